@@ -1,0 +1,43 @@
+// Reading depth safely: a look-up that refuses values beside depth edges, and a coarse grid of safe depths.
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_noise.h"
+
+namespace vip_slam {
+
+struct DepthLookupOptions {
+  int radius = 2;              ///< half window in pixels
+  double edge_ratio = 0.03;    ///< a spread (max - min) above edge_ratio * z + edge_sigmas * sigma(z) is an edge
+  double edge_sigmas = 6.0;
+  double min_valid_fraction = 0.6;
+};
+
+/// Depth z in metres at sub-pixel (u, v): a local plane-aware robust value (median), 0 when invalid, out of range, or
+/// beside an edge. `depth` is CV_32FC1, metres; 0 and NaN are invalid.
+float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options = {});
+
+/// Converts 16UC1 (times `scale` metres) or 32FC1 to 32FC1 metres with invalid = 0. Throws std::invalid_argument on
+/// other types, naming the type.
+cv::Mat depthToMetres(const cv::Mat& raw, double scale);
+
+/// Depths on a regular pixel grid; node (c, r) sits at pixel (offset + c*stride, offset + r*stride). 0 = invalid.
+struct DepthGrid {
+  int stride = 0, offset = 0, cols = 0, rows = 0;
+  std::vector<float> z;         ///< metres, row-major
+  bool empty() const { return z.empty(); }
+  float at(int c, int r) const { return z[static_cast<std::size_t>(r) * cols + c]; }
+  Eigen::Vector2d pixel(int c, int r) const { return {double(offset + c * stride), double(offset + r * stride)}; }
+};
+DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise, const DepthLookupOptions& options = {});
+
+/// Registers a depth image taken by its own camera into the colour camera (z-buffered forward warp). Returns 32FC1
+/// metres of the colour camera's size.
+cv::Mat registerDepth(const cv::Mat& depth, const CameraModel& depth_camera, const CameraModel& colour_camera,
+                      const Eigen::Matrix4d& T_colour_depth);
+
+}  // namespace vip_slam

@@ -1,0 +1,63 @@
+// Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams.
+// Not thread-safe: one owner; shells lock around it.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/imu/imu_types.h"
+
+namespace vip_slam {
+
+struct ImuBufferCounters {
+  std::size_t accepted = 0, out_of_order = 0, duplicate = 0, not_finite = 0, gaps = 0;
+};
+
+class ImuBuffer {
+ public:
+  /// `gap_seconds`: a distance between samples above this counts as a gap. `capacity_seconds` bounds memory.
+  explicit ImuBuffer(double gap_seconds = 0.05, double capacity_seconds = 30.0);
+
+  /// False (and counted) when the sample is not finite, repeats or precedes the newest stamp.
+  bool add(const ImuSample& sample);
+  /// Split streams: the accelerometer is interpolated onto the gyro stamps; samples come out once both sides cover them.
+  bool addGyro(double t, const Eigen::Vector3d& gyro);
+  bool addAccel(double t, const Eigen::Vector3d& accel);
+
+  bool empty() const { return samples_.empty(); }
+  std::size_t size() const { return samples_.size(); }
+  double oldest() const { return samples_.front().t; }
+  double newest() const { return samples_.back().t; }
+  bool covers(double t) const { return !empty() && oldest() <= t && t <= newest(); }
+
+  /// Samples in [t0, t1], first and last interpolated to exactly t0 and t1. Empty when the buffer does not cover both
+  /// or t1 <= t0. `max_gap`, when given, receives the largest step inside.
+  std::vector<ImuSample> between(double t0, double t1, double* max_gap = nullptr) const;
+  /// The sample interpolated at t, when covered.
+  std::optional<ImuSample> at(double t) const;
+
+  /// Forgets samples older than t, keeping one before it for interpolation.
+  void dropBefore(double t);
+  void clear();
+  const ImuBufferCounters& counters() const { return counters_; }
+
+ private:
+  struct Stamped {
+    double t;
+    Eigen::Vector3d value;
+  };
+  void joinStreams();
+
+  double gap_seconds_, capacity_seconds_;
+  std::deque<ImuSample> samples_;
+  std::deque<Stamped> gyro_, accel_;
+  ImuBufferCounters counters_;
+};
+
+/// Linear interpolation of two samples at t.
+ImuSample interpolate(const ImuSample& a, const ImuSample& b, double t);
+
+}  // namespace vip_slam

@@ -1,0 +1,38 @@
+// IMU samples, noise figures and the navigation state shared by front end and back end.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam {
+
+/// Standard gravity vector as used in p_j = p_i + v_i dt - 0.5 G dt^2 + R_i alpha (world z up).
+inline Eigen::Vector3d gravityVector(double magnitude = 9.81) { return Eigen::Vector3d(0, 0, magnitude); }
+
+struct ImuSample {
+  double t = 0;                                    ///< seconds, IMU clock
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< rad/s, IMU frame
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero(); ///< specific force, m/s^2; at rest about +9.81 along up
+};
+
+/// Continuous-time densities as Kalibr states them.
+struct ImuNoise {
+  double gyro_noise_density = 1e-3;   ///< rad/s/sqrt(Hz)
+  double gyro_random_walk = 1e-5;     ///< rad/s^2/sqrt(Hz)
+  double accel_noise_density = 1e-2;  ///< m/s^2/sqrt(Hz)
+  double accel_random_walk = 1e-4;    ///< m/s^3/sqrt(Hz)
+};
+
+/// State of the IMU (body) at time t. Tangent order wherever a 15x15 covariance appears:
+/// (theta, p, v, b_g, b_a), theta by right perturbation, p and v in the world (odom or map) frame.
+struct NavState {
+  double t = 0;
+  SE3 T_W_I;
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,45 @@
+// One sensor = one YAML file: topics, encodings, intrinsics, extrinsics, IMU and depth noise, delay.
+// Keys are documented in vip_slam_bringup/config/sensors/README.md; every shipped and every rendered file has them all.
+#pragma once
+
+#include <string>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_core/imu/imu_types.h"
+
+namespace vip_slam {
+
+struct SensorTopics {
+  std::string color, color_info, depth, depth_info;
+  std::string imu;          ///< united stream; empty when split
+  std::string gyro, accel;  ///< split streams; empty when united
+};
+
+struct SensorConfig {
+  std::string name;
+  SensorTopics topics;
+  std::string color_encoding = "rgb8";   ///< rgb8, bgr8, mono8, rgba8, bgra8, yuv422 or "compressed" (JPEG/PNG)
+  std::string depth_encoding = "16UC1";  ///< 16UC1, 32FC1 or "compressed" (16-bit PNG, also compressedDepth)
+  double depth_scale = 0.001;            ///< metres per unit of 16UC1
+  bool depth_registered = true;          ///< depth pixels belong to the colour camera
+  double color_rate = 30, depth_rate = 30, imu_rate = 200;  ///< Hz, nominal; for checks and messages
+
+  bool intrinsics_from_camera_info = true;  ///< else `camera` below is used
+  CameraIntrinsics camera;        ///< colour camera; may be empty when from camera_info
+  CameraIntrinsics depth_camera;  ///< only when not registered
+  SE3 T_color_depth;              ///< only when not registered
+
+  SE3 T_imu_cam;   ///< colour optical frame into IMU frame
+  SE3 T_base_imu;  ///< IMU into base_link; identity unless the robot says otherwise
+  ImuNoise imu_noise;
+  DepthNoise depth_noise;
+  double time_offset = 0;           ///< seconds; t_imu = t_image + time_offset
+  double gravity = 9.81;            ///< m/s^2
+};
+
+/// Throws std::runtime_error "file: key: what, expected what" on a missing file, unknown or missing key, bad value.
+SensorConfig loadSensorConfig(const std::string& path);
+void saveSensorConfig(const std::string& path, const SensorConfig& config);
+
+}  // namespace vip_slam

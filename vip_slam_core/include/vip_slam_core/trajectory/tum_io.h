@@ -1,0 +1,26 @@
+// Trajectories in TUM format: "timestamp tx ty tz qx qy qz qw", one pose a line, '#' comments.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam {
+
+struct StampedPose {
+  double t = 0;
+  SE3 T_W_B;
+};
+using Trajectory = std::vector<StampedPose>;
+
+/// Throws std::runtime_error "file:line: what, expected what" on a missing file, malformed line, non-finite number,
+/// zero quaternion, or stamps that repeat or run backwards.
+Trajectory readTum(const std::string& path);
+/// Stamps with 9 decimals, values with 9; whole or not at all.
+void writeTum(const std::string& path, const Trajectory& trajectory);
+
+/// Pose at t by interpolation between neighbours at most `max_gap` apart; false outside.
+bool poseAt(const Trajectory& trajectory, double t, SE3* T_W_B, double max_gap = 0.1);
+
+}  // namespace vip_slam

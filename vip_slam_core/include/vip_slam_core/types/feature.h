@@ -1,0 +1,31 @@
+// Identifiers and image features that travel from the front end to planes and back end.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <Eigen/Core>
+
+namespace vip_slam {
+
+using KeyframeId = std::uint64_t;
+using PlaneId = std::uint64_t;
+/// A landmark's id is the id of the track that first saw it.
+using LandmarkId = std::int64_t;
+constexpr LandmarkId kNoLandmark = -1;
+
+using Descriptor = std::array<std::uint8_t, 32>;  ///< 256-bit ORB
+
+struct Feature {
+  LandmarkId id = kNoLandmark;  ///< track id; kNoLandmark for a corner that was detected but is not tracked
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< distorted pixel, colour image
+  Eigen::Vector2f xy = Eigen::Vector2f::Zero();     ///< undistorted normalised coordinates (z = 1)
+  float depth = 0;        ///< z in the camera, metres; 0 = no safe depth
+  float depth_sigma = 0;  ///< one sigma of depth, metres
+  float angle = 0;        ///< ORB orientation, radians
+  std::uint8_t octave = 0;
+  std::uint32_t age = 0;  ///< images this track has lived
+  Descriptor descriptor{};
+};
+
+}  // namespace vip_slam

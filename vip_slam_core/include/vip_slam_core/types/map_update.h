@@ -1,0 +1,55 @@
+// What the back end hands to front end and planes after each optimisation. World is `map`.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/geometry/plane.h"
+#include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_core/types/feature.h"
+#include "vip_slam_core/types/plane_map.h"
+
+namespace vip_slam {
+
+struct KeyframeEstimate {
+  KeyframeId id = 0;
+  NavState state;  ///< T_map_I, v_map, biases
+};
+
+struct LandmarkEstimate {
+  LandmarkId id = kNoLandmark;
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+  std::uint32_t observations = 0;
+  PlaneId plane = 0;  ///< 0: on none
+  Descriptor descriptor{};
+};
+
+struct LoopEvent {
+  KeyframeId query = 0, match = 0;
+  bool accepted = false;
+  std::string reason;          ///< why rejected, or what convinced
+  int inliers = 0;
+  SE3 T_match_query;           ///< IMU frames
+  double t = 0;
+};
+
+struct MapUpdate {
+  std::uint64_t revision = 0;        ///< increases by one per update
+  double t = 0;                      ///< stamp of the newest keyframe in it
+  std::uint32_t epoch = 0;           ///< epoch that T_map_odom belongs to
+  SE3 T_map_odom;
+  KeyframeId newest_keyframe = 0;
+  bool global = false;               ///< everything moved (GBA, loop); else a local window
+  std::vector<KeyframeEstimate> keyframes;   ///< changed ones (all when global)
+  std::vector<LandmarkEstimate> landmarks;   ///< changed ones (all when global)
+  std::vector<std::pair<PlaneId, Plane>> planes;  ///< optimised planes
+  std::vector<KeyframeId> removed_keyframes;
+  std::vector<LandmarkId> removed_landmarks;
+  std::vector<std::pair<LandmarkId, LandmarkId>> merged_landmarks;  ///< (from, into)
+  std::vector<LoopEvent> loops;      ///< since the previous update
+};
+
+using MapUpdatePtr = std::shared_ptr<const MapUpdate>;
+
+}  // namespace vip_slam

@@ -1,0 +1,64 @@
+// What the plane module hands to the back end: the plane map and what changed. World here is `map`.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "vip_slam_core/geometry/plane.h"
+#include "vip_slam_core/types/feature.h"
+
+namespace vip_slam {
+
+enum class PlaneKind { kHorizontal = 0, kVertical = 1, kGeneral = 2 };
+
+/// A closed ring of 3D points on the plane, without repeating the first.
+using Ring = std::vector<Eigen::Vector3d>;
+struct PlanePolygon {
+  Ring outer;
+  std::vector<Ring> holes;
+};
+
+struct PlaneEstimate {
+  PlaneId id = 0;
+  PlaneKind kind = PlaneKind::kGeneral;
+  Plane plane;                         ///< in `map`; n points to the side it was seen from
+  std::vector<PlanePolygon> polygons;  ///< disjoint pieces
+  double area = 0;                     ///< m^2
+  std::uint32_t keyframes = 0;         ///< keyframes that saw it
+};
+
+/// A depth point on a plane, in the keyframe's camera frame, with the one-sigma distance error used as its weight.
+struct PlanePoint {
+  Eigen::Vector3f p_C;
+  float sigma;  ///< metres along the plane normal
+};
+
+/// Depth points of one keyframe on one plane (paper section "Compressed Point-to-Plane Measurement").
+struct PlaneObservation {
+  KeyframeId keyframe = 0;
+  PlaneId plane = 0;
+  /// G_p = sum w [p_C;1][p_C;1]^T, w = 1/sigma^2 scaled so that the sum of effective points is capped.
+  Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
+  double weight_scale = 1.0;       ///< G = weight_scale * sum 1/sigma^2 p~ p~^T over `points`
+  std::vector<PlanePoint> points;  ///< the samples behind G
+};
+
+struct PlaneMerge {
+  PlaneId from = 0, into = 0;  ///< `into` is the older id
+};
+
+/// Changes since the previous update, in this order: merges, removals, then the rest.
+struct PlaneUpdate {
+  std::uint64_t revision = 0;      ///< revision of the MapUpdate it was computed with
+  double t = 0;
+  std::vector<PlaneMerge> merges;
+  std::vector<PlaneId> removed;
+  std::vector<PlaneEstimate> planes;             ///< all planes as they are now
+  std::vector<PlaneObservation> observations;    ///< new ones, or replacing the same (keyframe, plane)
+  std::vector<std::pair<LandmarkId, PlaneId>> associated;  ///< landmarks found to lie on a plane
+  std::vector<LandmarkId> dissociated;           ///< landmarks that no longer do
+};
+
+using PlaneUpdatePtr = std::shared_ptr<const PlaneUpdate>;
+
+}  // namespace vip_slam

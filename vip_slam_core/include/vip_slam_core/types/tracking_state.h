@@ -1,0 +1,26 @@
+// The state every published pose carries.
+#pragma once
+
+#include <string>
+
+namespace vip_slam {
+
+enum class TrackingState { kWaiting = 0, kInitialising = 1, kTracking = 2, kDegraded = 3, kLost = 4 };
+
+inline const char* trackingStateName(TrackingState state) {
+  switch (state) {
+    case TrackingState::kWaiting: return "WAITING";
+    case TrackingState::kInitialising: return "INITIALISING";
+    case TrackingState::kTracking: return "TRACKING";
+    case TrackingState::kDegraded: return "DEGRADED";
+    case TrackingState::kLost: return "LOST";
+  }
+  return "UNKNOWN";
+}
+
+struct TrackingStatus {
+  TrackingState state = TrackingState::kWaiting;
+  std::string reason;  ///< in words, empty while TRACKING
+};
+
+}  // namespace vip_slam
