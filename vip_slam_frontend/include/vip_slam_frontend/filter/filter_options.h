@@ -1,0 +1,96 @@
+// Options of the sliding-window filter, its calibration states and zero-velocity updates.
+#pragma once
+
+#include "vip_slam_core/util/options.h"
+
+namespace vip_slam {
+
+struct CalibrationOptions {
+  bool rotation = false;
+  bool translation = false;
+  bool time_offset = false;
+  double sigma_rotation = 0.01;
+  double sigma_translation = 0.01;
+  double sigma_time_offset = 0.005;
+  double min_rotation_rate = 0.15;
+  double min_acceleration = 0.3;
+
+  void visit(OptionVisitor& v) {
+    v.field("rotation", rotation, "estimate the camera-IMU rotation online");
+    v.field("translation", translation, "estimate the camera-IMU translation online");
+    v.field("time_offset", time_offset, "estimate the camera-IMU delay online");
+    v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "initial one-sigma of the rotation, rad");
+    v.field("sigma_translation", sigma_translation, 1e-5, 1.0, "initial one-sigma of the translation, m");
+    v.field("sigma_time_offset", sigma_time_offset, 1e-6, 1.0, "initial one-sigma of the delay, s");
+    v.field("min_rotation_rate", min_rotation_rate, 0.0, 10.0, "calibration is frozen below this rate (rad/s) and ...");
+    v.field("min_acceleration", min_acceleration, 0.0, 50.0, "... below this spread of acceleration, m/s^2");
+  }
+};
+
+struct ZuptOptions {
+  bool enabled = true;
+  double window = 0.25;
+  double max_gyro_std = 0.02;
+  double max_accel_std = 0.25;
+  double max_disparity_px = 0.5;
+  int min_tracks = 20;
+  double max_speed = 0.1;
+  int frames_in = 4;
+  int frames_out = 2;
+  double sigma_velocity = 0.02;
+  double sigma_rotation = 0.0017;
+  double sigma_position = 0.002;
+
+  void visit(OptionVisitor& v) {
+    v.field("enabled", enabled, "zero-velocity updates while standing still");
+    v.field("window", window, 0.1, 5.0, "IMU time looked at, s");
+    v.field("max_gyro_std", max_gyro_std, 0.0, 1.0, "largest gyro deviation while still, rad/s");
+    v.field("max_accel_std", max_accel_std, 0.0, 10.0, "largest accelerometer deviation while still, m/s^2");
+    v.field("max_disparity_px", max_disparity_px, 0.0, 10.0, "largest mean image motion over the window, px");
+    v.field("min_tracks", min_tracks, 0, 1000, "tracks needed to trust the image motion");
+    v.field("max_speed", max_speed, 0.0, 10.0, "largest estimated speed to enter, m/s");
+    v.field("frames_in", frames_in, 1, 100, "still images in a row to enter");
+    v.field("frames_out", frames_out, 1, 100, "moving images in a row to leave");
+    v.field("sigma_velocity", sigma_velocity, 1e-4, 1.0, "one-sigma of zero velocity, m/s");
+    v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "one-sigma of zero rotation since stopping, rad");
+    v.field("sigma_position", sigma_position, 1e-5, 1.0, "one-sigma of zero translation since stopping, m");
+  }
+};
+
+struct FilterOptions {
+  int window = 11;
+  double sigma_px = 0.5;
+  bool adapt_sigma_px = true;
+  double sigma_px_min = 0.2;
+  double sigma_px_max = 2.0;
+  double gate_probability = 0.95;
+  double huber = 1.5;
+  int max_update_features = 30;
+  bool use_depth = true;
+  double depth_inflation = 1.0;
+  double imu_noise_inflation = 1.0;
+  double sigma_bias_gyro = 0.02;
+  double sigma_bias_accel = 0.1;
+  CalibrationOptions calibration;
+  ZuptOptions zupt;
+
+  void visit(OptionVisitor& v) {
+    v.field("window", window, 4, 30, "clones kept");
+    v.field("sigma_px", sigma_px, 0.05, 10.0, "one-sigma of a tracked pixel at the start, px");
+    v.field("adapt_sigma_px", adapt_sigma_px, "adapt sigma_px to the normalised innovations");
+    v.field("sigma_px_min", sigma_px_min, 0.02, 10.0, "lower bound of the adaptation, px");
+    v.field("sigma_px_max", sigma_px_max, 0.05, 20.0, "upper bound of the adaptation, px");
+    v.field("gate_probability", gate_probability, 0.5, 0.9999, "chi-square quantile of the feature gate");
+    v.field("huber", huber, 0.5, 100.0, "Huber threshold on whitened residuals, sigmas");
+    v.field("max_update_features", max_update_features, 5, 500, "features used by one update");
+    v.field("use_depth", use_depth, "use depth measurements");
+    v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise model");
+    v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
+    v.field("sigma_bias_gyro", sigma_bias_gyro, 1e-5, 1.0, "initial one-sigma of the gyro bias, rad/s");
+    v.field("sigma_bias_accel", sigma_bias_accel, 1e-4, 5.0, "initial one-sigma of the accelerometer bias, m/s^2");
+    v.group("calibration", calibration);
+    v.group("zupt", zupt);
+  }
+};
+
+}  // namespace vip_slam

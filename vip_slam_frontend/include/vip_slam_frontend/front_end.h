@@ -1,0 +1,88 @@
+// The front end: RGB-D-inertial odometry at image rate (paper section "Front End"). ROS-free; one owner thread.
+//
+// Images go in with process() in order of their stamps, IMU samples with addImu() (or addGyro()/addAccel() when the
+// sensor splits them). Poses come out in `odom`, which starts at the first pose with yaw 0 and never jumps: what the
+// back end corrects moves T_map_odom only.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/types/keyframe.h"
+#include "vip_slam_core/types/map_update.h"
+#include "vip_slam_core/util/timing.h"
+#include "vip_slam_frontend/front_end_options.h"
+
+namespace vip_slam {
+
+struct FrameInput {
+  double t = 0;   ///< image stamp, seconds
+  cv::Mat gray;   ///< 8UC1, the size of the colour camera
+  cv::Mat depth;  ///< 32FC1 metres registered to gray, 0 or NaN invalid; empty when there is none
+};
+
+struct FrameOutput {
+  TrackedFramePtr frame;  ///< never null; frame->status says how far it can be trusted
+  KeyframePtr keyframe;   ///< null: this image is none
+};
+
+/// Everything that was counted since construction; for diagnostics.
+struct FrontEndCounters {
+  std::uint64_t images = 0, keyframes = 0, restarts = 0;
+  std::uint64_t bad_image = 0;       ///< wrong size or type, or empty
+  std::uint64_t bad_depth = 0;       ///< depth of wrong size or type: treated as none
+  std::uint64_t no_depth = 0;        ///< images without depth
+  std::uint64_t bad_stamp = 0;       ///< repeated, backward or non-finite image stamps
+  std::uint64_t imu_rejected = 0;    ///< non-finite, repeated or backward samples
+  std::uint64_t imu_gaps = 0;
+  std::uint64_t imu_missing = 0;     ///< images not covered by the IMU
+  std::uint64_t zero_velocity = 0;   ///< images taken standing still
+  std::uint64_t coasting = 0;        ///< images passed on the IMU alone
+  std::uint64_t lost = 0;            ///< times the state went to LOST
+  std::uint64_t features_used = 0, features_gated = 0;
+  std::uint64_t landmarks_reacquired = 0;
+  double sigma_px = 0;               ///< adapted pixel noise
+  double nis_per_dof = 0;            ///< of the last update; about 1 when consistent
+};
+
+class FrontEnd {
+ public:
+  /// Throws std::invalid_argument when sensor.camera is unusable. `timing` may be null and must outlive this.
+  FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing = nullptr);
+  ~FrontEnd();
+  FrontEnd(const FrontEnd&) = delete;
+  FrontEnd& operator=(const FrontEnd&) = delete;
+
+  /// False (and counted) when the sample is not finite or not newer than the last.
+  bool addImu(const ImuSample& sample);
+  bool addGyro(double t, const Eigen::Vector3d& gyro);
+  bool addAccel(double t, const Eigen::Vector3d& accel);
+  /// The IMU covers t_image + time offset.
+  bool ready(double t_image) const;
+
+  /// Always returns a frame. Bad input is counted and named in its status; it never throws on data.
+  FrameOutput process(const FrameInput& input);
+
+  /// Landmarks of the map (so that features regain their id) and T_map_odom; odom does not move.
+  void applyMapUpdate(const MapUpdate& update);
+
+  /// The newest state integrated with the IMU to time t (IMU clock), in odom; empty before tracking starts.
+  std::optional<NavState> predict(double t) const;
+  /// Starts anew: a new epoch; keyframe and landmark ids go on.
+  void reset(const std::string& reason);
+
+  const FrontEndCounters& counters() const;
+  const FrontEndOptions& options() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vip_slam

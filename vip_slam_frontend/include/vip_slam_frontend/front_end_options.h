@@ -1,0 +1,53 @@
+// All options of the front end, in groups.
+#pragma once
+
+#include "vip_slam_core/util/options.h"
+#include "vip_slam_frontend/filter/filter_options.h"
+#include "vip_slam_frontend/initialisation/initialisation_options.h"
+#include "vip_slam_frontend/keyframes/keyframe_options.h"
+#include "vip_slam_frontend/tracking/tracking_options.h"
+
+namespace vip_slam {
+
+/// What happens when measurements fail.
+struct RecoveryOptions {
+  double coast_seconds = 4.0;
+  int min_tracks = 10;
+  double max_imu_gap = 0.1;
+  double max_image_gap = 2.0;
+  double max_position_sigma = 2.0;
+  double max_speed = 20.0;
+
+  void visit(OptionVisitor& v) {
+    v.field("coast_seconds", coast_seconds, 0.1, 60.0, "IMU-only time before LOST, s");
+    v.field("min_tracks", min_tracks, 3, 500, "fewer tracks than this count as none");
+    v.field("max_imu_gap", max_imu_gap, 0.01, 5.0, "IMU gap that is bridged with more noise, s; a longer one restarts");
+    v.field("max_image_gap", max_image_gap, 0.2, 60.0, "images missing for longer than this restart the tracking, s");
+    v.field("max_position_sigma", max_position_sigma, 0.05, 100.0, "LOST when a coast grows beyond this, m");
+    v.field("max_speed", max_speed, 0.5, 300.0, "an estimated speed above this is a failure, m/s");
+  }
+};
+
+struct FrontEndOptions {
+  TrackingOptions tracking;
+  FilterOptions filter;
+  InitialisationOptions initialisation;
+  KeyframeOptions keyframes;
+  RecoveryOptions recovery;
+  bool use_map_landmarks = true;
+  int frame_grid_stride = 16;
+  int keyframe_grid_stride = 8;
+
+  void visit(OptionVisitor& v) {
+    v.group("tracking", tracking);
+    v.group("filter", filter);
+    v.group("initialisation", initialisation);
+    v.group("keyframes", keyframes);
+    v.group("recovery", recovery);
+    v.field("use_map_landmarks", use_map_landmarks, "re-acquire the back end's landmarks so that they keep their id");
+    v.field("frame_grid_stride", frame_grid_stride, 4, 64, "stride of the depth grid of every image, px");
+    v.field("keyframe_grid_stride", keyframe_grid_stride, 2, 64, "stride of the depth grid of a keyframe, px");
+  }
+};
+
+}  // namespace vip_slam
