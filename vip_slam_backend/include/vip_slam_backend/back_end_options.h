@@ -1,0 +1,119 @@
+// Options of the back end: name, default, range and meaning in one place.
+#pragma once
+
+#include <string>
+
+#include "vip_slam_core/util/options.h"
+
+namespace vip_slam {
+
+/// The paper's four systems (section "Ablation Study").
+enum class Variant { kVi, kViP, kViCp, kVip };
+/// "vi", "vi_p", "vi_cp", "vip"; throws std::invalid_argument on others.
+Variant variantFromName(const std::string& name);
+const char* variantName(Variant variant);
+
+struct MeasurementOptions {
+  double pixel_sigma = 0.7;
+  double matched_pixel_sigma = 1.0;
+  double huber = 2.0;
+  double depth_huber = 2.0;
+  double depth_sigma_scale = 1.0;
+  double outlier_chi2 = 9.0;
+  double plane_prior_deg = 0.5;
+  double homography_inflation = 1.4;
+  int homography_min_pairs = 4;
+
+  void visit(OptionVisitor& v) {
+    v.field("pixel_sigma", pixel_sigma, 0.1, 10.0, "one sigma of a tracked feature, px");
+    v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0, "one sigma of an untracked ORB corner, px per octave");
+    v.field("huber", huber, 0.5, 20.0, "reprojection residuals above this many sigmas weigh less");
+    v.field("depth_huber", depth_huber, 0.5, 20.0, "depth residuals above this many sigmas weigh less");
+    v.field("depth_sigma_scale", depth_sigma_scale, 0.1, 20.0, "factor on the depth sigma given by the front end");
+    v.field("outlier_chi2", outlier_chi2, 2.0, 100.0, "an observation above this squared error (sigmas) is removed");
+    v.field("plane_prior_deg", plane_prior_deg, 0.01, 10.0, "one sigma of horizontal and vertical planes, degrees");
+    v.field("homography_inflation", homography_inflation, 1.0, 5.0,
+            "factor on the pixel sigma of homography pairs, which share their host's noise");
+    v.field("homography_min_pairs", homography_min_pairs, 1, 50, "fewest pairs in a compressed homography");
+  }
+};
+
+struct LocalBaOptions {
+  int window = 20;
+  int max_iterations = 10;
+  double max_seconds = 0.2;
+  int max_fixed_keyframes = 40;
+
+  void visit(OptionVisitor& v) {
+    v.field("window", window, 3, 100, "newest keyframes that are optimised");
+    v.field("max_iterations", max_iterations, 1, 100, "Levenberg-Marquardt iterations");
+    v.field("max_seconds", max_seconds, 0.0, 10.0, "time limit; 0 or lockstep: none");
+    v.field("max_fixed_keyframes", max_fixed_keyframes, 0, 1000, "older keyframes that hold the window's landmarks");
+  }
+};
+
+struct GlobalBaOptions {
+  int max_iterations = 100;
+  double max_seconds = 2.0;
+  bool at_end = true;
+
+  void visit(OptionVisitor& v) {
+    v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
+    v.field("max_seconds", max_seconds, 0.0, 600.0, "time limit; 0 or lockstep: none");
+    v.field("at_end", at_end, "run one at the end of the data");
+  }
+};
+
+struct ReobservationOptions {
+  int keyframes = 30;
+  double radius = 8.0;
+  int max_hamming = 50;
+  double ratio = 0.85;
+  double merge_chi2 = 9.0;
+
+  void visit(OptionVisitor& v) {
+    v.field("keyframes", keyframes, 0, 500, "covisible and nearby keyframes whose landmarks are looked for");
+    v.field("radius", radius, 1.0, 100.0, "search radius around the projection, px");
+    v.field("max_hamming", max_hamming, 10, 128, "largest descriptor distance, bits");
+    v.field("ratio", ratio, 0.3, 1.0, "best over second-best descriptor distance");
+    v.field("merge_chi2", merge_chi2, 2.0, 100.0, "gate on joining two tracks into one landmark");
+  }
+};
+
+struct CullingOptions {
+  bool enabled = true;
+  double redundancy = 0.9;
+  double max_imu_seconds = 3.0;
+
+  void visit(OptionVisitor& v) {
+    v.field("enabled", enabled, "remove redundant keyframes and poor landmarks");
+    v.field("redundancy", redundancy, 0.5, 1.0, "fraction of landmarks seen by three other keyframes that makes one redundant");
+    v.field("max_imu_seconds", max_imu_seconds, 0.5, 10.0, "longest IMU factor that culling may leave");
+  }
+};
+
+struct BackEndOptions {
+  std::string variant = "vip";
+  std::string solver = "structured";
+  bool loop_closing = true;
+  bool lockstep = false;
+  MeasurementOptions measurement;
+  LocalBaOptions local_ba;
+  GlobalBaOptions global_ba;
+  ReobservationOptions reobservation;
+  CullingOptions culling;
+
+  void visit(OptionVisitor& v) {
+    v.field("variant", variant, {"vi", "vi_p", "vi_cp", "vip"}, "which of the paper's systems runs");
+    v.field("solver", solver, {"structured", "ceres"}, "the structure-aware Levenberg-Marquardt or the Ceres reference");
+    v.field("loop_closing", loop_closing, "recognise places and close loops");
+    v.field("lockstep", lockstep, "ignore time limits so that two runs give the same bits");
+    v.group("measurement", measurement);
+    v.group("local_ba", local_ba);
+    v.group("global_ba", global_ba);
+    v.group("reobservation", reobservation);
+    v.group("culling", culling);
+  }
+};
+
+}  // namespace vip_slam

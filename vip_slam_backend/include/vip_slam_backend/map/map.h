@@ -1,0 +1,104 @@
+// The map of the back end. One owner thread; others get snapshots. Every operation keeps the invariants that
+// checkMap() (map_checker.h) states, or throws MapError and changes nothing.
+#pragma once
+
+#include <map>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "vip_slam_backend/map/map_types.h"
+
+namespace vip_slam {
+
+/// What changed since the last takeChanges(), for the next MapUpdate.
+struct MapChanges {
+  std::vector<KeyframeId> removed_keyframes;
+  std::vector<LandmarkId> removed_landmarks;
+  std::vector<std::pair<LandmarkId, LandmarkId>> merged_landmarks;  ///< (from, into)
+};
+
+class Map {
+ public:
+  // ---- keyframes ----
+  /// Inserts a keyframe at the end of the IMU chain. Refused: id not above all others, time not after the previous
+  /// keyframe's, non-finite numbers in state, features or IMU, features without the camera's half space (NaN xy).
+  MapKeyframe& addKeyframe(const KeyframePtr& data, const NavState& state, const ImuNoise& noise);
+  /// Inserts a keyframe of a stored map: any id not taken, no check of time; the chain is given by `previous`.
+  MapKeyframe& restoreKeyframe(const KeyframePtr& data, const NavState& state, KeyframeId previous,
+                               const std::vector<ImuSample>& imu, const ImuNoise& noise);
+  /// Removes it with its observations; landmarks left without observation go too. The IMU chain is joined over the gap
+  /// while the joined factor stays below `max_imu_seconds`, else it is cut.
+  void removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds);
+
+  bool hasKeyframe(KeyframeId id) const { return keyframes_.count(id) != 0; }
+  MapKeyframe& keyframe(KeyframeId id);  ///< throws MapError when there is none
+  const MapKeyframe& keyframe(KeyframeId id) const;
+  const std::map<KeyframeId, MapKeyframe>& keyframes() const { return keyframes_; }
+  KeyframeId newestKeyframe() const { return keyframes_.empty() ? 0 : keyframes_.rbegin()->first; }
+  /// Keyframes that share landmarks with `id`, most shared first (ties: newer first).
+  std::vector<std::pair<KeyframeId, int>> covisible(KeyframeId id, int min_shared = 1) const;
+  /// Sets the state. Integrates the IMU anew when the biases moved too far.
+  void setState(KeyframeId id, const NavState& state, const ImuNoise& noise);
+
+  // ---- landmarks ----
+  /// A new landmark with its first observation. Refused: id taken, position not finite, feature taken or unknown.
+  MapLandmark& addLandmark(LandmarkId id, const Eigen::Vector3d& p_W, const MapObservation& first);
+  /// False when that feature has a landmark already or that keyframe sees this landmark already.
+  bool addObservation(LandmarkId id, const MapObservation& observation);
+  /// The landmark goes when it was the last one.
+  void removeObservation(LandmarkId id, KeyframeId keyframe);
+  void removeLandmark(LandmarkId id);
+  /// Moves the observations of `from` to `into`. False (nothing done) when both are seen by one keyframe in different
+  /// features, or they are the same.
+  bool mergeLandmarks(LandmarkId from, LandmarkId into);
+  /// Follows merges: the id under which a track is known now; the id itself when it was never merged.
+  LandmarkId resolve(LandmarkId id) const;
+
+  bool hasLandmark(LandmarkId id) const { return landmarks_.count(id) != 0; }
+  MapLandmark& landmark(LandmarkId id);  ///< throws MapError when there is none
+  const MapLandmark& landmark(LandmarkId id) const;
+  const MapLandmark* findLandmark(LandmarkId id) const;
+  const std::unordered_map<LandmarkId, MapLandmark>& landmarks() const { return landmarks_; }
+  std::vector<LandmarkId> landmarkIds() const;  ///< ascending
+  void setPosition(LandmarkId id, const Eigen::Vector3d& p_W);
+  const Feature& feature(const MapObservation& o) const { return keyframe(o.keyframe).features()[o.feature]; }
+
+  // ---- planes ----
+  /// Adds or updates; keeps our parameters when the plane was optimised already.
+  void setPlane(const PlaneEstimate& estimate);
+  void setPlaneParameters(PlaneId id, const Plane& plane);
+  void mergePlanes(PlaneId from, PlaneId into);
+  void removePlane(PlaneId id);
+  bool hasPlane(PlaneId id) const { return planes_.count(id) != 0; }
+  const std::map<PlaneId, MapPlane>& planes() const { return planes_; }
+  /// Ignored (false) when keyframe or plane are gone, or the numbers are not finite.
+  bool setPlaneObservation(const PlaneObservation& observation);
+  /// 0 removes the association.
+  void associate(LandmarkId landmark, PlaneId plane);
+
+  // ---- all ----
+  /// Moves keyframes to new poses (loop correction): velocities turn with them, each landmark follows its host.
+  void moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I);
+  MapChanges takeChanges();
+  void clear();
+  bool empty() const { return keyframes_.empty(); }
+
+ private:
+  MapKeyframe& insert(const KeyframePtr& data, const NavState& state, KeyframeId previous,
+                      const std::shared_ptr<const std::vector<ImuSample>>& imu, const ImuNoise& noise);
+  void updateDescriptor(MapLandmark& landmark);
+
+  std::map<KeyframeId, MapKeyframe> keyframes_;
+  std::unordered_map<LandmarkId, MapLandmark> landmarks_;
+  std::unordered_map<LandmarkId, LandmarkId> merged_into_;
+  std::map<PlaneId, MapPlane> planes_;
+  MapChanges changes_;
+};
+
+/// Empty when the keyframe may enter a map, else the reason ("keyframe 7: feature 12 is not finite").
+std::string validateKeyframe(const Keyframe& keyframe);
+
+int hammingDistance(const Descriptor& a, const Descriptor& b);
+
+}  // namespace vip_slam

@@ -1,0 +1,14 @@
+// The map's invariants. Tests run it after every operation; tools may run it on a loaded map.
+#pragma once
+
+#include <string>
+
+#include "vip_slam_backend/map/map.h"
+
+namespace vip_slam {
+
+/// Empty when the map is consistent, else the first violation in words: two-way links between keyframes and landmarks,
+/// ascending observations, a chain of keyframes linked both ways, planes that exist, finite numbers.
+std::string checkMap(const Map& map);
+
+}  // namespace vip_slam

@@ -1,0 +1,189 @@
+// Keyframes of the map: insertion with checks, the IMU chain, removal, covisibility.
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_backend/map/map.h"
+
+namespace vip_slam {
+namespace {
+
+bool finite(const NavState& s) {
+  return std::isfinite(s.t) && s.T_W_I.isFinite() && s.v_W.allFinite() && s.bias_gyro.allFinite() &&
+         s.bias_accel.allFinite();
+}
+
+std::shared_ptr<const Preintegration> integrate(const std::shared_ptr<const std::vector<ImuSample>>& imu,
+                                                const NavState& from, const ImuNoise& noise) {
+  if (!imu || imu->size() < 2) return nullptr;
+  return std::make_shared<Preintegration>(*imu, from.bias_gyro, from.bias_accel, noise);
+}
+
+}  // namespace
+
+std::string validateKeyframe(const Keyframe& keyframe) {
+  const std::string name = "keyframe " + std::to_string(keyframe.id) + ": ";
+  if (keyframe.id == 0) return "keyframe without an id (0)";
+  if (!std::isfinite(keyframe.frame.t)) return name + "stamp is not finite";
+  if (!finite(keyframe.frame.state)) return name + "state is not finite";
+  if (!keyframe.frame.T_I_C.isFinite()) return name + "extrinsics are not finite";
+  const auto& features = keyframe.frame.features;
+  for (std::size_t k = 0; k < features.size(); ++k) {
+    const Feature& f = features[k];
+    if (!f.pixel.allFinite() || !f.xy.allFinite() || !std::isfinite(f.depth) || !std::isfinite(f.depth_sigma))
+      return name + "feature " + std::to_string(k) + " is not finite";
+    if (f.depth < 0 || (f.depth > 0 && !(f.depth_sigma > 0)))
+      return name + "feature " + std::to_string(k) + " has depth " + std::to_string(f.depth) + " with sigma " +
+             std::to_string(f.depth_sigma);
+  }
+  for (std::size_t k = 0; k < keyframe.imu.size(); ++k) {
+    const ImuSample& s = keyframe.imu[k];
+    if (!std::isfinite(s.t) || !s.gyro.allFinite() || !s.accel.allFinite())
+      return name + "IMU sample " + std::to_string(k) + " is not finite";
+    if (k > 0 && !(s.t > keyframe.imu[k - 1].t))
+      return name + "IMU sample " + std::to_string(k) + " is not after the one before";
+  }
+  return "";
+}
+
+MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, const ImuNoise& noise) {
+  if (!data) throw MapError("no keyframe given");
+  const std::string name = "keyframe " + std::to_string(data->id);
+  if (data->id <= newestKeyframe())
+    throw MapError(name + " is not newer than keyframe " + std::to_string(newestKeyframe()) + " of the map");
+  const std::string bad = validateKeyframe(*data);
+  if (!bad.empty()) throw MapError(bad);
+  if (!finite(state)) throw MapError(name + ": state in the map is not finite");
+  KeyframeId previous = 0;
+  std::shared_ptr<const std::vector<ImuSample>> imu;
+  if (data->previous != 0 && !keyframes_.empty()) {
+    // The front end's previous keyframe may have been refused or culled: then the chain is cut here.
+    const auto it = keyframes_.find(data->previous);
+    if (it != keyframes_.end() && it->second.next == 0 && it->second.data->frame.epoch == data->frame.epoch) {
+      if (!(data->frame.t > it->second.data->frame.t))
+        throw MapError(name + ": stamp is not after that of its previous keyframe " + std::to_string(data->previous));
+      previous = data->previous;
+      if (data->imu.size() >= 2) imu = std::shared_ptr<const std::vector<ImuSample>>(data, &data->imu);
+    }
+  }
+  return insert(data, state, previous, imu, noise);
+}
+
+MapKeyframe& Map::restoreKeyframe(const KeyframePtr& data, const NavState& state, KeyframeId previous,
+                                  const std::vector<ImuSample>& imu, const ImuNoise& noise) {
+  if (!data) throw MapError("no keyframe given");
+  const std::string name = "keyframe " + std::to_string(data->id);
+  if (hasKeyframe(data->id)) throw MapError(name + " exists already");
+  const std::string bad = validateKeyframe(*data);
+  if (!bad.empty()) throw MapError(bad);
+  if (!finite(state)) throw MapError(name + ": state in the map is not finite");
+  if (previous != 0 && (!hasKeyframe(previous) || keyframe(previous).next != 0))
+    throw MapError(name + ": its previous keyframe " + std::to_string(previous) + " is missing or has a successor");
+  std::shared_ptr<const std::vector<ImuSample>> samples;
+  if (previous != 0 && imu.size() >= 2) samples = std::make_shared<const std::vector<ImuSample>>(imu);
+  return insert(data, state, previous, samples, noise);
+}
+
+MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, KeyframeId previous,
+                         const std::shared_ptr<const std::vector<ImuSample>>& imu, const ImuNoise& noise) {
+  MapKeyframe kf;
+  kf.data = data;
+  kf.state = state;
+  kf.T_I_C = data->frame.T_I_C;
+  kf.landmarks.assign(data->frame.features.size(), kNoLandmark);
+  kf.previous = previous;
+  if (previous != 0) {
+    kf.imu = imu;
+    kf.preintegration = integrate(imu, keyframe(previous).state, noise);
+  }
+  MapKeyframe& inserted = keyframes_.emplace(data->id, std::move(kf)).first->second;
+  if (previous != 0) keyframe(previous).next = data->id;
+  return inserted;
+}
+
+void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds) {
+  MapKeyframe& kf = keyframe(id);
+  for (const LandmarkId landmark : std::vector<LandmarkId>(kf.landmarks))
+    if (landmark != kNoLandmark) removeObservation(landmark, id);
+  const KeyframeId previous = kf.previous, next = kf.next;
+  if (next != 0) {
+    MapKeyframe& n = keyframe(next);
+    std::shared_ptr<const std::vector<ImuSample>> joined;
+    KeyframeId chained = 0;
+    if (previous != 0 && kf.imu && n.imu && n.imu->back().t - kf.imu->front().t <= max_imu_seconds) {
+      auto samples = std::make_shared<std::vector<ImuSample>>(*kf.imu);
+      samples->insert(samples->end(), n.imu->begin() + 1, n.imu->end());
+      joined = samples;
+      chained = previous;
+    }
+    n.previous = chained;
+    n.imu = joined;
+    n.preintegration = chained ? integrate(joined, keyframe(chained).state, noise) : nullptr;
+    if (previous != 0) keyframe(previous).next = chained ? next : 0;
+  } else if (previous != 0) {
+    keyframe(previous).next = 0;
+  }
+  keyframes_.erase(id);
+  changes_.removed_keyframes.push_back(id);
+}
+
+MapKeyframe& Map::keyframe(KeyframeId id) {
+  const auto it = keyframes_.find(id);
+  if (it == keyframes_.end()) throw MapError("no keyframe " + std::to_string(id) + " in the map");
+  return it->second;
+}
+
+const MapKeyframe& Map::keyframe(KeyframeId id) const { return const_cast<Map*>(this)->keyframe(id); }
+
+std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId id, int min_shared) const {
+  std::map<KeyframeId, int> count;
+  for (const LandmarkId landmark_id : keyframe(id).landmarks) {
+    if (landmark_id == kNoLandmark) continue;
+    for (const MapObservation& o : landmark(landmark_id).observations)
+      if (o.keyframe != id) ++count[o.keyframe];
+  }
+  std::vector<std::pair<KeyframeId, int>> result;
+  for (const auto& c : count)
+    if (c.second >= min_shared) result.push_back(c);
+  std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) {
+    return a.second != b.second ? a.second > b.second : a.first > b.first;
+  });
+  return result;
+}
+
+void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) {
+  if (!finite(state)) throw MapError("keyframe " + std::to_string(id) + ": new state is not finite");
+  MapKeyframe& kf = keyframe(id);
+  kf.state = state;
+  if (kf.next == 0) return;
+  MapKeyframe& next = keyframe(kf.next);
+  if (next.preintegration && next.preintegration->needsReintegration(state.bias_gyro, state.bias_accel))
+    next.preintegration = integrate(next.imu, state, noise);
+}
+
+void Map::moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I) {
+  std::map<KeyframeId, SE3> motion;  // new world from old world, per keyframe
+  for (const auto& entry : T_W_I) {
+    if (!entry.second.isFinite()) throw MapError("keyframe " + std::to_string(entry.first) + ": new pose is not finite");
+    motion[entry.first] = entry.second * keyframe(entry.first).state.T_W_I.inverse();
+  }
+  for (auto& entry : landmarks_) {
+    MapLandmark& landmark = entry.second;
+    const auto it = motion.find(landmark.host());
+    if (it != motion.end()) landmark.p_W = it->second * landmark.p_W;
+  }
+  for (const auto& entry : T_W_I) {
+    NavState& state = keyframe(entry.first).state;
+    state.v_W = motion[entry.first].rotation() * state.v_W;
+    state.T_W_I = entry.second;
+  }
+}
+
+MapChanges Map::takeChanges() {
+  MapChanges taken;
+  std::swap(taken, changes_);
+  return taken;
+}
+
+void Map::clear() { *this = Map(); }
+
+}  // namespace vip_slam

@@ -1,0 +1,85 @@
+// Planes of the map: estimates, observations by keyframes, association of landmarks.
+#include <cmath>
+
+#include "vip_slam_backend/map/map.h"
+
+namespace vip_slam {
+namespace {
+
+bool finite(const Plane& plane) {
+  return plane.n.allFinite() && std::isfinite(plane.d) && std::abs(plane.n.norm() - 1.0) < 1e-3;
+}
+
+}  // namespace
+
+void Map::setPlane(const PlaneEstimate& estimate) {
+  const std::string name = "plane " + std::to_string(estimate.id);
+  if (estimate.id == 0) throw MapError("a plane needs an id");
+  if (!finite(estimate.plane)) throw MapError(name + ": parameters are not finite or its normal is not a unit vector");
+  MapPlane& plane = planes_[estimate.id];
+  const Plane optimised = plane.estimate.plane;
+  plane.estimate = estimate;
+  if (plane.optimised) plane.estimate.plane = optimised;
+}
+
+void Map::setPlaneParameters(PlaneId id, const Plane& parameters) {
+  const auto it = planes_.find(id);
+  if (it == planes_.end()) throw MapError("no plane " + std::to_string(id) + " in the map");
+  if (!finite(parameters)) throw MapError("plane " + std::to_string(id) + ": new parameters are not finite");
+  it->second.estimate.plane = parameters;
+  it->second.optimised = true;
+}
+
+void Map::mergePlanes(PlaneId from, PlaneId into) {
+  if (from == into || !hasPlane(from)) return;
+  if (!hasPlane(into)) {
+    MapPlane plane = planes_[from];
+    plane.estimate.id = into;
+    planes_[into] = plane;
+  }
+  for (auto& entry : keyframes_) {
+    auto& observations = entry.second.planes;
+    const auto it = observations.find(from);
+    if (it == observations.end()) continue;
+    PlaneObservation moved = std::move(it->second);
+    observations.erase(it);
+    moved.plane = into;
+    const auto other = observations.find(into);
+    if (other == observations.end()) {
+      observations.emplace(into, std::move(moved));
+    } else {
+      // Two pieces of one wall in one keyframe: their blocks add (each keeps its own scale inside G).
+      other->second.G += moved.G;
+      for (PlanePoint p : moved.points) {
+        p.sigma *= static_cast<float>(std::sqrt(other->second.weight_scale / moved.weight_scale));
+        other->second.points.push_back(p);
+      }
+    }
+  }
+  for (auto& entry : landmarks_)
+    if (entry.second.plane == from) entry.second.plane = into;
+  planes_.erase(from);
+}
+
+void Map::removePlane(PlaneId id) {
+  for (auto& entry : keyframes_) entry.second.planes.erase(id);
+  for (auto& entry : landmarks_)
+    if (entry.second.plane == id) entry.second.plane = 0;
+  planes_.erase(id);
+}
+
+bool Map::setPlaneObservation(const PlaneObservation& observation) {
+  if (!hasKeyframe(observation.keyframe) || !hasPlane(observation.plane)) return false;
+  if (!observation.G.allFinite() || !(observation.weight_scale > 0)) return false;
+  for (const PlanePoint& p : observation.points)
+    if (!p.p_C.allFinite() || !(p.sigma > 0)) return false;
+  keyframe(observation.keyframe).planes[observation.plane] = observation;
+  return true;
+}
+
+void Map::associate(LandmarkId id, PlaneId plane) {
+  if (plane != 0 && !hasPlane(plane)) throw MapError("no plane " + std::to_string(plane) + " in the map");
+  landmark(id).plane = plane;
+}
+
+}  // namespace vip_slam
