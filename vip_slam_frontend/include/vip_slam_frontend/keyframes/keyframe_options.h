@@ -14,7 +14,7 @@ struct KeyframeOptions {
   double max_translation_ratio = 0.12;
 
   void visit(OptionVisitor& v) {
-    v.field("min_parallax_px", min_parallax_px, 1.0, 500.0, "mean rotation-compensated image motion for a keyframe, px");
+    v.field("min_parallax_px", min_parallax_px, 1.0, 500.0, "mean image motion without rotation for a keyframe, px");
     v.field("min_tracked_ratio", min_tracked_ratio, 0.05, 1.0,
             "a keyframe when fewer of the last one's features are left");
     v.field("max_seconds", max_seconds, 0.1, 60.0, "a keyframe at least this often while moving, s");

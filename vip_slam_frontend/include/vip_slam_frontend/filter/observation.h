@@ -1,0 +1,32 @@
+// A feature's sightings as the filter sees them.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vip_slam_core/types/feature.h"
+#include "vip_slam_frontend/filter/window_state.h"
+
+namespace vip_slam {
+
+struct Observation {
+  CloneId clone = 0;
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< undistorted normalised coordinates
+  double depth = 0;                              ///< z, metres; 0: none
+  double depth_sigma = 0;                        ///< metres
+};
+
+struct FilterTrack {
+  LandmarkId id = kNoLandmark;
+  std::vector<Observation> observations;  ///< one per clone, oldest first
+};
+
+/// Noise of one image: sigma_xy = sigma_px / focal.
+struct MeasurementNoise {
+  double sigma_xy = 0.001;
+  double depth_inflation = 1.0;
+  bool use_depth = true;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,27 @@
+// IMU propagation between two images: predicted state, transition Phi and noise Q, state order (theta, p, v, b_g, b_a).
+// Phi is evaluated between the first estimates of both ends (FEJ), which keeps the four unobservable directions
+// (position and yaw) unobservable: Phi N_k = N_{k+1} exactly.
+#pragma once
+
+#include <vector>
+
+#include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/window_state.h"
+
+namespace vip_slam {
+
+struct Propagation {
+  NavState predicted;
+  Matrix15d Phi = Matrix15d::Identity();
+  Matrix15d Q = Matrix15d::Identity();
+  /// Upper-triangular-free W with W^T W = Q^-1 (here lower triangular).
+  Matrix15d W = Matrix15d::Identity();
+  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
+};
+
+/// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.
+/// `noise_scale` multiplies all noise densities (IMU gaps). The window is not changed.
+Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
+                      const Eigen::Vector3d& G, double noise_scale = 1.0);
+
+}  // namespace vip_slam

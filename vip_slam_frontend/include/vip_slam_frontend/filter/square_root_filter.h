@@ -1,0 +1,55 @@
+// Square-root inverse filter algebra (Wu et al. 2015; algorithms as in the paper's front end): the cost |R x - r|^2 of
+// the error state with R upper triangular, so P = R^-1 R^-T. After every update the correction is applied to the window
+// and r is zero again.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vip_slam_frontend/filter/propagation.h"
+#include "vip_slam_frontend/filter/window_state.h"
+
+namespace vip_slam {
+
+struct UpdateResult {
+  bool ok = false;      ///< false: nothing was changed (non-finite result)
+  int rows = 0;
+  double nis = 0;       ///< |e|^2, the normalised innovation squared of all rows
+  Eigen::VectorXd delta;
+};
+
+class SquareRootFilter {
+ public:
+  /// `rows` are whitened prior rows on the whole state (at least dimension() of them, full rank).
+  void initialise(const WindowState& window, const Eigen::MatrixXd& rows);
+
+  WindowState& window() { return window_; }
+  const WindowState& window() const { return window_; }
+  const Eigen::MatrixXd& R() const { return R_; }
+
+  /// Adds the new clone and nav state behind the IMU rows W [-Phi I] and marginalises the old nav state.
+  void augment(const Propagation& propagation, CloneId id);
+  /// Marginalises clones (indices ascending). Removing the oldest ones only deletes rows; others cost a QR.
+  void marginalise(const std::vector<int>& clone_indices);
+
+  /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.
+  UpdateResult update(Eigen::MatrixXd& H, Eigen::VectorXd& h);
+
+  /// Covariance of (theta, p, v, b_g, b_a) of the newest pose.
+  Matrix15d navCovariance() const;
+  /// Joint covariance of the whole state; for tests.
+  Eigen::MatrixXd covariance() const;
+  /// All diagonal entries of R finite and positive.
+  bool healthy() const;
+
+ private:
+  WindowState window_;
+  Eigen::MatrixXd R_;
+};
+
+/// The trailing (n - k) square triangle after the columns in `order` (a permutation of R's columns whose first k are
+/// to go) were brought to the front and triangularised. A may have more rows than columns.
+Eigen::MatrixXd marginaliseColumns(const Eigen::MatrixXd& A, const std::vector<int>& order, int k);
+
+}  // namespace vip_slam

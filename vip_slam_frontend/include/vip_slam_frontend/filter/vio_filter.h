@@ -1,0 +1,91 @@
+// The visual-inertial filter: window, feature tracks and the order of steps per image (propagate, augment, select
+// features, update, marginalise). Source: paper section "Motion Estimation"; Wu et al. 2015.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/filter_options.h"
+#include "vip_slam_frontend/filter/gating.h"
+#include "vip_slam_frontend/filter/noise_monitor.h"
+#include "vip_slam_frontend/filter/observation.h"
+#include "vip_slam_frontend/filter/square_root_filter.h"
+
+namespace vip_slam {
+
+/// One feature in the present image.
+struct FilterMeasurement {
+  LandmarkId id = kNoLandmark;
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero();
+  double depth = 0, depth_sigma = 0;
+};
+
+/// Where the estimate starts and how well that is known.
+struct FilterPrior {
+  NavState state;
+  double sigma_tilt = 0.02;      ///< rad, about the world's x and y
+  double sigma_yaw = 1e-4;       ///< rad, gauge
+  double sigma_position = 1e-4;  ///< m, gauge
+  double sigma_velocity = 0.02;  ///< m/s
+  double sigma_bias_gyro = 0.01, sigma_bias_accel = 0.1;
+  /// The state was levelled by the mean specific force of a standing body (R^T G + b_a = mean): ties tilt to the
+  /// accelerometer bias instead of counting their errors apart.
+  bool standing = false;
+  double sigma_mean_accel = 0.01;
+};
+
+struct StepReport {
+  bool healthy = true;
+  bool zero_velocity = false;
+  int features_tried = 0, features_used = 0, features_gated = 0;
+  int rows = 0;
+  double nis = 0;
+};
+
+class VioFilter {
+ public:
+  VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, const SE3& T_I_C, double time_offset,
+            double focal_px, double gravity);
+
+  void start(const FilterPrior& prior, CloneId id, const Eigen::Vector3d& omega_I);
+  bool started() const { return started_; }
+  void stop();
+
+  /// Prediction from the newest clone over `samples` (first at its time); does not change the filter.
+  Propagation predict(const std::vector<ImuSample>& samples, double noise_scale = 1.0) const;
+  /// One image: `propagation` from predict(). Without measurements this coasts.
+  StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,
+                  bool still, bool calibrate);
+
+  const WindowState& window() const { return filter_.window(); }
+  NavState nav() const { return filter_.window().nav(); }
+  Matrix15d covariance() const { return filter_.navCovariance(); }
+  double sigmaPx() const { return noise_.sigma(); }
+  const SquareRootFilter& algebra() const { return filter_; }
+
+ private:
+  struct Candidate {
+    const FilterTrack* track;
+    bool lost;
+  };
+  void addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements);
+  std::vector<Candidate> chooseCandidates(CloneId id, bool window_full);
+  void updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report);
+  void forgetClone(CloneId id);
+
+  FilterOptions options_;
+  ImuNoise imu_noise_;
+  SE3 T_I_C_;
+  double time_offset_, focal_;
+  Eigen::Vector3d G_;
+  Gate gate_;
+  NoiseMonitor noise_;
+  SquareRootFilter filter_;
+  std::map<LandmarkId, FilterTrack> tracks_;
+  bool started_ = false;
+  int still_images_ = 0;   ///< images since the standing began; 0 when moving
+  CloneId still_anchor_ = 0;
+};
+
+}  // namespace vip_slam

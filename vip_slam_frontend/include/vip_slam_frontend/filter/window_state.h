@@ -1,0 +1,58 @@
+// The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
+// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td) that are estimated.
+// Rotations are perturbed on the right, positions in the world.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vip_slam_core/imu/imu_types.h"
+
+namespace vip_slam {
+
+using CloneId = std::uint64_t;
+
+/// IMU pose at one image.
+struct Clone {
+  CloneId id = 0;
+  double t = 0;       ///< IMU time at which the pose holds
+  SE3 T_W_I;          ///< estimate
+  SE3 T_W_I_fej;      ///< first estimate: right after propagation; every Jacobian is taken there
+  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< rad/s, for the delay's Jacobian
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();      ///< m/s, same
+  double time_offset = 0;  ///< td that was used to choose t; a later td shifts the pose by (td' - td)
+};
+
+struct CalibrationFlags {
+  bool rotation = false, translation = false, time_offset = false;
+  int size() const { return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0); }
+};
+
+struct WindowState {
+  std::vector<Clone> clones;
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_W_fej = Eigen::Vector3d::Zero();  ///< right after propagation
+  Eigen::Vector3d bias_gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
+  SE3 T_I_C;
+  double time_offset = 0;
+  CalibrationFlags calibration;
+
+  int cloneColumn(int index) const { return 6 * index; }
+  int calibrationColumn() const { return 6 * static_cast<int>(clones.size()); }
+  int navColumn() const { return calibrationColumn() + calibration.size(); }
+  int dimension() const { return navColumn() + 9; }
+  /// Columns of single calibration states; meaningless when the state is not estimated.
+  int rotationColumn() const { return calibrationColumn(); }
+  int translationColumn() const { return calibrationColumn() + (calibration.rotation ? 3 : 0); }
+  int timeOffsetColumn() const { return translationColumn() + (calibration.translation ? 3 : 0); }
+
+  /// Index of the clone, -1 when it is not in the window.
+  int indexOf(CloneId id) const;
+  NavState nav() const;
+  /// x <- x boxplus delta; delta has dimension() entries.
+  void boxplus(const Eigen::VectorXd& delta);
+  bool isFinite() const;
+};
+
+}  // namespace vip_slam

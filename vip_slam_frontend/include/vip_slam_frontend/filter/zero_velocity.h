@@ -1,0 +1,51 @@
+// Zero-velocity updates: when is the body still, and what does stillness say.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/filter_options.h"
+#include "vip_slam_frontend/filter/window_state.h"
+
+namespace vip_slam {
+
+struct ImuSpread {
+  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
+  double gyro_std = 0, accel_std = 0;  ///< norm of the per-axis standard deviations
+  std::size_t count = 0;
+};
+ImuSpread imuSpread(const std::vector<ImuSample>& samples);
+
+/// What one image says about motion.
+struct StillnessCues {
+  ImuSpread imu;             ///< over ZuptOptions::window
+  double disparity_px = -1;  ///< mean image motion over the same time; < 0: unknown
+  double anchor_disparity_px = -1;  ///< since standing still began; < 0: unknown
+  int tracks = 0;
+  double speed = 0;          ///< estimated, m/s
+};
+
+/// Still only when the IMU is quiet and the image stands and the estimate is slow; with hysteresis both ways. The image
+/// alone is never enough: a wall that moves along would fool it.
+class StillnessDetector {
+ public:
+  explicit StillnessDetector(const ZuptOptions& options) : options_(options) {}
+  bool update(const StillnessCues& cues);
+  bool still() const { return still_; }
+  void reset();
+
+ private:
+  ZuptOptions options_;
+  bool still_ = false;
+  int in_a_row_ = 0;
+};
+
+/// Whitened rows on the newest clone and the nav state: v = 0, and no rotation or translation against the clone at
+/// `anchor` (index in the window; -1: velocity only). `repeats` counts the images since stopping: they repeat the same
+/// statement, so the sigmas grow with its root.
+void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ZuptOptions& options,
+                      Eigen::MatrixXd* H, Eigen::VectorXd* h);
+
+}  // namespace vip_slam

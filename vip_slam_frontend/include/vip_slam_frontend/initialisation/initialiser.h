@@ -1,0 +1,52 @@
+// The start. Standing: gravity and biases from a second of rest. Moving: camera poses against the first image from its
+// points with depth (metric), gyro bias from their rotations, then velocity and gravity from their translations.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/imu/imu_buffer.h"
+#include "vip_slam_frontend/filter/vio_filter.h"
+#include "vip_slam_frontend/initialisation/initialisation_options.h"
+
+namespace vip_slam {
+
+struct InitialisationInput {
+  double t_imu = 0;
+  std::vector<FilterMeasurement> features;
+};
+
+class Initialiser {
+ public:
+  Initialiser(const InitialisationOptions& options, const FilterOptions& filter, const ImuNoise& noise,
+              const SE3& T_I_C, double focal_px, double gravity);
+
+  /// Adds one image; the prior of the start once there is enough, holding at that image's time.
+  std::optional<FilterPrior> add(const InitialisationInput& image, const ImuBuffer& imu);
+  /// Why it is still waiting.
+  const std::string& reason() const { return reason_; }
+  void reset();
+
+ private:
+  std::optional<FilterPrior> standing(const ImuBuffer& imu);
+  std::optional<FilterPrior> moving(const ImuBuffer& imu);
+
+  InitialisationOptions options_;
+  FilterOptions filter_;
+  ImuNoise noise_;
+  SE3 T_I_C_;
+  double focal_, gravity_;
+  std::deque<InitialisationInput> images_;
+  std::string reason_ = "waiting for images and IMU";
+};
+
+/// Mean image motion in pixels of features common to both; -1 when fewer than five are.
+double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b, double focal_px);
+
+/// Levelled prior from the mean of a rest; pure function of the samples.
+FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOptions& options, const ImuNoise& noise,
+                          double gravity);
+
+}  // namespace vip_slam

@@ -1,0 +1,88 @@
+// Follows features from image to image: KLT from a start predicted by gyro, depth and the filter, forward-backward
+// check, alignment with the patch of first appearance, gyro-aided outlier rejection, and new corners where features are
+// missing. Track ids live as long as the track and are never reused.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_core/types/feature.h"
+#include "vip_slam_core/util/timing.h"
+#include "vip_slam_frontend/tracking/tracking_options.h"
+
+namespace vip_slam {
+
+/// The image a track is aligned with, and the camera pose it was taken from.
+struct ReferenceImage {
+  cv::Mat gray;
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();  ///< pixel of gray's first element, when it is a cut-out
+  SE3 T_odom_C;
+};
+
+struct Track {
+  Feature feature;            ///< of the newest image; descriptor and angle only on keyframes
+  std::shared_ptr<const ReferenceImage> reference;
+  Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
+  double reference_depth = 0; ///< metres; 0: unknown
+};
+
+struct TrackingResult {
+  int tracked = 0;       ///< survived everything
+  int lost_klt = 0, lost_outlier = 0;
+  bool pose_ok = false;  ///< RANSAC gave a metric pose
+  SE3 T_current_previous;
+};
+
+class FeatureTracker {
+ public:
+  FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
+                 TimingLog* timing);
+
+  /// Tracks into `gray`. `predicted` is the camera motion since the last image (T_current_previous), `T_odom_C` the
+  /// predicted pose of this one; when the translation is unknown give only a rotation and `has_translation` false.
+  TrackingResult track(const cv::Mat& gray, const cv::Mat& depth, const SE3& predicted, bool has_translation,
+                       const SE3& T_odom_C, double t);
+  /// Adds corners where features are missing; pose of the newest image as now known. `force`: also when few are
+  /// missing. Returns the indices of the new tracks.
+  std::vector<std::size_t> replenish(const SE3& T_odom_C, bool force, double t);
+  /// Moves the track's pixel to where its reference patch lies in the newest image; false when it does not fit.
+  bool alignTrack(Track* track, const SE3& T_odom_C) const;
+  /// Adds a track found by others in the newest image (which becomes its reference when it has none).
+  void addTrack(Track track, const SE3& T_odom_C);
+  /// The newest image becomes the reference of all tracks.
+  void restartReferences(const SE3& T_odom_C);
+  /// Tracks that ended with the last track() call.
+  const std::vector<Track>& ended() const { return ended_; }
+  /// Forgets all tracks and images; ids go on.
+  void clear();
+
+  std::vector<Track>& tracks() { return tracks_; }
+  const std::vector<Track>& tracks() const { return tracks_; }
+  const cv::Mat& gray() const { return gray_; }
+  const cv::Mat& depth() const { return depth_; }
+  /// Fills xy, depth and depth_sigma from the pixel and the newest depth image.
+  void measure(Feature* feature) const;
+
+ private:
+  void runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation, std::vector<cv::Point2f>* next,
+              std::vector<char>* found);
+  void alignWithReferences(const SE3& T_odom_C);
+
+  TrackingOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+  DepthNoise noise_;
+  TimingLog* timing_;
+  std::vector<Track> tracks_, ended_;
+  std::vector<cv::Mat> pyramid_, last_pyramid_;
+  cv::Mat gray_, depth_;
+  LandmarkId next_id_ = 1;
+  std::uint32_t image_count_ = 0;
+};
+
+}  // namespace vip_slam

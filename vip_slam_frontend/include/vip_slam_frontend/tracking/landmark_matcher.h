@@ -1,0 +1,45 @@
+// Brings back landmarks of the map that are in view but not tracked: projected with the corrected pose, matched by
+// Hamming distance to the corners around and aligned with the patch of their old track, so that a track starts again
+// under the landmark's id.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "vip_slam_core/types/map_update.h"
+#include "vip_slam_frontend/tracking/feature_tracker.h"
+#include "vip_slam_frontend/tracking/orb_extractor.h"
+
+namespace vip_slam {
+
+class LandmarkMatcher {
+ public:
+  LandmarkMatcher(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera);
+
+  void apply(const MapUpdate& update);
+  /// Keeps the patch of a track that ended, for its landmark's return.
+  void retire(const Track& track);
+  /// Adds a track for every landmark found again in the tracker's newest image; returns how many.
+  int reacquire(FeatureTracker* tracker, const OrbExtractor& orb, const SE3& T_map_C, const SE3& T_odom_C) const;
+  std::size_t size() const { return landmarks_.size(); }
+  void clear();
+
+ private:
+  struct Entry {
+    Eigen::Vector3d p_map = Eigen::Vector3d::Zero();
+    std::uint32_t observations = 0;
+    Descriptor descriptor{};
+  };
+  struct Patch {
+    std::shared_ptr<const ReferenceImage> reference;
+    Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+    double depth = 0;
+  };
+  TrackingOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+  std::map<LandmarkId, Entry> landmarks_;
+  std::map<LandmarkId, Patch> patches_;
+};
+
+}  // namespace vip_slam

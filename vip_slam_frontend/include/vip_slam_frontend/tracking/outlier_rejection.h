@@ -1,0 +1,41 @@
+// Gyro-aided outlier rejection. The rotation between two images comes from the gyro, so the translation is all that a
+// sample has to give: two points with depth (metric), or two rays (direction only). Unlike the eight-point fundamental
+// matrix this does not degenerate when all points lie on one plane.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam {
+
+struct PointPair {
+  Eigen::Vector2d xy_previous = Eigen::Vector2d::Zero();  ///< normalised
+  Eigen::Vector2d xy_current = Eigen::Vector2d::Zero();
+  double depth_previous = 0;  ///< metres; 0: none
+};
+
+struct RansacOptions {
+  double threshold = 0.004;  ///< normalised image units
+  int iterations = 60;
+  std::uint32_t seed = 1;
+};
+
+struct RansacResult {
+  bool ok = false;            ///< a model was found
+  SE3 T_current_previous;     ///< translation metric only when with_depth
+  bool with_depth = false;
+  std::vector<char> inlier;
+  int inliers = 0;
+};
+
+/// `predicted` supplies the rotation and a first guess of the translation. Pairs without depth are judged by their
+/// distance from the epipolar line.
+RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& predicted, const RansacOptions& options);
+
+/// Gauss-Newton on the reprojection of points with depth, Huber-weighted at `huber`; returns false when it fails.
+bool refinePose(const std::vector<PointPair>& pairs, const std::vector<char>& use, double huber,
+                SE3* T_current_previous);
+
+}  // namespace vip_slam

@@ -1,0 +1,21 @@
+// Sub-pixel alignment of a patch with its first appearance (inverse compositional Lucas-Kanade over shift and
+// brightness). Frame-to-frame tracking creeps by a few hundredths of a pixel per image; this takes the creep back.
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+namespace vip_slam {
+
+struct PatchAlignment {
+  bool ok = false;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double residual = 0;  ///< root mean square after gain and offset, grey levels
+};
+
+/// Finds in `current` the patch that `reference` shows at `reference_pixel`. `A_ref_cur` maps small pixel offsets of
+/// the current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge.
+PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
+                          const Eigen::Matrix2d& A_ref_cur, const cv::Mat& current, const Eigen::Vector2d& start);
+
+}  // namespace vip_slam

@@ -1,0 +1,17 @@
+#include "vip_slam_frontend/filter/noise_monitor.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam {
+
+NoiseMonitor::NoiseMonitor(double sigma_px, double min_px, double max_px, bool adapt)
+    : sigma_(std::clamp(sigma_px, min_px, std::max(min_px, max_px))), min_(min_px), max_(max_px), adapt_(adapt) {}
+
+void NoiseMonitor::add(double chi2_per_dof, int dof) {
+  if (!adapt_ || dof < 20 || !(chi2_per_dof > 0) || !std::isfinite(chi2_per_dof)) return;
+  const double step = 0.05 * std::clamp(0.5 * std::log(chi2_per_dof), -1.0, 1.0);
+  sigma_ = std::clamp(sigma_ * std::exp(step), min_, std::max(min_, max_));
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,67 @@
+#include "vip_slam_frontend/filter/propagation.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "vip_slam_core/imu/preintegration.h"
+
+namespace vip_slam {
+
+namespace {
+
+// Added to Q's diagonal so that its factor exists for intervals of a few microseconds. (rad, m, m/s, rad/s, m/s^2)
+Eigen::Matrix<double, 15, 1> noiseFloor() {
+  Eigen::Matrix<double, 15, 1> floor;
+  floor << Eigen::Vector3d::Constant(1e-7), Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1e-6),
+      Eigen::Vector3d::Constant(1e-8), Eigen::Vector3d::Constant(1e-7);
+  return floor;
+}
+
+}  // namespace
+
+Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
+                      const Eigen::Vector3d& G, double noise_scale) {
+  Propagation result;
+  ImuNoise scaled = noise;
+  scaled.gyro_noise_density *= noise_scale;
+  scaled.accel_noise_density *= noise_scale;
+  scaled.gyro_random_walk *= noise_scale;
+  scaled.accel_random_walk *= noise_scale;
+  const Preintegration pre(samples, window.bias_gyro, window.bias_accel, scaled);
+  const NavState from = window.nav();
+  result.predicted = pre.predict(from, G);
+  result.predicted.t = samples.back().t;
+  result.omega_I = samples.back().gyro - window.bias_gyro;
+
+  const Clone& last = window.clones.back();
+  const Eigen::Matrix3d R_fej = last.T_W_I_fej.R();
+  const Eigen::Matrix3d R_now = last.T_W_I.R();
+  const double dt = pre.dt();
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  Matrix15d& Phi = result.Phi;
+  // dtheta' = R'^T R dtheta + J dbg; dp', dv' from the displacement between first estimates, seen from the world.
+  Phi.block<3, 3>(0, 0) = result.predicted.T_W_I.R().transpose() * R_fej;
+  Phi.block<3, 3>(0, 9) = pre.J_theta_bg();
+  const Eigen::Vector3d dp =
+      result.predicted.T_W_I.t() - last.T_W_I_fej.t() - window.v_W_fej * dt + 0.5 * G * dt * dt;
+  const Eigen::Vector3d dv = result.predicted.v_W - window.v_W_fej + G * dt;
+  Phi.block<3, 3>(3, 0) = -hat(dp) * R_fej;
+  Phi.block<3, 3>(3, 6) = I * dt;
+  Phi.block<3, 3>(3, 9) = R_now * pre.J_alpha_bg();
+  Phi.block<3, 3>(3, 12) = R_now * pre.J_alpha_ba();
+  Phi.block<3, 3>(6, 0) = -hat(dv) * R_fej;
+  Phi.block<3, 3>(6, 9) = R_now * pre.J_beta_bg();
+  Phi.block<3, 3>(6, 12) = R_now * pre.J_beta_ba();
+
+  // The preintegrated position and velocity noise lives in the frame of the first pose.
+  Matrix15d T = Matrix15d::Identity();
+  T.block<3, 3>(3, 3) = R_now;
+  T.block<3, 3>(6, 6) = R_now;
+  result.Q = T * pre.covariance() * T.transpose();
+  result.Q.diagonal() += noiseFloor().cwiseAbs2();
+  const Eigen::LLT<Matrix15d> llt(result.Q);
+  result.W = llt.matrixL().solve(Matrix15d::Identity());
+  return result;
+}
+
+}  // namespace vip_slam

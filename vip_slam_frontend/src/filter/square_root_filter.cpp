@@ -1,0 +1,124 @@
+#include "vip_slam_frontend/filter/square_root_filter.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "vip_slam_frontend/filter/qr.h"
+
+namespace vip_slam {
+
+Eigen::MatrixXd marginaliseColumns(const Eigen::MatrixXd& A, const std::vector<int>& order, int k) {
+  const int n = static_cast<int>(A.cols());
+  Eigen::MatrixXd permuted(A.rows(), n);
+  for (int c = 0; c < n; ++c) permuted.col(c) = A.col(order[c]);
+  triangularise(permuted, n);
+  return permuted.block(k, k, n - k, n - k).triangularView<Eigen::Upper>();
+}
+
+void SquareRootFilter::initialise(const WindowState& window, const Eigen::MatrixXd& rows) {
+  window_ = window;
+  Eigen::MatrixXd A = rows;
+  const int n = window.dimension();
+  triangularise(A, n);
+  R_ = A.topLeftCorner(n, n).triangularView<Eigen::Upper>();
+}
+
+void SquareRootFilter::augment(const Propagation& propagation, CloneId id) {
+  const int n = window_.dimension();
+  const int last_clone = window_.cloneColumn(static_cast<int>(window_.clones.size()) - 1);
+  const int nav = window_.navColumn();
+
+  // Rows of the old factor, then W [-Phi I] on (C_k, E_k ; C_k+1, E_k+1), appended behind the old columns.
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n + 15, n + 15);
+  A.topLeftCorner(n, n) = R_;
+  const Matrix15d WPhi = propagation.W * propagation.Phi;
+  A.block<15, 6>(n, last_clone) = -WPhi.leftCols<6>();
+  A.block<15, 9>(n, nav) = -WPhi.rightCols<9>();
+  A.block<15, 15>(n, n) = propagation.W;
+
+  std::vector<int> order;
+  order.reserve(n + 15);
+  for (int c = nav; c < n; ++c) order.push_back(c);                              // E_k goes
+  for (int c = 0; c < window_.calibrationColumn(); ++c) order.push_back(c);      // clones
+  for (int c = n; c < n + 6; ++c) order.push_back(c);                            // C_k+1
+  for (int c = window_.calibrationColumn(); c < nav; ++c) order.push_back(c);    // calibration
+  for (int c = n + 6; c < n + 15; ++c) order.push_back(c);                       // E_k+1
+  R_ = marginaliseColumns(A, order, 9);
+
+  Clone clone;
+  clone.id = id;
+  clone.t = propagation.predicted.t;
+  clone.T_W_I = clone.T_W_I_fej = propagation.predicted.T_W_I;
+  clone.omega_I = propagation.omega_I;
+  clone.v_W = propagation.predicted.v_W;
+  clone.time_offset = window_.time_offset;
+  window_.clones.push_back(clone);
+  window_.v_W = window_.v_W_fej = propagation.predicted.v_W;
+}
+
+void SquareRootFilter::marginalise(const std::vector<int>& clone_indices) {
+  if (clone_indices.empty()) return;
+  const int n = window_.dimension();
+  const int k = 6 * static_cast<int>(clone_indices.size());
+  bool oldest_only = true;
+  for (std::size_t i = 0; i < clone_indices.size(); ++i) oldest_only &= clone_indices[i] == static_cast<int>(i);
+  if (oldest_only) {
+    R_ = Eigen::MatrixXd(R_.bottomRightCorner(n - k, n - k));
+  } else {
+    std::vector<bool> goes(n, false);
+    std::vector<int> order;
+    for (int index : clone_indices) {
+      for (int c = 0; c < 6; ++c) {
+        order.push_back(6 * index + c);
+        goes[6 * index + c] = true;
+      }
+    }
+    for (int c = 0; c < n; ++c) {
+      if (!goes[c]) order.push_back(c);
+    }
+    R_ = marginaliseColumns(R_, order, k);
+  }
+  for (std::size_t i = clone_indices.size(); i-- > 0;) {
+    window_.clones.erase(window_.clones.begin() + clone_indices[i]);
+  }
+}
+
+UpdateResult SquareRootFilter::update(Eigen::MatrixXd& H, Eigen::VectorXd& h) {
+  UpdateResult result;
+  result.rows = static_cast<int>(H.rows());
+  if (H.rows() == 0) return result;
+  Eigen::MatrixXd R = R_;
+  Eigen::VectorXd r = Eigen::VectorXd::Zero(R.rows());
+  stackTriangular(R, r, H, h);
+  result.delta = R.triangularView<Eigen::Upper>().solve(r);
+  result.nis = h.squaredNorm();
+  if (!result.delta.allFinite() || !R.diagonal().allFinite()) return result;
+  R_.swap(R);
+  window_.boxplus(result.delta);
+  result.ok = true;
+  return result;
+}
+
+Matrix15d SquareRootFilter::navCovariance() const {
+  const int n = window_.dimension();
+  const int clone = window_.cloneColumn(static_cast<int>(window_.clones.size()) - 1);
+  const int nav = window_.navColumn();
+  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(15, n);
+  Y.block<6, 6>(0, clone).setIdentity();
+  Y.block<9, 9>(6, nav).setIdentity();
+  solveRight(R_, Y);
+  return Y * Y.transpose();
+}
+
+Eigen::MatrixXd SquareRootFilter::covariance() const {
+  Eigen::MatrixXd Y = Eigen::MatrixXd::Identity(R_.rows(), R_.cols());
+  solveRight(R_, Y);
+  return Y * Y.transpose();
+}
+
+bool SquareRootFilter::healthy() const {
+  const auto diagonal = R_.diagonal().array();
+  return diagonal.allFinite() && (diagonal > 0).all() && window_.isFinite();
+}
+
+}  // namespace vip_slam

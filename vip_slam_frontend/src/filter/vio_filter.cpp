@@ -1,0 +1,226 @@
+#include "vip_slam_frontend/filter/vio_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_frontend/filter/feature_rows.h"
+#include "vip_slam_frontend/filter/triangulation.h"
+#include "vip_slam_frontend/filter/zero_velocity.h"
+
+namespace vip_slam {
+
+VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, const SE3& T_I_C, double time_offset,
+                     double focal_px, double gravity)
+    : options_(options),
+      imu_noise_(imu_noise),
+      T_I_C_(T_I_C),
+      time_offset_(time_offset),
+      focal_(focal_px),
+      G_(gravityVector(gravity)),
+      gate_(options.gate_probability),
+      noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px) {}
+
+void VioFilter::stop() {
+  started_ = false;
+  tracks_.clear();
+  still_images_ = 0;
+}
+
+void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3d& omega_I) {
+  stop();
+  WindowState window;
+  Clone clone;
+  clone.id = id;
+  clone.t = prior.state.t;
+  clone.T_W_I = clone.T_W_I_fej = prior.state.T_W_I;
+  clone.omega_I = omega_I;
+  clone.v_W = prior.state.v_W;
+  clone.time_offset = time_offset_;
+  window.clones.push_back(clone);
+  window.v_W = window.v_W_fej = prior.state.v_W;
+  window.bias_gyro = prior.state.bias_gyro;
+  window.bias_accel = prior.state.bias_accel;
+  window.T_I_C = T_I_C_;
+  window.time_offset = time_offset_;
+  const CalibrationOptions& calibration = options_.calibration;
+  window.calibration = {calibration.rotation, calibration.translation, calibration.time_offset};
+
+  const int n = window.dimension(), nav = window.navColumn();
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
+  const Eigen::Vector3d sigma_rotation(prior.sigma_tilt, prior.sigma_tilt, prior.sigma_yaw);
+  rows.block<3, 3>(0, 0) = sigma_rotation.cwiseInverse().asDiagonal() * prior.state.T_W_I.R();
+  rows.block<3, 3>(3, 3).diagonal().setConstant(1.0 / prior.sigma_position);
+  for (int c = 6; c < nav; ++c) {
+    double sigma = calibration.sigma_time_offset;
+    if (calibration.rotation && c < window.rotationColumn() + 3) {
+      sigma = calibration.sigma_rotation;
+    } else if (calibration.translation && c < window.translationColumn() + 3) {
+      sigma = calibration.sigma_translation;
+    }
+    rows(c, c) = 1.0 / sigma;
+  }
+  rows.block<3, 3>(nav, nav).diagonal().setConstant(1.0 / prior.sigma_velocity);
+  rows.block<3, 3>(nav + 3, nav + 3).diagonal().setConstant(1.0 / prior.sigma_bias_gyro);
+  rows.block<3, 3>(nav + 6, nav + 6).diagonal().setConstant(1.0 / prior.sigma_bias_accel);
+  if (prior.standing) {
+    // mean = b_a + R^T G. The state was levelled with this mean, so the residual is zero.
+    const Eigen::Vector3d up_I = prior.state.T_W_I.R().transpose() * G_;
+    const double w = 1.0 / prior.sigma_mean_accel;
+    rows.block<3, 3>(n, 0) = w * hat(up_I);
+    rows.block<3, 3>(n, nav + 6) = w * Eigen::Matrix3d::Identity();
+  }
+  filter_.initialise(window, rows);
+  started_ = true;
+}
+
+Propagation VioFilter::predict(const std::vector<ImuSample>& samples, double noise_scale) const {
+  return propagate(filter_.window(), samples, imu_noise_, G_, noise_scale * options_.imu_noise_inflation);
+}
+
+void VioFilter::forgetClone(CloneId id) {
+  for (auto it = tracks_.begin(); it != tracks_.end();) {
+    auto& observations = it->second.observations;
+    observations.erase(std::remove_if(observations.begin(), observations.end(),
+                                      [id](const Observation& o) { return o.clone == id; }),
+                       observations.end());
+    it = observations.empty() ? tracks_.erase(it) : std::next(it);
+  }
+}
+
+void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements) {
+  for (const FilterMeasurement& m : measurements) {
+    FilterTrack& track = tracks_[m.id];
+    track.id = m.id;
+    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma});
+  }
+}
+
+std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool window_full) {
+  std::vector<Candidate> candidates;
+  const CloneId oldest = filter_.window().clones.front().id;
+  for (auto& entry : tracks_) {
+    const auto& observations = entry.second.observations;
+    const bool lost = observations.back().clone != id;
+    const bool leaving = window_full && observations.front().clone == oldest;
+    if ((lost || leaving) && observations.size() >= 2) candidates.push_back({&entry.second, lost});
+  }
+  // Long tracks say most. Ties go by id, so that two runs agree.
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.track->observations.size() > b.track->observations.size();
+  });
+  return candidates;
+}
+
+void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report) {
+  const WindowState& window = filter_.window();
+  MeasurementNoise noise;
+  noise.sigma_xy = noise_.sigma() / focal_;
+  noise.depth_inflation = options_.depth_inflation;
+  noise.use_depth = options_.use_depth;
+
+  std::vector<FeatureRows> accepted;
+  std::vector<double> chi2;
+  int rows = 0, chi2_rows = 0;
+  for (const Candidate& candidate : candidates) {
+    if (static_cast<int>(accepted.size()) >= options_.max_update_features) break;
+    ++report->features_tried;
+    const auto& observations = candidate.track->observations;
+    const Triangulation point = triangulate(window, observations, noise);
+    if (!point.ok) continue;
+    FeatureRows feature = featureRows(window, observations, point.p_W, noise);
+    const int dof = static_cast<int>(feature.r.size());
+    if (dof == 0) continue;
+    if (!calibrate && window.calibration.size() > 0) {
+      feature.H.middleCols(window.calibrationColumn(), window.calibration.size()).setZero();
+    }
+    if (point.pixel_rows >= 10) {
+      chi2.push_back(point.pixel_chi2 / (point.pixel_rows - 3));
+      chi2_rows += point.pixel_rows - 3;
+    }
+    const double distance = mahalanobis(filter_.R(), feature.H, feature.r);
+    if (!(distance < gate_.threshold(dof))) {
+      ++report->features_gated;
+      continue;
+    }
+    const double relative = std::sqrt(distance / dof);
+    if (relative > options_.huber) {
+      const double weight = std::sqrt(options_.huber / relative);
+      feature.H *= weight;
+      feature.r *= weight;
+    }
+    rows += dof;
+    accepted.push_back(std::move(feature));
+  }
+  if (chi2.size() >= 3) {
+    // The median of a chi-square per degree of freedom with the usual dozen of rows lies some 5 % below its mean.
+    std::nth_element(chi2.begin(), chi2.begin() + chi2.size() / 2, chi2.end());
+    noise_.add(1.05 * chi2[chi2.size() / 2], chi2_rows);
+  }
+  if (rows == 0) return;
+  Eigen::MatrixXd H(rows, window.dimension());
+  Eigen::VectorXd h(rows);
+  int at = 0;
+  for (const FeatureRows& feature : accepted) {
+    H.middleRows(at, feature.r.size()) = feature.H;
+    h.segment(at, feature.r.size()) = feature.r;
+    at += static_cast<int>(feature.r.size());
+  }
+  const UpdateResult result = filter_.update(H, h);
+  report->features_used = static_cast<int>(accepted.size());
+  report->rows = rows;
+  report->nis = result.nis;
+  report->healthy = report->healthy && result.ok;
+}
+
+StepReport VioFilter::step(const Propagation& propagation, CloneId id,
+                           const std::vector<FilterMeasurement>& measurements, bool still, bool calibrate) {
+  StepReport report;
+  const CloneId previous = filter_.window().clones.back().id;
+  filter_.augment(propagation, id);
+
+  // From the second still image on, the newest clone replaces the one before: the window keeps what it knew of the
+  // motion and does not fill with copies of one pose.
+  const bool replace = still && still_images_ > 0;
+  if (replace && previous != still_anchor_) {
+    filter_.marginalise({static_cast<int>(filter_.window().clones.size()) - 2});
+    forgetClone(previous);
+  }
+  addMeasurements(id, measurements);
+
+  if (still) {
+    if (still_images_ == 0) still_anchor_ = id;
+    Eigen::MatrixXd H;
+    Eigen::VectorXd h;
+    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, options_.zupt, &H, &h);
+    const UpdateResult result = filter_.update(H, h);
+    report.zero_velocity = true;
+    report.healthy = result.ok;
+    ++still_images_;
+  } else {
+    still_images_ = 0;
+  }
+
+  const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
+  const std::vector<Candidate> candidates = chooseCandidates(id, window_full);
+  if (!candidates.empty()) updateWithFeatures(candidates, calibrate, &report);
+
+  // Used sightings may not be used again: lost tracks go, those at the window's end start anew with the next image.
+  const int used = std::min<int>(report.features_tried, static_cast<int>(candidates.size()));
+  std::vector<LandmarkId> gone;
+  for (int i = 0; i < static_cast<int>(candidates.size()); ++i) {
+    if (candidates[i].lost || i < used) gone.push_back(candidates[i].track->id);
+  }
+  for (LandmarkId track : gone) tracks_.erase(track);
+  for (auto it = tracks_.begin(); it != tracks_.end();) {
+    it = it->second.observations.back().clone != id ? tracks_.erase(it) : std::next(it);
+  }
+  if (window_full) {
+    const CloneId oldest = filter_.window().clones.front().id;
+    filter_.marginalise({0});
+    forgetClone(oldest);
+  }
+  report.healthy = report.healthy && filter_.healthy();
+  return report;
+}
+
+}  // namespace vip_slam

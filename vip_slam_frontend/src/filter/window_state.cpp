@@ -1,0 +1,44 @@
+#include "vip_slam_frontend/filter/window_state.h"
+
+namespace vip_slam {
+
+int WindowState::indexOf(CloneId id) const {
+  for (std::size_t i = 0; i < clones.size(); ++i) {
+    if (clones[i].id == id) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+NavState WindowState::nav() const {
+  NavState nav;
+  nav.t = clones.back().t;
+  nav.T_W_I = clones.back().T_W_I;
+  nav.v_W = v_W;
+  nav.bias_gyro = bias_gyro;
+  nav.bias_accel = bias_accel;
+  return nav;
+}
+
+void WindowState::boxplus(const Eigen::VectorXd& delta) {
+  for (std::size_t i = 0; i < clones.size(); ++i) {
+    clones[i].T_W_I = clones[i].T_W_I.boxplus(delta.segment<6>(cloneColumn(static_cast<int>(i))));
+  }
+  Vector6d extrinsic = Vector6d::Zero();
+  if (calibration.rotation) extrinsic.head<3>() = delta.segment<3>(rotationColumn());
+  if (calibration.translation) extrinsic.tail<3>() = delta.segment<3>(translationColumn());
+  if (calibration.rotation || calibration.translation) T_I_C = T_I_C.boxplus(extrinsic);
+  if (calibration.time_offset) time_offset += delta(timeOffsetColumn());
+  v_W += delta.segment<3>(navColumn());
+  bias_gyro += delta.segment<3>(navColumn() + 3);
+  bias_accel += delta.segment<3>(navColumn() + 6);
+}
+
+bool WindowState::isFinite() const {
+  for (const Clone& clone : clones) {
+    if (!clone.T_W_I.isFinite()) return false;
+  }
+  return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
+         std::isfinite(time_offset);
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,83 @@
+#include "vip_slam_frontend/filter/zero_velocity.h"
+
+#include <cmath>
+
+namespace vip_slam {
+
+ImuSpread imuSpread(const std::vector<ImuSample>& samples) {
+  ImuSpread spread;
+  spread.count = samples.size();
+  if (samples.empty()) return spread;
+  for (const ImuSample& s : samples) {
+    spread.mean_gyro += s.gyro;
+    spread.mean_accel += s.accel;
+  }
+  spread.mean_gyro /= static_cast<double>(samples.size());
+  spread.mean_accel /= static_cast<double>(samples.size());
+  double gyro = 0, accel = 0;
+  for (const ImuSample& s : samples) {
+    gyro += (s.gyro - spread.mean_gyro).squaredNorm();
+    accel += (s.accel - spread.mean_accel).squaredNorm();
+  }
+  spread.gyro_std = std::sqrt(gyro / samples.size());
+  spread.accel_std = std::sqrt(accel / samples.size());
+  return spread;
+}
+
+bool StillnessDetector::update(const StillnessCues& cues) {
+  const bool quiet = cues.imu.count >= 5 && cues.imu.gyro_std < options_.max_gyro_std &&
+                     cues.imu.accel_std < options_.max_accel_std;
+  const bool image_known = cues.disparity_px >= 0 && cues.tracks > options_.min_tracks;
+  bool wants = options_.enabled && quiet && cues.speed < options_.max_speed;
+  if (still_) {
+    // Inside, an image without features (lights off) does not end the standing; one that moves does.
+    wants = wants && (!image_known || cues.disparity_px < 1.5 * options_.max_disparity_px) &&
+            cues.anchor_disparity_px < 3.0 * options_.max_disparity_px;
+  } else {
+    wants = wants && image_known && cues.disparity_px < options_.max_disparity_px;
+  }
+  if (wants == still_) {
+    in_a_row_ = 0;
+  } else if (++in_a_row_ >= (still_ ? options_.frames_out : options_.frames_in)) {
+    still_ = wants;
+    in_a_row_ = 0;
+  }
+  // A first doubt already suspends the updates; it takes frames_in images to start them.
+  return still_ && wants;
+}
+
+void StillnessDetector::reset() {
+  still_ = false;
+  in_a_row_ = 0;
+}
+
+void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ZuptOptions& options,
+                      Eigen::MatrixXd* H, Eigen::VectorXd* h) {
+  const int newest = static_cast<int>(window.clones.size()) - 1;
+  const bool relative = anchor >= 0 && anchor != newest;
+  const double inflation = std::sqrt(1.0 + repeats);
+  *H = Eigen::MatrixXd::Zero(relative ? 9 : 3, window.dimension());
+  *h = Eigen::VectorXd::Zero(relative ? 9 : 3);
+  const double wv = 1.0 / (options.sigma_velocity * inflation);
+  H->block<3, 3>(0, window.navColumn()) = wv * Eigen::Matrix3d::Identity();
+  h->head<3>() = -wv * window.v_W;
+  if (!relative) return;
+
+  const Clone& a = window.clones[anchor];
+  const Clone& b = window.clones[newest];
+  const double wr = 1.0 / (options.sigma_rotation * inflation), wp = 1.0 / (options.sigma_position * inflation);
+  // Log(R_a^T R_b) = 0 with theta right-perturbed on both: d = dtheta_b - R_b^T R_a dtheta_a for a small angle. The
+  // translation is compared in the frame of a, which keeps yaw and position unobservable.
+  const Eigen::Matrix3d Ra = a.T_W_I_fej.R(), Rb = b.T_W_I_fej.R();
+  const Eigen::Vector3d rotation = logSO3(Eigen::Matrix3d(a.T_W_I.R().transpose() * b.T_W_I.R()));
+  H->block<3, 3>(3, window.cloneColumn(newest)) = wr * Eigen::Matrix3d::Identity();
+  H->block<3, 3>(3, window.cloneColumn(anchor)) = -wr * Rb.transpose() * Ra;
+  h->segment<3>(3) = -wr * rotation;
+  const Eigen::Vector3d d_fej = Ra.transpose() * (b.T_W_I_fej.t() - a.T_W_I_fej.t());
+  H->block<3, 3>(6, window.cloneColumn(newest) + 3) = wp * Ra.transpose();
+  H->block<3, 3>(6, window.cloneColumn(anchor) + 3) = -wp * Ra.transpose();
+  H->block<3, 3>(6, window.cloneColumn(anchor)) = wp * hat(d_fej);
+  h->tail<3>() = -wp * (a.T_W_I.R().transpose() * (b.T_W_I.t() - a.T_W_I.t()));
+}
+
+}  // namespace vip_slam

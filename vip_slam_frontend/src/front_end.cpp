@@ -1,0 +1,22 @@
+#include "vip_slam_frontend/front_end.h"
+
+#include "front_end_impl.h"
+
+namespace vip_slam {
+
+FrontEnd::FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing)
+    : impl_(std::make_unique<Impl>(options, sensor, timing)) {}
+FrontEnd::~FrontEnd() = default;
+
+bool FrontEnd::addImu(const ImuSample& sample) { return impl_->addImu(sample); }
+bool FrontEnd::addGyro(double t, const Eigen::Vector3d& gyro) { return impl_->addGyro(t, gyro); }
+bool FrontEnd::addAccel(double t, const Eigen::Vector3d& accel) { return impl_->addAccel(t, accel); }
+bool FrontEnd::ready(double t_image) const { return impl_->ready(t_image); }
+FrameOutput FrontEnd::process(const FrameInput& input) { return impl_->process(input); }
+void FrontEnd::applyMapUpdate(const MapUpdate& update) { impl_->applyMapUpdate(update); }
+std::optional<NavState> FrontEnd::predict(double t) const { return impl_->predict(t); }
+void FrontEnd::reset(const std::string& reason) { impl_->reset(reason); }
+const FrontEndCounters& FrontEnd::counters() const { return impl_->counters_; }
+const FrontEndOptions& FrontEnd::options() const { return impl_->options_; }
+
+}  // namespace vip_slam

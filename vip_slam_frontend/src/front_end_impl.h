@@ -1,0 +1,89 @@
+// The front end's inside: what it owns and the steps of one image.
+#pragma once
+
+#include <deque>
+#include <utility>
+
+#include "vip_slam_core/imu/imu_buffer.h"
+#include "vip_slam_frontend/filter/vio_filter.h"
+#include "vip_slam_frontend/filter/zero_velocity.h"
+#include "vip_slam_frontend/front_end.h"
+#include "vip_slam_frontend/initialisation/initialiser.h"
+#include "vip_slam_frontend/keyframes/keyframe_selector.h"
+#include "vip_slam_frontend/tracking/feature_tracker.h"
+#include "vip_slam_frontend/tracking/landmark_matcher.h"
+#include "vip_slam_frontend/tracking/orb_extractor.h"
+
+namespace vip_slam {
+
+class FrontEnd::Impl {
+ public:
+  Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing);
+
+  bool addImu(const ImuSample& sample);
+  bool addGyro(double t, const Eigen::Vector3d& gyro);
+  bool addAccel(double t, const Eigen::Vector3d& accel);
+  bool ready(double t_image) const { return imu_.covers(t_image + timeOffset()); }
+  FrameOutput process(const FrameInput& input);
+  void applyMapUpdate(const MapUpdate& update);
+  std::optional<NavState> predict(double t) const;
+  void reset(const std::string& reason);
+
+  FrontEndCounters counters_;
+  FrontEndOptions options_;
+
+ private:
+  enum class Phase { kWaiting, kInitialising, kTracking, kLost };
+
+  double timeOffset() const { return filter_.started() ? filter_.window().time_offset : sensor_.time_offset; }
+  SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : sensor_.T_imu_cam; }
+  /// Empty when the input is usable; else what is wrong. Fixes up the depth.
+  std::string checkInput(const FrameInput& input, cv::Mat* depth);
+  bool noticeTimeJump(double t, double newest, const char* what);
+  void countImu();
+
+  FrameOutput initialise(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth);
+  FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth);
+  SE3 gyroRotation(double t0, double t1) const;
+  bool decideStillness(double t_imu);
+  bool calibrationExcited(double t_imu) const;
+  std::vector<FilterMeasurement> measurements() const;
+  void judge(int tracks, bool with_depth, double t);
+
+  FrameOutput makeOutput(double t, double t_imu, const std::string& keyframe_reason);
+  std::shared_ptr<TrackedFrame> makeFrame(double t, bool with_features) const;
+  KeyframePtr makeKeyframe(const TrackedFrame& frame, double t_imu);
+  FrameOutput statusOnly(double t, TrackingState state, const std::string& reason) const;
+
+  SensorConfig sensor_;
+  TimingLog* timing_;
+  std::shared_ptr<const CameraModel> camera_;
+  ImuBuffer imu_;
+  FeatureTracker tracker_;
+  LandmarkMatcher landmarks_;
+  OrbExtractor orb_;
+  VioFilter filter_;
+  Initialiser initialiser_;
+  StillnessDetector stillness_;
+  KeyframeSelector selector_;
+
+  Phase phase_ = Phase::kWaiting;
+  TrackingStatus status_{TrackingState::kWaiting, "waiting for the first image"};
+  std::uint32_t epoch_ = 0;
+  double last_image_t_ = -1e300;   ///< image clock
+  double last_imu_t_ = -1e300;     ///< IMU time of the newest image
+  CloneId next_clone_ = 1;
+  KeyframeId next_keyframe_ = 1, last_keyframe_ = 0, newest_keyframe_ = 0;
+  double last_keyframe_imu_t_ = 0;
+  bool keyframe_imu_broken_ = false;  ///< a gap since the last keyframe
+  double last_good_t_ = 0;            ///< image with enough features
+  int gated_in_a_row_ = 0;
+  bool still_ = false;
+  SE3 T_map_odom_;
+  bool have_map_ = false;
+  using PixelList = std::vector<std::pair<LandmarkId, Eigen::Vector2f>>;
+  std::deque<std::pair<double, PixelList>> recent_pixels_;  ///< over the stillness window
+  PixelList still_anchor_;
+};
+
+}  // namespace vip_slam

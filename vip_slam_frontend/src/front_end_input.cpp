@@ -1,0 +1,145 @@
+// Input side of the front end: IMU, checks of images, clock jumps, feedback from the back end.
+#include <cmath>
+
+#include "vip_slam_core/imu/preintegration.h"
+
+#include "front_end_impl.h"
+
+namespace vip_slam {
+
+namespace {
+
+// A step back by more than this is a looped bag or a restarted clock, less is a sample out of order.
+constexpr double kClockJump = 1.0;
+
+SensorConfig checked(const SensorConfig& sensor) {
+  const std::string problem = sensor.camera.validate();
+  if (!problem.empty()) throw std::invalid_argument("front end: camera: " + problem);
+  return sensor;
+}
+
+}  // namespace
+
+FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing)
+    : options_(options),
+      sensor_(checked(sensor)),
+      timing_(timing),
+      camera_(makeCamera(sensor_.camera)),
+      imu_(options.recovery.max_imu_gap, 30.0),
+      tracker_(options.tracking, camera_, sensor_.depth_noise, timing),
+      landmarks_(options.tracking, camera_),
+      orb_(options.tracking.keyframe_corners),
+      filter_(options.filter, sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset, camera_->focal(),
+              sensor_.gravity),
+      initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, camera_->focal(),
+                   sensor_.gravity),
+      stillness_(options.filter.zupt),
+      selector_(options.keyframes) {
+  counters_.sigma_px = filter_.sigmaPx();
+}
+
+bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
+  if (!(t < newest - kClockJump)) return false;
+  imu_.clear();
+  last_image_t_ = last_imu_t_ = -1e300;
+  reset(std::string(what) + " clock ran back by " + std::to_string(newest - t) + " s");
+  return true;
+}
+
+void FrontEnd::Impl::countImu() {
+  const ImuBufferCounters& c = imu_.counters();
+  counters_.imu_rejected = c.out_of_order + c.duplicate + c.not_finite;
+  counters_.imu_gaps = c.gaps;
+}
+
+bool FrontEnd::Impl::addImu(const ImuSample& sample) {
+  if (!imu_.empty() && std::isfinite(sample.t)) noticeTimeJump(sample.t, imu_.newest(), "IMU");
+  const bool accepted = imu_.add(sample);
+  countImu();
+  return accepted;
+}
+
+bool FrontEnd::Impl::addGyro(double t, const Eigen::Vector3d& gyro) {
+  if (!imu_.empty() && std::isfinite(t)) noticeTimeJump(t, imu_.newest(), "gyro");
+  const bool accepted = imu_.addGyro(t, gyro);
+  countImu();
+  return accepted;
+}
+
+bool FrontEnd::Impl::addAccel(double t, const Eigen::Vector3d& accel) {
+  const bool accepted = imu_.addAccel(t, accel);
+  countImu();
+  return accepted;
+}
+
+std::string FrontEnd::Impl::checkInput(const FrameInput& input, cv::Mat* depth) {
+  if (!std::isfinite(input.t)) {
+    ++counters_.bad_stamp;
+    return "image stamp is not finite";
+  }
+  noticeTimeJump(input.t, last_image_t_, "image");
+  if (input.t <= last_image_t_) {
+    ++counters_.bad_stamp;
+    return "image stamp repeats or runs backward";
+  }
+  if (input.gray.empty() || input.gray.type() != CV_8UC1) {
+    ++counters_.bad_image;
+    return input.gray.empty() ? "image is empty" : "image is not 8-bit grey";
+  }
+  if (input.gray.cols != camera_->width() || input.gray.rows != camera_->height()) {
+    ++counters_.bad_image;
+    return "image is " + std::to_string(input.gray.cols) + "x" + std::to_string(input.gray.rows) + ", the camera is " +
+           std::to_string(camera_->width()) + "x" + std::to_string(camera_->height());
+  }
+  if (input.depth.empty()) {
+    ++counters_.no_depth;
+  } else if (input.depth.type() != CV_32FC1 || input.depth.size() != input.gray.size()) {
+    ++counters_.bad_depth;
+  } else {
+    *depth = input.depth;
+  }
+  return "";
+}
+
+void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
+  landmarks_.apply(update);
+  if (update.epoch != epoch_) return;
+  T_map_odom_ = update.T_map_odom;
+  have_map_ = update.newest_keyframe != 0;
+}
+
+std::optional<NavState> FrontEnd::Impl::predict(double t) const {
+  if (!filter_.started()) return std::nullopt;
+  NavState state = filter_.nav();
+  if (imu_.empty() || !std::isfinite(t)) return state;
+  const double until = std::min(t, imu_.newest());
+  const std::vector<ImuSample> samples = imu_.between(state.t, until);
+  if (samples.size() < 2) return state;
+  const Preintegration pre(samples, state.bias_gyro, state.bias_accel, sensor_.imu_noise);
+  NavState predicted = pre.predict(state, gravityVector(sensor_.gravity));
+  predicted.t = until;
+  return predicted;
+}
+
+void FrontEnd::Impl::reset(const std::string& reason) {
+  if (phase_ != Phase::kWaiting) {
+    ++counters_.restarts;
+    ++epoch_;
+  }
+  phase_ = Phase::kWaiting;
+  status_ = {TrackingState::kInitialising, reason};
+  tracker_.clear();
+  filter_.stop();
+  initialiser_.reset();
+  stillness_.reset();
+  selector_.reset();
+  recent_pixels_.clear();
+  still_anchor_.clear();
+  still_ = false;
+  have_map_ = false;
+  last_keyframe_ = 0;
+  keyframe_imu_broken_ = false;
+  gated_in_a_row_ = 0;
+}
+
+}  // namespace vip_slam

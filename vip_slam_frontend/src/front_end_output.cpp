@@ -1,0 +1,89 @@
+// Output side of the front end: tracked frames and keyframes.
+#include <cmath>
+
+#include "front_end_impl.h"
+
+namespace vip_slam {
+
+std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_features) const {
+  auto frame = std::make_shared<TrackedFrame>();
+  frame->t = t;
+  frame->epoch = epoch_;
+  frame->status = status_;
+  frame->T_I_C = extrinsics();
+  frame->time_offset = timeOffset();
+  frame->zero_velocity = still_;
+  frame->keyframe = newest_keyframe_;
+  if (filter_.started()) {
+    frame->state = filter_.nav();
+    frame->covariance = filter_.covariance();
+  }
+  if (with_features) {
+    for (const Track& track : tracker_.tracks()) frame->features.push_back(track.feature);
+  }
+  return frame;
+}
+
+FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std::string& reason) const {
+  std::shared_ptr<TrackedFrame> frame = makeFrame(t, false);
+  frame->status = {state, reason};
+  if (const std::optional<NavState> predicted = std::isfinite(t) ? predict(t + timeOffset()) : std::nullopt) {
+    frame->state = *predicted;
+  }
+  return {frame, nullptr};
+}
+
+FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string& keyframe_reason) {
+  const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
+  const bool is_keyframe = !keyframe_reason.empty();
+  if (options_.use_map_landmarks && have_map_ && is_keyframe) {
+    ScopedTimer timer(timing_, "frontend.reacquire", t);
+    counters_.landmarks_reacquired += landmarks_.reacquire(&tracker_, orb_, T_map_odom_ * T_odom_C, T_odom_C);
+  }
+  tracker_.replenish(T_odom_C, is_keyframe, t);
+
+  FrameOutput output;
+  std::shared_ptr<TrackedFrame> frame = makeFrame(t, true);
+  if (is_keyframe) {
+    ScopedTimer timer(timing_, "frontend.keyframe", t);
+    orb_.describe(tracker_.gray(), &frame->features);
+    for (std::size_t i = 0; i < frame->features.size(); ++i) tracker_.tracks()[i].feature = frame->features[i];
+    output.keyframe = makeKeyframe(*frame, t_imu);
+    frame->keyframe = newest_keyframe_;
+  }
+  if (!tracker_.depth().empty()) {
+    ScopedTimer timer(timing_, "frontend.depth_grid", t);
+    frame->depth_grid = makeDepthGrid(tracker_.depth(), options_.frame_grid_stride, sensor_.depth_noise);
+  }
+  output.frame = frame;
+  const double horizon = std::max(2.0, options_.initialisation.standing_seconds + 0.5);
+  imu_.dropBefore(last_keyframe_ != 0 ? std::min(last_keyframe_imu_t_, t_imu - horizon) : t_imu - horizon);
+  return output;
+}
+
+KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu) {
+  auto keyframe = std::make_shared<Keyframe>();
+  keyframe->id = next_keyframe_++;
+  keyframe->frame = frame;
+  keyframe->frame.keyframe = keyframe->id;
+  keyframe->previous = last_keyframe_;
+  std::vector<cv::Point2f> occupied;
+  for (const Feature& f : frame.features) occupied.emplace_back(f.pixel.x(), f.pixel.y());
+  for (Feature& corner : orb_.extract(tracker_.gray(), occupied, 6.0)) {
+    tracker_.measure(&corner);
+    keyframe->frame.features.push_back(corner);
+  }
+  if (!tracker_.depth().empty()) {
+    keyframe->frame.depth_grid = makeDepthGrid(tracker_.depth(), options_.keyframe_grid_stride, sensor_.depth_noise);
+  }
+  if (last_keyframe_ != 0 && !keyframe_imu_broken_) keyframe->imu = imu_.between(last_keyframe_imu_t_, t_imu);
+
+  selector_.accept(frame.t, frame.state.T_W_I * frame.T_I_C, frame.features);
+  last_keyframe_ = newest_keyframe_ = keyframe->id;
+  last_keyframe_imu_t_ = t_imu;
+  keyframe_imu_broken_ = false;
+  ++counters_.keyframes;
+  return keyframe;
+}
+
+}  // namespace vip_slam

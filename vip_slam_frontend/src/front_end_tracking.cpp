@@ -1,0 +1,213 @@
+// The steps of one image: check, predict, track, estimate, judge, hand on.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "vip_slam_core/imu/preintegration.h"
+
+#include "front_end_impl.h"
+
+namespace vip_slam {
+
+namespace {
+
+// Features gated away in this many images in a row: the estimate has left the measurements.
+constexpr int kGatedImages = 30;
+constexpr double kLongGapNoise = 5.0;
+
+}  // namespace
+
+FrameOutput FrontEnd::Impl::process(const FrameInput& input) {
+  ScopedTimer timer(timing_, "frontend.total", input.t);
+  ++counters_.images;
+  cv::Mat depth;
+  const std::string problem = checkInput(input, &depth);
+  const TrackingState doubtful =
+      filter_.started() ? std::max(status_.state, TrackingState::kDegraded) : TrackingState::kWaiting;
+  if (!problem.empty()) return statusOnly(input.t, doubtful, problem);
+  const double t_imu = input.t + timeOffset();
+  if (!imu_.covers(t_imu)) {
+    ++counters_.imu_missing;
+    return statusOnly(input.t, doubtful, imu_.empty() ? "no IMU yet" : "the IMU does not cover the image");
+  }
+  last_image_t_ = input.t;
+  // The tracker keeps images for later comparison; the caller may reuse his.
+  const cv::Mat gray = input.gray.clone();
+  if (filter_.started()) {
+    const double gap = t_imu - last_imu_t_;
+    if (gap > options_.recovery.max_image_gap) {
+      reset("no image for " + std::to_string(gap).substr(0, 4) + " s");
+    } else {
+      return trackImage(input.t, t_imu, gray, depth);
+    }
+  }
+  return initialise(input.t, t_imu, gray, depth);
+}
+
+SE3 FrontEnd::Impl::gyroRotation(double t0, double t1) const {
+  const std::vector<ImuSample> samples = imu_.between(t0, t1);
+  if (samples.size() < 2) return SE3();
+  const Preintegration pre(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), sensor_.imu_noise);
+  const Eigen::Matrix3d R_I_C = sensor_.T_imu_cam.R();
+  return SE3(Eigen::Matrix3d(R_I_C.transpose() * pre.deltaR().transpose() * R_I_C), Eigen::Vector3d::Zero());
+}
+
+std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
+  std::vector<FilterMeasurement> list;
+  list.reserve(tracker_.tracks().size());
+  for (const Track& track : tracker_.tracks()) {
+    const Feature& f = track.feature;
+    list.push_back({f.id, f.xy.cast<double>(), f.depth, f.depth_sigma});
+  }
+  return list;
+}
+
+FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth) {
+  const bool first = phase_ == Phase::kWaiting;
+  phase_ = Phase::kInitialising;
+  const SE3 rotation = first ? SE3() : gyroRotation(last_imu_t_, t_imu);
+  last_imu_t_ = t_imu;
+  tracker_.track(gray, depth, rotation, false, SE3(), t);
+  tracker_.replenish(SE3(), true, t);
+  const std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements()}, imu_);
+  if (!prior) {
+    const std::string why = status_.state == TrackingState::kInitialising && !status_.reason.empty() && first
+                                ? status_.reason + "; " + initialiser_.reason()
+                                : initialiser_.reason();
+    status_ = {TrackingState::kInitialising, why};
+    return statusOnly(t, status_.state, status_.reason);
+  }
+  const std::optional<ImuSample> here = imu_.at(t_imu);
+  const Eigen::Vector3d omega = here ? Eigen::Vector3d(here->gyro - prior->state.bias_gyro) : Eigen::Vector3d::Zero();
+  filter_.start(*prior, next_clone_++, omega);
+  initialiser_.reset();
+  phase_ = Phase::kTracking;
+  status_ = {TrackingState::kTracking, ""};
+  last_good_t_ = t;
+  // The tracks' references were taken under unknown poses: begin them here.
+  const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
+  tracker_.restartReferences(T_odom_C);
+  return makeOutput(t, t_imu, "first");
+}
+
+bool FrontEnd::Impl::decideStillness(double t_imu) {
+  const ZuptOptions& options = options_.filter.zupt;
+  PixelList now;
+  for (const Track& track : tracker_.tracks()) now.emplace_back(track.feature.id, track.feature.pixel);
+  const auto disparity = [&now](const PixelList& then) {
+    std::map<LandmarkId, Eigen::Vector2f> pixels(then.begin(), then.end());
+    std::vector<float> moved;
+    for (const auto& item : now) {
+      const auto it = pixels.find(item.first);
+      if (it != pixels.end()) moved.push_back((it->second - item.second).norm());
+    }
+    if (moved.size() < 5) return -1.0;
+    std::nth_element(moved.begin(), moved.begin() + moved.size() / 2, moved.end());
+    return static_cast<double>(moved[moved.size() / 2]);
+  };
+  StillnessCues cues;
+  cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), t_imu - options.window), t_imu));
+  cues.tracks = static_cast<int>(now.size());
+  cues.speed = filter_.nav().v_W.norm();
+  while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options.window - 1e-6) {
+    recent_pixels_.pop_front();
+  }
+  if (!recent_pixels_.empty()) cues.disparity_px = disparity(recent_pixels_.front().second);
+  if (still_) cues.anchor_disparity_px = disparity(still_anchor_);
+  recent_pixels_.emplace_back(t_imu, now);
+  const bool still = stillness_.update(cues);
+  if (still && !still_) still_anchor_ = std::move(now);
+  return still;
+}
+
+bool FrontEnd::Impl::calibrationExcited(double t_imu) const {
+  const CalibrationOptions& options = options_.filter.calibration;
+  const ImuSpread spread = imuSpread(imu_.between(std::max(imu_.oldest(), t_imu - 0.5), t_imu));
+  return spread.mean_gyro.norm() + spread.gyro_std > options.min_rotation_rate &&
+         spread.accel_std > options.min_acceleration;
+}
+
+FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth) {
+  double max_gap = 0;
+  const double from = filter_.nav().t;
+  const std::vector<ImuSample> samples = imu_.between(from, t_imu, &max_gap);
+  if (samples.size() < 2) return statusOnly(t, TrackingState::kDegraded, "no IMU between the images");
+  const bool gap = max_gap > options_.recovery.max_imu_gap;
+  if (max_gap > 5.0 * options_.recovery.max_imu_gap) {
+    reset("IMU gap of " + std::to_string(max_gap).substr(0, 4) + " s");
+    return initialise(t, t_imu, gray, depth);
+  }
+  keyframe_imu_broken_ = keyframe_imu_broken_ || gap;
+  const Propagation propagation = filter_.predict(samples, gap ? kLongGapNoise : 1.0);
+  last_imu_t_ = t_imu;
+
+  const SE3 T_I_C = extrinsics();
+  const SE3 T_odom_C_last = filter_.nav().T_W_I * T_I_C;
+  const SE3 T_odom_C = propagation.predicted.T_W_I * T_I_C;
+  const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
+  const TrackingResult tracked =
+      tracker_.track(gray, depth, T_odom_C.inverse() * T_odom_C_last, !coasting, T_odom_C, t);
+  for (const Track& track : tracker_.ended()) landmarks_.retire(track);
+
+  StepReport report;
+  {
+    ScopedTimer timer(timing_, "frontend.update", t);
+    still_ = decideStillness(t_imu);
+    report = filter_.step(propagation, next_clone_++, measurements(), still_, calibrationExcited(t_imu));
+  }
+  counters_.features_used += report.features_used;
+  counters_.features_gated += report.features_gated;
+  counters_.zero_velocity += report.zero_velocity;
+  counters_.sigma_px = filter_.sigmaPx();
+  if (report.rows > 0) counters_.nis_per_dof = report.nis / report.rows;
+  const bool all_gated = report.features_gated >= 5 && report.features_used * 5 < report.features_gated;
+  gated_in_a_row_ = all_gated ? gated_in_a_row_ + 1 : (report.features_used > 0 ? 0 : gated_in_a_row_);
+
+  const std::string failure = !report.healthy                                  ? "the filter became singular"
+                              : filter_.nav().v_W.norm() > options_.recovery.max_speed ? "estimated speed is impossible"
+                              : gated_in_a_row_ >= kGatedImages                ? "measurements contradict the estimate"
+                                                                               : "";
+  if (!failure.empty()) {
+    reset(failure);
+    return initialise(t, t_imu, gray, depth);
+  }
+  int with_depth = 0;
+  for (const Track& track : tracker_.tracks()) with_depth += track.feature.depth > 0;
+  judge(tracked.tracked, with_depth >= options_.recovery.min_tracks, t);
+  if (phase_ == Phase::kLost && tracked.tracked >= 2 * options_.recovery.min_tracks && tracked.pose_ok) {
+    reset("features are back after LOST");
+    return initialise(t, t_imu, gray, depth);
+  }
+  const SE3 T_now = filter_.nav().T_W_I * extrinsics();
+  std::string reason;
+  if (phase_ == Phase::kTracking) {
+    const std::shared_ptr<TrackedFrame> frame = makeFrame(t, true);
+    reason = selector_.decide(t, T_now, frame->features, camera_->focal(), still_);
+  }
+  return makeOutput(t, t_imu, reason);
+}
+
+void FrontEnd::Impl::judge(int tracks, bool with_depth, double t) {
+  if (tracks >= options_.recovery.min_tracks || still_) {
+    last_good_t_ = t;
+    if (phase_ == Phase::kLost) return;
+    status_ = with_depth || still_ ? TrackingStatus{TrackingState::kTracking, ""}
+                                   : TrackingStatus{TrackingState::kDegraded, "no depth: visual-inertial only"};
+    return;
+  }
+  ++counters_.coasting;
+  const Matrix15d P = filter_.covariance();
+  const double sigma = std::sqrt(P.block<3, 3>(3, 3).diagonal().maxCoeff());
+  const double seconds = t - last_good_t_;
+  if (phase_ != Phase::kLost &&
+      (seconds > options_.recovery.coast_seconds || sigma > options_.recovery.max_position_sigma)) {
+    phase_ = Phase::kLost;
+    ++counters_.lost;
+  }
+  status_ = phase_ == Phase::kLost
+                ? TrackingStatus{TrackingState::kLost, "no features for " + std::to_string(seconds).substr(0, 4) + " s"}
+                : TrackingStatus{TrackingState::kDegraded,
+                                 "coasting on the IMU with " + std::to_string(tracks) + " features"};
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,158 @@
+#include "vip_slam_frontend/initialisation/initialiser.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_frontend/filter/zero_velocity.h"
+#include "vip_slam_frontend/initialisation/moving_start.h"
+#include "vip_slam_frontend/tracking/outlier_rejection.h"
+
+namespace vip_slam {
+
+double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b,
+                     double focal_px) {
+  double sum = 0;
+  int count = 0;
+  // Both lists are small; ids ascend within neither, so look each one up.
+  std::map<LandmarkId, Eigen::Vector2d> first;
+  for (const FilterMeasurement& m : a) first[m.id] = m.xy;
+  for (const FilterMeasurement& m : b) {
+    const auto it = first.find(m.id);
+    if (it == first.end()) continue;
+    sum += (it->second - m.xy).norm() * focal_px;
+    ++count;
+  }
+  return count < 5 ? -1.0 : sum / count;
+}
+
+FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOptions& options, const ImuNoise& noise,
+                          double gravity) {
+  FilterPrior prior;
+  const ImuSpread spread = imuSpread(samples);
+  const double seconds = std::max(0.1, samples.back().t - samples.front().t);
+  const Eigen::Vector3d up = spread.mean_accel.normalized();
+  prior.standing = true;
+  prior.state.t = samples.back().t;
+  prior.state.T_W_I = SE3(gravityAlignedRotation(spread.mean_accel), Eigen::Vector3d::Zero());
+  prior.state.bias_gyro = spread.mean_gyro;
+  // Of the accelerometer bias a rest shows only the part along gravity.
+  prior.state.bias_accel = (spread.mean_accel.norm() - gravity) * up;
+  prior.sigma_tilt = 0.3;
+  prior.sigma_velocity = 0.02;
+  prior.sigma_bias_accel = options.sigma_bias_accel;
+  const double inflation = 2.0 * options.imu_noise_inflation;
+  const double root = std::sqrt(seconds);
+  prior.sigma_bias_gyro = std::min(
+      options.sigma_bias_gyro,
+      2e-4 + inflation * (noise.gyro_noise_density / root + noise.gyro_random_walk * root));
+  prior.sigma_mean_accel =
+      0.005 + inflation * (noise.accel_noise_density / root + noise.accel_random_walk * root);
+  return prior;
+}
+
+Initialiser::Initialiser(const InitialisationOptions& options, const FilterOptions& filter, const ImuNoise& noise,
+                         const SE3& T_I_C, double focal_px, double gravity)
+    : options_(options), filter_(filter), noise_(noise), T_I_C_(T_I_C), focal_(focal_px), gravity_(gravity) {}
+
+void Initialiser::reset() {
+  images_.clear();
+  reason_ = "waiting for images and IMU";
+}
+
+std::optional<FilterPrior> Initialiser::add(const InitialisationInput& image, const ImuBuffer& imu) {
+  images_.push_back(image);
+  const double keep = std::max(options_.standing_seconds, options_.moving_seconds) + 0.5;
+  while (images_.size() > 2 && images_.back().t_imu - images_.front().t_imu > keep) images_.pop_front();
+  if (auto prior = standing(imu)) return prior;
+  return moving(imu);
+}
+
+std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
+  const double now = images_.back().t_imu;
+  const double from = now - options_.standing_seconds;
+  if (imu.empty() || imu.oldest() > from) {
+    reason_ = "gathering " + std::to_string(options_.standing_seconds).substr(0, 3) + " s of IMU";
+    return std::nullopt;
+  }
+  const std::vector<ImuSample> samples = imu.between(from, now);
+  const ImuSpread spread = imuSpread(samples);
+  if (samples.size() < 10) {
+    reason_ = "too few IMU samples";
+    return std::nullopt;
+  }
+  if (spread.gyro_std > options_.max_gyro_std || spread.accel_std > options_.max_accel_std ||
+      spread.mean_gyro.norm() > 0.3 || std::abs(spread.mean_accel.norm() - gravity_) > 1.5) {
+    reason_ = "moving: gathering images for a start in motion";
+    return std::nullopt;
+  }
+  // The oldest image inside the second shows whether the scene stood, too.
+  const InitialisationInput* oldest = nullptr;
+  for (const InitialisationInput& image : images_) {
+    if (image.t_imu >= from - 1e-9) {
+      oldest = &image;
+      break;
+    }
+  }
+  const double disparity = oldest && oldest != &images_.back()
+                               ? meanDisparity(oldest->features, images_.back().features, focal_)
+                               : -1.0;
+  if (disparity > options_.max_disparity_px) {
+    reason_ = "IMU is quiet but the image moves: gathering images for a start in motion";
+    return std::nullopt;
+  }
+  return standingPrior(samples, filter_, noise_, gravity_);
+}
+
+std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {
+  if (images_.size() < 5 || images_.back().t_imu - images_.front().t_imu < options_.moving_seconds) return std::nullopt;
+  // Poses of all images against the first; when too little of the first is left in view, a later one takes its place.
+  const auto pairsOf = [](const InitialisationInput& a, const InitialisationInput& b) {
+    std::map<LandmarkId, const FilterMeasurement*> first;
+    for (const FilterMeasurement& m : a.features) {
+      if (m.depth > 0) first[m.id] = &m;
+    }
+    std::vector<PointPair> pairs;
+    for (const FilterMeasurement& m : b.features) {
+      const auto it = first.find(m.id);
+      if (it != first.end()) pairs.push_back({it->second->xy, m.xy, it->second->depth});
+    }
+    return pairs;
+  };
+  std::vector<TimedCameraPose> poses{{images_.front().t_imu, SE3()}};
+  std::size_t base = 0;
+  SE3 T_first_base, T_base_last;
+  for (std::size_t k = 1; k < images_.size(); ++k) {
+    std::vector<PointPair> pairs = pairsOf(images_[base], images_[k]);
+    if (static_cast<int>(pairs.size()) < options_.min_tracks && base != k - 1) {
+      T_first_base = T_first_base * T_base_last;
+      T_base_last = SE3();
+      base = k - 1;
+      pairs = pairsOf(images_[base], images_[k]);
+    }
+    if (static_cast<int>(pairs.size()) < options_.min_tracks) {
+      reason_ = "start in motion needs " + std::to_string(options_.min_tracks) + " features with depth, has " +
+                std::to_string(pairs.size());
+      images_.erase(images_.begin(), images_.begin() + static_cast<long>(k));
+      return std::nullopt;
+    }
+    SE3 T_k_base = T_base_last.inverse();
+    std::vector<char> use(pairs.size(), 1);
+    if (!refinePose(pairs, use, 1.0 / focal_, &T_k_base)) {
+      reason_ = "start in motion: camera pose failed";
+      images_.erase(images_.begin(), images_.begin() + static_cast<long>(k));
+      return std::nullopt;
+    }
+    T_base_last = T_k_base.inverse();
+    poses.push_back({images_[k].t_imu, T_first_base * T_base_last});
+  }
+  MovingStart start = solveMovingStart(poses, imu, T_I_C_, noise_, filter_, gravity_);
+  if (!start.ok || start.gravity_error > options_.max_gravity_error) {
+    reason_ = start.ok ? "start in motion: gravity off by " + std::to_string(start.gravity_error) + " m/s^2"
+                       : "start in motion: " + start.reason;
+    images_.pop_front();
+    return std::nullopt;
+  }
+  return start.prior;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,240 @@
+#include "vip_slam_frontend/tracking/feature_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/video/tracking.hpp>
+
+#include "vip_slam_frontend/tracking/corner_detector.h"
+#include "vip_slam_frontend/tracking/outlier_rejection.h"
+#include "vip_slam_frontend/tracking/patch_alignment.h"
+
+namespace vip_slam {
+
+namespace {
+
+Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
+
+/// d(reference pixel) / d(current pixel) for a patch facing the camera at `depth` in the reference (0: far away).
+bool warpOf(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, double depth, const SE3& T_cur_ref,
+            Eigen::Matrix2d* A_ref_cur) {
+  const double z = depth > 0 ? depth : 1e4;
+  Eigen::Vector2d centre, shifted;
+  Eigen::Matrix2d A_cur_ref;
+  const double h = 5.0;
+  if (!camera.project(T_cur_ref * camera.unproject(reference_pixel, z), &centre)) return false;
+  for (int axis = 0; axis < 2; ++axis) {
+    Eigen::Vector2d p = reference_pixel;
+    p(axis) += h;
+    if (!camera.project(T_cur_ref * camera.unproject(p, z), &shifted)) return false;
+    A_cur_ref.col(axis) = (shifted - centre) / h;
+  }
+  const double det = A_cur_ref.determinant();
+  if (!(det > 0.05) || !(det < 20.0)) return false;
+  *A_ref_cur = A_cur_ref.inverse();
+  return true;
+}
+
+}  // namespace
+
+FeatureTracker::FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera,
+                               const DepthNoise& noise, TimingLog* timing)
+    : options_(options), camera_(std::move(camera)), noise_(noise), timing_(timing) {}
+
+void FeatureTracker::clear() {
+  tracks_.clear();
+  ended_.clear();
+  pyramid_.clear();
+  last_pyramid_.clear();
+  gray_ = cv::Mat();
+  depth_ = cv::Mat();
+}
+
+void FeatureTracker::measure(Feature* feature) const {
+  Eigen::Vector2d xy;
+  camera_->undistort(feature->pixel.cast<double>(), &xy);
+  feature->xy = xy.cast<float>();
+  feature->depth = depth_.empty() ? 0.0f : safeDepth(depth_, feature->pixel.x(), feature->pixel.y(), noise_);
+  feature->depth_sigma = feature->depth > 0 ? static_cast<float>(noise_.sigma(feature->depth)) : 0.0f;
+}
+
+void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation,
+                            std::vector<cv::Point2f>* next, std::vector<char>* found) {
+  const cv::Size window(options_.klt_window | 1, options_.klt_window | 1);
+  std::vector<cv::Point2f> previous;
+  previous.reserve(tracks_.size());
+  next->clear();
+  for (const Track& track : tracks_) {
+    const Feature& f = track.feature;
+    previous.emplace_back(f.pixel.x(), f.pixel.y());
+    const double z = has_translation && f.depth > 0 ? f.depth : 1e4;
+    const Eigen::Vector3d p = predicted.R() * (f.xy.homogeneous().cast<double>() * z) +
+                              (has_translation ? predicted.t() : Eigen::Vector3d(Eigen::Vector3d::Zero()));
+    Eigen::Vector2d uv;
+    const bool usable = camera_->project(p, &uv) && camera_->inImage(uv);
+    next->push_back(usable ? cv::Point2f(static_cast<float>(uv.x()), static_cast<float>(uv.y())) : previous.back());
+  }
+  found->assign(tracks_.size(), 0);
+  if (tracks_.empty()) return;
+
+  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.klt_iterations, 0.01);
+  std::vector<std::uint8_t> status, back_status;
+  cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, previous, *next, status, cv::noArray(), window, options_.klt_levels,
+                           criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  // Back again, from the forward result shifted by the inverse flow: one level is enough there.
+  std::vector<cv::Point2f> back = previous;
+  cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, *next, back, back_status, cv::noArray(), window,
+                           std::min(1, options_.klt_levels), criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  for (std::size_t i = 0; i < previous.size(); ++i) {
+    const cv::Point2f d = back[i] - previous[i];
+    const Eigen::Vector2d uv = asVector((*next)[i]);
+    (*found)[i] = status[i] && back_status[i] && std::hypot(d.x, d.y) < options_.forward_backward_px &&
+                  uv.allFinite() && uv.x() >= options_.border && uv.y() >= options_.border &&
+                  uv.x() < gray.cols - options_.border && uv.y() < gray.rows - options_.border;
+  }
+}
+
+bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C) const {
+  if (!track->reference) return false;
+  Eigen::Matrix2d A;
+  const SE3 T_cur_ref = T_odom_C.inverse() * track->reference->T_odom_C;
+  if (!warpOf(*camera_, track->reference_pixel, track->reference_depth, T_cur_ref, &A)) return false;
+  const double scale = std::sqrt(A.determinant());
+  const double shear = (A / scale - (A / scale).inverse().transpose()).norm();
+  if (!(scale > 0.6) || !(scale < 1.7) || !(shear < 0.7)) return false;
+  const Eigen::Vector2d start = track->feature.pixel.cast<double>();
+  const PatchAlignment aligned =
+      alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, A, gray_, start);
+  if (!aligned.ok || (aligned.pixel - start).norm() > options_.reference_max_correction_px) return false;
+  track->feature.pixel = aligned.pixel.cast<float>();
+  return true;
+}
+
+void FeatureTracker::addTrack(Track track, const SE3& T_odom_C) {
+  if (!track.reference) {
+    auto here = std::make_shared<ReferenceImage>();
+    here->gray = gray_;
+    here->T_odom_C = T_odom_C;
+    track.reference = here;
+    track.reference_pixel = track.feature.pixel.cast<double>();
+    track.reference_depth = track.feature.depth;
+  }
+  tracks_.push_back(std::move(track));
+}
+
+void FeatureTracker::restartReferences(const SE3& T_odom_C) {
+  auto here = std::make_shared<ReferenceImage>();
+  here->gray = gray_;
+  here->T_odom_C = T_odom_C;
+  for (Track& track : tracks_) {
+    track.reference = here;
+    track.reference_pixel = track.feature.pixel.cast<double>();
+    track.reference_depth = track.feature.depth;
+  }
+}
+
+void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
+  std::shared_ptr<ReferenceImage> here;
+  for (Track& track : tracks_) {
+    if (alignTrack(&track, T_odom_C)) continue;
+    // The view changed too much for the old patch: the present one becomes the reference.
+    if (!here) {
+      here = std::make_shared<ReferenceImage>();
+      here->gray = gray_;
+      here->T_odom_C = T_odom_C;
+    }
+    track.reference = here;
+    track.reference_pixel = track.feature.pixel.cast<double>();
+    track.reference_depth = -1;  // set once this image's depth was read
+  }
+}
+
+TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, const SE3& predicted,
+                                     bool has_translation, const SE3& T_odom_C, double t) {
+  TrackingResult result;
+  ++image_count_;
+  std::vector<cv::Point2f> next;
+  std::vector<char> found;
+  {
+    ScopedTimer timer(timing_, "frontend.track", t);
+    pyramid_.swap(last_pyramid_);
+    pyramid_.clear();
+    cv::buildOpticalFlowPyramid(gray, pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
+                                options_.klt_levels);
+    if (!last_pyramid_.empty()) runKlt(gray, predicted, has_translation, &next, &found);
+    gray_ = gray;
+    depth_ = depth;
+  }
+  ended_.clear();
+  if (tracks_.empty() || found.empty()) return result;
+
+  ScopedTimer timer(timing_, "frontend.match", t);
+  std::vector<PointPair> pairs;
+  std::vector<std::size_t> index;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (!found[i]) continue;
+    Eigen::Vector2d xy;
+    camera_->undistort(asVector(next[i]), &xy);
+    pairs.push_back({tracks_[i].feature.xy.cast<double>(), xy, tracks_[i].feature.depth});
+    index.push_back(i);
+  }
+  RansacOptions ransac;
+  ransac.threshold = options_.ransac_px / camera_->focal();
+  ransac.iterations = options_.ransac_iterations;
+  ransac.seed = image_count_;
+  const RansacResult model = rejectOutliers(pairs, predicted, ransac);
+  result.lost_klt = static_cast<int>(tracks_.size() - pairs.size());
+  result.lost_outlier = static_cast<int>(pairs.size()) - model.inliers;
+  result.pose_ok = model.ok && model.with_depth;
+  result.T_current_previous = model.T_current_previous;
+
+  std::vector<Track> kept;
+  kept.reserve(index.size());
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    if (!model.inlier[k]) continue;
+    Track track = std::move(tracks_[index[k]]);
+    track.feature.pixel = Eigen::Vector2f(next[index[k]].x, next[index[k]].y);
+    ++track.feature.age;
+    kept.push_back(std::move(track));
+  }
+  for (Track& track : tracks_) {
+    if (track.reference) ended_.push_back(std::move(track));  // those that survived were moved out
+  }
+  tracks_.swap(kept);
+  if (options_.refine_against_reference) alignWithReferences(T_odom_C);
+  for (Track& track : tracks_) {
+    measure(&track.feature);
+    if (track.reference_depth < 0) track.reference_depth = track.feature.depth;
+  }
+  result.tracked = static_cast<int>(tracks_.size());
+  return result;
+}
+
+std::vector<std::size_t> FeatureTracker::replenish(const SE3& T_odom_C, bool force, double t) {
+  std::vector<std::size_t> added;
+  const int missing = options_.max_features - static_cast<int>(tracks_.size());
+  // A corner search costs about as much as the tracking; a handful of missing features can wait.
+  if (missing <= 0 || gray_.empty() || (!force && missing < options_.max_features / 8 && image_count_ % 4 != 0)) {
+    return added;
+  }
+  ScopedTimer timer(timing_, "frontend.detect", t);
+  std::vector<cv::Point2f> occupied;
+  for (const Track& track : tracks_) occupied.emplace_back(track.feature.pixel.x(), track.feature.pixel.y());
+  auto here = std::make_shared<ReferenceImage>();
+  here->gray = gray_;
+  here->T_odom_C = T_odom_C;
+  for (const Corner& corner : detectCorners(gray_, occupied, missing, options_)) {
+    Track track;
+    track.feature.id = next_id_++;
+    track.feature.pixel = Eigen::Vector2f(corner.pixel.x, corner.pixel.y);
+    measure(&track.feature);
+    track.reference = here;
+    track.reference_pixel = track.feature.pixel.cast<double>();
+    track.reference_depth = track.feature.depth;
+    added.push_back(tracks_.size());
+    tracks_.push_back(std::move(track));
+  }
+  return added;
+}
+
+}  // namespace vip_slam

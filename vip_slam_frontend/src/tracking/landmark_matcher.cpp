@@ -1,0 +1,141 @@
+#include "vip_slam_frontend/tracking/landmark_matcher.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <opencv2/features2d.hpp>
+
+namespace vip_slam {
+
+namespace {
+
+constexpr int kPatchRadius = 20;
+constexpr std::size_t kMostPatches = 8000;
+constexpr int kMostPerImage = 60;
+
+}  // namespace
+
+LandmarkMatcher::LandmarkMatcher(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera)
+    : options_(options), camera_(std::move(camera)) {}
+
+void LandmarkMatcher::clear() {
+  landmarks_.clear();
+  patches_.clear();
+}
+
+void LandmarkMatcher::apply(const MapUpdate& update) {
+  for (const LandmarkEstimate& l : update.landmarks) landmarks_[l.id] = {l.p_W, l.observations, l.descriptor};
+  for (LandmarkId id : update.removed_landmarks) {
+    landmarks_.erase(id);
+    patches_.erase(id);
+  }
+  for (const auto& merge : update.merged_landmarks) {
+    landmarks_.erase(merge.first);
+    patches_.erase(merge.first);
+  }
+}
+
+void LandmarkMatcher::retire(const Track& track) {
+  // A short-lived track's patch is not worth keeping, nor are more than a few thousand of them: the oldest go.
+  if (!track.reference || track.feature.age < 5) return;
+  const cv::Mat& image = track.reference->gray;
+  const int x = static_cast<int>(std::lround(track.reference_pixel.x()));
+  const int y = static_cast<int>(std::lround(track.reference_pixel.y()));
+  if (x < kPatchRadius || y < kPatchRadius || x + kPatchRadius >= image.cols || y + kPatchRadius >= image.rows) return;
+  const cv::Rect window(x - kPatchRadius, y - kPatchRadius, 2 * kPatchRadius + 1, 2 * kPatchRadius + 1);
+  auto reference = std::make_shared<ReferenceImage>(*track.reference);
+  reference->gray = image(window).clone();
+  reference->origin = track.reference->origin + Eigen::Vector2d(window.x, window.y);
+  patches_[track.feature.id] = {reference, track.reference_pixel, track.reference_depth};
+  if (patches_.size() > kMostPatches) patches_.erase(patches_.begin());
+}
+
+int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb, const SE3& T_map_C,
+                               const SE3& T_odom_C) const {
+  if (landmarks_.empty() || tracker->gray().empty()) return 0;
+  const cv::Mat& gray = tracker->gray();
+  std::set<LandmarkId> tracked;
+  std::vector<Eigen::Vector2f> taken;
+  for (const Track& track : tracker->tracks()) {
+    tracked.insert(track.feature.id);
+    taken.push_back(track.feature.pixel);
+  }
+  const auto free = [&](const Eigen::Vector2d& uv, double distance) {
+    return std::none_of(taken.begin(), taken.end(), [&](const Eigen::Vector2f& p) {
+      return (p.cast<double>() - uv).squaredNorm() < distance * distance;
+    });
+  };
+
+  struct Visible {
+    LandmarkId id;
+    const Entry* entry;
+    Eigen::Vector2d uv;
+    double z;
+  };
+  std::vector<Visible> visible;
+  const SE3 T_C_map = T_map_C.inverse();
+  for (const auto& item : landmarks_) {
+    if (item.second.observations < 3 || tracked.count(item.first)) continue;
+    const Eigen::Vector3d p_C = T_C_map * item.second.p_map;
+    Eigen::Vector2d uv;
+    if (p_C.z() < 0.2 || p_C.z() > 15.0 || !camera_->project(p_C, &uv)) continue;
+    if (!camera_->inImage(uv, options_.border + options_.landmark_radius_px)) continue;
+    if (free(uv, options_.min_distance)) visible.push_back({item.first, &item.second, uv, p_C.z()});
+  }
+  std::stable_sort(visible.begin(), visible.end(), [](const Visible& a, const Visible& b) {
+    return a.entry->observations > b.entry->observations;
+  });
+  if (static_cast<int>(visible.size()) > 2 * kMostPerImage) visible.resize(2 * kMostPerImage);
+
+  // Corners around every projection, described in one go.
+  std::vector<Feature> corners;
+  std::vector<std::size_t> owner;
+  const int radius = static_cast<int>(options_.landmark_radius_px);
+  std::vector<cv::KeyPoint> keypoints;
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    const int x = static_cast<int>(visible[i].uv.x()), y = static_cast<int>(visible[i].uv.y());
+    const cv::Rect roi(x - radius - 3, y - radius - 3, 2 * radius + 7, 2 * radius + 7);
+    cv::FAST(gray(roi & cv::Rect(0, 0, gray.cols, gray.rows)), keypoints, options_.fast_threshold_low, true);
+    for (const cv::KeyPoint& k : keypoints) {
+      Feature f;
+      f.pixel = Eigen::Vector2f(k.pt.x + std::max(0, roi.x), k.pt.y + std::max(0, roi.y));
+      corners.push_back(f);
+      owner.push_back(i);
+    }
+  }
+  orb.describe(gray, &corners);
+  std::vector<int> best(visible.size(), -1), best_distance(visible.size(), options_.landmark_hamming + 1);
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const int distance = hammingDistance(corners[k].descriptor, visible[owner[k]].entry->descriptor);
+    if (distance < best_distance[owner[k]]) {
+      best_distance[owner[k]] = distance;
+      best[owner[k]] = static_cast<int>(k);
+    }
+  }
+
+  int count = 0;
+  for (std::size_t i = 0; i < visible.size() && count < kMostPerImage; ++i) {
+    if (best[i] < 0) continue;
+    Track track;
+    track.feature = corners[best[i]];
+    track.feature.id = visible[i].id;
+    if (!free(track.feature.pixel.cast<double>(), options_.min_distance)) continue;
+    const auto patch = patches_.find(visible[i].id);
+    if (patch != patches_.end()) {
+      track.reference = patch->second.reference;
+      track.reference_pixel = patch->second.pixel;
+      track.reference_depth = patch->second.depth;
+      if (!tracker->alignTrack(&track, T_odom_C)) continue;
+    }
+    tracker->measure(&track.feature);
+    // Another surface in front of it is not the landmark.
+    if (track.feature.depth > 0 && std::abs(track.feature.depth - visible[i].z) > 0.05 * visible[i].z + 0.05) continue;
+    taken.push_back(track.feature.pixel);
+    tracker->addTrack(std::move(track), T_odom_C);
+    ++count;
+  }
+  return count;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,106 @@
+#include "vip_slam_frontend/tracking/patch_alignment.h"
+
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace vip_slam {
+
+namespace {
+
+constexpr int kHalf = 6;
+constexpr int kSide = 2 * kHalf + 1;
+constexpr int kWide = kSide + 2;  // one more on each side for the gradients
+constexpr int kCount = kSide * kSide;
+
+inline float bilinear(const cv::Mat& image, float x, float y) {
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const float fx = x - ix, fy = y - iy;
+  const std::uint8_t* p = image.ptr<std::uint8_t>(iy) + ix;
+  const std::uint8_t* q = p + image.step[0];
+  return (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) + fy * ((1 - fx) * q[0] + fx * q[1]);
+}
+
+}  // namespace
+
+PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
+                          const Eigen::Matrix2d& A_ref_cur, const cv::Mat& current, const Eigen::Vector2d& start) {
+  PatchAlignment result;
+  float wide[kWide * kWide];
+  for (int y = 0; y < kWide; ++y) {
+    for (int x = 0; x < kWide; ++x) {
+      const Eigen::Vector2d p = reference_pixel + A_ref_cur * Eigen::Vector2d(x - kHalf - 1, y - kHalf - 1);
+      if (!(p.x() >= 0) || !(p.y() >= 0) || p.x() >= reference.cols - 1 || p.y() >= reference.rows - 1) return result;
+      wide[y * kWide + x] = bilinear(reference, static_cast<float>(p.x()), static_cast<float>(p.y()));
+    }
+  }
+  float patch[kCount], gx[kCount], gy[kCount];
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const float* p = wide + (y + 1) * kWide + x + 1;
+      const int i = y * kSide + x;
+      patch[i] = *p;
+      gx[i] = 0.5f * (p[1] - p[-1]);
+      gy[i] = 0.5f * (p[kWide] - p[-kWide]);
+      const Eigen::Vector3d g(gx[i], gy[i], 1.0);
+      A += g * g.transpose();
+    }
+  }
+  double mean = 0, square = 0;
+  for (float value : patch) {
+    mean += value;
+    square += value * value;
+  }
+  mean /= kCount;
+  const double deviation = std::sqrt(std::max(1e-6, square / kCount - mean * mean));
+  const Eigen::LDLT<Eigen::Matrix3d> solver(A);
+  if (deviation < 1.0 || solver.vectorD().minCoeff() < 1.0) return result;
+
+  Eigen::Vector2d pixel = start;
+  float sampled[kCount];
+  for (int iteration = 0; iteration < 12; ++iteration) {
+    const double x0 = pixel.x() - kHalf, y0 = pixel.y() - kHalf;
+    if (!(x0 >= 0) || !(y0 >= 0) || x0 + kSide >= current.cols || y0 + kSide >= current.rows) return result;
+    const int ix = static_cast<int>(x0), iy = static_cast<int>(y0);
+    const float fx = static_cast<float>(x0 - ix), fy = static_cast<float>(y0 - iy);
+    const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
+    double sum = 0, sum2 = 0;
+    for (int y = 0; y < kSide; ++y) {
+      const std::uint8_t* p = current.ptr<std::uint8_t>(iy + y) + ix;
+      const std::uint8_t* q = current.ptr<std::uint8_t>(iy + y + 1) + ix;
+      for (int x = 0; x < kSide; ++x) {
+        const float value = w00 * p[x] + w01 * p[x + 1] + w10 * q[x] + w11 * q[x + 1];
+        sampled[y * kSide + x] = value;
+        sum += value;
+        sum2 += value * value;
+      }
+    }
+    const double sampled_mean = sum / kCount;
+    const double sampled_deviation = std::sqrt(std::max(1e-6, sum2 / kCount - sampled_mean * sampled_mean));
+    // Exposure may change the contrast; noise must not blow it up.
+    const float gain = static_cast<float>(std::min(2.0, std::max(0.5, deviation / sampled_deviation)));
+    const float offset = static_cast<float>(mean - gain * sampled_mean);
+    double bx = 0, by = 0, bo = 0, cost = 0;
+    for (int i = 0; i < kCount; ++i) {
+      const float e = gain * sampled[i] + offset - patch[i];
+      bx += gx[i] * e;
+      by += gy[i] * e;
+      bo += e;
+      cost += e * e;
+    }
+    result.residual = std::sqrt(cost / kCount);
+    const Eigen::Vector3d step = solver.solve(Eigen::Vector3d(bx, by, bo));
+    if (!step.allFinite() || step.head<2>().norm() > 3.0) return result;
+    pixel -= step.head<2>();
+    if (step.head<2>().squaredNorm() < 1e-4) {
+      // What is left over must be small beside the patch's own contrast, else it shows something else.
+      result.ok = result.residual < 0.6 * deviation + 2.0;
+      break;
+    }
+  }
+  result.pixel = pixel;
+  return result;
+}
+
+}  // namespace vip_slam
