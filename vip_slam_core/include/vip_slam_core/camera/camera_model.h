@@ -2,6 +2,7 @@
 // Pixel (0,0) is the centre of the top-left pixel, as in OpenCV and ROS.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -54,6 +55,8 @@ class CameraModel {
  protected:
   explicit CameraModel(CameraIntrinsics intrinsics) : intrinsics_(std::move(intrinsics)) {}
   CameraIntrinsics intrinsics_;
+  /// Squared normalised radius up to which the distortion is one-to-one; project() refuses points beyond.
+  double max_radius2_ = std::numeric_limits<double>::infinity();
 };
 
 /// Throws std::invalid_argument with intrinsics.validate()'s words when unusable.

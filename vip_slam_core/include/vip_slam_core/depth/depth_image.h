@@ -1,6 +1,7 @@
 // Reading depth safely: a look-up that refuses values beside depth edges, and a coarse grid of safe depths.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -35,8 +36,25 @@ struct DepthGrid {
 };
 DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise, const DepthLookupOptions& options = {});
 
-/// Registers a depth image taken by its own camera into the colour camera (z-buffered forward warp). Returns 32FC1
-/// metres of the colour camera's size.
+/// Registers depth images taken by their own camera into the colour camera (z-buffered forward warp). Rays and the
+/// footprint of each depth pixel are computed once, so that a stream of images pays for the warp only.
+class DepthRegistration {
+ public:
+  /// Throws std::invalid_argument when a camera is null.
+  DepthRegistration(std::shared_ptr<const CameraModel> depth_camera, std::shared_ptr<const CameraModel> colour_camera,
+                    const Eigen::Matrix4d& T_colour_depth);
+  /// `depth` is 32FC1 metres of the depth camera's size; returns 32FC1 metres of the colour camera's size, 0 = invalid.
+  cv::Mat operator()(const cv::Mat& depth) const;
+
+ private:
+  std::shared_ptr<const CameraModel> depth_camera_, colour_camera_;
+  Eigen::Matrix3f R_;                ///< colour from depth
+  Eigen::Vector3f t_;
+  std::vector<Eigen::Vector2f> xy_;  ///< normalised coordinates of each depth pixel, row-major; NaN without a ray
+  float footprint_u_ = 1, footprint_v_ = 1;  ///< colour pixels per depth pixel
+};
+
+/// The same for a single image.
 cv::Mat registerDepth(const cv::Mat& depth, const CameraModel& depth_camera, const CameraModel& colour_camera,
                       const Eigen::Matrix4d& T_colour_depth);
 

@@ -49,6 +49,7 @@ class ImuBuffer {
     double t;
     Eigen::Vector3d value;
   };
+  bool acceptStamped(std::deque<Stamped>* stream, double newest_joined, double t, const Eigen::Vector3d& value);
   void joinStreams();
 
   double gap_seconds_, capacity_seconds_;

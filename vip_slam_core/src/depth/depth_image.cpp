@@ -1,0 +1,143 @@
+#include "vip_slam_core/depth/depth_image.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace vip_slam {
+namespace {
+
+constexpr int kLargestRadius = 7;
+constexpr int kLargestWindow = (2 * kLargestRadius + 1) * (2 * kLargestRadius + 1);
+
+// What the window around one pixel holds, gathered in one pass.
+struct Window {
+  int count = 0;
+  float low, high;
+  float z[kLargestWindow];
+  signed char x[kLargestWindow], y[kLargestWindow];
+};
+
+void gather(const cv::Mat& depth, int cu, int cv, int radius, const DepthNoise& noise, Window* w) {
+  const float min_range = float(noise.min_range), max_range = float(noise.max_range);
+  const int x0 = std::max(-radius, -cu), x1 = std::min(radius, depth.cols - 1 - cu);
+  const int y0 = std::max(-radius, -cv), y1 = std::min(radius, depth.rows - 1 - cv);
+  w->low = max_range;
+  w->high = 0;
+  for (int y = y0; y <= y1; ++y) {
+    const float* row = depth.ptr<float>(cv + y) + cu;
+    for (int x = x0; x <= x1; ++x) {
+      const float z = row[x];
+      if (!(z >= min_range && z <= max_range)) continue;  // also refuses 0 and NaN
+      w->z[w->count] = z;
+      w->x[w->count] = static_cast<signed char>(x);
+      w->y[w->count++] = static_cast<signed char>(y);
+      w->low = std::min(w->low, z);
+      w->high = std::max(w->high, z);
+    }
+  }
+}
+
+// Slope of z over the window by least squares; zero when the valid pixels do not span it.
+void fitSlope(const Window& w, float mean, float* slope_x, float* slope_y) {
+  float sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, sxz = 0, syz = 0;
+  for (int i = 0; i < w.count; ++i) {
+    const float x = w.x[i], y = w.y[i], z = w.z[i] - mean;
+    sx += x, sy += y, sxx += x * x, syy += y * y, sxy += x * y, sxz += x * z, syz += y * z;
+  }
+  const float n = float(w.count);
+  sxx -= sx * sx / n, syy -= sy * sy / n, sxy -= sx * sy / n;
+  const float determinant = sxx * syy - sxy * sxy;
+  if (determinant < 1e-3f * n * n) {
+    *slope_x = *slope_y = 0;
+    return;
+  }
+  *slope_x = (syy * sxz - sxy * syz) / determinant;
+  *slope_y = (sxx * syz - sxy * sxz) / determinant;
+}
+
+float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options) {
+  const int cu = static_cast<int>(std::lround(u)), cv = static_cast<int>(std::lround(v));
+  if (cu < 0 || cv < 0 || cu >= depth.cols || cv >= depth.rows) return 0.0f;
+  const int radius = std::clamp(options.radius, 0, kLargestRadius);
+  Window w;
+  gather(depth, cu, cv, radius, noise, &w);
+  const int side = 2 * radius + 1;
+  const int inside = (std::min(cu + radius, depth.cols - 1) - std::max(cu - radius, 0) + 1) *
+                     (std::min(cv + radius, depth.rows - 1) - std::max(cv - radius, 0) + 1);
+  if (w.count == 0 || w.count < options.min_valid_fraction * std::min(inside, side * side)) return 0.0f;
+  const float middle = 0.5f * (w.low + w.high);
+  if (w.high - w.low > options.edge_ratio * middle + options.edge_sigmas * noise.sigma(middle)) return 0.0f;
+
+  // The median of the values carried along the local slope to (u, v): robust, and unbiased on slanted surfaces.
+  float mean = 0;
+  for (int i = 0; i < w.count; ++i) mean += w.z[i];
+  mean /= float(w.count);
+  float slope_x, slope_y;
+  fitSlope(w, mean, &slope_x, &slope_y);
+  const float du = float(u - cu), dv = float(v - cv);
+  for (int i = 0; i < w.count; ++i) w.z[i] += slope_x * (du - w.x[i]) + slope_y * (dv - w.y[i]);
+  float* median = w.z + w.count / 2;
+  std::nth_element(w.z, median, w.z + w.count);
+  if (w.count % 2 == 1) return *median;
+  return 0.5f * (*median + *std::max_element(w.z, median));
+}
+
+void requireFloatDepth(const cv::Mat& depth) {
+  if (depth.type() != CV_32FC1) {
+    throw std::invalid_argument("depth image: type " + std::to_string(depth.type()) + ", expected CV_32FC1 in metres");
+  }
+}
+
+}  // namespace
+
+float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options) {
+  if (depth.empty()) return 0.0f;
+  requireFloatDepth(depth);
+  if (!std::isfinite(u) || !std::isfinite(v)) return 0.0f;
+  return lookUp(depth, u, v, noise, options);
+}
+
+cv::Mat depthToMetres(const cv::Mat& raw, double scale) {
+  if (raw.type() == CV_16UC1) {
+    cv::Mat metres;
+    raw.convertTo(metres, CV_32F, scale);
+    return metres;
+  }
+  if (raw.type() == CV_32FC1) {
+    cv::Mat metres(raw.size(), CV_32FC1);
+    for (int r = 0; r < raw.rows; ++r) {
+      const float* in = raw.ptr<float>(r);
+      float* out = metres.ptr<float>(r);
+      for (int c = 0; c < raw.cols; ++c) {
+        out[c] = (in[c] > 0.0f && in[c] < std::numeric_limits<float>::max()) ? in[c] : 0.0f;
+      }
+    }
+    return metres;
+  }
+  throw std::invalid_argument("depth image: OpenCV type " + cv::typeToString(raw.type()) +
+                              ", expected CV_16UC1 or CV_32FC1");
+}
+
+DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise, const DepthLookupOptions& options) {
+  DepthGrid grid;
+  if (depth.empty()) return grid;
+  requireFloatDepth(depth);
+  if (stride < 1) throw std::invalid_argument("depth grid: stride " + std::to_string(stride) + ", expected >= 1");
+  grid.stride = stride;
+  grid.offset = stride / 2;
+  grid.cols = std::max(0, (depth.cols - 1 - grid.offset) / stride + 1);
+  grid.rows = std::max(0, (depth.rows - 1 - grid.offset) / stride + 1);
+  grid.z.resize(static_cast<std::size_t>(grid.cols) * grid.rows);
+  for (int r = 0; r < grid.rows; ++r) {
+    for (int c = 0; c < grid.cols; ++c) {
+      grid.z[static_cast<std::size_t>(r) * grid.cols + c] =
+          lookUp(depth, grid.offset + c * stride, grid.offset + r * stride, noise, options);
+    }
+  }
+  return grid;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,90 @@
+#include "vip_slam_core/geometry/so3.h"
+
+#include <cmath>
+
+namespace vip_slam {
+namespace {
+
+// sin(x)/x
+double sinc(double x) { return std::abs(x) < 1e-9 ? 1.0 : std::sin(x) / x; }
+
+// (1 - cos x)/x^2, written with the half angle because 1 - cos x cancels near zero.
+double versineOverSquare(double x) {
+  const double s = sinc(0.5 * x);
+  return 0.5 * s * s;
+}
+
+// (x - sin x)/x^3; below 0.3 the series is exact to rounding while the quotient cancels.
+double sineDefectOverCube(double x) {
+  if (std::abs(x) > 0.3) return (x - std::sin(x)) / (x * x * x);
+  const double y = x * x;
+  return 1.0 / 6 - y * (1.0 / 120 - y * (1.0 / 5040 - y * (1.0 / 362880 - y / 39916800.0)));
+}
+
+// (1 - (x/2) cot(x/2))/x^2
+double cotangentTerm(double x) {
+  if (std::abs(x) > 0.3) return (1.0 - 0.5 * x / std::tan(0.5 * x)) / (x * x);
+  const double y = x * x;
+  return 1.0 / 12 + y * (1.0 / 720 + y * (1.0 / 30240 + y * (1.0 / 1209600 + y / 47900160.0)));
+}
+
+}  // namespace
+
+Eigen::Matrix3d hat(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+Eigen::Matrix3d expSO3(const Eigen::Vector3d& theta) {
+  const double x = theta.norm();
+  const Eigen::Matrix3d W = hat(theta);
+  return Eigen::Matrix3d::Identity() + sinc(x) * W + versineOverSquare(x) * W * W;
+}
+
+Eigen::Quaterniond expQuaternion(const Eigen::Vector3d& theta) {
+  const double half = 0.5 * theta.norm();
+  const Eigen::Vector3d v = 0.5 * sinc(half) * theta;
+  return Eigen::Quaterniond(std::cos(half), v.x(), v.y(), v.z()).normalized();
+}
+
+Eigen::Vector3d logSO3(const Eigen::Quaterniond& q) {
+  const double sign = q.w() < 0 ? -1.0 : 1.0;
+  const double w = sign * q.w();
+  const Eigen::Vector3d v = sign * q.vec();
+  const double n = v.norm();
+  if (n < 1e-12) return (2.0 / w) * v;
+  return (2.0 * std::atan2(n, w) / n) * v;
+}
+
+Eigen::Vector3d logSO3(const Eigen::Matrix3d& R) { return logSO3(Eigen::Quaterniond(R)); }
+
+Eigen::Matrix3d leftJacobianSO3(const Eigen::Vector3d& theta) {
+  const double x = theta.norm();
+  const Eigen::Matrix3d W = hat(theta);
+  return Eigen::Matrix3d::Identity() + versineOverSquare(x) * W + sineDefectOverCube(x) * W * W;
+}
+
+Eigen::Matrix3d rightJacobianSO3(const Eigen::Vector3d& theta) { return leftJacobianSO3(-theta); }
+
+Eigen::Matrix3d rightJacobianInverseSO3(const Eigen::Vector3d& theta) {
+  const Eigen::Matrix3d W = hat(theta);
+  return Eigen::Matrix3d::Identity() + 0.5 * W + cotangentTerm(theta.norm()) * W * W;
+}
+
+Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  return Eigen::Quaterniond::FromTwoVectors(from, to).normalized();
+}
+
+double yawOf(const Eigen::Quaterniond& R_W_B) {
+  const Eigen::Matrix3d R = R_W_B.toRotationMatrix();
+  return std::atan2(R(1, 0), R(0, 0));
+}
+
+Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up_B) {
+  const Eigen::Quaterniond levelled = rotationBetween(up_B.normalized(), Eigen::Vector3d::UnitZ());
+  const Eigen::Quaterniond unyaw = expQuaternion(Eigen::Vector3d(0, 0, -yawOf(levelled)));
+  return (unyaw * levelled).normalized();
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,228 @@
+#include "vip_slam_core/sensor/sensor_config.h"
+
+#include <set>
+#include <stdexcept>
+
+#include <yaml-cpp/yaml.h>
+
+#include "util/text.h"
+#include "vip_slam_core/util/atomic_file.h"
+
+namespace vip_slam {
+namespace {
+
+/// A map whose every key must be asked for: what is left over is an unknown key.
+class Section {
+ public:
+  Section(YAML::Node node, std::string name) : node_(std::move(node)), name_(std::move(name)) {
+    if (!node_.IsMap()) throw std::runtime_error((name_.empty() ? "file" : name_) + ": expected a map");
+  }
+  bool has(const std::string& key) {
+    known_.insert(key);
+    return static_cast<bool>(node_[key]);
+  }
+  std::string full(const std::string& key) const { return name_.empty() ? key : name_ + "/" + key; }
+  YAML::Node need(const std::string& key) {
+    if (!has(key)) throw std::runtime_error(full(key) + ": missing");
+    return node_[key];
+  }
+  Section section(const std::string& key) { return Section(need(key), full(key)); }
+
+  template <class T>
+  void get(const std::string& key, T& value, bool required = true) {
+    if (!required && !has(key)) return;
+    const YAML::Node node = need(key);
+    try {
+      value = node.as<T>();
+    } catch (const YAML::Exception&) {
+      throw std::runtime_error(full(key) + ": '" + (node.IsScalar() ? node.Scalar() : "…") + "' is not of the expected type");
+    }
+  }
+  void pose(const std::string& key, SE3& T, bool required = true) {
+    if (!required && !has(key)) return;
+    const YAML::Node node = need(key);
+    Eigen::Matrix4d M;
+    if (!node.IsSequence() || node.size() != 4) throw std::runtime_error(full(key) + ": expected 4 rows of 4 numbers");
+    for (int r = 0; r < 4; ++r) {
+      if (!node[r].IsSequence() || node[r].size() != 4)
+        throw std::runtime_error(full(key) + ": row " + std::to_string(r + 1) + ": expected 4 numbers");
+      for (int c = 0; c < 4; ++c) M(r, c) = node[r][c].as<double>();
+    }
+    const Eigen::Matrix3d R = M.topLeftCorner<3, 3>();
+    const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0;
+    if (!M.allFinite() || !rotation || (M.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-9)
+      throw std::runtime_error(full(key) + ": not a rigid transform (orthonormal rotation, last row 0 0 0 1 expected)");
+    T = SE3(R, M.topRightCorner<3, 1>());
+  }
+  void finish() const {
+    for (const auto& entry : node_)
+      if (!known_.count(entry.first.Scalar())) throw std::runtime_error(full(entry.first.Scalar()) + ": unknown key");
+  }
+
+ private:
+  YAML::Node node_;
+  std::string name_;
+  std::set<std::string> known_;
+};
+
+CameraIntrinsics cameraFrom(Section section) {
+  CameraIntrinsics camera;
+  std::string model;
+  section.get("model", model);
+  camera.model = distortionModelFromName(model);
+  section.get("width", camera.width);
+  section.get("height", camera.height);
+  section.get("fx", camera.fx);
+  section.get("fy", camera.fy);
+  section.get("cx", camera.cx);
+  section.get("cy", camera.cy);
+  section.get("distortion", camera.distortion, false);
+  section.finish();
+  return camera;
+}
+
+std::string text(const SE3& T) {
+  const Eigen::Matrix4d M = T.matrix();
+  std::string out;
+  for (int r = 0; r < 4; ++r) {
+    out += "\n  - [";
+    for (int c = 0; c < 4; ++c) out += (c ? ", " : "") + formatDouble(M(r, c));
+    out += "]";
+  }
+  return out;
+}
+
+void writeCamera(std::ostream& out, const char* key, const CameraIntrinsics& camera) {
+  out << key << ":\n  model: " << distortionModelName(camera.model) << "\n  width: " << camera.width
+      << "\n  height: " << camera.height << "\n  fx: " << formatDouble(camera.fx) << "\n  fy: " << formatDouble(camera.fy)
+      << "\n  cx: " << formatDouble(camera.cx) << "\n  cy: " << formatDouble(camera.cy) << "\n  distortion: [";
+  for (std::size_t k = 0; k < camera.distortion.size(); ++k) out << (k ? ", " : "") << formatDouble(camera.distortion[k]);
+  out << "]\n";
+}
+
+SensorConfig configFrom(const YAML::Node& node) {
+  SensorConfig config;
+  Section root(node, "");
+  root.get("name", config.name);
+
+  Section topics = root.section("topics");
+  topics.get("color", config.topics.color);
+  topics.get("color_info", config.topics.color_info, false);
+  topics.get("depth", config.topics.depth, false);
+  topics.get("depth_info", config.topics.depth_info, false);
+  topics.get("imu", config.topics.imu, false);
+  topics.get("gyro", config.topics.gyro, false);
+  topics.get("accel", config.topics.accel, false);
+  topics.finish();
+  const bool split = !config.topics.gyro.empty() && !config.topics.accel.empty();
+  if (config.topics.imu.empty() && !split)
+    throw std::runtime_error("topics/imu: expected one united topic, or both gyro and accel");
+
+  Section color = root.section("color");
+  color.get("encoding", config.color_encoding);
+  color.get("rate", config.color_rate);
+  color.finish();
+  Section depth = root.section("depth");
+  depth.get("encoding", config.depth_encoding);
+  depth.get("scale", config.depth_scale);
+  depth.get("rate", config.depth_rate);
+  depth.get("registered", config.depth_registered);
+  depth.finish();
+  if (!(config.depth_scale > 0)) throw std::runtime_error("depth/scale: must be > 0, is " + formatDouble(config.depth_scale));
+
+  root.get("intrinsics_from_camera_info", config.intrinsics_from_camera_info);
+  if (root.has("camera")) config.camera = cameraFrom(root.section("camera"));
+  if (root.has("depth_camera")) config.depth_camera = cameraFrom(root.section("depth_camera"));
+  root.pose("T_color_depth", config.T_color_depth, !config.depth_registered);
+  if (!config.intrinsics_from_camera_info) {
+    const std::string wrong = config.camera.validate();
+    if (!wrong.empty()) throw std::runtime_error("camera: " + wrong);
+  }
+  root.pose("T_imu_cam", config.T_imu_cam);
+  root.pose("T_base_imu", config.T_base_imu, false);
+
+  Section imu = root.section("imu");
+  imu.get("rate", config.imu_rate);
+  imu.get("gyro_noise_density", config.imu_noise.gyro_noise_density);
+  imu.get("gyro_random_walk", config.imu_noise.gyro_random_walk);
+  imu.get("accel_noise_density", config.imu_noise.accel_noise_density);
+  imu.get("accel_random_walk", config.imu_noise.accel_random_walk);
+  imu.get("gravity", config.gravity, false);
+  imu.finish();
+  for (double value : {config.imu_noise.gyro_noise_density, config.imu_noise.gyro_random_walk,
+                       config.imu_noise.accel_noise_density, config.imu_noise.accel_random_walk, config.imu_rate})
+    if (!(value > 0)) throw std::runtime_error("imu: rate and all noise figures must be > 0");
+  if (!(config.gravity > 9.0 && config.gravity < 10.5))
+    throw std::runtime_error("imu/gravity: expected 9.0 to 10.5 m/s^2, is " + formatDouble(config.gravity));
+
+  Section noise = root.section("depth_noise");
+  std::string type;
+  noise.get("model", type);
+  config.depth_noise = DepthNoise::preset(depthSensorTypeFromName(type));
+  noise.get("a", config.depth_noise.a, false);
+  noise.get("b", config.depth_noise.b, false);
+  noise.get("c", config.depth_noise.c, false);
+  noise.get("min_range", config.depth_noise.min_range, false);
+  noise.get("max_range", config.depth_noise.max_range, false);
+  noise.get("bias_floor", config.depth_noise.bias_floor, false);
+  noise.finish();
+  const std::string wrong = config.depth_noise.validate();
+  if (!wrong.empty()) throw std::runtime_error("depth_noise: " + wrong);
+
+  root.get("time_offset", config.time_offset, false);
+  root.finish();
+  return config;
+}
+
+}  // namespace
+
+SensorConfig loadSensorConfig(const std::string& path) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(path);
+  } catch (const YAML::BadFile&) {
+    throw std::runtime_error(path + ": cannot be read");
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(path + ": line " + std::to_string(error.mark.line + 1) + ": " + error.msg);
+  }
+  try {
+    return configFrom(root);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+}
+
+void saveSensorConfig(const std::string& path, const SensorConfig& config) {
+  AtomicFile file(path);
+  std::ofstream& out = file.stream();
+  const SensorTopics& topics = config.topics;
+  out << "name: " << config.name << "\ntopics:\n  color: \"" << topics.color << "\"\n  color_info: \"" << topics.color_info
+      << "\"\n  depth: \"" << topics.depth << "\"\n  depth_info: \"" << topics.depth_info << "\"\n  imu: \"" << topics.imu
+      << "\"\n  gyro: \"" << topics.gyro << "\"\n  accel: \"" << topics.accel << "\"\ncolor:\n  encoding: "
+      << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate) << "\ndepth:\n  encoding: "
+      << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
+      << "\n  rate: " << formatDouble(config.depth_rate)
+      << "\n  registered: " << (config.depth_registered ? "true" : "false") << "\nintrinsics_from_camera_info: "
+      << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";
+  if (config.camera.width > 0) writeCamera(out, "camera", config.camera);
+  if (!config.depth_registered) {
+    writeCamera(out, "depth_camera", config.depth_camera);
+    out << "T_color_depth:" << text(config.T_color_depth) << "\n";
+  }
+  out << "T_imu_cam:" << text(config.T_imu_cam) << "\nT_base_imu:" << text(config.T_base_imu)
+      << "\nimu:\n  rate: " << formatDouble(config.imu_rate)
+      << "\n  gyro_noise_density: " << formatDouble(config.imu_noise.gyro_noise_density)
+      << "\n  gyro_random_walk: " << formatDouble(config.imu_noise.gyro_random_walk)
+      << "\n  accel_noise_density: " << formatDouble(config.imu_noise.accel_noise_density)
+      << "\n  accel_random_walk: " << formatDouble(config.imu_noise.accel_random_walk)
+      << "\n  gravity: " << formatDouble(config.gravity) << "\ndepth_noise:\n  model: "
+      << depthSensorTypeName(config.depth_noise.type) << "\n  a: " << formatDouble(config.depth_noise.a)
+      << "\n  b: " << formatDouble(config.depth_noise.b) << "\n  c: " << formatDouble(config.depth_noise.c)
+      << "\n  min_range: " << formatDouble(config.depth_noise.min_range)
+      << "\n  max_range: " << formatDouble(config.depth_noise.max_range)
+      << "\n  bias_floor: " << formatDouble(config.depth_noise.bias_floor)
+      << "\ntime_offset: " << formatDouble(config.time_offset) << "\n";
+  file.commit();
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,117 @@
+#include "vip_slam_core/types/planes_yaml.h"
+
+#include <stdexcept>
+
+#include <yaml-cpp/yaml.h>
+
+#include "util/text.h"
+#include "vip_slam_core/util/atomic_file.h"
+
+namespace vip_slam {
+namespace {
+
+const char* kindName(PlaneKind kind) {
+  switch (kind) {
+    case PlaneKind::kHorizontal: return "horizontal";
+    case PlaneKind::kVertical: return "vertical";
+    case PlaneKind::kGeneral: return "general";
+  }
+  return "general";
+}
+
+PlaneKind kindFromName(const std::string& name) {
+  if (name == "horizontal") return PlaneKind::kHorizontal;
+  if (name == "vertical") return PlaneKind::kVertical;
+  if (name == "general") return PlaneKind::kGeneral;
+  throw std::runtime_error("kind: '" + name + "' is not horizontal, vertical or general");
+}
+
+YAML::Node need(const YAML::Node& node, const char* key) {
+  if (!node[key]) throw std::runtime_error(std::string(key) + ": missing");
+  return node[key];
+}
+
+Eigen::Vector3d vectorFrom(const YAML::Node& node, const char* key) {
+  if (!node.IsSequence() || node.size() != 3) throw std::runtime_error(std::string(key) + ": expected [x, y, z]");
+  const Eigen::Vector3d v(node[0].as<double>(), node[1].as<double>(), node[2].as<double>());
+  if (!v.allFinite()) throw std::runtime_error(std::string(key) + ": not finite");
+  return v;
+}
+
+Ring ringFrom(const YAML::Node& node, const char* key) {
+  Ring ring;
+  if (!node.IsSequence()) throw std::runtime_error(std::string(key) + ": expected a list of points");
+  for (const YAML::Node& point : node) ring.push_back(vectorFrom(point, key));
+  return ring;
+}
+
+std::string text(const Eigen::Vector3d& v) {
+  return "[" + formatDouble(v.x()) + ", " + formatDouble(v.y()) + ", " + formatDouble(v.z()) + "]";
+}
+
+std::string text(const Ring& ring) {
+  std::string out = "[";
+  for (std::size_t k = 0; k < ring.size(); ++k) out += (k ? ", " : "") + text(ring[k]);
+  return out + "]";
+}
+
+PlaneEstimate planeFrom(const YAML::Node& node) {
+  PlaneEstimate plane;
+  plane.id = need(node, "id").as<PlaneId>();
+  plane.kind = kindFromName(need(node, "kind").as<std::string>());
+  const Eigen::Vector3d n = vectorFrom(need(node, "normal"), "normal");
+  const double d = need(node, "distance").as<double>();
+  if (n.norm() < 1e-6) throw std::runtime_error("normal: zero length");
+  plane.plane = Plane(n, d);
+  plane.area = need(node, "area").as<double>();
+  if (node["keyframes"]) plane.keyframes = node["keyframes"].as<std::uint32_t>();
+  for (const YAML::Node& piece : need(node, "polygons")) {
+    PlanePolygon polygon;
+    polygon.outer = ringFrom(need(piece, "outer"), "outer");
+    if (piece["holes"])
+      for (const YAML::Node& hole : piece["holes"]) polygon.holes.push_back(ringFrom(hole, "holes"));
+    plane.polygons.push_back(std::move(polygon));
+  }
+  return plane;
+}
+
+}  // namespace
+
+std::vector<PlaneEstimate> readPlanesYaml(const std::string& path) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(path);
+  } catch (const YAML::BadFile&) {
+    throw std::runtime_error(path + ": cannot be read");
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(path + ": line " + std::to_string(error.mark.line + 1) + ": " + error.msg);
+  }
+  if (!root.IsMap() || !root["planes"]) throw std::runtime_error(path + ": planes: missing, expected a list");
+  std::vector<PlaneEstimate> planes;
+  for (const YAML::Node& node : root["planes"]) {
+    try {
+      planes.push_back(planeFrom(node));
+    } catch (const std::exception& error) {
+      throw std::runtime_error(path + ": plane " + std::to_string(planes.size() + 1) + ": " + error.what());
+    }
+  }
+  return planes;
+}
+
+void writePlanesYaml(const std::string& path, const std::vector<PlaneEstimate>& planes) {
+  AtomicFile file(path);
+  std::ofstream& out = file.stream();
+  out << "planes:" << (planes.empty() ? " []" : "") << "\n";
+  for (const PlaneEstimate& plane : planes) {
+    out << "  - id: " << plane.id << "\n    kind: " << kindName(plane.kind) << "\n    normal: " << text(plane.plane.n)
+        << "\n    distance: " << formatDouble(plane.plane.d) << "\n    area: " << formatDouble(plane.area)
+        << "\n    keyframes: " << plane.keyframes << "\n    polygons:" << (plane.polygons.empty() ? " []" : "") << "\n";
+    for (const PlanePolygon& polygon : plane.polygons) {
+      out << "      - outer: " << text(polygon.outer) << "\n        holes:" << (polygon.holes.empty() ? " []" : "") << "\n";
+      for (const Ring& hole : polygon.holes) out << "          - " << text(hole) << "\n";
+    }
+  }
+  file.commit();
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,58 @@
+#include "vip_slam_core/util/timing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <numeric>
+
+#include "vip_slam_core/util/atomic_file.h"
+
+namespace vip_slam {
+
+void TimingLog::add(const std::string& stage, double t, double milliseconds) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  rows_[stage].push_back({t, milliseconds});
+}
+
+TimingSummary TimingLog::summary(const std::string& stage) const {
+  std::vector<double> ms;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = rows_.find(stage);
+    if (found == rows_.end()) return {};
+    for (const Row& row : found->second) ms.push_back(row.ms);
+  }
+  std::sort(ms.begin(), ms.end());
+  TimingSummary summary;
+  summary.count = ms.size();
+  summary.mean = std::accumulate(ms.begin(), ms.end(), 0.0) / double(ms.size());
+  const std::size_t half = ms.size() / 2;
+  summary.median = ms.size() % 2 == 1 ? ms[half] : 0.5 * (ms[half - 1] + ms[half]);
+  // Nearest rank: the smallest value that 99 % do not exceed.
+  summary.p99 = ms[static_cast<std::size_t>(std::ceil(0.99 * double(ms.size()))) - 1];
+  summary.max = ms.back();
+  return summary;
+}
+
+std::vector<std::string> TimingLog::stages() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<std::string> names;
+  for (const auto& [name, rows] : rows_) names.push_back(name);
+  return names;
+}
+
+void TimingLog::writeCsv(const std::string& path) const {
+  AtomicFile file(path);
+  file.stream() << "stage,t,ms\n" << std::fixed;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    for (const auto& [stage, rows] : rows_) {
+      for (const Row& row : rows) {
+        file.stream() << stage << ',' << std::setprecision(9) << row.t << ',' << std::setprecision(4) << row.ms << '\n';
+      }
+    }
+  }
+  file.commit();
+}
+
+}  // namespace vip_slam
