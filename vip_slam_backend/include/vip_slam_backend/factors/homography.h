@@ -1,0 +1,43 @@
+// Homography of a plane between two keyframes (paper section "Compressed Homography Measurement", corrected):
+//   H = R_j^T (I - a n^T / D) R_i,  a = t_i - t_j,  D = d + n^T t_i   (camera poses),  H p_i = (z_j / z_i) p_j.
+// One pair of observations gives C_l vec(H) = rho (p^_j - p_j) (rows of 9, row-major vec), weighted by
+// f / (sigma_px rho) with rho frozen, so that the cost is the reprojection cost. N pairs on one plane compress into
+// G_h = sum C^T C: cost 1/2 h^T G_h h, residual L^T h with G_h = L L^T.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "vip_slam_backend/factors/frame_geometry.h"
+#include "vip_slam_core/geometry/plane.h"
+
+namespace vip_slam {
+
+using Vector9d = Eigen::Matrix<double, 9, 1>;
+using Matrix9d = Eigen::Matrix<double, 9, 9>;
+/// Columns: theta_i, t_i, theta_j, t_j (IMU poses), plane (two in the tangent plane of n, one for d).
+using HomographyJacobian = Eigen::Matrix<double, 9, 15>;
+
+struct HomographyPair {
+  Eigen::Vector2d xy_i = Eigen::Vector2d::Zero(), xy_j = Eigen::Vector2d::Zero();  ///< undistorted, z = 1
+  double weight = 1;  ///< f / (sigma_px |rho|)
+};
+
+/// vec(H), row-major. `basis`: tangentBasis(plane.n), needed with J only.
+Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
+                          const Eigen::Matrix<double, 3, 2>* basis = nullptr, HomographyJacobian* J = nullptr);
+
+/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor: camera within
+/// 0.15 m of the plane, ray within 10 degrees of it, ratio outside [1/4, 4], point behind a camera.
+bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane, const Eigen::Vector2d& xy_i,
+                          double* rho);
+
+/// The two rows C_l, weighted.
+Eigen::Matrix<double, 2, 9> homographyRows(const HomographyPair& pair);
+
+/// Adds C_l^T C_l.
+void addHomographyPair(const HomographyPair& pair, Matrix9d* G);
+
+/// Rows L^T (at most 9) with G = L L^T; eigenvalues below 1e-12 of the largest are dropped. Returns the number of rows.
+int decomposeHomography(const Matrix9d& G, Matrix9d* rows);
+
+}  // namespace vip_slam

@@ -1,0 +1,53 @@
+// The interface of the two bundle adjusters. Both run Levenberg-Marquardt with the same damping (Ceres' rule) on the same
+// factors, so that their iterates agree.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vip_slam_backend/solver/ba_problem.h"
+
+namespace vip_slam {
+
+struct SolverOptions {
+  int max_iterations = 10;
+  double max_seconds = 0;            ///< 0: no limit
+  int threads = 1;
+  double initial_radius = 1e4;       ///< trust region: damping is diag(J^T J) / radius
+  double function_tolerance = 1e-6;  ///< stop when the cost falls by less than this fraction
+  double gradient_tolerance = 1e-10;
+  double parameter_tolerance = 1e-8;
+  bool keep_iterating = false;       ///< run all max_iterations whatever the tolerances say (benchmarks)
+};
+
+struct SolverIteration {
+  double cost = 0, radius = 0, step_norm = 0;
+  bool accepted = false;
+};
+
+struct SolverSummary {
+  double initial_cost = 0, final_cost = 0;
+  int iterations = 0;                ///< steps tried
+  bool usable = true;                ///< false: the problem was left as it was
+  std::string message;
+  double residual_ms = 0, jacobian_ms = 0, linear_ms = 0, preprocess_ms = 0, postprocess_ms = 0, total_ms = 0;
+  std::size_t residual_blocks = 0, parameters = 0, observations = 0;
+  std::size_t factor_nonzeros = 0;   ///< of the reduced system's Cholesky factor, when known
+  std::vector<SolverIteration> log;
+};
+
+class BaSolver {
+ public:
+  virtual ~BaSolver() = default;
+  virtual std::string name() const = 0;
+  /// Improves the variables in place. Throws std::invalid_argument with validateProblem()'s words.
+  virtual SolverSummary solve(BaProblem& problem, const SolverOptions& options) = 0;
+};
+
+/// "structured" or "ceres"; throws std::invalid_argument on others. A structured solver keeps its symbolic factorisation
+/// from call to call while the structure stays the same.
+std::unique_ptr<BaSolver> makeSolver(const std::string& name);
+
+}  // namespace vip_slam

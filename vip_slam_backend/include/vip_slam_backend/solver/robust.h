@@ -1,0 +1,18 @@
+// Huber's loss on a squared, whitened residual.
+#pragma once
+
+#include <cmath>
+
+namespace vip_slam {
+
+/// rho(s) for the squared norm s; delta in sigmas, 0: plain squares.
+inline double huberCost(double s, double delta) {
+  return delta <= 0 || s <= delta * delta ? s : 2.0 * delta * std::sqrt(s) - delta * delta;
+}
+
+/// sqrt(rho'(s)): factor on residual and Jacobian (as Ceres does for rho'' <= 0).
+inline double huberScale(double s, double delta) {
+  return delta <= 0 || s <= delta * delta ? 1.0 : std::sqrt(delta / std::sqrt(s));
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,71 @@
+// Block-sparse Cholesky of a symmetric positive definite matrix whose unknowns come in nodes (6 pose, 9 motion, 3 plane):
+// approximate minimum degree on the nodes, then a multifrontal factorisation on dense fronts. The symbolic part is done
+// once per structure; numbers go straight from the caller's blocks into the fronts.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace vip_slam {
+
+class SparseCholesky {
+ public:
+  /// `sizes`: unknowns per node; `pairs`: distinct node pairs (a != b) that may be non-zero.
+  void analyze(const std::vector<int>& sizes, const std::vector<std::pair<int, int>>& pairs);
+
+  int nodes() const { return static_cast<int>(sizes_.size()); }
+  int dimension() const { return dimension_; }
+  /// First unknown of a node in vectors (nodes in the caller's order).
+  int unknown(int node) const { return unknown_[node]; }
+  /// Place of a node in the elimination order.
+  int position(int node) const { return position_[node]; }
+
+  /// Values: column-major blocks in one array of valueCount() doubles. Diagonal blocks are square (lower half read);
+  /// the block of pair k has the rows of the node eliminated later and the columns of the one eliminated earlier.
+  /// Columns are leading(rows) apart: those of poses are padded so that a column is a whole number of vectors.
+  static int leading(int rows) { return rows == 6 ? 8 : rows; }
+  std::size_t valueCount() const { return value_count_; }
+  std::size_t diagonalOffset(int node) const { return diagonal_offset_[node]; }
+  std::size_t pairOffset(int pair) const { return pair_offset_[pair]; }
+
+  /// False when the matrix is not positive definite.
+  bool factorize(const double* values);
+  /// Solves in place; after a successful factorize().
+  void solve(double* b) const;
+
+  std::size_t factorNonzeros() const { return factor_nonzeros_; }
+  double factorFlops() const { return factor_flops_; }
+
+ private:
+  struct Entry {          // a block of the matrix inside its front
+    std::size_t offset;   // into values
+    int row, column;      // inside the front
+    int rows, columns, ld;
+    bool diagonal;
+  };
+  struct Segment {        // rows of a child's update that stay together in the parent's front
+    int child, parent, size;
+  };
+  struct Front {
+    int columns = 0, rows = 0, ld = 0;   // pivots, pivots + update rows, leading dimension
+    std::vector<Entry> entries;
+    std::vector<int> children;
+    std::vector<Segment> to_parent;
+    std::vector<int> unknowns;           // caller's unknown of each row
+    std::size_t factor_offset = 0;
+  };
+  void order(const std::vector<std::vector<int>>& neighbours);
+
+  std::vector<int> sizes_, unknown_, position_, node_at_;
+  std::vector<std::size_t> diagonal_offset_, pair_offset_;
+  std::size_t value_count_ = 0, factor_nonzeros_ = 0;
+  double factor_flops_ = 0;
+  int dimension_ = 0;
+  std::vector<Front> fronts_;
+  std::size_t front_size_ = 0, stack_size_ = 0, factor_size_ = 0;
+  std::vector<double> front_, stack_, factor_;
+  mutable std::vector<double> work_;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,115 @@
+#include "vip_slam_backend/solver/ba_problem.h"
+
+#include "vip_slam_backend/factors/plane_prior.h"
+#include "vip_slam_backend/factors/point_to_plane.h"
+#include "vip_slam_backend/factors/reprojection.h"
+#include "vip_slam_backend/solver/robust.h"
+
+namespace vip_slam {
+
+std::size_t BaProblem::residualBlocks() const {
+  std::size_t n = observations.size() + imu.size() + homographies.size() + homography_pairs.size() +
+                  point_to_plane.size() + plane_points.size() + gauges.size() + motion_priors.size();
+  for (const BaPlane& p : planes) n += p.prior_weight > 0 && p.kind != PlaneKind::kGeneral;
+  return n;
+}
+
+std::size_t BaProblem::parameters() const {
+  std::size_t n = 3 * (points.size() + planes.size());
+  for (const BaFrame& f : frames)
+    if (!f.fixed) n += f.motion ? 15 : 6;
+  return n;
+}
+
+std::string validateProblem(const BaProblem& problem) {
+  const int frames = static_cast<int>(problem.frames.size()), planes = static_cast<int>(problem.planes.size());
+  const auto frameOk = [&](int f) { return f >= 0 && f < frames; };
+  const auto planeOk = [&](int p) { return p >= 0 && p < planes; };
+  for (int k = 0; k < frames; ++k) {
+    const NavState& s = problem.frames[k].state;
+    if (!s.T_W_I.isFinite() || !s.v_W.allFinite() || !s.bias_gyro.allFinite() || !s.bias_accel.allFinite())
+      return "frame " + std::to_string(k) + ": state is not finite";
+  }
+  int next = 0;
+  for (std::size_t k = 0; k < problem.points.size(); ++k) {
+    const BaPoint& p = problem.points[k];
+    const std::string name = "point " + std::to_string(k);
+    if (!p.p_W.allFinite()) return name + ": position is not finite";
+    if (p.first != next || p.count < 1) return name + ": its observations do not follow those of the point before";
+    next += p.count;
+    if (next > static_cast<int>(problem.observations.size())) return name + ": too few observations";
+    for (int o = p.first; o < next; ++o) {
+      const BaObservation& b = problem.observations[o];
+      if (!frameOk(b.frame)) return name + ": observed by frame " + std::to_string(b.frame) + ", which does not exist";
+      if (!std::isfinite(b.x) || !std::isfinite(b.y) || !(b.weight > 0) || !std::isfinite(b.depth) ||
+          !(b.depth_weight >= 0))
+        return name + ": an observation is not finite or has no weight";
+    }
+  }
+  if (next != static_cast<int>(problem.observations.size())) return "observations that belong to no point";
+  for (std::size_t k = 0; k < problem.planes.size(); ++k)
+    if (!problem.planes[k].plane.n.allFinite() || !std::isfinite(problem.planes[k].plane.d))
+      return "plane " + std::to_string(k) + ": parameters are not finite";
+  for (const BaImu& f : problem.imu)
+    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !f.preintegration) return "an IMU factor without its frames";
+  for (const BaHomography& f : problem.homographies)
+    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane) || !f.G.allFinite())
+      return "a compressed homography without its frames or plane, or not finite";
+  for (const BaHomographyPair& f : problem.homography_pairs)
+    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane))
+      return "a homography pair without its frames or plane";
+  for (const BaPointToPlane& f : problem.point_to_plane)
+    if (!frameOk(f.frame) || !planeOk(f.plane) || !f.G.allFinite())
+      return "a compressed point-to-plane factor without its frame or plane, or not finite";
+  for (const BaPlanePoint& f : problem.plane_points)
+    if (!frameOk(f.frame) || !planeOk(f.plane)) return "a plane point without its frame or plane";
+  for (const BaGauge& f : problem.gauges)
+    if (!frameOk(f.frame)) return "a gauge prior without its frame";
+  for (const BaMotionPrior& f : problem.motion_priors)
+    if (!frameOk(f.frame)) return "a motion prior without its frame";
+  return "";
+}
+
+double evaluateCost(const BaProblem& problem) {
+  std::vector<FrameGeometry> geometry;
+  geometry.reserve(problem.frames.size());
+  for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
+  double cost = 0;
+  for (const BaPoint& p : problem.points)
+    for (int o = p.first; o < p.first + p.count; ++o) {
+      const BaObservation& b = problem.observations[o];
+      Eigen::Vector2d r;
+      if (!reprojectionResidual(geometry[b.frame], p.p_W, Eigen::Vector2d(b.x, b.y), b.weight, &r)) continue;
+      cost += huberCost(r.squaredNorm(), problem.huber);
+      if (b.depth_weight > 0) {
+        const double d = depthResidual(geometry[b.frame], p.p_W, b.depth, b.depth_weight);
+        cost += huberCost(d * d, problem.depth_huber);
+      }
+    }
+  for (const BaPlane& p : problem.planes)
+    cost += planePriorResidual(p.kind, p.plane, p.prior_weight).squaredNorm();
+  for (const BaImu& f : problem.imu)
+    cost += f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
+  for (const BaHomography& f : problem.homographies) {
+    const Vector9d h = homographyVector(geometry[f.i], geometry[f.j], problem.planes[f.plane].plane);
+    cost += h.dot(f.G * h);
+  }
+  for (const BaHomographyPair& f : problem.homography_pairs)
+    cost += (homographyRows(f.pair) * homographyVector(geometry[f.i], geometry[f.j], problem.planes[f.plane].plane))
+                .squaredNorm();
+  for (const BaPointToPlane& f : problem.point_to_plane) {
+    const Eigen::Vector4d u = planeInCamera(geometry[f.frame], problem.planes[f.plane].plane);
+    cost += u.dot(f.G * u);
+  }
+  for (const BaPlanePoint& f : problem.plane_points) {
+    const double r = f.weight * planeInCamera(geometry[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
+    cost += r * r;
+  }
+  for (const BaGauge& f : problem.gauges)
+    cost += gaugeResidual(f.prior, problem.frames[f.frame].state.T_W_I).squaredNorm();
+  for (const BaMotionPrior& f : problem.motion_priors)
+    cost += motionPriorResidual(f.prior, problem.frames[f.frame].state).squaredNorm();
+  return 0.5 * cost;
+}
+
+}  // namespace vip_slam

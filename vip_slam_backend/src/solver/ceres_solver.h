@@ -1,0 +1,23 @@
+// The reference: the same factors in Ceres' Levenberg-Marquardt with SPARSE_SCHUR. Used in tests, in the benchmark, and
+// wherever a user asks for it.
+#pragma once
+
+#include <memory>
+
+#include <Eigen/Core>
+
+#include "vip_slam_backend/solver/ba_solver.h"
+
+namespace vip_slam {
+
+class CeresSolver : public BaSolver {
+ public:
+  std::string name() const override { return "ceres"; }
+  SolverSummary solve(BaProblem& problem, const SolverOptions& options) override;
+};
+
+/// For tests: J^T J and J^T r by Ceres at the problem's present state. Unknowns: free frames' poses in frame order, free
+/// motions in frame order, planes, points.
+void ceresNormalEquations(BaProblem& problem, Eigen::MatrixXd* JtJ, Eigen::VectorXd* Jtr);
+
+}  // namespace vip_slam

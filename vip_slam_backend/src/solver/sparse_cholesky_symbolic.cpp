@@ -1,0 +1,228 @@
+// Symbolic part of the block-sparse Cholesky: ordering, elimination tree, fronts.
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+
+#include <amd.h>
+
+#include "dense_kernels.h"
+#include "vip_slam_backend/solver/sparse_cholesky.h"
+
+namespace vip_slam {
+namespace {
+
+using Lists = std::vector<std::vector<int>>;
+
+// Structure of the factor below each node, in positions, with the given order.
+Lists eliminate(const Lists& neighbours, const std::vector<int>& position, std::vector<int>* parent) {
+  const int n = static_cast<int>(neighbours.size());
+  std::vector<int> node_at(n);
+  for (int v = 0; v < n; ++v) node_at[position[v]] = v;
+  Lists structure(n), children(n);
+  std::vector<int> mark(n, -1);
+  parent->assign(n, -1);
+  for (int k = 0; k < n; ++k) {
+    mark[k] = k;
+    std::vector<int>& s = structure[k];
+    const auto take = [&](int p) {
+      if (p > k && mark[p] != k) {
+        mark[p] = k;
+        s.push_back(p);
+      }
+    };
+    for (const int v : neighbours[node_at[k]]) take(position[v]);
+    for (const int c : children[k])
+      for (const int p : structure[c]) take(p);
+    std::sort(s.begin(), s.end());
+    if (!s.empty()) {
+      (*parent)[k] = s.front();
+      children[s.front()].push_back(k);
+    }
+  }
+  return structure;
+}
+
+std::vector<int> postorder(const std::vector<int>& parent) {
+  const int n = static_cast<int>(parent.size());
+  Lists children(n);
+  std::vector<int> roots, order;
+  for (int k = 0; k < n; ++k) (parent[k] < 0 ? roots : children[parent[k]]).push_back(k);
+  std::vector<std::pair<int, std::size_t>> stack;
+  for (const int root : roots) {
+    stack.emplace_back(root, 0);
+    while (!stack.empty()) {
+      auto& top = stack.back();
+      if (top.second < children[top.first].size()) {
+        const int child = children[top.first][top.second++];
+        stack.emplace_back(child, 0);
+      } else {
+        order.push_back(top.first);
+        stack.pop_back();
+      }
+    }
+  }
+  return order;
+}
+
+}  // namespace
+
+void SparseCholesky::order(const Lists& neighbours) {
+  const int n = nodes();
+  std::vector<int> starts(n + 1, 0), indices;
+  for (int v = 0; v < n; ++v) {
+    indices.insert(indices.end(), neighbours[v].begin(), neighbours[v].end());
+    starts[v + 1] = static_cast<int>(indices.size());
+  }
+  if (indices.empty()) indices.push_back(0);
+  std::vector<int> permutation(n);
+  const int status = n == 0 ? AMD_OK : amd_order(n, starts.data(), indices.data(), permutation.data(), nullptr, nullptr);
+  if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED) throw std::runtime_error("sparse Cholesky: ordering failed");
+  position_.resize(n);
+  for (int k = 0; k < n; ++k) position_[permutation[k]] = k;
+}
+
+void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<std::pair<int, int>>& pairs) {
+  sizes_ = sizes;
+  const int n = nodes();
+  unknown_.resize(n);
+  diagonal_offset_.resize(n);
+  dimension_ = 0;
+  value_count_ = 0;
+  for (int v = 0; v < n; ++v) {
+    unknown_[v] = dimension_;
+    dimension_ += sizes[v];
+    diagonal_offset_[v] = value_count_;
+    value_count_ += static_cast<std::size_t>(leading(sizes[v])) * sizes[v];
+  }
+  Lists neighbours(n);
+  pair_offset_.resize(pairs.size());
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    neighbours[pairs[k].first].push_back(pairs[k].second);
+    neighbours[pairs[k].second].push_back(pairs[k].first);
+  }
+  for (auto& list : neighbours) std::sort(list.begin(), list.end());
+  order(neighbours);
+  std::vector<int> parent;
+  eliminate(neighbours, position_, &parent);
+  const std::vector<int> post = postorder(parent);
+  std::vector<int> renumber(n);
+  for (int k = 0; k < n; ++k) renumber[post[k]] = k;
+  for (int v = 0; v < n; ++v) position_[v] = renumber[position_[v]];
+  const Lists structure = eliminate(neighbours, position_, &parent);
+  node_at_.resize(n);
+  for (int v = 0; v < n; ++v) node_at_[position_[v]] = v;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    int later = pairs[k].first, earlier = pairs[k].second;
+    if (position_[later] < position_[earlier]) std::swap(later, earlier);
+    pair_offset_[k] = value_count_;
+    value_count_ += static_cast<std::size_t>(leading(sizes[later])) * sizes[earlier];
+  }
+  const auto sizeAt = [&](int p) { return sizes_[node_at_[p]]; };
+
+  // Supernodes: a chain in the tree joins while the zeros it stores stay few.
+  std::vector<int> first, last_of, front_of(n);
+  for (int k = 0; k < n;) {
+    int end = k, columns = sizeAt(k);
+    double zeros = 0;
+    while (end + 1 < n && parent[end] == end + 1) {
+      double missing = 0;  // rows of the parent that the present front lacks
+      std::size_t i = 0;
+      for (const int p : structure[end + 1]) {
+        while (i < structure[end].size() && structure[end][i] < p) ++i;
+        if (i == structure[end].size() || structure[end][i] != p) missing += sizeAt(p);
+      }
+      double below = 0;
+      for (const int p : structure[end + 1]) below += sizeAt(p);
+      const double joined_columns = columns + sizeAt(end + 1);
+      const double total = joined_columns * (below + 0.5 * joined_columns);
+      const double joined_zeros = zeros + columns * missing;
+      const double limit = joined_columns <= 20 ? 0.4 : joined_columns <= 48 ? 0.15 : 0.05;
+      if (joined_zeros > limit * total) break;
+      zeros = joined_zeros;
+      columns = static_cast<int>(joined_columns);
+      ++end;
+    }
+    for (int p = k; p <= end; ++p) front_of[p] = static_cast<int>(first.size());
+    first.push_back(k);
+    last_of.push_back(end);
+    k = end + 1;
+  }
+
+  fronts_.assign(first.size(), Front());
+  front_size_ = stack_size_ = factor_size_ = factor_nonzeros_ = 0;
+  factor_flops_ = 0;
+  std::vector<std::vector<int>> rows_of(fronts_.size());
+  std::vector<int> offset_in_front(n, -1);
+  std::vector<std::vector<int>> row_offset(fronts_.size());
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    Front& front = fronts_[f];
+    std::vector<int>& rows = rows_of[f];
+    for (int p = first[f]; p <= last_of[f]; ++p) rows.push_back(p);
+    rows.insert(rows.end(), structure[last_of[f]].begin(), structure[last_of[f]].end());
+    for (const int p : rows) {
+      row_offset[f].push_back(front.rows);
+      for (int u = 0; u < sizeAt(p); ++u) front.unknowns.push_back(unknown_[node_at_[p]] + u);
+      front.rows += sizeAt(p);
+      if (p <= last_of[f]) front.columns += sizeAt(p);
+    }
+    front.ld = (front.rows + kKernelPadding + 7) / 8 * 8;
+    if (front.ld % 64 == 0) front.ld += 8;  // columns must not fall on the same cache sets
+    front.factor_offset = factor_size_;
+    factor_size_ += static_cast<std::size_t>(front.ld) * front.columns;
+    front_size_ = std::max(front_size_, static_cast<std::size_t>(front.ld) * front.rows + kKernelPadding);
+    for (int c = 0; c < front.columns; ++c) {
+      const double below = front.rows - c;
+      factor_nonzeros_ += static_cast<std::size_t>(below);
+      factor_flops_ += below * below;
+    }
+  }
+  // Rows of each front in its parent; update matrices live on a stack (the order is a postorder).
+  std::size_t stack = 0;
+  std::vector<std::size_t> update_size(fronts_.size());
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    Front& front = fronts_[f];
+    const std::size_t m = front.rows - front.columns;
+    update_size[f] = m * m;
+    for (const int child : front.children) stack -= update_size[child];
+    stack += update_size[f];
+    stack_size_ = std::max(stack_size_, stack);
+    if (m == 0) continue;
+    const int up = front_of[structure[last_of[f]].front()];
+    fronts_[up].children.push_back(static_cast<int>(f));
+    for (std::size_t k = 0; k < rows_of[up].size(); ++k) offset_in_front[rows_of[up][k]] = row_offset[up][k];
+    for (const int p : structure[last_of[f]]) {
+      const int child_row = front.to_parent.empty() ? 0 : front.to_parent.back().child + front.to_parent.back().size;
+      Segment segment{child_row, offset_in_front[p], sizeAt(p)};
+      if (!front.to_parent.empty() && front.to_parent.back().parent + front.to_parent.back().size == segment.parent)
+        front.to_parent.back().size += segment.size;
+      else
+        front.to_parent.push_back(segment);
+    }
+  }
+  // The stack must also hold a front's update beside its children's while it is assembled.
+  std::size_t largest = 0;
+  for (const std::size_t s : update_size) largest = std::max(largest, s);
+  stack_size_ += largest + kKernelPadding;
+
+  // Where each block of the matrix goes.
+  const auto place = [&](int later, int earlier, std::size_t value_offset, bool diagonal) {
+    const int f = front_of[earlier];
+    const auto offset = [&](int p) {
+      const auto it = std::lower_bound(rows_of[f].begin(), rows_of[f].end(), p);
+      return row_offset[f][it - rows_of[f].begin()];
+    };
+    fronts_[f].entries.push_back({value_offset, offset(later), offset(earlier), sizeAt(later), sizeAt(earlier),
+                                  leading(sizeAt(later)), diagonal});
+  };
+  for (int v = 0; v < n; ++v) place(position_[v], position_[v], diagonal_offset_[v], true);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const int a = position_[pairs[k].first], b = position_[pairs[k].second];
+    place(std::max(a, b), std::min(a, b), pair_offset_[k], false);
+  }
+  front_.assign(front_size_, 0.0);
+  stack_.assign(stack_size_, 0.0);
+  factor_.assign(factor_size_, 0.0);
+  work_.assign(dimension_ + kKernelPadding, 0.0);
+}
+
+}  // namespace vip_slam

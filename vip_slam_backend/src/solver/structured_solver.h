@@ -1,0 +1,62 @@
+// Levenberg-Marquardt that knows the structure of a bundle adjustment: fixed-size blocks, points eliminated while they are
+// linearised, plane factors reduced to small dense blocks, one symbolic factorisation for all iterations.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "point_kernels.h"
+#include "system_structure.h"
+#include "vip_slam_backend/solver/ba_solver.h"
+
+namespace vip_slam {
+
+class StructuredSolver : public BaSolver {
+ public:
+  std::string name() const override { return "structured"; }
+  SolverSummary solve(BaProblem& problem, const SolverOptions& options) override;
+
+  /// For tests: the damped, reduced normal equations and the step at the problem's present state.
+  struct Step {
+    Eigen::VectorXd gradient;      ///< J^T r of poses, motions, planes in node order, before elimination
+    Eigen::VectorXd diagonal;      ///< diag(J^T J) of the same
+    Eigen::VectorXd step;          ///< of the same
+    Eigen::VectorXd point_step;    ///< 3 per point
+  };
+  Step stepAt(const BaProblem& problem, double radius);
+  const SystemStructure& structure() const { return structure_; }
+
+ private:
+  void prepare(const BaProblem& problem);
+  void loadFrames(const BaProblem& problem);
+  double cost(const BaProblem& problem);
+  void linearize(const BaProblem& problem, double radius, int threads);
+  bool solveStep();
+  /// Predicted decrease of the cost by the present step.
+  double modelDecrease() const;
+  struct State {
+    std::vector<BaFrame> frames;
+    std::vector<BaPoint> points;
+    std::vector<BaPlane> planes;
+  };
+  void apply(const BaProblem& from, State* to) const;
+  double stepNorm() const;
+  PointKernelArguments arguments(const BaProblem& problem, double radius);
+
+  // linearize_factors.cpp
+  void linearizeImu(const BaProblem& problem);
+  void linearizePlanes(const BaProblem& problem);
+  void linearizePriors(const BaProblem& problem);
+  double factorCost(const BaProblem& problem) const;
+
+  SystemStructure structure_;
+  std::vector<KernelFrame> frames_;
+  std::vector<FrameGeometry> geometry_;
+  std::vector<Eigen::Matrix<double, 3, 2>> basis_;
+  std::vector<BaObservation> observations_;
+  std::vector<double> points_, values_, gradient_, full_gradient_, diagonal_, damping_, W_, point_inverse_,
+      point_gradient_, point_damping_, step_, point_step_, scratch_;
+  // Second thread's sums.
+  std::vector<double> values2_, gradient2_, full_gradient2_, diagonal2_, scratch2_;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,46 @@
+// Which unknowns a problem has, which pairs of them share a factor, and where their blocks lie: everything about the
+// reduced system that stays the same over iterations, and over calls while the structure stays.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vip_slam_backend/solver/ba_problem.h"
+#include "vip_slam_backend/solver/sparse_cholesky.h"
+
+namespace vip_slam {
+
+/// Where a block between two nodes goes; offset -1: one of them is a constant.
+struct BlockPlace {
+  std::int64_t offset = -1;
+  bool transposed = false;  ///< the block is stored with rows and columns exchanged
+};
+
+class SystemStructure {
+ public:
+  /// Does nothing when the structure is that of the previous call. True when it was analysed anew.
+  bool update(const BaProblem& problem);
+
+  SparseCholesky cholesky;
+  std::vector<int> pose_node, motion_node, plane_node;  ///< -1: constant
+  /// Observations sorted, per point, by the elimination order of their frames (fixed frames first).
+  std::vector<int> sorted, first;
+  std::vector<std::uint32_t> pair_offset;               ///< [earlier * frames + later] pose blocks
+  /// Blocks of the other factors: IMU (pose_i, motion_i, pose_j, motion_j), homographies (pose_i, pose_j, plane).
+  struct ImuPlaces {
+    BlockPlace place[4][4];  ///< [row node][column node], row > column
+  };
+  struct TriplePlaces {
+    BlockPlace ji, pi, pj;   ///< (j, i), (plane, i), (plane, j)
+  };
+  std::vector<ImuPlaces> imu;
+  std::vector<TriplePlaces> homographies, homography_pairs;
+  std::vector<BlockPlace> point_to_plane, plane_points, motion_priors;
+
+ private:
+  std::uint64_t signature(const BaProblem& problem) const;
+  std::uint64_t signature_ = 0;
+  bool valid_ = false;
+};
+
+}  // namespace vip_slam
