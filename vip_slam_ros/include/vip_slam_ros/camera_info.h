@@ -1,0 +1,15 @@
+// Camera calibration as ROS states it <-> the core's intrinsics.
+#pragma once
+
+#include <sensor_msgs/CameraInfo.h>
+
+#include "vip_slam_core/camera/camera_model.h"
+
+namespace vip_slam {
+
+/// Takes plumb_bob, rational_polynomial, equidistant, fisheye and none; an uncalibrated K (fx = 0), a missing size or an
+/// unknown distortion model throws std::invalid_argument naming the field.
+CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info);
+sensor_msgs::CameraInfo toCameraInfo(const CameraIntrinsics& intrinsics);
+
+}  // namespace vip_slam

@@ -1,0 +1,29 @@
+// Geometry: core types <-> geometry_msgs. Exact both ways up to the normalisation of quaternions.
+#pragma once
+
+#include <Eigen/Core>
+#include <geometry_msgs/Point.h>
+#include <geometry_msgs/Pose.h>
+#include <geometry_msgs/Transform.h>
+#include <geometry_msgs/Vector3.h>
+#include <ros/time.h>
+
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam {
+
+geometry_msgs::Point toPointMsg(const Eigen::Vector3d& p);
+geometry_msgs::Vector3 toVectorMsg(const Eigen::Vector3d& v);
+geometry_msgs::Pose toPoseMsg(const SE3& T);
+geometry_msgs::Transform toTransformMsg(const SE3& T);
+
+Eigen::Vector3d fromMsg(const geometry_msgs::Point& p);
+Eigen::Vector3d fromMsg(const geometry_msgs::Vector3& v);
+/// A quaternion of zero length, as an unset message has, becomes the identity.
+SE3 fromMsg(const geometry_msgs::Pose& pose);
+SE3 fromMsg(const geometry_msgs::Transform& transform);
+
+/// Seconds to stamp; stamps that came from toSec() return exactly. Negative and non-finite times become 0.
+ros::Time toStamp(double t);
+
+}  // namespace vip_slam

@@ -1,0 +1,21 @@
+// Images from drivers, recordings and phones to what the front end takes: 8-bit gray, and depth in metres.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+
+namespace vip_slam {
+
+/// 8UC1 of its own memory. Takes mono8, 8UC1, mono16, rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, yuv422, yuv422_yuy2 and 8-bit
+/// Bayer. All decoders throw std::invalid_argument naming the encoding or size found and what was expected.
+cv::Mat decodeGray(const sensor_msgs::Image& image);
+/// JPEG or PNG.
+cv::Mat decodeGray(const sensor_msgs::CompressedImage& image);
+
+/// 32FC1 metres, 0 = invalid. Takes 16UC1 and mono16 (times `scale` metres per unit) and 32FC1 (metres).
+cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale);
+/// 16-bit PNG, bare or behind the 12-byte header of compressedDepth (16UC1, or 32FC1 quantised as inverse depth).
+cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale);
+
+}  // namespace vip_slam

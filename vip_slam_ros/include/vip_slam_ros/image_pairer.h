@@ -1,0 +1,64 @@
+// Joins colour and depth images by their stamps. ROS-free, single owner; the nodelet and the offline runner share it, so
+// that both see the same pairs.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+
+#include <opencv2/core.hpp>
+
+namespace vip_slam {
+
+struct StampedImage {
+  double t = 0;  ///< seconds
+  cv::Mat image;
+};
+
+struct ImagePair {
+  double t = 0;   ///< stamp of gray
+  cv::Mat gray;
+  cv::Mat depth;  ///< empty: none came in time
+};
+
+struct PairerOptions {
+  double tolerance = 0.02;  ///< largest difference between the stamps of a pair, seconds
+  double patience = 0.15;   ///< colour waits for its depth until any image is this much newer, seconds
+  std::size_t capacity = 20;
+};
+
+struct PairerCounters {
+  std::size_t pairs = 0;
+  std::size_t without_depth = 0;  ///< colour images that no depth matched
+  std::size_t unused_depth = 0;
+  std::size_t dropped = 0;        ///< colour images that the queue could not hold
+  std::size_t backward = 0;       ///< images whose stamp was not newer than the one before
+  double skew = 0;                ///< depth stamp - colour stamp of the newest pair, seconds
+};
+
+class ImagePairer {
+ public:
+  explicit ImagePairer(const PairerOptions& options = {}) : options_(options) {}
+
+  /// Images come in the order of their stamps per stream; others are counted and refused (false).
+  bool addColor(double t, cv::Mat gray);
+  bool addDepth(double t, cv::Mat depth);
+
+  /// The oldest colour image once its depth is there, or cannot come any more. Depth matches by the nearest stamp.
+  const ImagePair* front();
+  void pop();
+  void clear();
+
+  /// Stamp of the newest image of either stream.
+  double newest() const;
+  const PairerCounters& counters() const { return counters_; }
+
+ private:
+  PairerOptions options_;
+  std::deque<StampedImage> color_, depth_;
+  std::optional<double> newest_color_, newest_depth_;
+  std::optional<ImagePair> front_;
+  PairerCounters counters_;
+};
+
+}  // namespace vip_slam

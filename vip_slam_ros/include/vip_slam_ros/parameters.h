@@ -1,0 +1,26 @@
+// Option structs from ROS parameters: "group/name" is looked up below the given namespace.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <ros/node_handle.h>
+
+#include "vip_slam_core/util/options.h"
+
+namespace vip_slam {
+
+/// The parameters below `nh`'s namespace that name a known option or lie in a group of one, as
+/// "group/name" -> text. Throws std::invalid_argument naming a parameter that is a list.
+std::vector<std::pair<std::string, std::string>> readParameters(const ros::NodeHandle& nh,
+                                                                const std::vector<OptionRow>& known);
+
+/// Sets the options that have a parameter. Throws std::invalid_argument naming the parameter, its value and what was
+/// expected; a parameter inside one of the options' groups that no option has is an error, with the nearest known name.
+template <class Options>
+void loadOptionsFromParameters(Options& options, const ros::NodeHandle& nh) {
+  setOptions(options, readParameters(nh, listOptions(options)));
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,29 @@
+// Planes: core types <-> messages, without loss.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <vip_slam_msgs/Plane.h>
+#include <vip_slam_msgs/PlaneMap.h>
+#include <vip_slam_msgs/PlaneObservation.h>
+#include <vip_slam_msgs/PlaneUpdate.h>
+
+#include "vip_slam_core/types/plane_map.h"
+
+namespace vip_slam {
+
+vip_slam_msgs::Plane toMsg(const PlaneEstimate& plane);
+vip_slam_msgs::PlaneObservation toMsg(const PlaneObservation& observation);
+vip_slam_msgs::PlaneUpdate toMsg(const PlaneUpdate& update, const std::string& map_frame);
+vip_slam_msgs::PlaneMap toPlaneMapMsg(const std::vector<PlaneEstimate>& planes, double t, std::uint64_t revision,
+                                      const std::string& map_frame);
+
+/// All throw std::invalid_argument naming the field when a message contradicts itself (a kind that does not exist, a
+/// normal of zero length, points that do not come in fours).
+PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg);
+PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg);
+PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg);
+std::vector<PlaneEstimate> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes);
+
+}  // namespace vip_slam

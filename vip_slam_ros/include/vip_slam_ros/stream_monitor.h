@@ -1,0 +1,45 @@
+// Watches the stamps of one input topic: measured rate, gaps, repetitions, backward steps, silence.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <mutex>
+#include <string>
+
+namespace vip_slam {
+
+class StreamMonitor {
+ public:
+  /// `nominal_rate` in Hz; a step longer than `gap_factor` nominal periods counts as a gap. 0: rate unknown, no gaps.
+  StreamMonitor(std::string topic, double nominal_rate, double gap_factor = 2.5);
+
+  enum class Step { kGood, kGap, kRepeated, kBackward };
+  /// `t`: header stamp, `arrival`: when it came (same clock), seconds. Thread-safe, as all of this class.
+  Step add(double t, double arrival);
+  void reject(const std::string& why);  ///< a message that could not be used
+
+  struct Report {
+    std::string topic;
+    std::size_t messages = 0, gaps = 0, repeated = 0, backward = 0, rejected = 0;
+    std::string last_rejection;
+    double nominal_rate = 0;
+    double rate = 0;         ///< Hz over the last seconds of stamps
+    double largest_gap = 0;  ///< seconds
+    double delay = 0;        ///< arrival - stamp of the newest message, seconds
+    double newest = 0;       ///< stamp, seconds
+    double last_arrival = 0;
+  };
+  Report report() const;
+  /// One sentence on what is wrong at time `now` ("topic /x: ..."); empty when nothing is.
+  std::string complaint(double now) const;
+  /// After time ran backwards: the next stamp may be anything.
+  void restart();
+
+ private:
+  const double gap_seconds_;
+  mutable std::mutex mutex_;
+  Report report_;
+  std::deque<double> stamps_;
+};
+
+}  // namespace vip_slam

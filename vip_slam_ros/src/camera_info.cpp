@@ -1,0 +1,48 @@
+#include "vip_slam_ros/camera_info.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace vip_slam {
+
+CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info) {
+  CameraIntrinsics intrinsics;
+  intrinsics.width = int(info.width);
+  intrinsics.height = int(info.height);
+  intrinsics.fx = info.K[0];
+  intrinsics.cx = info.K[2];
+  intrinsics.fy = info.K[4];
+  intrinsics.cy = info.K[5];
+  const bool straight = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
+  try {
+    // Drivers of rectified images leave the model empty, or name one with coefficients that are all zero.
+    intrinsics.model = straight ? DistortionModel::kNone : distortionModelFromName(info.distortion_model);
+  } catch (const std::exception& error) {
+    throw std::invalid_argument(std::string("camera_info.distortion_model: ") + error.what());
+  }
+  if (!straight) intrinsics.distortion.assign(info.D.begin(), info.D.end());
+  const std::string wrong = intrinsics.validate();
+  if (!wrong.empty()) throw std::invalid_argument("camera_info: " + wrong);
+  return intrinsics;
+}
+
+sensor_msgs::CameraInfo toCameraInfo(const CameraIntrinsics& intrinsics) {
+  sensor_msgs::CameraInfo info;
+  info.width = std::uint32_t(intrinsics.width);
+  info.height = std::uint32_t(intrinsics.height);
+  switch (intrinsics.model) {
+    case DistortionModel::kNone: info.distortion_model = "plumb_bob"; break;
+    case DistortionModel::kRadTan:
+      info.distortion_model = intrinsics.distortion.size() > 5 ? "rational_polynomial" : "plumb_bob";
+      break;
+    case DistortionModel::kEquidistant: info.distortion_model = "equidistant"; break;
+  }
+  info.D.assign(intrinsics.distortion.begin(), intrinsics.distortion.end());
+  if (intrinsics.model != DistortionModel::kEquidistant) info.D.resize(std::max<std::size_t>(5, info.D.size()), 0.0);
+  info.K = {intrinsics.fx, 0, intrinsics.cx, 0, intrinsics.fy, intrinsics.cy, 0, 0, 1};
+  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.P = {intrinsics.fx, 0, intrinsics.cx, 0, 0, intrinsics.fy, intrinsics.cy, 0, 0, 0, 1, 0};
+  return info;
+}
+
+}  // namespace vip_slam

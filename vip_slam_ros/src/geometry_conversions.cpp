@@ -1,0 +1,68 @@
+#include "vip_slam_ros/geometry_conversions.h"
+
+#include <cmath>
+
+namespace vip_slam {
+namespace {
+
+SE3 makeTransform(double qw, double qx, double qy, double qz, const Eigen::Vector3d& t) {
+  const Eigen::Quaterniond q(qw, qx, qy, qz);
+  return SE3(q.squaredNorm() > 0 ? q : Eigen::Quaterniond::Identity(), t);
+}
+
+template <class Message>
+void setQuaternion(const SE3& T, Message& q) {
+  q.w = T.rotation().w();
+  q.x = T.rotation().x();
+  q.y = T.rotation().y();
+  q.z = T.rotation().z();
+}
+
+}  // namespace
+
+geometry_msgs::Point toPointMsg(const Eigen::Vector3d& p) {
+  geometry_msgs::Point msg;
+  msg.x = p.x();
+  msg.y = p.y();
+  msg.z = p.z();
+  return msg;
+}
+
+geometry_msgs::Vector3 toVectorMsg(const Eigen::Vector3d& v) {
+  geometry_msgs::Vector3 msg;
+  msg.x = v.x();
+  msg.y = v.y();
+  msg.z = v.z();
+  return msg;
+}
+
+geometry_msgs::Pose toPoseMsg(const SE3& T) {
+  geometry_msgs::Pose msg;
+  msg.position = toPointMsg(T.t());
+  setQuaternion(T, msg.orientation);
+  return msg;
+}
+
+geometry_msgs::Transform toTransformMsg(const SE3& T) {
+  geometry_msgs::Transform msg;
+  msg.translation = toVectorMsg(T.t());
+  setQuaternion(T, msg.rotation);
+  return msg;
+}
+
+Eigen::Vector3d fromMsg(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
+Eigen::Vector3d fromMsg(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.z}; }
+
+SE3 fromMsg(const geometry_msgs::Pose& pose) {
+  const auto& q = pose.orientation;
+  return makeTransform(q.w, q.x, q.y, q.z, fromMsg(pose.position));
+}
+
+SE3 fromMsg(const geometry_msgs::Transform& transform) {
+  const auto& q = transform.rotation;
+  return makeTransform(q.w, q.x, q.y, q.z, fromMsg(transform.translation));
+}
+
+ros::Time toStamp(double t) { return std::isfinite(t) && t > 0 ? ros::Time(t) : ros::Time(); }
+
+}  // namespace vip_slam

@@ -1,0 +1,84 @@
+#include "vip_slam_ros/image_pairer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace vip_slam {
+
+bool ImagePairer::addColor(double t, cv::Mat gray) {
+  if (!std::isfinite(t) || (newest_color_ && t <= *newest_color_)) {
+    ++counters_.backward;
+    return false;
+  }
+  newest_color_ = t;
+  color_.push_back({t, std::move(gray)});
+  if (color_.size() > options_.capacity) {
+    color_.pop_front();
+    ++counters_.dropped;
+  }
+  return true;
+}
+
+bool ImagePairer::addDepth(double t, cv::Mat depth) {
+  if (!std::isfinite(t) || (newest_depth_ && t <= *newest_depth_)) {
+    ++counters_.backward;
+    return false;
+  }
+  newest_depth_ = t;
+  depth_.push_back({t, std::move(depth)});
+  if (depth_.size() > options_.capacity) {
+    depth_.pop_front();
+    ++counters_.unused_depth;
+  }
+  return true;
+}
+
+double ImagePairer::newest() const {
+  return std::max(newest_color_.value_or(-1e300), newest_depth_.value_or(-1e300));
+}
+
+const ImagePair* ImagePairer::front() {
+  if (front_) return &*front_;
+  if (color_.empty()) return nullptr;
+  const double t = color_.front().t;
+  while (!depth_.empty() && depth_.front().t < t - options_.tolerance) {
+    depth_.pop_front();
+    ++counters_.unused_depth;
+  }
+  // The nearest depth image is known once one at or after t is there; an exact match needs no waiting.
+  const auto after = std::find_if(depth_.begin(), depth_.end(), [t](const StampedImage& d) { return d.t >= t; });
+  auto best = depth_.end();
+  if (after != depth_.end() && after->t <= t + options_.tolerance) best = after;
+  if (after != depth_.begin()) {
+    const auto before = std::prev(after);
+    if (best == depth_.end() || t - before->t < best->t - t) best = before;
+  }
+  const bool decided = after != depth_.end() || newest() - t > options_.patience;
+  if (!decided) return nullptr;
+
+  front_ = ImagePair{t, std::move(color_.front().image), {}};
+  color_.pop_front();
+  if (best == depth_.end()) {
+    ++counters_.without_depth;
+  } else {
+    counters_.skew = best->t - t;
+    counters_.unused_depth += std::size_t(best - depth_.begin());
+    front_->depth = std::move(best->image);
+    depth_.erase(depth_.begin(), best + 1);
+    ++counters_.pairs;
+  }
+  return &*front_;
+}
+
+void ImagePairer::pop() { front_.reset(); }
+
+void ImagePairer::clear() {
+  color_.clear();
+  depth_.clear();
+  newest_color_.reset();
+  newest_depth_.reset();
+  front_.reset();
+}
+
+}  // namespace vip_slam

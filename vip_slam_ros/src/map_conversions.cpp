@@ -1,0 +1,126 @@
+#include "vip_slam_ros/map_conversions.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "vip_slam_ros/frame_conversions.h"
+#include "vip_slam_ros/geometry_conversions.h"
+
+namespace vip_slam {
+namespace {
+
+vip_slam_msgs::LandmarkEstimate toLandmarkMsg(const LandmarkEstimate& landmark) {
+  vip_slam_msgs::LandmarkEstimate msg;
+  msg.id = landmark.id;
+  msg.position = toPointMsg(landmark.p_W);
+  msg.observations = landmark.observations;
+  msg.plane = landmark.plane;
+  std::copy(landmark.descriptor.begin(), landmark.descriptor.end(), msg.descriptor.begin());
+  return msg;
+}
+
+LandmarkEstimate fromLandmarkMsg(const vip_slam_msgs::LandmarkEstimate& msg) {
+  LandmarkEstimate landmark;
+  landmark.id = msg.id;
+  landmark.p_W = fromMsg(msg.position);
+  landmark.observations = msg.observations;
+  landmark.plane = msg.plane;
+  std::copy(msg.descriptor.begin(), msg.descriptor.end(), landmark.descriptor.begin());
+  return landmark;
+}
+
+std::pair<PlaneId, Plane> fromPlaneMsg(const vip_slam_msgs::PlaneCoefficients& msg) {
+  Plane plane;
+  // Assigned rather than normalised anew, so that a round trip changes no bit.
+  plane.n = fromMsg(msg.normal);
+  plane.d = msg.distance;
+  if (std::abs(plane.n.norm() - 1.0) > 1e-6) {
+    throw std::invalid_argument("MapUpdate: plane " + std::to_string(msg.id) + ": normal of length " +
+                                std::to_string(plane.n.norm()) + ", expected 1");
+  }
+  return {msg.id, plane};
+}
+
+}  // namespace
+
+vip_slam_msgs::LoopEvent toMsg(const LoopEvent& loop) {
+  vip_slam_msgs::LoopEvent msg;
+  msg.t = loop.t;
+  msg.query = loop.query;
+  msg.match = loop.match;
+  msg.accepted = loop.accepted;
+  msg.reason = loop.reason;
+  msg.inliers = loop.inliers;
+  msg.match_query = toPoseMsg(loop.T_match_query);
+  return msg;
+}
+
+LoopEvent fromMsg(const vip_slam_msgs::LoopEvent& msg) {
+  LoopEvent loop;
+  loop.t = msg.t;
+  loop.query = msg.query;
+  loop.match = msg.match;
+  loop.accepted = msg.accepted;
+  loop.reason = msg.reason;
+  loop.inliers = msg.inliers;
+  loop.T_match_query = fromMsg(msg.match_query);
+  return loop;
+}
+
+vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_frame) {
+  vip_slam_msgs::MapUpdate msg;
+  msg.header.stamp = toStamp(update.t);
+  msg.header.frame_id = map_frame;
+  msg.revision = update.revision;
+  msg.epoch = update.epoch;
+  msg.map_odom = toPoseMsg(update.T_map_odom);
+  msg.newest_keyframe = update.newest_keyframe;
+  msg.global_update = update.global;
+  msg.keyframes.reserve(update.keyframes.size());
+  for (const auto& keyframe : update.keyframes) {
+    vip_slam_msgs::KeyframeEstimate k;
+    k.id = keyframe.id;
+    k.state = toMsg(keyframe.state);
+    msg.keyframes.push_back(k);
+  }
+  msg.landmarks.reserve(update.landmarks.size());
+  for (const auto& landmark : update.landmarks) msg.landmarks.push_back(toLandmarkMsg(landmark));
+  for (const auto& [id, plane] : update.planes) {
+    vip_slam_msgs::PlaneCoefficients p;
+    p.id = id;
+    p.normal = toVectorMsg(plane.n);
+    p.distance = plane.d;
+    msg.planes.push_back(p);
+  }
+  msg.removed_keyframes = update.removed_keyframes;
+  msg.removed_landmarks = update.removed_landmarks;
+  for (const auto& [from, into] : update.merged_landmarks) {
+    vip_slam_msgs::LandmarkMerge merge;
+    merge.from = from;
+    merge.into = into;
+    msg.merged_landmarks.push_back(merge);
+  }
+  for (const auto& loop : update.loops) msg.loops.push_back(toMsg(loop));
+  return msg;
+}
+
+MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
+  MapUpdate update;
+  update.t = msg.header.stamp.toSec();
+  update.revision = msg.revision;
+  update.epoch = msg.epoch;
+  update.T_map_odom = fromMsg(msg.map_odom);
+  update.newest_keyframe = msg.newest_keyframe;
+  update.global = msg.global_update;
+  for (const auto& keyframe : msg.keyframes) update.keyframes.push_back({keyframe.id, fromMsg(keyframe.state)});
+  update.landmarks.reserve(msg.landmarks.size());
+  for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));
+  for (const auto& plane : msg.planes) update.planes.push_back(fromPlaneMsg(plane));
+  update.removed_keyframes = msg.removed_keyframes;
+  update.removed_landmarks = msg.removed_landmarks;
+  for (const auto& merge : msg.merged_landmarks) update.merged_landmarks.emplace_back(merge.from, merge.into);
+  for (const auto& loop : msg.loops) update.loops.push_back(fromMsg(loop));
+  return update;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,97 @@
+#include "vip_slam_ros/owner_thread.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <memory>
+
+namespace vip_slam {
+
+OwnerThread::OwnerThread(ErrorHandler on_error) : on_error_(std::move(on_error)) {}
+
+OwnerThread::~OwnerThread() { stop(); }
+
+OwnerThread::Lane OwnerThread::addLane(const std::string& name, std::size_t capacity) {
+  lanes_.push_back({name, 0, std::max<std::size_t>(1, capacity), 0});
+  return lanes_.size() - 1;
+}
+
+void OwnerThread::start() {
+  thread_ = std::thread([this] { loop(); });
+}
+
+void OwnerThread::stop() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+    tasks_.clear();
+    ready_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+bool OwnerThread::post(Lane lane, std::function<void()> task) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (stopping_) return false;
+  LaneState& state = lanes_.at(lane);
+  const bool full = state.waiting >= state.capacity;
+  if (full) {
+    tasks_.erase(std::find_if(tasks_.begin(), tasks_.end(), [lane](const Task& t) { return t.lane == lane; }));
+    ++state.dropped;
+  } else {
+    ++state.waiting;
+  }
+  tasks_.push_back({lane, std::move(task)});
+  ready_.notify_one();
+  return !full;
+}
+
+bool OwnerThread::call(Lane lane, std::function<void()> task, double seconds) {
+  // 0: waiting, 1: begun, 2: given up; whoever moves it away from 0 decides.
+  auto phase = std::make_shared<std::atomic<int>>(0);
+  auto done = std::make_shared<std::promise<void>>();
+  std::future<void> finished = done->get_future();
+  post(lane, [phase, done, task = std::move(task)] {
+    int expected = 0;
+    if (!phase->compare_exchange_strong(expected, 1)) return;
+    try {
+      task();
+      done->set_value();
+    } catch (...) {
+      done->set_exception(std::current_exception());
+    }
+  });
+  if (finished.wait_for(std::chrono::duration<double>(seconds)) != std::future_status::ready) {
+    int expected = 0;
+    if (phase->compare_exchange_strong(expected, 2)) return false;
+  }
+  finished.get();
+  return true;
+}
+
+std::vector<OwnerThread::LaneState> OwnerThread::lanes() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return lanes_;
+}
+
+void OwnerThread::loop() {
+  for (;;) {
+    Task task;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      ready_.wait(lock, [this] { return stopping_ || !tasks_.empty(); });
+      if (stopping_) return;
+      task = std::move(tasks_.front());
+      tasks_.pop_front();
+      --lanes_[task.lane].waiting;
+    }
+    try {
+      task.run();
+    } catch (const std::exception& error) {
+      on_error_(error.what());
+    }
+  }
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,53 @@
+#include "vip_slam_ros/parameters.h"
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+namespace vip_slam {
+namespace {
+
+std::string toText(const std::string& name, XmlRpc::XmlRpcValue& value) {
+  switch (value.getType()) {
+    case XmlRpc::XmlRpcValue::TypeBoolean: return static_cast<bool>(value) ? "true" : "false";
+    case XmlRpc::XmlRpcValue::TypeInt: return std::to_string(static_cast<int>(value));
+    case XmlRpc::XmlRpcValue::TypeString: return static_cast<std::string>(value);
+    case XmlRpc::XmlRpcValue::TypeDouble: {
+      std::ostringstream text;
+      text.precision(17);
+      text << static_cast<double>(value);
+      return text.str();
+    }
+    default: throw std::invalid_argument("parameter " + name + ": a list, expected a single value");
+  }
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> readParameters(const ros::NodeHandle& nh,
+                                                                const std::vector<OptionRow>& known) {
+  std::set<std::string> names, groups;
+  for (const auto& row : known) {
+    names.insert(row.name);
+    const auto slash = row.name.find('/');
+    if (slash != std::string::npos) groups.insert(row.name.substr(0, slash + 1));
+  }
+  std::vector<std::string> all;
+  nh.getParamNames(all);
+  const std::string prefix = nh.getNamespace() == "/" ? "/" : nh.getNamespace() + "/";
+  std::vector<std::pair<std::string, std::string>> values;
+  for (const std::string& path : all) {
+    if (path.compare(0, prefix.size(), prefix) != 0) continue;
+    const std::string name = path.substr(prefix.size());
+    const bool ours = names.count(name) > 0 || std::any_of(groups.begin(), groups.end(), [&](const std::string& g) {
+                        return name.compare(0, g.size(), g) == 0;
+                      });
+    XmlRpc::XmlRpcValue value;
+    if (ours && nh.getParam(path, value)) values.emplace_back(name, toText(path, value));
+  }
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+}  // namespace vip_slam

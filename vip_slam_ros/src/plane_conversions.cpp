@@ -1,0 +1,153 @@
+#include "vip_slam_ros/plane_conversions.h"
+
+#include <stdexcept>
+
+#include "vip_slam_ros/geometry_conversions.h"
+
+namespace vip_slam {
+namespace {
+
+vip_slam_msgs::Ring toRingMsg(const Ring& ring) {
+  vip_slam_msgs::Ring msg;
+  msg.points.reserve(ring.size());
+  for (const auto& p : ring) msg.points.push_back(toPointMsg(p));
+  return msg;
+}
+
+Ring fromRingMsg(const vip_slam_msgs::Ring& msg) {
+  Ring ring;
+  ring.reserve(msg.points.size());
+  for (const auto& p : msg.points) ring.push_back(fromMsg(p));
+  return ring;
+}
+
+}  // namespace
+
+vip_slam_msgs::Plane toMsg(const PlaneEstimate& plane) {
+  vip_slam_msgs::Plane msg;
+  msg.id = plane.id;
+  msg.kind = static_cast<std::uint8_t>(plane.kind);
+  msg.normal = toVectorMsg(plane.plane.n);
+  msg.distance = plane.plane.d;
+  for (const auto& polygon : plane.polygons) {
+    vip_slam_msgs::PlanePolygon piece;
+    piece.outer = toRingMsg(polygon.outer);
+    for (const auto& hole : polygon.holes) piece.holes.push_back(toRingMsg(hole));
+    msg.polygons.push_back(std::move(piece));
+  }
+  msg.area = plane.area;
+  msg.keyframes = plane.keyframes;
+  return msg;
+}
+
+PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg) {
+  const std::string name = "Plane " + std::to_string(msg.id) + ".";
+  if (msg.kind > vip_slam_msgs::Plane::GENERAL) {
+    throw std::invalid_argument(name + "kind: " + std::to_string(msg.kind) + ", expected 0 to 2");
+  }
+  PlaneEstimate plane;
+  plane.id = msg.id;
+  plane.kind = static_cast<PlaneKind>(msg.kind);
+  // Assigned rather than normalised anew, so that a round trip changes no bit.
+  plane.plane.n = fromMsg(msg.normal);
+  plane.plane.d = msg.distance;
+  if (std::abs(plane.plane.n.norm() - 1.0) > 1e-6) {
+    throw std::invalid_argument(name + "normal: length " + std::to_string(plane.plane.n.norm()) + ", expected 1");
+  }
+  for (const auto& piece : msg.polygons) {
+    PlanePolygon polygon;
+    polygon.outer = fromRingMsg(piece.outer);
+    for (const auto& hole : piece.holes) polygon.holes.push_back(fromRingMsg(hole));
+    plane.polygons.push_back(std::move(polygon));
+  }
+  plane.area = msg.area;
+  plane.keyframes = msg.keyframes;
+  return plane;
+}
+
+std::vector<PlaneEstimate> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes) {
+  std::vector<PlaneEstimate> result;
+  result.reserve(planes.size());
+  for (const auto& plane : planes) result.push_back(fromMsg(plane));
+  return result;
+}
+
+vip_slam_msgs::PlaneObservation toMsg(const PlaneObservation& observation) {
+  vip_slam_msgs::PlaneObservation msg;
+  msg.keyframe = observation.keyframe;
+  msg.plane = observation.plane;
+  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(msg.g.data()) = observation.G;
+  msg.weight_scale = observation.weight_scale;
+  msg.points.reserve(4 * observation.points.size());
+  for (const auto& point : observation.points) {
+    msg.points.insert(msg.points.end(), {point.p_C.x(), point.p_C.y(), point.p_C.z(), point.sigma});
+  }
+  return msg;
+}
+
+PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg) {
+  if (msg.points.size() % 4 != 0) {
+    throw std::invalid_argument("PlaneObservation.points: " + std::to_string(msg.points.size()) +
+                                " values, expected four per point");
+  }
+  PlaneObservation observation;
+  observation.keyframe = msg.keyframe;
+  observation.plane = msg.plane;
+  observation.G = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(msg.g.data());
+  observation.weight_scale = msg.weight_scale;
+  observation.points.reserve(msg.points.size() / 4);
+  for (std::size_t i = 0; i < msg.points.size(); i += 4) {
+    observation.points.push_back({{msg.points[i], msg.points[i + 1], msg.points[i + 2]}, msg.points[i + 3]});
+  }
+  return observation;
+}
+
+vip_slam_msgs::PlaneUpdate toMsg(const PlaneUpdate& update, const std::string& map_frame) {
+  vip_slam_msgs::PlaneUpdate msg;
+  msg.header.stamp = toStamp(update.t);
+  msg.header.frame_id = map_frame;
+  msg.revision = update.revision;
+  for (const auto& merge : update.merges) {
+    vip_slam_msgs::PlaneMerge m;
+    m.from = merge.from;
+    m.into = merge.into;
+    msg.merges.push_back(m);
+  }
+  msg.removed = update.removed;
+  for (const auto& plane : update.planes) msg.planes.push_back(toMsg(plane));
+  for (const auto& observation : update.observations) msg.observations.push_back(toMsg(observation));
+  for (const auto& [landmark, plane] : update.associated) {
+    vip_slam_msgs::LandmarkPlane pair;
+    pair.landmark = landmark;
+    pair.plane = plane;
+    msg.associated.push_back(pair);
+  }
+  msg.dissociated = update.dissociated;
+  return msg;
+}
+
+PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg) {
+  PlaneUpdate update;
+  update.t = msg.header.stamp.toSec();
+  update.revision = msg.revision;
+  for (const auto& merge : msg.merges) update.merges.push_back({merge.from, merge.into});
+  update.removed = msg.removed;
+  update.planes = fromMsg(msg.planes);
+  update.observations.reserve(msg.observations.size());
+  for (const auto& observation : msg.observations) update.observations.push_back(fromMsg(observation));
+  for (const auto& pair : msg.associated) update.associated.emplace_back(pair.landmark, pair.plane);
+  update.dissociated = msg.dissociated;
+  return update;
+}
+
+vip_slam_msgs::PlaneMap toPlaneMapMsg(const std::vector<PlaneEstimate>& planes, double t, std::uint64_t revision,
+                                      const std::string& map_frame) {
+  vip_slam_msgs::PlaneMap msg;
+  msg.header.stamp = toStamp(t);
+  msg.header.frame_id = map_frame;
+  msg.revision = revision;
+  for (const auto& plane : planes) msg.planes.push_back(toMsg(plane));
+  return msg;
+}
+
+}  // namespace vip_slam

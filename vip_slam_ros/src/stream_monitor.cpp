@@ -1,0 +1,86 @@
+#include "vip_slam_ros/stream_monitor.h"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kWindow = 100;  // stamps over which the rate is measured
+
+std::string format(const char* pattern, double a, double b) {
+  char text[160];
+  std::snprintf(text, sizeof text, pattern, a, b);
+  return text;
+}
+
+}  // namespace
+
+StreamMonitor::StreamMonitor(std::string topic, double nominal_rate, double gap_factor)
+    : gap_seconds_(nominal_rate > 0 ? gap_factor / nominal_rate : 0) {
+  report_.topic = std::move(topic);
+  report_.nominal_rate = nominal_rate;
+}
+
+StreamMonitor::Step StreamMonitor::add(double t, double arrival) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  ++report_.messages;
+  report_.delay = arrival - t;
+  report_.last_arrival = arrival;
+  Step step = Step::kGood;
+  if (!stamps_.empty()) {
+    const double dt = t - stamps_.back();
+    if (dt == 0) {
+      ++report_.repeated;
+      return Step::kRepeated;
+    }
+    if (dt < 0) {
+      ++report_.backward;
+      return Step::kBackward;
+    }
+    if (gap_seconds_ > 0 && dt > gap_seconds_) {
+      ++report_.gaps;
+      report_.largest_gap = std::max(report_.largest_gap, dt);
+      step = Step::kGap;
+    }
+  }
+  report_.newest = t;
+  stamps_.push_back(t);
+  if (stamps_.size() > kWindow) stamps_.pop_front();
+  return step;
+}
+
+void StreamMonitor::reject(const std::string& why) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  ++report_.rejected;
+  report_.last_rejection = why;
+}
+
+StreamMonitor::Report StreamMonitor::report() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  Report report = report_;
+  if (stamps_.size() > 1 && stamps_.back() > stamps_.front()) {
+    report.rate = double(stamps_.size() - 1) / (stamps_.back() - stamps_.front());
+  }
+  return report;
+}
+
+std::string StreamMonitor::complaint(double now) const {
+  const Report r = report();
+  const std::string topic = "topic " + r.topic + ": ";
+  if (r.messages == 0 && r.rejected == 0) return topic + "no message so far; is the name right, and the driver running?";
+  if (r.rejected > 0 && r.messages <= r.rejected) return topic + r.last_rejection;
+  const double silence = now - r.last_arrival;
+  if (silence > 2.0) return topic + format("silent for %.1f s", silence, 0);
+  if (r.nominal_rate > 0 && r.rate > 0 && r.rate < 0.7 * r.nominal_rate) {
+    return topic + format("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
+  }
+  return "";
+}
+
+void StreamMonitor::restart() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  stamps_.clear();
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,325 @@
+// Core types survive the way through messages and through serialisation unchanged.
+#include <random>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+#include <ros/serialization.h>
+
+#include "vip_slam_ros/camera_info.h"
+#include "vip_slam_ros/frame_conversions.h"
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/map_conversions.h"
+#include "vip_slam_ros/plane_conversions.h"
+
+namespace vip_slam {
+namespace {
+
+/// Through bytes, as a message takes that leaves the process.
+template <class Message>
+Message throughBytes(const Message& message) {
+  const ros::SerializedMessage bytes = ros::serialization::serializeMessage(message);
+  ros::serialization::IStream stream(bytes.message_start, std::uint32_t(bytes.num_bytes - 4));
+  Message result;
+  ros::serialization::deserialize(stream, result);
+  return result;
+}
+
+class Conversions : public ::testing::Test {
+ protected:
+  double number() { return std::uniform_real_distribution<double>(-5, 5)(random_); }
+  Eigen::Vector3d vector() { return {number(), number(), number()}; }
+  SE3 pose() { return SE3(expQuaternion(vector()), vector()); }
+
+  NavState state() {
+    NavState s;
+    s.t = 1e9 + 0.123456789123;
+    s.T_W_I = pose();
+    s.v_W = vector();
+    s.bias_gyro = vector();
+    s.bias_accel = vector();
+    return s;
+  }
+  Feature feature() {
+    Feature f;
+    f.id = LandmarkId(random_()) - (LandmarkId(1) << 31);
+    f.pixel = vector().head<2>().cast<float>();
+    f.xy = vector().head<2>().cast<float>();
+    f.depth = float(number());
+    f.depth_sigma = float(number());
+    f.angle = float(number());
+    f.octave = std::uint8_t(random_() % 8);
+    f.age = random_();
+    for (auto& byte : f.descriptor) byte = std::uint8_t(random_());
+    return f;
+  }
+  TrackedFrame frame() {
+    TrackedFrame f;
+    f.t = ros::Time(1600000000, 123456789).toSec();
+    f.epoch = 3;
+    f.status = {TrackingState::kDegraded, "no depth"};
+    f.state = state();
+    f.covariance.setRandom();
+    f.T_I_C = pose();
+    f.time_offset = number();
+    for (int i = 0; i < 5; ++i) f.features.push_back(feature());
+    f.depth_grid.stride = 16;
+    f.depth_grid.offset = 8;
+    f.depth_grid.cols = 3;
+    f.depth_grid.rows = 2;
+    f.depth_grid.z = {1, 2, 0, 4, 5.5f, 6};
+    f.zero_velocity = true;
+    f.keyframe = 17;
+    return f;
+  }
+  PlaneEstimate plane(PlaneId id) {
+    PlaneEstimate p;
+    p.id = id;
+    p.kind = PlaneKind::kVertical;
+    p.plane = Plane(vector(), number());
+    p.polygons.resize(2);
+    p.polygons[0].outer = {vector(), vector(), vector()};
+    p.polygons[0].holes = {{vector(), vector(), vector()}};
+    p.polygons[1].outer = {vector(), vector(), vector(), vector()};
+    p.area = 2.5;
+    p.keyframes = 9;
+    return p;
+  }
+
+  std::mt19937 random_{7};
+};
+
+void expectSame(const SE3& a, const SE3& b) {
+  EXPECT_EQ(a.t(), b.t());
+  EXPECT_LT((a.rotation().coeffs() - b.rotation().coeffs()).norm(), 1e-15);
+}
+
+void expectSame(const NavState& a, const NavState& b) {
+  EXPECT_EQ(a.t, b.t);
+  expectSame(a.T_W_I, b.T_W_I);
+  EXPECT_EQ(a.v_W, b.v_W);
+  EXPECT_EQ(a.bias_gyro, b.bias_gyro);
+  EXPECT_EQ(a.bias_accel, b.bias_accel);
+}
+
+void expectSame(const TrackedFrame& a, const TrackedFrame& b) {
+  EXPECT_EQ(a.t, b.t);
+  EXPECT_EQ(a.epoch, b.epoch);
+  EXPECT_EQ(a.status.state, b.status.state);
+  EXPECT_EQ(a.status.reason, b.status.reason);
+  expectSame(a.state, b.state);
+  EXPECT_EQ(a.covariance, b.covariance);
+  expectSame(a.T_I_C, b.T_I_C);
+  EXPECT_EQ(a.time_offset, b.time_offset);
+  ASSERT_EQ(a.features.size(), b.features.size());
+  for (std::size_t i = 0; i < a.features.size(); ++i) {
+    const Feature &f = a.features[i], &g = b.features[i];
+    EXPECT_EQ(f.id, g.id);
+    EXPECT_EQ(f.pixel, g.pixel);
+    EXPECT_EQ(f.xy, g.xy);
+    EXPECT_EQ(f.depth, g.depth);
+    EXPECT_EQ(f.depth_sigma, g.depth_sigma);
+    EXPECT_EQ(f.angle, g.angle);
+    EXPECT_EQ(f.octave, g.octave);
+    EXPECT_EQ(f.age, g.age);
+    EXPECT_EQ(f.descriptor, g.descriptor);
+  }
+  EXPECT_EQ(a.depth_grid.stride, b.depth_grid.stride);
+  EXPECT_EQ(a.depth_grid.offset, b.depth_grid.offset);
+  EXPECT_EQ(a.depth_grid.cols, b.depth_grid.cols);
+  EXPECT_EQ(a.depth_grid.rows, b.depth_grid.rows);
+  EXPECT_EQ(a.depth_grid.z, b.depth_grid.z);
+  EXPECT_EQ(a.zero_velocity, b.zero_velocity);
+  EXPECT_EQ(a.keyframe, b.keyframe);
+}
+
+void expectSame(const PlaneEstimate& a, const PlaneEstimate& b) {
+  EXPECT_EQ(a.id, b.id);
+  EXPECT_EQ(a.kind, b.kind);
+  EXPECT_EQ(a.plane.coefficients(), b.plane.coefficients());
+  ASSERT_EQ(a.polygons.size(), b.polygons.size());
+  for (std::size_t i = 0; i < a.polygons.size(); ++i) {
+    EXPECT_EQ(a.polygons[i].outer, b.polygons[i].outer);
+    EXPECT_EQ(a.polygons[i].holes, b.polygons[i].holes);
+  }
+  EXPECT_EQ(a.area, b.area);
+  EXPECT_EQ(a.keyframes, b.keyframes);
+}
+
+TEST_F(Conversions, KeyframeIsUnchanged) {
+  Keyframe keyframe;
+  keyframe.id = 18;
+  keyframe.frame = frame();
+  keyframe.previous = 17;
+  for (int i = 0; i < 4; ++i) keyframe.imu.push_back({1e9 + 0.1 * i, vector(), vector()});
+  const Keyframe back = fromMsg(throughBytes(toMsg(keyframe, "odom")));
+  EXPECT_EQ(back.id, keyframe.id);
+  EXPECT_EQ(back.previous, keyframe.previous);
+  expectSame(back.frame, keyframe.frame);
+  ASSERT_EQ(back.imu.size(), keyframe.imu.size());
+  for (std::size_t i = 0; i < back.imu.size(); ++i) {
+    EXPECT_EQ(back.imu[i].t, keyframe.imu[i].t);
+    EXPECT_EQ(back.imu[i].gyro, keyframe.imu[i].gyro);
+    EXPECT_EQ(back.imu[i].accel, keyframe.imu[i].accel);
+  }
+}
+
+TEST_F(Conversions, PlaneUpdateIsUnchanged) {
+  PlaneUpdate update;
+  update.revision = 5;
+  update.t = ros::Time(1600000000, 987654321).toSec();
+  update.merges = {{4, 2}};
+  update.removed = {7};
+  update.planes = {plane(1), plane(2)};
+  PlaneObservation observation;
+  observation.keyframe = 3;
+  observation.plane = 2;
+  observation.G.setRandom();
+  observation.weight_scale = 0.25;
+  observation.points = {{{1, 2, 3}, 0.01f}, {{4, 5, 6}, 0.02f}};
+  update.observations = {observation};
+  update.associated = {{11, 2}, {12, 1}};
+  update.dissociated = {13};
+  const PlaneUpdate back = fromMsg(throughBytes(toMsg(update, "map")));
+  EXPECT_EQ(back.revision, update.revision);
+  EXPECT_EQ(back.t, update.t);
+  ASSERT_EQ(back.merges.size(), 1u);
+  EXPECT_EQ(back.merges[0].from, 4u);
+  EXPECT_EQ(back.merges[0].into, 2u);
+  EXPECT_EQ(back.removed, update.removed);
+  ASSERT_EQ(back.planes.size(), 2u);
+  for (int i = 0; i < 2; ++i) expectSame(back.planes[i], update.planes[i]);
+  ASSERT_EQ(back.observations.size(), 1u);
+  EXPECT_EQ(back.observations[0].keyframe, 3u);
+  EXPECT_EQ(back.observations[0].plane, 2u);
+  EXPECT_EQ(back.observations[0].G, observation.G);
+  EXPECT_EQ(back.observations[0].weight_scale, 0.25);
+  ASSERT_EQ(back.observations[0].points.size(), 2u);
+  EXPECT_EQ(back.observations[0].points[1].p_C, observation.points[1].p_C);
+  EXPECT_EQ(back.observations[0].points[1].sigma, observation.points[1].sigma);
+  EXPECT_EQ(back.associated, update.associated);
+  EXPECT_EQ(back.dissociated, update.dissociated);
+}
+
+TEST_F(Conversions, MapUpdateIsUnchanged) {
+  MapUpdate update;
+  update.revision = 6;
+  update.t = ros::Time(1600000001, 1).toSec();
+  update.epoch = 2;
+  update.T_map_odom = pose();
+  update.newest_keyframe = 30;
+  update.global = true;
+  update.keyframes = {{29, state()}, {30, state()}};
+  LandmarkEstimate landmark;
+  landmark.id = 77;
+  landmark.p_W = vector();
+  landmark.observations = 6;
+  landmark.plane = 2;
+  landmark.descriptor[5] = 200;
+  update.landmarks = {landmark};
+  update.planes = {{2, Plane(vector(), 1.5)}};
+  update.removed_keyframes = {3};
+  update.removed_landmarks = {4, 5};
+  update.merged_landmarks = {{8, 9}};
+  LoopEvent loop;
+  loop.query = 30;
+  loop.match = 2;
+  loop.accepted = true;
+  loop.reason = "41 inliers";
+  loop.inliers = 41;
+  loop.T_match_query = pose();
+  loop.t = 12.5;
+  update.loops = {loop};
+  const MapUpdate back = fromMsg(throughBytes(toMsg(update, "map")));
+  EXPECT_EQ(back.revision, update.revision);
+  EXPECT_EQ(back.t, update.t);
+  EXPECT_EQ(back.epoch, update.epoch);
+  expectSame(back.T_map_odom, update.T_map_odom);
+  EXPECT_EQ(back.newest_keyframe, update.newest_keyframe);
+  EXPECT_TRUE(back.global);
+  ASSERT_EQ(back.keyframes.size(), 2u);
+  EXPECT_EQ(back.keyframes[1].id, 30u);
+  expectSame(back.keyframes[1].state, update.keyframes[1].state);
+  ASSERT_EQ(back.landmarks.size(), 1u);
+  EXPECT_EQ(back.landmarks[0].id, 77);
+  EXPECT_EQ(back.landmarks[0].p_W, landmark.p_W);
+  EXPECT_EQ(back.landmarks[0].observations, 6u);
+  EXPECT_EQ(back.landmarks[0].plane, 2u);
+  EXPECT_EQ(back.landmarks[0].descriptor, landmark.descriptor);
+  ASSERT_EQ(back.planes.size(), 1u);
+  EXPECT_EQ(back.planes[0].second.coefficients(), update.planes[0].second.coefficients());
+  EXPECT_EQ(back.removed_keyframes, update.removed_keyframes);
+  EXPECT_EQ(back.removed_landmarks, update.removed_landmarks);
+  EXPECT_EQ(back.merged_landmarks, update.merged_landmarks);
+  ASSERT_EQ(back.loops.size(), 1u);
+  EXPECT_EQ(back.loops[0].reason, loop.reason);
+  EXPECT_TRUE(back.loops[0].accepted);
+  EXPECT_EQ(back.loops[0].inliers, 41);
+  EXPECT_EQ(back.loops[0].t, 12.5);
+  expectSame(back.loops[0].T_match_query, loop.T_match_query);
+}
+
+TEST_F(Conversions, StampsSurvive) {
+  std::uniform_int_distribution<std::uint32_t> seconds(0, 4000000000u), nanoseconds(0, 999999999u);
+  for (int i = 0; i < 1000; ++i) {
+    const double t = ros::Time(seconds(random_), nanoseconds(random_)).toSec();
+    EXPECT_EQ(toStamp(t).toSec(), t);
+  }
+  EXPECT_EQ(toStamp(-1), ros::Time());
+  EXPECT_EQ(toStamp(std::nan("")), ros::Time());
+}
+
+TEST_F(Conversions, ContradictoryMessagesAreNamed) {
+  vip_slam_msgs::TrackingStatus status;
+  status.state = 9;
+  EXPECT_THROW(fromMsg(status), std::invalid_argument);
+  vip_slam_msgs::DepthGrid grid;
+  grid.cols = 2;
+  grid.rows = 2;
+  grid.z = {1, 2, 3};
+  EXPECT_THROW(fromMsg(grid), std::invalid_argument);
+  vip_slam_msgs::Plane unset;
+  EXPECT_THROW(fromMsg(unset), std::invalid_argument);
+  vip_slam_msgs::PlaneObservation observation;
+  observation.points = {1, 2, 3};
+  EXPECT_THROW(fromMsg(observation), std::invalid_argument);
+}
+
+TEST(CameraInfo, BothWays) {
+  CameraIntrinsics intrinsics;
+  intrinsics.width = 640;
+  intrinsics.height = 480;
+  intrinsics.fx = 600;
+  intrinsics.fy = 601;
+  intrinsics.cx = 320.5;
+  intrinsics.cy = 240.25;
+  intrinsics.model = DistortionModel::kRadTan;
+  intrinsics.distortion = {0.1, -0.05, 0.001, 0.002, 0.01};
+  const CameraIntrinsics back = intrinsicsFromCameraInfo(toCameraInfo(intrinsics));
+  EXPECT_EQ(back.width, 640);
+  EXPECT_EQ(back.height, 480);
+  EXPECT_EQ(back.fx, 600);
+  EXPECT_EQ(back.fy, 601);
+  EXPECT_EQ(back.cx, 320.5);
+  EXPECT_EQ(back.cy, 240.25);
+  EXPECT_EQ(back.model, DistortionModel::kRadTan);
+  EXPECT_EQ(back.distortion, intrinsics.distortion);
+}
+
+TEST(CameraInfo, UnusableIsNamed) {
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  try {
+    intrinsicsFromCameraInfo(info);
+    FAIL() << "an uncalibrated camera was taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("fx"), std::string::npos) << error.what();
+  }
+  info.K = {600, 0, 320, 0, 600, 240, 0, 0, 1};
+  info.distortion_model = "magic";
+  info.D = {0.1, 0, 0, 0, 0};
+  EXPECT_THROW(intrinsicsFromCameraInfo(info), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vip_slam

@@ -1,0 +1,172 @@
+// Every encoding a driver may send becomes the same gray or depth image; what cannot be read is named.
+#include <cstring>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "vip_slam_ros/image_decoding.h"
+
+namespace vip_slam {
+namespace {
+
+sensor_msgs::Image toImage(const cv::Mat& pixels, const std::string& encoding) {
+  sensor_msgs::Image image;
+  image.width = std::uint32_t(pixels.cols);
+  image.height = std::uint32_t(pixels.rows);
+  image.encoding = encoding;
+  image.step = std::uint32_t(pixels.cols * pixels.elemSize());
+  image.data.assign(pixels.data, pixels.data + image.step * image.height);
+  return image;
+}
+
+/// A smooth colour picture.
+cv::Mat picture() {
+  cv::Mat bgr(48, 64, CV_8UC3);
+  for (int r = 0; r < bgr.rows; ++r) {
+    for (int c = 0; c < bgr.cols; ++c) bgr.at<cv::Vec3b>(r, c) = {uchar(c * 3), uchar(r * 4), uchar(100 + c)};
+  }
+  return bgr;
+}
+
+cv::Mat depthUnits() {
+  cv::Mat depth(48, 64, CV_16UC1);
+  for (int r = 0; r < depth.rows; ++r) {
+    for (int c = 0; c < depth.cols; ++c) depth.at<std::uint16_t>(r, c) = std::uint16_t(500 + 50 * r + c);
+  }
+  depth.at<std::uint16_t>(3, 4) = 0;
+  return depth;
+}
+
+double difference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF); }
+
+TEST(DecodeGray, ColourEncodingsAgree) {
+  const cv::Mat bgr = picture();
+  cv::Mat gray, rgb, rgba, bgra;
+  cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  cv::cvtColor(bgr, rgba, cv::COLOR_BGR2RGBA);
+  cv::cvtColor(bgr, bgra, cv::COLOR_BGR2BGRA);
+  EXPECT_EQ(difference(decodeGray(toImage(bgr, "bgr8")), gray), 0);
+  EXPECT_EQ(difference(decodeGray(toImage(rgb, "rgb8")), gray), 0);
+  EXPECT_EQ(difference(decodeGray(toImage(rgba, "rgba8")), gray), 0);
+  EXPECT_EQ(difference(decodeGray(toImage(bgra, "bgra8")), gray), 0);
+  EXPECT_EQ(difference(decodeGray(toImage(gray, "mono8")), gray), 0);
+  cv::Mat deep;
+  gray.convertTo(deep, CV_16UC1, 256);
+  EXPECT_EQ(difference(decodeGray(toImage(deep, "mono16")), gray), 0);
+}
+
+TEST(DecodeGray, YuvKeepsTheLuminance) {
+  cv::Mat uyvy(4, 6, CV_8UC2), yuy2(4, 6, CV_8UC2);
+  for (int i = 0; i < 24; ++i) {
+    uyvy.at<cv::Vec2b>(i / 6, i % 6) = {128, uchar(10 * i)};
+    yuy2.at<cv::Vec2b>(i / 6, i % 6) = {uchar(10 * i), 128};
+  }
+  for (const cv::Mat& gray : {decodeGray(toImage(uyvy, "yuv422")), decodeGray(toImage(yuy2, "yuv422_yuy2"))}) {
+    for (int i = 0; i < 24; ++i) EXPECT_EQ(gray.at<uchar>(i / 6, i % 6), 10 * i);
+  }
+}
+
+TEST(DecodeGray, RowsWithPadding) {
+  sensor_msgs::Image image = toImage(picture(), "bgr8");
+  sensor_msgs::Image padded = image;
+  padded.step = image.step + 7;
+  padded.data.assign(padded.step * padded.height, 0);
+  for (std::uint32_t r = 0; r < image.height; ++r) {
+    std::memcpy(&padded.data[r * padded.step], &image.data[r * image.step], image.step);
+  }
+  EXPECT_EQ(difference(decodeGray(padded), decodeGray(image)), 0);
+}
+
+TEST(DecodeGray, Compressed) {
+  cv::Mat gray;
+  cv::cvtColor(picture(), gray, cv::COLOR_BGR2GRAY);
+  sensor_msgs::CompressedImage png, jpeg;
+  cv::imencode(".png", picture(), png.data);
+  cv::imencode(".jpg", picture(), jpeg.data, {cv::IMWRITE_JPEG_QUALITY, 98});
+  EXPECT_LE(difference(decodeGray(png), gray), 1);
+  EXPECT_LE(difference(decodeGray(jpeg), gray), 12);
+}
+
+TEST(DecodeDepth, RawAndCompressedAgree) {
+  const cv::Mat units = depthUnits();
+  cv::Mat metres;
+  units.convertTo(metres, CV_32FC1, 0.001);
+  EXPECT_LT(difference(decodeDepth(toImage(units, "16UC1"), 0.001), metres), 1e-6);
+  EXPECT_LT(difference(decodeDepth(toImage(metres, "32FC1"), 0.001), metres), 1e-9);
+
+  sensor_msgs::CompressedImage bare, headed;
+  bare.format = "png";
+  cv::imencode(".png", units, bare.data);
+  EXPECT_LT(difference(decodeDepth(bare, 0.001), metres), 1e-6);
+  headed.format = "16UC1; compressedDepth png";
+  headed.data.assign(12, 0);
+  headed.data.insert(headed.data.end(), bare.data.begin(), bare.data.end());
+  EXPECT_LT(difference(decodeDepth(headed, 0.001), metres), 1e-6);
+}
+
+TEST(DecodeDepth, OtherByteOrder) {
+  const cv::Mat units = depthUnits();
+  sensor_msgs::Image swapped = toImage(units, "16UC1");
+  for (std::size_t i = 0; i + 1 < swapped.data.size(); i += 2) std::swap(swapped.data[i], swapped.data[i + 1]);
+  swapped.is_bigendian = 1;
+  EXPECT_EQ(difference(decodeDepth(swapped, 0.001), decodeDepth(toImage(units, "16UC1"), 0.001)), 0);
+}
+
+TEST(DecodeDepth, QuantisedInverseDepth) {
+  // v = a / z + b, as compressed_depth_image_transport writes 32FC1.
+  const float a = 1000, b = 20;
+  cv::Mat values(2, 2, CV_16UC1);
+  const float z[4] = {1.0f, 2.0f, 4.0f, 0.0f};
+  for (int i = 0; i < 4; ++i) values.at<std::uint16_t>(i / 2, i % 2) = std::uint16_t(z[i] > 0 ? a / z[i] + b : 0);
+  sensor_msgs::CompressedImage image;
+  image.format = "32FC1; compressedDepth png";
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", values, png);
+  image.data.assign(12, 0);
+  std::memcpy(&image.data[4], &a, 4);
+  std::memcpy(&image.data[8], &b, 4);
+  image.data.insert(image.data.end(), png.begin(), png.end());
+  const cv::Mat depth = decodeDepth(image, 0.001);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(depth.at<float>(i / 2, i % 2), z[i], 1e-4);
+}
+
+TEST(DecodeDepth, NotANumberIsInvalid) {
+  cv::Mat metres(2, 2, CV_32FC1, cv::Scalar(1.5));
+  metres.at<float>(0, 1) = std::numeric_limits<float>::quiet_NaN();
+  const cv::Mat depth = decodeDepth(toImage(metres, "32FC1"), 1.0);
+  EXPECT_EQ(depth.at<float>(0, 0), 1.5f);
+  EXPECT_EQ(depth.at<float>(0, 1), 0.0f);
+}
+
+template <class Call>
+void expectNamed(Call call, const std::string& word) {
+  try {
+    call();
+    FAIL() << "taken, expected an error that names " << word;
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+  }
+}
+
+TEST(Decode, UnusableImagesAreNamed) {
+  expectNamed([] { decodeGray(toImage(picture(), "magic8")); }, "magic8");
+  expectNamed([] { decodeDepth(toImage(picture(), "rgb8"), 1); }, "rgb8");
+  sensor_msgs::Image cut = toImage(picture(), "bgr8");
+  cut.data.resize(100);
+  expectNamed([&] { decodeGray(cut); }, "100 bytes");
+  expectNamed([] { decodeGray(sensor_msgs::Image()); }, "encoding");
+  sensor_msgs::CompressedImage garbage;
+  garbage.format = "jpeg";
+  garbage.data = {1, 2, 3};
+  expectNamed([&] { decodeGray(garbage); }, "jpeg");
+  expectNamed([&] { decodeDepth(garbage, 1); }, "PNG");
+  sensor_msgs::CompressedImage eight_bit;
+  cv::imencode(".png", picture(), eight_bit.data);
+  expectNamed([&] { decodeDepth(eight_bit, 1); }, "16-bit");
+}
+
+}  // namespace
+}  // namespace vip_slam

@@ -1,0 +1,48 @@
+#include <gtest/gtest.h>
+
+#include "vip_slam_ros/stream_monitor.h"
+
+namespace vip_slam {
+namespace {
+
+using Step = StreamMonitor::Step;
+
+TEST(StreamMonitor, MeasuresTheRate) {
+  StreamMonitor monitor("/imu", 200);
+  for (int i = 0; i < 500; ++i) EXPECT_EQ(monitor.add(10 + i / 200.0, 10.01 + i / 200.0), Step::kGood);
+  EXPECT_NEAR(monitor.report().rate, 200, 1e-6);
+  EXPECT_NEAR(monitor.report().delay, 0.01, 1e-9);
+  EXPECT_EQ(monitor.complaint(12.6), "");
+}
+
+TEST(StreamMonitor, CountsWhatIsWrong) {
+  StreamMonitor monitor("/depth", 30);
+  EXPECT_EQ(monitor.add(1.0, 1.0), Step::kGood);
+  EXPECT_EQ(monitor.add(1.0, 1.0), Step::kRepeated);
+  EXPECT_EQ(monitor.add(0.9, 1.1), Step::kBackward);
+  EXPECT_EQ(monitor.add(1.5, 1.5), Step::kGap);
+  const auto report = monitor.report();
+  EXPECT_EQ(report.messages, 4u);
+  EXPECT_EQ(report.repeated, 1u);
+  EXPECT_EQ(report.backward, 1u);
+  EXPECT_EQ(report.gaps, 1u);
+  EXPECT_NEAR(report.largest_gap, 0.5, 1e-9);
+}
+
+TEST(StreamMonitor, ComplaintsNameTheTopic) {
+  StreamMonitor monitor("/camera/imu", 200);
+  EXPECT_NE(monitor.complaint(1).find("/camera/imu"), std::string::npos);
+  for (int i = 0; i < 50; ++i) monitor.add(i / 20.0, i / 20.0);
+  EXPECT_NE(monitor.complaint(2.5).find("20.0 Hz"), std::string::npos) << monitor.complaint(2.5);
+  EXPECT_NE(monitor.complaint(10).find("silent"), std::string::npos);
+}
+
+TEST(StreamMonitor, StartsAnewAfterTimeRanBackwards) {
+  StreamMonitor monitor("/color", 30);
+  monitor.add(100, 100);
+  monitor.restart();
+  EXPECT_EQ(monitor.add(5, 5), Step::kGood);
+}
+
+}  // namespace
+}  // namespace vip_slam
