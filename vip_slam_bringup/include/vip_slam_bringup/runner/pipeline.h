@@ -1,0 +1,57 @@
+// The estimators in lock-step: sensor events go in, poses come out, the same bits each time.
+//
+// The front end runs in the calling thread, planes and back end in a thread of their own. What the back end says about a
+// keyframe reaches the front end a fixed number of images later, whenever it is computed, so that the two threads never
+// race. With a lag of 0 the front end waits for it.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_bringup/runner/pipeline_options.h"
+#include "vip_slam_bringup/runner/trajectory_assembly.h"
+#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/types/tracking_state.h"
+#include "vip_slam_core/util/timing.h"
+#include "vip_slam_frontend/front_end.h"
+
+namespace vip_slam {
+
+struct StateChange {
+  double t;
+  TrackingStatus status;
+};
+
+class Pipeline {
+ public:
+  Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing);
+  ~Pipeline();
+
+  void add(const SensorEvent& event);
+  /// End of the data: processes what waits.
+  void finish();
+
+  std::size_t images() const { return images_; }
+  const std::vector<OdometryPose>& odometry() const { return odometry_; }  ///< images with a pose
+  const std::vector<StateChange>& states() const { return states_; }
+  const FrontEnd& frontEnd() const { return *front_end_; }
+
+ private:
+  void process(const ImagePair& pair);
+  void processReady();
+
+  const PipelineOptions options_;
+  TimingLog* const timing_;
+  std::unique_ptr<FrontEnd> front_end_;
+  std::deque<ImagePair> waiting_;
+  double newest_ = -1e300;
+  std::size_t images_ = 0;
+  std::vector<OdometryPose> odometry_;
+  std::vector<StateChange> states_;
+};
+
+}  // namespace vip_slam

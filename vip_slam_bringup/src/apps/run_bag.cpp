@@ -1,0 +1,110 @@
+// run_bag BAG --sensor NAME_OR_YAML --out DIR: the whole system over a recorded bag, in lock-step.
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+
+#include <CLI/CLI.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_bringup/runner/pipeline.h"
+#include "vip_slam_bringup/runner/progress_bar.h"
+#include "vip_slam_bringup/runner/run_output.h"
+#include "vip_slam_ros/sensor_files.h"
+
+namespace {
+
+volatile std::sig_atomic_t g_interrupted = 0;
+
+struct Arguments {
+  std::string bag, sensor, out, parameters;
+  std::vector<std::string> settings;
+  double start = 0, duration = -1;
+};
+
+void addArguments(CLI::App& app, Arguments& arguments) {
+  app.add_option("bag", arguments.bag, "the recording")->required();
+  app.add_option("--sensor", arguments.sensor, "a shipped sensor or a sensor YAML file")->required();
+  app.add_option("--out", arguments.out, "folder for the results; made when it does not exist")->required();
+  app.add_option("--params", arguments.parameters, "YAML file with options, in groups");
+  app.add_option("--set", arguments.settings, "one option as group/key=value; repeatable")->take_all();
+  app.add_option("--start", arguments.start, "seconds to skip at the beginning");
+  app.add_option("--duration", arguments.duration, "seconds to process");
+}
+
+std::pair<std::string, std::string> splitSetting(const std::string& setting) {
+  const auto equals = setting.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw std::invalid_argument("--set " + setting + ": expected group/key=value");
+  }
+  return {setting.substr(0, equals), setting.substr(equals + 1)};
+}
+
+vip_slam::PipelineOptions loadPipelineOptions(const Arguments& arguments) {
+  vip_slam::PipelineOptions options;
+  if (!arguments.parameters.empty()) vip_slam::loadOptions(options, arguments.parameters, "");
+  std::vector<std::pair<std::string, std::string>> values;
+  for (const auto& setting : arguments.settings) values.push_back(splitSetting(setting));
+  vip_slam::setOptions(options, values);
+  return options;
+}
+
+int run(const Arguments& arguments) {
+  using Clock = std::chrono::steady_clock;
+  const vip_slam::PipelineOptions options = loadPipelineOptions(arguments);
+  vip_slam::SensorConfig sensor = vip_slam::loadSensorConfig(vip_slam::resolveSensor(arguments.sensor));
+  vip_slam::BagReaderOptions reading;
+  reading.start = arguments.start;
+  reading.duration = arguments.duration;
+  vip_slam::BagReader reader(arguments.bag, sensor, reading);
+  std::filesystem::create_directories(arguments.out);
+
+  vip_slam::TimingLog timing;
+  vip_slam::Pipeline pipeline(options, sensor, &timing);
+  vip_slam::ProgressBar progress("run_bag");
+  const auto begin = Clock::now();
+  reader.start();
+  while (const auto event = reader.next()) {
+    if (g_interrupted) break;
+    pipeline.add(*event);
+    if (const auto* pair = std::get_if<vip_slam::ImagePair>(&*event)) {
+      progress.update((pair->t - reader.beginTime()) / (reader.endTime() - reader.beginTime()),
+                      pipeline.states().empty() ? "" : trackingStateName(pipeline.states().back().status.state));
+    }
+  }
+  pipeline.finish();
+  const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+
+  vip_slam::RunFacts facts;
+  facts.bag = arguments.bag;
+  facts.sensor = sensor.name;
+  facts.finished = !g_interrupted;
+  facts.processing_time = seconds;
+  vip_slam::writeRun(arguments.out, facts, pipeline, reader, timing);
+  char note[160];
+  std::snprintf(note, sizeof note, "%zu images in %.1f s%s, results in %s", pipeline.images(), seconds,
+                g_interrupted ? " (interrupted)" : "", arguments.out.c_str());
+  progress.finish(note);
+  return pipeline.odometry().empty() ? 2 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Runs VIP-SLAM over a bag, as fast as the machine allows; two runs give the same bits.");
+  Arguments arguments;
+  addArguments(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  std::signal(SIGINT, [](int) { g_interrupted = 1; });
+  std::signal(SIGTERM, [](int) { g_interrupted = 1; });
+  // The pipeline has its own threads, one for each core; OpenCV's would only stand in their way.
+  cv::setNumThreads(1);
+  try {
+    return run(arguments);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "run_bag: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,203 @@
+#include "vip_slam_bringup/runner/bag_reader.h"
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
+
+#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_ros/camera_info.h"
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/image_decoding.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kAhead = 200;  // events, of which about one in ten is an image pair of 1.5 MB
+
+std::string join(const std::set<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+cv::Mat gray(const rosbag::MessageInstance& message) {
+  if (const auto image = message.instantiate<sensor_msgs::Image>()) return decodeGray(*image);
+  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return decodeGray(*image);
+  throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
+}
+
+cv::Mat metres(const rosbag::MessageInstance& message, double scale) {
+  if (const auto image = message.instantiate<sensor_msgs::Image>()) return decodeDepth(*image, scale);
+  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return decodeDepth(*image, scale);
+  throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
+}
+
+double stampOf(const rosbag::MessageInstance& message) {
+  if (const auto image = message.instantiate<sensor_msgs::Image>()) return image->header.stamp.toSec();
+  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return image->header.stamp.toSec();
+  return message.getTime().toSec();
+}
+
+}  // namespace
+
+struct BagReader::Source {
+  rosbag::Bag bag;
+  ros::Time begin, end;
+  std::shared_ptr<const CameraModel> color_camera, depth_camera;  // only for depth that is not registered
+
+  void open(const std::string& path) {
+    try {
+      bag.open(path, rosbag::bagmode::Read);
+    } catch (const rosbag::BagUnindexedException&) {
+      throw std::runtime_error(path + ": the bag has no index (the recording was cut off); run: rosbag reindex " + path);
+    } catch (const std::exception& error) {
+      throw std::runtime_error(path + ": not a readable bag: " + error.what());
+    }
+    if (rosbag::View(bag).size() == 0) throw std::runtime_error(path + ": an empty bag");
+  }
+
+  void checkTopics(const SensorConfig& sensor) {
+    const SensorTopics& topics = sensor.topics;
+    std::set<std::string> there, missing;
+    rosbag::View view(bag);
+    for (const rosbag::ConnectionInfo* connection : view.getConnections()) there.insert(connection->topic);
+    for (const std::string& topic : {topics.color, topics.depth, topics.imu, topics.gyro, topics.accel}) {
+      if (!topic.empty() && there.count(topic) == 0) missing.insert(topic);
+    }
+    if (!missing.empty()) {
+      throw std::runtime_error(bag.getFileName() + ": no topic " + join(missing) + ", which sensor '" + sensor.name +
+                               "' names; in the bag are: " + join(there));
+    }
+  }
+
+  CameraIntrinsics cameraInfo(const std::string& topic) {
+    rosbag::View view(bag, rosbag::TopicQuery(topic));
+    for (const auto& message : view) {
+      const auto info = message.instantiate<sensor_msgs::CameraInfo>();
+      if (!info) {
+        throw std::runtime_error(bag.getFileName() + ": topic " + topic + " is " + message.getDataType() +
+                                 ", expected sensor_msgs/CameraInfo");
+      }
+      return intrinsicsFromCameraInfo(*info);
+    }
+    throw std::runtime_error(bag.getFileName() + ": topic " + topic + ": no camera_info in the bag; name the right topic " +
+                             "or put the intrinsics into the sensor configuration");
+  }
+};
+
+BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagReaderOptions& options)
+    : source_(std::make_unique<Source>()), options_(options), channel_(kAhead) {
+  source_->open(path);
+  source_->checkTopics(sensor);
+  if (sensor.intrinsics_from_camera_info) {
+    sensor.camera = source_->cameraInfo(sensor.topics.color_info);
+    if (!sensor.depth_registered) sensor.depth_camera = source_->cameraInfo(sensor.topics.depth_info);
+  }
+  if (!sensor.depth_registered) {
+    source_->color_camera = makeCamera(sensor.camera);
+    source_->depth_camera = makeCamera(sensor.depth_camera);
+  }
+  sensor_ = sensor;
+
+  rosbag::View all(source_->bag);
+  source_->begin = all.getBeginTime() + ros::Duration(std::max(0.0, options.start));
+  source_->end = all.getEndTime();
+  if (options.duration >= 0) source_->end = std::min(source_->end, source_->begin + ros::Duration(options.duration));
+  if (source_->begin > source_->end) {
+    throw std::runtime_error(path + ": --start lies behind the end of the bag, which lasts " +
+                             std::to_string((all.getEndTime() - all.getBeginTime()).toSec()) + " s");
+  }
+}
+
+BagReader::~BagReader() {
+  stop_ = true;
+  channel_.close();
+  if (thread_.joinable()) thread_.join();
+}
+
+double BagReader::beginTime() const { return source_->begin.toSec(); }
+double BagReader::endTime() const { return source_->end.toSec(); }
+
+void BagReader::start() {
+  thread_ = std::thread([this] {
+    try {
+      read();
+    } catch (const std::exception& error) {
+      warnings_.push_back(std::string("the bag breaks off: ") + error.what());
+    }
+    channel_.close();
+  });
+}
+
+std::optional<SensorEvent> BagReader::next() { return channel_.pop(); }
+
+void BagReader::read() {
+  const SensorTopics& topics = sensor_.topics;
+  std::vector<std::string> names;
+  for (const auto& name : {topics.color, topics.depth, topics.imu, topics.gyro, topics.accel}) {
+    if (!name.empty()) names.push_back(name);
+  }
+  ImagePairer pairer(options_.pairing);
+  std::set<std::string> complained;
+  const auto decode = [&](const rosbag::MessageInstance& message, auto&& use) {
+    try {
+      use();
+    } catch (const std::exception& error) {
+      ++counters_["undecodable_images"];
+      if (complained.insert(message.getTopic()).second) {
+        warnings_.push_back("topic " + message.getTopic() + ": " + error.what());
+      }
+    }
+  };
+
+  rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
+  for (const auto& message : view) {
+    if (stop_) return;
+    const std::string& topic = message.getTopic();
+    bool open = true;
+    if (topic == topics.color) {
+      decode(message, [&] { pairer.addColor(stampOf(message), gray(message)); });
+    } else if (topic == topics.depth) {
+      decode(message, [&] {
+        cv::Mat depth = metres(message, sensor_.depth_scale);
+        if (source_->depth_camera) {
+          depth = registerDepth(depth, *source_->depth_camera, *source_->color_camera, sensor_.T_color_depth.matrix());
+        }
+        pairer.addDepth(stampOf(message), depth);
+      });
+    } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
+      const double t = imu->header.stamp.toSec();
+      const Eigen::Vector3d gyro = fromMsg(imu->angular_velocity), accel = fromMsg(imu->linear_acceleration);
+      if (topic == topics.imu) {
+        open = channel_.push(ImuSample{t, gyro, accel});
+      } else if (topic == topics.gyro) {
+        open = channel_.push(GyroSample{t, gyro});
+      } else {
+        open = channel_.push(AccelSample{t, accel});
+      }
+    } else {
+      ++counters_["messages_of_wrong_type"];
+      if (complained.insert(topic).second) {
+        warnings_.push_back("topic " + topic + ": type " + message.getDataType() + ", expected sensor_msgs/Imu");
+      }
+    }
+    while (open && pairer.front()) {
+      open = channel_.push(*pairer.front());
+      pairer.pop();
+    }
+    if (!open) return;
+  }
+  counters_["image_pairs"] = pairer.counters().pairs;
+  counters_["images_without_depth"] = pairer.counters().without_depth;
+  counters_["unused_depth_images"] = pairer.counters().unused_depth;
+  counters_["images_out_of_order"] = pairer.counters().backward;
+}
+
+}  // namespace vip_slam

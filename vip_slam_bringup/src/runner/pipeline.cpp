@@ -1,0 +1,60 @@
+#include "vip_slam_bringup/runner/pipeline.h"
+
+#include <algorithm>
+
+namespace vip_slam {
+
+Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing)
+    : options_(options), timing_(timing), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {}
+
+Pipeline::~Pipeline() = default;
+
+void Pipeline::add(const SensorEvent& event) {
+  double t = newest_;
+  if (const auto* imu = std::get_if<ImuSample>(&event)) {
+    front_end_->addImu(*imu);
+    t = imu->t;
+  } else if (const auto* gyro = std::get_if<GyroSample>(&event)) {
+    front_end_->addGyro(gyro->t, gyro->gyro);
+    t = gyro->t;
+  } else if (const auto* accel = std::get_if<AccelSample>(&event)) {
+    front_end_->addAccel(accel->t, accel->accel);
+    t = accel->t;
+  } else {
+    waiting_.push_back(std::get<ImagePair>(event));
+    t = waiting_.back().t;
+  }
+  newest_ = std::max(newest_, t);
+  processReady();
+}
+
+void Pipeline::processReady() {
+  while (!waiting_.empty() &&
+         (front_end_->ready(waiting_.front().t) || newest_ - waiting_.front().t > options_.imu_patience)) {
+    process(waiting_.front());
+    waiting_.pop_front();
+  }
+}
+
+void Pipeline::finish() {
+  for (const ImagePair& pair : waiting_) {
+    if (front_end_->ready(pair.t)) process(pair);
+  }
+  waiting_.clear();
+}
+
+void Pipeline::process(const ImagePair& pair) {
+  FrameOutput output;
+  {
+    ScopedTimer timer(timing_, "frontend.total", pair.t);
+    output = front_end_->process({pair.t, pair.gray, pair.depth});
+  }
+  ++images_;
+  const TrackedFrame& frame = *output.frame;
+  if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
+  if (frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded) {
+    odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
+  }
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,38 @@
+#include "vip_slam_bringup/runner/trajectory_assembly.h"
+
+#include <algorithm>
+#include <map>
+
+namespace vip_slam {
+namespace {
+
+SE3 carry(const Anchor& anchor, const OdometryPose& pose) {
+  return anchor.T_map_I * (anchor.T_odom_I.inverse() * pose.T_odom_I);
+}
+
+}  // namespace
+
+Trajectory anchorTrajectory(const std::vector<OdometryPose>& odometry, const std::vector<Anchor>& anchors) {
+  std::map<std::uint32_t, std::vector<const Anchor*>> by_epoch;
+  for (const Anchor& anchor : anchors) by_epoch[anchor.epoch].push_back(&anchor);
+
+  Trajectory trajectory;
+  trajectory.reserve(odometry.size());
+  for (const OdometryPose& pose : odometry) {
+    const auto epoch = by_epoch.find(pose.epoch);
+    if (epoch == by_epoch.end()) continue;
+    const auto& list = epoch->second;
+    const auto after = std::lower_bound(list.begin(), list.end(), pose.t, [](const Anchor* a, double t) { return a->t < t; });
+    if (after == list.begin()) {
+      trajectory.push_back({pose.t, carry(**after, pose)});
+    } else if (after == list.end()) {
+      trajectory.push_back({pose.t, carry(*list.back(), pose)});
+    } else {
+      const Anchor &a = **std::prev(after), &b = **after;
+      trajectory.push_back({pose.t, interpolate(carry(a, pose), carry(b, pose), (pose.t - a.t) / (b.t - a.t))});
+    }
+  }
+  return trajectory;
+}
+
+}  // namespace vip_slam

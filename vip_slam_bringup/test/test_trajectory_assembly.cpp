@@ -1,0 +1,50 @@
+// Every image's pose follows the final keyframes.
+#include <gtest/gtest.h>
+
+#include "vip_slam_bringup/runner/trajectory_assembly.h"
+
+namespace vip_slam {
+namespace {
+
+SE3 at(double x, double yaw = 0) { return SE3(expQuaternion({0, 0, yaw}), {x, 0, 0}); }
+
+TEST(AnchorTrajectory, FollowsACommonCorrection) {
+  const SE3 T_map_odom(expQuaternion({0.1, -0.2, 0.3}), {1, 2, 3});
+  std::vector<OdometryPose> odometry;
+  std::vector<Anchor> anchors;
+  for (int i = 0; i <= 20; ++i) {
+    const SE3 T = at(0.1 * i, 0.05 * i);
+    odometry.push_back({double(i), 1, T});
+    if (i % 7 == 3) anchors.push_back({double(i), 1, T, T_map_odom * T});
+  }
+  const Trajectory trajectory = anchorTrajectory(odometry, anchors);
+  ASSERT_EQ(trajectory.size(), odometry.size());
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    EXPECT_LT(trajectory[i].T_W_B.boxminus(T_map_odom * odometry[i].T_odom_I).norm(), 1e-12) << i;
+  }
+}
+
+TEST(AnchorTrajectory, BlendsBetweenKeyframesFarFromTheOrigin) {
+  // A yaw correction 100 m from the origin of odom: images between the keyframes must stay between them.
+  std::vector<OdometryPose> odometry;
+  for (int i = 0; i <= 10; ++i) odometry.push_back({double(i), 1, at(100 + 0.1 * i)});
+  const std::vector<Anchor> anchors = {{0, 1, at(100), at(100)}, {10, 1, at(101), at(101, 0.4)}};
+  const Trajectory trajectory = anchorTrajectory(odometry, anchors);
+  ASSERT_EQ(trajectory.size(), 11u);
+  EXPECT_LT(trajectory.front().T_W_B.boxminus(at(100)).norm(), 1e-12);
+  EXPECT_LT(trajectory.back().T_W_B.boxminus(at(101, 0.4)).norm(), 1e-12);
+  for (int i = 0; i <= 10; ++i) EXPECT_LT((trajectory[i].T_W_B.t() - odometry[i].T_odom_I.t()).norm(), 0.2) << i;
+  EXPECT_NEAR(yawOf(trajectory[5].T_W_B.rotation()), 0.2, 1e-9);
+}
+
+TEST(AnchorTrajectory, EpochsDoNotMix) {
+  const std::vector<OdometryPose> odometry = {{0, 0, at(0)}, {1, 1, at(5)}, {2, 1, at(6)}, {3, 2, at(9)}};
+  const std::vector<Anchor> anchors = {{1, 1, at(5), at(50)}};
+  const Trajectory trajectory = anchorTrajectory(odometry, anchors);
+  ASSERT_EQ(trajectory.size(), 2u);
+  EXPECT_NEAR(trajectory[0].T_W_B.t().x(), 50, 1e-12);
+  EXPECT_NEAR(trajectory[1].T_W_B.t().x(), 51, 1e-12);
+}
+
+}  // namespace
+}  // namespace vip_slam

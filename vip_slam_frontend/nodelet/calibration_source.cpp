@@ -1,0 +1,90 @@
+#include "calibration_source.h"
+
+#include "vip_slam_ros/camera_info.h"
+#include "vip_slam_ros/tf_lookup.h"
+
+namespace vip_slam {
+
+CalibrationSource::CalibrationSource(const SensorConfig& sensor, const FrontEndNodeOptions& options,
+                                     const tf2_ros::Buffer& tf)
+    : sensor_(sensor), options_(options), tf_(tf) {}
+
+void CalibrationSource::addColorInfo(const sensor_msgs::CameraInfo& info) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (color_info_) return;
+  try {
+    sensor_.camera = intrinsicsFromCameraInfo(info);
+    color_info_ = true;
+    problem_.clear();
+  } catch (const std::exception& error) {
+    problem_ = "topic " + sensor_.topics.color_info + ": " + error.what();
+  }
+}
+
+void CalibrationSource::addDepthInfo(const sensor_msgs::CameraInfo& info) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (depth_info_) return;
+  try {
+    sensor_.depth_camera = intrinsicsFromCameraInfo(info);
+    depth_info_ = true;
+    problem_.clear();
+  } catch (const std::exception& error) {
+    problem_ = "topic " + sensor_.topics.depth_info + ": " + error.what();
+  }
+}
+
+void CalibrationSource::addColorFrame(const std::string& frame_id) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  color_frame_ = frame_id;
+}
+
+void CalibrationSource::addImuFrame(const std::string& frame_id, double t) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  imu_frame_ = frame_id;
+  if (!first_imu_ || t < *first_imu_) first_imu_ = t;
+}
+
+bool CalibrationSource::intrinsicsKnown() const {
+  if (!sensor_.intrinsics_from_camera_info) return true;
+  return color_info_ && (sensor_.depth_registered || depth_info_);
+}
+
+std::optional<SensorConfig> CalibrationSource::resolve(double t) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!intrinsicsKnown()) {
+    const std::string& topic = color_info_ ? sensor_.topics.depth_info : sensor_.topics.color_info;
+    waiting_for_ = problem_.empty() ? "no camera_info on topic " + topic + " yet" : problem_;
+    return std::nullopt;
+  }
+  if (!first_imu_) {
+    waiting_for_ = "no IMU message yet";
+    return std::nullopt;
+  }
+  if (options_.extrinsics != "config") {
+    const auto T_imu_cam = lookUpTransform(tf_, imu_frame_, color_frame_);
+    const auto T_base_imu = lookUpTransform(tf_, options_.base_frame, imu_frame_);
+    const bool patient = options_.extrinsics == "tf" || t - *first_imu_ < options_.tf_patience;
+    if (!(T_imu_cam && T_base_imu) && patient) {
+      const std::string& target = T_imu_cam ? options_.base_frame : imu_frame_;
+      const std::string& source = T_imu_cam ? imu_frame_ : color_frame_;
+      waiting_for_ = "tf does not connect '" + source + "' to '" + target + "' yet";
+      return std::nullopt;
+    }
+    if (T_imu_cam) sensor_.T_imu_cam = *T_imu_cam;
+    if (T_base_imu) sensor_.T_base_imu = *T_base_imu;
+  }
+  waiting_for_.clear();
+  return sensor_;
+}
+
+std::string CalibrationSource::waitingFor() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return waiting_for_;
+}
+
+std::string CalibrationSource::colorFrame() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return color_frame_;
+}
+
+}  // namespace vip_slam

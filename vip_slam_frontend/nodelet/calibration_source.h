@@ -1,0 +1,45 @@
+// Collects what the estimators must know of the sensor before they can start: intrinsics from camera_info or the sensor
+// configuration, extrinsics from tf or the sensor configuration.
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <sensor_msgs/CameraInfo.h>
+#include <tf2_ros/buffer.h>
+
+#include "front_end_node_options.h"
+#include "vip_slam_core/sensor/sensor_config.h"
+
+namespace vip_slam {
+
+/// Thread-safe.
+class CalibrationSource {
+ public:
+  CalibrationSource(const SensorConfig& sensor, const FrontEndNodeOptions& options, const tf2_ros::Buffer& tf);
+
+  void addColorInfo(const sensor_msgs::CameraInfo& info);
+  void addDepthInfo(const sensor_msgs::CameraInfo& info);
+  void addColorFrame(const std::string& frame_id);
+  void addImuFrame(const std::string& frame_id, double t);
+
+  /// The completed configuration, once everything is known at time `t` (stamps, seconds).
+  std::optional<SensorConfig> resolve(double t);
+  /// What is missing, as a sentence; what is wrong with a camera_info that came.
+  std::string waitingFor() const;
+  std::string colorFrame() const;
+
+ private:
+  bool intrinsicsKnown() const;
+
+  mutable std::mutex mutex_;
+  SensorConfig sensor_;
+  const FrontEndNodeOptions options_;
+  const tf2_ros::Buffer& tf_;
+  bool color_info_ = false, depth_info_ = false;
+  std::string color_frame_, imu_frame_, problem_, waiting_for_;
+  std::optional<double> first_imu_;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,128 @@
+// What the front-end nodelet says about itself in /diagnostics.
+#include <vip_slam_msgs/TrackingStatus.h>
+
+#include "front_end_nodelet.h"
+#include "vip_slam_ros/frame_conversions.h"
+#include "vip_slam_ros/process_memory.h"
+
+namespace vip_slam {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+void FrontEndNodelet::tick() {
+  // Before the first image nothing else says why there is no pose.
+  bool started;
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    started = shown_.counters.images > 0;
+  }
+  if (!started) {
+    TrackingStatus waiting{TrackingState::kWaiting, ""};
+    const double now = ros::Time::now().toSec();
+    waiting.reason = color_monitor_->complaint(now);
+    if (waiting.reason.empty()) waiting.reason = imu_monitor_->complaint(now);
+    if (waiting.reason.empty()) waiting.reason = calibration_->waitingFor();
+    if (waiting.reason.empty()) waiting.reason = "the first image waits for its depth and the IMU";
+    status_pub_.publish(toMsg(waiting));
+    NODELET_WARN_THROTTLE(10, "WAITING: %s", waiting.reason.c_str());
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown_.status = waiting;
+  }
+  diagnostics_->force_update();
+}
+
+void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  Shown shown;
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown = shown_;
+  }
+  const TrackingState state = shown.status.state;
+  const auto level = state == TrackingState::kTracking ? DiagnosticStatus::OK
+                     : state == TrackingState::kLost   ? DiagnosticStatus::ERROR
+                                                       : DiagnosticStatus::WARN;
+  const std::string reason = shown.status.reason.empty() ? "" : ": " + shown.status.reason;
+  status.summary(level, trackingStateName(state) + reason);
+  const FrontEndCounters& c = shown.counters;
+  status.add("features", shown.features);
+  status.add("processing of the last image (ms)", shown.processing);
+  status.add("latency, stamp to odometry (ms)", 1e3 * shown.latency);
+  status.add("NIS per degree of freedom", c.nis_per_dof);
+  status.add("pixel sigma in use", c.sigma_px);
+  status.add("images", c.images);
+  status.add("keyframes", c.keyframes);
+  status.add("restarts", c.restarts);
+  status.add("times lost", c.lost);
+  status.add("images on the IMU alone", c.coasting);
+  status.add("images standing still", c.zero_velocity);
+  status.add("landmarks of the map found again", c.landmarks_reacquired);
+  status.add("memory (MB)", processMemoryMb());
+}
+
+void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  Shown shown;
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown = shown_;
+  }
+  const double now = ros::Time::now().toSec();
+  std::vector<const StreamMonitor*> monitors = {color_monitor_.get()};
+  if (!sensor_.topics.depth.empty()) monitors.push_back(depth_monitor_.get());
+  monitors.push_back(imu_monitor_.get());
+  if (!sensor_.topics.accel.empty()) monitors.push_back(accel_monitor_.get());
+
+  std::string complaints;
+  for (const StreamMonitor* monitor : monitors) {
+    const std::string complaint = monitor->complaint(now);
+    if (!complaint.empty()) complaints += (complaints.empty() ? "" : "; ") + complaint;
+    const StreamMonitor::Report r = monitor->report();
+    const std::string name = r.topic + " ";
+    status.add(name + "rate (Hz)", r.rate);
+    status.add(name + "delay on arrival (ms)", 1e3 * r.delay);
+    status.add(name + "gaps", r.gaps);
+    status.add(name + "largest gap (ms)", 1e3 * r.largest_gap);
+    status.add(name + "repeated stamps", r.repeated);
+    status.add(name + "backward stamps", r.backward);
+    status.add(name + "unusable messages", r.rejected);
+    if (!r.last_rejection.empty()) status.add(name + "last unusable", r.last_rejection);
+  }
+  const std::size_t unpaired = shown.pairs.without_depth;
+  if (!sensor_.topics.depth.empty() && unpaired > 10 && unpaired > shown.pairs.pairs) {
+    const double skew = depth_monitor_->report().newest - color_monitor_->report().newest;
+    char words[240];
+    std::snprintf(words, sizeof words,
+                  "%s (%.1f Hz) and %s (%.1f Hz) are not synchronised: newest stamps %.0f ms apart, pairs need %.0f ms",
+                  sensor_.topics.color.c_str(), color_monitor_->report().rate, sensor_.topics.depth.c_str(),
+                  depth_monitor_->report().rate, 1e3 * skew, 1e3 * options_.pair_tolerance);
+    complaints += (complaints.empty() ? "" : "; ") + std::string(words);
+  }
+  status.summary(complaints.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
+                 complaints.empty() ? "all topics arrive" : complaints);
+  const FrontEndCounters& c = shown.counters;
+  status.add("colour-depth pairs", shown.pairs.pairs);
+  status.add("colour images without depth", shown.pairs.without_depth);
+  status.add("skew of the last pair (ms)", 1e3 * shown.pairs.skew);
+  status.add("images of wrong size or type", c.bad_image);
+  status.add("depth of wrong size or type", c.bad_depth);
+  status.add("images out of order", shown.pairs.backward + c.bad_stamp);
+  status.add("images without IMU", c.imu_missing);
+  status.add("IMU samples refused", c.imu_rejected);
+  status.add("IMU gaps", c.imu_gaps);
+  status.add("times that time ran backwards", shown.time_jumps);
+}
+
+void FrontEndNodelet::reportQueues(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  std::size_t dropped = 0;
+  for (const auto& lane : owner_->lanes()) {
+    status.add(lane.name + " waiting", lane.waiting);
+    status.add(lane.name + " dropped", lane.dropped);
+    dropped += lane.dropped;
+  }
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  status.add("images dropped while waiting for depth or IMU", shown_.pairs.dropped);
+  dropped += shown_.pairs.dropped;
+  status.summary(dropped == 0 ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
+                 dropped == 0 ? "nothing dropped" : std::to_string(dropped) + " messages dropped");
+}
+
+}  // namespace vip_slam

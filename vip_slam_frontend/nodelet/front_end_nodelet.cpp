@@ -1,0 +1,316 @@
+#include "front_end_nodelet.h"
+
+#include <pluginlib/class_list_macros.hpp>
+#include <vip_slam_msgs/Calibration.h>
+#include <vip_slam_msgs/Keyframe.h>
+#include <vip_slam_msgs/TrackedFrame.h>
+#include <vip_slam_msgs/TrackingStatus.h>
+
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/image_decoding.h"
+#include "vip_slam_ros/map_conversions.h"
+#include "vip_slam_ros/parameters.h"
+#include "vip_slam_ros/sensor_files.h"
+
+namespace vip_slam {
+
+FrontEndNodelet::~FrontEndNodelet() {
+  timer_.stop();
+  for (auto& subscriber : subscribers_) subscriber.shutdown();
+  if (owner_) owner_->stop();
+}
+
+void FrontEndNodelet::onInit() {
+  try {
+    loadOptionsFromParameters(options_, getPrivateNodeHandle());
+    sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
+  } catch (const std::exception& error) {
+    NODELET_FATAL("%s", error.what());
+    throw;
+  }
+  frames_.odom = options_.odom_frame;
+  frames_.base = options_.base_frame;
+  PairerOptions pairing;
+  pairing.tolerance = options_.pair_tolerance;
+  pairing.patience = sensor_.topics.depth.empty() ? -1.0 : options_.depth_patience;
+  pairing.capacity = std::size_t(options_.image_queue);
+  pairer_ = std::make_unique<ImagePairer>(pairing);
+  tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
+  tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
+  calibration_ = std::make_unique<CalibrationSource>(sensor_, options_, tf_buffer_);
+
+  owner_ = std::make_unique<OwnerThread>([this](const std::string& what) { NODELET_ERROR("%s", what.c_str()); });
+  imu_lane_ = owner_->addLane("imu", 4000);
+  image_lane_ = owner_->addLane("color", std::size_t(options_.image_queue));
+  depth_lane_ = owner_->addLane("depth", std::size_t(options_.image_queue));
+  control_lane_ = owner_->addLane("control", 1000);
+  advertise();
+  owner_->start();
+  subscribe();
+  timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { tick(); });
+}
+
+void FrontEndNodelet::advertise() {
+  ros::NodeHandle& nh = getNodeHandle();
+  odometry_pub_ = nh.advertise<nav_msgs::Odometry>("odom", 50);
+  imu_rate_pub_ = nh.advertise<nav_msgs::Odometry>("odom_imu_rate", 400);
+  frame_pub_ = nh.advertise<vip_slam_msgs::TrackedFrame>("tracked_frame", 20);
+  keyframe_pub_ = nh.advertise<vip_slam_msgs::Keyframe>("keyframe", 20);
+  status_pub_ = nh.advertise<vip_slam_msgs::TrackingStatus>("tracking_status", 5, true);
+  feature_image_pub_ = nh.advertise<sensor_msgs::Image>("feature_image", 2);
+  calibration_pub_ = nh.advertise<vip_slam_msgs::Calibration>("calibration", 1, true);
+
+  diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
+  diagnostics_->setHardwareID(sensor_.name);
+  diagnostics_->add("tracking", this, &FrontEndNodelet::reportTracking);
+  diagnostics_->add("input", this, &FrontEndNodelet::reportInput);
+  diagnostics_->add("queues", this, &FrontEndNodelet::reportQueues);
+
+  // The parameters given at the start are the initial values; dynamic_reconfigure would overwrite them by its defaults.
+  ros::NodeHandle& private_nh = getPrivateNodeHandle();
+  private_nh.setParam("publish_tf", options_.publish_tf);
+  private_nh.setParam("imu_rate_odometry", options_.imu_rate_odometry);
+  reconfigure_ = std::make_unique<dynamic_reconfigure::Server<FrontEndConfig>>(private_nh);
+  reconfigure_->setCallback([this](FrontEndConfig& config, std::uint32_t) { onReconfigure(config); });
+}
+
+void FrontEndNodelet::subscribe() {
+  const SensorTopics& topics = sensor_.topics;
+  color_monitor_ = std::make_unique<StreamMonitor>(topics.color, sensor_.color_rate);
+  depth_monitor_ = std::make_unique<StreamMonitor>(topics.depth, sensor_.depth_rate);
+  imu_monitor_ = std::make_unique<StreamMonitor>(topics.imu.empty() ? topics.gyro : topics.imu, sensor_.imu_rate);
+  accel_monitor_ = std::make_unique<StreamMonitor>(topics.accel, 0);
+
+  ros::NodeHandle& nh = getMTNodeHandle();
+  const auto hints = ros::TransportHints().tcpNoDelay();
+  if (sensor_.intrinsics_from_camera_info) {
+    subscribers_.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
+        topics.color_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { calibration_->addColorInfo(*m); }));
+    if (!sensor_.depth_registered) {
+      subscribers_.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
+          topics.depth_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { calibration_->addDepthInfo(*m); }));
+    }
+  }
+  subscribeImage(
+      topics.color, sensor_.color_encoding,
+      [this](const sensor_msgs::ImageConstPtr& m) {
+        onColor(m->header.stamp.toSec(), m->header.frame_id, [m] { return decodeGray(*m); });
+      },
+      [this](const sensor_msgs::CompressedImageConstPtr& m) {
+        onColor(m->header.stamp.toSec(), m->header.frame_id, [m] { return decodeGray(*m); });
+      });
+  if (!topics.depth.empty()) {
+    const double scale = sensor_.depth_scale;
+    subscribeImage(
+        topics.depth, sensor_.depth_encoding,
+        [this, scale](const sensor_msgs::ImageConstPtr& m) {
+          onDepth(m->header.stamp.toSec(), [m, scale] { return decodeDepth(*m, scale); });
+        },
+        [this, scale](const sensor_msgs::CompressedImageConstPtr& m) {
+          onDepth(m->header.stamp.toSec(), [m, scale] { return decodeDepth(*m, scale); });
+        });
+  }
+  // One queue in order for what is small and frequent; images are decoded beside it.
+  ros::NodeHandle& ordered = getNodeHandle();
+  const auto imu = [&](const std::string& topic, void (FrontEndNodelet::*callback)(const sensor_msgs::ImuConstPtr&)) {
+    if (!topic.empty()) subscribers_.push_back(ordered.subscribe(topic, 1000, callback, this, hints));
+  };
+  imu(topics.imu, &FrontEndNodelet::onImu);
+  imu(topics.gyro, &FrontEndNodelet::onGyro);
+  imu(topics.accel, &FrontEndNodelet::onAccel);
+  subscribers_.push_back(ordered.subscribe("map_update", 20, &FrontEndNodelet::onMapUpdate, this));
+  subscribers_.push_back(ordered.subscribe("control", 20, &FrontEndNodelet::onControl, this));
+}
+
+void FrontEndNodelet::subscribeImage(
+    const std::string& topic, const std::string& encoding,
+    const std::function<void(const sensor_msgs::ImageConstPtr&)>& raw,
+    const std::function<void(const sensor_msgs::CompressedImageConstPtr&)>& compressed) {
+  // Capacity of the topic's queue: images that come while one is being decoded. Each topic keeps its order.
+  ros::NodeHandle& nh = getMTNodeHandle();
+  const auto hints = ros::TransportHints().tcpNoDelay();
+  const auto size = std::uint32_t(options_.image_queue);
+  if (encoding == "compressed") {
+    subscribers_.push_back(nh.subscribe<sensor_msgs::CompressedImage>(topic, size, compressed, nullptr, hints));
+  } else {
+    subscribers_.push_back(nh.subscribe<sensor_msgs::Image>(topic, size, raw, nullptr, hints));
+  }
+}
+
+void FrontEndNodelet::watch(StreamMonitor& monitor, double t) { monitor.add(t, ros::Time::now().toSec()); }
+
+void FrontEndNodelet::onColor(double t, const std::string& frame_id, const std::function<cv::Mat()>& decode) {
+  watch(*color_monitor_, t);
+  calibration_->addColorFrame(frame_id);
+  try {
+    cv::Mat gray = decode();
+    owner_->post(image_lane_, [this, t, gray] {
+      if (noticeTime(t)) pairer_->addColor(t, gray);
+      processReady();
+    });
+  } catch (const std::exception& error) {
+    color_monitor_->reject(error.what());
+    NODELET_WARN_THROTTLE(10, "topic %s: %s", sensor_.topics.color.c_str(), error.what());
+  }
+}
+
+void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) {
+  watch(*depth_monitor_, t);
+  try {
+    cv::Mat depth = decode();
+    owner_->post(depth_lane_, [this, t, depth] {
+      if (noticeTime(t)) pairer_->addDepth(t, depth);
+      processReady();
+    });
+  } catch (const std::exception& error) {
+    depth_monitor_->reject(error.what());
+    NODELET_WARN_THROTTLE(10, "topic %s: %s", sensor_.topics.depth.c_str(), error.what());
+  }
+}
+
+void FrontEndNodelet::onImu(const sensor_msgs::ImuConstPtr& msg) {
+  const double t = msg->header.stamp.toSec();
+  watch(*imu_monitor_, t);
+  calibration_->addImuFrame(msg->header.frame_id, t);
+  const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity), accel = fromMsg(msg->linear_acceleration);
+  owner_->post(imu_lane_, [this, t, gyro, accel] { addInertial(t, &gyro, &accel); });
+}
+
+void FrontEndNodelet::onGyro(const sensor_msgs::ImuConstPtr& msg) {
+  const double t = msg->header.stamp.toSec();
+  watch(*imu_monitor_, t);
+  calibration_->addImuFrame(msg->header.frame_id, t);
+  const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity);
+  owner_->post(imu_lane_, [this, t, gyro] { addInertial(t, &gyro, nullptr); });
+}
+
+void FrontEndNodelet::onAccel(const sensor_msgs::ImuConstPtr& msg) {
+  const double t = msg->header.stamp.toSec();
+  watch(*accel_monitor_, t);
+  const Eigen::Vector3d accel = fromMsg(msg->linear_acceleration);
+  owner_->post(imu_lane_, [this, t, accel] { addInertial(t, nullptr, &accel); });
+}
+
+void FrontEndNodelet::onMapUpdate(const vip_slam_msgs::MapUpdateConstPtr& msg) {
+  owner_->post(control_lane_, [this, msg] {
+    if (front_end_) front_end_->applyMapUpdate(fromMsg(*msg));
+  });
+}
+
+void FrontEndNodelet::onControl(const vip_slam_msgs::ControlConstPtr& msg) {
+  owner_->post(control_lane_, [this, command = msg->command] {
+    using vip_slam_msgs::Control;
+    if (command == Control::PAUSE) paused_ = true;
+    const bool resumed = command == Control::RESUME && paused_;
+    if (command == Control::RESUME) paused_ = false;
+    if (command == Control::RESET || resumed) {
+      pairer_->clear();
+      if (front_end_) front_end_->reset(resumed ? "resumed after a pause" : "reset by request");
+    }
+  });
+}
+
+void FrontEndNodelet::onReconfigure(FrontEndConfig& config) {
+  publish_tf_ = config.publish_tf;
+  imu_rate_odometry_ = config.imu_rate_odometry;
+  feature_image_rate_ = config.feature_image_rate;
+}
+
+bool FrontEndNodelet::noticeTime(double t) {
+  if (paused_) return false;
+  if (t < newest_ - options_.time_jump) {
+    char words[120];
+    std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", newest_ - t);
+    NODELET_WARN("%s: the odometry starts anew, the map stays", words);
+    pairer_->clear();
+    early_.clear();
+    for (auto* monitor : {color_monitor_.get(), depth_monitor_.get(), imu_monitor_.get(), accel_monitor_.get()}) {
+      monitor->restart();
+    }
+    if (front_end_) front_end_->reset(words);
+    newest_ = t;
+    last_feature_image_ = -1e300;
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    ++shown_.time_jumps;
+  }
+  newest_ = std::max(newest_, t);
+  return true;
+}
+
+void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel) {
+  if (!noticeTime(t)) return;
+  if (!front_end_) {
+    constexpr std::size_t kEarly = 4000;
+    const Eigen::Vector3d g = gyro ? *gyro : Eigen::Vector3d::Zero(), a = accel ? *accel : Eigen::Vector3d::Zero();
+    const bool has_gyro = gyro != nullptr, has_accel = accel != nullptr;
+    early_.push_back([this, t, g, a, has_gyro, has_accel] {
+      addInertial(t, has_gyro ? &g : nullptr, has_accel ? &a : nullptr);
+    });
+    if (early_.size() > kEarly) early_.pop_front();
+    startWhenCalibrated();
+    return;
+  }
+  if (gyro && accel) {
+    front_end_->addImu({t, *gyro, *accel});
+  } else if (gyro) {
+    front_end_->addGyro(t, *gyro);
+  } else {
+    front_end_->addAccel(t, *accel);
+  }
+  if (gyro) gyro_ = *gyro;
+  processReady();
+  if (gyro && imu_rate_odometry_) publishImuRate(t);
+}
+
+void FrontEndNodelet::startWhenCalibrated() {
+  const std::optional<SensorConfig> resolved = calibration_->resolve(newest_);
+  if (!resolved) return;
+  try {
+    front_end_ = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr);
+  } catch (const std::exception& error) {
+    NODELET_ERROR_THROTTLE(5, "sensor '%s': %s", sensor_.name.c_str(), error.what());
+    return;
+  }
+  sensor_ = *resolved;
+  frames_.T_base_imu = sensor_.T_base_imu;
+  if (!sensor_.depth_registered) {
+    color_camera_ = makeCamera(sensor_.camera);
+    depth_camera_ = makeCamera(sensor_.depth_camera);
+  }
+  publishCalibration();
+  const auto early = std::move(early_);
+  early_.clear();
+  for (const auto& add : early) add();
+}
+
+void FrontEndNodelet::processReady() {
+  if (!front_end_) return;
+  while (const ImagePair* pair = pairer_->front()) {
+    if (!front_end_->ready(pair->t) && newest_ - pair->t <= options_.imu_patience) return;
+    process(*pair);
+    pairer_->pop();
+  }
+}
+
+void FrontEndNodelet::process(const ImagePair& pair) {
+  FrameInput input{pair.t, pair.gray, pair.depth};
+  if (depth_camera_ && !input.depth.empty()) {
+    input.depth = registerDepth(pair.depth, *depth_camera_, *color_camera_, sensor_.T_color_depth.matrix());
+  }
+  const ros::WallTime begin = ros::WallTime::now();
+  const FrameOutput output = front_end_->process(input);
+  const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
+  publish(pair, output);
+
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  shown_.status = output.frame->status;
+  shown_.counters = front_end_->counters();
+  shown_.pairs = pairer_->counters();
+  shown_.features = output.frame->features.size();
+  shown_.latency = ros::Time::now().toSec() - pair.t;
+  shown_.processing = milliseconds;
+}
+
+}  // namespace vip_slam
+
+PLUGINLIB_EXPORT_CLASS(vip_slam::FrontEndNodelet, nodelet::Nodelet)

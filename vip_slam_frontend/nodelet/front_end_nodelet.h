@@ -1,0 +1,126 @@
+// The front end as a nodelet: subscribers decode and hand over, one thread owns the estimator, publishers hand on.
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <dynamic_reconfigure/server.h>
+#include <nodelet/nodelet.h>
+#include <ros/ros.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_broadcaster.h>
+#include <tf2_ros/transform_listener.h>
+#include <vip_slam_msgs/Control.h>
+#include <vip_slam_msgs/MapUpdate.h>
+
+#include "calibration_source.h"
+#include "front_end_node_options.h"
+#include "odometry_messages.h"
+#include "vip_slam_core/util/timing.h"
+#include "vip_slam_frontend/FrontEndConfig.h"
+#include "vip_slam_frontend/front_end.h"
+#include "vip_slam_ros/image_pairer.h"
+#include "vip_slam_ros/owner_thread.h"
+#include "vip_slam_ros/stream_monitor.h"
+
+namespace vip_slam {
+
+class FrontEndNodelet : public nodelet::Nodelet {
+ public:
+  ~FrontEndNodelet() override;
+
+ private:
+  void onInit() override;
+  void advertise();
+  void subscribe();
+
+  // In the callback threads: decoding, watching, handing over.
+  void onColor(double t, const std::string& frame_id, const std::function<cv::Mat()>& decode);
+  void onDepth(double t, const std::function<cv::Mat()>& decode);
+  void onImu(const sensor_msgs::ImuConstPtr& msg);
+  void onGyro(const sensor_msgs::ImuConstPtr& msg);
+  void onAccel(const sensor_msgs::ImuConstPtr& msg);
+  void onMapUpdate(const vip_slam_msgs::MapUpdateConstPtr& msg);
+  void onControl(const vip_slam_msgs::ControlConstPtr& msg);
+  void onReconfigure(FrontEndConfig& config);
+  void watch(StreamMonitor& monitor, double t);
+  void subscribeImage(const std::string& topic, const std::string& encoding,
+                      const std::function<void(const sensor_msgs::ImageConstPtr&)>& raw,
+                      const std::function<void(const sensor_msgs::CompressedImageConstPtr&)>& compressed);
+
+  // In the owner thread.
+  void addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
+  bool noticeTime(double t);
+  void startWhenCalibrated();
+  void processReady();
+  void process(const ImagePair& pair);
+  void publish(const ImagePair& pair, const FrameOutput& output);
+  void publishFeatureImage(const ImagePair& pair, const TrackedFrame& frame);
+  void publishImuRate(double t);
+  void publishCalibration();
+
+  // Diagnostics, once a second by the wall clock.
+  void tick();
+  void reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void reportInput(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void reportQueues(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  FrontEndNodeOptions options_;
+  SensorConfig sensor_;
+  OdometryFrames frames_;
+  TimingLog timing_;
+  tf2_ros::Buffer tf_buffer_;
+  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
+  std::unique_ptr<CalibrationSource> calibration_;
+
+  std::unique_ptr<StreamMonitor> color_monitor_, depth_monitor_, imu_monitor_, accel_monitor_;
+
+  // Owned by the thread.
+  std::unique_ptr<FrontEnd> front_end_;
+  std::shared_ptr<const CameraModel> color_camera_, depth_camera_;
+  std::unique_ptr<ImagePairer> pairer_;
+  std::deque<std::function<void()>> early_;  ///< IMU samples before the calibration is complete
+  double newest_ = -1e300;
+  Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();
+  Matrix15d covariance_ = Matrix15d::Zero();  ///< of the newest image; predictions between images carry it
+  bool paused_ = false;
+  double last_feature_image_ = -1e300;
+
+  // What the thread tells the diagnostics.
+  struct Shown {
+    TrackingStatus status;
+    FrontEndCounters counters;
+    PairerCounters pairs;
+    std::size_t features = 0;
+    double latency = 0;     ///< stamp to publishing, seconds (by ROS time)
+    double processing = 0;  ///< last image, ms
+    std::size_t time_jumps = 0;
+  };
+  mutable std::mutex shown_mutex_;
+  Shown shown_;
+
+  std::atomic<bool> publish_tf_{true}, imu_rate_odometry_{false};
+  std::atomic<double> feature_image_rate_{15.0};
+
+  OwnerThread::Lane imu_lane_ = 0, image_lane_ = 0, depth_lane_ = 0, control_lane_ = 0;
+  ros::Publisher odometry_pub_, imu_rate_pub_, frame_pub_, keyframe_pub_, status_pub_, feature_image_pub_,
+      calibration_pub_;
+  std::vector<ros::Subscriber> subscribers_;
+  std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  std::unique_ptr<dynamic_reconfigure::Server<FrontEndConfig>> reconfigure_;
+  ros::WallTimer timer_;
+  std::unique_ptr<OwnerThread> owner_;  ///< last: stops before anything it uses goes
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,81 @@
+// What the front-end nodelet publishes.
+#include <vip_slam_msgs/Calibration.h>
+#include <vip_slam_msgs/Keyframe.h>
+#include <vip_slam_msgs/TrackedFrame.h>
+#include <vip_slam_msgs/TrackingStatus.h>
+
+#include "feature_image.h"
+#include "front_end_nodelet.h"
+#include "vip_slam_ros/camera_info.h"
+#include "vip_slam_ros/frame_conversions.h"
+#include "vip_slam_ros/geometry_conversions.h"
+
+namespace vip_slam {
+namespace {
+
+bool hasPose(const TrackedFrame& frame) {
+  return frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
+}
+
+/// Standard deviation of one gyro sample, rad/s.
+double gyroSigma(const SensorConfig& sensor) {
+  return sensor.imu_noise.gyro_noise_density * std::sqrt(std::max(1.0, sensor.imu_rate));
+}
+
+}  // namespace
+
+void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output) {
+  const TrackedFrame& frame = *output.frame;
+  covariance_ = frame.covariance;
+  // A message that is published is shared with all receivers and never changed again.
+  if (hasPose(frame)) {
+    auto odometry = boost::make_shared<nav_msgs::Odometry>(
+        toOdometry(frame.t, frame.state, frame.covariance, gyro_, gyroSigma(sensor_), frames_));
+    if (publish_tf_) tf_broadcaster_->sendTransform(toTransform(*odometry));
+    odometry_pub_.publish(odometry);
+  }
+  // Planes and back end get the keyframe before the frame that belongs to it, as in the offline runner.
+  if (output.keyframe) {
+    keyframe_pub_.publish(boost::make_shared<vip_slam_msgs::Keyframe>(toMsg(*output.keyframe, frames_.odom)));
+  }
+  frame_pub_.publish(boost::make_shared<vip_slam_msgs::TrackedFrame>(toMsg(frame, frames_.odom)));
+  status_pub_.publish(boost::make_shared<vip_slam_msgs::TrackingStatus>(toMsg(frame.status)));
+  publishFeatureImage(pair, frame);
+}
+
+void FrontEndNodelet::publishFeatureImage(const ImagePair& pair, const TrackedFrame& frame) {
+  if (feature_image_pub_.getNumSubscribers() == 0 || pair.gray.empty() || pair.gray.type() != CV_8UC1) return;
+  if (pair.t - last_feature_image_ < 1.0 / feature_image_rate_ - 1e-3) return;
+  last_feature_image_ = pair.t;
+  const cv::Mat picture = drawFeatureImage(pair.gray, frame);
+  auto image = boost::make_shared<sensor_msgs::Image>();
+  image->header.stamp = toStamp(pair.t);
+  image->header.frame_id = calibration_->colorFrame();
+  image->width = std::uint32_t(picture.cols);
+  image->height = std::uint32_t(picture.rows);
+  image->encoding = "bgr8";
+  image->step = std::uint32_t(picture.cols * 3);
+  image->data.assign(picture.data, picture.data + std::size_t(image->step) * image->height);
+  feature_image_pub_.publish(image);
+}
+
+void FrontEndNodelet::publishImuRate(double t) {
+  if (imu_rate_pub_.getNumSubscribers() == 0) return;
+  if (const auto state = front_end_->predict(t)) {
+    imu_rate_pub_.publish(boost::make_shared<nav_msgs::Odometry>(toOdometry(
+        t - sensor_.time_offset, *state, covariance_, gyro_, gyroSigma(sensor_), frames_)));
+  }
+}
+
+void FrontEndNodelet::publishCalibration() {
+  auto msg = boost::make_shared<vip_slam_msgs::Calibration>();
+  msg->header.stamp = toStamp(newest_);
+  msg->header.frame_id = calibration_->colorFrame();
+  msg->camera = toCameraInfo(sensor_.camera);
+  msg->camera.header = msg->header;
+  msg->imu_camera = toPoseMsg(sensor_.T_imu_cam);
+  msg->base_imu = toPoseMsg(sensor_.T_base_imu);
+  calibration_pub_.publish(msg);
+}
+
+}  // namespace vip_slam

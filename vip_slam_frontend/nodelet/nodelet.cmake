@@ -1,0 +1,29 @@
+# The front end as a nodelet. Included last: ROS stays out of the library above.
+find_package(catkin REQUIRED COMPONENTS
+  diagnostic_updater dynamic_reconfigure geometry_msgs nav_msgs nodelet pluginlib roscpp sensor_msgs tf2_ros
+  vip_slam_core vip_slam_msgs vip_slam_ros)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc)
+
+add_library(vip_slam_frontend_nodelets
+  nodelet/calibration_source.cpp
+  nodelet/feature_image.cpp
+  nodelet/front_end_diagnostics.cpp
+  nodelet/front_end_nodelet.cpp
+  nodelet/front_end_publishing.cpp
+  nodelet/odometry_messages.cpp
+)
+target_include_directories(vip_slam_frontend_nodelets PRIVATE nodelet)
+target_include_directories(vip_slam_frontend_nodelets SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
+target_compile_options(vip_slam_frontend_nodelets PRIVATE -Wall -Wextra)
+target_link_libraries(vip_slam_frontend_nodelets vip_slam_frontend ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
+add_dependencies(vip_slam_frontend_nodelets vip_slam_frontend_gencfg ${catkin_EXPORTED_TARGETS})
+
+install(TARGETS vip_slam_frontend_nodelets LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+install(FILES nodelet/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/nodelet)
+
+if(CATKIN_ENABLE_TESTING)
+  catkin_add_gtest(test_odometry_messages nodelet/test_odometry_messages.cpp)
+  target_include_directories(test_odometry_messages PRIVATE nodelet)
+  target_include_directories(test_odometry_messages SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  target_link_libraries(test_odometry_messages vip_slam_frontend_nodelets gtest_main ${catkin_LIBRARIES})
+endif()
