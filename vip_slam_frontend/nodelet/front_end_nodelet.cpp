@@ -70,8 +70,8 @@ void FrontEndNodelet::advertise() {
   ros::NodeHandle& private_nh = getPrivateNodeHandle();
   private_nh.setParam("publish_tf", options_.publish_tf);
   private_nh.setParam("imu_rate_odometry", options_.imu_rate_odometry);
-  reconfigure_ = std::make_unique<dynamic_reconfigure::Server<FrontEndConfig>>(private_nh);
-  reconfigure_->setCallback([this](FrontEndConfig& config, std::uint32_t) { onReconfigure(config); });
+  reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_frontend::FrontEndConfig>>(private_nh);
+  reconfigure_->setCallback([this](vip_slam_frontend::FrontEndConfig& config, std::uint32_t) { onReconfigure(config); });
 }
 
 void FrontEndNodelet::subscribe() {
@@ -210,7 +210,7 @@ void FrontEndNodelet::onControl(const vip_slam_msgs::ControlConstPtr& msg) {
   });
 }
 
-void FrontEndNodelet::onReconfigure(FrontEndConfig& config) {
+void FrontEndNodelet::onReconfigure(vip_slam_frontend::FrontEndConfig& config) {
   publish_tf_ = config.publish_tf;
   imu_rate_odometry_ = config.imu_rate_odometry;
   feature_image_rate_ = config.feature_image_rate;

@@ -52,7 +52,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void onAccel(const sensor_msgs::ImuConstPtr& msg);
   void onMapUpdate(const vip_slam_msgs::MapUpdateConstPtr& msg);
   void onControl(const vip_slam_msgs::ControlConstPtr& msg);
-  void onReconfigure(FrontEndConfig& config);
+  void onReconfigure(vip_slam_frontend::FrontEndConfig& config);
   void watch(StreamMonitor& monitor, double t);
   void subscribeImage(const std::string& topic, const std::string& encoding,
                       const std::function<void(const sensor_msgs::ImageConstPtr&)>& raw,
@@ -118,7 +118,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
       calibration_pub_;
   std::vector<ros::Subscriber> subscribers_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
-  std::unique_ptr<dynamic_reconfigure::Server<FrontEndConfig>> reconfigure_;
+  std::unique_ptr<dynamic_reconfigure::Server<vip_slam_frontend::FrontEndConfig>> reconfigure_;
   ros::WallTimer timer_;
   std::unique_ptr<OwnerThread> owner_;  ///< last: stops before anything it uses goes
 };
