@@ -1,0 +1,30 @@
+// Where a rendered sequence goes: a bag (vip_slam_sim_bag) or a folder.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "vip_slam_sim/sequence/sequence_renderer.h"
+
+namespace vip_slam {
+
+/// Takes IMU samples and frames in time order. Nothing but whole files is left behind: commit() puts them in place, a
+/// writer destroyed before it removes what it wrote.
+class SequenceWriter {
+ public:
+  virtual ~SequenceWriter() = default;
+  virtual void imu(std::int64_t stamp_ns, const ImuSample& sample, const NavState& truth) = 0;
+  virtual void frame(const SimFrame& frame) = 0;
+  virtual void commit() = 0;
+};
+
+/// EuRoC-like folder with TUM's lists: rgb/STAMP.png, depth/STAMP.png, rgb.txt, depth.txt, associations.txt,
+/// imu0/data.csv, state_groundtruth_estimate0/data.csv.
+std::unique_ptr<SequenceWriter> makeFolderWriter(const std::string& folder);
+
+/// Bag with a RealSense driver's topics, lz4-compressed: colour rgb8, depth 16UC1, both camera_info, IMU, /tf_static,
+/// /ground_truth/odometry.
+std::unique_ptr<SequenceWriter> makeBagWriter(const std::string& path, const SensorConfig& sensor,
+                                              std::int64_t start_ns);
+
+}  // namespace vip_slam

@@ -1,0 +1,41 @@
+// From radiance and exact depth to what the sensors deliver.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_sim/render/renderer.h"
+#include "vip_slam_sim/sequence/sequence_spec.h"
+
+namespace vip_slam {
+
+/// Velocity of the camera in its own frame.
+struct CameraTwist {
+  Eigen::Vector3d v_C = Eigen::Vector3d::Zero(), omega_C = Eigen::Vector3d::Zero();
+};
+
+class SensorEffects {
+ public:
+  SensorEffects(const EffectOptions& effects, const DepthOptions& depth, const CameraModel& camera, int seed);
+
+  /// Smears the radiance along the optical flow of the exposure time.
+  void motionBlur(const CameraTwist& twist, FrameBuffers* frame) const;
+  /// 8UC3 RGB of frame number `index`, taken `t` seconds into the sequence.
+  cv::Mat colour(const FrameBuffers& frame, int index, double t) const;
+  /// 16UC1 millimetres, 0 = invalid. `brightness` (8UC3, may be empty) tells dark surfaces.
+  cv::Mat depth(const FrameBuffers& frame, const cv::Mat& brightness, int index) const;
+
+ private:
+  const float* noise(std::uint64_t key) const;
+
+  EffectOptions effects_;
+  DepthOptions depth_;
+  const CameraModel& camera_;
+  std::uint64_t seed_;
+  std::vector<float> vignette_;
+  std::vector<float> gauss_;  ///< standard normal deviates, read from random places
+};
+
+}  // namespace vip_slam

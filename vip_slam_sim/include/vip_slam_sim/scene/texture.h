@@ -1,0 +1,41 @@
+// A mip-mapped texture with anisotropic look-up, so that nothing shimmers when seen from afar or at a slant.
+// Colours are stored as the square root of the reflectance (gamma 2): filtering happens in that space.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_sim/scene/vec.h"
+
+namespace vip_slam {
+
+class Texture {
+ public:
+  /// `image`: CV_8UC3 RGB or CV_32FC3 RGB in 0..1, row 0 at the top. A repeating texture needs power-of-two sides.
+  /// Throws std::invalid_argument otherwise.
+  Texture(const cv::Mat& image, bool repeat);
+
+  int width() const { return levels_[0].width; }
+  int height() const { return levels_[0].height; }
+
+  /// Filtered colour at texel coordinates (s right, t down), with the change of (s, t) per pixel step in x and y.
+  Vec4 sample(float s, float t, float dsdx, float dtdx, float dsdy, float dtdy) const;
+  /// Mean colour.
+  Vec4 mean() const { return bilinear(levels_.back(), 0, 0); }
+
+ private:
+  struct Level {
+    int width, height;
+    std::size_t offset;
+  };
+  Vec4 bilinear(const Level& level, float s, float t) const;
+  void addLevel(const cv::Mat& image);
+
+  bool repeat_;
+  std::vector<Level> levels_;
+  std::vector<std::uint16_t> texels_;  ///< RGBA
+};
+
+}  // namespace vip_slam

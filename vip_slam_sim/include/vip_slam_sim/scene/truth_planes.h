@@ -1,0 +1,46 @@
+// The true planes of a scene and how long and how much of each the camera saw.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_sim/render/renderer.h"
+#include "vip_slam_sim/scene/scene.h"
+
+namespace vip_slam {
+
+/// Outline of a surface: pieces united exactly, with holes.
+std::vector<PlanePolygon> surfaceOutline(const Scene& scene, const Surface& surface);
+
+/// Counts which surfaces frames show. Not thread-safe.
+class VisibilityCounter {
+ public:
+  explicit VisibilityCounter(std::shared_ptr<const Scene> scene);
+  /// A frame shown for `seconds`; only depths up to `max_depth` count.
+  void add(const FrameBuffers& frame, const CameraModel& camera, const SE3& T_W_C, double seconds, double max_depth);
+  double seenSeconds(int surface) const { return seconds_[surface]; }
+  double seenArea(int surface) const;
+
+ private:
+  struct Grid {
+    float u0 = 0, v0 = 0;
+    int cols = 0, rows = 0;
+    std::vector<char> seen;
+  };
+  std::shared_ptr<const Scene> scene_;
+  std::vector<double> seconds_;
+  std::vector<Grid> grids_;
+};
+
+struct TruthPlane {
+  PlaneEstimate plane;
+  double seen_seconds = 0;  ///< time it filled at least 0.5 % of the image within depth range
+  double seen_area = 0;     ///< m^2 of it that was ever in view
+};
+
+/// Planes of at least `min_area` m^2, ids from 1, normals to the open side.
+std::vector<TruthPlane> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area = 0.02);
+
+}  // namespace vip_slam

@@ -1,0 +1,89 @@
+// Everything that defines a sequence. One declaration per key gives default, range and meaning; the YAML of named
+// sequences and a user's own file use the same keys.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/util/options.h"
+
+namespace vip_slam {
+
+struct MotionOptions {
+  std::string type = "path";
+  std::string waypoints;     ///< "x,y[,z]; ...; turn DEG; pause SECONDS"
+  std::string style = "handheld";
+  std::string file;
+  double duration = 0, hold = 2.6, start_at = 0;
+  double speed = 0.8, height = 1.5, max_rate = 0.8;
+  double yaw_swing = 12, pitch = -6, turn_rate = 45;
+  double x = 0, y = 0, z = 0, yaw = 0;
+  double extent_x = 2.0, extent_y = 1.3, extent_z = 0.35;
+  bool check_collisions = true;
+  double clearance = 0.22;
+  void visit(OptionVisitor& v);
+};
+
+struct CameraOptions {
+  int width = 640, height = 480;
+  double fx = 480, fy = 480, cx = 319.5, cy = 239.5;
+  std::string model = "none";
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0;
+  double rate = 20;
+  void visit(OptionVisitor& v);
+  CameraIntrinsics intrinsics() const;
+};
+
+struct DepthOptions {
+  std::string model = "proportional";
+  double a = 0, b = 0.0017, c = 0, min_range = 0.2, max_range = 10;
+  double dropout = 0, edge_hole = 0, grazing_limit = 0, dark_limit = 0, bias_amplitude = 0;
+  bool registered = true;
+  double baseline = 0.015;
+  void visit(OptionVisitor& v);
+};
+
+struct ImuOptions {
+  double rate = 200;
+  double gyro_noise_density = 1.7e-4, gyro_random_walk = 2e-5;
+  double accel_noise_density = 2e-3, accel_random_walk = 3e-3;
+  double gyro_bias = 0.01, accel_bias = 0.06;
+  double scale_error = 0;
+  double time_offset = 0;
+  void visit(OptionVisitor& v);
+};
+
+struct EffectOptions {
+  double exposure = 1.0, exposure_drift = 0.06, vignetting = 0.18;
+  double read_noise = 1.0, shot_noise = 0.9;
+  double exposure_time = 0.005;
+  bool motion_blur = false;
+  double rolling_shutter = 0;
+  void visit(OptionVisitor& v);
+};
+
+struct SequenceSpec {
+  std::string name;
+  std::string scene = "room";
+  int seed = 1;
+  double start_time = 1600000000;
+  MotionOptions motion;
+  CameraOptions camera;
+  DepthOptions depth;
+  ImuOptions imu;
+  EffectOptions effects;
+  void visit(OptionVisitor& v);
+
+  SE3 T_imu_cam() const;           ///< the rig's own, a little off every axis
+  SensorConfig sensorConfig() const;
+};
+
+/// A named sequence of `library` (the shipped config/sequences.yaml) or, when `name_or_file` ends in .yaml, a file of
+/// one sequence whose optional key `base` names the sequence it changes. Throws std::runtime_error that names the file,
+/// the key and what was expected.
+SequenceSpec loadSequence(const std::string& name_or_file, const std::string& library);
+/// Names in the library, in order.
+std::vector<std::string> sequenceNames(const std::string& library);
+
+}  // namespace vip_slam

@@ -1,0 +1,104 @@
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <stdexcept>
+#include <string>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "vip_slam_sim/io/sequence_writer.h"
+
+namespace vip_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string secondsText(std::int64_t ns) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%lld.%09lld", static_cast<long long>(ns / 1000000000LL),
+                static_cast<long long>(ns % 1000000000LL));
+  return text;
+}
+
+class FolderWriter : public SequenceWriter {
+ public:
+  explicit FolderWriter(const std::string& folder) : target_(folder), work_(folder + ".part") {
+    if (fs::exists(target_)) throw std::runtime_error(target_.string() + ": exists already");
+    fs::remove_all(work_);
+    for (const char* sub : {"rgb", "depth", "imu0", "state_groundtruth_estimate0"}) fs::create_directories(work_ / sub);
+    open(imu_, "imu0/data.csv",
+         "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],"
+         "a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]");
+    open(truth_, "state_groundtruth_estimate0/data.csv",
+         "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],"
+         "v_RS_R_x [m s^-1],v_RS_R_y [m s^-1],v_RS_R_z [m s^-1],b_w_RS_S_x [rad s^-1],b_w_RS_S_y [rad s^-1],"
+         "b_w_RS_S_z [rad s^-1],b_a_RS_S_x [m s^-2],b_a_RS_S_y [m s^-2],b_a_RS_S_z [m s^-2]");
+    open(rgb_, "rgb.txt", "# timestamp filename");
+    open(depth_, "depth.txt", "# timestamp filename (16-bit, millimetres)");
+    open(both_, "associations.txt", "# rgb_timestamp rgb_file depth_timestamp depth_file");
+  }
+  ~FolderWriter() override {
+    std::error_code ignored;
+    if (!committed_) fs::remove_all(work_, ignored);
+  }
+
+  void imu(std::int64_t ns, const ImuSample& s, const NavState& x) override {
+    const auto list = [](std::ofstream& out, const Eigen::Vector3d& v) { out << ',' << v.x() << ',' << v.y() << ',' << v.z(); };
+    imu_ << ns;
+    list(imu_, s.gyro);
+    list(imu_, s.accel);
+    imu_ << '\n';
+    truth_ << ns;
+    list(truth_, x.T_W_I.t());
+    const Eigen::Quaterniond& q = x.T_W_I.rotation();
+    truth_ << ',' << q.w() << ',' << q.x() << ',' << q.y() << ',' << q.z();
+    list(truth_, x.v_W);
+    list(truth_, x.bias_gyro);
+    list(truth_, x.bias_accel);
+    truth_ << '\n';
+  }
+
+  void frame(const SimFrame& f) override {
+    const std::string stamp = secondsText(f.stamp_ns);
+    const std::string rgb = "rgb/" + stamp + ".png", depth = "depth/" + stamp + ".png";
+    cv::Mat bgr;
+    cv::cvtColor(f.rgb, bgr, cv::COLOR_RGB2BGR);
+    const std::vector<int> quick = {cv::IMWRITE_PNG_COMPRESSION, 1};
+    for (const auto& [name, image] : {std::pair<std::string, cv::Mat>{rgb, bgr}, {depth, f.depth}})
+      if (!cv::imwrite((work_ / name).string(), image, quick))
+        throw std::runtime_error((work_ / name).string() + ": cannot be written");
+    rgb_ << stamp << ' ' << rgb << '\n';
+    depth_ << stamp << ' ' << depth << '\n';
+    both_ << stamp << ' ' << rgb << ' ' << stamp << ' ' << depth << '\n';
+  }
+
+  void commit() override {
+    for (std::ofstream* out : {&imu_, &truth_, &rgb_, &depth_, &both_}) {
+      out->close();
+      if (!*out) throw std::runtime_error(work_.string() + ": a list could not be written");
+    }
+    fs::rename(work_, target_);
+    committed_ = true;
+  }
+
+ private:
+  void open(std::ofstream& out, const char* name, const char* header) {
+    out.open(work_ / name);
+    if (!out) throw std::runtime_error((work_ / name).string() + ": cannot be written");
+    out << header << '\n' << std::setprecision(12);
+  }
+
+  fs::path target_, work_;
+  std::ofstream imu_, truth_, rgb_, depth_, both_;
+  bool committed_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<SequenceWriter> makeFolderWriter(const std::string& folder) {
+  return std::make_unique<FolderWriter>(folder);
+}
+
+}  // namespace vip_slam

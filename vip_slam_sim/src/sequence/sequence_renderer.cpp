@@ -1,0 +1,197 @@
+#include "vip_slam_sim/sequence/sequence_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <condition_variable>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+#include "vip_slam_sim/motion/motion_generator.h"
+#include "vip_slam_sim/render/light_baker.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kMargin = 0.1;  ///< s of IMU before the first and after the last image
+
+}  // namespace
+
+SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions& options)
+    : spec_(spec), options_(options), sensor_(spec.sensorConfig()),
+      trajectory_(makeMotion(spec.motion, spec.T_imu_cam(), spec.seed)),
+      imu_(synthesiseImu(trajectory_, spec.imu, spec.seed, sensor_.gravity)) {
+  options_.threads = std::max(1, options_.threads);
+  camera_ = makeCamera(sensor_.camera);
+  auto scene = std::make_shared<Scene>(buildScene(spec.scene));
+  tracer_ = std::make_shared<RayTracer>(*scene);
+  scene_ = scene;
+  if (spec.motion.check_collisions) {
+    double when = 0;
+    const double least = leastClearance(&when);
+    if (least < spec.motion.clearance) {
+      const Eigen::Vector3d p = (trajectory_.at(when).T_W_I * sensor_.T_imu_cam).t();
+      std::ostringstream words;
+      words << "sequence '" << spec.name << "': motion: the camera is " << least << " m from the scene at t = " << when
+            << " s, (" << p.transpose() << "), expected at least " << spec.motion.clearance
+            << " m (motion/clearance; motion/check_collisions: false to allow)";
+      throw std::runtime_error(words.str());
+    }
+  }
+  bakeLight(scene.get(), *tracer_, options_.threads, options_.light_spacing_scale);
+  renderer_ = std::make_unique<Renderer>(scene_, tracer_, camera_);
+  if (!spec.depth.registered)
+    depth_renderer_ = std::make_unique<Renderer>(scene_, tracer_, makeCamera(sensor_.depth_camera));
+  effects_ = std::make_unique<SensorEffects>(spec.effects, spec.depth, *camera_, spec.seed);
+  visibility_ = std::make_unique<VisibilityCounter>(scene_);
+  const double usable = trajectory_.end() - 2 * kMargin - std::abs(spec.imu.time_offset) - spec.effects.rolling_shutter;
+  if (usable <= 0) throw std::runtime_error("sequence '" + spec.name + "': motion: too short for a single image");
+  frame_count_ = static_cast<int>(usable * spec.camera.rate) + 1;
+}
+
+SequenceRenderer::~SequenceRenderer() = default;
+
+double SequenceRenderer::leastClearance(double* when) const {
+  double least = 1e9;
+  for (double t = 0; t <= trajectory_.end(); t += 0.05) {
+    const Eigen::Vector3f p = (trajectory_.at(t).T_W_I * sensor_.T_imu_cam).t().cast<float>();
+    const double c = tracer_->clearance({p.x(), p.y(), p.z()}, 1.0f);
+    if (c < least) {
+      least = c;
+      if (when) *when = t;
+    }
+  }
+  return least;
+}
+
+std::int64_t SequenceRenderer::toNanoseconds(double t) const {
+  return std::llround(spec_.start_time) * 1000000000LL + std::llround(t * 1e9);
+}
+
+double SequenceRenderer::toSeconds(std::int64_t stamp_ns) const {
+  return static_cast<double>(stamp_ns - std::llround(spec_.start_time) * 1000000000LL) * 1e-9;
+}
+
+double SequenceRenderer::frameTime(int index) const {
+  const double t = kMargin + 0.5 * std::abs(spec_.imu.time_offset) + 0.5 * spec_.effects.rolling_shutter +
+                   index / spec_.camera.rate;
+  return std::round(t * 1e9) * 1e-9;  // what the stamp can say
+}
+
+NavState SequenceRenderer::stateAt(double t) const {
+  const MotionState m = trajectory_.at(t);
+  NavState s;
+  s.t = t;
+  s.T_W_I = m.T_W_I;
+  s.v_W = m.v_W;
+  const auto k = static_cast<std::size_t>(std::clamp(std::llround(t * spec_.imu.rate), 0LL, static_cast<long long>(imu_.biases.size()) - 1));
+  s.bias_gyro = imu_.biases[k].gyro;
+  s.bias_accel = imu_.biases[k].accel;
+  return s;
+}
+
+SimFrame SequenceRenderer::renderFrame(int index) const {
+  SimFrame f;
+  f.index = index;
+  const double t = frameTime(index);
+  f.stamp_ns = toNanoseconds(t - spec_.imu.time_offset);
+  const MotionState m = trajectory_.at(t);
+  f.T_W_C = m.T_W_I * sensor_.T_imu_cam;
+  const double readout = spec_.effects.rolling_shutter;
+  if (readout > 0) {
+    const double rows = camera_->height();
+    renderer_->render([&](int row) { return trajectory_.at(t + readout * ((row + 0.5) / rows - 0.5)).T_W_I * sensor_.T_imu_cam; },
+                      true, &f.exact);
+  } else {
+    renderer_->render(f.T_W_C, &f.exact);
+  }
+  if (spec_.effects.motion_blur) {
+    CameraTwist twist;
+    const Eigen::Quaterniond R_C_I = sensor_.T_imu_cam.rotation().conjugate();
+    twist.omega_C = R_C_I * m.omega_I;
+    const Eigen::Vector3d v_I = m.T_W_I.rotation().conjugate() * m.v_W + m.omega_I.cross(sensor_.T_imu_cam.t());
+    twist.v_C = R_C_I * v_I;
+    effects_->motionBlur(twist, &f.exact);
+  }
+  f.rgb = effects_->colour(f.exact, index, t);
+  if (spec_.depth.registered) {
+    f.depth = effects_->depth(f.exact, f.rgb, index);
+  } else {
+    FrameBuffers own;
+    depth_renderer_->renderDepth(f.T_W_C * sensor_.T_color_depth, &own);
+    f.depth = effects_->depth(own, cv::Mat(), index);
+  }
+  return f;
+}
+
+void SequenceRenderer::render(const std::function<bool(const SimFrame&)>& take) {
+  const int first = options_.first;
+  const int last = options_.count < 0 ? frame_count_ : std::min(frame_count_, first + options_.count);
+  const int window = 2 * options_.threads + 2;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::map<int, SimFrame> done;
+  int next_to_render = first, next_to_take = first;
+  bool stop = false;
+  std::exception_ptr error;
+  const auto work = [&] {
+    for (;;) {
+      int index;
+      {
+        std::unique_lock<std::mutex> lock(mutex);
+        changed.wait(lock, [&] { return stop || next_to_render >= last || next_to_render < next_to_take + window; });
+        if (stop || next_to_render >= last) return;
+        index = next_to_render++;
+      }
+      try {
+        SimFrame frame = renderFrame(index);
+        std::lock_guard<std::mutex> lock(mutex);
+        done.emplace(index, std::move(frame));
+      } catch (...) {
+        std::lock_guard<std::mutex> lock(mutex);
+        error = std::current_exception();
+        stop = true;
+      }
+      changed.notify_all();
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int i = 0; i < options_.threads; ++i) pool.emplace_back(work);
+  const auto finish = [&] {
+    {
+      std::lock_guard<std::mutex> lock(mutex);
+      stop = true;
+    }
+    changed.notify_all();
+    for (std::thread& t : pool) t.join();
+    pool.clear();
+  };
+  try {
+    while (next_to_take < last) {
+      SimFrame frame;
+      {
+        std::unique_lock<std::mutex> lock(mutex);
+        changed.wait(lock, [&] { return stop || done.count(next_to_take); });
+        if (stop) break;
+        frame = std::move(done.at(next_to_take));
+        done.erase(next_to_take);
+        ++next_to_take;
+      }
+      changed.notify_all();
+      visibility_->add(frame.exact, *camera_, frame.T_W_C, 1.0 / spec_.camera.rate, spec_.depth.max_range);
+      if (!take(frame)) break;
+    }
+  } catch (...) {
+    finish();
+    throw;
+  }
+  finish();
+  if (error) std::rethrow_exception(error);
+}
+
+std::vector<TruthPlane> SequenceRenderer::planes() const { return truthPlanes(*scene_, *visibility_); }
+
+}  // namespace vip_slam
