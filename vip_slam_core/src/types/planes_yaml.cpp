@@ -65,6 +65,8 @@ PlaneEstimate planeFrom(const YAML::Node& node) {
   plane.plane = Plane(n, d);
   plane.area = need(node, "area").as<double>();
   if (node["keyframes"]) plane.keyframes = node["keyframes"].as<std::uint32_t>();
+  if (node["seen_seconds"]) plane.seen_seconds = node["seen_seconds"].as<double>();
+  if (node["seen_area"]) plane.seen_area = node["seen_area"].as<double>();
   for (const YAML::Node& piece : need(node, "polygons")) {
     PlanePolygon polygon;
     polygon.outer = ringFrom(need(piece, "outer"), "outer");
@@ -105,7 +107,10 @@ void writePlanesYaml(const std::string& path, const std::vector<PlaneEstimate>& 
   for (const PlaneEstimate& plane : planes) {
     out << "  - id: " << plane.id << "\n    kind: " << kindName(plane.kind) << "\n    normal: " << text(plane.plane.n)
         << "\n    distance: " << formatDouble(plane.plane.d) << "\n    area: " << formatDouble(plane.area)
-        << "\n    keyframes: " << plane.keyframes << "\n    polygons:" << (plane.polygons.empty() ? " []" : "") << "\n";
+        << "\n    keyframes: " << plane.keyframes;
+    if (plane.seen_seconds >= 0) out << "\n    seen_seconds: " << formatDouble(plane.seen_seconds);
+    if (plane.seen_area >= 0) out << "\n    seen_area: " << formatDouble(plane.seen_area);
+    out << "\n    polygons:" << (plane.polygons.empty() ? " []" : "") << "\n";
     for (const PlanePolygon& polygon : plane.polygons) {
       out << "      - outer: " << text(polygon.outer) << "\n        holes:" << (polygon.holes.empty() ? " []" : "") << "\n";
       for (const Ring& hole : polygon.holes) out << "          - " << text(hole) << "\n";

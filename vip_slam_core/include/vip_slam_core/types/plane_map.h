@@ -25,6 +25,8 @@ struct PlaneEstimate {
   std::vector<PlanePolygon> polygons;  ///< disjoint pieces
   double area = 0;                     ///< m^2
   std::uint32_t keyframes = 0;         ///< keyframes that saw it
+  double seen_seconds = -1;            ///< simulator's truth: time in view; -1: not known
+  double seen_area = -1;               ///< simulator's truth: m^2 of it that was ever in view; -1: not known
 };
 
 /// A depth point on a plane, in the keyframe's camera frame, with the one-sigma distance error used as its weight.
