@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <Eigen/LU>
+
 namespace vip_slam {
 
 Eigen::Vector2d PinholeCamera::distort(const Eigen::Vector2d& xy, Eigen::Matrix2d* J) const {
