@@ -201,8 +201,8 @@ double VisibilityCounter::seenArea(int surface) const {
   return std::min(cells, scene_->surfaces[surface].area);
 }
 
-std::vector<TruthPlane> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area) {
-  std::vector<TruthPlane> planes;
+std::vector<PlaneEstimate> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area) {
+  std::vector<PlaneEstimate> planes;
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const Surface& s = scene.surfaces[i];
     if (s.area < min_area) continue;
@@ -214,7 +214,9 @@ std::vector<TruthPlane> truthPlanes(const Scene& scene, const VisibilityCounter&
     p.kind = up > 0.9999 ? PlaneKind::kHorizontal : up < 0.01 ? PlaneKind::kVertical : PlaneKind::kGeneral;
     p.polygons = surfaceOutline(scene, s);
     p.area = s.area;
-    planes.push_back({std::move(p), seen.seenSeconds(static_cast<int>(i)), seen.seenArea(static_cast<int>(i))});
+    p.seen_seconds = seen.seenSeconds(static_cast<int>(i));
+    p.seen_area = seen.seenArea(static_cast<int>(i));
+    planes.push_back(std::move(p));
   }
   return planes;
 }

@@ -192,6 +192,6 @@ void SequenceRenderer::render(const std::function<bool(const SimFrame&)>& take) 
   if (error) std::rethrow_exception(error);
 }
 
-std::vector<TruthPlane> SequenceRenderer::planes() const { return truthPlanes(*scene_, *visibility_); }
+std::vector<PlaneEstimate> SequenceRenderer::planes() const { return truthPlanes(*scene_, *visibility_); }
 
 }  // namespace vip_slam

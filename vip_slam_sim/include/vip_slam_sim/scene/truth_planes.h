@@ -34,13 +34,8 @@ class VisibilityCounter {
   std::vector<Grid> grids_;
 };
 
-struct TruthPlane {
-  PlaneEstimate plane;
-  double seen_seconds = 0;  ///< time it filled at least 0.5 % of the image within depth range
-  double seen_area = 0;     ///< m^2 of it that was ever in view
-};
-
-/// Planes of at least `min_area` m^2, ids from 1, normals to the open side.
-std::vector<TruthPlane> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area = 0.02);
+/// Planes of at least `min_area` m^2, ids from 1, normals to the open side. seen_seconds counts frames of which the
+/// plane filled at least 0.5 % within depth range, seen_area what was ever in view.
+std::vector<PlaneEstimate> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area = 0.02);
 
 }  // namespace vip_slam

@@ -63,7 +63,7 @@ class SequenceRenderer {
   /// All frames in order on the calling thread; returning false stops. Visibility is counted on the way.
   void render(const std::function<bool(const SimFrame&)>& take);
   /// The true planes, with what the frames rendered so far have seen.
-  std::vector<TruthPlane> planes() const;
+  std::vector<PlaneEstimate> planes() const;
   /// Least distance between camera and scene over the motion, and when.
   double leastClearance(double* when) const;
 
