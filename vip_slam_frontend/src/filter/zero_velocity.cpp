@@ -1,8 +1,16 @@
 #include "vip_slam_frontend/filter/zero_velocity.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace vip_slam {
+
+namespace {
+
+// Beyond this many repeats the sigmas stay: without an end to their growth the IMU's noise would carry the pose away.
+constexpr int kMostRepeats = 8;
+
+}  // namespace
 
 ImuSpread imuSpread(const std::vector<ImuSample>& samples) {
   ImuSpread spread;
@@ -55,7 +63,7 @@ void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const 
                       Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   const int newest = static_cast<int>(window.clones.size()) - 1;
   const bool relative = anchor >= 0 && anchor != newest;
-  const double inflation = std::sqrt(1.0 + repeats);
+  const double inflation = std::sqrt(1.0 + std::min(repeats, kMostRepeats));
   *H = Eigen::MatrixXd::Zero(relative ? 9 : 3, window.dimension());
   *h = Eigen::VectorXd::Zero(relative ? 9 : 3);
   const double wv = 1.0 / (options.sigma_velocity * inflation);

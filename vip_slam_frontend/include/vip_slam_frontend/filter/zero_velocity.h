@@ -44,7 +44,7 @@ class StillnessDetector {
 
 /// Whitened rows on the newest clone and the nav state: v = 0, and no rotation or translation against the clone at
 /// `anchor` (index in the window; -1: velocity only). `repeats` counts the images since stopping: they repeat the same
-/// statement, so the sigmas grow with its root.
+/// statement, so the sigmas grow with its root, up to threefold.
 void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ZuptOptions& options,
                       Eigen::MatrixXd* H, Eigen::VectorXd* h);
 

@@ -1,0 +1,191 @@
+#include "landmark_simulation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam::testing {
+
+namespace {
+
+Eigen::Vector3d gaussian(std::mt19937& random, double sigma) {
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const double x = normal(random), y = normal(random), z = normal(random);
+  return sigma * Eigen::Vector3d(x, y, z);
+}
+
+}  // namespace
+
+LandmarkSimulation::LandmarkSimulation(const SimulationOptions& options) : options_(options), random_(options.seed) {
+  Eigen::Matrix3d R_I_C;
+  R_I_C << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // camera looks along the body's x
+  T_I_C_ = SE3(Eigen::Matrix3d(R_I_C * expSO3(Eigen::Vector3d(0.02, -0.03, 0.01))), Eigen::Vector3d(0.05, 0.02, -0.01));
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const Eigen::Vector3d half(4.5, 3.5, 1.6);
+  for (int i = 0; i < options.points; ++i) {
+    Eigen::Vector3d p(half.x() * unit(random_), half.y() * unit(random_), half.z() * unit(random_));
+    const int axis = i % 3;
+    p(axis) = unit(random_) > 0 ? half(axis) : -half(axis);
+    // Clutter in front of the walls.
+    if (i % 5 == 0) p *= 0.8;
+    points_.push_back(p);
+  }
+  track_.assign(points_.size(), kNoLandmark);
+  generateImu(0.0);
+}
+
+SE3 LandmarkSimulation::poseAt(double t) const {
+  const double s = t * options_.speed;
+  const Eigen::Vector3d p(1.6 * std::sin(0.5 * s), 1.2 * std::sin(0.7 * s + 0.3) - 1.2 * std::sin(0.3),
+                          0.4 * std::sin(0.9 * s));
+  const double yaw = 1.2 * std::sin(0.45 * s) + 0.3 * std::sin(1.3 * s), pitch = 0.25 * std::sin(0.8 * s + 1.0),
+               roll = 0.2 * std::sin(1.1 * s + 2.0);
+  const Eigen::Quaterniond q = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+                               Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+                               Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
+  return SE3(q, p);
+}
+
+NavState LandmarkSimulation::stateAt(double t) const {
+  NavState state;
+  state.t = t;
+  state.T_W_I = poseAt(t);
+  const double h = 1e-4;
+  state.v_W = (poseAt(t + h).t() - poseAt(t - h).t()) / (2 * h);
+  const auto index = std::min<std::size_t>(bias_gyro_.size() - 1,
+                                           static_cast<std::size_t>(std::max(0.0, t * options_.imu_rate + 0.5)));
+  state.bias_gyro = bias_gyro_[index];
+  state.bias_accel = bias_accel_[index];
+  return state;
+}
+
+void LandmarkSimulation::generateImu(double until) {
+  const double dt = 1.0 / options_.imu_rate, h = 1e-4;
+  const double on = options_.imu_noise ? 1.0 : 0.0;
+  if (bias_gyro_.empty()) {
+    bias_gyro_.push_back(gaussian(random_, 0.005 * on));
+    bias_accel_.push_back(gaussian(random_, 0.04 * on));
+  }
+  while (imu_.empty() || imu_.back().t < until + 0.1) {
+    const double t = static_cast<double>(imu_.size()) * dt;
+    const SE3 a = poseAt(t - h), b = poseAt(t), c = poseAt(t + h);
+    ImuSample sample;
+    sample.t = t;
+    sample.gyro = logSO3(Eigen::Matrix3d(a.R().transpose() * c.R())) / (2 * h);
+    const Eigen::Vector3d acceleration = (a.t() - 2 * b.t() + c.t()) / (h * h);
+    sample.accel = b.R().transpose() * (acceleration + gravityVector());
+    sample.gyro += bias_gyro_.back() + gaussian(random_, on * options_.noise.gyro_noise_density / std::sqrt(dt));
+    sample.accel += bias_accel_.back() + gaussian(random_, on * options_.noise.accel_noise_density / std::sqrt(dt));
+    imu_.push_back(sample);
+    bias_gyro_.push_back(bias_gyro_.back() + gaussian(random_, on * options_.noise.gyro_random_walk * std::sqrt(dt)));
+    bias_accel_.push_back(bias_accel_.back() +
+                          gaussian(random_, on * options_.noise.accel_random_walk * std::sqrt(dt)));
+  }
+}
+
+std::vector<ImuSample> LandmarkSimulation::imuBetween(double t0, double t1) const {
+  std::vector<ImuSample> samples;
+  const auto first = static_cast<std::size_t>(std::max(0.0, std::floor(t0 * options_.imu_rate)));
+  for (std::size_t i = first; i + 1 < imu_.size() && imu_[i].t < t1; ++i) {
+    const ImuSample &a = imu_[i], &b = imu_[i + 1];
+    const auto at = [&](double t) {
+      const double s = (t - a.t) / (b.t - a.t);
+      return ImuSample{t, (1 - s) * a.gyro + s * b.gyro, (1 - s) * a.accel + s * b.accel};
+    };
+    if (samples.empty() && b.t > t0) samples.push_back(at(std::max(a.t, t0)));
+    if (!samples.empty() && b.t > t0 && std::min(b.t, t1) > samples.back().t + 1e-9) {
+      samples.push_back(at(std::min(b.t, t1)));
+    }
+  }
+  return samples;
+}
+
+std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t most) {
+  std::vector<FilterMeasurement> seen;
+  const SE3 T_C_W = (poseAt(t) * T_I_C_).inverse();
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  // Tracks already running come first: a tracker holds on to what it has.
+  for (const bool running : {true, false}) {
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if ((track_[i] != kNoLandmark) != running) continue;
+      const Eigen::Vector3d p = T_C_W * points_[i];
+      const bool visible = p.z() > 0.4 && std::abs(p.x() / p.z()) < 0.62 && std::abs(p.y() / p.z()) < 0.46;
+      // A track ends for reasons of its own now and then.
+      const bool survives = !running || unit(random_) > 0.02;
+      if (!visible || !survives || seen.size() >= most) {
+        if (running) track_[i] = kNoLandmark;
+        continue;
+      }
+      if (!running) track_[i] = next_++;
+      FilterMeasurement m;
+      m.id = track_[i];
+      const Eigen::Vector3d noise = gaussian(random_, 1.0);
+      m.xy = p.head<2>() / p.z() + noise.head<2>() * options_.sigma_px / options_.focal;
+      if (unit(random_) < options_.outlier_ratio) m.xy += Eigen::Vector2d(0.05, -0.04);
+      if (options_.depth) {
+        m.depth_sigma = options_.depth_a + options_.depth_c * p.z() * p.z();
+        m.depth = p.z() + noise.z() * m.depth_sigma;
+      }
+      seen.push_back(m);
+    }
+  }
+  return seen;
+}
+
+RunResult runFilter(const SimulationOptions& options, const FilterOptions& filter_options, double seconds,
+                    bool standing, const SE3& extrinsic_error, double time_offset_guess) {
+  LandmarkSimulation simulation(options);
+  simulation.generateImu(seconds + 1.0);
+  std::mt19937 random(options.seed + 1000);
+  VioFilter filter(filter_options, options.noise, simulation.T_I_C() * extrinsic_error, time_offset_guess, options.focal,
+                   9.81);
+  FilterPrior prior;
+  const NavState truth0 = simulation.stateAt(0.2);
+  prior.state = truth0;
+  prior.sigma_tilt = 0.01;
+  prior.sigma_velocity = 0.03;
+  prior.sigma_bias_gyro = 0.003;
+  prior.sigma_bias_accel = 0.04;
+  if (options.imu_noise) {
+    const Eigen::Vector3d tilt = gaussian(random, prior.sigma_tilt);
+    prior.state.T_W_I.setRotation(expQuaternion(Eigen::Vector3d(tilt.x(), tilt.y(), 0)) * truth0.T_W_I.rotation());
+    prior.state.v_W += gaussian(random, prior.sigma_velocity);
+    prior.state.bias_gyro += gaussian(random, prior.sigma_bias_gyro);
+    prior.state.bias_accel += gaussian(random, prior.sigma_bias_accel);
+  }
+  CloneId id = 1;
+  filter.start(prior, id++, simulation.imuBetween(0.15, 0.2).back().gyro - prior.state.bias_gyro);
+
+  RunResult result;
+  double nis = 0;
+  int rows = 0, count = 0;
+  Eigen::Vector3d last = truth0.T_W_I.t();
+  const double step = 1.0 / options.image_rate;
+  for (int k = 1; 0.2 + k * step < seconds; ++k) {
+    const double t_imu_true = 0.2 + k * step;  // the image stamp is this minus the true delay
+    const double t_imu = t_imu_true - options.time_offset + filter.window().time_offset;
+    const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
+    const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200), standing, true);
+    nis += report.nis;
+    rows += report.rows;
+    result.gated += report.features_gated;
+    result.used += report.features_used;
+    const NavState truth = simulation.stateAt(t_imu), estimate = filter.nav();
+    result.length += (truth.T_W_I.t() - last).norm();
+    last = truth.T_W_I.t();
+    const Vector6d error = truth.T_W_I.boxminus(estimate.T_W_I);
+    result.covariance = filter.covariance();
+    if (k * step > 1.0) {
+      const Matrix6d P = result.covariance.topLeftCorner<6, 6>();
+      result.nees += error.dot(P.ldlt().solve(error));
+      ++count;
+    }
+    result.final_position = error.tail<3>().norm();
+    result.final_rotation = error.head<3>().norm();
+  }
+  result.nees /= std::max(1, count);
+  result.nis_per_dof = rows > 0 ? nis / rows : 0;
+  result.window = filter.window();
+  return result;
+}
+
+}  // namespace vip_slam::testing

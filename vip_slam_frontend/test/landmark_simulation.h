@@ -1,0 +1,69 @@
+// A body on a smooth path in a box-shaped room whose walls carry points; IMU samples and noisy sightings of the points
+// (pixels and depth) without rendering. Everything random comes from the seed.
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/vio_filter.h"
+
+namespace vip_slam::testing {
+
+struct SimulationOptions {
+  std::uint32_t seed = 1;
+  double sigma_px = 0.5;
+  double focal = 500;
+  double imu_rate = 200, image_rate = 20;
+  double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
+  bool depth = true;
+  bool imu_noise = true;
+  int points = 1200;
+  double outlier_ratio = 0;
+  double speed = 1.0;  ///< factor on the motion's frequencies; 0: standing
+  ImuNoise noise{1.7e-3, 2e-5, 2e-2, 3e-4};
+  double time_offset = 0;  ///< t_imu = t_image + time_offset
+};
+
+class LandmarkSimulation {
+ public:
+  explicit LandmarkSimulation(const SimulationOptions& options);
+
+  /// True pose, velocity; biases as they wander.
+  NavState stateAt(double t) const;
+  /// Noisy samples covering [t0, t1] on the fixed IMU raster.
+  const std::vector<ImuSample>& imu() const { return imu_; }
+  std::vector<ImuSample> imuBetween(double t0, double t1) const;
+  /// Noisy sightings at IMU time t of at most `most` points; a point keeps its track id while it stays in view.
+  std::vector<FilterMeasurement> sight(double t, std::size_t most);
+  const SE3& T_I_C() const { return T_I_C_; }
+  void generateImu(double until);
+
+ private:
+  SE3 poseAt(double t) const;
+  SimulationOptions options_;
+  std::mt19937 random_;
+  SE3 T_I_C_;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<LandmarkId> track_;
+  LandmarkId next_ = 1;
+  std::vector<ImuSample> imu_;
+  std::vector<Eigen::Vector3d> bias_gyro_, bias_accel_;
+};
+
+struct RunResult {
+  double nees = 0;            ///< mean over time of the 6-DoF pose error's normalised square (expectation 6)
+  double final_position = 0;  ///< m
+  double final_rotation = 0;  ///< rad
+  double length = 0;          ///< m travelled
+  double nis_per_dof = 0;
+  int gated = 0, used = 0;
+  WindowState window;         ///< at the end
+  Matrix15d covariance = Matrix15d::Zero();
+};
+
+/// Runs the filter over `seconds` of the simulation from a start drawn from its own prior.
+RunResult runFilter(const SimulationOptions& simulation, const FilterOptions& filter, double seconds, bool standing,
+                    const SE3& extrinsic_error = SE3(), double time_offset_guess = 0);
+
+}  // namespace vip_slam::testing

@@ -1,0 +1,177 @@
+// Jacobians of the measurement rows and of the propagation against central differences.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+
+#include "landmark_simulation.h"
+#include "vip_slam_frontend/filter/feature_rows.h"
+#include "vip_slam_frontend/filter/triangulation.h"
+#include "vip_slam_frontend/filter/zero_velocity.h"
+
+namespace vip_slam {
+namespace {
+
+/// A window of four true poses with sightings of one point.
+struct Scene {
+  WindowState window;
+  std::vector<Observation> observations;
+  Eigen::Vector3d f_W;
+};
+
+Scene makeScene() {
+  Scene scene;
+  testing::SimulationOptions options;
+  testing::LandmarkSimulation simulation(options);
+  simulation.generateImu(3.0);
+  scene.window.T_I_C = simulation.T_I_C();
+  scene.window.calibration = {true, true, true};
+  scene.window.time_offset = 0.003;
+  scene.f_W = simulation.stateAt(0.5).T_W_I * (simulation.T_I_C() * Eigen::Vector3d(0.3, -0.2, 2.5));
+  for (int i = 0; i < 4; ++i) {
+    const NavState state = simulation.stateAt(0.4 + 0.1 * i);
+    Clone clone;
+    clone.id = static_cast<CloneId>(i + 1);
+    clone.t = state.t;
+    clone.T_W_I = clone.T_W_I_fej = state.T_W_I;
+    clone.omega_I = Eigen::Vector3d(0.4, -0.3, 0.5);
+    clone.v_W = state.v_W;
+    clone.time_offset = 0.003;
+    scene.window.clones.push_back(clone);
+    const Eigen::Vector3d p_C = (clone.T_W_I * scene.window.T_I_C).inverse() * scene.f_W;
+    scene.observations.push_back({clone.id, p_C.head<2>() / p_C.z() + Eigen::Vector2d(1e-3, -2e-3), p_C.z() + 0.01, 0.01});
+  }
+  scene.window.v_W = scene.window.v_W_fej = scene.window.clones.back().v_W;
+  return scene;
+}
+
+TEST(FeatureRows, JacobiansMatchCentralDifferences) {
+  const Scene scene = makeScene();
+  const MeasurementNoise noise;
+  Eigen::MatrixXd H_x, H_f, unused_x, unused_f;
+  Eigen::VectorXd r, plus, minus;
+  stackFeature(scene.window, scene.observations, scene.f_W, noise, &H_x, &H_f, &r);
+  ASSERT_EQ(r.size(), 12);
+  const double h = 1e-6;
+  // r = z - h(x): the rows are the derivative of the prediction, so minus that of r.
+  const auto difference = [&](const WindowState& a, const Eigen::Vector3d& fa, const WindowState& b,
+                              const Eigen::Vector3d& fb) {
+    stackFeature(a, scene.observations, fa, noise, &unused_x, &unused_f, &plus);
+    stackFeature(b, scene.observations, fb, noise, &unused_x, &unused_f, &minus);
+    return Eigen::VectorXd(-(plus - minus) / (2 * h));
+  };
+  for (int c = 0; c < scene.window.dimension(); ++c) {
+    Eigen::VectorXd delta = Eigen::VectorXd::Zero(scene.window.dimension());
+    delta(c) = h;
+    WindowState a = scene.window, b = scene.window;
+    a.boxplus(delta);
+    b.boxplus(-delta);
+    EXPECT_LT((difference(a, scene.f_W, b, scene.f_W) - H_x.col(c)).norm(), 1e-6 * (1.0 + H_x.col(c).norm()))
+        << "column " << c;
+  }
+  for (int c = 0; c < 3; ++c) {
+    const Eigen::Vector3d step = h * Eigen::Vector3d::Unit(c);
+    EXPECT_LT((difference(scene.window, scene.f_W + step, scene.window, scene.f_W - step) - H_f.col(c)).norm(),
+              1e-6 * H_f.col(c).norm());
+  }
+}
+
+TEST(FeatureRows, ProjectionRemovesTheFeature) {
+  const Scene scene = makeScene();
+  const FeatureRows rows = featureRows(scene.window, scene.observations, scene.f_W, MeasurementNoise());
+  EXPECT_EQ(rows.r.size(), 2 * 4 + 4 - 3);
+  // Moving the point alone must not change the projected residual to first order.
+  Eigen::MatrixXd H_x, H_f;
+  Eigen::VectorXd r;
+  stackFeature(scene.window, scene.observations, scene.f_W, MeasurementNoise(), &H_x, &H_f, &r);
+  const Eigen::VectorXd best = H_f.colPivHouseholderQr().solve(r);
+  EXPECT_NEAR(rows.r.squaredNorm(), (r - H_f * best).squaredNorm(), 1e-9 * r.squaredNorm());
+}
+
+TEST(FeatureRows, WithoutDepthOnlyPixels) {
+  const Scene scene = makeScene();
+  MeasurementNoise noise;
+  noise.use_depth = false;
+  EXPECT_EQ(featureRows(scene.window, scene.observations, scene.f_W, noise).r.size(), 2 * 4 - 3);
+}
+
+TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
+  Scene scene = makeScene();
+  for (Observation& o : scene.observations) {
+    const Eigen::Vector3d p_C =
+        cameraPose(scene.window, scene.window.clones[scene.window.indexOf(o.clone)]).inverse() * scene.f_W;
+    o.xy = p_C.head<2>() / p_C.z();
+    o.depth = p_C.z();
+  }
+  MeasurementNoise noise;
+  Triangulation point = triangulate(scene.window, scene.observations, noise);
+  ASSERT_TRUE(point.ok);
+  EXPECT_EQ(point.depth_rows, 4);
+  EXPECT_LT((point.p_W - scene.f_W).norm(), 1e-6);
+  noise.use_depth = false;
+  point = triangulate(scene.window, scene.observations, noise);
+  ASSERT_TRUE(point.ok);
+  EXPECT_LT((point.p_W - scene.f_W).norm(), 1e-4);
+  // One depth read across an edge does not carry the point away.
+  noise.use_depth = true;
+  scene.observations[1].depth += 1.5;
+  point = triangulate(scene.window, scene.observations, noise);
+  ASSERT_TRUE(point.ok);
+  EXPECT_LT((point.p_W - scene.f_W).norm(), 0.05);
+}
+
+TEST(Propagation, TransitionMatchesCentralDifferences) {
+  testing::SimulationOptions options;
+  testing::LandmarkSimulation simulation(options);
+  simulation.generateImu(3.0);
+  WindowState window;
+  const NavState state = simulation.stateAt(0.5);
+  Clone clone;
+  clone.t = 0.5;
+  clone.T_W_I = clone.T_W_I_fej = state.T_W_I;
+  window.clones.push_back(clone);
+  window.v_W = window.v_W_fej = state.v_W;
+  const auto samples = simulation.imuBetween(0.5, 0.56);
+  const auto predicted = [&](const Eigen::Matrix<double, 15, 1>& d) {
+    WindowState moved = window;
+    moved.boxplus(d);
+    return propagate(moved, samples, options.noise, gravityVector()).predicted;
+  };
+  const Propagation nominal = propagate(window, samples, options.noise, gravityVector());
+  EXPECT_LT((nominal.W.transpose() * nominal.W * nominal.Q - Matrix15d::Identity()).norm(), 1e-6);
+  const double h = 1e-5;
+  for (int c = 0; c < 15; ++c) {
+    const NavState a = predicted(h * Eigen::Matrix<double, 15, 1>::Unit(c));
+    const NavState b = predicted(-h * Eigen::Matrix<double, 15, 1>::Unit(c));
+    Eigen::Matrix<double, 15, 1> column;
+    column << (a.T_W_I.boxminus(nominal.predicted.T_W_I) - b.T_W_I.boxminus(nominal.predicted.T_W_I)),
+        a.v_W - b.v_W, a.bias_gyro - b.bias_gyro, a.bias_accel - b.bias_accel;
+    column /= 2 * h;
+    EXPECT_LT((column - nominal.Phi.col(c)).norm(), 1e-5 * (1.0 + column.norm())) << "column " << c;
+  }
+}
+
+TEST(ZeroVelocity, RowsMatchCentralDifferences) {
+  Scene scene = makeScene();
+  Eigen::MatrixXd H, unused;
+  Eigen::VectorXd r, plus, minus;
+  const ZuptOptions options;
+  // Near rest, where the rows are used: the rotation's logarithm is linearised about zero.
+  scene.window.clones[3].T_W_I = scene.window.clones[3].T_W_I_fej =
+      scene.window.clones[1].T_W_I.boxplus((Vector6d() << 1e-5, 2e-5, -1e-5, 1e-4, 2e-4, -1e-4).finished());
+  zeroVelocityRows(scene.window, 1, 0, options, &H, &r);
+  ASSERT_EQ(r.size(), 9);
+  const double h = 1e-6;
+  for (int c = 0; c < scene.window.dimension(); ++c) {
+    Eigen::VectorXd delta = Eigen::VectorXd::Zero(scene.window.dimension());
+    delta(c) = h;
+    WindowState a = scene.window, b = scene.window;
+    a.boxplus(delta);
+    b.boxplus(-delta);
+    zeroVelocityRows(a, 1, 0, options, &unused, &plus);
+    zeroVelocityRows(b, 1, 0, options, &unused, &minus);
+    EXPECT_LT((-(plus - minus) / (2 * h) - H.col(c)).norm(), 1e-3 * (1.0 + H.col(c).norm())) << "column " << c;
+  }
+}
+
+}  // namespace
+}  // namespace vip_slam
