@@ -1,0 +1,36 @@
+# Stereo depth, converters, preflight check, run report.
+
+add_library(vip_slam_bringup
+  src/convert/bag_output.cpp
+  src/convert/dataset_sensor.cpp
+  src/convert/euroc.cpp
+  src/convert/image_messages.cpp
+  src/convert/stray.cpp
+  src/convert/text_table.cpp
+  src/convert/tum_rgbd.cpp
+  src/stereo/stereo_calibration.cpp
+  src/stereo/stereo_depth.cpp
+)
+target_link_libraries(vip_slam_bringup ${catkin_LIBRARIES} ${OpenCV_LIBS} yaml-cpp)
+
+add_library(vip_slam_bringup_nodelets src/nodelets/stereo_depth_nodelet.cpp)
+target_link_libraries(vip_slam_bringup_nodelets vip_slam_bringup ${catkin_LIBRARIES})
+
+add_executable(convert_to_bag src/apps/convert_to_bag.cpp)
+target_link_libraries(convert_to_bag vip_slam_bringup CLI11::CLI11)
+
+install(TARGETS vip_slam_bringup vip_slam_bringup_nodelets
+  LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+install(TARGETS convert_to_bag RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
+install(DIRECTORY config DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+
+if(CATKIN_ENABLE_TESTING)
+  catkin_add_gtest(test_stereo_depth test/test_stereo_depth.cpp)
+  target_link_libraries(test_stereo_depth vip_slam_bringup)
+  target_compile_definitions(test_stereo_depth PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
+
+  catkin_add_gtest(test_converters test/test_converters.cpp)
+  target_link_libraries(test_converters vip_slam_bringup)
+endif()

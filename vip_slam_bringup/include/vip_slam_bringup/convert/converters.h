@@ -1,0 +1,63 @@
+// Data-set folders to bags. Each converter reads every table before it writes, names file and line of what it cannot
+// read (std::runtime_error, one line), and leaves either all of its files or none.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vip_slam_bringup/stereo/stereo_depth.h"
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/trajectory/tum_io.h"
+
+namespace vip_slam {
+
+struct ConversionReport {
+  std::map<std::string, std::size_t> messages;  ///< per topic
+  std::vector<std::string> files;               ///< written
+  std::vector<std::string> warnings;
+};
+
+struct ConversionOptions {
+  std::string folder;  ///< the data set
+  std::string bag;     ///< NAME.bag; beside it NAME_sensor.yaml and, with truth, NAME_truth.tum
+  bool overwrite = false;
+  std::function<void(std::size_t, std::size_t)> progress;
+};
+
+struct EurocOptions : ConversionOptions {
+  bool depth = false;  ///< also write the rectified left image and the stereo depth
+  StereoDepthOptions stereo;
+};
+/// EuRoC MAV folder (with or without the inner mav0): /cam0/image_raw, /cam1/image_raw, /imu0 as in the data set's own
+/// bags; with `depth` also the topics of config/sensors/euroc.yaml.
+ConversionReport convertEuroc(const EurocOptions& options);
+
+struct TumRgbdOptions : ConversionOptions {
+  std::optional<CameraIntrinsics> camera;  ///< else calibration.txt, else from "freiburg1..3" in the folder's name
+  double depth_factor = 5000;              ///< depth units per metre
+  SE3 T_imu_cam;                           ///< identity unless the folder's imu.txt has other axes
+};
+/// TUM RGB-D folder: rgb.txt, depth.txt, optional groundtruth.txt, and inertial data from imu.txt (stamp, gyro, accel)
+/// or accelerometer.txt (no gyro: warned, since the odometry needs one).
+ConversionReport convertTumRgbd(const TumRgbdOptions& options);
+
+struct StrayOptions : ConversionOptions {
+  int width = 640;         ///< colour and depth are resized to this width
+  int min_confidence = 1;  ///< depth of lower ARKit confidence (0, 1, 2) is dropped
+  int jpeg_quality = 92;
+};
+/// Stray Scanner recording (iPhone or iPad with LiDAR): rgb.mp4, depth/, confidence/, odometry.csv, imu.csv.
+ConversionReport convertStray(const StrayOptions& options);
+
+/// NAME of NAME.bag, with its folder. Throws std::runtime_error when the name does not end in .bag.
+std::string bagStem(const std::string& bag);
+/// Writes NAME_sensor.yaml and NAME_truth.tum (when not empty) and notes them in the report.
+void writeSideFiles(const std::string& bag, const SensorConfig& sensor, const Trajectory& truth,
+                    ConversionReport* report);
+
+}  // namespace vip_slam

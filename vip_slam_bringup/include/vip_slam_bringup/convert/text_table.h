@@ -1,0 +1,39 @@
+// Tables in text files (CSV or blank-separated), read so that every error names file and line.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace vip_slam {
+
+struct TextRow {
+  int line = 0;  ///< 1-based
+  std::vector<std::string> cells;
+};
+
+class TextTable {
+ public:
+  /// Cells end at any of `separators` and are stripped of blanks. Lines that are empty or begin with '#' are left out;
+  /// so is the first line when its first cell is not a number. Throws std::runtime_error when the file cannot be read,
+  /// holds no row, or a row has fewer than `min_columns` cells.
+  TextTable(const std::string& path, const std::string& separators, std::size_t min_columns);
+
+  const std::vector<TextRow>& rows() const { return rows_; }
+  /// The header's cells without a leading '#'; empty when there is none.
+  const std::vector<std::string>& header() const { return header_; }
+  const std::string& path() const { return path_; }
+
+  /// The cell as a finite number; throws std::runtime_error "file:line: gyro x is 'abc', expected a number".
+  double number(const TextRow& row, std::size_t column, const std::string& what) const;
+  /// The cell as whole nanoseconds.
+  long long nanoseconds(const TextRow& row, std::size_t column) const;
+  /// Throws std::runtime_error "file:line: message".
+  [[noreturn]] void fail(const TextRow& row, const std::string& message) const;
+
+ private:
+  std::string path_;
+  std::vector<TextRow> rows_;
+  std::vector<std::string> header_;
+};
+
+}  // namespace vip_slam

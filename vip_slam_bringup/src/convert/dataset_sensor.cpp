@@ -1,0 +1,33 @@
+#include <filesystem>
+#include <stdexcept>
+
+#include "vip_slam_bringup/convert/converters.h"
+
+namespace vip_slam {
+
+std::string bagStem(const std::string& bag) {
+  const std::string ending = ".bag";
+  if (bag.size() <= ending.size() || bag.compare(bag.size() - ending.size(), ending.size(), ending) != 0)
+    throw std::runtime_error(bag + ": the output must be named *.bag");
+  return bag.substr(0, bag.size() - ending.size());
+}
+
+void writeSideFiles(const std::string& bag, const SensorConfig& sensor, const Trajectory& truth,
+                    ConversionReport* report) {
+  const std::string stem = bagStem(bag);
+  try {
+    report->files.push_back(stem + "_sensor.yaml");
+    saveSensorConfig(report->files.back(), sensor);
+    if (truth.empty()) return;
+    report->files.push_back(stem + "_truth.tum");
+    writeTum(report->files.back(), truth);
+  } catch (...) {
+    for (const std::string& file : report->files) {
+      std::error_code ignored;
+      std::filesystem::remove(file, ignored);
+    }
+    throw;
+  }
+}
+
+}  // namespace vip_slam

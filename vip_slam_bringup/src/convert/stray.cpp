@@ -1,0 +1,258 @@
+// Stray Scanner layout: rgb.mp4 (1920x1440, one frame a row of odometry.csv), depth/NNNNNN.png (16-bit millimetres,
+// 256x192, registered to the colour camera), confidence/NNNNNN.png (0, 1, 2), odometry.csv (stamp, frame, position,
+// quaternion xyzw [, fx, fy, cx, cy]), camera_matrix.csv, imu.csv (stamp, accelerometer, gyro). One clock for all.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <rosbag/bag.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Imu.h>
+
+#include "vip_slam_bringup/convert/bag_output.h"
+#include "vip_slam_bringup/convert/converters.h"
+#include "vip_slam_bringup/convert/image_messages.h"
+#include "vip_slam_bringup/convert/text_table.h"
+
+namespace fs = std::filesystem;
+
+namespace vip_slam {
+namespace {
+
+const char* const kColor = "/phone/color/image_raw/compressed";
+const char* const kColorInfo = "/phone/color/camera_info";
+const char* const kDepth = "/phone/depth/image_raw/compressed";
+const char* const kDepthInfo = "/phone/depth/camera_info";
+const char* const kImu = "/phone/imu";
+const char* const kFrame = "phone_color_optical_frame";
+
+struct Row {
+  double t = 0;
+  int frame = 0;
+  SE3 T_W_C;
+  double fx = 0, fy = 0, cx = 0, cy = 0;
+};
+
+std::vector<Row> readOdometry(const std::string& folder) {
+  const TextTable table(folder + "/odometry.csv", ",", 9);
+  double k[4] = {0, 0, 0, 0};
+  if (fs::exists(folder + "/camera_matrix.csv")) {
+    const TextTable matrix(folder + "/camera_matrix.csv", ",", 3);
+    if (matrix.rows().size() < 2) throw std::runtime_error(matrix.path() + ": expected three rows of three numbers");
+    k[0] = matrix.number(matrix.rows()[0], 0, "fx");
+    k[1] = matrix.number(matrix.rows()[1], 1, "fy");
+    k[2] = matrix.number(matrix.rows()[0], 2, "cx");
+    k[3] = matrix.number(matrix.rows()[1], 2, "cy");
+  }
+  std::vector<Row> rows;
+  for (const TextRow& text : table.rows()) {
+    Row row;
+    double v[9];
+    for (int i = 0; i < 9; ++i) v[i] = table.number(text, i, "column " + std::to_string(i + 1));
+    row.t = v[0];
+    row.frame = static_cast<int>(v[1]);
+    const Eigen::Quaterniond q(v[8], v[5], v[6], v[7]);
+    if (std::abs(q.norm() - 1.0) > 0.01) table.fail(text, "the quaternion (x, y, z, w) does not have length 1");
+    row.T_W_C = SE3(q, Eigen::Vector3d(v[2], v[3], v[4]));
+    const bool own = text.cells.size() >= 13 && !text.cells[9].empty();
+    row.fx = own ? table.number(text, 9, "fx") : k[0];
+    row.fy = own ? table.number(text, 10, "fy") : k[1];
+    row.cx = own ? table.number(text, 11, "cx") : k[2];
+    row.cy = own ? table.number(text, 12, "cy") : k[3];
+    if (row.fx <= 0 || row.fy <= 0)
+      table.fail(text, "no intrinsics: neither columns fx fy cx cy nor camera_matrix.csv");
+    if (!rows.empty() && row.t <= rows.back().t) table.fail(text, "the stamp does not follow the one before");
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+/// CoreMotion reports minus the specific force, older versions of the app in m/s^2, newer ones in g: told apart by the
+/// median length. IMU axes: x right, y up, z out of the screen, phone upright.
+std::vector<sensor_msgs::Imu> readImu(const std::string& path) {
+  const TextTable table(path, ",", 7);
+  std::vector<double> length;
+  std::vector<sensor_msgs::Imu> samples;
+  for (const TextRow& row : table.rows()) {
+    double v[7];
+    for (int i = 0; i < 7; ++i) v[i] = table.number(row, i, i < 1 ? "the stamp" : i < 4 ? "accelerometer" : "gyro");
+    sensor_msgs::Imu sample;
+    sample.header.stamp.fromSec(v[0]);
+    sample.header.frame_id = "phone_imu_frame";
+    if (!samples.empty() && sample.header.stamp <= samples.back().header.stamp)
+      table.fail(row, "the stamp does not follow the one before");
+    sample.orientation_covariance[0] = -1;
+    sample.linear_acceleration.x = -v[1];
+    sample.linear_acceleration.y = -v[2];
+    sample.linear_acceleration.z = -v[3];
+    sample.angular_velocity.x = v[4];
+    sample.angular_velocity.y = v[5];
+    sample.angular_velocity.z = v[6];
+    samples.push_back(sample);
+    length.push_back(std::sqrt(v[1] * v[1] + v[2] * v[2] + v[3] * v[3]));
+  }
+  std::nth_element(length.begin(), length.begin() + length.size() / 2, length.end());
+  const double median = length[length.size() / 2];
+  if (median < 0.5 || (median > 2.0 && (median < 8.0 || median > 12.0)))
+    throw std::runtime_error(path + ": median acceleration is " + std::to_string(median) +
+                             ", expected about 1 (g) or about 9.81 (m/s^2)");
+  if (median <= 2.0) {
+    for (auto& sample : samples) {
+      sample.linear_acceleration.x *= 9.81;
+      sample.linear_acceleration.y *= 9.81;
+      sample.linear_acceleration.z *= 9.81;
+    }
+  }
+  return samples;
+}
+
+int countFrames(const std::string& path, cv::Size* size) {
+  cv::VideoCapture video(path);
+  if (!video.isOpened()) throw std::runtime_error(path + ": is not a readable video");
+  *size = cv::Size(static_cast<int>(video.get(cv::CAP_PROP_FRAME_WIDTH)),
+                   static_cast<int>(video.get(cv::CAP_PROP_FRAME_HEIGHT)));
+  int frames = 0;
+  while (video.grab()) ++frames;
+  return frames;
+}
+
+std::string numbered(const std::string& folder, int frame) {
+  char name[32];
+  std::snprintf(name, sizeof(name), "/%06d.png", frame);
+  return folder + name;
+}
+
+cv::Mat readDepth(const std::string& folder, int frame, int min_confidence, const cv::Size& size) {
+  const std::string path = numbered(folder + "/depth", frame);
+  cv::Mat depth = cv::imread(path, cv::IMREAD_UNCHANGED);
+  if (depth.empty()) throw std::runtime_error(path + ": is not a readable image");
+  if (depth.type() != CV_16UC1) throw std::runtime_error(path + ": expected a 16-bit depth image");
+  const std::string confidence_path = numbered(folder + "/confidence", frame);
+  if (min_confidence > 0 && fs::exists(confidence_path)) {
+    const cv::Mat confidence = cv::imread(confidence_path, cv::IMREAD_GRAYSCALE);
+    if (confidence.size() != depth.size())
+      throw std::runtime_error(confidence_path + ": size differs from the depth image");
+    depth.setTo(0, confidence < min_confidence);
+  }
+  cv::Mat out;
+  cv::resize(depth, out, size, 0, 0, cv::INTER_NEAREST);
+  return out;
+}
+
+sensor_msgs::CompressedImage compressed(const cv::Mat& image, const char* ending, const char* format,
+                                        const std::vector<int>& parameters, const std_msgs::Header& header) {
+  sensor_msgs::CompressedImage message;
+  message.header = header;
+  message.format = format;
+  cv::imencode(ending, image, message.data, parameters);
+  return message;
+}
+
+/// Optical axes in the axes of CoreMotion: the image's x runs down the upright phone, its y to the phone's left.
+SE3 cameraInImu() {
+  Eigen::Matrix3d R;
+  R << 0, -1, 0, -1, 0, 0, 0, 0, -1;
+  return SE3(R, Eigen::Vector3d::Zero());
+}
+
+}  // namespace
+
+ConversionReport convertStray(const StrayOptions& options) {
+  for (const char* needed : {"rgb.mp4", "odometry.csv", "imu.csv"})
+    if (!fs::exists(options.folder + "/" + needed))
+      throw std::runtime_error(options.folder + "/" + needed + ": is not there; expected a Stray Scanner recording");
+  std::vector<Row> rows = readOdometry(options.folder);
+  const auto imu = readImu(options.folder + "/imu.csv");
+  cv::Size video_size;
+  const int frames = countFrames(options.folder + "/rgb.mp4", &video_size);
+  ConversionReport report;
+  // The app's edit list hides the first frame from most decoders: then the video's frames belong to the rows' end.
+  std::size_t skip = 0;
+  if (frames < static_cast<int>(rows.size())) {
+    skip = rows.size() - frames;
+    if (skip > 2)
+      throw std::runtime_error(options.folder + "/rgb.mp4: " + std::to_string(frames) + " frames for " +
+                               std::to_string(rows.size()) + " rows of odometry.csv");
+    report.warnings.push_back("rgb.mp4 has " + std::to_string(skip) + " frame(s) less than odometry.csv: the first rows get none");
+  }
+  rows.erase(rows.begin(), rows.begin() + skip);
+  const cv::Size size(options.width, static_cast<int>(std::lround(double(options.width) * video_size.height / video_size.width)));
+  std::vector<int> without_depth;
+  for (const Row& row : rows)
+    if (!fs::exists(numbered(options.folder + "/depth", row.frame))) without_depth.push_back(row.frame);
+  if (without_depth.size() == rows.size()) throw std::runtime_error(options.folder + "/depth: no NNNNNN.png for any row");
+  if (!without_depth.empty())
+    report.warnings.push_back(std::to_string(without_depth.size()) + " images have no depth");
+
+  const SE3 T_imu_cam = cameraInImu();
+  // ARKit's world has y up; ours has z up.
+  const SE3 T_zup_yup(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX())), Eigen::Vector3d::Zero());
+  Trajectory truth;
+  auto video = std::make_shared<cv::VideoCapture>(options.folder + "/rgb.mp4");
+  BagOutput bag(options.bag, options.overwrite);
+  for (const Row& row : rows) {
+    truth.push_back({row.t, T_zup_yup * row.T_W_C * T_imu_cam.inverse()});
+    const bool has_depth = !std::binary_search(without_depth.begin(), without_depth.end(), row.frame);
+    const ros::Time stamp(row.t);
+    bag.add(stamp, [=](rosbag::Bag& out) {
+      cv::Mat frame, image;
+      if (!video->read(frame)) throw std::runtime_error(options.folder + "/rgb.mp4: ends before frame " + std::to_string(row.frame));
+      cv::resize(frame, image, size, 0, 0, cv::INTER_AREA);
+      std_msgs::Header header;
+      header.stamp = stamp;
+      header.frame_id = kFrame;
+      CameraIntrinsics full;
+      full.width = video_size.width;
+      full.height = video_size.height;
+      full.fx = row.fx;
+      full.fy = row.fy;
+      full.cx = row.cx;
+      full.cy = row.cy;
+      const auto info = cameraInfo(full.scaled(size.width, size.height), header);
+      out.write(kColor, stamp, compressed(image, ".jpg", "bgr8; jpeg compressed bgr8", {cv::IMWRITE_JPEG_QUALITY, options.jpeg_quality}, header));
+      out.write(kColorInfo, stamp, info);
+      if (!has_depth) return;
+      const cv::Mat depth = readDepth(options.folder, row.frame, options.min_confidence, size);
+      out.write(kDepth, stamp, compressed(depth, ".png", "16UC1; png compressed ", {cv::IMWRITE_PNG_COMPRESSION, 3}, header));
+      out.write(kDepthInfo, stamp, info);
+    });
+  }
+  report.messages[kColor] = report.messages[kColorInfo] = rows.size();
+  report.messages[kDepth] = report.messages[kDepthInfo] = rows.size() - without_depth.size();
+  for (const auto& sample : imu)
+    bag.add(sample.header.stamp, [sample](rosbag::Bag& out) { out.write(kImu, sample.header.stamp, sample); });
+  report.messages[kImu] = imu.size();
+
+  SensorConfig sensor;
+  sensor.name = "phone";
+  sensor.topics.color = kColor;
+  sensor.topics.color_info = kColorInfo;
+  sensor.topics.depth = kDepth;
+  sensor.topics.depth_info = kDepthInfo;
+  sensor.topics.imu = kImu;
+  sensor.color_encoding = sensor.depth_encoding = "compressed";
+  const double seconds = rows.back().t - rows.front().t;
+  sensor.color_rate = sensor.depth_rate = seconds > 0 ? std::round((rows.size() - 1) / seconds) : 30;
+  const double imu_seconds = (imu.back().header.stamp - imu.front().header.stamp).toSec();
+  sensor.imu_rate = imu_seconds > 0 ? std::round((imu.size() - 1) / imu_seconds) : 100;
+  sensor.T_imu_cam = T_imu_cam;
+  sensor.imu_noise = {2e-3, 2e-5, 2e-2, 3e-4};
+  sensor.depth_noise = DepthNoise::preset(DepthSensorType::kTof);
+  sensor.depth_noise.max_range = 5.0;
+  writeSideFiles(options.bag, sensor, truth, &report);
+  try {
+    bag.finish(options.progress);
+  } catch (...) {
+    for (const std::string& file : report.files) fs::remove(file);
+    throw;
+  }
+  report.files.insert(report.files.begin(), options.bag);
+  return report;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,84 @@
+#include "vip_slam_bringup/convert/text_table.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <stdexcept>
+
+namespace vip_slam {
+namespace {
+
+std::string stripped(const std::string& text) {
+  const auto first = text.find_first_not_of(" \t\r");
+  if (first == std::string::npos) return "";
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+std::vector<std::string> split(const std::string& line, const std::string& separators) {
+  const bool blanks = separators.find(' ') != std::string::npos;
+  std::vector<std::string> cells;
+  std::size_t begin = 0;
+  while (true) {
+    const auto end = line.find_first_of(separators, begin);
+    const std::string cell = stripped(line.substr(begin, end == std::string::npos ? end : end - begin));
+    if (!(blanks && cell.empty())) cells.push_back(cell);
+    if (end == std::string::npos) return cells;
+    begin = end + 1;
+  }
+}
+
+bool isNumber(const std::string& text) {
+  if (text.empty()) return false;
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  return *end == '\0' && std::isfinite(value);
+}
+
+}  // namespace
+
+TextTable::TextTable(const std::string& path, const std::string& separators, std::size_t min_columns) : path_(path) {
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error(path + ": cannot be opened");
+  std::string line;
+  int number = 0;
+  while (std::getline(file, line)) {
+    ++number;
+    const std::string text = stripped(line);
+    if (text.empty()) continue;
+    if (text[0] == '#') {
+      if (rows_.empty()) header_ = split(stripped(text.substr(1)), separators);
+      continue;
+    }
+    TextRow row{number, split(text, separators)};
+    if (rows_.empty() && number == 1 && !isNumber(row.cells[0])) {
+      header_ = row.cells;
+      continue;
+    }
+    if (row.cells.size() < min_columns)
+      fail(row, std::to_string(row.cells.size()) + " columns, expected at least " + std::to_string(min_columns));
+    rows_.push_back(std::move(row));
+  }
+  if (rows_.empty()) throw std::runtime_error(path + ": no data, expected rows of " + std::to_string(min_columns) +
+                                              " columns");
+}
+
+double TextTable::number(const TextRow& row, std::size_t column, const std::string& what) const {
+  if (column >= row.cells.size()) fail(row, what + " is missing (column " + std::to_string(column + 1) + ")");
+  if (!isNumber(row.cells[column])) fail(row, what + " is '" + row.cells[column] + "', expected a number");
+  return std::strtod(row.cells[column].c_str(), nullptr);
+}
+
+long long TextTable::nanoseconds(const TextRow& row, std::size_t column) const {
+  const std::string& text = row.cells.at(column);
+  char* end = nullptr;
+  const long long value = std::strtoll(text.c_str(), &end, 10);
+  if (text.empty() || *end != '\0' || value < 0)
+    fail(row, "the stamp is '" + text + "', expected whole nanoseconds");
+  return value;
+}
+
+void TextTable::fail(const TextRow& row, const std::string& message) const {
+  throw std::runtime_error(path_ + ":" + std::to_string(row.line) + ": " + message);
+}
+
+}  // namespace vip_slam

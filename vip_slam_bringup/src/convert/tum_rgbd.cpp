@@ -1,0 +1,209 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include <opencv2/imgcodecs.hpp>
+#include <rosbag/bag.h>
+#include <sensor_msgs/Imu.h>
+
+#include "vip_slam_bringup/convert/bag_output.h"
+#include "vip_slam_bringup/convert/converters.h"
+#include "vip_slam_bringup/convert/image_messages.h"
+#include "vip_slam_bringup/convert/text_table.h"
+
+namespace fs = std::filesystem;
+
+namespace vip_slam {
+namespace {
+
+const char* const kColor = "/camera/rgb/image_color";
+const char* const kColorInfo = "/camera/rgb/camera_info";
+const char* const kDepth = "/camera/depth_registered/image_raw";
+const char* const kDepthInfo = "/camera/depth_registered/camera_info";
+const char* const kImu = "/camera/imu";
+const char* const kAccel = "/camera/accel/sample";
+const char* const kFrame = "camera_rgb_optical_frame";
+
+struct StampedFile {
+  double t;
+  std::string path;
+};
+
+std::vector<StampedFile> readList(const std::string& folder, const std::string& name) {
+  const TextTable table(folder + "/" + name, " \t", 2);
+  std::vector<StampedFile> files;
+  for (const TextRow& row : table.rows()) {
+    StampedFile file{table.number(row, 0, "the stamp"), folder + "/" + row.cells[1]};
+    if (!files.empty() && file.t <= files.back().t) table.fail(row, "the stamp does not follow the one before");
+    if (!fs::exists(file.path)) table.fail(row, "image " + file.path + " is not there");
+    files.push_back(std::move(file));
+  }
+  return files;
+}
+
+CameraIntrinsics freiburg(double fx, double fy, double cx, double cy, std::vector<double> distortion) {
+  CameraIntrinsics camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = fx;
+  camera.fy = fy;
+  camera.cx = cx;
+  camera.cy = cy;
+  camera.model = distortion.empty() ? DistortionModel::kNone : DistortionModel::kRadTan;
+  camera.distortion = std::move(distortion);
+  return camera;
+}
+
+/// The given one, else calibration.txt (fx fy cx cy), else the published calibration of the three Freiburg cameras.
+CameraIntrinsics findCamera(const TumRgbdOptions& options, const cv::Size& size) {
+  CameraIntrinsics camera;
+  const std::string file = options.folder + "/calibration.txt";
+  const std::string name = fs::absolute(options.folder + "/.").lexically_normal().parent_path().filename().string();
+  if (options.camera) {
+    camera = *options.camera;
+  } else if (fs::exists(file)) {
+    const TextTable table(file, " \t", 4);
+    const TextRow& row = table.rows().front();
+    camera = freiburg(table.number(row, 0, "fx"), table.number(row, 1, "fy"), table.number(row, 2, "cx"),
+                      table.number(row, 3, "cy"), {});
+  } else if (name.find("freiburg1") != std::string::npos) {
+    camera = freiburg(517.3, 516.5, 318.6, 255.3, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633});
+  } else if (name.find("freiburg2") != std::string::npos) {
+    camera = freiburg(520.9, 521.0, 325.1, 249.7, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172});
+  } else if (name.find("freiburg3") != std::string::npos) {
+    camera = freiburg(535.4, 539.2, 320.1, 247.6, {});
+  } else {
+    throw std::runtime_error(options.folder + ": no calibration: give --camera fx fy cx cy, add calibration.txt, or " +
+                             "keep 'freiburg1', 'freiburg2' or 'freiburg3' in the folder's name");
+  }
+  camera.width = size.width;
+  camera.height = size.height;
+  const std::string wrong = camera.validate();
+  if (!wrong.empty()) throw std::runtime_error(options.folder + ": camera: " + wrong);
+  return camera;
+}
+
+std::vector<sensor_msgs::Imu> readInertial(const std::string& path, bool gyro) {
+  const TextTable table(path, " \t,", gyro ? 7 : 4);
+  std::vector<sensor_msgs::Imu> samples;
+  for (const TextRow& row : table.rows()) {
+    sensor_msgs::Imu sample;
+    sample.header.stamp.fromSec(table.number(row, 0, "the stamp"));
+    sample.header.frame_id = gyro ? "camera_imu_optical_frame" : "camera_accel_optical_frame";
+    if (!samples.empty() && sample.header.stamp <= samples.back().header.stamp)
+      table.fail(row, "the stamp does not follow the one before");
+    sample.orientation_covariance[0] = -1;
+    const std::size_t accel = gyro ? 4 : 1;
+    if (gyro) {
+      sample.angular_velocity.x = table.number(row, 1, "gyro x");
+      sample.angular_velocity.y = table.number(row, 2, "gyro y");
+      sample.angular_velocity.z = table.number(row, 3, "gyro z");
+    } else {
+      sample.angular_velocity_covariance[0] = -1;
+    }
+    sample.linear_acceleration.x = table.number(row, accel, "accelerometer x");
+    sample.linear_acceleration.y = table.number(row, accel + 1, "accelerometer y");
+    sample.linear_acceleration.z = table.number(row, accel + 2, "accelerometer z");
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+Trajectory readTruth(const std::string& path, const SE3& T_cam_imu) {
+  const TextTable table(path, " \t", 8);
+  Trajectory truth;
+  for (const TextRow& row : table.rows()) {
+    double v[8];
+    for (int i = 0; i < 8; ++i) v[i] = table.number(row, i, "column " + std::to_string(i + 1));
+    const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
+    if (std::abs(q.norm() - 1.0) > 0.01) table.fail(row, "the quaternion (x, y, z, w) does not have length 1");
+    if (!truth.empty() && v[0] <= truth.back().t) continue;  // the public files repeat a few stamps
+    truth.push_back({v[0], SE3(q, Eigen::Vector3d(v[1], v[2], v[3])) * T_cam_imu});
+  }
+  return truth;
+}
+
+double rateOf(const std::vector<StampedFile>& files) {
+  const double seconds = files.back().t - files.front().t;
+  return seconds > 0 ? (files.size() - 1) / seconds : 30.0;
+}
+
+}  // namespace
+
+ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
+  const auto color = readList(options.folder, "rgb.txt"), depth = readList(options.folder, "depth.txt");
+  const cv::Mat first = cv::imread(color.front().path, cv::IMREAD_COLOR);
+  if (first.empty()) throw std::runtime_error(color.front().path + ": is not a readable image");
+  const CameraIntrinsics camera = findCamera(options, first.size());
+  const bool gyro = fs::exists(options.folder + "/imu.txt");
+  const std::string inertial = options.folder + (gyro ? "/imu.txt" : "/accelerometer.txt");
+  std::vector<sensor_msgs::Imu> imu;
+  if (fs::exists(inertial)) imu = readInertial(inertial, gyro);
+  Trajectory truth;
+  if (fs::exists(options.folder + "/groundtruth.txt"))
+    truth = readTruth(options.folder + "/groundtruth.txt", options.T_imu_cam.inverse());
+
+  ConversionReport report;
+  if (imu.empty())
+    report.warnings.push_back("no imu.txt: the bag has images only, and the odometry needs an IMU");
+  else if (!gyro)
+    report.warnings.push_back("accelerometer.txt has no gyroscope: the odometry needs one (imu.txt: stamp gx gy gz ax ay az)");
+  BagOutput bag(options.bag, options.overwrite);
+  const auto addImages = [&](const std::vector<StampedFile>& files, const std::string& topic, const std::string& info,
+                             bool is_color) {
+    for (const StampedFile& file : files) {
+      const ros::Time stamp(file.t);
+      bag.add(stamp, [=](rosbag::Bag& out) {
+        const cv::Mat image = cv::imread(file.path, is_color ? cv::IMREAD_COLOR : cv::IMREAD_UNCHANGED);
+        if (image.empty()) throw std::runtime_error(file.path + ": is not a readable image");
+        if (image.type() != (is_color ? CV_8UC3 : CV_16UC1))
+          throw std::runtime_error(file.path + ": expected " + (is_color ? "8-bit colour" : "16-bit depth"));
+        if (image.cols != camera.width || image.rows != camera.height)
+          throw std::runtime_error(file.path + ": size differs from the first colour image");
+        std_msgs::Header header;
+        header.stamp = stamp;
+        header.frame_id = kFrame;
+        out.write(topic, stamp, imageMessage(image, is_color ? "bgr8" : "16UC1", header));
+        out.write(info, stamp, cameraInfo(camera, header));
+      });
+    }
+    report.messages[topic] = report.messages[info] = files.size();
+  };
+  addImages(color, kColor, kColorInfo, true);
+  addImages(depth, kDepth, kDepthInfo, false);
+  for (const auto& sample : imu)
+    bag.add(sample.header.stamp,
+            [sample, gyro](rosbag::Bag& out) { out.write(gyro ? kImu : kAccel, sample.header.stamp, sample); });
+  if (!imu.empty()) report.messages[gyro ? kImu : kAccel] = imu.size();
+
+  SensorConfig sensor;
+  sensor.name = "tum_rgbd";
+  sensor.topics.color = kColor;
+  sensor.topics.color_info = kColorInfo;
+  sensor.topics.depth = kDepth;
+  sensor.topics.depth_info = kDepthInfo;
+  sensor.topics.imu = kImu;
+  sensor.color_encoding = "bgr8";
+  sensor.depth_encoding = "16UC1";
+  sensor.depth_scale = 1.0 / options.depth_factor;
+  sensor.color_rate = std::round(rateOf(color));
+  sensor.depth_rate = std::round(rateOf(depth));
+  if (imu.size() > 1) {
+    const double seconds = (imu.back().header.stamp - imu.front().header.stamp).toSec();
+    if (seconds > 0) sensor.imu_rate = std::round((imu.size() - 1) / seconds);
+  }
+  sensor.camera = camera;
+  sensor.T_imu_cam = options.T_imu_cam;
+  sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStructuredLight);
+  writeSideFiles(options.bag, sensor, truth, &report);
+  try {
+    bag.finish(options.progress);
+  } catch (...) {
+    for (const std::string& file : report.files) fs::remove(file);
+    throw;
+  }
+  report.files.insert(report.files.begin(), options.bag);
+  return report;
+}
+
+}  // namespace vip_slam

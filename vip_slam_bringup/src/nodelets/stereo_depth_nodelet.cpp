@@ -1,0 +1,90 @@
+// Stereo pair in, rectified left image and depth out, for sensors without a depth camera (EuRoC).
+//   subscribes  left/image_raw, right/image_raw  (mono8; colour is not accepted)
+//   publishes   rectified/image, depth/image (32FC1 metres), rectified/camera_info, depth/camera_info
+//   parameters  ~calibration (file, required), ~max_skew (s), the fields of StereoDepthOptions
+#include <message_filters/subscriber.h>
+#include <message_filters/sync_policies/approximate_time.h>
+#include <message_filters/synchronizer.h>
+#include <nodelet/nodelet.h>
+#include <pluginlib/class_list_macros.hpp>
+#include <ros/ros.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include "vip_slam_bringup/convert/image_messages.h"
+#include "vip_slam_bringup/stereo/stereo_depth.h"
+
+namespace vip_slam {
+
+class StereoDepthNodelet : public nodelet::Nodelet {
+ public:
+  void onInit() override {
+    ros::NodeHandle& nh = getMTNodeHandle();
+    ros::NodeHandle& parameters = getPrivateNodeHandle();
+    const std::string calibration = parameters.param<std::string>("calibration", "");
+    try {
+      if (calibration.empty()) throw std::runtime_error(parameters.resolveName("calibration") + ": not set");
+      StereoDepthOptions options;
+      std::vector<std::pair<std::string, std::string>> values;
+      for (const OptionRow& row : listOptions(options)) {
+        XmlRpc::XmlRpcValue value;
+        if (!parameters.getParam(row.name, value)) continue;
+        std::ostringstream text;
+        text << value;
+        values.emplace_back(row.name, text.str());
+      }
+      setOptions(options, values);
+      stereo_ = std::make_unique<StereoDepth>(loadStereoCalibration(calibration), options);
+    } catch (const std::exception& e) {
+      NODELET_FATAL("Stereo depth does not start: %s", e.what());
+      return;
+    }
+    image_publisher_ = nh.advertise<sensor_msgs::Image>("rectified/image", 5);
+    image_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("rectified/camera_info", 5);
+    depth_publisher_ = nh.advertise<sensor_msgs::Image>("depth/image", 5);
+    depth_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("depth/camera_info", 5);
+    left_.subscribe(nh, "left/image_raw", 20);
+    right_.subscribe(nh, "right/image_raw", 20);
+    sync_ = std::make_unique<message_filters::Synchronizer<Policy>>(Policy(20), left_, right_);
+    sync_->setMaxIntervalDuration(ros::Duration(parameters.param("max_skew", 0.005)));
+    sync_->registerCallback(&StereoDepthNodelet::onPair, this);
+    watchdog_ = nh.createTimer(ros::Duration(5.0), &StereoDepthNodelet::onWatch, this);
+  }
+
+ private:
+  using Policy = message_filters::sync_policies::ApproximateTime<sensor_msgs::Image, sensor_msgs::Image>;
+
+  void onPair(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right) {
+    ++pairs_;
+    try {
+      const StereoDepthFrame frame = stereo_->compute(grayView(*left), grayView(*right));
+      const sensor_msgs::CameraInfo info = cameraInfo(stereo_->rectified(), left->header);
+      image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", left->header)));
+      image_info_publisher_.publish(info);
+      depth_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", left->header)));
+      depth_info_publisher_.publish(info);
+    } catch (const std::exception& e) {
+      NODELET_ERROR_THROTTLE(5.0, "Stereo depth: %s", e.what());
+    }
+  }
+
+  void onWatch(const ros::TimerEvent&) {
+    if (pairs_ == pairs_seen_)
+      NODELET_WARN("Stereo depth: no image pair on %s and %s in the last 5 s", left_.getTopic().c_str(),
+                   right_.getTopic().c_str());
+    pairs_seen_ = pairs_;
+  }
+
+  std::unique_ptr<StereoDepth> stereo_;
+  ros::Publisher image_publisher_, image_info_publisher_, depth_publisher_, depth_info_publisher_;
+  message_filters::Subscriber<sensor_msgs::Image> left_, right_;
+  std::unique_ptr<message_filters::Synchronizer<Policy>> sync_;
+  ros::Timer watchdog_;
+  std::atomic<std::size_t> pairs_{0};
+  std::size_t pairs_seen_ = 0;
+};
+
+}  // namespace vip_slam
+
+PLUGINLIB_EXPORT_CLASS(vip_slam::StereoDepthNodelet, nodelet::Nodelet)

@@ -1,0 +1,317 @@
+// Converters on tiny generated folders: what lands in the bag, and what an unreadable folder says.
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
+
+#include "vip_slam_bringup/convert/converters.h"
+#include "vip_slam_bringup/convert/text_table.h"
+
+namespace fs = std::filesystem;
+
+namespace vip_slam {
+namespace {
+
+class Converters : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    root_ = fs::temp_directory_path() / ("vip_slam_convert_" + std::string(info->name()) + std::to_string(::getpid()));
+    fs::remove_all(root_);
+    fs::create_directories(root_);
+    bag_ = (root_ / "out.bag").string();
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  void write(const std::string& name, const std::string& text) {
+    fs::create_directories((root_ / name).parent_path());
+    std::ofstream(root_ / name) << text;
+  }
+  void writeImage(const std::string& name, const cv::Mat& image) {
+    fs::create_directories((root_ / name).parent_path());
+    ASSERT_TRUE(cv::imwrite((root_ / name).string(), image));
+  }
+  std::string errorOf(const std::function<void()>& call) {
+    try {
+      call();
+    } catch (const std::exception& e) {
+      const std::string text = e.what();
+      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+      // Nothing half-written stays behind.
+      for (const auto& entry : fs::directory_iterator(root_))
+        EXPECT_EQ(entry.path().filename().string().find("out"), std::string::npos) << entry.path();
+      return text;
+    }
+    return "";
+  }
+  template <class Message>
+  std::vector<boost::shared_ptr<Message>> read(const std::string& topic) {
+    rosbag::Bag bag(bag_);
+    std::vector<boost::shared_ptr<Message>> out;
+    for (const auto& m : rosbag::View(bag, rosbag::TopicQuery(topic))) {
+      auto message = m.instantiate<Message>();
+      EXPECT_TRUE(message) << topic;
+      if (message) {
+        EXPECT_EQ(m.getTime(), message->header.stamp);
+        out.push_back(message);
+      }
+    }
+    return out;
+  }
+
+  fs::path root_;
+  std::string bag_;
+};
+
+constexpr long long kStart = 1403715273262142976LL;
+
+class EurocConverter : public Converters {
+ protected:
+  void makeFolder() {
+    const std::string camera_yaml =
+        "resolution: [96, 64]\nintrinsics: [80.0, 80.0, 48.0, 32.0]\ndistortion_model: radial-tangential\n"
+        "distortion_coefficients: [0.0, 0.0, 0.0, 0.0]\nT_BS:\n  data: [1,0,0,";
+    write("set/mav0/cam0/sensor.yaml", camera_yaml + "0.0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n");
+    write("set/mav0/cam1/sensor.yaml", camera_yaml + "0.1, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n");
+    write("set/mav0/imu0/sensor.yaml",
+          "gyroscope_noise_density: 1.6968e-04\ngyroscope_random_walk: 1.9393e-05\n"
+          "accelerometer_noise_density: 2.0e-3\naccelerometer_random_walk: 3.0e-3\n");
+    std::string images = "#timestamp [ns],filename\n", imu = "#timestamp,wx,wy,wz,ax,ay,az\n";
+    cv::RNG rng(3);
+    for (int i = 0; i < 3; ++i) {
+      const std::string stamp = std::to_string(kStart + i * 50000000LL);
+      images += stamp + "," + stamp + ".png\n";
+      cv::Mat image(64, 96, CV_8UC1);
+      rng.fill(image, cv::RNG::UNIFORM, 0, 255);
+      writeImage("set/mav0/cam0/data/" + stamp + ".png", image);
+      writeImage("set/mav0/cam1/data/" + stamp + ".png", image);
+    }
+    for (int i = 0; i < 20; ++i)
+      imu += std::to_string(kStart + i * 5000000LL) + ",0.1,0.2,0.3,9.8,0.5,-0.25\n";
+    write("set/mav0/cam0/data.csv", images);
+    write("set/mav0/cam1/data.csv", images);
+    write("set/mav0/imu0/data.csv", imu);
+    write("set/mav0/state_groundtruth_estimate0/data.csv",
+          "#timestamp,px,py,pz,qw,qx,qy,qz\n" + std::to_string(kStart) + ",1,2,3,1,0,0,0\n");
+    options_.folder = (root_ / "set").string();
+    options_.bag = bag_;
+    options_.stereo.num_disparities = 16;
+  }
+  EurocOptions options_;
+};
+
+TEST_F(EurocConverter, KeepsStampsPixelsAndInertialData) {
+  makeFolder();
+  options_.depth = true;
+  const ConversionReport report = convertEuroc(options_);
+  EXPECT_EQ(report.files.size(), 3u);
+  for (const auto& file : report.files) EXPECT_TRUE(fs::exists(file)) << file;
+
+  const auto left = read<sensor_msgs::Image>("/cam0/image_raw");
+  ASSERT_EQ(left.size(), 3u);
+  EXPECT_EQ(left[1]->header.stamp.toNSec(), std::uint64_t(kStart + 50000000LL));
+  EXPECT_EQ(left[1]->encoding, "mono8");
+  const cv::Mat png = cv::imread((root_ / "set/mav0/cam0/data" / (std::to_string(kStart) + ".png")).string(), 0);
+  EXPECT_EQ(0, memcmp(left[0]->data.data(), png.data, 64 * 96));
+  EXPECT_EQ(read<sensor_msgs::Image>("/cam1/image_raw").size(), 3u);
+
+  const auto imu = read<sensor_msgs::Imu>("/imu0");
+  ASSERT_EQ(imu.size(), 20u);
+  EXPECT_DOUBLE_EQ(imu[3]->angular_velocity.z, 0.3);
+  EXPECT_DOUBLE_EQ(imu[3]->linear_acceleration.x, 9.8);
+
+  const SensorConfig sensor = loadSensorConfig((root_ / "out_sensor.yaml").string());
+  const auto depth = read<sensor_msgs::Image>(sensor.topics.depth);
+  ASSERT_EQ(depth.size(), 3u);
+  EXPECT_EQ(depth[0]->encoding, sensor.depth_encoding);
+  EXPECT_EQ(read<sensor_msgs::CameraInfo>(sensor.topics.color_info).size(), 3u);
+  EXPECT_EQ(read<sensor_msgs::Image>(sensor.topics.color)[0]->encoding, sensor.color_encoding);
+  EXPECT_DOUBLE_EQ(sensor.imu_noise.gyro_noise_density, 1.6968e-04);
+
+  const Trajectory truth = readTum((root_ / "out_truth.tum").string());
+  ASSERT_EQ(truth.size(), 1u);
+  EXPECT_NEAR(truth[0].T_W_B.t().z(), 3, 1e-12);
+}
+
+TEST_F(EurocConverter, NamesFileAndLine) {
+  makeFolder();
+  write("set/mav0/imu0/data.csv", "#t,wx,wy,wz,ax,ay,az\n" + std::to_string(kStart) + ",0,0,abc,0,0,0\n");
+  const std::string number = errorOf([&] { convertEuroc(options_); });
+  EXPECT_NE(number.find("imu0/data.csv:2: gyro z is 'abc', expected a number"), std::string::npos) << number;
+
+  makeFolder();
+  fs::remove(root_ / "set/mav0/cam1/data" / (std::to_string(kStart + 50000000LL) + ".png"));
+  const std::string missing = errorOf([&] { convertEuroc(options_); });
+  EXPECT_NE(missing.find("cam1/data.csv:3: image"), std::string::npos) << missing;
+
+  makeFolder();
+  write("set/mav0/cam0/data/" + std::to_string(kStart + 100000000LL) + ".png", "not a png");
+  const std::string broken = errorOf([&] { convertEuroc(options_); });
+  EXPECT_NE(broken.find("is not a readable image"), std::string::npos) << broken;
+
+  options_.folder = (root_ / "nothing").string();
+  EXPECT_NE(errorOf([&] { convertEuroc(options_); }).find("expected a EuRoC folder"), std::string::npos);
+}
+
+TEST_F(EurocConverter, DoesNotOverwriteUnasked) {
+  makeFolder();
+  convertEuroc(options_);
+  EXPECT_THROW(convertEuroc(options_), std::runtime_error);
+  options_.overwrite = true;
+  EXPECT_NO_THROW(convertEuroc(options_));
+}
+
+class TumConverter : public Converters {
+ protected:
+  void makeFolder(const std::string& name) {
+    std::string rgb = "# color images\n", depth = "# depth maps\n";
+    for (int i = 0; i < 4; ++i) {
+      char line[96];
+      std::snprintf(line, sizeof(line), "%.6f rgb/%d.png\n", 1305031102.1 + 0.033 * i, i);
+      rgb += line;
+      std::snprintf(line, sizeof(line), "%.6f depth/%d.png\n", 1305031102.11 + 0.033 * i, i);
+      depth += line;
+      writeImage(name + "/rgb/" + std::to_string(i) + ".png", cv::Mat(48, 64, CV_8UC3, cv::Scalar(10, 20, 30)));
+      writeImage(name + "/depth/" + std::to_string(i) + ".png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(7500)));
+    }
+    write(name + "/rgb.txt", rgb);
+    write(name + "/depth.txt", depth);
+    write(name + "/groundtruth.txt", "# t x y z qx qy qz qw\n1305031102.1 1 2 3 0 0 0 1\n1305031102.2 1 2 3.5 0 0 0 1\n");
+    options_.folder = (root_ / name).string();
+    options_.bag = bag_;
+  }
+  TumRgbdOptions options_;
+};
+
+TEST_F(TumConverter, DepthKeepsItsUnitAndTheGyroIsMissed) {
+  makeFolder("rgbd_dataset_freiburg1_xyz");
+  write("rgbd_dataset_freiburg1_xyz/accelerometer.txt", "# t ax ay az\n1305031102.1 0 9.8 0\n1305031102.2 0 9.8 0\n");
+  const ConversionReport report = convertTumRgbd(options_);
+  ASSERT_EQ(report.warnings.size(), 1u);
+  EXPECT_NE(report.warnings[0].find("gyroscope"), std::string::npos);
+  const SensorConfig sensor = loadSensorConfig((root_ / "out_sensor.yaml").string());
+  EXPECT_NEAR(sensor.camera.fx, 517.3, 1e-9);
+  const auto depth = read<sensor_msgs::Image>(sensor.topics.depth);
+  ASSERT_EQ(depth.size(), 4u);
+  const auto* value = reinterpret_cast<const std::uint16_t*>(depth[0]->data.data());
+  EXPECT_NEAR(value[5] * sensor.depth_scale, 1.5, 1e-9);
+  const auto color = read<sensor_msgs::Image>(sensor.topics.color);
+  EXPECT_EQ(color[0]->encoding, sensor.color_encoding);
+  EXPECT_EQ(color[0]->data[0], 10);
+  EXPECT_EQ(readTum((root_ / "out_truth.tum").string()).size(), 2u);
+}
+
+TEST_F(TumConverter, UnknownCameraAndBadRowsAreNamed) {
+  makeFolder("kitchen");
+  EXPECT_NE(errorOf([&] { convertTumRgbd(options_); }).find("no calibration"), std::string::npos);
+  write("kitchen/calibration.txt", "525 525 32 24\n");
+  write("kitchen/imu.txt", "1305031102.1 0 0 0 0 9.8 0\n1305031102.1 0 0 0 0 9.8 0\n");
+  const std::string error = errorOf([&] { convertTumRgbd(options_); });
+  EXPECT_NE(error.find("imu.txt:2: the stamp does not follow"), std::string::npos) << error;
+  write("kitchen/imu.txt", "1305031102.1 0 0 0 0 9.8 0\n1305031102.11 0.1 0 0 0 9.8 0\n");
+  EXPECT_TRUE(convertTumRgbd(options_).warnings.empty());
+  EXPECT_EQ(read<sensor_msgs::Imu>("/camera/imu").size(), 2u);
+}
+
+class StrayConverter : public Converters {
+ protected:
+  void makeFolder(int video_frames, double gravity) {
+    fs::create_directories(root_ / "rec");
+    cv::VideoWriter video((root_ / "rec/rgb.mp4").string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 30, {320, 240});
+    ASSERT_TRUE(video.isOpened());
+    for (int i = 0; i < video_frames; ++i) video.write(cv::Mat(240, 320, CV_8UC3, cv::Scalar(40 * i, 90, 200)));
+    video.release();
+    std::string odometry = "timestamp, frame, x, y, z, qx, qy, qz, qw\n", imu = "timestamp, a_x, a_y, a_z, alpha_x, alpha_y, alpha_z\n";
+    for (int i = 0; i < 4; ++i) {
+      char line[128], name[32];
+      std::snprintf(line, sizeof(line), "%.6f, %06d, 0.0, %f, 0.0, 0.0, 0.0, 0.0, 1.0\n", 100 + i / 30.0, i, 0.1 * i);
+      odometry += line;
+      std::snprintf(name, sizeof(name), "%06d.png", i);
+      cv::Mat depth(24, 32, CV_16UC1, cv::Scalar(1234)), confidence(24, 32, CV_8UC1, cv::Scalar(2));
+      confidence.colRange(0, 16).setTo(0);
+      writeImage(std::string("rec/depth/") + name, depth);
+      writeImage(std::string("rec/confidence/") + name, confidence);
+    }
+    for (int i = 0; i < 20; ++i) {
+      char line[128];
+      std::snprintf(line, sizeof(line), "%.6f, 0.0, %f, 0.0, 0.01, 0.02, 0.03\n", 100 + 0.01 * i, -gravity);
+      imu += line;
+    }
+    write("rec/odometry.csv", odometry);
+    write("rec/imu.csv", imu);
+    write("rec/camera_matrix.csv", "250.0, 0.0, 159.5\n0.0, 250.0, 119.5\n0.0, 0.0, 1.0\n");
+    options_.folder = (root_ / "rec").string();
+    options_.bag = bag_;
+    options_.width = 160;
+  }
+  StrayOptions options_;
+};
+
+TEST_F(StrayConverter, ColourDepthAndSpecificForce) {
+  for (const double gravity : {1.0, 9.81}) {
+    makeFolder(4, gravity);
+    options_.overwrite = true;
+    const ConversionReport report = convertStray(options_);
+    EXPECT_TRUE(report.warnings.empty());
+    const SensorConfig sensor = loadSensorConfig((root_ / "out_sensor.yaml").string());
+    const auto imu = read<sensor_msgs::Imu>(sensor.topics.imu);
+    ASSERT_EQ(imu.size(), 20u);
+    EXPECT_NEAR(imu[0]->linear_acceleration.y, 9.81, 1e-3);  // upright at rest: along +y
+    // At rest the specific force points up: against the image's y in a phone turned to landscape. Here the phone is
+    // upright, so up is the image's -x.
+    const Eigen::Vector3d up_C = sensor.T_imu_cam.R().transpose() * Eigen::Vector3d(0, 1, 0);
+    EXPECT_NEAR(up_C.x(), -1, 1e-12);
+
+    const auto color = read<sensor_msgs::CompressedImage>(sensor.topics.color);
+    ASSERT_EQ(color.size(), 4u);
+    const cv::Mat image = cv::imdecode(color[3]->data, cv::IMREAD_COLOR);
+    EXPECT_EQ(image.cols, 160);
+    EXPECT_NEAR(image.at<cv::Vec3b>(60, 80)[0], 120, 12);  // the fourth frame, not another one
+    const auto depth = read<sensor_msgs::CompressedImage>(sensor.topics.depth);
+    ASSERT_EQ(depth.size(), 4u);
+    const cv::Mat z = cv::imdecode(depth[0]->data, cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(z.type(), CV_16UC1);
+    ASSERT_EQ(z.size(), image.size());
+    EXPECT_EQ(z.at<std::uint16_t>(60, 20), 0);  // low confidence
+    EXPECT_EQ(z.at<std::uint16_t>(60, 140), 1234);
+    const auto info = read<sensor_msgs::CameraInfo>(sensor.topics.color_info);
+    EXPECT_NEAR(info[0]->K[0], 125, 1e-9);
+    // ARKit's up is y, ours is z.
+    const Trajectory truth = readTum((root_ / "out_truth.tum").string());
+    EXPECT_NEAR(truth.back().T_W_B.t().z() - truth.front().T_W_B.t().z(), 0.3, 1e-6);
+  }
+}
+
+TEST_F(StrayConverter, OneHiddenFrameIsForgivenAShortVideoIsNot) {
+  makeFolder(3, 1.0);
+  const ConversionReport report = convertStray(options_);
+  ASSERT_EQ(report.warnings.size(), 1u);
+  EXPECT_EQ(read<sensor_msgs::CompressedImage>("/phone/color/image_raw/compressed").size(), 3u);
+  fs::remove(bag_);
+  fs::remove(root_ / "out_sensor.yaml");
+  fs::remove(root_ / "out_truth.tum");
+  makeFolder(1, 1.0);
+  EXPECT_NE(errorOf([&] { convertStray(options_); }).find("1 frames for 4 rows"), std::string::npos);
+  makeFolder(4, 5.0);
+  EXPECT_NE(errorOf([&] { convertStray(options_); }).find("median acceleration"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vip_slam
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
