@@ -1,6 +1,7 @@
 # Stereo depth, converters, preflight check, run report.
 
 add_library(vip_slam_bringup
+  src/sensor_files.cpp
   src/convert/bag_output.cpp
   src/convert/dataset_sensor.cpp
   src/convert/euroc.cpp
@@ -21,6 +22,8 @@ target_link_libraries(convert_to_bag vip_slam_bringup CLI11::CLI11)
 
 install(TARGETS vip_slam_bringup vip_slam_bringup_nodelets
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+catkin_install_python(PROGRAMS scripts/make_report DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(DIRECTORY report DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(TARGETS convert_to_bag RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
 install(DIRECTORY config DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
@@ -33,4 +36,8 @@ if(CATKIN_ENABLE_TESTING)
 
   catkin_add_gtest(test_converters test/test_converters.cpp)
   target_link_libraries(test_converters vip_slam_bringup)
+
+  catkin_add_gtest(test_report test/test_report.cpp)
+  target_link_libraries(test_report yaml-cpp)
+  target_compile_definitions(test_report PRIVATE SCRIPT="${CMAKE_CURRENT_SOURCE_DIR}/scripts/make_report")
 endif()

@@ -1,0 +1,100 @@
+"""Errors against the truth. The judge of record is `vip_slam_eval evaluate`; the page computes the same two measures
+so that it stands on its own: absolute trajectory error after one rigid alignment, and plane angle and distance."""
+import numpy as np
+
+
+def rotation_matrices(q):
+    """Rows x, y, z, w to an array of 3x3 matrices."""
+    x, y, z, w = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
+    return np.stack([np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], -1),
+                     np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], -1),
+                     np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], -1)], 1)
+
+
+def interpolate_poses(truth, times, max_gap=0.1):
+    """Truth at `times` (mask of those it covers, positions, unit quaternions)."""
+    after = np.clip(np.searchsorted(truth[:, 0], times, side='right'), 1, len(truth) - 1)
+    before = after - 1
+    t0, t1 = truth[before, 0], truth[after, 0]
+    ok = (times >= truth[0, 0]) & (times <= truth[-1, 0]) & (t1 - t0 <= max_gap)
+    s = np.clip((times - t0) / np.maximum(t1 - t0, 1e-12), 0, 1)[:, None]
+    p = truth[before, 1:4] * (1 - s) + truth[after, 1:4] * s
+    a, b = truth[before, 4:8], truth[after, 4:8].copy()
+    b[np.sum(a * b, axis=1) < 0] *= -1
+    # Neighbours are milliseconds apart: the normalised blend equals slerp to 1e-6 rad.
+    q = a * (1 - s) + b * s
+    return ok, p, q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def rigid_alignment(source, target):
+    """4x4 T with target ~ T source, least squares, no scale."""
+    mean_s, mean_t = source.mean(0), target.mean(0)
+    U, _, Vt = np.linalg.svd((target - mean_t).T @ (source - mean_s))
+    D = np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))])
+    T = np.eye(4)
+    T[:3, :3] = U @ D @ Vt
+    T[:3, 3] = mean_t - T[:3, :3] @ mean_s
+    return T
+
+
+def trajectory_error(estimate, truth):
+    if len(estimate) < 3 or len(truth) < 2:
+        return None
+    ok, p_true, q_true = interpolate_poses(truth, estimate[:, 0])
+    if ok.sum() < 3:
+        return None
+    estimate, p_true, q_true = estimate[ok], p_true[ok], q_true[ok]
+    T = rigid_alignment(estimate[:, 1:4], p_true)
+    position = np.linalg.norm(estimate[:, 1:4] @ T[:3, :3].T + T[:3, 3] - p_true, axis=1)
+    R_est = T[:3, :3] @ rotation_matrices(estimate[:, 4:8])
+    trace = np.einsum('nij,nij->n', R_est, rotation_matrices(q_true))
+    rotation = np.degrees(np.arccos(np.clip((trace - 1) / 2, -1, 1)))
+    return {'t': estimate[:, 0], 'position': position, 'rotation': rotation, 'T_truth_map': T,
+            'ate': float(np.sqrt(np.mean(position ** 2))), 'median': float(np.median(position)),
+            'max': float(position.max()), 'rotation_rmse': float(np.sqrt(np.mean(rotation ** 2))),
+            'count': int(len(position))}
+
+
+def outer_points(plane):
+    return np.array([p for polygon in plane['polygons'] for p in polygon['outer']]).reshape(-1, 3)
+
+
+def contains(plane, point):
+    """Is the point's projection inside one of the plane's outlines (holes left aside)?"""
+    n = np.array(plane['normal'])
+    u = np.cross(n, [0, 0, 1] if abs(n[2]) < 0.9 else [1, 0, 0])
+    u /= np.linalg.norm(u)
+    v = np.cross(n, u)
+    x, y = point @ u, point @ v
+    for polygon in plane['polygons']:
+        ring = np.array(polygon['outer'])
+        a, b = ring @ u, ring @ v
+        a2, b2 = np.roll(a, -1), np.roll(b, -1)
+        crosses = (b > y) != (b2 > y)
+        with np.errstate(divide='ignore', invalid='ignore'):
+            if np.sum(crosses & (x < a + (y - b) / (b2 - b) * (a2 - a))) % 2:
+                return True
+    return False
+
+
+def plane_errors(found, true, T_truth_map):
+    """Each found plane against the true plane of like direction and place: [{id, truth, angle (deg), distance (m)}]."""
+    T = np.eye(4) if T_truth_map is None else T_truth_map
+    rows = []
+    for plane in found:
+        points = outer_points(plane)
+        centre = points.mean(0) if len(points) else -plane['distance'] * np.array(plane['normal'])
+        n, centre = T[:3, :3] @ np.array(plane['normal']), T[:3, :3] @ centre + T[:3, 3]
+        best = None
+        for other in true:
+            m = np.array(other['normal'])
+            angle = float(np.degrees(np.arccos(min(1.0, abs(n @ m)))))
+            distance = float(abs(m @ centre + other['distance']))
+            if angle > 10 or distance > 0.15 or (other['polygons'] and not contains(other, centre)):
+                continue
+            if best is None or distance < best['distance']:
+                best = {'truth': other['id'], 'angle': angle, 'distance': distance}
+        rows.append(dict({'id': plane['id']}, **(best or {'truth': None})))
+    matched = [row['truth'] for row in rows if row['truth'] is not None]
+    return {'rows': rows, 'true_count': len(true), 'matched': len(set(matched)),
+            'duplicates': len(matched) - len(set(matched)), 'aligned': T_truth_map is not None}
