@@ -1,7 +1,6 @@
 # Stereo depth, converters, preflight check, run report.
 
 add_library(vip_slam_bringup
-  src/sensor_files.cpp
   src/convert/bag_output.cpp
   src/convert/dataset_sensor.cpp
   src/convert/euroc.cpp

@@ -1,5 +1,5 @@
 // Stereo pair in, rectified left image and depth out, for sensors without a depth camera (EuRoC).
-//   subscribes  left/image_raw, right/image_raw  (mono8; colour is not accepted)
+//   subscribes  left/image_raw, right/image_raw  (mono8 or colour)
 //   publishes   rectified/image, depth/image (32FC1 metres), rectified/camera_info, depth/camera_info
 //   parameters  ~calibration (file, required), ~max_skew (s), the fields of StereoDepthOptions
 #include <message_filters/subscriber.h>
@@ -14,6 +14,8 @@
 
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/stereo/stereo_depth.h"
+#include "vip_slam_ros/image_decoding.h"
+#include "vip_slam_ros/parameters.h"
 
 namespace vip_slam {
 
@@ -26,15 +28,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     try {
       if (calibration.empty()) throw std::runtime_error(parameters.resolveName("calibration") + ": not set");
       StereoDepthOptions options;
-      std::vector<std::pair<std::string, std::string>> values;
-      for (const OptionRow& row : listOptions(options)) {
-        XmlRpc::XmlRpcValue value;
-        if (!parameters.getParam(row.name, value)) continue;
-        std::ostringstream text;
-        text << value;
-        values.emplace_back(row.name, text.str());
-      }
-      setOptions(options, values);
+      loadOptionsFromParameters(options, parameters);
       stereo_ = std::make_unique<StereoDepth>(loadStereoCalibration(calibration), options);
     } catch (const std::exception& e) {
       NODELET_FATAL("Stereo depth does not start: %s", e.what());
@@ -58,7 +52,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
   void onPair(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right) {
     ++pairs_;
     try {
-      const StereoDepthFrame frame = stereo_->compute(grayView(*left), grayView(*right));
+      const StereoDepthFrame frame = stereo_->compute(decodeGray(*left), decodeGray(*right));
       const sensor_msgs::CameraInfo info = cameraInfo(stereo_->rectified(), left->header);
       image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", left->header)));
       image_info_publisher_.publish(info);

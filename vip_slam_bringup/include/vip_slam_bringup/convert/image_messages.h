@@ -1,4 +1,4 @@
-// Images and intrinsics to and from messages, as converters and the stereo nodelet need them.
+// Images and intrinsics to messages, as converters and the stereo nodelet need them.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -11,8 +11,6 @@ namespace vip_slam {
 
 /// Copies `image` (continuous or not) into a message of the given encoding.
 sensor_msgs::Image imageMessage(const cv::Mat& image, const std::string& encoding, const std_msgs::Header& header);
-/// A view of a mono8 message's pixels, valid while the message lives. Throws std::invalid_argument naming the encoding.
-cv::Mat grayView(const sensor_msgs::Image& message);
 sensor_msgs::CameraInfo cameraInfo(const CameraIntrinsics& camera, const std_msgs::Header& header);
 
 }  // namespace vip_slam
