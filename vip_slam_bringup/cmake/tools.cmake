@@ -8,6 +8,14 @@ add_library(vip_slam_bringup
   src/convert/stray.cpp
   src/convert/text_table.cpp
   src/convert/tum_rgbd.cpp
+  src/preflight/check_images.cpp
+  src/preflight/check_imu.cpp
+  src/preflight/check_motion.cpp
+  src/preflight/check_streams.cpp
+  src/preflight/check_tf.cpp
+  src/preflight/image_rotation.cpp
+  src/preflight/record_sources.cpp
+  src/preflight/recorder.cpp
   src/stereo/stereo_calibration.cpp
   src/stereo/stereo_depth.cpp
 )
@@ -21,9 +29,12 @@ target_link_libraries(convert_to_bag vip_slam_bringup CLI11::CLI11)
 
 install(TARGETS vip_slam_bringup vip_slam_bringup_nodelets
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+add_executable(check_bag src/apps/check_bag.cpp)
+target_link_libraries(check_bag vip_slam_bringup CLI11::CLI11)
+
 catkin_install_python(PROGRAMS scripts/make_report DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY report DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-install(TARGETS convert_to_bag RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(TARGETS check_bag convert_to_bag RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
 install(DIRECTORY config DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

@@ -1,0 +1,52 @@
+// The preflight checks: each looks at one aspect of a recording and says in plain words what it found.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vip_slam_bringup/preflight/recording.h"
+
+namespace vip_slam {
+
+enum class Severity {
+  kGood,     ///< as it should be
+  kNote,     ///< worth knowing
+  kWarning,  ///< works worse than it could
+  kError     ///< will not work
+};
+
+struct Finding {
+  Severity severity = Severity::kGood;
+  std::string about;   ///< topic or quantity
+  std::string text;    ///< what was found
+  std::string advice;  ///< what to do; empty when all is well
+};
+using Findings = std::vector<Finding>;
+
+Findings checkTopics(const Recording& recording);     ///< there, of the right type, with messages
+Findings checkRates(const Recording& recording);      ///< rates, missing messages, order of stamps, stamps against clock
+Findings checkImages(const Recording& recording);     ///< encodings, sizes, camera_info, depth values
+Findings checkSkew(const Recording& recording);       ///< colour against depth stamps
+Findings checkImu(const Recording& recording);        ///< gaps, units, gravity, values that never change
+Findings checkMotion(const Recording& recording);     ///< camera-IMU delay and rotation from the motion itself
+Findings checkTf(const Recording& recording);         ///< frames, and extrinsics against the sensor file
+
+/// All of them in this order; the later ones only when their input is there.
+Findings checkAll(const Recording& recording);
+Severity worst(const Findings& findings);
+/// One line a finding, the worst first within each check, then the verdict; `color`: ANSI colours.
+std::string toText(const Findings& findings, bool color);
+
+/// Camera-IMU delay and rotation estimated from gyro rates and image rotation.
+struct MotionEstimate {
+  bool usable = false;
+  std::string why_not;      ///< in words when not usable
+  double time_offset = 0;   ///< seconds; t_imu = t_image + time_offset
+  Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
+  bool rotation_known = false;  ///< rotated about two axes at least
+  double correlation = 0;   ///< share of the gyro's variance that the images explain, 0..1
+  double scale = 1;         ///< gyro rate over image rate
+};
+MotionEstimate estimateMotion(const Recording& recording, double max_offset = 0.2);
+
+}  // namespace vip_slam

@@ -1,0 +1,30 @@
+// Rotation between successive images, for the check of delay and extrinsics: corners tracked by KLT, with depth by PnP
+// (parallax taken out), else by aligning the bearing vectors.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_bringup/preflight/recording.h"
+#include "vip_slam_core/camera/camera_model.h"
+
+namespace vip_slam {
+
+class ImageRotation {
+ public:
+  explicit ImageRotation(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {}
+  /// `gray` 8UC1 of the camera's size, `depth` 32FC1 metres of the same size or empty. A step when the two last images
+  /// are less than 0.2 s apart and enough corners agree on the motion.
+  std::optional<RotationStep> add(double t, const cv::Mat& gray, const cv::Mat& depth);
+
+ private:
+  std::optional<Eigen::Matrix3d> rotationTo(const cv::Mat& gray) const;  ///< R_now_before
+
+  std::shared_ptr<const CameraModel> camera_;
+  double t_ = 0;
+  cv::Mat gray_, depth_;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,58 @@
+// Fills a Recording from messages, whether they come from a bag or from live topics.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "vip_slam_bringup/preflight/image_rotation.h"
+#include "vip_slam_bringup/preflight/recording.h"
+
+namespace vip_slam {
+
+class Recorder {
+ public:
+  /// Images are decoded for the first `image_seconds` of the recording only; stamps are kept throughout.
+  Recorder(const SensorConfig& sensor, bool live, double image_seconds);
+
+  void add(const std::string& topic, double arrival, const sensor_msgs::Image& message);
+  void add(const std::string& topic, double arrival, const sensor_msgs::CompressedImage& message);
+  void add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message);
+  void add(const std::string& topic, double arrival, const sensor_msgs::Imu& message);
+  void add(const std::string& topic, double arrival, const tf2_msgs::TFMessage& message);
+  /// Every topic that is there, wanted or not.
+  void setTopics(std::map<std::string, std::string> topics) { recording_.topics = std::move(topics); }
+
+  /// After the last message.
+  void finish() { flushGray(true); }
+  const Recording& recording() const { return recording_; }
+
+ private:
+  template <class ImageMessage>
+  void addImage(const std::string& topic, double arrival, const ImageMessage& message, const std::string& encoding);
+  void addDepth(double t, const cv::Mat& depth);
+  void addGray(double t, const cv::Mat& gray);
+  void flushGray(bool all);
+
+  Recording recording_;
+  const double image_seconds_;
+  double first_image_ = -1;
+  std::unique_ptr<ImageRotation> rotation_;
+  struct Stamped {
+    double t;
+    cv::Mat image;
+  };
+  std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour waits a moment for its depth
+};
+
+/// Reads a bag. Throws std::runtime_error naming the file when it cannot be read.
+Recording recordBag(const std::string& path, const SensorConfig& sensor, double image_seconds);
+/// Listens to the sensor's topics for `seconds`. Needs ros::init(); throws std::runtime_error without a master.
+Recording recordLive(const SensorConfig& sensor, double seconds);
+
+}  // namespace vip_slam

@@ -1,0 +1,62 @@
+// What was seen of a sensor in a bag or on live topics, reduced to what the checks need. ROS-free, so that the checks
+// are tested on invented recordings.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_core/sensor/sensor_config.h"
+
+namespace vip_slam {
+
+struct StreamRecord {
+  std::vector<double> stamps;    ///< header stamps in order of arrival, seconds
+  std::vector<double> arrivals;  ///< record or receive times, seconds
+  std::string type;              ///< ROS type of the messages, "sensor_msgs/Image"
+  std::set<std::string> encodings;
+  std::set<std::pair<int, int>> sizes;  ///< (width, height)
+  std::string frame_id;                 ///< of the last message
+  std::size_t unusable = 0;             ///< messages that could not be decoded
+  std::string unusable_reason;
+};
+
+struct StampedVector {
+  double t = 0;
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+};
+
+/// Mean rotation rate of the camera between two images, rad/s, in the colour optical frame.
+struct RotationStep {
+  double t0 = 0, t1 = 0;
+  Eigen::Vector3d rate_C = Eigen::Vector3d::Zero();
+};
+
+struct DepthSample {
+  double valid = 0;   ///< share of pixels with a value
+  double median = 0;  ///< metres, of those
+};
+
+struct TfEdge {
+  std::string parent, child;
+  SE3 T_parent_child;
+  bool is_static = false;
+};
+
+struct Recording {
+  SensorConfig sensor;                        ///< what is expected
+  bool live = false;
+  std::map<std::string, std::string> topics;  ///< everything that is there: topic -> type
+  StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
+  CameraIntrinsics color_camera, depth_camera;     ///< from camera_info; width 0: none seen
+  std::string color_camera_error, depth_camera_error;  ///< why camera_info is unusable
+  std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
+  std::vector<RotationStep> rotations;
+  std::vector<DepthSample> depths;
+  std::vector<TfEdge> tf;                     ///< newest transform of each edge
+};
+
+}  // namespace vip_slam

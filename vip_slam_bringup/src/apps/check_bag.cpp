@@ -1,0 +1,46 @@
+// rosrun vip_slam_bringup check_bag BAG --sensor NAME_OR_YAML     a bag
+// rosrun vip_slam_bringup check_bag --live --sensor NAME_OR_YAML  what is published now
+// Exit status: 0 ready (warnings may stand), 1 not ready, 2 nothing could be checked.
+#include <unistd.h>
+
+#include <cstdio>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+#include <ros/ros.h>
+
+#include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/recorder.h"
+#include "vip_slam_ros/sensor_files.h"
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "check_bag", ros::init_options::AnonymousName | ros::init_options::NoSigintHandler);
+  CLI::App app{"Tells what is missing or wrong in a bag or on live topics before VIP-SLAM sees them."};
+  std::string bag, sensor = "simulator";
+  bool live = false;
+  double seconds = 0;
+  app.add_option("bag", bag, "the bag to check");
+  app.add_flag("--live", live, "listen to live topics instead");
+  app.add_option("--sensor,-s", sensor, "name of a shipped sensor or a YAML file")->capture_default_str();
+  app.add_option("--seconds", seconds, "how long to listen (10), or how much of the bag's images to look at (60)")
+      ->check(CLI::PositiveNumber);
+  try {
+    app.parse(argc, argv);
+    if (live != bag.empty()) throw CLI::ValidationError("give either a bag or --live");
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    const std::string file = vip_slam::resolveSensor(sensor);
+    const vip_slam::SensorConfig config = vip_slam::loadSensorConfig(file);
+    std::printf("%s against %s\n", live ? "Live topics" : bag.c_str(), file.c_str());
+    const auto recording = live ? vip_slam::recordLive(config, seconds > 0 ? seconds : 10)
+                                : vip_slam::recordBag(bag, config, seconds > 0 ? seconds : 60);
+    const vip_slam::Findings findings = vip_slam::checkAll(recording);
+    std::fputs(vip_slam::toText(findings, ::isatty(STDOUT_FILENO)).c_str(), stdout);
+    return vip_slam::worst(findings) == vip_slam::Severity::kError ? 1 : 0;
+  } catch (const std::exception& e) {
+    std::cerr << "check_bag: " << e.what() << "\n";
+    return 2;
+  }
+}

@@ -1,0 +1,106 @@
+// IMU gaps, units, gravity.
+#include <cmath>
+
+#include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/words.h"
+
+namespace vip_slam {
+namespace {
+
+double spread(const std::vector<StampedVector>& samples, std::size_t begin, std::size_t end) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::size_t i = begin; i < end; ++i) mean += samples[i].value;
+  mean /= double(end - begin);
+  double sum = 0;
+  for (std::size_t i = begin; i < end; ++i) sum += (samples[i].value - mean).squaredNorm();
+  return std::sqrt(sum / double(end - begin));
+}
+
+/// Lengths of the mean specific force over the half seconds with the least motion (at most a fifth of them).
+std::vector<double> quietForces(const std::vector<StampedVector>& accel, double* least_spread) {
+  std::vector<std::pair<double, double>> windows;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < accel.size(); ++i) {
+    if (accel[i].t - accel[begin].t < 0.5) continue;
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (std::size_t k = begin; k < i; ++k) mean += accel[k].value;
+    windows.emplace_back(spread(accel, begin, i), (mean / double(i - begin)).norm());
+    begin = i;
+  }
+  std::sort(windows.begin(), windows.end());
+  std::vector<double> out;
+  for (std::size_t i = 0; i < windows.size() && i <= windows.size() / 5; ++i) out.push_back(windows[i].second);
+  *least_spread = windows.empty() ? 0 : windows.front().first;
+  return out;
+}
+
+void checkGaps(const std::string& role, const std::vector<StampedVector>& samples, Findings* out) {
+  std::vector<double> steps;
+  double largest = 0, at = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double step = samples[i].t - samples[i - 1].t;
+    if (step > 0) steps.push_back(step);
+    if (step > largest) {
+      largest = step;
+      at = samples[i - 1].t - samples.front().t;
+    }
+  }
+  if (steps.empty()) return;
+  const double period = median(steps);
+  std::size_t gaps = 0;
+  for (const double step : steps) gaps += step > std::max(3.5 * period, 0.012) ? 1 : 0;
+  if (gaps > 0)
+    out->push_back({largest > 0.1 ? Severity::kError : Severity::kWarning, role,
+                    words("%zu gaps, the largest %.0f ms at %.1f s", gaps, 1000 * largest, at),
+                    "the driver or the recording loses samples; a gap above 100 ms restarts the odometry"});
+  else
+    out->push_back({Severity::kGood, role, words("no gaps, largest step %.1f ms", 1000 * largest), ""});
+  if (1.0 / period < 90)
+    out->push_back({Severity::kWarning, role, words("only %.0f Hz", 1.0 / period), "100 Hz or more is wanted, 200 Hz is good"});
+}
+
+}  // namespace
+
+Findings checkImu(const Recording& r) {
+  Findings out;
+  const bool split = r.sensor.topics.imu.empty();
+  checkGaps(split ? "gyroscope" : "IMU", r.gyro_samples, &out);
+  if (split) checkGaps("accelerometer", r.accel_samples, &out);
+  for (const auto* samples : {&r.gyro_samples, &r.accel_samples}) {
+    const std::string role = samples == &r.gyro_samples ? "gyroscope" : "accelerometer";
+    if (samples->size() < 20) continue;
+    std::size_t bad = 0;
+    for (const auto& s : *samples) bad += s.value.allFinite() ? 0 : 1;
+    if (bad > 0) {
+      out.push_back({Severity::kError, role, words("%zu values are not numbers", bad), "the driver is broken"});
+      return out;
+    }
+    if (spread(*samples, 0, samples->size()) < 1e-9)
+      out.push_back({Severity::kError, role, "the values never change",
+                     role == "gyroscope" ? "is this an accelerometer-only stream?" : "is this a gyroscope-only stream?"});
+  }
+  if (!r.gyro_samples.empty()) {
+    double largest = 0;
+    for (const auto& s : r.gyro_samples) largest = std::max(largest, s.value.norm());
+    if (largest > 40)
+      out.push_back({Severity::kError, "gyroscope", words("rates up to %.0f", largest), "degrees a second? radians a second are expected"});
+  }
+  double least_spread = 0;
+  const std::vector<double> forces = quietForces(r.accel_samples, &least_spread);
+  if (forces.empty()) return out;
+  const double g = median(forces);
+  if (g > 0.85 && g < 1.15)
+    out.push_back({Severity::kError, "gravity", words("%.2f when quiet: the accelerometer reports in g", g), "multiply by 9.81 in the driver; m/s^2 are expected"});
+  else if (g < 2.0)
+    out.push_back({Severity::kError, "gravity", words("%.2f m/s^2 when quiet: gravity has been taken out", g), "publish the raw specific force, not the linear acceleration"});
+  else if (std::abs(g - r.sensor.gravity) > (least_spread < 0.3 ? 0.35 : 1.2))
+    out.push_back({Severity::kWarning, "gravity", words("%.2f m/s^2 when quiet, expected %.2f", g, r.sensor.gravity),
+                   "calibrate the accelerometer (scale, bias)"});
+  else
+    out.push_back({Severity::kGood, "gravity", words("%.2f m/s^2 when quiet", g), ""});
+  if (least_spread > 0.5)
+    out.push_back({Severity::kNote, "start", "the sensor is never still", "a second of standing still at the start helps the initialisation"});
+  return out;
+}
+
+}  // namespace vip_slam

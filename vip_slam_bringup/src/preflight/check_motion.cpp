@@ -1,0 +1,181 @@
+// Camera-IMU delay and rotation from the motion: the gyro and the images see the same rotation.
+//   gyro(t + td) = R_I_C rate_C(t) + b
+// For each delay in a grid, R and b by orthogonal Procrustes; the delay with the least residual wins.
+#include <cmath>
+
+#include <Eigen/SVD>
+
+#include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/words.h"
+
+namespace vip_slam {
+namespace {
+
+/// Integral of the gyro from the first sample, piecewise linear in time.
+class GyroIntegral {
+ public:
+  explicit GyroIntegral(const std::vector<StampedVector>& gyro) {
+    for (const StampedVector& s : gyro) {
+      if (!t_.empty() && s.t <= t_.back()) continue;
+      sum_.push_back(t_.empty() ? Eigen::Vector3d::Zero()
+                                : Eigen::Vector3d(sum_.back() + 0.5 * (s.t - t_.back()) * (s.value + last_)));
+      t_.push_back(s.t);
+      last_ = s.value;
+    }
+  }
+  bool covers(double t) const { return t_.size() > 1 && t >= t_.front() && t <= t_.back(); }
+  Eigen::Vector3d at(double t) const {
+    const std::size_t i = std::min<std::size_t>(std::max<std::ptrdiff_t>(std::upper_bound(t_.begin(), t_.end(), t) - t_.begin(), 1), t_.size() - 1);
+    const double s = (t - t_[i - 1]) / (t_[i] - t_[i - 1]);
+    return (1 - s) * sum_[i - 1] + s * sum_[i];
+  }
+
+ private:
+  std::vector<double> t_;
+  std::vector<Eigen::Vector3d> sum_;
+  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
+};
+
+struct Fit {
+  double residual = 0, variance = 0, scale = 1;  ///< residual and variance: mean squares of the gyro side
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d camera_variances = Eigen::Vector3d::Zero();  ///< descending
+  std::size_t count = 0;
+};
+
+Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, double offset) {
+  std::vector<Eigen::Vector3d> imu, camera;
+  for (const RotationStep& s : steps) {
+    if (!gyro.covers(s.t0 + offset) || !gyro.covers(s.t1 + offset)) continue;
+    imu.push_back((gyro.at(s.t1 + offset) - gyro.at(s.t0 + offset)) / (s.t1 - s.t0));
+    camera.push_back(s.rate_C);
+  }
+  Fit fit;
+  fit.count = imu.size();
+  if (imu.size() < 20) return fit;
+  // Two rounds: the second without the steps the first cannot explain (blur, moving objects).
+  std::vector<bool> use(imu.size(), true);
+  for (int round = 0; round < 2; ++round) {
+    Eigen::Vector3d mean_imu = Eigen::Vector3d::Zero(), mean_camera = Eigen::Vector3d::Zero();
+    double n = 0;
+    for (std::size_t i = 0; i < imu.size(); ++i) {
+      if (!use[i]) continue;
+      mean_imu += imu[i];
+      mean_camera += camera[i];
+      n += 1;
+    }
+    mean_imu /= n;
+    mean_camera /= n;
+    Eigen::Matrix3d cross = Eigen::Matrix3d::Zero(), spread = Eigen::Matrix3d::Zero();
+    double variance = 0;
+    for (std::size_t i = 0; i < imu.size(); ++i) {
+      if (!use[i]) continue;
+      const Eigen::Vector3d a = imu[i] - mean_imu, b = camera[i] - mean_camera;
+      cross += a * b.transpose() / n;
+      spread += b * b.transpose() / n;
+      variance += a.squaredNorm() / n;
+    }
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() > 0 ? 1 : -1);
+    fit.R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+    fit.camera_variances = Eigen::JacobiSVD<Eigen::Matrix3d>(spread).singularValues();
+    fit.scale = fit.camera_variances.sum() > 0 ? std::sqrt(variance / fit.camera_variances.sum()) : 1;
+    fit.variance = variance;
+    std::vector<double> squares(imu.size());
+    for (std::size_t i = 0; i < imu.size(); ++i)
+      squares[i] = (imu[i] - mean_imu - fit.R * (camera[i] - mean_camera)).squaredNorm();
+    const double limit = 9 * median(squares);
+    fit.residual = 0;
+    double kept = 0;
+    for (std::size_t i = 0; i < imu.size(); ++i) {
+      if (round == 0) use[i] = squares[i] <= limit;
+      if (!use[i]) continue;
+      fit.residual += squares[i];
+      kept += 1;
+    }
+    fit.residual /= std::max(kept, 1.0);
+  }
+  return fit;
+}
+
+}  // namespace
+
+MotionEstimate estimateMotion(const Recording& r, double max_offset) {
+  MotionEstimate out;
+  if (r.rotations.size() < 40 || r.gyro_samples.size() < 100) {
+    out.why_not = "too few images with enough texture";
+    return out;
+  }
+  const GyroIntegral gyro(r.gyro_samples);
+  const double step = 0.002;
+  const int half = static_cast<int>(std::lround(max_offset / step));
+  std::vector<Fit> fits;
+  for (int i = -half; i <= half; ++i) fits.push_back(fitRotation(r.rotations, gyro, i * step));
+  int best = -1;
+  for (int i = 0; i < static_cast<int>(fits.size()); ++i)
+    if (fits[i].count >= 40 && (best < 0 || fits[i].residual < fits[best].residual)) best = i;
+  if (best < 0) {
+    out.why_not = "images and gyroscope do not overlap in time";
+    return out;
+  }
+  const Fit& fit = fits[best];
+  out.scale = fit.scale;
+  out.correlation = fit.variance > 0 ? std::max(0.0, 1 - fit.residual / fit.variance) : 0;
+  out.R_imu_cam = Eigen::Quaterniond(fit.R);
+  if (fit.camera_variances.sum() < 0.05 * 0.05) {
+    out.why_not = "the sensor hardly rotates";
+    return out;
+  }
+  if (out.scale < 5 && out.correlation < 0.6) {
+    out.why_not = words("image and gyro rotation do not agree (%.0f %% explained)", 100 * out.correlation);
+    return out;
+  }
+  double offset = (best - half) * step;
+  if (best > 0 && best + 1 < static_cast<int>(fits.size())) {
+    const double a = fits[best - 1].residual, b = fit.residual, c = fits[best + 1].residual, curve = a - 2 * b + c;
+    if (curve > 0) offset += step * 0.5 * (a - c) / curve;
+  }
+  out.time_offset = offset;
+  // The rotation is known once a second axis moves: 0.05 rad/s.
+  out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
+  out.usable = true;
+  return out;
+}
+
+Findings checkMotion(const Recording& r) {
+  Findings out;
+  const MotionEstimate motion = estimateMotion(r);
+  if (motion.scale > 30 && motion.scale < 90)
+    out.push_back({Severity::kError, "gyroscope", words("turns %.0f times as fast as the images", motion.scale),
+                   "it reports degrees a second; radians a second are expected"});
+  if (!motion.usable) {
+    out.push_back({Severity::kNote, "camera-IMU delay", "not measured: " + motion.why_not,
+                   "turn the sensor about two axes in front of a textured scene"});
+    return out;
+  }
+  if (motion.scale > 5) return out;
+  const double difference = motion.time_offset - r.sensor.time_offset;
+  const std::string measured = words("%+.1f ms measured, the sensor file says %+.1f ms", 1000 * motion.time_offset, 1000 * r.sensor.time_offset);
+  if (std::abs(difference) > 0.006)
+    out.push_back({std::abs(difference) > 0.05 ? Severity::kError : Severity::kWarning, "camera-IMU delay", measured,
+                   words("set time_offset: %.4f in the sensor file", motion.time_offset)});
+  else
+    out.push_back({Severity::kGood, "camera-IMU delay", measured, ""});
+  if (!motion.rotation_known) {
+    out.push_back({Severity::kNote, "extrinsics", "not checked: the sensor turns about one axis only", ""});
+    return out;
+  }
+  const double angle = r.sensor.T_imu_cam.rotation().angularDistance(motion.R_imu_cam) * 180 / M_PI;
+  if (angle > 5) {
+    const Eigen::Matrix3d R = motion.R_imu_cam.toRotationMatrix();
+    std::string rows;
+    for (int i = 0; i < 3; ++i) rows += words("%s[%.3f, %.3f, %.3f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
+    out.push_back({Severity::kError, "extrinsics", words("the motion contradicts T_imu_cam by %.0f degrees", angle),
+                   "the rotation that fits the motion has rows " + rows});
+  } else {
+    out.push_back({Severity::kGood, "extrinsics", words("rotation of T_imu_cam fits the motion (%.1f degrees)", angle), ""});
+  }
+  return out;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,139 @@
+// Topics and rates.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/words.h"
+
+namespace vip_slam {
+namespace {
+
+struct Wanted {
+  std::string role, topic;
+  std::vector<std::string> types;
+  const StreamRecord* stream;
+  double rate;
+  bool required;
+};
+
+std::vector<Wanted> wanted(const Recording& r) {
+  const SensorTopics& t = r.sensor.topics;
+  const auto image = [](const std::string& encoding) {
+    return std::vector<std::string>{encoding == "compressed" ? "sensor_msgs/CompressedImage" : "sensor_msgs/Image"};
+  };
+  const std::vector<std::string> imu{"sensor_msgs/Imu"}, info{"sensor_msgs/CameraInfo"};
+  std::vector<Wanted> out{
+      {"colour image", t.color, image(r.sensor.color_encoding), &r.color, r.sensor.color_rate, true},
+      {"depth image", t.depth, image(r.sensor.depth_encoding), &r.depth, r.sensor.depth_rate, true},
+      {"colour camera_info", t.color_info, info, &r.color_info, r.sensor.color_rate,
+       r.sensor.intrinsics_from_camera_info},
+      {"depth camera_info", t.depth_info, info, &r.depth_info, r.sensor.depth_rate, false}};
+  if (!t.imu.empty()) {
+    out.push_back({"IMU", t.imu, imu, &r.imu, r.sensor.imu_rate, true});
+  } else {
+    out.push_back({"gyroscope", t.gyro, imu, &r.gyro, r.sensor.imu_rate, true});
+    out.push_back({"accelerometer", t.accel, imu, &r.accel, 0.0, true});
+  }
+  out.erase(std::remove_if(out.begin(), out.end(), [](const Wanted& w) { return w.topic.empty() && !w.required; }),
+            out.end());
+  return out;
+}
+
+/// Topics of the right type that might be meant.
+std::string candidates(const Recording& r, const Wanted& w) {
+  std::string list;
+  for (const auto& [topic, type] : r.topics) {
+    if (std::find(w.types.begin(), w.types.end(), type) == w.types.end()) continue;
+    list += (list.empty() ? "" : ", ") + topic;
+  }
+  const std::string where = r.live ? "published" : "in the bag";
+  return list.empty() ? "no topic of type " + w.types.front() + " is " + where
+                      : "of type " + w.types.front() + " " + where + ": " + list;
+}
+
+}  // namespace
+
+Findings checkTopics(const Recording& r) {
+  Findings out;
+  for (const Wanted& w : wanted(r)) {
+    if (w.topic.empty()) {
+      out.push_back({Severity::kError, w.role, "the sensor file names no topic", "fill it in; " + candidates(r, w)});
+      continue;
+    }
+    const auto found = r.topics.find(w.topic);
+    const Severity bad = w.required ? Severity::kError : Severity::kNote;
+    if (found == r.topics.end()) {
+      out.push_back({bad, w.role, "topic " + w.topic + " is not there", candidates(r, w)});
+    } else if (std::find(w.types.begin(), w.types.end(), found->second) == w.types.end()) {
+      out.push_back({bad, w.role, "topic " + w.topic + " has type " + found->second + ", expected " + w.types.front(),
+                     candidates(r, w)});
+    } else if (w.stream->stamps.empty()) {
+      out.push_back({bad, w.role, "no message on " + w.topic, "is the driver running, and is this stream switched on?"});
+    } else {
+      out.push_back({Severity::kGood, w.role, words("%zu messages on %s", w.stream->stamps.size(), w.topic.c_str()), ""});
+    }
+  }
+  return out;
+}
+
+Findings checkRates(const Recording& r) {
+  Findings out;
+  for (const Wanted& w : wanted(r)) {
+    const auto& stamps = w.stream->stamps;
+    if (w.role.find("camera_info") != std::string::npos || stamps.size() < 3) continue;
+    std::size_t backward = 0, repeated = 0, lost = 0;
+    double largest = 0, largest_at = 0;
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < stamps.size(); ++i) {
+      const double step = stamps[i] - stamps[i - 1];
+      if (step < 0) ++backward;
+      else if (step == 0) ++repeated;
+      else steps.push_back(step);
+      if (step > largest) {
+        largest = step;
+        largest_at = stamps[i - 1] - stamps.front();
+      }
+    }
+    if (steps.empty()) {
+      out.push_back({Severity::kError, w.role, "all stamps are the same", "the driver does not stamp its messages"});
+      continue;
+    }
+    const double period = median(steps), rate = 1.0 / period;
+    for (const double step : steps)
+      if (step > 1.7 * period) lost += static_cast<std::size_t>(std::lround(step / period)) - 1;
+    if (stamps.front() < 1.0 && !r.live)
+      out.push_back({Severity::kWarning, w.role, "stamps begin at zero", "recorded without a clock? all streams must share one"});
+    if (backward > 0)
+      out.push_back({Severity::kError, w.role, words("time runs backwards %zu times", backward),
+                     "bag joined or played in a loop? messages out of order are dropped"});
+    if (repeated > 0)
+      out.push_back({Severity::kWarning, w.role, words("%zu stamps repeat the one before", repeated),
+                     "repeated messages are dropped"});
+    if (w.rate > 0 && std::abs(rate - w.rate) > 0.15 * w.rate) {
+      const bool far = rate < 0.5 * w.rate;
+      out.push_back({far ? Severity::kError : Severity::kWarning, w.role,
+                     words("%.1f Hz, the sensor file says %.0f Hz", rate, w.rate),
+                     "set the driver's rate, or the rate in the sensor file when it is meant"});
+    } else {
+      out.push_back({Severity::kGood, w.role, words("%.1f Hz", rate), ""});
+    }
+    const double share = double(lost) / (stamps.size() + lost);
+    if (share > 0.005 && lost > 1)
+      out.push_back({share > 0.1 ? Severity::kError : Severity::kWarning, w.role,
+                     words("%.1f %% of the messages are missing, the largest hole is %.2f s at %.1f s", 100 * share,
+                           largest, largest_at),
+                     "USB bandwidth, disk or CPU too slow? lower the resolution or record compressed"});
+    std::vector<double> delays;
+    for (std::size_t i = 0; i < stamps.size() && i < w.stream->arrivals.size(); ++i)
+      delays.push_back(w.stream->arrivals[i] - stamps[i]);
+    const double delay = delays.empty() ? 0 : median(delays);
+    if (r.live && std::abs(delay) > 1.0)
+      out.push_back({Severity::kError, w.role, words("stamps lie %.1f s %s the clock of this machine", std::abs(delay),
+                                                     delay > 0 ? "behind" : "ahead of"),
+                     "the driver stamps with the device's clock: set it to system or global time"});
+  }
+  return out;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,99 @@
+#include "vip_slam_bringup/preflight/image_rotation.h"
+
+#include <Eigen/SVD>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/geometry/so3.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kLeastCorners = 15;
+
+/// Rotation with to ~ R from, by Kabsch with two rounds of trimming.
+std::optional<Eigen::Matrix3d> alignBearings(const std::vector<Eigen::Vector3d>& from,
+                                             const std::vector<Eigen::Vector3d>& to) {
+  std::vector<bool> use(from.size(), true);
+  Eigen::Matrix3d R;
+  for (int round = 0; round < 3; ++round) {
+    Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      if (!use[i]) continue;
+      cross += to[i] * from[i].transpose();
+      ++n;
+    }
+    if (n < kLeastCorners) return std::nullopt;
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() > 0 ? 1 : -1);
+    R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < from.size(); ++i) errors.push_back((to[i] - R * from[i]).norm());
+    const double limit = 2.5 * median(errors) + 1e-9;
+    for (std::size_t i = 0; i < from.size(); ++i) use[i] = errors[i] <= limit;
+  }
+  return R;
+}
+
+}  // namespace
+
+std::optional<RotationStep> ImageRotation::add(double t, const cv::Mat& gray, const cv::Mat& depth) {
+  std::optional<RotationStep> step;
+  if (!gray_.empty() && t > t_ && t - t_ < 0.2) {
+    if (const auto R_now_before = rotationTo(gray)) {
+      // A camera turning by w dt sees the scene turn by -w dt.
+      const Eigen::Vector3d angle = logSO3(Eigen::Matrix3d(R_now_before->transpose()));
+      step = RotationStep{t_, t, angle / (t - t_)};
+    }
+  }
+  t_ = t;
+  gray_ = gray.clone();
+  depth_ = depth.empty() ? cv::Mat() : depth.clone();
+  return step;
+}
+
+std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray) const {
+  std::vector<cv::Point2f> before, after;
+  cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0);
+  if (before.size() < kLeastCorners) return std::nullopt;
+  std::vector<unsigned char> found;
+  std::vector<float> error;
+  cv::calcOpticalFlowPyrLK(gray_, gray, before, after, found, error, cv::Size(21, 21), 4);
+  std::vector<Eigen::Vector3d> from, to;
+  std::vector<cv::Point3f> points;
+  std::vector<cv::Point2f> images;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    Eigen::Vector2d a, b;
+    if (!found[i] || !camera_->undistort({before[i].x, before[i].y}, &a) || !camera_->undistort({after[i].x, after[i].y}, &b))
+      continue;
+    from.push_back(a.homogeneous().normalized());
+    to.push_back(b.homogeneous().normalized());
+    const int u = cvRound(before[i].x), v = cvRound(before[i].y);
+    if (depth_.empty() || u < 0 || v < 0 || u >= depth_.cols || v >= depth_.rows) continue;
+    const float z = depth_.at<float>(v, u);
+    if (z < 0.1f || z > 20.f) continue;
+    points.emplace_back(a.x() * z, a.y() * z, z);
+    images.emplace_back(b.x(), b.y());
+  }
+  if (points.size() >= kLeastCorners) {
+    cv::Mat r, t, inliers;
+    const float threshold = static_cast<float>(2.0 / camera_->focal());
+    if (cv::solvePnPRansac(points, images, cv::Matx33d::eye(), cv::noArray(), r, t, false, 60, threshold, 0.99, inliers,
+                           cv::SOLVEPNP_EPNP) && inliers.rows >= static_cast<int>(kLeastCorners)) {
+      std::vector<cv::Point3f> good_points;
+      std::vector<cv::Point2f> good_images;
+      for (int i = 0; i < inliers.rows; ++i) {
+        good_points.push_back(points[inliers.at<int>(i)]);
+        good_images.push_back(images[inliers.at<int>(i)]);
+      }
+      cv::solvePnPRefineLM(good_points, good_images, cv::Matx33d::eye(), cv::noArray(), r, t);
+      return expSO3(Eigen::Vector3d(r.at<double>(0), r.at<double>(1), r.at<double>(2)));
+    }
+  }
+  return alignBearings(from, to);
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,147 @@
+#include "vip_slam_bringup/preflight/recorder.h"
+
+#include <cmath>
+
+#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_ros/camera_info.h"
+#include "vip_slam_ros/image_decoding.h"
+
+namespace vip_slam {
+namespace {
+
+template <class Message>
+void note(StreamRecord* stream, double arrival, const Message& message) {
+  stream->stamps.push_back(message.header.stamp.toSec());
+  stream->arrivals.push_back(arrival);
+  stream->frame_id = message.header.frame_id;
+}
+
+}  // namespace
+
+Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds) : image_seconds_(image_seconds) {
+  recording_.sensor = sensor;
+  recording_.live = live;
+  if (!sensor.intrinsics_from_camera_info) rotation_ = std::make_unique<ImageRotation>(makeCamera(sensor.camera));
+}
+
+void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message) {
+  addImage(topic, arrival, message, message.encoding);
+}
+
+void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CompressedImage& message) {
+  addImage(topic, arrival, message, "compressed (" + message.format + ")");
+}
+
+template <class ImageMessage>
+void Recorder::addImage(const std::string& topic, double arrival, const ImageMessage& message,
+                        const std::string& encoding) {
+  const bool is_color = topic == recording_.sensor.topics.color;
+  if (!is_color && topic != recording_.sensor.topics.depth) return;
+  StreamRecord& stream = is_color ? recording_.color : recording_.depth;
+  note(&stream, arrival, message);
+  stream.encodings.insert(encoding);
+  const double t = message.header.stamp.toSec();
+  if (first_image_ < 0) first_image_ = arrival;
+  if (arrival - first_image_ > image_seconds_) return;
+  try {
+    const cv::Mat image = is_color ? decodeGray(message) : decodeDepth(message, recording_.sensor.depth_scale);
+    stream.sizes.emplace(image.cols, image.rows);
+    if (is_color) addGray(t, image);
+    else addDepth(t, image);
+  } catch (const std::exception& e) {
+    ++stream.unusable;
+    stream.unusable_reason = e.what();
+  }
+}
+
+void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message) {
+  const auto take = [&](StreamRecord* stream, CameraIntrinsics* camera, std::string* error) {
+    note(stream, arrival, message);
+    if (stream->stamps.size() > 1) return;
+    try {
+      *camera = intrinsicsFromCameraInfo(message);
+      const std::string wrong = camera->validate();
+      if (!wrong.empty()) *error = wrong;
+    } catch (const std::exception& e) {
+      *error = e.what();
+    }
+    if (!error->empty()) *camera = CameraIntrinsics();
+  };
+  const SensorTopics& topics = recording_.sensor.topics;
+  if (topic == topics.color_info) {
+    take(&recording_.color_info, &recording_.color_camera, &recording_.color_camera_error);
+    if (!rotation_ && recording_.color_camera.width > 0)
+      rotation_ = std::make_unique<ImageRotation>(makeCamera(recording_.color_camera));
+  }
+  if (topic == topics.depth_info) take(&recording_.depth_info, &recording_.depth_camera, &recording_.depth_camera_error);
+}
+
+void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Imu& message) {
+  const SensorTopics& topics = recording_.sensor.topics;
+  const double t = message.header.stamp.toSec();
+  const auto& w = message.angular_velocity;
+  const auto& a = message.linear_acceleration;
+  if (topic == topics.imu) note(&recording_.imu, arrival, message);
+  if (topic == topics.gyro) note(&recording_.gyro, arrival, message);
+  if (topic == topics.accel) note(&recording_.accel, arrival, message);
+  if (topic == topics.imu || topic == topics.gyro) recording_.gyro_samples.push_back({t, {w.x, w.y, w.z}});
+  if (topic == topics.imu || topic == topics.accel) recording_.accel_samples.push_back({t, {a.x, a.y, a.z}});
+}
+
+void Recorder::add(const std::string& topic, double, const tf2_msgs::TFMessage& message) {
+  for (const auto& transform : message.transforms) {
+    TfEdge edge;
+    edge.parent = transform.header.frame_id;
+    edge.child = transform.child_frame_id;
+    const auto& q = transform.transform.rotation;
+    const auto& p = transform.transform.translation;
+    edge.T_parent_child = SE3(Eigen::Quaterniond(q.w, q.x, q.y, q.z), Eigen::Vector3d(p.x, p.y, p.z));
+    edge.is_static = topic == "/tf_static";
+    bool known = false;
+    for (TfEdge& old : recording_.tf) {
+      if (old.child != edge.child || old.parent != edge.parent) continue;
+      old = edge;
+      known = true;
+    }
+    if (!known) recording_.tf.push_back(edge);
+  }
+}
+
+void Recorder::addDepth(double t, const cv::Mat& depth) {
+  if (recording_.depth.stamps.size() % 5 == 1) {
+    std::vector<double> values;
+    std::size_t all = 0;
+    for (int v = 0; v < depth.rows; v += 8)
+      for (int u = 0; u < depth.cols; u += 8) {
+        ++all;
+        const float z = depth.at<float>(v, u);
+        if (z > 0 && std::isfinite(z)) values.push_back(z);
+      }
+    recording_.depths.push_back({double(values.size()) / std::max<std::size_t>(all, 1), values.empty() ? 0 : median(values)});
+  }
+  recent_depth_.push_back({t, depth});
+  if (recent_depth_.size() > 12) recent_depth_.erase(recent_depth_.begin());
+  flushGray(false);
+}
+
+void Recorder::addGray(double t, const cv::Mat& gray) {
+  waiting_gray_.push_back({t, gray});
+  flushGray(false);
+}
+
+/// A colour image goes on once its depth is there, or when others already wait behind it.
+void Recorder::flushGray(bool all) {
+  while (!waiting_gray_.empty()) {
+    const Stamped& gray = waiting_gray_.front();
+    const cv::Mat* depth = nullptr;
+    for (const Stamped& d : recent_depth_)
+      if (std::abs(d.t - gray.t) < 0.02 && d.image.size() == gray.image.size()) depth = &d.image;
+    if (!depth && !all && waiting_gray_.size() < 4) return;
+    if (rotation_ && gray.image.cols == (recording_.color_camera.width > 0 ? recording_.color_camera.width : recording_.sensor.camera.width))
+      if (const auto step = rotation_->add(gray.t, gray.image, depth ? *depth : cv::Mat())) recording_.rotations.push_back(*step);
+    waiting_gray_.erase(waiting_gray_.begin());
+  }
+}
+
+}  // namespace vip_slam
