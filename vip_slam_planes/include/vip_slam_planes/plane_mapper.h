@@ -1,0 +1,63 @@
+// The plane module (paper section "Plane Detection and Association"). ROS-free; one owner thread.
+//
+// Keyframes go in with addKeyframe() and wait until a MapUpdate places them in `map`; tracked frames only grow planes
+// that exist. Everything that comes out is in `map`. Normals point to the side a plane was seen from, so that the two
+// faces of a door are two planes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_core/types/keyframe.h"
+#include "vip_slam_core/types/map_update.h"
+#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/util/timing.h"
+#include "vip_slam_planes/plane_mapper_options.h"
+
+namespace vip_slam {
+
+/// Counted since construction; for diagnostics.
+struct PlaneMapperCounters {
+  std::uint64_t keyframes = 0;          ///< placed and processed
+  std::uint64_t keyframes_waiting = 0;  ///< not placed yet
+  std::uint64_t keyframes_forgotten = 0;  ///< never placed by the back end, dropped
+  std::uint64_t frames_grown = 0, frames_skipped = 0;
+  std::uint64_t planes_started = 0, planes_merged = 0, planes_removed = 0;
+  std::uint64_t points_associated = 0, points_dissociated = 0, point_candidates = 0;
+};
+
+class PlaneMapper {
+ public:
+  /// Throws std::invalid_argument when the camera is null or the depth noise unusable. `timing` may be null and must
+  /// outlive this.
+  PlaneMapper(const PlaneMapperOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
+              TimingLog* timing = nullptr);
+  ~PlaneMapper();
+  PlaneMapper(const PlaneMapper&) = delete;
+  PlaneMapper& operator=(const PlaneMapper&) = delete;
+
+  /// Remembered until a MapUpdate has placed it. A null keyframe or a known id is ignored.
+  void addKeyframe(KeyframePtr keyframe);
+  /// Image rate: extends planes that exist; starts none. Does nothing without depth, while not tracking, or when the
+  /// frame belongs to another epoch than the newest keyframe.
+  void grow(const TrackedFrame& frame, const SE3& T_map_odom);
+  /// Takes the corrections, then detects, associates and merges with the keyframes that are now placed.
+  PlaneUpdate applyMapUpdate(const MapUpdate& update);
+  /// Confirmed planes, by id; polygons are as of the last applyMapUpdate().
+  const std::vector<PlaneEstimate>& planes() const;
+  /// Starts from the planes of a loaded map; everything known before is forgotten.
+  void restore(const std::vector<PlaneEstimate>& planes);
+  void clear();
+
+  const PlaneMapperCounters& counters() const;
+  const PlaneMapperOptions& options() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vip_slam
