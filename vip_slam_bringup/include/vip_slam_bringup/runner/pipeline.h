@@ -13,7 +13,7 @@
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_bringup/runner/pipeline_options.h"
-#include "vip_slam_bringup/runner/trajectory_assembly.h"
+#include "vip_slam_core/trajectory/anchored_trajectory.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/types/tracking_state.h"
 #include "vip_slam_core/util/timing.h"

@@ -1,7 +1,7 @@
 // Every image's pose follows the final keyframes.
 #include <gtest/gtest.h>
 
-#include "vip_slam_bringup/runner/trajectory_assembly.h"
+#include "vip_slam_core/trajectory/anchored_trajectory.h"
 
 namespace vip_slam {
 namespace {

@@ -1,4 +1,4 @@
-#include "vip_slam_bringup/runner/trajectory_assembly.h"
+#include "vip_slam_core/trajectory/anchored_trajectory.h"
 
 #include <algorithm>
 #include <map>
