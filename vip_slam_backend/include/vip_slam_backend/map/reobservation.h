@@ -1,0 +1,33 @@
+// Finds landmarks of nearby keyframes again in a new keyframe: projection, pixel gate, Hamming distance. Untracked corners
+// become observations; a tracked feature that has a landmark of its own is the same point seen anew, and the two merge.
+#pragma once
+
+#include <memory>
+
+#include "vip_slam_backend/back_end_options.h"
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/camera/camera_model.h"
+
+namespace vip_slam {
+
+struct ReobservationResult {
+  int candidates = 0;  ///< landmarks that should be visible
+  int found = 0;       ///< new observations
+  int merged = 0;      ///< duplicate landmarks joined
+};
+
+class Reobservation {
+ public:
+  Reobservation(const ReobservationOptions& options, std::shared_ptr<const CameraModel> camera)
+      : options_(options), camera_(std::move(camera)) {}
+  /// `id` is in the map with its predicted or optimised pose.
+  ReobservationResult process(KeyframeId id, Map* map) const;
+  /// Keyframes whose landmarks are looked for: covisible ones, then near ones that look the same way.
+  std::vector<KeyframeId> neighbours(const Map& map, KeyframeId id) const;
+
+ private:
+  ReobservationOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+};
+
+}  // namespace vip_slam

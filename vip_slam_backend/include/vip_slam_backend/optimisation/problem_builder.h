@@ -1,0 +1,55 @@
+// From the map to a bundle adjustment and back: which keyframes are free, which are held, and how the four variants turn
+// landmarks and planes into factors.
+#pragma once
+
+#include <set>
+#include <vector>
+
+#include "vip_slam_backend/back_end_options.h"
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/solver/ba_problem.h"
+
+namespace vip_slam {
+
+struct ProblemScope {
+  std::vector<KeyframeId> free;    ///< optimised, ascending
+  std::vector<KeyframeId> fixed;   ///< held, ascending
+  /// Keyframes outside both hold the planes through one block per plane (their poses are constants).
+  bool outside_planes = true;
+};
+
+/// Newest `window` keyframes, the IMU neighbour before them, and the observers of their landmarks (most shared first).
+ProblemScope localScope(const Map& map, const LocalBaOptions& options);
+/// All keyframes.
+ProblemScope globalScope(const Map& map);
+
+struct BuiltProblem {
+  BaProblem problem;
+  std::vector<KeyframeId> frames;       ///< per problem frame; 0: the world frame of outside planes
+  std::vector<LandmarkId> points;
+  std::vector<PlaneId> planes;
+  std::vector<LandmarkId> plane_points; ///< landmarks that stand for homographies only (vip)
+  /// Landmark and keyframe of every observation, for outlier removal.
+  std::vector<MapObservation> observations;
+};
+
+struct BuilderSettings {
+  Variant variant = Variant::kVip;
+  MeasurementOptions measurement;
+  double focal = 500;                   ///< px
+  Eigen::Vector3d gravity = gravityVector();
+};
+
+BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings);
+
+/// Writes the optimised variables back. Landmarks that are no variables follow: plane points are intersected with their
+/// plane, single views move with their keyframe. Keyframes that are gone meanwhile are skipped.
+void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);
+
+/// Observations whose residual is above `chi2` (squared sigmas) or behind the camera are removed from the map; their number.
+int removeOutliers(const BuiltProblem& built, double chi2, Map* map);
+
+/// Weight (focal length / sigma) of a feature's pixel.
+double pixelWeight(const Feature& feature, const BuilderSettings& settings);
+
+}  // namespace vip_slam

@@ -1,0 +1,165 @@
+#include "vip_slam_backend/back_end.h"
+
+#include "back_end_impl.h"
+
+namespace vip_slam {
+
+BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l)
+    : options(o),
+      sensor(s),
+      log(l),
+      camera(makeCamera(s.camera)),
+      maker(LandmarkMakerOptions{12.0, 1.0, camera->focal()}),
+      reobservation(o.reobservation, camera),
+      solver(makeSolver(o.solver)) {
+  settings.variant = variantFromName(o.variant);
+  settings.measurement = o.measurement;
+  settings.focal = camera->focal();
+  settings.gravity = gravityVector(s.gravity);
+}
+
+MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
+  refusal.clear();
+  ++statistics.keyframes_received;
+  const double t = keyframe ? keyframe->frame.t : 0.0;
+  const ScopedTimer timer(log, "backend.keyframe", t);
+  MapUpdate update = beginUpdate(t);
+  try {
+    if (!keyframe) throw MapError("no keyframe given");
+    const std::string bad = validateKeyframe(*keyframe);
+    if (!bad.empty()) throw MapError(bad);
+    if (keyframe->id <= map.newestKeyframe())
+      throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
+                     std::to_string(map.newestKeyframe()) + " of the map");
+    const SE3 T_map_odom_before = T_map_odom;
+    const std::uint32_t epoch_before = epoch;
+    const NavState state = predict(*keyframe);
+    try {
+      map.addKeyframe(keyframe, state, sensor.imu_noise);
+    } catch (...) {
+      T_map_odom = T_map_odom_before;
+      epoch = epoch_before;
+      throw;
+    }
+  } catch (const MapError& e) {
+    refusal = e.what();
+    ++statistics.keyframes_refused;
+    finishUpdate(&update);
+    return update;
+  }
+  const KeyframeId id = keyframe->id;
+  {
+    const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
+    maker.process(id, &map);
+    const ReobservationResult found = reobservation.process(id, &map);
+    statistics.reobserved += found.found;
+    statistics.merged += found.merged;
+  }
+  localBundleAdjustment(t, &update);
+  cull(&update);
+  finishUpdate(&update);
+  return update;
+}
+
+void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
+  const ScopedTimer timer(log, "backend.planes", update.t);
+  for (const PlaneMerge& merge : update.merges) map.mergePlanes(merge.from, merge.into);
+  for (const PlaneId id : update.removed) map.removePlane(id);
+  for (const PlaneEstimate& plane : update.planes) {
+    try {
+      map.setPlane(plane);
+    } catch (const MapError& e) {
+      refusal = e.what();
+    }
+  }
+  for (const PlaneObservation& observation : update.observations) map.setPlaneObservation(observation);
+  for (const auto& pair : update.associated) {
+    const LandmarkId id = map.resolve(pair.first);
+    if (map.hasLandmark(id) && map.hasPlane(pair.second)) map.associate(id, pair.second);
+  }
+  for (const LandmarkId landmark : update.dissociated) {
+    const LandmarkId id = map.resolve(landmark);
+    if (map.hasLandmark(id)) map.associate(id, 0);
+  }
+}
+
+MapSnapshot BackEnd::Impl::snapshot() const {
+  MapSnapshot snapshot;
+  snapshot.revision = revision;
+  snapshot.epoch = epoch;
+  snapshot.T_map_odom = T_map_odom;
+  for (const auto& entry : map.keyframes()) {
+    const MapKeyframe& kf = entry.second;
+    SnapshotKeyframe out;
+    out.id = entry.first;
+    out.t = kf.data->frame.t;
+    out.epoch = kf.data->frame.epoch;
+    out.state = kf.state;
+    out.T_odom_I = kf.data->frame.state.T_W_I;
+    for (const LandmarkId landmark : kf.landmarks) out.landmarks += landmark != kNoLandmark;
+    snapshot.keyframes.push_back(out);
+  }
+  for (const LandmarkId id : map.landmarkIds()) snapshot.landmarks.push_back(estimateOf(map.landmark(id)));
+  for (const auto& entry : map.planes()) snapshot.planes.push_back(entry.second.estimate);
+  snapshot.loops = loops;
+  snapshot.statistics = statistics;
+  snapshot.statistics.landmarks = snapshot.landmarks.size();
+  for (const LandmarkEstimate& landmark : snapshot.landmarks) {
+    snapshot.statistics.observations += landmark.observations;
+    snapshot.statistics.plane_landmarks += landmark.plane != 0;
+  }
+  return snapshot;
+}
+
+void BackEnd::Impl::reset() {
+  map.clear();
+  maker.clear();
+  solver = makeSolver(options.solver);
+  T_map_odom = SE3();
+  epoch = 0;
+  global_wanted = false;
+  refusal.clear();
+  loops.clear();
+  new_loops.clear();
+  statistics = BackEndStatistics();
+}
+
+BackEnd::BackEnd(const BackEndOptions& options, const SensorConfig& sensor, TimingLog* log)
+    : impl_(std::make_unique<Impl>(options, sensor, log)) {}
+BackEnd::~BackEnd() = default;
+
+MapUpdate BackEnd::addKeyframe(KeyframePtr keyframe) { return impl_->addKeyframe(keyframe); }
+const std::string& BackEnd::lastRefusal() const { return impl_->refusal; }
+void BackEnd::applyPlaneUpdate(const PlaneUpdate& update) { impl_->applyPlaneUpdate(update); }
+bool BackEnd::globalBaWanted() const { return impl_->global_wanted; }
+void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }
+
+GbaJob BackEnd::startGlobalBa() {
+  impl_->global_wanted = false;
+  return impl_->makeGlobalJob();
+}
+
+GbaResult BackEnd::run(const GbaJob& job) const {
+  GbaResult result;
+  if (!job.problem) return result;
+  const ScopedTimer timer(impl_->log, "backend.gba", job.problem->t);
+  result.solution = std::make_shared<const GlobalBaSolution>(solveGlobalBa(*job.problem));
+  return result;
+}
+
+MapUpdate BackEnd::merge(const GbaResult& result) { return impl_->mergeGlobal(result); }
+
+MapUpdate BackEnd::finish() {
+  if (!impl_->options.global_ba.at_end) {
+    MapUpdate update = impl_->beginUpdate(0);
+    impl_->finishUpdate(&update);
+    return update;
+  }
+  return merge(run(startGlobalBa()));
+}
+
+MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
+const Map& BackEnd::map() const { return impl_->map; }
+void BackEnd::reset() { impl_->reset(); }
+
+}  // namespace vip_slam

@@ -1,0 +1,65 @@
+// State of the back end, shared by the files that implement its parts.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/map/culling.h"
+#include "vip_slam_backend/map/landmark_maker.h"
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/reobservation.h"
+#include "vip_slam_backend/optimisation/global_ba.h"
+#include "vip_slam_backend/optimisation/problem_builder.h"
+#include "vip_slam_backend/solver/ba_solver.h"
+
+namespace vip_slam {
+
+struct BackEnd::Impl {
+  Impl(const BackEndOptions& options, const SensorConfig& sensor, TimingLog* log);
+
+  // back_end.cpp
+  MapUpdate addKeyframe(const KeyframePtr& keyframe);
+  void applyPlaneUpdate(const PlaneUpdate& update);
+  MapSnapshot snapshot() const;
+  void reset();
+
+  // back_end_steps.cpp
+  /// Pose of the keyframe in the map as T_map_odom predicts it; starts a new epoch where the odometry did.
+  NavState predict(const Keyframe& keyframe);
+  /// Optimises the window; ids of keyframes, landmarks and planes that changed go to `update`.
+  void localBundleAdjustment(double t, MapUpdate* update);
+  void cull(MapUpdate* update);
+  /// T_map_odom from the newest keyframe.
+  void followNewest();
+  MapUpdate beginUpdate(double t) const;
+  /// Fills estimates of everything (global) and what was removed and merged since the last update.
+  void fillGlobal(MapUpdate* update) const;
+  void finishUpdate(MapUpdate* update);
+  LandmarkEstimate estimateOf(const MapLandmark& landmark) const;
+  GbaJob makeGlobalJob() const;
+  MapUpdate mergeGlobal(const GbaResult& result);
+
+  BackEndOptions options;
+  SensorConfig sensor;
+  TimingLog* log = nullptr;
+  std::shared_ptr<const CameraModel> camera;
+  BuilderSettings settings;
+  Map map;
+  LandmarkMaker maker;
+  Reobservation reobservation;
+  std::unique_ptr<BaSolver> solver;
+
+  SE3 T_map_odom;
+  std::uint32_t epoch = 0;
+  std::uint64_t revision = 0;
+  bool global_wanted = false;
+  std::string refusal;
+  std::vector<LoopEvent> loops;        ///< all so far
+  std::vector<LoopEvent> new_loops;    ///< since the last update
+  BackEndStatistics statistics;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,152 @@
+// The steps of the back end between a keyframe and a map update.
+#include <algorithm>
+#include <cmath>
+
+#include "back_end_impl.h"
+
+namespace vip_slam {
+namespace {
+
+SE3 yawAndPosition(const SE3& T_W_I) {
+  return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yawOf(T_W_I.rotation()), Eigen::Vector3d::UnitZ())), T_W_I.t());
+}
+
+}  // namespace
+
+NavState BackEnd::Impl::predict(const Keyframe& keyframe) {
+  const NavState& odom = keyframe.frame.state;
+  if (!map.empty() && keyframe.frame.epoch != epoch) {
+    // The odometry started anew: go on where the map ends until a loop or relocalisation says better.
+    const SE3 last = map.keyframe(map.newestKeyframe()).state.T_W_I;
+    T_map_odom = yawAndPosition(last) * yawAndPosition(odom.T_W_I).inverse();
+  }
+  epoch = keyframe.frame.epoch;
+  NavState state = odom;
+  state.T_W_I = T_map_odom * odom.T_W_I;
+  state.v_W = T_map_odom.rotation() * odom.v_W;
+  if (keyframe.previous != 0 && map.hasKeyframe(keyframe.previous)) {
+    const NavState& previous = map.keyframe(keyframe.previous).state;
+    state.bias_gyro = previous.bias_gyro;
+    state.bias_accel = previous.bias_accel;
+  }
+  return state;
+}
+
+void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
+  const ScopedTimer timer(log, "backend.lba", t);
+  BuiltProblem built;
+  {
+    const ScopedTimer build_timer(log, "backend.lba_build", t);
+    built = buildProblem(map, localScope(map, options.local_ba), settings);
+  }
+  SolverOptions solver_options;
+  solver_options.max_iterations = options.local_ba.max_iterations;
+  solver_options.max_seconds = options.lockstep ? 0 : options.local_ba.max_seconds;
+  solver_options.function_tolerance = 1e-4;
+  {
+    const ScopedTimer solve_timer(log, "backend.lba_solve", t);
+    const SolverSummary summary = solver->solve(built.problem, solver_options);
+    if (!summary.usable) return;
+  }
+  ++statistics.local_ba;
+  storeProblem(built, sensor.imu_noise, &map);
+  statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map);
+  followNewest();
+
+  std::set<LandmarkId> landmarks;
+  for (std::size_t f = 0; f < built.frames.size(); ++f) {
+    if (built.problem.frames[f].fixed) continue;
+    const MapKeyframe& kf = map.keyframe(built.frames[f]);
+    update->keyframes.push_back({kf.id(), kf.state});
+    for (const LandmarkId id : kf.landmarks)
+      if (id != kNoLandmark) landmarks.insert(id);
+  }
+  for (const LandmarkId id : landmarks) update->landmarks.push_back(estimateOf(map.landmark(id)));
+  for (const PlaneId id : built.planes) update->planes.emplace_back(id, map.planes().at(id).estimate.plane);
+}
+
+void BackEnd::Impl::cull(MapUpdate* update) {
+  if (!options.culling.enabled || map.keyframes().size() < 4) return;
+  auto it = map.keyframes().rbegin();
+  std::advance(it, 2);
+  cullLandmarks(it->first, &map);
+  const auto removed = cullKeyframes(options.culling, options.local_ba.window, sensor.imu_noise, &map);
+  statistics.keyframes_culled += removed.size();
+  update->landmarks.erase(std::remove_if(update->landmarks.begin(), update->landmarks.end(),
+                                         [&](const LandmarkEstimate& l) { return !map.hasLandmark(l.id); }),
+                          update->landmarks.end());
+}
+
+void BackEnd::Impl::followNewest() {
+  const MapKeyframe& newest = map.keyframe(map.newestKeyframe());
+  if (newest.data->frame.epoch == epoch) T_map_odom = newest.state.T_W_I * newest.data->frame.state.T_W_I.inverse();
+}
+
+MapUpdate BackEnd::Impl::beginUpdate(double t) const {
+  MapUpdate update;
+  update.t = t;
+  return update;
+}
+
+LandmarkEstimate BackEnd::Impl::estimateOf(const MapLandmark& landmark) const {
+  LandmarkEstimate out;
+  out.id = landmark.id;
+  out.p_W = landmark.p_W;
+  out.observations = static_cast<std::uint32_t>(landmark.observations.size());
+  out.plane = landmark.plane;
+  out.descriptor = landmark.descriptor;
+  return out;
+}
+
+void BackEnd::Impl::fillGlobal(MapUpdate* update) const {
+  update->global = true;
+  update->keyframes.clear();
+  update->landmarks.clear();
+  update->planes.clear();
+  for (const auto& entry : map.keyframes()) update->keyframes.push_back({entry.first, entry.second.state});
+  for (const LandmarkId id : map.landmarkIds()) update->landmarks.push_back(estimateOf(map.landmark(id)));
+  for (const auto& entry : map.planes()) update->planes.emplace_back(entry.first, entry.second.estimate.plane);
+}
+
+void BackEnd::Impl::finishUpdate(MapUpdate* update) {
+  update->revision = ++revision;
+  update->epoch = epoch;
+  update->T_map_odom = T_map_odom;
+  update->newest_keyframe = map.newestKeyframe();
+  if (update->newest_keyframe != 0) update->t = map.keyframe(update->newest_keyframe).data->frame.t;
+  MapChanges changes = map.takeChanges();
+  update->removed_keyframes = std::move(changes.removed_keyframes);
+  update->removed_landmarks = std::move(changes.removed_landmarks);
+  update->merged_landmarks = std::move(changes.merged_landmarks);
+  update->loops = std::move(new_loops);
+  new_loops.clear();
+}
+
+GbaJob BackEnd::Impl::makeGlobalJob() const {
+  GbaJob job;
+  if (map.keyframes().size() < 2) return job;
+  auto problem = std::make_shared<GlobalBaProblem>();
+  problem->map = std::make_shared<const Map>(map);
+  problem->settings = settings;
+  problem->options = options.global_ba;
+  problem->solver = options.solver;
+  problem->noise = sensor.imu_noise;
+  problem->max_seconds = options.lockstep ? 0 : options.global_ba.max_seconds;
+  problem->t = map.keyframe(map.newestKeyframe()).data->frame.t;
+  job.problem = problem;
+  return job;
+}
+
+MapUpdate BackEnd::Impl::mergeGlobal(const GbaResult& result) {
+  MapUpdate update = beginUpdate(0);
+  if (result.solution && result.solution->summary.usable) {
+    mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
+    ++statistics.global_ba;
+    followNewest();
+    fillGlobal(&update);
+  }
+  finishUpdate(&update);
+  return update;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,134 @@
+#include "vip_slam_backend/map/reobservation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace vip_slam {
+namespace {
+
+// Features in cells of the image.
+class FeatureGrid {
+ public:
+  FeatureGrid(const std::vector<Feature>& features, int width, int height, double cell)
+      : cell_(cell), cols_(static_cast<int>(width / cell) + 1), rows_(static_cast<int>(height / cell) + 1),
+        cells_(static_cast<std::size_t>(cols_) * rows_), features_(features) {
+    for (std::uint32_t k = 0; k < features.size(); ++k) cells_[index(features[k].pixel.x(), features[k].pixel.y())].push_back(k);
+  }
+
+  template <class Visit>
+  void around(const Eigen::Vector2d& uv, double radius, Visit visit) const {
+    const int c0 = column(uv.x() - radius), c1 = column(uv.x() + radius);
+    const int r0 = row(uv.y() - radius), r1 = row(uv.y() + radius);
+    for (int r = r0; r <= r1; ++r)
+      for (int c = c0; c <= c1; ++c)
+        for (const std::uint32_t k : cells_[static_cast<std::size_t>(r) * cols_ + c])
+          if ((features_[k].pixel.cast<double>() - uv).squaredNorm() <= radius * radius) visit(k);
+  }
+
+ private:
+  int column(double u) const { return std::clamp(static_cast<int>(u / cell_), 0, cols_ - 1); }
+  int row(double v) const { return std::clamp(static_cast<int>(v / cell_), 0, rows_ - 1); }
+  std::size_t index(double u, double v) const { return static_cast<std::size_t>(row(v)) * cols_ + column(u); }
+
+  double cell_;
+  int cols_, rows_;
+  std::vector<std::vector<std::uint32_t>> cells_;
+  const std::vector<Feature>& features_;
+};
+
+constexpr double kMaxViewAngle = 1.0;      // radians between the ray then and now
+constexpr double kMaxDistanceRatio = 2.0;
+
+}  // namespace
+
+std::vector<KeyframeId> Reobservation::neighbours(const Map& map, KeyframeId id) const {
+  std::vector<KeyframeId> chosen;
+  std::set<KeyframeId> taken{id};
+  const std::size_t limit = static_cast<std::size_t>(options_.keyframes);
+  for (const auto& c : map.covisible(id, 3)) {
+    if (chosen.size() >= limit / 2) break;
+    chosen.push_back(c.first);
+    taken.insert(c.first);
+  }
+  const SE3 T_W_C = map.keyframe(id).T_W_C();
+  const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
+  std::vector<std::pair<double, KeyframeId>> near;
+  for (const auto& entry : map.keyframes()) {
+    if (taken.count(entry.first)) continue;
+    const SE3 other = entry.second.T_W_C();
+    const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
+    const double distance = (other.t() - T_W_C.t()).norm();
+    if (cosine < 0.5 || distance > 5.0) continue;
+    near.emplace_back(distance + 3.0 * (1.0 - cosine), entry.first);
+  }
+  std::sort(near.begin(), near.end());
+  for (const auto& n : near) {
+    if (chosen.size() >= limit) break;
+    chosen.push_back(n.second);
+  }
+  return chosen;
+}
+
+ReobservationResult Reobservation::process(KeyframeId id, Map* map) const {
+  ReobservationResult result;
+  const MapKeyframe& kf = map->keyframe(id);
+  const std::vector<Feature>& features = kf.features();
+  if (options_.keyframes == 0 || features.empty()) return result;
+  std::set<LandmarkId> candidates;
+  for (const KeyframeId other : neighbours(*map, id))
+    for (const LandmarkId landmark : map->keyframe(other).landmarks)
+      if (landmark != kNoLandmark) candidates.insert(landmark);
+  for (const LandmarkId own : kf.landmarks) candidates.erase(own);
+
+  const FeatureGrid grid(features, camera_->width(), camera_->height(), 2 * options_.radius);
+  const SE3 T_W_C = kf.T_W_C(), T_C_W = T_W_C.inverse();
+  for (const LandmarkId landmark_id : candidates) {
+    const MapLandmark* landmark = map->findLandmark(landmark_id);
+    if (!landmark || landmark->observations.size() < 2) continue;
+    const Eigen::Vector3d p_C = T_C_W * landmark->p_W;
+    Eigen::Vector2d uv;
+    if (p_C.z() < 0.1 || !camera_->project(p_C, &uv) || !camera_->inImage(uv, 2)) continue;
+    const Eigen::Vector3d now = landmark->p_W - T_W_C.t();
+    const Eigen::Vector3d then = landmark->p_W - map->keyframe(landmark->observations.back().keyframe).T_W_C().t();
+    const double ratio = now.norm() / then.norm();
+    if (now.dot(then) < std::cos(kMaxViewAngle) * now.norm() * then.norm()) continue;
+    if (ratio > kMaxDistanceRatio || ratio < 1 / kMaxDistanceRatio) continue;
+    ++result.candidates;
+    int best = options_.max_hamming + 1, second = 256;
+    std::uint32_t best_feature = 0;
+    grid.around(uv, options_.radius, [&](std::uint32_t k) {
+      const Feature& f = features[k];
+      if (f.depth > 0 && std::abs(f.depth - p_C.z()) > 4 * f.depth_sigma + 0.03 * p_C.z()) return;
+      const int distance = hammingDistance(f.descriptor, landmark->descriptor);
+      if (distance < best) {
+        // Two detections of one corner are no rivals.
+        if (best <= options_.max_hamming && (features[best_feature].pixel - f.pixel).squaredNorm() > 4) second = best;
+        best = distance;
+        best_feature = k;
+      } else if (distance < second && (features[best_feature].pixel - f.pixel).squaredNorm() > 4) {
+        second = distance;
+      }
+    });
+    map->landmark(landmark_id).visible++;
+    if (best > options_.max_hamming || best > options_.ratio * second) continue;
+    const LandmarkId own = kf.landmarks[best_feature];
+    if (own == kNoLandmark) {
+      if (map->addObservation(landmark_id, {id, best_feature})) {
+        map->landmark(landmark_id).found++;
+        ++result.found;
+      }
+      continue;
+    }
+    // The same point under two tracks: the older name stays.
+    const MapLandmark& other = map->landmark(own);
+    const double pixels = (features[best_feature].pixel.cast<double>() - uv).norm();
+    if (pixels * pixels > options_.merge_chi2) continue;
+    if ((other.p_W - landmark->p_W).norm() > 0.02 * p_C.z() + 0.01) continue;
+    const bool keep_other = other.observations.front().keyframe < landmark->observations.front().keyframe;
+    if (map->mergeLandmarks(keep_other ? landmark_id : own, keep_other ? own : landmark_id)) ++result.merged;
+  }
+  return result;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,44 @@
+#include "vip_slam_backend/optimisation/global_ba.h"
+
+#include <set>
+
+namespace vip_slam {
+
+GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job) {
+  GlobalBaSolution solution;
+  Map map = *job.map;
+  const auto solver = makeSolver(job.solver);
+  SolverOptions options;
+  options.max_iterations = job.options.max_iterations;
+  options.max_seconds = 0.5 * job.max_seconds;
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    solution.built = buildProblem(map, globalScope(map), job.settings);
+    solution.summary = solver->solve(solution.built.problem, options);
+    ++solution.rounds;
+    if (round + 1 < kRounds) {
+      storeProblem(solution.built, job.noise, &map);
+      removeOutliers(solution.built, job.settings.measurement.outlier_chi2, &map);
+    }
+  }
+  return solution;
+}
+
+void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map* map) {
+  std::set<KeyframeId> solved(solution.built.frames.begin(), solution.built.frames.end());
+  KeyframeId newest = 0;
+  for (const KeyframeId id : solved)
+    if (map->hasKeyframe(id)) newest = std::max(newest, id);
+  if (newest == 0) return;
+  SE3 motion;  // of the newest solved keyframe, new from old world
+  for (std::size_t f = 0; f < solution.built.frames.size(); ++f)
+    if (solution.built.frames[f] == newest)
+      motion = solution.built.problem.frames[f].state.T_W_I * map->keyframe(newest).state.T_W_I.inverse();
+  std::map<KeyframeId, SE3> moved;
+  for (const auto& entry : map->keyframes())
+    if (!solved.count(entry.first)) moved[entry.first] = motion * entry.second.state.T_W_I;
+  map->moveKeyframes(moved);
+  storeProblem(solution.built, noise, map);
+}
+
+}  // namespace vip_slam

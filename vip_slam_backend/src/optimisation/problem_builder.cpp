@@ -1,0 +1,222 @@
+#include "vip_slam_backend/optimisation/problem_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+#include "plane_factors.h"
+#include "vip_slam_backend/factors/reprojection.h"
+
+namespace vip_slam {
+namespace {
+
+class UnionFind {
+ public:
+  explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
+  int find(int a) {
+    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
+    return a;
+  }
+  void join(int a, int b) { parent_[std::max(find(a), find(b))] = std::min(find(a), find(b)); }
+
+ private:
+  std::vector<int> parent_;
+};
+
+// Position and yaw of every connected part that hangs on no fixed frame are held at its oldest frame; parts without IMU
+// are held altogether.
+void addGauges(BaProblem* problem) {
+  UnionFind parts(problem->frames.size());
+  for (const BaPoint& p : problem->points)
+    for (int o = p.first + 1; o < p.first + p.count; ++o)
+      parts.join(problem->observations[p.first].frame, problem->observations[o].frame);
+  for (const BaImu& f : problem->imu) parts.join(f.i, f.j);
+  for (const BaHomography& f : problem->homographies) parts.join(f.i, f.j);
+  for (const BaHomographyPair& f : problem->homography_pairs) parts.join(f.i, f.j);
+  const int n = static_cast<int>(problem->frames.size());
+  std::vector<char> held(n, 0), inertial(n, 0);
+  for (int f = 0; f < n; ++f)
+    if (problem->frames[f].fixed) held[parts.find(f)] = 1;
+  for (const BaImu& f : problem->imu) inertial[parts.find(f.i)] = 1;
+  for (int f = 0; f < n; ++f) {
+    const int part = parts.find(f);
+    if (held[part]) continue;
+    held[part] = 1;  // frames ascend: f is the oldest of its part
+    BaGauge gauge;
+    gauge.frame = f;
+    gauge.prior.T_W_I = problem->frames[f].state.T_W_I;
+    gauge.prior.tilt = !inertial[part];
+    problem->gauges.push_back(gauge);
+  }
+}
+
+// Velocity and biases need a hold where no IMU factor reaches from before.
+void addMotionPriors(BaProblem* problem) {
+  std::vector<char> reached(problem->frames.size(), 0);
+  for (const BaImu& f : problem->imu) reached[f.j] = 1;
+  for (std::size_t f = 0; f < problem->frames.size(); ++f) {
+    const BaFrame& frame = problem->frames[f];
+    if (frame.fixed || reached[f]) continue;
+    BaMotionPrior prior;
+    prior.frame = static_cast<int>(f);
+    prior.prior.v_W = frame.state.v_W;
+    prior.prior.bias_gyro = frame.state.bias_gyro;
+    prior.prior.bias_accel = frame.state.bias_accel;
+    problem->motion_priors.push_back(prior);
+  }
+}
+
+}  // namespace
+
+double pixelWeight(const Feature& feature, const BuilderSettings& settings) {
+  const double sigma = feature.id != kNoLandmark
+                           ? settings.measurement.pixel_sigma
+                           : settings.measurement.matched_pixel_sigma * std::pow(1.2, feature.octave);
+  return settings.focal / sigma;
+}
+
+BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings) {
+  BuiltProblem built;
+  BaProblem& problem = built.problem;
+  problem.gravity = settings.gravity;
+  problem.huber = settings.measurement.huber;
+  problem.depth_huber = settings.measurement.depth_huber;
+
+  // Frames, ascending; fixed and free interleaved by id.
+  std::unordered_map<KeyframeId, int> index;
+  {
+    std::vector<std::pair<KeyframeId, bool>> all;
+    for (const KeyframeId id : scope.free) all.emplace_back(id, false);
+    for (const KeyframeId id : scope.fixed) all.emplace_back(id, true);
+    std::sort(all.begin(), all.end());
+    for (const auto& entry : all) {
+      const MapKeyframe& kf = map.keyframe(entry.first);
+      BaFrame frame;
+      frame.state = kf.state;
+      frame.T_I_C = kf.T_I_C;
+      frame.fixed = entry.second;
+      index[entry.first] = static_cast<int>(problem.frames.size());
+      problem.frames.push_back(frame);
+      built.frames.push_back(entry.first);
+    }
+  }
+  for (std::size_t f = 0; f < built.frames.size(); ++f) {
+    const MapKeyframe& kf = map.keyframe(built.frames[f]);
+    const auto previous = index.find(kf.previous);
+    if (!kf.preintegration || previous == index.end()) continue;
+    if (problem.frames[f].fixed && problem.frames[previous->second].fixed) continue;
+    BaImu imu;
+    imu.i = previous->second;
+    imu.j = static_cast<int>(f);
+    imu.preintegration = kf.preintegration;
+    problem.imu.push_back(imu);
+  }
+
+  // Landmarks of the free frames.
+  std::vector<LandmarkId> landmarks;
+  for (const KeyframeId id : scope.free)
+    for (const LandmarkId landmark : map.keyframe(id).landmarks)
+      if (landmark != kNoLandmark) landmarks.push_back(landmark);
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+
+  PlaneFactorBuilder planes(map, scope, settings, index, &built);
+  for (const LandmarkId id : landmarks) {
+    const MapLandmark& landmark = map.landmark(id);
+    const bool plane_point = planes.addLandmark(landmark);
+    if (plane_point && settings.variant == Variant::kVip) {
+      built.plane_points.push_back(id);
+      continue;
+    }
+    BaPoint point;
+    point.p_W = landmark.p_W;
+    point.first = static_cast<int>(problem.observations.size());
+    bool depth = false;
+    for (const MapObservation& o : landmark.observations) {
+      const auto frame = index.find(o.keyframe);
+      if (frame == index.end()) continue;
+      const Feature& feature = map.feature(o);
+      BaObservation observation;
+      observation.frame = frame->second;
+      observation.x = feature.xy.x();
+      observation.y = feature.xy.y();
+      observation.weight = pixelWeight(feature, settings);
+      if (feature.depth > 0) {
+        observation.depth = feature.depth;
+        observation.depth_weight = 1.0 / (feature.depth_sigma * settings.measurement.depth_sigma_scale);
+        depth = true;
+      }
+      problem.observations.push_back(observation);
+      built.observations.push_back(o);
+    }
+    point.count = static_cast<int>(problem.observations.size()) - point.first;
+    // One view says nothing about poses; two without depth hang on a baseline that may be nothing.
+    if (point.count < 2 || (point.count < 3 && !depth)) {
+      problem.observations.resize(point.first);
+      built.observations.resize(point.first);
+      continue;
+    }
+    problem.points.push_back(point);
+    built.points.push_back(id);
+  }
+  planes.finish();
+  addGauges(&problem);
+  addMotionPriors(&problem);
+  return built;
+}
+
+void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
+  const BaProblem& problem = built.problem;
+  std::unordered_map<KeyframeId, SE3> motion;
+  for (std::size_t f = 0; f < built.frames.size(); ++f) {
+    if (problem.frames[f].fixed || !map->hasKeyframe(built.frames[f])) continue;
+    const NavState& state = problem.frames[f].state;
+    motion[built.frames[f]] = state.T_W_I * map->keyframe(built.frames[f]).state.T_W_I.inverse();
+    map->setState(built.frames[f], state, noise);
+  }
+  for (std::size_t p = 0; p < built.planes.size(); ++p)
+    if (map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
+  std::set<LandmarkId> done;
+  for (std::size_t p = 0; p < built.points.size(); ++p) {
+    done.insert(built.points[p]);
+    if (map->hasLandmark(built.points[p])) map->setPosition(built.points[p], problem.points[p].p_W);
+  }
+  for (const LandmarkId id : built.plane_points) {
+    if (!map->hasLandmark(id)) continue;
+    const MapLandmark& landmark = map->landmark(id);
+    if (landmark.plane == 0 || !map->hasPlane(landmark.plane)) continue;
+    done.insert(id);
+    map->setPosition(id, intersectWithPlane(*map, landmark));
+  }
+  for (const auto& moved : motion) {
+    // Landmarks that no factor held go with the keyframe that made them.
+    for (const LandmarkId id : map->keyframe(moved.first).landmarks) {
+      if (id == kNoLandmark || map->landmark(id).host() != moved.first || done.count(id)) continue;
+      map->setPosition(id, moved.second * map->landmark(id).p_W);
+    }
+  }
+}
+
+int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
+  const BaProblem& problem = built.problem;
+  std::vector<FrameGeometry> geometry;
+  for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
+  int removed = 0;
+  for (std::size_t p = 0; p < problem.points.size(); ++p) {
+    if (!map->hasLandmark(built.points[p])) continue;
+    const BaPoint& point = problem.points[p];
+    for (int o = point.first; o < point.first + point.count; ++o) {
+      const BaObservation& b = problem.observations[o];
+      Eigen::Vector2d r;
+      const bool front = reprojectionResidual(geometry[b.frame], point.p_W, Eigen::Vector2d(b.x, b.y), b.weight, &r);
+      if (front && r.squaredNorm() <= chi2) continue;
+      if (!map->hasLandmark(built.points[p])) break;
+      map->removeObservation(built.points[p], built.observations[o].keyframe);
+      ++removed;
+    }
+  }
+  return removed;
+}
+
+}  // namespace vip_slam
