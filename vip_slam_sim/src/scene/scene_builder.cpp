@@ -163,7 +163,7 @@ void SceneBuilder::cylinder(const Eigen::Isometry3d& pose, double radius, double
     travelled += edge.norm();
   }
   // Caps as parallel slats whose ends follow the rim.
-  const int slats = strips / 2;
+  const int slats = std::max(32, strips);
   for (int end = 0; end < 2; ++end) {
     for (int k = 0; k < slats; ++k) {
       const double y0 = radius * (2.0 * k / slats - 1), y1 = radius * (2.0 * (k + 1) / slats - 1);

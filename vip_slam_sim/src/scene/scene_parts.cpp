@@ -97,7 +97,7 @@ void plant(SceneBuilder* b, const Palette& p, double x, double y, double height,
   for (int k = 0; k < 4; ++k) {
     const float g = static_cast<float>(rng->uniform(0.40, 0.55));
     b->sphere({x + rng->uniform(-0.12, 0.12), y + rng->uniform(-0.12, 0.12), height - 0.25 - 0.13 * k},
-              rng->uniform(0.16, 0.24), {-1, 1, rgb(0.28f, g, 0.26f)}, 14);
+              rng->uniform(0.16, 0.24), {-1, 1, rgb(0.28f, g, 0.26f)}, 20);
   }
 }
 

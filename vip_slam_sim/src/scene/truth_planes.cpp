@@ -67,6 +67,19 @@ bool contains(const std::vector<Eigen::Vector2d>& ring, const Eigen::Vector2d& p
   return in;
 }
 
+/// Newell's sum: outlines count positive, holes negative. Pieces that overlap count once.
+double outlineArea(const std::vector<PlanePolygon>& outline, const Eigen::Vector3d& n) {
+  double area = 0;
+  const auto add = [&](const Ring& ring) {
+    for (std::size_t i = 0; i < ring.size(); ++i) area += 0.5 * ring[i].cross(ring[(i + 1) % ring.size()]).dot(n);
+  };
+  for (const PlanePolygon& polygon : outline) {
+    add(polygon.outer);
+    for (const Ring& hole : polygon.holes) add(hole);
+  }
+  return area;
+}
+
 /// Boundaries of a set of grid cells, inside on the left; turning left where cells meet at a corner only.
 std::vector<std::vector<Node>> traceCells(const std::vector<std::vector<char>>& cell) {
   const int nu = static_cast<int>(cell.size()), nv = static_cast<int>(cell[0].size());
@@ -198,7 +211,7 @@ void VisibilityCounter::add(const FrameBuffers& frame, const CameraModel& camera
 double VisibilityCounter::seenArea(int surface) const {
   const Grid& g = grids_[surface];
   const double cells = static_cast<double>(std::count(g.seen.begin(), g.seen.end(), 1)) * kCell * kCell;
-  return std::min(cells, scene_->surfaces[surface].area);
+  return cells;
 }
 
 std::vector<PlaneEstimate> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area) {
@@ -206,16 +219,17 @@ std::vector<PlaneEstimate> truthPlanes(const Scene& scene, const VisibilityCount
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const Surface& s = scene.surfaces[i];
     if (s.area < min_area) continue;
+    const std::vector<PlanePolygon> outline = surfaceOutline(scene, s);
     const Chart& f = scene.charts[s.frame_chart];
     PlaneEstimate p;
     p.id = planes.size() + 1;
     p.plane = Plane::fromPointNormal(toEigen(f.o), toEigen(f.n));
     const double up = std::abs(p.plane.n.z());
     p.kind = up > 0.9999 ? PlaneKind::kHorizontal : up < 0.01 ? PlaneKind::kVertical : PlaneKind::kGeneral;
-    p.polygons = surfaceOutline(scene, s);
-    p.area = s.area;
+    p.polygons = outline;
+    p.area = outlineArea(outline, p.plane.n);
     p.seen_seconds = seen.seenSeconds(static_cast<int>(i));
-    p.seen_area = seen.seenArea(static_cast<int>(i));
+    p.seen_area = std::min(p.area, seen.seenArea(static_cast<int>(i)));
     planes.push_back(std::move(p));
   }
   return planes;
