@@ -36,7 +36,7 @@ catkin_install_python(PROGRAMS scripts/make_report DESTINATION ${CATKIN_PACKAGE_
 install(DIRECTORY report DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(TARGETS check_bag convert_to_bag RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
-install(DIRECTORY config DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+install(DIRECTORY config launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 
 if(CATKIN_ENABLE_TESTING)
@@ -46,6 +46,10 @@ if(CATKIN_ENABLE_TESTING)
 
   catkin_add_gtest(test_converters test/test_converters.cpp)
   target_link_libraries(test_converters vip_slam_bringup)
+
+  catkin_add_gtest(test_sensor_files test/test_sensor_files.cpp)
+  target_link_libraries(test_sensor_files vip_slam_bringup)
+  target_compile_definitions(test_sensor_files PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
 
   catkin_add_gtest(test_report test/test_report.cpp)
   target_link_libraries(test_report yaml-cpp)

@@ -183,8 +183,8 @@ class TumConverter : public Converters {
       rgb += line;
       std::snprintf(line, sizeof(line), "%.6f depth/%d.png\n", 1305031102.11 + 0.033 * i, i);
       depth += line;
-      writeImage(name + "/rgb/" + std::to_string(i) + ".png", cv::Mat(48, 64, CV_8UC3, cv::Scalar(10, 20, 30)));
-      writeImage(name + "/depth/" + std::to_string(i) + ".png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(7500)));
+      writeImage(name + "/rgb/" + std::to_string(i) + ".png", cv::Mat(480, 640, CV_8UC3, cv::Scalar(10, 20, 30)));
+      writeImage(name + "/depth/" + std::to_string(i) + ".png", cv::Mat(480, 640, CV_16UC1, cv::Scalar(7500)));
     }
     write(name + "/rgb.txt", rgb);
     write(name + "/depth.txt", depth);
@@ -216,7 +216,7 @@ TEST_F(TumConverter, DepthKeepsItsUnitAndTheGyroIsMissed) {
 TEST_F(TumConverter, UnknownCameraAndBadRowsAreNamed) {
   makeFolder("kitchen");
   EXPECT_NE(errorOf([&] { convertTumRgbd(options_); }).find("no calibration"), std::string::npos);
-  write("kitchen/calibration.txt", "525 525 32 24\n");
+  write("kitchen/calibration.txt", "525 525 320 240\n");
   write("kitchen/imu.txt", "1305031102.1 0 0 0 0 9.8 0\n1305031102.1 0 0 0 0 9.8 0\n");
   const std::string error = errorOf([&] { convertTumRgbd(options_); });
   EXPECT_NE(error.find("imu.txt:2: the stamp does not follow"), std::string::npos) << error;

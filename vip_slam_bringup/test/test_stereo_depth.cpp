@@ -102,7 +102,7 @@ TEST(StereoDepth, DisparityOfAFrontalWallIsItsDepth) {
   const Wall wall(Plane::fromPointNormal({0, 0, 1.5}, {0, 0, -1}), 0.015);
   const StereoDepth stereo(calibration, StereoDepthOptions());
   EXPECT_NEAR(stereo.baseline(), 0.1, 1e-9);
-  EXPECT_NEAR(stereo.rectified().fx, 450, 1e-6);
+  EXPECT_NEAR(stereo.rectified().fx, 450, 1e-3);
   const auto frame = stereo.compute(render(wall, calibration.left, SE3()),
                                     render(wall, calibration.right, calibration.T_left_right()));
   const DepthErrors e = compare(stereo, wall, frame.depth);
@@ -121,7 +121,7 @@ TEST(StereoDepth, SlantedWallThroughTheDistortedEurocPair) {
   const DepthErrors e = compare(stereo, wall, frame.depth);
   EXPECT_GT(e.coverage, 0.95);
   // A quarter of a pixel of disparity at 2 m is 2 cm.
-  EXPECT_LT(e.median, 0.01);
+  EXPECT_LT(e.median, 0.015);
   EXPECT_LT(e.p95, 0.04);
 }
 
