@@ -77,6 +77,8 @@ TEST(SensorFiles, AllHaveTheSameKeysAndTheReadmeNamesThem) {
     EXPECT_NE(text.find("`" + path.stem().string() + "`"), std::string::npos) << path << " is not in README.md";
   }
   for (const std::string& key : expected) {
+    const auto next = expected.upper_bound(key);
+    if (next != expected.end() && next->rfind(key + "/", 0) == 0) continue;  // a section, not a value
     const std::string last = key.substr(key.rfind('/') == std::string::npos ? 0 : key.rfind('/') + 1);
     EXPECT_TRUE(text.find("`" + key + "`") != std::string::npos || text.find("`" + last + "`") != std::string::npos)
         << key << " is not in README.md";
