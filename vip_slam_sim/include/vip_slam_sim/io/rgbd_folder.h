@@ -1,0 +1,37 @@
+// Folders of real RGB-D images with poses: 7-Scenes layout (frame-N.color.*, frame-N.depth.png, frame-N.pose.txt,
+// camera-intrinsics.txt) or TUM layout (rgb.txt, depth.txt, groundtruth.txt).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/trajectory/tum_io.h"
+
+namespace vip_slam {
+
+struct RgbdFrame {
+  double t = 0;  ///< s
+  std::string colour, depth;
+};
+
+struct RgbdFolder {
+  std::vector<RgbdFrame> frames;
+  Trajectory T_W_C;          ///< camera poses, in the folder's own world
+  CameraIntrinsics camera;   ///< width and height from the first image; focal lengths 0 when the folder does not say
+  double depth_scale = 0.001;
+};
+
+/// `rate`: images per second where the folder has no stamps. Throws std::runtime_error naming the file (and line).
+RgbdFolder openRgbdFolder(const std::string& folder, double rate);
+
+/// RGB image and depth in 16UC1 millimetres (0 = invalid). Throws std::runtime_error naming the file.
+void loadRgbdFrame(const RgbdFolder& folder, const RgbdFrame& frame, cv::Mat* rgb, cv::Mat* depth_mm);
+
+/// Up in the folder's world, from floors and walls: normals of the depth images near the cameras' mean up direction
+/// must be parallel to it, those near the horizon perpendicular. Throws std::runtime_error when too few are found.
+Eigen::Vector3d upFromDepth(const RgbdFolder& folder);
+
+}  // namespace vip_slam

@@ -1,0 +1,64 @@
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Eigenvalues>
+
+#include "vip_slam_sim/io/rgbd_folder.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr int kReach = 8;  ///< px between the points of a normal: bridges the sensor's quantisation
+
+/// Normals of locally flat patches, in the folder's world.
+void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_C, std::vector<Eigen::Vector3d>* out) {
+  cv::Mat rgb, depth;
+  loadRgbdFrame(folder, frame, &rgb, &depth);
+  const CameraIntrinsics& c = folder.camera;
+  const auto point = [&](int u, int v) {
+    const double z = 0.001 * depth.at<std::uint16_t>(v, u);
+    return Eigen::Vector3d((u - c.cx) / c.fx * z, (v - c.cy) / c.fy * z, z);
+  };
+  for (int v = kReach; v < depth.rows - kReach; v += 6)
+    for (int u = kReach; u < depth.cols - kReach; u += 6) {
+      const Eigen::Vector3d m = point(u, v), l = point(u - kReach, v), r = point(u + kReach, v), t = point(u, v - kReach),
+                            b = point(u, v + kReach);
+      if (m.z() < 0.4 || m.z() > 4 || l.z() == 0 || r.z() == 0 || t.z() == 0 || b.z() == 0) continue;
+      const double bend = 0.004 * m.z() * m.z() + 0.002;
+      if ((0.5 * (l + r) - m).norm() > bend || (0.5 * (t + b) - m).norm() > bend) continue;
+      out->push_back(T_W_C.rotation() * (r - l).cross(b - t).normalized());
+    }
+}
+
+}  // namespace
+
+Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> normals;
+  for (std::size_t i = 0; i < folder.frames.size(); ++i) {
+    SE3 T_W_C;
+    if (!poseAt(folder.T_W_C, folder.frames[i].t, &T_W_C)) continue;
+    up += T_W_C.rotation() * Eigen::Vector3d(0, -1, 0);
+    if (i % 8 == 0) collectNormals(folder, folder.frames[i], T_W_C, &normals);
+  }
+  up.normalize();
+  // Cameras are held level only roughly: narrow the cone in steps. A floor and a wall agree on the same direction.
+  std::size_t used = 0;
+  for (const double degrees : {35.0, 25.0, 15.0, 10.0, 7.0, 5.0, 5.0, 5.0}) {
+    const double c = std::cos(degrees * M_PI / 180), s = std::sin(degrees * M_PI / 180);
+    Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+    used = 0;
+    for (const Eigen::Vector3d& n : normals) {
+      const double d = std::abs(n.dot(up));
+      if (d > c) M += n * n.transpose(), ++used;
+      if (d < s && degrees < 20) M -= n * n.transpose(), ++used;
+    }
+    if (used < 500) throw std::runtime_error("gravity: too few floor and wall points in the depth images; give --up X Y Z");
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(M);
+    const Eigen::Vector3d next = eigen.eigenvectors().col(2);
+    up = next.dot(up) < 0 ? Eigen::Vector3d(-next) : next;
+  }
+  return up;
+}
+
+}  // namespace vip_slam

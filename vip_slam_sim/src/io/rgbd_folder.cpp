@@ -1,0 +1,129 @@
+#include "vip_slam_sim/io/rgbd_folder.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include <Eigen/SVD>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace vip_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<double> numbersOf(const fs::path& path, std::size_t expected) {
+  std::ifstream in(path);
+  if (!in) throw std::runtime_error(path.string() + ": cannot be read");
+  std::vector<double> values;
+  for (double v; in >> v;) values.push_back(v);
+  if (values.size() != expected || !std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))
+    throw std::runtime_error(path.string() + ": expected " + std::to_string(expected) + " numbers, found " +
+                             std::to_string(values.size()));
+  return values;
+}
+
+/// The nearest rotation to a matrix that is slightly off.
+Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& m) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d s = Eigen::Matrix3d::Identity();
+  s(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  return svd.matrixU() * s * svd.matrixV().transpose();
+}
+
+RgbdFolder openSevenScenes(const fs::path& folder, double rate) {
+  RgbdFolder out;
+  std::vector<std::pair<long, fs::path>> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    long n;
+    char rest[32];
+    if (std::sscanf(name.c_str(), "frame-%ld.%31s", &n, rest) == 2 && std::string(rest).rfind("color.", 0) == 0)
+      found.emplace_back(n, entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  for (const auto& [n, colour] : found) {
+    char stem[32];
+    std::snprintf(stem, sizeof stem, "frame-%06ld", n);
+    const double t = static_cast<double>(n - found.front().first) / rate;
+    const fs::path depth = folder / (std::string(stem) + ".depth.png"), pose = folder / (std::string(stem) + ".pose.txt");
+    if (!fs::exists(depth)) throw std::runtime_error(depth.string() + ": missing");
+    out.frames.push_back({t, colour.string(), depth.string()});
+    const std::vector<double> m = numbersOf(pose, 16);
+    const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
+    const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
+    if ((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() > 0.05)
+      throw std::runtime_error(pose.string() + ": expected a rotation in the first three columns");
+    out.T_W_C.push_back({t, SE3(nearestRotation(R), T.topRightCorner<3, 1>())});
+  }
+  const std::vector<double> k = numbersOf(folder / "camera-intrinsics.txt", 9);
+  out.camera.fx = k[0];
+  out.camera.fy = k[4];
+  out.camera.cx = k[2];
+  out.camera.cy = k[5];
+  return out;
+}
+
+std::vector<std::pair<double, std::string>> readList(const fs::path& path) {
+  std::ifstream in(path);
+  if (!in) throw std::runtime_error(path.string() + ": cannot be read");
+  std::vector<std::pair<double, std::string>> out;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    if (line.empty() || line[0] == '#') continue;
+    std::stringstream s(line);
+    double t;
+    std::string file;
+    if (!(s >> t >> file)) throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": expected 'stamp file'");
+    if (!out.empty() && t <= out.back().first)
+      throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": stamp repeats or runs backwards");
+    out.emplace_back(t, file);
+  }
+  return out;
+}
+
+RgbdFolder openTum(const fs::path& folder) {
+  RgbdFolder out;
+  out.T_W_C = readTum((folder / "groundtruth.txt").string());
+  const auto colour = readList(folder / "rgb.txt"), depth = readList(folder / "depth.txt");
+  if (depth.empty()) throw std::runtime_error((folder / "depth.txt").string() + ": no image");
+  std::size_t k = 0;
+  for (const auto& [t, file] : colour) {
+    while (k + 1 < depth.size() && std::abs(depth[k + 1].first - t) < std::abs(depth[k].first - t)) ++k;
+    if (std::abs(depth[k].first - t) > 0.02) continue;
+    out.frames.push_back({t, (folder / file).string(), (folder / depth[k].second).string()});
+  }
+  out.depth_scale = 1.0 / 5000;
+  return out;
+}
+
+}  // namespace
+
+RgbdFolder openRgbdFolder(const std::string& folder, double rate) {
+  if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": no such directory");
+  RgbdFolder out = fs::exists(fs::path(folder) / "rgb.txt") ? openTum(folder) : openSevenScenes(folder, rate);
+  if (out.frames.size() < 2)
+    throw std::runtime_error(folder + ": expected frame-N.color.* with depth and pose, or rgb.txt with depth.txt and groundtruth.txt");
+  const cv::Mat first = cv::imread(out.frames.front().colour, cv::IMREAD_COLOR);
+  if (first.empty()) throw std::runtime_error(out.frames.front().colour + ": not an image");
+  out.camera.width = first.cols;
+  out.camera.height = first.rows;
+  return out;
+}
+
+void loadRgbdFrame(const RgbdFolder& folder, const RgbdFrame& frame, cv::Mat* rgb, cv::Mat* depth_mm) {
+  const cv::Mat bgr = cv::imread(frame.colour, cv::IMREAD_COLOR);
+  if (bgr.empty()) throw std::runtime_error(frame.colour + ": not an image");
+  const cv::Mat raw = cv::imread(frame.depth, cv::IMREAD_UNCHANGED);
+  if (raw.type() != CV_16UC1) throw std::runtime_error(frame.depth + ": expected a 16-bit grey image");
+  if (raw.size() != bgr.size()) throw std::runtime_error(frame.depth + ": expected the size of " + frame.colour);
+  cv::cvtColor(bgr, *rgb, cv::COLOR_BGR2RGB);
+  raw.convertTo(*depth_mm, CV_16U, folder.depth_scale * 1000);
+  depth_mm->setTo(0, raw == 65535);
+}
+
+}  // namespace vip_slam
