@@ -1,0 +1,87 @@
+// Options of place recognition, loop verification and the pose-plane graph.
+#pragma once
+
+#include <string>
+
+#include "vip_slam_core/util/options.h"
+
+namespace vip_slam {
+
+/// Does the same place show at two keyframes, and from where? Shared by loop closing and relocalisation.
+struct PlaceVerificationOptions {
+  int max_hamming = 64;
+  double ratio = 0.85;
+  int min_matches = 12;
+  int ransac_iterations = 400;
+  double ransac_px = 4.0;
+  int min_ransac_inliers = 10;
+  int guided_keyframes = 10;
+  double guided_radius = 10.0;
+  double inlier_px = 3.0;
+  int min_inliers = 25;
+  double max_sigma_position = 0.05;
+  double max_gravity_deg = 2.0;
+  double min_depth_agreement = 0.6;
+  double max_see_through = 0.12;
+
+  void visit(OptionVisitor& v) {
+    v.field("max_hamming", max_hamming, 10, 128, "largest descriptor distance of a match, bits");
+    v.field("ratio", ratio, 0.3, 1.0, "best over second-best descriptor distance");
+    v.field("min_matches", min_matches, 4, 500, "descriptor matches needed to try a pose");
+    v.field("ransac_iterations", ransac_iterations, 10, 10000, "samples drawn by the pose RANSAC");
+    v.field("ransac_px", ransac_px, 0.5, 20.0, "inlier threshold of the RANSAC, px");
+    v.field("min_ransac_inliers", min_ransac_inliers, 4, 500, "inliers needed to go on to guided matching");
+    v.field("guided_keyframes", guided_keyframes, 1, 100, "keyframes around the match whose landmarks are looked for");
+    v.field("guided_radius", guided_radius, 1.0, 50.0, "search radius around a projected landmark, px");
+    v.field("inlier_px", inlier_px, 0.5, 20.0, "largest reprojection error of a final inlier, px per octave scale");
+    v.field("min_inliers", min_inliers, 6, 500, "final inliers needed");
+    v.field("max_sigma_position", max_sigma_position, 0.001, 1.0, "largest one-sigma of the relative position, m");
+    v.field("max_gravity_deg", max_gravity_deg, 0.1, 45.0, "largest tilt between the found pose and gravity, degrees");
+    v.field("min_depth_agreement", min_depth_agreement, 0.0, 1.0, "fraction of common depth that must agree");
+    v.field("max_see_through", max_see_through, 0.0, 1.0, "fraction of common depth that may lie behind the other's surface");
+  }
+};
+
+struct PoseGraphOptions {
+  double odometry_sigma_position = 0.015;
+  double odometry_sigma_yaw_deg = 0.10;
+  double loop_sigma_position = 0.02;
+  double loop_sigma_angle_deg = 0.3;
+  int covisible_edge = 60;
+  double max_chi2 = 40.0;
+  int max_iterations = 50;
+
+  void visit(OptionVisitor& v) {
+    v.field("odometry_sigma_position", odometry_sigma_position, 1e-4, 1.0, "drift of position, m per square root of metre");
+    v.field("odometry_sigma_yaw_deg", odometry_sigma_yaw_deg, 1e-3, 10.0, "drift of yaw, degrees per square root of metre");
+    v.field("loop_sigma_position", loop_sigma_position, 1e-4, 1.0, "smallest one-sigma of a loop edge's position, m");
+    v.field("loop_sigma_angle_deg", loop_sigma_angle_deg, 1e-3, 10.0, "smallest one-sigma of a loop edge's angles, degrees");
+    v.field("covisible_edge", covisible_edge, 10, 1000, "shared landmarks that make an edge between two keyframes");
+    v.field("max_chi2", max_chi2, 5.0, 10000.0, "a loop that costs the graph more than this is rejected");
+    v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
+  }
+};
+
+struct LoopOptions {
+  std::string vocabulary;
+  double min_seconds = 10.0;
+  int max_shared = 12;
+  int candidates = 4;
+  double relative_score = 0.25;
+  int consistency = 1;
+  PlaceVerificationOptions verification;
+  PoseGraphOptions graph;
+
+  void visit(OptionVisitor& v) {
+    v.field("vocabulary", vocabulary, {}, "vocabulary file (ours or ORB-SLAM text); empty: the shipped one");
+    v.field("min_seconds", min_seconds, 0.0, 1000.0, "a loop joins keyframes at least this far apart in time, s");
+    v.field("max_shared", max_shared, 0, 1000, "keyframes sharing more landmarks than this are joined already");
+    v.field("candidates", candidates, 1, 50, "places verified per keyframe");
+    v.field("relative_score", relative_score, 0.0, 1.0, "smallest score over the score of the keyframe before");
+    v.field("consistency", consistency, 0, 10, "keyframes before that must have pointed to the same place");
+    v.group("verification", verification);
+    v.group("graph", graph);
+  }
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,54 @@
+// Geometric verification that a keyframe shows a place of the map: descriptor matches by the direct index, RANSAC with
+// depth and gravity, guided matching of the neighbourhood's landmarks, refinement, and the witnesses: gravity, depth.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "vip_slam_backend/loop/loop_options.h"
+#include "vip_slam_backend/loop/place_pose.h"
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/place_recognition/vocabulary.h"
+#include "vip_slam_core/camera/camera_model.h"
+
+namespace vip_slam {
+
+struct PlaceVerification {
+  bool accepted = false;
+  std::string reason;            ///< why not, or what convinced
+  KeyframeId match = 0;
+  SE3 T_W_I;                     ///< the query's pose in the map, by the landmarks it was matched with
+  Matrix6d information = Matrix6d::Zero();  ///< of the perturbation (theta, t) of the query's camera pose
+  int matches = 0, inliers = 0;
+  double depth_agreement = -1;   ///< -1: no depth to compare
+  std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< inliers: feature of the query, landmark of the map
+};
+
+class PlaceVerifier {
+ public:
+  PlaceVerifier(const PlaceVerificationOptions& options, std::shared_ptr<const CameraModel> camera);
+
+  /// `T_G_I`: the query's pose in any gravity-aligned frame. Landmarks are taken from keyframes that `allowed` lets pass.
+  PlaceVerification verify(const Map& map, const Keyframe& query, const SE3& T_G_I, const BowResult& query_bow,
+                           KeyframeId match, const BowResult& match_bow,
+                           const std::function<bool(KeyframeId)>& allowed) const;
+  /// The same from a predicted pose in the map, without appearance: guided matching around `match` at once.
+  PlaceVerification track(const Map& map, const Keyframe& query, const SE3& T_W_I, KeyframeId match,
+                          const std::function<bool(KeyframeId)>& allowed) const;
+
+ private:
+  struct Guided;
+  Guided guide(const Map& map, const Keyframe& query, const SE3& T_W_C, double radius,
+               const std::vector<KeyframeId>& around) const;
+  void finish(const Map& map, const Keyframe& query, const SE3& T_G_I, const SE3& start,
+              const std::vector<KeyframeId>& around, PlaceVerification* result) const;
+
+  PlaceVerificationOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+  PlacePoseOptions pose_options_;
+};
+
+}  // namespace vip_slam

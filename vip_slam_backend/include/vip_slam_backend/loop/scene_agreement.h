@@ -1,0 +1,37 @@
+// Witnesses for a place match that do not come from its feature points: do the depth images and the planes of the two
+// keyframes describe one scene?
+#pragma once
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_image.h"
+
+namespace vip_slam {
+
+struct DepthAgreement {
+  int compared = 0;       ///< nodes of either grid seen by the other
+  int agree = 0;          ///< on the same surface
+  int see_through = 0;    ///< the other camera sees something farther: this surface is not there
+  int occluded = 0;       ///< the other camera sees something nearer
+  double agreement() const { return compared ? static_cast<double>(agree) / compared : 0; }
+  double seeThrough() const { return compared ? static_cast<double>(see_through) / compared : 0; }
+};
+
+/// Warps each grid into the other camera; T_a_b maps points of camera b into camera a.
+DepthAgreement compareDepth(const DepthGrid& a, const DepthGrid& b, const SE3& T_a_b, const CameraModel& camera);
+
+struct PlaneAgreement {
+  std::vector<std::pair<PlaneId, PlaneId>> same;  ///< (plane of the query, plane of the match): one surface
+  int contradictions = 0;  ///< overlapping parallel surfaces of one side at different depth
+};
+
+/// Compares the planes seen by `query` keyframes with those seen by `match` keyframes, where `T_W_W` moves the query's
+/// part of the map onto the match's. Planes that both have already are not compared.
+PlaneAgreement comparePlanes(const Map& map, const std::set<KeyframeId>& query, const std::set<KeyframeId>& match,
+                             const SE3& T_W_W);
+
+}  // namespace vip_slam

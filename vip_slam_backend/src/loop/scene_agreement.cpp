@@ -1,0 +1,113 @@
+#include "vip_slam_backend/loop/scene_agreement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace vip_slam {
+namespace {
+
+void warp(const DepthGrid& from, const DepthGrid& into, const SE3& T_into_from, const CameraModel& camera,
+          DepthAgreement* count) {
+  for (int r = 0; r < from.rows; ++r)
+    for (int c = 0; c < from.cols; ++c) {
+      const double z = from.at(c, r);
+      if (z <= 0) continue;
+      const Eigen::Vector3d p = T_into_from * camera.unproject(from.pixel(c, r), z);
+      Eigen::Vector2d uv;
+      if (p.z() < 0.2 || !camera.project(p, &uv) || !camera.inImage(uv)) continue;
+      // The four nodes around the pixel: a surface agrees when it passes between them.
+      const int c0 = static_cast<int>(std::floor((uv.x() - into.offset) / into.stride));
+      const int r0 = static_cast<int>(std::floor((uv.y() - into.offset) / into.stride));
+      if (c0 < 0 || r0 < 0 || c0 + 1 >= into.cols || r0 + 1 >= into.rows) continue;
+      double nearest = std::numeric_limits<double>::max(), farthest = 0;
+      for (int k = 0; k < 4; ++k) {
+        const double node = into.at(c0 + (k & 1), r0 + (k >> 1));
+        if (node <= 0) continue;
+        nearest = std::min(nearest, node);
+        farthest = std::max(farthest, node);
+      }
+      if (farthest <= 0) continue;
+      const double tolerance = 0.05 + 0.025 * p.z();
+      ++count->compared;
+      if (p.z() < nearest - tolerance)
+        ++count->see_through;
+      else if (p.z() > farthest + tolerance)
+        ++count->occluded;
+      else
+        ++count->agree;
+    }
+}
+
+struct Patch {
+  Plane plane;                ///< in the world of the match
+  std::vector<Eigen::Vector3d> points;  ///< samples of the surface, same world
+};
+
+// The planes some keyframes see, with samples of their surface.
+std::map<PlaneId, Patch> patches(const Map& map, const std::set<KeyframeId>& keyframes, const SE3& T_W_W) {
+  std::map<PlaneId, Patch> result;
+  for (const KeyframeId id : keyframes) {
+    if (!map.hasKeyframe(id)) continue;
+    const MapKeyframe& kf = map.keyframe(id);
+    const SE3 T_W_C = T_W_W * kf.T_W_C();
+    for (const auto& entry : kf.planes) {
+      const auto plane = map.planes().find(entry.first);
+      if (plane == map.planes().end()) continue;
+      Patch& patch = result[entry.first];
+      patch.plane = transformPlane(T_W_W, plane->second.estimate.plane);
+      const std::size_t step = std::max<std::size_t>(1, entry.second.points.size() / 40);
+      for (std::size_t k = 0; k < entry.second.points.size(); k += step)
+        patch.points.push_back(T_W_C * entry.second.points[k].p_C.cast<double>());
+    }
+  }
+  return result;
+}
+
+bool overlap(const Patch& a, const Patch& b) {
+  int close = 0;
+  for (const Eigen::Vector3d& p : a.points)
+    for (const Eigen::Vector3d& q : b.points) {
+      const Eigen::Vector3d d = p - q;
+      if ((d - a.plane.n.dot(d) * a.plane.n).norm() < 0.25 && ++close >= 5) return true;
+    }
+  return false;
+}
+
+}  // namespace
+
+DepthAgreement compareDepth(const DepthGrid& a, const DepthGrid& b, const SE3& T_a_b, const CameraModel& camera) {
+  DepthAgreement result;
+  if (a.empty() || b.empty()) return result;
+  warp(b, a, T_a_b, camera, &result);
+  warp(a, b, T_a_b.inverse(), camera, &result);
+  return result;
+}
+
+PlaneAgreement comparePlanes(const Map& map, const std::set<KeyframeId>& query, const std::set<KeyframeId>& match,
+                             const SE3& T_W_W) {
+  constexpr double kAngle = 4.0 * M_PI / 180.0, kSame = 0.08, kContradiction = 0.6;
+  PlaneAgreement result;
+  const auto ours = patches(map, query, T_W_W), theirs = patches(map, match, SE3());
+  for (const auto& a : ours) {
+    if (theirs.count(a.first)) continue;
+    bool same = false, contradicted = false;
+    for (const auto& b : theirs) {
+      if (ours.count(b.first)) continue;
+      if (a.second.plane.n.dot(b.second.plane.n) < std::cos(kAngle) || !overlap(a.second, b.second)) continue;
+      double distance = 0;
+      for (const Eigen::Vector3d& p : a.second.points) distance += std::abs(b.second.plane.signedDistance(p));
+      distance /= std::max<std::size_t>(1, a.second.points.size());
+      if (distance < kSame) {
+        result.same.emplace_back(a.first, b.first);
+        same = true;
+      } else if (distance < kContradiction) {
+        contradicted = true;
+      }
+    }
+    result.contradictions += contradicted && !same;
+  }
+  return result;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "vip_slam_backend/loop/place_pose.h"
+
+namespace vip_slam {
+namespace {
+
+class PlacePoseTest : public ::testing::Test {
+ protected:
+  double uniform(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
+  double normal(double s) { return std::normal_distribution<double>(0, s)(random_); }
+
+  // A camera with some tilt at a random place; `inlier_ratio` of the matches are true.
+  void make(int n, double inlier_ratio, bool depth) {
+    T_W_C_ = SE3(Eigen::Quaterniond(Eigen::AngleAxisd(uniform(-3, 3), Eigen::Vector3d::UnitZ())) *
+                     Eigen::Quaterniond(Eigen::AngleAxisd(-M_PI / 2 + uniform(-0.3, 0.3), Eigen::Vector3d::UnitX())) *
+                     Eigen::Quaterniond(Eigen::AngleAxisd(uniform(-0.2, 0.2), Eigen::Vector3d::UnitZ())),
+                 Eigen::Vector3d(uniform(-20, 20), uniform(-20, 20), uniform(0, 2)));
+    // The attitude the odometry reports: right tilt, any yaw.
+    R_G_C_ = Eigen::Quaterniond(Eigen::AngleAxisd(uniform(-3, 3), Eigen::Vector3d::UnitZ())) * T_W_C_.rotation();
+    matches_.clear();
+    truth_.clear();
+    for (int k = 0; k < n; ++k) {
+      const Eigen::Vector2d xy(uniform(-0.6, 0.6), uniform(-0.45, 0.45));
+      const double z = uniform(1, 6);
+      PlaceMatch m;
+      m.p_W = T_W_C_ * Eigen::Vector3d(xy.x() * z, xy.y() * z, z);
+      const bool inlier = k < inlier_ratio * n;
+      if (!inlier) m.p_W = T_W_C_.t() + Eigen::Vector3d(uniform(-6, 6), uniform(-6, 6), uniform(-2, 2));
+      m.xy = xy + Eigen::Vector2d(normal(0.7), normal(0.7)) / 500.0;
+      m.depth_sigma = 0.005 * z;
+      if (depth) m.depth = z + normal(m.depth_sigma);
+      matches_.push_back(m);
+      truth_.push_back(inlier);
+    }
+  }
+  void expectFound(double position, double angle) {
+    PlacePoseOptions options;
+    const PlacePose coarse = ransacPlacePose(matches_, R_G_C_, options);
+    ASSERT_TRUE(coarse.found);
+    const PlacePose fine = refinePlacePose(matches_, coarse.T_W_C, options);
+    ASSERT_TRUE(fine.found);
+    const Vector6d error = fine.T_W_C.boxminus(T_W_C_);
+    EXPECT_LT(error.tail<3>().norm(), position);
+    EXPECT_LT(error.head<3>().norm(), angle);
+    int right = 0, wrong = 0;
+    for (const std::uint32_t k : fine.inliers) (truth_[k] ? right : wrong) += 1;
+    const int all = static_cast<int>(std::count(truth_.begin(), truth_.end(), true));
+    EXPECT_GE(right, 0.9 * all);
+    EXPECT_LE(wrong, 2);
+    // The information says how far off it is: 6 degrees of freedom, 99.99 % below 28.
+    EXPECT_LT(error.dot(fine.information * error), 40.0);
+  }
+  std::mt19937_64 random_{5};
+  SE3 T_W_C_;
+  Eigen::Quaterniond R_G_C_;
+  std::vector<PlaceMatch> matches_;
+  std::vector<bool> truth_;
+};
+
+TEST_F(PlacePoseTest, WithDepthAndManyOutliers) {
+  for (int trial = 0; trial < 50; ++trial) {
+    make(80, 0.3, true);
+    expectFound(0.02, 0.006);
+  }
+}
+
+TEST_F(PlacePoseTest, WithoutDepthFromGravityAndTwoRays) {
+  for (int trial = 0; trial < 50; ++trial) {
+    make(80, 0.6, false);
+    expectFound(0.04, 0.01);
+  }
+}
+
+TEST_F(PlacePoseTest, RefinementCorrectsTheTiltThatRansacHeld) {
+  make(100, 1.0, true);
+  R_G_C_ = Eigen::Quaterniond(Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitX())) * R_G_C_;
+  expectFound(0.02, 0.005);
+}
+
+TEST_F(PlacePoseTest, NothingButOutliersGivesFewInliers) {
+  int worst = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    make(80, 0.0, true);
+    const PlacePose pose = ransacPlacePose(matches_, R_G_C_, {});
+    worst = std::max(worst, static_cast<int>(pose.inliers.size()));
+  }
+  EXPECT_LT(worst, 8);
+}
+
+TEST_F(PlacePoseTest, SameSeedSameAnswer) {
+  make(80, 0.4, true);
+  const PlacePose a = ransacPlacePose(matches_, R_G_C_, {}), b = ransacPlacePose(matches_, R_G_C_, {});
+  EXPECT_EQ(a.inliers, b.inliers);
+  EXPECT_EQ(a.T_W_C.matrix(), b.T_W_C.matrix());
+}
+
+TEST_F(PlacePoseTest, DegenerateInput) {
+  EXPECT_FALSE(ransacPlacePose({}, Eigen::Quaterniond::Identity(), {}).found);
+  make(10, 1.0, true);
+  for (PlaceMatch& m : matches_) m = matches_[0];
+  EXPECT_FALSE(ransacPlacePose(matches_, R_G_C_, {}).found);
+  EXPECT_FALSE(refinePlacePose(matches_, T_W_C_, {}).found);
+}
+
+}  // namespace
+}  // namespace vip_slam
