@@ -1,0 +1,29 @@
+// From the map to the pose-plane graph: odometry edges between neighbours in time, edges that earlier loops and shared
+// landmarks give, plane edges, and the new loop.
+#pragma once
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "vip_slam_backend/loop/loop_options.h"
+#include "vip_slam_backend/loop/pose_plane_graph.h"
+#include "vip_slam_backend/map/map.h"
+
+namespace vip_slam {
+
+/// Diagonal square-root information of a relative pose: angles in radians, position in metres, one sigma each.
+Matrix6d diagonalSqrtInformation(double sigma_angle, double sigma_position);
+
+/// All measurements at their present values (the graph is at its minimum), except for what the caller adds.
+/// `loops`: accepted ones (query, match); `same_planes`: (from, into) are one surface; `min_seconds`: keyframes nearer in
+/// time are joined by odometry alone.
+PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
+                                   const std::vector<std::pair<PlaneId, PlaneId>>& same_planes, double min_seconds,
+                                   const PoseGraphOptions& options);
+
+/// Keyframes that odometry, loops or shared landmarks tie to `id`, itself included.
+std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,
+                                        const std::vector<std::pair<KeyframeId, KeyframeId>>& loops);
+
+}  // namespace vip_slam

@@ -1,0 +1,114 @@
+#include "vip_slam_backend/loop/graph_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace vip_slam {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+
+// Odometry between neighbours: drift grows with the square root of the way; a coasting front end knows far less.
+Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, const PoseGraphOptions& options) {
+  const double turned = a.state.T_W_I.rotation().angularDistance(b.state.T_W_I.rotation());
+  // Turning on the spot drifts too: a full turn counts as two metres of way.
+  const double way = (a.state.T_W_I.t() - b.state.T_W_I.t()).norm() + turned / M_PI;
+  const bool weak = a.data->frame.status.state != TrackingState::kTracking ||
+                    b.data->frame.status.state != TrackingState::kTracking;
+  const double factor = std::sqrt(std::max(0.02, way)) * (weak ? 10.0 : 1.0);
+  return diagonalSqrtInformation(options.odometry_sigma_yaw_deg * kDegree * factor,
+                                 options.odometry_sigma_position * factor);
+}
+
+std::map<std::uint32_t, std::uint32_t> epochGroups(const Map& map,
+                                                   const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
+  std::map<std::uint32_t, std::uint32_t> group;
+  for (const auto& entry : map.keyframes()) group[entry.second.data->frame.epoch] = entry.second.data->frame.epoch;
+  const auto join = [&group](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t from = std::max(group[a], group[b]), into = std::min(group[a], group[b]);
+    if (from == into) return;
+    for (auto& g : group)
+      if (g.second == from) g.second = into;
+  };
+  for (const auto& loop : loops)
+    if (map.hasKeyframe(loop.first) && map.hasKeyframe(loop.second))
+      join(map.keyframe(loop.first).data->frame.epoch, map.keyframe(loop.second).data->frame.epoch);
+  for (const auto& entry : map.landmarks()) {
+    const auto& observations = entry.second.observations;
+    const std::uint32_t first = map.keyframe(observations.front().keyframe).data->frame.epoch;
+    const std::uint32_t last = map.keyframe(observations.back().keyframe).data->frame.epoch;
+    if (first != last) join(first, last);
+  }
+  return group;
+}
+
+}  // namespace
+
+Matrix6d diagonalSqrtInformation(double sigma_angle, double sigma_position) {
+  Matrix6d L = Matrix6d::Zero();
+  L.diagonal().head<3>().setConstant(1.0 / sigma_angle);
+  L.diagonal().tail<3>().setConstant(1.0 / sigma_position);
+  return L;
+}
+
+std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,
+                                        const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
+  const auto group = epochGroups(map, loops);
+  const std::uint32_t ours = group.at(map.keyframe(id).data->frame.epoch);
+  std::set<KeyframeId> result;
+  for (const auto& entry : map.keyframes())
+    if (group.at(entry.second.data->frame.epoch) == ours) result.insert(entry.first);
+  return result;
+}
+
+PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
+                                   const std::vector<std::pair<PlaneId, PlaneId>>& same_planes, double min_seconds,
+                                   const PoseGraphOptions& options) {
+  PosePlaneGraph graph;
+  std::map<PlaneId, PlaneId> into;
+  for (const auto& pair : same_planes) into[pair.first] = pair.second;
+  const auto planeOf = [&into](PlaneId id) {
+    const auto it = into.find(id);
+    return it == into.end() ? id : it->second;
+  };
+  for (const auto& entry : map.keyframes()) graph.addPose(entry.first, entry.second.state.T_W_I);
+  for (const auto& entry : map.planes())
+    if (planeOf(entry.first) == entry.first) graph.addPlane(entry.first, entry.second.estimate.plane);
+
+  const auto relative = [&map](KeyframeId i, KeyframeId j) {
+    return map.keyframe(i).state.T_W_I.inverse() * map.keyframe(j).state.T_W_I;
+  };
+  const Matrix6d loop_information =
+      diagonalSqrtInformation(options.loop_sigma_angle_deg * kDegree, options.loop_sigma_position);
+  std::map<std::uint32_t, KeyframeId> last;  // per epoch
+  for (const auto& entry : map.keyframes()) {
+    const MapKeyframe& kf = entry.second;
+    const auto before = last.find(kf.data->frame.epoch);
+    if (before != last.end())
+      graph.addEdge(RelativePoseEdge{before->second, entry.first, relative(before->second, entry.first),
+                                     odometryInformation(map.keyframe(before->second), kf, options)});
+    last[kf.data->frame.epoch] = entry.first;
+    for (const auto& neighbour : map.covisible(entry.first, options.covisible_edge)) {
+      const MapKeyframe& other = map.keyframe(neighbour.first);
+      const bool apart = other.data->frame.epoch != kf.data->frame.epoch ||
+                         std::abs(other.data->frame.t - kf.data->frame.t) > min_seconds;
+      if (neighbour.first < entry.first && apart)
+        graph.addEdge(RelativePoseEdge{neighbour.first, entry.first, relative(neighbour.first, entry.first), loop_information});
+    }
+    const Eigen::Vector3d plane_sigma(0.5 * kDegree, 0.5 * kDegree, 0.02);
+    for (const auto& seen : kf.planes) {
+      const auto plane = map.planes().find(seen.first);
+      if (plane == map.planes().end()) continue;
+      graph.addEdge(PosePlaneEdge{entry.first, planeOf(seen.first),
+                                  transformPlane(kf.state.T_W_I.inverse(), plane->second.estimate.plane),
+                                  plane_sigma.cwiseInverse().asDiagonal()});
+    }
+  }
+  for (const auto& loop : loops)
+    if (map.hasKeyframe(loop.first) && map.hasKeyframe(loop.second))
+      graph.addEdge(RelativePoseEdge{loop.second, loop.first, relative(loop.second, loop.first), loop_information});
+  return graph;
+}
+
+}  // namespace vip_slam

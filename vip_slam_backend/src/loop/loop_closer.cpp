@@ -1,0 +1,124 @@
+#include "vip_slam_backend/loop/loop_closer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_backend/place_recognition/vocabulary_io.h"
+
+namespace vip_slam {
+namespace {
+
+// A keyframe with those around it that show the same place.
+std::set<KeyframeId> placeOf(const Map& map, KeyframeId id) {
+  std::set<KeyframeId> place{id};
+  const MapKeyframe& kf = map.keyframe(id);
+  for (const KeyframeId neighbour : {kf.previous, kf.next})
+    if (neighbour != 0) place.insert(neighbour);
+  for (const auto& neighbour : map.covisible(id, 15)) place.insert(neighbour.first);
+  return place;
+}
+
+bool touch(const std::set<KeyframeId>& a, const std::set<KeyframeId>& b) {
+  return std::any_of(a.begin(), a.end(), [&b](KeyframeId id) { return b.count(id) != 0; });
+}
+
+}  // namespace
+
+LoopCloser::LoopCloser(const LoopOptions& options, std::shared_ptr<const CameraModel> camera, TimingLog* timing)
+    : options_(options),
+      camera_(camera),
+      timing_(timing),
+      vocabulary_(openVocabulary(options.vocabulary)),
+      database_(vocabulary_->words()),
+      verifier_(options.verification, camera) {}
+
+BowResult LoopCloser::describe(const Keyframe& keyframe) const {
+  std::vector<Descriptor> descriptors;
+  descriptors.reserve(keyframe.frame.features.size());
+  for (const Feature& f : keyframe.frame.features) descriptors.push_back(f.descriptor);
+  return vocabulary_->transform(descriptors, 1);
+}
+
+void LoopCloser::add(const Map& map, KeyframeId id) {
+  ScopedTimer timer(timing_, "backend.bow", map.keyframe(id).data->frame.t);
+  database_.add(id, describe(*map.keyframe(id).data));
+}
+
+void LoopCloser::rebuild(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
+  clear();
+  for (const auto& entry : map.keyframes()) database_.add(entry.first, describe(*entry.second.data));
+  loops_ = loops;
+}
+
+void LoopCloser::clear() {
+  database_.clear();
+  loops_.clear();
+  recent_places_.clear();
+}
+
+std::vector<KeyframeId> LoopCloser::candidates(const Map& map, KeyframeId query) {
+  const MapKeyframe& kf = map.keyframe(query);
+  const BowVector& bow = database_.bow(query).bow;
+  std::set<KeyframeId> joined;
+  for (const auto& neighbour : map.covisible(query, options_.max_shared + 1)) joined.insert(neighbour.first);
+  const auto old = [&](KeyframeId id) {
+    if (id == query || joined.count(id) || !map.hasKeyframe(id)) return false;
+    const TrackedFrame& other = map.keyframe(id).data->frame;
+    return other.epoch != kf.data->frame.epoch || kf.data->frame.t - other.t > options_.min_seconds;
+  };
+  // Words are shared by accident too: what the keyframe before scores tells how much two views of one place share here.
+  double reference = 0;
+  if (kf.previous != 0 && database_.has(kf.previous)) reference = bowScore(bow, database_.bow(kf.previous).bow);
+  const auto matches = database_.query(bow, 30, old);
+
+  std::vector<KeyframeId> chosen;
+  std::vector<std::set<KeyframeId>> places;
+  std::set<KeyframeId> pointed_to;
+  for (const DatabaseMatch& match : matches) {
+    if (match.score < options_.relative_score * reference) break;
+    if (static_cast<int>(places.size()) >= options_.candidates) break;
+    // One candidate per place: its best keyframe.
+    if (std::any_of(places.begin(), places.end(), [&](const auto& place) { return place.count(match.keyframe) != 0; }))
+      continue;
+    places.push_back(placeOf(map, match.keyframe));
+    pointed_to.insert(places.back().begin(), places.back().end());
+    int agreeing = 0;
+    for (auto recent = recent_places_.rbegin(); recent != recent_places_.rend(); ++recent)
+      agreeing += touch(places.back(), *recent);
+    if (agreeing >= options_.consistency) chosen.push_back(match.keyframe);
+  }
+  recent_places_.push_back(std::move(pointed_to));
+  while (recent_places_.size() > static_cast<std::size_t>(options_.consistency) + 1) recent_places_.pop_front();
+  return chosen;
+}
+
+std::vector<LoopEvent> LoopCloser::close(Map& map, KeyframeId query) {
+  const MapKeyframe& kf = map.keyframe(query);
+  const double t = kf.data->frame.t;
+  ScopedTimer timer(timing_, "backend.loop", t);
+  std::vector<LoopEvent> events;
+  for (const KeyframeId match : candidates(map, query)) {
+    const double query_time = t;
+    const std::uint32_t epoch = kf.data->frame.epoch;
+    // The pose must rest on the old part of the map alone, else it confirms the drift.
+    const auto old = [&](KeyframeId id) {
+      const TrackedFrame& other = map.keyframe(id).data->frame;
+      return other.epoch != epoch || query_time - other.t > options_.min_seconds;
+    };
+    const PlaceVerification place = verifier_.verify(map, *kf.data, kf.state.T_W_I, database_.bow(query), match,
+                                                     database_.bow(match), old);
+    LoopEvent event;
+    event.query = query;
+    event.match = match;
+    event.t = t;
+    event.inliers = place.inliers;
+    event.reason = place.reason;
+    event.T_match_query = map.keyframe(match).state.T_W_I.inverse() * place.T_W_I;
+    event.accepted = place.accepted && correct(map, query, place, &event);
+    events.push_back(event);
+    if (event.accepted) break;
+  }
+  return events;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,134 @@
+// What an accepted place does to the map: the pose-plane graph and its last veto, then the fusion of landmarks.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "vip_slam_backend/loop/graph_builder.h"
+#include "vip_slam_backend/loop/loop_closer.h"
+#include "vip_slam_backend/loop/loop_fusion.h"
+#include "vip_slam_backend/loop/scene_agreement.h"
+
+namespace vip_slam {
+namespace {
+
+// Landmarks of the two ends that are one point lie this near each other once the loop is closed.
+constexpr double kFuseDistance = 0.25;
+constexpr int kFusedNeighbours = 8;
+
+// The yaw and position part of a correction: tilt belongs to the IMU.
+SE3 levelled(const SE3& T) {
+  return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yawOf(T.rotation()), Eigen::Vector3d::UnitZ())), T.t());
+}
+
+// Information of the relative pose, never better than the floor.
+Matrix6d loopSqrtInformation(const PlaceVerification& place, const SE3& T_I_C, const PoseGraphOptions& options) {
+  Matrix6d covariance = Matrix6d::Zero();
+  const Eigen::FullPivLU<Matrix6d> lu(place.information);
+  if (lu.isInvertible()) {
+    // From the camera's perturbation to the body's: theta_C = R_I_C^T theta_I; position error grows with the arm.
+    const Matrix6d camera = lu.inverse();
+    Matrix6d J = Matrix6d::Zero();
+    J.topLeftCorner<3, 3>() = T_I_C.R();
+    J.bottomRightCorner<3, 3>() = place.T_W_I.R().transpose();
+    covariance = J * camera * J.transpose();
+  }
+  const double angle = options.loop_sigma_angle_deg * M_PI / 180.0;
+  covariance.diagonal().head<3>().array() += angle * angle;
+  covariance.diagonal().tail<3>().array() += options.loop_sigma_position * options.loop_sigma_position;
+  return covariance.inverse().llt().matrixU();
+}
+
+std::set<KeyframeId> withNeighbours(const Map& map, KeyframeId id, std::size_t most) {
+  std::set<KeyframeId> result{id};
+  for (KeyframeId k = map.keyframe(id).previous; k != 0 && result.size() < most; k = map.keyframe(k).previous)
+    result.insert(k);
+  return result;
+}
+
+std::set<KeyframeId> around(const Map& map, KeyframeId id, std::size_t most) {
+  std::set<KeyframeId> result = withNeighbours(map, id, most);
+  for (KeyframeId k = map.keyframe(id).next; k != 0 && result.size() < 2 * most; k = map.keyframe(k).next)
+    result.insert(k);
+  return result;
+}
+
+}  // namespace
+
+bool LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerification& place, LoopEvent* event) {
+  const MapKeyframe& kf = map.keyframe(query);
+  const SE3 T_match_query = map.keyframe(place.match).state.T_W_I.inverse() * place.T_W_I;
+  const SE3 correction = levelled(place.T_W_I * kf.state.T_W_I.inverse());
+  char text[160];
+
+  // Planes of the two ends must be the same or different, but not shifted copies. The newest keyframe's planes come
+  // after it, so its forerunners speak for it.
+  const PlaneAgreement planes =
+      comparePlanes(map, withNeighbours(map, query, 5), around(map, place.match, 4), correction);
+  if (planes.contradictions > static_cast<int>(planes.same.size())) {
+    std::snprintf(text, sizeof text, "%d planes contradict, %zu agree", planes.contradictions, planes.same.size());
+    event->reason = text;
+    return false;
+  }
+
+  // A part of the map that nothing tied to the match yet is brought there as a whole; odometry has no say then.
+  const std::set<KeyframeId> part = connectedKeyframes(map, query, loops_);
+  const bool tied = part.count(place.match) != 0;
+  std::map<KeyframeId, SE3> start;
+  for (const KeyframeId id : part)
+    start[id] = tied ? map.keyframe(id).state.T_W_I : correction * map.keyframe(id).state.T_W_I;
+
+  PosePlaneGraph graph = buildPosePlaneGraph(map, loops_, tied ? planes.same : decltype(planes.same)(),
+                                             options_.min_seconds, options_.graph);
+  if (!tied) {
+    for (const auto& pose : start) graph.addPose(pose.first, pose.second);
+    for (const auto& plane : map.planes()) {
+      const bool ours = std::any_of(part.begin(), part.end(),
+                                    [&](KeyframeId id) { return map.keyframe(id).planes.count(plane.first) != 0; });
+      if (ours) graph.addPlane(plane.first, transformPlane(correction, plane.second.estimate.plane));
+    }
+  }
+  graph.addEdge(RelativePoseEdge{place.match, query, T_match_query,
+                                 loopSqrtInformation(place, kf.data->frame.T_I_C, options_.graph)});
+  const PosePlaneSolution solution = graph.solve(options_.graph.max_iterations);
+  if (!solution.usable || solution.chi2 > options_.graph.max_chi2) {
+    std::snprintf(text, sizeof text, "closing it costs the graph chi2 %.1f, at most %.1f (moves %.3f m)", solution.chi2,
+                  options_.graph.max_chi2, correction.t().norm());
+    event->reason = text;
+    return false;
+  }
+  map.moveKeyframes(solution.T_W_I);
+  for (const auto& plane : solution.planes) map.setPlaneParameters(plane.first, plane.second);
+  for (const auto& same : planes.same)
+    if (tied) map.setPlaneParameters(same.first, solution.planes.at(same.second));
+  map.keyframe(query).loop_keyframe = map.keyframe(place.match).loop_keyframe = true;
+  loops_.emplace_back(query, place.match);
+  recent_places_.clear();
+  std::snprintf(text, sizeof text, "%s, chi2 %.1f, %zu planes agree", place.reason.c_str(), solution.chi2,
+                planes.same.size());
+  event->reason = text;
+  fuse(map, query, place);
+  return true;
+}
+
+void LoopCloser::fuse(Map& map, KeyframeId query, const PlaceVerification& place) {
+  fuseLandmarks(map, query, place.landmarks, kFuseDistance);
+  const std::uint32_t epoch = map.keyframe(query).data->frame.epoch;
+  const double t = map.keyframe(query).data->frame.t;
+  const auto old = [&](KeyframeId id) {
+    const TrackedFrame& other = map.keyframe(id).data->frame;
+    return other.epoch != epoch || t - other.t > options_.min_seconds;
+  };
+  // The keyframes on the way to the query saw the place as well.
+  int left = kFusedNeighbours;
+  for (KeyframeId id = map.keyframe(query).previous; id != 0 && left > 0; id = map.keyframe(id).previous, --left) {
+    if (id == place.match) break;
+    const MapKeyframe& kf = map.keyframe(id);
+    const PlaceVerification neighbour = verifier_.track(map, *kf.data, kf.state.T_W_I, place.match, old);
+    if (neighbour.inliers >= 12) fuseLandmarks(map, id, neighbour.landmarks, kFuseDistance);
+  }
+}
+
+}  // namespace vip_slam
