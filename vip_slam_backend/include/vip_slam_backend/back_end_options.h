@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "vip_slam_backend/loop/loop_options.h"
 #include "vip_slam_core/util/options.h"
 
 namespace vip_slam {
@@ -102,6 +103,7 @@ struct BackEndOptions {
   GlobalBaOptions global_ba;
   ReobservationOptions reobservation;
   CullingOptions culling;
+  LoopOptions loop;
 
   void visit(OptionVisitor& v) {
     v.field("variant", variant, {"vi", "vi_p", "vi_cp", "vip"}, "which of the paper's systems runs");
@@ -113,6 +115,7 @@ struct BackEndOptions {
     v.group("global_ba", global_ba);
     v.group("reobservation", reobservation);
     v.group("culling", culling);
+    v.group("loop", loop);
   }
 };
 

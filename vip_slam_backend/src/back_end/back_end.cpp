@@ -11,7 +11,8 @@ BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l
       camera(makeCamera(s.camera)),
       maker(LandmarkMakerOptions{12.0, 1.0, camera->focal()}),
       reobservation(o.reobservation, camera),
-      solver(makeSolver(o.solver)) {
+      solver(makeSolver(o.solver)),
+      loop_closer(o.loop, camera, l) {
   settings.variant = variantFromName(o.variant);
   settings.measurement = o.measurement;
   settings.focal = camera->focal();
@@ -57,6 +58,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   }
   localBundleAdjustment(t, &update);
   cull(&update);
+  closeLoop(&update);
   finishUpdate(&update);
   return update;
 }
@@ -114,6 +116,7 @@ MapSnapshot BackEnd::Impl::snapshot() const {
 void BackEnd::Impl::reset() {
   map.clear();
   maker.clear();
+  loop_closer.clear();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/loop/loop_closer.h"
 #include "vip_slam_backend/map/culling.h"
 #include "vip_slam_backend/map/landmark_maker.h"
 #include "vip_slam_backend/map/map.h"
@@ -42,6 +43,10 @@ struct BackEnd::Impl {
   GbaJob makeGlobalJob() const;
   MapUpdate mergeGlobal(const GbaResult& result);
 
+  // back_end_loops.cpp
+  /// Enters the newest keyframe into the place database and closes a loop there when there is one.
+  void closeLoop(MapUpdate* update);
+
   BackEndOptions options;
   SensorConfig sensor;
   TimingLog* log = nullptr;
@@ -51,6 +56,7 @@ struct BackEnd::Impl {
   LandmarkMaker maker;
   Reobservation reobservation;
   std::unique_ptr<BaSolver> solver;
+  LoopCloser loop_closer;
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;

@@ -72,6 +72,7 @@ void BackEnd::Impl::cull(MapUpdate* update) {
   cullLandmarks(it->first, &map);
   const auto removed = cullKeyframes(options.culling, options.local_ba.window, sensor.imu_noise, &map);
   statistics.keyframes_culled += removed.size();
+  for (const KeyframeId id : removed) loop_closer.remove(id);
   update->landmarks.erase(std::remove_if(update->landmarks.begin(), update->landmarks.end(),
                                          [&](const LandmarkEstimate& l) { return !map.hasLandmark(l.id); }),
                           update->landmarks.end());

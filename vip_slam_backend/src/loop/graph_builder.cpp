@@ -34,12 +34,6 @@ std::map<std::uint32_t, std::uint32_t> epochGroups(const Map& map,
   for (const auto& loop : loops)
     if (map.hasKeyframe(loop.first) && map.hasKeyframe(loop.second))
       join(map.keyframe(loop.first).data->frame.epoch, map.keyframe(loop.second).data->frame.epoch);
-  for (const auto& entry : map.landmarks()) {
-    const auto& observations = entry.second.observations;
-    const std::uint32_t first = map.keyframe(observations.front().keyframe).data->frame.epoch;
-    const std::uint32_t last = map.keyframe(observations.back().keyframe).data->frame.epoch;
-    if (first != last) join(first, last);
-  }
   return group;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/place_recognition/vocabulary_io.h"
 
 namespace vip_slam {
@@ -48,6 +49,15 @@ void LoopCloser::rebuild(const Map& map, const std::vector<std::pair<KeyframeId,
   clear();
   for (const auto& entry : map.keyframes()) database_.add(entry.first, describe(*entry.second.data));
   loops_ = loops;
+}
+
+void LoopCloser::tie(Map& map, KeyframeId query, KeyframeId match) {
+  map.keyframe(query).loop_keyframe = map.keyframe(match).loop_keyframe = true;
+  loops_.emplace_back(query, match);
+}
+
+bool LoopCloser::tied(const Map& map, KeyframeId id) const {
+  return connectedKeyframes(map, id, loops_).size() == map.keyframes().size();
 }
 
 void LoopCloser::clear() {

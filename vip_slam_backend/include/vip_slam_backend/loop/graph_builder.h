@@ -22,7 +22,7 @@ PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<K
                                    const std::vector<std::pair<PlaneId, PlaneId>>& same_planes, double min_seconds,
                                    const PoseGraphOptions& options);
 
-/// Keyframes that odometry, loops or shared landmarks tie to `id`, itself included.
+/// Keyframes that odometry (one epoch) and loops tie to `id`, itself included.
 std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,
                                         const std::vector<std::pair<KeyframeId, KeyframeId>>& loops);
 

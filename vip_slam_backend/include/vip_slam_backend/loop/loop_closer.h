@@ -29,7 +29,12 @@ class LoopCloser {
   /// Looks for a loop at a keyframe that add() knows. On success the map is corrected and fused: all keyframes,
   /// landmarks and planes may have moved. One event per verified candidate; the accepted one is the last.
   std::vector<LoopEvent> close(Map& map, KeyframeId query);
+  void remove(KeyframeId id) { database_.remove(id); }
   void clear();
+  /// A relocalised keyframe: from now on its epoch and that of `match` are one part of the map.
+  void tie(Map& map, KeyframeId query, KeyframeId match);
+  /// Whether the odometry of `id` is known relative to all else.
+  bool tied(const Map& map, KeyframeId id) const;
 
   /// (query, match) of the accepted loops, oldest first.
   const std::vector<std::pair<KeyframeId, KeyframeId>>& loops() const { return loops_; }
