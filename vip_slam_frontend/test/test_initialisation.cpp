@@ -1,0 +1,159 @@
+// Starts, standing and moving, on the landmark simulation; stillness; keyframe choice.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "landmark_simulation.h"
+#include "vip_slam_frontend/filter/zero_velocity.h"
+#include "vip_slam_frontend/initialisation/initialiser.h"
+#include "vip_slam_frontend/keyframes/keyframe_selector.h"
+
+namespace vip_slam::testing {
+namespace {
+
+struct Start {
+  std::optional<FilterPrior> prior;
+  double t = 0;
+  std::string reason;
+};
+
+Start start(double speed, bool depth) {
+  SimulationOptions options;
+  options.speed = speed;
+  options.depth = depth;
+  options.seed = 9;
+  LandmarkSimulation simulation(options);
+  simulation.generateImu(6.0);
+  ImuBuffer imu;
+  Initialiser initialiser(InitialisationOptions(), FilterOptions(), options.noise, simulation.T_I_C(), options.focal,
+                          9.81);
+  std::size_t next = 0;
+  Start result;
+  for (int k = 0; k < 80 && !result.prior; ++k) {
+    result.t = 1.0 + 0.05 * k;
+    while (simulation.imu()[next].t < result.t + 0.01) imu.add(simulation.imu()[next++]);
+    result.prior = initialiser.add({result.t, simulation.sight(result.t, 200)}, imu);
+    result.reason = initialiser.reason();
+  }
+  return result;
+}
+
+double tiltError(const FilterPrior& prior, const NavState& truth) {
+  const Eigen::Vector3d a = prior.state.T_W_I.R().transpose() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d b = truth.T_W_I.R().transpose() * Eigen::Vector3d::UnitZ();
+  return std::acos(std::min(1.0, a.dot(b)));
+}
+
+NavState truthOf(double speed, double t) {
+  SimulationOptions options;
+  options.speed = speed;
+  options.seed = 9;
+  LandmarkSimulation simulation(options);
+  simulation.generateImu(6.0);
+  return simulation.stateAt(t);
+}
+
+TEST(Initialiser, StandingLevelsAndFindsTheGyroBias) {
+  const Start s = start(0.0, true);
+  ASSERT_TRUE(s.prior);
+  EXPECT_LT(s.t, 2.2);
+  const NavState truth = truthOf(0.0, s.t);
+  EXPECT_TRUE(s.prior->standing);
+  EXPECT_LT(tiltError(*s.prior, truth), 0.02);  // an accelerometer bias of 0.04 m/s^2 tilts by 4 mrad per axis
+  EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.005);
+  EXPECT_LT(s.prior->state.v_W.norm(), 1e-9);
+}
+
+TEST(Initialiser, MovingFindsVelocityAndGravity) {
+  const Start s = start(1.0, true);
+  ASSERT_TRUE(s.prior) << s.reason;
+  EXPECT_LT(s.t, 3.5);
+  const NavState truth = truthOf(1.0, s.t);
+  EXPECT_FALSE(s.prior->standing);
+  EXPECT_LT(tiltError(*s.prior, truth), 3.0 * s.prior->sigma_tilt);
+  EXPECT_LT(tiltError(*s.prior, truth), 0.06);
+  // Velocity in the body frame: yaw is free.
+  const Eigen::Vector3d estimated = s.prior->state.T_W_I.R().transpose() * s.prior->state.v_W;
+  const Eigen::Vector3d expected = truth.T_W_I.R().transpose() * truth.v_W;
+  EXPECT_LT((estimated - expected).norm(), 3.0 * s.prior->sigma_velocity);
+  EXPECT_LT((estimated - expected).norm(), 0.15);
+  EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.01);
+}
+
+TEST(Initialiser, MovingWithoutDepthSaysWhyItWaits) {
+  const Start s = start(1.0, false);
+  EXPECT_FALSE(s.prior);
+  EXPECT_NE(s.reason.find("features with depth"), std::string::npos) << s.reason;
+}
+
+StillnessCues quiet() {
+  StillnessCues cues;
+  cues.imu.count = 50;
+  cues.imu.gyro_std = 0.002;
+  cues.imu.accel_std = 0.03;
+  cues.disparity_px = 0.1;
+  cues.anchor_disparity_px = 0.1;
+  cues.tracks = 100;
+  return cues;
+}
+
+TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
+  const ZuptOptions options;
+  StillnessDetector detector(options);
+  for (int i = 0; i < options.frames_in - 1; ++i) EXPECT_FALSE(detector.update(quiet()));
+  EXPECT_TRUE(detector.update(quiet()));
+  StillnessCues moving = quiet();
+  moving.disparity_px = 5;
+  EXPECT_FALSE(detector.update(moving));  // the update is suspended at once ...
+  EXPECT_TRUE(detector.still());          // ... the state a little later
+  EXPECT_FALSE(detector.update(moving));
+  EXPECT_FALSE(detector.still());
+
+  // A wall that moves along: the image stands, the IMU does not.
+  StillnessCues wall = quiet();
+  wall.imu.accel_std = 1.0;
+  // Even flight past a distant view: IMU quiet, image quiet, but the estimate moves.
+  StillnessCues glide = quiet();
+  glide.speed = 0.5;
+  StillnessCues dark = quiet();
+  dark.tracks = 3;
+  for (const StillnessCues& cues : {wall, glide, dark}) {
+    detector.reset();
+    for (int i = 0; i < 20; ++i) EXPECT_FALSE(detector.update(cues));
+  }
+}
+
+std::vector<Feature> features(double shift) {
+  std::vector<Feature> list;
+  for (int i = 0; i < 100; ++i) {
+    Feature f;
+    f.id = i + 1;
+    f.xy = Eigen::Vector2f(0.01f * (i % 10) + static_cast<float>(shift), 0.01f * (i / 10));
+    f.depth = 2.0f;
+    list.push_back(f);
+  }
+  return list;
+}
+
+TEST(KeyframeSelector, ChoosesByEachCriterionAndNeverWhileStill) {
+  const KeyframeOptions options;
+  KeyframeSelector selector(options);
+  EXPECT_EQ(selector.decide(0, SE3(), features(0), 500, false), "first");
+  selector.accept(0, SE3(), features(0));
+  EXPECT_EQ(selector.decide(0.5, SE3(), features(0), 500, false), "");
+  EXPECT_EQ(selector.decide(0.5, SE3(), features(0.08), 500, false), "parallax");
+  EXPECT_EQ(selector.decide(0.05, SE3(), features(0.08), 500, false), "");
+  EXPECT_EQ(selector.decide(0.5, SE3(), features(0.08), 500, true), "");
+  EXPECT_EQ(selector.decide(2.0, SE3(), features(0), 500, false), "time");
+  EXPECT_EQ(selector.decide(200.0, SE3(), features(0), 500, true), "");
+  const SE3 turned(expQuaternion(Eigen::Vector3d(0, 0.3, 0)), Eigen::Vector3d::Zero());
+  EXPECT_EQ(selector.decide(0.5, turned, features(0), 500, false), "rotation");
+  const SE3 shifted(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.3, 0, 0));
+  EXPECT_EQ(selector.decide(0.5, shifted, features(0), 500, false), "translation");
+  std::vector<Feature> few = features(0);
+  few.resize(50);
+  EXPECT_EQ(selector.decide(0.5, SE3(), few, 500, false), "tracked ratio");
+}
+
+}  // namespace
+}  // namespace vip_slam::testing

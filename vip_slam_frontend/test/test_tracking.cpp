@@ -1,0 +1,225 @@
+// Tracking pieces on small synthetic images with known motion.
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "vip_slam_frontend/tracking/corner_detector.h"
+#include "vip_slam_frontend/tracking/feature_tracker.h"
+#include "vip_slam_frontend/tracking/orb_extractor.h"
+#include "vip_slam_frontend/tracking/outlier_rejection.h"
+#include "vip_slam_frontend/tracking/patch_alignment.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kFocal = 400, kCx = 319.5, kCy = 239.5;
+
+std::shared_ptr<const CameraModel> camera() {
+  CameraIntrinsics intrinsics;
+  intrinsics.width = 640;
+  intrinsics.height = 480;
+  intrinsics.fx = intrinsics.fy = kFocal;
+  intrinsics.cx = kCx;
+  intrinsics.cy = kCy;
+  return makeCamera(intrinsics);
+}
+
+/// Smooth random texture on the plane z = 2 of the world, seen from a camera at `t` without rotation.
+cv::Mat render(const cv::Mat& texture, const Eigen::Vector3d& t, double noise, unsigned seed) {
+  const double z = 2.0 - t.z();
+  cv::Mat_<float> mx(480, 640), my(480, 640);
+  for (int v = 0; v < 480; ++v) {
+    for (int u = 0; u < 640; ++u) {
+      const double x = (u - kCx) / kFocal * z + t.x(), y = (v - kCy) / kFocal * z + t.y();
+      mx(v, u) = static_cast<float>(x * 200 + texture.cols / 2);
+      my(v, u) = static_cast<float>(y * 200 + texture.rows / 2);
+    }
+  }
+  cv::Mat image;
+  cv::remap(texture, image, mx, my, cv::INTER_CUBIC, cv::BORDER_REFLECT);
+  cv::Mat noisy;
+  image.convertTo(noisy, CV_16S);
+  cv::Mat n(image.size(), CV_16S);
+  cv::RNG random(seed);
+  random.fill(n, cv::RNG::NORMAL, 0, noise);
+  noisy += n;
+  noisy.convertTo(image, CV_8U);
+  return image;
+}
+
+cv::Mat makeTexture() {
+  cv::Mat texture(1200, 1600, CV_8U);
+  cv::RNG random(7);
+  random.fill(texture, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(texture, texture, cv::Size(), 3.0);
+  cv::normalize(texture, texture, 0, 255, cv::NORM_MINMAX);
+  return texture;
+}
+
+TEST(CornerDetector, SpreadsOverTheImageAndKeepsDistance) {
+  const cv::Mat image = render(makeTexture(), Eigen::Vector3d::Zero(), 1.0, 1);
+  const TrackingOptions options;
+  const std::vector<Corner> corners = detectCorners(image, {}, 200, options);
+  EXPECT_EQ(corners.size(), 200u);
+  std::vector<int> quadrant(4, 0);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    ++quadrant[(corners[i].pixel.x > 320) + 2 * (corners[i].pixel.y > 240)];
+    for (std::size_t j = 0; j < i; ++j) {
+      EXPECT_GE(cv::norm(corners[i].pixel - corners[j].pixel), options.min_distance);
+    }
+  }
+  for (int count : quadrant) EXPECT_GT(count, 30);
+}
+
+TEST(CornerDetector, NothingOnABlankWall) {
+  cv::Mat image(480, 640, CV_8U, cv::Scalar(120));
+  EXPECT_TRUE(detectCorners(image, {}, 200, TrackingOptions()).empty());
+}
+
+TEST(PatchAlignment, RecoversSubPixelShiftUnderExposureChange) {
+  const cv::Mat texture = makeTexture();
+  const cv::Mat reference = render(texture, Eigen::Vector3d::Zero(), 0.5, 1);
+  // 0.37 and -0.21 pixels at z = 2, brighter by a gain and an offset.
+  const Eigen::Vector3d t(-0.37 * 2.0 / kFocal, 0.21 * 2.0 / kFocal, 0);
+  cv::Mat current = render(texture, t, 0.5, 2);
+  current.convertTo(current, CV_8U, 0.8, 10);
+  double worst = 0, sum = 0;
+  int count = 0;
+  for (const Corner& corner : detectCorners(reference, {}, 100, TrackingOptions())) {
+    const Eigen::Vector2d p(corner.pixel.x, corner.pixel.y);
+    const PatchAlignment aligned = alignPatch(reference, p, Eigen::Matrix2d::Identity(), current, p);
+    if (!aligned.ok) continue;
+    const double error = (aligned.pixel - p - Eigen::Vector2d(0.37, -0.21)).norm();
+    worst = std::max(worst, error);
+    sum += error;
+    ++count;
+  }
+  EXPECT_GT(count, 90);
+  EXPECT_LT(sum / count, 0.04);
+  EXPECT_LT(worst, 0.2);
+}
+
+TEST(PatchAlignment, RefusesADifferentPatch) {
+  const cv::Mat image = render(makeTexture(), Eigen::Vector3d::Zero(), 0.5, 1);
+  int accepted = 0;
+  for (int i = 0; i < 40; ++i) {
+    const Eigen::Vector2d a(60 + 12 * i, 100), b(70 + 12 * i, 350);
+    accepted += alignPatch(image, a, Eigen::Matrix2d::Identity(), image, b).ok;
+  }
+  EXPECT_LT(accepted, 8);
+}
+
+TEST(OutlierRejection, FindsTheMotionOnAPlaneWithManyOutliers) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const SE3 truth(expSO3(Eigen::Vector3d(0.01, -0.02, 0.015)), Eigen::Vector3d(0.04, -0.02, 0.03));
+  for (const bool depth : {true, false}) {
+    std::vector<PointPair> pairs;
+    std::vector<char> good;
+    for (int i = 0; i < 150; ++i) {
+      PointPair pair;
+      pair.xy_previous = Eigen::Vector2d(0.6 * unit(random), 0.45 * unit(random));
+      const double z = 2.5;  // one plane: where the fundamental matrix degenerates
+      const Eigen::Vector3d p = truth * Eigen::Vector3d(pair.xy_previous.x() * z, pair.xy_previous.y() * z, z);
+      pair.xy_current = p.head<2>() / p.z() + 3e-4 * Eigen::Vector2d(unit(random), unit(random));
+      pair.depth_previous = depth ? z : 0.0;
+      good.push_back(i % 3 != 0);
+      if (!good.back()) pair.xy_current += 0.1 * Eigen::Vector2d(unit(random) + 1.2, unit(random) - 1.2);
+      pairs.push_back(pair);
+    }
+    // The gyro knows the rotation to a tenth of a degree.
+    const SE3 guess(Eigen::Quaterniond(truth.rotation() * expQuaternion(Eigen::Vector3d(1e-3, -1e-3, 1e-3))),
+                    Eigen::Vector3d::Zero());
+    const RansacResult result = rejectOutliers(pairs, guess, RansacOptions());
+    ASSERT_TRUE(result.ok);
+    EXPECT_EQ(result.with_depth, depth);
+    int right = 0, wrong = 0;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      right += good[i] && result.inlier[i];
+      wrong += !good[i] && result.inlier[i];
+    }
+    EXPECT_GE(right, 95);
+    EXPECT_LE(wrong, depth ? 0 : 8);
+    if (depth) EXPECT_LT((result.T_current_previous.t() - truth.t()).norm(), 2e-3);
+  }
+}
+
+TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
+  const cv::Mat texture = makeTexture();
+  DepthNoise noise;
+  FeatureTracker tracker(TrackingOptions(), camera(), noise, nullptr);
+  const auto poseAt = [](int k) { return SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.006 * k, 0.002 * k, 0)); };
+  std::map<LandmarkId, Eigen::Vector2d> first;
+  std::map<LandmarkId, int> born;
+  for (int k = 0; k < 40; ++k) {
+    const cv::Mat image = render(texture, poseAt(k).t(), 1.5, static_cast<unsigned>(k + 1));
+    const cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(2.0));
+    const SE3 motion = k == 0 ? SE3() : poseAt(k).inverse() * poseAt(k - 1);
+    const TrackingResult result = tracker.track(image, depth, motion, true, poseAt(k), k);
+    if (k > 0) EXPECT_GT(result.tracked, 150);
+    tracker.replenish(poseAt(k), true, k);
+    for (const Track& track : tracker.tracks()) {
+      if (first.count(track.feature.id)) continue;
+      first[track.feature.id] = track.feature.pixel.cast<double>();
+      born[track.feature.id] = k;
+    }
+  }
+  double sum = 0;
+  int old = 0;
+  for (const Track& track : tracker.tracks()) {
+    if (track.feature.age < 25) continue;
+    const Eigen::Vector3d moved = poseAt(born[track.feature.id]).t() - poseAt(39).t();
+    const Eigen::Vector2d expected = first[track.feature.id] + kFocal / 2.0 * moved.head<2>();
+    sum += (track.feature.pixel.cast<double>() - expected).squaredNorm();
+    EXPECT_NEAR(track.feature.depth, 2.0, 1e-3);
+    ++old;
+  }
+  ASSERT_GT(old, 60);
+  EXPECT_LT(std::sqrt(sum / old), 0.12);  // px, after 25 images and more
+}
+
+TEST(OrbExtractor, DescriptorsSurviveARotationAndTellPointsApart) {
+  const cv::Mat image = render(makeTexture(), Eigen::Vector3d::Zero(), 1.0, 1);
+  cv::Mat turned;
+  const cv::Mat M = cv::getRotationMatrix2D(cv::Point2f(319.5f, 239.5f), 30, 1.0);
+  cv::warpAffine(image, turned, M, image.size(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
+  std::vector<Feature> a, b;
+  for (const Corner& corner : detectCorners(image, {}, 80, TrackingOptions())) {
+    const double x = corner.pixel.x, y = corner.pixel.y;
+    const Eigen::Vector2f p(
+        static_cast<float>(M.at<double>(0, 0) * x + M.at<double>(0, 1) * y + M.at<double>(0, 2)),
+        static_cast<float>(M.at<double>(1, 0) * x + M.at<double>(1, 1) * y + M.at<double>(1, 2)));
+    if (p.x() < 30 || p.y() < 30 || p.x() > 610 || p.y() > 450) continue;
+    Feature f;
+    f.pixel = Eigen::Vector2f(corner.pixel.x, corner.pixel.y);
+    a.push_back(f);
+    f.pixel = p;
+    b.push_back(f);
+  }
+  const OrbExtractor orb(300);
+  orb.describe(image, &a);
+  orb.describe(turned, &b);
+  ASSERT_GT(a.size(), 40u);
+  int matched = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t best = 0;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      if (hammingDistance(a[i].descriptor, b[j].descriptor) < hammingDistance(a[i].descriptor, b[best].descriptor)) {
+        best = j;
+      }
+    }
+    matched += best == i;
+  }
+  EXPECT_GT(matched, static_cast<int>(0.8 * a.size()));
+  const std::vector<Feature> corners = orb.extract(image, {cv::Point2f(300, 200)}, 50);
+  EXPECT_GT(corners.size(), 150u);
+  for (const Feature& f : corners) {
+    EXPECT_EQ(f.id, kNoLandmark);
+    EXPECT_GE((f.pixel - Eigen::Vector2f(300, 200)).norm(), 50);
+  }
+}
+
+}  // namespace
+}  // namespace vip_slam
