@@ -106,7 +106,7 @@ bool FrontEnd::Impl::decideStillness(double t_imu) {
     return static_cast<double>(moved[moved.size() / 2]);
   };
   StillnessCues cues;
-  cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), t_imu - options.window), t_imu));
+  cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), t_imu - options.window), t_imu), &sensor_.imu_noise);
   cues.tracks = static_cast<int>(now.size());
   cues.speed = filter_.nav().v_W.norm();
   while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options.window - 1e-6) {

@@ -21,7 +21,8 @@ TEST(Consistency, NeesInsideTheBandOverTwentySeeds) {
     drift += run.final_position / run.length / kSeeds;
   }
   // Average of 20 independent six-dimensional chi-squares, 95 % two-sided.
-  const double low = chiSquareQuantile(0.025, 6 * kSeeds) / kSeeds, high = chiSquareQuantile(0.975, 6 * kSeeds) / kSeeds;
+  const double low = chiSquareQuantile(0.025, 6 * kSeeds) / kSeeds;
+  const double high = chiSquareQuantile(0.975, 6 * kSeeds) / kSeeds;
   std::printf("NEES %.2f, band %.2f to %.2f; NIS per row %.3f; drift %.3f %%\n", nees, low, high, nis, 100 * drift);
   EXPECT_GT(nees, low);
   EXPECT_LT(nees, high);

@@ -12,7 +12,11 @@ constexpr int kMostRepeats = 8;
 
 }  // namespace
 
-ImuSpread imuSpread(const std::vector<ImuSample>& samples) {
+bool ImuSpread::quiet(double max_gyro_std, double max_accel_std) const {
+  return gyro_std < std::max(max_gyro_std, 1.4 * gyro_floor) && accel_std < std::max(max_accel_std, 1.4 * accel_floor);
+}
+
+ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise) {
   ImuSpread spread;
   spread.count = samples.size();
   if (samples.empty()) return spread;
@@ -29,12 +33,17 @@ ImuSpread imuSpread(const std::vector<ImuSample>& samples) {
   }
   spread.gyro_std = std::sqrt(gyro / samples.size());
   spread.accel_std = std::sqrt(accel / samples.size());
+  const double seconds = samples.back().t - samples.front().t;
+  if (noise && seconds > 0) {
+    const double root = std::sqrt(3.0 * static_cast<double>(samples.size() - 1) / seconds);  // three axes
+    spread.gyro_floor = noise->gyro_noise_density * root;
+    spread.accel_floor = noise->accel_noise_density * root;
+  }
   return spread;
 }
 
 bool StillnessDetector::update(const StillnessCues& cues) {
-  const bool quiet = cues.imu.count >= 5 && cues.imu.gyro_std < options_.max_gyro_std &&
-                     cues.imu.accel_std < options_.max_accel_std;
+  const bool quiet = cues.imu.count >= 5 && cues.imu.quiet(options_.max_gyro_std, options_.max_accel_std);
   const bool image_known = cues.disparity_px >= 0 && cues.tracks > options_.min_tracks;
   bool wants = options_.enabled && quiet && cues.speed < options_.max_speed;
   if (still_) {

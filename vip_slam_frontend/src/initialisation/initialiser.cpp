@@ -75,13 +75,13 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     return std::nullopt;
   }
   const std::vector<ImuSample> samples = imu.between(from, now);
-  const ImuSpread spread = imuSpread(samples);
+  const ImuSpread spread = imuSpread(samples, &noise_);
   if (samples.size() < 10) {
     reason_ = "too few IMU samples";
     return std::nullopt;
   }
-  if (spread.gyro_std > options_.max_gyro_std || spread.accel_std > options_.max_accel_std ||
-      spread.mean_gyro.norm() > 0.3 || std::abs(spread.mean_accel.norm() - gravity_) > 1.5) {
+  if (!spread.quiet(options_.max_gyro_std, options_.max_accel_std) || spread.mean_gyro.norm() > 0.3 ||
+      std::abs(spread.mean_accel.norm() - gravity_) > 1.5) {
     reason_ = "moving: gathering images for a start in motion";
     return std::nullopt;
   }

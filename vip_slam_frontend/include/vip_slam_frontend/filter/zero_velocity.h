@@ -14,9 +14,14 @@ namespace vip_slam {
 struct ImuSpread {
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
   double gyro_std = 0, accel_std = 0;  ///< norm of the per-axis standard deviations
+  double gyro_floor = 0, accel_floor = 0;  ///< what sensor noise alone would give, 0 when unknown
   std::size_t count = 0;
+
+  /// Deviations no larger than the limits, or than sensor noise explains.
+  bool quiet(double max_gyro_std, double max_accel_std) const;
 };
-ImuSpread imuSpread(const std::vector<ImuSample>& samples);
+/// `noise` may be null: then the floors stay 0.
+ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise = nullptr);
 
 /// What one image says about motion.
 struct StillnessCues {
