@@ -1,0 +1,64 @@
+// Whole-filter runs on the landmark simulation: outliers, noise adaptation, standing still, calibration.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "landmark_simulation.h"
+
+namespace vip_slam::testing {
+namespace {
+
+TEST(FilterRuns, OutliersAreGatedAway) {
+  SimulationOptions simulation;
+  simulation.seed = 5;
+  simulation.outlier_ratio = 0.01;
+  const RunResult run = runFilter(simulation, FilterOptions(), 15.0, false);
+  EXPECT_GT(run.gated, 50);
+  EXPECT_LT(run.final_position / run.length, 0.006);
+}
+
+TEST(FilterRuns, PixelNoiseIsLearnt) {
+  SimulationOptions simulation;
+  simulation.seed = 3;
+  simulation.sigma_px = 1.0;
+  FilterOptions options;
+  options.sigma_px = 0.4;
+  const RunResult run = runFilter(simulation, options, 15.0, false);
+  EXPECT_NEAR(run.nis_per_dof, 1.0, 0.25);
+}
+
+TEST(StandingStill, FiveMinutesWithoutDrift) {
+  SimulationOptions simulation;
+  simulation.seed = 2;
+  simulation.speed = 0;
+  simulation.image_rate = 15;
+  const RunResult run = runFilter(simulation, FilterOptions(), 300.0, true);
+  std::printf("five minutes: %.2f mm, %.3f deg\n", 1e3 * run.final_position, run.final_rotation * 180 / M_PI);
+  EXPECT_LT(run.final_position, 0.005);
+  EXPECT_LT(run.final_rotation * 180 / M_PI, 0.2 + 0.01 * 180 / M_PI * 3);
+  EXPECT_LE(run.window.clones.size(), 3u);
+}
+
+TEST(Calibration, FindsExtrinsicsAndDelay) {
+  SimulationOptions simulation;
+  simulation.seed = 4;
+  simulation.speed = 1.5;
+  simulation.time_offset = 0.008;
+  FilterOptions options;
+  options.calibration.rotation = options.calibration.translation = options.calibration.time_offset = true;
+  options.calibration.sigma_rotation = 0.02;
+  options.calibration.sigma_translation = 0.03;
+  options.calibration.sigma_time_offset = 0.01;
+  const SE3 wrong(expSO3(Eigen::Vector3d(0.012, -0.01, 0.015)), Eigen::Vector3d(0.015, -0.01, 0.02));
+  const RunResult run = runFilter(simulation, options, 40.0, false, wrong, 0.0);
+  const LandmarkSimulation truth(simulation);
+  const Vector6d error = run.window.T_I_C.boxminus(truth.T_I_C());
+  std::printf("extrinsics off by %.2f mrad, %.1f mm; delay by %.2f ms\n", 1e3 * error.head<3>().norm(),
+              1e3 * error.tail<3>().norm(), 1e3 * std::abs(run.window.time_offset - 0.008));
+  EXPECT_LT(error.head<3>().norm(), 0.003);
+  EXPECT_LT(error.tail<3>().norm(), 0.015);
+  EXPECT_NEAR(run.window.time_offset, 0.008, 0.001);
+}
+
+}  // namespace
+}  // namespace vip_slam::testing
