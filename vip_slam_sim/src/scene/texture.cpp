@@ -8,10 +8,16 @@
 
 #include <opencv2/imgproc.hpp>
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 namespace vip_slam {
 namespace {
 
+#ifndef __SSE2__
 using U16x4 = std::uint16_t __attribute__((vector_size(8)));
+#endif
 
 constexpr float kFromTexel = 1.f / 65535.f;
 constexpr int kMaxProbes = 8;
@@ -19,9 +25,15 @@ constexpr int kMaxProbes = 8;
 bool powerOfTwo(int v) { return v > 0 && (v & (v - 1)) == 0; }
 
 inline Vec4 load(const std::uint16_t* p) {
+#ifdef __SSE2__
+  // Compilers convert 16-bit lanes one by one here; two instructions do.
+  const __m128i raw = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(p));
+  return _mm_cvtepi32_ps(_mm_unpacklo_epi16(raw, _mm_setzero_si128()));
+#else
   U16x4 raw;
   std::memcpy(&raw, p, sizeof raw);
   return __builtin_convertvector(raw, Vec4);
+#endif
 }
 
 /// log2 to about 0.01: enough to choose a mip level.
@@ -60,7 +72,9 @@ Texture::Texture(const cv::Mat& image, bool repeat) : repeat_(repeat) {
 }
 
 void Texture::addLevel(const cv::Mat& image) {
-  levels_.push_back({image.cols, image.rows, texels_.size()});
+  const float w0 = levels_.empty() ? 1.f : static_cast<float>(image.cols) / static_cast<float>(width());
+  const float h0 = levels_.empty() ? 1.f : static_cast<float>(image.rows) / static_cast<float>(height());
+  levels_.push_back({image.cols, image.rows, w0, h0, texels_.size()});
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x) {
       const cv::Vec3f c = image.at<cv::Vec3f>(y, x);
@@ -70,13 +84,14 @@ void Texture::addLevel(const cv::Mat& image) {
     }
 }
 
+template <bool kRepeat>
 inline Vec4 Texture::bilinear(const Level& level, float s, float t) const {
-  s -= 0.5f;
-  t -= 0.5f;
+  s = s * level.scale_s - 0.5f;
+  t = t * level.scale_t - 0.5f;
   int x0 = floorInt(s), y0 = floorInt(t);
   const float fx = s - static_cast<float>(x0), fy = t - static_cast<float>(y0);
   int x1 = x0 + 1, y1 = y0 + 1;
-  if (repeat_) {
+  if (kRepeat) {
     x0 &= level.width - 1;
     x1 &= level.width - 1;
     y0 &= level.height - 1;
@@ -88,11 +103,32 @@ inline Vec4 Texture::bilinear(const Level& level, float s, float t) const {
     y1 = std::clamp(y1, 0, level.height - 1);
   }
   const std::uint16_t* base = texels_.data() + level.offset;
-  const std::uint16_t* row0 = base + static_cast<std::size_t>(y0) * level.width * 4;
-  const std::uint16_t* row1 = base + static_cast<std::size_t>(y1) * level.width * 4;
+  const std::uint16_t* row0 = base + static_cast<std::ptrdiff_t>(y0) * level.width * 4;
+  const std::uint16_t* row1 = base + static_cast<std::ptrdiff_t>(y1) * level.width * 4;
   const Vec4 a = load(row0 + x0 * 4), b = load(row0 + x1 * 4), c = load(row1 + x0 * 4), d = load(row1 + x1 * 4);
   const Vec4 top = a + (b - a) * splat(fx), bottom = c + (d - c) * splat(fx);
-  return (top + (bottom - top) * splat(fy)) * splat(kFromTexel);
+  return top + (bottom - top) * splat(fy);
+}
+
+/// Mean of `probes` look-ups along (ds, dt), between levels a and b.
+template <bool kRepeat>
+inline Vec4 Texture::probe(const Level& a, const Level& b, float f, float s, float t, float ds, float dt,
+                           int probes) const {
+  const float step = 1.f / static_cast<float>(probes);
+  const bool only_a = f < 0.08f, only_b = f > 0.92f;
+  Vec4 sum = splat(0.f);
+  float o = 0.5f * step - 0.5f;
+  for (int k = 0; k < probes; ++k, o += step) {
+    const float ps = s + o * ds, pt = t + o * dt;
+    if (only_b) {
+      sum += bilinear<kRepeat>(b, ps, pt);
+    } else {
+      Vec4 c = bilinear<kRepeat>(a, ps, pt);
+      if (!only_a) c += (bilinear<kRepeat>(b, ps, pt) - c) * splat(f);
+      sum += c;
+    }
+  }
+  return sum * splat(step * kFromTexel);
 }
 
 Vec4 Texture::sample(float s, float t, float dsdx, float dtdx, float dsdy, float dtdy) const {
@@ -103,26 +139,18 @@ Vec4 Texture::sample(float s, float t, float dsdx, float dtdx, float dsdy, float
     major_s = dsdy;
     major_t = dtdy;
   }
-  const float major = std::sqrt(major2), minor = std::max(std::sqrt(minor2), major * (1.f / kMaxProbes));
-  const int probes = major <= 1.f ? 1 : std::clamp(static_cast<int>(major / minor + 0.5f), 1, kMaxProbes);
-  const float lod = minor <= 1.f ? 0.f : fastLog2(minor);
+  minor2 = std::max(minor2, major2 * (1.f / (kMaxProbes * kMaxProbes)));
+  int probes = 1;
+  if (major2 > 1.f && major2 > 2.25f * minor2) {
+    const float ratio = std::sqrt(major2 / std::max(minor2, 1.f));
+    probes = std::min(static_cast<int>(ratio + 0.5f), kMaxProbes);
+  }
+  const float lod = minor2 <= 1.f ? 0.f : 0.5f * fastLog2(minor2);
   const int last = static_cast<int>(levels_.size()) - 1;
   const int l0 = std::min(static_cast<int>(lod), last), l1 = std::min(l0 + 1, last);
   const float f = std::min(lod - static_cast<float>(l0), 1.f);
-  const Level& a = levels_[l0];
-  const Level& b = levels_[l1];
-  const float ax = static_cast<float>(a.width) / width(), ay = static_cast<float>(a.height) / height();
-  const float bx = static_cast<float>(b.width) / width(), by = static_cast<float>(b.height) / height();
-  Vec4 sum = splat(0.f);
-  const float step = 1.f / static_cast<float>(probes);
-  for (int k = 0; k < probes; ++k) {
-    const float o = (static_cast<float>(k) + 0.5f) * step - 0.5f;
-    const float ps = s + o * major_s, pt = t + o * major_t;
-    Vec4 c = bilinear(a, ps * ax, pt * ay);
-    if (f > 0.02f && l1 != l0) c += (bilinear(b, ps * bx, pt * by) - c) * splat(f);
-    sum += c;
-  }
-  return sum * splat(step);
+  return repeat_ ? probe<true>(levels_[l0], levels_[l1], f, s, t, major_s, major_t, probes)
+                 : probe<false>(levels_[l0], levels_[l1], f, s, t, major_s, major_t, probes);
 }
 
 }  // namespace vip_slam

@@ -1,4 +1,6 @@
 // render_sequence NAME_OR_YAML --out DIR: a sequence with ground truth into a bag (or a folder).
+#include <malloc.h>
+
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -123,6 +125,9 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Image buffers come and go with every frame: keep their pages instead of asking the system anew.
+  mallopt(M_MMAP_THRESHOLD, 1 << 28);
+  mallopt(M_TRIM_THRESHOLD, 1 << 29);
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {

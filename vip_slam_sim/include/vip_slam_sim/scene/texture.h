@@ -22,15 +22,16 @@ class Texture {
 
   /// Filtered colour at texel coordinates (s right, t down), with the change of (s, t) per pixel step in x and y.
   Vec4 sample(float s, float t, float dsdx, float dtdx, float dsdy, float dtdy) const;
-  /// Mean colour.
-  Vec4 mean() const { return bilinear(levels_.back(), 0, 0); }
-
  private:
   struct Level {
     int width, height;
+    float scale_s, scale_t;  ///< of finest-level texel coordinates
     std::size_t offset;
   };
+  template <bool kRepeat>
   Vec4 bilinear(const Level& level, float s, float t) const;
+  template <bool kRepeat>
+  Vec4 probe(const Level& a, const Level& b, float f, float s, float t, float ds, float dt, int probes) const;
   void addLevel(const cv::Mat& image);
 
   bool repeat_;
