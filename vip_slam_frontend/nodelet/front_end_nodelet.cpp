@@ -203,7 +203,7 @@ void FrontEndNodelet::onControl(const vip_slam_msgs::ControlConstPtr& msg) {
     if (command == Control::PAUSE) paused_ = true;
     const bool resumed = command == Control::RESUME && paused_;
     if (command == Control::RESUME) paused_ = false;
-    if (command == Control::RESET || resumed) {
+    if (command == Control::RESET || command == Control::RESET_ODOMETRY || resumed) {
       pairer_->clear();
       if (front_end_) front_end_->reset(resumed ? "resumed after a pause" : "reset by request");
     }

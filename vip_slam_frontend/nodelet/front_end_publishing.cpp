@@ -6,7 +6,7 @@
 
 #include "feature_image.h"
 #include "front_end_nodelet.h"
-#include "vip_slam_ros/camera_info.h"
+#include "vip_slam_ros/calibration.h"
 #include "vip_slam_ros/frame_conversions.h"
 #include "vip_slam_ros/geometry_conversions.h"
 
@@ -68,14 +68,8 @@ void FrontEndNodelet::publishImuRate(double t) {
 }
 
 void FrontEndNodelet::publishCalibration() {
-  auto msg = boost::make_shared<vip_slam_msgs::Calibration>();
-  msg->header.stamp = toStamp(newest_);
-  msg->header.frame_id = calibration_->colorFrame();
-  msg->camera = toCameraInfo(sensor_.camera);
-  msg->camera.header = msg->header;
-  msg->imu_camera = toPoseMsg(sensor_.T_imu_cam);
-  msg->base_imu = toPoseMsg(sensor_.T_base_imu);
-  calibration_pub_.publish(msg);
+  calibration_pub_.publish(boost::make_shared<vip_slam_msgs::Calibration>(
+      toCalibrationMsg(sensor_, newest_, calibration_->colorFrame())));
 }
 
 }  // namespace vip_slam

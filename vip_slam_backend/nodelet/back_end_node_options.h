@@ -1,0 +1,35 @@
+// Parameters of the back-end nodelet beside those of the estimator.
+#pragma once
+
+#include <string>
+
+#include "vip_slam_backend/back_end_options.h"
+#include "vip_slam_core/util/options.h"
+
+namespace vip_slam {
+
+struct BackEndNodeOptions {
+  BackEndOptions back_end;
+  std::string sensor;
+  std::string map_frame = "map";
+  std::string odom_frame = "odom";
+  std::string base_frame = "base_link";
+  std::string load_map;
+  bool localisation_mode = false;
+  bool publish_tf = true;
+  int keyframe_queue = 50;
+
+  void visit(OptionVisitor& v) {
+    v.field("sensor", sensor, {}, "a shipped sensor or the path of a sensor YAML file");
+    v.field("map_frame", map_frame, {}, "tf frame of the map");
+    v.field("odom_frame", odom_frame, {}, "tf frame of the odometry");
+    v.field("base_frame", base_frame, {}, "tf frame of the robot");
+    v.field("load_map", load_map, {}, "map file to start with; empty: a new map");
+    v.field("localisation_mode", localisation_mode, "use the map without changing it");
+    v.field("publish_tf", publish_tf, "publish map -> odom");
+    v.field("keyframe_queue", keyframe_queue, 2, 1000, "keyframes and plane updates that may wait");
+    back_end.visit(v);
+  }
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,240 @@
+#include "back_end_nodelet.h"
+
+#include <pluginlib/class_list_macros.hpp>
+#include <vip_slam_msgs/LoopEvent.h>
+#include <vip_slam_msgs/MapUpdate.h>
+
+#include "vip_slam_ros/calibration.h"
+#include "vip_slam_ros/frame_conversions.h"
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/map_conversions.h"
+#include "vip_slam_ros/parameters.h"
+#include "vip_slam_ros/plane_conversions.h"
+#include "vip_slam_ros/process_memory.h"
+#include "vip_slam_ros/sensor_files.h"
+
+namespace vip_slam {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+BackEndNodelet::~BackEndNodelet() {
+  timer_.stop();
+  for (auto& service : services_) service.shutdown();
+  for (auto& subscriber : subscribers_) subscriber.shutdown();
+  if (owner_) owner_->stop();
+  if (adjustment_.joinable()) adjustment_.join();
+}
+
+void BackEndNodelet::onInit() {
+  try {
+    loadOptionsFromParameters(options_, getPrivateNodeHandle());
+    sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
+  } catch (const std::exception& error) {
+    NODELET_FATAL("%s", error.what());
+    throw;
+  }
+  publish_tf_ = options_.publish_tf;
+  tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
+  owner_ = std::make_unique<OwnerThread>([this](const std::string& what) {
+    NODELET_ERROR("%s", what.c_str());
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    problem_ = what;
+  });
+  keyframe_lane_ = owner_->addLane("keyframes", std::size_t(options_.keyframe_queue));
+  update_lane_ = owner_->addLane("plane updates", std::size_t(options_.keyframe_queue));
+  control_lane_ = owner_->addLane("control", 100);
+  advertise();
+  owner_->start();
+  advertiseServices();
+  subscribe();
+  timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0),
+                                             [this](const ros::WallTimerEvent&) { diagnostics_->force_update(); });
+}
+
+void BackEndNodelet::advertise() {
+  ros::NodeHandle& nh = getNodeHandle();
+  map_update_pub_ = nh.advertise<vip_slam_msgs::MapUpdate>("map_update", 20);
+  control_pub_ = nh.advertise<vip_slam_msgs::Control>("control", 10);
+  pose_pub_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", 50);
+  path_pub_ = nh.advertise<nav_msgs::Path>("path", 1, true);
+  markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("map_markers", 1, true);
+  landmarks_pub_ = nh.advertise<sensor_msgs::PointCloud2>("landmarks", 1, true);
+  loop_pub_ = nh.advertise<vip_slam_msgs::LoopEvent>("loop_event", 20);
+  statistics_pub_ = nh.advertise<vip_slam_msgs::BackEndStatistics>("back_end_statistics", 5, true);
+
+  diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
+  diagnostics_->setHardwareID(sensor_.name);
+  diagnostics_->add("map", this, &BackEndNodelet::report);
+  getPrivateNodeHandle().setParam("localisation_mode", options_.localisation_mode);
+  reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>>(getPrivateNodeHandle());
+  reconfigure_->setCallback(
+      [this](vip_slam_backend::BackEndConfig& config, std::uint32_t) { onReconfigure(config); });
+}
+
+void BackEndNodelet::subscribe() {
+  ros::NodeHandle& nh = getNodeHandle();
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Calibration>(
+      "calibration", 1, [this](const vip_slam_msgs::CalibrationConstPtr& m) {
+        owner_->post(control_lane_, [this, m] { start(*m); });
+      }));
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Keyframe>(
+      "keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
+        if (!owner_->post(keyframe_lane_, [this, m] { addKeyframe(*m); })) {
+          NODELET_WARN_THROTTLE(5, "the back end is too slow: a keyframe was dropped");
+        }
+      }));
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::PlaneUpdate>(
+      "plane_update", 50, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
+        owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); });
+      }));
+  subscribers_.push_back(getMTNodeHandle().subscribe<vip_slam_msgs::TrackedFrame>(
+      "tracked_frame", 50, [this](const vip_slam_msgs::TrackedFrameConstPtr& m) { onFrame(*m); }));
+}
+
+void BackEndNodelet::onReconfigure(vip_slam_backend::BackEndConfig& config) {
+  display_rate_ = config.display_rate;
+  options_.localisation_mode = config.localisation_mode;
+  owner_->post(control_lane_, [this, on = config.localisation_mode] {
+    if (back_end_) setLocalisation(on);
+  });
+}
+
+void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
+  const auto state = TrackingState(frame.status.state);
+  if (state != TrackingState::kTracking && state != TrackingState::kDegraded) return;
+  const double t = frame.header.stamp.toSec();
+  const SE3 T_odom_I = fromMsg(frame.state.pose);
+  const std::optional<SE3> T_map_odom = pose_.add(t, frame.epoch, T_odom_I);
+  if (!T_map_odom) return;
+  if (publish_tf_) {
+    geometry_msgs::TransformStamped transform;
+    transform.header.stamp = frame.header.stamp;
+    transform.header.frame_id = options_.map_frame;
+    transform.child_frame_id = options_.odom_frame;
+    transform.transform = toTransformMsg(*T_map_odom);
+    tf_broadcaster_->sendTransform(transform);
+  }
+  const Matrix15d covariance =
+      Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(frame.covariance.data());
+  pose_pub_.publish(boost::make_shared<geometry_msgs::PoseWithCovarianceStamped>(
+      pose_.message(t, *T_map_odom, T_odom_I, covariance, options_.map_frame)));
+}
+
+void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {
+  if (back_end_) return;  // the front end restarted; the calibration is the same sensor's
+  applyCalibration(calibration, &sensor_);
+  back_end_ = std::make_unique<BackEnd>(options_.back_end, sensor_);
+  pose_.setBase(sensor_.T_base_imu);
+  display_.setBase(sensor_.T_base_imu);
+  if (!options_.load_map.empty()) NODELET_INFO("%s", loadMap(options_.load_map).c_str());
+  if (options_.localisation_mode) setLocalisation(true);
+}
+
+void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
+  if (!back_end_ || msg.frame.header.stamp.toSec() < ignore_before_) return;
+  const auto keyframe = std::make_shared<const Keyframe>(fromMsg(msg));
+  display_.addKeyframe(*keyframe);
+  const ros::WallTime begin = ros::WallTime::now();
+  const MapUpdate update = back_end_->addKeyframe(keyframe);
+  const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown_.local_ms = milliseconds;
+    problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
+  }
+  distribute(update);
+  startGlobalBa();
+}
+
+void BackEndNodelet::applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg) {
+  if (back_end_) back_end_->applyPlaneUpdate(fromMsg(msg));
+}
+
+void BackEndNodelet::startGlobalBa() {
+  if (adjusting_ || !back_end_ || !back_end_->globalBaWanted()) return;
+  if (adjustment_.joinable()) adjustment_.join();
+  adjusting_ = true;
+  adjustment_ = std::thread([this, job = back_end_->startGlobalBa()] {
+    const ros::WallTime begin = ros::WallTime::now();
+    const GbaResult result = back_end_->run(job);
+    const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
+    owner_->post(control_lane_, [this, result, milliseconds] {
+      adjusting_ = false;
+      distribute(back_end_->merge(result));
+      std::lock_guard<std::mutex> lock(shown_mutex_);
+      shown_.global_ms = milliseconds;
+      ++shown_.global_adjustments;
+    });
+  });
+}
+
+void BackEndNodelet::distribute(const MapUpdate& update) {
+  pose_.apply(update);
+  display_.apply(update);
+  map_update_pub_.publish(boost::make_shared<vip_slam_msgs::MapUpdate>(toMsg(update, options_.map_frame)));
+  for (const LoopEvent& loop : update.loops) loop_pub_.publish(boost::make_shared<vip_slam_msgs::LoopEvent>(toMsg(loop)));
+  publishDisplay(update.t, update.global);
+
+  auto statistics = boost::make_shared<vip_slam_msgs::BackEndStatistics>();
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown_.header.stamp = toStamp(update.t);
+    shown_.revision = update.revision;
+    shown_.keyframes = std::uint32_t(display_.keyframeCount());
+    shown_.landmarks = std::uint32_t(display_.landmarkCount());
+    shown_.plane_landmarks = std::uint32_t(display_.planeLandmarkCount());
+    shown_.planes = std::uint32_t(display_.planeCount());
+    for (const LoopEvent& loop : update.loops) ++(loop.accepted ? shown_.loops_accepted : shown_.loops_rejected);
+    shown_.keyframes_dropped = owner_->lanes()[keyframe_lane_].dropped;
+    *statistics = shown_;
+  }
+  statistics_pub_.publish(statistics);
+}
+
+void BackEndNodelet::publishDisplay(double t, bool now) {
+  if (!now && t > last_display_ && t - last_display_ < 1.0 / display_rate_) return;
+  last_display_ = t;
+  std_msgs::Header header;
+  header.stamp = toStamp(t);
+  header.frame_id = options_.map_frame;
+  path_pub_.publish(boost::make_shared<nav_msgs::Path>(display_.path(header)));
+  if (markers_pub_.getNumSubscribers() > 0) {
+    markers_pub_.publish(boost::make_shared<visualization_msgs::MarkerArray>(display_.markers(header)));
+  }
+  if (landmarks_pub_.getNumSubscribers() > 0) {
+    landmarks_pub_.publish(boost::make_shared<sensor_msgs::PointCloud2>(display_.landmarks(header)));
+  }
+}
+
+void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  std::size_t dropped = 0;
+  for (const auto& lane : owner_->lanes()) {
+    status.add(lane.name + " waiting", lane.waiting);
+    status.add(lane.name + " dropped", lane.dropped);
+    dropped += lane.dropped;
+  }
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  if (!problem_.empty()) {
+    status.summary(DiagnosticStatus::WARN, problem_);
+  } else if (dropped > 0) {
+    status.summary(DiagnosticStatus::WARN, std::to_string(dropped) + " messages dropped: the back end is too slow");
+  } else {
+    status.summary(DiagnosticStatus::OK, std::to_string(shown_.keyframes) + " keyframes, " +
+                                             std::to_string(shown_.landmarks) + " landmarks");
+  }
+  status.add("keyframes", shown_.keyframes);
+  status.add("landmarks", shown_.landmarks);
+  status.add("landmarks on planes", shown_.plane_landmarks);
+  status.add("planes", shown_.planes);
+  status.add("loops accepted", shown_.loops_accepted);
+  status.add("loops rejected", shown_.loops_rejected);
+  status.add("last keyframe (ms)", shown_.local_ms);
+  status.add("last global adjustment (ms)", shown_.global_ms);
+  status.add("global adjustments", shown_.global_adjustments);
+  status.add("localisation mode", shown_.localisation_mode ? "on" : "off");
+  status.add("memory (MB)", processMemoryMb());
+}
+
+}  // namespace vip_slam
+
+PLUGINLIB_EXPORT_CLASS(vip_slam::BackEndNodelet, nodelet::Nodelet)

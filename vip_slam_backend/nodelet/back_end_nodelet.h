@@ -1,0 +1,98 @@
+// The back end as a nodelet: keyframes and plane updates in; map updates, map->odom, paths, markers and services out. One
+// thread owns the map; a global bundle adjustment runs in a thread of its own and its result is merged by the owner.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <dynamic_reconfigure/server.h>
+#include <nodelet/nodelet.h>
+#include <ros/ros.h>
+#include <tf2_ros/transform_broadcaster.h>
+#include <vip_slam_msgs/BackEndStatistics.h>
+#include <vip_slam_msgs/Calibration.h>
+#include <vip_slam_msgs/Control.h>
+#include <vip_slam_msgs/Keyframe.h>
+#include <vip_slam_msgs/PlaneUpdate.h>
+#include <vip_slam_msgs/TrackedFrame.h>
+
+#include "back_end_node_options.h"
+#include "map_display.h"
+#include "pose_in_map.h"
+#include "vip_slam_backend/BackEndConfig.h"
+#include "vip_slam_backend/back_end.h"
+#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_ros/owner_thread.h"
+
+namespace vip_slam {
+
+class BackEndNodelet : public nodelet::Nodelet {
+ public:
+  ~BackEndNodelet() override;
+
+ private:
+  void onInit() override;
+  void advertise();
+  void advertiseServices();
+  void subscribe();
+  void onReconfigure(vip_slam_backend::BackEndConfig& config);
+  void onFrame(const vip_slam_msgs::TrackedFrame& frame);  ///< not in the owner thread: at image rate
+
+  // In the owner thread.
+  void start(const vip_slam_msgs::Calibration& calibration);
+  void addKeyframe(const vip_slam_msgs::Keyframe& msg);
+  void applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg);
+  void startGlobalBa();
+  void distribute(const MapUpdate& update);
+  void publishDisplay(double t, bool now);
+  void command(std::uint8_t command);
+
+  /// Runs `work` in the owner thread; fills a service's response with its words or those of its exception.
+  template <class Response>
+  bool serve(Response& response, const std::function<std::string()>& work);
+  std::string reset(bool keep_map);
+  std::string loadMap(const std::string& path);
+  std::string saveMap(const std::string& path);
+  std::string saveTrajectory(const std::string& path);
+  std::string setLocalisation(bool on);
+  BackEnd& backEnd();  ///< throws while there is none
+
+  void report(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  BackEndNodeOptions options_;
+  SensorConfig sensor_;
+  PoseInMap pose_;
+
+  // Owned by the thread.
+  std::unique_ptr<BackEnd> back_end_;
+  MapDisplay display_;
+  double last_display_ = -1e300;
+  double ignore_before_ = -1e300;  ///< stamp of the last reset
+  bool adjusting_ = false;  ///< a global adjustment is under way
+  std::thread adjustment_;
+
+  mutable std::mutex shown_mutex_;
+  vip_slam_msgs::BackEndStatistics shown_;
+  std::string problem_;
+
+  std::atomic<double> display_rate_{2.0};
+  std::atomic<bool> publish_tf_{true};
+  OwnerThread::Lane keyframe_lane_ = 0, update_lane_ = 0, control_lane_ = 0;
+  std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
+  ros::Publisher map_update_pub_, control_pub_, pose_pub_, path_pub_, markers_pub_, landmarks_pub_, loop_pub_,
+      statistics_pub_;
+  std::vector<ros::Subscriber> subscribers_;
+  std::vector<ros::ServiceServer> services_;
+  std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  std::unique_ptr<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>> reconfigure_;
+  ros::WallTimer timer_;
+  std::unique_ptr<OwnerThread> owner_;  ///< last: stops before anything it uses goes
+};
+
+}  // namespace vip_slam

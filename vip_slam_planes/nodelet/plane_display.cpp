@@ -1,0 +1,111 @@
+#include "plane_display.h"
+
+#include "vip_slam_core/geometry/polygon_triangulation.h"
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/markers.h"
+#include "vip_slam_ros/point_cloud.h"
+
+namespace vip_slam {
+namespace {
+
+std_msgs::ColorRGBA colorOf(const PlaneEstimate& plane, double alpha) {
+  return plane.kind == PlaneKind::kHorizontal ? makeColor(0.62, 0.62, 0.65, alpha) : colorOfId(plane.id, alpha);
+}
+
+void addRing(const Ring& ring, visualization_msgs::Marker* lines) {
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    lines->points.push_back(toPointMsg(ring[i]));
+    lines->points.push_back(toPointMsg(ring[(i + 1) % ring.size()]));
+  }
+}
+
+}  // namespace
+
+visualization_msgs::MarkerArray PlaneDisplay::markers(const std::vector<PlaneEstimate>& planes,
+                                                      const std_msgs::Header& header, double opacity) {
+  using visualization_msgs::Marker;
+  visualization_msgs::MarkerArray array;
+  std::set<PlaneId> now;
+  for (const PlaneEstimate& plane : planes) {
+    Marker fill = makeMarker(header, "planes", int(plane.id), Marker::TRIANGLE_LIST);
+    fill.color = colorOf(plane, opacity);
+    Marker lines = makeMarker(header, "outlines", int(plane.id), Marker::LINE_LIST);
+    lines.color = colorOf(plane, 1.0);
+    lines.scale.x = 0.02;
+    for (const PlanePolygon& polygon : plane.polygons) {
+      for (const Triangle& triangle : triangulate(polygon, plane.plane)) {
+        for (const auto& corner : triangle) fill.points.push_back(toPointMsg(corner));
+      }
+      addRing(polygon.outer, &lines);
+      for (const Ring& hole : polygon.holes) addRing(hole, &lines);
+    }
+    if (fill.points.empty()) continue;  // rviz warns about empty lists
+    now.insert(plane.id);
+    array.markers.push_back(std::move(fill));
+    array.markers.push_back(std::move(lines));
+  }
+  for (const PlaneId id : shown_) {
+    if (now.count(id) > 0) continue;
+    array.markers.push_back(makeDeletion(header, "planes", int(id)));
+    array.markers.push_back(makeDeletion(header, "outlines", int(id)));
+  }
+  shown_ = std::move(now);
+  return array;
+}
+
+void PlaneDisplay::apply(const MapUpdate& update) {
+  for (const auto& keyframe : update.keyframes) keyframes_[keyframe.id] = keyframe.state.T_W_I;
+  for (const KeyframeId id : update.removed_keyframes) {
+    keyframes_.erase(id);
+    for (auto& [plane, observations] : points_) observations.erase(id);
+  }
+}
+
+void PlaneDisplay::apply(const PlaneUpdate& update) {
+  for (const PlaneMerge& merge : update.merges) {
+    auto node = points_.extract(merge.from);
+    if (node.empty()) continue;
+    for (auto& [keyframe, points] : node.mapped()) {
+      auto& into = points_[merge.into][keyframe];
+      into.insert(into.end(), points.begin(), points.end());
+    }
+  }
+  for (const PlaneId id : update.removed) points_.erase(id);
+  for (const PlaneObservation& observation : update.observations) {
+    auto& points = points_[observation.plane][observation.keyframe];
+    points.clear();
+    for (const PlanePoint& point : observation.points) points.push_back(point.p_C);
+  }
+}
+
+sensor_msgs::PointCloud2 PlaneDisplay::cloud(const std_msgs::Header& header) const {
+  std::vector<ColoredPoint> all;
+  all.reserve(points());
+  for (const auto& [plane, observations] : points_) {
+    const std_msgs::ColorRGBA color = colorOfId(plane);
+    for (const auto& [keyframe, points] : observations) {
+      const auto pose = keyframes_.find(keyframe);
+      if (pose == keyframes_.end()) continue;
+      const SE3 T_map_cam = pose->second * T_imu_cam_;
+      const Eigen::Matrix3f R = T_map_cam.R().cast<float>();
+      const Eigen::Vector3f t = T_map_cam.t().cast<float>();
+      for (const auto& p : points) all.push_back({R * p + t, color});
+    }
+  }
+  return toPointCloud(all, header);
+}
+
+std::size_t PlaneDisplay::points() const {
+  std::size_t count = 0;
+  for (const auto& [plane, observations] : points_) {
+    for (const auto& [keyframe, points] : observations) count += points.size();
+  }
+  return count;
+}
+
+void PlaneDisplay::clear() {
+  keyframes_.clear();
+  points_.clear();
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,42 @@
+// Planes as rviz shows them.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "vip_slam_core/types/map_update.h"
+#include "vip_slam_core/types/plane_map.h"
+
+namespace vip_slam {
+
+class PlaneDisplay {
+ public:
+  /// Translucent polygons with outlines: grey when horizontal, else one colour a plane. Planes shown before that are gone
+  /// are deleted.
+  visualization_msgs::MarkerArray markers(const std::vector<PlaneEstimate>& planes, const std_msgs::Header& header,
+                                          double opacity);
+
+  /// Remembers what the depth points on planes need to be drawn.
+  void apply(const MapUpdate& update);
+  void apply(const PlaneUpdate& update);
+  void setCamera(const SE3& T_imu_cam) { T_imu_cam_ = T_imu_cam; }
+  /// The depth points on planes, coloured by plane.
+  sensor_msgs::PointCloud2 cloud(const std_msgs::Header& header) const;
+  std::size_t points() const;
+  void clear();
+
+ private:
+  SE3 T_imu_cam_;
+  std::set<PlaneId> shown_;
+  std::map<KeyframeId, SE3> keyframes_;  ///< T_map_I
+  std::map<PlaneId, std::map<KeyframeId, std::vector<Eigen::Vector3f>>> points_;
+};
+
+}  // namespace vip_slam

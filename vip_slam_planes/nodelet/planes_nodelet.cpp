@@ -1,0 +1,177 @@
+#include "planes_nodelet.h"
+
+#include <pluginlib/class_list_macros.hpp>
+#include <vip_slam_msgs/PlaneMap.h>
+#include <vip_slam_msgs/PlaneUpdate.h>
+
+#include "vip_slam_ros/calibration.h"
+#include "vip_slam_ros/frame_conversions.h"
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/map_conversions.h"
+#include "vip_slam_ros/parameters.h"
+#include "vip_slam_ros/plane_conversions.h"
+#include "vip_slam_ros/sensor_files.h"
+
+namespace vip_slam {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+PlanesNodelet::~PlanesNodelet() {
+  timer_.stop();
+  for (auto& subscriber : subscribers_) subscriber.shutdown();
+  if (owner_) owner_->stop();
+}
+
+void PlanesNodelet::onInit() {
+  try {
+    loadOptionsFromParameters(options_, getPrivateNodeHandle());
+    sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
+  } catch (const std::exception& error) {
+    NODELET_FATAL("%s", error.what());
+    throw;
+  }
+  owner_ = std::make_unique<OwnerThread>([this](const std::string& what) { NODELET_ERROR("%s", what.c_str()); });
+  frame_lane_ = owner_->addLane("tracked frames", 5);  // growth may skip images
+  keyframe_lane_ = owner_->addLane("keyframes", std::size_t(options_.keyframe_queue));
+  update_lane_ = owner_->addLane("map updates", std::size_t(options_.keyframe_queue));
+  control_lane_ = owner_->addLane("control", 100);
+
+  ros::NodeHandle& nh = getNodeHandle();
+  update_pub_ = nh.advertise<vip_slam_msgs::PlaneUpdate>("plane_update", 20);
+  map_pub_ = nh.advertise<vip_slam_msgs::PlaneMap>("plane_map", 1, true);
+  markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("plane_markers", 1, true);
+  cloud_pub_ = nh.advertise<sensor_msgs::PointCloud2>("plane_cloud", 1, true);
+  diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
+  diagnostics_->setHardwareID(sensor_.name);
+  diagnostics_->add("planes", this, &PlanesNodelet::report);
+  reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_planes::PlanesConfig>>(getPrivateNodeHandle());
+  reconfigure_->setCallback(
+      [this](vip_slam_planes::PlanesConfig& config, std::uint32_t) { onReconfigure(config); });
+  owner_->start();
+
+  // One callback queue in order: a keyframe is handed over before the update that places it.
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Calibration>(
+      "calibration", 1, [this](const vip_slam_msgs::CalibrationConstPtr& m) {
+        owner_->post(control_lane_, [this, m] { start(*m); });
+      }));
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Keyframe>(
+      "keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
+        owner_->post(keyframe_lane_, [this, m] {
+          if (mapper_) mapper_->addKeyframe(std::make_shared<const Keyframe>(fromMsg(*m)));
+        });
+      }));
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::TrackedFrame>(
+      "tracked_frame", 20, [this](const vip_slam_msgs::TrackedFrameConstPtr& m) {
+        owner_->post(frame_lane_, [this, m] { grow(*m); });
+      }));
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::MapUpdate>(
+      "map_update", 50, [this](const vip_slam_msgs::MapUpdateConstPtr& m) {
+        owner_->post(update_lane_, [this, m] { applyMapUpdate(*m); });
+      }));
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Control>(
+      "control", 20, [this](const vip_slam_msgs::ControlConstPtr& m) {
+        owner_->post(control_lane_, [this, m] { obey(*m); });
+      }));
+  timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0),
+                                             [this](const ros::WallTimerEvent&) { diagnostics_->force_update(); });
+}
+
+void PlanesNodelet::onReconfigure(vip_slam_planes::PlanesConfig& config) {
+  opacity_ = config.opacity;
+  display_rate_ = config.display_rate;
+}
+
+void PlanesNodelet::start(const vip_slam_msgs::Calibration& calibration) {
+  if (mapper_) return;  // the front end restarted; the calibration is the same sensor's
+  applyCalibration(calibration, &sensor_);
+  mapper_ = std::make_unique<PlaneMapper>(options_.mapper, makeCamera(sensor_.camera), sensor_.depth_noise);
+  display_.setCamera(sensor_.T_imu_cam);
+}
+
+void PlanesNodelet::grow(const vip_slam_msgs::TrackedFrame& msg) {
+  if (mapper_ && placed_ && msg.epoch == epoch_) mapper_->grow(fromMsg(msg), T_map_odom_);
+}
+
+void PlanesNodelet::applyMapUpdate(const vip_slam_msgs::MapUpdate& msg) {
+  if (!mapper_) return;
+  const MapUpdate map = fromMsg(msg);
+  T_map_odom_ = map.T_map_odom;
+  epoch_ = map.epoch;
+  placed_ = map.newest_keyframe != 0;
+  revision_ = map.revision;
+  const ros::WallTime begin = ros::WallTime::now();
+  const PlaneUpdate update = mapper_->applyMapUpdate(map);
+  const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
+  update_pub_.publish(boost::make_shared<vip_slam_msgs::PlaneUpdate>(toMsg(update, options_.map_frame)));
+  display_.apply(map);
+  display_.apply(update);
+  publishMap(map.t, map.global);
+
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  shown_.counters = mapper_->counters();
+  shown_.planes = mapper_->planes().size();
+  shown_.points = display_.points();
+  shown_.update_ms = milliseconds;
+}
+
+void PlanesNodelet::obey(const vip_slam_msgs::Control& control) {
+  using vip_slam_msgs::Control;
+  if (!mapper_) return;
+  if (control.command == Control::RESET) {
+    mapper_->clear();
+    display_.clear();
+    placed_ = false;
+    publishMap(control.header.stamp.toSec(), true);
+  } else if (control.command == Control::MAP_LOADED) {
+    mapper_->restore(fromMsg(control.planes));
+    display_.clear();
+    publishMap(control.header.stamp.toSec(), true);
+  }
+}
+
+void PlanesNodelet::publishMap(double t, bool now) {
+  map_pub_.publish(boost::make_shared<vip_slam_msgs::PlaneMap>(
+      toPlaneMapMsg(mapper_->planes(), t, revision_, options_.map_frame)));
+  if (!now && t > last_display_ && t - last_display_ < 1.0 / display_rate_) return;
+  last_display_ = t;
+  std_msgs::Header header;
+  header.stamp = toStamp(t);
+  header.frame_id = options_.map_frame;
+  markers_pub_.publish(
+      boost::make_shared<visualization_msgs::MarkerArray>(display_.markers(mapper_->planes(), header, opacity_)));
+  if (cloud_pub_.getNumSubscribers() > 0) {
+    cloud_pub_.publish(boost::make_shared<sensor_msgs::PointCloud2>(display_.cloud(header)));
+  }
+}
+
+void PlanesNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  std::size_t dropped = 0;
+  for (const auto& lane : owner_->lanes()) {
+    status.add(lane.name + " waiting", lane.waiting);
+    status.add(lane.name + " dropped", lane.dropped);
+    // Growth is made to skip images when there is no time for it.
+    if (lane.name != "tracked frames") dropped += lane.dropped;
+  }
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  const PlaneMapperCounters& c = shown_.counters;
+  status.summary(dropped == 0 ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
+                 dropped == 0 ? std::to_string(shown_.planes) + " planes"
+                              : std::to_string(dropped) + " keyframes or map updates dropped");
+  status.add("planes", shown_.planes);
+  status.add("depth points on planes", shown_.points);
+  status.add("last update (ms)", shown_.update_ms);
+  status.add("keyframes processed", c.keyframes);
+  status.add("keyframes waiting for their place", c.keyframes_waiting);
+  status.add("keyframes never placed", c.keyframes_forgotten);
+  status.add("images grown with", c.frames_grown);
+  status.add("images skipped", c.frames_skipped);
+  status.add("planes started", c.planes_started);
+  status.add("planes merged", c.planes_merged);
+  status.add("planes removed", c.planes_removed);
+  status.add("points associated", c.points_associated);
+  status.add("points dissociated", c.points_dissociated);
+}
+
+}  // namespace vip_slam
+
+PLUGINLIB_EXPORT_CLASS(vip_slam::PlanesNodelet, nodelet::Nodelet)
