@@ -53,9 +53,9 @@ class BackEndNodelet : public nodelet::Nodelet {
   void publishDisplay(double t, bool now);
   void command(std::uint8_t command);
 
-  /// Runs `work` in the owner thread; fills a service's response with its words or those of its exception.
-  template <class Response>
-  bool serve(Response& response, const std::function<std::string()>& work);
+  /// A service whose work runs in the owner thread and answers with its words, or those of its exception.
+  template <class Service>
+  void offer(const std::string& name, const std::function<std::string(const typename Service::Request&)>& work);
   std::string reset(bool keep_map);
   std::string loadMap(const std::string& path);
   std::string saveMap(const std::string& path);

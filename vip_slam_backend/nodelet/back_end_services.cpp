@@ -22,60 +22,46 @@ std::string requirePath(const std::string& path) {
 
 }  // namespace
 
-template <class Response>
-bool BackEndNodelet::serve(Response& response, const std::function<std::string()>& work) {
-  try {
-    auto words = std::make_shared<std::string>();
-    response.success = owner_->call(control_lane_, [words, work] { *words = work(); }, kPatience);
-    response.message = response.success ? *words : "the back end was busy for too long; nothing was done";
-  } catch (const std::exception& error) {
-    response.success = false;
-    response.message = error.what();
-  }
-  if (!response.success) NODELET_WARN("%s", response.message.c_str());
-  return true;
+template <class Service>
+void BackEndNodelet::offer(const std::string& name,
+                           const std::function<std::string(const typename Service::Request&)>& work) {
+  using Request = typename Service::Request;
+  using Response = typename Service::Response;
+  const boost::function<bool(Request&, Response&)> callback = [this, work](const Request& request, Response& response) {
+    try {
+      // Copies: a call that comes too late must not touch what this function has left behind.
+      auto words = std::make_shared<std::string>();
+      response.success = owner_->call(control_lane_, [words, work, request] { *words = work(request); }, kPatience);
+      response.message = response.success ? *words : "the back end was busy for too long; nothing was done";
+    } catch (const std::exception& error) {
+      response.success = false;
+      response.message = error.what();
+    }
+    if (!response.success) NODELET_WARN("%s", response.message.c_str());
+    return true;
+  };
+  services_.push_back(getMTNodeHandle().advertiseService(name, callback));
 }
 
 void BackEndNodelet::advertiseServices() {
   using namespace vip_slam_msgs;
-  ros::NodeHandle& nh = getMTNodeHandle();
-  const auto offer = [&](const std::string& name, auto callback) {
-    services_.push_back(nh.advertiseService(name, callback));
-  };
-  using std::function;
-  offer("save_map", function<bool(SaveMap::Request&, SaveMap::Response&)>([this](auto& q, auto& r) {
-          return serve(r, [this, path = q.path] { return saveMap(path); });
-        }));
-  offer("load_map", function<bool(LoadMap::Request&, LoadMap::Response&)>([this](auto& q, auto& r) {
-          return serve(r, [this, path = q.path] { return loadMap(path); });
-        }));
-  offer("save_trajectory", function<bool(SaveTrajectory::Request&, SaveTrajectory::Response&)>([this](auto& q, auto& r) {
-          return serve(r, [this, path = q.path] { return saveTrajectory(path); });
-        }));
-  offer("reset", function<bool(Reset::Request&, Reset::Response&)>([this](auto& q, auto& r) {
-          return serve(r, [this, keep = bool(q.keep_map)] { return reset(keep); });
-        }));
-  offer("pause", function<bool(Pause::Request&, Pause::Response&)>([this](auto& q, auto& r) {
-          return serve(r, [this, pause = bool(q.pause)] {
-            command(pause ? Control::PAUSE : Control::RESUME);
-            return std::string(pause ? "paused" : "resumed");
-          });
-        }));
-  offer("set_localisation_mode",
-        function<bool(SetLocalisationMode::Request&, SetLocalisationMode::Response&)>([this](auto& q, auto& r) {
-          return serve(r, [this, on = bool(q.localisation)] {
-            backEnd();
-            return setLocalisation(on);
-          });
-        }));
-  offer("trigger_global_ba",
-        function<bool(TriggerGlobalBa::Request&, TriggerGlobalBa::Response&)>([this](auto&, auto& r) {
-          return serve(r, [this] {
-            backEnd().requestGlobalBa();
-            startGlobalBa();
-            return std::string("a global adjustment is under way; its result comes as a global map update");
-          });
-        }));
+  offer<SaveMap>("save_map", [this](const SaveMapRequest& request) { return saveMap(request.path); });
+  offer<LoadMap>("load_map", [this](const LoadMapRequest& request) { return loadMap(request.path); });
+  offer<SaveTrajectory>("save_trajectory",
+                        [this](const SaveTrajectoryRequest& request) { return saveTrajectory(request.path); });
+  offer<Reset>("reset", [this](const ResetRequest& request) { return reset(request.keep_map); });
+  offer<Pause>("pause", [this](const PauseRequest& request) {
+    command(request.pause ? Control::PAUSE : Control::RESUME);
+    return request.pause ? "paused" : "resumed";
+  });
+  offer<SetLocalisationMode>("set_localisation_mode", [this](const SetLocalisationModeRequest& request) {
+    return setLocalisation(request.localisation);
+  });
+  offer<TriggerGlobalBa>("trigger_global_ba", [this](const TriggerGlobalBaRequest&) {
+    backEnd().requestGlobalBa();
+    startGlobalBa();
+    return "a global adjustment is under way; its result comes as a global map update";
+  });
 }
 
 BackEnd& BackEndNodelet::backEnd() {
