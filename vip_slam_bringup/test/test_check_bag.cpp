@@ -1,0 +1,174 @@
+// check_bag against bags with one fault each: the fault is found, named, and nothing else is called an error.
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "driver_bag.h"
+#include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/recorder.h"
+
+namespace fs = std::filesystem;
+
+namespace vip_slam {
+namespace {
+
+using test_support::DriverBagOptions;
+
+class CheckBag : public testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = (fs::temp_directory_path() / ("vip_slam_check_" + std::to_string(::getpid()) + ".bag")).string();
+    options_.sensor = expected_ = loadSensorConfig(CONFIG_DIR "/sensors/d435i.yaml");
+    options_.width = 320;  // small images: these tests are about everything but the images
+    options_.height = 240;
+    options_.moving = 2.4;
+  }
+  void TearDown() override { fs::remove(path_); }
+
+  Findings check() {
+    test_support::writeDriverBag(path_, options_);
+    return checkAll(recordBag(path_, expected_, 60));
+  }
+  /// A finding of that severity that is about `about` and holds `words`.
+  static void expectFound(const Findings& findings, Severity severity, const std::string& about, const std::string& words) {
+    for (const Finding& f : findings)
+      if (f.severity == severity && f.about == about && (f.text + " " + f.advice).find(words) != std::string::npos) return;
+    ADD_FAILURE() << "no such finding: " << about << ": " << words << "\n" << toText(findings, false);
+  }
+  static void expectNoErrorBut(const Findings& findings, const std::string& about) {
+    for (const Finding& f : findings) EXPECT_TRUE(f.severity != Severity::kError || f.about == about) << f.about << ": " << f.text;
+  }
+
+  std::string path_;
+  DriverBagOptions options_;
+  SensorConfig expected_;
+};
+
+TEST_F(CheckBag, AGoodBagIsReady) {
+  const Findings findings = check();
+  EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
+  EXPECT_NE(toText(findings, false).find("Ready.\n"), std::string::npos);
+}
+
+TEST_F(CheckBag, WrongTopicIsNamedWithItsLikes) {
+  options_.renamed["/camera/color/image_raw"] = "/cam/rgb";
+  const Findings findings = check();
+  expectFound(findings, Severity::kError, "colour image", "/cam/rgb");
+  expectNoErrorBut(findings, "colour image");
+  EXPECT_NE(toText(findings, false).find("Not ready"), std::string::npos);
+}
+
+TEST_F(CheckBag, MissingAndEmptyCalibration) {
+  options_.renamed["/camera/color/camera_info"] = "";
+  expectFound(check(), Severity::kError, "colour camera_info", "is not there");
+  options_.renamed.clear();
+  options_.calibrated = false;
+  expectFound(check(), Severity::kError, "colour camera_info", "calibrate the camera");
+}
+
+TEST_F(CheckBag, DepthOfAnotherSizeUnitOrTime) {
+  options_.depth_divisor = 2;
+  expectFound(check(), Severity::kError, "depth image", "is 160x120, the colour image is 320x240");
+  options_.depth_divisor = 1;
+  options_.depth_unit_factor = 0.001;  // metres written as if they were millimetres
+  expectFound(check(), Severity::kError, "depth image", "");
+  options_.depth_unit_factor = 1;
+  options_.depth_skew = 0.014;
+  expectFound(check(), Severity::kWarning, "colour and depth", "14.0 ms after");
+  options_.depth_skew = 5.0;
+  expectFound(check(), Severity::kError, "colour and depth", "");
+}
+
+TEST_F(CheckBag, EncodingAndRate) {
+  options_.other_encoding = "bgr8";
+  expectFound(check(), Severity::kWarning, "colour image", "encoding is bgr8, the sensor file says rgb8");
+  options_.other_encoding.clear();
+  options_.image_rate_factor = 0.4;
+  options_.moving = 4;
+  expectFound(check(), Severity::kError, "colour image", "12.0 Hz, the sensor file says 30 Hz");
+}
+
+TEST_F(CheckBag, ImuGaps) {
+  options_.imu_hole_at = 1.5;
+  options_.imu_hole = 0.25;
+  const Findings findings = check();
+  expectFound(findings, Severity::kError, "IMU", "at 1.5 s");
+  expectFound(findings, Severity::kError, "IMU", "gaps");
+}
+
+TEST_F(CheckBag, UnitsOfTheImu) {
+  options_.accel_factor = 1 / 9.81;
+  expectFound(check(), Severity::kError, "gravity", "in g");
+  options_.accel_factor = 1.06;
+  expectFound(check(), Severity::kWarning, "gravity", "10.40 m/s^2");
+  options_.accel_factor = 1;
+  options_.gravity = false;
+  expectFound(check(), Severity::kError, "gravity", "taken out");
+  options_.gravity = true;
+  options_.gyro_factor = 180 / M_PI;
+  expectFound(check(), Severity::kError, "gyroscope", "degrees a second");
+}
+
+TEST_F(CheckBag, DelayBetweenCameraAndImu) {
+  for (const double offset : {-0.030, 0.018}) {
+    options_.sensor.time_offset = offset;
+    test_support::writeDriverBag(path_, options_);
+    const Recording recording = recordBag(path_, expected_, 60);
+    const MotionEstimate motion = estimateMotion(recording);
+    ASSERT_TRUE(motion.usable) << motion.why_not;
+    EXPECT_NEAR(motion.time_offset, offset, 0.0015);
+    EXPECT_GT(motion.correlation, 0.95);
+    expectFound(checkAll(recording), Severity::kWarning, "camera-IMU delay", "set time_offset");
+    // Knowing it, the check is content.
+    Recording informed = recording;
+    informed.sensor.time_offset = offset;
+    expectFound(checkMotion(informed), Severity::kGood, "camera-IMU delay", "");
+  }
+}
+
+TEST_F(CheckBag, ExtrinsicsThatContradictTheMotion) {
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // camera axes in a body whose x points forward
+  options_.sensor.T_imu_cam = SE3(R, Eigen::Vector3d(0.02, 0, 0));
+  options_.tf = false;
+  const Findings findings = check();
+  expectFound(findings, Severity::kError, "extrinsics", "contradicts T_imu_cam by 120 degrees");
+  expectNoErrorBut(findings, "extrinsics");
+  const MotionEstimate motion = estimateMotion(recordBag(path_, expected_, 60));
+  EXPECT_LT(motion.R_imu_cam.angularDistance(Eigen::Quaterniond(R)), 0.02);
+}
+
+TEST_F(CheckBag, FramesInTf) {
+  options_.tf = false;
+  expectFound(check(), Severity::kNote, "tf", "camera_color_optical_frame and camera_imu_optical_frame not in tf");
+  options_.tf = true;
+  options_.sensor.T_imu_cam.t() += Eigen::Vector3d(0.05, 0, 0);
+  expectFound(check(), Severity::kWarning, "tf", "differs from the sensor file's T_imu_cam by 0.0 degrees and 5.0 cm");
+}
+
+TEST_F(CheckBag, TimeThatRunsBackwards) {
+  options_.late_jump = -1.0;
+  expectFound(check(), Severity::kError, "IMU", "time runs backwards");
+}
+
+TEST_F(CheckBag, UnreadableBag) {
+  std::ofstream(path_) << "not a bag";
+  try {
+    recordBag(path_, expected_, 60);
+    ADD_FAILURE() << "was read";
+  } catch (const std::exception& e) {
+    EXPECT_NE(std::string(e.what()).find(path_), std::string::npos) << e.what();
+  }
+  EXPECT_THROW(recordBag("/nowhere/x.bag", expected_, 60), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace vip_slam
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}

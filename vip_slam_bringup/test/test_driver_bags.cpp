@@ -1,0 +1,70 @@
+// Every shipped configuration against a bag as its driver writes it: the check finds nothing to complain about, and the
+// offline pipeline tracks it.
+#include <unistd.h>
+
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "driver_bag.h"
+#include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/recorder.h"
+#include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_bringup/runner/pipeline.h"
+
+namespace fs = std::filesystem;
+
+namespace vip_slam {
+namespace {
+
+class DriverBags : public testing::TestWithParam<const char*> {};
+
+TEST_P(DriverBags, IsReadyAndTracks) {
+  const std::string bag = (fs::temp_directory_path() / ("vip_slam_driver_" + std::string(GetParam()) + std::to_string(::getpid()) + ".bag")).string();
+  test_support::DriverBagOptions options;
+  options.sensor = loadSensorConfig(std::string(CONFIG_DIR "/sensors/") + GetParam() + ".yaml");
+  options.still = 1.2;
+  options.moving = 1.5;
+  const Trajectory truth = test_support::writeDriverBag(bag, options);
+
+  const Findings findings = checkAll(recordBag(bag, options.sensor, 60));
+  EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
+  bool motion_seen = false;
+  for (const Finding& f : findings) motion_seen |= f.about == "extrinsics" && f.severity == Severity::kGood;
+  EXPECT_TRUE(motion_seen) << toText(findings, false);
+
+  SensorConfig sensor = options.sensor;
+  BagReader reader(bag, sensor);
+  Pipeline pipeline(PipelineOptions(), sensor);
+  reader.start();
+  while (const auto event = reader.next()) pipeline.add(*event);
+  pipeline.finish();
+  fs::remove(bag);
+  EXPECT_TRUE(reader.warnings().empty()) << reader.warnings().front();
+  const auto& odometry = pipeline.odometry();
+  ASSERT_GT(odometry.size(), 0.4 * truth.size());
+  // The way gone since the first tracked image, against the truth: the system starts level and at zero yaw, so only
+  // lengths compare.
+  const auto at = [&](double t) {
+    SE3 T;
+    EXPECT_TRUE(poseAt(truth, t, &T)) << t;
+    return T;
+  };
+  const SE3 moved = odometry.front().T_odom_I.inverse() * odometry.back().T_odom_I;
+  const SE3 moved_true = at(odometry.front().t).inverse() * at(odometry.back().t);
+  EXPECT_LT((moved.t() - moved_true.t()).norm(), 0.03);
+  EXPECT_LT(moved.rotation().angularDistance(moved_true.rotation()), 0.03);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, DriverBags,
+                         testing::Values("d435i", "d435i_split", "d455", "d455_split", "l515", "l515_split", "azure_kinect",
+                                         "orbbec_femto", "oak_d", "phone", "euroc", "simulator"),
+                         [](const auto& info) { return std::string(info.param); });
+
+}  // namespace
+}  // namespace vip_slam
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
