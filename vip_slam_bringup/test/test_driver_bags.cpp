@@ -35,7 +35,7 @@ TEST_P(DriverBags, IsReadyAndTracks) {
 
   SensorConfig sensor = options.sensor;
   BagReader reader(bag, sensor);
-  Pipeline pipeline(PipelineOptions(), sensor);
+  Pipeline pipeline(PipelineOptions(), sensor, nullptr);
   reader.start();
   while (const auto event = reader.next()) pipeline.add(*event);
   pipeline.finish();

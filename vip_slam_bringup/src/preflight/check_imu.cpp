@@ -16,7 +16,8 @@ double spread(const std::vector<StampedVector>& samples, std::size_t begin, std:
   return std::sqrt(sum / double(end - begin));
 }
 
-/// Lengths of the mean specific force over the half seconds with the least motion (at most a fifth of them).
+/// Lengths of the mean specific force over the half seconds with the least motion (those about as quiet as the quietest,
+/// a fifth of all at most).
 std::vector<double> quietForces(const std::vector<StampedVector>& accel, double* least_spread) {
   std::vector<std::pair<double, double>> windows;
   std::size_t begin = 0;
@@ -29,7 +30,8 @@ std::vector<double> quietForces(const std::vector<StampedVector>& accel, double*
   }
   std::sort(windows.begin(), windows.end());
   std::vector<double> out;
-  for (std::size_t i = 0; i < windows.size() && i <= windows.size() / 5; ++i) out.push_back(windows[i].second);
+  for (const auto& [window_spread, force] : windows)
+    if (window_spread <= 2 * windows.front().first + 0.02 && out.size() <= windows.size() / 5) out.push_back(force);
   *least_spread = windows.empty() ? 0 : windows.front().first;
   return out;
 }

@@ -1,6 +1,7 @@
 // Camera-IMU delay and rotation from the motion: the gyro and the images see the same rotation.
 //   gyro(t + td) = R_I_C rate_C(t) + b
 // For each delay in a grid, R and b by orthogonal Procrustes; the delay with the least residual wins.
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/SVD>
@@ -81,19 +82,16 @@ Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro
     fit.camera_variances = Eigen::JacobiSVD<Eigen::Matrix3d>(spread).singularValues();
     fit.scale = fit.camera_variances.sum() > 0 ? std::sqrt(variance / fit.camera_variances.sum()) : 1;
     fit.variance = variance;
-    std::vector<double> squares(imu.size());
-    for (std::size_t i = 0; i < imu.size(); ++i)
-      squares[i] = (imu[i] - mean_imu - fit.R * (camera[i] - mean_camera)).squaredNorm();
-    const double limit = 9 * median(squares);
+    // What disagrees by more than half its rate is blur, a moving object or a mismatch: it counts with that bound, and
+    // the second round fits without it. The bound does not depend on the delay, so that residuals compare.
     fit.residual = 0;
-    double kept = 0;
     for (std::size_t i = 0; i < imu.size(); ++i) {
-      if (round == 0) use[i] = squares[i] <= limit;
-      if (!use[i]) continue;
-      fit.residual += squares[i];
-      kept += 1;
+      const double error = (imu[i] - mean_imu - fit.R * (camera[i] - mean_camera)).norm();
+      const double bound = 0.1 + 0.5 * (imu[i] - mean_imu).norm();
+      if (round == 0) use[i] = error <= bound;
+      fit.residual += std::min(error, bound) * std::min(error, bound) / double(imu.size());
     }
-    fit.residual /= std::max(kept, 1.0);
+    if (std::count(use.begin(), use.end(), true) < 10) break;
   }
   return fit;
 }
