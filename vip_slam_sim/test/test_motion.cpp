@@ -128,7 +128,9 @@ TEST(Motion, NamedSequencesMoveLikePeopleAndDrones) {
     EXPECT_LT(v, 2.3) << name;
     EXPECT_LT(a, 5.0) << name;
     EXPECT_LT(w, 2.4) << name;
-    if (spec.motion.start_at == 0 && spec.motion.type != "still") EXPECT_GE(still, 1.5) << name;
+    if (spec.motion.start_at == 0 && spec.motion.type != "still") {
+      EXPECT_GE(still, 1.5) << name;
+    }
   }
   EXPECT_GT(motionOf("moving_start").at(0).v_W.norm(), 0.2);
 }

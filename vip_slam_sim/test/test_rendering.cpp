@@ -154,6 +154,28 @@ TEST(Depth, HardModelLosesEdgesDarkAndGrazing) {
   EXPECT_GT(edge_bad / double(edge), 0.4);
 }
 
+TEST(Depth, OwnDepthCameraSeesFromItsOwnPlace) {
+  SequenceSpec spec = cleanSequence("own_depth_camera");
+  spec.depth.b = 0;
+  SequenceRenderer s(spec, quickOptions());
+  const SimFrame f = s.renderFrame(50);
+  const auto camera = makeCamera(s.sensor().depth_camera);
+  const SE3 T_W_D = f.T_W_C * s.sensor().T_color_depth;
+  // Carried into the colour image, its points agree with what the colour camera sees.
+  int good = 0, all = 0;
+  for (int v = 10; v < 470; v += 11)
+    for (int u = 10; u < 630; u += 11) {
+      const double z = 0.001 * f.depth.at<std::uint16_t>(v, u);
+      Eigen::Vector2d q;
+      const Eigen::Vector3d p = f.T_W_C.inverse() * (T_W_D * camera->unproject({double(u), double(v)}, z));
+      if (z == 0 || !s.camera()->project(p, &q) || !s.camera()->inImage(q, 2)) continue;
+      ++all;
+      good += std::abs(f.exact.depth.at<float>(static_cast<int>(q.y() + 0.5), static_cast<int>(q.x() + 0.5)) - p.z()) < 0.01 + 0.01 * p.z();
+    }
+  ASSERT_GT(all, 1500);
+  EXPECT_GT(good, 0.97 * all);
+}
+
 TEST(Colour, NoiseMatchesTheConfiguration) {
   SequenceSpec clean = cleanSequence("07"), noisy = clean;
   noisy.effects.read_noise = 1.5;

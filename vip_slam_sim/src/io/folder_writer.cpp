@@ -36,7 +36,8 @@ class FolderWriter : public SequenceWriter {
          "v_RS_R_x [m s^-1],v_RS_R_y [m s^-1],v_RS_R_z [m s^-1],b_w_RS_S_x [rad s^-1],b_w_RS_S_y [rad s^-1],"
          "b_w_RS_S_z [rad s^-1],b_a_RS_S_x [m s^-2],b_a_RS_S_y [m s^-2],b_a_RS_S_z [m s^-2]");
     open(rgb_, "rgb.txt", "# timestamp filename");
-    open(depth_, "depth.txt", "# timestamp filename (16-bit, millimetres)");
+    open(depth_, "depth.txt", "# timestamp filename (16-bit, 5000 per metre as in TUM RGB-D)");
+    open(poses_, "groundtruth.txt", "# colour camera in world: timestamp tx ty tz qx qy qz qw");
     open(both_, "associations.txt", "# rgb_timestamp rgb_file depth_timestamp depth_file");
   }
   ~FolderWriter() override {
@@ -65,17 +66,24 @@ class FolderWriter : public SequenceWriter {
     const std::string rgb = "rgb/" + stamp + ".png", depth = "depth/" + stamp + ".png";
     cv::Mat bgr;
     cv::cvtColor(f.rgb, bgr, cv::COLOR_RGB2BGR);
+    cv::Mat fifth_millimetres;
+    f.depth.convertTo(fifth_millimetres, CV_16U, 5.0);
+    fifth_millimetres.setTo(0, f.depth > 13000);
     const std::vector<int> quick = {cv::IMWRITE_PNG_COMPRESSION, 1};
-    for (const auto& [name, image] : {std::pair<std::string, cv::Mat>{rgb, bgr}, {depth, f.depth}})
+    for (const auto& [name, image] : {std::pair<std::string, cv::Mat>{rgb, bgr}, {depth, fifth_millimetres}})
       if (!cv::imwrite((work_ / name).string(), image, quick))
         throw std::runtime_error((work_ / name).string() + ": cannot be written");
     rgb_ << stamp << ' ' << rgb << '\n';
     depth_ << stamp << ' ' << depth << '\n';
     both_ << stamp << ' ' << rgb << ' ' << stamp << ' ' << depth << '\n';
+    const Eigen::Vector3d& t = f.T_W_C.t();
+    const Eigen::Quaterniond& q = f.T_W_C.rotation();
+    poses_ << stamp << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z()
+           << ' ' << q.w() << '\n';
   }
 
   void commit() override {
-    for (std::ofstream* out : {&imu_, &truth_, &rgb_, &depth_, &both_}) {
+    for (std::ofstream* out : {&imu_, &truth_, &rgb_, &depth_, &both_, &poses_}) {
       out->close();
       if (!*out) throw std::runtime_error(work_.string() + ": a list could not be written");
     }
@@ -91,7 +99,7 @@ class FolderWriter : public SequenceWriter {
   }
 
   fs::path target_, work_;
-  std::ofstream imu_, truth_, rgb_, depth_, both_;
+  std::ofstream imu_, truth_, rgb_, depth_, both_, poses_;
   bool committed_ = false;
 };
 

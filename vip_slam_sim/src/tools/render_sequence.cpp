@@ -1,6 +1,7 @@
 // render_sequence NAME_OR_YAML --out DIR: a sequence with ground truth into a bag (or a folder).
 #include <malloc.h>
 
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -23,6 +24,8 @@ namespace fs = std::filesystem;
 using namespace vip_slam;
 
 namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
 
 /// Colour beside depth (near = warm), as a PNG to look at.
 void saveSnapshot(const SimFrame& frame, const std::string& path) {
@@ -49,7 +52,7 @@ int run(int argc, char** argv) {
   std::string what, out, format = "bag", library = ros::package::getPath("vip_slam_sim") + "/config/sequences.yaml";
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   int snapshot_every = 0, first = 0, count = -1;
-  bool list = false, keep = false;
+  bool list = false, keys = false, keep = false;
   CLI::App app{"Renders an RGB-D + IMU sequence with ground truth."};
   app.add_option("sequence", what, "name of a shipped sequence (--list) or a .yaml file");
   app.add_option("--out", out, "directory for NAME.bag, NAME_truth.tum, NAME_planes.yaml, NAME_sensor.yaml");
@@ -61,6 +64,7 @@ int run(int argc, char** argv) {
   app.add_option("--first", first, "first frame")->check(CLI::NonNegativeNumber);
   app.add_option("--count", count, "number of frames (default all)");
   app.add_flag("--list", list, "list the shipped sequences");
+  app.add_flag("--keys", keys, "print the keys of a sequence with their defaults and ranges");
   app.add_flag("--skip-existing", keep, "do nothing when the outputs are there");
   try {
     app.parse(argc, argv);
@@ -69,6 +73,10 @@ int run(int argc, char** argv) {
   }
   if (list) {
     for (const std::string& name : sequenceNames(library)) std::cout << name << "\n";
+    return 0;
+  }
+  if (keys) {
+    std::cout << optionReference("Keys of a sequence", listOptions(SequenceSpec()));
     return 0;
   }
   if (what.empty() || out.empty()) throw std::runtime_error("expected a sequence and --out DIR (--help)");
@@ -98,6 +106,8 @@ int run(int argc, char** argv) {
       if (writer)
         writer->imu(sequence.toNanoseconds(imu[next_imu].t), imu[next_imu], sequence.stateAt(imu[next_imu].t));
   };
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
   ProgressBar bar(spec.name, frames);
   int done = 0;
   sequence.render([&](const SimFrame& frame) {
@@ -109,9 +119,10 @@ int run(int argc, char** argv) {
       saveSnapshot(frame, base + number);
     }
     bar.update(++done);
-    return true;
+    return !interrupted;
   });
   bar.finish();
+  if (interrupted) throw std::runtime_error("interrupted, nothing is left behind");
   imuUntil(std::numeric_limits<std::int64_t>::max());
   if (writer) {
     saveSensorConfig(base + "_sensor.yaml", sequence.sensor());

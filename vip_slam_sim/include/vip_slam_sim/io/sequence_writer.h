@@ -18,8 +18,9 @@ class SequenceWriter {
   virtual void commit() = 0;
 };
 
-/// EuRoC-like folder with TUM's lists: rgb/STAMP.png, depth/STAMP.png, rgb.txt, depth.txt, associations.txt,
-/// imu0/data.csv, state_groundtruth_estimate0/data.csv.
+/// A folder in TUM RGB-D's layout (rgb/STAMP.png, depth/STAMP.png with 5000 per metre, rgb.txt, depth.txt,
+/// associations.txt, groundtruth.txt of the colour camera) with EuRoC's IMU and states beside it (imu0/data.csv,
+/// state_groundtruth_estimate0/data.csv).
 std::unique_ptr<SequenceWriter> makeFolderWriter(const std::string& folder);
 
 /// Bag with a RealSense driver's topics, lz4-compressed: colour rgb8, depth 16UC1, both camera_info, IMU, /tf_static,

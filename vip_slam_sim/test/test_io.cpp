@@ -1,0 +1,159 @@
+// Bags and folders: what goes in comes out, nothing is left half done; folders of real images.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
+
+#include "test_support.h"
+#include "vip_slam_sim/io/rgbd_folder.h"
+#include "vip_slam_sim/io/sequence_writer.h"
+
+namespace vip_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string scratch(const std::string& name) {
+  const std::string path = testing::TempDir() + "vip_slam_sim_" + name;
+  fs::remove_all(path);
+  return path;
+}
+
+void writeAll(SequenceRenderer& s, SequenceWriter& writer) {
+  std::size_t next = 0;
+  const auto& imu = s.imu().samples;
+  const auto until = [&](std::int64_t ns) {
+    for (; next < imu.size() && s.toNanoseconds(imu[next].t) <= ns; ++next)
+      writer.imu(s.toNanoseconds(imu[next].t), imu[next], s.stateAt(imu[next].t));
+  };
+  s.render([&](const SimFrame& f) {
+    until(f.stamp_ns);
+    writer.frame(f);
+    return true;
+  });
+}
+
+std::string bytesOf(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::stringstream all;
+  all << in.rdbuf();
+  return all.str();
+}
+
+TEST(Bag, HoldsADriversTopicsAndIsTheSameTwice) {
+  const SequenceSpec spec = loadSequence("07", libraryPath());
+  const std::string a = scratch("a.bag"), b = scratch("b.bag");
+  std::vector<SimFrame> frames;
+  for (const std::string& path : {a, b}) {
+    SequenceRenderer s(spec, quickOptions(0, 4));
+    const auto writer = makeBagWriter(path, s.sensor(), s.toNanoseconds(0));
+    writeAll(s, *writer);
+    EXPECT_FALSE(fs::exists(path));
+    writer->commit();
+    for (int i = 0; i < 4 && path == a; ++i) frames.push_back(s.renderFrame(i));
+  }
+  EXPECT_EQ(bytesOf(a), bytesOf(b));
+  rosbag::Bag bag(a, rosbag::bagmode::Read);
+  std::map<std::string, int> count;
+  int image = 0;
+  for (const rosbag::MessageInstance& m : rosbag::View(bag)) {
+    ++count[m.getTopic()];
+    if (const auto color = m.instantiate<sensor_msgs::Image>(); color && m.getTopic() == "/camera/color/image_raw") {
+      const SimFrame& f = frames[image++];
+      EXPECT_EQ(color->encoding, "rgb8");
+      EXPECT_EQ(color->header.stamp.toNSec(), static_cast<std::uint64_t>(f.stamp_ns));
+      EXPECT_EQ(0, std::memcmp(color->data.data(), f.rgb.data, color->data.size()));
+      EXPECT_EQ(color->header.frame_id, "camera_color_optical_frame");
+    }
+    if (const auto imu = m.instantiate<sensor_msgs::Imu>()) {
+      EXPECT_EQ(imu->orientation_covariance[0], -1);
+    }
+    if (const auto info = m.instantiate<sensor_msgs::CameraInfo>()) {
+      EXPECT_EQ(info->distortion_model, "plumb_bob");
+      EXPECT_DOUBLE_EQ(info->K[0], spec.camera.fx);
+      EXPECT_DOUBLE_EQ(info->D[0], spec.camera.k1);
+    }
+  }
+  for (const char* topic : {"/camera/color/image_raw", "/camera/aligned_depth_to_color/image_raw", "/camera/color/camera_info",
+                            "/camera/aligned_depth_to_color/camera_info"})
+    EXPECT_EQ(count[topic], 4) << topic;
+  EXPECT_EQ(count["/tf_static"], 1);
+  EXPECT_GT(count["/camera/imu"], 40);
+  EXPECT_EQ(count["/camera/imu"], count["/ground_truth/odometry"]);
+}
+
+TEST(Bag, NothingIsLeftWithoutCommit) {
+  const std::string path = scratch("never.bag");
+  {
+    SequenceRenderer s(loadSequence("smoke", libraryPath()), quickOptions(0, 1));
+    const auto writer = makeBagWriter(path, s.sensor(), s.toNanoseconds(0));
+    writeAll(s, *writer);
+  }
+  EXPECT_FALSE(fs::exists(path));
+  EXPECT_FALSE(fs::exists(path + ".part"));
+  EXPECT_THROW(makeBagWriter("/nowhere/at/all.bag", SensorConfig(), 0), std::runtime_error);
+}
+
+TEST(Folder, ReadsBackAsAnRgbdFolderAndKnowsUp) {
+  const std::string path = scratch("folder");
+  SequenceSpec spec = loadSequence("07", libraryPath());
+  spec.camera.rate = 2;  // sees much in few images
+  SequenceRenderer s(spec, quickOptions(5, 33));
+  std::vector<SimFrame> frames;
+  {
+    const auto writer = makeFolderWriter(path);
+    s.render([&](const SimFrame& f) {
+      writer->frame(f);
+      frames.push_back(f);
+      return true;
+    });
+    writer->commit();
+  }
+  EXPECT_THROW(makeFolderWriter(path), std::runtime_error);  // does not overwrite
+  RgbdFolder folder = openRgbdFolder(path, 30);
+  folder.camera = s.sensor().camera;
+  ASSERT_EQ(folder.frames.size(), frames.size());
+  cv::Mat rgb, depth;
+  loadRgbdFrame(folder, folder.frames[3], &rgb, &depth);
+  EXPECT_EQ(cv::norm(rgb, frames[3].rgb, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(depth, frames[3].depth, cv::NORM_INF), 0);
+  // Up is found whatever way the folder's world lies.
+  const SE3 turn(expQuaternion(Eigen::Vector3d(1.1, -0.7, 0.4)), Eigen::Vector3d(1, 2, 3));
+  for (StampedPose& p : folder.T_W_C) p.T_W_B = turn * p.T_W_B;
+  const Eigen::Vector3d up = upFromDepth(folder), want = turn.rotation() * Eigen::Vector3d::UnitZ();
+  const double angle = std::acos(std::min(1.0, up.dot(want))) * 180 / M_PI;
+  std::printf("  up found to %.3f deg\n", angle);
+  EXPECT_LT(angle, 0.3);
+}
+
+TEST(Folder, ErrorsNameTheFile) {
+  const auto messageOf = [](const std::string& folder) -> std::string {
+    try {
+      openRgbdFolder(folder, 30);
+    } catch (const std::exception& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(messageOf("/nowhere").find("/nowhere"), std::string::npos);
+  const std::string path = scratch("tum");
+  fs::create_directories(path);
+  std::ofstream(path + "/rgb.txt") << "1.0 a.png\n1.0 b.png\n";
+  std::ofstream(path + "/depth.txt") << "1.0 a.png\n";
+  std::ofstream(path + "/groundtruth.txt") << "1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n";
+  EXPECT_NE(messageOf(path).find("rgb.txt:2"), std::string::npos) << messageOf(path);
+  const std::string seven = scratch("seven");
+  fs::create_directories(seven);
+  std::ofstream(seven + "/frame-000000.color.png") << "x";
+  EXPECT_NE(messageOf(seven).find("frame-000000.depth.png"), std::string::npos) << messageOf(seven);
+}
+
+}  // namespace
+}  // namespace vip_slam
