@@ -1,0 +1,189 @@
+// The back end on simulated keyframes: accuracy, invariants after every operation, all variants, bad input by name.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "back_end/simulated_keyframes.h"
+#include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/map_checker.h"
+
+using namespace vip_slam;
+
+namespace {
+
+BackEndOptions options(const std::string& variant) {
+  BackEndOptions o;
+  o.variant = variant;
+  o.loop_closing = false;
+  o.lockstep = true;
+  return o;
+}
+
+struct RunResult {
+  double rmse = 0, odometry_rmse = 0;
+  MapSnapshot snapshot;
+};
+
+RunResult run(const std::string& variant, int keyframes, unsigned seed = 1, const std::string& solver = "structured") {
+  SimulatedKeyframes world(seed);
+  BackEndOptions o = options(variant);
+  o.solver = solver;
+  BackEnd back_end(o, world.sensor());
+  std::map<KeyframeId, double> odometry_error;
+  for (int k = 0; k < keyframes; ++k) {
+    const KeyframePtr kf = world.next();
+    odometry_error[kf->id] = (kf->frame.state.T_W_I.t() - world.truth(kf->frame.t).T_W_I.t()).squaredNorm();
+    const MapUpdate update = back_end.addKeyframe(kf);
+    EXPECT_EQ(back_end.lastRefusal(), "");
+    EXPECT_EQ(update.newest_keyframe, kf->id);
+    EXPECT_EQ(checkMap(back_end.map()), "") << "after keyframe " << kf->id;
+    back_end.applyPlaneUpdate(world.planes());
+    EXPECT_EQ(checkMap(back_end.map()), "") << "after the planes of keyframe " << kf->id;
+  }
+  back_end.finish();
+  EXPECT_EQ(checkMap(back_end.map()), "");
+  RunResult result;
+  result.snapshot = back_end.snapshot();
+  for (const SnapshotKeyframe& kf : result.snapshot.keyframes) {
+    result.rmse += (kf.state.T_W_I.t() - world.truth(kf.t).T_W_I.t()).squaredNorm();
+    result.odometry_rmse += odometry_error[kf.id];
+  }
+  result.rmse = std::sqrt(result.rmse / result.snapshot.keyframes.size());
+  result.odometry_rmse = std::sqrt(result.odometry_rmse / result.snapshot.keyframes.size());
+  return result;
+}
+
+}  // namespace
+
+TEST(BackEnd, AllVariantsBeatTheOdometry) {
+  for (const char* variant : {"vi", "vi_p", "vi_cp", "vip"}) {
+    const RunResult result = run(variant, variant == std::string("vi_p") ? 20 : 45);
+    EXPECT_LT(result.rmse, 0.01) << variant;
+    EXPECT_LT(result.rmse, 0.5 * result.odometry_rmse) << variant;
+    EXPECT_GT(result.snapshot.landmarks.size(), 50u) << variant;
+    RecordProperty(variant, std::to_string(result.rmse));
+    std::printf("%s: rmse %.4f m, odometry %.4f m, %zu keyframes, %zu landmarks, reobserved %lu merged %lu outliers %lu\n", variant,
+                result.rmse, result.odometry_rmse, result.snapshot.keyframes.size(), result.snapshot.landmarks.size(),
+                static_cast<unsigned long>(result.snapshot.statistics.reobserved),
+                static_cast<unsigned long>(result.snapshot.statistics.merged),
+                static_cast<unsigned long>(result.snapshot.statistics.outliers));
+  }
+}
+
+TEST(BackEnd, TwoRunsGiveTheSameBits) {
+  const RunResult a = run("vip", 15), b = run("vip", 15);
+  ASSERT_EQ(a.snapshot.keyframes.size(), b.snapshot.keyframes.size());
+  for (std::size_t k = 0; k < a.snapshot.keyframes.size(); ++k)
+    EXPECT_EQ(a.snapshot.keyframes[k].state.T_W_I.matrix(), b.snapshot.keyframes[k].state.T_W_I.matrix());
+}
+
+TEST(BackEnd, CeresRunsTheSameSystem) {
+  const RunResult a = run("vip", 12), b = run("vip", 12, 1, "ceres");
+  EXPECT_NEAR(a.rmse, b.rmse, 2e-3);
+}
+
+TEST(BackEnd, GlobalAdjustmentMergesWithWhatCameMeanwhile) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 15; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  back_end.requestGlobalBa();
+  EXPECT_TRUE(back_end.globalBaWanted());
+  const GbaJob job = back_end.startGlobalBa();
+  EXPECT_FALSE(back_end.globalBaWanted());
+  for (int k = 0; k < 5; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  const MapUpdate update = back_end.merge(back_end.run(job));
+  EXPECT_TRUE(update.global);
+  EXPECT_EQ(checkMap(back_end.map()), "");
+  EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
+  for (const KeyframeEstimate& kf : update.keyframes)
+    EXPECT_LT((kf.state.T_W_I.t() - world.truth((kf.id - 1) * world.interval()).T_W_I.t()).norm(), 0.03);
+  // map -> odom carries the newest keyframe.
+  const MapKeyframe& newest = back_end.map().keyframe(update.newest_keyframe);
+  EXPECT_LT((update.T_map_odom * newest.data->frame.state.T_W_I).boxminus(newest.state.T_W_I).norm(), 1e-9);
+}
+
+TEST(BackEnd, BadInputIsRefusedByName) {
+  SimulatedKeyframes world(5);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 4; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  const KeyframePtr good = world.next();
+  const auto refusalOf = [&](const Keyframe& kf) {
+    const std::size_t before = back_end.map().keyframes().size();
+    const MapUpdate update = back_end.addKeyframe(std::make_shared<Keyframe>(kf));
+    EXPECT_EQ(back_end.map().keyframes().size(), before);
+    EXPECT_TRUE(update.keyframes.empty());
+    EXPECT_EQ(checkMap(back_end.map()), "");
+    return back_end.lastRefusal();
+  };
+  Keyframe bad = *good;
+  bad.frame.features[3].xy.x() = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(refusalOf(bad).find("feature 3 is not finite"), std::string::npos);
+  bad = *good;
+  bad.frame.state.v_W.y() = std::numeric_limits<double>::infinity();
+  EXPECT_NE(refusalOf(bad).find("state is not finite"), std::string::npos);
+  bad = *good;
+  bad.id = 2;
+  EXPECT_NE(refusalOf(bad).find("not newer"), std::string::npos);
+  bad = *good;
+  bad.imu[4].gyro.x() = std::nan("");
+  EXPECT_NE(refusalOf(bad).find("IMU sample 4"), std::string::npos);
+  bad = *good;
+  bad.frame.t = 0.1;
+  EXPECT_NE(refusalOf(bad).find("not after"), std::string::npos);
+  EXPECT_EQ(back_end.addKeyframe(nullptr).keyframes.size(), 0u);
+  EXPECT_NE(back_end.lastRefusal().find("no keyframe"), std::string::npos);
+  // A good one still enters afterwards.
+  back_end.addKeyframe(good);
+  EXPECT_EQ(back_end.lastRefusal(), "");
+}
+
+TEST(BackEnd, SurvivesPoorKeyframes) {
+  SimulatedKeyframes world(6);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 12; ++k) {
+    Keyframe kf = *world.next();
+    if (k == 4 || k == 5) kf.frame.features.clear();                    // no points
+    if (k == 7) kf.imu.clear();                                          // a gap in the IMU
+    if (k == 9) kf.frame.features.clear(), kf.imu.clear();               // neither
+    back_end.addKeyframe(std::make_shared<Keyframe>(kf));
+    EXPECT_EQ(back_end.lastRefusal(), "") << k;
+    EXPECT_EQ(checkMap(back_end.map()), "") << k;
+    PlaneUpdate planes = world.planes();
+    if (k == 6) {
+      PlaneEstimate through_origin;                                      // seen once, through the world origin
+      through_origin.id = 50;
+      through_origin.plane = Plane(Eigen::Vector3d(1, 2, 0.1), 0.0);
+      planes.planes.push_back(through_origin);
+      PlaneObservation once;
+      once.keyframe = kf.id;
+      once.plane = 50;
+      once.G = 100 * Eigen::Matrix4d::Identity();
+      planes.observations.push_back(once);
+      PlaneEstimate broken;
+      broken.id = 51;
+      broken.plane.d = std::nan("");
+      planes.planes.push_back(broken);
+      once.plane = 77;                                                   // unknown plane
+      planes.observations.push_back(once);
+      planes.associated.emplace_back(12345678, 50);                      // unknown landmark
+    }
+    back_end.applyPlaneUpdate(planes);
+    EXPECT_EQ(checkMap(back_end.map()), "") << k;
+    EXPECT_FALSE(back_end.map().hasPlane(51));
+  }
+  back_end.finish();
+  EXPECT_EQ(checkMap(back_end.map()), "");
+  for (const auto& entry : back_end.map().keyframes())
+    EXPECT_LT((entry.second.state.T_W_I.t() - world.truth(entry.second.data->frame.t).T_W_I.t()).norm(), 0.1);
+}

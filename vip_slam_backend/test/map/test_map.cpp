@@ -1,0 +1,164 @@
+// The map's operations keep its invariants; what breaks them is refused and changes nothing.
+#include <gtest/gtest.h>
+
+#include "back_end/simulated_keyframes.h"
+#include "vip_slam_backend/map/culling.h"
+#include "vip_slam_backend/map/landmark_maker.h"
+#include "vip_slam_backend/map/map_checker.h"
+
+using namespace vip_slam;
+
+namespace {
+
+struct Fixture {
+  SimulatedKeyframes world{11};
+  Map map;
+  LandmarkMaker maker{LandmarkMakerOptions()};
+  void add(int count) {
+    for (int k = 0; k < count; ++k) {
+      const KeyframePtr kf = world.next();
+      NavState state = world.truth(kf->frame.t);
+      map.addKeyframe(kf, state, ImuNoise());
+      maker.process(kf->id, &map);
+      ASSERT_EQ(checkMap(map), "");
+    }
+  }
+};
+
+}  // namespace
+
+TEST(Map, TracksBecomeLandmarks) {
+  Fixture f;
+  f.add(6);
+  EXPECT_GT(f.map.landmarks().size(), 40u);
+  std::size_t seen_often = 0;
+  for (const auto& entry : f.map.landmarks()) seen_often += entry.second.observations.size() >= 3;
+  EXPECT_GT(seen_often, 20u);
+  const auto covisible = f.map.covisible(6);
+  ASSERT_FALSE(covisible.empty());
+  EXPECT_EQ(covisible.front().first, 5u);
+}
+
+TEST(Map, RemovingAKeyframeJoinsTheImuChain) {
+  Fixture f;
+  f.add(5);
+  const double before = f.map.keyframe(3).preintegration->dt() + f.map.keyframe(4).preintegration->dt();
+  f.map.removeKeyframe(3, ImuNoise(), 3.0);
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.keyframe(4).previous, 2u);
+  EXPECT_NEAR(f.map.keyframe(4).preintegration->dt(), before, 1e-9);
+  EXPECT_EQ(f.map.takeChanges().removed_keyframes, std::vector<KeyframeId>{3});
+  // Too long a factor: the chain is cut instead.
+  f.map.removeKeyframe(4, ImuNoise(), 0.5);
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.keyframe(5).previous, 0u);
+  EXPECT_FALSE(f.map.keyframe(5).preintegration);
+  f.map.removeKeyframe(5, ImuNoise(), 3.0);
+  f.map.removeKeyframe(1, ImuNoise(), 3.0);
+  f.map.removeKeyframe(2, ImuNoise(), 3.0);
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_TRUE(f.map.landmarks().empty());
+  EXPECT_THROW(f.map.keyframe(2), MapError);
+}
+
+TEST(Map, MergingLandmarks) {
+  Fixture f;
+  f.add(2);
+  // Two landmarks of one keyframe cannot be one point.
+  std::vector<LandmarkId> own;
+  for (const LandmarkId id : f.map.keyframe(2).landmarks)
+    if (id != kNoLandmark) own.push_back(id);
+  ASSERT_GE(own.size(), 2u);
+  EXPECT_FALSE(f.map.mergeLandmarks(own[0], own[1]));
+  EXPECT_FALSE(f.map.mergeLandmarks(own[0], own[0]));
+  // One only in keyframe 1 and one only in keyframe 2 can.
+  LandmarkId only1 = kNoLandmark, only2 = kNoLandmark;
+  for (const LandmarkId id : f.map.landmarkIds()) {
+    const MapLandmark& l = f.map.landmark(id);
+    if (l.observations.size() == 1) (l.host() == 1 ? only1 : only2) = id;
+  }
+  ASSERT_NE(only1, kNoLandmark);
+  ASSERT_NE(only2, kNoLandmark);
+  EXPECT_TRUE(f.map.mergeLandmarks(only2, only1));
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.resolve(only2), only1);
+  EXPECT_EQ(f.map.landmark(only1).observations.size(), 2u);
+  EXPECT_THROW(f.map.addLandmark(only2, Eigen::Vector3d::Zero(), {1, 0}), MapError);
+}
+
+TEST(Map, PlanesMergeAndGo) {
+  Fixture f;
+  f.add(3);
+  const PlaneUpdate update = f.world.planes();
+  for (const PlaneEstimate& plane : update.planes) f.map.setPlane(plane);
+  for (const PlaneObservation& o : update.observations) EXPECT_TRUE(f.map.setPlaneObservation(o));
+  ASSERT_GE(update.observations.size(), 2u);
+  EXPECT_EQ(checkMap(f.map), "");
+  const PlaneId a = update.observations[0].plane, b = update.observations[1].plane;
+  const LandmarkId landmark = f.map.landmarkIds().front();
+  f.map.associate(landmark, b);
+  const Eigen::Matrix4d sum = f.map.keyframe(3).planes.at(a).G + f.map.keyframe(3).planes.at(b).G;
+  f.map.mergePlanes(b, a);
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.landmark(landmark).plane, a);
+  EXPECT_LT((f.map.keyframe(3).planes.at(a).G - sum).norm(), 1e-9 * sum.norm());
+  f.map.removePlane(a);
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.landmark(landmark).plane, 0u);
+  EXPECT_THROW(f.map.associate(landmark, a), MapError);
+  PlaneObservation broken = update.observations[0];
+  broken.plane = update.observations.back().plane;
+  broken.G(0, 0) = std::nan("");
+  EXPECT_FALSE(f.map.setPlaneObservation(broken));
+  PlaneEstimate nan_plane = update.planes[0];
+  nan_plane.plane.n.x() = std::nan("");
+  EXPECT_THROW(f.map.setPlane(nan_plane), MapError);
+}
+
+TEST(Map, CorrectionMovesLandmarksWithTheirHost) {
+  Fixture f;
+  f.add(4);
+  const SE3 shift(expQuaternion(Eigen::Vector3d(0, 0, 0.3)), Eigen::Vector3d(1, 2, 0));
+  std::map<KeyframeId, SE3> poses;
+  for (const auto& entry : f.map.keyframes()) poses[entry.first] = shift * entry.second.state.T_W_I;
+  const LandmarkId id = f.map.landmarkIds().front();
+  const Eigen::Vector3d p = f.map.landmark(id).p_W, v = f.map.keyframe(2).state.v_W;
+  f.map.moveKeyframes(poses);
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_LT((f.map.landmark(id).p_W - shift * p).norm(), 1e-9);
+  EXPECT_LT((f.map.keyframe(2).state.v_W - shift.rotation() * v).norm(), 1e-9);
+}
+
+TEST(Map, CullingKeepsTheMapValid) {
+  Fixture f;
+  f.add(40);
+  const std::size_t landmarks = f.map.landmarks().size();
+  EXPECT_GT(cullLandmarks(39, &f.map), 0);
+  EXPECT_LT(f.map.landmarks().size(), landmarks);
+  EXPECT_EQ(checkMap(f.map), "");
+  CullingOptions options;
+  options.redundancy = 0.5;
+  const auto removed = cullKeyframes(options, 20, ImuNoise(), &f.map);
+  EXPECT_FALSE(removed.empty());
+  EXPECT_EQ(checkMap(f.map), "");
+  for (const auto& entry : f.map.keyframes())
+    if (entry.second.preintegration) EXPECT_LE(entry.second.preintegration->dt(), options.max_imu_seconds + 1e-9);
+}
+
+TEST(Map, CheckerSeesDamage) {
+  Fixture f;
+  f.add(3);
+  const LandmarkId id = f.map.landmarkIds().front();
+  Map damaged = f.map;
+  damaged.landmark(id).observations.clear();
+  EXPECT_NE(checkMap(damaged), "");
+  damaged = f.map;
+  damaged.keyframe(2).next = 1;
+  EXPECT_NE(checkMap(damaged), "");
+  damaged = f.map;
+  damaged.landmark(id).plane = 9;
+  EXPECT_NE(checkMap(damaged), "");
+  damaged = f.map;
+  damaged.landmark(id).p_W.x() = std::nan("");
+  EXPECT_NE(checkMap(damaged), "");
+}
