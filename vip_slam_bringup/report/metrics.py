@@ -77,6 +77,14 @@ def contains(plane, point):
     return False
 
 
+def worth_finding(plane):
+    """Only planes of 1 m2 and more, in view for 2 s and more, count as missed."""
+    def at_least(value, limit):
+        return value is None or value >= limit
+    area = plane['seen_area'] if plane.get('seen_area') is not None else plane['area']
+    return at_least(area, 1.0) and at_least(plane.get('seen_seconds'), 2.0)
+
+
 def plane_errors(found, true, T_truth_map):
     """Each found plane against the true plane of like direction and place: [{id, truth, angle (deg), distance (m)}]."""
     T = np.eye(4) if T_truth_map is None else T_truth_map
@@ -96,5 +104,6 @@ def plane_errors(found, true, T_truth_map):
                 best = {'truth': other['id'], 'angle': angle, 'distance': distance}
         rows.append(dict({'id': plane['id']}, **(best or {'truth': None})))
     matched = [row['truth'] for row in rows if row['truth'] is not None]
-    return {'rows': rows, 'true_count': len(true), 'matched': len(set(matched)),
+    expected = {plane['id'] for plane in true if worth_finding(plane)}
+    return {'rows': rows, 'true_count': len(expected), 'matched': len(expected & set(matched)),
             'duplicates': len(matched) - len(set(matched)), 'aligned': T_truth_map is not None}

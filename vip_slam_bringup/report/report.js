@@ -19,7 +19,7 @@ function tiles(data) {
   if (s.real_time_factor !== undefined) add(number(s.real_time_factor, 1), '×', 'real time');
   if (s.keyframes !== undefined) add(s.keyframes, '', 'keyframes');
   if (s.landmarks !== undefined) add(s.landmarks, '', 'landmarks' + (s.plane_landmarks ? `, ${s.plane_landmarks} on planes` : ''));
-  add(data.planes.length, '', data.plane_report ? `planes, ${data.plane_report.matched} of ${data.plane_report.true_count} true ones` : 'planes');
+  if (data.planes.length || !data.missing.includes('planes.yaml')) add(data.planes.length, '', data.plane_report ? `planes, ${data.plane_report.matched} of ${data.plane_report.true_count} true ones` : 'planes');
   const loops = s.loops || [];
   if (s.loops) add(loops.filter(l => l.accepted).length, '', `loops closed, ${loops.filter(l => !l.accepted).length} rejected`);
   if (s.peak_memory_mb !== undefined) add(number(s.peak_memory_mb, 0), 'MB', 'peak memory');
@@ -71,7 +71,7 @@ function planes(data) {
   if (report) {
     report.rows.forEach(r => { errors[r.id] = r; });
     const lost = report.true_count - report.matched;
-    el('planes-note').textContent = `${report.matched} of ${report.true_count} true planes found` +
+    el('planes-note').textContent = `${report.matched} of ${report.true_count} true planes (1 m² and more, in view for 2 s and more) found` +
       (report.duplicates ? `, ${report.duplicates} found more than once` : ', none twice') + (lost ? `, ${lost} not seen or missed` : '') +
       (report.aligned ? '; compared after aligning the trajectories.' : '; compared without alignment.');
   }

@@ -56,6 +56,7 @@ def read_planes(path):
                 'id': int(plane['id']), 'kind': str(plane['kind']),
                 'normal': [float(v) for v in plane['normal']], 'distance': float(plane['distance']),
                 'area': float(plane.get('area', 0.0)), 'keyframes': plane.get('keyframes'),
+                'seen_seconds': plane.get('seen_seconds'), 'seen_area': plane.get('seen_area'),
                 'polygons': [{'outer': [[float(v) for v in p] for p in polygon['outer']],
                               'holes': [[[float(v) for v in p] for p in ring] for ring in polygon.get('holes') or []]}
                              for polygon in plane.get('polygons') or []]})
@@ -118,10 +119,12 @@ def load(folder, truth_path=None, planes_truth_path=None):
         path = os.path.join(folder, name)
         return path if os.path.isfile(path) else None
 
-    if not present('trajectory.tum'):
-        raise Unreadable('%s: no trajectory.tum; expected a folder that run_bag wrote' % folder)
-    missing = [name for name in ('odometry.tum', 'planes.yaml', 'timing.csv', 'summary.yaml') if not present(name)]
-    trajectory = read_tum(present('trajectory.tum'))
+    if not present('trajectory.tum') and not present('odometry.tum'):
+        raise Unreadable('%s: neither trajectory.tum nor odometry.tum; expected a folder that run_bag wrote' % folder)
+    missing = [name for name in ('trajectory.tum', 'odometry.tum', 'planes.yaml', 'timing.csv', 'summary.yaml')
+               if not present(name)]
+    # A run of the front end alone has no trajectory in the map: the odometry takes its place.
+    trajectory = read_tum(present('trajectory.tum') or present('odometry.tum'))
     summary = read_yaml(present('summary.yaml')) if present('summary.yaml') else {}
     if not isinstance(summary, dict):
         raise Unreadable('%s/summary.yaml: expected keys and values' % folder)
@@ -131,7 +134,7 @@ def load(folder, truth_path=None, planes_truth_path=None):
         t0 = min(t0, float(states[0].get('t', t0))) if len(trajectory) else float(states[0].get('t', 0.0))
     data = {'summary': summary, 't0': t0, 'missing': missing, 'trajectory': path_points(trajectory, t0)}
     data['t_end'] = float(trajectory[-1, 0] - t0) if len(trajectory) else 0.0
-    if present('odometry.tum'):
+    if present('odometry.tum') and present('trajectory.tum'):
         data['odometry'] = path_points(read_tum(present('odometry.tum')), t0)
     data['planes'] = read_planes(present('planes.yaml')) if present('planes.yaml') else []
     stages = read_timing(present('timing.csv')) if present('timing.csv') else {}
