@@ -2,7 +2,9 @@
 
 add_library(vip_slam_runner
   src/runner/bag_reader.cpp
+  src/runner/mapping_thread.cpp
   src/runner/pipeline.cpp
+  src/runner/plane_files.cpp
   src/runner/progress_bar.cpp
   src/runner/run_output.cpp
 )

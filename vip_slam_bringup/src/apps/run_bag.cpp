@@ -1,4 +1,7 @@
 // run_bag BAG --sensor NAME_OR_YAML --out DIR: the whole system over a recorded bag, in lock-step.
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -19,7 +22,8 @@ namespace {
 volatile std::sig_atomic_t g_interrupted = 0;
 
 struct Arguments {
-  std::string bag, sensor, out, parameters;
+  std::string bag, sensor, out, parameters, variant, loop;
+  bool report = true;
   std::vector<std::string> settings;
   double start = 0, duration = -1;
 };
@@ -28,6 +32,9 @@ void addArguments(CLI::App& app, Arguments& arguments) {
   app.add_option("bag", arguments.bag, "the recording")->required();
   app.add_option("--sensor", arguments.sensor, "a shipped sensor or a sensor YAML file")->required();
   app.add_option("--out", arguments.out, "folder for the results; made when it does not exist")->required();
+  app.add_option("--variant", arguments.variant, "vi, vi_p, vi_cp or vip (default)");
+  app.add_option("--loop", arguments.loop, "loop closing: on (default) or off");
+  app.add_flag("!--no-report", arguments.report, "leave report.html out");
   app.add_option("--params", arguments.parameters, "YAML file with options, in groups");
   app.add_option("--set", arguments.settings, "one option as group/key=value; repeatable")->take_all();
   app.add_option("--start", arguments.start, "seconds to skip at the beginning");
@@ -42,13 +49,34 @@ std::pair<std::string, std::string> splitSetting(const std::string& setting) {
   return {setting.substr(0, equals), setting.substr(equals + 1)};
 }
 
+std::string onOff(const std::string& name, const std::string& text) {
+  if (text == "on" || text == "off") return text == "on" ? "true" : "false";
+  throw std::invalid_argument(name + " " + text + ": expected on or off");
+}
+
 vip_slam::PipelineOptions loadPipelineOptions(const Arguments& arguments) {
   vip_slam::PipelineOptions options;
   if (!arguments.parameters.empty()) vip_slam::loadOptions(options, arguments.parameters, "");
   std::vector<std::pair<std::string, std::string>> values;
+  if (!arguments.variant.empty()) values.emplace_back("backend/variant", arguments.variant);
+  if (!arguments.loop.empty()) values.emplace_back("backend/loop_closing", onOff("--loop", arguments.loop));
   for (const auto& setting : arguments.settings) values.push_back(splitSetting(setting));
   vip_slam::setOptions(options, values);
   return options;
+}
+
+/// The report's own script lies beside this program.
+void makeReport(const std::string& folder) {
+  const auto script = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "make_report";
+  const pid_t child = fork();
+  if (child == 0) {
+    execl(script.c_str(), script.c_str(), "--out-dir", folder.c_str(), static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  int status = 0;
+  if (child < 0 || waitpid(child, &status, 0) < 0 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    std::fprintf(stderr, "run_bag: no report: %s failed\n", script.c_str());
+  }
 }
 
 int run(const Arguments& arguments) {
@@ -80,9 +108,12 @@ int run(const Arguments& arguments) {
   vip_slam::RunFacts facts;
   facts.bag = arguments.bag;
   facts.sensor = sensor.name;
+  facts.variant = options.backend.variant;
+  facts.loop_closing = options.backend.loop_closing;
   facts.finished = !g_interrupted;
   facts.processing_time = seconds;
   vip_slam::writeRun(arguments.out, facts, pipeline, reader, timing);
+  if (arguments.report) makeReport(arguments.out);
   char note[160];
   std::snprintf(note, sizeof note, "%zu images in %.1f s%s, results in %s", pipeline.images(), seconds,
                 g_interrupted ? " (interrupted)" : "", arguments.out.c_str());

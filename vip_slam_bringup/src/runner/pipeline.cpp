@@ -1,11 +1,14 @@
 #include "vip_slam_bringup/runner/pipeline.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace vip_slam {
 
 Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing)
-    : options_(options), timing_(timing), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {}
+    : options_(options), timing_(timing), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
+  if (options.mapping) mapping_ = std::make_unique<MappingThread>(options, sensor, timing);
+}
 
 Pipeline::~Pipeline() = default;
 
@@ -41,9 +44,24 @@ void Pipeline::finish() {
     if (front_end_->ready(pair.t)) process(pair);
   }
   waiting_.clear();
+  applyAnswers(std::numeric_limits<std::size_t>::max());
+  if (mapping_) mapping_->finish();
+}
+
+void Pipeline::applyAnswers(std::size_t image) {
+  while (!answers_.empty() && answers_.front().due <= image) {
+    for (const MapUpdate& update : answers_.front().updates.get()) {
+      front_end_->applyMapUpdate(update);
+      T_map_odom_ = update.T_map_odom;
+      epoch_ = update.epoch;
+      placed_ = update.newest_keyframe != 0;
+    }
+    answers_.pop_front();
+  }
 }
 
 void Pipeline::process(const ImagePair& pair) {
+  applyAnswers(images_);
   FrameOutput output;
   {
     ScopedTimer timer(timing_, "frontend.total", pair.t);
@@ -54,7 +72,14 @@ void Pipeline::process(const ImagePair& pair) {
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
   if (frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
+    if (placed_ && epoch_ == frame.epoch) realtime_.push_back({frame.t, T_map_odom_ * frame.state.T_W_I});
   }
+  if (!mapping_) return;
+  if (output.keyframe) {
+    answers_.push_back({images_ + std::size_t(options_.lag), mapping_->addKeyframe(output.keyframe)});
+    if (options_.lag == 0) applyAnswers(images_);
+  }
+  mapping_->grow(output.frame);
 }
 
 }  // namespace vip_slam

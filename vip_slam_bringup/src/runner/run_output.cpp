@@ -4,6 +4,8 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "vip_slam_bringup/runner/plane_files.h"
+#include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
 
 namespace vip_slam {
@@ -48,7 +50,46 @@ void emitStates(YAML::Emitter& yaml, const std::vector<StateChange>& states) {
   yaml << YAML::EndSeq;
 }
 
-std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader) {
+void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
+             const std::vector<GlobalBaRecord>& adjustments) {
+  const auto put = [&yaml](const char* key, const auto& value) { yaml << YAML::Key << key << YAML::Value << value; };
+  put("keyframes", map.keyframes.size());
+  put("landmarks", map.landmarks.size());
+  put("planes", planes);
+  put("plane_landmarks", map.statistics.plane_landmarks);
+  yaml << YAML::Key << "loops" << YAML::Value << YAML::BeginSeq;
+  for (const LoopEvent& loop : map.loops) {
+    yaml << YAML::Flow << YAML::BeginMap;
+    put("t", loop.t);
+    put("query", loop.query);
+    put("match", loop.match);
+    put("accepted", loop.accepted);
+    put("inliers", loop.inliers);
+    put("reason", loop.reason);
+    yaml << YAML::EndMap;
+  }
+  yaml << YAML::EndSeq << YAML::Key << "global_ba" << YAML::Value << YAML::BeginSeq;
+  for (const GlobalBaRecord& record : adjustments) {
+    yaml << YAML::Flow << YAML::BeginMap;
+    put("t", record.t);
+    put("keyframes", record.keyframes);
+    put("ms", record.milliseconds);
+    yaml << YAML::EndMap;
+  }
+  yaml << YAML::EndSeq;
+}
+
+std::vector<std::string> warnings(const Pipeline& pipeline, const BagReader& reader) {
+  std::vector<std::string> all = reader.warnings();
+  if (pipeline.mapping()) {
+    const auto& refusals = pipeline.mapping()->refusals();
+    all.insert(all.end(), refusals.begin(), refusals.end());
+  }
+  return all;
+}
+
+std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader, const MapSnapshot& map,
+                    std::size_t planes) {
   const double duration = reader.endTime() - reader.beginTime();
   YAML::Emitter yaml;
   yaml.SetDoublePrecision(15);
@@ -56,6 +97,8 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   const auto put = [&yaml](const char* key, const auto& value) { yaml << YAML::Key << key << YAML::Value << value; };
   put("bag", facts.bag);
   put("sensor", facts.sensor);
+  put("variant", facts.variant);
+  put("loop_closing", facts.loop_closing);
   put("finished", facts.finished);
   put("duration", duration);
   put("processing_time", facts.processing_time);
@@ -63,14 +106,22 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   put("peak_memory_mb", peakMemoryMb());
   put("images", pipeline.images());
   put("tracked_images", pipeline.odometry().size());
-  put("keyframes", pipeline.frontEnd().counters().keyframes);
   put("distance", lengthOf(pipeline.odometry()));
   put("epochs", pipeline.frontEnd().counters().restarts + 1);
+  emitMap(yaml, map, planes, pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());
   emitStates(yaml, pipeline.states());
-  put("warnings", reader.warnings());
+  put("warnings", warnings(pipeline, reader));
   yaml << YAML::EndMap;
   return yaml.c_str();
+}
+
+Trajectory anchored(const Pipeline& pipeline, const MapSnapshot& map) {
+  std::vector<Anchor> anchors;
+  for (const SnapshotKeyframe& keyframe : map.keyframes) {
+    anchors.push_back({keyframe.t, keyframe.epoch, keyframe.T_odom_I, keyframe.state.T_W_I});
+  }
+  return anchorTrajectory(pipeline.odometry(), anchors);
 }
 
 }  // namespace
@@ -80,9 +131,22 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
   Trajectory odometry;
   for (const OdometryPose& pose : pipeline.odometry()) odometry.push_back({pose.t, pose.T_odom_I});
   writeTum(folder + "/odometry.tum", odometry);
+  MapSnapshot map;
+  std::vector<PlaneEstimate> planes;
+  if (const MappingThread* mapping = pipeline.mapping()) {
+    map = mapping->backEnd().snapshot();
+    planes = mapping->planes();
+    const Trajectory trajectory = anchored(pipeline, map);
+    writeTum(folder + "/trajectory.tum", trajectory);
+    writeTum(folder + "/realtime.tum", pipeline.realtime());
+    writePlanesYaml(folder + "/planes.yaml", planes);
+    writePlanesPly(folder + "/planes.ply", planes);
+    writeFloorPlan(folder + "/floorplan.svg", planes, trajectory);
+    mapping->backEnd().saveMap(folder + "/map.vsm");
+  }
   timing.writeCsv(folder + "/timing.csv");
   AtomicFile file(folder + "/summary.yaml");
-  file.stream() << summary(facts, pipeline, reader) << "\n";
+  file.stream() << summary(facts, pipeline, reader, map, planes.size()) << "\n";
   file.commit();
 }
 

@@ -7,11 +7,13 @@
 
 #include <cstdint>
 #include <deque>
+#include <future>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_bringup/runner/mapping_thread.h"
 #include "vip_slam_bringup/runner/pipeline_options.h"
 #include "vip_slam_core/trajectory/anchored_trajectory.h"
 #include "vip_slam_core/sensor/sensor_config.h"
@@ -32,25 +34,38 @@ class Pipeline {
   ~Pipeline();
 
   void add(const SensorEvent& event);
-  /// End of the data: processes what waits.
+  /// End of the data: processes what waits, and the last global adjustment.
   void finish();
 
   std::size_t images() const { return images_; }
   const std::vector<OdometryPose>& odometry() const { return odometry_; }  ///< images with a pose
   const std::vector<StateChange>& states() const { return states_; }
+  const Trajectory& realtime() const { return realtime_; }  ///< in map, as known at that time
   const FrontEnd& frontEnd() const { return *front_end_; }
+  const MappingThread* mapping() const { return mapping_.get(); }  ///< null: odometry only. Read it after finish()
 
  private:
+  struct Answer {
+    std::size_t due;  ///< number of the image before which it is applied
+    std::future<std::vector<MapUpdate>> updates;
+  };
+  void applyAnswers(std::size_t image);
   void process(const ImagePair& pair);
   void processReady();
 
   const PipelineOptions options_;
   TimingLog* const timing_;
   std::unique_ptr<FrontEnd> front_end_;
+  std::unique_ptr<MappingThread> mapping_;
   std::deque<ImagePair> waiting_;
+  std::deque<Answer> answers_;
+  SE3 T_map_odom_;
+  std::uint32_t epoch_ = 0;
+  bool placed_ = false;  ///< T_map_odom_ is known for epoch_
   double newest_ = -1e300;
   std::size_t images_ = 0;
   std::vector<OdometryPose> odometry_;
+  Trajectory realtime_;
   std::vector<StateChange> states_;
 };
 

@@ -10,7 +10,8 @@ namespace vip_slam {
 
 /// What the pipeline itself does not know.
 struct RunFacts {
-  std::string bag, sensor;
+  std::string bag, sensor, variant;
+  bool loop_closing = true;
   bool finished = true;
   double processing_time = 0;  ///< seconds, wall clock
 };

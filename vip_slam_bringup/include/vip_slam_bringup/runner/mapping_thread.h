@@ -1,0 +1,62 @@
+// Planes and back end in a thread of their own: work is done in the order it is handed over, so that the results do not
+// depend on how fast either thread runs.
+#pragma once
+
+#include <functional>
+#include <future>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "vip_slam_backend/back_end.h"
+#include "vip_slam_bringup/runner/channel.h"
+#include "vip_slam_bringup/runner/pipeline_options.h"
+#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/types/keyframe.h"
+#include "vip_slam_core/util/timing.h"
+#include "vip_slam_planes/plane_mapper.h"
+
+namespace vip_slam {
+
+struct GlobalBaRecord {
+  double t = 0;  ///< stamp of the newest keyframe
+  std::size_t keyframes = 0;
+  double milliseconds = 0;
+};
+
+class MappingThread {
+ public:
+  /// `timing` may be null.
+  MappingThread(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing);
+  ~MappingThread();
+  MappingThread(const MappingThread&) = delete;
+  MappingThread& operator=(const MappingThread&) = delete;
+
+  void grow(TrackedFramePtr frame);
+  /// The map updates that follow from the keyframe, in order. An exception of the estimators comes out of get().
+  std::future<std::vector<MapUpdate>> addKeyframe(KeyframePtr keyframe);
+  /// Does what waits, then the last global adjustment. Afterwards the estimators may be read.
+  void finish();
+
+  const BackEnd& backEnd() const { return *back_end_; }
+  std::vector<PlaneEstimate> planes() const;  ///< empty without planes
+  const std::vector<GlobalBaRecord>& globalAdjustments() const { return adjustments_; }
+  const std::vector<std::string>& refusals() const { return refusals_; }
+
+ private:
+  std::vector<MapUpdate> process(const KeyframePtr& keyframe);
+  void distribute(const MapUpdate& update);
+
+  TimingLog* const timing_;
+  std::unique_ptr<PlaneMapper> planes_;  ///< null: a system without planes
+  std::unique_ptr<BackEnd> back_end_;
+  SE3 T_map_odom_;
+  std::uint32_t epoch_ = 0;
+  bool placed_ = false;
+  std::vector<GlobalBaRecord> adjustments_;
+  std::vector<std::string> refusals_;
+  Channel<std::function<void()>> work_;
+  std::thread thread_;
+};
+
+}  // namespace vip_slam
