@@ -1,0 +1,38 @@
+// Are the map points that the system ties to planes really on them?
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_eval/plane_metrics.h"
+
+namespace vip_slam {
+
+/// A map point and the estimated plane it is tied to; plane 0: none.
+struct LabelledPoint {
+  std::int64_t id = 0;
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+  PlaneId plane = 0;
+};
+
+/// CSV with the header id,x,y,z,plane. Throws std::runtime_error "file:line: what, expected what".
+std::vector<LabelledPoint> readLabelledPoints(const std::string& path);
+/// Whole or not at all.
+void writeLabelledPoints(const std::string& path, const std::vector<LabelledPoint>& points);
+
+struct AssociationMetrics {
+  std::size_t labelled = 0;       ///< points tied to a plane
+  std::size_t correct = 0;        ///< of these, on the true plane (distance and outline)
+  std::size_t on_found_planes = 0;///< points that truly lie on a true plane that was found
+  std::size_t recovered = 0;      ///< of these, tied to it
+  double precision = 1, recall = 1;
+};
+
+/// `points` in the truth's world. A point is on a plane when within `tolerance` metres of it and inside its outline
+/// (or within `tolerance` of a place inside).
+AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<PlaneEstimate>& truth,
+                                      const PlaneMetrics& planes, double tolerance = 0.05);
+
+}  // namespace vip_slam

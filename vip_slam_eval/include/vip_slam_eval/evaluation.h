@@ -1,0 +1,52 @@
+// The whole judgement of one run: everything the command `evaluate` prints, writes and draws.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vip_slam_eval/association_metrics.h"
+#include "vip_slam_eval/metric_table.h"
+#include "vip_slam_eval/plane_metrics.h"
+#include "vip_slam_eval/trajectory_consistency.h"
+#include "vip_slam_eval/trajectory_metrics.h"
+
+namespace vip_slam {
+
+struct EvaluationInput {
+  std::string title;
+  Trajectory truth, estimate;
+  std::vector<PoseWithCovariance> covariances;  ///< empty: no NEES
+  std::optional<std::vector<PlaneEstimate>> true_planes, planes;
+  std::optional<std::vector<LabelledPoint>> points;
+
+  Alignment alignment = Alignment::kYaw;  ///< of the picture, the planes and the points
+  double max_gap = 0.1;                   ///< seconds between true poses that may be interpolated
+  double gap_seconds = 0.5;               ///< a longer hole in the estimate is a gap
+  double time_offset = 0;                 ///< t_truth = t_estimate + time_offset
+  std::vector<double> rpe_seconds = {1.0, 10.0};
+  std::vector<double> rpe_metres = {1.0, 5.0, 10.0};
+};
+
+struct Evaluation {
+  std::vector<PosePair> pairs;
+  AbsoluteError se3, yaw, position;  ///< ATE by alignment
+  AbsoluteError shown;               ///< by the chosen alignment
+  std::vector<RelativeError> over_time, over_distance;
+  Coverage coverage;
+  std::optional<Nees> nees;
+  std::optional<PlaneMetrics> planes;
+  std::optional<AssociationMetrics> associations;
+};
+
+/// Throws std::runtime_error when no estimate meets the truth in time.
+Evaluation evaluate(const EvaluationInput& input);
+
+MetricTable metricsOf(const EvaluationInput& input, const Evaluation& evaluation);
+/// Trajectory over the truth from above, errors and height over time, planes when given. An SVG document.
+std::string evaluationPicture(const EvaluationInput& input, const Evaluation& evaluation);
+/// Creates `folder` when needed and leaves metrics.csv, errors.csv, evaluation.svg and, with planes, planes.csv and
+/// true_planes.csv; none of them when one cannot be written.
+void writeEvaluation(const std::string& folder, const EvaluationInput& input, const Evaluation& evaluation);
+
+}  // namespace vip_slam

@@ -1,0 +1,26 @@
+// A list of named figures and its three spellings: terminal table, CSV, Markdown.
+#pragma once
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace vip_slam {
+
+struct Metric {
+  std::string group;  ///< "ATE yaw"
+  std::string name;   ///< "position rmse"
+  double value = 0;
+  std::string unit;   ///< "m"
+};
+using MetricTable = std::vector<Metric>;
+
+void printMetrics(std::ostream& out, const MetricTable& table);
+/// Columns group,name,value,unit.
+void writeMetricsCsv(std::ostream& out, const MetricTable& table);
+void writeMetricsMarkdown(std::ostream& out, const MetricTable& table);
+
+/// A number in at most `digits` significant digits, without exponent for ordinary sizes.
+std::string shortNumber(double value, int digits = 4);
+
+}  // namespace vip_slam

@@ -1,0 +1,44 @@
+// Is the trajectory complete, and are its covariances honest?
+#pragma once
+
+#include <vector>
+
+#include "vip_slam_core/trajectory/tum_io.h"
+#include "vip_slam_eval/statistics.h"
+
+namespace vip_slam {
+
+struct Gap {
+  double begin = 0, end = 0;  ///< seconds
+};
+
+/// How much of the truth's time the estimate covers. Gaps include what is missing before its first and after its last
+/// pose.
+struct Coverage {
+  double fraction = 0;  ///< of the truth's duration, gaps taken away
+  std::vector<Gap> gaps;
+  double longest_gap = 0;  ///< seconds
+};
+Coverage coverage(const Trajectory& truth, const Trajectory& estimate, double gap_seconds, double time_offset = 0.0);
+
+/// A pose with the covariance it was published with.
+struct PoseWithCovariance {
+  double t = 0;
+  SE3 T_M_B;
+  /// ROS order and frames: x y z in M, then rotation about the axes of M.
+  Matrix6d covariance = Matrix6d::Zero();
+};
+
+/// Normalised estimation error squared: e^T P^-1 e. An honest filter has a mean of `dof`.
+struct Nees {
+  ErrorStatistics pose;      ///< 6 degrees of freedom
+  ErrorStatistics position;  ///< 3
+  ErrorStatistics rotation;  ///< 3
+  double within_95 = 0;      ///< fraction of poses below the 95 % bound of chi-square with 6 degrees of freedom
+  std::size_t unusable = 0;  ///< covariances that are not positive definite
+};
+/// The filter's uncertainty counts from its start, so the worlds are joined there: position and yaw of the first pose.
+Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap = 0.1,
+          double time_offset = 0.0);
+
+}  // namespace vip_slam

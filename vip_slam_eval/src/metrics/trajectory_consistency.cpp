@@ -1,0 +1,71 @@
+#include "vip_slam_eval/trajectory_consistency.h"
+
+#include <algorithm>
+
+#include <Eigen/Cholesky>
+
+namespace vip_slam {
+namespace {
+
+constexpr double kChiSquare95Of6 = 12.5916;
+
+}  // namespace
+
+Coverage coverage(const Trajectory& truth, const Trajectory& estimate, double gap_seconds, double time_offset) {
+  Coverage result;
+  if (truth.size() < 2) return result;
+  const double begin = truth.front().t, end = truth.back().t;
+  double missing = 0, previous = begin;
+  const auto step = [&](double t) {
+    if (t - previous > gap_seconds) {
+      result.gaps.push_back({previous, t});
+      result.longest_gap = std::max(result.longest_gap, t - previous);
+      missing += t - previous;
+    }
+    previous = std::max(previous, t);
+  };
+  for (const StampedPose& pose : estimate) step(std::clamp(pose.t + time_offset, begin, end));
+  step(end);
+  result.fraction = 1.0 - missing / (end - begin);
+  return result;
+}
+
+Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap,
+          double time_offset) {
+  Nees result;
+  std::vector<double> pose, position, rotation;
+  std::size_t within = 0;
+  bool joined = false;
+  SE3 T_M_W;
+  for (const PoseWithCovariance& sample : estimate) {
+    SE3 T_W_B;
+    if (!poseAt(truth, sample.t + time_offset, &T_W_B, max_gap)) continue;
+    if (!joined) {
+      joined = true;
+      const double yaw = yawOf(sample.T_M_B.rotation()) - yawOf(T_W_B.rotation());
+      const Eigen::Quaterniond q = expQuaternion(Eigen::Vector3d(0, 0, yaw));
+      T_M_W = SE3(q, sample.T_M_B.t() - q * T_W_B.t());
+    }
+    const SE3 T_M_B = T_M_W * T_W_B;
+    Vector6d error;
+    error << sample.T_M_B.t() - T_M_B.t(), logSO3(sample.T_M_B.rotation() * T_M_B.rotation().conjugate());
+    const Eigen::LLT<Matrix6d> llt(sample.covariance);
+    const Eigen::LLT<Eigen::Matrix3d> llt_p(sample.covariance.topLeftCorner<3, 3>());
+    const Eigen::LLT<Eigen::Matrix3d> llt_r(sample.covariance.bottomRightCorner<3, 3>());
+    if (llt.info() != Eigen::Success || llt_p.info() != Eigen::Success || llt_r.info() != Eigen::Success) {
+      ++result.unusable;
+      continue;
+    }
+    pose.push_back(error.dot(llt.solve(error)));
+    position.push_back(error.head<3>().dot(llt_p.solve(error.head<3>())));
+    rotation.push_back(error.tail<3>().dot(llt_r.solve(error.tail<3>())));
+    if (pose.back() <= kChiSquare95Of6) ++within;
+  }
+  if (!pose.empty()) result.within_95 = double(within) / double(pose.size());
+  result.pose = summarise(std::move(pose));
+  result.position = summarise(std::move(position));
+  result.rotation = summarise(std::move(rotation));
+  return result;
+}
+
+}  // namespace vip_slam

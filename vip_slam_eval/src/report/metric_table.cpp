@@ -1,0 +1,55 @@
+#include "vip_slam_eval/metric_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <locale>
+#include <sstream>
+
+namespace vip_slam {
+
+std::string shortNumber(double value, int digits) {
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  if (value != 0 && std::abs(value) < 1e-4) {
+    out << std::scientific << std::setprecision(std::max(0, digits - 2)) << value;
+    return out.str();
+  }
+  const int before = value == 0 ? 1 : std::max(1, static_cast<int>(std::floor(std::log10(std::abs(value)))) + 1);
+  const int leading_zeros = (value != 0 && std::abs(value) < 1) ? static_cast<int>(-std::floor(std::log10(std::abs(value)))) - 1 : 0;
+  const int decimals = value == std::floor(value) && std::abs(value) < 1e15 ? 0 : std::max(0, digits - before + (before == 1 && std::abs(value) < 1 ? 1 + leading_zeros : 0));
+  out << std::fixed << std::setprecision(decimals) << value;
+  return out.str();
+}
+
+void printMetrics(std::ostream& out, const MetricTable& table) {
+  std::size_t width = 0, value_width = 0;
+  for (const Metric& metric : table) {
+    width = std::max(width, metric.name.size());
+    value_width = std::max(value_width, shortNumber(metric.value).size());
+  }
+  std::string group;
+  for (const Metric& metric : table) {
+    if (metric.group != group) out << metric.group << "\n";
+    group = metric.group;
+    out << "  " << std::left << std::setw(static_cast<int>(width)) << metric.name << "  " << std::right
+        << std::setw(static_cast<int>(value_width)) << shortNumber(metric.value) << "  " << metric.unit << "\n";
+  }
+}
+
+void writeMetricsCsv(std::ostream& out, const MetricTable& table) {
+  out << "group,name,value,unit\n";
+  for (const Metric& metric : table) {
+    out << metric.group << ',' << metric.name << ',' << shortNumber(metric.value, 9) << ',' << metric.unit << '\n';
+  }
+}
+
+void writeMetricsMarkdown(std::ostream& out, const MetricTable& table) {
+  out << "| group | measure | value | unit |\n|---|---|---:|---|\n";
+  for (const Metric& metric : table) {
+    out << "| " << metric.group << " | " << metric.name << " | " << shortNumber(metric.value) << " | " << metric.unit
+        << " |\n";
+  }
+}
+
+}  // namespace vip_slam
