@@ -22,7 +22,7 @@
 #include <vip_slam_msgs/PlaneUpdate.h>
 #include <vip_slam_msgs/TrackedFrame.h>
 
-#include "back_end_node_options.h"
+#include "vip_slam_backend/back_end_node_options.h"
 #include "map_display.h"
 #include "pose_in_map.h"
 #include "vip_slam_backend/BackEndConfig.h"

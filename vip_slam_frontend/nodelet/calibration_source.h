@@ -9,7 +9,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <tf2_ros/buffer.h>
 
-#include "front_end_node_options.h"
+#include "vip_slam_frontend/front_end_node_options.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 
 namespace vip_slam {

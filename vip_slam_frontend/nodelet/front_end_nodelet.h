@@ -24,7 +24,7 @@
 #include <vip_slam_msgs/MapUpdate.h>
 
 #include "calibration_source.h"
-#include "front_end_node_options.h"
+#include "vip_slam_frontend/front_end_node_options.h"
 #include "odometry_messages.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/FrontEndConfig.h"
