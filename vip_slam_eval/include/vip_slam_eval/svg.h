@@ -28,8 +28,10 @@ class SvgPage {
   void polygon(const std::vector<std::vector<Eigen::Vector2d>>& rings, const SvgStyle& style);
   void text(double x, double y, const std::string& text, double size, SvgAnchor anchor = SvgAnchor::kStart,
             const std::string& colour = "#333", bool bold = false, double turn_degrees = 0);
-  /// Everything until endClip() is cut to this rectangle.
-  void beginClip(double x, double y, double width, double height);
+  /// A rectangle to cut to, for beginClip().
+  int addClip(double x, double y, double width, double height);
+  /// Everything until endClip() is cut to the rectangle.
+  void beginClip(int clip);
   void endClip();
   std::string str() const;
 
@@ -58,6 +60,7 @@ class SvgAxes {
  private:
   SvgPage* page_;
   double left_, top_, width_, height_;
+  int clip_;
   double x0_ = 0, x1_ = 1, y0_ = 0, y1_ = 1;
 };
 

@@ -40,9 +40,18 @@ void drawPlanesFromAbove(SvgAxes* axes, const std::vector<PlaneEstimate>& planes
   }
 }
 
+// Which judged poses come after a hole in the estimate: no line leads to them.
+std::vector<char> followsGap(const EvaluationInput& input, const Evaluation& evaluation) {
+  std::vector<char> after(evaluation.pairs.size(), 0);
+  for (std::size_t i = 1; i < after.size(); ++i) {
+    after[i] = evaluation.pairs[i].t - evaluation.pairs[i - 1].t > input.gap_seconds;
+  }
+  return after;
+}
+
 // The estimate in runs of one colour each, by position error.
 void drawColoured(SvgAxes* axes, const std::vector<Eigen::Vector2d>& points, const std::vector<double>& errors,
-                  double worst) {
+                  double worst, const std::vector<char>& after_gap) {
   constexpr int kLevels = 24;
   std::vector<Eigen::Vector2d> run;
   int level = -1;
@@ -51,7 +60,10 @@ void drawColoured(SvgAxes* axes, const std::vector<Eigen::Vector2d>& points, con
   };
   for (std::size_t i = 0; i < points.size(); ++i) {
     const int next = std::clamp(static_cast<int>(errors[i] / worst * kLevels), 0, kLevels - 1);
-    if (next != level && !run.empty()) {
+    if (after_gap[i]) {
+      flush();
+      run.assign(1, points[i]);
+    } else if (next != level && !run.empty()) {
       run.push_back(points[i]);
       flush();
       run.assign(1, points[i]);
@@ -113,7 +125,7 @@ void drawTopView(SvgPage* page, const EvaluationInput& input, const Evaluation& 
   drawPlanesFromAbove(&axes, planes, {"#d95f02", "none", 2.0, 0.85, ""}, {"#7570b3", "#7570b3", 1.0, 0.13, ""});
   axes.polyline(truth, {"#000", "none", 1.0, 0.55, "5 3"});
   const double worst = std::max(1e-6, evaluation.shown.position.p95);
-  drawColoured(&axes, estimate, errors, worst);
+  drawColoured(&axes, estimate, errors, worst, followsGap(input, evaluation));
   const Eigen::Vector2d start = axes.map(estimate.front()), end = axes.map(estimate.back());
   page->circle(start.x(), start.y(), 5, {"#fff", "#1b9e77", 1.5, 1.0, ""});
   page->circle(end.x(), end.y(), 5, {"#fff", "#d62728", 1.5, 1.0, ""});
@@ -145,7 +157,8 @@ struct Curve {
   std::string name;
 };
 
-void drawOverTime(SvgPage* page, double top, const Evaluation& evaluation, const std::string& title,
+void drawOverTime(SvgPage* page, double top, const EvaluationInput& input, const Evaluation& evaluation,
+                  const std::string& title,
                   const std::string& label, const std::vector<Curve>& curves, bool from_zero) {
   SvgAxes axes(page, 1010, top, 460, 190);
   const double t0 = evaluation.pairs.front().t;
@@ -156,6 +169,14 @@ void drawOverTime(SvgPage* page, double top, const Evaluation& evaluation, const
   const double margin = 0.06 * std::max(1e-9, high - low);
   axes.range(0, evaluation.pairs.back().t - t0, from_zero ? 0 : low - margin, high + margin);
   axes.draw(title, "time [s]", label);
+  const std::vector<char> after_gap = followsGap(input, evaluation);
+  for (const Gap& gap : evaluation.coverage.gaps) {
+    const double begin = std::max(gap.begin - t0 - input.time_offset, axes.x0());
+    const double end = std::min(gap.end - t0 - input.time_offset, axes.x1());
+    if (end <= begin) continue;
+    axes.polygon({{{begin, axes.y0()}, {end, axes.y0()}, {end, axes.y1()}, {begin, axes.y1()}}},
+                 {"none", "#d62728", 0, 0.15, ""});
+  }
   double name_x = 1466;
   for (auto curve = curves.rbegin(); curve != curves.rend(); ++curve) {
     if (curve->name.empty()) continue;
@@ -165,6 +186,10 @@ void drawOverTime(SvgPage* page, double top, const Evaluation& evaluation, const
   for (const Curve& curve : curves) {
     std::vector<Eigen::Vector2d> points;
     for (std::size_t i = 0; i < curve.values.size(); ++i) {
+      if (after_gap[i]) {
+        axes.polyline(points, curve.style);
+        points.clear();
+      }
       points.emplace_back(evaluation.pairs[i].t - t0, curve.values[i]);
     }
     axes.polyline(points, curve.style);
@@ -197,11 +222,11 @@ std::string evaluationPicture(const EvaluationInput& input, const Evaluation& ev
     true_z.push_back(evaluation.pairs[i].T_W_B.t().z());
     estimated_z.push_back(true_z.back() + e.position.z());
   }
-  drawOverTime(&page, 100, evaluation, "Position error", "[cm]", {{position, {"#3b528b", "none", 1.4, 1.0, ""}, ""}},
+  drawOverTime(&page, 100, input, evaluation, "Position error", "[cm]", {{position, {"#3b528b", "none", 1.4, 1.0, ""}, ""}},
                true);
-  drawOverTime(&page, 370, evaluation, "Rotation error", "[deg]", {{rotation, {"#d95f02", "none", 1.4, 1.0, ""}, ""}},
+  drawOverTime(&page, 370, input, evaluation, "Rotation error", "[deg]", {{rotation, {"#d95f02", "none", 1.4, 1.0, ""}, ""}},
                true);
-  drawOverTime(&page, 640, evaluation, "Height", "z [m]",
+  drawOverTime(&page, 640, input, evaluation, "Height", "z [m]",
                {{true_z, {"#777", "none", 2.4, 0.6, ""}, "truth"},
                 {estimated_z, {"#21918c", "none", 1.2, 1.0, ""}, "estimate"}},
                false);

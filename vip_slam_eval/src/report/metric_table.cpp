@@ -15,9 +15,10 @@ std::string shortNumber(double value, int digits) {
     out << std::scientific << std::setprecision(std::max(0, digits - 2)) << value;
     return out.str();
   }
-  const int before = value == 0 ? 1 : std::max(1, static_cast<int>(std::floor(std::log10(std::abs(value)))) + 1);
-  const int leading_zeros = (value != 0 && std::abs(value) < 1) ? static_cast<int>(-std::floor(std::log10(std::abs(value)))) - 1 : 0;
-  const int decimals = value == std::floor(value) && std::abs(value) < 1e15 ? 0 : std::max(0, digits - before + (before == 1 && std::abs(value) < 1 ? 1 + leading_zeros : 0));
+  // The first significant digit stands for 10^exponent.
+  const int exponent = value == 0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(value))));
+  const bool whole = value == std::floor(value) && std::abs(value) < 1e15;
+  const int decimals = whole ? 0 : std::max(0, digits - 1 - exponent);
   out << std::fixed << std::setprecision(decimals) << value;
   return out.str();
 }
@@ -39,8 +40,11 @@ void printMetrics(std::ostream& out, const MetricTable& table) {
 
 void writeMetricsCsv(std::ostream& out, const MetricTable& table) {
   out << "group,name,value,unit\n";
+  const auto cell = [](const std::string& text) {
+    return text.find(',') == std::string::npos ? text : "\"" + text + "\"";
+  };
   for (const Metric& metric : table) {
-    out << metric.group << ',' << metric.name << ',' << shortNumber(metric.value, 9) << ',' << metric.unit << '\n';
+    out << cell(metric.group) << ',' << cell(metric.name) << ',' << shortNumber(metric.value, 9) << ',' << metric.unit << '\n';
   }
 }
 

@@ -8,8 +8,6 @@
 #include <locale>
 #include <sstream>
 
-#include "vip_slam_eval/metric_table.h"
-
 namespace vip_slam {
 namespace {
 
@@ -25,6 +23,16 @@ std::string number(double value) {
   std::ostringstream out;
   out.imbue(std::locale::classic());
   out << value;
+  return out.str();
+}
+
+// As many decimals as tell neighbouring ticks apart.
+std::string tickLabel(double value, double step) {
+  if (std::abs(value) < 1e-9 * step) return "0";
+  const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out << std::fixed << std::setprecision(decimals) << value;
   return out.str();
 }
 
@@ -100,11 +108,13 @@ void SvgPage::text(double x, double y, const std::string& text, double size, Svg
   body_ += ">" + escaped(text) + "</text>\n";
 }
 
-void SvgPage::beginClip(double x, double y, double width, double height) {
-  const std::string id = "clip" + std::to_string(++clips_);
-  body_ += "<clipPath id=\"" + id + "\"><rect x=\"" + pixel(x) + "\" y=\"" + pixel(y) + "\" width=\"" + pixel(width) +
-           "\" height=\"" + pixel(height) + "\"/></clipPath>\n<g clip-path=\"url(#" + id + ")\">\n";
+int SvgPage::addClip(double x, double y, double width, double height) {
+  body_ += "<clipPath id=\"clip" + std::to_string(++clips_) + "\"><rect x=\"" + pixel(x) + "\" y=\"" + pixel(y) +
+           "\" width=\"" + pixel(width) + "\" height=\"" + pixel(height) + "\"/></clipPath>\n";
+  return clips_;
 }
+
+void SvgPage::beginClip(int clip) { body_ += "<g clip-path=\"url(#clip" + std::to_string(clip) + ")\">\n"; }
 
 void SvgPage::endClip() { body_ += "</g>\n"; }
 
@@ -117,7 +127,12 @@ std::string SvgPage::str() const {
 }
 
 SvgAxes::SvgAxes(SvgPage* page, double x, double y, double width, double height)
-    : page_(page), left_(x), top_(y), width_(width), height_(height) {}
+    : page_(page),
+      left_(x),
+      top_(y),
+      width_(width),
+      height_(height),
+      clip_(page->addClip(x, y, width, height)) {}
 
 void SvgAxes::range(double x0, double x1, double y0, double y1, bool equal) {
   const auto widen = [](double* low, double* high, double by) {
@@ -144,13 +159,13 @@ void SvgAxes::draw(const std::string& title, const std::string& x_label, const s
   for (double x = std::ceil(x0_ / x_step) * x_step; x <= x1_ + 1e-9 * x_step; x += x_step) {
     const double at = map({x, y0_}).x();
     page_->line(at, top_, at, top_ + height_, grid);
-    page_->text(at, top_ + height_ + 16, shortNumber(std::abs(x) < 1e-9 * x_step ? 0 : x, 6), 11, SvgAnchor::kMiddle);
+    page_->text(at, top_ + height_ + 16, tickLabel(x, x_step), 11, SvgAnchor::kMiddle);
   }
-  const double y_step = niceStep(y1_ - y0_, std::max(3, static_cast<int>(height_ / 60)));
+  const double y_step = niceStep(y1_ - y0_, std::max(3, static_cast<int>(height_ / 45)));
   for (double y = std::ceil(y0_ / y_step) * y_step; y <= y1_ + 1e-9 * y_step; y += y_step) {
     const double at = map({x0_, y}).y();
     page_->line(left_, at, left_ + width_, at, grid);
-    page_->text(left_ - 6, at + 4, shortNumber(std::abs(y) < 1e-9 * y_step ? 0 : y, 6), 11, SvgAnchor::kEnd);
+    page_->text(left_ - 6, at + 4, tickLabel(y, y_step), 11, SvgAnchor::kEnd);
   }
   page_->rectangle(left_, top_, width_, height_, {"#888", "none", 1.0, 1.0, ""});
   page_->text(left_, top_ - 8, title, 14, SvgAnchor::kStart, "#222", true);
@@ -161,7 +176,7 @@ void SvgAxes::draw(const std::string& title, const std::string& x_label, const s
 void SvgAxes::polyline(const std::vector<Eigen::Vector2d>& points, const SvgStyle& style) {
   std::vector<Eigen::Vector2d> mapped;
   for (const Eigen::Vector2d& p : points) mapped.push_back(map(p));
-  page_->beginClip(left_, top_, width_, height_);
+  page_->beginClip(clip_);
   page_->polyline(mapped, style);
   page_->endClip();
 }
@@ -172,7 +187,7 @@ void SvgAxes::polygon(const std::vector<std::vector<Eigen::Vector2d>>& rings, co
     mapped.emplace_back();
     for (const Eigen::Vector2d& p : ring) mapped.back().push_back(map(p));
   }
-  page_->beginClip(left_, top_, width_, height_);
+  page_->beginClip(clip_);
   page_->polygon(mapped, style);
   page_->endClip();
 }
