@@ -1,36 +1,127 @@
 #include "vip_slam_planes/plane_mapper.h"
 
+#include <cmath>
 #include <stdexcept>
 
-namespace vip_slam {
+#include "plane_mapper_impl.h"
+#include "vip_slam_planes/growth/see_through.h"
+#include "vip_slam_planes/growth/triangle_association.h"
 
-class PlaneMapper::Impl {
- public:
-  PlaneMapperOptions options;
-  PlaneMapperCounters counters;
-  std::vector<PlaneEstimate> published;
-};
+namespace vip_slam {
+namespace {
+
+// Keyframes that the back end has not placed by then never will be.
+constexpr std::size_t kMostWaiting = 50;
+
+const CameraModel& checked(const std::shared_ptr<const CameraModel>& camera, const DepthNoise& noise) {
+  if (!camera) throw std::invalid_argument("plane mapper: the camera model is missing");
+  const std::string fault = noise.validate();
+  if (!fault.empty()) throw std::invalid_argument("plane mapper: depth noise: " + fault);
+  return *camera;
+}
+
+}  // namespace
+
+PlaneMapper::Impl::Impl(const PlaneMapperOptions& o, std::shared_ptr<const CameraModel> c, const DepthNoise& n,
+                        TimingLog* t)
+    : options(o), camera(c), noise(n), timing(t), mesher_(o.mesh, c, n), rays_(c),
+      sampler_(o.observation, o.growth.distance, n),
+      points_(o.association, checked(c, n).focal(), n.bias_floor) {}
+
+std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C) {
+  std::vector<PlaneTrack*> tracks;
+  // Planes grow into view as well: the reach goes beyond what is covered.
+  for (auto& [id, track] : tracks_) {
+    if (mayBeInView(track, T_map_C, noise.max_range + options.growth.gap)) tracks.push_back(&track);
+  }
+  return tracks;
+}
+
+void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
+  const bool usable = frame.status.state == TrackingState::kTracking && !frame.depth_grid.empty() && newest_ != 0 &&
+                      frame.epoch == epoch_ && !tracks_.empty();
+  const SE3 T_map_C = T_map_odom * frame.state.T_W_I * frame.T_I_C;
+  const SE3 moved = grown_at_.inverse() * T_map_C;
+  const bool still = has_grown_ && moved.t().norm() < options.growth.min_move &&
+                     logSO3(moved.rotation()).norm() < options.growth.min_turn_deg * M_PI / 180.0;
+  if (!usable || still) {
+    ++counters.frames_skipped;
+    return;
+  }
+  const ScopedTimer timer(timing, "planes.grow", frame.t);
+  ++counters.frames_grown;
+  grown_at_ = T_map_C;
+  has_grown_ = true;
+  const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
+  if (tracks.empty()) return;
+  const std::vector<MapTriangle> triangles = placeMesh(mesher_.build(frame.features, frame.depth_grid), T_map_C);
+  const std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
+  const auto host_pose = poses_.find(frame.keyframe);
+  const KeyframeId host = host_pose == poses_.end() ? newest_ : frame.keyframe;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (label[i] >= 0) tracks[label[i]]->cover(triangles[i], host, poses_.at(host), nullptr);
+  }
+}
+
+void PlaneMapper::Impl::clear() {
+  waiting.clear();
+  placed_.clear();
+  poses_.clear();
+  tracks_.clear();
+  points_.clear();
+  published.clear();
+  merges_.clear();
+  removed_.clear();
+  fresh_.clear();
+  withdrawn_.clear();
+  next_plane_ = 1;
+  newest_ = 0;
+  has_grown_ = false;
+}
+
+void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
+  clear();
+  for (const PlaneEstimate& estimate : planes) {
+    next_plane_ = std::max(next_plane_, estimate.id + 1);
+    if (estimate.polygons.empty() || estimate.polygons.front().outer.empty()) continue;
+    PlaneTrack track(estimate.id, estimate.kind, estimate.plane, estimate.polygons.front().outer.front(),
+                     options.growth.cell);
+    for (const PlanePolygon& polygon : estimate.polygons) {
+      Ring2d outer;
+      for (const Eigen::Vector3d& p : polygon.outer) outer.push_back(track.toPlane(p));
+      std::vector<Ring2d> holes(polygon.holes.size());
+      for (std::size_t i = 0; i < holes.size(); ++i) {
+        for (const Eigen::Vector3d& p : polygon.holes[i]) holes[i].push_back(track.toPlane(p));
+      }
+      track.coverPolygon(outer, holes);
+    }
+    track.confirmed = true;
+    track.keyframes_seen = static_cast<int>(estimate.keyframes);
+    tracks_.emplace(estimate.id, std::move(track));
+  }
+  published = planes;
+}
 
 PlaneMapper::PlaneMapper(const PlaneMapperOptions& options, std::shared_ptr<const CameraModel> camera,
-                         const DepthNoise& noise, TimingLog*)
-    : impl_(new Impl) {
-  if (!camera) throw std::invalid_argument("plane mapper: no camera model");
-  const std::string bad = noise.validate();
-  if (!bad.empty()) throw std::invalid_argument("plane mapper: depth noise: " + bad);
-  impl_->options = options;
-}
+                         const DepthNoise& noise, TimingLog* timing)
+    : impl_(new Impl(options, std::move(camera), noise, timing)) {}
 PlaneMapper::~PlaneMapper() = default;
-void PlaneMapper::addKeyframe(KeyframePtr) {}
-void PlaneMapper::grow(const TrackedFrame&, const SE3&) {}
-PlaneUpdate PlaneMapper::applyMapUpdate(const MapUpdate& update) {
-  PlaneUpdate result;
-  result.revision = update.revision;
-  result.t = update.t;
-  return result;
+
+void PlaneMapper::addKeyframe(KeyframePtr keyframe) {
+  if (!keyframe || keyframe->id == 0) return;
+  impl_->waiting.emplace(keyframe->id, keyframe);
+  while (impl_->waiting.size() > kMostWaiting) {
+    impl_->waiting.erase(impl_->waiting.begin());
+    ++impl_->counters.keyframes_forgotten;
+  }
+  impl_->counters.keyframes_waiting = impl_->waiting.size();
 }
+
+void PlaneMapper::grow(const TrackedFrame& frame, const SE3& T_map_odom) { impl_->grow(frame, T_map_odom); }
+PlaneUpdate PlaneMapper::applyMapUpdate(const MapUpdate& update) { return impl_->applyMapUpdate(update); }
 const std::vector<PlaneEstimate>& PlaneMapper::planes() const { return impl_->published; }
-void PlaneMapper::restore(const std::vector<PlaneEstimate>& planes) { impl_->published = planes; }
-void PlaneMapper::clear() { impl_->published.clear(); }
+void PlaneMapper::restore(const std::vector<PlaneEstimate>& planes) { impl_->restore(planes); }
+void PlaneMapper::clear() { impl_->clear(); }
 const PlaneMapperCounters& PlaneMapper::counters() const { return impl_->counters; }
 const PlaneMapperOptions& PlaneMapper::options() const { return impl_->options; }
 

@@ -130,12 +130,14 @@ struct PointAssociationOptions {
 
 struct PlaneSupportOptions {
   int min_keyframes = 2;
+  double sure_area = 1.0;
   double min_area = 0.1;
   double see_through = 0.10;
   int patience = 8;
 
   void visit(OptionVisitor& v) {
     v.field("min_keyframes", min_keyframes, 1, 20, "keyframes that must have seen a plane before it is published");
+    v.field("sure_area", sure_area, 0.0, 100.0, "... unless its area is at least this, m^2");
     v.field("min_area", min_area, 0.0, 10.0, "planes that shrink below this disappear, m^2");
     v.field("see_through", see_through, 0.02, 1.0, "depth measured this far behind a plane speaks against it, m");
     v.field("patience", patience, 1, 1000, "keyframes that an unconfirmed plane may wait for its confirmation");

@@ -1,0 +1,45 @@
+// The compressed point-to-plane measurement of one keyframe on one plane (paper section "Compressed Point-to-Plane
+// Measurement", algorithms.md 5): samples spread evenly in 3D, G = s * sum p~ p~^T / sigma^2.
+// The back end cannot take back a wrong sample once it is summed, so the choice is strict: nodes one stride inside the
+// surface's image region, near the plane at the corrected pose, and on the surface that these nodes form by themselves.
+// The last test does not depend on the pose, so that it does not hide the pose error which the measurement is to show.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_core/types/keyframe.h"
+#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_planes/association/surface_labels.h"
+#include "vip_slam_planes/plane_mapper_options.h"
+
+namespace vip_slam {
+
+class PlaneSampler {
+ public:
+  PlaneSampler(const PlaneObservationOptions& options, double distance_gate, const DepthNoise& noise)
+      : options_(options), distance_gate_(distance_gate), noise_(noise) {}
+
+  /// One sigma of the distance along n_C of a depth point, without bias: sigma_z(z) |n.ray| / |ray.e_z|.
+  double sigmaAlong(const Eigen::Vector3d& n_C, const Eigen::Vector3d& p_C) const;
+
+  /// Samples of label `label`; empty when too few remain or they lie on another surface. `rays` belong to the grid.
+  std::optional<PlaneObservation> sample(const Keyframe& keyframe, const SurfaceLabels& labels, int label,
+                                         const std::vector<Eigen::Vector2f>& rays, const SE3& T_map_C, PlaneId plane_id,
+                                         const Plane& plane) const;
+
+  /// Sums the samples with sigmas for normal n_C into observation->G; sets weight_scale.
+  void accumulate(const Eigen::Vector3d& n_C, PlaneObservation* observation) const;
+
+ private:
+  std::vector<Eigen::Vector3d> spreadEvenly(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& n) const;
+  bool keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eigen::Vector3d>* points) const;
+
+  PlaneObservationOptions options_;
+  double distance_gate_;
+  DepthNoise noise_;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,77 @@
+// Which landmarks lie on which plane: the paper's candidate set and its decisions. Landmarks keep their identity through
+// the back end's merges; what is known about one follows its MapUpdates.
+#pragma once
+
+#include <functional>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "vip_slam_core/types/keyframe.h"
+#include "vip_slam_core/types/map_update.h"
+#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_planes/association/surface_labels.h"
+#include "vip_slam_planes/growth/plane_track.h"
+#include "vip_slam_planes/plane_mapper_options.h"
+
+namespace vip_slam {
+
+class PointAssociation {
+ public:
+  /// focal in pixels; depth_floor: systematic depth error, metres.
+  PointAssociation(const PointAssociationOptions& options, double focal, double depth_floor)
+      : options_(options), focal_(focal), depth_floor_(depth_floor) {}
+
+  void applyMapUpdate(const MapUpdate& update);
+  /// Sightings of a placed keyframe, once per keyframe.
+  void addSightings(const Keyframe& keyframe);
+  void removeKeyframe(KeyframeId id);
+
+  using FindPlane = std::function<const Plane*(PlaneId)>;
+  /// Candidates from a keyframe whose nodes are labelled with indices into `plane_of_label`; decides on those that
+  /// enough keyframes see. `trusted[k]` is false for planes that may not take points yet.
+  void process(const Keyframe& keyframe, const SurfaceLabels& labels, const std::vector<PlaneId>& plane_of_label,
+               const std::vector<char>& trusted, const CameraPoses& poses, const FindPlane& plane);
+  /// Re-checks all associated landmarks against moved planes; cheap.
+  void recheck(const FindPlane& plane);
+
+  void renamePlane(PlaneId from, PlaneId into);
+  void removePlane(PlaneId id);
+  void clear();
+
+  /// Changes since the last call.
+  std::vector<std::pair<LandmarkId, PlaneId>> takeAssociated();
+  std::vector<LandmarkId> takeDissociated();
+  /// The plane of a landmark, 0: none.
+  PlaneId planeOf(LandmarkId id) const;
+  std::size_t candidates() const;
+
+ private:
+  struct Sighting {
+    KeyframeId keyframe;
+    Eigen::Vector2f xy;
+    float depth, depth_sigma;
+  };
+  struct Landmark {
+    std::vector<Sighting> sightings;
+    Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+    bool placed = false;
+    PlaneId plane = 0;      ///< associated
+    PlaneId candidate = 0;  ///< 0: none
+    int failures = 0;
+    std::size_t tested = 0; ///< sightings at the last test
+    std::vector<PlaneId> refused;
+  };
+  LandmarkId resolve(LandmarkId id) const;
+  void setPlane(LandmarkId id, Landmark* landmark, PlaneId plane);
+  void test(LandmarkId id, Landmark* landmark, const CameraPoses& poses, const Plane& plane);
+
+  PointAssociationOptions options_;
+  double focal_, depth_floor_;
+  std::unordered_map<LandmarkId, Landmark> landmarks_;
+  std::unordered_map<LandmarkId, LandmarkId> alias_;
+  std::vector<std::pair<LandmarkId, PlaneId>> associated_;
+  std::vector<LandmarkId> dissociated_;
+};
+
+}  // namespace vip_slam

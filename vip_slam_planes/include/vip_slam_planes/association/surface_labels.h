@@ -1,0 +1,25 @@
+// Which node of a keyframe's depth grid shows which plane.
+#pragma once
+
+#include <vector>
+
+#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_planes/mesh/depth_mesh.h"
+
+namespace vip_slam {
+
+struct SurfaceLabels {
+  int stride = 0, offset = 0, cols = 0, rows = 0;
+  std::vector<int> label;  ///< -1: none
+
+  int at(int c, int r) const { return c < 0 || r < 0 || c >= cols || r >= rows ? -1 : label[std::size_t(r) * cols + c]; }
+  /// The label shared by the four nodes around a pixel, -1 when they differ.
+  int around(const Eigen::Vector2f& pixel) const;
+  /// The label of a node whose eight neighbours have it too, else -1: a margin of one stride to every border.
+  int inner(int c, int r) const;
+};
+
+/// Paints the 2D triangles' labels onto the nodes they cover.
+SurfaceLabels labelNodes(const DepthMesh& mesh, const std::vector<int>& triangle_label, const DepthGrid& grid);
+
+}  // namespace vip_slam

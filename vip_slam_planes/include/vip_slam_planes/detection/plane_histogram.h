@@ -1,0 +1,50 @@
+// Sparse, unbounded voting spaces for planes: height for horizontal triangles, angle x distance for vertical ones.
+// Votes are areas. Facing matters: floor and ceiling, or the two faces of a thin wall, vote apart. With the normal
+// turned to the camera the angle runs over the full circle and wraps at +-180 degrees without the sign flip of d that
+// a half circle needs. Distances are measured from a local origin, because theta-d bins shear with the lever arm.
+#pragma once
+
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace vip_slam {
+
+class PlaneHistogram {
+ public:
+  /// Bin sizes in metres and degrees; the angle bin is rounded so that a full circle holds a whole number of them.
+  PlaneHistogram(double distance_bin, double angle_bin_deg);
+
+  void clear();
+  /// A vote for the plane through p with unit normal n; `index` comes back with the peak. The mode says which space.
+  void addHorizontal(const Eigen::Vector3d& n, const Eigen::Vector3d& p_local, double area, int index);
+  void addVertical(const Eigen::Vector3d& n, const Eigen::Vector3d& p_local, double area, int index);
+
+  struct Peak {
+    double area = 0;
+    std::vector<int> members;  ///< indices in the bin and its neighbours, in order of their addition
+  };
+  /// The neighbourhood (bin and direct neighbours) with the largest area; area 0 when empty. Deterministic.
+  Peak peak() const;
+  void remove(int index);
+
+ private:
+  struct Vote {
+    int space, angle, distance;  ///< space 0: up, 1: down, 2: vertical
+    double area;
+  };
+  static std::uint64_t key(int space, int angle, int distance);
+  void add(const Vote& vote, int index);
+  template <class F>
+  void forNeighbours(int space, int angle, int distance, F f) const;
+
+  double distance_bin_, angle_bin_;
+  int angles_;
+  std::unordered_map<std::uint64_t, double> bins_;
+  std::vector<std::pair<int, Vote>> votes_;
+  std::unordered_map<int, std::size_t> vote_of_;  ///< index -> position in votes_
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,76 @@
+// A plane's covered area as square cells of its own 2D frame, each with the number of sightings (saturating).
+// Memory follows the covered area, whatever the number of frames; area, containment, overlap and polygons come from it.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace vip_slam {
+
+struct CellIndex {
+  int x = 0, y = 0;
+  bool operator==(const CellIndex& o) const { return x == o.x && y == o.y; }
+};
+
+class CellGrid {
+ public:
+  int at(CellIndex c) const {
+    const int i = c.x - x0_, j = c.y - y0_;
+    return i < 0 || j < 0 || i >= width_ || j >= height_ ? 0 : hits_[static_cast<std::size_t>(j) * width_ + i];
+  }
+  /// Grows as needed.
+  void set(CellIndex c, int hits);
+  /// Number of cells with at least `min_hits`.
+  int count(int min_hits) const;
+  /// True when a cell within `reach` (Chebyshev) has at least one hit.
+  bool near(CellIndex c, int reach) const;
+  bool empty() const { return hits_.empty(); }
+  void clear();
+
+  // Bounds of the stored rectangle: [x0, x0 + width) x [y0, y0 + height).
+  int x0() const { return x0_; }
+  int y0() const { return y0_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  /// f(CellIndex, hits) for every cell with hits, row by row.
+  template <class F>
+  void forEach(F f) const {
+    for (int j = 0; j < height_; ++j) {
+      for (int i = 0; i < width_; ++i) {
+        const int h = hits_[static_cast<std::size_t>(j) * width_ + i];
+        if (h) f(CellIndex{x0_ + i, y0_ + j}, h);
+      }
+    }
+  }
+
+  /// Covers single empty cells between covered opposite neighbours (re-sampling leaves such pinholes).
+  void closePinholes();
+
+ private:
+  void cover(CellIndex c);
+
+  int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;
+  std::vector<std::uint8_t> hits_;
+};
+
+/// Calls f(CellIndex) for the cells (side `cell`, metres) whose centre lies in the triangle abc of the plane.
+template <class F>
+void forCellsOfTriangle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c, double cell, F f) {
+  const Eigen::Vector2d low = a.cwiseMin(b).cwiseMin(c) / cell, high = a.cwiseMax(b).cwiseMax(c) / cell;
+  const auto cross = [](const Eigen::Vector2d& u, const Eigen::Vector2d& v) { return u.x() * v.y() - u.y() * v.x(); };
+  const double sign = cross(b - a, c - a) < 0 ? -1.0 : 1.0;
+  for (int y = static_cast<int>(std::ceil(low.y() - 0.5)); y + 0.5 <= high.y(); ++y) {
+    for (int x = static_cast<int>(std::ceil(low.x() - 0.5)); x + 0.5 <= high.x(); ++x) {
+      const Eigen::Vector2d p((x + 0.5) * cell, (y + 0.5) * cell);
+      if (sign * cross(b - a, p - a) >= 0 && sign * cross(c - b, p - b) >= 0 && sign * cross(a - c, p - c) >= 0) {
+        f(CellIndex{x, y});
+      }
+    }
+  }
+}
+
+}  // namespace vip_slam

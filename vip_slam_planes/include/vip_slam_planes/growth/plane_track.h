@@ -1,0 +1,110 @@
+// One plane as the mapper keeps it: parameters, covered cells, and what each keyframe contributed.
+//
+// Cells are stored as points in the camera frame of the keyframe that first covered them, so that a correction of the
+// keyframes (loop closure) carries the area along; the grid is a rasterisation of them in the plane's own 2D frame.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <unordered_map>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "vip_slam_core/geometry/plane.h"
+#include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_planes/detection/plane_fit.h"
+#include "vip_slam_planes/growth/cell_grid.h"
+#include "vip_slam_planes/growth/outline.h"
+#include "vip_slam_planes/mesh/map_triangles.h"
+
+namespace vip_slam {
+
+/// Camera poses T_map_C of placed keyframes.
+using CameraPoses = std::unordered_map<KeyframeId, SE3>;
+
+class PlaneTrack {
+ public:
+  PlaneTrack(PlaneId id, PlaneKind kind, const Plane& plane, const Eigen::Vector3d& origin, double cell);
+
+  PlaneId id() const { return id_; }
+  PlaneKind kind() const { return kind_; }
+  const Plane& plane() const { return plane_; }
+  double cellSize() const { return cell_; }
+  const CellGrid& cells() const { return cells_; }
+  double area() const { return cells_.count(1) * cell_ * cell_; }
+
+  Eigen::Vector2d toPlane(const Eigen::Vector3d& p) const {
+    return {ex_.dot(p - origin_), ey_.dot(p - origin_)};
+  }
+  Eigen::Vector3d fromPlane(const Eigen::Vector2d& q) const { return origin_ + q.x() * ex_ + q.y() * ey_; }
+  CellIndex cellAt(const Eigen::Vector2d& q) const {
+    return {static_cast<int>(std::floor(q.x() / cell_)), static_cast<int>(std::floor(q.y() / cell_))};
+  }
+  Eigen::Vector3d cellCentre(CellIndex c) const { return fromPlane({(c.x + 0.5) * cell_, (c.y + 0.5) * cell_}); }
+
+  /// New parameters; the normal is turned to the side kept so far, and the area moves along.
+  void setPlane(const Plane& plane);
+  /// The back end has set the parameters: they are no longer refitted here.
+  void markOptimised() { optimised_ = true; }
+  bool optimised() const { return optimised_; }
+
+  /// Covers the cells under a triangle, seen from keyframe `host` with camera pose T_map_C; `counted` cells gain a hit.
+  void cover(const MapTriangle& triangle, KeyframeId host, const SE3& T_map_C, std::vector<CellIndex>* touched);
+  void hit(CellIndex c) { cells_.set(c, std::min(kMostHits, cells_.at(c) + 1)); }
+  void coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C);
+  /// Covers a polygon of a loaded map; it has no host and moves with the plane alone.
+  void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes);
+  void miss(CellIndex c) {
+    cells_.set(c, cells_.at(c) - 1);
+    area_changed_ = true;
+  }
+
+  /// Rasterises the cells anew when hosts have moved (against where they were when last rasterised) by more than half a
+  /// cell; the 2D frame follows the host with most cells, so that a rigid correction moves all without resampling.
+  void followKeyframes(const CameraPoses& poses);
+  /// Hands the cells of a keyframe that goes away to another one.
+  void rehost(KeyframeId from, KeyframeId to, const CameraPoses& poses);
+  /// Takes over the cells and observations of a plane that was merged into this one.
+  void absorb(const PlaneTrack& other, const CameraPoses& poses);
+
+  std::map<KeyframeId, PlaneObservation>& observations() { return observations_; }
+  const std::map<KeyframeId, PlaneObservation>& observations() const { return observations_; }
+  /// Moments of all observations in `map`.
+  PlaneMoments moments(const CameraPoses& poses) const;
+
+  /// Drawn anew only when the area changed; always on the plane as it is now.
+  std::vector<PlanePolygon> polygons(int min_hits);
+  /// Area or parameters changed noticeably since the last call with `reset`.
+  bool changed(bool reset);
+
+  // Book-keeping of the mapper.
+  bool confirmed = false;
+  int keyframes_seen = 0;        ///< keyframes with an observation, ever
+  int keyframes_waited = 0;      ///< processed since the plane started
+
+ private:
+  /// Few enough that a surface which has gone is forgotten after as many sightings of what is behind it.
+  static constexpr int kMostHits = 8;
+  struct Patch {
+    SE3 T_map_C;                           ///< of the host, when last rasterised
+    std::vector<Eigen::Vector3f> cells_C;  ///< cell centres in the host's camera frame
+  };
+  void alignFrame(const Eigen::Vector3d& ex_hint, const Eigen::Vector3d& origin_hint);
+
+  PlaneId id_;
+  PlaneKind kind_;
+  Plane plane_;
+  bool optimised_ = false;
+  double cell_;
+  Eigen::Vector3d origin_, ex_, ey_;
+  CellGrid cells_;
+  bool area_changed_ = true, grown_ = true;
+  std::vector<Outline> outlines_;
+  Plane last_checked_;
+  std::map<KeyframeId, Patch> patches_;  ///< host 0: cells of a loaded map, in `map`
+  std::map<KeyframeId, PlaneObservation> observations_;
+};
+
+}  // namespace vip_slam

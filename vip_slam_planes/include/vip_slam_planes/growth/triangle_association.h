@@ -1,0 +1,22 @@
+// Which triangles of a placed mesh belong to which known plane (paper: 10 degrees, 5 cm).
+#pragma once
+
+#include <vector>
+
+#include "vip_slam_planes/growth/plane_track.h"
+#include "vip_slam_planes/mesh/map_triangles.h"
+#include "vip_slam_planes/plane_mapper_options.h"
+
+namespace vip_slam {
+
+/// Angle within which a triangle's normal counts as a plane's: the option, widened where noise makes normals unsteady.
+double angleGate(const MapTriangle& triangle, double angle_deg);
+double distanceGate(const MapTriangle& triangle, double distance);
+
+/// Index into `tracks` per triangle, -1: none. A connected patch of triangles joins only where it comes within
+/// options.gap of the plane's covered area: planes are surfaces, and two tables of one height are two.
+/// `tracks` holds the planes that can be in view.
+std::vector<int> associateTriangles(const std::vector<MapTriangle>& triangles,
+                                    const std::vector<const PlaneTrack*>& tracks, const PlaneGrowthOptions& options);
+
+}  // namespace vip_slam

@@ -1,0 +1,80 @@
+// The image's Delaunay mesh lifted to 3D by depth (paper section "Plane Detection"), in the camera's optical frame.
+//
+// The paper triangulates the features alone. White walls, the very planes that hold the drift down, have none; so nodes
+// of the image's grid of edge-safe depths fill in wherever no feature with depth is near. Triangles that cross a depth
+// edge, are long and thin, or are seen at a grazing angle are dropped.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/types/feature.h"
+#include "vip_slam_planes/mesh/delaunay.h"
+#include "vip_slam_planes/plane_mapper_options.h"
+
+namespace vip_slam {
+
+struct MeshVertex {
+  Eigen::Vector2f pixel;
+  Eigen::Vector3f p_C;   ///< metres
+  int feature = -1;      ///< index in the features; -1: a grid node
+};
+
+struct MeshTriangle {
+  std::array<int, 3> vertex;
+  std::array<int, 3> neighbour;  ///< triangles that were kept; -1: none
+  Eigen::Vector3f n_C;           ///< unit, towards the camera, averaged with neighbours of the same surface
+  Eigen::Vector3f centre_C;
+  float area;                    ///< m^2
+  float sigma;                   ///< one sigma of the distance along n, metres
+  float sigma_angle;             ///< one sigma of the normal, radians
+};
+
+struct DepthMesh {
+  std::vector<MeshVertex> vertices;
+  std::vector<MeshTriangle> triangles;
+};
+
+/// Rays (x, y) with z = 1 of the nodes of a depth grid; NaN where the pixel has none.
+class GridRays {
+ public:
+  explicit GridRays(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {}
+  /// Recomputed only when the layout of the grid changes.
+  const std::vector<Eigen::Vector2f>& operator()(const DepthGrid& grid);
+
+ private:
+  std::shared_ptr<const CameraModel> camera_;
+  int stride_ = 0, offset_ = 0, cols_ = 0, rows_ = 0;
+  std::vector<Eigen::Vector2f> rays_;
+};
+
+class DepthMeshBuilder {
+ public:
+  DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
+  /// The result is valid until the next call. The grid may be empty.
+  const DepthMesh& build(const std::vector<Feature>& features, const DepthGrid& grid);
+
+ private:
+  void collectVertices(const std::vector<Feature>& features, const DepthGrid& grid);
+  bool lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step, MeshTriangle* triangle) const;
+  bool crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const;
+  void smoothNormals();
+  int gridStep(const DepthGrid& grid) const;
+
+  PlaneMeshOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+  DepthNoise noise_;
+  GridRays rays_;
+  const std::vector<Eigen::Vector2f>* grid_rays_ = nullptr;
+  Delaunay delaunay_;
+  DepthMesh mesh_;
+  std::vector<Eigen::Vector2f> pixels_;
+  std::vector<char> taken_;
+  std::vector<int> number_;
+  std::vector<Eigen::Vector3f> smoothed_;
+};
+
+}  // namespace vip_slam

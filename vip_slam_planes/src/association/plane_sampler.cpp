@@ -1,0 +1,118 @@
+#include "vip_slam_planes/association/plane_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include <Eigen/Eigenvalues>
+
+#include "vip_slam_planes/detection/plane_fit.h"
+
+namespace vip_slam {
+
+double PlaneSampler::sigmaAlong(const Eigen::Vector3d& n_C, const Eigen::Vector3d& p_C) const {
+  return noise_.sigma(p_C.z()) * std::abs(n_C.dot(p_C)) / p_C.z();
+}
+
+std::vector<Eigen::Vector3d> PlaneSampler::spreadEvenly(const std::vector<Eigen::Vector3d>& points,
+                                                        const Eigen::Vector3d& n) const {
+  // One sample per voxel of the plane: the mean of its points. Coarser voxels when there would be too many.
+  const Eigen::Matrix<double, 3, 2> basis = tangentBasis(n);
+  double voxel = options_.voxel;
+  while (true) {
+    std::unordered_map<std::int64_t, std::size_t> index;
+    std::vector<std::pair<Eigen::Vector3d, int>> sums;
+    for (const Eigen::Vector3d& p : points) {
+      const Eigen::Vector2d q = basis.transpose() * p / voxel;
+      const std::int64_t x = std::llround(std::floor(q.x())), y = std::llround(std::floor(q.y()));
+      const auto [it, fresh] = index.try_emplace((x << 32) ^ (y & 0xffffffff), sums.size());
+      if (fresh) sums.emplace_back(Eigen::Vector3d::Zero(), 0);
+      sums[it->second].first += p;
+      ++sums[it->second].second;
+    }
+    if (sums.size() > std::size_t(options_.max_points)) {
+      voxel *= 1.02 * std::sqrt(double(sums.size()) / options_.max_points);
+      continue;
+    }
+    std::vector<Eigen::Vector3d> means;
+    for (const auto& [sum, count] : sums) means.push_back(sum / count);
+    return means;
+  }
+}
+
+bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eigen::Vector3d>* points) const {
+  std::vector<double> weights;
+  std::vector<double> sigmas;
+  for (const Eigen::Vector3d& p : *points) {
+    sigmas.push_back(sigmaAlong(n_C, p) + 0.001);
+    weights.push_back(1.0 / (sigmas.back() * sigmas.back()));
+  }
+  std::vector<double> sorted = sigmas;
+  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+  Plane local;
+  if (!fitPlaneRobust(*points, weights, sorted[sorted.size() / 2], PlaneKind::kGeneral, n_C, &local, nullptr)) return false;
+  std::vector<Eigen::Vector3d> kept;
+  PlaneMoments moments;
+  for (std::size_t i = 0; i < points->size(); ++i) {
+    if (std::abs(local.signedDistance((*points)[i])) > options_.inlier_sigmas * sigmas[i]) continue;
+    kept.push_back((*points)[i]);
+    moments.add((*points)[i], 1.0);
+  }
+  // Mostly off: clutter. Turned away beyond what noise does to a surface of this size: another surface.
+  if (kept.size() < std::max<std::size_t>(options_.min_points, points->size() / 2)) return false;
+  const Eigen::Vector3d mean = moments.centroid();
+  const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
+  const double spread =
+      std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
+  const double slack = 3.0 * (sorted[sorted.size() / 2] + 0.3 * noise_.bias_floor) / spread / std::sqrt(double(kept.size()) / 9.0);
+  const double turned = std::acos(std::min(1.0, std::abs(local.n.dot(n_C))));
+  *points = std::move(kept);
+  return turned < 5.0 * M_PI / 180.0 + slack;
+}
+
+void PlaneSampler::accumulate(const Eigen::Vector3d& n_C, PlaneObservation* observation) const {
+  PlaneMoments moments;
+  for (PlanePoint& point : observation->points) {
+    const Eigen::Vector3d p = point.p_C.cast<double>();
+    const double sigma = std::hypot(sigmaAlong(n_C, p), noise_.bias_floor);
+    point.sigma = float(sigma);
+    moments.add(p, 1.0 / (double(point.sigma) * double(point.sigma)));
+  }
+  observation->weight_scale = std::min(1.0, options_.effective_points / double(observation->points.size()));
+  observation->G = observation->weight_scale * moments.M;
+}
+
+std::optional<PlaneObservation> PlaneSampler::sample(const Keyframe& keyframe, const SurfaceLabels& labels, int label,
+                                                     const std::vector<Eigen::Vector2f>& rays, const SE3& T_map_C,
+                                                     PlaneId plane_id, const Plane& plane) const {
+  const DepthGrid& grid = keyframe.frame.depth_grid;
+  const Plane plane_C = transformPlane(T_map_C.inverse(), plane);
+  std::vector<Eigen::Vector3d> points;
+  const auto consider = [&](const Eigen::Vector3d& p) {
+    const double gate = std::max(distance_gate_, 3.0 * sigmaAlong(plane_C.n, p));
+    if (std::abs(plane_C.signedDistance(p)) < gate) points.push_back(p);
+  };
+  for (int r = 1; r + 1 < grid.rows; ++r) {
+    for (int c = 1; c + 1 < grid.cols; ++c) {
+      if (grid.at(c, r) > 0 && labels.inner(c, r) == label) {
+        const Eigen::Vector2f& ray = rays[std::size_t(r) * grid.cols + c];
+        consider(Eigen::Vector3d(ray.x(), ray.y(), 1.0) * grid.at(c, r));
+      }
+    }
+  }
+  for (const Feature& f : keyframe.frame.features) {
+    if (f.depth > 0 && labels.around(f.pixel) == label) consider(Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0) * f.depth);
+  }
+  if (points.size() < std::size_t(options_.min_points)) return {};
+  points = spreadEvenly(points, plane_C.n);
+  if (points.size() < std::size_t(options_.min_points) || !keepLocalSurface(plane_C.n, &points)) return {};
+
+  PlaneObservation observation;
+  observation.keyframe = keyframe.id;
+  observation.plane = plane_id;
+  for (const Eigen::Vector3d& p : points) observation.points.push_back({p.cast<float>(), 0.0f});
+  accumulate(plane_C.n, &observation);
+  return observation;
+}
+
+}  // namespace vip_slam

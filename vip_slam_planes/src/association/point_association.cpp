@@ -1,0 +1,202 @@
+#include "vip_slam_planes/association/point_association.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "vip_slam_planes/association/consistency_test.h"
+
+namespace vip_slam {
+namespace {
+
+// Views of one point that a test uses; more add time, not certainty.
+constexpr std::size_t kMaxSightings = 12;
+
+}  // namespace
+
+LandmarkId PointAssociation::resolve(LandmarkId id) const {
+  for (auto it = alias_.find(id); it != alias_.end(); it = alias_.find(id)) id = it->second;
+  return id;
+}
+
+void PointAssociation::setPlane(LandmarkId id, Landmark* landmark, PlaneId plane) {
+  if (landmark->plane == plane) return;
+  landmark->plane = plane;
+  if (plane) {
+    associated_.emplace_back(id, plane);
+  } else {
+    dissociated_.push_back(id);
+  }
+}
+
+void PointAssociation::applyMapUpdate(const MapUpdate& update) {
+  for (const auto& [from, into] : update.merged_landmarks) {
+    const LandmarkId target = resolve(into), source = resolve(from);
+    if (source == target) continue;
+    alias_[source] = target;
+    const auto it = landmarks_.find(source);
+    if (it == landmarks_.end()) continue;
+    Landmark moved = std::move(it->second);
+    landmarks_.erase(it);
+    Landmark& kept = landmarks_[target];
+    for (const Sighting& s : moved.sightings) {
+      const bool known = std::any_of(kept.sightings.begin(), kept.sightings.end(),
+                                     [&](const Sighting& o) { return o.keyframe == s.keyframe; });
+      if (!known) kept.sightings.push_back(s);
+    }
+    if (!kept.candidate) kept.candidate = moved.candidate;
+    if (!kept.placed) kept.p_W = moved.p_W, kept.placed = moved.placed;
+    // The back end gave the joint landmark a plane by its own rule; stating ours settles it.
+    if (!kept.plane && moved.plane) setPlane(target, &kept, moved.plane);
+  }
+  for (LandmarkId id : update.removed_landmarks) landmarks_.erase(resolve(id));
+  for (const LandmarkEstimate& estimate : update.landmarks) {
+    Landmark& landmark = landmarks_[resolve(estimate.id)];
+    landmark.p_W = estimate.p_W;
+    landmark.placed = true;
+  }
+}
+
+void PointAssociation::addSightings(const Keyframe& keyframe) {
+  for (const Feature& f : keyframe.frame.features) {
+    if (f.id == kNoLandmark) continue;
+    landmarks_[resolve(f.id)].sightings.push_back({keyframe.id, f.xy, f.depth, f.depth_sigma});
+  }
+}
+
+void PointAssociation::removeKeyframe(KeyframeId id) {
+  for (auto it = landmarks_.begin(); it != landmarks_.end();) {
+    std::vector<Sighting>& s = it->second.sightings;
+    s.erase(std::remove_if(s.begin(), s.end(), [&](const Sighting& o) { return o.keyframe == id; }), s.end());
+    it = s.empty() && !it->second.placed ? landmarks_.erase(it) : std::next(it);
+  }
+}
+
+void PointAssociation::test(LandmarkId id, Landmark* landmark, const CameraPoses& poses, const Plane& plane) {
+  std::vector<PointSighting> sightings;
+  const std::size_t step = (landmark->sightings.size() + kMaxSightings - 1) / kMaxSightings;
+  for (std::size_t i = 0; i < landmark->sightings.size(); i += std::max<std::size_t>(1, step)) {
+    const Sighting& s = landmark->sightings[i];
+    const auto pose = poses.find(s.keyframe);
+    if (pose == poses.end()) continue;
+    sightings.push_back({pose->second.inverse(), s.xy.cast<double>(), double(s.depth),
+                         std::hypot(double(s.depth_sigma), depth_floor_)});
+  }
+  if (sightings.size() < std::size_t(options_.min_keyframes)) return;
+  landmark->tested = landmark->sightings.size();
+  const ConsistencyResult result = testConsistency(sightings, plane, landmark->p_W, focal_, options_);
+  if (result.consistent) {
+    landmark->failures = 0;
+    setPlane(id, landmark, landmark->candidate);
+    return;
+  }
+  if (++landmark->failures < options_.max_failures) return;
+  landmark->refused.push_back(landmark->candidate);
+  landmark->candidate = 0;
+  landmark->failures = 0;
+  setPlane(id, landmark, 0);
+}
+
+void PointAssociation::process(const Keyframe& keyframe, const SurfaceLabels& labels,
+                               const std::vector<PlaneId>& plane_of_label, const std::vector<char>& trusted,
+                               const CameraPoses& poses, const FindPlane& find_plane) {
+  const auto pose = poses.find(keyframe.id);
+  if (pose == poses.end()) return;
+  for (const Feature& f : keyframe.frame.features) {
+    if (f.id == kNoLandmark) continue;
+    const LandmarkId id = resolve(f.id);
+    const auto it = landmarks_.find(id);
+    if (it == landmarks_.end()) continue;
+    Landmark& landmark = it->second;
+    if (!landmark.placed) {
+      if (!(f.depth > 0)) continue;
+      landmark.p_W = pose->second * (Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0) * f.depth);
+    }
+    const int k = labels.around(f.pixel);
+    if (k >= 0 && !landmark.candidate) {
+      const PlaneId plane_id = plane_of_label[k];
+      const Plane* plane = find_plane(plane_id);
+      const bool refused = std::count(landmark.refused.begin(), landmark.refused.end(), plane_id) > 0;
+      if (plane && !refused && std::abs(plane->signedDistance(landmark.p_W)) < options_.candidate_distance) {
+        landmark.candidate = plane_id;
+        landmark.failures = 0;
+      }
+    }
+    if (!landmark.candidate) continue;
+    // Decided points are asked again when their evidence has doubled.
+    const std::size_t due = landmark.plane ? 2 * landmark.tested : landmark.tested + 1;
+    if (landmark.sightings.size() < std::max<std::size_t>(options_.min_keyframes, due)) continue;
+    const auto label = std::find(plane_of_label.begin(), plane_of_label.end(), landmark.candidate);
+    if (label != plane_of_label.end() && !trusted[label - plane_of_label.begin()]) continue;
+    const Plane* plane = find_plane(landmark.candidate);
+    if (plane) test(id, &landmark, poses, *plane);
+  }
+}
+
+void PointAssociation::recheck(const FindPlane& find_plane) {
+  for (auto& [id, landmark] : landmarks_) {
+    landmark.refused.clear();  // the map has moved: everyone gets another chance
+    if (!landmark.plane || !landmark.placed) continue;
+    const Plane* plane = find_plane(landmark.plane);
+    if (plane && std::abs(plane->signedDistance(landmark.p_W)) < options_.candidate_distance) continue;
+    landmark.candidate = 0;
+    landmark.tested = 0;
+    setPlane(id, &landmark, 0);
+  }
+}
+
+void PointAssociation::renamePlane(PlaneId from, PlaneId into) {
+  for (auto& [id, landmark] : landmarks_) {
+    if (landmark.candidate == from) landmark.candidate = into;
+    if (landmark.plane == from) landmark.plane = into;  // the back end renames by the merge itself
+  }
+}
+
+void PointAssociation::removePlane(PlaneId plane) {
+  for (auto& [id, landmark] : landmarks_) {
+    if (landmark.candidate == plane) landmark.candidate = 0, landmark.tested = 0;
+    if (landmark.plane == plane) setPlane(id, &landmark, 0);
+  }
+}
+
+void PointAssociation::clear() {
+  landmarks_.clear();
+  alias_.clear();
+  associated_.clear();
+  dissociated_.clear();
+}
+
+std::vector<std::pair<LandmarkId, PlaneId>> PointAssociation::takeAssociated() {
+  // The last word per landmark, in order of ids: the hash table's order must not show.
+  std::set<LandmarkId> ids;
+  for (const auto& [id, plane] : associated_) ids.insert(resolve(id));
+  std::vector<std::pair<LandmarkId, PlaneId>> result;
+  for (LandmarkId id : ids) {
+    const PlaneId plane = planeOf(id);
+    if (plane) result.emplace_back(id, plane);
+  }
+  associated_.clear();
+  return result;
+}
+
+std::vector<LandmarkId> PointAssociation::takeDissociated() {
+  std::set<LandmarkId> ids;
+  for (LandmarkId id : dissociated_) {
+    if (landmarks_.count(id) && !planeOf(id)) ids.insert(id);
+  }
+  dissociated_.clear();
+  return {ids.begin(), ids.end()};
+}
+
+PlaneId PointAssociation::planeOf(LandmarkId id) const {
+  const auto it = landmarks_.find(resolve(id));
+  return it == landmarks_.end() ? 0 : it->second.plane;
+}
+
+std::size_t PointAssociation::candidates() const {
+  return static_cast<std::size_t>(std::count_if(landmarks_.begin(), landmarks_.end(), [](const auto& entry) {
+    return entry.second.candidate && !entry.second.plane;
+  }));
+}
+
+}  // namespace vip_slam

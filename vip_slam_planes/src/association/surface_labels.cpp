@@ -1,0 +1,56 @@
+#include "vip_slam_planes/association/surface_labels.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam {
+
+int SurfaceLabels::around(const Eigen::Vector2f& pixel) const {
+  if (stride == 0) return -1;
+  const int c = static_cast<int>(std::floor((pixel.x() - float(offset)) / float(stride)));
+  const int r = static_cast<int>(std::floor((pixel.y() - float(offset)) / float(stride)));
+  const int k = at(c, r);
+  return k >= 0 && at(c + 1, r) == k && at(c, r + 1) == k && at(c + 1, r + 1) == k ? k : -1;
+}
+
+int SurfaceLabels::inner(int c, int r) const {
+  const int k = at(c, r);
+  if (k < 0) return -1;
+  for (int dr = -1; dr <= 1; ++dr) {
+    for (int dc = -1; dc <= 1; ++dc) {
+      if (at(c + dc, r + dr) != k) return -1;
+    }
+  }
+  return k;
+}
+
+SurfaceLabels labelNodes(const DepthMesh& mesh, const std::vector<int>& triangle_label, const DepthGrid& grid) {
+  SurfaceLabels labels;
+  labels.stride = grid.stride, labels.offset = grid.offset, labels.cols = grid.cols, labels.rows = grid.rows;
+  labels.label.assign(grid.z.size(), -1);
+  if (grid.empty()) return labels;
+  const auto cross = [](const Eigen::Vector2f& u, const Eigen::Vector2f& v) { return u.x() * v.y() - u.y() * v.x(); };
+  const float stride = float(grid.stride), offset = float(grid.offset);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    if (triangle_label[i] < 0) continue;
+    const Eigen::Vector2f& a = mesh.vertices[mesh.triangles[i].vertex[0]].pixel;
+    const Eigen::Vector2f& b = mesh.vertices[mesh.triangles[i].vertex[1]].pixel;
+    const Eigen::Vector2f& c = mesh.vertices[mesh.triangles[i].vertex[2]].pixel;
+    const Eigen::Vector2f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+    const int c0 = std::max(0, static_cast<int>(std::ceil((low.x() - offset) / stride)));
+    const int c1 = std::min(grid.cols - 1, static_cast<int>(std::floor((high.x() - offset) / stride)));
+    const int r0 = std::max(0, static_cast<int>(std::ceil((low.y() - offset) / stride)));
+    const int r1 = std::min(grid.rows - 1, static_cast<int>(std::floor((high.y() - offset) / stride)));
+    for (int row = r0; row <= r1; ++row) {
+      for (int col = c0; col <= c1; ++col) {
+        const Eigen::Vector2f p(offset + float(col) * stride, offset + float(row) * stride);
+        if (cross(b - a, p - a) >= 0 && cross(c - b, p - b) >= 0 && cross(a - c, p - c) >= 0) {
+          labels.label[std::size_t(row) * grid.cols + col] = triangle_label[i];
+        }
+      }
+    }
+  }
+  return labels;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,231 @@
+#include "vip_slam_planes/detection/plane_detector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include <Eigen/Eigenvalues>
+
+#include "vip_slam_planes/detection/plane_fit.h"
+#include "vip_slam_planes/detection/plane_histogram.h"
+#include "vip_slam_planes/growth/triangle_association.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+
+class Detector {
+ public:
+  Detector(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
+           const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth)
+      : triangles_(triangles), taken_(taken), camera_(camera_centre), options_(options), growth_(growth) {}
+
+  std::vector<DetectedPlane> run() {
+    histogramPeaks();
+    if (options_.general) generalSurfaces();
+    return std::move(found_);
+  }
+
+ private:
+  bool kindOf(const MapTriangle& t, PlaneKind* kind) const {
+    const double gate = angleGate(t, options_.gravity_deg);
+    if (std::abs(t.n.z()) > std::cos(gate)) {
+      *kind = PlaneKind::kHorizontal;
+    } else if (std::abs(t.n.z()) < std::sin(gate)) {
+      *kind = PlaneKind::kVertical;
+    } else {
+      *kind = PlaneKind::kGeneral;
+    }
+    return *kind != PlaneKind::kGeneral;
+  }
+
+  void histogramPeaks() {
+    PlaneHistogram histogram(options_.distance_bin, options_.angle_bin_deg);
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      PlaneKind kind;
+      const MapTriangle& t = triangles_[i];
+      if (taken_[i] || !kindOf(t, &kind)) continue;
+      const Eigen::Vector3d local = t.centre - camera_;
+      if (kind == PlaneKind::kHorizontal) {
+        histogram.addHorizontal(t.n, local, t.area, static_cast<int>(i));
+      } else {
+        histogram.addVertical(t.n, local, t.area, static_cast<int>(i));
+      }
+    }
+    while (true) {
+      const PlaneHistogram::Peak peak = histogram.peak();
+      if (peak.area < options_.min_area) break;
+      for (int i : peak.members) histogram.remove(i);
+      PlaneKind kind;
+      kindOf(triangles_[peak.members.front()], &kind);
+      Plane plane;
+      if (!fit(peak.members, kind, &plane, nullptr)) continue;
+      const std::vector<int> members = gather(plane);
+      for (const std::vector<int>& surface : surfaces(members, plane)) {
+        if (accept(surface, kind)) {
+          for (int i : surface) histogram.remove(i);
+        }
+      }
+    }
+  }
+
+  // Flood fill over the mesh, after the peaks; accept() takes what is neither horizontal nor vertical.
+  void generalSurfaces() {
+    std::vector<char> visited(triangles_.size(), 0);
+    for (std::size_t seed = 0; seed < triangles_.size(); ++seed) {
+      if (visited[seed] || taken_[seed]) continue;
+      const Plane start = Plane::fromPointNormal(triangles_[seed].centre, triangles_[seed].n);
+      std::vector<int> patch{static_cast<int>(seed)};
+      visited[seed] = 1;
+      double area = 0;
+      for (std::size_t i = 0; i < patch.size(); ++i) {
+        area += triangles_[patch[i]].area;
+        for (int g : triangles_[patch[i]].neighbour) {
+          if (g < 0 || visited[g] || taken_[g] || !joins(triangles_[g], start, 3.0)) continue;
+          visited[g] = 1;
+          patch.push_back(g);
+        }
+      }
+      Plane plane;
+      if (area < options_.min_area || !fit(patch, PlaneKind::kGeneral, &plane, nullptr)) continue;
+      for (const std::vector<int>& surface : surfaces(gather(plane), plane)) accept(surface, PlaneKind::kGeneral);
+    }
+  }
+
+  bool joins(const MapTriangle& t, const Plane& plane, double widening) const {
+    return plane.n.dot(t.n) > std::cos(angleGate(t, growth_.angle_deg)) &&
+           std::abs(plane.signedDistance(t.centre)) < widening * distanceGate(t, growth_.distance);
+  }
+
+  std::vector<int> gather(const Plane& plane) const {
+    std::vector<int> members;
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      if (!taken_[i] && joins(triangles_[i], plane, 1.0)) members.push_back(static_cast<int>(i));
+    }
+    return members;
+  }
+
+  bool fit(const std::vector<int>& members, PlaneKind kind, Plane* plane, double* rms) const {
+    std::vector<Eigen::Vector3d> points;
+    std::vector<double> weights;
+    for (int i : members) {
+      // Area, so that dense features do not rule; noise, so that the far end does not.
+      points.push_back(triangles_[i].centre - camera_);
+      const double sigma = triangles_[i].sigma + 0.005;
+      weights.push_back(triangles_[i].area / (sigma * sigma));
+    }
+    Plane local;
+    if (points.size() < 3 || !fitPlaneRobust(points, weights, medianSigma(members) + 0.002, kind,
+                                             triangles_[members.front()].n, &local, rms)) {
+      return false;
+    }
+    *plane = Plane(local.n, local.d - local.n.dot(camera_));
+    return true;
+  }
+
+  double medianSigma(const std::vector<int>& members) const {
+    std::vector<double> sigmas;
+    for (int i : members) sigmas.push_back(triangles_[i].sigma);
+    std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
+    return sigmas[sigmas.size() / 2];
+  }
+
+  // Connected parts: cells of growth.gap side, joined with their eight neighbours.
+  std::vector<std::vector<int>> surfaces(const std::vector<int>& members, const Plane& plane) const {
+    const Eigen::Matrix<double, 3, 2> basis = tangentBasis(plane.n);
+    const auto key = [](std::int64_t x, std::int64_t y) { return (x << 32) ^ (y & 0xffffffff); };
+    std::unordered_map<std::int64_t, std::vector<int>> cells;
+    std::vector<std::pair<std::int64_t, std::int64_t>> at;
+    const double side = std::max(0.05, growth_.gap);
+    for (int i : members) {
+      const Eigen::Vector2d q = basis.transpose() * (triangles_[i].centre - camera_) / side;
+      at.emplace_back(std::llround(std::floor(q.x())), std::llround(std::floor(q.y())));
+      cells[key(at.back().first, at.back().second)].push_back(static_cast<int>(at.size()) - 1);
+    }
+    std::vector<char> visited(members.size(), 0);
+    std::vector<std::vector<int>> parts;
+    for (std::size_t seed = 0; seed < members.size(); ++seed) {
+      if (visited[seed]) continue;
+      std::vector<int> queue{static_cast<int>(seed)};
+      visited[seed] = 1;
+      for (std::size_t i = 0; i < queue.size(); ++i) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          for (int dy = -1; dy <= 1; ++dy) {
+            const auto cell = cells.find(key(at[queue[i]].first + dx, at[queue[i]].second + dy));
+            if (cell == cells.end()) continue;
+            for (int j : cell->second) {
+              if (!visited[j]) visited[j] = 1, queue.push_back(j);
+            }
+            cell->second.clear();
+          }
+        }
+      }
+      std::sort(queue.begin(), queue.end());
+      for (int& j : queue) j = members[j];
+      parts.push_back(std::move(queue));
+    }
+    return parts;
+  }
+
+  bool accept(const std::vector<int>& surface, PlaneKind kind) {
+    DetectedPlane result;
+    result.kind = kind;
+    PlaneMoments moments;
+    for (int i : surface) {
+      result.area += triangles_[i].area;
+      moments.add(triangles_[i].centre - camera_, triangles_[i].area);
+    }
+    if (result.area < options_.min_area || surface.size() < 6) return false;
+    double rms = 0;
+    if (!fit(surface, kind, &result.plane, &rms)) return false;
+    const double sigma = medianSigma(surface);
+    if (rms > options_.max_rms + 1.5 * sigma) return false;
+
+    const Eigen::Vector3d mean = moments.centroid();
+    const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
+    const double minor = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1);
+    const double spread = std::sqrt(std::max(1e-12, minor));
+    if (spread * std::sqrt(12.0) < options_.min_width) return false;  // side of a uniform rectangle
+
+    // Surfaces that lean are left alone: what a free fit says, less what noise explains.
+    Plane free;
+    if (!fit(surface, PlaneKind::kGeneral, &free, nullptr)) return false;
+    const double z = std::min(1.0, std::abs(free.n.z()));
+    const double uncertainty = std::max(sigma, rms) / (spread * std::sqrt(double(surface.size()) / 4.0));
+    const double lean = std::min(std::acos(z), std::asin(z));
+    const double limit = options_.max_tilt_deg * kDegree;
+    if (kind == PlaneKind::kGeneral) {
+      if (lean < limit) return false;
+    } else {
+      const double tilt = kind == PlaneKind::kHorizontal ? std::acos(z) : std::asin(z);
+      if (tilt > limit + 2 * uncertainty) return false;
+    }
+    result.centroid = mean + camera_;
+    for (int i : surface) {
+      // The free triangles were gathered around the whole peak; keep those on this surface's own plane.
+      if (!joins(triangles_[i], result.plane, 1.0)) continue;
+      result.triangles.push_back(i);
+      taken_[i] = 1;
+    }
+    found_.push_back(std::move(result));
+    return true;
+  }
+
+  const std::vector<MapTriangle>& triangles_;
+  std::vector<char> taken_;
+  Eigen::Vector3d camera_;
+  const PlaneDetectionOptions& options_;
+  const PlaneGrowthOptions& growth_;
+  std::vector<DetectedPlane> found_;
+};
+
+}  // namespace
+
+std::vector<DetectedPlane> detectPlanes(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
+                                        const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options,
+                                        const PlaneGrowthOptions& growth) {
+  return Detector(triangles, taken, camera_centre, options, growth).run();
+}
+
+}  // namespace vip_slam

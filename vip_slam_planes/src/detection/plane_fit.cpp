@@ -1,0 +1,71 @@
+#include "vip_slam_planes/detection/plane_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace vip_slam {
+
+double PlaneMoments::meanSquare(const Plane& plane) const {
+  const Eigen::Vector4d pi = plane.coefficients();
+  return weight() > 0 ? std::max(0.0, pi.dot(M * pi) / weight()) : 0.0;
+}
+
+PlaneMoments PlaneMoments::transformed(const SE3& T) const {
+  const Eigen::Matrix4d A = T.matrix();
+  return {A * M * A.transpose()};
+}
+
+bool fitPlane(const PlaneMoments& moments, PlaneKind kind, const Eigen::Vector3d& towards, Plane* plane) {
+  if (!(moments.weight() > 0)) return false;
+  const Eigen::Vector3d mean = moments.centroid();
+  Eigen::Vector3d n;
+  if (kind == PlaneKind::kHorizontal) {
+    n = Eigen::Vector3d::UnitZ();
+  } else {
+    const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
+    if (kind == PlaneKind::kVertical) {
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(scatter.topLeftCorner<2, 2>());
+      if (!(solver.eigenvalues()(1) > 1e-8)) return false;
+      n << solver.eigenvectors().col(0), 0.0;
+    } else {
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
+      if (!(solver.eigenvalues()(1) > 1e-8)) return false;
+      n = solver.eigenvectors().col(0);
+    }
+  }
+  if (n.dot(towards) < 0) n = -n;
+  *plane = Plane::fromPointNormal(mean, n);
+  return true;
+}
+
+bool fitPlaneRobust(const std::vector<Eigen::Vector3d>& points, const std::vector<double>& weights, double sigma,
+                    PlaneKind kind, const Eigen::Vector3d& towards, Plane* plane, double* rms) {
+  constexpr int kRounds = 8, kAbsolute = 4;  // least absolute distances first: Tukey needs a start near the majority
+  constexpr double kTukey = 4.685;
+  std::vector<double> residuals(points.size()), sorted;
+  PlaneMoments moments;
+  for (std::size_t i = 0; i < points.size(); ++i) moments.add(points[i], weights[i]);
+  for (int round = 0; round < kRounds; ++round) {
+    if (!fitPlane(moments, kind, towards, plane)) return false;
+    for (std::size_t i = 0; i < points.size(); ++i) residuals[i] = std::abs(plane->signedDistance(points[i]));
+    sorted = residuals;
+    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+    const double scale = std::max(sigma, 1.4826 * sorted[sorted.size() / 2]), cut = kTukey * scale;
+    moments = PlaneMoments();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (round < kAbsolute) {
+        moments.add(points[i], weights[i] * scale / std::max(0.2 * scale, residuals[i]));
+        continue;
+      }
+      const double x = residuals[i] / cut;
+      if (x < 1) moments.add(points[i], weights[i] * (1 - x * x) * (1 - x * x));
+    }
+  }
+  if (!fitPlane(moments, kind, towards, plane)) return false;
+  if (rms) *rms = std::sqrt(moments.meanSquare(*plane));
+  return true;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,67 @@
+#include "vip_slam_planes/growth/cell_grid.h"
+
+#include <algorithm>
+
+namespace vip_slam {
+
+void CellGrid::cover(CellIndex c) {
+  constexpr int kSlack = 8;  // cells beyond the need, so that growth copies seldom
+  if (hits_.empty()) {
+    x0_ = c.x - kSlack, y0_ = c.y - kSlack, width_ = height_ = 2 * kSlack + 1;
+    hits_.assign(static_cast<std::size_t>(width_) * height_, 0);
+    return;
+  }
+  if (c.x >= x0_ && c.y >= y0_ && c.x < x0_ + width_ && c.y < y0_ + height_) return;
+  const int x0 = c.x < x0_ ? c.x - kSlack : x0_, y0 = c.y < y0_ ? c.y - kSlack : y0_;
+  const int x1 = c.x >= x0_ + width_ ? c.x + kSlack + 1 : x0_ + width_;
+  const int y1 = c.y >= y0_ + height_ ? c.y + kSlack + 1 : y0_ + height_;
+  std::vector<std::uint8_t> hits(static_cast<std::size_t>(x1 - x0) * (y1 - y0), 0);
+  for (int j = 0; j < height_; ++j) {
+    std::copy_n(hits_.begin() + static_cast<std::size_t>(j) * width_, width_,
+                hits.begin() + static_cast<std::size_t>(j + y0_ - y0) * (x1 - x0) + (x0_ - x0));
+  }
+  hits_ = std::move(hits);
+  x0_ = x0, y0_ = y0, width_ = x1 - x0, height_ = y1 - y0;
+}
+
+void CellGrid::set(CellIndex c, int hits) {
+  if (hits == 0 && at(c) == 0) return;
+  cover(c);
+  hits_[static_cast<std::size_t>(c.y - y0_) * width_ + (c.x - x0_)] =
+      static_cast<std::uint8_t>(std::clamp(hits, 0, 255));
+}
+
+int CellGrid::count(int min_hits) const {
+  return static_cast<int>(std::count_if(hits_.begin(), hits_.end(), [&](int h) { return h >= min_hits; }));
+}
+
+bool CellGrid::near(CellIndex c, int reach) const {
+  const int xa = std::max(c.x - reach, x0_), xb = std::min(c.x + reach, x0_ + width_ - 1);
+  const int ya = std::max(c.y - reach, y0_), yb = std::min(c.y + reach, y0_ + height_ - 1);
+  for (int y = ya; y <= yb; ++y) {
+    const std::uint8_t* row = hits_.data() + static_cast<std::size_t>(y - y0_) * width_ - x0_;
+    for (int x = xa; x <= xb; ++x) {
+      if (row[x]) return true;
+    }
+  }
+  return false;
+}
+
+void CellGrid::clear() {
+  hits_.clear();
+  x0_ = y0_ = width_ = height_ = 0;
+}
+
+void CellGrid::closePinholes() {
+  std::vector<std::pair<CellIndex, int>> holes;
+  for (int y = y0_; y < y0_ + height_; ++y) {
+    for (int x = x0_; x < x0_ + width_; ++x) {
+      if (at({x, y})) continue;
+      const int across = std::min(at({x - 1, y}), at({x + 1, y})), along = std::min(at({x, y - 1}), at({x, y + 1}));
+      if (across || along) holes.push_back({{x, y}, std::max(across, along)});
+    }
+  }
+  for (const auto& [c, h] : holes) set(c, h);
+}
+
+}  // namespace vip_slam

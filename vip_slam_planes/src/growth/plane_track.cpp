@@ -1,0 +1,193 @@
+#include "vip_slam_planes/growth/plane_track.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam {
+
+PlaneTrack::PlaneTrack(PlaneId id, PlaneKind kind, const Plane& plane, const Eigen::Vector3d& origin, double cell)
+    : id_(id), kind_(kind), plane_(plane), cell_(cell) {
+  // Walls: x level, y up. Floors: x east. So that polygons of upright things are upright rectangles.
+  const Eigen::Vector3d level = Eigen::Vector3d::UnitZ().cross(plane.n);
+  alignFrame(level.norm() > 0.1 ? level : Eigen::Vector3d::UnitX(), origin);
+}
+
+void PlaneTrack::alignFrame(const Eigen::Vector3d& ex_hint, const Eigen::Vector3d& origin_hint) {
+  origin_ = plane_.project(origin_hint);
+  ex_ = (ex_hint - plane_.n * plane_.n.dot(ex_hint)).normalized();
+  ey_ = plane_.n.cross(ex_);
+}
+
+void PlaneTrack::setPlane(const Plane& plane) {
+  plane_ = plane.n.dot(plane_.n) < 0 ? plane.flipped() : plane;
+  alignFrame(ex_, origin_);
+}
+
+void PlaneTrack::coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C) {
+  const int before = cells_.at(c);
+  cells_.set(c, before + hits);
+  if (before > 0) return;
+  area_changed_ = grown_ = true;
+  auto [it, fresh] = patches_.try_emplace(host);
+  if (fresh) it->second.T_map_C = T_map_C;
+  it->second.cells_C.push_back((it->second.T_map_C.inverse() * cellCentre(c)).cast<float>());
+}
+
+void PlaneTrack::cover(const MapTriangle& triangle, KeyframeId host, const SE3& T_map_C,
+                       std::vector<CellIndex>* touched) {
+  forCellsOfTriangle(toPlane(triangle.corner[0]), toPlane(triangle.corner[1]), toPlane(triangle.corner[2]), cell_,
+                     [&](CellIndex c) {
+                       if (cells_.at(c) == 0) {
+                         coverCell(c, 1, host, T_map_C);
+                       } else if (touched) {
+                         touched->push_back(c);
+                       }
+                     });
+}
+
+void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes) {
+  if (outer.size() < 3) return;
+  Eigen::Vector2d low = outer.front(), high = low;
+  for (const Eigen::Vector2d& q : outer) low = low.cwiseMin(q), high = high.cwiseMax(q);
+  const CellIndex first = cellAt(low), last = cellAt(high);
+  for (int y = first.y; y <= last.y; ++y) {
+    for (int x = first.x; x <= last.x; ++x) {
+      const Eigen::Vector2d q((x + 0.5) * cell_, (y + 0.5) * cell_);
+      if (!ringContains(outer, q)) continue;
+      const bool open = std::any_of(holes.begin(), holes.end(), [&](const Ring2d& h) { return ringContains(h, q); });
+      if (!open) coverCell({x, y}, 1, 0, SE3());
+    }
+  }
+}
+
+void PlaneTrack::followKeyframes(const CameraPoses& poses) {
+  const Patch* main = nullptr;
+  SE3 main_move;
+  bool moved = false;
+  for (const auto& [host, patch] : patches_) {
+    const auto it = poses.find(host);
+    if (it == poses.end()) continue;
+    const SE3 move = it->second * patch.T_map_C.inverse();
+    if (!patch.cells_C.empty()) {
+      const Eigen::Vector3d p = patch.T_map_C * patch.cells_C.front().cast<double>();
+      const Eigen::Vector3d shift = move * p - p;
+      moved = moved || (shift - plane_.n * plane_.n.dot(shift)).norm() > 0.5 * cell_;
+    }
+    if (!main || patch.cells_C.size() > main->cells_C.size()) main = &patch, main_move = move;
+  }
+  if (!moved) return;
+  area_changed_ = grown_ = true;
+
+  // Where each cell was, before the frame moves.
+  CellGrid old;
+  std::swap(old, cells_);
+  struct Source {
+    Patch* patch;
+    std::vector<int> hits;
+  };
+  std::vector<Source> sources;
+  for (auto& [host, patch] : patches_) {
+    Source source{&patch, {}};
+    std::vector<Eigen::Vector3f> kept;
+    for (const Eigen::Vector3f& p_C : patch.cells_C) {
+      const int h = old.at(cellAt(toPlane(patch.T_map_C * p_C.cast<double>())));
+      if (h == 0) continue;  // cleared since
+      kept.push_back(p_C);
+      source.hits.push_back(h);
+    }
+    patch.cells_C = std::move(kept);
+    const auto it = poses.find(host);
+    if (it != poses.end()) patch.T_map_C = it->second;
+    sources.push_back(std::move(source));
+  }
+  alignFrame(main_move.rotation() * ex_, main_move * origin_);
+  for (const Source& source : sources) {
+    for (std::size_t i = 0; i < source.hits.size(); ++i) {
+      const CellIndex c = cellAt(toPlane(source.patch->T_map_C * source.patch->cells_C[i].cast<double>()));
+      cells_.set(c, std::max(cells_.at(c), source.hits[i]));
+    }
+  }
+  cells_.closePinholes();
+}
+
+void PlaneTrack::rehost(KeyframeId from, KeyframeId to, const CameraPoses& poses) {
+  observations_.erase(from);
+  const auto it = patches_.find(from);
+  if (it == patches_.end()) return;
+  const auto target = poses.find(to);
+  Patch moved = std::move(it->second);
+  patches_.erase(it);
+  auto [patch, fresh] = patches_.try_emplace(to);
+  if (fresh) patch->second.T_map_C = target == poses.end() ? SE3() : target->second;
+  const SE3 T_to_from = patch->second.T_map_C.inverse() * moved.T_map_C;
+  for (const Eigen::Vector3f& p : moved.cells_C) {
+    patch->second.cells_C.push_back((T_to_from * p.cast<double>()).cast<float>());
+  }
+}
+
+void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
+  for (const auto& [host, patch] : other.patches_) {
+    const auto pose = poses.find(host);
+    const SE3 T_map_C = pose == poses.end() ? patch.T_map_C : pose->second;
+    for (const Eigen::Vector3f& p_C : patch.cells_C) {
+      const Eigen::Vector3d p = patch.T_map_C * p_C.cast<double>();
+      const int hits = other.cells_.at(other.cellAt(other.toPlane(p)));
+      if (hits > 0) coverCell(cellAt(toPlane(p)), hits, host, T_map_C);
+    }
+  }
+  cells_.closePinholes();
+  for (const auto& [keyframe, theirs] : other.observations_) {
+    auto [it, fresh] = observations_.emplace(keyframe, theirs);
+    PlaneObservation& mine = it->second;
+    mine.plane = id_;
+    if (fresh) continue;
+    // Both saw parts of the same plane: the samples join, and the joint count is capped as each was.
+    const double n1 = double(mine.points.size()), n2 = double(theirs.points.size());
+    const double effective = std::max(mine.weight_scale * n1, theirs.weight_scale * n2);
+    const Eigen::Matrix4d sum = mine.G / mine.weight_scale + theirs.G / theirs.weight_scale;
+    mine.points.insert(mine.points.end(), theirs.points.begin(), theirs.points.end());
+    mine.weight_scale = std::min(1.0, effective / (n1 + n2));
+    mine.G = mine.weight_scale * sum;
+  }
+  keyframes_seen = std::max<int>(keyframes_seen, static_cast<int>(observations_.size()));
+  confirmed = confirmed || other.confirmed;
+}
+
+PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {
+  PlaneMoments sum;
+  for (const auto& [keyframe, observation] : observations_) {
+    const auto it = poses.find(keyframe);
+    if (it != poses.end()) sum.M += PlaneMoments{observation.G}.transformed(it->second).M;
+  }
+  return sum;
+}
+
+bool PlaneTrack::changed(bool reset) {
+  constexpr double kTurn = 1e-3, kShift = 1e-3;  // radians, metres
+  const bool changed = grown_ || (plane_.n - last_checked_.n).norm() > kTurn ||
+                       std::abs(last_checked_.signedDistance(origin_)) > kShift;
+  if (reset) grown_ = false, last_checked_ = plane_;
+  return changed;
+}
+
+std::vector<PlanePolygon> PlaneTrack::polygons(int min_hits) {
+  // Stairs of diagonal borders are one cell high; anything smaller than three by three cells is a speck.
+  const double speck = 9 * cell_ * cell_;
+  const auto lift = [&](const Ring2d& ring) {
+    Ring out;
+    for (const Eigen::Vector2d& q : ring) out.push_back(fromPlane(q));
+    return out;
+  };
+  std::vector<PlanePolygon> result;
+  if (area_changed_) outlines_ = traceOutlines(cells_, cell_, min_hits, 0.5 * speck, speck, 0.8 * cell_);
+  area_changed_ = false;
+  for (const Outline& outline : outlines_) {
+    PlanePolygon polygon;
+    polygon.outer = lift(outline.outer);
+    for (const Ring2d& hole : outline.holes) polygon.holes.push_back(lift(hole));
+    result.push_back(std::move(polygon));
+  }
+  return result;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,54 @@
+#include "vip_slam_planes/growth/see_through.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace vip_slam {
+
+bool mayBeInView(const PlaneTrack& track, const SE3& T_map_C, double range) {
+  const CellGrid& cells = track.cells();
+  if (cells.empty() || track.plane().signedDistance(T_map_C.t()) < -0.1) return false;
+  if (std::abs(track.plane().signedDistance(T_map_C.t())) > range) return false;
+  // Nearest point of the bounds to the camera.
+  const Eigen::Vector2d q = track.toPlane(T_map_C.t()) / track.cellSize();
+  const double dx = std::max({cells.x0() - q.x(), 0.0, q.x() - (cells.x0() + cells.width())});
+  const double dy = std::max({cells.y0() - q.y(), 0.0, q.y() - (cells.y0() + cells.height())});
+  if (std::hypot(dx, dy) * track.cellSize() > range) return false;
+  // Entirely behind the camera?
+  const Eigen::Vector3d forward = T_map_C.R().col(2);
+  for (int corner = 0; corner < 4; ++corner) {
+    const CellIndex c{cells.x0() + (corner & 1) * cells.width(), cells.y0() + (corner >> 1) * cells.height()};
+    if (forward.dot(track.cellCentre(c) - T_map_C.t()) > 0) return true;
+  }
+  return std::hypot(dx, dy) == 0;
+}
+
+int clearSeenThrough(const DepthGrid& grid, const CameraModel& camera, const DepthNoise& noise, const SE3& T_map_C,
+                     double margin, PlaneTrack* track) {
+  constexpr double kGrazing = 0.25;  // cosine of 75 degrees
+  if (grid.empty()) return 0;
+  const SE3 T_C_map = T_map_C.inverse();
+  const Eigen::Vector3d n_C = T_C_map.rotation() * track->plane().n;
+  std::vector<CellIndex> through;
+  track->cells().forEach([&](CellIndex cell, int) {
+    const Eigen::Vector3d p = T_C_map * track->cellCentre(cell);
+    if (p.z() < noise.min_range || p.z() > noise.max_range || -n_C.dot(p) < kGrazing * p.norm()) return;
+    Eigen::Vector2d uv;
+    if (!camera.project(p, &uv) || !camera.inImage(uv)) return;
+    const int c = static_cast<int>(std::floor((uv.x() - grid.offset) / grid.stride));
+    const int r = static_cast<int>(std::floor((uv.y() - grid.offset) / grid.stride));
+    if (c < 0 || r < 0 || c + 1 >= grid.cols || r + 1 >= grid.rows) return;
+    const double facing = -n_C.dot(p) / p.z();  // |n . ray|
+    const double behind = (margin + 3 * noise.sigma(p.z()) * facing) / facing;
+    for (int k = 0; k < 4; ++k) {
+      const double z = grid.at(c + (k & 1), r + (k >> 1));
+      if (!(z > p.z() + behind)) return;
+    }
+    through.push_back(cell);
+  });
+  for (const CellIndex& cell : through) track->miss(cell);
+  return static_cast<int>(through.size());
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,86 @@
+#include "vip_slam_planes/growth/triangle_association.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+constexpr double kWidestAngle = 25.0 * kDegree;
+constexpr int kNone = -1;
+
+// The nearest admissible plane of each open triangle.
+void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
+                   const std::vector<char>& usable, const PlaneGrowthOptions& options, std::vector<int>* label) {
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if ((*label)[i] != kNone) continue;
+    const MapTriangle& t = triangles[i];
+    const double min_cos = std::cos(angleGate(t, options.angle_deg));
+    double best = distanceGate(t, options.distance);
+    for (std::size_t k = 0; k < tracks.size(); ++k) {
+      if (!usable[k]) continue;
+      const Plane& plane = tracks[k]->plane();
+      const double distance = std::abs(plane.signedDistance(t.centre));
+      if (distance < best && plane.n.dot(t.n) > min_cos) best = distance, (*label)[i] = static_cast<int>(k);
+    }
+  }
+}
+
+// Takes the label from connected patches that come nowhere near the area of their plane. Returns true when any did.
+bool dropDetached(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
+                  const std::vector<char>& settled, double gap, std::vector<int>* label, std::vector<char>* attached) {
+  std::vector<char> visited(triangles.size(), 0);
+  std::vector<int> patch;
+  bool any = false;
+  for (std::size_t seed = 0; seed < triangles.size(); ++seed) {
+    const int k = (*label)[seed];
+    if (k == kNone || visited[seed] || settled[seed]) continue;
+    const PlaneTrack& track = *tracks[k];
+    const int reach = static_cast<int>(std::ceil(gap / track.cellSize()));
+    bool touches = false;
+    patch.assign(1, static_cast<int>(seed));
+    visited[seed] = 1;
+    for (std::size_t i = 0; i < patch.size(); ++i) {
+      const MapTriangle& t = triangles[patch[i]];
+      touches = touches || track.cells().near(track.cellAt(track.toPlane(t.centre)), reach);
+      for (int g : t.neighbour) {
+        if (g < 0 || visited[g] || (*label)[g] != k) continue;
+        visited[g] = 1;
+        patch.push_back(g);
+      }
+    }
+    if (touches) {
+      (*attached)[k] = 1;
+      continue;
+    }
+    any = true;
+    for (int i : patch) (*label)[i] = kNone;
+  }
+  return any;
+}
+
+}  // namespace
+
+double angleGate(const MapTriangle& triangle, double angle_deg) {
+  return std::clamp(2.0 * triangle.sigma_angle, angle_deg * kDegree, std::max(kWidestAngle, angle_deg * kDegree));
+}
+
+double distanceGate(const MapTriangle& triangle, double distance) {
+  return std::clamp(3.0 * triangle.sigma, distance, 2.0 * distance);
+}
+
+std::vector<int> associateTriangles(const std::vector<MapTriangle>& triangles,
+                                    const std::vector<const PlaneTrack*>& tracks, const PlaneGrowthOptions& options) {
+  std::vector<int> label(triangles.size(), kNone);
+  std::vector<char> usable(tracks.size(), 1), settled(triangles.size(), 0), attached(tracks.size(), 0);
+  nearestPlanes(triangles, tracks, usable, options, &label);
+  if (!dropDetached(triangles, tracks, settled, options.gap, &label, &attached)) return label;
+  // A plane far away in its own extent may have been a little nearer than the right one; ask again without those.
+  for (std::size_t i = 0; i < triangles.size(); ++i) settled[i] = label[i] != kNone;
+  nearestPlanes(triangles, tracks, attached, options, &label);
+  dropDetached(triangles, tracks, settled, options.gap, &label, &attached);
+  return label;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,97 @@
+#include "vip_slam_planes/merging/plane_merging.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam {
+namespace {
+
+constexpr double kWidestGap = 3.0;  // metres
+
+bool isBorder(const CellGrid& cells, CellIndex c) {
+  return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) || !cells.at({c.x, c.y + 1});
+}
+
+// What the smaller plane's area looks like from the larger one.
+struct Contact {
+  int cells = 0, shared = 0, near = 0;
+  double worst_border = 0;   ///< largest distance of a border point of the smaller to the larger plane
+  double worst_meeting = 0;  ///< largest distance of a point of the larger, where they meet, to the smaller plane
+  double separation = 0;     ///< mean distance where shared
+};
+
+Contact contact(const PlaneTrack& small, const PlaneTrack& large, double gap) {
+  Contact result;
+  const int reach = static_cast<int>(std::ceil(gap / large.cellSize()));
+  small.cells().forEach([&](CellIndex c, int) {
+    ++result.cells;
+    const Eigen::Vector3d p = small.cellCentre(c);
+    const bool border = isBorder(small.cells(), c);
+    if (border) result.worst_border = std::max(result.worst_border, std::abs(large.plane().signedDistance(p)));
+    const CellIndex there = large.cellAt(large.toPlane(p));
+    if (large.cells().at(there)) {
+      ++result.shared;
+      ++result.near;
+      const double off = std::abs(small.plane().signedDistance(large.cellCentre(there)));
+      result.worst_meeting = std::max(result.worst_meeting, off);
+      result.separation += std::abs(large.plane().signedDistance(p));
+    } else if (border && (result.near < 8 || c.x % 4 == 0) && large.cells().near(there, reach)) {
+      ++result.near;  // sampled once contact is certain: the search around a cell is not free
+    }
+  });
+  if (result.shared) result.separation /= result.shared;
+  return result;
+}
+
+PlaneMoments surfaceMoments(const PlaneTrack& track, const CameraPoses& poses) {
+  PlaneMoments moments = track.moments(poses);
+  if (moments.weight() > 0) return moments;
+  // A plane of a loaded map has no observations; its cells stand in for them.
+  track.cells().forEach([&](CellIndex c, int) { moments.add(track.cellCentre(c), 1.0); });
+  return moments;
+}
+
+bool jointFitServes(const PlaneMoments& a, const PlaneMoments& b, const PlaneTrack& track, double slack) {
+  const PlaneMoments both{a.M + b.M};
+  Plane joint, own;
+  if (!fitPlane(both, track.kind(), track.plane().n, &joint)) return false;
+  for (const PlaneMoments* m : {&a, &b}) {
+    if (!fitPlane(*m, track.kind(), track.plane().n, &own)) return false;
+    if (m->meanSquare(joint) > m->meanSquare(own) + slack * slack) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& poses,
+                 const PlaneMergingOptions& options) {
+  if (a.kind() != b.kind() || a.cells().empty() || b.cells().empty()) return false;
+  if (a.plane().n.dot(b.plane().n) < std::cos(options.angle_deg * M_PI / 180.0)) return false;
+  const double area_a = a.area(), area_b = b.area();
+  const PlaneTrack& small = area_a < area_b ? a : b;
+  const PlaneTrack& large = area_a < area_b ? b : a;
+  // Cheap: any cell of the smaller near the larger plane at all?
+  const CellGrid& grid = small.cells();
+  const Eigen::Vector3d middle = small.cellCentre({grid.x0() + grid.width() / 2, grid.y0() + grid.height() / 2});
+  const double radius = 0.5 * small.cellSize() * std::hypot(grid.width(), grid.height());
+  if (std::abs(large.plane().signedDistance(middle)) >
+      options.distance + radius * std::sin(options.angle_deg * M_PI / 180.0)) {
+    return false;
+  }
+  const double gap = std::max(
+      options.gap, std::min(kWidestGap, options.gap_per_size * std::sqrt(std::min(area_a, area_b))));
+  const Contact meeting = contact(small, large, gap);
+  if (meeting.near == 0 || meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) {
+    return false;
+  }
+  const double shared = double(meeting.shared) / std::max(1, meeting.cells);
+  // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift
+  // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
+  if (shared > 2 * options.overlap || (shared > options.overlap && meeting.separation < 0.5 * options.distance)) {
+    return true;
+  }
+  return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, options.max_rms);
+}
+
+}  // namespace vip_slam

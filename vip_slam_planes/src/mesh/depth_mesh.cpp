@@ -1,0 +1,166 @@
+#include "vip_slam_planes/mesh/depth_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Geometry>
+
+namespace vip_slam {
+namespace {
+
+constexpr float kDegree = float(M_PI / 180.0);
+// Share of a pixel's depth sigma left in a safe depth, which is the median of a 5x5 window of correlated pixels.
+constexpr float kMedianGain = 0.5f;
+constexpr float kSameSurface = 0.9f;  // cosine between neighbouring normals that are averaged (26 degrees)
+
+}  // namespace
+
+const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid) {
+  if (grid.stride == stride_ && grid.offset == offset_ && grid.cols == cols_ && grid.rows == rows_) return rays_;
+  stride_ = grid.stride, offset_ = grid.offset, cols_ = grid.cols, rows_ = grid.rows;
+  rays_.clear();
+  rays_.reserve(static_cast<std::size_t>(cols_) * rows_);
+  for (int r = 0; r < rows_; ++r) {
+    for (int c = 0; c < cols_; ++c) {
+      Eigen::Vector2d xy;
+      if (!camera_->undistort(grid.pixel(c, r), &xy)) xy.setConstant(std::numeric_limits<double>::quiet_NaN());
+      rays_.push_back(xy.cast<float>());
+    }
+  }
+  return rays_;
+}
+
+DepthMeshBuilder::DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera,
+                                   const DepthNoise& noise)
+    : options_(options), camera_(camera), noise_(noise), rays_(camera) {}
+
+int DepthMeshBuilder::gridStep(const DepthGrid& grid) const {
+  return std::max(1, static_cast<int>(std::lround(options_.spacing / std::max(1, grid.stride))));
+}
+
+void DepthMeshBuilder::collectVertices(const std::vector<Feature>& features, const DepthGrid& grid) {
+  mesh_.vertices.clear();
+  const float spacing = float(options_.spacing);
+  const int bucket_cols = static_cast<int>(float(camera_->width()) / spacing) + 1;
+  const int bucket_rows = static_cast<int>(float(camera_->height()) / spacing) + 1;
+  taken_.assign(static_cast<std::size_t>(bucket_cols) * bucket_rows, 0);
+  const auto bucket = [&](float u, float v) -> char& {
+    const int c = std::clamp(static_cast<int>(u / spacing), 0, bucket_cols - 1);
+    const int r = std::clamp(static_cast<int>(v / spacing), 0, bucket_rows - 1);
+    return taken_[static_cast<std::size_t>(r) * bucket_cols + c];
+  };
+  // One feature per bucket: corners cluster, and triangles of a few pixels have no usable normal.
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const Feature& f = features[i];
+    if (!(f.depth > 0) || !noise_.inRange(f.depth) || !f.pixel.allFinite()) continue;
+    if (f.pixel.x() < 0 || f.pixel.y() < 0) continue;
+    char& used = bucket(f.pixel.x(), f.pixel.y());
+    if (used) continue;
+    used = 1;
+    mesh_.vertices.push_back({f.pixel, Eigen::Vector3f(f.xy.x(), f.xy.y(), 1.0f) * f.depth, static_cast<int>(i)});
+  }
+  if (grid.empty()) return;
+  const int step = gridStep(grid);
+  for (int r = 0; r < grid.rows; r += step) {
+    for (int c = 0; c < grid.cols; c += step) {
+      const float z = grid.at(c, r);
+      if (!(z > 0)) continue;
+      const Eigen::Vector2f pixel = grid.pixel(c, r).cast<float>();
+      if (bucket(pixel.x(), pixel.y())) continue;
+      const Eigen::Vector2f& ray = (*grid_rays_)[static_cast<std::size_t>(r) * grid.cols + c];
+      if (!ray.allFinite()) continue;
+      mesh_.vertices.push_back({pixel, Eigen::Vector3f(ray.x(), ray.y(), 1.0f) * z, -1});
+    }
+  }
+}
+
+bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const {
+  // Grid nodes beside the middle of each side must lie on the triangle's plane.
+  int missing = 0;
+  const float d = -triangle.n_C.dot(triangle.centre_C);
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector2f middle = 0.5f * (mesh_.vertices[triangle.vertex[(k + 1) % 3]].pixel +
+                                           mesh_.vertices[triangle.vertex[(k + 2) % 3]].pixel);
+    const int c = static_cast<int>(std::lround((middle.x() - float(grid.offset)) / float(grid.stride)));
+    const int r = static_cast<int>(std::lround((middle.y() - float(grid.offset)) / float(grid.stride)));
+    if (c < 0 || r < 0 || c >= grid.cols || r >= grid.rows) continue;
+    const float z = grid.at(c, r);
+    if (!(z > 0)) {
+      ++missing;
+      continue;
+    }
+    const Eigen::Vector2f& xy = (*grid_rays_)[static_cast<std::size_t>(r) * grid.cols + c];
+    const Eigen::Vector3f ray(xy.x(), xy.y(), 1.0f);
+    const float off = std::abs(triangle.n_C.dot(ray) * z + d);
+    const float sigma = float(noise_.sigma(z)) * kMedianGain * std::abs(triangle.n_C.dot(ray));
+    if (off > float(options_.gap_sigmas) * sigma + 0.005f) return true;
+  }
+  return missing >= 2;  // the depth look-up refuses pixels beside an edge
+}
+
+bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step,
+                            MeshTriangle* triangle) const {
+  const Eigen::Vector3f& a = mesh_.vertices[flat.vertex[0]].p_C;
+  const Eigen::Vector3f& b = mesh_.vertices[flat.vertex[1]].p_C;
+  const Eigen::Vector3f& c = mesh_.vertices[flat.vertex[2]].p_C;
+  const float ab = (b - a).norm(), bc = (c - b).norm(), ca = (a - c).norm();
+  const float longest = std::max({ab, bc, ca});
+  const Eigen::Vector3f cross = (b - a).cross(c - a);
+  const float twice = cross.norm();
+  if (!(longest > 1e-4f) || longest > float(options_.max_edge)) return false;
+  const float altitude = twice / longest;
+  if (altitude < float(options_.min_altitude_ratio) * longest) return false;
+  triangle->vertex = flat.vertex;
+  triangle->neighbour = flat.neighbour;
+  triangle->centre_C = (a + b + c) / 3.0f;
+  triangle->n_C = cross / twice;
+  if (triangle->n_C.dot(triangle->centre_C) > 0) triangle->n_C = -triangle->n_C;
+  triangle->area = 0.5f * twice;
+  const float z = triangle->centre_C.z();
+  const float facing = -triangle->n_C.dot(triangle->centre_C);
+  if (facing < std::cos(float(options_.max_incidence_deg) * kDegree) * triangle->centre_C.norm()) return false;
+  triangle->sigma = float(noise_.sigma(z)) * kMedianGain * facing / z;
+  triangle->sigma_angle = triangle->sigma / altitude;
+  return step < 2 || grid.empty() || !crossesDepthEdge(*triangle, grid);
+}
+
+void DepthMeshBuilder::smoothNormals() {
+  std::vector<MeshTriangle>& triangles = mesh_.triangles;
+  for (int round = 0; round < 2; ++round) {
+    smoothed_.resize(triangles.size());
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      const MeshTriangle& t = triangles[i];
+      Eigen::Vector3f sum = t.n_C * t.area;
+      for (int g : t.neighbour) {
+        if (g >= 0 && triangles[g].n_C.dot(t.n_C) > kSameSurface) sum += triangles[g].n_C * triangles[g].area;
+      }
+      smoothed_[i] = sum.normalized();
+    }
+    for (std::size_t i = 0; i < triangles.size(); ++i) triangles[i].n_C = smoothed_[i];
+  }
+}
+
+const DepthMesh& DepthMeshBuilder::build(const std::vector<Feature>& features, const DepthGrid& grid) {
+  if (!grid.empty()) grid_rays_ = &rays_(grid);
+  collectVertices(features, grid);
+  pixels_.clear();
+  for (const MeshVertex& v : mesh_.vertices) pixels_.push_back(v.pixel);
+  const std::vector<DelaunayTriangle>& flat = delaunay_.triangulate(pixels_, camera_->width(), camera_->height());
+  const int step = grid.empty() ? 0 : gridStep(grid);
+  mesh_.triangles.clear();
+  number_.assign(flat.size(), -1);
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    MeshTriangle triangle;
+    if (!lift(flat[i], grid, step, &triangle)) continue;
+    number_[i] = static_cast<int>(mesh_.triangles.size());
+    mesh_.triangles.push_back(triangle);
+  }
+  for (MeshTriangle& t : mesh_.triangles) {
+    for (int& g : t.neighbour) g = g < 0 ? -1 : number_[g];
+  }
+  smoothNormals();
+  return mesh_;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,79 @@
+// The plane mapper's state; its steps are spread over plane_mapper_*.cpp.
+#pragma once
+
+#include <map>
+#include <set>
+
+#include "vip_slam_planes/association/plane_sampler.h"
+#include "vip_slam_planes/association/point_association.h"
+#include "vip_slam_planes/growth/plane_track.h"
+#include "vip_slam_planes/mesh/depth_mesh.h"
+#include "vip_slam_planes/mesh/map_triangles.h"
+#include "vip_slam_planes/plane_mapper.h"
+
+namespace vip_slam {
+
+class PlaneMapper::Impl {
+ public:
+  Impl(const PlaneMapperOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
+       TimingLog* timing);
+
+  void grow(const TrackedFrame& frame, const SE3& T_map_odom);
+  PlaneUpdate applyMapUpdate(const MapUpdate& update);
+  void restore(const std::vector<PlaneEstimate>& planes);
+  void clear();
+
+  PlaneMapperOptions options;
+  std::shared_ptr<const CameraModel> camera;
+  DepthNoise noise;
+  TimingLog* timing;
+  PlaneMapperCounters counters;
+  std::vector<PlaneEstimate> published;
+  std::map<KeyframeId, KeyframePtr> waiting;  ///< not placed yet
+
+ private:
+  using Tracks = std::map<PlaneId, PlaneTrack>;
+
+  // plane_mapper_update.cpp: corrections from the back end.
+  void takeCorrections(const MapUpdate& update);
+  void removeKeyframe(KeyframeId id);
+  void refit(PlaneTrack* track);
+  void withdrawBrokenObservations();
+  void dropUnsupported(PlaneUpdate* result);
+  void publish(PlaneUpdate* result);
+
+  // plane_mapper_keyframe.cpp: one placed keyframe.
+  void processKeyframe(const Keyframe& keyframe, bool first_time);
+  std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C);
+  void startPlanes(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
+                   std::vector<int>* label, std::vector<PlaneTrack*>* tracks);
+  void observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
+               const std::vector<int>& label, const DepthMesh& mesh);
+  void mergePlanes(const std::vector<PlaneId>& changed);
+  void mergeInto(PlaneId from, PlaneId into);
+  void removePlane(PlaneId id);
+  const Plane* findPlane(PlaneId id) const;
+
+  DepthMeshBuilder mesher_;
+  GridRays rays_;
+  PlaneSampler sampler_;
+  PointAssociation points_;
+
+  std::map<KeyframeId, KeyframePtr> placed_;  ///< processed keyframes that the map still has
+  CameraPoses poses_;                         ///< T_map_C of all of those
+  Tracks tracks_;
+  PlaneId next_plane_ = 1;
+  std::uint32_t epoch_ = 0;                   ///< of the newest placed keyframe
+  KeyframeId newest_ = 0;
+  SE3 grown_at_;                              ///< camera pose of the last frame that grew planes
+  bool has_grown_ = false;
+  bool map_moved_ = false;                    ///< by this update, everywhere
+
+  // Collected for the next PlaneUpdate.
+  std::vector<PlaneMerge> merges_;
+  std::vector<PlaneId> removed_;
+  std::set<std::pair<PlaneId, KeyframeId>> fresh_;  ///< observations to report
+  std::vector<PlaneObservation> withdrawn_;         ///< empty ones that replace what no longer holds
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,147 @@
+// What a placed keyframe does to the plane map: grow, start, observe, associate.
+#include <algorithm>
+#include <cmath>
+
+#include "plane_mapper_impl.h"
+#include "vip_slam_planes/detection/plane_detector.h"
+#include "vip_slam_planes/growth/see_through.h"
+#include "vip_slam_planes/growth/triangle_association.h"
+#include "vip_slam_planes/merging/plane_merging.h"
+
+namespace vip_slam {
+
+void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_time) {
+  const ScopedTimer timer(timing, "planes.keyframe", keyframe.frame.t);
+  const SE3& T_map_C = poses_.at(keyframe.id);
+  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, keyframe.frame.depth_grid);
+  const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
+  std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
+  std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
+
+  std::vector<CellIndex> seen_again;
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    seen_again.clear();
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      if (label[i] == static_cast<int>(k)) tracks[k]->cover(triangles[i], keyframe.id, T_map_C, &seen_again);
+    }
+    if (!first_time) continue;
+    for (const CellIndex& c : seen_again) tracks[k]->hit(c);
+    clearSeenThrough(keyframe.frame.depth_grid, *camera, noise, T_map_C, options.support.see_through, tracks[k]);
+  }
+  if (first_time) {
+    startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
+    ++counters.keyframes;
+  }
+  observe(keyframe, T_map_C, tracks, label, mesh);
+  if (first_time) {
+    for (auto& [id, track] : tracks_) ++track.keyframes_waited;
+  }
+}
+
+void PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
+                                    const std::vector<MapTriangle>& triangles, std::vector<int>* label,
+                                    std::vector<PlaneTrack*>* tracks) {
+  std::vector<char> taken(triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i) taken[i] = (*label)[i] >= 0;
+  for (const DetectedPlane& found :
+       detectPlanes(triangles, taken, T_map_C.t(), options.detection, options.growth)) {
+    const PlaneId id = next_plane_++;
+    PlaneTrack& track =
+        tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;
+    for (int i : found.triangles) {
+      track.cover(triangles[i], keyframe.id, T_map_C, nullptr);
+      (*label)[i] = static_cast<int>(tracks->size());
+    }
+    tracks->push_back(&track);
+    ++counters.planes_started;
+  }
+}
+
+void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
+                                const std::vector<int>& label, const DepthMesh& mesh) {
+  const DepthGrid& grid = keyframe.frame.depth_grid;
+  const SurfaceLabels labels = labelNodes(mesh, label, grid);
+  std::vector<char> present(tracks.size(), 0);
+  for (int k : labels.label) {
+    if (k >= 0) present[k] = 1;
+  }
+  std::vector<PlaneId> ids;
+  std::vector<char> trusted;
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    PlaneTrack& track = *tracks[k];
+    ids.push_back(track.id());
+    if (present[k]) {
+      auto observation = sampler_.sample(keyframe, labels, static_cast<int>(k), rays_(grid), T_map_C, track.id(),
+                                         track.plane());
+      if (observation) {
+        const auto [it, fresh] = track.observations().insert_or_assign(keyframe.id, std::move(*observation));
+        if (fresh) ++track.keyframes_seen;
+        fresh_.emplace(track.id(), keyframe.id);
+        refit(&track);
+      }
+    }
+    track.confirmed = track.confirmed || track.keyframes_seen >= options.support.min_keyframes ||
+                      (track.keyframes_seen > 0 && track.area() >= options.support.sure_area);
+    trusted.push_back(track.confirmed);
+  }
+  points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });
+}
+
+void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
+  // Each merge may bring further planes together; every one removes a plane, so this ends.
+  std::set<PlaneId> open(changed.begin(), changed.end());
+  while (!open.empty()) {
+    const PlaneId id = *open.begin();
+    open.erase(open.begin());
+    const auto mine = tracks_.find(id);
+    if (mine == tracks_.end()) continue;
+    for (auto& [other_id, other] : tracks_) {
+      if (other_id == id || !sameSurface(mine->second, other, poses_, options.merging)) continue;
+      // The older id stays, but one that the back end knows goes before one that it does not.
+      PlaneId into = std::min(id, other_id), from = std::max(id, other_id);
+      if (tracks_.at(from).confirmed && !tracks_.at(into).confirmed) std::swap(into, from);
+      mergeInto(from, into);
+      open.erase(from);
+      open.insert(into);
+      break;
+    }
+  }
+}
+
+void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
+  PlaneTrack& into = tracks_.at(into_id);
+  const PlaneTrack& from = tracks_.at(from_id);
+  const bool known = from.confirmed;
+  for (const auto& [keyframe, observation] : from.observations()) {
+    // The back end re-keys what it has; what it lacks, and what two planes of one keyframe make together, is reported.
+    if (!known || into.observations().count(keyframe) || fresh_.count({from_id, keyframe})) {
+      fresh_.emplace(into_id, keyframe);
+    }
+    fresh_.erase({from_id, keyframe});
+  }
+  into.absorb(from, poses_);
+  refit(&into);
+  points_.renamePlane(from_id, into_id);
+  tracks_.erase(from_id);
+  ++counters.planes_merged;
+  if (known) merges_.push_back({from_id, into_id});
+}
+
+void PlaneMapper::Impl::removePlane(PlaneId id) {
+  const auto it = tracks_.find(id);
+  if (it == tracks_.end()) return;
+  for (const auto& [keyframe, observation] : it->second.observations()) fresh_.erase({id, keyframe});
+  if (it->second.confirmed) {
+    removed_.push_back(id);
+    ++counters.planes_removed;
+  }
+  points_.removePlane(id);
+  tracks_.erase(it);
+}
+
+const Plane* PlaneMapper::Impl::findPlane(PlaneId id) const {
+  const auto it = tracks_.find(id);
+  return it == tracks_.end() ? nullptr : &it->second.plane();
+}
+
+}  // namespace vip_slam

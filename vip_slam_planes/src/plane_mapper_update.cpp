@@ -1,0 +1,181 @@
+// Corrections from the back end, and what goes back to it.
+#include <algorithm>
+#include <cmath>
+
+#include "plane_mapper_impl.h"
+
+namespace vip_slam {
+namespace {
+
+// Keyframes looked at anew per update after the map has moved under their observations.
+constexpr std::size_t kMostRenewed = 10;
+constexpr double kMovedTurn = 0.5 * M_PI / 180.0, kMovedShift = 0.02;  // of a keyframe by one update
+
+}  // namespace
+
+PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
+  const ScopedTimer timer(timing, "planes.update", update.t);
+  PlaneUpdate result;
+  result.revision = update.revision;
+  result.t = update.t;
+  takeCorrections(update);
+
+  for (const KeyframeEstimate& estimate : update.keyframes) {
+    const auto it = waiting.find(estimate.id);
+    if (it == waiting.end()) continue;
+    const KeyframePtr keyframe = it->second;
+    waiting.erase(it);
+    placed_[keyframe->id] = keyframe;
+    poses_[keyframe->id] = estimate.state.T_W_I * keyframe->frame.T_I_C;
+    if (keyframe->id > newest_) newest_ = keyframe->id, epoch_ = keyframe->frame.epoch;
+    points_.addSightings(*keyframe);
+    processKeyframe(*keyframe, true);
+  }
+  counters.keyframes_waiting = waiting.size();
+
+  std::vector<PlaneId> changed;
+  for (auto& [id, track] : tracks_) {
+    if (track.changed(true)) changed.push_back(id);
+  }
+  mergePlanes(changed);
+  dropUnsupported(&result);
+  publish(&result);
+  return result;
+}
+
+void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
+  map_moved_ = update.global;
+  for (const KeyframeEstimate& estimate : update.keyframes) {
+    const auto it = placed_.find(estimate.id);
+    if (it == placed_.end()) continue;
+    SE3& T_map_C = poses_[estimate.id];
+    const SE3 corrected = estimate.state.T_W_I * it->second->frame.T_I_C;
+    const SE3 move = T_map_C.inverse() * corrected;
+    map_moved_ = map_moved_ || move.t().norm() > kMovedShift || logSO3(move.rotation()).norm() > kMovedTurn;
+    T_map_C = corrected;
+  }
+  for (const auto& [id, plane] : update.planes) {
+    const auto it = tracks_.find(id);
+    if (it == tracks_.end()) continue;
+    it->second.setPlane(plane);
+    it->second.markOptimised();
+  }
+  for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
+  points_.applyMapUpdate(update);
+  for (auto& [id, track] : tracks_) {
+    if (!track.optimised()) refit(&track);
+    track.followKeyframes(poses_);
+  }
+  if (map_moved_) withdrawBrokenObservations();
+  if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
+}
+
+void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
+  waiting.erase(id);
+  if (!placed_.count(id)) return;
+  // Its share of the area goes to the neighbour in time, which moves nearly alike.
+  const auto it = placed_.find(id);
+  const KeyframeId heir = it != placed_.begin()              ? std::prev(it)->first
+                          : std::next(it) != placed_.end() ? std::next(it)->first
+                                                           : 0;
+  for (auto& [plane, track] : tracks_) {
+    track.rehost(id, heir, poses_);
+    fresh_.erase({plane, id});
+  }
+  points_.removeKeyframe(id);
+  placed_.erase(it);
+  poses_.erase(id);
+  if (newest_ == id) newest_ = placed_.empty() ? 0 : placed_.rbegin()->first;
+}
+
+void PlaneMapper::Impl::refit(PlaneTrack* track) {
+  if (track->optimised()) return;
+  Plane plane;
+  if (fitPlane(track->moments(poses_), track->kind(), track->plane().n, &plane)) track->setPlane(plane);
+}
+
+void PlaneMapper::Impl::withdrawBrokenObservations() {
+  // Samples that the corrected poses have put off their plane belong to something else, or to another piece of it.
+  std::set<KeyframeId> renewed;
+  for (auto& [id, track] : tracks_) {
+    for (auto it = track.observations().begin(); it != track.observations().end();) {
+      const auto pose = poses_.find(it->first);
+      const PlaneMoments moments{it->second.G};
+      const bool holds = pose == poses_.end() ||
+                         moments.meanSquare(transformPlane(pose->second.inverse(), track.plane())) <
+                             options.growth.distance * options.growth.distance;
+      if (holds) {
+        ++it;
+        continue;
+      }
+      if (track.confirmed && !fresh_.count({id, it->first})) {
+        PlaneObservation none;
+        none.keyframe = it->first;
+        none.plane = id;
+        withdrawn_.push_back(none);
+      }
+      fresh_.erase({id, it->first});
+      renewed.insert(it->first);
+      it = track.observations().erase(it);
+    }
+  }
+  while (renewed.size() > kMostRenewed) renewed.erase(renewed.begin());  // the newest matter most
+  for (KeyframeId id : renewed) processKeyframe(*placed_.at(id), false);
+}
+
+void PlaneMapper::Impl::dropUnsupported(PlaneUpdate* result) {
+  std::vector<PlaneId> gone;
+  for (const auto& [id, track] : tracks_) {
+    const bool shrunk = track.area() < options.support.min_area;
+    const bool never_confirmed = !track.confirmed && track.keyframes_waited > options.support.patience;
+    if (shrunk || never_confirmed) gone.push_back(id);
+  }
+  for (PlaneId id : gone) removePlane(id);
+  result->merges = std::move(merges_);
+  result->removed = std::move(removed_);
+  merges_.clear();
+  removed_.clear();
+}
+
+void PlaneMapper::Impl::publish(PlaneUpdate* result) {
+  published.clear();
+  for (auto& [id, track] : tracks_) {
+    if (!track.confirmed) continue;
+    PlaneEstimate estimate;
+    estimate.polygons = track.polygons(options.growth.min_hits);
+    estimate.area = track.cells().count(options.growth.min_hits) * track.cellSize() * track.cellSize();
+    estimate.id = id;
+    estimate.kind = track.kind();
+    estimate.plane = track.plane();
+    estimate.keyframes = static_cast<std::uint32_t>(track.keyframes_seen);
+    published.push_back(std::move(estimate));
+  }
+  result->planes = published;
+
+  for (PlaneObservation& none : withdrawn_) {
+    const auto it = tracks_.find(none.plane);
+    if (it != tracks_.end() && !it->second.observations().count(none.keyframe)) result->observations.push_back(none);
+  }
+  withdrawn_.clear();
+  for (auto it = fresh_.begin(); it != fresh_.end();) {
+    const auto track = tracks_.find(it->first);
+    if (track == tracks_.end()) {
+      it = fresh_.erase(it);
+      continue;
+    }
+    if (!track->second.confirmed) {
+      ++it;
+      continue;
+    }
+    const auto observation = track->second.observations().find(it->second);
+    if (observation != track->second.observations().end()) result->observations.push_back(observation->second);
+    it = fresh_.erase(it);
+  }
+  result->associated = points_.takeAssociated();
+  result->dissociated = points_.takeDissociated();
+  counters.points_associated += result->associated.size();
+  counters.points_dissociated += result->dissociated.size();
+  counters.point_candidates = points_.candidates();
+}
+
+}  // namespace vip_slam

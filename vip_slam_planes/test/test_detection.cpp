@@ -1,0 +1,164 @@
+// Mesh and detection on exact scenes: one keyframe, no map.
+#include <gtest/gtest.h>
+
+#include "scene.h"
+#include "vip_slam_planes/detection/plane_detector.h"
+#include "vip_slam_planes/detection/plane_histogram.h"
+#include "vip_slam_planes/mesh/map_triangles.h"
+
+namespace vip_slam {
+namespace {
+
+using testing::lookAt;
+using testing::Scene;
+using testing::SceneCamera;
+
+std::vector<DetectedPlane> detect(SceneCamera* camera, const Scene& scene, const SE3& T_W_C,
+                                  PlaneDetectionOptions options = {}) {
+  const auto keyframe = camera->keyframe(scene, T_W_C);
+  DepthMeshBuilder builder({}, camera->camera, camera->noise);
+  const auto triangles = placeMesh(builder.build(keyframe->frame.features, keyframe->frame.depth_grid), T_W_C);
+  return detectPlanes(triangles, std::vector<char>(triangles.size(), 0), T_W_C.t(), options, {});
+}
+
+const DetectedPlane* find(const std::vector<DetectedPlane>& planes, const Plane& truth) {
+  for (const DetectedPlane& p : planes) {
+    if (p.plane.n.dot(truth.n) > 0.999 && std::abs(p.plane.d - truth.d) < 0.02) return &p;
+  }
+  return nullptr;
+}
+
+TEST(Detection, RoomCorner) {
+  Scene scene;
+  scene.addRoom({-3, -3, 0}, {3, 3, 2.6});
+  SceneCamera camera;
+  const auto planes = detect(&camera, scene, lookAt({0, 0, 1.4}, {3, 3, 0.9}));
+  ASSERT_EQ(3u, planes.size());
+  for (const Plane& truth : {Plane({0, 0, 1}, 0), Plane({-1, 0, 0}, 3), Plane({0, -1, 0}, 3)}) {
+    const DetectedPlane* p = find(planes, truth);
+    ASSERT_TRUE(p);
+    EXPECT_LT(angleBetween(p->plane, truth), 0.05 * M_PI / 180);
+    EXPECT_NEAR(truth.d, p->plane.d, 0.002);
+    EXPECT_GT(p->area, 1.0);
+  }
+}
+
+TEST(Detection, PlanesThroughTheOrigin) {
+  Scene scene;
+  scene.add({0, -3, -1}, {0, 6, 0}, {0, 0, 3});  // x = 0
+  scene.add({-3, 0, -1}, {6, 0, 0}, {0, 0, 3});  // y = 0
+  scene.add({-3, -3, 0}, {6, 0, 0}, {0, 6, 0});  // z = 0
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  const auto planes = detect(&camera, scene, lookAt({2, 2, 1.2}, {0, 0, 0.3}));
+  ASSERT_EQ(3u, planes.size());
+  for (const Plane& truth : {Plane({1, 0, 0}, 0), Plane({0, 1, 0}, 0), Plane({0, 0, 1}, 0)}) {
+    const DetectedPlane* p = find(planes, truth);
+    ASSERT_TRUE(p);
+    EXPECT_NEAR(0, p->plane.d, 0.004);
+  }
+}
+
+TEST(Detection, DoorTwelveCentimetresBeforeTheWallStaysTwo) {
+  Scene scene;
+  scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  scene.add({2.88, -0.5, 0}, {0, 1, 0}, {0, 0, 2.1});
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  const auto planes = detect(&camera, scene, lookAt({0, 0.2, 1.4}, {3, 0, 1.3}));
+  ASSERT_EQ(2u, planes.size());
+  ASSERT_TRUE(find(planes, Plane({-1, 0, 0}, 3.0)));
+  ASSERT_TRUE(find(planes, Plane({-1, 0, 0}, 2.88)));
+  EXPECT_NEAR(3.0, find(planes, Plane({-1, 0, 0}, 3.0))->plane.d, 0.004);
+  EXPECT_NEAR(2.88, find(planes, Plane({-1, 0, 0}, 2.88))->plane.d, 0.004);
+}
+
+TEST(Detection, WallsAtEveryAngleIncludingTheWrap) {
+  for (double degrees : {180.0, 179.2, -179.2, 178.5, -178.5, 90.0, -90.0, 0.0, 45.0, -1.5}) {
+    const double a = degrees * M_PI / 180;
+    const Eigen::Vector3d n(std::cos(a), std::sin(a), 0), along(-n.y(), n.x(), 0);
+    Scene scene;
+    scene.add(-2.0 * n - 3 * along, 6 * along, {0, 0, 2.5});
+    SceneCamera camera(testing::quietNoise(), 1.0);
+    const auto planes = detect(&camera, scene, lookAt({0.3, 0.2, 1.2}, -2 * n + Eigen::Vector3d(0, 0, 1.3)));
+    ASSERT_EQ(1u, planes.size()) << degrees;
+    EXPECT_TRUE(find(planes, Plane(n, 2.0))) << degrees;
+  }
+}
+
+TEST(Detection, SlantedSurfacesAreLeftAloneUnlessAskedFor) {
+  for (double degrees : {6.0, 12.0, 30.0, 60.0, 80.0}) {
+    const double a = degrees * M_PI / 180;
+    Scene scene;
+    scene.add({1, -1.5, 0.2}, {0, 3, 0}, Eigen::Vector3d(std::cos(a), 0, std::sin(a)) * 2.0);
+    SceneCamera camera(testing::quietNoise(), 1.0);
+    const SE3 view = lookAt({-0.5, 0, 2.2}, {1.8, 0, 0.6});
+    EXPECT_TRUE(detect(&camera, scene, view).empty()) << degrees;
+    PlaneDetectionOptions options;
+    options.general = true;
+    const auto planes = detect(&camera, scene, view, options);
+    ASSERT_EQ(1u, planes.size()) << degrees;
+    EXPECT_EQ(PlaneKind::kGeneral, planes[0].kind);
+    EXPECT_NEAR(degrees, std::acos(std::abs(planes[0].plane.n.z())) * 180 / M_PI, 0.5);
+  }
+}
+
+TEST(Detection, StairsAreNoPlaneButTheirTreads) {
+  Scene scene;
+  for (int i = 0; i < 6; ++i) {
+    scene.add({1 + 0.3 * i, -1, 0.17 * i}, {0, 2, 0}, {0, 0, 0.17});
+    scene.add({1 + 0.3 * i, -1, 0.17 * (i + 1)}, {0, 2, 0}, {0.3, 0, 0});
+  }
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  for (const DetectedPlane& p : detect(&camera, scene, lookAt({-0.6, 0, 1.9}, {2, 0, 0.5}))) {
+    const double height = -p.plane.d * p.plane.n.z();
+    if (p.kind == PlaneKind::kHorizontal) {
+      EXPECT_NEAR(0, std::remainder(height, 0.17), 0.01);
+    } else {
+      EXPECT_NEAR(0, std::remainder(-p.plane.d / p.plane.n.x() - 1, 0.3), 0.01);
+    }
+    EXPECT_LT(p.area, 0.8);
+  }
+}
+
+TEST(Detection, TwoTablesOfOneHeightAreTwo) {
+  Scene scene;
+  scene.add({1.2, -1.6, 0.74}, {0.8, 0, 0}, {0, 1.2, 0});
+  scene.add({1.2, 0.4, 0.74}, {0.8, 0, 0}, {0, 1.2, 0});
+  SceneCamera camera;
+  const auto planes = detect(&camera, scene, lookAt({-0.5, 0, 1.9}, {1.6, 0, 0.74}));
+  ASSERT_EQ(2u, planes.size());
+  for (const DetectedPlane& p : planes) EXPECT_NEAR(-0.74, p.plane.d, 0.002);
+}
+
+TEST(Detection, MeshDropsTrianglesAcrossDepthEdges) {
+  Scene scene;
+  scene.add({4, -4, -2}, {0, 8, 0}, {0, 0, 6});
+  scene.add({3, -0.5, 0}, {0, 1, 0}, {0, 0, 1.5});
+  SceneCamera camera;
+  const SE3 view = lookAt({0, 0, 1}, {4, 0, 1});
+  const auto keyframe = camera.keyframe(scene, view);
+  DepthMeshBuilder builder({}, camera.camera, camera.noise);
+  const auto triangles = placeMesh(builder.build({}, keyframe->frame.depth_grid), view);
+  ASSERT_GT(triangles.size(), 1000u);
+  for (const MapTriangle& t : triangles) EXPECT_GT(-t.n.x(), 0.98);
+}
+
+TEST(Detection, HistogramKeepsSidesApartAndForgets) {
+  PlaneHistogram histogram(0.05, 3);
+  histogram.addHorizontal({0, 0, 1}, {0, 0, 1.02}, 1.0, 0);
+  histogram.addHorizontal({0, 0, -1}, {0, 0, 1.02}, 2.0, 1);
+  histogram.addVertical({-1, 1e-9, 0}, {3, 0, 0}, 1.5, 2);
+  histogram.addVertical({-1, -1e-9, 0}, {3, 0, 0}, 1.0, 3);  // the other side of +-180 degrees
+  auto peak = histogram.peak();
+  EXPECT_EQ((std::vector<int>{2, 3}), peak.members);
+  EXPECT_DOUBLE_EQ(2.5, peak.area);
+  histogram.remove(2);
+  histogram.remove(3);
+  EXPECT_EQ((std::vector<int>{1}), histogram.peak().members);
+  histogram.remove(1);
+  EXPECT_EQ((std::vector<int>{0}), histogram.peak().members);
+  histogram.remove(0);
+  EXPECT_EQ(0, histogram.peak().area);
+}
+
+}  // namespace
+}  // namespace vip_slam

@@ -1,0 +1,87 @@
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "vip_slam_planes/detection/plane_fit.h"
+
+namespace vip_slam {
+namespace {
+
+std::vector<Eigen::Vector3d> samples(const Plane& plane, double sigma, unsigned seed, int count = 400) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> u(-2, 2);
+  std::normal_distribution<double> gauss(0, sigma);
+  const auto basis = tangentBasis(plane.n);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) {
+    points.push_back(basis * Eigen::Vector2d(u(random), u(random)) - plane.n * (plane.d + gauss(random)));
+  }
+  return points;
+}
+
+TEST(PlaneFit, WallThroughTheOrigin) {
+  const Plane truth(Eigen::Vector3d(0.6, 0.8, 0), 0.0);
+  const auto points = samples(truth, 0.01, 3);
+  Plane plane;
+  double rms;
+  ASSERT_TRUE(fitPlaneRobust(points, std::vector<double>(points.size(), 1.0), 0.005, PlaneKind::kVertical, truth.n,
+                             &plane, &rms));
+  EXPECT_NEAR(0, plane.d, 0.002);
+  EXPECT_LT(angleBetween(truth, plane), 0.1 * M_PI / 180);
+  EXPECT_NEAR(0.01, rms, 0.002);
+}
+
+TEST(PlaneFit, KindsKeepTheirNormalsAndSide) {
+  for (double d : {-1.3, 0.0, 2.4}) {
+    Plane plane;
+    PlaneMoments moments;
+    for (const auto& p : samples(Plane(Eigen::Vector3d::UnitZ(), d), 0, 1)) moments.add(p, 2.0);
+    ASSERT_TRUE(fitPlane(moments, PlaneKind::kHorizontal, -Eigen::Vector3d::UnitZ(), &plane));
+    EXPECT_EQ(-1.0, plane.n.z());
+    EXPECT_NEAR(-d, plane.d, 1e-12);
+    const Plane wall(Eigen::Vector3d(-1, 0.2, 0), d);
+    moments = PlaneMoments();
+    for (const auto& p : samples(wall, 0, 2)) moments.add(p, 1.0);
+    ASSERT_TRUE(fitPlane(moments, PlaneKind::kVertical, wall.n, &plane));
+    EXPECT_EQ(0.0, plane.n.z());
+    EXPECT_LT((plane.coefficients() - wall.coefficients()).norm(), 1e-9);
+    const Plane ramp(Eigen::Vector3d(0.3, 0.2, 0.9), d);
+    moments = PlaneMoments();
+    for (const auto& p : samples(ramp, 0, 4)) moments.add(p, 1.0);
+    ASSERT_TRUE(fitPlane(moments, PlaneKind::kGeneral, ramp.n, &plane));
+    EXPECT_LT((plane.coefficients() - ramp.coefficients()).norm(), 1e-9);
+  }
+}
+
+TEST(PlaneFit, ThirtyPercentOutliersOnOneSide) {
+  const Plane truth(Eigen::Vector3d(0, 1, 0), -3.0);
+  auto points = samples(truth, 0.005, 5);
+  for (std::size_t i = 0; i < points.size() * 3 / 10; ++i) points[i] += truth.n * 0.12;
+  Plane plane;
+  ASSERT_TRUE(fitPlaneRobust(points, std::vector<double>(points.size(), 1.0), 0.005, PlaneKind::kVertical, truth.n,
+                             &plane, nullptr));
+  EXPECT_NEAR(truth.d, plane.d, 0.003);
+}
+
+TEST(PlaneFit, MomentsMoveWithTheirPoints) {
+  const SE3 T = SE3::exp((Vector6d() << 0.3, -0.2, 0.5, 1, 2, -3).finished());
+  PlaneMoments before, after;
+  for (const auto& p : samples(Plane(Eigen::Vector3d(1, 2, 3), 0.4), 0.02, 6)) {
+    before.add(p, 0.7);
+    after.add(T * p, 0.7);
+  }
+  EXPECT_LT((before.transformed(T).M - after.M).norm(), 1e-9 * after.M.norm());
+}
+
+TEST(PlaneFit, RefusesWhatDoesNotDetermineAPlane) {
+  Plane plane;
+  PlaneMoments moments;
+  EXPECT_FALSE(fitPlane(moments, PlaneKind::kGeneral, Eigen::Vector3d::UnitX(), &plane));
+  moments.add({1, 2, 3}, 1.0);
+  EXPECT_FALSE(fitPlane(moments, PlaneKind::kVertical, Eigen::Vector3d::UnitX(), &plane));
+  moments.add({2, 2, 3}, 1.0);
+  EXPECT_FALSE(fitPlane(moments, PlaneKind::kGeneral, Eigen::Vector3d::UnitX(), &plane));
+}
+
+}  // namespace
+}  // namespace vip_slam
