@@ -1,0 +1,36 @@
+// The paper's Table III and time-over-keyframes figure: one map, four variants, two solvers, the times split.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vip_slam_backend/back_end_options.h"
+#include "vip_slam_backend/solver/ba_solver.h"
+#include "vip_slam_eval/gba_benchmark/simulated_map.h"
+
+namespace vip_slam {
+
+struct GbaRun {
+  Variant variant = Variant::kVi;
+  std::string solver = "structured";
+  int threads = 1;
+  int keyframes = 0;
+  std::size_t points = 0, planes = 0, homographies = 0, homography_pairs = 0, point_to_plane = 0;
+  double build_ms = 0;      ///< map to problem, compression included
+  SolverSummary summary;    ///< of the run with the median total time
+  double rmse_before = 0, rmse = 0;  ///< ATE of the keyframes after rigid alignment, metres
+};
+
+/// Runs `repeats` times from the same start and keeps the run with the median time.
+GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats);
+
+/// The map of the first `keyframes` keyframes.
+SimulatedMap prefix(const SimulatedMap& map, int keyframes);
+
+/// ATE RMSE of positions after rigid alignment (no scale), metres.
+double alignedRmse(const std::vector<Eigen::Vector3d>& truth, const std::vector<Eigen::Vector3d>& estimate);
+
+std::string gbaTableMarkdown(const std::vector<GbaRun>& runs);
+std::string gbaTableCsv(const std::vector<GbaRun>& runs);
+
+}  // namespace vip_slam

@@ -1,0 +1,139 @@
+// gba_benchmark --out DIR: the paper's Table III and its time-over-keyframes figure on a simulated map.
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+#include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_eval/gba_benchmark/gba_benchmark.h"
+#include "vip_slam_eval/plot/line_plot.h"
+
+using namespace vip_slam;
+
+namespace {
+
+void writeText(const std::string& path, const std::string& text) {
+  AtomicFile file(path);
+  file.stream() << text;
+  file.commit();
+}
+
+std::string ratioLine(const char* what, double value, const char* aim) {
+  char buffer[160];
+  std::snprintf(buffer, sizeof(buffer), "| %s | %.2f | %s |\n", what, value, aim);
+  return buffer;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Times the global bundle adjustment of the four variants on one simulated map");
+  std::string out;
+  SimulatedMapOptions options;
+  int iterations = 10, repeats = 5;
+  bool quick = false;
+  app.add_option("--out", out, "directory for table.md, table.csv, time_over_keyframes.csv and .png")->required();
+  app.add_option("--keyframes", options.keyframes, "keyframes of the table")->check(CLI::Range(20, 2000));
+  app.add_option("--plane-points", options.plane_points, "points on planes")->check(CLI::Range(50, 100000));
+  app.add_option("--free-points", options.free_points, "points on no plane")->check(CLI::Range(50, 100000));
+  app.add_option("--seed", options.seed, "seed of the simulation");
+  app.add_option("--iterations", iterations, "Levenberg-Marquardt iterations")->check(CLI::Range(1, 1000));
+  app.add_option("--repeats", repeats, "runs per figure; the median counts")->check(CLI::Range(1, 100));
+  app.add_flag("--quick", quick, "the table only, not the figure over keyframes");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    std::filesystem::create_directories(out);
+    const SimulatedMap map = simulateMap(options);
+    const Variant variants[] = {Variant::kVi, Variant::kViP, Variant::kViCp, Variant::kVip};
+    std::ostringstream md;
+    md << "# Global bundle adjustment of the four variants\n\n"
+       << options.keyframes << " keyframes, " << options.plane_points << " points on planes ("
+       << map.plane_observations << " observations), " << options.free_points << " free points (" << map.free_observations
+       << " observations), seed " << options.seed << ", " << iterations << " iterations, median of " << repeats
+       << " runs.\n\nThe structured solver eliminates the points while it evaluates the Jacobians, so its elimination counts "
+          "there; Ceres counts it as linear solving. Only sums compare across solvers.\n";
+    std::vector<GbaRun> all;
+    const auto table = [&](const char* title, const char* solver, int threads, int runs) {
+      std::vector<GbaRun> rows;
+      for (const Variant v : variants) {
+        rows.push_back(runGba(map, v, solver, threads, iterations, runs));
+        std::fprintf(stderr, "%s, %d thread(s), %s: %.1f ms, RMSE %.4f m\n", solver, threads, variantName(v),
+                     rows.back().summary.total_ms, rows.back().rmse);
+      }
+      md << "\n## " << title << "\n\n" << gbaTableMarkdown(rows);
+      all.insert(all.end(), rows.begin(), rows.end());
+      return rows;
+    };
+    const auto own = table("Structured solver, one thread", "structured", 1, repeats);
+    const auto own2 = table("Structured solver, two threads", "structured", 2, repeats);
+    const auto stock = table("Stock Ceres (SPARSE_SCHUR), one thread", "ceres", 1, std::min(repeats, 3));
+    md << "\n## Ratios of the sums\n\n| ratio | measured | aim (paper) |\n|---|---:|---|\n"
+       << ratioLine("VI / VIP, structured", own[0].summary.total_ms / own[3].summary.total_ms, "3 (2.84)")
+       << ratioLine("P / CP, structured", own[1].summary.total_ms / own[2].summary.total_ms, "3 (2.0)")
+       << ratioLine("VI on stock Ceres / VIP, structured", stock[0].summary.total_ms / own[3].summary.total_ms, "8 (2.84)")
+       << ratioLine("VI / VIP, stock Ceres", stock[0].summary.total_ms / stock[3].summary.total_ms, "- (2.84)")
+       << ratioLine("P / CP, stock Ceres", stock[1].summary.total_ms / stock[2].summary.total_ms, "- (2.0)")
+       << ratioLine("VIP on stock Ceres / VIP, structured", stock[3].summary.total_ms / own[3].summary.total_ms, "-")
+       << ratioLine("VIP, one thread / two threads, structured", own[3].summary.total_ms / own2[3].summary.total_ms, "-")
+       << ratioLine("RMSE of VIP / RMSE of VI", own[3].rmse / own[0].rmse, "1 or less (0.84)");
+
+    if (!quick) {
+      std::vector<PlotSeries> series;
+      std::ostringstream csv;
+      csv << "map,keyframes,variant,solver,total_ms\n";
+      for (const Variant v : variants) series.push_back({std::string(variantName(v)) + ", structured", {}, {}});
+      series.push_back({"vi, Ceres", {}, {}});
+      for (int n = 30; n <= options.keyframes; n += std::max(10, (options.keyframes - 30) / 6)) {
+        const SimulatedMap part = prefix(map, n);
+        for (int v = 0; v < 4; ++v) {
+          const GbaRun run = runGba(part, variants[v], "structured", 1, iterations, std::min(repeats, 3));
+          series[v].x.push_back(n);
+          series[v].y.push_back(run.summary.total_ms);
+          csv << "rooms," << n << ',' << variantName(variants[v]) << ",structured," << run.summary.total_ms << '\n';
+        }
+        const GbaRun run = runGba(part, Variant::kVi, "ceres", 1, iterations, 1);
+        series[4].x.push_back(n);
+        series[4].y.push_back(run.summary.total_ms);
+        csv << "rooms," << n << ",vi,ceres," << run.summary.total_ms << '\n';
+      }
+      writeLinePlot(out + "/time_over_keyframes.png", "Global bundle adjustment, two rooms there and back", "keyframes",
+                    "ms", series);
+      // A corridor: the cost should grow with its length and no faster.
+      std::vector<PlotSeries> straight(2);
+      straight[0].name = "vi, structured";
+      straight[1].name = "vip, structured";
+      md << "\n## Corridor\n\n| keyframes | vi (ms) | vip (ms) | vip per keyframe (us) |\n|---:|---:|---:|---:|\n";
+      for (const int n : {100, 200, 400, 800}) {
+        SimulatedMapOptions corridor = options;
+        corridor.world = "corridor";
+        corridor.keyframes = n;
+        corridor.plane_points = 10 * n;
+        corridor.free_points = 6 * n;
+        const SimulatedMap map_n = simulateMap(corridor);
+        double ms[2];
+        for (int k = 0; k < 2; ++k) {
+          const Variant v = k ? Variant::kVip : Variant::kVi;
+          ms[k] = runGba(map_n, v, "structured", 1, iterations, std::min(repeats, 3)).summary.total_ms;
+          straight[k].x.push_back(n);
+          straight[k].y.push_back(ms[k]);
+          csv << "corridor," << n << ',' << variantName(v) << ",structured," << ms[k] << '\n';
+        }
+        char row[120];
+        std::snprintf(row, sizeof(row), "| %d | %.1f | %.1f | %.0f |\n", n, ms[0], ms[1], 1e3 * ms[1] / n);
+        md << row;
+      }
+      writeLinePlot(out + "/time_over_corridor.png", "Global bundle adjustment along a corridor", "keyframes", "ms", straight);
+      writeText(out + "/time_over_keyframes.csv", csv.str());
+      md << "\n![time over keyframes](time_over_keyframes.png)\n\n![time along a corridor](time_over_corridor.png)\n";
+    }
+    writeText(out + "/table.md", md.str());
+    writeText(out + "/table.csv", gbaTableCsv(all));
+    std::printf("%s\n", md.str().c_str());
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "gba_benchmark: %s\n", e.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,160 @@
+#include "vip_slam_eval/gba_benchmark/gba_benchmark.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <sstream>
+
+#include <Eigen/Dense>
+
+#include "vip_slam_backend/optimisation/problem_builder.h"
+
+namespace vip_slam {
+
+double alignedRmse(const std::vector<Eigen::Vector3d>& truth, const std::vector<Eigen::Vector3d>& estimate) {
+  const std::size_t n = truth.size();
+  Eigen::Vector3d mean_t = Eigen::Vector3d::Zero(), mean_e = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < n; ++k) mean_t += truth[k], mean_e += estimate[k];
+  mean_t /= n;
+  mean_e /= n;
+  Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
+  for (std::size_t k = 0; k < n; ++k) C += (truth[k] - mean_t) * (estimate[k] - mean_e).transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(C, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();
+  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) S(2, 2) = -1;
+  const Eigen::Matrix3d R = svd.matrixU() * S * svd.matrixV().transpose();
+  double sum = 0;
+  for (std::size_t k = 0; k < n; ++k) sum += (truth[k] - mean_t - R * (estimate[k] - mean_e)).squaredNorm();
+  return std::sqrt(sum / n);
+}
+
+GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver_name, int threads, int iterations,
+              int repeats) {
+  BuilderSettings settings;
+  settings.variant = variant;
+  settings.focal = map.focal;
+  settings.measurement.pixel_sigma = map.pixel_sigma;
+  // The simulation has no outliers: plain squares, so that neither solver spends time on losses.
+  settings.measurement.huber = settings.measurement.depth_huber = 0;
+  settings.measurement.outlier_chi2 = 1e6;
+
+  GbaRun run;
+  run.variant = variant;
+  run.solver = solver_name;
+  run.threads = threads;
+  run.keyframes = static_cast<int>(map.map.keyframes().size());
+  const auto start = std::chrono::steady_clock::now();
+  const BuiltProblem built = buildProblem(map.map, globalScope(map.map), settings);
+  run.build_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  run.points = built.problem.points.size();
+  run.planes = built.problem.planes.size();
+  run.homographies = built.problem.homographies.size();
+  run.homography_pairs = built.problem.homography_pairs.size();
+  run.point_to_plane = built.problem.point_to_plane.size() + built.problem.plane_points.size();
+
+  SolverOptions options;
+  options.max_iterations = iterations;
+  options.keep_iterating = true;
+  options.threads = threads;
+  std::vector<SolverSummary> summaries;
+  const auto rmse = [&](const BaProblem& problem) {
+    std::vector<Eigen::Vector3d> truth, estimate;
+    for (std::size_t f = 0; f < built.frames.size(); ++f) {
+      if (built.frames[f] == 0) continue;
+      truth.push_back(map.truth.at(built.frames[f]).T_W_I.t());
+      estimate.push_back(problem.frames[f].state.T_W_I.t());
+    }
+    return alignedRmse(truth, estimate);
+  };
+  run.rmse_before = rmse(built.problem);
+  for (int k = 0; k < repeats; ++k) {
+    BaProblem problem = built.problem;
+    // A new solver each time: nothing is kept from the run before.
+    summaries.push_back(makeSolver(solver_name)->solve(problem, options));
+    run.rmse = rmse(problem);
+  }
+  std::sort(summaries.begin(), summaries.end(),
+            [](const SolverSummary& a, const SolverSummary& b) { return a.total_ms < b.total_ms; });
+  run.summary = summaries[summaries.size() / 2];
+  return run;
+}
+
+SimulatedMap prefix(const SimulatedMap& map, int keyframes) {
+  SimulatedMap out = map;
+  while (static_cast<int>(out.map.keyframes().size()) > keyframes) {
+    const KeyframeId last = out.map.newestKeyframe();
+    out.map.removeKeyframe(last, out.noise, 3.0);
+    out.truth.erase(last);
+  }
+  return out;
+}
+
+namespace {
+
+struct Row {
+  const char* name;
+  const char* format;
+  double (*value)(const GbaRun&);
+};
+
+const Row kRows[] = {
+    {"Keyframes", "%.0f", [](const GbaRun& r) { return double(r.keyframes); }},
+    {"Points", "%.0f", [](const GbaRun& r) { return double(r.points); }},
+    {"Planes", "%.0f", [](const GbaRun& r) { return double(r.planes); }},
+    {"Pixel + depth observations", "%.0f", [](const GbaRun& r) { return double(r.summary.observations); }},
+    {"Homographies", "%.0f", [](const GbaRun& r) { return double(r.homographies + r.homography_pairs); }},
+    {"Point-to-plane factors", "%.0f", [](const GbaRun& r) { return double(r.point_to_plane); }},
+    {"Residual blocks", "%.0f", [](const GbaRun& r) { return double(r.summary.residual_blocks); }},
+    {"Parameters", "%.0f", [](const GbaRun& r) { return double(r.summary.parameters); }},
+    {"Iterations", "%.0f", [](const GbaRun& r) { return double(r.summary.iterations); }},
+    {"Residual (ms)", "%.1f", [](const GbaRun& r) { return r.summary.residual_ms; }},
+    {"Jacobians (ms)", "%.1f", [](const GbaRun& r) { return r.summary.jacobian_ms; }},
+    {"Linear (ms)", "%.1f", [](const GbaRun& r) { return r.summary.linear_ms; }},
+    {"Pre-processor (ms)", "%.1f", [](const GbaRun& r) { return r.summary.preprocess_ms; }},
+    {"Post-processor (ms)", "%.1f", [](const GbaRun& r) { return r.summary.postprocess_ms; }},
+    {"Sum (ms)", "%.1f", [](const GbaRun& r) { return r.summary.total_ms; }},
+    {"Map to problem (ms)", "%.1f", [](const GbaRun& r) { return r.build_ms; }},
+    {"Final cost", "%.1f", [](const GbaRun& r) { return r.summary.final_cost; }},
+    {"RMSE before (m)", "%.4f", [](const GbaRun& r) { return r.rmse_before; }},
+    {"RMSE (m)", "%.4f", [](const GbaRun& r) { return r.rmse; }},
+};
+
+std::string format(const Row& row, const GbaRun& run) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof(buffer), row.format, row.value(run));
+  return buffer;
+}
+
+}  // namespace
+
+std::string gbaTableMarkdown(const std::vector<GbaRun>& runs) {
+  std::ostringstream out;
+  out << "| |";
+  for (const GbaRun& run : runs) out << ' ' << variantName(run.variant) << " |";
+  out << "\n|---|";
+  for (std::size_t k = 0; k < runs.size(); ++k) out << "---:|";
+  out << '\n';
+  for (const Row& row : kRows) {
+    out << "| " << row.name << " |";
+    for (const GbaRun& run : runs) out << ' ' << format(row, run) << " |";
+    out << '\n';
+  }
+  return out.str();
+}
+
+std::string gbaTableCsv(const std::vector<GbaRun>& runs) {
+  std::ostringstream out;
+  out << "variant,solver,threads";
+  for (const Row& row : kRows) out << ',' << row.name;
+  out << '\n';
+  for (const GbaRun& run : runs) {
+    out << variantName(run.variant) << ',' << run.solver << ',' << run.threads;
+    for (const Row& row : kRows) out << ',' << format(row, run);
+    out << '\n';
+  }
+  return out.str();
+}
+
+}  // namespace vip_slam
