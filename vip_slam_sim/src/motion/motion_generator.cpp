@@ -300,11 +300,13 @@ SplineTrajectory makeFromFile(const MotionOptions& o) {
   Trajectory poses = readPoseFile(o.file);
   const SE3 place(Eigen::Quaterniond(Eigen::AngleAxisd(o.yaw * kDeg, Eigen::Vector3d::UnitZ())),
                   Eigen::Vector3d(o.x, o.y, o.z));
+  const SE3 roll(Eigen::Quaterniond(Eigen::AngleAxisd(o.file_roll * kDeg, Eigen::Vector3d::UnitZ())),
+                 Eigen::Vector3d::Zero());
   Trajectory chosen;
   for (StampedPose& pose : poses) {
     pose.t -= o.start_at;
     if (pose.t < 0 || (o.duration > 0 && pose.t > o.duration)) continue;
-    chosen.push_back({pose.t, place * pose.T_W_B});
+    chosen.push_back({pose.t, place * pose.T_W_B * roll});
   }
   if (chosen.size() < 2) fail("motion/file: " + o.file + ": fewer than two poses between start_at and duration");
   const double first = chosen.front().t;

@@ -28,6 +28,8 @@ void MotionOptions::visit(OptionVisitor& v) {
   v.field("y", y, -1000, 1000, "see x");
   v.field("z", z, -1000, 1000, "see x");
   v.field("yaw", yaw, -360, 360, "heading at the start of orbit, rotate, still; turn of file, deg");
+  v.field("file_roll", file_roll, -360, 360,
+          "file: turns the body about its z axis; 90 for EuRoC, whose x axis points up while ours points right, deg");
   v.field("extent_x", extent_x, 0, 50, "orbit: half extent, m");
   v.field("extent_y", extent_y, 0, 50, "orbit: half extent, m");
   v.field("extent_z", extent_z, 0, 10, "orbit: half extent, m");

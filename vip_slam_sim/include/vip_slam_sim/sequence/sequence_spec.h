@@ -18,7 +18,7 @@ struct MotionOptions {
   double duration = 0, hold = 2.6, start_at = 0;
   double speed = 0.8, height = 1.5, max_rate = 0.8;
   double yaw_swing = 12, pitch = -6, turn_rate = 45;
-  double x = 0, y = 0, z = 0, yaw = 0;
+  double x = 0, y = 0, z = 0, yaw = 0, file_roll = 0;
   double extent_x = 2.0, extent_y = 1.3, extent_z = 0.35;
   bool check_collisions = true;
   double clearance = 0.22;
