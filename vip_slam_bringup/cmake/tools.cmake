@@ -8,6 +8,7 @@ add_library(vip_slam_bringup
   src/convert/stray.cpp
   src/convert/text_table.cpp
   src/convert/tum_rgbd.cpp
+  src/parameter_reference.cpp
   src/preflight/check_images.cpp
   src/preflight/check_imu.cpp
   src/preflight/check_motion.cpp
@@ -32,9 +33,12 @@ install(TARGETS vip_slam_bringup vip_slam_bringup_nodelets
 add_executable(check_bag src/apps/check_bag.cpp)
 target_link_libraries(check_bag vip_slam_bringup CLI11::CLI11)
 
+add_executable(parameter_reference src/apps/parameter_reference.cpp)
+target_link_libraries(parameter_reference vip_slam_bringup)
+
 catkin_install_python(PROGRAMS scripts/make_report DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY report DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-install(TARGETS check_bag convert_to_bag RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(TARGETS check_bag convert_to_bag parameter_reference RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
 install(DIRECTORY config launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
@@ -59,7 +63,16 @@ if(CATKIN_ENABLE_TESTING)
     target_compile_definitions(test_${thing} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
   endforeach()
 
+  catkin_add_gtest(test_documents test/test_documents.cpp)
+  target_link_libraries(test_documents vip_slam_bringup)
+  target_compile_definitions(test_documents PRIVATE ROOT="${CMAKE_CURRENT_SOURCE_DIR}/..")
+
   catkin_add_gtest(test_report test/test_report.cpp)
   target_link_libraries(test_report yaml-cpp)
   target_compile_definitions(test_report PRIVATE SCRIPT="${CMAKE_CURRENT_SOURCE_DIR}/scripts/make_report")
+
+  find_package(rostest REQUIRED)
+  add_rostest_gtest(test_live_tools test/live_tools.test test/test_live_tools.cpp)
+  target_link_libraries(test_live_tools ${PROJECT_NAME}_driver_bag vip_slam_bringup)
+  target_compile_definitions(test_live_tools PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
 endif()

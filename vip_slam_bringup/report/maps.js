@@ -81,11 +81,11 @@ function tracePolygon(g, polygon, project) {
 }
 
 function topView(canvas, data) {
-  const view = {scale: null, x: 0, y: 0};
+  const view = {scale: null, x: 0, y: 0, touched: false};  // fits the window until somebody moves it
   const {low, high} = extent(data);
   const request = setUpCanvas(canvas, (g, width, height) => {
     const fit = 0.88 * Math.min(width / Math.max(high[0] - low[0], 0.5), height / Math.max(high[1] - low[1], 0.5));
-    if (view.scale === null) Object.assign(view, {scale: fit, x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2});
+    if (!view.touched) Object.assign(view, {scale: fit, x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2});
     const project = p => [width / 2 + (p[0] - view.x) * view.scale, height / 2 - (p[1] - view.y) * view.scale];
     const step = ticks(0, 90 / view.scale, 1)[1] || 1;
     g.strokeStyle = css('grid');
@@ -132,8 +132,8 @@ function topView(canvas, data) {
     g.font = '12px system-ui, sans-serif';
     g.fillText(+step.toPrecision(3) + ' m', 16 + step * view.scale, height - 8);
   });
-  dragAndZoom(canvas, (dx, dy) => { view.x -= dx / view.scale; view.y += dy / view.scale; request(); },
-              factor => { view.scale *= factor; request(); });
+  dragAndZoom(canvas, (dx, dy) => { view.touched = true; view.x -= dx / view.scale; view.y += dy / view.scale; request(); },
+              factor => { view.touched = true; view.scale *= factor; request(); });
 }
 
 function spaceView(canvas, data) {
