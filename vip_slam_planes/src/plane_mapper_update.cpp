@@ -126,7 +126,7 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
 void PlaneMapper::Impl::dropUnsupported(PlaneUpdate* result) {
   std::vector<PlaneId> gone;
   for (const auto& [id, track] : tracks_) {
-    const bool shrunk = track.area() < options.support.min_area;
+    const bool shrunk = track.area() < options.support.min_area || track.mostlyGone();
     const bool never_confirmed = !track.confirmed && track.keyframes_waited > options.support.patience;
     if (shrunk || never_confirmed) gone.push_back(id);
   }

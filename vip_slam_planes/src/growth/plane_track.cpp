@@ -28,6 +28,7 @@ void PlaneTrack::coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_
   cells_.set(c, before + hits);
   if (before > 0) return;
   area_changed_ = grown_ = true;
+  lost_ = std::max(0, lost_ - 1);
   auto [it, fresh] = patches_.try_emplace(host);
   if (fresh) it->second.T_map_C = T_map_C;
   it->second.cells_C.push_back((it->second.T_map_C.inverse() * cellCentre(c)).cast<float>());

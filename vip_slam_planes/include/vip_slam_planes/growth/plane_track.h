@@ -59,6 +59,7 @@ class PlaneTrack {
   void miss(CellIndex c) {
     cells_.set(c, cells_.at(c) - 1);
     area_changed_ = true;
+    lost_ += cells_.at(c) == 0;
   }
 
   /// Rasterises the cells anew when hosts have moved (against where they were when last rasterised) by more than half a
@@ -78,6 +79,10 @@ class PlaneTrack {
   std::vector<PlanePolygon> polygons(int min_hits);
   /// Area or parameters changed noticeably since the last call with `reset`.
   bool changed(bool reset);
+
+  /// Most of what was covered has been looked through since: the surface is gone, and what is left are the rims that
+  /// no view can refute (the foot of a partition has the floor close behind it).
+  bool mostlyGone() const { return lost_ > 2 * cells_.count(1); }
 
   // Book-keeping of the mapper.
   bool confirmed = false;
@@ -101,6 +106,7 @@ class PlaneTrack {
   Eigen::Vector3d origin_, ex_, ey_;
   CellGrid cells_;
   bool area_changed_ = true, grown_ = true;
+  int lost_ = 0;
   std::vector<Outline> outlines_;
   Plane last_checked_;
   std::map<KeyframeId, Patch> patches_;  ///< host 0: cells of a loaded map, in `map`

@@ -1,0 +1,357 @@
+// The whole plane module on exact scenes, with poses that are given as a back end would give them.
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "scene.h"
+#include "vip_slam_planes/plane_mapper.h"
+
+namespace vip_slam {
+namespace {
+
+using testing::lookAt;
+using testing::Scene;
+using testing::SceneCamera;
+using testing::updateFor;
+
+class Rig {
+ public:
+  explicit Rig(double noise_scale = 1.0, PlaneMapperOptions options = {})
+      : camera(testing::quietNoise(), noise_scale), mapper(options, camera.camera, camera.noise) {}
+
+  PlaneUpdate look(const Scene& scene, const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
+    return place(camera.keyframe(scene, lookAt(eye, target)), lookAt(eye, target));
+  }
+  /// A keyframe that the back end puts at T_W_C, wherever it was taken.
+  PlaneUpdate place(const std::shared_ptr<Keyframe>& keyframe, const SE3& T_W_C, const MapUpdate& base = {}) {
+    mapper.addKeyframe(keyframe);
+    MapUpdate update = updateFor(*keyframe, T_W_C);
+    update.landmarks = base.landmarks;
+    update.planes = base.planes;
+    poses[keyframe->id] = T_W_C;
+    return mapper.applyMapUpdate(update);
+  }
+  const PlaneEstimate* find(const Plane& truth, double max_d = 0.02) const {
+    for (const PlaneEstimate& p : mapper.planes()) {
+      if (p.plane.n.dot(truth.n) > std::cos(0.02) && std::abs(p.plane.d - truth.d) < max_d) return &p;
+    }
+    return nullptr;
+  }
+
+  SceneCamera camera;
+  PlaneMapper mapper;
+  std::map<KeyframeId, SE3> poses;
+};
+
+Scene room() {
+  Scene scene;
+  scene.addRoom({-3, -2.5, 0}, {3, 2.5, 2.6});
+  return scene;
+}
+
+TEST(Mapper, TurningInARoomFindsSixPlanesOnce) {
+  Rig rig;
+  const Scene scene = room();
+  for (int i = 0; i < 14; ++i) {
+    const double a = i * 30 * M_PI / 180;
+    rig.look(scene, {0.2 * std::cos(a), 0.1, 1.4},
+             {3 * std::cos(a), 3 * std::sin(a), i % 2 ? 0.6 : 2.2});
+  }
+  ASSERT_EQ(6u, rig.mapper.planes().size());
+  for (const Plane& truth : {Plane({0, 0, 1}, 0), Plane({0, 0, -1}, 2.6), Plane({1, 0, 0}, 3), Plane({-1, 0, 0}, 3),
+                             Plane({0, 1, 0}, 2.5), Plane({0, -1, 0}, 2.5)}) {
+    const PlaneEstimate* p = rig.find(truth, 0.003);
+    ASSERT_TRUE(p) << truth.coefficients().transpose();
+    EXPECT_LT(angleBetween(truth, p->plane), 0.1 * M_PI / 180);
+    EXPECT_EQ(truth.n.z() != 0 ? PlaneKind::kHorizontal : PlaneKind::kVertical, p->kind);
+    EXPECT_FALSE(p->polygons.empty());
+    for (const PlanePolygon& polygon : p->polygons) {
+      for (const Eigen::Vector3d& q : polygon.outer) EXPECT_NEAR(0, p->plane.signedDistance(q), 1e-9);
+    }
+  }
+  const PlaneEstimate* wall = rig.find(Plane({1, 0, 0}, 3));
+  EXPECT_GT(wall->area, 0.75 * 5 * 2.6);
+  EXPECT_LT(wall->area, 1.02 * 5 * 2.6);
+}
+
+TEST(Mapper, DoorBeforeTheWallStaysTwoWhateverTheView) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  scene.add({2.88, -0.5, 0}, {0, 1, 0}, {0, 0, 2.1});
+  for (int i = 0; i < 8; ++i) rig.look(scene, {0.2, -1.4 + 0.4 * i, 1.4}, {3, 0.3 * (i - 4), 1.2});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3.0), 0.004));
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 2.88), 0.004));
+  EXPECT_NEAR(2.1, rig.find(Plane({-1, 0, 0}, 2.88))->area, 0.35);
+}
+
+TEST(Mapper, CorridorWallSeenFromBothEndsBecomesOne) {
+  Rig rig;
+  Scene scene;
+  scene.add({-6, 1, 0}, {12, 0, 0}, {0, 0, 2.5});
+  // Each end looks at its own half first; what lies between comes last. The far end has drifted by 2.5 cm.
+  const auto at = [&](double x, double target_x, double drift) {
+    const SE3 truth = lookAt({x, -1, 1.3}, {target_x, 1, 1.2});
+    const auto keyframe = rig.camera.keyframe(scene, truth);
+    return rig.place(keyframe, SE3(truth.rotation(), truth.t() + Eigen::Vector3d(0, drift, 0)));
+  };
+  at(-5, -5, 0);
+  at(-4.6, -4.6, 0);
+  at(5, 5, 0.025);
+  at(4.6, 4.6, 0.025);
+  EXPECT_EQ(2u, rig.mapper.planes().size());
+  const PlaneId oldest = rig.mapper.planes().front().id;
+  std::vector<PlaneMerge> merges;
+  for (double x = -4; x <= 4.1; x += 0.8) {
+    const PlaneUpdate update = at(x, x, 0.0125 + x / 4 * 0.0125);
+    merges.insert(merges.end(), update.merges.begin(), update.merges.end());
+  }
+  ASSERT_EQ(1u, rig.mapper.planes().size());
+  EXPECT_EQ(oldest, rig.mapper.planes().front().id);
+  ASSERT_EQ(1u, merges.size());
+  EXPECT_EQ(oldest, merges.front().into);
+  EXPECT_GT(rig.mapper.planes().front().area, 20);
+}
+
+TEST(Mapper, BothFacesOfAThinWallAreTwo) {
+  Rig rig;
+  Scene scene;
+  scene.add({0, -2, 0}, {0, 4, 0}, {0, 0, 2.5});
+  scene.add({0.08, -2, 0}, {0, 4, 0}, {0, 0, 2.5});
+  for (int i = 0; i < 3; ++i) rig.look(scene, {-2, 0.2 * i, 1.3}, {0, 0, 1.3});
+  for (int i = 0; i < 3; ++i) rig.look(scene, {2, 0.2 * i, 1.3}, {0, 0, 1.3});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 0), 0.004));
+  EXPECT_TRUE(rig.find(Plane({1, 0, 0}, -0.08), 0.004));
+}
+
+TEST(Mapper, DoorwayIsAHoleInTheWall) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -3, 0}, {0, 2.5, 0}, {0, 0, 2.6});
+  scene.add({3, 0.5, 0}, {0, 2.5, 0}, {0, 0, 2.6});
+  scene.add({3, -0.5, 2}, {0, 1, 0}, {0, 0, 0.6});
+  scene.add({5, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  for (int i = 0; i < 6; ++i) rig.look(scene, {0, -1 + 0.4 * i, 1.4}, {3, -0.6 + 0.25 * i, 1.4});
+  const PlaneEstimate* wall = rig.find(Plane({-1, 0, 0}, 3), 0.01);
+  ASSERT_TRUE(wall);
+  const Eigen::Vector3d middle(3, 0, 1.0);
+  EXPECT_GT(wall->area, 5);
+  // The doorway's middle lies in no piece.
+  for (const PlanePolygon& polygon : wall->polygons) {
+    bool inside = false;
+    for (std::size_t i = 0, j = polygon.outer.size() - 1; i < polygon.outer.size(); j = i++) {
+      const Eigen::Vector3d &a = polygon.outer[i], &b = polygon.outer[j];
+      if ((a.z() > middle.z()) != (b.z() > middle.z()) &&
+          middle.y() < (b.y() - a.y()) * (middle.z() - a.z()) / (b.z() - a.z()) + a.y()) {
+        inside = !inside;
+      }
+    }
+    EXPECT_FALSE(inside);
+  }
+}
+
+TEST(Mapper, GrowsWithFramesButStartsNothing) {
+  Rig rig(0.0);
+  const Scene scene = room();
+  TrackedFrame frame = rig.camera.frame(scene, lookAt({0, 0, 1.4}, {3, 0, 1.2}), 0.1, 16);
+  rig.mapper.grow(frame, SE3());
+  EXPECT_EQ(0u, rig.mapper.counters().frames_grown);
+  rig.look(scene, {0, 0, 1.4}, {3, 0, 1.3});
+  rig.look(scene, {0.3, 0, 1.4}, {3, 0, 1.3});
+  const double before = rig.find(Plane({-1, 0, 0}, 3))->area;
+  const std::size_t count = rig.mapper.planes().size();
+  const SE3 T_map_odom(Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())), {1, 2, 0.3});
+  for (int i = 1; i <= 6; ++i) {
+    const SE3 T_W_C = lookAt({0.3, 0, 1.4}, {3, 0.35 * i, 1.3});
+    frame = rig.camera.frame(scene, T_W_C, 2 + i, 16);
+    frame.keyframe = 2;
+    frame.state.T_W_I = T_map_odom.inverse() * T_W_C;
+    rig.mapper.grow(frame, T_map_odom);
+  }
+  MapUpdate nothing;
+  rig.mapper.applyMapUpdate(nothing);
+  EXPECT_EQ(count, rig.mapper.planes().size());
+  EXPECT_GT(rig.find(Plane({-1, 0, 0}, 3))->area, before + 1.0);
+  EXPECT_LE(rig.find(Plane({-1, 0, 0}, 3))->area, 5 * 2.6 * 1.02);
+  EXPECT_EQ(6u, rig.mapper.counters().frames_grown);
+  frame.status.state = TrackingState::kLost;
+  frame.state.T_W_I = SE3();
+  rig.mapper.grow(frame, T_map_odom);
+  EXPECT_EQ(6u, rig.mapper.counters().frames_grown);
+}
+
+TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
+  Rig rig;
+  const Scene scene = room();
+  for (int i = 0; i < 6; ++i) rig.look(scene, {-1 + 0.4 * i, 0, 1.4}, {3, -1 + 0.4 * i, 1.0});
+  const std::size_t count = rig.mapper.planes().size();
+  const PlaneEstimate wall = *rig.find(Plane({-1, 0, 0}, 3));
+  const SE3 move(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())), {2, -1, 0.2});
+  MapUpdate update;
+  update.global = true;
+  for (const auto& [id, T] : rig.poses) {
+    KeyframeEstimate k;
+    k.id = id;
+    k.state.T_W_I = move * T;
+    update.keyframes.push_back(k);
+  }
+  rig.mapper.applyMapUpdate(update);
+  EXPECT_EQ(count, rig.mapper.planes().size());
+  const Plane expected = transformPlane(move, wall.plane);
+  const PlaneEstimate* moved = rig.find(expected, 0.001);
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(wall.id, moved->id);
+  EXPECT_NEAR(wall.area, moved->area, 0.1 * wall.area);
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = -low, low2 = low, high2 = high;
+  for (const auto& p : wall.polygons)
+    for (const auto& q : p.outer) low = low.cwiseMin(q), high = high.cwiseMax(q);
+  for (const auto& p : moved->polygons)
+    for (const auto& q : p.outer) low2 = low2.cwiseMin(move.inverse() * q), high2 = high2.cwiseMax(move.inverse() * q);
+  EXPECT_LT((low - low2).norm(), 0.15);
+  EXPECT_LT((high - high2).norm(), 0.15);
+}
+
+TEST(Mapper, OneWallMappedTwiceBecomesOneWhenTheLoopCloses) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  // The second visit has drifted by 40 cm: two planes until the correction.
+  for (int visit = 0; visit < 2; ++visit) {
+    for (int i = 0; i < 3; ++i) {
+      const SE3 truth = lookAt({0, -0.5 + 0.4 * i, 1.4}, {3, -0.5 + 0.4 * i, 1.3});
+      rig.place(rig.camera.keyframe(scene, truth), SE3(truth.rotation(), truth.t() - Eigen::Vector3d(0.4 * visit, 0, 0)));
+    }
+  }
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  const PlaneId oldest = rig.mapper.planes()[0].id, newest = rig.mapper.planes()[1].id;
+  MapUpdate update;
+  update.global = true;
+  for (const auto& [id, T] : rig.poses) {
+    KeyframeEstimate k;
+    k.id = id;
+    k.state.T_W_I = SE3(T.rotation(), T.t() + Eigen::Vector3d(id > 3 ? 0.4 : 0.0, 0, 0));
+    update.keyframes.push_back(k);
+  }
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+  ASSERT_EQ(1u, result.planes.size());
+  ASSERT_EQ(1u, result.merges.size());
+  EXPECT_EQ(newest, result.merges[0].from);
+  EXPECT_EQ(oldest, result.merges[0].into);
+  EXPECT_NEAR(3.0, result.planes[0].plane.d, 0.004);
+}
+
+TEST(Mapper, APlaneThatIsGoneDisappears) {
+  Rig rig;
+  Scene with = room(), without = room();
+  with.add({1, -0.8, 0}, {0, 1.6, 0}, {0, 0, 1.8});  // a partition that is carried away
+  for (int i = 0; i < 3; ++i) rig.look(with, {-1.5, 0.1 * i, 1.2}, {1, 0, 1.0});
+  const PlaneEstimate* partition = rig.find(Plane({-1, 0, 0}, 1));
+  ASSERT_TRUE(partition);
+  const PlaneId id = partition->id;
+  std::set<PlaneId> removed;
+  for (int i = 0; i < 10; ++i) {
+    const PlaneUpdate update = rig.look(without, {-1.5, 0.1 * i, 1.2}, {1, 0, 1.0});
+    removed.insert(update.removed.begin(), update.removed.end());
+  }
+  EXPECT_FALSE(rig.find(Plane({-1, 0, 0}, 1)));
+  EXPECT_EQ(std::set<PlaneId>{id}, removed);
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 3)));
+}
+
+TEST(Mapper, ObservationsHoldOnlyPointsOfTheirPlane) {
+  Rig rig;
+  Scene scene = room();
+  scene.add({1.5, -0.4, 0}, {0, 0.8, 0}, {0, 0, 0.9});   // a box before the wall
+  scene.add({1.5, -0.4, 0.9}, {0, 0.8, 0}, {0.6, 0, 0});
+  scene.add({2.95, 0.6, 0.8}, {0, 1, 0}, {0, 0, 1.0});   // a picture 5 cm off the wall
+  std::size_t observations = 0, points = 0;
+  for (int i = 0; i < 5; ++i) {
+    const SE3 T_W_C = lookAt({-1.5, -0.6 + 0.3 * i, 1.5}, {3, 0.2, 0.9});
+    const PlaneUpdate update = rig.place(rig.camera.keyframe(scene, T_W_C), T_W_C);
+    for (const PlaneObservation& o : update.observations) {
+      ++observations;
+      Plane plane;
+      for (const PlaneEstimate& p : update.planes) {
+        if (p.id == o.plane) plane = p.plane;
+      }
+      const SE3& T = rig.poses.at(o.keyframe);
+      EXPECT_LE(o.points.size(), 200u);
+      EXPECT_LE(o.weight_scale * double(o.points.size()), 50.001);
+      Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
+      for (const PlanePoint& p : o.points) {
+        ++points;
+        const Eigen::Vector3d p_W = T * p.p_C.cast<double>();
+        EXPECT_LT(std::abs(plane.signedDistance(p_W)), 4 * p.sigma) << "plane " << o.plane << " at " << p_W.transpose();
+        EXPECT_GE(p.sigma, float(rig.camera.noise.bias_floor));
+        const Eigen::Vector4d h = p.p_C.homogeneous().cast<double>();
+        G += o.weight_scale / (double(p.sigma) * double(p.sigma)) * h * h.transpose();
+      }
+      EXPECT_LT((G - o.G).norm(), 1e-6 * G.norm());
+    }
+  }
+  EXPECT_GE(observations, 12u);
+  EXPECT_GE(points, 600u);
+}
+
+TEST(Mapper, OptimisedParametersReplaceOursAndPolygonsFollow) {
+  Rig rig;
+  const Scene scene = room();
+  for (int i = 0; i < 3; ++i) rig.look(scene, {0, 0.2 * i, 1.4}, {3, 0, 1.0});
+  const PlaneEstimate wall = *rig.find(Plane({-1, 0, 0}, 3));
+  MapUpdate update;
+  const Plane optimised(Eigen::Vector3d(1, 0.01, 0), -3.01);  // on the other gauge
+  update.planes.emplace_back(wall.id, optimised);
+  rig.mapper.applyMapUpdate(update);
+  const PlaneEstimate* moved = rig.find(optimised.flipped(), 1e-9);
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(wall.id, moved->id);
+  for (const auto& p : moved->polygons)
+    for (const auto& q : p.outer) EXPECT_NEAR(0, optimised.signedDistance(q), 1e-9);
+}
+
+TEST(Mapper, RestoredPlanesAreRecognised) {
+  Rig first;
+  const Scene scene = room();
+  for (int i = 0; i < 4; ++i) first.look(scene, {0, 0.2 * i, 1.4}, {3, 0.2, 1.0});
+  Rig second;
+  second.mapper.restore(first.mapper.planes());
+  EXPECT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
+  for (int i = 0; i < 4; ++i) second.look(scene, {0.2, 0.2 * i, 1.4}, {3, 0.5, 1.1});
+  ASSERT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
+  for (std::size_t i = 0; i < first.mapper.planes().size(); ++i) {
+    EXPECT_EQ(first.mapper.planes()[i].id, second.mapper.planes()[i].id);
+    EXPECT_NEAR(first.mapper.planes()[i].area, second.mapper.planes()[i].area, 0.35 * second.mapper.planes()[i].area);
+  }
+}
+
+TEST(Mapper, RemovedKeyframesLeaveTheirArea) {
+  Rig rig;
+  const Scene scene = room();
+  for (int i = 0; i < 6; ++i) rig.look(scene, {-1 + 0.3 * i, 0, 1.4}, {3, -1.2 + 0.4 * i, 1.0});
+  const double area = rig.find(Plane({-1, 0, 0}, 3))->area;
+  MapUpdate update;
+  update.removed_keyframes = {1, 2, 4};
+  rig.mapper.applyMapUpdate(update);
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3), 0.004));
+  EXPECT_NEAR(area, rig.find(Plane({-1, 0, 0}, 3))->area, 1e-9);
+}
+
+TEST(Mapper, BadInput) {
+  const auto camera = testing::testCamera();
+  EXPECT_THROW(PlaneMapper({}, nullptr, testing::quietNoise()), std::invalid_argument);
+  DepthNoise noise = testing::quietNoise();
+  noise.max_range = 0;
+  EXPECT_THROW(PlaneMapper({}, camera, noise), std::invalid_argument);
+  PlaneMapper mapper({}, camera, testing::quietNoise());
+  mapper.addKeyframe(nullptr);
+  auto keyframe = std::make_shared<Keyframe>();
+  keyframe->id = 1;
+  mapper.addKeyframe(keyframe);  // no depth, no features
+  EXPECT_TRUE(mapper.applyMapUpdate(updateFor(*keyframe, SE3())).planes.empty());
+  EXPECT_EQ(1u, mapper.counters().keyframes);
+}
+
+}  // namespace
+}  // namespace vip_slam

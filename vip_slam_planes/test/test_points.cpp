@@ -1,0 +1,144 @@
+// Which map points lie on which plane.
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "scene.h"
+#include "vip_slam_planes/association/consistency_test.h"
+#include "vip_slam_planes/plane_mapper.h"
+
+namespace vip_slam {
+namespace {
+
+using testing::lookAt;
+using testing::Scene;
+using testing::SceneCamera;
+
+std::vector<PointSighting> sightings(const Eigen::Vector3d& p, double baseline, int count, double depth_sigma,
+                                     unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> gauss;
+  std::vector<PointSighting> result;
+  for (int i = 0; i < count; ++i) {
+    const SE3 T_C_W = lookAt({0, baseline * (double(i) / (count - 1) - 0.5), 1.2}, {3, 0, 1.2}).inverse();
+    const Eigen::Vector3d q = T_C_W * p;
+    const Eigen::Vector2d noise = Eigen::Vector2d(gauss(random), gauss(random)) * 0.5 / 525;
+    result.push_back({T_C_W, q.head<2>() / q.z() + noise, depth_sigma > 0 ? q.z() + depth_sigma * gauss(random) : 0.0,
+                      depth_sigma});
+  }
+  return result;
+}
+
+TEST(Consistency, OnAndOffThePlane) {
+  const Plane wall({-1, 0, 0}, 3);
+  PointAssociationOptions options;
+  int on = 0, off = 0;
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    const Eigen::Vector3d p(3, -0.8 + 0.03 * seed, 0.7 + 0.02 * seed), q = p - Eigen::Vector3d(0.08, 0, 0);
+    on += testConsistency(sightings(p, 1.5, 5, 0.01, seed), wall, p + Eigen::Vector3d(0.02, 0, 0), 525, options).consistent;
+    off += testConsistency(sightings(q, 1.5, 5, 0.01, seed), wall, q, 525, options).consistent;
+  }
+  EXPECT_GE(on, 49);
+  EXPECT_EQ(0, off);
+}
+
+TEST(Consistency, DepthDecidesWithoutParallax) {
+  const Plane wall({-1, 0, 0}, 3);
+  const Eigen::Vector3d q(2.9, 0.1, 1.3);
+  EXPECT_FALSE(testConsistency(sightings(q, 0.02, 5, 0.008, 1), wall, q, 525, {}).consistent);
+}
+
+TEST(Consistency, NeedsSightingsInFront) {
+  const Plane wall({-1, 0, 0}, 3);
+  EXPECT_FALSE(testConsistency({}, wall, {3, 0, 1}, 525, {}).solved);
+  EXPECT_FALSE(testConsistency(sightings({-3, 0, 1}, 1, 4, 0, 1), wall, {-3, 0, 1}, 525, {}).solved);
+}
+
+struct World {
+  Scene scene;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<int> truth;  ///< 1: on the wall, 2: floor, 0: neither
+};
+
+World world() {
+  World w;
+  w.scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  w.scene.add({-3, -3, 0}, {6, 0, 0}, {0, 6, 0});
+  w.scene.add({2.93, -1, 1.0}, {0, 0.5, 0}, {0, 0, 0.6});  // 7 cm off the wall
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 150; ++i) {
+    w.points.emplace_back(3, -2 + 4 * u(random), 0.2 + 2 * u(random));
+    const bool hidden = w.points.back().y() > -1.1 && w.points.back().y() < -0.4 && w.points.back().z() > 0.9 &&
+                        w.points.back().z() < 1.7;
+    w.truth.push_back(hidden ? -1 : 1);
+    w.points.emplace_back(0.5 + 2.3 * u(random), -2 + 4 * u(random), 0);
+    w.truth.push_back(2);
+    w.points.emplace_back(2.93, -0.99 + 0.48 * u(random), 1.01 + 0.58 * u(random));
+    w.truth.push_back(0);
+  }
+  return w;
+}
+
+TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
+  const World w = world();
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  PlaneMapper mapper({}, camera.camera, camera.noise);
+  std::map<LandmarkId, PlaneId> associated;
+  std::map<LandmarkId, int> seen;
+  for (int i = 0; i < 8; ++i) {
+    const SE3 T_W_C = lookAt({-0.8, -1.2 + 0.35 * i, 1.4}, {3, -0.5 + 0.1 * i, 0.9});
+    const auto keyframe = camera.keyframe(w.scene, T_W_C, w.points, 0.5);
+    for (const Feature& f : keyframe->frame.features) ++seen[f.id];
+    mapper.addKeyframe(keyframe);
+    MapUpdate update = testing::updateFor(*keyframe, T_W_C);
+    for (std::size_t k = 0; k < w.points.size(); ++k) {
+      LandmarkEstimate estimate;
+      estimate.id = LandmarkId(k);
+      estimate.p_W = w.points[k];
+      update.landmarks.push_back(estimate);
+    }
+    const PlaneUpdate result = mapper.applyMapUpdate(update);
+    for (const auto& [id, plane] : result.associated) associated[id] = plane;
+    for (LandmarkId id : result.dissociated) associated.erase(id);
+  }
+  PlaneId wall = 0, floor = 0;
+  for (const PlaneEstimate& p : mapper.planes()) {
+    if (p.kind == PlaneKind::kHorizontal) floor = p.id;
+    if (p.kind == PlaneKind::kVertical && std::abs(p.plane.d - 3) < 0.01) wall = p.id;
+  }
+  ASSERT_TRUE(wall && floor);
+  int correct = 0, wrong = 0, expected = 0;
+  for (const auto& [id, plane] : associated) {
+    const int truth = w.truth[id];
+    if (truth < 0) continue;
+    (truth == 1 && plane == wall) || (truth == 2 && plane == floor) || (truth == 0 && plane != wall && plane != floor)
+        ? ++correct
+        : ++wrong;
+  }
+  int found = 0;
+  for (const auto& [id, count] : seen) {
+    if (count < 5 || w.truth[id] < 1) continue;
+    ++expected;
+    found += associated.count(id) ? 1 : 0;
+  }
+  EXPECT_GT(expected, 150);
+  EXPECT_LE(wrong, correct / 50);
+  EXPECT_GE(found, expected * 8 / 10);
+
+  // A merge of landmarks keeps the answer; a plane that moves away loses its points.
+  const LandmarkId first = associated.begin()->first;
+  MapUpdate merge;
+  merge.merged_landmarks.emplace_back(first, 100000);
+  const PlaneUpdate renamed = mapper.applyMapUpdate(merge);
+  ASSERT_EQ(1u, renamed.associated.size());
+  EXPECT_EQ(100000, renamed.associated[0].first);
+  EXPECT_EQ(associated.begin()->second, renamed.associated[0].second);
+  MapUpdate away;
+  away.global = true;
+  away.planes.emplace_back(wall, Plane({-1, 0, 0}, 3.3));
+  EXPECT_GT(mapper.applyMapUpdate(away).dissociated.size(), 20u);
+}
+
+}  // namespace
+}  // namespace vip_slam
