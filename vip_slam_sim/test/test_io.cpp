@@ -81,8 +81,8 @@ TEST(Bag, HoldsADriversTopicsAndIsTheSameTwice) {
       EXPECT_DOUBLE_EQ(info->D[0], spec.camera.k1);
     }
   }
-  for (const char* topic : {"/camera/color/image_raw", "/camera/aligned_depth_to_color/image_raw", "/camera/color/camera_info",
-                            "/camera/aligned_depth_to_color/camera_info"})
+  for (const char* topic : {"/camera/color/image_raw", "/camera/aligned_depth_to_color/image_raw",
+                            "/camera/color/camera_info", "/camera/aligned_depth_to_color/camera_info"})
     EXPECT_EQ(count[topic], 4) << topic;
   EXPECT_EQ(count["/tf_static"], 1);
   EXPECT_GT(count["/camera/imu"], 40);

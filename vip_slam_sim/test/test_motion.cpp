@@ -24,7 +24,8 @@ TEST(Spline, DerivativesMatchDifferences) {
     const Eigen::Vector3d acc = (b.v_W - a.v_W) / (2 * h);
     const Eigen::Vector3d w = logSO3(a.T_W_I.rotation().conjugate() * b.T_W_I.rotation()) / (2 * h);
     const Eigen::Vector3d alpha = (b.omega_I - a.omega_I) / (2 * h);
-    worst = std::max({worst, (v - m.v_W).norm(), (acc - m.a_W).norm(), (w - m.omega_I).norm(), (alpha - m.alpha_I).norm()});
+    worst =
+        std::max({worst, (v - m.v_W).norm(), (acc - m.a_W).norm(), (w - m.omega_I).norm(), (alpha - m.alpha_I).norm()});
   }
   EXPECT_LT(worst, 2e-5);
 }
@@ -137,7 +138,8 @@ TEST(Motion, NamedSequencesMoveLikePeopleAndDrones) {
 
 TEST(Motion, FliesPosesOfFiles) {
   const SplineTrajectory s = motionOf("07");
-  const std::string tum = testing::TempDir() + "vip_slam_sim_poses.tum", euroc = testing::TempDir() + "vip_slam_sim_poses.csv";
+  const std::string tum = testing::TempDir() + "vip_slam_sim_poses.tum",
+                    euroc = testing::TempDir() + "vip_slam_sim_poses.csv";
   Trajectory poses;
   std::ofstream csv(euroc);
   csv << "#timestamp,p,q,v\n";
@@ -146,7 +148,8 @@ TEST(Motion, FliesPosesOfFiles) {
     const SE3 T = s.at(t).T_W_I;
     poses.push_back({100 + t, T});
     csv << static_cast<long long>((100 + t) * 1e9) << ',' << T.t().x() << ',' << T.t().y() << ',' << T.t().z() << ','
-        << T.rotation().w() << ',' << T.rotation().x() << ',' << T.rotation().y() << ',' << T.rotation().z() << ",0,0,0\n";
+        << T.rotation().w() << ',' << T.rotation().x() << ',' << T.rotation().y() << ',' << T.rotation().z()
+        << ",0,0,0\n";
   }
   csv.close();
   writeTum(tum, poses);

@@ -21,7 +21,8 @@ cv::Mat gray(const SimFrame& f) {
 }
 
 /// Where pixel (u, v) of frame a appears in frame b; false when hidden or outside.
-bool carry(const SequenceRenderer& s, const SimFrame& a, const SimFrame& b, const Eigen::Vector2d& uv, Eigen::Vector2d* out) {
+bool carry(const SequenceRenderer& s, const SimFrame& a, const SimFrame& b, const Eigen::Vector2d& uv,
+           Eigen::Vector2d* out) {
   const float z = a.exact.depth.at<float>(static_cast<int>(uv.y() + 0.5), static_cast<int>(uv.x() + 0.5));
   if (z <= 0) return false;
   const Eigen::Vector3d p_W = a.T_W_C * s.camera()->unproject(uv, z);
@@ -77,7 +78,8 @@ TEST_P(Rendering, KltFlowAgreesWithTrueFlow) {
     Eigen::Vector2d q;
     if (!ok[i] || !carry(s, a, b, {from[i].x, from[i].y}, &q)) continue;
     // Corners where two depths meet move with neither surface exactly.
-    const cv::Mat near = a.exact.depth(cv::Rect(int(from[i].x) - 4, int(from[i].y) - 4, 9, 9) & cv::Rect(0, 0, ga.cols, ga.rows));
+    const cv::Mat near =
+        a.exact.depth(cv::Rect(int(from[i].x) - 4, int(from[i].y) - 4, 9, 9) & cv::Rect(0, 0, ga.cols, ga.rows));
     double lo, hi;
     cv::minMaxLoc(near, &lo, &hi);
     if (hi - lo > 0.1 * lo) continue;
@@ -102,7 +104,8 @@ TEST(Depth, LiesOnTheTruePlanesAndCarriesTheConfiguredNoise) {
       if (piece < 0) continue;
       const Chart& c = s.scene().charts[s.scene().pieces[piece].chart];
       const Eigen::Vector3d p = f.T_W_C * s.camera()->unproject({double(u), double(v)}, f.exact.depth.at<float>(v, u));
-      worst = std::max(worst, std::abs((p - Eigen::Vector3d(c.o.x, c.o.y, c.o.z)).dot(Eigen::Vector3d(c.n.x, c.n.y, c.n.z))));
+      worst = std::max(worst,
+                       std::abs((p - Eigen::Vector3d(c.o.x, c.o.y, c.o.z)).dot(Eigen::Vector3d(c.n.x, c.n.y, c.n.z))));
     }
   EXPECT_LT(worst, 1e-4);
   // Noise: sigma = 0.17 % of depth (millimetre rounding adds 0.29 mm).
@@ -170,7 +173,8 @@ TEST(Depth, OwnDepthCameraSeesFromItsOwnPlace) {
       const Eigen::Vector3d p = f.T_W_C.inverse() * (T_W_D * camera->unproject({double(u), double(v)}, z));
       if (z == 0 || !s.camera()->project(p, &q) || !s.camera()->inImage(q, 2)) continue;
       ++all;
-      good += std::abs(f.exact.depth.at<float>(static_cast<int>(q.y() + 0.5), static_cast<int>(q.x() + 0.5)) - p.z()) < 0.01 + 0.01 * p.z();
+      good += std::abs(f.exact.depth.at<float>(static_cast<int>(q.y() + 0.5), static_cast<int>(q.x() + 0.5)) - p.z()) <
+              0.01 + 0.01 * p.z();
     }
   ASSERT_GT(all, 1500);
   EXPECT_GT(good, 0.97 * all);
@@ -204,8 +208,14 @@ TEST(Sequence, SameSeedSameBytesWhateverTheThreads) {
   two.threads = 3;
   std::vector<SimFrame> a, b;
   SequenceRenderer ra(spec, one), rb(spec, two);
-  ra.render([&](const SimFrame& f) { a.push_back(f); return true; });
-  rb.render([&](const SimFrame& f) { b.push_back(f); return true; });
+  ra.render([&](const SimFrame& f) {
+    a.push_back(f);
+    return true;
+  });
+  rb.render([&](const SimFrame& f) {
+    b.push_back(f);
+    return true;
+  });
   ASSERT_EQ(a.size(), 4u);
   ASSERT_EQ(b.size(), 4u);
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -234,10 +244,12 @@ TEST(Sequence, RollingShutterAndTimeOffsetShiftWhatTheyShould) {
   double worst = 0;
   for (int v : {40, 240, 440})  // every row lies where the scene is at its own time
     for (int u = 20; u < 640; u += 50) {
-      const SE3 T = r.trajectory().at(t + rolling.effects.rolling_shutter * ((v + 0.5) / 480 - 0.5)).T_W_I * r.sensor().T_imu_cam;
+      const SE3 T =
+          r.trajectory().at(t + rolling.effects.rolling_shutter * ((v + 0.5) / 480 - 0.5)).T_W_I * r.sensor().T_imu_cam;
       const Chart& c = r.scene().charts[r.scene().pieces[g.exact.piece.at<int>(v, u)].chart];
       const Eigen::Vector3d p = T * r.camera()->unproject({double(u), double(v)}, g.exact.depth.at<float>(v, u));
-      worst = std::max(worst, std::abs((p - Eigen::Vector3d(c.o.x, c.o.y, c.o.z)).dot(Eigen::Vector3d(c.n.x, c.n.y, c.n.z))));
+      worst = std::max(worst,
+                       std::abs((p - Eigen::Vector3d(c.o.x, c.o.y, c.o.z)).dot(Eigen::Vector3d(c.n.x, c.n.y, c.n.z))));
     }
   EXPECT_LT(worst, 1e-4);
 }

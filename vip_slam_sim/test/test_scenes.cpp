@@ -42,7 +42,7 @@ TEST(Scenes, OfficeIsLargeAndItsCorridorFloorIsOnePlane) {
     if (p.kind == PlaneKind::kHorizontal && p.plane.n.z() > 0 && (!floor || p.area > floor->area)) floor = &p;
   ASSERT_TRUE(floor);
   EXPECT_NEAR(floor->plane.d, 0, 1e-6);
-  EXPECT_GT(floor->area, 500);               // hall, corridors and rooms hang together
+  EXPECT_GT(floor->area, 500);                     // hall, corridors and rooms hang together
   EXPECT_FALSE(floor->polygons[0].holes.empty());  // the core
   Eigen::Vector3d lo = floor->polygons[0].outer[0], hi = lo;
   for (const Eigen::Vector3d& x : floor->polygons[0].outer) lo = lo.cwiseMin(x), hi = hi.cwiseMax(x);
@@ -138,7 +138,13 @@ TEST(Sequences, PathsKeepClear) {
   for (const std::string name : {"01", "02", "03", "04", "05", "long_loop", "stairs", "alias"}) {
     SequenceSpec spec = loadSequence(name, libraryPath());
     EXPECT_TRUE(spec.motion.check_collisions);
-    EXPECT_NO_THROW(SequenceRenderer(spec, [] { RenderOptions o = quickOptions(); o.light_spacing_scale = 40; return o; }())) << name;
+    EXPECT_NO_THROW(SequenceRenderer(spec,
+                                     [] {
+                                       RenderOptions o = quickOptions();
+                                       o.light_spacing_scale = 40;
+                                       return o;
+                                     }()))
+        << name;
   }
 }
 

@@ -163,7 +163,8 @@ class BagWriter : public SequenceWriter {
     m.encoding = encoding;
     m.step = static_cast<std::uint32_t>(image.cols * image.elemSize());
     m.data.resize(static_cast<std::size_t>(m.step) * m.height);
-    for (int v = 0; v < image.rows; ++v) std::memcpy(m.data.data() + static_cast<std::size_t>(v) * m.step, image.ptr(v), m.step);
+    for (int v = 0; v < image.rows; ++v)
+      std::memcpy(m.data.data() + static_cast<std::size_t>(v) * m.step, image.ptr(v), m.step);
     bag_.write(topic, stamp, m);
   }
 

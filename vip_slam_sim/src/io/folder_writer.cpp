@@ -46,7 +46,9 @@ class FolderWriter : public SequenceWriter {
   }
 
   void imu(std::int64_t ns, const ImuSample& s, const NavState& x) override {
-    const auto list = [](std::ofstream& out, const Eigen::Vector3d& v) { out << ',' << v.x() << ',' << v.y() << ',' << v.z(); };
+    const auto list = [](std::ofstream& out, const Eigen::Vector3d& v) {
+      out << ',' << v.x() << ',' << v.y() << ',' << v.z();
+    };
     imu_ << ns;
     list(imu_, s.gyro);
     list(imu_, s.accel);

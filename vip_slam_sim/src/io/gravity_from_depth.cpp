@@ -11,7 +11,8 @@ namespace {
 constexpr int kReach = 8;  ///< px between the points of a normal: bridges the sensor's quantisation
 
 /// Normals of locally flat patches, in the folder's world.
-void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_C, std::vector<Eigen::Vector3d>* out) {
+void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_C,
+                    std::vector<Eigen::Vector3d>* out) {
   cv::Mat rgb, depth;
   loadRgbdFrame(folder, frame, &rgb, &depth);
   const CameraIntrinsics& c = folder.camera;
@@ -21,8 +22,8 @@ void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3&
   };
   for (int v = kReach; v < depth.rows - kReach; v += 6)
     for (int u = kReach; u < depth.cols - kReach; u += 6) {
-      const Eigen::Vector3d m = point(u, v), l = point(u - kReach, v), r = point(u + kReach, v), t = point(u, v - kReach),
-                            b = point(u, v + kReach);
+      const Eigen::Vector3d m = point(u, v), l = point(u - kReach, v), r = point(u + kReach, v),
+                            t = point(u, v - kReach), b = point(u, v + kReach);
       if (m.z() < 0.4 || m.z() > 4 || l.z() == 0 || r.z() == 0 || t.z() == 0 || b.z() == 0) continue;
       const double bend = 0.004 * m.z() * m.z() + 0.002;
       if ((0.5 * (l + r) - m).norm() > bend || (0.5 * (t + b) - m).norm() > bend) continue;
@@ -53,7 +54,8 @@ Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
       if (d > c) M += n * n.transpose(), ++used;
       if (d < s && degrees < 20) M -= n * n.transpose(), ++used;
     }
-    if (used < 500) throw std::runtime_error("gravity: too few floor and wall points in the depth images; give --up X Y Z");
+    if (used < 500)
+      throw std::runtime_error("gravity: too few floor and wall points in the depth images; give --up X Y Z");
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(M);
     const Eigen::Vector3d next = eigen.eigenvectors().col(2);
     up = next.dot(up) < 0 ? Eigen::Vector3d(-next) : next;

@@ -21,7 +21,8 @@ std::vector<double> numbersOf(const fs::path& path, std::size_t expected) {
   if (!in) throw std::runtime_error(path.string() + ": cannot be read");
   std::vector<double> values;
   for (double v; in >> v;) values.push_back(v);
-  if (values.size() != expected || !std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))
+  if (values.size() != expected ||
+      !std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))
     throw std::runtime_error(path.string() + ": expected " + std::to_string(expected) + " numbers, found " +
                              std::to_string(values.size()));
   return values;
@@ -50,7 +51,8 @@ RgbdFolder openSevenScenes(const fs::path& folder, double rate) {
     char stem[32];
     std::snprintf(stem, sizeof stem, "frame-%06ld", n);
     const double t = static_cast<double>(n - found.front().first) / rate;
-    const fs::path depth = folder / (std::string(stem) + ".depth.png"), pose = folder / (std::string(stem) + ".pose.txt");
+    const fs::path depth = folder / (std::string(stem) + ".depth.png"),
+                   pose = folder / (std::string(stem) + ".pose.txt");
     if (!fs::exists(depth)) throw std::runtime_error(depth.string() + ": missing");
     out.frames.push_back({t, colour.string(), depth.string()});
     const std::vector<double> m = numbersOf(pose, 16);
@@ -78,7 +80,8 @@ std::vector<std::pair<double, std::string>> readList(const fs::path& path) {
     std::stringstream s(line);
     double t;
     std::string file;
-    if (!(s >> t >> file)) throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": expected 'stamp file'");
+    if (!(s >> t >> file))
+      throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": expected 'stamp file'");
     if (!out.empty() && t <= out.back().first)
       throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": stamp repeats or runs backwards");
     out.emplace_back(t, file);
@@ -107,7 +110,8 @@ RgbdFolder openRgbdFolder(const std::string& folder, double rate) {
   if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": no such directory");
   RgbdFolder out = fs::exists(fs::path(folder) / "rgb.txt") ? openTum(folder) : openSevenScenes(folder, rate);
   if (out.frames.size() < 2)
-    throw std::runtime_error(folder + ": expected frame-N.color.* with depth and pose, or rgb.txt with depth.txt and groundtruth.txt");
+    throw std::runtime_error(
+        folder + ": expected frame-N.color.* with depth and pose, or rgb.txt with depth.txt and groundtruth.txt");
   const cv::Mat first = cv::imread(out.frames.front().colour, cv::IMREAD_COLOR);
   if (first.empty()) throw std::runtime_error(out.frames.front().colour + ": not an image");
   out.camera.width = first.cols;

@@ -11,8 +11,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kKnot = 0.1;    ///< s between control poses
-constexpr double kFine = 0.02;   ///< s between samples of the plan
+constexpr double kKnot = 0.1;   ///< s between control poses
+constexpr double kFine = 0.02;  ///< s between samples of the plan
 constexpr double kDeg = M_PI / 180;
 
 /// Where the camera is and looks: forward has this yaw and pitch, roll about forward.
@@ -26,10 +26,11 @@ struct View {
     level.col(0) = Eigen::Vector3d(0, -1, 0);
     level.col(1) = Eigen::Vector3d(0, 0, -1);
     level.col(2) = Eigen::Vector3d(1, 0, 0);
-    const Eigen::Matrix3d R = (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
-                               Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
-                               Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
-                                  .toRotationMatrix() * level;
+    const Eigen::Matrix3d R =
+        (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
+            .toRotationMatrix() *
+        level;
     return SE3(R, p);
   }
 };
@@ -57,8 +58,16 @@ class Wander {
 class Shake {
  public:
   Shake(const std::string& style, double yaw_swing, int seed)
-      : style_(style), swing_(yaw_swing * kDeg), rng_(seed * 977 + 5), slow_yaw_(rng_, 0.12), slow_pitch_(rng_, 0.16),
-        x_(rng_, 0.45), y_(rng_, 0.5), z_(rng_, 0.4), roll_(rng_, 0.5), jitter_yaw_(rng_, 1.1),
+      : style_(style),
+        swing_(yaw_swing * kDeg),
+        rng_(seed * 977 + 5),
+        slow_yaw_(rng_, 0.12),
+        slow_pitch_(rng_, 0.16),
+        x_(rng_, 0.45),
+        y_(rng_, 0.5),
+        z_(rng_, 0.4),
+        roll_(rng_, 0.5),
+        jitter_yaw_(rng_, 1.1),
         jitter_pitch_(rng_, 1.3) {}
 
   void apply(double t, View* view) const {
@@ -126,7 +135,8 @@ std::vector<Leg> parseWaypoints(const MotionOptions& o) {
     if (word.empty()) continue;
     if (word == "turn" || word == "pause") {
       double value;
-      if (!(in >> value) || !started) fail("motion/waypoints: '" + item + "': expected '" + word + " NUMBER' after a point");
+      if (!(in >> value) || !started)
+        fail("motion/waypoints: '" + item + "': expected '" + word + " NUMBER' after a point");
       if (word == "turn")
         legs.push_back({Leg::kTurn, here, here, value * kDeg});
       else
@@ -175,7 +185,8 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
       break;
     }
   const auto stay = [&](const Eigen::Vector3d& at, double seconds, double life) {
-    for (int i = 0; i < static_cast<int>(seconds / kFine); ++i) p.push_back(at), heading.push_back(yaw), lively.push_back(life);
+    for (int i = 0; i < static_cast<int>(seconds / kFine); ++i)
+      p.push_back(at), heading.push_back(yaw), lively.push_back(life);
   };
   stay(legs.front().from, o.hold, 0);
   for (const Leg& leg : legs) {
@@ -199,7 +210,8 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
         yaw = to;
       }
       const int n = static_cast<int>(d.norm() / o.speed / kFine) + 1;
-      for (int i = 1; i <= n; ++i) p.push_back(leg.from + d * (double(i) / n)), heading.push_back(yaw), lively.push_back(1);
+      for (int i = 1; i <= n; ++i)
+        p.push_back(leg.from + d * (double(i) / n)), heading.push_back(yaw), lively.push_back(1);
     }
   }
   stay(legs.back().to, 1.5, 0);
@@ -210,7 +222,8 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
   const int ahead = samples(0.5);
   std::vector<double> early(heading.size());
   for (std::size_t i = 0; i < heading.size(); ++i)
-    early[i] = i < static_cast<std::size_t>(o.hold / kFine) ? heading[i] : heading[std::min(i + ahead, heading.size() - 1)];
+    early[i] =
+        i < static_cast<std::size_t>(o.hold / kFine) ? heading[i] : heading[std::min(i + ahead, heading.size() - 1)];
   heading = smoothed(early, samples(1.3));
 
   const Shake shake(o.style, o.yaw_swing, seed);

@@ -51,8 +51,8 @@ class Baker {
       if (dot(to, to) > kLampReach * kLampReach) continue;
       const float area = 4 * length(lamp.half_u) * length(lamp.half_v);
       for (int k = 0; k < 4; ++k) {
-        const Vec3 q = lamp.centre + lamp.half_u * (k & 1 ? 0.5f : -0.5f) + lamp.half_v * (k & 2 ? 0.5f : -0.5f) +
-                       lamp.n * 2e-3f;
+        const Vec3 q =
+            lamp.centre + lamp.half_u * (k & 1 ? 0.5f : -0.5f) + lamp.half_v * (k & 2 ? 0.5f : -0.5f) + lamp.n * 2e-3f;
         const Vec3 d = q - from;
         const float r2 = dot(d, d), r = std::sqrt(r2);
         const float c = dot(d, n) / r, cl = -dot(d, lamp.n) / r;
@@ -111,8 +111,7 @@ void completeChart(const Chart& c, std::vector<char> valid, Vec4* light) {
       Vec4 sum = splat(0);
       for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx)
-          sum += splat(k[dx + 1] * k[dy + 1]) *
-                 copy[std::clamp(y + dy, 0, h - 1) * w + std::clamp(x + dx, 0, w - 1)];
+          sum += splat(k[dx + 1] * k[dy + 1]) * copy[std::clamp(y + dy, 0, h - 1) * w + std::clamp(x + dx, 0, w - 1)];
       light[y * w + x] = sum;
     }
 }

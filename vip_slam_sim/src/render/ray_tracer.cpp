@@ -129,7 +129,8 @@ RayTracer::RayTracer(const Scene& scene) : impl_(new Impl) {
   rtcCommitScene(impl_->scene);
   const RTCError error = rtcGetDeviceError(impl_->device);
   if (error != RTC_ERROR_NONE)
-    throw std::runtime_error("Embree: building scene '" + scene.name + "' failed (error " + std::to_string(error) + ")");
+    throw std::runtime_error("Embree: building scene '" + scene.name + "' failed (error " + std::to_string(error) +
+                             ")");
 }
 
 RayTracer::~RayTracer() = default;

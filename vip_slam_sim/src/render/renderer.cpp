@@ -17,7 +17,7 @@ inline float coverage(float u, float f, float a, float b) {
 }
 
 // Rotated grid inside the pixel, and its middle is left out.
-constexpr float kSamples[6][2] = {{-0.417f, -0.083f}, {-0.25f, 0.417f},  {-0.083f, -0.25f},
+constexpr float kSamples[6][2] = {{-0.417f, -0.083f}, {-0.25f, 0.417f}, {-0.083f, -0.25f},
                                   {0.083f, 0.25f},    {0.25f, -0.417f}, {0.417f, 0.083f}};
 constexpr int kSampleCount = 6;
 
@@ -36,8 +36,8 @@ struct Renderer::RowFrame {
 };
 
 struct Renderer::Ray {
-  Vec3 o, d;           ///< d has z = 1 in the camera, so t is depth
-  Vec3 right, down;    ///< change of d per pixel
+  Vec3 o, d;         ///< d has z = 1 in the camera, so t is depth
+  Vec3 right, down;  ///< change of d per pixel
 };
 
 Renderer::Renderer(std::shared_ptr<const Scene> scene, std::shared_ptr<const RayTracer> tracer,
@@ -68,8 +68,8 @@ Vec4 Renderer::shade(int piece, float t, const Ray& ray) const {
   Vec4 colour = c.material.tint;
   if (c.material.texture >= 0) {
     const float k = c.material.texels_per_metre;
-    colour *= scene_->textures[c.material.texture].sample((u + c.tu) * k, -(v + c.tv) * k, ux * k, -vx * k, uy * k,
-                                                          -vy * k);
+    colour *=
+        scene_->textures[c.material.texture].sample((u + c.tu) * k, -(v + c.tv) * k, ux * k, -vx * k, uy * k, -vy * k);
   }
   float emission = 0;
   if (c.decal_count) {

@@ -144,8 +144,8 @@ cv::Mat poster(int width, int height, std::uint64_t seed) {
   const int m = width / 14;
   const int title = height / 9;
   cv::rectangle(image, cv::Rect(0, 0, width, title), scalar(randomColour(rng, 0.2, 0.6, 0.25)), cv::FILLED);
-  textBlock(image, cv::Rect(m, title / 4, width - 2 * m, title / 2), std::max(6, title / 2), cv::Vec3f(.93f, .93f, .93f),
-            rng);
+  textBlock(image, cv::Rect(m, title / 4, width - 2 * m, title / 2), std::max(6, title / 2),
+            cv::Vec3f(.93f, .93f, .93f), rng);
   const int picture = static_cast<int>(height * rng.uniform(0.25, 0.45));
   photograph(width - 2 * m, picture, seed * 7 + 3).copyTo(image(cv::Rect(m, title + m / 2, width - 2 * m, picture)));
   const int top = title + picture + m;
@@ -214,12 +214,15 @@ cv::Mat screen(int width, int height, std::uint64_t seed) {
   cv::rectangle(image, inner, scalar(randomColour(rng, 0.25, 0.5, 0.15)), cv::FILLED);
   for (int i = 0; i < 3; ++i) {
     const cv::Rect w = cv::Rect(inner.x + rng.integer(inner.width / 2), inner.y + rng.integer(inner.height / 2),
-                                inner.width / 2, inner.height / 2) & inner;
+                                inner.width / 2, inner.height / 2) &
+                       inner;
     const bool dark = rng.uniform() < 0.5;
     cv::rectangle(image, w, dark ? cv::Scalar(0.15, 0.16, 0.2) : cv::Scalar(0.85, 0.85, 0.86), cv::FILLED);
     cv::rectangle(image, cv::Rect(w.x, w.y, w.width, std::max(3, height / 30)), cv::Scalar(0.4, 0.45, 0.6), cv::FILLED);
-    textBlock(image, cv::Rect(w.x + m, w.y + height / 20 + m, std::max(1, w.width - 2 * m), std::max(1, w.height - height / 10)),
-              std::max(6, height / 30), dark ? cv::Vec3f(.6f, .8f, .6f) : cv::Vec3f(.2f, .2f, .25f), rng);
+    textBlock(
+        image,
+        cv::Rect(w.x + m, w.y + height / 20 + m, std::max(1, w.width - 2 * m), std::max(1, w.height - height / 10)),
+        std::max(6, height / 30), dark ? cv::Vec3f(.6f, .8f, .6f) : cv::Vec3f(.2f, .2f, .25f), rng);
   }
   return image;
 }
@@ -256,8 +259,7 @@ cv::Mat cardboard(int size, std::uint64_t seed) {
 cv::Mat checkers(int size, int cells, const cv::Vec3f& a, const cv::Vec3f& b) {
   cv::Mat image(size, size, CV_32FC3);
   for (int y = 0; y < size; ++y)
-    for (int x = 0; x < size; ++x)
-      image.at<cv::Vec3f>(y, x) = ((x * cells / size + y * cells / size) & 1) ? a : b;
+    for (int x = 0; x < size; ++x) image.at<cv::Vec3f>(y, x) = ((x * cells / size + y * cells / size) & 1) ? a : b;
   return image;
 }
 

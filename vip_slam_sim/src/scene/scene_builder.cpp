@@ -87,7 +87,8 @@ int SceneBuilder::wall(const Eigen::Vector2d& a, const Eigen::Vector2d& b, doubl
       const bool open = op.kind == Opening::Kind::kPassage;
       rectangle(corner, -n * d, ez * h, open ? material : Material{-1, 1, kFrameTint});
       rectangle(corner + eu * w - n * d, n * d, ez * h, open ? material : Material{-1, 1, kFrameTint});
-      if (h < height - 1e-4) rectangle(corner + ez * h - n * d, eu * w, n * d, open ? material : Material{-1, 1, kFrameTint});
+      if (h < height - 1e-4)
+        rectangle(corner + ez * h - n * d, eu * w, n * d, open ? material : Material{-1, 1, kFrameTint});
       rectangle(corner, eu * w, -n * d, threshold);
     }
     if (op.kind == Opening::Kind::kClosed || op.kind == Opening::Kind::kProud) {
@@ -211,7 +212,8 @@ void SceneBuilder::decal(int chart, double u0, double v0, double u1, double v1, 
 }
 
 void SceneBuilder::ceilingLamp(int chart, double u, double v, double su, double sv, double power) {
-  decal(chart, u - su / 2 - 0.02, v - sv / 2 - 0.02, u + su / 2 + 0.02, v + sv / 2 + 0.02, -1, rgb(0.75f, 0.75f, 0.75f));
+  decal(chart, u - su / 2 - 0.02, v - sv / 2 - 0.02, u + su / 2 + 0.02, v + sv / 2 + 0.02, -1,
+        rgb(0.75f, 0.75f, 0.75f));
   decal(chart, u - su / 2, v - sv / 2, u + su / 2, v + sv / 2, -1, rgb(1, 1, 1), 0.75);
   const Chart& c = scene_.charts[chart];
   Lamp lamp;

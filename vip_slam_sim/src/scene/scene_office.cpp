@@ -1,5 +1,6 @@
-// An office floor, 44 x 22 m: a ring of corridors round a closed core, rooms to the north and south, and an open hall to
-// the east. Long plain walls, faint carpet and ceiling tiles; pictures and fittings are far between, as in real ones.
+// An office floor, 44 x 22 m: a ring of corridors round a closed core, rooms to the north and south, and an open hall
+// to the east. Long plain walls, faint carpet and ceiling tiles; pictures and fittings are far between, as in real
+// ones.
 #include <cmath>
 
 #include "scene_parts.h"
@@ -34,8 +35,7 @@ struct OfficePlan {
   }
   void lamps(int ceiling, double su, double sv, int nu, int nv, double power, double lu = 1.2, double lv = 0.3) {
     for (int i = 0; i < nu; ++i)
-      for (int j = 0; j < nv; ++j)
-        b.ceilingLamp(ceiling, su * (i + 0.5) / nu, sv * (j + 0.5) / nv, lu, lv, power);
+      for (int j = 0; j < nv; ++j) b.ceilingLamp(ceiling, su * (i + 0.5) / nu, sv * (j + 0.5) / nv, lu, lv, power);
   }
 
   void room(double x0, double y0, double x1, double y1, double h, const std::vector<Opening>& south,
@@ -187,7 +187,8 @@ void OfficePlan::hall() {
   skirting(&b, south, 0, 8.93);
   skirting(&b, south, 11.12, 14);
   for (int i = 0; i < 5; ++i) b.decal(east, 1.6 + 4.1 * i, 0.9, 4.0 + 4.1 * i, 3.0, p.blinds);
-  b.decal(west, 9.6, 1.2, 12.4, 2.6, b.addTexture(sign(1024, 512, "NORTH WING", {.30f, .40f, .52f}, {.9f, .9f, .92f}), false));
+  b.decal(west, 9.6, 1.2, 12.4, 2.6,
+          b.addTexture(sign(1024, 512, "NORTH WING", {.30f, .40f, .52f}, {.9f, .9f, .92f}), false));
   hangPoster(&b, west, p, 7, 3.0, 1.7, 1.2);
   hangPoster(&b, west, p, 8, 18.6, 1.7, 1.2);
   hangPoster(&b, north, p, 9, 2.4, 1.7, 1.0);

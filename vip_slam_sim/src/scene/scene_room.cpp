@@ -49,7 +49,8 @@ Scene buildRoom() {
   hangPoster(&b, west, p, 12, 3.3, 2.9, 0.9);
   hangPoster(&b, north, p, 3, 0.9, 1.9, 1.1);
   b.decal(north, 2.0, 1.0, 4.4, 2.2, -1, rgb(0.6f, 0.6f, 0.62f));
-  b.decal(north, 2.04, 1.04, 4.36, 2.16, b.addTexture(sign(640, 310, "plan: f = m a", {.93f, .93f, .94f}, {.2f, .25f, .5f}), false));
+  b.decal(north, 2.04, 1.04, 4.36, 2.16,
+          b.addTexture(sign(640, 310, "plan: f = m a", {.93f, .93f, .94f}, {.2f, .25f, .5f}), false));
   hangPoster(&b, north, p, 4, 5.3, 1.8, 1.2);
   hangPoster(&b, north, p, 5, 7.9, 2.2, 1.0);
   hangPoster(&b, north, p, 13, 6.6, 3.0, 0.9);
@@ -62,7 +63,8 @@ Scene buildRoom() {
   hangPoster(&b, south, p, 9, 5.4, 1.8, 1.2);
   hangPoster(&b, south, p, 14, 6.6, 2.9, 0.9);
   b.decal(south, 7.3, 1.3, 8.3, 2.0, p.photographs[1]);
-  for (double u : {0.5, 4.5}) socket(&b, west, u), socket(&b, north, u + 1), socket(&b, east, u + 0.5), socket(&b, south, u);
+  for (double u : {0.5, 4.5})
+    socket(&b, west, u), socket(&b, north, u + 1), socket(&b, east, u + 0.5), socket(&b, south, u);
   lightSwitch(&b, west, 5.1);
 
   // furniture along the walls
@@ -84,7 +86,8 @@ Scene buildRoom() {
   Eigen::Isometry3d lean = uprightPose(0.6, -Y + 0.33, 0.62, 0);
   lean.linear() = Eigen::AngleAxisd(0.45, Eigen::Vector3d::UnitX()).toRotationMatrix();
   const int board = b.box(lean, {1.3, 0.04, 1.3}, p.wood, p.wood);
-  b.decal(board + 2, 0.15, 0.15, 1.15, 1.15, b.addTexture(checkers(256, 8, {.85f, .85f, .85f}, {.15f, .15f, .17f}), false));
+  b.decal(board + 2, 0.15, 0.15, 1.15, 1.15,
+          b.addTexture(checkers(256, 8, {.85f, .85f, .85f}, {.15f, .15f, .17f}), false));
   // a low ramp wedge of boxes and a turned crate in the open
   boxStack(&b, p, -1.9, 2.6, &rng, 1);
   b.boxAt(2.7, 1.2, 0, 0.6, {0.6, 0.6, 0.45}, p.cardboard, p.cardboard);

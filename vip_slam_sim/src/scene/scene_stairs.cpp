@@ -22,7 +22,8 @@ Scene buildStairs() {
     b.ceilingLamp(roof_s, 1.5 + 3.0 * i, 2.6, 1.2, 0.4, 8.0);
     b.ceilingLamp(roof_n, 1.5 + 3.0 * i, 1.9, 1.2, 0.4, 8.0);
   }
-  const int west = b.wall({0, 0}, {0, W}, 0, ridge, p.wall, {{3.5f, 4.45f, 2.1f, Opening::Kind::kClosed, 0.12f, p.door}}, p.carpet);
+  const int west =
+      b.wall({0, 0}, {0, W}, 0, ridge, p.wall, {{3.5f, 4.45f, 2.1f, Opening::Kind::kClosed, 0.12f, p.door}}, p.carpet);
   const int north = b.wall({0, W}, {L, W}, 0, eave, p.wall);
   const int east = b.wall({L, W}, {L, 0}, 0, ridge, p.wall);
   const int south = b.wall({L, 0}, {0, 0}, 0, eave, p.wall);

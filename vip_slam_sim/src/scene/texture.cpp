@@ -115,7 +115,7 @@ template <bool kRepeat>
 inline Vec4 Texture::probe(const Level& a, const Level& b, float f, float s, float t, float ds, float dt,
                            int probes) const {
   const float step = 1.f / static_cast<float>(probes);
-  const bool only_a = f < 0.08f, only_b = f > 0.92f;
+  const bool only_a = f<0.08f, only_b = f> 0.92f;
   Vec4 sum = splat(0.f);
   float o = 0.5f * step - 0.5f;
   for (int k = 0; k < probes; ++k, o += step) {

@@ -143,7 +143,8 @@ std::vector<PlanePolygon> surfaceOutline(const Scene& scene, const Surface& surf
     const std::size_t n = nodes.size();
     for (std::size_t i = 0; i < n; ++i) {
       const Node &a = nodes[(i + n - 1) % n], &b = nodes[i], &c = nodes[(i + 1) % n];
-      const bool straight = (a.first == b.first && b.first == c.first) || (a.second == b.second && b.second == c.second);
+      const bool straight =
+          (a.first == b.first && b.first == c.first) || (a.second == b.second && b.second == c.second);
       if (!straight) ring.emplace_back(us[b.first], vs[b.second]);
     }
     (signedArea(ring) > 0 ? outers : holes).push_back(ring);

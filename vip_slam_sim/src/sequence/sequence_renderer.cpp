@@ -21,7 +21,9 @@ constexpr double kMargin = 0.1;  ///< s of IMU before the first and after the la
 }  // namespace
 
 SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions& options)
-    : spec_(spec), options_(options), sensor_(spec.sensorConfig()),
+    : spec_(spec),
+      options_(options),
+      sensor_(spec.sensorConfig()),
       trajectory_(makeMotion(spec.motion, spec.T_imu_cam(), spec.seed)),
       imu_(synthesiseImu(trajectory_, spec.imu, spec.seed, sensor_.gravity)) {
   options_.threads = std::max(1, options_.threads);
@@ -76,8 +78,8 @@ double SequenceRenderer::toSeconds(std::int64_t stamp_ns) const {
 }
 
 double SequenceRenderer::frameTime(int index) const {
-  const double t = kMargin + 0.5 * std::abs(spec_.imu.time_offset) + 0.5 * spec_.effects.rolling_shutter +
-                   index / spec_.camera.rate;
+  const double t =
+      kMargin + 0.5 * std::abs(spec_.imu.time_offset) + 0.5 * spec_.effects.rolling_shutter + index / spec_.camera.rate;
   return std::round(t * 1e9) * 1e-9;  // what the stamp can say
 }
 
@@ -87,7 +89,8 @@ NavState SequenceRenderer::stateAt(double t) const {
   s.t = t;
   s.T_W_I = m.T_W_I;
   s.v_W = m.v_W;
-  const auto k = static_cast<std::size_t>(std::clamp(std::llround(t * spec_.imu.rate), 0LL, static_cast<long long>(imu_.biases.size()) - 1));
+  const auto k = static_cast<std::size_t>(
+      std::clamp(std::llround(t * spec_.imu.rate), 0LL, static_cast<long long>(imu_.biases.size()) - 1));
   s.bias_gyro = imu_.biases[k].gyro;
   s.bias_accel = imu_.biases[k].accel;
   return s;
@@ -103,8 +106,9 @@ SimFrame SequenceRenderer::renderFrame(int index) const {
   const double readout = spec_.effects.rolling_shutter;
   if (readout > 0) {
     const double rows = camera_->height();
-    renderer_->render([&](int row) { return trajectory_.at(t + readout * ((row + 0.5) / rows - 0.5)).T_W_I * sensor_.T_imu_cam; },
-                      true, &f.exact);
+    renderer_->render(
+        [&](int row) { return trajectory_.at(t + readout * ((row + 0.5) / rows - 0.5)).T_W_I * sensor_.T_imu_cam; },
+        true, &f.exact);
   } else {
     renderer_->render(f.T_W_C, &f.exact);
   }

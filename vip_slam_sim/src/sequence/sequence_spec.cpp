@@ -69,7 +69,8 @@ CameraIntrinsics CameraOptions::intrinsics() const {
 }
 
 void DepthOptions::visit(OptionVisitor& v) {
-  v.field("model", model, {"proportional", "structured_light", "stereo", "tof"}, "label of the noise, for the sensor file");
+  v.field("model", model, {"proportional", "structured_light", "stereo", "tof"},
+          "label of the noise, for the sensor file");
   v.field("a", a, 0, 1, "sigma = a + b z + c z^2, m");
   v.field("b", b, 0, 1, "see a");
   v.field("c", c, 0, 1, "see a, 1/m");

@@ -20,7 +20,7 @@ namespace {
 
 struct Settings {
   std::string folder, out, name, format = "bag";
-  std::vector<double> up;       ///< in the folder's world; empty: from the depth images
+  std::vector<double> up;  ///< in the folder's world; empty: from the depth images
   std::vector<double> intrinsics;
   double rate = 30, spacing = 0.15;
   int iterations = 3, seed = 1;
@@ -57,10 +57,12 @@ int run(int argc, char** argv) {
   app.add_option("folder", s.folder, "7-Scenes or TUM layout")->required();
   app.add_option("--out", s.out, "directory for NAME.bag, NAME_truth.tum, NAME_sensor.yaml")->required();
   app.add_option("--name", s.name, "default: the folder's name");
-  app.add_option("--up", s.up, "up vector in the world of the poses; default: from floors and walls in the depth")->expected(3);
+  app.add_option("--up", s.up, "up vector in the world of the poses; default: from floors and walls in the depth")
+      ->expected(3);
   app.add_option("--intrinsics", s.intrinsics, "fx fy cx cy, where the folder does not say")->expected(4);
   app.add_option("--rate", s.rate, "images per second, where the folder has no stamps")->check(CLI::Range(1.0, 120.0));
-  app.add_option("--spacing", s.spacing, "seconds between spline knots: smooths the poses' noise")->check(CLI::Range(0.02, 2.0));
+  app.add_option("--spacing", s.spacing, "seconds between spline knots: smooths the poses' noise")
+      ->check(CLI::Range(0.02, 2.0));
   app.add_option("--iterations", s.iterations, "corrections towards the poses")->check(CLI::Range(0, 50));
   app.add_option("--imu-rate", s.imu.rate, "Hz")->check(CLI::Range(50.0, 2000.0));
   app.add_option("--seed", s.seed, "of the IMU's noise");
@@ -70,8 +72,9 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e);
   }
-  if (s.name.empty()) s.name = fs::path(s.folder).filename().empty() ? fs::path(s.folder).parent_path().filename().string()
-                                                                     : fs::path(s.folder).filename().string();
+  if (s.name.empty())
+    s.name = fs::path(s.folder).filename().empty() ? fs::path(s.folder).parent_path().filename().string()
+                                                   : fs::path(s.folder).filename().string();
   RgbdFolder folder = openRgbdFolder(s.folder, s.rate);
   if (s.intrinsics.size() == 4) {
     folder.camera.fx = s.intrinsics[0];
@@ -83,7 +86,8 @@ int run(int argc, char** argv) {
     throw std::runtime_error(s.folder + ": " + folder.camera.validate() + "; give --intrinsics FX FY CX CY");
   const Eigen::Vector3d up = s.up.empty() ? upFromDepth(folder) : Eigen::Vector3d(s.up[0], s.up[1], s.up[2]);
   if (!(up.norm() > 1e-6)) throw std::runtime_error("--up: expected a vector that is not zero");
-  std::fprintf(stderr, "up in the folder's world: %.4f %.4f %.4f\n", up.x() / up.norm(), up.y() / up.norm(), up.z() / up.norm());
+  std::fprintf(stderr, "up in the folder's world: %.4f %.4f %.4f\n", up.x() / up.norm(), up.y() / up.norm(),
+               up.z() / up.norm());
 
   // Level world, first camera above the origin; body = IMU of the simulator's rig.
   SequenceSpec rig;

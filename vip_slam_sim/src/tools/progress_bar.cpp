@@ -7,8 +7,11 @@
 namespace vip_slam {
 
 ProgressBar::ProgressBar(std::string label, int total)
-    : label_(std::move(label)), total_(total), terminal_(isatty(STDERR_FILENO) != 0),
-      start_(std::chrono::steady_clock::now()), shown_(start_) {}
+    : label_(std::move(label)),
+      total_(total),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      start_(std::chrono::steady_clock::now()),
+      shown_(start_) {}
 
 double ProgressBar::perSecond() const {
   const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();

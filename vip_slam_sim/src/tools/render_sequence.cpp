@@ -9,10 +9,10 @@
 #include <string>
 #include <thread>
 
+#include <ros/package.h>
 #include <CLI/CLI.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <ros/package.h>
 
 #include "progress_bar.h"
 #include "vip_slam_core/sensor/sensor_config.h"

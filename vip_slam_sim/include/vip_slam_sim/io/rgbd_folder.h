@@ -19,8 +19,8 @@ struct RgbdFrame {
 
 struct RgbdFolder {
   std::vector<RgbdFrame> frames;
-  Trajectory T_W_C;          ///< camera poses, in the folder's own world
-  CameraIntrinsics camera;   ///< width and height from the first image; focal lengths 0 when the folder does not say
+  Trajectory T_W_C;         ///< camera poses, in the folder's own world
+  CameraIntrinsics camera;  ///< width and height from the first image; focal lengths 0 when the folder does not say
   double depth_scale = 0.001;
 };
 

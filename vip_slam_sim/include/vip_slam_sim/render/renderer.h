@@ -15,10 +15,10 @@
 namespace vip_slam {
 
 struct FrameBuffers {
-  cv::Mat radiance;   ///< CV_32FC4, linear, 1 = full scale at exposure 1
-  cv::Mat depth;      ///< CV_32FC1, z in metres, exact; 0 where nothing is hit
-  cv::Mat piece;      ///< CV_32SC1, -1 where nothing is hit
-  cv::Mat grazing;    ///< CV_32FC1, cosine between ray and surface normal
+  cv::Mat radiance;  ///< CV_32FC4, linear, 1 = full scale at exposure 1
+  cv::Mat depth;     ///< CV_32FC1, z in metres, exact; 0 where nothing is hit
+  cv::Mat piece;     ///< CV_32SC1, -1 where nothing is hit
+  cv::Mat grazing;   ///< CV_32FC1, cosine between ray and surface normal
 };
 
 class Renderer {

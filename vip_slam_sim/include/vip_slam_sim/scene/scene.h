@@ -23,20 +23,20 @@ struct Decal {
   float u0, v0, u1, v1;  ///< metres in the chart, u right, v up as seen
   int texture = -1;      ///< stretched over the rectangle
   Vec4 tint = {1, 1, 1, 1};
-  float emission = 0;    ///< radiance added
+  float emission = 0;  ///< radiance added
 };
 
 /// A planar shading frame: point = o + u eu + v ev, seen from the side of n = eu x ev.
 struct Chart {
   Vec3 o, eu, ev, n;
-  float su = 0, sv = 0;   ///< extent, metres
-  Vec3 n0, n1;            ///< shading normals at u = 0 and u = su (equal to n unless part of a curved strip)
+  float su = 0, sv = 0;  ///< extent, metres
+  Vec3 n0, n1;           ///< shading normals at u = 0 and u = su (equal to n unless part of a curved strip)
   Material material;
-  float tu = 0, tv = 0;   ///< texture offset, metres
+  float tu = 0, tv = 0;                            ///< texture offset, metres
   int light_offset = 0, light_w = 0, light_h = 0;  ///< light map nodes, from edge to edge
   int decal_begin = 0, decal_count = 0;
   bool planar = true;
-  int surface = -1;       ///< index into Scene::surfaces, -1: not planar
+  int surface = -1;  ///< index into Scene::surfaces, -1: not planar
 };
 
 /// A rectangle of a chart that is really there (walls have holes).
@@ -53,7 +53,7 @@ struct Lamp {
 
 /// Coplanar pieces that touch: one physical plane.
 struct Surface {
-  int frame_chart;          ///< its o, eu, ev are the surface's 2D frame
+  int frame_chart;  ///< its o, eu, ev are the surface's 2D frame
   std::vector<int> pieces;
   double area = 0;
 };

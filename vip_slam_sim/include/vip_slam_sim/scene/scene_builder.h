@@ -12,10 +12,10 @@ namespace vip_slam {
 /// An opening in a wall, from the wall's bottom edge up.
 struct Opening {
   enum class Kind {
-    kCut,       ///< just a hole
-    kPassage,   ///< jambs and threshold of `depth` lead to what lies behind
-    kClosed,    ///< a door leaf set back by `depth`
-    kProud,     ///< a door leaf standing out from the wall by `depth`
+    kCut,      ///< just a hole
+    kPassage,  ///< jambs and threshold of `depth` lead to what lies behind
+    kClosed,   ///< a door leaf set back by `depth`
+    kProud,    ///< a door leaf standing out from the wall by `depth`
   };
   float s0, s1, height;
   Kind kind = Kind::kCut;

@@ -22,6 +22,7 @@ class Texture {
 
   /// Filtered colour at texel coordinates (s right, t down), with the change of (s, t) per pixel step in x and y.
   Vec4 sample(float s, float t, float dsdx, float dtdx, float dsdy, float dtdy) const;
+
  private:
   struct Level {
     int width, height;

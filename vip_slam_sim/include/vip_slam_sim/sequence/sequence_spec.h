@@ -12,7 +12,7 @@ namespace vip_slam {
 
 struct MotionOptions {
   std::string type = "path";
-  std::string waypoints;     ///< "x,y[,z]; ...; turn DEG; pause SECONDS"
+  std::string waypoints;  ///< "x,y[,z]; ...; turn DEG; pause SECONDS"
   std::string style = "handheld";
   std::string file;
   double duration = 0, hold = 2.6, start_at = 0;
@@ -75,7 +75,7 @@ struct SequenceSpec {
   EffectOptions effects;
   void visit(OptionVisitor& v);
 
-  SE3 T_imu_cam() const;           ///< the rig's own, a little off every axis
+  SE3 T_imu_cam() const;  ///< the rig's own, a little off every axis
   SensorConfig sensorConfig() const;
 };
 
