@@ -1,6 +1,7 @@
 #include "feature_image.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include <opencv2/imgproc.hpp>
@@ -8,9 +9,9 @@
 namespace vip_slam {
 namespace {
 
-/// Red at half a metre over yellow and green to blue at eight, evenly in inverse depth.
+/// Red at half a metre over yellow and green to blue at eight, each doubling of the distance by the same step.
 cv::Scalar depthColour(float z) {
-  const float s = std::clamp((1.0f / z - 0.125f) / (2.0f - 0.125f), 0.0f, 1.0f);
+  const float s = std::clamp(std::log2(8.0f / z) / 4.0f, 0.0f, 1.0f);
   const cv::Mat hsv(1, 1, CV_8UC3, cv::Scalar(120 * (1 - s), 220, 255));
   cv::Mat bgr;
   cv::cvtColor(hsv, bgr, cv::COLOR_HSV2BGR);

@@ -1,0 +1,73 @@
+"""What the tests of the running system share."""
+import os
+import re
+import threading
+import time
+
+import rospy
+from vip_slam_msgs.msg import TrackingStatus
+
+REPOSITORY = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), '..', '..', '..'))
+
+
+def wait_for(condition, seconds, what):
+    """Waits by the wall clock; the bag's clock may stand still."""
+    end = time.time() + seconds
+    while time.time() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.05)
+    raise AssertionError('not within %.0f s: %s' % (seconds, what))
+
+
+class Listener:
+    """Keeps all messages of a topic."""
+
+    def __init__(self, topic, kind):
+        self.messages = []
+        self.lock = threading.Lock()
+        self.subscriber = rospy.Subscriber(topic, kind, self.add, queue_size=1000)
+
+    def add(self, message):
+        with self.lock:
+            self.messages.append(message)
+
+    def all(self):
+        with self.lock:
+            return list(self.messages)
+
+    def last(self):
+        with self.lock:
+            return self.messages[-1] if self.messages else None
+
+    def count(self):
+        return len(self.messages)
+
+    def wait(self, number, seconds, what):
+        """`number` messages more than now."""
+        target = self.count() + number
+        wait_for(lambda: self.count() >= target, seconds, what)
+
+
+def tracking(status):
+    return status is not None and status.state == TrackingStatus.TRACKING
+
+
+def documented(kind):
+    """(name, type) of each topic or service in the tables of the documents whose header names `kind`."""
+    rows = []
+    for document in ('README.md', 'docs/ros_api.md'):
+        inside = False
+        with open(os.path.join(REPOSITORY, document), encoding='utf-8') as file:
+            for line in file:
+                cells = [cell.strip() for cell in line.strip().strip('|').split('|')]
+                if not line.startswith('|'):
+                    inside = False
+                elif cells[0] == kind:
+                    inside = 'type' in cells
+                elif inside and '`' in cells[0]:
+                    names = re.findall(r'`([^`]+)`', cells[0])
+                    types = re.findall(r'[a-z0-9_]+/[A-Za-z0-9]+', cells[1])
+                    rows += list(zip(names, types))
+    return sorted(set(rows))

@@ -1,0 +1,66 @@
+#!/usr/bin/python3
+"""run_bag: every file it promises, the same bits twice, and results when it is interrupted."""
+import filecmp
+import os
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+import numpy as np
+import rostest
+import rospy
+import yaml
+
+FILES = ('trajectory.tum', 'realtime.tum', 'odometry.tum', 'planes.yaml', 'planes.ply', 'map.vsm', 'floorplan.svg',
+         'timing.csv', 'summary.yaml', 'report.html')
+
+
+class OfflineTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node('offline_test')
+        cls.data = rospy.get_param('~data')
+        cls.folder = tempfile.mkdtemp()
+
+    def command(self, out, *more):
+        return ['rosrun', 'vip_slam_bringup', 'run_bag', os.path.join(self.data, 'smoke.bag'), '--sensor',
+                os.path.join(self.data, 'smoke_sensor.yaml'), '--out', os.path.join(self.folder, out), *more]
+
+    def summary(self, out):
+        with open(os.path.join(self.folder, out, 'summary.yaml')) as file:
+            return yaml.safe_load(file)
+
+    def test_01_two_runs_give_the_same_bits(self):
+        for out in ('a', 'b'):
+            subprocess.run(self.command(out), check=True, timeout=120)
+        for name in FILES:
+            self.assertGreater(os.path.getsize(os.path.join(self.folder, 'a', name)), 0, name)
+        for name in FILES[:7]:
+            a, b = (os.path.join(self.folder, out, name) for out in ('a', 'b'))
+            self.assertTrue(filecmp.cmp(a, b, shallow=False), name)
+        summary = self.summary('a')
+        self.assertTrue(summary['finished'])
+        self.assertGreater(summary['tracked_images'], 0.8 * summary['images'])
+        self.assertGreater(summary['planes'], 3)
+
+    def test_02_an_interrupted_run_writes_what_there_is(self):
+        process = subprocess.Popen(self.command('c', '--no-report'))
+        path = os.path.join(self.folder, 'c')
+        time.sleep(1.5)
+        process.send_signal(signal.SIGINT)
+        process.wait(60)
+        self.assertFalse(self.summary('c')['finished'])
+        self.assertGreater(len(np.loadtxt(os.path.join(path, 'odometry.tum'))), 0)
+
+    def test_03_a_part_of_the_bag(self):
+        subprocess.run(self.command('d', '--start', '2', '--duration', '5', '--variant', 'vi', '--loop', 'off',
+                                    '--no-report'), check=True, timeout=120)
+        summary = self.summary('d')
+        self.assertEqual((summary['variant'], summary['loop_closing'], summary['planes']), ('vi', False, 0))
+        self.assertLess(abs(summary['images'] - 100), 3)
+
+
+if __name__ == '__main__':
+    rostest.rosrun('vip_slam_bringup', 'offline_test', OfflineTest)

@@ -1,0 +1,179 @@
+#!/usr/bin/python3
+"""The running system on a bag that plays in a loop: poses, frames, covariances, names, services."""
+import os
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy as np
+import rosgraph
+import rosservice
+import rospy
+import rostest
+import tf2_ros
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from vip_slam_msgs.msg import MapUpdate, TrackedFrame, TrackingStatus
+from vip_slam_msgs.srv import (LoadMap, Pause, Reset, SaveMap, SaveTrajectory, SetLocalisationMode, TriggerGlobalBa)
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from live import Listener, documented, tracking, wait_for  # noqa: E402
+
+NS = '/vip_slam/'
+
+
+def load_tum(path):
+    return np.atleast_2d(np.loadtxt(path))
+
+
+def position_error(truth, estimate):
+    """Root mean square after the best rigid alignment, metres."""
+    t = estimate[:, 0]
+    p = np.stack([np.interp(t, truth[:, 0], truth[:, k]) for k in (1, 2, 3)], 1)
+    q = estimate[:, 1:4]
+    p0, q0 = p.mean(0), q.mean(0)
+    u, _, vt = np.linalg.svd((q - q0).T @ (p - p0))
+    d = np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))])
+    return np.sqrt((((p - p0) - (q - q0) @ (vt.T @ d @ u.T).T) ** 2).sum(1).mean())
+
+
+class SystemTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node('system_test')
+        cls.truth = load_tum(rospy.get_param('~truth'))
+        cls.odometry = Listener(NS + 'odom', Odometry)
+        cls.pose = Listener(NS + 'pose', PoseWithCovarianceStamped)
+        cls.status = Listener(NS + 'tracking_status', TrackingStatus)
+        cls.frames = Listener(NS + 'tracked_frame', TrackedFrame)
+        cls.updates = Listener(NS + 'map_update', MapUpdate)
+        cls.buffer = tf2_ros.Buffer(rospy.Duration(1000))
+        cls.listener = tf2_ros.TransformListener(cls.buffer)
+        cls.folder = tempfile.mkdtemp()
+
+    def call(self, name, kind, *arguments):
+        rospy.wait_for_service(NS + name, 10)
+        answer = rospy.ServiceProxy(NS + name, kind)(*arguments)
+        return answer.success, answer.message
+
+    def test_01_follows_the_truth(self):
+        last = self.truth[-1, 0]
+        wait_for(lambda: tracking(self.status.last()), 40, 'TRACKING')
+        wait_for(lambda: self.pose.last() and self.pose.last().header.stamp.to_sec() > last - 1.0, 60, 'the end of the bag')
+        path = os.path.join(self.folder, 'trajectory.tum')
+        ok, words = self.call('save_trajectory', SaveTrajectory, path)
+        self.assertTrue(ok, words)
+        trajectory = load_tum(path)
+        duration = self.truth[-1, 0] - self.truth[0, 0]
+        self.assertGreater(trajectory[-1, 0] - trajectory[0, 0], 0.8 * duration)
+        self.assertLess(position_error(self.truth, trajectory), 0.02)
+
+    def test_02_no_image_was_lost(self):
+        stamps = sorted({m.header.stamp.to_sec() for m in self.frames.all()})
+        self.assertGreater(len(stamps), 50)
+        self.assertLess(np.diff(stamps).max(), 0.075, 'images come at 20 Hz')
+
+    def test_03_frames_as_rep_105(self):
+        odometry = self.odometry.all()[len(self.odometry.all()) // 2]
+        self.assertEqual(odometry.header.frame_id, 'odom')
+        self.assertEqual(odometry.child_frame_id, 'base_link')
+        stamp = odometry.header.stamp
+        transform = self.buffer.lookup_transform('odom', 'base_link', stamp).transform
+        p, q = transform.translation, odometry.pose.pose.position
+        self.assertLess(abs(p.x - q.x) + abs(p.y - q.y) + abs(p.z - q.z), 1e-6)
+        pose = next(m for m in self.pose.all() if m.header.stamp == stamp)
+        self.assertEqual(pose.header.frame_id, 'map')
+        transform = self.buffer.lookup_transform('map', 'base_link', stamp).transform
+        p, q = transform.translation, pose.pose.pose.position
+        self.assertLess(abs(p.x - q.x) + abs(p.y - q.y) + abs(p.z - q.z), 1e-3)
+        tree = self.buffer.all_frames_as_yaml()
+        self.assertRegex(tree, r"odom:\s+parent: 'map'")
+        self.assertRegex(tree, r"base_link:\s+parent: 'odom'")
+
+    def test_04_odometry_does_not_jump(self):
+        stamps, points = [], []
+        for message in self.odometry.all():
+            if stamps and message.header.stamp.to_sec() <= stamps[-1]:
+                break  # the bag starts again
+            p = message.pose.pose.position
+            stamps.append(message.header.stamp.to_sec())
+            points.append([p.x, p.y, p.z])
+        speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(stamps)
+        self.assertLess(speed.max(), 2.0)
+
+    def test_05_covariances_are_filled(self):
+        for message in self.odometry.all():
+            for block in (message.pose.covariance, message.twist.covariance):
+                eigenvalues = np.linalg.eigvalsh(np.array(block).reshape(6, 6))
+                self.assertGreater(eigenvalues.min(), 0)
+                self.assertLess(eigenvalues.max(), 10)
+        last = np.array(self.pose.last().pose.covariance).reshape(6, 6)
+        self.assertGreater(np.linalg.eigvalsh(last).min(), 0)
+
+    def test_06_names_are_as_documented(self):
+        types = dict(rosgraph.Master('/system_test').getTopicTypes())
+        topics, services = documented('topic'), documented('service')
+        self.assertGreater(len(topics), 15)
+        self.assertGreater(len(services), 5)
+        for name, kind in topics:
+            self.assertEqual(types.get(name if name.startswith('/') else NS + name), kind, name)
+        for name, kind in services:
+            self.assertEqual(rosservice.get_service_type(NS + name), kind, name)
+
+    def test_07_a_looping_bag_keeps_the_map(self):
+        epoch = self.frames.last().epoch
+        keyframes = self.updates.last().newest_keyframe
+        wait_for(lambda: self.frames.last().epoch > epoch, 40, 'a new epoch after the bag has started again')
+        wait_for(lambda: tracking(self.status.last()), 20, 'TRACKING again')
+        wait_for(lambda: self.updates.last().newest_keyframe > keyframes, 20, 'keyframes that go on counting')
+
+    def test_08_pause_and_resume(self):
+        self.assertTrue(self.call('pause', Pause, True)[0])
+        time.sleep(0.5)
+        before = self.frames.count()
+        time.sleep(1.0)
+        self.assertLess(self.frames.count() - before, 3)
+        self.assertTrue(self.call('pause', Pause, False)[0])
+        self.frames.wait(10, 10, 'images after resuming')
+
+    def test_09_global_adjustment(self):
+        wait_for(lambda: tracking(self.status.last()), 20, 'TRACKING')
+        before = sum(m.global_update for m in self.updates.all())
+        ok, words = self.call('trigger_global_ba', TriggerGlobalBa)
+        self.assertTrue(ok, words)
+        wait_for(lambda: sum(m.global_update for m in self.updates.all()) > before, 20, 'a global map update')
+
+    def test_10_save_and_load(self):
+        path = os.path.join(self.folder, 'map.vsm')
+        ok, words = self.call('save_map', SaveMap, path)
+        self.assertTrue(ok, words)
+        self.assertGreater(os.path.getsize(path), 1000)
+        ok, words = self.call('load_map', LoadMap, path)
+        self.assertTrue(ok, words)
+        self.frames.wait(10, 10, 'images after loading')
+        with open(path, 'r+b') as file:
+            file.seek(os.path.getsize(path) // 2)
+            file.write(b'damaged')
+        ok, words = self.call('load_map', LoadMap, path)
+        self.assertFalse(ok)
+        self.assertIn(path, words)
+        self.assertFalse(self.call('save_map', SaveMap, '/nowhere/at/all/map.vsm')[0])
+
+    def test_11_localisation_mode(self):
+        for on in (True, False):
+            ok, words = self.call('set_localisation_mode', SetLocalisationMode, on)
+            self.assertTrue(ok, words)
+        self.frames.wait(10, 10, 'images afterwards')
+
+    def test_12_reset(self):
+        epoch = self.frames.last().epoch
+        ok, words = self.call('reset', Reset, False)
+        self.assertTrue(ok, words)
+        wait_for(lambda: self.frames.last().epoch > epoch, 20, 'a new epoch')
+        wait_for(lambda: tracking(self.status.last()), 30, 'TRACKING after the reset')
+        wait_for(lambda: self.updates.last().epoch > epoch, 30, 'a map of the new epoch')
+
+
+if __name__ == '__main__':
+    rostest.rosrun('vip_slam_bringup', 'system_test', SystemTest)
