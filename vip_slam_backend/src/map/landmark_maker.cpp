@@ -39,7 +39,9 @@ int LandmarkMaker::process(KeyframeId id, Map* map) {
     const auto waited = waiting_.find(f.id);
     if (waited != waiting_.end())
       for (const MapObservation& o : waited->second)
-        if (map->hasKeyframe(o.keyframe)) views.push_back(o);
+        // Re-observation may have given an older view to another landmark meanwhile.
+        if (map->hasKeyframe(o.keyframe) && map->keyframe(o.keyframe).landmarks[o.feature] == kNoLandmark)
+          views.push_back(o);
     views.push_back(here);
     Eigen::Vector3d p_W;
     if (views.size() >= 3 && triangulate(*map, views, &p_W)) {
