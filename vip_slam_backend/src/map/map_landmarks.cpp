@@ -8,14 +8,20 @@
 namespace vip_slam {
 
 int hammingDistance(const Descriptor& a, const Descriptor& b) {
-  int distance = 0;
-  for (std::size_t k = 0; k < a.size(); k += 8) {
-    std::uint64_t x, y;
-    std::memcpy(&x, a.data() + k, 8);
-    std::memcpy(&y, b.data() + k, 8);
-    distance += __builtin_popcountll(x ^ y);
+  // Baseline x86-64 has no popcount instruction: sums of bit fields, pairs of words sharing the later steps.
+  constexpr std::uint64_t k1 = 0x5555555555555555u, k2 = 0x3333333333333333u, k4 = 0x0F0F0F0F0F0F0F0Fu;
+  std::uint64_t x[4], y[4];
+  std::memcpy(x, a.data(), 32);
+  std::memcpy(y, b.data(), 32);
+  for (int k = 0; k < 4; ++k) {
+    x[k] ^= y[k];
+    x[k] -= (x[k] >> 1) & k1;
+    x[k] = (x[k] & k2) + ((x[k] >> 2) & k2);
   }
-  return distance;
+  x[0] += x[1];
+  x[2] += x[3];
+  const std::uint64_t bytes = (x[0] & k4) + ((x[0] >> 4) & k4) + (x[2] & k4) + ((x[2] >> 4) & k4);
+  return static_cast<int>((bytes * 0x0101010101010101u) >> 56);
 }
 
 MapLandmark& Map::addLandmark(LandmarkId id, const Eigen::Vector3d& p_W, const MapObservation& first) {
@@ -34,6 +40,25 @@ MapLandmark& Map::addLandmark(LandmarkId id, const Eigen::Vector3d& p_W, const M
   landmark.visible = landmark.found = 1;
   kf.landmarks[first.feature] = id;
   return landmarks_.emplace(id, std::move(landmark)).first->second;
+}
+
+MapLandmark& Map::restoreLandmark(const MapLandmark& stored) {
+  const std::string name = "landmark " + std::to_string(stored.id);
+  if (stored.id == kNoLandmark) throw MapError("a landmark needs an id");
+  if (hasLandmark(stored.id) || merged_into_.count(stored.id)) throw MapError(name + " exists already");
+  if (!stored.p_W.allFinite()) throw MapError(name + ": position is not finite");
+  if (stored.plane != 0 && !hasPlane(stored.plane)) throw MapError(name + ": lies on a plane that is not in the map");
+  if (stored.observations.empty()) throw MapError(name + ": no observation");
+  KeyframeId last = 0;
+  for (const MapObservation& o : stored.observations) {
+    if (o.keyframe <= last) throw MapError(name + ": observations are not ascending, one per keyframe");
+    last = o.keyframe;
+    const MapKeyframe& kf = keyframe(o.keyframe);
+    if (o.feature >= kf.landmarks.size() || kf.landmarks[o.feature] != kNoLandmark)
+      throw MapError(name + ": its feature in keyframe " + std::to_string(o.keyframe) + " is unknown or taken");
+  }
+  for (const MapObservation& o : stored.observations) keyframe(o.keyframe).landmarks[o.feature] = stored.id;
+  return landmarks_.emplace(stored.id, stored).first->second;
 }
 
 bool Map::addObservation(LandmarkId id, const MapObservation& observation) {

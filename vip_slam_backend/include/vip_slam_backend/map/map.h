@@ -44,6 +44,8 @@ class Map {
   // ---- landmarks ----
   /// A new landmark with its first observation. Refused: id taken, position not finite, feature taken or unknown.
   MapLandmark& addLandmark(LandmarkId id, const Eigen::Vector3d& p_W, const MapObservation& first);
+  /// A landmark of a stored map with all its observations, as it is. Refused like the single steps would be.
+  MapLandmark& restoreLandmark(const MapLandmark& stored);
   /// False when that feature has a landmark already or that keyframe sees this landmark already.
   bool addObservation(LandmarkId id, const MapObservation& observation);
   /// The landmark goes when it was the last one.

@@ -1,0 +1,41 @@
+// Map files (.vsm): everything a later session needs to relocalise and to go on mapping.
+//
+// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 1 | u32 reserved = 0 | u64 payload bytes | payload |
+// u32 CRC-32 of all before it. The payload holds the vocabulary's id, planes, keyframes (state, features with
+// descriptors, depth grid in mm, IMU samples, plane observations), landmarks and loops.
+//
+// A file is the same bytes for the same map: landmarks and epochs are numbered anew in ascending order when written.
+// Read back, landmarks get ids from kLoadedLandmarks and epochs from kLoadedEpochs on, so that they never meet those of
+// the running odometry. Keyframe and plane ids stay as they are.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "vip_slam_backend/map/map.h"
+
+namespace vip_slam {
+
+constexpr LandmarkId kLoadedLandmarks = LandmarkId(1) << 40;
+constexpr std::uint32_t kLoadedEpochs = 0x80000000u;
+
+struct StoredMap {
+  Map map;
+  std::vector<std::pair<KeyframeId, KeyframeId>> loops;  ///< (query, match)
+  std::uint64_t vocabulary_id = 0;
+};
+
+std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
+                         std::uint64_t vocabulary_id);
+/// Throws std::runtime_error "source: what, expected what" on anything that is not a whole, undamaged, consistent map of
+/// this version. Allocates no more than a small multiple of `size`.
+StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise);
+
+/// Whole or not at all. Throws std::runtime_error naming the path.
+void saveMapFile(const std::string& path, const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
+                 std::uint64_t vocabulary_id);
+StoredMap loadMapFile(const std::string& path, const ImuNoise& noise);
+
+}  // namespace vip_slam

@@ -1,0 +1,251 @@
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "map_file_format.h"
+#include "vip_slam_backend/map_io/byte_stream.h"
+#include "vip_slam_backend/map_io/map_file.h"
+#include "vip_slam_backend/util/crc32.h"
+
+namespace vip_slam {
+namespace {
+
+double finite(ByteReader& in, const char* what) {
+  const auto v = in.get<double>(what);
+  if (!std::isfinite(v)) in.fail(std::string(what) + " is not a finite number");
+  return v;
+}
+
+template <class Vector>
+Vector finiteVector(ByteReader& in, const char* what) {
+  const Vector v = in.vector<Vector>(what);
+  if (!v.allFinite()) in.fail(std::string(what) + " is not finite");
+  return v;
+}
+
+bool flag(ByteReader& in, const char* what) {
+  const auto v = in.get<std::uint8_t>(what);
+  if (v > 1) in.fail(std::string(what) + " is " + std::to_string(v) + ", expected 0 or 1");
+  return v != 0;
+}
+
+SE3 readPose(ByteReader& in, const char* what) {
+  const auto q = finiteVector<Eigen::Vector4d>(in, what);
+  const auto t = finiteVector<Eigen::Vector3d>(in, what);
+  if (std::abs(q.norm() - 1.0) > 1e-6) in.fail(std::string(what) + ": rotation is not a unit quaternion");
+  return SE3(Eigen::Quaterniond(q(3), q(0), q(1), q(2)), t);
+}
+
+NavState readState(ByteReader& in, const char* what) {
+  NavState s;
+  s.t = finite(in, what);
+  s.T_W_I = readPose(in, what);
+  s.v_W = finiteVector<Eigen::Vector3d>(in, what);
+  s.bias_gyro = finiteVector<Eigen::Vector3d>(in, what);
+  s.bias_accel = finiteVector<Eigen::Vector3d>(in, what);
+  return s;
+}
+
+DepthGrid readGrid(ByteReader& in) {
+  DepthGrid grid;
+  grid.stride = in.get<std::uint16_t>("depth grid");
+  grid.offset = in.get<std::uint16_t>("depth grid");
+  grid.cols = in.get<std::uint16_t>("depth grid");
+  grid.rows = in.get<std::uint16_t>("depth grid");
+  const std::size_t nodes = static_cast<std::size_t>(grid.cols) * static_cast<std::size_t>(grid.rows);
+  if (nodes > in.left() / 2) in.fail("depth grid of " + std::to_string(nodes) + " nodes does not fit into the file");
+  if (nodes > 0 && grid.stride == 0) in.fail("depth grid without a stride");
+  grid.z.resize(nodes);
+  for (float& z : grid.z) z = static_cast<float>(in.get<std::uint16_t>("depth grid") * map_file::kDepthUnit);
+  return grid;
+}
+
+Ring readRing(ByteReader& in) {
+  Ring ring(in.count(map_file::kPointBytes, "polygon points"));
+  for (Eigen::Vector3d& p : ring) p = finiteVector<Eigen::Vector3d>(in, "polygon point");
+  return ring;
+}
+
+void readPlane(ByteReader& in, Map& map) {
+  PlaneEstimate e;
+  e.id = in.get<std::uint64_t>("plane id");
+  if (map.hasPlane(e.id)) in.fail("plane " + std::to_string(e.id) + " twice");
+  const auto kind = in.get<std::uint8_t>("plane kind");
+  if (kind > 2) in.fail("plane kind " + std::to_string(kind) + ", expected 0 to 2");
+  e.kind = static_cast<PlaneKind>(kind);
+  const bool optimised = flag(in, "plane flag");
+  e.plane.n = finiteVector<Eigen::Vector3d>(in, "plane normal");
+  if (std::abs(e.plane.n.norm() - 1.0) > 1e-7) in.fail("plane normal is not a unit vector");
+  e.plane.d = finite(in, "plane distance");
+  e.area = finite(in, "plane area");
+  e.keyframes = in.get<std::uint32_t>("plane keyframes");
+  e.polygons.resize(in.count(8, "polygons"));
+  for (PlanePolygon& polygon : e.polygons) {
+    polygon.outer = readRing(in);
+    polygon.holes.resize(in.count(4, "holes"));
+    for (Ring& hole : polygon.holes) hole = readRing(in);
+  }
+  map.setPlane(e);
+  if (optimised) map.setPlaneParameters(e.id, e.plane);
+}
+
+PlaneObservation readObservation(ByteReader& in, KeyframeId keyframe) {
+  PlaneObservation o;
+  o.keyframe = keyframe;
+  o.plane = in.get<std::uint64_t>("plane observation");
+  for (int r = 0; r < 4; ++r)
+    for (int c = r; c < 4; ++c) o.G(r, c) = o.G(c, r) = finite(in, "plane observation");
+  o.weight_scale = finite(in, "plane observation");
+  o.points.resize(in.count(map_file::kPlanePointBytes, "plane points"));
+  for (PlanePoint& p : o.points) {
+    p.p_C = in.vector<Eigen::Vector3f>("plane point");
+    p.sigma = in.get<float>("plane point");
+  }
+  return o;
+}
+
+Feature readFeature(ByteReader& in, std::size_t landmark_limit, std::uint32_t* landmark) {
+  Feature f;
+  f.pixel = in.vector<Eigen::Vector2f>("feature");
+  f.xy = in.vector<Eigen::Vector2f>("feature");
+  f.depth = in.get<float>("feature");
+  f.depth_sigma = in.get<float>("feature");
+  f.angle = in.get<float>("feature");
+  if (!std::isfinite(f.angle)) in.fail("feature angle is not finite");
+  f.octave = in.get<std::uint8_t>("feature");
+  const bool tracked = flag(in, "feature flag");
+  in.bytes(f.descriptor.data(), f.descriptor.size(), "feature");
+  *landmark = in.get<std::uint32_t>("feature");
+  if (*landmark != map_file::kNoIndex && *landmark >= landmark_limit)
+    in.fail("landmark " + std::to_string(*landmark) + " cannot exist in a file of this size");
+  if (tracked && *landmark != map_file::kNoIndex) f.id = kLoadedLandmarks + *landmark;
+  return f;
+}
+
+// One keyframe into the map; its observations by landmark into `seen`.
+void readKeyframe(ByteReader& in, std::size_t landmark_limit, const ImuNoise& noise, Map& map,
+                  std::vector<std::vector<MapObservation>>& seen) {
+  auto data = std::make_shared<Keyframe>();
+  TrackedFrame& frame = data->frame;
+  data->id = in.get<std::uint64_t>("keyframe id");
+  if (data->id <= map.newestKeyframe()) in.fail("keyframe " + std::to_string(data->id) + " is out of order");
+  frame.t = finite(in, "keyframe stamp");
+  const auto epoch = in.get<std::uint32_t>("keyframe epoch");
+  if (epoch > map.keyframes().size()) in.fail("epoch " + std::to_string(epoch) + " is out of order");
+  frame.epoch = kLoadedEpochs + epoch;
+  const auto status = in.get<std::uint8_t>("keyframe status");
+  if (status > 4) in.fail("tracking state " + std::to_string(status) + ", expected 0 to 4");
+  frame.status.state = static_cast<TrackingState>(status);
+  const NavState state = readState(in, "keyframe state");
+  frame.state = readState(in, "odometry state");
+  frame.T_I_C = readPose(in, "extrinsics");
+  frame.time_offset = finite(in, "time offset");
+  const bool loop_keyframe = flag(in, "loop flag");
+  frame.zero_velocity = flag(in, "standstill flag");
+  const auto previous = in.get<std::uint64_t>("previous keyframe");
+  frame.keyframe = data->id;
+  data->previous = previous;
+  const std::size_t features = in.count(map_file::kFeatureBytes, "features");
+  frame.features.reserve(features);
+  for (std::uint32_t k = 0; k < features; ++k) {
+    std::uint32_t landmark;
+    frame.features.push_back(readFeature(in, landmark_limit, &landmark));
+    if (landmark == map_file::kNoIndex) continue;
+    if (landmark >= seen.size()) seen.resize(landmark + 1);
+    seen[landmark].push_back({data->id, k});
+  }
+  frame.depth_grid = readGrid(in);
+  std::vector<ImuSample> imu(in.count(map_file::kImuBytes, "IMU samples"));
+  for (std::size_t k = 0; k < imu.size(); ++k) {
+    imu[k].t = finite(in, "IMU sample");
+    imu[k].gyro = finiteVector<Eigen::Vector3d>(in, "IMU sample");
+    imu[k].accel = finiteVector<Eigen::Vector3d>(in, "IMU sample");
+    // Far beyond any sensor; larger numbers would overflow when integrated.
+    if (imu[k].gyro.norm() > 1e3 || imu[k].accel.norm() > 1e4) in.fail("IMU sample is out of any sensor's range");
+    if (k > 0 && !(imu[k].t > imu[k - 1].t)) in.fail("IMU samples are not in order");
+  }
+  if (!imu.empty() && imu.back().t - imu.front().t > 1e4) in.fail("IMU samples span hours");
+  map.restoreKeyframe(data, state, previous, imu, noise).loop_keyframe = loop_keyframe;
+  const std::size_t planes = in.count(8 + 11 * 8 + 4, "plane observations");
+  for (std::size_t k = 0; k < planes; ++k) {
+    const PlaneObservation observation = readObservation(in, data->id);
+    if (!map.setPlaneObservation(observation))
+      in.fail("observation of plane " + std::to_string(observation.plane) + " is unusable");
+  }
+}
+
+void readLandmark(ByteReader& in, std::uint32_t index, std::vector<MapObservation>&& seen, Map& map) {
+  MapLandmark landmark;
+  landmark.id = kLoadedLandmarks + index;
+  landmark.p_W = finiteVector<Eigen::Vector3d>(in, "landmark position");
+  landmark.plane = in.get<std::uint64_t>("landmark plane");
+  landmark.visible = in.get<std::uint32_t>("landmark");
+  landmark.found = in.get<std::uint32_t>("landmark");
+  in.bytes(landmark.descriptor.data(), landmark.descriptor.size(), "landmark");
+  landmark.observations = std::move(seen);
+  map.restoreLandmark(landmark);
+}
+
+void readPayload(ByteReader& in, const ImuNoise& noise, StoredMap* stored) {
+  Map& map = stored->map;
+  stored->vocabulary_id = in.get<std::uint64_t>("vocabulary id");
+  const std::size_t planes = in.count(map_file::kPlaneBytes, "planes");
+  for (std::size_t k = 0; k < planes; ++k) readPlane(in, map);
+  const std::size_t keyframes = in.count(map_file::kKeyframeBytes, "keyframes");
+  const std::size_t landmark_limit = in.left() / map_file::kLandmarkBytes;
+  std::vector<std::vector<MapObservation>> seen;
+  for (std::size_t k = 0; k < keyframes; ++k) readKeyframe(in, landmark_limit, noise, map, seen);
+  const std::size_t landmarks = in.count(map_file::kLandmarkBytes, "landmarks");
+  if (seen.size() > landmarks) in.fail("keyframes see more landmarks than the " + std::to_string(landmarks) + " stored");
+  seen.resize(landmarks);
+  for (std::uint32_t k = 0; k < landmarks; ++k) readLandmark(in, k, std::move(seen[k]), map);
+  const std::size_t loops = in.count(16, "loops");
+  for (std::size_t k = 0; k < loops; ++k) {
+    const auto query = in.get<std::uint64_t>("loop"), match = in.get<std::uint64_t>("loop");
+    if (!map.hasKeyframe(query) || !map.hasKeyframe(match)) in.fail("a loop joins keyframes that are not there");
+    stored->loops.emplace_back(query, match);
+  }
+  if (in.left() != 0) in.fail(std::to_string(in.left()) + " bytes too many");
+  map.takeChanges();
+}
+
+}  // namespace
+
+StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise) {
+  ByteReader in(data, size, source);
+  char magic[8];
+  if (size < map_file::kHeader + 4) in.fail("too short for a map file (" + std::to_string(size) + " bytes)");
+  in.bytes(magic, 8, "magic");
+  if (std::memcmp(magic, map_file::kMagic, 8) != 0) in.fail("not a map file, expected it to start with VIPMAP");
+  const auto version = in.get<std::uint32_t>("version");
+  if (version != map_file::kVersion)
+    in.fail("map file version " + std::to_string(version) + ", expected " + std::to_string(map_file::kVersion));
+  if (in.get<std::uint32_t>("reserved") != 0) in.fail("reserved field is not 0");
+  const auto length = in.get<std::uint64_t>("length");
+  if (length != in.left() - 4)
+    in.fail("payload of " + std::to_string(in.left() - 4) + " bytes, expected " + std::to_string(length) + " (truncated?)");
+  std::uint32_t crc;
+  std::memcpy(&crc, data + size - 4, 4);
+  if (crc32(data, size - 4) != crc) in.fail("checksum is wrong, the file is damaged");
+
+  ByteReader payload(data + map_file::kHeader, static_cast<std::size_t>(length), source);
+  StoredMap stored;
+  try {
+    readPayload(payload, noise, &stored);
+  } catch (const MapError& e) {
+    payload.fail(e.what());
+  }
+  return stored;
+}
+
+StoredMap loadMapFile(const std::string& path, const ImuNoise& noise) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in) throw std::runtime_error(path + ": cannot be opened, expected a map file");
+  std::string bytes(static_cast<std::size_t>(std::max<std::streamoff>(0, in.tellg())), '\0');
+  in.seekg(0);
+  in.read(&bytes[0], static_cast<std::streamsize>(bytes.size()));
+  if (!in) throw std::runtime_error(path + ": cannot be read");
+  return parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), path, noise);
+}
+
+}  // namespace vip_slam

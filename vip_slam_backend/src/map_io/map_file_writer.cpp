@@ -1,0 +1,177 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+#include "map_file_format.h"
+#include "vip_slam_backend/map_io/byte_stream.h"
+#include "vip_slam_backend/map_io/map_file.h"
+#include "vip_slam_backend/util/crc32.h"
+#include "vip_slam_core/util/atomic_file.h"
+
+namespace vip_slam {
+namespace {
+
+void write(ByteWriter& out, const SE3& T) {
+  // Reading normalises; what is written must be a fixed point of that, or the next save would differ.
+  Eigen::Quaterniond q = T.rotation();
+  for (int k = 0; k < 8; ++k) {
+    const Eigen::Quaterniond n = q.normalized();
+    if (n.coeffs() == q.coeffs()) break;
+    q = n;
+  }
+  out.vector(q.coeffs());
+  out.vector(T.t());
+}
+
+void write(ByteWriter& out, const NavState& s) {
+  out.put(s.t);
+  write(out, s.T_W_I);
+  out.vector(s.v_W);
+  out.vector(s.bias_gyro);
+  out.vector(s.bias_accel);
+}
+
+void write(ByteWriter& out, const DepthGrid& grid) {
+  for (const int v : {grid.stride, grid.offset, grid.cols, grid.rows}) out.put(static_cast<std::uint16_t>(v));
+  for (const float z : grid.z) {
+    const double units = std::round(z / map_file::kDepthUnit);
+    out.put(static_cast<std::uint16_t>(units >= 0 && units <= 65535 ? units : 0));
+  }
+}
+
+void write(ByteWriter& out, const Ring& ring) {
+  out.put(static_cast<std::uint32_t>(ring.size()));
+  for (const Eigen::Vector3d& p : ring) out.vector(p);
+}
+
+void write(ByteWriter& out, const MapPlane& plane) {
+  const PlaneEstimate& e = plane.estimate;
+  out.put(e.id);
+  out.put(static_cast<std::uint8_t>(e.kind));
+  out.put(static_cast<std::uint8_t>(plane.optimised));
+  out.vector(e.plane.n);
+  out.put(e.plane.d);
+  out.put(e.area);
+  out.put(e.keyframes);
+  out.put(static_cast<std::uint32_t>(e.polygons.size()));
+  for (const PlanePolygon& polygon : e.polygons) {
+    write(out, polygon.outer);
+    out.put(static_cast<std::uint32_t>(polygon.holes.size()));
+    for (const Ring& hole : polygon.holes) write(out, hole);
+  }
+}
+
+void write(ByteWriter& out, const PlaneObservation& observation) {
+  out.put(observation.plane);
+  for (int r = 0; r < 4; ++r)
+    for (int c = r; c < 4; ++c) out.put(observation.G(r, c));
+  out.put(observation.weight_scale);
+  out.put(static_cast<std::uint32_t>(observation.points.size()));
+  for (const PlanePoint& p : observation.points) {
+    out.vector(p.p_C);
+    out.put(p.sigma);
+  }
+}
+
+void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch,
+           const std::unordered_map<LandmarkId, std::uint32_t>& index) {
+  const TrackedFrame& frame = kf.data->frame;
+  out.put(kf.id());
+  out.put(frame.t);
+  out.put(epoch);
+  out.put(static_cast<std::uint8_t>(frame.status.state));
+  write(out, kf.state);
+  write(out, frame.state);
+  write(out, kf.T_I_C);
+  out.put(frame.time_offset);
+  out.put(static_cast<std::uint8_t>(kf.loop_keyframe));
+  out.put(static_cast<std::uint8_t>(frame.zero_velocity));
+  out.put(kf.previous);
+  out.put(static_cast<std::uint32_t>(frame.features.size()));
+  for (std::size_t k = 0; k < frame.features.size(); ++k) {
+    const Feature& f = frame.features[k];
+    const LandmarkId landmark = kf.landmarks[k];
+    out.vector(f.pixel);
+    out.vector(f.xy);
+    out.put(f.depth);
+    out.put(f.depth_sigma);
+    out.put(f.angle);
+    out.put(f.octave);
+    // A track means nothing to a later session unless it is a landmark.
+    out.put(static_cast<std::uint8_t>(f.id != kNoLandmark && landmark != kNoLandmark));
+    out.bytes(f.descriptor.data(), f.descriptor.size());
+    out.put(landmark == kNoLandmark ? map_file::kNoIndex : index.at(landmark));
+  }
+  write(out, frame.depth_grid);
+  const std::size_t samples = kf.previous != 0 && kf.imu ? kf.imu->size() : 0;
+  out.put(static_cast<std::uint32_t>(samples));
+  for (std::size_t k = 0; k < samples; ++k) {
+    const ImuSample& s = (*kf.imu)[k];
+    out.put(s.t);
+    out.vector(s.gyro);
+    out.vector(s.accel);
+  }
+  out.put(static_cast<std::uint32_t>(kf.planes.size()));
+  for (const auto& entry : kf.planes) write(out, entry.second);
+}
+
+}  // namespace
+
+std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
+                         std::uint64_t vocabulary_id) {
+  ByteWriter out;
+  out.bytes(map_file::kMagic, 8);
+  out.put(map_file::kVersion);
+  out.put(std::uint32_t(0));
+  const std::size_t length_at = out.data().size();
+  out.put(std::uint64_t(0));
+
+  out.put(vocabulary_id);
+  out.put(static_cast<std::uint32_t>(map.planes().size()));
+  for (const auto& entry : map.planes()) write(out, entry.second);
+
+  const std::vector<LandmarkId> landmarks = map.landmarkIds();
+  std::unordered_map<LandmarkId, std::uint32_t> index;
+  for (std::size_t k = 0; k < landmarks.size(); ++k) index[landmarks[k]] = static_cast<std::uint32_t>(k);
+  std::unordered_map<std::uint32_t, std::uint32_t> epochs;
+  out.put(static_cast<std::uint32_t>(map.keyframes().size()));
+  for (const auto& entry : map.keyframes()) {
+    const auto epoch = epochs.emplace(entry.second.data->frame.epoch, static_cast<std::uint32_t>(epochs.size())).first;
+    write(out, entry.second, epoch->second, index);
+  }
+  out.put(static_cast<std::uint32_t>(landmarks.size()));
+  for (const LandmarkId id : landmarks) {
+    const MapLandmark& l = map.landmark(id);
+    out.vector(l.p_W);
+    out.put(l.plane);
+    out.put(l.visible);
+    out.put(l.found);
+    out.bytes(l.descriptor.data(), l.descriptor.size());
+  }
+  std::vector<std::pair<KeyframeId, KeyframeId>> kept;
+  for (const auto& loop : loops)
+    if (map.hasKeyframe(loop.first) && map.hasKeyframe(loop.second)) kept.push_back(loop);
+  out.put(static_cast<std::uint32_t>(kept.size()));
+  for (const auto& loop : kept) {
+    out.put(loop.first);
+    out.put(loop.second);
+  }
+
+  std::string bytes = out.take();
+  const std::uint64_t length = bytes.size() - map_file::kHeader;
+  std::memcpy(&bytes[length_at], &length, sizeof length);
+  const std::uint32_t crc = crc32(bytes.data(), bytes.size());
+  bytes.append(reinterpret_cast<const char*>(&crc), sizeof crc);
+  return bytes;
+}
+
+void saveMapFile(const std::string& path, const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
+                 std::uint64_t vocabulary_id) {
+  const std::string bytes = serialiseMap(map, loops, vocabulary_id);
+  AtomicFile file(path, true);
+  file.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.commit();
+}
+
+}  // namespace vip_slam
