@@ -12,11 +12,34 @@ BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l
       maker(LandmarkMakerOptions{12.0, 1.0, camera->focal()}),
       reobservation(o.reobservation, camera),
       solver(makeSolver(o.solver)),
-      loop_closer(o.loop, camera, l) {
+      loop_closer(o.loop, camera, l),
+      relocaliser(o.loop.relocalisation) {
   settings.variant = variantFromName(o.variant);
   settings.measurement = o.measurement;
   settings.focal = camera->focal();
   settings.gravity = gravityVector(s.gravity);
+}
+
+void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
+  const double t = keyframe->frame.t;
+  const SE3 T_map_odom_before = T_map_odom;
+  const std::uint32_t epoch_before = epoch;
+  const NavState state = predict(*keyframe);
+  try {
+    map.addKeyframe(keyframe, state, sensor.imu_noise);
+  } catch (...) {
+    T_map_odom = T_map_odom_before;
+    epoch = epoch_before;
+    throw;
+  }
+  const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
+  maker.process(keyframe->id, &map);
+  // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by chance.
+  const std::set<KeyframeId> part = connectedKeyframes(map, keyframe->id, loop_closer.loops());
+  const ReobservationResult found =
+      reobservation.process(keyframe->id, &map, [&part](KeyframeId id) { return part.count(id) != 0; });
+  statistics.reobserved += found.found;
+  statistics.merged += found.merged;
 }
 
 MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
@@ -29,32 +52,25 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (!keyframe) throw MapError("no keyframe given");
     const std::string bad = validateKeyframe(*keyframe);
     if (!bad.empty()) throw MapError(bad);
+    if (localisation_only && !map.empty()) {
+      localise(keyframe);
+      finishUpdate(&update);
+      update.removed_keyframes.push_back(keyframe->id);  // it will never be in the map
+      return update;
+    }
     if (keyframe->id <= map.newestKeyframe())
       throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
                      std::to_string(map.newestKeyframe()) + " of the map");
-    const SE3 T_map_odom_before = T_map_odom;
-    const std::uint32_t epoch_before = epoch;
-    const NavState state = predict(*keyframe);
-    try {
-      map.addKeyframe(keyframe, state, sensor.imu_noise);
-    } catch (...) {
-      T_map_odom = T_map_odom_before;
-      epoch = epoch_before;
-      throw;
+    if (searching && !enterLoadedMap(keyframe)) {
+      finishUpdate(&update);
+      return update;
     }
+    if (!map.hasKeyframe(keyframe->id)) insert(keyframe);
   } catch (const MapError& e) {
     refusal = e.what();
     ++statistics.keyframes_refused;
     finishUpdate(&update);
     return update;
-  }
-  const KeyframeId id = keyframe->id;
-  {
-    const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
-    maker.process(id, &map);
-    const ReobservationResult found = reobservation.process(id, &map);
-    statistics.reobserved += found.found;
-    statistics.merged += found.merged;
   }
   localBundleAdjustment(t, &update);
   cull(&update);
@@ -117,6 +133,8 @@ void BackEnd::Impl::reset() {
   map.clear();
   maker.clear();
   loop_closer.clear();
+  searching = false;
+  held.clear();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;
@@ -164,5 +182,8 @@ MapUpdate BackEnd::finish() {
 MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }
 void BackEnd::reset() { impl_->reset(); }
+void BackEnd::saveMap(const std::string& path) const { impl_->saveMap(path); }
+MapUpdate BackEnd::loadMap(const std::string& path) { return impl_->loadMap(path); }
+void BackEnd::setLocalisationMode(bool on) { impl_->localisation_only = on; }
 
 }  // namespace vip_slam

@@ -7,13 +7,16 @@
 #include <vector>
 
 #include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/loop/loop_closer.h"
+#include "vip_slam_backend/loop/loop_fusion.h"
 #include "vip_slam_backend/map/culling.h"
 #include "vip_slam_backend/map/landmark_maker.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map/reobservation.h"
 #include "vip_slam_backend/optimisation/global_ba.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
+#include "vip_slam_backend/relocalisation/relocaliser.h"
 #include "vip_slam_backend/solver/ba_solver.h"
 
 namespace vip_slam {
@@ -22,6 +25,8 @@ struct BackEnd::Impl {
   Impl(const BackEndOptions& options, const SensorConfig& sensor, TimingLog* log);
 
   // back_end.cpp
+  /// Inserts at the predicted pose and looks for known landmarks; throws MapError when refused.
+  void insert(const KeyframePtr& keyframe);
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
   void applyPlaneUpdate(const PlaneUpdate& update);
   MapSnapshot snapshot() const;
@@ -43,6 +48,15 @@ struct BackEnd::Impl {
   GbaJob makeGlobalJob() const;
   MapUpdate mergeGlobal(const GbaResult& result);
 
+  // back_end_maps.cpp
+  void saveMap(const std::string& path) const;
+  MapUpdate loadMap(const std::string& path);
+  bool findInMap(const Keyframe& keyframe, Relocalisation* found);
+  /// Recognises the loaded map; on success the keyframe and those held before it enter it.
+  bool enterLoadedMap(const KeyframePtr& keyframe);
+  /// Localisation only: T_map_odom follows, the map stays.
+  void localise(const KeyframePtr& keyframe);
+
   // back_end_loops.cpp
   /// Enters the newest keyframe into the place database and closes a loop there when there is one.
   void closeLoop(MapUpdate* update);
@@ -57,6 +71,10 @@ struct BackEnd::Impl {
   Reobservation reobservation;
   std::unique_ptr<BaSolver> solver;
   LoopCloser loop_closer;
+  Relocaliser relocaliser;
+  bool searching = false;          ///< a loaded map is not recognised yet
+  bool localisation_only = false;
+  std::vector<KeyframePtr> held;   ///< keyframes that wait for that
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;

@@ -25,23 +25,27 @@ int LandmarkMaker::process(KeyframeId id, Map* map) {
       continue;
     }
     if (known != f.id) continue;  // merged into a landmark that is gone
+    std::vector<MapObservation> views;
+    LandmarkId found = kNoLandmark;  // a waiting view may have been matched with a landmark meanwhile
+    const auto waited = waiting_.find(f.id);
+    if (waited != waiting_.end())
+      for (const MapObservation& o : waited->second) {
+        if (!map->hasKeyframe(o.keyframe)) continue;
+        const LandmarkId now = map->keyframe(o.keyframe).landmarks[o.feature];
+        if (now == kNoLandmark) views.push_back(o);
+        else found = now;
+      }
+    if (found != kNoLandmark) {
+      map->addObservation(found, here);
+      continue;
+    }
     if (f.depth > 0) {
       const Eigen::Vector3d p_C = Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0) * f.depth;
       map->addLandmark(f.id, T_W_C * p_C, here);
-      const auto waited = waiting_.find(f.id);
-      if (waited != waiting_.end())
-        for (const MapObservation& o : waited->second)
-          if (map->hasKeyframe(o.keyframe)) map->addObservation(f.id, o);
+      for (const MapObservation& o : views) map->addObservation(f.id, o);
       ++made;
       continue;
     }
-    std::vector<MapObservation> views;
-    const auto waited = waiting_.find(f.id);
-    if (waited != waiting_.end())
-      for (const MapObservation& o : waited->second)
-        // Re-observation may have given an older view to another landmark meanwhile.
-        if (map->hasKeyframe(o.keyframe) && map->keyframe(o.keyframe).landmarks[o.feature] == kNoLandmark)
-          views.push_back(o);
     views.push_back(here);
     Eigen::Vector3d p_W;
     if (views.size() >= 3 && triangulate(*map, views, &p_W)) {

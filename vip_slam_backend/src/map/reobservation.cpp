@@ -42,7 +42,8 @@ constexpr double kMaxDistanceRatio = 2.0;
 
 }  // namespace
 
-std::vector<KeyframeId> Reobservation::neighbours(const Map& map, KeyframeId id) const {
+std::vector<KeyframeId> Reobservation::neighbours(const Map& map, KeyframeId id,
+                                                  const std::function<bool(KeyframeId)>& allowed) const {
   std::vector<KeyframeId> chosen;
   std::set<KeyframeId> taken{id};
   const std::size_t limit = static_cast<std::size_t>(options_.keyframes);
@@ -55,7 +56,7 @@ std::vector<KeyframeId> Reobservation::neighbours(const Map& map, KeyframeId id)
   const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
   std::vector<std::pair<double, KeyframeId>> near;
   for (const auto& entry : map.keyframes()) {
-    if (taken.count(entry.first)) continue;
+    if (taken.count(entry.first) || (allowed && !allowed(entry.first))) continue;
     const SE3 other = entry.second.T_W_C();
     const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
     const double distance = (other.t() - T_W_C.t()).norm();
@@ -70,13 +71,14 @@ std::vector<KeyframeId> Reobservation::neighbours(const Map& map, KeyframeId id)
   return chosen;
 }
 
-ReobservationResult Reobservation::process(KeyframeId id, Map* map) const {
+ReobservationResult Reobservation::process(KeyframeId id, Map* map,
+                                           const std::function<bool(KeyframeId)>& allowed) const {
   ReobservationResult result;
   const MapKeyframe& kf = map->keyframe(id);
   const std::vector<Feature>& features = kf.features();
   if (options_.keyframes == 0 || features.empty()) return result;
   std::set<LandmarkId> candidates;
-  for (const KeyframeId other : neighbours(*map, id))
+  for (const KeyframeId other : neighbours(*map, id, allowed))
     for (const LandmarkId landmark : map->keyframe(other).landmarks)
       if (landmark != kNoLandmark) candidates.insert(landmark);
   for (const LandmarkId own : kf.landmarks) candidates.erase(own);

@@ -62,6 +62,18 @@ struct PoseGraphOptions {
   }
 };
 
+struct RelocalisationOptions {
+  int candidates = 6;
+  int min_inliers = 30;
+  double ambiguity = 0.6;
+
+  void visit(OptionVisitor& v) {
+    v.field("candidates", candidates, 1, 100, "places verified per keyframe");
+    v.field("min_inliers", min_inliers, 6, 500, "inliers needed; there is no odometry to contradict a wrong place");
+    v.field("ambiguity", ambiguity, 0.0, 1.0, "refused when another place has more than this fraction of the best's inliers");
+  }
+};
+
 struct LoopOptions {
   std::string vocabulary;
   double min_seconds = 10.0;
@@ -71,6 +83,7 @@ struct LoopOptions {
   int consistency = 1;
   PlaceVerificationOptions verification;
   PoseGraphOptions graph;
+  RelocalisationOptions relocalisation;
 
   void visit(OptionVisitor& v) {
     v.field("vocabulary", vocabulary, {}, "vocabulary file (ours or ORB-SLAM text); empty: the shipped one");
@@ -81,6 +94,7 @@ struct LoopOptions {
     v.field("consistency", consistency, 0, 10, "keyframes before that must have pointed to the same place");
     v.group("verification", verification);
     v.group("graph", graph);
+    v.group("relocalisation", relocalisation);
   }
 };
 

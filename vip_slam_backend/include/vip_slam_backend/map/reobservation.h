@@ -2,6 +2,7 @@
 // become observations; a tracked feature that has a landmark of its own is the same point seen anew, and the two merge.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "vip_slam_backend/back_end_options.h"
@@ -21,9 +22,10 @@ class Reobservation {
   Reobservation(const ReobservationOptions& options, std::shared_ptr<const CameraModel> camera)
       : options_(options), camera_(std::move(camera)) {}
   /// `id` is in the map with its predicted or optimised pose.
-  ReobservationResult process(KeyframeId id, Map* map) const;
+  /// `allowed` names the keyframes whose landmarks may be looked for (empty: all).
+  ReobservationResult process(KeyframeId id, Map* map, const std::function<bool(KeyframeId)>& allowed = {}) const;
   /// Keyframes whose landmarks are looked for: covisible ones, then near ones that look the same way.
-  std::vector<KeyframeId> neighbours(const Map& map, KeyframeId id) const;
+  std::vector<KeyframeId> neighbours(const Map& map, KeyframeId id, const std::function<bool(KeyframeId)>& allowed = {}) const;
 
  private:
   ReobservationOptions options_;

@@ -1,0 +1,39 @@
+// Where in the map is this keyframe? Without any prior pose: after LOST, in a loaded map, in localisation-only mode.
+// There is no odometry to contradict a wrong place here, so a second place that fits about as well makes it refuse.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "vip_slam_backend/loop/loop_closer.h"
+
+namespace vip_slam {
+
+struct Relocalisation {
+  KeyframeId match = 0;
+  SE3 T_W_I;
+  int inliers = 0;
+  std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< feature of the query, landmark of the map
+};
+
+class Relocaliser {
+ public:
+  explicit Relocaliser(const RelocalisationOptions& options) : options_(options) {}
+
+  /// By appearance. Empty when no place fits, or two do; `reason` (may be null) then says which.
+  std::optional<Relocalisation> relocalise(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
+                                           const std::function<bool(KeyframeId)>& allowed = {},
+                                           std::string* reason = nullptr) const;
+  /// From a predicted pose: the landmarks around it are looked for at once.
+  std::optional<Relocalisation> track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
+                                      const SE3& T_W_I) const;
+
+ private:
+  RelocalisationOptions options_;
+};
+
+/// T_map_odom that brings T_odom_I to T_map_I with gravity kept: yaw and position.
+SE3 alignOdometry(const SE3& T_map_I, const SE3& T_odom_I);
+
+}  // namespace vip_slam

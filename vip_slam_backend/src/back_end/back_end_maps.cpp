@@ -1,0 +1,85 @@
+// Stored maps within the back end: saving, loading, finding the way in a loaded map, localisation without mapping.
+#include "back_end_impl.h"
+#include "vip_slam_backend/map_io/map_file.h"
+
+namespace vip_slam {
+namespace {
+
+// Keyframes kept while a loaded map is not recognised yet: about ten minutes.
+constexpr std::size_t kMostHeld = 1500;
+
+}  // namespace
+
+void BackEnd::Impl::saveMap(const std::string& path) const {
+  saveMapFile(path, map, loop_closer.loops(), loop_closer.vocabulary().id());
+}
+
+MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
+  StoredMap stored = loadMapFile(path, sensor.imu_noise);  // throws before anything is changed
+  reset();
+  map = std::move(stored.map);
+  loop_closer.rebuild(map, stored.loops);
+  searching = !map.empty();
+  if (searching) epoch = map.keyframe(map.newestKeyframe()).data->frame.epoch;
+  MapUpdate update = beginUpdate(0);
+  fillGlobal(&update);
+  finishUpdate(&update);
+  return update;
+}
+
+bool BackEnd::Impl::findInMap(const Keyframe& keyframe, Relocalisation* found) {
+  const ScopedTimer timer(log, "backend.relocalise", keyframe.frame.t);
+  std::string reason;
+  const auto result = relocaliser.relocalise(map, loop_closer, keyframe, {}, &reason);
+  LoopEvent event;
+  event.query = keyframe.id;
+  event.t = keyframe.frame.t;
+  event.accepted = result.has_value();
+  event.reason = "relocalisation: " + reason;
+  if (result) {
+    *found = *result;
+    event.match = result->match;
+    event.inliers = result->inliers;
+    event.T_match_query = map.keyframe(result->match).state.T_W_I.inverse() * result->T_W_I;
+    event.reason = "relocalisation: " + std::to_string(result->inliers) + " inliers";
+  }
+  loops.push_back(event);
+  new_loops.push_back(event);
+  (result ? statistics.loops_accepted : statistics.loops_rejected) += 1;
+  return result.has_value();
+}
+
+bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
+  Relocalisation found;
+  if (!findInMap(*keyframe, &found)) {
+    if (held.size() < kMostHeld) held.push_back(keyframe);
+    return false;
+  }
+  searching = false;
+  epoch = keyframe->frame.epoch;
+  T_map_odom = alignOdometry(found.T_W_I, keyframe->frame.state.T_W_I);
+  // What was seen before the map was recognised belongs to it as well, as far as the odometry did not start anew since.
+  std::vector<KeyframePtr> before;
+  before.swap(held);
+  for (const KeyframePtr& kf : before)
+    if (kf->frame.epoch == epoch && kf->id < keyframe->id) insert(kf);
+  T_map_odom = alignOdometry(found.T_W_I, keyframe->frame.state.T_W_I);
+  insert(keyframe);
+  loop_closer.tie(map, keyframe->id, found.match);
+  fuseLandmarks(map, keyframe->id, found.landmarks, 0.25);
+  return true;
+}
+
+void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
+  const bool known = !searching && keyframe->frame.epoch == epoch;
+  std::optional<Relocalisation> found;
+  if (known) found = relocaliser.track(map, loop_closer, *keyframe, T_map_odom * keyframe->frame.state.T_W_I);
+  Relocalisation place;
+  if (!found && findInMap(*keyframe, &place)) found = place;
+  if (!found) return;
+  searching = false;
+  epoch = keyframe->frame.epoch;
+  T_map_odom = alignOdometry(found->T_W_I, keyframe->frame.state.T_W_I);
+}
+
+}  // namespace vip_slam
