@@ -14,5 +14,8 @@ add_executable(run_bag src/apps/run_bag.cpp)
 target_link_libraries(run_bag vip_slam_runner CLI11::CLI11)
 
 install(TARGETS vip_slam_runner LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
-install(TARGETS run_bag RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+add_executable(train_vocabulary src/apps/train_vocabulary.cpp)
+target_link_libraries(train_vocabulary vip_slam_runner CLI11::CLI11)
+
+install(TARGETS run_bag train_vocabulary RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
