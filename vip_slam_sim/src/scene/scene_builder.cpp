@@ -215,14 +215,18 @@ void SceneBuilder::ceilingLamp(int chart, double u, double v, double su, double 
   decal(chart, u - su / 2 - 0.02, v - sv / 2 - 0.02, u + su / 2 + 0.02, v + sv / 2 + 0.02, -1,
         rgb(0.75f, 0.75f, 0.75f));
   decal(chart, u - su / 2, v - sv / 2, u + su / 2, v + sv / 2, -1, rgb(1, 1, 1), 0.75);
+  lamp(chart, u, v, su, sv, power);
+}
+
+void SceneBuilder::lamp(int chart, double u, double v, double su, double sv, double power) {
   const Chart& c = scene_.charts[chart];
-  Lamp lamp;
-  lamp.centre = c.o + c.eu * static_cast<float>(u) + c.ev * static_cast<float>(v);
-  lamp.half_u = c.eu * static_cast<float>(su / 2);
-  lamp.half_v = c.ev * static_cast<float>(sv / 2);
-  lamp.n = c.n;
-  lamp.power = static_cast<float>(power);
-  scene_.lamps.push_back(lamp);
+  Lamp shining;
+  shining.centre = c.o + c.eu * static_cast<float>(u) + c.ev * static_cast<float>(v);
+  shining.half_u = c.eu * static_cast<float>(su / 2);
+  shining.half_v = c.ev * static_cast<float>(sv / 2);
+  shining.n = c.n;
+  shining.power = static_cast<float>(power);
+  scene_.lamps.push_back(shining);
 }
 
 Scene SceneBuilder::finish() {

@@ -11,7 +11,10 @@ namespace {
 using Kind = Opening::Kind;
 
 struct OfficePlan {
-  SceneBuilder b{"office"};
+  explicit OfficePlan(bool without) : b(without ? "office_bare" : "office"), bare(without) {}
+
+  SceneBuilder b;
+  const bool bare;  ///< corridors without pictures, sockets or patterns
   Palette p;
   Rng rng{21};
   int number = 100;
@@ -41,6 +44,8 @@ struct OfficePlan {
   void room(double x0, double y0, double x1, double y1, double h, const std::vector<Opening>& south,
             const std::vector<Opening>& north, int style);
   void corridors();
+  void fittings(int south, int south_in, int west, int north, int north_in);
+  void kitchen();
   void hall();
 };
 
@@ -80,8 +85,15 @@ void OfficePlan::corridors() {
   const int cs = b.ceiling(0, 6, 29.8, 8.2, h, p.ceiling);
   const int cw = b.ceiling(0, 8.2, 2.2, 13.8, h, p.ceiling);
   const int cn = b.ceiling(0, 13.8, 29.8, 16, h, p.ceiling);
-  lamps(cs, 29.8, 2.2, 9, 1, 10.0);
-  lamps(cn, 29.8, 2.2, 9, 1, 10.0);
+  for (int chart : {cs, cn}) {
+    if (!bare) {
+      lamps(chart, 29.8, 2.2, 9, 1, 10.0);
+      continue;
+    }
+    // One strip of light from end to end: nothing in it tells how far one has walked.
+    b.decal(chart, 1.0, 1.02, 28.8, 1.18, -1, rgb(1, 1, 1), 0.75);
+    for (int i = 0; i < 18; ++i) b.lamp(chart, 1.0 + 27.8 * (i + 0.5) / 18, 1.1, 27.8 / 18, 0.16, 7.5);
+  }
   lamps(cw, 2.2, 5.6, 1, 2, 10.0, 0.3, 1.2);
 
   // South corridor, outer wall (seen from the north, so it runs from east to west).
@@ -116,6 +128,11 @@ void OfficePlan::corridors() {
   skirt(west_in, 5.6, {{2.33, 3.42}});
   skirt(north, 29.8, {{5.13, 6.22}, {11.5, 12.5}, {16.43, 17.52}, {20.5, 21.45}, {25.93, 27.02}});
   skirt(north_in, 27.6, {{7.93, 9.02}, {19.43, 20.52}});
+  if (!bare) fittings(south, south_in, west, north, north_in);
+  kitchen();
+}
+
+void OfficePlan::fittings(int south, int south_in, int west, int north, int north_in) {
   // The few things on the walls. The south-west and north-west corners stay bare.
   hangPoster(&b, south, p, 0, 4.4, 1.55, 0.8);
   hangPoster(&b, south, p, 1, 15.2, 1.55, 0.8);
@@ -141,8 +158,10 @@ void OfficePlan::corridors() {
     const Vec3 at = c.o + c.eu * float(u + 0.2) + c.n * 0.1f;
     b.cylinder(uprightPose(at.x, at.y, 0.4), 0.07, 0.5, {-1, 1, rgb(0.75f, 0.15f, 0.13f)}, p.dark, 24);
   }
+}
 
-  // Kitchen niche in the core.
+void OfficePlan::kitchen() {
+  // A niche in the core.
   const double x0 = 12.2, x1 = 15.2, y0 = 8.2, y1 = 11.0;
   b.floor(x0, y0, x1, y1, 0, p.carpet);
   const int nc = b.ceiling(x0, y0, x1, y1, 2.3, p.white);
@@ -230,10 +249,10 @@ void OfficePlan::hall() {
 
 }  // namespace
 
-Scene buildOffice() {
-  OfficePlan o;
+Scene buildOffice(bool bare) {
+  OfficePlan o(bare);
   o.b.scene().light_spacing = 0.12f;
-  o.p = makePalette(&o.b, 3, 12, 0.008);
+  o.p = makePalette(&o.b, 3, 12, bare ? 0.002 : 0.008, bare ? 0.15 : 1.0);
   o.corridors();
   o.hall();
   // Rooms one can enter: door positions match the corridor walls' passages.

@@ -5,11 +5,17 @@
 
 namespace vip_slam {
 
-Palette makePalette(SceneBuilder* b, std::uint64_t seed, int posters, double wall_contrast) {
+Palette makePalette(SceneBuilder* b, std::uint64_t seed, int posters, double wall_contrast, double contrast) {
   Palette p;
   p.wall = {b->addTexture(plaster(1024, {0.91f, 0.91f, 0.90f}, wall_contrast, seed + 1), true), 256};
-  p.carpet = {b->addTexture(tiles(1024, 8, {0.52f, 0.53f, 0.56f}, 0.028, 0.09, 0.010, seed + 2), true), 256};
-  p.ceiling = {b->addTexture(tiles(1024, 4, {0.93f, 0.93f, 0.92f}, 0.012, 0.08, 0.003, seed + 3), true), 1024 / 2.4f};
+  p.carpet = {
+      b->addTexture(
+          tiles(1024, 8, {0.52f, 0.53f, 0.56f}, 0.028 * contrast, 0.09 * contrast, 0.010 * contrast, seed + 2), true),
+      256};
+  p.ceiling = {
+      b->addTexture(
+          tiles(1024, 4, {0.93f, 0.93f, 0.92f}, 0.012 * contrast, 0.08 * contrast, 0.003 * contrast, seed + 3), true),
+      1024 / 2.4f};
   p.wood = {b->addTexture(wood(512, {0.72f, 0.60f, 0.46f}, 0.05, seed + 4), true), 400};
   p.white = {-1, 1, rgb(0.86f, 0.86f, 0.85f)};
   p.dark = {-1, 1, rgb(0.24f, 0.24f, 0.26f)};
@@ -19,7 +25,7 @@ Palette makePalette(SceneBuilder* b, std::uint64_t seed, int posters, double wal
   for (int i = 0; i < 4; ++i) p.photographs.push_back(b->addTexture(photograph(420, 300, seed * 37 + i), false));
   for (int i = 0; i < 3; ++i) p.screens.push_back(b->addTexture(screen(400, 240, seed * 41 + i), false));
   for (int i = 0; i < 3; ++i) p.books.push_back(b->addTexture(bookshelf(512, 768, 5, seed * 43 + i), false));
-  p.door = b->addTexture(wood(512, {0.70f, 0.58f, 0.45f}, 0.035, seed + 6), true);
+  p.door = b->addTexture(wood(512, {0.70f, 0.58f, 0.45f}, 0.035 * contrast, seed + 6), true);
   p.blinds = b->addTexture(blinds(512, 512, seed + 7), false);
   p.exit_sign = b->addTexture(sign(256, 96, "EXIT", {0.1f, 0.55f, 0.3f}, {0.95f, 0.95f, 0.95f}), false);
   return p;
@@ -111,10 +117,11 @@ void boxStack(SceneBuilder* b, const Palette& p, double x, double y, Rng* rng, i
   }
 }
 
-std::vector<std::string> sceneNames() { return {"office", "room", "stairs", "alias_corridor"}; }
+std::vector<std::string> sceneNames() { return {"office", "office_bare", "room", "stairs", "alias_corridor"}; }
 
 Scene buildScene(const std::string& name) {
-  if (name == "office") return buildOffice();
+  if (name == "office") return buildOffice(false);
+  if (name == "office_bare") return buildOffice(true);
   if (name == "room") return buildRoom();
   if (name == "stairs") return buildStairs();
   if (name == "alias_corridor") return buildAliasCorridor();

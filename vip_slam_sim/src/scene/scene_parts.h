@@ -17,7 +17,9 @@ struct Palette {
   std::vector<int> posters, photographs, screens, books, signs;
   int door = -1, blinds = -1, exit_sign = -1;
 };
-Palette makePalette(SceneBuilder* builder, std::uint64_t seed, int posters, double wall_contrast);
+/// `contrast` scales what carpet, ceiling and doors show (walls have their own figure).
+Palette makePalette(SceneBuilder* builder, std::uint64_t seed, int posters, double wall_contrast,
+                    double contrast = 1.0);
 
 /// A poster of height `h` (sides 7:10) with its middle at (u, v).
 void hangPoster(SceneBuilder* b, int chart, const Palette& p, int which, double u, double v, double h);
@@ -38,7 +40,7 @@ Eigen::Isometry3d uprightPose(double x, double y, double z, double yaw = 0);
 
 // The scenes.
 Scene buildRoom();
-Scene buildOffice();
+Scene buildOffice(bool bare);
 Scene buildStairs();
 Scene buildAliasCorridor();
 

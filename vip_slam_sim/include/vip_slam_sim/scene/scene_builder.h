@@ -50,6 +50,8 @@ class SceneBuilder {
 
   void decal(int chart, double u0, double v0, double u1, double v1, int texture, Vec4 tint = rgb(1, 1, 1),
              double emission = 0);
+  /// Light from a rectangle of a chart; the picture of it is left to decals.
+  void lamp(int chart, double u, double v, double su, double sv, double power);
   /// A lamp panel in a ceiling chart: a bright decal and the light it gives.
   void ceilingLamp(int chart, double u, double v, double su, double sv, double power);
 
