@@ -99,14 +99,14 @@ function stateChart(parent, states, loops, end) {
   });
   for (const loop of loops)
     svg += loop.accepted ? `<path d="M${X(loop.t)} 16 l-5 -9 h10 z" fill="var(--loop)"/>`
-                         : `<path d="M${X(loop.t) - 4} 7 l8 8 m0 -8 l-8 8" stroke="var(--muted)" stroke-width="1.5"/>`;
+                         : `<path d="M${X(loop.t)} 8 v7" stroke="var(--muted)" stroke-width="1" opacity=".5"/>`;
   for (const t of ticks(0, end, 10))
     svg += `<text x="${X(t)}" y="${height - 6}" text-anchor="middle">${+t.toPrecision(6)}${t === 0 ? ' s' : ''}</text>`;
   svg += `<line class="cursor" y1="4" y2="40" visibility="hidden"/></svg>`;
   const names = [...new Set(states.map(s => s.state))];
   let legend = names.map(n => `<span class="swatch" style="background:var(--${n})"></span>${n} &nbsp; `).join('');
   if (loops.some(l => l.accepted)) legend += '<span style="color:var(--loop)">▼</span> loop accepted &nbsp; ';
-  if (loops.some(l => !l.accepted)) legend += '✕ loop rejected';
+  if (loops.some(l => !l.accepted)) legend += '<span style="opacity:.6">|</span> loop rejected';
   parent.innerHTML = svg + `<div class="hint">${legend}</div>`;
   const node = parent.firstChild;
   attachCursor(node, node.querySelector('.cursor'), X, width, left, right, end, (event, t) => {

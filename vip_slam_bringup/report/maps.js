@@ -87,7 +87,8 @@ function topView(canvas, data) {
     const fit = 0.88 * Math.min(width / Math.max(high[0] - low[0], 0.5), height / Math.max(high[1] - low[1], 0.5));
     if (!view.touched) Object.assign(view, {scale: fit, x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2});
     const project = p => [width / 2 + (p[0] - view.x) * view.scale, height / 2 - (p[1] - view.y) * view.scale];
-    const step = ticks(0, 90 / view.scale, 1)[1] || 1;
+    const wanted = 90 / view.scale, power = Math.pow(10, Math.floor(Math.log10(wanted)));
+    const step = power * [5, 2, 1].find(m => m * power <= wanted);
     g.strokeStyle = css('grid');
     g.lineWidth = 1;
     for (let x = Math.ceil((view.x - width / 2 / view.scale) / step) * step; x < view.x + width / 2 / view.scale; x += step) {
@@ -136,11 +137,39 @@ function topView(canvas, data) {
               factor => { view.touched = true; view.scale *= factor; request(); });
 }
 
+// All points that the views show, and the heading of their longest horizontal extent.
+function shownPoints(data) {
+  const points = data.trajectory ? data.trajectory.p.slice() : [];
+  for (const plane of data.planes) for (const polygon of plane.polygons) points.push(...polygon.outer);
+  return points;
+}
+function longAxis(points) {
+  let x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (const p of points) { x += p[0] / points.length; y += p[1] / points.length; }
+  for (const p of points) { xx += (p[0] - x) ** 2; xy += (p[0] - x) * (p[1] - y); yy += (p[1] - y) ** 2; }
+  return 0.5 * Math.atan2(2 * xy, xx - yy);
+}
+
 function spaceView(canvas, data) {
-  const {low, high} = extent(data);
+  const {low, high} = extent(data), points = shownPoints(data);
   const size = Math.max(high[0] - low[0], high[1] - low[1], high[2] - low[2], 1);
-  const view = {yaw: -0.9, pitch: 0.75, distance: 1.75 * size, target: low.map((v, k) => (v + high[k]) / 2)};
+  // Across the longest extent, a little from the side and from above; as near as everything fits.
+  const view = {yaw: (points.length ? longAxis(points) : 0) - Math.PI / 2 + 0.35, pitch: 0.8, distance: 1.75 * size,
+                target: low.map((v, k) => (v + high[k]) / 2), touched: false};
+  const fit = (width, height) => {
+    const cy = Math.cos(view.yaw), sy = Math.sin(view.yaw), cp = Math.cos(view.pitch), sp = Math.sin(view.pitch);
+    const focal = 1.15 * Math.min(width, height);
+    let distance = 0.3 * size;
+    for (const p of points) {
+      const d = p.map((v, k) => v - view.target[k]);
+      const toward = d[0] * cy * cp + d[1] * sy * cp + d[2] * sp;
+      const u = Math.abs(-d[0] * sy + d[1] * cy), v = Math.abs(-d[0] * cy * sp - d[1] * sy * sp + d[2] * cp);
+      distance = Math.max(distance, toward + focal * Math.max(u / (0.47 * width), v / (0.46 * height)));
+    }
+    view.distance = distance;
+  };
   const request = setUpCanvas(canvas, (g, width, height) => {
+    if (!view.touched && points.length) fit(width, height);
     const cy = Math.cos(view.yaw), sy = Math.sin(view.yaw), cp = Math.cos(view.pitch), sp = Math.sin(view.pitch);
     const right = [-sy, cy, 0], up = [-cy * sp, -sy * sp, cp], back = [cy * cp, sy * cp, sp];
     const eye = view.target.map((v, k) => v + view.distance * back[k]);
@@ -183,6 +212,7 @@ function spaceView(canvas, data) {
     drawAxes(g, height, right, up);
   });
   dragAndZoom(canvas, (dx, dy, shift) => {
+    view.touched = true;
     if (shift) {
       const s = view.distance / 700, cy = Math.cos(view.yaw), sy = Math.sin(view.yaw);
       view.target[0] += s * (sy * dx - cy * dy);
@@ -192,7 +222,7 @@ function spaceView(canvas, data) {
       view.pitch = Math.min(1.55, Math.max(-0.3, view.pitch + dy * 0.006));
     }
     request();
-  }, factor => { view.distance /= factor; request(); });
+  }, factor => { view.touched = true; view.distance /= factor; request(); });
 }
 
 function drawAxes(g, height, right, up) {
