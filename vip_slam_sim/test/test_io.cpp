@@ -1,5 +1,6 @@
 // Bags and folders: what goes in comes out, nothing is left half done; folders of real images.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -20,10 +21,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A path in a directory of this run's own, which goes when the program ends.
 std::string scratch(const std::string& name) {
-  const std::string path = testing::TempDir() + "vip_slam_sim_" + name;
-  fs::remove_all(path);
-  return path;
+  struct Directory {
+    fs::path path = fs::path(testing::TempDir()) / ("vip_slam_sim_io_" + std::to_string(getpid()));
+    Directory() { fs::create_directories(path); }
+    ~Directory() {
+      std::error_code ignored;
+      fs::remove_all(path, ignored);
+    }
+  };
+  static const Directory directory;
+  return (directory.path / name).string();
 }
 
 void writeAll(SequenceRenderer& s, SequenceWriter& writer) {
