@@ -9,8 +9,15 @@ int SurfaceLabels::around(const Eigen::Vector2f& pixel) const {
   if (stride == 0) return -1;
   const int c = static_cast<int>(std::floor((pixel.x() - float(offset)) / float(stride)));
   const int r = static_cast<int>(std::floor((pixel.y() - float(offset)) / float(stride)));
-  const int k = at(c, r);
-  return k >= 0 && at(c + 1, r) == k && at(c, r + 1) == k && at(c + 1, r + 1) == k ? k : -1;
+  int shared = -1, count = 0;
+  for (int i = 0; i < 4; ++i) {
+    const int k = at(c + (i & 1), r + (i >> 1));
+    if (k < 0) continue;
+    if (shared >= 0 && k != shared) return -1;
+    shared = k;
+    ++count;
+  }
+  return count >= 2 ? shared : -1;
 }
 
 int SurfaceLabels::inner(int c, int r) const {

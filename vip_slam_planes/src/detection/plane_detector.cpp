@@ -174,7 +174,7 @@ class Detector {
     PlaneMoments moments;
     for (int i : surface) {
       result.area += triangles_[i].area;
-      moments.add(triangles_[i].centre - camera_, triangles_[i].area);
+      for (const Eigen::Vector3d& p : triangles_[i].corner) moments.add(p - camera_, triangles_[i].area / 3);
     }
     if (result.area < options_.min_area || surface.size() < 6) return false;
     double rms = 0;

@@ -62,17 +62,44 @@ void DepthMeshBuilder::collectVertices(const std::vector<Feature>& features, con
   }
   if (grid.empty()) return;
   const int step = gridStep(grid);
+  used_.assign(grid.z.size(), 0);
+  const auto add = [&](int c, int r, bool beside_feature) {
+    const std::size_t i = static_cast<std::size_t>(r) * grid.cols + c;
+    if (used_[i] || !(grid.z[i] > 0) || !(*grid_rays_)[i].allFinite()) return;
+    const Eigen::Vector2f pixel = grid.pixel(c, r).cast<float>(), &ray = (*grid_rays_)[i];
+    if (!beside_feature && bucket(pixel.x(), pixel.y())) return;
+    used_[i] = 1;
+    mesh_.vertices.push_back({pixel, Eigen::Vector3f(ray.x(), ray.y(), 1.0f) * grid.z[i], -1});
+  };
   for (int r = 0; r < grid.rows; r += step) {
     for (int c = 0; c < grid.cols; c += step) {
-      const float z = grid.at(c, r);
-      if (!(z > 0)) continue;
-      const Eigen::Vector2f pixel = grid.pixel(c, r).cast<float>();
-      if (bucket(pixel.x(), pixel.y())) continue;
-      const Eigen::Vector2f& ray = (*grid_rays_)[static_cast<std::size_t>(r) * grid.cols + c];
-      if (!ray.allFinite()) continue;
-      mesh_.vertices.push_back({pixel, Eigen::Vector3f(ray.x(), ray.y(), 1.0f) * z, -1});
+      add(c, r, false);
+      if (step < 2 || flatBlock(grid, c, r, step)) continue;
+      // Narrow strips of a surface beside an edge would fall between the coarse nodes.
+      for (int y = r; y <= std::min(r + step, grid.rows - 1); ++y) {
+        for (int x = c; x <= std::min(c + step, grid.cols - 1); ++x) add(x, y, true);
+      }
     }
   }
+}
+
+bool DepthMeshBuilder::flatBlock(const DepthGrid& grid, int c, int r, int step) const {
+  if (c + step >= grid.cols || r + step >= grid.rows) return false;
+  const float corner[4] = {grid.at(c, r), grid.at(c + step, r), grid.at(c, r + step), grid.at(c + step, r + step)};
+  for (float z : corner) {
+    if (!(z > 0)) return false;
+  }
+  // Inverse depth of a plane is linear in the image.
+  for (int y = 0; y <= step; ++y) {
+    for (int x = 0; x <= step; ++x) {
+      const float z = grid.at(c + x, r + y), a = float(x) / float(step), b = float(y) / float(step);
+      if (!(z > 0)) return false;
+      const float inverse = (1 - b) * ((1 - a) / corner[0] + a / corner[1]) + b * ((1 - a) / corner[2] + a / corner[3]);
+      const float tolerance = float(options_.gap_sigmas * noise_.sigma(z)) * kMedianGain + 0.005f;
+      if (std::abs(z - 1.0f / inverse) > tolerance) return false;
+    }
+  }
+  return true;
 }
 
 bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const {

@@ -1,8 +1,9 @@
 // The image's Delaunay mesh lifted to 3D by depth (paper section "Plane Detection"), in the camera's optical frame.
 //
 // The paper triangulates the features alone. White walls, the very planes that hold the drift down, have none; so nodes
-// of the image's grid of edge-safe depths fill in wherever no feature with depth is near. Triangles that cross a depth
-// edge, are long and thin, or are seen at a grazing angle are dropped.
+// of the image's grid of edge-safe depths fill in wherever no feature with depth is near: coarsely on flat blocks, every
+// node beside depth edges. Triangles that cross a depth edge, are long and thin, or are seen at a grazing angle are
+// dropped.
 #pragma once
 
 #include <array>
@@ -60,6 +61,7 @@ class DepthMeshBuilder {
  private:
   void collectVertices(const std::vector<Feature>& features, const DepthGrid& grid);
   bool lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step, MeshTriangle* triangle) const;
+  bool flatBlock(const DepthGrid& grid, int c, int r, int step) const;
   bool crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const;
   void smoothNormals();
   int gridStep(const DepthGrid& grid) const;
@@ -72,7 +74,7 @@ class DepthMeshBuilder {
   Delaunay delaunay_;
   DepthMesh mesh_;
   std::vector<Eigen::Vector2f> pixels_;
-  std::vector<char> taken_;
+  std::vector<char> taken_, used_;
   std::vector<int> number_;
   std::vector<Eigen::Vector3f> smoothed_;
 };
