@@ -36,7 +36,8 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
 FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string& keyframe_reason) {
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
   const bool is_keyframe = !keyframe_reason.empty();
-  if (options_.use_map_landmarks && have_map_ && is_keyframe) {
+  const bool few = static_cast<int>(tracker_.tracks().size()) < 2 * options_.recovery.min_tracks;
+  if (options_.use_map_landmarks && have_map_ && (is_keyframe || few)) {
     ScopedTimer timer(timing_, "frontend.reacquire", t);
     counters_.landmarks_reacquired += landmarks_.reacquire(&tracker_, orb_, T_map_odom_ * T_odom_C, T_odom_C);
   }

@@ -180,7 +180,8 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   }
   const SE3 T_now = filter_.nav().T_W_I * extrinsics();
   std::string reason;
-  if (phase_ == Phase::kTracking) {
+  // A keyframe of darkness would tie nothing to anything.
+  if (phase_ == Phase::kTracking && tracked.tracked >= options_.recovery.min_tracks) {
     const std::shared_ptr<TrackedFrame> frame = makeFrame(t, true);
     reason = selector_.decide(t, T_now, frame->features, camera_->focal(), still_);
   }

@@ -14,4 +14,19 @@ void NoiseMonitor::add(double chi2_per_dof, int dof) {
   sigma_ = std::clamp(sigma_ * std::exp(step), min_, std::max(min_, max_));
 }
 
+void ImuNoiseMonitor::add(int used, int gated) {
+  if (!adapt_ || used + gated < 5) return;
+  gated_ratio_ += 0.05 * (static_cast<double>(gated) / (used + gated) - gated_ratio_);
+  if (gated_ratio_ > 0.3) {
+    scale_ = std::min(10.0, scale_ * 1.05);
+  } else if (gated_ratio_ < 0.15) {
+    scale_ = std::max(1.0, scale_ / 1.02);
+  }
+}
+
+void ImuNoiseMonitor::reset() {
+  scale_ = 1.0;
+  gated_ratio_ = 0.05;
+}
+
 }  // namespace vip_slam

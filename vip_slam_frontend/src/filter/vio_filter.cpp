@@ -18,11 +18,13 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(options.gate_probability),
-      noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px) {}
+      noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px),
+      imu_monitor_(options.adapt_imu_noise) {}
 
 void VioFilter::stop() {
   started_ = false;
   tracks_.clear();
+  imu_monitor_.reset();
   still_images_ = 0;
 }
 
@@ -74,7 +76,8 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
 }
 
 Propagation VioFilter::predict(const std::vector<ImuSample>& samples, double noise_scale) const {
-  return propagate(filter_.window(), samples, imu_noise_, G_, noise_scale * options_.imu_noise_inflation);
+  const double scale = noise_scale * options_.imu_noise_inflation * imu_monitor_.scale();
+  return propagate(filter_.window(), samples, imu_noise_, G_, scale);
 }
 
 void VioFilter::forgetClone(CloneId id) {
@@ -203,6 +206,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full);
   if (!candidates.empty()) updateWithFeatures(candidates, calibrate, &report);
+  imu_monitor_.add(report.features_used, report.features_gated);
 
   // Used sightings may not be used again: lost tracks go, those at the window's end start anew with the next image.
   const int used = std::min<int>(report.features_tried, static_cast<int>(candidates.size()));

@@ -94,7 +94,7 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
   }
 }
 
-bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C) const {
+bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_px) const {
   if (!track->reference) return false;
   Eigen::Matrix2d A;
   const SE3 T_cur_ref = T_odom_C.inverse() * track->reference->T_odom_C;
@@ -105,7 +105,7 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C) const {
   const Eigen::Vector2d start = track->feature.pixel.cast<double>();
   const PatchAlignment aligned =
       alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, A, gray_, start);
-  if (!aligned.ok || (aligned.pixel - start).norm() > options_.reference_max_correction_px) return false;
+  if (!aligned.ok || (aligned.pixel - start).norm() > most_px) return false;
   track->feature.pixel = aligned.pixel.cast<float>();
   return true;
 }
@@ -136,7 +136,7 @@ void FeatureTracker::restartReferences(const SE3& T_odom_C) {
 void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
   std::shared_ptr<ReferenceImage> here;
   for (Track& track : tracks_) {
-    if (alignTrack(&track, T_odom_C)) continue;
+    if (alignTrack(&track, T_odom_C, options_.reference_max_correction_px)) continue;
     // The view changed too much for the old patch: the present one becomes the reference.
     if (!here) {
       here = std::make_shared<ReferenceImage>();

@@ -13,6 +13,8 @@ namespace {
 constexpr int kPatchRadius = 20;
 constexpr std::size_t kMostPatches = 8000;
 constexpr int kMostPerImage = 60;
+// A corner detected anew may lie this far from where the old track saw it, px.
+constexpr double kCornerOffset = 3.0;
 
 }  // namespace
 
@@ -88,12 +90,28 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   });
   if (static_cast<int>(visible.size()) > 2 * kMostPerImage) visible.resize(2 * kMostPerImage);
 
-  // Corners around every projection, described in one go.
+  // Where each may be: its patch aligned from the projection, and the corners around; described in one go.
   std::vector<Feature> corners;
   std::vector<std::size_t> owner;
+  std::vector<char> aligned;
+  const auto withPatch = [&](std::size_t i, Track* track) {
+    const auto patch = patches_.find(visible[i].id);
+    if (patch == patches_.end()) return false;
+    track->reference = patch->second.reference;
+    track->reference_pixel = patch->second.pixel;
+    track->reference_depth = patch->second.depth;
+    return true;
+  };
   const int radius = static_cast<int>(options_.landmark_radius_px);
   std::vector<cv::KeyPoint> keypoints;
   for (std::size_t i = 0; i < visible.size(); ++i) {
+    Track direct;
+    direct.feature.pixel = visible[i].uv.cast<float>();
+    if (withPatch(i, &direct) && tracker->alignTrack(&direct, T_odom_C, 0.5 * options_.landmark_radius_px)) {
+      corners.push_back(direct.feature);
+      owner.push_back(i);
+      aligned.push_back(1);
+    }
     const int x = static_cast<int>(visible[i].uv.x()), y = static_cast<int>(visible[i].uv.y());
     const cv::Rect roi(x - radius - 3, y - radius - 3, 2 * radius + 7, 2 * radius + 7);
     cv::FAST(gray(roi & cv::Rect(0, 0, gray.cols, gray.rows)), keypoints, options_.fast_threshold_low, true);
@@ -102,6 +120,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
       f.pixel = Eigen::Vector2f(k.pt.x + std::max(0, roi.x), k.pt.y + std::max(0, roi.y));
       corners.push_back(f);
       owner.push_back(i);
+      aligned.push_back(0);
     }
   }
   orb.describe(gray, &corners);
@@ -120,14 +139,8 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     Track track;
     track.feature = corners[best[i]];
     track.feature.id = visible[i].id;
+    if (withPatch(i, &track) && !aligned[best[i]] && !tracker->alignTrack(&track, T_odom_C, kCornerOffset)) continue;
     if (!free(track.feature.pixel.cast<double>(), options_.min_distance)) continue;
-    const auto patch = patches_.find(visible[i].id);
-    if (patch != patches_.end()) {
-      track.reference = patch->second.reference;
-      track.reference_pixel = patch->second.pixel;
-      track.reference_depth = patch->second.depth;
-      if (!tracker->alignTrack(&track, T_odom_C)) continue;
-    }
     tracker->measure(&track.feature);
     // Another surface in front of it is not the landmark.
     if (track.feature.depth > 0 && std::abs(track.feature.depth - visible[i].z) > 0.05 * visible[i].z + 0.05) continue;

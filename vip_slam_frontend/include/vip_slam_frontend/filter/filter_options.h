@@ -61,14 +61,15 @@ struct FilterOptions {
   int window = 11;
   double sigma_px = 0.5;
   bool adapt_sigma_px = true;
-  double sigma_px_min = 0.2;
+  double sigma_px_min = 0.15;
   double sigma_px_max = 2.0;
   double gate_probability = 0.95;
   double huber = 1.5;
   int max_update_features = 30;
   bool use_depth = true;
-  double depth_inflation = 1.0;
+  double depth_inflation = 0.7;
   double imu_noise_inflation = 1.0;
+  bool adapt_imu_noise = true;
   double sigma_bias_gyro = 0.02;
   double sigma_bias_accel = 0.1;
   CalibrationOptions calibration;
@@ -84,8 +85,9 @@ struct FilterOptions {
     v.field("huber", huber, 0.5, 100.0, "Huber threshold on whitened residuals, sigmas");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");
     v.field("use_depth", use_depth, "use depth measurements");
-    v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise model");
+    v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise; below 1: medians of many pixels");
     v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
+    v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the gate turns away too many features");
     v.field("sigma_bias_gyro", sigma_bias_gyro, 1e-5, 1.0, "initial one-sigma of the gyro bias, rad/s");
     v.field("sigma_bias_accel", sigma_bias_accel, 1e-4, 5.0, "initial one-sigma of the accelerometer bias, m/s^2");
     v.group("calibration", calibration);

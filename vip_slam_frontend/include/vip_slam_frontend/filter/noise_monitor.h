@@ -16,4 +16,18 @@ class NoiseMonitor {
   bool adapt_;
 };
 
+/// Widens the IMU's noise when the gate turns away far more features than its probability explains: then the prediction
+/// is surer of itself than it should be (noise figures from a data sheet, vibration). Narrows again when all is well.
+class ImuNoiseMonitor {
+ public:
+  explicit ImuNoiseMonitor(bool adapt) : adapt_(adapt) {}
+  void add(int used, int gated);
+  double scale() const { return scale_; }
+  void reset();
+
+ private:
+  bool adapt_;
+  double scale_ = 1.0, gated_ratio_ = 0.05;
+};
+
 }  // namespace vip_slam

@@ -81,6 +81,7 @@ class VioFilter {
   Eigen::Vector3d G_;
   Gate gate_;
   NoiseMonitor noise_;
+  ImuNoiseMonitor imu_monitor_;
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;

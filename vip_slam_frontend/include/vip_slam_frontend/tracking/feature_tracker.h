@@ -51,8 +51,9 @@ class FeatureTracker {
   /// Adds corners where features are missing; pose of the newest image as now known. `force`: also when few are
   /// missing. Returns the indices of the new tracks.
   std::vector<std::size_t> replenish(const SE3& T_odom_C, bool force, double t);
-  /// Moves the track's pixel to where its reference patch lies in the newest image; false when it does not fit.
-  bool alignTrack(Track* track, const SE3& T_odom_C) const;
+  /// Moves the track's pixel by at most `most_px` to where its reference patch lies in the newest image; false when it
+  /// does not fit there.
+  bool alignTrack(Track* track, const SE3& T_odom_C, double most_px) const;
   /// Adds a track found by others in the newest image (which becomes its reference when it has none).
   void addTrack(Track track, const SE3& T_odom_C);
   /// The newest image becomes the reference of all tracks.
