@@ -142,6 +142,7 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
     writePlanesYaml(folder + "/planes.yaml", planes);
     writePlanesPly(folder + "/planes.ply", planes);
     writeFloorPlan(folder + "/floorplan.svg", planes, trajectory);
+    mapping->backEnd().saveMap(folder + "/map.vsm");
   }
   timing.writeCsv(folder + "/timing.csv");
   AtomicFile file(folder + "/summary.yaml");
