@@ -35,8 +35,8 @@ struct Step {
 };
 
 // Angular rate and specific force are taken as linear between the samples. With the mid sample held constant the
-// integrals of Exp(w t) a are closed; what remains of the linear change are the coning term dt^2/12 w0 x w1, the
-// sculling term dt^2/12 w x (a1 - a0), and -dt^2/12 (a1 - a0) in position.
+// integrals of Exp(w t) a are closed; what remains of the linear change (da, dw) are the coning term dt^2/12 w0 x w1 in
+// rotation, dt^2/12 (w x da - dw x a) in velocity, and -dt^2/12 da - dt^3/24 dw x a in position.
 Step integrateStep(const ImuSample& first, const ImuSample& second, const Eigen::Vector3d& bias_gyro,
                    const Eigen::Vector3d& bias_accel) {
   Step step;
@@ -45,17 +45,17 @@ Step integrateStep(const ImuSample& first, const ImuSample& second, const Eigen:
   const Eigen::Vector3d w0 = first.gyro - bias_gyro, w1 = second.gyro - bias_gyro;
   const Eigen::Vector3d w = 0.5 * (w0 + w1);
   const Eigen::Vector3d a = 0.5 * (first.accel + second.accel) - bias_accel;
-  const Eigen::Vector3d da = second.accel - first.accel;
+  const Eigen::Vector3d da = second.accel - first.accel, dw = second.gyro - first.gyro;
 
   step.phi = w * dt + c * w0.cross(w1);
-  step.phi_bg = -dt * Eigen::Matrix3d::Identity() + c * hat(second.gyro - first.gyro);
+  step.phi_bg = -dt * Eigen::Matrix3d::Identity() + c * hat(dw);
 
   const Eigen::Matrix3d single = leftJacobianSO3(step.phi);
   const Eigen::Matrix3d twice = doubleIntegralOfExp(step.phi);
-  step.velocity = dt * (single * a) + c * w.cross(da);
-  step.position = dt * dt * (twice * a) - c * da;
-  step.velocity_ba = -dt * single;
-  step.position_ba = -dt * dt * twice;
+  step.velocity = dt * (single * a) + c * (w.cross(da) - dw.cross(a));
+  step.position = dt * dt * (twice * a) - c * da - 0.5 * dt * c * dw.cross(a);
+  step.velocity_ba = -dt * single + c * hat(dw);
+  step.position_ba = -dt * dt * twice + 0.5 * dt * c * hat(dw);
 
   // Derivatives of single * a and twice * a by phi, to second order in the (small) angle of one step.
   const Eigen::Matrix3d A = hat(a);

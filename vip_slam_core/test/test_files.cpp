@@ -1,0 +1,268 @@
+// TUM trajectories, plane maps and sensor files: round trips, and errors that name file, line or key.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <sstream>
+
+#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/testing/analytic_motion.h"
+#include "vip_slam_core/trajectory/tum_io.h"
+#include "vip_slam_core/types/planes_yaml.h"
+
+namespace vip_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+class FileFormats : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              (std::string("formats_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string text(const std::string& name) const {
+    std::ostringstream out;
+    out << std::ifstream(path(name)).rdbuf();
+    return out.str();
+  }
+  void write(const std::string& name, const std::string& content) const { std::ofstream(path(name)) << content; }
+  // The message must name the file and contain `what`, in one line.
+  void expectRefused(const std::function<void()>& action, const std::string& file, const std::string& what) {
+    try {
+      action();
+      ADD_FAILURE() << "accepted, expected: " << what;
+    } catch (const std::runtime_error& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find(file), std::string::npos) << message;
+      EXPECT_NE(message.find(what), std::string::npos) << message;
+      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+    }
+  }
+  fs::path folder_;
+};
+
+TEST_F(FileFormats, TumRoundTrip) {
+  const testing::AnalyticMotion motion(1);
+  Trajectory trajectory;
+  for (int k = 0; k < 100; ++k) trajectory.push_back({1403715273.25 + 0.05 * k, motion.stateAt(0.05 * k).T_W_I});
+  writeTum(path("t.tum"), trajectory);
+  const Trajectory back = readTum(path("t.tum"));
+  ASSERT_EQ(back.size(), trajectory.size());
+  for (std::size_t k = 0; k < back.size(); ++k) {
+    EXPECT_NEAR(back[k].t, trajectory[k].t, 5e-7);
+    EXPECT_LT(back[k].T_W_B.boxminus(trajectory[k].T_W_B).norm(), 1e-8);
+  }
+  write("spaces.tum", "# head\n\n  1 1 2 3\t0 0 0 1 \r\n# middle\n2.5 1 2 3 0 0 0 -1\n");
+  EXPECT_EQ(readTum(path("spaces.tum")).size(), 2u);
+}
+
+TEST_F(FileFormats, TumErrorsNameTheLine) {
+  const auto refused = [&](const std::string& content, const std::string& what) {
+    write("bad.tum", content);
+    expectRefused([&] { readTum(path("bad.tum")); }, "bad.tum", what);
+  };
+  expectRefused([&] { readTum(path("missing.tum")); }, "missing.tum", "cannot be opened");
+  refused("# c\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0\n", ":3: 7 values, expected 8");
+  refused("1 0 0 0 0 0 0 1 5\n", ":1: 9 values");
+  refused("1 0 zero 0 0 0 0 1\n", ":1: 'zero' is not a number");
+  refused("1 0 nan 0 0 0 0 1\n", "expected a finite number");
+  refused("1 0 0 0 0 0 0 0\n", "unit quaternion");
+  refused("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", ":2: timestamp 1 does not follow 1");
+  refused("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "ascending");
+}
+
+TEST_F(FileFormats, PoseAtInterpolatesButNotAcrossGaps) {
+  const SE3 a(Eigen::Quaterniond::Identity(), {0, 0, 0}), b(expQuaternion({0, 0, 1}), {1, 0, 0});
+  const Trajectory trajectory = {{1.0, a}, {1.1, b}, {3.0, a}};
+  SE3 T;
+  ASSERT_TRUE(poseAt(trajectory, 1.05, &T, 0.11));
+  EXPECT_NEAR(T.t().x(), 0.5, 1e-9);
+  EXPECT_NEAR(yawOf(T.rotation()), 0.5, 1e-9);
+  EXPECT_TRUE(poseAt(trajectory, 1.0, &T));
+  EXPECT_TRUE(poseAt(trajectory, 3.0, &T));
+  EXPECT_FALSE(poseAt(trajectory, 2.0, &T));
+  EXPECT_FALSE(poseAt(trajectory, 0.9, &T));
+  EXPECT_FALSE(poseAt(trajectory, 3.1, &T));
+  EXPECT_FALSE(poseAt({}, 1, &T));
+}
+
+PlaneEstimate floorPlane() {
+  PlaneEstimate plane;
+  plane.id = 12;
+  plane.kind = PlaneKind::kHorizontal;
+  plane.plane = Plane(Eigen::Vector3d(0.01, 0, 1), 0.1);
+  plane.area = 3.25;
+  plane.keyframes = 9;
+  PlanePolygon polygon;
+  polygon.outer = {{0, 0, -0.1}, {2, 0, -0.12}, {2, 2, -0.12}, {0, 2, -0.1}};
+  polygon.holes.push_back({{0.5, 0.5, -0.1}, {1, 0.5, -0.11}, {1, 1, -0.11}});
+  plane.polygons = {polygon, {{{5, 5, 0}, {6, 5, 0}, {6, 6, 0}}, {}}};
+  return plane;
+}
+
+TEST_F(FileFormats, PlanesRoundTrip) {
+  PlaneEstimate truth = floorPlane();
+  truth.id = 13;
+  truth.kind = PlaneKind::kGeneral;
+  truth.seen_seconds = 4.5;
+  truth.seen_area = 2.5;
+  writePlanesYaml(path("p.yaml"), {floorPlane(), truth});
+  const auto back = readPlanesYaml(path("p.yaml"));
+  ASSERT_EQ(back.size(), 2u);
+  EXPECT_EQ(back[0].id, 12u);
+  EXPECT_EQ(back[0].kind, PlaneKind::kHorizontal);
+  EXPECT_LT((back[0].plane.coefficients() - floorPlane().plane.coefficients()).norm(), 1e-12);
+  EXPECT_EQ(back[0].keyframes, 9u);
+  EXPECT_EQ(back[0].area, 3.25);
+  ASSERT_EQ(back[0].polygons.size(), 2u);
+  ASSERT_EQ(back[0].polygons[0].holes.size(), 1u);
+  EXPECT_EQ(back[0].polygons[0].outer, floorPlane().polygons[0].outer);
+  EXPECT_EQ(back[0].polygons[0].holes[0], floorPlane().polygons[0].holes[0]);
+  EXPECT_LT(back[0].seen_seconds, 0);
+  EXPECT_EQ(back[1].seen_seconds, 4.5);
+  EXPECT_EQ(back[1].seen_area, 2.5);
+  EXPECT_EQ(back[1].kind, PlaneKind::kGeneral);
+  writePlanesYaml(path("none.yaml"), {});
+  EXPECT_TRUE(readPlanesYaml(path("none.yaml")).empty());
+}
+
+TEST_F(FileFormats, PlaneErrorsNamePlaneAndKey) {
+  writePlanesYaml(path("good.yaml"), {floorPlane()});
+  const std::string good = text("good.yaml");
+  const auto changed = [&](const std::string& from, const std::string& to, const std::string& what) {
+    std::string content = good;
+    const auto at = content.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write("bad.yaml", content.replace(at, from.size(), to));
+    expectRefused([&] { readPlanesYaml(path("bad.yaml")); }, "bad.yaml", what);
+  };
+  changed("kind: horizontal", "kind: flat", "kind");
+  changed("distance:", "distanz:", "distanz");
+  changed("    area: 3.25\n", "", "area");
+  changed("area: 3.25", "area: large", "area");
+  changed("[2, 0, -0.12]", "[2, 0]", "outer");
+  changed("[2, 0, -0.12]", "[2, 0, .nan]", "outer");
+  changed("normal: [", "normal: [0, ", "normal");
+  changed("planes:", "flats:", "planes");
+  changed("planes:", "planes: [", "line");
+  expectRefused([&] { readPlanesYaml(path("missing.yaml")); }, "missing.yaml", "cannot be read");
+}
+
+SensorConfig sensor() {
+  SensorConfig c;
+  c.name = "test rig";
+  c.topics.color = "/c";
+  c.topics.color_info = "/ci";
+  c.topics.depth = "/d";
+  c.topics.depth_info = "/di";
+  c.topics.gyro = "/g";
+  c.topics.accel = "/a";
+  c.color_encoding = "bgr8";
+  c.depth_encoding = "32FC1";
+  c.depth_scale = 0.0002;
+  c.depth_registered = false;
+  c.color_rate = 25, c.depth_rate = 15, c.imu_rate = 250;
+  c.intrinsics_from_camera_info = false;
+  c.camera.width = 640, c.camera.height = 480;
+  c.camera.fx = 610.25, c.camera.fy = 611.5, c.camera.cx = 320.1, c.camera.cy = 239.9;
+  c.camera.model = DistortionModel::kRadTan;
+  c.camera.distortion = {0.1, -0.2, 0.001, -0.002, 0.05};
+  c.depth_camera = c.camera;
+  c.depth_camera.model = DistortionModel::kNone;
+  c.depth_camera.distortion.clear();
+  c.T_color_depth = SE3(expQuaternion({0.01, 0.02, -0.01}), {0.015, 0, 0.001});
+  c.T_imu_cam = SE3(expQuaternion({-1.2, 1.2, -1.2}), {0.03, 0.02, -0.01});
+  c.T_base_imu = SE3(expQuaternion({0, 0, 0.5}), {0.1, 0.2, 0.3});
+  c.imu_noise = {1.7e-4, 2e-5, 2e-3, 3e-3};
+  c.depth_noise = DepthNoise::preset(DepthSensorType::kStereo);
+  c.depth_noise.c = 0.0031;
+  c.time_offset = -0.0123;
+  c.gravity = 9.807;
+  return c;
+}
+
+TEST_F(FileFormats, SensorRoundTrip) {
+  saveSensorConfig(path("s.yaml"), sensor());
+  const SensorConfig a = sensor(), b = loadSensorConfig(path("s.yaml"));
+  EXPECT_EQ(b.name, a.name);
+  EXPECT_EQ(b.topics.color, "/c");
+  EXPECT_EQ(b.topics.depth_info, "/di");
+  EXPECT_EQ(b.topics.imu, "");
+  EXPECT_EQ(b.topics.accel, "/a");
+  EXPECT_EQ(b.color_encoding, a.color_encoding);
+  EXPECT_EQ(b.depth_encoding, a.depth_encoding);
+  EXPECT_EQ(b.depth_scale, a.depth_scale);
+  EXPECT_FALSE(b.depth_registered);
+  EXPECT_EQ(b.color_rate, 25);
+  EXPECT_EQ(b.depth_rate, 15);
+  EXPECT_EQ(b.imu_rate, 250);
+  EXPECT_FALSE(b.intrinsics_from_camera_info);
+  EXPECT_EQ(b.camera.fx, a.camera.fx);
+  EXPECT_EQ(b.camera.distortion, a.camera.distortion);
+  EXPECT_EQ(b.camera.model, a.camera.model);
+  EXPECT_EQ(b.depth_camera.model, DistortionModel::kNone);
+  EXPECT_LT(b.T_color_depth.boxminus(a.T_color_depth).norm(), 1e-12);
+  EXPECT_LT(b.T_imu_cam.boxminus(a.T_imu_cam).norm(), 1e-12);
+  EXPECT_LT(b.T_base_imu.boxminus(a.T_base_imu).norm(), 1e-12);
+  EXPECT_EQ(b.imu_noise.gyro_random_walk, a.imu_noise.gyro_random_walk);
+  EXPECT_EQ(b.imu_noise.accel_noise_density, a.imu_noise.accel_noise_density);
+  EXPECT_EQ(b.depth_noise.type, DepthSensorType::kStereo);
+  EXPECT_EQ(b.depth_noise.c, 0.0031);
+  EXPECT_EQ(b.depth_noise.bias_floor, a.depth_noise.bias_floor);
+  EXPECT_EQ(b.time_offset, a.time_offset);
+  EXPECT_EQ(b.gravity, a.gravity);
+
+  SensorConfig plain = sensor();
+  plain.depth_registered = true;
+  plain.intrinsics_from_camera_info = true;
+  plain.camera = CameraIntrinsics();
+  plain.topics.imu = "/imu";
+  plain.topics.gyro = plain.topics.accel = "";
+  saveSensorConfig(path("s2.yaml"), plain);
+  const SensorConfig back = loadSensorConfig(path("s2.yaml"));
+  EXPECT_TRUE(back.depth_registered);
+  EXPECT_TRUE(back.intrinsics_from_camera_info);
+  EXPECT_EQ(back.topics.imu, "/imu");
+}
+
+TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
+  saveSensorConfig(path("good.yaml"), sensor());
+  const std::string good = text("good.yaml");
+  const auto changed = [&](const std::string& from, const std::string& to, const std::string& what) {
+    std::string content = good;
+    const auto at = content.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write("bad.yaml", content.replace(at, from.size(), to));
+    expectRefused([&] { loadSensorConfig(path("bad.yaml")); }, "bad.yaml", what);
+  };
+  expectRefused([&] { loadSensorConfig(path("missing.yaml")); }, "missing.yaml", "cannot be read");
+  changed("name:", "nom:", "name: missing");
+  changed("time_offset:", "time_ofset:", "time_ofset: unknown key");
+  changed("  rate: 250", "  rate: fast", "imu/rate");
+  changed("gyro_noise_density: 0.00017", "gyro_noise_density: -1", "imu");
+  changed("accel_random_walk: 0.003", "accel_random_walk: .nan", "imu");
+  changed("fx: 610.25", "fx: 0", "fx");
+  changed("fx: 610.25", "fx: .nan", "fx");
+  changed("model: radtan", "model: barrel", "barrel");
+  changed("distortion: [0.1, -0.2, 0.001, -0.002, 0.05]", "distortion: [0.1, -0.2]", "distortion");
+  changed("model: stereo", "model: sonar", "sonar");
+  changed("min_range: 0.3", "min_range: 30", "depth_noise");
+  changed("gravity: 9.807", "gravity: 1.6", "gravity");
+  changed("scale: 0.0002", "scale: 0", "depth/scale");
+  changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth");
+  changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam");
+  changed("gyro: \"/g\"", "gyro: \"\"", "topics/imu");
+  changed("encoding: bgr8", "encoding: rgb9", "color/encoding");
+  changed("encoding: 32FC1", "encoding: 8UC1", "depth/encoding");
+  changed("time_offset: -0.0123", "time_offset: .inf", "time_offset");
+  changed("  rate: 25\n", "  rate: 0\n", "color/rate");
+}
+
+}  // namespace
+}  // namespace vip_slam
