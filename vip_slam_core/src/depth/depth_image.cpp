@@ -58,18 +58,64 @@ void fitSlope(const Window& w, float mean, float* slope_x, float* slope_y) {
   *slope_y = (sxx * syz - sxy * sxz) / determinant;
 }
 
+bool isEdge(float low, float high, const DepthNoise& noise, const DepthLookupOptions& options) {
+  const float middle = 0.5f * (low + high);
+  return high - low > options.edge_ratio * middle + options.edge_sigmas * noise.sigma(middle);
+}
+
+// The common case, a full 5x5 window of valid pixels: the sums of the slope fit are constants and nothing branches per
+// pixel. False when some pixel is invalid; the general way then decides.
+bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, const DepthNoise& noise,
+                   const DepthLookupOptions& options, float* result) {
+  float z[25];
+  const float* at = depth.ptr<float>(cv - 2) + cu - 2;
+  const std::size_t step = depth.step1();
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 0; x < 5; ++x) z[5 * y + x] = at[y * step + x];
+  }
+  float low = z[0], high = z[0], sum = 0, slope_x = 0, slope_y = 0;
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 0; x < 5; ++x) {
+      const float value = z[5 * y + x];
+      low = value < low ? value : low;
+      high = value > high ? value : high;
+      sum += value;
+      slope_x += float(x - 2) * value;
+      slope_y += float(y - 2) * value;
+    }
+  }
+  // Comparisons pass over NaN, the sum does not.
+  if (!(sum == sum && low >= float(noise.min_range) && high <= float(noise.max_range))) return false;
+  if (isEdge(low, high, noise, options)) {
+    *result = 0.0f;
+    return true;
+  }
+  slope_x /= 50.0f;  // sum of x^2 over the window
+  slope_y /= 50.0f;
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 0; x < 5; ++x) z[5 * y + x] += slope_x * (du - float(x - 2)) + slope_y * (dv - float(y - 2));
+  }
+  std::nth_element(z, z + 12, z + 25);
+  *result = z[12];
+  return true;
+}
+
 float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options) {
-  const int cu = static_cast<int>(std::lround(u)), cv = static_cast<int>(std::lround(v));
+  if (!(u > -1 && v > -1 && u < depth.cols && v < depth.rows)) return 0.0f;
+  const int cu = static_cast<int>(std::floor(u + 0.5)), cv = static_cast<int>(std::floor(v + 0.5));
   if (cu < 0 || cv < 0 || cu >= depth.cols || cv >= depth.rows) return 0.0f;
   const int radius = std::clamp(options.radius, 0, kLargestRadius);
+  if (radius == 2 && cu >= 2 && cv >= 2 && cu + 2 < depth.cols && cv + 2 < depth.rows) {
+    float result;
+    if (lookUpFull5x5(depth, cu, cv, float(u - cu), float(v - cv), noise, options, &result)) return result;
+  }
   Window w;
   gather(depth, cu, cv, radius, noise, &w);
   const int side = 2 * radius + 1;
   const int inside = (std::min(cu + radius, depth.cols - 1) - std::max(cu - radius, 0) + 1) *
                      (std::min(cv + radius, depth.rows - 1) - std::max(cv - radius, 0) + 1);
   if (w.count == 0 || w.count < options.min_valid_fraction * std::min(inside, side * side)) return 0.0f;
-  const float middle = 0.5f * (w.low + w.high);
-  if (w.high - w.low > options.edge_ratio * middle + options.edge_sigmas * noise.sigma(middle)) return 0.0f;
+  if (isEdge(w.low, w.high, noise, options)) return 0.0f;
 
   // The median of the values carried along the local slope to (u, v): robust, and unbiased on slanted surfaces.
   float mean = 0;
@@ -96,7 +142,6 @@ void requireFloatDepth(const cv::Mat& depth) {
 float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options) {
   if (depth.empty()) return 0.0f;
   requireFloatDepth(depth);
-  if (!std::isfinite(u) || !std::isfinite(v)) return 0.0f;
   return lookUp(depth, u, v, noise, options);
 }
 

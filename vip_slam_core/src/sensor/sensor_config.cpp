@@ -23,8 +23,26 @@ class Section {
   }
   std::string full(const std::string& key) const { return name_.empty() ? key : name_ + "/" + key; }
   YAML::Node need(const std::string& key) {
-    if (!has(key)) throw std::runtime_error(full(key) + ": missing");
+    if (!has(key)) throw std::runtime_error(full(key) + ": missing, expected a value");
     return node_[key];
+  }
+  /// A finite number within [min, max].
+  void number(const std::string& key, double& value, double min, double max, bool required = true) {
+    if (!required && !has(key)) return;
+    get(key, value);
+    if (!(value >= min && value <= max)) {
+      throw std::runtime_error(full(key) + ": is " + formatDouble(value) + ", expected " + formatDouble(min) + " to " +
+                               formatDouble(max));
+    }
+  }
+  void choice(const std::string& key, std::string& value, const std::vector<std::string>& choices) {
+    get(key, value);
+    std::string expected;
+    for (const std::string& name : choices) {
+      if (name == value) return;
+      expected += (expected.empty() ? "" : ", ") + name;
+    }
+    throw std::runtime_error(full(key) + ": is '" + value + "', expected one of " + expected);
   }
   Section section(const std::string& key) { return Section(need(key), full(key)); }
 
@@ -35,7 +53,8 @@ class Section {
     try {
       value = node.as<T>();
     } catch (const YAML::Exception&) {
-      throw std::runtime_error(full(key) + ": '" + (node.IsScalar() ? node.Scalar() : "…") + "' is not of the expected type");
+      throw std::runtime_error(full(key) + ": is '" + (node.IsScalar() ? node.Scalar() : "a list") + "', expected " +
+                               expectedType(value));
     }
   }
   void pose(const std::string& key, SE3& T, bool required = true) {
@@ -46,7 +65,10 @@ class Section {
     for (int r = 0; r < 4; ++r) {
       if (!node[r].IsSequence() || node[r].size() != 4)
         throw std::runtime_error(full(key) + ": row " + std::to_string(r + 1) + ": expected 4 numbers");
-      for (int c = 0; c < 4; ++c) M(r, c) = node[r][c].as<double>();
+      for (int c = 0; c < 4; ++c) {
+        if (!node[r][c].IsScalar() || !parseDouble(node[r][c].Scalar(), &M(r, c)))
+          throw std::runtime_error(full(key) + ": row " + std::to_string(r + 1) + ": expected 4 numbers");
+      }
     }
     const Eigen::Matrix3d R = M.topLeftCorner<3, 3>();
     const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0;
@@ -60,6 +82,12 @@ class Section {
   }
 
  private:
+  static const char* expectedType(bool) { return "true or false"; }
+  static const char* expectedType(int) { return "a whole number"; }
+  static const char* expectedType(double) { return "a number"; }
+  static const char* expectedType(const std::string&) { return "a text"; }
+  static const char* expectedType(const std::vector<double>&) { return "a list of numbers"; }
+
   YAML::Node node_;
   std::string name_;
   std::set<std::string> known_;
@@ -119,16 +147,16 @@ SensorConfig configFrom(const YAML::Node& node) {
     throw std::runtime_error("topics/imu: expected one united topic, or both gyro and accel");
 
   Section color = root.section("color");
-  color.get("encoding", config.color_encoding);
-  color.get("rate", config.color_rate);
+  color.choice("encoding", config.color_encoding,
+               {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
+  color.number("rate", config.color_rate, 0.1, 1000);
   color.finish();
   Section depth = root.section("depth");
-  depth.get("encoding", config.depth_encoding);
-  depth.get("scale", config.depth_scale);
-  depth.get("rate", config.depth_rate);
+  depth.choice("encoding", config.depth_encoding, {"16UC1", "32FC1", "compressed"});
+  depth.number("scale", config.depth_scale, 1e-6, 1.0);
+  depth.number("rate", config.depth_rate, 0.1, 1000);
   depth.get("registered", config.depth_registered);
   depth.finish();
-  if (!(config.depth_scale > 0)) throw std::runtime_error("depth/scale: must be > 0, is " + formatDouble(config.depth_scale));
 
   root.get("intrinsics_from_camera_info", config.intrinsics_from_camera_info);
   if (root.has("camera")) config.camera = cameraFrom(root.section("camera"));
@@ -137,23 +165,20 @@ SensorConfig configFrom(const YAML::Node& node) {
   if (!config.intrinsics_from_camera_info) {
     const std::string wrong = config.camera.validate();
     if (!wrong.empty()) throw std::runtime_error("camera: " + wrong);
+    const std::string depth_wrong = config.depth_registered ? "" : config.depth_camera.validate();
+    if (!depth_wrong.empty()) throw std::runtime_error("depth_camera: " + depth_wrong);
   }
   root.pose("T_imu_cam", config.T_imu_cam);
   root.pose("T_base_imu", config.T_base_imu, false);
 
   Section imu = root.section("imu");
-  imu.get("rate", config.imu_rate);
-  imu.get("gyro_noise_density", config.imu_noise.gyro_noise_density);
-  imu.get("gyro_random_walk", config.imu_noise.gyro_random_walk);
-  imu.get("accel_noise_density", config.imu_noise.accel_noise_density);
-  imu.get("accel_random_walk", config.imu_noise.accel_random_walk);
-  imu.get("gravity", config.gravity, false);
+  imu.number("rate", config.imu_rate, 1, 10000);
+  imu.number("gyro_noise_density", config.imu_noise.gyro_noise_density, 1e-9, 10);
+  imu.number("gyro_random_walk", config.imu_noise.gyro_random_walk, 1e-9, 10);
+  imu.number("accel_noise_density", config.imu_noise.accel_noise_density, 1e-9, 10);
+  imu.number("accel_random_walk", config.imu_noise.accel_random_walk, 1e-9, 10);
+  imu.number("gravity", config.gravity, 9.0, 10.5, false);
   imu.finish();
-  for (double value : {config.imu_noise.gyro_noise_density, config.imu_noise.gyro_random_walk,
-                       config.imu_noise.accel_noise_density, config.imu_noise.accel_random_walk, config.imu_rate})
-    if (!(value > 0)) throw std::runtime_error("imu: rate and all noise figures must be > 0");
-  if (!(config.gravity > 9.0 && config.gravity < 10.5))
-    throw std::runtime_error("imu/gravity: expected 9.0 to 10.5 m/s^2, is " + formatDouble(config.gravity));
 
   Section noise = root.section("depth_noise");
   std::string type;
@@ -169,7 +194,7 @@ SensorConfig configFrom(const YAML::Node& node) {
   const std::string wrong = config.depth_noise.validate();
   if (!wrong.empty()) throw std::runtime_error("depth_noise: " + wrong);
 
-  root.get("time_offset", config.time_offset, false);
+  root.number("time_offset", config.time_offset, -1, 1, false);
   root.finish();
   return config;
 }

@@ -1,5 +1,7 @@
 #include "vip_slam_core/types/planes_yaml.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include <yaml-cpp/yaml.h>
@@ -27,14 +29,37 @@ PlaneKind kindFromName(const std::string& name) {
 }
 
 YAML::Node need(const YAML::Node& node, const char* key) {
-  if (!node[key]) throw std::runtime_error(std::string(key) + ": missing");
+  if (!node[key]) throw std::runtime_error(std::string(key) + ": missing, expected a value");
   return node[key];
+}
+
+void refuseUnknown(const YAML::Node& node, const std::vector<std::string>& known) {
+  if (!node.IsMap()) throw std::runtime_error("is no map, expected keys and values");
+  for (const auto& entry : node) {
+    const std::string key = entry.first.Scalar();
+    if (std::find(known.begin(), known.end(), key) == known.end()) throw std::runtime_error(key + ": unknown key");
+  }
+}
+
+template <class T>
+T valueOf(const YAML::Node& node, const char* key) {
+  const YAML::Node value = need(node, key);
+  try {
+    return value.as<T>();
+  } catch (const YAML::Exception&) {
+    throw std::runtime_error(std::string(key) + ": is '" + (value.IsScalar() ? value.Scalar() : "a list") +
+                             "', expected a number");
+  }
 }
 
 Eigen::Vector3d vectorFrom(const YAML::Node& node, const char* key) {
   if (!node.IsSequence() || node.size() != 3) throw std::runtime_error(std::string(key) + ": expected [x, y, z]");
-  const Eigen::Vector3d v(node[0].as<double>(), node[1].as<double>(), node[2].as<double>());
-  if (!v.allFinite()) throw std::runtime_error(std::string(key) + ": not finite");
+  Eigen::Vector3d v;
+  for (int k = 0; k < 3; ++k) {
+    if (!node[k].IsScalar() || !parseDouble(node[k].Scalar(), &v[k]) || !std::isfinite(v[k])) {
+      throw std::runtime_error(std::string(key) + ": expected three finite numbers");
+    }
+  }
   return v;
 }
 
@@ -56,18 +81,20 @@ std::string text(const Ring& ring) {
 }
 
 PlaneEstimate planeFrom(const YAML::Node& node) {
+  refuseUnknown(node, {"id", "kind", "normal", "distance", "area", "keyframes", "seen_seconds", "seen_area", "polygons"});
   PlaneEstimate plane;
-  plane.id = need(node, "id").as<PlaneId>();
+  plane.id = valueOf<PlaneId>(node, "id");
   plane.kind = kindFromName(need(node, "kind").as<std::string>());
   const Eigen::Vector3d n = vectorFrom(need(node, "normal"), "normal");
-  const double d = need(node, "distance").as<double>();
+  const double d = valueOf<double>(node, "distance");
   if (n.norm() < 1e-6) throw std::runtime_error("normal: zero length");
   plane.plane = Plane(n, d);
-  plane.area = need(node, "area").as<double>();
-  if (node["keyframes"]) plane.keyframes = node["keyframes"].as<std::uint32_t>();
-  if (node["seen_seconds"]) plane.seen_seconds = node["seen_seconds"].as<double>();
-  if (node["seen_area"]) plane.seen_area = node["seen_area"].as<double>();
+  plane.area = valueOf<double>(node, "area");
+  if (node["keyframes"]) plane.keyframes = valueOf<std::uint32_t>(node, "keyframes");
+  if (node["seen_seconds"]) plane.seen_seconds = valueOf<double>(node, "seen_seconds");
+  if (node["seen_area"]) plane.seen_area = valueOf<double>(node, "seen_area");
   for (const YAML::Node& piece : need(node, "polygons")) {
+    refuseUnknown(piece, {"outer", "holes"});
     PlanePolygon polygon;
     polygon.outer = ringFrom(need(piece, "outer"), "outer");
     if (piece["holes"])
