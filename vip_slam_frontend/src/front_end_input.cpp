@@ -1,4 +1,5 @@
 // Input side of the front end: IMU, checks of images, clock jumps, feedback from the back end.
+#include <algorithm>
 #include <cmath>
 
 #include "vip_slam_core/imu/preintegration.h"
@@ -103,6 +104,8 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, cv::Mat* depth) 
 
 void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
   landmarks_.apply(update);
+  // A loaded map brings keyframes of its own: new ones come after them.
+  next_keyframe_ = std::max(next_keyframe_, update.newest_keyframe + 1);
   if (update.epoch != epoch_) return;
   T_map_odom_ = update.T_map_odom;
   have_map_ = update.newest_keyframe != 0;

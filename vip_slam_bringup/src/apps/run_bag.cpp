@@ -22,7 +22,8 @@ namespace {
 volatile std::sig_atomic_t g_interrupted = 0;
 
 struct Arguments {
-  std::string bag, sensor, out, parameters, variant, loop;
+  std::string bag, sensor, out, parameters, variant, loop, map;
+  bool localise = false;
   bool report = true;
   std::vector<std::string> settings;
   double start = 0, duration = -1;
@@ -34,6 +35,8 @@ void addArguments(CLI::App& app, Arguments& arguments) {
   app.add_option("--out", arguments.out, "folder for the results; made when it does not exist")->required();
   app.add_option("--variant", arguments.variant, "vi, vi_p, vi_cp or vip (default)");
   app.add_option("--loop", arguments.loop, "loop closing: on (default) or off");
+  CLI::Option* map = app.add_option("--map", arguments.map, "stored map (map.vsm) to start in");
+  app.add_flag("--localise", arguments.localise, "leave the stored map as it is, only find the way in it")->needs(map);
   app.add_flag("!--no-report", arguments.report, "leave report.html out");
   app.add_option("--params", arguments.parameters, "YAML file with options, in groups");
   app.add_option("--set", arguments.settings, "one option as group/key=value; repeatable")->take_all();
@@ -91,6 +94,7 @@ int run(const Arguments& arguments) {
 
   vip_slam::TimingLog timing;
   vip_slam::Pipeline pipeline(options, sensor, &timing);
+  if (!arguments.map.empty()) pipeline.loadMap(arguments.map, arguments.localise);
   vip_slam::ProgressBar progress("run_bag");
   const auto begin = Clock::now();
   reader.start();

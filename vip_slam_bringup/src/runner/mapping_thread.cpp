@@ -31,6 +31,15 @@ MappingThread::~MappingThread() {
   if (thread_.joinable()) thread_.join();
 }
 
+MapUpdate MappingThread::loadMap(const std::string& path) {
+  const MapUpdate update = back_end_->loadMap(path);
+  if (planes_) {
+    planes_->restore(back_end_->snapshot().planes);
+    planes_->applyMapUpdate(update);
+  }
+  return update;
+}
+
 void MappingThread::grow(TrackedFramePtr frame) {
   if (!planes_) return;
   work_.push([this, frame = std::move(frame)] {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 
 namespace vip_slam {
 
@@ -11,6 +12,12 @@ Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, T
 }
 
 Pipeline::~Pipeline() = default;
+
+void Pipeline::loadMap(const std::string& path, bool localise) {
+  if (!mapping_) throw std::invalid_argument("a map was given, but mapping is switched off");
+  front_end_->applyMapUpdate(mapping_->loadMap(path));
+  if (localise) mapping_->localiseOnly();
+}
 
 void Pipeline::add(const SensorEvent& event) {
   double t = newest_;

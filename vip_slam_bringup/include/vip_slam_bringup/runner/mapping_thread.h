@@ -32,6 +32,11 @@ class MappingThread {
   MappingThread(const MappingThread&) = delete;
   MappingThread& operator=(const MappingThread&) = delete;
 
+  /// Before the first keyframe: starts in a stored map. Throws std::runtime_error naming the file when it is unusable.
+  MapUpdate loadMap(const std::string& path);
+  /// Only finds its way in the map from now on.
+  void localiseOnly() { back_end_->setLocalisationMode(true); }
+
   void grow(TrackedFramePtr frame);
   /// The map updates that follow from the keyframe, in order. An exception of the estimators comes out of get().
   std::future<std::vector<MapUpdate>> addKeyframe(KeyframePtr keyframe);

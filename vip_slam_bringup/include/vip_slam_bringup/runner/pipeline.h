@@ -33,6 +33,8 @@ class Pipeline {
   Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing);
   ~Pipeline();
 
+  /// Before the first event: starts in a stored map, and with `localise` leaves that map as it is.
+  void loadMap(const std::string& path, bool localise);
   void add(const SensorEvent& event);
   /// End of the data: processes what waits, and the last global adjustment.
   void finish();
