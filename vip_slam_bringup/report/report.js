@@ -96,7 +96,7 @@ function details(data) {
   for (const key of ['bag', 'sensor', 'variant', 'loop_closing', 'processing_time', 'images', 'tracked_images', 'epochs'])
     if (s[key] !== undefined) rows.push([key.replace(/_/g, ' '), s[key]]);
   for (const key of Object.keys(s.counters || {})) rows.push([key.replace(/_/g, ' '), s.counters[key]]);
-  (s.global_ba || []).forEach((g, i) => rows.push([`global bundle adjustment ${i + 1}`, `at ${number(g.t - data.t0, 1)} s: ${g.keyframes} keyframes, ${g.iterations} iterations, ${number(g.ms, 0)} ms`]));
+  (s.global_ba || []).forEach((g, i) => rows.push([`global bundle adjustment ${i + 1}`, `at ${number(g.t - data.t0, 1)} s: ${g.keyframes} keyframes${g.iterations === undefined ? '' : `, ${g.iterations} iterations`}, ${number(g.ms, 0)} ms`]));
   if (!rows.length) { el('details-card').hidden = true; return; }
   el('details').innerHTML = '<dl>' + rows.map(([k, v]) => `<dt>${escapeHtml(k)}</dt><dd>${escapeHtml(v)}</dd>`).join('') + '</dl>';
 }

@@ -2,6 +2,8 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
+
 #include <yaml-cpp/yaml.h>
 
 #include "vip_slam_bringup/runner/plane_files.h"
@@ -65,6 +67,9 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
     put("match", loop.match);
     put("accepted", loop.accepted);
     put("inliers", loop.inliers);
+    const auto match = std::find_if(map.keyframes.begin(), map.keyframes.end(),
+                                    [&loop](const SnapshotKeyframe& k) { return k.id == loop.match; });
+    if (match != map.keyframes.end()) put("t_match", match->t);  // else it was culled meanwhile
     put("reason", loop.reason);
     yaml << YAML::EndMap;
   }
