@@ -1,5 +1,7 @@
 #include "vip_slam_bringup/runner/run_output.h"
 
+#include <iomanip>
+
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -129,6 +131,17 @@ Trajectory anchored(const Pipeline& pipeline, const MapSnapshot& map) {
   return anchorTrajectory(pipeline.odometry(), anchors);
 }
 
+/// Map points with the plane they are tied to (0: none), for judging the associations.
+void writePoints(const std::string& path, const std::vector<LandmarkEstimate>& landmarks) {
+  AtomicFile file(path);
+  file.stream() << "id,x,y,z,plane\n" << std::fixed << std::setprecision(5);
+  for (const LandmarkEstimate& landmark : landmarks) {
+    file.stream() << landmark.id << ',' << landmark.p_W.x() << ',' << landmark.p_W.y() << ',' << landmark.p_W.z() << ','
+                  << landmark.plane << '\n';
+  }
+  file.commit();
+}
+
 }  // namespace
 
 void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader,
@@ -147,6 +160,7 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
     writePlanesYaml(folder + "/planes.yaml", planes);
     writePlanesPly(folder + "/planes.ply", planes);
     writeFloorPlan(folder + "/floorplan.svg", planes, trajectory);
+    writePoints(folder + "/points.csv", map.landmarks);
     mapping->backEnd().saveMap(folder + "/map.vsm");
   }
   timing.writeCsv(folder + "/timing.csv");
