@@ -1,0 +1,88 @@
+#!/usr/bin/python3
+"""The real rviz with our display, on a screen in memory: planes and the feature image are seen."""
+import os
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from geometry_msgs.msg import Point, TransformStamped
+from sensor_msgs.msg import Image
+from tf2_ros import StaticTransformBroadcaster
+from visualization_msgs.msg import Marker, MarkerArray
+
+WIDTH, HEIGHT = 1440, 900
+
+
+def plane():
+    marker = Marker(ns='planes', type=Marker.TRIANGLE_LIST, action=Marker.ADD)
+    marker.header.frame_id = 'map'
+    marker.pose.orientation.w = 1
+    marker.scale.x = marker.scale.y = marker.scale.z = 1
+    marker.color.r = marker.color.b = marker.color.a = 1
+    corners = [(-2, -2), (2, -2), (2, 2), (-2, -2), (2, 2), (-2, 2)]
+    marker.points = [Point(x, y, 0) for x, y in corners]
+    marker.colors = [marker.color] * 6
+    return MarkerArray([marker])
+
+
+def green_image():
+    image = Image(width=64, height=48, encoding='bgr8', step=192, data=bytes([0, 255, 0]) * (64 * 48))
+    image.header.frame_id = 'map'
+    return image
+
+
+class Screen:
+    def __init__(self):
+        read, write = os.pipe()
+        self.process = subprocess.Popen(['Xvfb', '-displayfd', str(write), '-screen', '0', '%dx%dx24' % (WIDTH, HEIGHT)],
+                                        pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as pipe:
+            self.display = ':' + pipe.readline().strip()
+
+    def pixels(self):
+        raw = subprocess.run(['import', '-window', 'root', '-depth', '8', 'rgb:-'], stdout=subprocess.PIPE, check=True,
+                             env=dict(os.environ, DISPLAY=self.display)).stdout
+        return np.frombuffer(raw, np.uint8).reshape(HEIGHT, WIDTH, 3).astype(int)
+
+    def count(self, color):
+        return int((np.abs(self.pixels() - color).max(axis=2) < 40).sum())
+
+
+class RvizTest(unittest.TestCase):
+    def test_planes_and_image_are_seen(self):
+        rospy.init_node('rviz_test')
+        transform = TransformStamped()
+        transform.header.frame_id, transform.child_frame_id = 'map', 'odom'
+        transform.transform.rotation.w = 1
+        broadcaster = StaticTransformBroadcaster()
+        broadcaster.sendTransform(transform)
+        planes = rospy.Publisher('/vip_slam/plane_markers', MarkerArray, queue_size=1, latch=True)
+        images = rospy.Publisher('/vip_slam/feature_image', Image, queue_size=1)
+        planes.publish(plane())
+        screen = Screen()
+        rviz = subprocess.Popen(['roslaunch', 'vip_slam_bringup', 'rviz.launch'], stdout=subprocess.DEVNULL,
+                                stderr=subprocess.DEVNULL,
+                                env=dict(os.environ, DISPLAY=screen.display, LIBGL_ALWAYS_SOFTWARE='1'))
+        try:
+            magenta = green = 0
+            end = time.time() + 90
+            while time.time() < end and (magenta < 5000 or green < 5000):
+                images.publish(green_image())
+                time.sleep(1)
+                magenta, green = screen.count((255, 0, 255)), screen.count((0, 255, 0))
+            self.assertGreater(magenta, 5000, 'pixels of the plane')
+            self.assertGreater(green, 5000, 'pixels of the feature image')
+        finally:
+            rviz.terminate()
+            rviz.wait(30)
+            screen.process.terminate()
+            screen.process.wait(10)
+
+
+if __name__ == '__main__':
+    rostest.rosrun('vip_slam_bringup', 'rviz_test', RvizTest, sys.argv)
