@@ -22,7 +22,7 @@ struct MeasurementOptions {
   double depth_sigma_scale = 1.0;
   double outlier_chi2 = 9.0;
   double plane_prior_deg = 0.5;
-  double homography_inflation = 1.4;
+  double homography_inflation = 1.0;
   int homography_min_pairs = 4;
 
   void visit(OptionVisitor& v) {
@@ -34,7 +34,7 @@ struct MeasurementOptions {
     v.field("outlier_chi2", outlier_chi2, 2.0, 100.0, "an observation above this squared error (sigmas) is removed");
     v.field("plane_prior_deg", plane_prior_deg, 0.01, 10.0, "one sigma of horizontal and vertical planes, degrees");
     v.field("homography_inflation", homography_inflation, 1.0, 5.0,
-            "factor on the pixel sigma of homography pairs, which share their host's noise");
+            "factor on the sigma of homography pairs, for noise that the pairs of one host share");
     v.field("homography_min_pairs", homography_min_pairs, 1, 50, "fewest pairs in a compressed homography");
   }
 };

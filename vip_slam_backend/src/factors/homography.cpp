@@ -66,6 +66,14 @@ bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const 
   return *rho >= 0.25 && *rho <= 4.0;
 }
 
+double hostNoiseGain(const Vector9d& h, const Eigen::Vector2d& xy_i) {
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> H = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(h.data());
+  const Eigen::Vector3d p = H * Eigen::Vector3d(xy_i.x(), xy_i.y(), 1.0);
+  const Eigen::Matrix2d A =
+      (H.topLeftCorner<2, 2>() - p.head<2>() / p.z() * H.bottomLeftCorner<1, 2>()) / p.z();
+  return 0.5 * A.squaredNorm();
+}
+
 Eigen::Matrix<double, 2, 9> homographyRows(const HomographyPair& pair) {
   const double x = pair.xy_i.x(), y = pair.xy_i.y(), u = pair.xy_j.x(), v = pair.xy_j.y();
   Eigen::Matrix<double, 2, 9> C;

@@ -61,10 +61,14 @@ bool PlaneFactorBuilder::addLandmark(const MapLandmark& landmark) {
       ++refused;
       continue;
     }
-    const double weight = pixelWeight(feature, settings_) / settings_.measurement.homography_inflation;
-    pair.pair.weight = weight / rho;
+    // The pair's noise is that of the observer and that of the host, seen from the observer.
+    const Vector9d h = homographyVector(geometry_[pair.i], geometry_[pair.j], plane);
+    const double observer = 1.0 / pixelWeight(feature, settings_), from = 1.0 / pixelWeight(*host_feature, settings_);
+    const double sigma = std::sqrt(observer * observer + hostNoiseGain(h, pair.pair.xy_i) * from * from) *
+                         settings_.measurement.homography_inflation;
+    pair.pair.weight = 1.0 / (sigma * rho);
     // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
-    const double chi2 = (homographyRows(pair.pair) * homographyVector(geometry_[pair.i], geometry_[pair.j], plane)).squaredNorm();
+    const double chi2 = (homographyRows(pair.pair) * h).squaredNorm();
     if (chi2 > 4 * settings_.measurement.outlier_chi2) {
       ++refused;
       continue;

@@ -37,8 +37,6 @@ struct NodeSums {
   }
 };
 
-using Matrix15x30 = Eigen::Matrix<double, 15, 30>;
-
 }  // namespace
 
 void StructuredSolver::linearizeImu(const BaProblem& problem) {
@@ -81,15 +79,12 @@ void StructuredSolver::linearizePlanes(const BaProblem& problem) {
   };
   Eigen::Matrix<double, 15, 15> H;
   HomographyJacobian J;
-  for (std::size_t k = 0; k < problem.homographies.size(); ++k) {
-    const BaHomography& f = problem.homographies[k];
-    const Vector9d h =
-        homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane, &basis_[f.plane], &J);
-    HomographyJacobian GJ;
-    GJ.noalias() = f.G * J;
-    H.noalias() = J.transpose() * GJ;
-    addTriple(structure_.homographies[k], f.i, f.j, f.plane, H, GJ.transpose() * h);
-  }
+  HomographyKernelArguments a = homographyArguments();
+  a.values = values_.data();
+  a.gradient = gradient_.data();
+  a.full_gradient = full_gradient_.data();
+  a.diagonal = diagonal_.data();
+  homographyKernels().linearize(a, 0, static_cast<int>(homographies_.size()));
   for (std::size_t k = 0; k < problem.homography_pairs.size(); ++k) {
     const BaHomographyPair& f = problem.homography_pairs[k];
     const Vector9d h =
@@ -148,10 +143,7 @@ double StructuredSolver::factorCost(const BaProblem& problem) const {
   double cost = 0;
   for (const BaImu& f : problem.imu)
     cost += f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
-  for (const BaHomography& f : problem.homographies) {
-    const Vector9d h = homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane);
-    cost += h.dot(f.G * h);
-  }
+  cost += homographyKernels().cost(homographyArguments(), 0, static_cast<int>(homographies_.size()));
   for (const BaHomographyPair& f : problem.homography_pairs)
     cost += (homographyRows(f.pair) * homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane))
                 .squaredNorm();

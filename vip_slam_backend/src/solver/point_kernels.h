@@ -11,7 +11,7 @@ namespace vip_slam {
 /// A frame for the kernels; matrices row-major.
 struct KernelFrame {
   double R_C_W[9], R_C_I[9], R_W_I[9];
-  double t_W_I[3];
+  double t_W_I[3], t_W_C[3], t_I_C[3];
   double offset_C[3];          ///< R_C_I t_I_C: p_C = R_C_W (p - t_W_I) - offset_C
   std::int64_t diagonal = -1;  ///< offset of its diagonal block in the values; -1: fixed
   std::int32_t unknown = 0;    ///< first unknown of the pose

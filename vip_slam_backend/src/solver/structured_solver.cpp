@@ -35,6 +35,15 @@ void StructuredSolver::prepare(const BaProblem& problem) {
   point_gradient_.resize(points_.size());
   point_damping_.resize(points_.size());
   point_inverse_.resize(2 * points_.size());
+  homographies_.resize(problem.homographies.size());
+  homography_G_.resize(problem.homographies.size());
+  for (std::size_t k = 0; k < homographies_.size(); ++k) {
+    const BaHomography& f = problem.homographies[k];
+    const SystemStructure::TriplePlaces& place = structure_.homographies[k];
+    homographies_[k] = {f.i, f.j, f.plane, place.ji.transposed, place.pi.transposed, place.pj.transposed,
+                        place.ji.offset, place.pi.offset, place.pj.offset};
+    homography_G_[k] = f.G.data();
+  }
   int longest = 1;
   for (const BaPoint& p : problem.points) longest = std::max(longest, p.count);
   scratch_.resize(24 * static_cast<std::size_t>(longest));
@@ -52,6 +61,8 @@ void StructuredSolver::loadFrames(const BaProblem& problem) {
     copyRowMajor(g.R_C_I, out.R_C_I);
     copyRowMajor(g.R_W_I, out.R_W_I);
     Eigen::Map<Eigen::Vector3d>(out.t_W_I) = g.t_W_I;
+    Eigen::Map<Eigen::Vector3d>(out.t_W_C) = g.t_W_C;
+    Eigen::Map<Eigen::Vector3d>(out.t_I_C) = g.t_I_C;
     Eigen::Map<Eigen::Vector3d>(out.offset_C) = g.R_C_I * g.t_I_C;
     const int node = structure_.pose_node[k];
     out.diagonal = node < 0 ? -1 : static_cast<std::int64_t>(structure_.cholesky.diagonalOffset(node));
@@ -60,7 +71,27 @@ void StructuredSolver::loadFrames(const BaProblem& problem) {
   for (std::size_t k = 0; k < problem.points.size(); ++k)
     Eigen::Map<Eigen::Vector3d>(points_.data() + 3 * k) = problem.points[k].p_W;
   basis_.resize(problem.planes.size());
-  for (std::size_t k = 0; k < basis_.size(); ++k) basis_[k] = tangentBasis(problem.planes[k].plane.n);
+  planes_.resize(problem.planes.size());
+  for (std::size_t k = 0; k < basis_.size(); ++k) {
+    const Plane& plane = problem.planes[k].plane;
+    basis_[k] = tangentBasis(plane.n);
+    KernelPlane& out = planes_[k];
+    Eigen::Map<Eigen::Vector3d>(out.n) = plane.n;
+    out.d = plane.d;
+    Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(out.basis) = basis_[k];
+    const int node = structure_.plane_node[k];
+    out.diagonal = static_cast<std::int64_t>(structure_.cholesky.diagonalOffset(node));
+    out.unknown = structure_.cholesky.unknown(node);
+  }
+}
+
+HomographyKernelArguments StructuredSolver::homographyArguments() const {
+  HomographyKernelArguments a;
+  a.frames = frames_.data();
+  a.planes = planes_.data();
+  a.factors = homographies_.data();
+  a.G = homography_G_.data();
+  return a;
 }
 
 PointKernelArguments StructuredSolver::arguments(const BaProblem& problem, double radius) {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "plane_kernels.h"
 #include "point_kernels.h"
 #include "system_structure.h"
 #include "vip_slam_backend/solver/ba_solver.h"
@@ -41,6 +42,7 @@ class StructuredSolver : public BaSolver {
   void apply(const BaProblem& from, State* to) const;
   double stepNorm() const;
   PointKernelArguments arguments(const BaProblem& problem, double radius);
+  HomographyKernelArguments homographyArguments() const;
 
   // linearize_factors.cpp
   void linearizeImu(const BaProblem& problem);
@@ -53,6 +55,9 @@ class StructuredSolver : public BaSolver {
   std::vector<FrameGeometry> geometry_;
   std::vector<Eigen::Matrix<double, 3, 2>> basis_;
   std::vector<BaObservation> observations_;
+  std::vector<KernelPlane> planes_;
+  std::vector<KernelHomography> homographies_;
+  std::vector<const double*> homography_G_;
   std::vector<double> points_, values_, gradient_, full_gradient_, diagonal_, damping_, W_, point_inverse_,
       point_gradient_, point_damping_, step_, point_step_, scratch_;
   // Second thread's sums.

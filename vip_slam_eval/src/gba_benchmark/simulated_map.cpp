@@ -28,12 +28,13 @@ struct SimulatedPoint {
 // is a silhouette that changes with the view and is soon hidden.
 struct TrackerModel {
   double keep;         // probability that a track survives one keyframe
-  double find;         // probability that a visible, lost point is found again
+  double find;         // probability that a visible, lost point is found again within kForgotten keyframes
   double view_angle;   // radians from the first view
   double range;        // metres
 };
-constexpr TrackerModel kPlaneTracker{0.97, 0.15, 1.1, 7.0};
-constexpr TrackerModel kFreeTracker{0.90, 0.05, 0.45, 4.5};
+constexpr TrackerModel kPlaneTracker{0.98, 0.15, 1.1, 7.0};
+constexpr TrackerModel kFreeTracker{0.88, 0.05, 0.45, 4.5};
+constexpr int kForgotten = 10;  // later it would be a new landmark
 
 class Simulator {
  public:
@@ -110,6 +111,7 @@ class Simulator {
           p.tracked = false;
           continue;
         }
+        if (!p.frames.empty() && k - p.frames.back() > kForgotten) continue;
         p.tracked = p.tracked ? uniform() < model.keep : uniform() < (p.frames.empty() ? 0.5 : model.find);
         if (!p.tracked) continue;
         if (p.frames.empty()) p.first_ray = (p.x - T_W_C.t()).normalized();
@@ -144,8 +146,8 @@ class Simulator {
       s.T_W_I = error * truth.T_W_I;
       s.v_W = error.rotation() * truth.v_W + gauss3(0.02);
       start_.push_back(s);
-      const Eigen::Vector3d turn(gauss(2e-4), gauss(2e-4), gauss(1e-3));
-      const SE3 about(expQuaternion(turn), truth.T_W_I.t() - expSO3(turn) * truth.T_W_I.t() + gauss3(0.006));
+      const Eigen::Vector3d turn(gauss(1e-4), gauss(1e-4), gauss(3e-4));
+      const SE3 about(expQuaternion(turn), truth.T_W_I.t() - expSO3(turn) * truth.T_W_I.t() + gauss3(0.002));
       error = error * about;
     }
   }
@@ -194,8 +196,8 @@ class Simulator {
     for (std::size_t p = 0; p < points_.size(); ++p) {
       const SimulatedPoint& point = points_[p];
       const KeyframeId host = point.frames.front() + 1;
-      const Feature& f = out->map.keyframe(host).features()[feature_[p].front()];
-      const Eigen::Vector3d x = out->map.keyframe(host).T_W_C() * (f.depth * Eigen::Vector3d(f.xy.x(), f.xy.y(), 1));
+      // Where local bundle adjustments would have left it: right beside its host, with a centimetre of noise.
+      const Eigen::Vector3d x = start_[host - 1].T_W_I * (truth_[host - 1].T_W_I.inverse() * point.x) + gauss3(0.01);
       const LandmarkId id = static_cast<LandmarkId>(p);
       out->map.addLandmark(id, x, {host, feature_[p].front()});
       for (std::size_t o = 1; o < point.frames.size(); ++o)
@@ -221,7 +223,8 @@ class Simulator {
         if (static_cast<int>(o.points.size()) == options_.depth_samples) continue;
         const double slope = std::abs(direction.dot(world_.planes[plane].plane.n));
         if (slope < 0.15 * ray.norm()) continue;
-        const double sigma_z = depthSigma(z);
+        // A sample is the mean of a small patch, so less noisy than the single pixel under a corner.
+        const double sigma_z = 0.5 * depthSigma(z);
         PlanePoint point;
         point.p_C = ((z + gauss(sigma_z)) * ray).cast<float>();
         point.sigma = static_cast<float>(std::hypot(sigma_z * slope, options_.depth_sample_floor));

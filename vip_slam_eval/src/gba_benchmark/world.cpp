@@ -47,8 +47,8 @@ World rooms() {
   const std::vector<Vector3d> way = {{3.2, 1.8, 1.4}, {2.6, 3.4, 1.5}, {2.8, 5.2, 1.4}, {3.6, 7.0, 1.5}, {5.4, 8.0, 1.4},
                                      {7.0, 8.1, 1.5}, {8.8, 7.9, 1.5}, {10.3, 6.8, 1.4}, {11.0, 5.0, 1.5}, {10.8, 3.2, 1.4},
                                      {10.2, 1.9, 1.5}};
-  const std::vector<double> yaw_there = {0.3, 1.2, 2.4, 2.0, 1.0, 0.4, -0.4, -0.9, 0.1, -1.0, -2.2};
-  const std::vector<double> yaw_back = {-3.2, -3.9, -3.3, -2.4, -3.0, -2.8, -3.5, -4.0, -4.9, -5.3, -6.0};
+  const std::vector<double> yaw_there = {3.6, 3.8, 1.0, -0.9, 0.6, 0.4, -0.4, -0.9, 0.1, -1.0, -2.2};
+  const std::vector<double> yaw_back = {-3.2, -3.9, -3.3, -2.4, -3.0, -2.8, -3.5, -4.0, -4.9, -6.2, -7.4};
   const int n = static_cast<int>(way.size());
   for (int k = 0; k < n; ++k) w.path.emplace_back(way[k].x(), way[k].y(), way[k].z(), yaw_there[k]);
   for (int k = n - 2; k >= 0; --k)

@@ -31,6 +31,10 @@ Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const 
 bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane, const Eigen::Vector2d& xy_i,
                           double* rho);
 
+/// Mean square of the factor by which noise of xy_i grows on its way into frame j: half the squared Frobenius norm of
+/// d p^_j / d p_i. The noise of a pair is that of j and the grown one of i.
+double hostNoiseGain(const Vector9d& h, const Eigen::Vector2d& xy_i);
+
 /// The two rows C_l, weighted.
 Eigen::Matrix<double, 2, 9> homographyRows(const HomographyPair& pair);
 

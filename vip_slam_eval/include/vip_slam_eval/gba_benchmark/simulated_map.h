@@ -17,9 +17,9 @@ struct SimulatedMapOptions {
   int plane_points = 2236;         ///< points on planes that the map keeps
   int free_points = 2032;
   double pixel_sigma = 0.7;        ///< px
-  double depth_a = 0.002, depth_b = 0.0025;  ///< depth sigma = a + b z^2, metres
+  double depth_a = 0.004, depth_b = 0.004;  ///< depth sigma = a + b z^2, metres
   int depth_samples = 50;          ///< samples per keyframe and plane
-  double depth_sample_floor = 0.005;  ///< m
+  double depth_sample_floor = 0.002;  ///< m
   unsigned seed = 1;
 };
 
