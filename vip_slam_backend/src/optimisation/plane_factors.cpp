@@ -29,30 +29,76 @@ PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope
   }
 }
 
+bool PlaneFactorBuilder::onPlane(const MapLandmark& landmark, int* index) const {
+  const auto found = planes_.find(landmark.plane);
+  if (landmark.plane == 0 || found == planes_.end()) return false;
+  *index = found->second;
+  return std::abs(built_->problem.planes[*index].plane.signedDistance(landmark.p_W)) <= 0.1;
+}
+
+void PlaneFactorBuilder::chooseHosts(const std::vector<LandmarkId>& landmarks) {
+  if (planes_.empty()) return;
+  // Per plane and keyframe: the landmarks that it could host.
+  std::map<int, std::map<KeyframeId, std::vector<LandmarkId>>> candidates;
+  std::unordered_map<LandmarkId, std::vector<KeyframeId>> views;
+  for (const LandmarkId id : landmarks) {
+    const MapLandmark& landmark = map_.landmark(id);
+    int plane = 0;
+    if (!onPlane(landmark, &plane)) continue;
+    const Plane& parameters = built_->problem.planes[plane].plane;
+    for (const MapObservation& o : landmark.observations) {
+      const auto frame = frames_.find(o.keyframe);
+      if (frame == frames_.end()) continue;
+      // A host must see the plane well: its ray is what the others are compared with.
+      const FrameGeometry& g = geometry_[frame->second];
+      const Eigen::Vector2d xy = map_.feature(o).xy.cast<double>();
+      double rho = 1;
+      if (!homographyDepthRatio(g, g, parameters, xy, &rho)) continue;
+      candidates[plane][o.keyframe].push_back(id);
+      views[id].push_back(o.keyframe);
+    }
+  }
+  for (auto& plane : candidates) {
+    std::map<KeyframeId, int> count;
+    std::set<std::pair<int, KeyframeId>> order;
+    for (const auto& entry : plane.second) {
+      count[entry.first] = static_cast<int>(entry.second.size());
+      order.insert({count[entry.first], entry.first});
+    }
+    while (!order.empty() && order.rbegin()->first > 0) {
+      const KeyframeId host = order.rbegin()->second;
+      for (const LandmarkId id : plane.second[host]) {
+        if (!hosts_.emplace(id, host).second) continue;
+        for (const KeyframeId other : views[id]) {
+          order.erase({count[other], other});
+          order.insert({--count[other], other});
+        }
+      }
+    }
+  }
+}
+
 bool PlaneFactorBuilder::addLandmark(const MapLandmark& landmark) {
-  const auto plane_index = planes_.find(landmark.plane);
-  if (landmark.plane == 0 || plane_index == planes_.end()) return false;
-  const Plane& plane = built_->problem.planes[plane_index->second].plane;
-  if (std::abs(plane.signedDistance(landmark.p_W)) > 0.1) return false;
-  // Host: the first keyframe of the problem that sees it well enough.
+  int plane_index = 0;
+  const auto host_id = hosts_.find(landmark.id);
+  if (host_id == hosts_.end() || !onPlane(landmark, &plane_index)) return false;
+  const Plane& plane = built_->problem.planes[plane_index].plane;
   std::vector<BaHomographyPair> pairs;
-  int host = -1, tried = 0, refused = 0;
+  int tried = 0, refused = 0;
+  const int host = frames_.at(host_id->second);
   const Feature* host_feature = nullptr;
+  for (const MapObservation& o : landmark.observations)
+    if (o.keyframe == host_id->second) host_feature = &map_.feature(o);
   for (const MapObservation& o : landmark.observations) {
     const auto frame = frames_.find(o.keyframe);
-    if (frame == frames_.end()) continue;
+    if (frame == frames_.end() || frame->second == host) continue;
     const Feature& feature = map_.feature(o);
-    if (host < 0) {
-      host = frame->second;
-      host_feature = &feature;
-      continue;
-    }
     const bool both_fixed = built_->problem.frames[host].fixed && built_->problem.frames[frame->second].fixed;
     if (both_fixed) continue;
     BaHomographyPair pair;
     pair.i = host;
     pair.j = frame->second;
-    pair.plane = plane_index->second;
+    pair.plane = plane_index;
     pair.pair.xy_i = host_feature->xy.cast<double>();
     pair.pair.xy_j = feature.xy.cast<double>();
     ++tried;
@@ -76,7 +122,7 @@ bool PlaneFactorBuilder::addLandmark(const MapLandmark& landmark) {
     pair.pair.weight *= huberScale(chi2, settings_.measurement.huber);
     pairs.push_back(pair);
   }
-  if (host < 0 || tried == 0 || 2 * refused > tried) return false;
+  if (tried == 0 || 2 * refused > tried) return false;
   pairs_.insert(pairs_.end(), pairs.begin(), pairs.end());
   return true;
 }

@@ -14,6 +14,10 @@ class PlaneFactorBuilder {
  public:
   PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings,
                      const std::unordered_map<KeyframeId, int>& frames, BuiltProblem* built);
+  /// Chooses the hosts of all landmarks on planes: on each plane the keyframe that sees most of the landmarks still without
+  /// host becomes theirs, and so on. Few hosts mean few, well-filled compressed factors and a sparse system; the
+  /// information is the same as with any other choice of one host per landmark.
+  void chooseHosts(const std::vector<LandmarkId>& landmarks);
   /// Turns a landmark on a plane into host-observer pairs. False when it is on none, or fails the gate: then it stays a
   /// free point.
   bool addLandmark(const MapLandmark& landmark);
@@ -22,6 +26,7 @@ class PlaneFactorBuilder {
 
  private:
   void addDepthBlocks();
+  bool onPlane(const MapLandmark& landmark, int* plane) const;
 
   const Map& map_;
   const ProblemScope& scope_;
@@ -30,6 +35,7 @@ class PlaneFactorBuilder {
   BuiltProblem* built_;
   std::vector<FrameGeometry> geometry_;
   std::map<PlaneId, int> planes_;
+  std::unordered_map<LandmarkId, KeyframeId> hosts_;
   std::map<std::array<int, 3>, BaHomography> homographies_;
   std::vector<BaHomographyPair> pairs_;
 };

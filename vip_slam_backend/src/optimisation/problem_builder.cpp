@@ -122,6 +122,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
   landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
 
   PlaneFactorBuilder planes(map, scope, settings, index, &built);
+  planes.chooseHosts(landmarks);
   for (const LandmarkId id : landmarks) {
     const MapLandmark& landmark = map.landmark(id);
     const bool plane_point = planes.addLandmark(landmark);

@@ -41,28 +41,32 @@ struct NodeSums {
 
 void StructuredSolver::linearizeImu(const BaProblem& problem) {
   const NodeSums sums{structure_.cholesky, values_.data(), gradient_.data(), full_gradient_.data(), diagonal_.data()};
+  using RowMajor15x32 = Eigen::Matrix<double, 15, 32, Eigen::RowMajor>;
   Matrix15d J[2];
+  alignas(64) double J_both[15 * 32] = {0}, H_both[30 * 32], g_both[32];
   for (std::size_t k = 0; k < problem.imu.size(); ++k) {
     const BaImu& f = problem.imu[k];
     const Eigen::Matrix<double, 15, 1> r = f.preintegration->residual(
         problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity, &J[0], &J[1]);
     const int nodes[4] = {structure_.pose_node[f.i], structure_.motion_node[f.i], structure_.pose_node[f.j],
                           structure_.motion_node[f.j]};
-    for (int s = 0; s < 2; ++s) {
-      Matrix15d H;
-      H.noalias() = J[s].transpose() * J[s];
-      const Eigen::Matrix<double, 15, 1> g = J[s].transpose() * r;
-      sums.add<6>(nodes[2 * s], H.topLeftCorner<6, 6>(), g.head<6>());
-      sums.add<9>(nodes[2 * s + 1], H.bottomRightCorner<9, 9>(), g.tail<9>());
-      addBlock<9, 6>(values_.data(), structure_.imu[k].place[2 * s + 1][2 * s], H.bottomLeftCorner<9, 6>());
-    }
-    Matrix15d H;
-    H.noalias() = J[1].transpose() * J[0];
+    Eigen::Map<RowMajor15x32> both(J_both);
+    both.leftCols<15>() = J[0];
+    both.middleCols<15>(15) = J[1];
+    homographyKernels().gram(J_both, r.data(), H_both, g_both);
+    const Eigen::Map<const Eigen::Matrix<double, 30, 32, Eigen::RowMajor>> H(H_both);
+    const Eigen::Map<const Eigen::Matrix<double, 32, 1>> g(g_both);
     const auto& place = structure_.imu[k].place;
-    addBlock<6, 6>(values_.data(), place[2][0], H.topLeftCorner<6, 6>());
-    addBlock<6, 9>(values_.data(), place[2][1], H.topRightCorner<6, 9>());
-    addBlock<9, 6>(values_.data(), place[3][0], H.bottomLeftCorner<9, 6>());
-    addBlock<9, 9>(values_.data(), place[3][1], H.bottomRightCorner<9, 9>());
+    for (int s = 0; s < 2; ++s) {
+      const int o = 15 * s;
+      sums.add<6>(nodes[2 * s], H.block<6, 6>(o, o), g.segment<6>(o));
+      sums.add<9>(nodes[2 * s + 1], H.block<9, 9>(o + 6, o + 6), g.segment<9>(o + 6));
+      addBlock<9, 6>(values_.data(), place[2 * s + 1][2 * s], H.block<9, 6>(o + 6, o));
+    }
+    addBlock<6, 6>(values_.data(), place[2][0], H.block<6, 6>(15, 0));
+    addBlock<6, 9>(values_.data(), place[2][1], H.block<6, 9>(15, 6));
+    addBlock<9, 6>(values_.data(), place[3][0], H.block<9, 6>(21, 0));
+    addBlock<9, 9>(values_.data(), place[3][1], H.block<9, 9>(21, 6));
   }
 }
 

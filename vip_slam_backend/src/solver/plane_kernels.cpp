@@ -28,10 +28,10 @@ namespace plane_avx512 {
 
 namespace {
 
-const HomographyKernels kBaseline{plane_baseline::linearize, plane_baseline::cost};
+const HomographyKernels kBaseline{plane_baseline::linearize, plane_baseline::cost, plane_baseline::gram};
 #if defined(__x86_64__)
-const HomographyKernels kAvx2{plane_avx2::linearize, plane_avx2::cost};
-const HomographyKernels kAvx512{plane_avx512::linearize, plane_avx512::cost};
+const HomographyKernels kAvx2{plane_avx2::linearize, plane_avx2::cost, plane_avx2::gram};
+const HomographyKernels kAvx512{plane_avx512::linearize, plane_avx512::cost, plane_avx512::gram};
 #endif
 
 }  // namespace

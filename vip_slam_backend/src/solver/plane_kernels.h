@@ -1,4 +1,5 @@
-// Compressed homographies of the structured solver on plain arrays: Jacobian, J^T G J and J^T G h of one factor at a time.
+// Compressed homographies of the structured solver on plain arrays: Jacobian, J^T G J and J^T G h of one factor at a time;
+// and the product that IMU factors need.
 #pragma once
 
 #include <cstdint>
@@ -31,6 +32,8 @@ struct HomographyKernelArguments {
 struct HomographyKernels {
   void (*linearize)(const HomographyKernelArguments& a, int begin, int end);
   double (*cost)(const HomographyKernelArguments& a, int begin, int end);
+  /// IMU factors: H (30 x 32) = J^T J and g (32) = J^T r with J 15 x 32 row-major, columns 30 and 31 zero.
+  void (*gram)(const double* J, const double* r, double* H, double* g);
 };
 
 const HomographyKernels& homographyKernels();
