@@ -25,18 +25,21 @@ int LandmarkMaker::process(KeyframeId id, Map* map) {
       continue;
     }
     if (known != f.id) continue;  // merged into a landmark that is gone
+    // Views that waited; one of them may have been recognised as a known landmark meanwhile: then the track is that.
     std::vector<MapObservation> views;
-    LandmarkId found = kNoLandmark;  // a waiting view may have been matched with a landmark meanwhile
+    LandmarkId recognised = map->keyframe(id).landmarks[k];
     const auto waited = waiting_.find(f.id);
     if (waited != waiting_.end())
       for (const MapObservation& o : waited->second) {
         if (!map->hasKeyframe(o.keyframe)) continue;
-        const LandmarkId now = map->keyframe(o.keyframe).landmarks[o.feature];
-        if (now == kNoLandmark) views.push_back(o);
-        else found = now;
+        const LandmarkId taken = map->keyframe(o.keyframe).landmarks[o.feature];
+        if (taken != kNoLandmark)
+          recognised = taken;
+        else
+          views.push_back(o);
       }
-    if (found != kNoLandmark) {
-      map->addObservation(found, here);
+    if (recognised != kNoLandmark) {
+      map->addObservation(recognised, here);
       continue;
     }
     if (f.depth > 0) {
