@@ -39,6 +39,35 @@ TEST(Map, TracksBecomeLandmarks) {
   EXPECT_EQ(covisible.front().first, 5u);
 }
 
+TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {
+  // Track 900 has no depth; while it waits, its first view is matched with landmark 800.
+  Map map;
+  LandmarkMaker maker{LandmarkMakerOptions()};
+  for (KeyframeId id = 1; id <= 4; ++id) {
+    auto kf = std::make_shared<Keyframe>();
+    kf->id = id;
+    kf->frame.t = 0.3 * id;
+    Feature f;
+    f.id = 900;
+    f.xy = Eigen::Vector2f(-0.1f * id, 0.0f);
+    kf->frame.features.push_back(f);
+    if (id == 2) {
+      f.id = 800;
+      f.depth = 2;
+      f.depth_sigma = 0.01f;
+      kf->frame.features.push_back(f);
+    }
+    NavState state;
+    state.T_W_I = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.2 * id, 0, 0));
+    map.addKeyframe(kf, state, ImuNoise());
+    ASSERT_NO_THROW(maker.process(id, &map));
+    if (id == 2) ASSERT_TRUE(map.addObservation(800, {1, 0}));
+    ASSERT_EQ(checkMap(map), "");
+  }
+  EXPECT_FALSE(map.hasLandmark(900));
+  EXPECT_GE(map.landmark(800).observations.size(), 3u);
+}
+
 TEST(Map, RemovingAKeyframeJoinsTheImuChain) {
   Fixture f;
   f.add(5);
