@@ -85,7 +85,7 @@ struct FilterOptions {
     v.field("huber", huber, 0.5, 100.0, "Huber threshold on whitened residuals, sigmas");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");
     v.field("use_depth", use_depth, "use depth measurements");
-    v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise; below 1: medians of many pixels");
+    v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise; below 1: medians of pixels");
     v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
     v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the gate turns away too many features");
     v.field("sigma_bias_gyro", sigma_bias_gyro, 1e-5, 1.0, "initial one-sigma of the gyro bias, rad/s");
