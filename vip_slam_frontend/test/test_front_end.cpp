@@ -2,6 +2,8 @@
 // and feedback from a map.
 #include <cmath>
 #include <limits>
+#include <map>
+#include <random>
 
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
@@ -258,6 +260,38 @@ TEST_F(FrontEndTest, LongImuGapRestartsWithItsReason) {
   EXPECT_EQ(output.frame->status.state, TrackingState::kInitialising);
   EXPECT_NE(output.frame->status.reason.find("gap"), std::string::npos) << output.frame->status.reason;
   EXPECT_EQ(front_end_.counters().restarts, 1u);
+}
+
+TEST_F(FrontEndTest, StandsStillForAMinuteUnderNoise) {
+  const cv::Mat clean = world_.image(0.0);
+  cv::RNG random(3);
+  std::mt19937 engine(4);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  FrameOutput output;
+  std::size_t keyframes = 0;
+  for (int k = 0; k < 600; ++k) {
+    const double t = 0.1 * k;
+    for (; imu_t_ < t + 0.02; imu_t_ += 0.005) {
+      ImuSample sample = World::imu(0.0);
+      sample.t = imu_t_;
+      sample.accel += Eigen::Vector3d(0.02, -0.03, 0.01);
+      for (int i = 0; i < 3; ++i) {
+        sample.gyro(i) += 0.014 * normal(engine);
+        sample.accel(i) += 0.14 * normal(engine);
+      }
+      front_end_.addImu(sample);
+    }
+    cv::Mat noise(clean.size(), CV_16S), sum;
+    random.fill(noise, cv::RNG::NORMAL, 0, 3.0);
+    cv::add(clean, noise, sum, cv::noArray(), CV_8U);
+    output = front_end_.process({t, sum, World::depth(0.0)});
+    keyframes += output.keyframe != nullptr;
+  }
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  EXPECT_TRUE(output.frame->zero_velocity);
+  EXPECT_LT(output.frame->state.T_W_I.t().norm(), 0.005);
+  EXPECT_LT(std::abs(yawOf(output.frame->state.T_W_I.rotation())), 0.2 * M_PI / 180);
+  EXPECT_LE(keyframes, 3u);
 }
 
 TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
