@@ -11,10 +11,12 @@ namespace vip_slam {
 std::string parameterReference() {
   std::string out =
       "# Parameters\n\n"
-      "Made from the option structs by `rosrun vip_slam_bringup parameter_reference`; a test fails when this page is out\n"
+      "Made from the option structs by `rosrun vip_slam_bringup parameter_reference`; a test fails when this page is "
+      "out\n"
       "of date. A group is a level of names: `tracking/max_features` is the ROS parameter\n"
       "`~tracking/max_features` of its nodelet, and `frontend/tracking/max_features` for run_bag\n"
-      "(`--set frontend/tracking/max_features=300`, or a YAML file of nested maps by `--params`). An unknown name or a\n"
+      "(`--set frontend/tracking/max_features=300`, or a YAML file of nested maps by `--params`). An unknown name or "
+      "a\n"
       "value out of range stops the start with the nearest known name.\n\n";
   out += optionReference("Front end (run_bag: `frontend/…`)", listOptions(FrontEndNodeOptions())) + "\n";
   out += optionReference("Planes (run_bag: `planes/…`)", listOptions(PlanesNodeOptions())) + "\n";

@@ -3,14 +3,14 @@
 #include <cmath>
 #include <functional>
 
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <rosbag/bag.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 #include <tf2_msgs/TFMessage.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_core/geometry/so3.h"
@@ -28,12 +28,17 @@ struct Motion {
   SE3 cameraAt(double t) const {
     const double s = std::max(0.0, t - still);
     const double w = s * s * s / (s * s * s + 0.02);  // twice differentiable at the start
-    const Eigen::Vector3d p(w * 0.15 * std::sin(1.9 * s), w * 0.2 * std::sin(1.3 * s), 1.4 + w * 0.1 * std::sin(2.3 * s));
-    const double yaw = w * 0.35 * std::sin(1.7 * s), pitch = w * 0.22 * std::sin(2.3 * s), roll = w * 0.2 * std::sin(2.9 * s);
+    const Eigen::Vector3d p(w * 0.15 * std::sin(1.9 * s), w * 0.2 * std::sin(1.3 * s),
+                            1.4 + w * 0.1 * std::sin(2.3 * s));
+    const double yaw = w * 0.35 * std::sin(1.7 * s), pitch = w * 0.22 * std::sin(2.3 * s),
+                 roll = w * 0.2 * std::sin(2.9 * s);
     Eigen::Matrix3d R_level_cam;  // looking along +x: optical z = x, x = -y, y = -z
     R_level_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    const Eigen::Matrix3d R = (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
-                               Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX())).toRotationMatrix() * R_level_cam;
+    const Eigen::Matrix3d R =
+        (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
+            .toRotationMatrix() *
+        R_level_cam;
     return SE3(R, p);
   }
   SE3 imuAt(double t) const { return cameraAt(t) * T_imu_cam.inverse(); }
@@ -75,7 +80,8 @@ class Room {
     const int i = static_cast<int>(u), j = static_cast<int>(v);
     const double a = u - i, b = v - j;
     const auto at = [&](int c, int r) { return double(noise_.at<std::uint8_t>(r & 255, c & 255)); };
-    *grey = static_cast<std::uint8_t>((1 - b) * ((1 - a) * at(i, j) + a * at(i + 1, j)) + b * ((1 - a) * at(i, j + 1) + a * at(i + 1, j + 1)));
+    *grey = static_cast<std::uint8_t>((1 - b) * ((1 - a) * at(i, j) + a * at(i + 1, j)) +
+                                      b * ((1 - a) * at(i, j + 1) + a * at(i + 1, j + 1)));
     *z = static_cast<float>(best);  // ray_C has z = 1
   }
 
@@ -89,12 +95,14 @@ void render(const Room& room, const SE3& T_W_C, const CameraIntrinsics& camera, 
   depth->create(camera.height, camera.width, CV_32FC1);
   for (int v = 0; v < camera.height; ++v)
     for (int u = 0; u < camera.width; ++u)
-      room.look(T_W_C, Eigen::Vector3d((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1), &grey->at<std::uint8_t>(v, u), &depth->at<float>(v, u));
+      room.look(T_W_C, Eigen::Vector3d((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1),
+                &grey->at<std::uint8_t>(v, u), &depth->at<float>(v, u));
 }
 
 class Writer {
  public:
-  Writer(const std::string& path, const DriverBagOptions& options) : options_(options), bag_(path, rosbag::bagmode::Write) {}
+  Writer(const std::string& path, const DriverBagOptions& options)
+      : options_(options), bag_(path, rosbag::bagmode::Write) {}
 
   template <class Message>
   void write(const std::string& topic, double t, const Message& message) {
@@ -175,7 +183,8 @@ void writeImu(Writer* out, const DriverBagOptions& o, const Motion& motion, doub
     }
     return m;
   };
-  const auto stream = [&](const std::string& topic, double rate, double phase, const char* frame, bool gyro, bool accel) {
+  const auto stream = [&](const std::string& topic, double rate, double phase, const char* frame, bool gyro,
+                          bool accel) {
     if (topic.empty()) return;
     for (int k = 0; k < end * rate; ++k) {
       const double t = phase + k / rate;
@@ -205,7 +214,8 @@ void writeTf(Writer* out, const DriverBagOptions& o) {
   };
   edge("base_link", "camera_link", SE3());
   edge("camera_link", "camera_color_optical_frame", SE3());
-  for (const char* imu : {"camera_imu_optical_frame", "camera_gyro_optical_frame"}) edge("camera_link", imu, o.sensor.T_imu_cam.inverse());
+  for (const char* imu : {"camera_imu_optical_frame", "camera_gyro_optical_frame"})
+    edge("camera_link", imu, o.sensor.T_imu_cam.inverse());
   out->write("/tf_static", 0, message);
 }
 

@@ -11,22 +11,22 @@
 namespace vip_slam::test_support {
 
 struct DriverBagOptions {
-  SensorConfig sensor;         ///< topics, encodings, rates and extrinsics of the bag
-  double still = 0.6;          ///< seconds at the start
-  double moving = 2.0;         ///< seconds after it
-  int width = 0, height = 0;   ///< of the images; 0: as the sensor file's camera
+  SensorConfig sensor;        ///< topics, encodings, rates and extrinsics of the bag
+  double still = 0.6;         ///< seconds at the start
+  double moving = 2.0;        ///< seconds after it
+  int width = 0, height = 0;  ///< of the images; 0: as the sensor file's camera
   // What can go wrong:
   std::map<std::string, std::string> renamed;  ///< topic -> other topic; to "": left out
   double image_rate_factor = 1;
-  double depth_skew = 0;       ///< seconds that depth is stamped later than colour
+  double depth_skew = 0;  ///< seconds that depth is stamped later than colour
   double depth_unit_factor = 1;
-  int depth_divisor = 1;       ///< depth image smaller than colour by this
-  bool calibrated = true;      ///< false: camera_info has an empty K
+  int depth_divisor = 1;   ///< depth image smaller than colour by this
+  bool calibrated = true;  ///< false: camera_info has an empty K
   double accel_factor = 1;
   bool gravity = true;
   double gyro_factor = 1;
   double imu_hole_at = -1, imu_hole = 0;  ///< seconds after the start; length
-  double late_jump = 0;        ///< stamps of the second half are moved by this
+  double late_jump = 0;                   ///< stamps of the second half are moved by this
   bool tf = true;
   std::string other_encoding;  ///< of the colour image, "" as the sensor file
 };

@@ -33,13 +33,16 @@ class CheckBag : public testing::Test {
     return checkAll(recordBag(path_, expected_, 60));
   }
   /// A finding of that severity that is about `about` and holds `words`.
-  static void expectFound(const Findings& findings, Severity severity, const std::string& about, const std::string& words) {
+  static void expectFound(const Findings& findings, Severity severity, const std::string& about,
+                          const std::string& words) {
     for (const Finding& f : findings)
-      if (f.severity == severity && f.about == about && (f.text + " " + f.advice).find(words) != std::string::npos) return;
+      if (f.severity == severity && f.about == about && (f.text + " " + f.advice).find(words) != std::string::npos)
+        return;
     ADD_FAILURE() << "no such finding: " << about << ": " << words << "\n" << toText(findings, false);
   }
   static void expectNoErrorBut(const Findings& findings, const std::string& about) {
-    for (const Finding& f : findings) EXPECT_TRUE(f.severity != Severity::kError || f.about == about) << f.about << ": " << f.text;
+    for (const Finding& f : findings)
+      EXPECT_TRUE(f.severity != Severity::kError || f.about == about) << f.about << ": " << f.text;
   }
 
   std::string path_;

@@ -6,15 +6,15 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/text_table.h"
@@ -98,8 +98,7 @@ class EurocConverter : public Converters {
       writeImage("set/mav0/cam0/data/" + stamp + ".png", image);
       writeImage("set/mav0/cam1/data/" + stamp + ".png", image);
     }
-    for (int i = 0; i < 20; ++i)
-      imu += std::to_string(kStart + i * 5000000LL) + ",0.1,0.2,0.3,9.8,0.5,-0.25\n";
+    for (int i = 0; i < 20; ++i) imu += std::to_string(kStart + i * 5000000LL) + ",0.1,0.2,0.3,9.8,0.5,-0.25\n";
     write("set/mav0/cam0/data.csv", images);
     write("set/mav0/cam1/data.csv", images);
     write("set/mav0/imu0/data.csv", imu);
@@ -188,7 +187,8 @@ class TumConverter : public Converters {
     }
     write(name + "/rgb.txt", rgb);
     write(name + "/depth.txt", depth);
-    write(name + "/groundtruth.txt", "# t x y z qx qy qz qw\n1305031102.1 1 2 3 0 0 0 1\n1305031102.2 1 2 3.5 0 0 0 1\n");
+    write(name + "/groundtruth.txt",
+          "# t x y z qx qy qz qw\n1305031102.1 1 2 3 0 0 0 1\n1305031102.2 1 2 3.5 0 0 0 1\n");
     options_.folder = (root_ / name).string();
     options_.bag = bag_;
   }
@@ -229,11 +229,13 @@ class StrayConverter : public Converters {
  protected:
   void makeFolder(int video_frames, double gravity) {
     fs::create_directories(root_ / "rec");
-    cv::VideoWriter video((root_ / "rec/rgb.mp4").string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 30, {320, 240});
+    cv::VideoWriter video((root_ / "rec/rgb.mp4").string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 30,
+                          {320, 240});
     ASSERT_TRUE(video.isOpened());
     for (int i = 0; i < video_frames; ++i) video.write(cv::Mat(240, 320, CV_8UC3, cv::Scalar(40 * i, 90, 200)));
     video.release();
-    std::string odometry = "timestamp, frame, x, y, z, qx, qy, qz, qw\n", imu = "timestamp, a_x, a_y, a_z, alpha_x, alpha_y, alpha_z\n";
+    std::string odometry = "timestamp, frame, x, y, z, qx, qy, qz, qw\n",
+                imu = "timestamp, a_x, a_y, a_z, alpha_x, alpha_y, alpha_z\n";
     for (int i = 0; i < 4; ++i) {
       char line[128], name[32];
       std::snprintf(line, sizeof(line), "%.6f, %06d, 0.0, %f, 0.0, 0.0, 0.0, 0.0, 1.0\n", 100 + i / 30.0, i, 0.1 * i);

@@ -59,7 +59,8 @@ std::map<std::string, std::string> namedRows(const std::string& text) {
 
 // docs/ros_api.md is checked against the running system; the readme's shorter tables against it.
 TEST(Documents, ReadmeNamesTopicsAndServicesThatExist) {
-  const auto readme = namedRows(slurp(fs::path(ROOT) / "README.md")), api = namedRows(slurp(fs::path(ROOT) / "docs/ros_api.md"));
+  const auto readme = namedRows(slurp(fs::path(ROOT) / "README.md")),
+             api = namedRows(slurp(fs::path(ROOT) / "docs/ros_api.md"));
   EXPECT_GT(readme.size(), 18u);
   for (const auto& [name, type] : readme) {
     if (name == "map" || name == "odom" || name == "base_link") continue;  // frames

@@ -20,7 +20,9 @@ namespace {
 class DriverBags : public testing::TestWithParam<const char*> {};
 
 TEST_P(DriverBags, IsReadyAndTracks) {
-  const std::string bag = (fs::temp_directory_path() / ("vip_slam_driver_" + std::string(GetParam()) + std::to_string(::getpid()) + ".bag")).string();
+  const std::string bag =
+      (fs::temp_directory_path() / ("vip_slam_driver_" + std::string(GetParam()) + std::to_string(::getpid()) + ".bag"))
+          .string();
   test_support::DriverBagOptions options;
   options.sensor = loadSensorConfig(std::string(CONFIG_DIR "/sensors/") + GetParam() + ".yaml");
   options.still = 1.2;
@@ -57,8 +59,8 @@ TEST_P(DriverBags, IsReadyAndTracks) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shipped, DriverBags,
-                         testing::Values("d435i", "d435i_split", "d455", "d455_split", "l515", "l515_split", "azure_kinect",
-                                         "orbbec_femto", "oak_d", "phone", "euroc", "simulator"),
+                         testing::Values("d435i", "d435i_split", "d455", "d455_split", "l515", "l515_split",
+                                         "azure_kinect", "orbbec_femto", "oak_d", "phone", "euroc", "simulator"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace

@@ -6,12 +6,12 @@
 #include <thread>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
 #include <ros/ros.h>
 #include <ros/topic.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <topic_tools/shape_shifter.h>
+#include <opencv2/imgproc.hpp>
 
 #include "driver_bag.h"
 #include "vip_slam_bringup/convert/image_messages.h"
@@ -69,7 +69,8 @@ TEST(LiveTools, CheckListensToTopics) {
   options.width = 320;
   options.height = 240;
   options.moving = 9;
-  const std::string path = (fs::temp_directory_path() / ("vip_slam_live_" + std::to_string(::getpid()) + ".bag")).string();
+  const std::string path =
+      (fs::temp_directory_path() / ("vip_slam_live_" + std::to_string(::getpid()) + ".bag")).string();
   test_support::writeDriverBag(path, options);
   {
     Player player(path);
@@ -89,15 +90,18 @@ TEST(LiveTools, CheckListensToTopics) {
 TEST(LiveTools, StereoNodeletMakesDepth) {
   const StereoCalibration calibration = loadStereoCalibration(CONFIG_DIR "/stereo/euroc.yaml");
   ros::NodeHandle nh;
-  ros::Publisher left = nh.advertise<sensor_msgs::Image>("/cam0/image_raw", 5), right = nh.advertise<sensor_msgs::Image>("/cam1/image_raw", 5);
+  ros::Publisher left = nh.advertise<sensor_msgs::Image>("/cam0/image_raw", 5),
+                 right = nh.advertise<sensor_msgs::Image>("/cam1/image_raw", 5);
   cv::Mat noise(calibration.left.height, calibration.left.width, CV_8UC1);
   cv::RNG rng(5);
   rng.fill(noise, cv::RNG::UNIFORM, 20, 235);
   cv::GaussianBlur(noise, noise, {5, 5}, 1.2);
   sensor_msgs::Image::ConstPtr depth;
   sensor_msgs::CameraInfo::ConstPtr info;
-  const ros::Subscriber d = nh.subscribe<sensor_msgs::Image>("/stereo/depth/image", 5, [&](const sensor_msgs::Image::ConstPtr& m) { depth = m; });
-  const ros::Subscriber i = nh.subscribe<sensor_msgs::CameraInfo>("/stereo/depth/camera_info", 5, [&](const sensor_msgs::CameraInfo::ConstPtr& m) { info = m; });
+  const ros::Subscriber d = nh.subscribe<sensor_msgs::Image>("/stereo/depth/image", 5,
+                                                             [&](const sensor_msgs::Image::ConstPtr& m) { depth = m; });
+  const ros::Subscriber i = nh.subscribe<sensor_msgs::CameraInfo>(
+      "/stereo/depth/camera_info", 5, [&](const sensor_msgs::CameraInfo::ConstPtr& m) { info = m; });
   const ros::WallTime give_up = ros::WallTime::now() + ros::WallDuration(20);
   while (ros::ok() && (!depth || !info) && ros::WallTime::now() < give_up) {
     std_msgs::Header header;
@@ -116,7 +120,8 @@ TEST(LiveTools, StereoNodeletMakesDepth) {
   // The same picture in both cameras: the disparity is what rectification shifts, about the offset of the principal
   // points; the message must be what the class computes.
   const cv::Mat expected = stereo.compute(noise, noise).depth;
-  const cv::Mat found(depth->height, depth->width, CV_32FC1, const_cast<std::uint8_t*>(depth->data.data()), depth->step);
+  const cv::Mat found(depth->height, depth->width, CV_32FC1, const_cast<std::uint8_t*>(depth->data.data()),
+                      depth->step);
   EXPECT_EQ(cv::norm(found, expected, cv::NORM_INF), 0.0);
 }
 

@@ -59,18 +59,23 @@ class Report : public testing::Test {
       const double s = double(i) / images, t = 1000.0 + 0.05 * i, phase = 4 * M_PI * s;
       const double x = 2.1 * std::cos(phase), y = 1.6 * std::sin(phase), z = 1.4 + 0.15 * std::sin(5 * phase);
       const double yaw = phase + M_PI / 2, bend = 0.02 * std::sqrt(2.0) * std::sin(20 * M_PI * s);
-      std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f 0 0 %.9f %.9f\n", t, x, y, z, std::sin(yaw / 2), std::cos(yaw / 2));
+      std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f 0 0 %.9f %.9f\n", t, x, y, z, std::sin(yaw / 2),
+                    std::cos(yaw / 2));
       truth << line;
       sum += bend * bend;
       const double half = (yaw + M_PI / 2) / 2;
-      std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f 0 0 %.9f %.9f\n", t, -y, x, z + bend, std::sin(half), std::cos(half));
+      std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f 0 0 %.9f %.9f\n", t, -y, x, z + bend, std::sin(half),
+                    std::cos(half));
       trajectory << line;
-      std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f 0 0 %.9f %.9f\n", t, -y * (1 + 0.05 * s), x + 0.12 * s, z + bend, std::sin(half), std::cos(half));
+      std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f 0 0 %.9f %.9f\n", t, -y * (1 + 0.05 * s), x + 0.12 * s,
+                    z + bend, std::sin(half), std::cos(half));
       odometry << line;
-      std::snprintf(line, sizeof(line), "frontend.track,%.3f,%.4f\nfrontend.update,%.3f,%.4f\n", t, 3 + std::sin(0.7 * i), t, 1.2 + 0.3 * std::cos(1.3 * i));
+      std::snprintf(line, sizeof(line), "frontend.track,%.3f,%.4f\nfrontend.update,%.3f,%.4f\n", t,
+                    3 + std::sin(0.7 * i), t, 1.2 + 0.3 * std::cos(1.3 * i));
       timing << line;
       if (i % 20 == 0) {
-        std::snprintf(line, sizeof(line), "planes.detect,%.3f,%.4f\nbackend.local_ba,%.3f,%.4f\n", t, 6 + 2 * std::sin(i), t, 25 + 20 * s + 8 * std::sin(3.0 * i));
+        std::snprintf(line, sizeof(line), "planes.detect,%.3f,%.4f\nbackend.local_ba,%.3f,%.4f\n", t,
+                      6 + 2 * std::sin(i), t, 25 + 20 * s + 8 * std::sin(3.0 * i));
         timing << line;
       }
     }
@@ -79,15 +84,20 @@ class Report : public testing::Test {
     std::ofstream(dir_ / "planes.yaml") << planesYaml(true);
     std::ofstream(dir_ / "planes_truth.yaml") << planesYaml(false);
     std::ofstream(dir_ / "summary.yaml")
-        << "bag: /somewhere/room.bag\nsensor: simulator\nvariant: vip\nloop_closing: true\nfinished: true\nduration: 59.95\n"
+        << "bag: /somewhere/room.bag\nsensor: simulator\nvariant: vip\nloop_closing: true\nfinished: true\nduration: "
+           "59.95\n"
            "processing_time: 11.2\nreal_time_factor: 5.35\npeak_memory_mb: 312\nimages: 1200\ntracked_images: 1178\n"
            "keyframes: 61\nlandmarks: 1840\nplane_landmarks: 1130\nplanes: 6\ndistance: 23.6\nepochs: 1\n"
            "counters: {dropped_images: 0, imu_gaps: 2}\n"
-           "states:\n- {t: 999.0, state: WAITING, reason: no IMU yet}\n- {t: 1000.0, state: INITIALISING, reason: standing still}\n"
-           "- {t: 1001.1, state: TRACKING, reason: ''}\n- {t: 1031.0, state: DEGRADED, reason: few features}\n- {t: 1033.0, state: TRACKING, reason: ''}\n"
-           "loops:\n- {t: 1032.5, t_match: 1002.5, query: 33, match: 3, accepted: true, inliers: 84, reason: 84 inliers and 2 planes agree}\n"
+           "states:\n- {t: 999.0, state: WAITING, reason: no IMU yet}\n- {t: 1000.0, state: INITIALISING, reason: "
+           "standing still}\n"
+           "- {t: 1001.1, state: TRACKING, reason: ''}\n- {t: 1031.0, state: DEGRADED, reason: few features}\n- {t: "
+           "1033.0, state: TRACKING, reason: ''}\n"
+           "loops:\n- {t: 1032.5, t_match: 1002.5, query: 33, match: 3, accepted: true, inliers: 84, reason: 84 "
+           "inliers and 2 planes agree}\n"
            "- {t: 1044.0, query: 45, match: 9, accepted: false, inliers: 12, reason: 'too few inliers </script>'}\n"
-           "global_ba:\n- {t: 1033.2, keyframes: 34, iterations: 8, ms: 190.5}\nwarnings: [2 gaps in the IMU were bridged]\n";
+           "global_ba:\n- {t: 1033.2, keyframes: 34, iterations: 8, ms: 190.5}\nwarnings: [2 gaps in the IMU were "
+           "bridged]\n";
   }
   void TearDown() override {
     if (!keep_) fs::remove_all(dir_);
@@ -116,8 +126,10 @@ class Report : public testing::Test {
       if (estimate && p.id == 2) continue;  // the ceiling was not found
       const auto turned = [&](const double* v) {
         std::ostringstream s;
-        if (estimate) s << "[" << -v[1] << ", " << v[0] << ", " << v[2] << "]";
-        else s << "[" << v[0] << ", " << v[1] << ", " << v[2] << "]";
+        if (estimate)
+          s << "[" << -v[1] << ", " << v[0] << ", " << v[2] << "]";
+        else
+          s << "[" << v[0] << ", " << v[1] << ", " << v[2] << "]";
         return s.str();
       };
       out << "- {id: " << p.id << ", kind: " << p.kind << ", normal: " << turned(p.n) << ", distance: " << p.d
@@ -125,7 +137,8 @@ class Report : public testing::Test {
       for (int k = 0; k < 4; ++k) out << (k ? ", " : "") << turned(p.corner[k]);
       out << "], holes: []}]}\n";
       if (!estimate && p.id == 7) {  // a glimpse of something small: nobody expects it to be found
-        out << "- {id: 8, kind: vertical, normal: [1, 0, 0], distance: 1, area: 4, seen_seconds: 0.4, seen_area: 0.2, polygons: []}\n";
+        out << "- {id: 8, kind: vertical, normal: [1, 0, 0], distance: 1, area: 4, seen_seconds: 0.4, seen_area: 0.2, "
+               "polygons: []}\n";
       }
     }
     return out.str();

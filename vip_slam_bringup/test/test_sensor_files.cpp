@@ -86,7 +86,8 @@ TEST(SensorFiles, AllHaveTheSameKeysAndTheReadmeNamesThem) {
 }
 
 TEST(SensorFiles, SavingAndLoadingChangesNothing) {
-  const std::string copy = (fs::temp_directory_path() / ("vip_slam_sensor_" + std::to_string(::getpid()) + ".yaml")).string();
+  const std::string copy =
+      (fs::temp_directory_path() / ("vip_slam_sensor_" + std::to_string(::getpid()) + ".yaml")).string();
   for (const auto& path : shipped()) {
     SCOPED_TRACE(path.string());
     const SensorConfig sensor = loadSensorConfig(path.string());

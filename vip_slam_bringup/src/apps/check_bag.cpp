@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <iostream>
 
-#include <CLI/CLI.hpp>
 #include <ros/ros.h>
+#include <CLI/CLI.hpp>
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/recorder.h"

@@ -53,8 +53,12 @@ int main(int argc, char** argv) {
   vip_slam::StrayOptions stray;
   CLI::App* stray_command = app.add_subcommand("stray", "Stray Scanner recording (iPhone or iPad with LiDAR)");
   addCommon(stray_command, &stray);
-  stray_command->add_option("--width", stray.width, "width of colour and depth, px")->check(CLI::Range(160, 1920))->capture_default_str();
-  stray_command->add_option("--min-confidence", stray.min_confidence, "drop depth below this ARKit confidence")->check(CLI::Range(0, 2))->capture_default_str();
+  stray_command->add_option("--width", stray.width, "width of colour and depth, px")
+      ->check(CLI::Range(160, 1920))
+      ->capture_default_str();
+  stray_command->add_option("--min-confidence", stray.min_confidence, "drop depth below this ARKit confidence")
+      ->check(CLI::Range(0, 2))
+      ->capture_default_str();
 
   CLI11_PARSE(app, argc, argv);
   try {

@@ -2,10 +2,10 @@
 #include <filesystem>
 #include <memory>
 
-#include <opencv2/imgcodecs.hpp>
 #include <rosbag/bag.h>
 #include <sensor_msgs/Imu.h>
 #include <yaml-cpp/yaml.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "vip_slam_bringup/convert/bag_output.h"
 #include "vip_slam_bringup/convert/converters.h"
@@ -72,7 +72,8 @@ std::vector<StampedFile> readImages(const std::string& camera_folder) {
   std::vector<StampedFile> images;
   for (const TextRow& row : table.rows()) {
     StampedFile image{rosTime(table.nanoseconds(row, 0)), camera_folder + "/data/" + row.cells[1]};
-    if (!images.empty() && image.stamp <= images.back().stamp) table.fail(row, "the stamp does not follow the one before");
+    if (!images.empty() && image.stamp <= images.back().stamp)
+      table.fail(row, "the stamp does not follow the one before");
     if (!fs::exists(image.path)) table.fail(row, "image " + image.path + " is not there");
     images.push_back(std::move(image));
   }
@@ -138,7 +139,9 @@ SensorConfig sensorOf(const StereoDepth& stereo, const std::string& imu_yaml, do
   sensor.camera = stereo.rectified();
   sensor.T_imu_cam = stereo.T_imu_rectified();
   const YAML::Node imu = loadYaml(imu_yaml);
-  const auto noise = [&](const char* key) { return numbers(YAML::Load("[" + imu[key].as<std::string>("") + "]"), imu_yaml, key, 1)[0]; };
+  const auto noise = [&](const char* key) {
+    return numbers(YAML::Load("[" + imu[key].as<std::string>("") + "]"), imu_yaml, key, 1)[0];
+  };
   sensor.imu_noise.gyro_noise_density = noise("gyroscope_noise_density");
   sensor.imu_noise.gyro_random_walk = noise("gyroscope_random_walk");
   sensor.imu_noise.accel_noise_density = noise("accelerometer_noise_density");
@@ -155,7 +158,8 @@ ConversionReport convertEuroc(const EurocOptions& options) {
   const std::string root = fs::exists(options.folder + "/mav0") ? options.folder + "/mav0" : options.folder;
   for (const char* needed : {"cam0/data.csv", "cam1/data.csv", "imu0/data.csv"})
     if (!fs::exists(root + "/" + needed))
-      throw std::runtime_error(root + "/" + needed + ": is not there; expected a EuRoC folder with mav0/cam0, cam1, imu0");
+      throw std::runtime_error(root + "/" + needed +
+                               ": is not there; expected a EuRoC folder with mav0/cam0, cam1, imu0");
   const auto left = readImages(root + "/cam0"), right = readImages(root + "/cam1");
   const auto imu = readImu(root + "/imu0/data.csv");
   auto calibration = std::make_shared<StereoCalibration>();
@@ -196,7 +200,8 @@ ConversionReport convertEuroc(const EurocOptions& options) {
     if (!options.depth) continue;
     const StampedFile other = right[r];
     bag.add(image.stamp, [=](rosbag::Bag& out) {
-      const auto frame = stereo->compute(readGray(image.path, calibration->left), readGray(other.path, calibration->right));
+      const auto frame =
+          stereo->compute(readGray(image.path, calibration->left), readGray(other.path, calibration->right));
       std_msgs::Header header;
       header.stamp = image.stamp;
       header.frame_id = "cam0_rectified";

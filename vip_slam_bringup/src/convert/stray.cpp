@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <memory>
 
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 #include <rosbag/bag.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Imu.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "vip_slam_bringup/convert/bag_output.h"
 #include "vip_slam_bringup/convert/converters.h"
@@ -178,20 +178,23 @@ ConversionReport convertStray(const StrayOptions& options) {
     if (skip > 2)
       throw std::runtime_error(options.folder + "/rgb.mp4: " + std::to_string(frames) + " frames for " +
                                std::to_string(rows.size()) + " rows of odometry.csv");
-    report.warnings.push_back("rgb.mp4 has " + std::to_string(skip) + " frame(s) less than odometry.csv: the first rows get none");
+    report.warnings.push_back("rgb.mp4 has " + std::to_string(skip) +
+                              " frame(s) less than odometry.csv: the first rows get none");
   }
   rows.erase(rows.begin(), rows.begin() + skip);
-  const cv::Size size(options.width, static_cast<int>(std::lround(double(options.width) * video_size.height / video_size.width)));
+  const cv::Size size(options.width,
+                      static_cast<int>(std::lround(double(options.width) * video_size.height / video_size.width)));
   std::vector<int> without_depth;
   for (const Row& row : rows)
     if (!fs::exists(numbered(options.folder + "/depth", row.frame))) without_depth.push_back(row.frame);
-  if (without_depth.size() == rows.size()) throw std::runtime_error(options.folder + "/depth: no NNNNNN.png for any row");
-  if (!without_depth.empty())
-    report.warnings.push_back(std::to_string(without_depth.size()) + " images have no depth");
+  if (without_depth.size() == rows.size())
+    throw std::runtime_error(options.folder + "/depth: no NNNNNN.png for any row");
+  if (!without_depth.empty()) report.warnings.push_back(std::to_string(without_depth.size()) + " images have no depth");
 
   const SE3 T_imu_cam = cameraInImu();
   // ARKit's world has y up; ours has z up.
-  const SE3 T_zup_yup(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX())), Eigen::Vector3d::Zero());
+  const SE3 T_zup_yup(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX())),
+                      Eigen::Vector3d::Zero());
   Trajectory truth;
   auto video = std::make_shared<cv::VideoCapture>(options.folder + "/rgb.mp4");
   BagOutput bag(options.bag, options.overwrite);
@@ -201,7 +204,8 @@ ConversionReport convertStray(const StrayOptions& options) {
     const ros::Time stamp(row.t);
     bag.add(stamp, [=](rosbag::Bag& out) {
       cv::Mat frame, image;
-      if (!video->read(frame)) throw std::runtime_error(options.folder + "/rgb.mp4: ends before frame " + std::to_string(row.frame));
+      if (!video->read(frame))
+        throw std::runtime_error(options.folder + "/rgb.mp4: ends before frame " + std::to_string(row.frame));
       cv::resize(frame, image, size, 0, 0, cv::INTER_AREA);
       std_msgs::Header header;
       header.stamp = stamp;
@@ -214,11 +218,14 @@ ConversionReport convertStray(const StrayOptions& options) {
       full.cx = row.cx;
       full.cy = row.cy;
       const auto info = cameraInfo(full.scaled(size.width, size.height), header);
-      out.write(kColor, stamp, compressed(image, ".jpg", "bgr8; jpeg compressed bgr8", {cv::IMWRITE_JPEG_QUALITY, options.jpeg_quality}, header));
+      out.write(kColor, stamp,
+                compressed(image, ".jpg", "bgr8; jpeg compressed bgr8",
+                           {cv::IMWRITE_JPEG_QUALITY, options.jpeg_quality}, header));
       out.write(kColorInfo, stamp, info);
       if (!has_depth) return;
       const cv::Mat depth = readDepth(options.folder, row.frame, options.min_confidence, size);
-      out.write(kDepth, stamp, compressed(depth, ".png", "16UC1; png compressed ", {cv::IMWRITE_PNG_COMPRESSION, 3}, header));
+      out.write(kDepth, stamp,
+                compressed(depth, ".png", "16UC1; png compressed ", {cv::IMWRITE_PNG_COMPRESSION, 3}, header));
       out.write(kDepthInfo, stamp, info);
     });
   }

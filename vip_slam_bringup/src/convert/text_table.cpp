@@ -58,8 +58,8 @@ TextTable::TextTable(const std::string& path, const std::string& separators, std
       fail(row, std::to_string(row.cells.size()) + " columns, expected at least " + std::to_string(min_columns));
     rows_.push_back(std::move(row));
   }
-  if (rows_.empty()) throw std::runtime_error(path + ": no data, expected rows of " + std::to_string(min_columns) +
-                                              " columns");
+  if (rows_.empty())
+    throw std::runtime_error(path + ": no data, expected rows of " + std::to_string(min_columns) + " columns");
 }
 
 double TextTable::number(const TextRow& row, std::size_t column, const std::string& what) const {
@@ -72,8 +72,7 @@ long long TextTable::nanoseconds(const TextRow& row, std::size_t column) const {
   const std::string& text = row.cells.at(column);
   char* end = nullptr;
   const long long value = std::strtoll(text.c_str(), &end, 10);
-  if (text.empty() || *end != '\0' || value < 0)
-    fail(row, "the stamp is '" + text + "', expected whole nanoseconds");
+  if (text.empty() || *end != '\0' || value < 0) fail(row, "the stamp is '" + text + "', expected whole nanoseconds");
   return value;
 }
 

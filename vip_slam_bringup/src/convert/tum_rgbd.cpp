@@ -2,9 +2,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include <opencv2/imgcodecs.hpp>
 #include <rosbag/bag.h>
 #include <sensor_msgs/Imu.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "vip_slam_bringup/convert/bag_output.h"
 #include "vip_slam_bringup/convert/converters.h"
@@ -147,7 +147,8 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   if (imu.empty())
     report.warnings.push_back("no imu.txt: the bag has images only, and the odometry needs an IMU");
   else if (!gyro)
-    report.warnings.push_back("accelerometer.txt has no gyroscope: the odometry needs one (imu.txt: stamp gx gy gz ax ay az)");
+    report.warnings.push_back(
+        "accelerometer.txt has no gyroscope: the odometry needs one (imu.txt: stamp gx gy gz ax ay az)");
   BagOutput bag(options.bag, options.overwrite);
   const auto addImages = [&](const std::vector<StampedFile>& files, const std::string& topic, const std::string& info,
                              bool is_color) {

@@ -6,11 +6,11 @@
 #include <message_filters/sync_policies/approximate_time.h>
 #include <message_filters/synchronizer.h>
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/stereo/stereo_depth.h"
@@ -56,7 +56,8 @@ class StereoDepthNodelet : public nodelet::Nodelet {
       const sensor_msgs::CameraInfo info = cameraInfo(stereo_->rectified(), left->header);
       image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", left->header)));
       image_info_publisher_.publish(info);
-      depth_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", left->header)));
+      depth_publisher_.publish(
+          boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", left->header)));
       depth_info_publisher_.publish(info);
     } catch (const std::exception& e) {
       NODELET_ERROR_THROTTLE(5.0, "Stereo depth: %s", e.what());

@@ -15,7 +15,8 @@ void checkEncoding(const std::string& role, const StreamRecord& stream, const st
   if (stream.stamps.empty()) return;
   if (stream.unusable > 0)
     out->push_back({stream.unusable * 2 > stream.stamps.size() ? Severity::kError : Severity::kWarning, role,
-                    words("%zu images could not be decoded: ", stream.unusable) + stream.unusable_reason, "record raw images, JPEG or PNG"});
+                    words("%zu images could not be decoded: ", stream.unusable) + stream.unusable_reason,
+                    "record raw images, JPEG or PNG"});
   for (const std::string& encoding : stream.encodings) {
     const bool same = encoding == expected || (expected == "16UC1" && encoding == "mono16") ||
                       (expected == "mono8" && encoding == "8UC1");
@@ -25,7 +26,8 @@ void checkEncoding(const std::string& role, const StreamRecord& stream, const st
       out->push_back({Severity::kWarning, role, "encoding is " + encoding + ", the sensor file says " + expected,
                       "correct the sensor file; colours or depth units may be read wrongly"});
   }
-  if (stream.sizes.size() > 1) out->push_back({Severity::kError, role, "the image size changes during the recording", ""});
+  if (stream.sizes.size() > 1)
+    out->push_back({Severity::kError, role, "the image size changes during the recording", ""});
 }
 
 void checkCamera(const std::string& role, const StreamRecord& info, const CameraIntrinsics& camera,
@@ -37,15 +39,19 @@ void checkCamera(const std::string& role, const StreamRecord& info, const Camera
     return;
   }
   if (images.sizes.size() == 1 && *images.sizes.begin() != std::make_pair(camera.width, camera.height))
-    out->push_back({Severity::kError, role,
-                    "says " + sizeText({camera.width, camera.height}) + ", the images are " + sizeText(*images.sizes.begin()),
-                    "the calibration belongs to another resolution"});
-  else if (std::abs(camera.fx / camera.fy - 1) > 0.1 || camera.cx < 0.25 * camera.width || camera.cx > 0.75 * camera.width)
-    out->push_back({Severity::kWarning, role,
-                    words("unusual calibration: fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy),
-                    "check it"});
+    out->push_back(
+        {Severity::kError, role,
+         "says " + sizeText({camera.width, camera.height}) + ", the images are " + sizeText(*images.sizes.begin()),
+         "the calibration belongs to another resolution"});
+  else if (std::abs(camera.fx / camera.fy - 1) > 0.1 || camera.cx < 0.25 * camera.width ||
+           camera.cx > 0.75 * camera.width)
+    out->push_back(
+        {Severity::kWarning, role,
+         words("unusual calibration: fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy),
+         "check it"});
   else
-    out->push_back({Severity::kGood, role, words("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
+    out->push_back({Severity::kGood, role,
+                    words("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
 }
 
 }  // namespace
@@ -65,7 +71,8 @@ Findings checkImages(const Recording& r) {
                      "set registered: false with the depth camera's calibration"});
     else
       out.push_back({Severity::kGood, "depth image", "same size as colour, " + sizeText(color), ""});
-    if (r.depth_camera.width > 0 && r.color_camera.width > 0 && std::abs(r.depth_camera.fx / r.color_camera.fx - 1) > 0.01)
+    if (r.depth_camera.width > 0 && r.color_camera.width > 0 &&
+        std::abs(r.depth_camera.fx / r.color_camera.fx - 1) > 0.01)
       out.push_back({Severity::kWarning, "depth camera_info",
                      words("focal length is %.1f, that of colour %.1f", r.depth_camera.fx, r.color_camera.fx),
                      "the depth image is not registered to colour"});
@@ -78,7 +85,8 @@ Findings checkImages(const Recording& r) {
     }
     const double share = median(valid);
     if (middle.empty() || share < 0.02) {
-      out.push_back({Severity::kError, "depth image", "holds almost no depth", "emitter off, wrong topic, or out of range?"});
+      out.push_back(
+          {Severity::kError, "depth image", "holds almost no depth", "emitter off, wrong topic, or out of range?"});
     } else {
       const double z = median(middle);
       if (z < 0.05 || z > 50)
@@ -88,7 +96,8 @@ Findings checkImages(const Recording& r) {
         out.push_back({Severity::kWarning, "depth image", words("only %.0f %% of the pixels have depth", 100 * share),
                        "glass, sunlight or range? planes and scale suffer"});
       else
-        out.push_back({Severity::kGood, "depth image", words("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
+        out.push_back({Severity::kGood, "depth image",
+                       words("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
     }
   }
   return out;
@@ -106,30 +115,39 @@ Findings checkSkew(const Recording& r) {
     double best = after != depth.end() ? *after - t : 1e9;
     if (after != depth.begin() && t - *(after - 1) < std::abs(best)) best = *(after - 1) - t;
     ++all;
-    if (std::abs(best) > 0.02) ++unmatched;
-    else skew.push_back(best);
+    if (std::abs(best) > 0.02)
+      ++unmatched;
+    else
+      skew.push_back(best);
   }
   if (all == 0) {
-    out.push_back({Severity::kError, "colour and depth",
-                   words("do not overlap in time: depth begins %.1f s after colour", depth.front() - r.color.stamps.front()),
-                   "the two streams use different clocks"});
+    out.push_back(
+        {Severity::kError, "colour and depth",
+         words("do not overlap in time: depth begins %.1f s after colour", depth.front() - r.color.stamps.front()),
+         "the two streams use different clocks"});
     return out;
   }
   const double share = double(unmatched) / all;
   if (skew.empty() || share > 0.5)
-    out.push_back({Severity::kError, "colour and depth", words("%.0f %% of the colour images have no depth within 20 ms", 100 * share),
+    out.push_back({Severity::kError, "colour and depth",
+                   words("%.0f %% of the colour images have no depth within 20 ms", 100 * share),
                    "switch on the driver's synchronisation (enable_sync, enable_frame_sync), or equal rates"});
   else if (share > 0.05)
-    out.push_back({Severity::kWarning, "colour and depth", words("%.0f %% of the colour images have no depth within 20 ms", 100 * share),
+    out.push_back({Severity::kWarning, "colour and depth",
+                   words("%.0f %% of the colour images have no depth within 20 ms", 100 * share),
                    "these images are tracked without depth"});
   if (!skew.empty()) {
     const double middle = median(skew);
     if (std::abs(middle) > 0.008)
-      out.push_back({Severity::kWarning, "colour and depth", words("depth is stamped %.1f ms %s colour", 1000 * std::abs(middle),
-                                                                   middle > 0 ? "after" : "before"),
-                     "moving edges get the wrong depth: switch on the driver's synchronisation"});
+      out.push_back(
+          {Severity::kWarning, "colour and depth",
+           words("depth is stamped %.1f ms %s colour", 1000 * std::abs(middle), middle > 0 ? "after" : "before"),
+           "moving edges get the wrong depth: switch on the driver's synchronisation"});
     else
-      out.push_back({Severity::kGood, "colour and depth", words("stamps agree within %.1f ms", 1000 * std::max(std::abs(quantile(skew, 0.95)), std::abs(quantile(skew, 0.05)))), ""});
+      out.push_back({Severity::kGood, "colour and depth",
+                     words("stamps agree within %.1f ms",
+                           1000 * std::max(std::abs(quantile(skew, 0.95)), std::abs(quantile(skew, 0.05)))),
+                     ""});
   }
   return out;
 }

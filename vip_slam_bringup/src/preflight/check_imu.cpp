@@ -16,8 +16,8 @@ double spread(const std::vector<StampedVector>& samples, std::size_t begin, std:
   return std::sqrt(sum / double(end - begin));
 }
 
-/// Lengths of the mean specific force over the half seconds with the least motion (those about as quiet as the quietest,
-/// a fifth of all at most).
+/// Lengths of the mean specific force over the half seconds with the least motion (those about as quiet as the
+/// quietest, a fifth of all at most).
 std::vector<double> quietForces(const std::vector<StampedVector>& accel, double* least_spread) {
   std::vector<std::pair<double, double>> windows;
   std::size_t begin = 0;
@@ -58,7 +58,8 @@ void checkGaps(const std::string& role, const std::vector<StampedVector>& sample
   else
     out->push_back({Severity::kGood, role, words("no gaps, largest step %.1f ms", 1000 * largest), ""});
   if (1.0 / period < 90)
-    out->push_back({Severity::kWarning, role, words("only %.0f Hz", 1.0 / period), "100 Hz or more is wanted, 200 Hz is good"});
+    out->push_back(
+        {Severity::kWarning, role, words("only %.0f Hz", 1.0 / period), "100 Hz or more is wanted, 200 Hz is good"});
 }
 
 }  // namespace
@@ -78,30 +79,35 @@ Findings checkImu(const Recording& r) {
       return out;
     }
     if (spread(*samples, 0, samples->size()) < 1e-9)
-      out.push_back({Severity::kError, role, "the values never change",
-                     role == "gyroscope" ? "is this an accelerometer-only stream?" : "is this a gyroscope-only stream?"});
+      out.push_back(
+          {Severity::kError, role, "the values never change",
+           role == "gyroscope" ? "is this an accelerometer-only stream?" : "is this a gyroscope-only stream?"});
   }
   if (!r.gyro_samples.empty()) {
     double largest = 0;
     for (const auto& s : r.gyro_samples) largest = std::max(largest, s.value.norm());
     if (largest > 40)
-      out.push_back({Severity::kError, "gyroscope", words("rates up to %.0f", largest), "degrees a second? radians a second are expected"});
+      out.push_back({Severity::kError, "gyroscope", words("rates up to %.0f", largest),
+                     "degrees a second? radians a second are expected"});
   }
   double least_spread = 0;
   const std::vector<double> forces = quietForces(r.accel_samples, &least_spread);
   if (forces.empty()) return out;
   const double g = median(forces);
   if (g > 0.85 && g < 1.15)
-    out.push_back({Severity::kError, "gravity", words("%.2f when quiet: the accelerometer reports in g", g), "multiply by 9.81 in the driver; m/s^2 are expected"});
+    out.push_back({Severity::kError, "gravity", words("%.2f when quiet: the accelerometer reports in g", g),
+                   "multiply by 9.81 in the driver; m/s^2 are expected"});
   else if (g < 2.0)
-    out.push_back({Severity::kError, "gravity", words("%.2f m/s^2 when quiet: gravity has been taken out", g), "publish the raw specific force, not the linear acceleration"});
+    out.push_back({Severity::kError, "gravity", words("%.2f m/s^2 when quiet: gravity has been taken out", g),
+                   "publish the raw specific force, not the linear acceleration"});
   else if (std::abs(g - r.sensor.gravity) > (least_spread < 0.3 ? 0.35 : 1.2))
     out.push_back({Severity::kWarning, "gravity", words("%.2f m/s^2 when quiet, expected %.2f", g, r.sensor.gravity),
                    "calibrate the accelerometer (scale, bias)"});
   else
     out.push_back({Severity::kGood, "gravity", words("%.2f m/s^2 when quiet", g), ""});
   if (least_spread > 0.5)
-    out.push_back({Severity::kNote, "start", "the sensor is never still", "a second of standing still at the start helps the initialisation"});
+    out.push_back({Severity::kNote, "start", "the sensor is never still",
+                   "a second of standing still at the start helps the initialisation"});
   return out;
 }
 

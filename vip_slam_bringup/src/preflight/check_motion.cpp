@@ -26,7 +26,8 @@ class GyroIntegral {
   }
   bool covers(double t) const { return t_.size() > 1 && t >= t_.front() && t <= t_.back(); }
   Eigen::Vector3d at(double t) const {
-    const std::size_t i = std::min<std::size_t>(std::max<std::ptrdiff_t>(std::upper_bound(t_.begin(), t_.end(), t) - t_.begin(), 1), t_.size() - 1);
+    const std::size_t i = std::min<std::size_t>(
+        std::max<std::ptrdiff_t>(std::upper_bound(t_.begin(), t_.end(), t) - t_.begin(), 1), t_.size() - 1);
     const double s = (t - t_[i - 1]) / (t_[i] - t_[i - 1]);
     return (1 - s) * sum_[i - 1] + s * sum_[i];
   }
@@ -153,7 +154,8 @@ Findings checkMotion(const Recording& r) {
   }
   if (motion.scale > 5) return out;
   const double difference = motion.time_offset - r.sensor.time_offset;
-  const std::string measured = words("%+.1f ms measured, the sensor file says %+.1f ms", 1000 * motion.time_offset, 1000 * r.sensor.time_offset);
+  const std::string measured =
+      words("%+.1f ms measured, the sensor file says %+.1f ms", 1000 * motion.time_offset, 1000 * r.sensor.time_offset);
   if (std::abs(difference) > 0.006)
     out.push_back({std::abs(difference) > 0.05 ? Severity::kError : Severity::kWarning, "camera-IMU delay", measured,
                    words("set time_offset: %.4f in the sensor file", motion.time_offset)});
@@ -171,7 +173,8 @@ Findings checkMotion(const Recording& r) {
     out.push_back({Severity::kError, "extrinsics", words("the motion contradicts T_imu_cam by %.0f degrees", angle),
                    "the rotation that fits the motion has rows " + rows});
   } else {
-    out.push_back({Severity::kGood, "extrinsics", words("rotation of T_imu_cam fits the motion (%.1f degrees)", angle), ""});
+    out.push_back(
+        {Severity::kGood, "extrinsics", words("rotation of T_imu_cam fits the motion (%.1f degrees)", angle), ""});
   }
   return out;
 }

@@ -69,9 +69,11 @@ Findings checkTopics(const Recording& r) {
       out.push_back({bad, w.role, "topic " + w.topic + " has type " + found->second + ", expected " + w.types.front(),
                      candidates(r, w)});
     } else if (w.stream->stamps.empty()) {
-      out.push_back({bad, w.role, "no message on " + w.topic, "is the driver running, and is this stream switched on?"});
+      out.push_back(
+          {bad, w.role, "no message on " + w.topic, "is the driver running, and is this stream switched on?"});
     } else {
-      out.push_back({Severity::kGood, w.role, words("%zu messages on %s", w.stream->stamps.size(), w.topic.c_str()), ""});
+      out.push_back(
+          {Severity::kGood, w.role, words("%zu messages on %s", w.stream->stamps.size(), w.topic.c_str()), ""});
     }
   }
   return out;
@@ -87,9 +89,12 @@ Findings checkRates(const Recording& r) {
     std::vector<double> steps;
     for (std::size_t i = 1; i < stamps.size(); ++i) {
       const double step = stamps[i] - stamps[i - 1];
-      if (step < 0) ++backward;
-      else if (step == 0) ++repeated;
-      else steps.push_back(step);
+      if (step < 0)
+        ++backward;
+      else if (step == 0)
+        ++repeated;
+      else
+        steps.push_back(step);
       if (step > largest) {
         largest = step;
         largest_at = stamps[i - 1] - stamps.front();
@@ -103,7 +108,8 @@ Findings checkRates(const Recording& r) {
     for (const double step : steps)
       if (step > 1.7 * period) lost += static_cast<std::size_t>(std::lround(step / period)) - 1;
     if (stamps.front() < 1.0 && !r.live)
-      out.push_back({Severity::kWarning, w.role, "stamps begin at zero", "recorded without a clock? all streams must share one"});
+      out.push_back(
+          {Severity::kWarning, w.role, "stamps begin at zero", "recorded without a clock? all streams must share one"});
     if (backward > 0)
       out.push_back({Severity::kError, w.role, words("time runs backwards %zu times", backward),
                      "bag joined or played in a loop? messages out of order are dropped"});
@@ -129,9 +135,10 @@ Findings checkRates(const Recording& r) {
       delays.push_back(w.stream->arrivals[i] - stamps[i]);
     const double delay = delays.empty() ? 0 : median(delays);
     if (r.live && std::abs(delay) > 1.0)
-      out.push_back({Severity::kError, w.role, words("stamps lie %.1f s %s the clock of this machine", std::abs(delay),
-                                                     delay > 0 ? "behind" : "ahead of"),
-                     "the driver stamps with the device's clock: set it to system or global time"});
+      out.push_back(
+          {Severity::kError, w.role,
+           words("stamps lie %.1f s %s the clock of this machine", std::abs(delay), delay > 0 ? "behind" : "ahead of"),
+           "the driver stamps with the device's clock: set it to system or global time"});
   }
   return out;
 }

@@ -36,20 +36,28 @@ std::optional<SE3> connection(const std::vector<TfEdge>& edges, const std::strin
 
 const char* label(Severity severity) {
   switch (severity) {
-    case Severity::kGood: return "ok     ";
-    case Severity::kNote: return "note   ";
-    case Severity::kWarning: return "WARNING";
-    case Severity::kError: return "ERROR  ";
+    case Severity::kGood:
+      return "ok     ";
+    case Severity::kNote:
+      return "note   ";
+    case Severity::kWarning:
+      return "WARNING";
+    case Severity::kError:
+      return "ERROR  ";
   }
   return "";
 }
 
 const char* paint(Severity severity) {
   switch (severity) {
-    case Severity::kGood: return "\033[32m";
-    case Severity::kNote: return "\033[36m";
-    case Severity::kWarning: return "\033[33m";
-    case Severity::kError: return "\033[31m";
+    case Severity::kGood:
+      return "\033[32m";
+    case Severity::kNote:
+      return "\033[36m";
+    case Severity::kWarning:
+      return "\033[33m";
+    case Severity::kError:
+      return "\033[31m";
   }
   return "";
 }
@@ -63,7 +71,8 @@ Findings checkTf(const Recording& r) {
   if (r.color.stamps.empty() || r.gyro_samples.empty()) return out;
   for (const auto& [role, frame] : {std::make_pair("colour image", camera), std::make_pair("IMU", imu)})
     if (frame.empty())
-      out.push_back({Severity::kNote, role, "messages have an empty frame_id", "tf cannot be used for it; the sensor file's extrinsics are"});
+      out.push_back({Severity::kNote, role, "messages have an empty frame_id",
+                     "tf cannot be used for it; the sensor file's extrinsics are"});
   if (camera.empty() || imu.empty()) return out;
   const auto T_imu_cam = connection(r.tf, imu, camera);
   if (!T_imu_cam) {
@@ -84,13 +93,18 @@ Findings checkTf(const Recording& r) {
   const double angle = difference.rotation().angularDistance(Eigen::Quaterniond::Identity()) * 180 / M_PI;
   const double distance = (T_imu_cam->t() - r.sensor.T_imu_cam.t()).norm();
   if (angle > 3 || distance > 0.02)
-    out.push_back({Severity::kWarning, "tf", words("%s to %s differs from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",
-                                                   camera.c_str(), imu.c_str(), angle, 100 * distance),
+    out.push_back({Severity::kWarning, "tf",
+                   words("%s to %s differs from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",
+                         camera.c_str(), imu.c_str(), angle, 100 * distance),
                    "one of them is wrong; tf is used when the launch file says so"});
   else
-    out.push_back({Severity::kGood, "tf", words("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", angle, 100 * distance), ""});
-  if (connection(r.tf, "base_link", imu)) out.push_back({Severity::kGood, "tf", "IMU is connected to base_link", ""});
-  else out.push_back({Severity::kNote, "tf", "base_link is not connected to the IMU", "the sensor file's T_base_imu is used"});
+    out.push_back({Severity::kGood, "tf",
+                   words("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", angle, 100 * distance), ""});
+  if (connection(r.tf, "base_link", imu))
+    out.push_back({Severity::kGood, "tf", "IMU is connected to base_link", ""});
+  else
+    out.push_back(
+        {Severity::kNote, "tf", "base_link is not connected to the IMU", "the sensor file's T_base_imu is used"});
   return out;
 }
 
@@ -126,9 +140,13 @@ std::string toText(const Findings& findings, bool color) {
     out += head + "  " + f.about + ": " + f.text + "\n";
     if (!f.advice.empty()) out += "           -> " + f.advice + "\n";
   }
-  if (errors > 0) out += words("Not ready: %zu error%s, %zu warning%s.\n", errors, errors == 1 ? "" : "s", warnings, warnings == 1 ? "" : "s");
-  else if (warnings > 0) out += words("Ready, with %zu warning%s.\n", warnings, warnings == 1 ? "" : "s");
-  else out += "Ready.\n";
+  if (errors > 0)
+    out += words("Not ready: %zu error%s, %zu warning%s.\n", errors, errors == 1 ? "" : "s", warnings,
+                 warnings == 1 ? "" : "s");
+  else if (warnings > 0)
+    out += words("Ready, with %zu warning%s.\n", warnings, warnings == 1 ? "" : "s");
+  else
+    out += "Ready.\n";
   return out;
 }
 

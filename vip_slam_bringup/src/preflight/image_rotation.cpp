@@ -67,7 +67,8 @@ std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray) co
   std::vector<cv::Point2f> images;
   for (std::size_t i = 0; i < before.size(); ++i) {
     Eigen::Vector2d a, b;
-    if (!found[i] || !camera_->undistort({before[i].x, before[i].y}, &a) || !camera_->undistort({after[i].x, after[i].y}, &b))
+    if (!found[i] || !camera_->undistort({before[i].x, before[i].y}, &a) ||
+        !camera_->undistort({after[i].x, after[i].y}, &b))
       continue;
     from.push_back(a.homogeneous().normalized());
     to.push_back(b.homogeneous().normalized());
@@ -82,7 +83,8 @@ std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray) co
     cv::Mat r, t, inliers;
     const float threshold = static_cast<float>(2.0 / camera_->focal());
     if (cv::solvePnPRansac(points, images, cv::Matx33d::eye(), cv::noArray(), r, t, false, 60, threshold, 0.99, inliers,
-                           cv::SOLVEPNP_EPNP) && inliers.rows >= static_cast<int>(kLeastCorners)) {
+                           cv::SOLVEPNP_EPNP) &&
+        inliers.rows >= static_cast<int>(kLeastCorners)) {
       std::vector<cv::Point3f> good_points;
       std::vector<cv::Point2f> good_images;
       for (int i = 0; i < inliers.rows; ++i) {

@@ -57,7 +57,8 @@ Recording recordBag(const std::string& path, const SensorConfig& sensor, double 
 
 Recording recordLive(const SensorConfig& sensor, double seconds) {
   if (!ros::master::check())
-    throw std::runtime_error("no ROS master at " + ros::master::getURI() + "; is roscore running, is ROS_MASTER_URI right?");
+    throw std::runtime_error("no ROS master at " + ros::master::getURI() +
+                             "; is roscore running, is ROS_MASTER_URI right?");
   ros::NodeHandle nh;
   Recorder recorder(sensor, true, seconds);
   std::vector<ros::Subscriber> subscribers;

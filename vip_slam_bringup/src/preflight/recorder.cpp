@@ -47,8 +47,10 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
   try {
     const cv::Mat image = is_color ? decodeGray(message) : decodeDepth(message, recording_.sensor.depth_scale);
     stream.sizes.emplace(image.cols, image.rows);
-    if (is_color) addGray(t, image);
-    else addDepth(t, image);
+    if (is_color)
+      addGray(t, image);
+    else
+      addDepth(t, image);
   } catch (const std::exception& e) {
     ++stream.unusable;
     stream.unusable_reason = e.what();
@@ -74,7 +76,8 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
     if (!rotation_ && recording_.color_camera.width > 0)
       rotation_ = std::make_unique<ImageRotation>(makeCamera(recording_.color_camera));
   }
-  if (topic == topics.depth_info) take(&recording_.depth_info, &recording_.depth_camera, &recording_.depth_camera_error);
+  if (topic == topics.depth_info)
+    take(&recording_.depth_info, &recording_.depth_camera, &recording_.depth_camera_error);
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Imu& message) {
@@ -118,7 +121,8 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
         const float z = depth.at<float>(v, u);
         if (z > 0 && std::isfinite(z)) values.push_back(z);
       }
-    recording_.depths.push_back({double(values.size()) / std::max<std::size_t>(all, 1), values.empty() ? 0 : median(values)});
+    recording_.depths.push_back(
+        {double(values.size()) / std::max<std::size_t>(all, 1), values.empty() ? 0 : median(values)});
   }
   recent_depth_.push_back({t, depth});
   if (recent_depth_.size() > 12) recent_depth_.erase(recent_depth_.begin());
@@ -138,8 +142,10 @@ void Recorder::flushGray(bool all) {
     for (const Stamped& d : recent_depth_)
       if (std::abs(d.t - gray.t) < 0.02 && d.image.size() == gray.image.size()) depth = &d.image;
     if (!depth && !all && waiting_gray_.size() < 4) return;
-    if (rotation_ && gray.image.cols == (recording_.color_camera.width > 0 ? recording_.color_camera.width : recording_.sensor.camera.width))
-      if (const auto step = rotation_->add(gray.t, gray.image, depth ? *depth : cv::Mat())) recording_.rotations.push_back(*step);
+    if (rotation_ && gray.image.cols == (recording_.color_camera.width > 0 ? recording_.color_camera.width
+                                                                           : recording_.sensor.camera.width))
+      if (const auto step = rotation_->add(gray.t, gray.image, depth ? *depth : cv::Mat()))
+        recording_.rotations.push_back(*step);
     waiting_gray_.erase(waiting_gray_.begin());
   }
 }

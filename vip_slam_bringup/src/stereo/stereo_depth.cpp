@@ -46,8 +46,8 @@ StereoDepth::StereoDepth(const StereoCalibration& calibration, const StereoDepth
   if (left.width != right.width || left.height != right.height)
     throw std::invalid_argument("stereo calibration: left is " + sizeText(size_) + ", right is " +
                                 sizeText({right.width, right.height}) + ", expected equal sizes");
-  if (left.model != right.model && (left.model == DistortionModel::kEquidistant ||
-                                    right.model == DistortionModel::kEquidistant))
+  if (left.model != right.model &&
+      (left.model == DistortionModel::kEquidistant || right.model == DistortionModel::kEquidistant))
     throw std::invalid_argument("stereo calibration: left is " + distortionModelName(left.model) + ", right is " +
                                 distortionModelName(right.model) + ", expected the same lens model");
   const SE3 T_right_left = calibration.T_left_right().inverse();

@@ -1,9 +1,9 @@
 // Images and intrinsics to messages, as converters and the stereo nodelet need them.
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
+#include <opencv2/core.hpp>
 
 #include "vip_slam_core/camera/camera_model.h"
 

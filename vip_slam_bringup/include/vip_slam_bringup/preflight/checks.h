@@ -23,13 +23,13 @@ struct Finding {
 };
 using Findings = std::vector<Finding>;
 
-Findings checkTopics(const Recording& recording);     ///< there, of the right type, with messages
-Findings checkRates(const Recording& recording);      ///< rates, missing messages, order of stamps, stamps against clock
-Findings checkImages(const Recording& recording);     ///< encodings, sizes, camera_info, depth values
-Findings checkSkew(const Recording& recording);       ///< colour against depth stamps
-Findings checkImu(const Recording& recording);        ///< gaps, units, gravity, values that never change
-Findings checkMotion(const Recording& recording);     ///< camera-IMU delay and rotation from the motion itself
-Findings checkTf(const Recording& recording);         ///< frames, and extrinsics against the sensor file
+Findings checkTopics(const Recording& recording);  ///< there, of the right type, with messages
+Findings checkRates(const Recording& recording);   ///< rates, missing messages, order of stamps, stamps against clock
+Findings checkImages(const Recording& recording);  ///< encodings, sizes, camera_info, depth values
+Findings checkSkew(const Recording& recording);    ///< colour against depth stamps
+Findings checkImu(const Recording& recording);     ///< gaps, units, gravity, values that never change
+Findings checkMotion(const Recording& recording);  ///< camera-IMU delay and rotation from the motion itself
+Findings checkTf(const Recording& recording);      ///< frames, and extrinsics against the sensor file
 
 /// All of them in this order; the later ones only when their input is there.
 Findings checkAll(const Recording& recording);
@@ -40,12 +40,12 @@ std::string toText(const Findings& findings, bool color);
 /// Camera-IMU delay and rotation estimated from gyro rates and image rotation.
 struct MotionEstimate {
   bool usable = false;
-  std::string why_not;      ///< in words when not usable
-  double time_offset = 0;   ///< seconds; t_imu = t_image + time_offset
+  std::string why_not;     ///< in words when not usable
+  double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
   bool rotation_known = false;  ///< rotated about two axes at least
-  double correlation = 0;   ///< share of the gyro's variance that the images explain, 0..1
-  double scale = 1;         ///< gyro rate over image rate
+  double correlation = 0;       ///< share of the gyro's variance that the images explain, 0..1
+  double scale = 1;             ///< gyro rate over image rate
 };
 MotionEstimate estimateMotion(const Recording& recording, double max_offset = 0.2);
 

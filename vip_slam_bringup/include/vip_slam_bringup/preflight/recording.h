@@ -47,16 +47,16 @@ struct TfEdge {
 };
 
 struct Recording {
-  SensorConfig sensor;                        ///< what is expected
+  SensorConfig sensor;  ///< what is expected
   bool live = false;
   std::map<std::string, std::string> topics;  ///< everything that is there: topic -> type
   StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
-  CameraIntrinsics color_camera, depth_camera;     ///< from camera_info; width 0: none seen
-  std::string color_camera_error, depth_camera_error;  ///< why camera_info is unusable
+  CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
+  std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable
   std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
   std::vector<RotationStep> rotations;
   std::vector<DepthSample> depths;
-  std::vector<TfEdge> tf;                     ///< newest transform of each edge
+  std::vector<TfEdge> tf;  ///< newest transform of each edge
 };
 
 }  // namespace vip_slam
