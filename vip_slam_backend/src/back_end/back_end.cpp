@@ -139,6 +139,7 @@ void BackEnd::Impl::reset() {
   T_map_odom = SE3();
   epoch = 0;
   global_wanted = false;
+  last_global = -1e300;
   refusal.clear();
   loops.clear();
   new_loops.clear();

@@ -80,6 +80,7 @@ struct BackEnd::Impl {
   std::uint32_t epoch = 0;
   std::uint64_t revision = 0;
   bool global_wanted = false;
+  double last_global = -1e300;         ///< stamp of the last one that a loop asked for
   std::string refusal;
   std::vector<LoopEvent> loops;        ///< all so far
   std::vector<LoopEvent> new_loops;    ///< since the last update

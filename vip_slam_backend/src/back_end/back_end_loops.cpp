@@ -2,11 +2,17 @@
 #include "back_end_impl.h"
 
 namespace vip_slam {
+namespace {
+
+constexpr double kRestSeconds = 15;
+
+}  // namespace
 
 void BackEnd::Impl::closeLoop(MapUpdate* update) {
   const KeyframeId id = map.newestKeyframe();
   loop_closer.add(map, id);
   if (!options.loop_closing) return;
+  const SE3 before = map.keyframe(id).state.T_W_I;
   for (const LoopEvent& event : loop_closer.close(map, id)) {
     (event.accepted ? statistics.loops_accepted : statistics.loops_rejected) += 1;
     loops.push_back(event);
@@ -14,7 +20,15 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
     if (!event.accepted) continue;
     followNewest();
     fillGlobal(update);
-    global_wanted = true;
+    // A loop that moves next to nothing can wait: the room that is seen again and again must not cost an adjustment of
+    // everything each time.
+    const SE3 moved = before.inverse() * map.keyframe(id).state.T_W_I;
+    const double t = map.keyframe(id).data->frame.t;
+    const bool far = moved.t().norm() > 0.02 || before.rotation().angularDistance(map.keyframe(id).state.T_W_I.rotation()) > 0.005;
+    if (far || t - last_global > kRestSeconds) {
+      global_wanted = true;
+      last_global = t;
+    }
   }
 }
 
