@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -66,7 +68,7 @@ void assign(Vector* out, const Eigen::Vector3d& in) {
 class BagWriter : public SequenceWriter {
  public:
   BagWriter(const std::string& path, const SensorConfig& sensor, std::int64_t start_ns)
-      : path_(path), part_(path + ".part"), sensor_(sensor) {
+      : path_(path), part_(path + "." + std::to_string(getpid()) + ".part"), sensor_(sensor) {
     try {
       bag_.open(part_, rosbag::bagmode::Write);
     } catch (const rosbag::BagException& e) {
