@@ -35,11 +35,11 @@ World rooms() {
   addPlane(&w, {13.5, 0.6, 0}, {0, 2.5, 0}, {0, 0, 1.9}, -Vector3d::UnitX(), V);
   addPlane(&w, {0, 0, 0}, {X, 0, 0}, {0, Y, 0}, Vector3d::UnitZ(), H);
   addPlane(&w, {0, 0, Z}, {X, 0, 0}, {0, Y, 0}, -Vector3d::UnitZ(), H);
-  addPlane(&w, {4.9, 1.0, 0.75}, {1.6, 0, 0}, {0, 0.9, 0}, Vector3d::UnitZ(), H);
+  addPlane(&w, {4.2, 3.6, 0.75}, {1.4, 0, 0}, {0, 1.0, 0}, Vector3d::UnitZ(), H);
   addPlane(&w, {0.9, 5.5, 0.9}, {0.8, 0, 0}, {0, 1.8, 0}, Vector3d::UnitZ(), H);
   addPlane(&w, {7.6, 1.2, 0.72}, {1.5, 0, 0}, {0, 0.9, 0}, Vector3d::UnitZ(), H);
   addPlane(&w, {12.4, 5.2, 0.45}, {0.9, 0, 0}, {0, 1.6, 0}, Vector3d::UnitZ(), H);
-  for (const Vector3d& c : {Vector3d(5.6, 1.4, 0.9), Vector3d(1.2, 6.2, 1.1), Vector3d(8.3, 1.6, 0.9), Vector3d(12.8, 6, 0.7),
+  for (const Vector3d& c : {Vector3d(4.9, 4.1, 0.95), Vector3d(1.2, 6.2, 1.1), Vector3d(8.3, 1.6, 0.9), Vector3d(12.8, 6, 0.7),
                             Vector3d(4.6, 4.6, 0.4), Vector3d(9.4, 4.4, 0.4), Vector3d(2.4, 8.7, 0.5), Vector3d(11, 8.7, 0.5),
                             Vector3d(1.4, 2.0, 0.6), Vector3d(12.6, 2.0, 0.6), Vector3d(6.3, 5.2, 1.2), Vector3d(7.7, 5.2, 1.2)})
     w.clutter.push_back({c - Vector3d(0.5, 0.5, 0.35), c + Vector3d(0.5, 0.5, 0.45)});
