@@ -21,9 +21,12 @@ DistortionModel distortionModelFromName(const std::string& name) {
 
 std::string distortionModelName(DistortionModel model) {
   switch (model) {
-    case DistortionModel::kNone: return "none";
-    case DistortionModel::kRadTan: return "radtan";
-    case DistortionModel::kEquidistant: return "equidistant";
+    case DistortionModel::kNone:
+      return "none";
+    case DistortionModel::kRadTan:
+      return "radtan";
+    case DistortionModel::kEquidistant:
+      return "equidistant";
   }
   return "unknown";
 }
@@ -96,13 +99,15 @@ std::shared_ptr<const CameraModel> makeCamera(const CameraIntrinsics& intrinsics
   const std::string problem = intrinsics.validate();
   if (!problem.empty()) throw std::invalid_argument("camera: " + problem);
   switch (intrinsics.model) {
-    case DistortionModel::kEquidistant: return std::make_shared<EquidistantCamera>(intrinsics);
+    case DistortionModel::kEquidistant:
+      return std::make_shared<EquidistantCamera>(intrinsics);
     case DistortionModel::kRadTan:
       if (std::any_of(intrinsics.distortion.begin(), intrinsics.distortion.end(), [](double k) { return k != 0; })) {
         return std::make_shared<RadTanCamera>(intrinsics);
       }
       break;
-    case DistortionModel::kNone: break;
+    case DistortionModel::kNone:
+      break;
   }
   return std::make_shared<PinholeCamera>(intrinsics);
 }

@@ -18,10 +18,14 @@ DepthSensorType depthSensorTypeFromName(const std::string& name) {
 
 std::string depthSensorTypeName(DepthSensorType type) {
   switch (type) {
-    case DepthSensorType::kProportional: return "proportional";
-    case DepthSensorType::kStructuredLight: return "structured_light";
-    case DepthSensorType::kStereo: return "stereo";
-    case DepthSensorType::kTof: return "tof";
+    case DepthSensorType::kProportional:
+      return "proportional";
+    case DepthSensorType::kStructuredLight:
+      return "structured_light";
+    case DepthSensorType::kStereo:
+      return "stereo";
+    case DepthSensorType::kTof:
+      return "tof";
   }
   return "unknown";
 }
@@ -30,7 +34,8 @@ DepthNoise DepthNoise::preset(DepthSensorType type) {
   DepthNoise noise;
   noise.type = type;
   switch (type) {
-    case DepthSensorType::kProportional: break;  // the simulated camera of the paper: 0.17 % of z
+    case DepthSensorType::kProportional:
+      break;  // the simulated camera of the paper: 0.17 % of z
     case DepthSensorType::kStructuredLight:
       // Khoshelham & Elberink 2012, Kinect v1: sigma_z = 1.425e-3 z^2 (metres); the constant is its quantisation floor.
       noise.a = 0.001, noise.b = 0, noise.c = 1.425e-3, noise.min_range = 0.5, noise.max_range = 5.0;

@@ -23,7 +23,8 @@ DepthRegistration::DepthRegistration(std::shared_ptr<const CameraModel> depth_ca
   for (int v = 0; v < depth_camera_->height(); ++v) {
     for (int u = 0; u < depth_camera_->width(); ++u) {
       Eigen::Vector2d xy;
-      if (!depth_camera_->undistort(Eigen::Vector2d(u, v), &xy)) xy.setConstant(std::numeric_limits<double>::quiet_NaN());
+      if (!depth_camera_->undistort(Eigen::Vector2d(u, v), &xy))
+        xy.setConstant(std::numeric_limits<double>::quiet_NaN());
       xy_.push_back(xy.cast<float>());
     }
   }
@@ -33,8 +34,8 @@ cv::Mat DepthRegistration::operator()(const cv::Mat& depth) const {
   if (depth.type() != CV_32FC1 || depth.cols != depth_camera_->width() || depth.rows != depth_camera_->height()) {
     throw std::invalid_argument("depth registration: image is " + std::to_string(depth.cols) + "x" +
                                 std::to_string(depth.rows) + " " + cv::typeToString(depth.type()) + ", expected " +
-                                std::to_string(depth_camera_->width()) + "x" +
-                                std::to_string(depth_camera_->height()) + " CV_32FC1");
+                                std::to_string(depth_camera_->width()) + "x" + std::to_string(depth_camera_->height()) +
+                                " CV_32FC1");
   }
   cv::Mat registered(colour_camera_->height(), colour_camera_->width(), CV_32FC1, cv::Scalar(0));
   std::size_t i = 0;
@@ -48,7 +49,8 @@ cv::Mat DepthRegistration::operator()(const cv::Mat& depth) const {
       if (!colour_camera_->project(p.cast<double>(), &uv)) continue;
       // The depth pixel's footprint in the colour image, at least the nearest pixel; the nearest surface wins.
       const double half_u = 0.5 * footprint_u_ * z / p.z(), half_v = 0.5 * footprint_v_ * z / p.z();
-      const int nearest_u = static_cast<int>(std::floor(uv.x() + 0.5)), nearest_v = static_cast<int>(std::floor(uv.y() + 0.5));
+      const int nearest_u = static_cast<int>(std::floor(uv.x() + 0.5)),
+                nearest_v = static_cast<int>(std::floor(uv.y() + 0.5));
       const int u0 = std::max(0, std::min(nearest_u, static_cast<int>(std::ceil(uv.x() - half_u))));
       const int u1 = std::min(registered.cols - 1, std::max(nearest_u, static_cast<int>(std::floor(uv.x() + half_u))));
       const int v0 = std::max(0, std::min(nearest_v, static_cast<int>(std::ceil(uv.y() - half_v))));

@@ -13,7 +13,9 @@ struct Vertex {
 using Outline = std::vector<Vertex>;
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
-double turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) { return cross(b - a, c - b); }
+double turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+  return cross(b - a, c - b);
+}
 
 /// The ring in plane coordinates, counter-clockwise or clockwise as asked.
 Outline flatten(const Ring& ring, const Eigen::Matrix<double, 3, 2>& axes, bool counter_clockwise) {
@@ -97,7 +99,8 @@ std::vector<Triangle> triangulate(const PlanePolygon& polygon, const Plane& plan
         }
       }
     }
-    if (found) triangles.push_back({outline[(ear + n - 1) % n].point, outline[ear].point, outline[(ear + 1) % n].point});
+    if (found)
+      triangles.push_back({outline[(ear + n - 1) % n].point, outline[ear].point, outline[(ear + 1) % n].point});
     outline.erase(outline.begin() + std::ptrdiff_t(ear));
   }
   return triangles;

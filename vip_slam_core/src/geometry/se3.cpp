@@ -34,9 +34,7 @@ Matrix6d SE3::adjoint() const {
   return A;
 }
 
-SE3 SE3::boxplus(const Vector6d& delta) const {
-  return SE3(q_ * expQuaternion(delta.head<3>()), t_ + delta.tail<3>());
-}
+SE3 SE3::boxplus(const Vector6d& delta) const { return SE3(q_ * expQuaternion(delta.head<3>()), t_ + delta.tail<3>()); }
 
 Vector6d SE3::boxminus(const SE3& reference) const {
   Vector6d delta;

@@ -154,8 +154,7 @@ Eigen::Matrix<double, 15, 1> Preintegration::residual(const NavState& i, const N
                                                       Matrix15d* J_i, Matrix15d* J_j, bool whiten) const {
   const Eigen::Vector3d dbg = i.bias_gyro - bias_gyro_, dba = i.bias_accel - bias_accel_;
   const Eigen::Matrix3d R_i_T = i.T_W_I.rotation().conjugate().toRotationMatrix();
-  const Eigen::Vector3d position =
-      R_i_T * (j.T_W_I.t() - i.T_W_I.t() - i.v_W * dt_ + 0.5 * G * dt_ * dt_);
+  const Eigen::Vector3d position = R_i_T * (j.T_W_I.t() - i.T_W_I.t() - i.v_W * dt_ + 0.5 * G * dt_ * dt_);
   const Eigen::Vector3d velocity = R_i_T * (j.v_W - i.v_W + G * dt_);
   const Eigen::Quaterniond R_i_j = i.T_W_I.rotation().conjugate() * j.T_W_I.rotation();
   const Eigen::Vector3d correction = J_theta_bg_ * dbg;

@@ -122,9 +122,11 @@ std::string text(const SE3& T) {
 
 void writeCamera(std::ostream& out, const char* key, const CameraIntrinsics& camera) {
   out << key << ":\n  model: " << distortionModelName(camera.model) << "\n  width: " << camera.width
-      << "\n  height: " << camera.height << "\n  fx: " << formatDouble(camera.fx) << "\n  fy: " << formatDouble(camera.fy)
-      << "\n  cx: " << formatDouble(camera.cx) << "\n  cy: " << formatDouble(camera.cy) << "\n  distortion: [";
-  for (std::size_t k = 0; k < camera.distortion.size(); ++k) out << (k ? ", " : "") << formatDouble(camera.distortion[k]);
+      << "\n  height: " << camera.height << "\n  fx: " << formatDouble(camera.fx)
+      << "\n  fy: " << formatDouble(camera.fy) << "\n  cx: " << formatDouble(camera.cx)
+      << "\n  cy: " << formatDouble(camera.cy) << "\n  distortion: [";
+  for (std::size_t k = 0; k < camera.distortion.size(); ++k)
+    out << (k ? ", " : "") << formatDouble(camera.distortion[k]);
   out << "]\n";
 }
 
@@ -147,8 +149,7 @@ SensorConfig configFrom(const YAML::Node& node) {
     throw std::runtime_error("topics/imu: expected one united topic, or both gyro and accel");
 
   Section color = root.section("color");
-  color.choice("encoding", config.color_encoding,
-               {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
+  color.choice("encoding", config.color_encoding, {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
   color.number("rate", config.color_rate, 0.1, 1000);
   color.finish();
   Section depth = root.section("depth");
@@ -221,14 +222,14 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
   AtomicFile file(path);
   std::ofstream& out = file.stream();
   const SensorTopics& topics = config.topics;
-  out << "name: " << config.name << "\ntopics:\n  color: \"" << topics.color << "\"\n  color_info: \"" << topics.color_info
-      << "\"\n  depth: \"" << topics.depth << "\"\n  depth_info: \"" << topics.depth_info << "\"\n  imu: \"" << topics.imu
-      << "\"\n  gyro: \"" << topics.gyro << "\"\n  accel: \"" << topics.accel << "\"\ncolor:\n  encoding: "
-      << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate) << "\ndepth:\n  encoding: "
-      << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
+  out << "name: " << config.name << "\ntopics:\n  color: \"" << topics.color << "\"\n  color_info: \""
+      << topics.color_info << "\"\n  depth: \"" << topics.depth << "\"\n  depth_info: \"" << topics.depth_info
+      << "\"\n  imu: \"" << topics.imu << "\"\n  gyro: \"" << topics.gyro << "\"\n  accel: \"" << topics.accel
+      << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
+      << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
       << "\n  rate: " << formatDouble(config.depth_rate)
-      << "\n  registered: " << (config.depth_registered ? "true" : "false") << "\nintrinsics_from_camera_info: "
-      << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";
+      << "\n  registered: " << (config.depth_registered ? "true" : "false")
+      << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";
   if (config.camera.width > 0) writeCamera(out, "camera", config.camera);
   if (!config.depth_registered) {
     writeCamera(out, "depth_camera", config.depth_camera);
@@ -240,9 +241,10 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\n  gyro_random_walk: " << formatDouble(config.imu_noise.gyro_random_walk)
       << "\n  accel_noise_density: " << formatDouble(config.imu_noise.accel_noise_density)
       << "\n  accel_random_walk: " << formatDouble(config.imu_noise.accel_random_walk)
-      << "\n  gravity: " << formatDouble(config.gravity) << "\ndepth_noise:\n  model: "
-      << depthSensorTypeName(config.depth_noise.type) << "\n  a: " << formatDouble(config.depth_noise.a)
-      << "\n  b: " << formatDouble(config.depth_noise.b) << "\n  c: " << formatDouble(config.depth_noise.c)
+      << "\n  gravity: " << formatDouble(config.gravity)
+      << "\ndepth_noise:\n  model: " << depthSensorTypeName(config.depth_noise.type)
+      << "\n  a: " << formatDouble(config.depth_noise.a) << "\n  b: " << formatDouble(config.depth_noise.b)
+      << "\n  c: " << formatDouble(config.depth_noise.c)
       << "\n  min_range: " << formatDouble(config.depth_noise.min_range)
       << "\n  max_range: " << formatDouble(config.depth_noise.max_range)
       << "\n  bias_floor: " << formatDouble(config.depth_noise.bias_floor)

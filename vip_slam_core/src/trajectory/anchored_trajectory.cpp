@@ -22,7 +22,8 @@ Trajectory anchorTrajectory(const std::vector<OdometryPose>& odometry, const std
     const auto epoch = by_epoch.find(pose.epoch);
     if (epoch == by_epoch.end()) continue;
     const auto& list = epoch->second;
-    const auto after = std::lower_bound(list.begin(), list.end(), pose.t, [](const Anchor* a, double t) { return a->t < t; });
+    const auto after =
+        std::lower_bound(list.begin(), list.end(), pose.t, [](const Anchor* a, double t) { return a->t < t; });
     if (after == list.begin()) {
       trajectory.push_back({pose.t, carry(**after, pose)});
     } else if (after == list.end()) {

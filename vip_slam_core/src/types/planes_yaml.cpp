@@ -14,9 +14,12 @@ namespace {
 
 const char* kindName(PlaneKind kind) {
   switch (kind) {
-    case PlaneKind::kHorizontal: return "horizontal";
-    case PlaneKind::kVertical: return "vertical";
-    case PlaneKind::kGeneral: return "general";
+    case PlaneKind::kHorizontal:
+      return "horizontal";
+    case PlaneKind::kVertical:
+      return "vertical";
+    case PlaneKind::kGeneral:
+      return "general";
   }
   return "general";
 }
@@ -81,7 +84,8 @@ std::string text(const Ring& ring) {
 }
 
 PlaneEstimate planeFrom(const YAML::Node& node) {
-  refuseUnknown(node, {"id", "kind", "normal", "distance", "area", "keyframes", "seen_seconds", "seen_area", "polygons"});
+  refuseUnknown(node,
+                {"id", "kind", "normal", "distance", "area", "keyframes", "seen_seconds", "seen_area", "polygons"});
   PlaneEstimate plane;
   plane.id = valueOf<PlaneId>(node, "id");
   plane.kind = kindFromName(need(node, "kind").as<std::string>());
@@ -139,7 +143,8 @@ void writePlanesYaml(const std::string& path, const std::vector<PlaneEstimate>& 
     if (plane.seen_area >= 0) out << "\n    seen_area: " << formatDouble(plane.seen_area);
     out << "\n    polygons:" << (plane.polygons.empty() ? " []" : "") << "\n";
     for (const PlanePolygon& polygon : plane.polygons) {
-      out << "      - outer: " << text(polygon.outer) << "\n        holes:" << (polygon.holes.empty() ? " []" : "") << "\n";
+      out << "      - outer: " << text(polygon.outer) << "\n        holes:" << (polygon.holes.empty() ? " []" : "")
+          << "\n";
       for (const Ring& hole : polygon.holes) out << "          - " << text(hole) << "\n";
     }
   }

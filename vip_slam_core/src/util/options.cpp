@@ -64,7 +64,8 @@ void OptionLister::field(const std::string& name, int& value, int min, int max, 
       {fullName(name), "int", std::to_string(value), rangeText(std::to_string(min), std::to_string(max)), meaning});
 }
 void OptionLister::field(const std::string& name, double& value, double min, double max, const std::string& meaning) {
-  rows.push_back({fullName(name), "double", formatDouble(value), rangeText(formatDouble(min), formatDouble(max)), meaning});
+  rows.push_back(
+      {fullName(name), "double", formatDouble(value), rangeText(formatDouble(min), formatDouble(max)), meaning});
 }
 void OptionLister::field(const std::string& name, std::string& value, const std::vector<std::string>& choices,
                          const std::string& meaning) {
