@@ -32,7 +32,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
     startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
     ++counters.keyframes;
   }
-  observe(keyframe, T_map_C, tracks, label, mesh);
+  observe(keyframe, T_map_C, tracks, label, mesh, first_time);
   if (first_time) {
     for (auto& [id, track] : tracks_) ++track.keyframes_waited;
   }
@@ -58,28 +58,28 @@ void PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C
 }
 
 void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
-                                const std::vector<int>& label, const DepthMesh& mesh) {
+                                const std::vector<int>& label, const DepthMesh& mesh, bool first_time) {
   const DepthGrid& grid = keyframe.frame.depth_grid;
   const SurfaceLabels labels = labelNodes(mesh, label, grid);
-  std::vector<char> present(tracks.size(), 0);
-  for (int k : labels.label) {
-    if (k >= 0) present[k] = 1;
+  std::vector<double> area(tracks.size(), 0);
+  for (std::size_t i = 0; i < label.size(); ++i) {
+    if (label[i] >= 0) area[label[i]] += mesh.triangles[i].area;
   }
   std::vector<PlaneId> ids;
   std::vector<char> trusted;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     PlaneTrack& track = *tracks[k];
     ids.push_back(track.id());
-    if (present[k]) {
+    if (area[k] > 0) {
       auto observation = sampler_.sample(keyframe, labels, static_cast<int>(k), rays_(grid), T_map_C, track.id(),
                                          track.plane());
       if (observation) {
-        const auto [it, fresh] = track.observations().insert_or_assign(keyframe.id, std::move(*observation));
-        if (fresh) ++track.keyframes_seen;
+        track.observations().insert_or_assign(keyframe.id, std::move(*observation));
         fresh_.emplace(track.id(), keyframe.id);
         refit(&track);
       }
     }
+    if (first_time && area[k] >= options.support.min_area) ++track.keyframes_seen;
     track.confirmed = track.confirmed || track.keyframes_seen >= options.support.min_keyframes ||
                       (track.keyframes_seen > 0 && track.area() >= options.support.sure_area);
     trusted.push_back(track.confirmed);

@@ -119,6 +119,24 @@ TEST(Detection, StairsAreNoPlaneButTheirTreads) {
   }
 }
 
+TEST(Detection, ARoundColumnIsNoPlane) {
+  for (double radius : {0.28, 0.5}) {
+    Scene scene;
+    for (int i = 0; i < 64; ++i) {
+      const double a = 2 * M_PI * i / 64, b = 2 * M_PI * (i + 1) / 64;
+      const Eigen::Vector3d p(radius * std::cos(a), radius * std::sin(a), 0), q(radius * std::cos(b), radius * std::sin(b), 0);
+      scene.add(p, q - p, {0, 0, 4});
+    }
+    SceneCamera camera(testing::quietNoise(), 1.0);
+    for (double distance : {1.5, 2.5, 3.5}) {
+      for (double a : {0.0, 0.7, 2.0}) {
+        const Eigen::Vector3d eye(distance * std::cos(a), distance * std::sin(a), 1.6);
+        EXPECT_TRUE(detect(&camera, scene, lookAt(eye, {0, 0, 1.7})).empty()) << radius << " m from " << distance;
+      }
+    }
+  }
+}
+
 TEST(Detection, TwoTablesOfOneHeightAreTwo) {
   Scene scene;
   scene.add({1.2, -1.6, 0.74}, {0.8, 0, 0}, {0, 1.2, 0});

@@ -74,7 +74,7 @@ struct PlaneMergingOptions {
   double angle_deg = 10.0;
   double distance = 0.10;
   double gap = 0.4;
-  double gap_per_size = 0.5;
+  double gap_per_size = 1.0;
   double overlap = 0.3;
   double max_rms = 0.02;
 
@@ -83,7 +83,7 @@ struct PlaneMergingOptions {
     v.field("distance", distance, 0.01, 0.5, "largest distance of each one's boundary points to the other, m");
     v.field("gap", gap, 0.0, 5.0, "largest gap between the covered areas, m");
     v.field("gap_per_size", gap_per_size, 0.0, 5.0,
-            "gap allowed between large planes, per square root of the smaller one's area");
+            "gap allowed between walls and floors (4 m^2 and more), per square root of the smaller one's area");
     v.field("overlap", overlap, 0.05, 1.0, "share of the smaller area covered by both that makes them one surface");
     v.field("max_rms", max_rms, 0.002, 0.2,
             "what the joint fit may add to each one's RMS when they do not overlap, m");

@@ -7,6 +7,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kWidestGap = 3.0;  // metres
+constexpr double kLargeArea = 4.0;  // m^2
 
 bool isBorder(const CellGrid& cells, CellIndex c) {
   return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) || !cells.at({c.x, c.y + 1});
@@ -79,8 +80,10 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
       options.distance + radius * std::sin(options.angle_deg * M_PI / 180.0)) {
     return false;
   }
-  const double gap = std::max(
-      options.gap, std::min(kWidestGap, options.gap_per_size * std::sqrt(std::min(area_a, area_b))));
+  // A cupboard interrupts a wall and the wall goes on; two tables of nearly one height stay two tables.
+  const double smaller = std::min(area_a, area_b);
+  double gap = options.gap;
+  if (smaller >= kLargeArea) gap = std::max(gap, std::min(kWidestGap, options.gap_per_size * std::sqrt(smaller)));
   const Contact meeting = contact(small, large, gap);
   if (meeting.near == 0 || meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) {
     return false;

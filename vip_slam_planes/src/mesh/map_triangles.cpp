@@ -11,6 +11,7 @@ std::vector<MapTriangle> placeMesh(const DepthMesh& mesh, const SE3& T_map_C) {
   placed.reserve(mesh.triangles.size());
   for (const MeshTriangle& t : mesh.triangles) {
     placed.push_back({{points[t.vertex[0]], points[t.vertex[1]], points[t.vertex[2]]},
+                      t.vertex,
                       t.neighbour,
                       R * t.n_C.cast<double>(),
                       R * t.centre_C.cast<double>() + T_map_C.t(),

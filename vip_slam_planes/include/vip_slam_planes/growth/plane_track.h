@@ -86,7 +86,7 @@ class PlaneTrack {
 
   // Book-keeping of the mapper.
   bool confirmed = false;
-  int keyframes_seen = 0;        ///< keyframes with an observation, ever
+  int keyframes_seen = 0;        ///< keyframes that saw a fair part of it, ever
   int keyframes_waited = 0;      ///< processed since the plane started
 
  private:

@@ -11,6 +11,7 @@ namespace vip_slam {
 
 struct MapTriangle {
   std::array<Eigen::Vector3d, 3> corner;  ///< metres
+  std::array<int, 3> vertex;              ///< of the mesh
   std::array<int, 3> neighbour;           ///< -1: none
   Eigen::Vector3d n;                      ///< unit, towards the camera
   Eigen::Vector3d centre;
