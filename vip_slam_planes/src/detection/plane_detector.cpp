@@ -187,7 +187,7 @@ class Detector {
       return std::size_t(std::unique(v->begin(), v->end()) - v->begin());
     };
     const std::size_t inside = distinct(&all) - distinct(&sides);
-    return inside >= 4 && 5 * inside >= surface.size();
+    return inside >= 4 && 10 * inside >= surface.size();
   }
 
   // A strip of a round column passes for a plane by its distances and normals; a quadric tells them apart. True when the
