@@ -42,7 +42,7 @@ TEST(StandingStill, FiveMinutesWithoutDrift) {
   const RunResult run = runFilter(simulation, filterOptions(), 300.0, true);
   std::printf("five minutes: %.2f mm, %.3f deg\n", 1e3 * run.final_position, run.final_rotation * 180 / M_PI);
   EXPECT_LT(run.final_position, 0.005);
-  EXPECT_LT(run.final_rotation * 180 / M_PI, 0.2 + 0.01 * 180 / M_PI * 3);
+  EXPECT_LT(run.final_rotation * 180 / M_PI, 0.2);  // with the tilt error it starts with
   EXPECT_LE(run.window.clones.size(), 3u);
 }
 

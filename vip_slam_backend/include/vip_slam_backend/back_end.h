@@ -2,6 +2,7 @@
 // tests use exactly this class. One owner thread calls it; run() may be called from any thread.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -22,9 +23,11 @@ struct GlobalBaSolution;
 /// A global bundle adjustment to run elsewhere: a copy of all it needs.
 struct GbaJob {
   std::shared_ptr<const GlobalBaProblem> problem;  ///< null: nothing to do
+  std::uint64_t correction = 0;                    ///< how often the whole map had been moved when it was copied
 };
 struct GbaResult {
   std::shared_ptr<const GlobalBaSolution> solution;  ///< null: none
+  std::uint64_t correction = 0;                      ///< of the job
 };
 
 class BackEnd {

@@ -138,6 +138,7 @@ void BackEnd::Impl::reset() {
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;
+  ++correction;
   global_wanted = false;
   last_global = -1e300;
   refusal.clear();
@@ -163,6 +164,7 @@ GbaJob BackEnd::startGlobalBa() {
 
 GbaResult BackEnd::run(const GbaJob& job) const {
   GbaResult result;
+  result.correction = job.correction;
   if (!job.problem) return result;
   const ScopedTimer timer(impl_->log, "backend.gba", job.problem->t);
   result.solution = std::make_shared<const GlobalBaSolution>(solveGlobalBa(*job.problem));

@@ -79,6 +79,8 @@ struct BackEnd::Impl {
   SE3 T_map_odom;
   std::uint32_t epoch = 0;
   std::uint64_t revision = 0;
+  /// Counts loop corrections, loaded maps and resets: a global adjustment of the map before one must not undo it.
+  std::uint64_t correction = 0;
   bool global_wanted = false;
   double last_global = -1e300;         ///< stamp of the last one that a loop asked for
   std::string refusal;

@@ -125,6 +125,7 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
 
 GbaJob BackEnd::Impl::makeGlobalJob() const {
   GbaJob job;
+  job.correction = correction;
   if (map.keyframes().size() < 2) return job;
   auto problem = std::make_shared<GlobalBaProblem>();
   problem->map = std::make_shared<const Map>(map);
@@ -140,7 +141,9 @@ GbaJob BackEnd::Impl::makeGlobalJob() const {
 
 MapUpdate BackEnd::Impl::mergeGlobal(const GbaResult& result) {
   MapUpdate update = beginUpdate(0);
-  if (result.solution && result.solution->summary.usable) {
+  if (result.correction != correction) {
+    global_wanted = result.solution != nullptr && !map.empty();  // the map it came from is no more: once again
+  } else if (result.solution && result.solution->summary.usable) {
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     ++statistics.global_ba;
     followNewest();

@@ -110,6 +110,21 @@ TEST(BackEnd, GlobalAdjustmentMergesWithWhatCameMeanwhile) {
   EXPECT_LT((update.T_map_odom * newest.data->frame.state.T_W_I).boxminus(newest.state.T_W_I).norm(), 1e-9);
 }
 
+TEST(BackEnd, GlobalAdjustmentOfAMapThatIsNoMoreIsDropped) {
+  SimulatedKeyframes world(3), other(9);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
+  const GbaResult late = back_end.run(back_end.startGlobalBa());
+  back_end.reset();
+  for (int k = 0; k < 6; ++k) back_end.addKeyframe(other.next());
+  const SE3 before = back_end.map().keyframe(3).state.T_W_I;
+  const MapUpdate update = back_end.merge(late);
+  EXPECT_FALSE(update.global);
+  EXPECT_TRUE(back_end.globalBaWanted());
+  EXPECT_EQ(back_end.map().keyframe(3).state.T_W_I.boxminus(before).norm(), 0.0);
+  EXPECT_EQ(checkMap(back_end.map()), "");
+}
+
 TEST(BackEnd, BadInputIsRefusedByName) {
   SimulatedKeyframes world(5);
   BackEnd back_end(options("vip"), world.sensor());
