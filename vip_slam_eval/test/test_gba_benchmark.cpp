@@ -14,7 +14,7 @@ SimulatedMapOptions smallMap() {
   SimulatedMapOptions options;
   options.keyframes = 60;
   options.plane_points = 400;
-  options.free_points = 300;
+  options.free_points = 200;
   options.keyframe_interval = 1.25;
   return options;
 }
@@ -25,7 +25,7 @@ TEST(GbaBenchmark, SimulationGivesWhatIsAskedFor) {
   const SimulatedMap map = simulateMap(smallMap());
   EXPECT_EQ(checkMap(map.map), "");
   EXPECT_EQ(map.map.keyframes().size(), 60u);
-  EXPECT_EQ(map.map.landmarks().size(), 700u);
+  EXPECT_EQ(map.map.landmarks().size(), 600u);
   SimulatedMapOptions too_many = smallMap();
   too_many.keyframes = 5;
   too_many.plane_points = 100000;
