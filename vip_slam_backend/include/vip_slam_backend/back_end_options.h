@@ -23,7 +23,7 @@ struct MeasurementOptions {
   double outlier_chi2 = 9.0;
   double plane_prior_deg = 0.5;
   double homography_inflation = 1.0;
-  int homography_min_pairs = 4;
+  bool homography_shared_hosts = false;
 
   void visit(OptionVisitor& v) {
     v.field("pixel_sigma", pixel_sigma, 0.1, 10.0, "one sigma of a tracked feature, px");
@@ -35,7 +35,8 @@ struct MeasurementOptions {
     v.field("plane_prior_deg", plane_prior_deg, 0.01, 10.0, "one sigma of horizontal and vertical planes, degrees");
     v.field("homography_inflation", homography_inflation, 1.0, 5.0,
             "factor on the sigma of homography pairs, for noise that the pairs of one host share");
-    v.field("homography_min_pairs", homography_min_pairs, 1, 50, "fewest pairs in a compressed homography");
+    v.field("homography_shared_hosts", homography_shared_hosts,
+            "few hosts for many plane points: faster adjustment, more sensitive to wrong tracks");
   }
 };
 

@@ -65,6 +65,11 @@ void PlaneFactorBuilder::chooseHosts(const std::vector<LandmarkId>& landmarks) {
       count[entry.first] = static_cast<int>(entry.second.size());
       order.insert({count[entry.first], entry.first});
     }
+    if (!settings_.measurement.homography_shared_hosts) {
+      for (const auto& entry : plane.second)
+        for (const LandmarkId id : entry.second) hosts_.emplace(id, entry.first);  // ascending: the first view wins
+      continue;
+    }
     while (!order.empty() && order.rbegin()->first > 0) {
       const KeyframeId host = order.rbegin()->second;
       for (const LandmarkId id : plane.second[host]) {
@@ -115,7 +120,7 @@ bool PlaneFactorBuilder::addLandmark(const MapLandmark& landmark) {
     pair.pair.weight = 1.0 / (sigma * rho);
     // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
     const double chi2 = (homographyRows(pair.pair) * h).squaredNorm();
-    if (chi2 > 4 * settings_.measurement.outlier_chi2) {
+    if (chi2 > settings_.measurement.outlier_chi2) {
       ++refused;
       continue;
     }

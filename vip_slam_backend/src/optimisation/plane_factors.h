@@ -14,9 +14,9 @@ class PlaneFactorBuilder {
  public:
   PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings,
                      const std::unordered_map<KeyframeId, int>& frames, BuiltProblem* built);
-  /// Chooses the hosts of all landmarks on planes: on each plane the keyframe that sees most of the landmarks still without
-  /// host becomes theirs, and so on. Few hosts mean few, well-filled compressed factors and a sparse system; the
-  /// information is the same as with any other choice of one host per landmark.
+  /// Chooses the host of every landmark on a plane: the first keyframe that sees it well. With shared hosts instead, plane
+  /// by plane, the keyframe that sees most of the landmarks still without host becomes theirs, and so on: few, well-filled
+  /// compressed factors and a sparse system, but a bad track in a host reaches farther.
   void chooseHosts(const std::vector<LandmarkId>& landmarks);
   /// Turns a landmark on a plane into host-observer pairs. False when it is on none, or fails the gate: then it stays a
   /// free point.

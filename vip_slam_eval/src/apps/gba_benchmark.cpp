@@ -53,7 +53,8 @@ int main(int argc, char** argv) {
        << map.plane_observations << " observations), " << options.free_points << " free points (" << map.free_observations
        << " observations), seed " << options.seed << ", " << iterations << " iterations, median of " << repeats
        << " runs.\n\nThe structured solver eliminates the points while it evaluates the Jacobians, so its elimination counts "
-          "there; Ceres counts it as linear solving. Only sums compare across solvers.\n";
+          "there; Ceres counts it as linear solving. Only sums compare across solvers.\n\nHomographies use shared hosts "
+          "(`homography_shared_hosts`), in all variants and both solvers; the live system's default is the first view.\n";
     std::vector<GbaRun> all;
     const auto table = [&](const char* title, const char* solver, int threads, int runs) {
       std::vector<GbaRun> rows;

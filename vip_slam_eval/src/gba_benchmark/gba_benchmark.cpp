@@ -31,7 +31,7 @@ double alignedRmse(const std::vector<Eigen::Vector3d>& truth, const std::vector<
 }
 
 GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver_name, int threads, int iterations,
-              int repeats) {
+              int repeats, bool shared_hosts) {
   BuilderSettings settings;
   settings.variant = variant;
   settings.focal = map.focal;
@@ -39,6 +39,7 @@ GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solve
   // The simulation has no outliers: plain squares, so that neither solver spends time on losses.
   settings.measurement.huber = settings.measurement.depth_huber = 0;
   settings.measurement.outlier_chi2 = 1e6;
+  settings.measurement.homography_shared_hosts = shared_hosts;
 
   GbaRun run;
   run.variant = variant;

@@ -81,7 +81,7 @@ class Simulator {
         points_.push_back(p);
       }
     }
-    const int count = static_cast<int>(3.0 * options_.free_points / world_.clutter.size()) + 1;
+    const int count = std::max(60, static_cast<int>(3.0 * options_.free_points / world_.clutter.size())) + 1;
     for (const auto& box : world_.clutter)
       for (int k = 0; k < count; ++k) {
         SimulatedPoint p;

@@ -22,7 +22,8 @@ struct GbaRun {
 };
 
 /// Runs `repeats` times from the same start and keeps the run with the median time.
-GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats);
+GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats,
+              bool shared_hosts = true);
 
 /// The map of the first `keyframes` keyframes.
 SimulatedMap prefix(const SimulatedMap& map, int keyframes);
