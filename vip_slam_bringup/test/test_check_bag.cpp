@@ -122,7 +122,8 @@ TEST_F(CheckBag, DelayBetweenCameraAndImu) {
     const Recording recording = recordBag(path_, expected_, 60);
     const MotionEstimate motion = estimateMotion(recording);
     ASSERT_TRUE(motion.usable) << motion.why_not;
-    EXPECT_NEAR(motion.time_offset, offset, 0.003);
+    EXPECT_NEAR(motion.time_offset, offset, 0.001);
+    EXPECT_LT(motion.time_sigma, 0.001);
     EXPECT_GT(motion.correlation, 0.95);
     expectFound(checkAll(recording), Severity::kWarning, "camera-IMU delay", "set time_offset");
     // Knowing it, the check is content.
@@ -141,7 +142,7 @@ TEST_F(CheckBag, ExtrinsicsThatContradictTheMotion) {
   expectFound(findings, Severity::kError, "extrinsics", "contradicts T_imu_cam by 1");
   expectNoErrorBut(findings, "extrinsics");
   const MotionEstimate motion = estimateMotion(recordBag(path_, expected_, 60));
-  EXPECT_LT(motion.R_imu_cam.angularDistance(Eigen::Quaterniond(R)), 0.03);
+  EXPECT_LT(motion.R_imu_cam.angularDistance(Eigen::Quaterniond(R)), 0.006);
 }
 
 TEST_F(CheckBag, FramesInTf) {

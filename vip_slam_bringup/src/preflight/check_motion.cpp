@@ -1,6 +1,7 @@
 // Camera-IMU delay and rotation from the motion: the gyro and the images see the same rotation.
 //   gyro(t + td) = R_I_C rate_C(t) + b
-// For each delay in a grid, R and b by orthogonal Procrustes; the delay with the least residual wins.
+// For each delay in a grid, R and b by orthogonal Procrustes; the delay with the least residual wins. Twice: with wide
+// bounds on what a step may contradict, then with bounds that the first round's errors give.
 #include <algorithm>
 #include <cmath>
 
@@ -40,12 +41,19 @@ class GyroIntegral {
 
 struct Fit {
   double residual = 0, variance = 0, scale = 1;  ///< residual and variance: mean squares of the gyro side
+  double median_error = 0;                       ///< rad/s
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   Eigen::Vector3d camera_variances = Eigen::Vector3d::Zero();  ///< descending
   std::size_t count = 0;
 };
 
-Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, double offset) {
+/// A step that disagrees by more than `floor + share * its rate` is blur, a moving object or a mismatch: it counts with
+/// that bound, and the later rounds fit without it. The bound hardly depends on the delay, so that residuals compare.
+struct Bound {
+  double floor, share;  ///< rad/s, -
+};
+
+Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, double offset, const Bound& limit) {
   std::vector<Eigen::Vector3d> imu, camera;
   for (const RotationStep& s : steps) {
     if (!gyro.covers(s.t0 + offset) || !gyro.covers(s.t1 + offset)) continue;
@@ -55,9 +63,8 @@ Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro
   Fit fit;
   fit.count = imu.size();
   if (imu.size() < 20) return fit;
-  // Two rounds: the second without the steps the first cannot explain (blur, moving objects).
   std::vector<bool> use(imu.size(), true);
-  for (int round = 0; round < 2; ++round) {
+  for (int round = 0; round < 3; ++round) {
     Eigen::Vector3d mean_imu = Eigen::Vector3d::Zero(), mean_camera = Eigen::Vector3d::Zero();
     double n = 0;
     for (std::size_t i = 0; i < imu.size(); ++i) {
@@ -83,18 +90,50 @@ Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro
     fit.camera_variances = Eigen::JacobiSVD<Eigen::Matrix3d>(spread).singularValues();
     fit.scale = fit.camera_variances.sum() > 0 ? std::sqrt(variance / fit.camera_variances.sum()) : 1;
     fit.variance = variance;
-    // What disagrees by more than half its rate is blur, a moving object or a mismatch: it counts with that bound, and
-    // the second round fits without it. The bound does not depend on the delay, so that residuals compare.
     fit.residual = 0;
+    std::vector<double> errors;
     for (std::size_t i = 0; i < imu.size(); ++i) {
-      const double error = (imu[i] - mean_imu - fit.R * (camera[i] - mean_camera)).norm();
-      const double bound = 0.1 + 0.5 * (imu[i] - mean_imu).norm();
-      if (round == 0) use[i] = error <= bound;
-      fit.residual += std::min(error, bound) * std::min(error, bound) / double(imu.size());
+      errors.push_back((imu[i] - mean_imu - fit.R * (camera[i] - mean_camera)).norm());
+      const double bound = limit.floor + limit.share * (imu[i] - mean_imu).norm();
+      use[i] = errors.back() <= bound;
+      fit.residual += std::min(errors.back(), bound) * std::min(errors.back(), bound) / double(imu.size());
     }
+    fit.median_error = median(errors);
     if (std::count(use.begin(), use.end(), true) < 10) break;
   }
   return fit;
+}
+
+constexpr double kStep = 0.002;  // of the grid of delays, seconds
+
+struct Search {
+  Fit fit;
+  double offset = 0;
+  double sigma = 0;  ///< of the offset, from the curvature of the residual; seconds
+};
+
+/// The best delay within `range` of `middle`; false when the two never overlap.
+bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, double middle, double range,
+            const Bound& limit, Search* out) {
+  const int half = static_cast<int>(std::lround(range / kStep));
+  std::vector<Fit> fits;
+  for (int i = -half; i <= half; ++i) fits.push_back(fitRotation(steps, gyro, middle + i * kStep, limit));
+  int best = -1;
+  for (int i = 0; i < static_cast<int>(fits.size()); ++i)
+    if (fits[i].count >= 40 && (best < 0 || fits[i].residual < fits[best].residual)) best = i;
+  if (best < 0) return false;
+  out->fit = fits[best];
+  out->offset = middle + (best - half) * kStep;
+  if (best > 0 && best + 1 < static_cast<int>(fits.size())) {
+    const double a = fits[best - 1].residual, b = out->fit.residual, c = fits[best + 1].residual, curve = a - 2 * b + c;
+    if (curve > 0) {
+      out->offset += kStep * 0.5 * (a - c) / curve;
+      // The residual is a mean over n steps of three components: variance of one is b / 3, and the second derivative
+      // of the residual is twice the mean square of what a second of delay changes.
+      out->sigma = std::sqrt(2.0 / 3.0 * b * kStep * kStep / (curve * double(out->fit.count)));
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -106,18 +145,15 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
     return out;
   }
   const GyroIntegral gyro(r.gyro_samples);
-  const double step = 0.002;
-  const int half = static_cast<int>(std::lround(max_offset / step));
-  std::vector<Fit> fits;
-  for (int i = -half; i <= half; ++i) fits.push_back(fitRotation(r.rotations, gyro, i * step));
-  int best = -1;
-  for (int i = 0; i < static_cast<int>(fits.size()); ++i)
-    if (fits[i].count >= 40 && (best < 0 || fits[i].residual < fits[best].residual)) best = i;
-  if (best < 0) {
+  Search coarse;
+  if (!search(r.rotations, gyro, 0, max_offset, {0.1, 0.5}, &coarse)) {
     out.why_not = "images and gyroscope do not overlap in time";
     return out;
   }
-  const Fit& fit = fits[best];
+  Search fine = coarse;
+  if (!search(r.rotations, gyro, coarse.offset, 0.02, {std::max(0.01, 3 * coarse.fit.median_error), 0.0}, &fine))
+    fine = coarse;
+  const Fit& fit = fine.fit;
   out.scale = fit.scale;
   out.correlation = fit.variance > 0 ? std::max(0.0, 1 - fit.residual / fit.variance) : 0;
   out.R_imu_cam = Eigen::Quaterniond(fit.R);
@@ -129,12 +165,8 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
     out.why_not = words("image and gyro rotation do not agree (%.0f %% explained)", 100 * out.correlation);
     return out;
   }
-  double offset = (best - half) * step;
-  if (best > 0 && best + 1 < static_cast<int>(fits.size())) {
-    const double a = fits[best - 1].residual, b = fit.residual, c = fits[best + 1].residual, curve = a - 2 * b + c;
-    if (curve > 0) offset += step * 0.5 * (a - c) / curve;
-  }
-  out.time_offset = offset;
+  out.time_offset = fine.offset;
+  out.time_sigma = fine.sigma;
   // The rotation is known once a second axis moves: 0.05 rad/s.
   out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
   out.usable = true;
@@ -154,9 +186,9 @@ Findings checkMotion(const Recording& r) {
   }
   if (motion.scale > 5) return out;
   const double difference = motion.time_offset - r.sensor.time_offset;
-  const std::string measured =
-      words("%+.1f ms measured, the sensor file says %+.1f ms", 1000 * motion.time_offset, 1000 * r.sensor.time_offset);
-  if (std::abs(difference) > 0.006)
+  const std::string measured = words("%+.1f ms measured (one sigma %.1f ms), the sensor file says %+.1f ms",
+                                     1000 * motion.time_offset, 1000 * motion.time_sigma, 1000 * r.sensor.time_offset);
+  if (std::abs(difference) > std::max(0.006, 3 * motion.time_sigma))
     out.push_back({std::abs(difference) > 0.05 ? Severity::kError : Severity::kWarning, "camera-IMU delay", measured,
                    words("set time_offset: %.4f in the sensor file", motion.time_offset)});
   else

@@ -42,6 +42,7 @@ struct MotionEstimate {
   bool usable = false;
   std::string why_not;     ///< in words when not usable
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
+  double time_sigma = 0;   ///< one sigma of it, seconds
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
   bool rotation_known = false;  ///< rotated about two axes at least
   double correlation = 0;       ///< share of the gyro's variance that the images explain, 0..1
