@@ -40,6 +40,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   void onInit() override;
   void advertise();
   void advertiseServices();
+  void advertiseRtabmapServices(const std::string& prefix);  ///< names and types that users of RTAB-Map know
   void subscribe();
   void onReconfigure(vip_slam_backend::BackEndConfig& config);
   void onFrame(const vip_slam_msgs::TrackedFrame& frame);  ///< not in the owner thread: at image rate
@@ -53,9 +54,13 @@ class BackEndNodelet : public nodelet::Nodelet {
   void publishDisplay(double t, bool now);
   void command(std::uint8_t command);
 
+  /// Runs work in the owner thread; false, with the reason as message, when it throws or has to wait for too long.
+  bool askOwner(const std::function<std::string()>& work, std::string* message);
   /// A service whose work runs in the owner thread and answers with its words, or those of its exception.
   template <class Service>
   void offer(const std::string& name, const std::function<std::string(const typename Service::Request&)>& work);
+  /// The same for std_srvs/Empty: the call itself fails when the work does, the words go to the log.
+  void offerEmpty(const std::string& name, const std::function<std::string()>& work);
   std::string reset(bool keep_map);
   std::string loadMap(const std::string& path);
   std::string saveMap(const std::string& path);

@@ -1,4 +1,5 @@
 // The services of the system, offered by the back end.
+#include <std_srvs/Empty.h>
 #include <vip_slam_msgs/LoadMap.h>
 #include <vip_slam_msgs/Pause.h>
 #include <vip_slam_msgs/Reset.h>
@@ -22,24 +23,40 @@ std::string requirePath(const std::string& path) {
 
 }  // namespace
 
+bool BackEndNodelet::askOwner(const std::function<std::string()>& work, std::string* message) {
+  bool success = false;
+  try {
+    // Copies: a call that comes too late must not touch what this function has left behind.
+    auto words = std::make_shared<std::string>();
+    success = owner_->call(control_lane_, [words, work] { *words = work(); }, kPatience);
+    *message = success ? *words : "the back end was busy for too long; nothing was done";
+  } catch (const std::exception& error) {
+    *message = error.what();
+  }
+  if (!success) NODELET_WARN("%s", message->c_str());
+  return success;
+}
+
 template <class Service>
 void BackEndNodelet::offer(const std::string& name,
                            const std::function<std::string(const typename Service::Request&)>& work) {
   using Request = typename Service::Request;
   using Response = typename Service::Response;
   const boost::function<bool(Request&, Response&)> callback = [this, work](const Request& request, Response& response) {
-    try {
-      // Copies: a call that comes too late must not touch what this function has left behind.
-      auto words = std::make_shared<std::string>();
-      response.success = owner_->call(control_lane_, [words, work, request] { *words = work(request); }, kPatience);
-      response.message = response.success ? *words : "the back end was busy for too long; nothing was done";
-    } catch (const std::exception& error) {
-      response.success = false;
-      response.message = error.what();
-    }
-    if (!response.success) NODELET_WARN("%s", response.message.c_str());
+    response.success = askOwner([work, request] { return work(request); }, &response.message);
     return true;
   };
+  services_.push_back(getMTNodeHandle().advertiseService(name, callback));
+}
+
+void BackEndNodelet::offerEmpty(const std::string& name, const std::function<std::string()>& work) {
+  const boost::function<bool(std_srvs::EmptyRequest&, std_srvs::EmptyResponse&)> callback =
+      [this, work](std_srvs::EmptyRequest&, std_srvs::EmptyResponse&) {
+        std::string message;
+        const bool success = askOwner(work, &message);
+        if (success) NODELET_INFO("%s", message.c_str());
+        return success;
+      };
   services_.push_back(getMTNodeHandle().advertiseService(name, callback));
 }
 
@@ -62,6 +79,24 @@ void BackEndNodelet::advertiseServices() {
     startGlobalBa();
     return "a global adjustment is under way; its result comes as a global map update";
   });
+  if (!options_.rtabmap_services.empty()) advertiseRtabmapServices(options_.rtabmap_services + "/");
+}
+
+void BackEndNodelet::advertiseRtabmapServices(const std::string& prefix) {
+  using vip_slam_msgs::Control;
+  offerEmpty(prefix + "reset", [this] { return reset(false); });
+  offerEmpty(prefix + "trigger_new_map", [this] { return reset(true); });
+  offerEmpty(prefix + "pause", [this] {
+    command(Control::PAUSE);
+    return "paused";
+  });
+  offerEmpty(prefix + "resume", [this] {
+    command(Control::RESUME);
+    return "resumed";
+  });
+  offerEmpty(prefix + "set_mode_localization", [this] { return setLocalisation(true); });
+  offerEmpty(prefix + "set_mode_mapping", [this] { return setLocalisation(false); });
+  offerEmpty(prefix + "backup", [this] { return saveMap(options_.backup_path); });
 }
 
 BackEnd& BackEndNodelet::backEnd() {

@@ -16,6 +16,8 @@ struct BackEndNodeOptions {
   std::string base_frame = "base_link";
   std::string load_map;
   bool localisation_mode = false;
+  std::string rtabmap_services = "rtabmap";
+  std::string backup_path = "vip_slam_backup.vsm";
   bool publish_tf = true;
   int keyframe_queue = 50;
 
@@ -26,6 +28,8 @@ struct BackEndNodeOptions {
     v.field("base_frame", base_frame, {}, "tf frame of the robot");
     v.field("load_map", load_map, {}, "map file to start with; empty: a new map");
     v.field("localisation_mode", localisation_mode, "use the map without changing it");
+    v.field("rtabmap_services", rtabmap_services, {}, "namespace of services named as RTAB-Map's; empty: none");
+    v.field("backup_path", backup_path, {}, "file of the backup service; relative: to ~/.ros under roslaunch");
     v.field("publish_tf", publish_tf, "publish map -> odom");
     v.field("keyframe_queue", keyframe_queue, 2, 1000, "keyframes and plane updates that may wait");
     back_end.visit(v);

@@ -4,6 +4,7 @@ import re
 import threading
 import time
 
+import numpy as np
 import rospy
 from vip_slam_msgs.msg import TrackingStatus
 
@@ -19,6 +20,21 @@ def wait_for(condition, seconds, what):
             return value
         time.sleep(0.05)
     raise AssertionError('not within %.0f s: %s' % (seconds, what))
+
+
+def load_tum(path):
+    return np.atleast_2d(np.loadtxt(path))
+
+
+def position_error(truth, estimate):
+    """Root mean square after the best rigid alignment, metres."""
+    t = estimate[:, 0]
+    p = np.stack([np.interp(t, truth[:, 0], truth[:, k]) for k in (1, 2, 3)], 1)
+    q = estimate[:, 1:4]
+    p0, q0 = p.mean(0), q.mean(0)
+    u, _, vt = np.linalg.svd((q - q0).T @ (p - p0))
+    d = np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))])
+    return np.sqrt((((p - p0) - (q - q0) @ (vt.T @ d @ u.T).T) ** 2).sum(1).mean())
 
 
 class Listener:
@@ -69,5 +85,6 @@ def documented(kind):
                 elif inside and '`' in cells[0]:
                     names = re.findall(r'`([^`]+)`', cells[0])
                     types = re.findall(r'[a-z0-9_]+/[A-Za-z0-9]+', cells[1])
-                    rows += list(zip(names, types))
+                    # One type in the row counts for all its names.
+                    rows += [(name, types[min(k, len(types) - 1)]) for k, name in enumerate(names) if types]
     return sorted(set(rows))

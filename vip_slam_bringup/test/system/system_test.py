@@ -14,28 +14,14 @@ import rostest
 import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
+from std_srvs.srv import Empty
 from vip_slam_msgs.msg import MapUpdate, TrackedFrame, TrackingStatus
 from vip_slam_msgs.srv import (LoadMap, Pause, Reset, SaveMap, SaveTrajectory, SetLocalisationMode, TriggerGlobalBa)
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from live import Listener, documented, tracking, wait_for  # noqa: E402
+from live import Listener, documented, load_tum, position_error, tracking, wait_for  # noqa: E402
 
 NS = '/vip_slam/'
-
-
-def load_tum(path):
-    return np.atleast_2d(np.loadtxt(path))
-
-
-def position_error(truth, estimate):
-    """Root mean square after the best rigid alignment, metres."""
-    t = estimate[:, 0]
-    p = np.stack([np.interp(t, truth[:, 0], truth[:, k]) for k in (1, 2, 3)], 1)
-    q = estimate[:, 1:4]
-    p0, q0 = p.mean(0), q.mean(0)
-    u, _, vt = np.linalg.svd((q - q0).T @ (p - p0))
-    d = np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))])
-    return np.sqrt((((p - p0) - (q - q0) @ (vt.T @ d @ u.T).T) ** 2).sum(1).mean())
 
 
 class SystemTest(unittest.TestCase):
@@ -166,7 +152,34 @@ class SystemTest(unittest.TestCase):
             self.assertTrue(ok, words)
         self.frames.wait(10, 10, 'images afterwards')
 
-    def test_12_reset(self):
+    def test_12_services_by_the_names_of_rtabmap(self):
+        def call(name):
+            rospy.wait_for_service(NS + 'rtabmap/' + name, 10)
+            rospy.ServiceProxy(NS + 'rtabmap/' + name, Empty)()
+
+        call('pause')
+        time.sleep(0.5)
+        before = self.frames.count()
+        time.sleep(1.0)
+        self.assertLess(self.frames.count() - before, 3)
+        call('resume')
+        self.frames.wait(10, 10, 'images after resuming')
+        call('set_mode_localization')
+        call('set_mode_mapping')
+        backup = rospy.get_param('~backup')
+        if os.path.exists(backup):
+            os.remove(backup)
+        call('backup')
+        self.assertGreater(os.path.getsize(backup), 1000)
+        epoch, keyframes = self.frames.last().epoch, self.updates.last().newest_keyframe
+        call('trigger_new_map')
+        wait_for(lambda: self.frames.last().epoch > epoch, 20, 'a new epoch')
+        wait_for(lambda: self.updates.last().newest_keyframe > keyframes, 30, 'keyframes that go on counting')
+        epoch = self.frames.last().epoch
+        call('reset')
+        wait_for(lambda: self.frames.last().epoch > epoch, 20, 'a new epoch after the reset')
+
+    def test_13_reset(self):
         epoch = self.frames.last().epoch
         ok, words = self.call('reset', Reset, False)
         self.assertTrue(ok, words)
