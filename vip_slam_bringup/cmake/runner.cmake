@@ -19,4 +19,4 @@ add_executable(train_vocabulary src/apps/train_vocabulary.cpp)
 target_link_libraries(train_vocabulary vip_slam_runner CLI11::CLI11)
 
 install(TARGETS run_bag train_vocabulary RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-catkin_install_python(PROGRAMS scripts/record_run DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+catkin_install_python(PROGRAMS scripts/record_run scripts/start_when_ready DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
