@@ -2,8 +2,8 @@
 
 add_library(vip_slam_bringup
   src/convert/bag_output.cpp
-  src/convert/dataset_sensor.cpp
   src/convert/euroc.cpp
+  src/convert/finish_conversion.cpp
   src/convert/image_messages.cpp
   src/convert/stray.cpp
   src/convert/text_table.cpp

@@ -222,14 +222,7 @@ ConversionReport convertEuroc(const EurocOptions& options) {
   const double seconds = (left.back().stamp - left.front().stamp).toSec();
   const SensorConfig sensor =
       sensorOf(*stereo, root + "/imu0/sensor.yaml", seconds > 0 ? std::round((left.size() - 1) / seconds) : 20.0);
-  writeSideFiles(options.bag, sensor, truth, &report);
-  try {
-    bag.finish(options.progress);
-  } catch (...) {
-    for (const std::string& file : report.files) fs::remove(file);
-    throw;
-  }
-  report.files.insert(report.files.begin(), options.bag);
+  finishConversion(options, sensor, truth, &bag, &report);
   return report;
 }
 

@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "vip_slam_bringup/convert/bag_output.h"
 #include "vip_slam_bringup/convert/converters.h"
 
 namespace vip_slam {
@@ -12,15 +13,17 @@ std::string bagStem(const std::string& bag) {
   return bag.substr(0, bag.size() - ending.size());
 }
 
-void writeSideFiles(const std::string& bag, const SensorConfig& sensor, const Trajectory& truth,
-                    ConversionReport* report) {
-  const std::string stem = bagStem(bag);
+void finishConversion(const ConversionOptions& options, const SensorConfig& sensor, const Trajectory& truth,
+                      BagOutput* bag, ConversionReport* report) {
+  const std::string stem = bagStem(options.bag);
   try {
     report->files.push_back(stem + "_sensor.yaml");
     saveSensorConfig(report->files.back(), sensor);
-    if (truth.empty()) return;
-    report->files.push_back(stem + "_truth.tum");
-    writeTum(report->files.back(), truth);
+    if (!truth.empty()) {
+      report->files.push_back(stem + "_truth.tum");
+      writeTum(report->files.back(), truth);
+    }
+    bag->finish(options.progress);
   } catch (...) {
     for (const std::string& file : report->files) {
       std::error_code ignored;
@@ -28,6 +31,7 @@ void writeSideFiles(const std::string& bag, const SensorConfig& sensor, const Tr
     }
     throw;
   }
+  report->files.insert(report->files.begin(), options.bag);
 }
 
 }  // namespace vip_slam

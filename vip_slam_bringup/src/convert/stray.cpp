@@ -251,14 +251,7 @@ ConversionReport convertStray(const StrayOptions& options) {
   sensor.imu_noise = {2e-3, 2e-5, 2e-2, 3e-4};
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kTof);
   sensor.depth_noise.max_range = 5.0;
-  writeSideFiles(options.bag, sensor, truth, &report);
-  try {
-    bag.finish(options.progress);
-  } catch (...) {
-    for (const std::string& file : report.files) fs::remove(file);
-    throw;
-  }
-  report.files.insert(report.files.begin(), options.bag);
+  finishConversion(options, sensor, truth, &bag, &report);
   return report;
 }
 

@@ -196,14 +196,7 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   sensor.camera = camera;
   sensor.T_imu_cam = options.T_imu_cam;
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStructuredLight);
-  writeSideFiles(options.bag, sensor, truth, &report);
-  try {
-    bag.finish(options.progress);
-  } catch (...) {
-    for (const std::string& file : report.files) fs::remove(file);
-    throw;
-  }
-  report.files.insert(report.files.begin(), options.bag);
+  finishConversion(options, sensor, truth, &bag, &report);
   return report;
 }
 

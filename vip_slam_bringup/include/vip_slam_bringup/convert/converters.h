@@ -16,6 +16,8 @@
 
 namespace vip_slam {
 
+class BagOutput;
+
 struct ConversionReport {
   std::map<std::string, std::size_t> messages;  ///< per topic
   std::vector<std::string> files;               ///< written
@@ -56,8 +58,8 @@ ConversionReport convertStray(const StrayOptions& options);
 
 /// NAME of NAME.bag, with its folder. Throws std::runtime_error when the name does not end in .bag.
 std::string bagStem(const std::string& bag);
-/// Writes NAME_sensor.yaml and NAME_truth.tum (when not empty) and notes them in the report.
-void writeSideFiles(const std::string& bag, const SensorConfig& sensor, const Trajectory& truth,
-                    ConversionReport* report);
+/// Writes NAME_sensor.yaml, NAME_truth.tum (when not empty) and the bag, and notes them in the report; all or none.
+void finishConversion(const ConversionOptions& options, const SensorConfig& sensor, const Trajectory& truth,
+                      BagOutput* bag, ConversionReport* report);
 
 }  // namespace vip_slam
