@@ -15,26 +15,6 @@ namespace {
 
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
 
-/// d(reference pixel) / d(current pixel) for a patch facing the camera at `depth` in the reference (0: far away).
-bool warpOf(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, double depth, const SE3& T_cur_ref,
-            Eigen::Matrix2d* A_ref_cur) {
-  const double z = depth > 0 ? depth : 1e4;
-  Eigen::Vector2d centre, shifted;
-  Eigen::Matrix2d A_cur_ref;
-  const double h = 5.0;
-  if (!camera.project(T_cur_ref * camera.unproject(reference_pixel, z), &centre)) return false;
-  for (int axis = 0; axis < 2; ++axis) {
-    Eigen::Vector2d p = reference_pixel;
-    p(axis) += h;
-    if (!camera.project(T_cur_ref * camera.unproject(p, z), &shifted)) return false;
-    A_cur_ref.col(axis) = (shifted - centre) / h;
-  }
-  const double det = A_cur_ref.determinant();
-  if (!(det > 0.05) || !(det < 20.0)) return false;
-  *A_ref_cur = A_cur_ref.inverse();
-  return true;
-}
-
 }  // namespace
 
 FeatureTracker::FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera,
@@ -98,10 +78,10 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
   if (!track->reference) return false;
   Eigen::Matrix2d A;
   const SE3 T_cur_ref = T_odom_C.inverse() * track->reference->T_odom_C;
-  if (!warpOf(*camera_, track->reference_pixel, track->reference_depth, T_cur_ref, &A)) return false;
+  if (!patchWarp(*camera_, track->reference_pixel, track->surface, T_cur_ref, &A)) return false;
   const double scale = std::sqrt(A.determinant());
   const double shear = (A / scale - (A / scale).inverse().transpose()).norm();
-  if (!(scale > 0.6) || !(scale < 1.7) || !(shear < 0.7)) return false;
+  if (!(scale > 0.45) || !(scale < 2.2) || !(shear < 1.5)) return false;
   const Eigen::Vector2d start = track->feature.pixel.cast<double>();
   const PatchAlignment aligned =
       alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, A, gray_, start);
@@ -110,14 +90,18 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
   return true;
 }
 
+void FeatureTracker::setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const {
+  track->reference = reference;
+  track->reference_pixel = track->feature.pixel.cast<double>();
+  track->surface = patchSurface(depth_, track->reference_pixel, track->feature.depth, noise_);
+}
+
 void FeatureTracker::addTrack(Track track, const SE3& T_odom_C) {
   if (!track.reference) {
     auto here = std::make_shared<ReferenceImage>();
     here->gray = gray_;
     here->T_odom_C = T_odom_C;
-    track.reference = here;
-    track.reference_pixel = track.feature.pixel.cast<double>();
-    track.reference_depth = track.feature.depth;
+    setReference(&track, here);
   }
   tracks_.push_back(std::move(track));
 }
@@ -127,9 +111,7 @@ void FeatureTracker::restartReferences(const SE3& T_odom_C) {
   here->gray = gray_;
   here->T_odom_C = T_odom_C;
   for (Track& track : tracks_) {
-    track.reference = here;
-    track.reference_pixel = track.feature.pixel.cast<double>();
-    track.reference_depth = track.feature.depth;
+    setReference(&track, here);
   }
 }
 
@@ -143,9 +125,8 @@ void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
       here->gray = gray_;
       here->T_odom_C = T_odom_C;
     }
-    track.reference = here;
-    track.reference_pixel = track.feature.pixel.cast<double>();
-    track.reference_depth = -1;  // set once this image's depth was read
+    measure(&track.feature);
+    setReference(&track, here);
   }
 }
 
@@ -202,10 +183,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   }
   tracks_.swap(kept);
   if (options_.refine_against_reference) alignWithReferences(T_odom_C);
-  for (Track& track : tracks_) {
-    measure(&track.feature);
-    if (track.reference_depth < 0) track.reference_depth = track.feature.depth;
-  }
+  for (Track& track : tracks_) measure(&track.feature);
   result.tracked = static_cast<int>(tracks_.size());
   return result;
 }
@@ -228,9 +206,7 @@ std::vector<std::size_t> FeatureTracker::replenish(const SE3& T_odom_C, bool for
     track.feature.id = next_id_++;
     track.feature.pixel = Eigen::Vector2f(corner.pixel.x, corner.pixel.y);
     measure(&track.feature);
-    track.reference = here;
-    track.reference_pixel = track.feature.pixel.cast<double>();
-    track.reference_depth = track.feature.depth;
+    setReference(&track, here);
     added.push_back(tracks_.size());
     tracks_.push_back(std::move(track));
   }

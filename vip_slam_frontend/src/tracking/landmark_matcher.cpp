@@ -49,7 +49,7 @@ void LandmarkMatcher::retire(const Track& track) {
   auto reference = std::make_shared<ReferenceImage>(*track.reference);
   reference->gray = image(window).clone();
   reference->origin = track.reference->origin + Eigen::Vector2d(window.x, window.y);
-  patches_[track.feature.id] = {reference, track.reference_pixel, track.reference_depth};
+  patches_[track.feature.id] = {reference, track.reference_pixel, track.surface};
   if (patches_.size() > kMostPatches) patches_.erase(patches_.begin());
 }
 
@@ -99,7 +99,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     if (patch == patches_.end()) return false;
     track->reference = patch->second.reference;
     track->reference_pixel = patch->second.pixel;
-    track->reference_depth = patch->second.depth;
+    track->surface = patch->second.surface;
     return true;
   };
   const int radius = static_cast<int>(options_.landmark_radius_px);

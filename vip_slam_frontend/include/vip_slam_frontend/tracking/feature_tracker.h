@@ -14,6 +14,7 @@
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/types/feature.h"
 #include "vip_slam_core/util/timing.h"
+#include "vip_slam_frontend/tracking/patch_surface.h"
 #include "vip_slam_frontend/tracking/tracking_options.h"
 
 namespace vip_slam {
@@ -29,7 +30,7 @@ struct Track {
   Feature feature;            ///< of the newest image; descriptor and angle only on keyframes
   std::shared_ptr<const ReferenceImage> reference;
   Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
-  double reference_depth = 0; ///< metres; 0: unknown
+  PatchSurface surface;       ///< what the reference patch shows
 };
 
 struct TrackingResult {
@@ -74,6 +75,7 @@ class FeatureTracker {
   void runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation, std::vector<cv::Point2f>* next,
               std::vector<char>* found);
   void alignWithReferences(const SE3& T_odom_C);
+  void setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const;
 
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;

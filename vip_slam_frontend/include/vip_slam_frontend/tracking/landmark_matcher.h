@@ -34,7 +34,7 @@ class LandmarkMatcher {
   struct Patch {
     std::shared_ptr<const ReferenceImage> reference;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-    double depth = 0;
+    PatchSurface surface;
   };
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;

@@ -1,0 +1,31 @@
+// The small piece of surface that a patch shows. With its depth and slope the patch can be warped into another view
+// exactly (to first order), also on a wall seen at a flat angle, where a patch taken to face the camera would creep.
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam {
+
+/// A plane is affine in inverse depth over the image: 1/z(p + d) = (1 + slope . d) / depth.
+struct PatchSurface {
+  double depth = 0;                                 ///< z at the patch's middle, metres; 0: unknown, far away
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< 1/pixel; zero: facing the camera
+
+  double depthAt(const Eigen::Vector2d& offset_px) const { return depth / (1.0 + slope.dot(offset_px)); }
+};
+
+/// Surface around `pixel` in `depth_image` (32FC1, metres, 0 or NaN invalid), whose depth in the middle is known to be
+/// `depth`. Facing the camera where the readings are too few or lie on no plane.
+PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
+                          const DepthNoise& noise);
+
+/// d(reference pixel) / d(current pixel) at the middle of the patch; false when it is out of sight or all but edge-on.
+bool patchWarp(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, const PatchSurface& surface,
+               const SE3& T_cur_ref, Eigen::Matrix2d* A_ref_cur);
+
+}  // namespace vip_slam

@@ -1,0 +1,79 @@
+#include "vip_slam_frontend/tracking/patch_surface.h"
+
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace vip_slam {
+
+namespace {
+
+constexpr int kRadius = 6;  // of the patch
+constexpr int kStride = 2;
+constexpr int kFewest = 20;
+// Slopes are a few per cent a pixel at the flattest angles that can be tracked; the prior decides where readings are few.
+constexpr double kPriorSlope = 0.03;
+constexpr double kSteepest = 0.06;
+
+}  // namespace
+
+PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
+                          const DepthNoise& noise) {
+  PatchSurface surface;
+  surface.depth = depth;
+  if (!(depth > 0) || depth_image.empty()) return surface;
+  const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+  if (u < kRadius || v < kRadius || u + kRadius >= depth_image.cols || v + kRadius >= depth_image.rows) return surface;
+
+  // Least squares on depth / z = offset + slope . d, in units of the noise of one reading.
+  const double sigma = std::max(noise.sigma(depth) / depth, 1e-4);
+  Eigen::Matrix3d A = Eigen::Vector3d(0, 1, 1).asDiagonal();
+  A *= sigma * sigma / (kPriorSlope * kPriorSlope);
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  double square = 0;
+  int count = 0;
+  for (int y = -kRadius; y <= kRadius; y += kStride) {
+    const float* row = depth_image.ptr<float>(v + y) + u;
+    for (int x = -kRadius; x <= kRadius; x += kStride) {
+      const double z = row[x];
+      if (!(z > 0.5 * depth && z < 2.0 * depth)) continue;  // also refuses 0 and NaN
+      const Eigen::Vector3d row_of_A(1.0, x, y);
+      const double value = depth / z - 1.0;
+      A += row_of_A * row_of_A.transpose();
+      b += row_of_A * value;
+      square += value * value;
+      ++count;
+    }
+  }
+  if (count < kFewest) return surface;
+  const Eigen::Vector3d fit = A.ldlt().solve(b);
+  const double residual = std::sqrt(std::max(0.0, square - b.dot(fit)) / count);
+  // A step or a rim inside the window is no plane, and its slope would be worse than none.
+  if (residual > 2.0 * sigma + 0.002 || !(fit.tail<2>().norm() < kSteepest)) return surface;
+  surface.slope = fit.tail<2>();
+  return surface;
+}
+
+bool patchWarp(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, const PatchSurface& surface,
+               const SE3& T_cur_ref, Eigen::Matrix2d* A_ref_cur) {
+  PatchSurface plane = surface;
+  if (!(plane.depth > 0)) plane.depth = 1e4;
+  const double h = 3.0;
+  Eigen::Matrix2d A_cur_ref;
+  for (int axis = 0; axis < 2; ++axis) {
+    Eigen::Vector2d ends[2];
+    for (int side = 0; side < 2; ++side) {
+      Eigen::Vector2d offset = Eigen::Vector2d::Zero();
+      offset(axis) = side ? h : -h;
+      const Eigen::Vector3d p = camera.unproject(reference_pixel + offset, plane.depthAt(offset));
+      if (!camera.project(T_cur_ref * p, &ends[side])) return false;
+    }
+    A_cur_ref.col(axis) = (ends[1] - ends[0]) / (2 * h);
+  }
+  const double det = A_cur_ref.determinant();
+  if (!(det > 0.05) || !(det < 20.0)) return false;
+  *A_ref_cur = A_cur_ref.inverse();
+  return true;
+}
+
+}  // namespace vip_slam

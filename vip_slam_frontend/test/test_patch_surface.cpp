@@ -1,0 +1,130 @@
+// A patch's surface from depth, and its warp into another view against the exact homography of the plane.
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "vip_slam_frontend/tracking/patch_alignment.h"
+#include "vip_slam_frontend/tracking/patch_surface.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kFocal = 400, kCx = 319.5, kCy = 239.5;
+const Eigen::Vector2d kPixel(420, 200);
+
+std::shared_ptr<const CameraModel> camera() {
+  CameraIntrinsics intrinsics;
+  intrinsics.width = 640;
+  intrinsics.height = 480;
+  intrinsics.fx = intrinsics.fy = kFocal;
+  intrinsics.cx = kCx;
+  intrinsics.cy = kCy;
+  return makeCamera(intrinsics);
+}
+
+/// A wall on the right, along which the camera looks: seen at about 15 degrees in kPixel.
+const Eigen::Vector3d kNormal = Eigen::Vector3d(-1.0, 0.1, 0.02).normalized();
+constexpr double kDistance = 1.2;  ///< n . p + d = 0
+
+Eigen::Vector3d ray(const Eigen::Vector2d& uv) { return {(uv.x() - kCx) / kFocal, (uv.y() - kCy) / kFocal, 1.0}; }
+double wallDepth(const Eigen::Vector2d& uv) { return -kDistance / kNormal.dot(ray(uv)); }
+
+cv::Mat wallDepthImage(double relative_noise) {
+  cv::Mat depth(480, 640, CV_32F, cv::Scalar(0));
+  cv::RNG random(3);
+  for (int v = 0; v < 480; ++v) {
+    for (int u = 0; u < 640; ++u) {
+      const double z = wallDepth({u, v});
+      if (z > 0 && z < 20) depth.at<float>(v, u) = static_cast<float>(z * (1 + random.gaussian(relative_noise)));
+    }
+  }
+  return depth;
+}
+
+DepthNoise noise() {
+  DepthNoise n;
+  n.a = 0;
+  n.b = 0.0017;
+  n.c = 0;
+  n.min_range = 0.2;
+  n.max_range = 20;
+  return n;
+}
+
+/// Exact pixel in the second view of what the first shows at uv.
+Eigen::Vector2d transfer(const SE3& T_2_1, const Eigen::Vector2d& uv) {
+  const Eigen::Vector3d p = T_2_1 * (ray(uv) * wallDepth(uv));
+  return {kFocal * p.x() / p.z() + kCx, kFocal * p.y() / p.z() + kCy};
+}
+
+const SE3 kMotion(expSO3(Eigen::Vector3d(0.02, -0.03, 0.05)), Eigen::Vector3d(0.05, 0.02, -0.6));  // 0.6 m forward
+
+TEST(PatchSurface, SlopeOfASlantedWall) {
+  const double h = 1e-3, z = wallDepth(kPixel);
+  const Eigen::Vector2d exact((z / wallDepth(kPixel + Eigen::Vector2d(h, 0)) - 1) / h,
+                              (z / wallDepth(kPixel + Eigen::Vector2d(0, h)) - 1) / h);
+  const PatchSurface clean = patchSurface(wallDepthImage(0), kPixel, z, noise());
+  EXPECT_LT((clean.slope - exact).norm(), 0.01 * exact.norm());
+  EXPECT_NEAR(clean.depthAt({6, -6}), wallDepth(kPixel + Eigen::Vector2d(6, -6)), 1e-3 * z);
+  const PatchSurface noisy = patchSurface(wallDepthImage(0.0017), kPixel, z, noise());
+  EXPECT_LT((noisy.slope - exact).norm(), 0.05 * exact.norm());
+}
+
+TEST(PatchSurface, FacesTheCameraWhereTheReadingsAreNoPlane) {
+  cv::Mat step = wallDepthImage(0.0017);
+  step.colRange(static_cast<int>(kPixel.x()) + 2, 640) *= 1.3;
+  EXPECT_EQ(patchSurface(step, kPixel, wallDepth(kPixel), noise()).slope.norm(), 0);
+  cv::Mat holes = wallDepthImage(0.0017);
+  holes.colRange(static_cast<int>(kPixel.x()) - 2, 640).setTo(0);
+  EXPECT_EQ(patchSurface(holes, kPixel, wallDepth(kPixel), noise()).slope.norm(), 0);
+  EXPECT_EQ(patchSurface(cv::Mat(), kPixel, 2.0, noise()).slope.norm(), 0);
+  EXPECT_EQ(patchSurface(wallDepthImage(0), Eigen::Vector2d(2, 2), 2.0, noise()).slope.norm(), 0);
+  EXPECT_EQ(patchSurface(wallDepthImage(0), kPixel, 0.0, noise()).depth, 0);
+}
+
+TEST(PatchSurface, WarpIsTheHomographysDerivative) {
+  const double h = 1e-3;
+  Eigen::Matrix2d A_cur_ref;
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector2d d = h * Eigen::Vector2d::Unit(axis);
+    A_cur_ref.col(axis) = (transfer(kMotion, kPixel + d) - transfer(kMotion, kPixel - d)) / (2 * h);
+  }
+  const Eigen::Matrix2d exact = A_cur_ref.inverse();
+  const PatchSurface surface = patchSurface(wallDepthImage(0), kPixel, wallDepth(kPixel), noise());
+  Eigen::Matrix2d A;
+  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &A));
+  EXPECT_LT((A - exact).norm(), 0.01);
+  PatchSurface facing = surface;
+  facing.slope.setZero();
+  ASSERT_TRUE(patchWarp(*camera(), kPixel, facing, kMotion, &A));
+  EXPECT_GT((A - exact).norm(), 0.1);  // what the slope is there for
+  EXPECT_FALSE(patchWarp(*camera(), kPixel, surface, SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &A));
+}
+
+TEST(PatchSurface, AlignmentOnASlantedWallFindsTheExactPixel) {
+  cv::Mat reference(480, 640, CV_8U);
+  cv::RNG random(7);
+  random.fill(reference, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(reference, reference, cv::Size(), 2.0);
+  cv::normalize(reference, reference, 0, 255, cv::NORM_MINMAX);
+  // What the second view shows, by the plane's homography (second to first).
+  const Eigen::Matrix3d K = (Eigen::Matrix3d() << kFocal, 0, kCx, 0, kFocal, kCy, 0, 0, 1).finished();
+  const Eigen::Matrix3d H_2_1 =
+      K * (kMotion.R() - kMotion.t() * kNormal.transpose() / kDistance) * K.inverse();
+  const cv::Mat H = (cv::Mat_<double>(3, 3) << H_2_1(0, 0), H_2_1(0, 1), H_2_1(0, 2), H_2_1(1, 0), H_2_1(1, 1),
+                     H_2_1(1, 2), H_2_1(2, 0), H_2_1(2, 1), H_2_1(2, 2));
+  cv::Mat current;
+  cv::warpPerspective(reference, current, H, reference.size(), cv::INTER_CUBIC);
+
+  const Eigen::Vector2d exact = transfer(kMotion, kPixel);
+  const PatchSurface surface = patchSurface(wallDepthImage(0.0017), kPixel, wallDepth(kPixel), noise());
+  Eigen::Matrix2d A;
+  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &A));
+  const PatchAlignment aligned = alignPatch(reference, kPixel, A, current, exact + Eigen::Vector2d(0.6, -0.4));
+  ASSERT_TRUE(aligned.ok);
+  EXPECT_LT((aligned.pixel - exact).norm(), 0.1);
+}
+
+}  // namespace
+}  // namespace vip_slam
