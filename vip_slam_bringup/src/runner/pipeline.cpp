@@ -69,11 +69,7 @@ void Pipeline::applyAnswers(std::size_t image) {
 
 void Pipeline::process(const ImagePair& pair) {
   applyAnswers(images_);
-  FrameOutput output;
-  {
-    ScopedTimer timer(timing_, "frontend.total", pair.t);
-    output = front_end_->process({pair.t, pair.gray, pair.depth});
-  }
+  const FrameOutput output = front_end_->process({pair.t, pair.gray, pair.depth});
   ++images_;
   const TrackedFrame& frame = *output.frame;
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
