@@ -7,7 +7,7 @@
 namespace vip_slam {
 
 Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing)
-    : options_(options), timing_(timing), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
+    : options_(options), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
   if (options.mapping) mapping_ = std::make_unique<MappingThread>(options, sensor, timing);
 }
 
