@@ -16,7 +16,7 @@ constexpr int kLargestWindow = (2 * kLargestRadius + 1) * (2 * kLargestRadius + 
 struct Window {
   int count = 0;
   float low, high;
-  float z[kLargestWindow];  ///< depths, later their inverses
+  float z[kLargestWindow];
   signed char x[kLargestWindow], y[kLargestWindow];
 };
 
@@ -30,7 +30,7 @@ void gather(const cv::Mat& depth, int cu, int cv, int radius, const DepthNoise& 
     const float* row = depth.ptr<float>(cv + y) + cu;
     for (int x = x0; x <= x1; ++x) {
       const float z = row[x];
-      if (!(z > 0 && z >= min_range && z <= max_range)) continue;  // also refuses NaN
+      if (!(z >= min_range && z <= max_range)) continue;  // also refuses 0 and NaN
       w->z[w->count] = z;
       w->x[w->count] = static_cast<signed char>(x);
       w->y[w->count++] = static_cast<signed char>(y);
@@ -40,7 +40,7 @@ void gather(const cv::Mat& depth, int cu, int cv, int radius, const DepthNoise& 
   }
 }
 
-// Slope of the window's values by least squares; zero when the valid pixels do not span it.
+// Slope of z over the window by least squares; zero when the valid pixels do not span it.
 void fitSlope(const Window& w, float mean, float* slope_x, float* slope_y) {
   float sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, sxz = 0, syz = 0;
   for (int i = 0; i < w.count; ++i) {
@@ -63,13 +63,20 @@ bool isEdge(float low, float high, const DepthNoise& noise, const DepthLookupOpt
   return high - low > options.edge_ratio * middle + options.edge_sigmas * noise.sigma(middle);
 }
 
-// On a plane the inverse of z is linear over the image. z itself bends: a straight line through the z of a corridor's
-// wall puts it too far by some 0.02 % at five metres, and the corridor comes out too long.
+// Whether levelled values, the local slope taken out, show anything but noise. `low` and `high` are theirs. Beyond a
+// certain slope there is no surface that one could measure.
+bool isEdgeOnSlope(float low, float high, float slope_x, float slope_y, const DepthNoise& noise,
+                   const DepthLookupOptions& options) {
+  constexpr float kSteepest = 0.02f;  // relative rise per pixel: about 84 degrees for a focal length of 500 px
+  const float z = 0.5f * (low + high);
+  return !(slope_x * slope_x + slope_y * slope_y <= kSteepest * kSteepest * z * z) ||
+         high - low > float(options.edge_sigmas * noise.sigma(z));
+}
 
 // The common case, a full 5x5 window of valid pixels: the sums of the slope fit are constants and nothing branches per
 // pixel. False when some pixel is invalid; the general way then decides.
 bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, const DepthNoise& noise,
-                   const DepthLookupOptions& options, float* result) {
+                   const DepthLookupOptions& options, bool grazing, float* result) {
   float z[25];
   const float* at = depth.ptr<float>(cv - 2) + cu - 2;
   const std::size_t step = depth.step1();
@@ -83,39 +90,45 @@ bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, con
       low = value < low ? value : low;
       high = value > high ? value : high;
       sum += value;
+      slope_x += float(x - 2) * value;
+      slope_y += float(y - 2) * value;
     }
   }
   // Comparisons pass over NaN, the sum does not.
-  if (!(sum == sum && low > 0 && low >= float(noise.min_range) && high <= float(noise.max_range))) return false;
-  if (isEdge(low, high, noise, options)) {
+  if (!(sum == sum && low >= float(noise.min_range) && high <= float(noise.max_range))) return false;
+  const bool edge = isEdge(low, high, noise, options);
+  if (edge && !grazing) {
     *result = 0.0f;
     return true;
-  }
-  for (float& value : z) value = 1.0f / value;
-  for (int y = 0; y < 5; ++y) {
-    for (int x = 0; x < 5; ++x) {
-      slope_x += float(x - 2) * z[5 * y + x];
-      slope_y += float(y - 2) * z[5 * y + x];
-    }
   }
   slope_x /= 50.0f;  // sum of x^2 over the window
   slope_y /= 50.0f;
   for (int y = 0; y < 5; ++y) {
     for (int x = 0; x < 5; ++x) z[5 * y + x] += slope_x * (du - float(x - 2)) + slope_y * (dv - float(y - 2));
   }
+  if (edge) {
+    const auto [lowest, highest] = std::minmax_element(z, z + 25);
+    if (isEdgeOnSlope(*lowest, *highest, slope_x, slope_y, noise, options)) {
+      *result = 0.0f;
+      return true;
+    }
+  }
   std::nth_element(z, z + 12, z + 25);
-  *result = 1.0f / z[12];
+  *result = z[12];
   return true;
 }
 
-float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options) {
+// With `grazing`, where the spread says edge it is judged again with the local slope taken out: floors and table tops at
+// a grazing angle rise by more than an edge over the window, yet they are surfaces.
+float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options,
+             bool grazing) {
   if (!(u > -1 && v > -1 && u < depth.cols && v < depth.rows)) return 0.0f;
   const int cu = static_cast<int>(std::floor(u + 0.5)), cv = static_cast<int>(std::floor(v + 0.5));
   if (cu < 0 || cv < 0 || cu >= depth.cols || cv >= depth.rows) return 0.0f;
   const int radius = std::clamp(options.radius, 0, kLargestRadius);
   if (radius == 2 && cu >= 2 && cv >= 2 && cu + 2 < depth.cols && cv + 2 < depth.rows) {
     float result;
-    if (lookUpFull5x5(depth, cu, cv, float(u - cu), float(v - cv), noise, options, &result)) return result;
+    if (lookUpFull5x5(depth, cu, cv, float(u - cu), float(v - cv), noise, options, grazing, &result)) return result;
   }
   Window w;
   gather(depth, cu, cv, radius, noise, &w);
@@ -123,23 +136,25 @@ float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, 
   const int inside = (std::min(cu + radius, depth.cols - 1) - std::max(cu - radius, 0) + 1) *
                      (std::min(cv + radius, depth.rows - 1) - std::max(cv - radius, 0) + 1);
   if (w.count == 0 || w.count < options.min_valid_fraction * std::min(inside, side * side)) return 0.0f;
-  if (isEdge(w.low, w.high, noise, options)) return 0.0f;
+  const bool edge = isEdge(w.low, w.high, noise, options);
+  if (edge && !grazing) return 0.0f;
 
-  // The median of the inverses carried along the local slope to (u, v): robust, and unbiased on slanted surfaces.
+  // The median of the values carried along the local slope to (u, v): robust, and unbiased on slanted surfaces.
   float mean = 0;
-  for (int i = 0; i < w.count; ++i) {
-    w.z[i] = 1.0f / w.z[i];
-    mean += w.z[i];
-  }
+  for (int i = 0; i < w.count; ++i) mean += w.z[i];
   mean /= float(w.count);
   float slope_x, slope_y;
   fitSlope(w, mean, &slope_x, &slope_y);
   const float du = float(u - cu), dv = float(v - cv);
   for (int i = 0; i < w.count; ++i) w.z[i] += slope_x * (du - w.x[i]) + slope_y * (dv - w.y[i]);
+  if (edge) {
+    const auto [lowest, highest] = std::minmax_element(w.z, w.z + w.count);
+    if (isEdgeOnSlope(*lowest, *highest, slope_x, slope_y, noise, options)) return 0.0f;
+  }
   float* median = w.z + w.count / 2;
   std::nth_element(w.z, median, w.z + w.count);
-  if (w.count % 2 == 1) return 1.0f / *median;
-  return 2.0f / (*median + *std::max_element(w.z, median));
+  if (w.count % 2 == 1) return *median;
+  return 0.5f * (*median + *std::max_element(w.z, median));
 }
 
 void requireFloatDepth(const cv::Mat& depth) {
@@ -153,7 +168,7 @@ void requireFloatDepth(const cv::Mat& depth) {
 float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options) {
   if (depth.empty()) return 0.0f;
   requireFloatDepth(depth);
-  return lookUp(depth, u, v, noise, options);
+  return lookUp(depth, u, v, noise, options, false);
 }
 
 cv::Mat depthToMetres(const cv::Mat& raw, double scale) {
@@ -190,7 +205,7 @@ DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& nois
   for (int r = 0; r < grid.rows; ++r) {
     for (int c = 0; c < grid.cols; ++c) {
       grid.z[static_cast<std::size_t>(r) * grid.cols + c] =
-          lookUp(depth, grid.offset + c * stride, grid.offset + r * stride, noise, options);
+          lookUp(depth, grid.offset + c * stride, grid.offset + r * stride, noise, options, true);
     }
   }
   return grid;
