@@ -12,8 +12,8 @@ PlaneHistogram::PlaneHistogram(double distance_bin, double angle_bin_deg)
 
 void PlaneHistogram::clear() {
   bins_.clear();
+  index_.clear();
   votes_.clear();
-  vote_of_.clear();
 }
 
 std::uint64_t PlaneHistogram::key(int space, int angle, int distance) {
@@ -21,66 +21,72 @@ std::uint64_t PlaneHistogram::key(int space, int angle, int distance) {
          std::uint64_t(std::uint32_t(distance));
 }
 
-void PlaneHistogram::add(const Vote& vote, int index) {
-  bins_[key(vote.space, vote.angle, vote.distance)] += vote.area;
-  vote_of_[index] = votes_.size();
-  votes_.emplace_back(index, vote);
+template <class F>
+void PlaneHistogram::forNeighbours(const Bin& bin, F f) {
+  const int reach = bin.space == 2 ? 1 : 0;
+  const int space = bin.space, angle = bin.angle, distance = bin.distance;
+  for (int a = -reach; a <= reach; ++a) {
+    for (int d = -1; d <= 1; ++d) {
+      const auto it = index_.find(key(space, reach ? (angle + a + angles_) % angles_ : 0, distance + d));
+      if (it != index_.end()) f(bins_[it->second]);
+    }
+  }
+}
+
+std::size_t PlaneHistogram::binAt(int space, int angle, int distance) {
+  const std::uint64_t k = key(space, angle, distance);
+  const auto it = index_.find(k);
+  if (it != index_.end()) return it->second;
+  Bin fresh{space, angle, distance, 0, 0, {}};
+  forNeighbours(fresh, [&](const Bin& other) { fresh.neighbourhood += other.area; });
+  index_.emplace(k, bins_.size());
+  bins_.push_back(std::move(fresh));
+  return bins_.size() - 1;
+}
+
+void PlaneHistogram::add(int space, int angle, int distance, double area, int index) {
+  const std::size_t at = binAt(space, angle, distance);
+  forNeighbours(bins_[at], [&](Bin& bin) { bin.neighbourhood += area; });
+  bins_[at].area += area;
+  bins_[at].members.push_back(index);
+  votes_[index] = {at, area};
 }
 
 void PlaneHistogram::addHorizontal(const Eigen::Vector3d& n, const Eigen::Vector3d& p, double area, int index) {
-  add({n.z() > 0 ? 0 : 1, 0, static_cast<int>(std::floor(p.z() / distance_bin_)), area}, index);
+  add(n.z() > 0 ? 0 : 1, 0, static_cast<int>(std::floor(p.z() / distance_bin_)), area, index);
 }
 
 void PlaneHistogram::addVertical(const Eigen::Vector3d& n, const Eigen::Vector3d& p, double area, int index) {
   const double length = std::hypot(n.x(), n.y());
   const double d = -(n.x() * p.x() + n.y() * p.y()) / length;
   const int angle = static_cast<int>(std::floor(std::atan2(n.y(), n.x()) / angle_bin_ + angles_)) % angles_;
-  add({2, angle, static_cast<int>(std::floor(d / distance_bin_)), area}, index);
+  add(2, angle, static_cast<int>(std::floor(d / distance_bin_)), area, index);
 }
 
-template <class F>
-void PlaneHistogram::forNeighbours(int space, int angle, int distance, F f) const {
-  const int reach = space == 2 ? 1 : 0;
-  for (int a = -reach; a <= reach; ++a) {
-    for (int d = -1; d <= 1; ++d) f(space == 2 ? (angle + a + angles_) % angles_ : 0, distance + d);
-  }
-}
-
-PlaneHistogram::Peak PlaneHistogram::peak() const {
-  // Scanned in the order of the votes, not of the hash table, so that ties break the same way everywhere.
-  Peak best;
-  const Vote* at = nullptr;
-  std::unordered_map<std::uint64_t, bool> seen;
-  for (const auto& [index, vote] : votes_) {
-    if (vote.area <= 0 || !seen.emplace(key(vote.space, vote.angle, vote.distance), true).second) continue;
-    double sum = 0;
-    forNeighbours(vote.space, vote.angle, vote.distance, [&](int a, int d) {
-      const auto it = bins_.find(key(vote.space, a, d));
-      if (it != bins_.end()) sum += it->second;
-    });
-    if (sum > best.area) {
-      best.area = sum;
-      at = &vote;
-    }
-  }
-  if (!at) return best;
-  for (const auto& [index, vote] : votes_) {
-    if (vote.area <= 0 || vote.space != at->space) continue;
-    bool near = false;
-    forNeighbours(at->space, at->angle, at->distance,
-                  [&](int a, int d) { near = near || (a == vote.angle && d == vote.distance); });
-    if (near) best.members.push_back(index);
-  }
-  return best;
+PlaneHistogram::Peak PlaneHistogram::peak() {
+  const auto highest = std::max_element(bins_.begin(), bins_.end(), [](const Bin& a, const Bin& b) {
+    return a.neighbourhood < b.neighbourhood;
+  });
+  Peak peak;
+  if (highest == bins_.end()) return peak;
+  forNeighbours(*highest, [&](const Bin& bin) {
+    peak.members.insert(peak.members.end(), bin.members.begin(), bin.members.end());
+  });
+  if (peak.members.empty()) return peak;
+  peak.area = highest->neighbourhood;
+  std::sort(peak.members.begin(), peak.members.end());
+  return peak;
 }
 
 void PlaneHistogram::remove(int index) {
-  const auto it = vote_of_.find(index);
-  if (it == vote_of_.end()) return;
-  Vote& vote = votes_[it->second].second;
-  bins_[key(vote.space, vote.angle, vote.distance)] -= vote.area;
-  vote.area = 0;
-  vote_of_.erase(it);
+  const auto it = votes_.find(index);
+  if (it == votes_.end()) return;
+  Bin& own = bins_[it->second.bin];
+  const double area = it->second.area;
+  forNeighbours(own, [area](Bin& bin) { bin.neighbourhood -= area; });
+  own.area -= area;
+  own.members.erase(std::find(own.members.begin(), own.members.end(), index));
+  votes_.erase(it);
 }
 
 }  // namespace vip_slam

@@ -107,8 +107,12 @@ bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const Dept
   int missing = 0;
   const float d = -triangle.n_C.dot(triangle.centre_C);
   for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector2f middle = 0.5f * (mesh_.vertices[triangle.vertex[(k + 1) % 3]].pixel +
-                                           mesh_.vertices[triangle.vertex[(k + 2) % 3]].pixel);
+    const MeshVertex &a = mesh_.vertices[triangle.vertex[(k + 1) % 3]], &b = mesh_.vertices[triangle.vertex[(k + 2) % 3]];
+    const Eigen::Vector2f middle = 0.5f * (a.pixel + b.pixel);
+    // Between neighbouring nodes there is no third one to ask.
+    const bool neighbours = a.feature < 0 && b.feature < 0 &&
+                            (a.pixel - b.pixel).cwiseAbs().maxCoeff() < 1.5f * float(grid.stride);
+    if (neighbours && brokenBetween(a, b, grid)) return true;
     const int c = static_cast<int>(std::lround((middle.x() - float(grid.offset)) / float(grid.stride)));
     const int r = static_cast<int>(std::lround((middle.y() - float(grid.offset)) / float(grid.stride)));
     if (c < 0 || r < 0 || c >= grid.cols || r >= grid.rows) continue;
@@ -124,6 +128,26 @@ bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const Dept
     if (off > float(options_.gap_sigmas) * sigma + 0.005f) return true;
   }
   return missing >= 2;  // the depth look-up refuses pixels beside an edge
+}
+
+bool DepthMeshBuilder::brokenBetween(const MeshVertex& a, const MeshVertex& b, const DepthGrid& grid) const {
+  // On a surface inverse depth goes on linearly. There is a step or a crease in between when neither end goes on to the
+  // other one, and one of them lies on a surface with the two nodes behind it. (A strip of two nodes between other
+  // things may be a surface; nothing speaks against it.)
+  const auto node = [&](const Eigen::Vector2f& pixel) {
+    const int c = static_cast<int>(std::lround((pixel.x() - float(grid.offset)) / float(grid.stride)));
+    const int r = static_cast<int>(std::lround((pixel.y() - float(grid.offset)) / float(grid.stride)));
+    return c < 0 || r < 0 || c >= grid.cols || r >= grid.rows ? 0.0f : grid.at(c, r);
+  };
+  const float za = a.p_C.z(), zb = b.p_C.z(), z = 0.5f * (za + zb);
+  const float tolerance = float(options_.gap_sigmas * noise_.sigma(z)) * kMedianGain * 2.45f + 0.005f;  // sqrt(1 + 4 + 1)
+  const auto straight = [&](float first, float middle, float last) {
+    return first > 0 && middle > 0 && std::abs(1.0f / first - 2.0f / middle + 1.0f / last) * z * z < tolerance;
+  };
+  const Eigen::Vector2f step = b.pixel - a.pixel;
+  const float before = node(a.pixel - step), after = node(b.pixel + step);
+  if (straight(before, za, zb) || straight(after, zb, za)) return false;
+  return straight(node(a.pixel - 2.0f * step), before, za) || straight(node(b.pixel + 2.0f * step), after, zb);
 }
 
 bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step,

@@ -24,27 +24,35 @@ class PlaneHistogram {
 
   struct Peak {
     double area = 0;
-    std::vector<int> members;  ///< indices in the bin and its neighbours, in order of their addition
+    std::vector<int> members;  ///< indices in the bin and its neighbours, ascending
   };
   /// The neighbourhood (bin and direct neighbours) with the largest area; area 0 when empty. Deterministic.
-  Peak peak() const;
+  Peak peak();
   void remove(int index);
 
  private:
-  struct Vote {
+  struct Bin {
     int space, angle, distance;  ///< space 0: up, 1: down, 2: vertical
+    double area = 0;
+    double neighbourhood = 0;    ///< area of this bin and its direct neighbours, kept up to date
+    std::vector<int> members;    ///< in order of their addition
+  };
+  struct Vote {
+    std::size_t bin;
     double area;
   };
   static std::uint64_t key(int space, int angle, int distance);
-  void add(const Vote& vote, int index);
+  void add(int space, int angle, int distance, double area, int index);
+  std::size_t binAt(int space, int angle, int distance);
+  /// f(Bin&) for the bin and those direct neighbours that hold votes.
   template <class F>
-  void forNeighbours(int space, int angle, int distance, F f) const;
+  void forNeighbours(const Bin& bin, F f);
 
   double distance_bin_, angle_bin_;
   int angles_;
-  std::unordered_map<std::uint64_t, double> bins_;
-  std::vector<std::pair<int, Vote>> votes_;
-  std::unordered_map<int, std::size_t> vote_of_;  ///< index -> position in votes_
+  std::vector<Bin> bins_;  ///< in order of their first vote, so that ties break the same way everywhere
+  std::unordered_map<std::uint64_t, std::size_t> index_;
+  std::unordered_map<int, Vote> votes_;
 };
 
 }  // namespace vip_slam

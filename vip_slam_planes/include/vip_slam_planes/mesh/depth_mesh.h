@@ -63,6 +63,7 @@ class DepthMeshBuilder {
   bool lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step, MeshTriangle* triangle) const;
   bool flatBlock(const DepthGrid& grid, int c, int r, int step) const;
   bool crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const;
+  bool brokenBetween(const MeshVertex& a, const MeshVertex& b, const DepthGrid& grid) const;
   void smoothNormals();
   int gridStep(const DepthGrid& grid) const;
 
