@@ -114,6 +114,31 @@ TEST(Mapper, CorridorWallSeenFromBothEndsBecomesOne) {
   EXPECT_GT(rig.mapper.planes().front().area, 20);
 }
 
+TEST(Mapper, FarPiecesOfOneWallAreOneButNotThoseOfTwo) {
+  for (const double step : {0.0, 0.05}) {
+    Rig rig;
+    Scene scene;
+    scene.add({-7, 1, 0}, {3, 0, 0}, {0, 0, 2.5});
+    scene.add({4, 1 + step, 0}, {3, 0, 0}, {0, 0, 2.5});  // eight metres further on
+    for (int i = 0; i < 4; ++i) rig.look(scene, {-6 + 0.3 * i, -1.5, 1.3}, {-6 + 0.4 * i, 1, 1.2});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {5 + 0.3 * i, -1.5, 1.3}, {5 + 0.4 * i, 1, 1.2});
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+    ASSERT_TRUE(rig.find(Plane({0, -1, 0}, 1), 0.004)) << step;
+    if (step == 0) EXPECT_GE(rig.find(Plane({0, -1, 0}, 1))->polygons.size(), 2u);
+  }
+}
+
+TEST(Mapper, TablesOfOneHeightStayTwo) {
+  Rig rig;
+  Scene scene;
+  scene.add({1.0, -1.8, 0.75}, {1.0, 0, 0}, {0, 1.4, 0});
+  scene.add({1.0, 0.4, 0.75}, {1.0, 0, 0}, {0, 1.4, 0});
+  for (int i = 0; i < 4; ++i) rig.look(scene, {-0.3, -1.1 + 0.1 * i, 1.5}, {1.5, -1.1, 0.75});
+  for (int i = 0; i < 4; ++i) rig.look(scene, {-0.3, 1.1 + 0.1 * i, 1.5}, {1.5, 1.1, 0.75});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  for (const PlaneEstimate& table : rig.mapper.planes()) EXPECT_NEAR(-0.75, table.plane.d, 0.004);
+}
+
 TEST(Mapper, BothFacesOfAThinWallAreTwo) {
   Rig rig;
   Scene scene;

@@ -73,17 +73,20 @@ struct PlaneGrowthOptions {
 struct PlaneMergingOptions {
   double angle_deg = 10.0;
   double distance = 0.10;
+  double distance_apart = 0.02;
   double gap = 0.4;
-  double gap_per_size = 1.0;
+  double gap_per_area = 2.0;
   double overlap = 0.3;
   double max_rms = 0.02;
 
   void visit(OptionVisitor& v) {
     v.field("angle_deg", angle_deg, 0.5, 30.0, "largest angle between planes that are merged, degrees");
     v.field("distance", distance, 0.01, 0.5, "largest distance of each one's boundary points to the other, m");
+    v.field("distance_apart", distance_apart, 0.002, 0.5,
+            "the same, of the smaller one to the larger plane, when they are further apart than the gap, m");
     v.field("gap", gap, 0.0, 5.0, "largest gap between the covered areas, m");
-    v.field("gap_per_size", gap_per_size, 0.0, 5.0,
-            "gap allowed between walls and floors (4 m^2 and more), per square root of the smaller one's area");
+    v.field("gap_per_area", gap_per_area, 0.0, 100.0,
+            "gap allowed between walls (1 m^2 and more) and between floors (4 m^2), per m^2 of the smaller one, m");
     v.field("overlap", overlap, 0.05, 1.0, "share of the smaller area covered by both that makes them one surface");
     v.field("max_rms", max_rms, 0.002, 0.2,
             "what the joint fit may add to each one's RMS when they do not overlap, m");

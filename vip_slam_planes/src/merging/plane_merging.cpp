@@ -6,8 +6,9 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kWidestGap = 3.0;  // metres
-constexpr double kLargeArea = 4.0;  // m^2
+// Smaller walls and ceilings are furniture. What one can put things on stays apart until it is a floor: two tables are
+// two.
+constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
 
 bool isBorder(const CellGrid& cells, CellIndex c) {
   return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) || !cells.at({c.x, c.y + 1});
@@ -42,6 +43,20 @@ Contact contact(const PlaneTrack& small, const PlaneTrack& large, double gap) {
   });
   if (result.shared) result.separation /= result.shared;
   return result;
+}
+
+// Distance between the bounds of the areas along the larger plane, metres; 0 when they overlap.
+double boundsGap(const PlaneTrack& small, const PlaneTrack& large) {
+  const CellGrid &s = small.cells(), &l = large.cells();
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e9), high = -low;
+  for (int corner = 0; corner < 4; ++corner) {
+    const CellIndex c{s.x0() + (corner & 1) * s.width(), s.y0() + (corner >> 1) * s.height()};
+    const Eigen::Vector2d q = large.toPlane(small.cellCentre(c)) / large.cellSize();
+    low = low.cwiseMin(q), high = high.cwiseMax(q);
+  }
+  const double dx = std::max({low.x() - (l.x0() + l.width()), l.x0() - high.x(), 0.0});
+  const double dy = std::max({low.y() - (l.y0() + l.height()), l.y0() - high.y(), 0.0});
+  return std::hypot(dx, dy) * large.cellSize();
 }
 
 PlaneMoments surfaceMoments(const PlaneTrack& track, const CameraPoses& poses) {
@@ -80,14 +95,15 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
       options.distance + radius * std::sin(options.angle_deg * M_PI / 180.0)) {
     return false;
   }
-  // A cupboard interrupts a wall and the wall goes on; two tables of nearly one height stay two tables.
+  // A cupboard interrupts a wall and the wall goes on, the ceilings of two corridors meet where nobody looked. How far
+  // apart two pieces of one plane may be follows from how well the smaller one determines its plane, not from a length.
   const double smaller = std::min(area_a, area_b);
-  double gap = options.gap;
-  if (smaller >= kLargeArea) gap = std::max(gap, std::min(kWidestGap, options.gap_per_size * std::sqrt(smaller)));
-  const Contact meeting = contact(small, large, gap);
-  if (meeting.near == 0 || meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) {
-    return false;
-  }
+  const double large_from = a.plane().n.z() > 0.5 ? kLargeFloor : kLargeWall;
+  const double gap = smaller >= large_from ? std::max(options.gap, options.gap_per_area * smaller) : options.gap;
+  if (boundsGap(small, large) > gap) return false;
+  const Contact meeting = contact(small, large, options.gap);
+  if (meeting.near == 0 && (gap <= options.gap || meeting.worst_border > options.distance_apart)) return false;
+  if (meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) return false;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
   // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift
   // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
