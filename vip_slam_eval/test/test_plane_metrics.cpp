@@ -16,6 +16,8 @@ PlaneEstimate rectangle(PlaneId id, const Eigen::Vector3d& o, const Eigen::Vecto
   PlaneEstimate plane;
   plane.id = id;
   plane.plane = Plane::fromPointNormal(o, a.cross(b));
+  const double up = std::abs(plane.plane.n.z());
+  plane.kind = up > 0.9999 ? PlaneKind::kHorizontal : up < 0.01 ? PlaneKind::kVertical : PlaneKind::kGeneral;
   plane.polygons.push_back({{o, o + a, o + a + b, o + b}, {}});
   plane.area = a.cross(b).norm();
   return plane;
@@ -82,6 +84,23 @@ TEST(PlaneMetricsTest, MissedDuplicatedAndInventedPlanes) {
   EXPECT_EQ(m.truths[0].represented_by, 2u);
   EXPECT_NEAR(m.truths[0].covered_area, 12.0, 0.05);
   EXPECT_FALSE(m.truths[2].found);
+}
+
+TEST(PlaneMetricsTest, SlantedPlanesAreNotExpectedAndMustNotBeForced) {
+  const PlaneEstimate ramp = rectangle(5, {0, 0, 0}, {2, 0, 0.2}, 2 * Y);
+  EXPECT_EQ(planeMetrics({ramp}, {}).expected, 0u);
+  PlaneMetrics m = planeMetrics({ramp}, {ramp});
+  EXPECT_EQ(m.forced_planes, 0u);
+  EXPECT_EQ(m.false_planes, 0u);
+  m = planeMetrics({ramp}, {rectangle(1, {0, 0, 0.1}, 2 * X, 2 * Y)});  // 5.7 degrees off
+  EXPECT_EQ(m.forced_planes, 1u);
+}
+
+TEST(PlaneMetricsTest, OnlyLargeInventionsAreLarge) {
+  const PlaneMetrics m = planeMetrics(room(), {rectangle(1, {1, 1, 1.5}, 0.6 * X, 0.6 * Y),
+                                               rectangle(2, {2, 1, 1.9}, 0.8 * X, 0.8 * Y)});
+  EXPECT_EQ(m.false_planes, 2u);
+  EXPECT_EQ(m.large_false_planes, 1u);
 }
 
 TEST(PlaneMetricsTest, OppositeSidesAreDifferentPlanes) {

@@ -16,6 +16,7 @@ struct PlaneMatchOptions {
   double min_overlap = 0.25;               ///< of the smaller of both areas
   double min_area = 1.0;                   ///< m^2 a true plane must show to count for recall
   double min_seconds = 2.0;                ///< it must have been in view, where the truth says so
+  double false_area = 0.5;                 ///< m^2 above which an invented plane is a large one
 };
 
 struct PlaneMatch {
@@ -29,7 +30,7 @@ struct PlaneMatch {
 
 struct TruePlaneResult {
   PlaneId id = 0;
-  bool counts = false;            ///< large enough and long enough in view
+  bool counts = false;            ///< horizontal or vertical, large enough and long enough in view
   bool found = false;             ///< some estimate matches it
   std::size_t represented_by = 0; ///< estimates whose best truth it is; above one: duplicates
   double visible_area = 0;        ///< m^2
@@ -37,12 +38,14 @@ struct TruePlaneResult {
 };
 
 struct PlaneMetrics {
-  std::size_t expected = 0;    ///< true planes that count
-  std::size_t found = 0;       ///< of these
-  double recall = 0;           ///< found / expected; 1 when nothing was expected
+  std::size_t expected = 0;            ///< true planes that count
+  std::size_t found = 0;               ///< of these
+  double recall = 0;                   ///< found / expected; 1 when nothing was expected
   std::size_t estimated = 0;
-  std::size_t duplicates = 0;  ///< estimates too many
-  std::size_t false_planes = 0;
+  std::size_t duplicates = 0;          ///< estimates too many
+  std::size_t false_planes = 0;        ///< estimates that no true plane explains
+  std::size_t large_false_planes = 0;  ///< of these, larger than options.false_area
+  std::size_t forced_planes = 0;       ///< horizontal or vertical estimates of true planes that are neither
   ErrorStatistics normal;      ///< degrees
   ErrorStatistics distance;    ///< metres
   std::vector<PlaneMatch> matches;

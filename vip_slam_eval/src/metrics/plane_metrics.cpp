@@ -75,7 +75,8 @@ PlaneMetrics planeMetrics(const std::vector<PlaneEstimate>& truth, const std::ve
     TruePlaneResult row;
     row.id = plane.id;
     row.visible_area = plane.seen_area >= 0 ? plane.seen_area : areas.back();
-    row.counts = row.visible_area >= options.min_area &&
+    // Slanted surfaces are left alone by design; a system that finds them all the same is not punished either.
+    row.counts = plane.kind != PlaneKind::kGeneral && row.visible_area >= options.min_area &&
                  (plane.seen_seconds < 0 || plane.seen_seconds >= options.min_seconds);
     result.truths.push_back(row);
   }
@@ -105,10 +106,13 @@ PlaneMetrics planeMetrics(const std::vector<PlaneEstimate>& truth, const std::ve
                                        [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
     if (best == candidates.end()) {
       ++result.false_planes;
+      if (match.area > options.false_area) ++result.large_false_planes;
     } else {
       TruePlaneResult& row = result.truths[best->truth];
       ++row.represented_by;
       match.truth = row.id;
+      const bool slanted = truth[best->truth].kind == PlaneKind::kGeneral;
+      if (slanted && plane.kind != PlaneKind::kGeneral) ++result.forced_planes;
       match.overlap = best->overlap;
       match.normal_error = best->angle;
       match.distance_error = std::abs(truth[best->truth].plane.signedDistance(middleOf(plane)));

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_eval/plane_tables.h"
 
 namespace vip_slam {
 namespace {
@@ -38,28 +39,6 @@ std::string errorsCsv(const Evaluation& evaluation) {
   for (const PoseError& e : evaluation.shown.errors) {
     out << std::setprecision(9) << e.t << std::setprecision(6) << ',' << e.position.x() << ',' << e.position.y() << ','
         << e.position.z() << ',' << e.position.norm() << ',' << e.rotation * kDegrees << '\n';
-  }
-  return out.str();
-}
-
-std::string matchesCsv(const PlaneMetrics& planes) {
-  std::ostringstream out;
-  out.imbue(std::locale::classic());
-  out << "estimate,truth,normal_error_deg,distance_error_m,overlap_m2,area_m2\n";
-  for (const PlaneMatch& m : planes.matches) {
-    out << m.estimate << ',' << (m.truth ? std::to_string(m.truth) : "none") << ',' << m.normal_error * kDegrees << ','
-        << m.distance_error << ',' << m.overlap << ',' << m.area << '\n';
-  }
-  return out.str();
-}
-
-std::string truthsCsv(const PlaneMetrics& planes) {
-  std::ostringstream out;
-  out.imbue(std::locale::classic());
-  out << "truth,counts,found,represented_by,visible_m2,covered_m2\n";
-  for (const TruePlaneResult& t : planes.truths) {
-    out << t.id << ',' << t.counts << ',' << t.found << ',' << t.represented_by << ',' << t.visible_area << ','
-        << t.covered_area << '\n';
   }
   return out.str();
 }
@@ -121,25 +100,8 @@ MetricTable metricsOf(const EvaluationInput& input, const Evaluation& evaluation
     table.push_back({"NEES", "within the 95 % bound", 100 * n.within_95, "%"});
     table.push_back({"NEES", "unusable covariances", double(n.unusable), ""});
   }
-  if (evaluation.planes) {
-    const PlaneMetrics& p = *evaluation.planes;
-    table.push_back({"planes", "expected", double(p.expected), ""});
-    table.push_back({"planes", "found", double(p.found), ""});
-    table.push_back({"planes", "recall", 100 * p.recall, "%"});
-    table.push_back({"planes", "estimated", double(p.estimated), ""});
-    table.push_back({"planes", "duplicates", double(p.duplicates), ""});
-    table.push_back({"planes", "false", double(p.false_planes), ""});
-    table.push_back({"planes", "normal error mean", p.normal.mean, "deg"});
-    table.push_back({"planes", "normal error max", p.normal.max, "deg"});
-    table.push_back({"planes", "distance error mean", p.distance.mean, "m"});
-    table.push_back({"planes", "distance error max", p.distance.max, "m"});
-  }
-  if (evaluation.associations) {
-    const AssociationMetrics& a = *evaluation.associations;
-    table.push_back({"points on planes", "associated", double(a.labelled), ""});
-    table.push_back({"points on planes", "precision", 100 * a.precision, "%"});
-    table.push_back({"points on planes", "recall", 100 * a.recall, "%"});
-  }
+  if (evaluation.planes) appendPlaneMetrics(&table, *evaluation.planes);
+  if (evaluation.associations) appendAssociationMetrics(&table, *evaluation.associations);
   return table;
 }
 
@@ -150,8 +112,8 @@ void writeEvaluation(const std::string& folder, const EvaluationInput& input, co
   contents.emplace_back("metrics.csv", metrics.str());
   contents.emplace_back("errors.csv", errorsCsv(evaluation));
   if (evaluation.planes) {
-    contents.emplace_back("planes.csv", matchesCsv(*evaluation.planes));
-    contents.emplace_back("true_planes.csv", truthsCsv(*evaluation.planes));
+    contents.emplace_back("planes.csv", planeMatchesCsv(*evaluation.planes));
+    contents.emplace_back("true_planes.csv", truePlanesCsv(*evaluation.planes));
   }
   contents.emplace_back("evaluation.svg", evaluationPicture(input, evaluation));
 

@@ -1,0 +1,42 @@
+// The plane module alone: the front end tracks and chooses keyframes, the poses are the true ones.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vip_slam_bringup/runner/pipeline_options.h"
+#include "vip_slam_core/trajectory/tum_io.h"
+#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/util/timing.h"
+#include "vip_slam_eval/association_metrics.h"
+#include "vip_slam_eval/metric_table.h"
+#include "vip_slam_eval/plane_metrics.h"
+#include "vip_slam_planes/plane_mapper.h"
+
+namespace vip_slam {
+
+struct PlaneBenchmarkInput {
+  std::string bag, sensor;  ///< sensor: a shipped name or a file
+  Trajectory truth;         ///< of the IMU
+  std::vector<PlaneEstimate> true_planes;
+  PipelineOptions options;  ///< of front end and planes
+  double start = 0;         ///< seconds to skip
+  double duration = -1;     ///< seconds; negative: to the end
+};
+
+struct PlaneBenchmarkResult {
+  std::size_t images = 0, keyframes = 0;
+  std::vector<PlaneEstimate> planes;
+  std::vector<LabelledPoint> points;  ///< landmarks that as many keyframes see as an association needs
+  PlaneMetrics metrics;
+  AssociationMetrics associations;
+  PlaneMapperCounters counters;
+};
+
+/// Stages "planes.update" (all that a keyframe costs) and "planes.grow" go to `timing`. Throws std::runtime_error naming
+/// what cannot be read, or when the truth covers no keyframe.
+PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing);
+
+MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing);
+
+}  // namespace vip_slam

@@ -1,0 +1,20 @@
+// Plane and association metrics as rows of a table and as CSV.
+#pragma once
+
+#include <string>
+
+#include "vip_slam_eval/association_metrics.h"
+#include "vip_slam_eval/metric_table.h"
+#include "vip_slam_eval/plane_metrics.h"
+
+namespace vip_slam {
+
+void appendPlaneMetrics(MetricTable* table, const PlaneMetrics& planes);
+void appendAssociationMetrics(MetricTable* table, const AssociationMetrics& associations);
+
+/// One row per estimate: the true plane it stands for, errors, overlap and area.
+std::string planeMatchesCsv(const PlaneMetrics& planes);
+/// One row per true plane: whether it counts, was found, how many estimates stand for it, area seen and covered.
+std::string truePlanesCsv(const PlaneMetrics& planes);
+
+}  // namespace vip_slam

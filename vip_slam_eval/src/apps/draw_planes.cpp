@@ -1,0 +1,74 @@
+// rosrun vip_slam_eval draw_planes BAG --sensor S --trajectory T.tum --planes P.yaml --time SECONDS... --out DIR
+// The planes of a run over the images of its bag.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_core/trajectory/tum_io.h"
+#include "vip_slam_core/types/planes_yaml.h"
+#include "vip_slam_eval/plane_picture.h"
+#include "vip_slam_ros/sensor_files.h"
+
+namespace {
+
+using namespace vip_slam;
+
+struct Arguments {
+  std::string bag, sensor, trajectory, planes, out;
+  std::vector<double> times;
+};
+
+int draw(Arguments arguments) {
+  SensorConfig sensor = loadSensorConfig(resolveSensor(arguments.sensor));
+  BagReader reader(arguments.bag, sensor);
+  const auto camera = makeCamera(sensor.camera);
+  const Trajectory trajectory = readTum(arguments.trajectory);
+  const std::vector<PlaneEstimate> planes = readPlanesYaml(arguments.planes);
+  std::filesystem::create_directories(arguments.out);
+  std::sort(arguments.times.begin(), arguments.times.end());
+  std::size_t next = 0;
+  int written = 0;
+  reader.start();
+  while (const auto event = reader.next()) {
+    const auto* pair = std::get_if<ImagePair>(&*event);
+    if (!pair || next == arguments.times.size() || pair->t < reader.beginTime() + arguments.times[next]) continue;
+    SE3 T_map_I;
+    if (!poseAt(trajectory, pair->t, &T_map_I)) continue;  // the next image that has a pose
+    const cv::Mat picture = drawPlanes(pair->gray, pair->depth, *camera, T_map_I * sensor.T_imu_cam, planes);
+    char name[64];
+    std::snprintf(name, sizeof name, "planes_%07.2f.png", pair->t - reader.beginTime());
+    const std::string path = (std::filesystem::path(arguments.out) / name).string();
+    if (!cv::imwrite(path, picture)) throw std::runtime_error(path + ": cannot be written");
+    std::cout << path << "\n";
+    ++written;
+    while (next < arguments.times.size() && pair->t >= reader.beginTime() + arguments.times[next]) ++next;
+  }
+  if (written == 0) throw std::runtime_error("no image with a pose at or after the given times");
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Draws the planes of a run over images of its bag."};
+  Arguments arguments;
+  app.add_option("bag", arguments.bag, "the recording")->required();
+  app.add_option("--sensor", arguments.sensor, "a shipped sensor or a sensor YAML file")->required();
+  app.add_option("--trajectory", arguments.trajectory, "poses of the IMU in the planes' world, TUM")->required();
+  app.add_option("--planes", arguments.planes, "planes.yaml of the run")->required();
+  app.add_option("--time", arguments.times, "seconds after the beginning of the bag; several make several pictures")
+      ->required();
+  app.add_option("--out", arguments.out, "folder for the pictures")->required();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return draw(arguments);
+  } catch (const std::exception& error) {
+    std::cerr << "draw_planes: " << error.what() << "\n";
+    return 1;
+  }
+}

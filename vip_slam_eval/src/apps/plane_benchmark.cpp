@@ -1,0 +1,76 @@
+// rosrun vip_slam_eval plane_benchmark BAG --sensor S --truth T.tum --planes-truth P.yaml [--out DIR]
+// Planes with true poses: what the plane module does by itself.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "vip_slam_core/types/planes_yaml.h"
+#include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_eval/plane_benchmark.h"
+#include "vip_slam_eval/plane_tables.h"
+
+namespace {
+
+using namespace vip_slam;
+
+void writeText(const std::filesystem::path& path, const std::string& text) {
+  AtomicFile file(path.string());
+  file.stream() << text;
+  file.commit();
+}
+
+void write(const std::string& folder, const PlaneBenchmarkResult& result, const MetricTable& table,
+           const TimingLog& timing) {
+  const std::filesystem::path out(folder);
+  std::ostringstream metrics;
+  writeMetricsCsv(metrics, table);
+  writeText(out / "metrics.csv", metrics.str());
+  writeText(out / "planes.csv", planeMatchesCsv(result.metrics));
+  writeText(out / "true_planes.csv", truePlanesCsv(result.metrics));
+  writePlanesYaml((out / "planes.yaml").string(), result.planes);
+  writeLabelledPoints((out / "points.csv").string(), result.points);
+  timing.writeCsv((out / "timing.csv").string());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Runs the plane module over a bag with true poses and judges its planes and point associations."};
+  PlaneBenchmarkInput input;
+  std::string truth, true_planes, out;
+  std::vector<std::string> settings;
+  app.add_option("bag", input.bag, "the recording")->required();
+  app.add_option("--sensor", input.sensor, "a shipped sensor or a sensor YAML file")->required();
+  app.add_option("--truth", truth, "true trajectory of the IMU, TUM")->required();
+  app.add_option("--planes-truth", true_planes, "true planes, YAML")->required();
+  app.add_option("--out", out, "folder for metrics.csv, planes.csv, true_planes.csv, planes.yaml, points.csv, timing.csv");
+  app.add_option("--set", settings, "one option as group/key=value, as for run_bag; repeatable")->take_all();
+  app.add_option("--start", input.start, "seconds to skip at the beginning");
+  app.add_option("--duration", input.duration, "seconds to process");
+  CLI11_PARSE(app, argc, argv);
+  cv::setNumThreads(1);
+  try {
+    std::vector<std::pair<std::string, std::string>> values;
+    for (const std::string& setting : settings) {
+      const auto equals = setting.find('=');
+      if (equals == std::string::npos) throw std::invalid_argument("--set " + setting + ": expected group/key=value");
+      values.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
+    }
+    setOptions(input.options, values);
+    input.truth = readTum(truth);
+    input.true_planes = readPlanesYaml(true_planes);
+    if (!out.empty()) std::filesystem::create_directories(out);
+    TimingLog timing;
+    const PlaneBenchmarkResult result = runPlaneBenchmark(input, &timing);
+    const MetricTable table = metricsOf(result, timing);
+    printMetrics(std::cout, table);
+    if (!out.empty()) write(out, result, table, timing);
+  } catch (const std::exception& error) {
+    std::cerr << "plane_benchmark: " << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

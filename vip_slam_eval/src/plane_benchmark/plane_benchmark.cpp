@@ -1,0 +1,115 @@
+#include "vip_slam_eval/plane_benchmark.h"
+
+#include <stdexcept>
+
+#include "plane_benchmark/true_map.h"
+#include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_bringup/runner/progress_bar.h"
+#include "vip_slam_eval/plane_tables.h"
+#include "vip_slam_frontend/front_end.h"
+#include "vip_slam_ros/sensor_files.h"
+
+namespace vip_slam {
+namespace {
+
+/// Front end, plane mapper and the true map between them, in lock-step.
+class Bench {
+ public:
+  Bench(const PlaneBenchmarkInput& input, const SensorConfig& sensor, TimingLog* timing)
+      : front_end_(input.options.frontend, sensor),
+        mapper_(input.options.planes, makeCamera(sensor.camera), sensor.depth_noise, timing),
+        map_(input.truth, sensor) {}
+
+  void add(const SensorEvent& event) {
+    if (const auto* imu = std::get_if<ImuSample>(&event)) {
+      front_end_.addImu(*imu);
+    } else if (const auto* gyro = std::get_if<GyroSample>(&event)) {
+      front_end_.addGyro(gyro->t, gyro->gyro);
+    } else if (const auto* accel = std::get_if<AccelSample>(&event)) {
+      front_end_.addAccel(accel->t, accel->accel);
+    } else {
+      waiting_.push_back(std::get<ImagePair>(event));
+    }
+    while (!waiting_.empty() && front_end_.ready(waiting_.front().t)) {
+      process(waiting_.front());
+      waiting_.pop_front();
+    }
+  }
+
+  PlaneBenchmarkResult finish(const PlaneBenchmarkInput& input) {
+    map_.apply(mapper_.applyMapUpdate({}));  // what was grown since the last keyframe
+    result_.planes = mapper_.planes();
+    result_.points = map_.points(input.options.planes.association.min_keyframes);
+    result_.metrics = planeMetrics(input.true_planes, result_.planes);
+    result_.associations = associationMetrics(result_.points, input.true_planes, result_.metrics);
+    result_.counters = mapper_.counters();
+    return result_;
+  }
+
+ private:
+  void process(const ImagePair& pair) {
+    const FrameOutput output = front_end_.process({pair.t, pair.gray, pair.depth});
+    ++result_.images;
+    if (output.keyframe) {
+      auto keyframe = std::make_shared<Keyframe>(*output.keyframe);
+      if (map_.place(&keyframe->frame)) {
+        ++result_.keyframes;
+        mapper_.addKeyframe(keyframe);
+        map_.apply(mapper_.applyMapUpdate(map_.addKeyframe(*keyframe)));
+      }
+    }
+    TrackedFrame frame = *output.frame;
+    if (map_.place(&frame)) mapper_.grow(frame, SE3());
+  }
+
+  FrontEnd front_end_;
+  PlaneMapper mapper_;
+  TrueMap map_;
+  std::deque<ImagePair> waiting_;
+  PlaneBenchmarkResult result_;
+};
+
+}  // namespace
+
+PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing) {
+  SensorConfig sensor = loadSensorConfig(resolveSensor(input.sensor));
+  BagReaderOptions reading;
+  reading.start = input.start;
+  reading.duration = input.duration;
+  BagReader reader(input.bag, sensor, reading);
+  Bench bench(input, sensor, timing);
+  ProgressBar progress("plane_benchmark");
+  reader.start();
+  while (const auto event = reader.next()) {
+    bench.add(*event);
+    if (const auto* pair = std::get_if<ImagePair>(&*event)) {
+      progress.update((pair->t - reader.beginTime()) / (reader.endTime() - reader.beginTime()));
+    }
+  }
+  PlaneBenchmarkResult result = bench.finish(input);
+  progress.finish(std::to_string(result.keyframes) + " keyframes");
+  if (result.keyframes == 0) {
+    throw std::runtime_error(input.bag + ": no keyframe at a time that the truth covers, expected the same clock");
+  }
+  return result;
+}
+
+MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing) {
+  MetricTable table;
+  table.push_back({"run", "images", double(result.images), ""});
+  table.push_back({"run", "keyframes", double(result.keyframes), ""});
+  table.push_back({"run", "planes started", double(result.counters.planes_started), ""});
+  table.push_back({"run", "planes merged", double(result.counters.planes_merged), ""});
+  table.push_back({"run", "planes removed", double(result.counters.planes_removed), ""});
+  appendPlaneMetrics(&table, result.metrics);
+  appendAssociationMetrics(&table, result.associations);
+  for (const auto& [stage, name] : {std::pair("planes.update", "keyframe"), std::pair("planes.grow", "growth frame")}) {
+    const TimingSummary time = timing.summary(stage);
+    table.push_back({"time", std::string(name) + " median", time.median, "ms"});
+    table.push_back({"time", std::string(name) + " 99 %", time.p99, "ms"});
+    table.push_back({"time", std::string(name) + " max", time.max, "ms"});
+  }
+  return table;
+}
+
+}  // namespace vip_slam
