@@ -1,4 +1,6 @@
 // What the front-end nodelet says about itself in /diagnostics.
+#include <algorithm>
+
 #include <vip_slam_msgs/TrackingStatus.h>
 
 #include "front_end_nodelet.h"
@@ -8,6 +10,17 @@
 namespace vip_slam {
 
 using diagnostic_msgs::DiagnosticStatus;
+
+namespace {
+
+double quantile(std::deque<double> values, double q) {
+  if (values.empty()) return 0;
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+}  // namespace
 
 void FrontEndNodelet::tick() {
   // Before the first image nothing else says why there is no pose.
@@ -46,6 +59,8 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   const FrontEndCounters& c = shown.counters;
   status.add("features", shown.features);
   status.add("processing of the last image (ms)", shown.processing);
+  status.add("processing, median of the last minute (ms)", quantile(shown.recent, 0.5));
+  status.add("processing, 99 % of the last minute (ms)", quantile(shown.recent, 0.99));
   status.add("latency, stamp to odometry (ms)", 1e3 * shown.latency);
   status.add("NIS per degree of freedom", c.nis_per_dof);
   status.add("pixel sigma in use", c.sigma_px);

@@ -309,6 +309,9 @@ void FrontEndNodelet::process(const ImagePair& pair) {
   shown_.features = output.frame->features.size();
   shown_.latency = ros::Time::now().toSec() - pair.t;
   shown_.processing = milliseconds;
+  constexpr std::size_t kRecent = 1200;
+  shown_.recent.push_back(milliseconds);
+  if (shown_.recent.size() > kRecent) shown_.recent.pop_front();
 }
 
 }  // namespace vip_slam

@@ -105,6 +105,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
     std::size_t features = 0;
     double latency = 0;     ///< stamp to publishing, seconds (by ROS time)
     double processing = 0;  ///< last image, ms
+    std::deque<double> recent;  ///< processing of the last images (a minute of them at 20 Hz), ms
     std::size_t time_jumps = 0;
   };
   mutable std::mutex shown_mutex_;

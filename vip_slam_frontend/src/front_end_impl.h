@@ -13,6 +13,7 @@
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/landmark_matcher.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
+#include "vip_slam_frontend/tracking/surface_tracker.h"
 
 namespace vip_slam {
 
@@ -48,7 +49,13 @@ class FrontEnd::Impl {
   bool decideStillness(double t_imu);
   bool calibrationExcited(double t_imu) const;
   std::vector<FilterMeasurement> measurements() const;
-  void judge(int tracks, bool with_depth, double t);
+  SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
+  /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
+  void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
+  /// `metric`: depth took part, by features or surfaces.
+  void judge(int tracks, bool metric, bool surfaces_hold, double t);
+  /// What the position's one sigma has grown by since the last image with enough features, m.
+  double coastedSigma() const;
 
   FrameOutput makeOutput(double t, double t_imu, const std::string& keyframe_reason);
   std::shared_ptr<TrackedFrame> makeFrame(double t, bool with_features) const;
@@ -60,6 +67,7 @@ class FrontEnd::Impl {
   std::shared_ptr<const CameraModel> camera_;
   ImuBuffer imu_;
   FeatureTracker tracker_;
+  SurfaceTracker surfaces_;
   LandmarkMatcher landmarks_;
   OrbExtractor orb_;
   VioFilter filter_;
@@ -77,6 +85,8 @@ class FrontEnd::Impl {
   double last_keyframe_imu_t_ = 0;
   bool keyframe_imu_broken_ = false;  ///< a gap since the last keyframe
   double last_good_t_ = 0;            ///< image with enough features
+  double last_good_variance_ = 0;     ///< of the position there, m^2
+  double last_held_t_ = 0;            ///< image with enough features or matched depth surfaces
   int gated_in_a_row_ = 0;
   bool still_ = false;
   SE3 T_map_odom_;

@@ -28,6 +28,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       camera_(makeCamera(sensor_.camera)),
       imu_(options.recovery.max_imu_gap, 30.0),
       tracker_(options.tracking, camera_, sensor_.depth_noise, timing),
+      surfaces_(camera_, sensor_.depth_noise),
       landmarks_(options.tracking, camera_),
       orb_(options.tracking.keyframe_corners),
       filter_(options.filter, sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset, camera_->focal(),
@@ -132,6 +133,7 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   phase_ = Phase::kWaiting;
   status_ = {TrackingState::kInitialising, reason};
   tracker_.clear();
+  surfaces_.clear();
   filter_.stop();
   initialiser_.reset();
   stillness_.reset();

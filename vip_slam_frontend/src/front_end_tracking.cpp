@@ -4,6 +4,7 @@
 #include <map>
 
 #include "vip_slam_core/imu/preintegration.h"
+#include "vip_slam_frontend/filter/triangulation.h"
 
 #include "front_end_impl.h"
 
@@ -83,7 +84,8 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   initialiser_.reset();
   phase_ = Phase::kTracking;
   status_ = {TrackingState::kTracking, ""};
-  last_good_t_ = t;
+  last_good_t_ = last_held_t_ = t;
+  last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   // The tracks' references were taken under unknown poses: begin them here.
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
   tracker_.restartReferences(T_odom_C);
@@ -127,6 +129,23 @@ bool FrontEnd::Impl::calibrationExcited(double t_imu) const {
          spread.accel_std > options.min_acceleration;
 }
 
+SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const {
+  const int index = filter_.window().indexOf(surfaces_.reference());
+  if (index < 0 || depth.empty() || !options_.filter.use_surfaces) return {};
+  ScopedTimer timer(timing_, "frontend.surfaces", t);
+  const SE3 T_odom_ref = cameraPose(filter_.window(), filter_.window().clones[index]);
+  return surfaces_.match(depth, T_odom_C.inverse() * T_odom_ref);
+}
+
+void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, double t) {
+  if (depth.empty() || !options_.filter.use_surfaces) return;
+  // At index 0 the reference leaves with the next image; changed now, this image belongs to the old and the new one.
+  const bool leaving = filter_.window().indexOf(surfaces_.reference()) <= 0;
+  if (!leaving && 2 * matched >= surfaces_.size()) return;
+  ScopedTimer timer(timing_, "frontend.surfaces", t);
+  surfaces_.setReference(depth, filter_.window().clones.back().id);
+}
+
 FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth) {
   double max_gap = 0;
   const double from = filter_.nav().t;
@@ -149,14 +168,17 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
       tracker_.track(gray, depth, T_odom_C.inverse() * T_odom_C_last, !coasting, T_odom_C, t);
   for (const Track& track : tracker_.ended()) landmarks_.retire(track);
 
+  const SurfaceMatches surfaces = matchSurfaces(depth, T_odom_C, t);
   StepReport report;
   {
     ScopedTimer timer(timing_, "frontend.update", t);
     still_ = decideStillness(t_imu);
-    report = filter_.step(propagation, next_clone_++, measurements(), still_, calibrationExcited(t_imu));
+    report = filter_.step(propagation, next_clone_++, measurements(), still_, calibrationExcited(t_imu), &surfaces);
   }
+  renewSurfaces(depth, surfaces.pairs.size(), t);
   counters_.features_used += report.features_used;
   counters_.features_gated += report.features_gated;
+  counters_.surfaces_used += report.surfaces_used;
   counters_.zero_velocity += report.zero_velocity;
   counters_.sigma_px = filter_.sigmaPx();
   if (report.rows > 0) counters_.nis_per_dof = report.nis / report.rows;
@@ -173,42 +195,57 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   }
   int with_depth = 0;
   for (const Track& track : tracker_.tracks()) with_depth += track.feature.depth > 0;
-  judge(tracked.tracked, with_depth >= options_.recovery.min_tracks, t);
+  const bool surfaces_hold = report.surfaces_used > 0;
+  const bool metric = surfaces_hold || with_depth >= options_.recovery.min_tracks;
+  judge(tracked.tracked, metric, surfaces_hold, t);
   if (phase_ == Phase::kLost && tracked.tracked >= 2 * options_.recovery.min_tracks && tracked.pose_ok) {
-    reset("features are back after LOST");
-    return initialise(t, t_imu, gray, depth);
+    // The IMU went on all the time. As long as it still tells where we are, the odometry goes on, too.
+    if (coastedSigma() > options_.recovery.max_position_sigma) {
+      reset("features are back after LOST");
+      return initialise(t, t_imu, gray, depth);
+    }
+    phase_ = Phase::kTracking;
+    judge(tracked.tracked, metric, surfaces_hold, t);
   }
   const SE3 T_now = filter_.nav().T_W_I * extrinsics();
   std::string reason;
-  // A keyframe of darkness would tie nothing to anything.
-  if (phase_ == Phase::kTracking && tracked.tracked >= options_.recovery.min_tracks) {
+  // A keyframe of darkness would tie nothing to anything; one of bare walls still has its planes.
+  if (phase_ == Phase::kTracking && (tracked.tracked >= options_.recovery.min_tracks || surfaces_hold)) {
     const std::shared_ptr<TrackedFrame> frame = makeFrame(t, true);
     reason = selector_.decide(t, T_now, frame->features, camera_->focal(), still_);
   }
   return makeOutput(t, t_imu, reason);
 }
 
-void FrontEnd::Impl::judge(int tracks, bool with_depth, double t) {
+double FrontEnd::Impl::coastedSigma() const {
+  const double variance = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
+  return std::sqrt(std::max(0.0, variance - last_good_variance_));
+}
+
+void FrontEnd::Impl::judge(int tracks, bool metric, bool surfaces_hold, double t) {
   if (tracks >= options_.recovery.min_tracks || still_) {
-    last_good_t_ = t;
     if (phase_ == Phase::kLost) return;
-    status_ = with_depth || still_ ? TrackingStatus{TrackingState::kTracking, ""}
+    last_good_t_ = last_held_t_ = t;
+    last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
+    status_ = metric || still_ ? TrackingStatus{TrackingState::kTracking, ""}
                                    : TrackingStatus{TrackingState::kDegraded, "no depth: visual-inertial only"};
     return;
   }
-  ++counters_.coasting;
-  const Matrix15d P = filter_.covariance();
-  const double sigma = std::sqrt(P.block<3, 3>(3, 3).diagonal().maxCoeff());
-  const double seconds = t - last_good_t_;
-  if (phase_ != Phase::kLost &&
-      (seconds > options_.recovery.coast_seconds || sigma > options_.recovery.max_position_sigma)) {
+  if (surfaces_hold && phase_ != Phase::kLost) last_held_t_ = t;
+  counters_.coasting += !surfaces_hold;
+  const double seconds = t - last_held_t_;
+  if (phase_ != Phase::kLost && (seconds > options_.recovery.coast_seconds ||
+                                 coastedSigma() > options_.recovery.max_position_sigma)) {
     phase_ = Phase::kLost;
     ++counters_.lost;
   }
-  status_ = phase_ == Phase::kLost
-                ? TrackingStatus{TrackingState::kLost, "no features for " + std::to_string(seconds).substr(0, 4) + " s"}
-                : TrackingStatus{TrackingState::kDegraded,
-                                 "coasting on the IMU with " + std::to_string(tracks) + " features"};
+  if (phase_ == Phase::kLost) {
+    status_ = {TrackingState::kLost, "no features for " + std::to_string(t - last_good_t_).substr(0, 4) + " s"};
+  } else {
+    status_ = {TrackingState::kDegraded, (surfaces_hold ? "held by depth surfaces and the IMU with "
+                                                        : "coasting on the IMU with ") +
+                                             std::to_string(tracks) + " features"};
+  }
 }
 
 }  // namespace vip_slam

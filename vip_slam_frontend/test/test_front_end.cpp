@@ -55,6 +55,21 @@ struct World {
   static cv::Mat depth(double t) {
     return cv::Mat(240, 320, CV_32FC1, cv::Scalar(kWall - position(t).x()));
   }
+  /// The same wall with a floor 0.9 m below and another wall 1.1 m to the left: three directions that depth alone holds.
+  static cv::Mat cornerDepth(double t) {
+    const Eigen::Vector3d p = position(t);
+    cv::Mat_<float> depth(240, 320);
+    for (int v = 0; v < 240; ++v) {
+      for (int u = 0; u < 320; ++u) {
+        const double left = -(u - kCx) / kFocal, down = (v - kCy) / kFocal;
+        double z = kWall - p.x();
+        if (left > 0) z = std::min(z, (1.1 - p.y()) / left);
+        if (down > 0) z = std::min(z, (0.9 + p.z()) / down);
+        depth(v, u) = static_cast<float>(z);
+      }
+    }
+    return depth;
+  }
 };
 
 SensorConfig sensor() {
@@ -212,10 +227,10 @@ TEST_F(FrontEndTest, WithoutDepthItGoesOnDegraded) {
   EXPECT_LT(error(output), 0.06);
 }
 
-TEST_F(FrontEndTest, DarknessCoastsWithGrowingCovarianceAndRecovers) {
+TEST_F(FrontEndTest, DarknessWithoutDepthCoastsWithGrowingCovarianceAndRecovers) {
   FrameOutput output = run(0.0, 3.0);
   const double before = output.frame->covariance(3, 3);
-  output = run(3.0, 4.0, true);
+  output = run(3.0, 4.0, true, false);
   EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
   EXPECT_NE(output.frame->status.reason.find("coasting"), std::string::npos);
   EXPECT_GT(output.frame->covariance(3, 3), 2.0 * before);
@@ -227,13 +242,105 @@ TEST_F(FrontEndTest, DarknessCoastsWithGrowingCovarianceAndRecovers) {
   EXPECT_LT(error(output), 0.15);
 }
 
-TEST_F(FrontEndTest, LongDarknessIsLostThenANewEpochBegins) {
+TEST_F(FrontEndTest, DarknessBeforeACornerIsHeldByDepth) {
+  FrameOutput output = run(0.0, 3.0);
+  const double before = output.frame->covariance(4, 4);
+  for (int k = 60; k < 260; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    output = front_end_.process({t, cv::Mat(240, 320, CV_8U, cv::Scalar(3)), World::cornerDepth(t)});
+    EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  }
+  EXPECT_NE(output.frame->status.reason.find("held by depth surfaces"), std::string::npos);
+  EXPECT_EQ(front_end_.counters().lost, 0u);
+  EXPECT_GT(front_end_.counters().surfaces_used, 200u * 20u);
+  EXPECT_LT(error(output), 0.02);  // after ten seconds; the IMU alone is off by metres then
+  EXPECT_LT(output.frame->covariance(4, 4), before + 0.02 * 0.02);
+  output = run(13.0, 14.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 0.02);
+}
+
+TEST_F(FrontEndTest, ExposureJumpsDoNotEndTheTracks) {
   run(0.0, 3.0);
-  FrameOutput output = run(3.0, 9.0, true);
+  FrameOutput output;
+  std::size_t old = 0;
+  for (int k = 60; k < 120; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    cv::Mat image;
+    world_.image(t).convertTo(image, CV_8U, k % 10 < 5 ? 1.0 : 0.45);  // twice a second
+    output = front_end_.process({t, image, World::depth(t)});
+    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+    old = 0;
+    for (const Feature& f : output.frame->features) old += f.age >= 12;
+  }
+  EXPECT_LT(error(output), 0.015);
+  EXPECT_GT(old, 20u);  // tracks that came through at least two jumps
+}
+
+TEST_F(FrontEndTest, LowLightAndBlurAreFollowed) {
+  run(0.0, 3.0);
+  cv::RNG random(11);
+  FrameOutput output;
+  for (int k = 60; k < 160; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    cv::Mat image = world_.image(t), noise(image.size(), CV_16S), dim;
+    if (k < 110) {
+      cv::blur(image, image, cv::Size(9, 3));  // a smear of nine pixels
+    } else {
+      image.convertTo(dim, CV_16S, 0.06, 2);  // fifteen grey levels are left, under noise of 1.5
+      random.fill(noise, cv::RNG::NORMAL, 0, 1.5);
+      dim += noise;
+      dim.convertTo(image, CV_8U);
+    }
+    output = front_end_.process({t, image, World::depth(t)});
+    EXPECT_NE(output.frame->status.state, TrackingState::kLost) << t;
+  }
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 0.05);
+}
+
+TEST_F(FrontEndTest, AfterLostTheOdometryGoesOnWhileTheImuStillTellsWhere) {
+  run(0.0, 3.0);
+  FrameOutput output = run(3.0, 9.0, true, false);
   EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
   EXPECT_EQ(front_end_.counters().lost, 1u);
+  const double lost_sigma = std::sqrt(output.frame->covariance(4, 4));
+  EXPECT_LT(error(output), 4 * lost_sigma);
   const std::size_t before = keyframes_.size();
-  output = run(9.0, 13.0);
+  output = run(9.0, 11.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 4 * lost_sigma);
+  ASSERT_GT(keyframes_.size(), before);
+  EXPECT_EQ(keyframes_[before]->previous, before);  // tied by six seconds of IMU
+  EXPECT_FALSE(keyframes_[before]->imu.empty());
+}
+
+TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
+  FrontEndOptions strict = options();
+  strict.recovery.max_position_sigma = 0.05;
+  FrontEnd front_end(strict, sensor());
+  const auto feed = [&](double from, double to, bool dark) {
+    FrameOutput last;
+    for (int k = static_cast<int>(std::lround(from * 20)); k < std::lround(to * 20); ++k) {
+      const double t = 0.05 * k;
+      for (; imu_t_ < t + 0.02; imu_t_ += 0.005) front_end.addImu(World::imu(imu_t_));
+      last = front_end.process({t, dark ? cv::Mat(240, 320, CV_8U, cv::Scalar(3)) : world_.image(t),
+                                dark ? cv::Mat() : World::depth(t)});
+      if (last.keyframe) keyframes_.push_back(last.keyframe);
+    }
+    return last;
+  };
+  feed(0.0, 3.0, false);
+  FrameOutput output = feed(3.0, 9.0, true);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
+  EXPECT_EQ(front_end.counters().lost, 1u);
+  const std::size_t before = keyframes_.size();
+  output = feed(9.0, 13.0, false);
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
   EXPECT_GE(output.frame->epoch, 1u);
   ASSERT_GT(keyframes_.size(), before);
@@ -319,7 +426,7 @@ TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
   ASSERT_TRUE(before);
   EXPECT_EQ(front_end_.predict(4.0)->T_W_I.t(), before->T_W_I.t());
   // Darkness ends all tracks; afterwards some come back under their old ids.
-  run(4.0, 4.3, true);
+  run(4.0, 4.3, true, false);
   output = run(4.3, 6.0);
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
   EXPECT_GT(front_end_.counters().landmarks_reacquired, 10u);

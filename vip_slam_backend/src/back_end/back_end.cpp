@@ -134,6 +134,7 @@ void BackEnd::Impl::reset() {
   maker.clear();
   loop_closer.clear();
   searching = false;
+  found_before.clear();
   held.clear();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();

@@ -74,6 +74,7 @@ struct BackEnd::Impl {
   Relocaliser relocaliser;
   bool searching = false;          ///< a loaded map is not recognised yet
   bool localisation_only = false;
+  PlaceAgreement found_before;     ///< where keyframes were found that were not believed at once
   std::vector<KeyframePtr> held;   ///< keyframes that wait for that
 
   SE3 T_map_odom;

@@ -30,7 +30,14 @@ MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
 bool BackEnd::Impl::findInMap(const Keyframe& keyframe, Relocalisation* found) {
   const ScopedTimer timer(log, "backend.relocalise", keyframe.frame.t);
   std::string reason;
-  const auto result = relocaliser.relocalise(map, loop_closer, keyframe, {}, &reason);
+  auto result = relocaliser.relocalise(map, loop_closer, keyframe, {}, &reason);
+  if (result) {
+    const bool agrees = found_before.add(keyframe.frame, result->T_W_I);
+    if (!agrees && result->inliers < options.loop.relocalisation.sure_inliers) {
+      reason = std::to_string(result->inliers) + " inliers, waits for another keyframe that agrees";
+      result.reset();
+    }
+  }
   LoopEvent event;
   event.query = keyframe.id;
   event.t = keyframe.frame.t;
@@ -66,7 +73,7 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   T_map_odom = alignOdometry(found.T_W_I, keyframe->frame.state.T_W_I);
   insert(keyframe);
   loop_closer.tie(map, keyframe->id, found.match);
-  fuseLandmarks(map, keyframe->id, found.landmarks, 0.25);
+  fuseLandmarks(map, keyframe->id, found.landmarks);
   return true;
 }
 

@@ -64,17 +64,16 @@ void LoopCloser::clear() {
   database_.clear();
   loops_.clear();
   recent_places_.clear();
+  joins_.clear();
 }
 
-std::vector<KeyframeId> LoopCloser::candidates(const Map& map, KeyframeId query) {
+std::vector<KeyframeId> LoopCloser::candidates(const Map& map, KeyframeId query, const std::set<KeyframeId>& part) {
   const MapKeyframe& kf = map.keyframe(query);
   const BowVector& bow = database_.bow(query).bow;
   std::set<KeyframeId> joined;
   for (const auto& neighbour : map.covisible(query, options_.max_shared + 1)) joined.insert(neighbour.first);
   const auto old = [&](KeyframeId id) {
-    if (id == query || joined.count(id) || !map.hasKeyframe(id)) return false;
-    const TrackedFrame& other = map.keyframe(id).data->frame;
-    return other.epoch != kf.data->frame.epoch || kf.data->frame.t - other.t > options_.min_seconds;
+    return id != query && !joined.count(id) && part.count(id) != 0 && isOld(map, id, *kf.data);
   };
   // Words are shared by accident too: what the keyframe before scores tells how much two views of one place share here.
   double reference = 0;
@@ -102,33 +101,43 @@ std::vector<KeyframeId> LoopCloser::candidates(const Map& map, KeyframeId query)
   return chosen;
 }
 
+bool LoopCloser::isOld(const Map& map, KeyframeId id, const Keyframe& query) const {
+  const TrackedFrame& frame = map.keyframe(id).data->frame;
+  return frame.epoch != query.frame.epoch || query.frame.t - frame.t > options_.min_seconds;
+}
+
 std::vector<LoopEvent> LoopCloser::close(Map& map, KeyframeId query) {
   const MapKeyframe& kf = map.keyframe(query);
-  const double t = kf.data->frame.t;
-  ScopedTimer timer(timing_, "backend.loop", t);
+  ScopedTimer timer(timing_, "backend.loop", kf.data->frame.t);
+  const std::set<KeyframeId> part = connectedKeyframes(map, query, loops_);
   std::vector<LoopEvent> events;
-  for (const KeyframeId match : candidates(map, query)) {
-    const double query_time = t;
-    const std::uint32_t epoch = kf.data->frame.epoch;
+  if (part.size() < map.keyframes().size()) {
+    events.push_back(joinParts(map, query, part));
+    if (events.back().accepted) return events;
+  }
+  for (const KeyframeId match : candidates(map, query, part)) {
     // The pose must rest on the old part of the map alone, else it confirms the drift.
-    const auto old = [&](KeyframeId id) {
-      const TrackedFrame& other = map.keyframe(id).data->frame;
-      return other.epoch != epoch || query_time - other.t > options_.min_seconds;
-    };
+    const auto old = [&](KeyframeId id) { return part.count(id) != 0 && isOld(map, id, *kf.data); };
     const PlaceVerification place = verifier_.verify(map, *kf.data, kf.state.T_W_I, database_.bow(query), match,
-                                                     database_.bow(match), old);
-    LoopEvent event;
-    event.query = query;
-    event.match = match;
-    event.t = t;
-    event.inliers = place.inliers;
-    event.reason = place.reason;
-    event.T_match_query = map.keyframe(match).state.T_W_I.inverse() * place.T_W_I;
-    event.accepted = place.accepted && correct(map, query, place, &event);
-    events.push_back(event);
-    if (event.accepted) break;
+                                                     database_, old);
+    events.push_back(correct(map, query, place));
+    if (events.back().accepted) break;
   }
   return events;
+}
+
+LoopEvent LoopCloser::joinParts(Map& map, KeyframeId query, const std::set<KeyframeId>& part) {
+  const MapKeyframe& kf = map.keyframe(query);
+  PlaceVerification refused;
+  const auto place = uniquePlace(map, database_, verifier_, options_.relocalisation, *kf.data, database_.bow(query),
+                                 [&part](KeyframeId id) { return part.count(id) == 0; }, &refused.reason);
+  if (!place) return correct(map, query, refused);
+  // Nothing but looks speaks for it: one keyframe is not enough.
+  if (joins_.add(kf.data->frame, place->T_W_I)) return correct(map, query, *place);
+  refused = *place;
+  refused.accepted = false;
+  refused.reason = "waits for another keyframe that agrees";
+  return correct(map, query, refused);
 }
 
 }  // namespace vip_slam

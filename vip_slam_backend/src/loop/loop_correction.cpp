@@ -14,8 +14,6 @@
 namespace vip_slam {
 namespace {
 
-// Landmarks of the two ends that are one point lie this near each other once the loop is closed.
-constexpr double kFuseDistance = 0.25;
 constexpr int kFusedNeighbours = 8;
 
 // The yaw and position part of a correction: tilt belongs to the IMU.
@@ -57,9 +55,18 @@ std::set<KeyframeId> around(const Map& map, KeyframeId id, std::size_t most) {
 
 }  // namespace
 
-bool LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerification& place, LoopEvent* event) {
+LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerification& place) {
   const MapKeyframe& kf = map.keyframe(query);
+  LoopEvent event;
+  event.query = query;
+  event.match = place.match;
+  event.t = kf.data->frame.t;
+  event.inliers = place.inliers;
+  event.reason = place.reason;
+  if (place.match == 0) return event;
   const SE3 T_match_query = map.keyframe(place.match).state.T_W_I.inverse() * place.T_W_I;
+  event.T_match_query = T_match_query;
+  if (!place.accepted) return event;
   const SE3 correction = levelled(place.T_W_I * kf.state.T_W_I.inverse());
   char text[160];
 
@@ -69,8 +76,8 @@ bool LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerification& pl
       comparePlanes(map, withNeighbours(map, query, 5), around(map, place.match, 4), correction);
   if (planes.contradictions > static_cast<int>(planes.same.size())) {
     std::snprintf(text, sizeof text, "%d planes contradict, %zu agree", planes.contradictions, planes.same.size());
-    event->reason = text;
-    return false;
+    event.reason = text;
+    return event;
   }
 
   // A part of the map that nothing tied to the match yet is brought there as a whole; odometry has no say then.
@@ -96,8 +103,8 @@ bool LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerification& pl
   if (!solution.usable || solution.chi2 > options_.graph.max_chi2) {
     std::snprintf(text, sizeof text, "closing it costs the graph chi2 %.1f, at most %.1f (moves %.3f m)", solution.chi2,
                   options_.graph.max_chi2, correction.t().norm());
-    event->reason = text;
-    return false;
+    event.reason = text;
+    return event;
   }
   map.moveKeyframes(solution.T_W_I);
   for (const auto& plane : solution.planes) map.setPlaneParameters(plane.first, plane.second);
@@ -108,26 +115,23 @@ bool LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerification& pl
   recent_places_.clear();
   std::snprintf(text, sizeof text, "%s, chi2 %.1f, %zu planes agree", place.reason.c_str(), solution.chi2,
                 planes.same.size());
-  event->reason = text;
+  event.reason = text;
   fuse(map, query, place);
-  return true;
+  event.accepted = true;
+  return event;
 }
 
 void LoopCloser::fuse(Map& map, KeyframeId query, const PlaceVerification& place) {
-  fuseLandmarks(map, query, place.landmarks, kFuseDistance);
-  const std::uint32_t epoch = map.keyframe(query).data->frame.epoch;
-  const double t = map.keyframe(query).data->frame.t;
-  const auto old = [&](KeyframeId id) {
-    const TrackedFrame& other = map.keyframe(id).data->frame;
-    return other.epoch != epoch || t - other.t > options_.min_seconds;
-  };
+  fuseLandmarks(map, query, place.landmarks);
+  const KeyframePtr& data = map.keyframe(query).data;
+  const auto old = [&](KeyframeId id) { return isOld(map, id, *data); };
   // The keyframes on the way to the query saw the place as well.
   int left = kFusedNeighbours;
   for (KeyframeId id = map.keyframe(query).previous; id != 0 && left > 0; id = map.keyframe(id).previous, --left) {
     if (id == place.match) break;
     const MapKeyframe& kf = map.keyframe(id);
     const PlaceVerification neighbour = verifier_.track(map, *kf.data, kf.state.T_W_I, place.match, old);
-    if (neighbour.inliers >= 12) fuseLandmarks(map, id, neighbour.landmarks, kFuseDistance);
+    if (neighbour.inliers >= 12) fuseLandmarks(map, id, neighbour.landmarks);
   }
 }
 

@@ -2,8 +2,8 @@
 
 namespace vip_slam {
 
-int fuseLandmarks(Map& map, KeyframeId query, const std::vector<std::pair<std::uint32_t, LandmarkId>>& pairs,
-                  double max_distance) {
+int fuseLandmarks(Map& map, KeyframeId query, const std::vector<std::pair<std::uint32_t, LandmarkId>>& pairs) {
+  const Eigen::Vector3d eye = map.keyframe(query).T_W_C().t();
   int joined = 0;
   for (const auto& pair : pairs) {
     // An earlier pair may have merged either side away.
@@ -14,7 +14,9 @@ int fuseLandmarks(Map& map, KeyframeId query, const std::vector<std::pair<std::u
       joined += map.addObservation(into, {query, pair.first});
       continue;
     }
-    if ((map.landmark(own).p_W - map.landmark(into).p_W).norm() > max_distance) continue;
+    // One point, as far as depth cameras and the correction that just moved the map can tell.
+    const Eigen::Vector3d& p_W = map.landmark(into).p_W;
+    if ((map.landmark(own).p_W - p_W).norm() > 0.03 + 0.02 * (p_W - eye).norm()) continue;
     joined += map.mergeLandmarks(own, into);
   }
   return joined;

@@ -180,20 +180,41 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
   result->reason = words("%.0f inliers, depth agreement %.2f", result->inliers, result->depth_agreement);
 }
 
+// A keyframe in poor texture has few corners that come again; those around it have others.
+std::vector<PlaceMatch> PlaceVerifier::match(const Map& map, const Keyframe& query, const BowResult& query_bow,
+                                             const std::vector<KeyframeId>& around,
+                                             const KeyframeDatabase& database) const {
+  struct Best {
+    int distance = 1000;
+    PlaceMatch match;
+  };
+  const auto& features = query.frame.features;
+  std::vector<Best> best(features.size());
+  for (const KeyframeId id : around) {
+    if (!database.has(id)) continue;
+    const MapKeyframe& kf = map.keyframe(id);
+    for (const auto& pair :
+         matchByDirectIndex(features, query_bow.direct, kf.features(), database.bow(id).direct, options_)) {
+      Eigen::Vector3d p_W;
+      double sigma;
+      const int distance = hammingDistance(features[pair.first].descriptor, kf.features()[pair.second].descriptor);
+      if (distance < best[pair.first].distance && pointOf(map, kf, pair.second, &p_W, &sigma))
+        best[pair.first] = {distance, makeMatch(features[pair.first], p_W, sigma)};
+    }
+  }
+  std::vector<PlaceMatch> matches;
+  for (const Best& b : best)
+    if (b.distance < 1000) matches.push_back(b.match);
+  return matches;
+}
+
 PlaceVerification PlaceVerifier::verify(const Map& map, const Keyframe& query, const SE3& T_G_I,
-                                        const BowResult& query_bow, KeyframeId match, const BowResult& match_bow,
+                                        const BowResult& query_bow, KeyframeId match, const KeyframeDatabase& database,
                                         const std::function<bool(KeyframeId)>& allowed) const {
   PlaceVerification result;
   result.match = match;
-  const MapKeyframe& kf = map.keyframe(match);
-  const auto pairs = matchByDirectIndex(query.frame.features, query_bow.direct, kf.features(), match_bow.direct, options_);
-  std::vector<PlaceMatch> matches;
-  for (const auto& pair : pairs) {
-    Eigen::Vector3d p_W;
-    double sigma;
-    if (pointOf(map, kf, pair.second, &p_W, &sigma))
-      matches.push_back(makeMatch(query.frame.features[pair.first], p_W, sigma));
-  }
+  const std::vector<PlaceMatch> matches = this->match(
+      map, query, query_bow, neighbourhood(map, match, options_.matched_keyframes, allowed), database);
   result.matches = static_cast<int>(matches.size());
   if (result.matches < options_.min_matches) {
     result.reason = words("%.0f descriptor matches, needs %.0f", result.matches, options_.min_matches);

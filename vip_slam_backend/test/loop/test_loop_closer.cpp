@@ -65,6 +65,42 @@ TEST(LoopCloser, IdenticalBaysMakeNoLoop) {
                              << loops.front().match << ": " << loops.front().reason;
 }
 
+TEST(LoopCloser, OdometryThatBeganAnewJoinsWhereOnlyOnePlaceFits) {
+  for (const int bays : {1, 6}) {
+    RingWorld world(bays);
+    Map map;
+    std::vector<SE3> truth;
+    world.walk(map, 0.9, 0.0, &truth);
+    LoopCloser closer(LoopOptions(), world.camera());
+    closeAll(closer, map);
+    // Carried elsewhere blindfolded: the new part of the map begins at a place and heading that are a guess.
+    const SE3 guess(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(3, -4, 0.5));
+    KeyframeId previous = 0;
+    SE3 T_map_odom;
+    for (int k = 0; k < 12; ++k) {
+      const SE3 T = world.truth(1.0 + 0.05 * k);
+      auto kf = std::make_shared<Keyframe>(*world.see(1000 + k, 900 + 0.5 * k, T, guess * T, 500000));
+      kf->frame.epoch = 1;
+      kf->previous = previous;
+      previous = kf->id;
+      NavState state = kf->frame.state;
+      state.T_W_I = T_map_odom * guess * T;
+      map.addKeyframe(kf, state, ImuNoise());
+      closer.add(map, kf->id);
+      closer.close(map, kf->id);
+      T_map_odom = map.keyframe(kf->id).state.T_W_I * (guess * T).inverse();
+    }
+    EXPECT_EQ(checkMap(map), "");
+    EXPECT_EQ(closer.tied(map, previous), bays == 1);
+    if (bays == 1) {
+      EXPECT_LT((map.keyframe(1000).state.T_W_I.t() - world.truth(1.0).t()).norm(), 0.05);
+      EXPECT_LT((map.keyframe(previous).state.T_W_I.t() - world.truth(1.55).t()).norm(), 0.05);
+    } else {
+      EXPECT_LT((map.keyframe(previous).state.T_W_I.t() - (guess * world.truth(1.55)).t()).norm(), 1e-9);
+    }
+  }
+}
+
 TEST(LoopCloser, TwoRunsGiveTheSameBits) {
   const auto run = [] {
     RingWorld world;

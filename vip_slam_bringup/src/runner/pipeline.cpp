@@ -7,7 +7,7 @@
 namespace vip_slam {
 
 Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing)
-    : options_(options), timing_(timing), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
+    : options_(options), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
   if (options.mapping) mapping_ = std::make_unique<MappingThread>(options, sensor, timing);
 }
 
@@ -69,11 +69,7 @@ void Pipeline::applyAnswers(std::size_t image) {
 
 void Pipeline::process(const ImagePair& pair) {
   applyAnswers(images_);
-  FrameOutput output;
-  {
-    ScopedTimer timer(timing_, "frontend.total", pair.t);
-    output = front_end_->process({pair.t, pair.gray, pair.depth});
-  }
+  const FrameOutput output = front_end_->process({pair.t, pair.gray, pair.depth});
   ++images_;
   const TrackedFrame& frame = *output.frame;
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});

@@ -46,6 +46,7 @@ struct FrontEndCounters {
   std::uint64_t coasting = 0;        ///< images passed on the IMU alone
   std::uint64_t lost = 0;            ///< times the state went to LOST
   std::uint64_t features_used = 0, features_gated = 0;
+  std::uint64_t surfaces_used = 0;   ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
   double sigma_px = 0;               ///< adapted pixel noise
   double nis_per_dof = 0;            ///< of the last update; about 1 when consistent

@@ -175,8 +175,23 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
   report->healthy = report->healthy && result.ok;
 }
 
+void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, bool calibrate, StepReport* report) {
+  const WindowState& window = filter_.window();
+  SurfaceRows surface = surfaceRows(window, filter_.R(), surfaces, options_.huber);
+  report->surfaces_used = surface.used;
+  report->surfaces_gated = surface.gated;
+  const int dof = static_cast<int>(surface.rows.r.size());
+  if (dof == 0) return;
+  if (!calibrate && window.calibration.size() > 0) {
+    surface.rows.H.middleCols(window.calibrationColumn(), window.calibration.size()).setZero();
+  }
+  const UpdateResult result = filter_.update(surface.rows.H, surface.rows.r);
+  report->healthy = report->healthy && result.ok;
+}
+
 StepReport VioFilter::step(const Propagation& propagation, CloneId id,
-                           const std::vector<FilterMeasurement>& measurements, bool still, bool calibrate) {
+                           const std::vector<FilterMeasurement>& measurements, bool still, bool calibrate,
+                           const SurfaceMatches* surfaces) {
   StepReport report;
   const CloneId previous = filter_.window().clones.back().id;
   filter_.augment(propagation, id);
@@ -207,6 +222,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full);
   if (!candidates.empty()) updateWithFeatures(candidates, calibrate, &report);
   imu_monitor_.add(report.features_used, report.features_gated);
+  if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, calibrate, &report);
 
   // Used sightings may not be used again: lost tracks go, those at the window's end start anew with the next image.
   const int used = std::min<int>(report.features_tried, static_cast<int>(candidates.size()));

@@ -4,6 +4,12 @@
 
 namespace vip_slam {
 
+namespace {
+
+constexpr std::size_t kLeastForRatio = 20;
+
+}  // namespace
+
 void KeyframeSelector::reset() { any_ = false; }
 
 std::string KeyframeSelector::decide(double t, const SE3& T_odom_C, const std::vector<Feature>& features,
@@ -26,7 +32,8 @@ std::string KeyframeSelector::decide(double t, const SE3& T_odom_C, const std::v
     const Eigen::Vector3d p = R_last_now * f.xy.homogeneous().cast<double>();
     if (p.z() > 0.1) parallax += (p.head<2>() / p.z() - it->second.cast<double>()).norm() * focal_px;
   }
-  if (common < options_.min_tracked_ratio * static_cast<double>(features_.size())) return "tracked ratio";
+  // Of a handful of features the ratio says nothing.
+  if (features_.size() >= kLeastForRatio && common < options_.min_tracked_ratio * static_cast<double>(features_.size())) return "tracked ratio";
   if (common > 0 && parallax / common > options_.min_parallax_px) return "parallax";
   if (t - t_ > options_.max_seconds) return "time";
   return "";

@@ -6,12 +6,17 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "vip_slam_frontend/tracking/corner_detector.h"
+#include "vip_slam_frontend/tracking/feature_depth.h"
 #include "vip_slam_frontend/tracking/outlier_rejection.h"
 #include "vip_slam_frontend/tracking/patch_alignment.h"
 
 namespace vip_slam {
 
 namespace {
+
+// Changes of contrast and mean grey level between two images beyond which KLT's constant brightness no longer holds.
+constexpr double kExposureGain = 0.1;
+constexpr double kExposureShift = 6.0;
 
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
 
@@ -34,8 +39,23 @@ void FeatureTracker::measure(Feature* feature) const {
   Eigen::Vector2d xy;
   camera_->undistort(feature->pixel.cast<double>(), &xy);
   feature->xy = xy.cast<float>();
-  feature->depth = depth_.empty() ? 0.0f : safeDepth(depth_, feature->pixel.x(), feature->pixel.y(), noise_);
-  feature->depth_sigma = feature->depth > 0 ? static_cast<float>(noise_.sigma(feature->depth)) : 0.0f;
+  const FeatureDepth surface = featureDepth(depth_, feature->pixel.x(), feature->pixel.y(), noise_);
+  feature->depth = surface.z;
+  feature->depth_sigma = surface.sigma;
+}
+
+void FeatureTracker::matchExposure(const cv::Mat& gray) {
+  cv::Scalar mean_last, deviation_last, mean, deviation;
+  cv::meanStdDev(gray_, mean_last, deviation_last);
+  cv::meanStdDev(gray, mean, deviation);
+  if (deviation_last[0] < 1.0 || deviation[0] < 1.0) return;
+  const double gain = deviation[0] / deviation_last[0], offset = mean[0] - gain * mean_last[0];
+  if (std::abs(gain - 1.0) < kExposureGain && std::abs(mean[0] - mean_last[0]) < kExposureShift) return;
+  cv::Mat adapted;
+  gray_.convertTo(adapted, CV_8U, gain, offset);
+  last_pyramid_.clear();
+  cv::buildOpticalFlowPyramid(adapted, last_pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
+                              options_.klt_levels);
 }
 
 void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation,
@@ -142,6 +162,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     pyramid_.clear();
     cv::buildOpticalFlowPyramid(gray, pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
                                 options_.klt_levels);
+    if (!last_pyramid_.empty()) matchExposure(gray);
     if (!last_pyramid_.empty()) runKlt(gray, predicted, has_translation, &next, &found);
     gray_ = gray;
     depth_ = depth;

@@ -6,30 +6,18 @@
 
 #include <Eigen/Cholesky>
 
+#include "pair_errors.h"
+#include "vip_slam_frontend/tracking/general_motion.h"
+
 namespace vip_slam {
 
 namespace {
 
+// The gyro's rotation is doubted when it leaves all but a third of at least so many pairs unexplained ...
+constexpr int kLeastToDoubt = 15;
+// ... and a motion with a free rotation explains two thirds of them. Less could be another body that moves by itself.
+
 Eigen::Vector3d bearing(const Eigen::Vector2d& xy) { return {xy.x(), xy.y(), 1.0}; }
-
-double reprojectionError(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
-  const Eigen::Vector3d p = R * (bearing(pair.xy_previous) * pair.depth_previous) + t;
-  if (p.z() < 0.01) return 1e9;
-  return (p.head<2>() / p.z() - pair.xy_current).norm();
-}
-
-/// Distance of the current point from its epipolar line, t up to scale. Without translation: from the rotated point.
-double epipolarError(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
-  const Eigen::Vector3d rotated = R * bearing(pair.xy_previous);
-  const Eigen::Vector3d line = t.cross(rotated);
-  const double norm = line.head<2>().norm();
-  if (norm < 1e-6) return (rotated.head<2>() / rotated.z() - pair.xy_current).norm();
-  return std::abs(line.dot(bearing(pair.xy_current))) / norm;
-}
-
-double errorOf(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, bool metric) {
-  return metric && pair.depth_previous > 0 ? reprojectionError(pair, R, t) : epipolarError(pair, R, t);
-}
 
 /// Normal equations of m x (R p + t) = 0 in t over the given pairs.
 bool solveTranslation(const std::vector<PointPair>& pairs, const int* sample, int n, const Eigen::Matrix3d& R,
@@ -114,7 +102,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
   const auto cost = [&](const Eigen::Vector3d& t, double best) {
     double sum = 0;
     for (const PointPair& pair : pairs) {
-      const double e = errorOf(pair, R, t, result.with_depth);
+      const double e = pairError(pair, R, t, result.with_depth);
       sum += std::min(limit2, e * e);
       if (sum >= best) break;
     }
@@ -148,7 +136,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
     const Eigen::Matrix3d Rt = T.R();
     result.inliers = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      result.inlier[i] = errorOf(pairs[i], Rt, T.t(), result.with_depth) < options.threshold;
+      result.inlier[i] = pairError(pairs[i], Rt, T.t(), result.with_depth) < options.threshold;
       result.inliers += result.inlier[i];
     }
   };
@@ -158,6 +146,20 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
   }
   result.T_current_previous = T;
   result.ok = result.inliers >= 5;
+  const int n = static_cast<int>(pairs.size());
+  if (n >= kLeastToDoubt && 3 * result.inliers < n) {
+    GeneralMotion general = poseFromDepth(pairs, predicted, options);
+    if (general.model == GeneralModel::kNone) general = fundamentalOrHomography(pairs, options);
+    if (3 * general.inliers > 2 * n) {
+      const bool metric = general.model == GeneralModel::kPose;
+      result.ok = true;
+      result.free_rotation = true;
+      result.with_depth = metric;
+      result.T_current_previous = metric ? general.T_current_previous : predicted;
+      result.inlier = std::move(general.inlier);
+      result.inliers = general.inliers;
+    }
+  }
   return result;
 }
 

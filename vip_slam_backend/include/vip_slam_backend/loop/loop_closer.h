@@ -10,6 +10,7 @@
 
 #include "vip_slam_backend/loop/loop_options.h"
 #include "vip_slam_backend/loop/place_verifier.h"
+#include "vip_slam_backend/loop/unique_place.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/place_recognition/keyframe_database.h"
 #include "vip_slam_core/types/map_update.h"
@@ -44,8 +45,14 @@ class LoopCloser {
   BowResult describe(const Keyframe& keyframe) const;
 
  private:
-  std::vector<KeyframeId> candidates(const Map& map, KeyframeId query);
-  bool correct(Map& map, KeyframeId query, const PlaceVerification& place, LoopEvent* event);
+  /// Keyframes of the query's own part of the map that look like it, one a place, best first.
+  std::vector<KeyframeId> candidates(const Map& map, KeyframeId query, const std::set<KeyframeId>& part);
+  /// Of another odometry or so long ago that the query does not follow from it.
+  bool isOld(const Map& map, KeyframeId id, const Keyframe& query) const;
+  /// Looks for the query in those parts of the map that nothing ties to its own yet.
+  LoopEvent joinParts(Map& map, KeyframeId query, const std::set<KeyframeId>& part);
+  /// The map's veto on a place that was verified, or the correction.
+  LoopEvent correct(Map& map, KeyframeId query, const PlaceVerification& place);
   void fuse(Map& map, KeyframeId query, const PlaceVerification& place);
 
   LoopOptions options_;
@@ -55,6 +62,7 @@ class LoopCloser {
   KeyframeDatabase database_;
   PlaceVerifier verifier_;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops_;
+  PlaceAgreement joins_;  ///< where the keyframes of a part that nothing ties yet were found
   std::deque<std::set<KeyframeId>> recent_places_;  ///< neighbourhoods that the last keyframes pointed to, newest last
 };
 

@@ -11,6 +11,7 @@ namespace vip_slam {
 struct PlaceVerificationOptions {
   int max_hamming = 64;
   double ratio = 0.85;
+  int matched_keyframes = 5;
   int min_matches = 12;
   int ransac_iterations = 400;
   double ransac_px = 4.0;
@@ -27,6 +28,7 @@ struct PlaceVerificationOptions {
   void visit(OptionVisitor& v) {
     v.field("max_hamming", max_hamming, 10, 128, "largest descriptor distance of a match, bits");
     v.field("ratio", ratio, 0.3, 1.0, "best over second-best descriptor distance");
+    v.field("matched_keyframes", matched_keyframes, 1, 100, "keyframes around a candidate that are matched by descriptor");
     v.field("min_matches", min_matches, 4, 500, "descriptor matches needed to try a pose");
     v.field("ransac_iterations", ransac_iterations, 10, 10000, "samples drawn by the pose RANSAC");
     v.field("ransac_px", ransac_px, 0.5, 20.0, "inlier threshold of the RANSAC, px");
@@ -65,11 +67,13 @@ struct PoseGraphOptions {
 struct RelocalisationOptions {
   int candidates = 6;
   int min_inliers = 30;
+  int sure_inliers = 45;
   double ambiguity = 0.6;
 
   void visit(OptionVisitor& v) {
     v.field("candidates", candidates, 1, 100, "places verified per keyframe");
     v.field("min_inliers", min_inliers, 6, 500, "inliers needed; there is no odometry to contradict a wrong place");
+    v.field("sure_inliers", sure_inliers, 6, 1000, "below these a second keyframe must be found where the odometry says");
     v.field("ambiguity", ambiguity, 0.0, 1.0, "refused when another place has more than this fraction of the best's inliers");
   }
 };

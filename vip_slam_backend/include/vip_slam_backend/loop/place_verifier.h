@@ -11,7 +11,7 @@
 #include "vip_slam_backend/loop/loop_options.h"
 #include "vip_slam_backend/loop/place_pose.h"
 #include "vip_slam_backend/map/map.h"
-#include "vip_slam_backend/place_recognition/vocabulary.h"
+#include "vip_slam_backend/place_recognition/keyframe_database.h"
 #include "vip_slam_core/camera/camera_model.h"
 
 namespace vip_slam {
@@ -31,9 +31,10 @@ class PlaceVerifier {
  public:
   PlaceVerifier(const PlaceVerificationOptions& options, std::shared_ptr<const CameraModel> camera);
 
-  /// `T_G_I`: the query's pose in any gravity-aligned frame. Landmarks are taken from keyframes that `allowed` lets pass.
+  /// `T_G_I`: the query's pose in any gravity-aligned frame. Landmarks are taken from keyframes that `allowed` lets pass
+  /// (empty: all); `database` knows those around `match`.
   PlaceVerification verify(const Map& map, const Keyframe& query, const SE3& T_G_I, const BowResult& query_bow,
-                           KeyframeId match, const BowResult& match_bow,
+                           KeyframeId match, const KeyframeDatabase& database,
                            const std::function<bool(KeyframeId)>& allowed) const;
   /// The same from a predicted pose in the map, without appearance: guided matching around `match` at once.
   PlaceVerification track(const Map& map, const Keyframe& query, const SE3& T_W_I, KeyframeId match,
@@ -41,6 +42,8 @@ class PlaceVerifier {
 
  private:
   struct Guided;
+  std::vector<PlaceMatch> match(const Map& map, const Keyframe& query, const BowResult& query_bow,
+                                const std::vector<KeyframeId>& around, const KeyframeDatabase& database) const;
   Guided guide(const Map& map, const Keyframe& query, const SE3& T_W_C, double radius,
                const std::vector<KeyframeId>& around) const;
   void finish(const Map& map, const Keyframe& query, const SE3& T_G_I, const SE3& start,

@@ -1,5 +1,5 @@
 // Where in the map is this keyframe? Without any prior pose: after LOST, in a loaded map, in localisation-only mode.
-// There is no odometry to contradict a wrong place here, so a second place that fits about as well makes it refuse.
+// See loop/unique_place.h for what makes it refuse.
 #pragma once
 
 #include <functional>

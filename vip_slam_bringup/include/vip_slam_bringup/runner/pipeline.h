@@ -56,7 +56,6 @@ class Pipeline {
   void processReady();
 
   const PipelineOptions options_;
-  TimingLog* const timing_;
   std::unique_ptr<FrontEnd> front_end_;
   std::unique_ptr<MappingThread> mapping_;
   std::deque<ImagePair> waiting_;

@@ -11,6 +11,7 @@
 #include "vip_slam_frontend/filter/noise_monitor.h"
 #include "vip_slam_frontend/filter/observation.h"
 #include "vip_slam_frontend/filter/square_root_filter.h"
+#include "vip_slam_frontend/filter/surface_rows.h"
 
 namespace vip_slam {
 
@@ -39,6 +40,7 @@ struct StepReport {
   bool healthy = true;
   bool zero_velocity = false;
   int features_tried = 0, features_used = 0, features_gated = 0;
+  int surfaces_used = 0, surfaces_gated = 0;  ///< point-to-patch pairs
   int rows = 0;
   double nis = 0;
 };
@@ -54,9 +56,10 @@ class VioFilter {
 
   /// Prediction from the newest clone over `samples` (first at its time); does not change the filter.
   Propagation predict(const std::vector<ImuSample>& samples, double noise_scale = 1.0) const;
-  /// One image: `propagation` from predict(). Without measurements this coasts.
+  /// One image: `propagation` from predict(). Without measurements this coasts. `surfaces` (may be null) ties the new
+  /// image's depth to that of an earlier clone.
   StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,
-                  bool still, bool calibrate);
+                  bool still, bool calibrate, const SurfaceMatches* surfaces = nullptr);
 
   const WindowState& window() const { return filter_.window(); }
   NavState nav() const { return filter_.window().nav(); }
@@ -72,6 +75,7 @@ class VioFilter {
   void addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements);
   std::vector<Candidate> chooseCandidates(CloneId id, bool window_full);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report);
+  void updateWithSurfaces(const SurfaceMatches& surfaces, bool calibrate, StepReport* report);
   void forgetClone(CloneId id);
 
   FilterOptions options_;

@@ -72,6 +72,8 @@ class FeatureTracker {
   void measure(Feature* feature) const;
 
  private:
+  /// After a jump of the exposure: gives the last image's pyramid the contrast and brightness of the new image.
+  void matchExposure(const cv::Mat& gray);
   void runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation, std::vector<cv::Point2f>* next,
               std::vector<char>* found);
   void alignWithReferences(const SE3& T_odom_C);

@@ -26,12 +26,14 @@ struct RansacResult {
   bool ok = false;            ///< a model was found
   SE3 T_current_previous;     ///< translation metric only when with_depth
   bool with_depth = false;
+  bool free_rotation = false; ///< the predicted rotation contradicted the pairs; a model without it was taken
   std::vector<char> inlier;
   int inliers = 0;
 };
 
 /// `predicted` supplies the rotation and a first guess of the translation. Pairs without depth are judged by their
-/// distance from the epipolar line.
+/// distance from the epipolar line. When that leaves most pairs unexplained and a motion with a free rotation explains
+/// most of them (general_motion.h), that motion judges.
 RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& predicted, const RansacOptions& options);
 
 /// Gauss-Newton on the reprojection of points with depth, Huber-weighted at `huber`; returns false when it fails.

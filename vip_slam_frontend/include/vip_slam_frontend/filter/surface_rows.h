@@ -1,0 +1,38 @@
+// Rows from depth alone: points of the newest depth image lie on the flat patches that an earlier one saw. They need no
+// corners, so they hold five degrees of freedom in a corridor whose walls show nothing. Per pair, in the patch's camera:
+//   n^T (T_ref_cur q - p) = 0.
+// The rows depend on the relative pose of two clones only: position and yaw of the window stay unobservable.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vip_slam_frontend/filter/feature_rows.h"
+#include "vip_slam_frontend/filter/window_state.h"
+
+namespace vip_slam {
+
+struct SurfacePair {
+  Eigen::Vector3d p_ref = Eigen::Vector3d::Zero();  ///< on the patch, camera frame of the reference, metres
+  Eigen::Vector3d n_ref = Eigen::Vector3d::Zero();  ///< unit normal, same frame
+  Eigen::Vector3d q_cur = Eigen::Vector3d::Zero();  ///< in the newest camera, metres
+  double sigma = 0.01;                              ///< one sigma of the distance along the normal, metres
+};
+
+struct SurfaceMatches {
+  CloneId reference = 0;
+  std::vector<SurfacePair> pairs;
+};
+
+struct SurfaceRows {
+  FeatureRows rows;     ///< whitened and compressed to the relative pose's dimension; empty when too few pairs are left
+  int used = 0, gated = 0;
+};
+
+/// Rows between the reference's clone and the newest one. `R` is the filter's factor: pairs beyond four sigmas of what
+/// state and noise allow are gated (another surface), the rest is Huber-weighted at `huber`. Residuals at the present
+/// estimate, Jacobians at the first estimates.
+SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, const SurfaceMatches& matches, double huber);
+
+}  // namespace vip_slam

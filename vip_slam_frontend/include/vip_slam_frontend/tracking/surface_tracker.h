@@ -1,0 +1,47 @@
+// Flat patches of one depth image, and where later depth images see the same surfaces: projective association of points
+// to planes, the measurements behind surface_rows.h.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_frontend/filter/surface_rows.h"
+
+namespace vip_slam {
+
+struct SurfacePatch {
+  Eigen::Vector3d p_C = Eigen::Vector3d::Zero();  ///< camera frame, metres
+  Eigen::Vector3d n_C = Eigen::Vector3d::Zero();  ///< unit normal towards the camera
+  double sigma = 0;                               ///< one sigma of the plane's distance at p_C, metres
+};
+
+class SurfaceTracker {
+ public:
+  SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
+
+  /// Patches of an image, one at most per cell of the raster; none where the window is not flat or seen too obliquely.
+  std::vector<SurfacePatch> patches(const cv::Mat& depth) const;
+  /// The image of `clone` becomes the reference.
+  void setReference(const cv::Mat& depth, CloneId clone);
+  void clear();
+  CloneId reference() const { return reference_; }  ///< 0: none
+  std::size_t size() const { return patches_.size(); }
+  /// Pairs of the reference's patches with patches of `depth`, looked up where `T_cur_ref` (cameras) puts them. Both are
+  /// fitted in the same way, so that what a fit makes of noise and curvature cancels.
+  SurfaceMatches match(const cv::Mat& depth, const SE3& T_cur_ref) const;
+
+ private:
+  bool fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch) const;
+
+  std::shared_ptr<const CameraModel> camera_;
+  DepthNoise noise_;
+  std::vector<SurfacePatch> patches_;
+  CloneId reference_ = 0;
+};
+
+}  // namespace vip_slam

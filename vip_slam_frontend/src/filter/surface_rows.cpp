@@ -1,0 +1,119 @@
+#include "vip_slam_frontend/filter/surface_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_frontend/filter/qr.h"
+#include "vip_slam_frontend/filter/triangulation.h"
+
+namespace vip_slam {
+
+namespace {
+
+constexpr double kGateSigmas = 4.0;
+// Fewer surviving pairs say too little about themselves to be believed.
+constexpr int kLeastPairs = 20;
+// Pairs share errors (the reference's patches with all its images, one warp of the depth, the calibration): many of them
+// tell no more than so many independent ones.
+constexpr double kMostEffective = 50.0;
+
+/// Columns of the rows before compression: newest clone (theta, p), calibration, reference's clone (theta, p).
+struct Layout {
+  explicit Layout(const WindowState& window) : calibration(window.calibration.size()) {}
+  const int calibration;
+  int reference() const { return 6 + calibration; }
+  int size() const { return 12 + calibration; }
+  int rank() const { return 6 + calibration; }  ///< the relative pose, and the calibration
+};
+
+/// Covariance of the layout's columns.
+Eigen::MatrixXd covarianceOf(const WindowState& window, const Layout& layout, int a, int b, const Eigen::MatrixXd& R) {
+  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(layout.size(), window.dimension());
+  Y.block<6, 6>(0, window.cloneColumn(b)).setIdentity();
+  Y.block(6, window.calibrationColumn(), layout.calibration, layout.calibration).setIdentity();
+  Y.block<6, 6>(layout.reference(), window.cloneColumn(a)).setIdentity();
+  solveRight(R, Y);
+  return Y * Y.transpose();
+}
+
+/// Whitened rows; the last column is the residual. Residuals at the estimate, Jacobians at the first estimates.
+Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int a, int b,
+                           const std::vector<SurfacePair>& pairs) {
+  const Clone &from = window.clones[a], &to = window.clones[b];
+  const SE3 T_ref_cur = cameraPose(window, from).inverse() * cameraPose(window, to);
+  const Eigen::Matrix3d R_a = from.T_W_I_fej.R(), R_ab = R_a.transpose() * to.T_W_I_fej.R();
+  const Eigen::Vector3d t_ab = R_a.transpose() * (to.T_W_I_fej.t() - from.T_W_I_fej.t());
+  const Eigen::Matrix3d R_I_C = window.T_I_C.R();
+  const Eigen::Vector3d t_I_C = window.T_I_C.t();
+  const int rotation = 6, translation = 6 + (window.calibration.rotation ? 3 : 0);
+  const int reference = layout.reference(), offset = reference - 1;
+
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<int>(pairs.size()), layout.size() + 1);
+  for (int i = 0; i < A.rows(); ++i) {
+    const SurfacePair& pair = pairs[i];
+    const double w = 1.0 / pair.sigma;
+    const Eigen::Vector3d q_I = R_I_C * pair.q_cur + t_I_C;  // in the newest IMU frame
+    const Eigen::Vector3d s_I = R_ab * q_I + t_ab;           // in the reference's
+    const Eigen::RowVector3d n_I = w * (R_I_C * pair.n_ref).transpose();
+    const Eigen::RowVector3d n_W = n_I * R_a.transpose();
+    A.block<1, 3>(i, 0) = -n_I * R_ab * hat(q_I);
+    A.block<1, 3>(i, 3) = n_W;
+    A.block<1, 3>(i, reference) = n_I * hat(s_I);
+    A.block<1, 3>(i, reference + 3) = -n_W;
+    if (window.calibration.rotation) {
+      // s_C = R_I_C^T (R_ab (R_I_C q + t) + t_ab - t)
+      const Eigen::Vector3d s_C = R_I_C.transpose() * (s_I - t_I_C);
+      const Eigen::Matrix3d R_ref_cur = R_I_C.transpose() * R_ab * R_I_C;
+      A.block<1, 3>(i, rotation) = w * pair.n_ref.transpose() * (hat(s_C) - R_ref_cur * hat(pair.q_cur));
+    }
+    if (window.calibration.translation) {
+      A.block<1, 3>(i, translation) = n_I * (R_ab - Eigen::Matrix3d::Identity());
+    }
+    if (window.calibration.time_offset) {
+      A(i, offset) = A.block<1, 3>(i, 0).dot(to.omega_I) + A.block<1, 3>(i, 3).dot(to.v_W) +
+                     A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
+    }
+    A(i, layout.size()) = -w * pair.n_ref.dot(T_ref_cur * pair.q_cur - pair.p_ref);
+  }
+  return A;
+}
+
+}  // namespace
+
+SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, const SurfaceMatches& matches,
+                        double huber) {
+  SurfaceRows result;
+  const int a = window.indexOf(matches.reference), b = static_cast<int>(window.clones.size()) - 1;
+  if (a < 0 || a == b || static_cast<int>(matches.pairs.size()) < kLeastPairs) return result;
+  const Layout layout(window);
+  Eigen::MatrixXd A = stackPairs(window, layout, a, b, matches.pairs);
+
+  // What each residual may be: the state's uncertainty plus one for its noise.
+  const Eigen::MatrixXd P = covarianceOf(window, layout, a, b, R);
+  int kept = 0;
+  for (int i = 0; i < A.rows(); ++i) {
+    const auto h = A.row(i).head(layout.size());
+    const double variance = h * P * h.transpose() + 1.0;
+    const double relative = std::abs(A(i, layout.size())) / std::sqrt(variance);
+    if (!(relative < kGateSigmas)) {
+      ++result.gated;
+      continue;
+    }
+    A.row(kept++) = (relative > huber ? std::sqrt(huber / relative) : 1.0) * A.row(i);
+  }
+  if (kept < kLeastPairs || kept < result.gated) return result;
+  result.used = kept;
+
+  A.conservativeResize(kept, Eigen::NoChange);
+  A *= std::sqrt(std::min(1.0, kMostEffective / kept));
+  triangularise(A, layout.rank());
+  const int rank = layout.rank();
+  result.rows.H = Eigen::MatrixXd::Zero(rank, window.dimension());
+  result.rows.H.middleCols<6>(window.cloneColumn(b)) = A.topLeftCorner(rank, 6);
+  result.rows.H.middleCols(window.calibrationColumn(), layout.calibration) = A.block(0, 6, rank, layout.calibration);
+  result.rows.H.middleCols<6>(window.cloneColumn(a)) = A.block(0, layout.reference(), rank, 6);
+  result.rows.r = A.col(layout.size()).head(rank);
+  return result;
+}
+
+}  // namespace vip_slam

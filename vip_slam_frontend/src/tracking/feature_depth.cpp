@@ -1,0 +1,156 @@
+#include "vip_slam_frontend/tracking/feature_depth.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+#include "vip_slam_core/depth/depth_image.h"
+
+namespace vip_slam {
+
+namespace {
+
+constexpr int kRadius = 3;
+constexpr int kMost = (2 * kRadius + 1) * (2 * kRadius + 1);
+constexpr int kLeastReadings = 30;  // of the 49 in the window
+constexpr int kLeastNear = 12;
+// Corners are placed to about this much against the depth image, px.
+constexpr double kPixelError = 0.5;
+// A corner farther than this from the rim belongs to what lies behind it, px.
+constexpr double kMostOffRim = 1.5;
+constexpr double kInlierSigmas = 3.5;
+constexpr double kMostRelativeSigma = 0.05;
+
+struct Reading {
+  double x, y, z;  // offset from the corner in px; metres
+  double sigma;
+};
+
+/// 1/z = c0 + c1 x + c2 y.
+struct InversePlane {
+  Eigen::Vector3d c = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+
+  double z(double x, double y) const {
+    const double inverse = c.x() + c.y() * x + c.z() * y;
+    return inverse > 1e-3 ? 1.0 / inverse : 1e3;
+  }
+  bool explains(const Reading& r) const { return std::abs(z(r.x, r.y) - r.z) < kInlierSigmas * r.sigma; }
+};
+
+template <typename Use>
+bool fit(const Reading* readings, int n, const Use& use, InversePlane* plane) {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (int i = 0; i < n; ++i) {
+    const Reading& r = readings[i];
+    if (!use(r)) continue;
+    // sigma of 1/z is sigma_z / z^2.
+    const double w = r.z * r.z / r.sigma;
+    const Eigen::Vector3d J(w, w * r.x, w * r.y);
+    A += J * J.transpose();
+    b += J * (w / r.z);
+    ++count;
+  }
+  if (count < kLeastNear) return false;
+  bool invertible = false;
+  double determinant;
+  // Scaled so that the determinant says whether the pixels span a plane rather than a line.
+  const double scale = A(0, 0);
+  (A / scale).computeInverseAndDetWithCheck(plane->covariance, determinant, invertible, 1e-2);
+  if (!invertible) return false;
+  plane->covariance /= scale;
+  plane->c = plane->covariance * b;
+  return plane->c.x() > 1e-3;
+}
+
+template <typename Use>
+int countExplained(const Reading* readings, int n, const InversePlane& plane, const Use& use) {
+  int count = 0;
+  for (int i = 0; i < n; ++i) count += use(readings[i]) && plane.explains(readings[i]);
+  return count;
+}
+
+FeatureDepth evaluate(const InversePlane& plane, FeatureDepth::Source source, const DepthNoise& noise) {
+  FeatureDepth result;
+  const double z = plane.z(0, 0);
+  const double slope = z * z * plane.c.tail<2>().norm();  // metres per px
+  const double fitted = z * z * std::sqrt(std::max(0.0, plane.covariance(0, 0)));
+  const double sigma = std::hypot(noise.sigma(z), std::hypot(kPixelError * slope, fitted));
+  if (!noise.inRange(z) || sigma > kMostRelativeSigma * z) return result;
+  result.z = static_cast<float>(z);
+  result.sigma = static_cast<float>(sigma);
+  result.source = source;
+  return result;
+}
+
+/// The nearer of two surfaces, split at the widest gap between sorted readings.
+FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
+  double sorted[kMost];
+  for (int i = 0; i < n; ++i) sorted[i] = readings[i].z;
+  std::sort(sorted, sorted + n);
+  int split = -1;
+  double widest = 0;
+  for (int i = kLeastNear; i < n; ++i) {
+    const double gap = sorted[i] - sorted[i - 1];
+    if (gap > widest) {
+      widest = gap;
+      split = i;
+    }
+  }
+  if (split < 0 || widest < 6.0 * noise.sigma(sorted[split - 1])) return {};
+  const double limit = 0.5 * (sorted[split] + sorted[split - 1]);
+  const auto near = [limit](const Reading& r) { return r.z < limit; };
+  InversePlane plane;
+  if (!fit(readings, n, near, &plane)) return {};
+  if (countExplained(readings, n, plane, near) < 0.85 * split) return {};
+  // What lies beyond the gap must lie behind the plane, too: else the gap was a column of a slanted surface.
+  int behind = 0;
+  double off2 = 1e300;
+  for (int i = 0; i < n; ++i) {
+    const Reading& r = readings[i];
+    if (!near(r)) {
+      behind += r.z > plane.z(r.x, r.y) + kInlierSigmas * r.sigma;
+    } else if (plane.explains(r)) {
+      off2 = std::min(off2, r.x * r.x + r.y * r.y);
+    }
+  }
+  if (behind < 0.85 * (n - split) || off2 > kMostOffRim * kMostOffRim) return {};
+  return evaluate(plane, FeatureDepth::Source::kRim, noise);
+}
+
+}  // namespace
+
+FeatureDepth featureDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise) {
+  FeatureDepth result;
+  if (depth.empty()) return result;
+  result.z = safeDepth(depth, u, v, noise);
+  if (result.z > 0) {
+    result.sigma = static_cast<float>(noise.sigma(result.z));
+    result.source = FeatureDepth::Source::kSmooth;
+    return result;
+  }
+  if (!(u > -0.5 && v > -0.5 && u < depth.cols - 0.5 && v < depth.rows - 0.5)) return result;
+  const int cu = static_cast<int>(std::floor(u + 0.5)), cv = static_cast<int>(std::floor(v + 0.5));
+  Reading readings[kMost];
+  int n = 0;
+  for (int y = std::max(0, cv - kRadius); y <= std::min(depth.rows - 1, cv + kRadius); ++y) {
+    const float* row = depth.ptr<float>(y);
+    for (int x = std::max(0, cu - kRadius); x <= std::min(depth.cols - 1, cu + kRadius); ++x) {
+      if (!noise.inRange(row[x])) continue;  // also refuses 0 and NaN
+      readings[n++] = {x - u, y - v, row[x], noise.sigma(row[x])};
+    }
+  }
+  if (n < kLeastReadings) return result;
+  const auto all = [](const Reading&) { return true; };
+  InversePlane plane;
+  if (fit(readings, n, all, &plane) && countExplained(readings, n, plane, all) >= 0.95 * n) {
+    return evaluate(plane, FeatureDepth::Source::kSlanted, noise);
+  }
+  return nearSide(readings, n, noise);
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,116 @@
+#include "vip_slam_frontend/tracking/surface_tracker.h"
+
+#include <cmath>
+
+#include <Eigen/LU>
+
+namespace vip_slam {
+
+namespace {
+
+constexpr int kStride = 32;      // px between patches
+constexpr int kSampleStep = 3;   // px between samples of a patch
+constexpr int kHalf = 3;         // samples to each side of the centre
+constexpr int kReach = kHalf * kSampleStep;
+constexpr int kSamples = (2 * kHalf + 1) * (2 * kHalf + 1);
+constexpr int kLeastSamples = 42;
+constexpr double kInlierSigmas = 3.5;
+constexpr double kLeastCosine = 0.12;
+constexpr double kMostTurned = 0.985;  // cosine between the normals of a pair
+// Neighbouring readings share part of their error: a patch counts as this share of one reading's sigma at least.
+constexpr double kLeastShare = 0.35;
+// Errors that no average removes: warped depth, skirtings, doors a little open. Metres.
+constexpr double kFloor = 0.002;
+
+}  // namespace
+
+SurfaceTracker::SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise)
+    : camera_(std::move(camera)), noise_(noise) {}
+
+bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch) const {
+  if (u < kReach || v < kReach || u + kReach >= depth.cols || v + kReach >= depth.rows) return false;
+  double z[kSamples];
+  // A plane N^T p = 1 is affine in inverse depth, 1/z = N^T (x, y, 1), and over a small window also in pixels.
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  int valid = 0;
+  for (int y = -kHalf, i = 0; y <= kHalf; ++y) {
+    const float* row = depth.ptr<float>(v + y * kSampleStep) + u;
+    for (int x = -kHalf; x <= kHalf; ++x, ++i) {
+      const float reading = row[x * kSampleStep];
+      z[i] = noise_.inRange(reading) ? reading : 0.0;
+      if (z[i] == 0) continue;
+      const double w = z[i] * z[i] / noise_.sigma(z[i]);
+      const Eigen::Vector3d J(w, w * x, w * y);
+      A += J * J.transpose();
+      b += J * (w / z[i]);
+      ++valid;
+    }
+  }
+  if (valid < kLeastSamples) return false;
+  const Eigen::Matrix3d covariance = A.inverse();
+  const Eigen::Vector3d c = covariance * b;
+  if (!c.allFinite() || !(c.x() > 1.0 / noise_.max_range)) return false;
+  int explained = 0;
+  for (int y = -kHalf, i = 0; y <= kHalf; ++y) {
+    for (int x = -kHalf; x <= kHalf; ++x, ++i) {
+      const double inverse = c.x() + c.y() * x + c.z() * y;
+      explained += z[i] > 0 && inverse > 0 && std::abs(1.0 / inverse - z[i]) < kInlierSigmas * noise_.sigma(z[i]);
+    }
+  }
+  if (explained < 0.95 * valid) return false;
+
+  Eigen::Vector2d xy;
+  Eigen::Matrix2d d_uv_xy;
+  if (!camera_->undistort(Eigen::Vector2d(u, v), &xy)) return false;
+  camera_->distort(xy, &d_uv_xy);
+  const Eigen::Vector2d gradient = d_uv_xy.transpose() * c.tail<2>() / kSampleStep;
+  const Eigen::Vector3d ray = xy.homogeneous();
+  const Eigen::Vector3d N(gradient.x(), gradient.y(), c.x() - gradient.dot(xy));
+  patch->p_C = ray / c.x();
+  patch->n_C = -N.normalized();
+  const double towards = -patch->n_C.dot(ray);  // d distance / d z
+  if (towards < kLeastCosine * ray.norm()) return false;
+  const double fitted = std::sqrt(covariance(0, 0)) / (c.x() * c.x());
+  patch->sigma = towards * std::max(fitted, kLeastShare * noise_.sigma(1.0 / c.x()));
+  return true;
+}
+
+std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth) const {
+  std::vector<SurfacePatch> result;
+  for (int v = kReach; v + kReach < depth.rows; v += kStride) {
+    for (int u = kReach; u + kReach < depth.cols; u += kStride) {
+      SurfacePatch patch;
+      if (fit(depth, u, v, &patch)) result.push_back(patch);
+    }
+  }
+  return result;
+}
+
+void SurfaceTracker::setReference(const cv::Mat& depth, CloneId clone) {
+  patches_ = patches(depth);
+  reference_ = clone;
+}
+
+void SurfaceTracker::clear() {
+  patches_.clear();
+  reference_ = 0;
+}
+
+SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref) const {
+  SurfaceMatches result;
+  result.reference = reference_;
+  const Eigen::Matrix3d R_cur_ref = T_cur_ref.R();
+  for (const SurfacePatch& patch : patches_) {
+    Eigen::Vector2d uv;
+    SurfacePatch seen;
+    if (!camera_->project(T_cur_ref * patch.p_C, &uv) || !camera_->inImage(uv)) continue;
+    if (!fit(depth, static_cast<int>(std::lround(uv.x())), static_cast<int>(std::lround(uv.y())), &seen)) continue;
+    if (seen.n_C.dot(R_cur_ref * patch.n_C) < kMostTurned) continue;
+    result.pairs.push_back(
+        {patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kFloor)});
+  }
+  return result;
+}
+
+}  // namespace vip_slam

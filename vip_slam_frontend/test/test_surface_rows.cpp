@@ -1,0 +1,265 @@
+// Rows from flat surfaces: Jacobians, what they leave unobservable, and the association behind them.
+#include <cmath>
+#include <random>
+
+#include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
+
+#include "vip_slam_frontend/filter/square_root_filter.h"
+#include "vip_slam_frontend/filter/surface_rows.h"
+#include "vip_slam_frontend/filter/triangulation.h"
+#include "vip_slam_frontend/tracking/surface_tracker.h"
+
+namespace vip_slam {
+namespace {
+
+Eigen::Vector3d gauss(std::mt19937* random, double sigma) {
+  std::normal_distribution<double> normal(0, sigma);
+  return {normal(*random), normal(*random), normal(*random)};
+}
+
+WindowState makeWindow(unsigned seed, const CalibrationFlags& calibration) {
+  std::mt19937 random(seed);
+  WindowState window;
+  for (int i = 0; i < 4; ++i) {
+    Clone clone;
+    clone.id = 10 + i;
+    clone.T_W_I = SE3(expSO3(Eigen::Vector3d(gauss(&random, 0.1))), Eigen::Vector3d(0.1 * i, 0, 1) + gauss(&random, 0.05));
+    clone.T_W_I_fej = clone.T_W_I;
+    clone.omega_I = gauss(&random, 0.5);
+    clone.v_W = gauss(&random, 0.5);
+    window.clones.push_back(clone);
+  }
+  window.T_I_C = SE3(expSO3(Eigen::Vector3d(gauss(&random, 0.3))), gauss(&random, 0.05));
+  window.calibration = calibration;
+  return window;
+}
+
+/// Pairs on `planes` random planes round the camera; residuals of a few sigmas.
+SurfaceMatches makeMatches(const WindowState& window, unsigned seed, const std::vector<Eigen::Vector3d>& normals_W,
+                           double error) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, 1);
+  const SE3 T_W_ref = cameraPose(window, window.clones[1]), T_W_cur = cameraPose(window, window.clones.back());
+  SurfaceMatches matches;
+  matches.reference = window.clones[1].id;
+  for (int i = 0; i < 120; ++i) {
+    const Eigen::Vector3d n_W = normals_W[i % normals_W.size()];
+    // On the plane n^T x = 2, somewhere around its foot point.
+    Eigen::Vector3d x_W = gauss(&random, 1.0);
+    x_W += (2.0 - n_W.dot(x_W)) * n_W;
+    Eigen::Vector3d y_W = x_W + gauss(&random, 0.03);
+    y_W += (2.0 - n_W.dot(y_W) + error * normal(random)) * n_W;
+    SurfacePair pair;
+    pair.p_ref = T_W_ref.inverse() * x_W;
+    pair.n_ref = T_W_ref.R().transpose() * n_W;
+    pair.q_cur = T_W_cur.inverse() * y_W;
+    pair.sigma = 0.01;
+    matches.pairs.push_back(pair);
+  }
+  return matches;
+}
+
+double cost(const WindowState& window, const SurfaceMatches& matches) {
+  const SE3 T_ref_cur = cameraPose(window, window.clones[window.indexOf(matches.reference)]).inverse() *
+                        cameraPose(window, window.clones.back());
+  double sum = 0;
+  for (const SurfacePair& pair : matches.pairs) {
+    const double r = pair.n_ref.dot(T_ref_cur * pair.q_cur - pair.p_ref) / pair.sigma;
+    sum += 0.5 * r * r;
+  }
+  return sum;
+}
+
+const std::vector<Eigen::Vector3d> kRoom{Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), -Eigen::Vector3d::UnitY(),
+                                         -Eigen::Vector3d::UnitZ(), Eigen::Vector3d(0.6, 0.8, 0)};
+const std::vector<Eigen::Vector3d> kCorridor{Eigen::Vector3d::UnitY(), -Eigen::Vector3d::UnitY(),
+                                             -Eigen::Vector3d::UnitZ()};
+
+TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
+  for (const bool calibrated : {false, true}) {
+    const WindowState window = makeWindow(3, {calibrated, calibrated, calibrated});
+    const SurfaceMatches matches = makeMatches(window, 4, kRoom, 0.01);
+    const int n = window.dimension();
+    // A weak prior, so that nothing is gated or weighted down.
+    const Eigen::MatrixXd R = 1e-3 * Eigen::MatrixXd::Identity(n, n);
+    const SurfaceRows rows = surfaceRows(window, R, matches, 100.0);
+    ASSERT_EQ(rows.used, 120);
+    ASSERT_EQ(rows.rows.H.rows(), 6 + window.calibration.size());
+    // 120 pairs count as 50.
+    const Eigen::VectorXd gradient = -120.0 / 50.0 * rows.rows.H.transpose() * rows.rows.r;
+    EXPECT_GT(gradient.norm(), 1.0);
+    for (int c = 0; c < n; ++c) {
+      const double h = 1e-6;
+      Eigen::VectorXd delta = Eigen::VectorXd::Zero(n);
+      WindowState plus = window, minus = window;
+      delta(c) = h;
+      plus.boxplus(delta);
+      minus.boxplus(-delta);
+      const double numeric = (cost(plus, matches) - cost(minus, matches)) / (2 * h);
+      EXPECT_NEAR(gradient(c), numeric, 1e-5 * std::max(1.0, gradient.norm())) << "column " << c;
+    }
+  }
+}
+
+TEST(SurfaceRows, PositionAndYawStayUnobservable) {
+  WindowState window = makeWindow(5, {});
+  // Estimates that have moved away from their first ones.
+  std::mt19937 random(6);
+  for (Clone& clone : window.clones) clone.T_W_I.t() += gauss(&random, 0.01);
+  const SurfaceMatches matches = makeMatches(window, 7, kRoom, 0.01);
+  const int n = window.dimension();
+  const SurfaceRows rows = surfaceRows(window, 1e-3 * Eigen::MatrixXd::Identity(n, n), matches, 100.0);
+  ASSERT_GT(rows.used, 100);
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(n, 4);
+  for (std::size_t i = 0; i < window.clones.size(); ++i) {
+    const int c = window.cloneColumn(static_cast<int>(i));
+    const SE3& fej = window.clones[i].T_W_I_fej;
+    N.block<3, 3>(c + 3, 0).setIdentity();
+    N.block<3, 1>(c, 3) = fej.R().transpose() * Eigen::Vector3d::UnitZ();
+    N.block<3, 1>(c + 3, 3) = Eigen::Vector3d::UnitZ().cross(fej.t());
+  }
+  EXPECT_LT((rows.rows.H * N).norm(), 1e-8 * rows.rows.H.norm());
+}
+
+TEST(SurfaceRows, ACorridorHoldsAllButItsAxis) {
+  const WindowState window = makeWindow(8, {});
+  const SurfaceMatches matches = makeMatches(window, 9, kCorridor, 0.0);
+  const int n = window.dimension(), newest = window.cloneColumn(3);
+  const SurfaceRows rows = surfaceRows(window, 1e-3 * Eigen::MatrixXd::Identity(n, n), matches, 100.0);
+  const Eigen::MatrixXd H = rows.rows.H.middleCols(newest, 6);
+  const Eigen::Matrix<double, 6, 6> information = H.transpose() * H;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(information);
+  EXPECT_LT(solver.eigenvalues()(0), 1e-9 * solver.eigenvalues()(5));
+  EXPECT_GT(solver.eigenvalues()(1), 1e-4 * solver.eigenvalues()(5));
+  EXPECT_NEAR(std::abs(solver.eigenvectors()(3, 0)), 1.0, 1e-6);  // the axis is x
+}
+
+TEST(SurfaceRows, AnUpdateBringsTheNewestPoseBackAndOtherSurfacesAreGated) {
+  const WindowState truth = makeWindow(10, {});
+  SurfaceMatches matches = makeMatches(truth, 11, kRoom, 0.0);
+  // One pair in six lies on something else: a door leaf 15 cm behind the wall.
+  for (std::size_t i = 0; i < matches.pairs.size(); i += 6) matches.pairs[i].p_ref += 0.15 * matches.pairs[i].n_ref;
+  WindowState guess = truth;
+  const Vector6d error = (Vector6d() << 0.004, -0.003, 0.005, 0.01, -0.015, 0.012).finished();
+  guess.clones.back().T_W_I = guess.clones.back().T_W_I_fej = truth.clones.back().T_W_I.boxplus(error);
+  const int n = guess.dimension();
+  Eigen::MatrixXd prior = 1e4 * Eigen::MatrixXd::Identity(n, n);
+  prior.block<3, 3>(guess.cloneColumn(3), guess.cloneColumn(3)).diagonal().setConstant(1.0 / 0.005);
+  prior.block<3, 3>(guess.cloneColumn(3) + 3, guess.cloneColumn(3) + 3).diagonal().setConstant(1.0 / 0.02);
+  SquareRootFilter filter;
+  filter.initialise(guess, prior);
+  SurfaceRows rows = surfaceRows(filter.window(), filter.R(), matches, 1.5);
+  EXPECT_EQ(rows.gated, 20);
+  EXPECT_EQ(rows.used, 100);
+  ASSERT_TRUE(filter.update(rows.rows.H, rows.rows.r).ok);
+  const SE3 left = truth.clones.back().T_W_I.inverse() * filter.window().clones.back().T_W_I;
+  EXPECT_LT(left.t().norm(), 0.002);
+  EXPECT_LT(logSO3(left.rotation()).norm(), 0.002);
+}
+
+TEST(SurfaceRows, NothingFromFewPairsOrAForgottenReference) {
+  const WindowState window = makeWindow(12, {});
+  SurfaceMatches matches = makeMatches(window, 13, kRoom, 0.0);
+  const int n = window.dimension();
+  const Eigen::MatrixXd R = Eigen::MatrixXd::Identity(n, n);
+  matches.reference = 99;
+  EXPECT_EQ(surfaceRows(window, R, matches, 1.5).rows.r.size(), 0);
+  matches.reference = window.clones.back().id;  // against itself
+  EXPECT_EQ(surfaceRows(window, R, matches, 1.5).rows.r.size(), 0);
+  matches.reference = window.clones.front().id;
+  matches.pairs.resize(10);
+  EXPECT_EQ(surfaceRows(window, R, matches, 1.5).rows.r.size(), 0);
+}
+
+// ---- association ----
+
+constexpr double kFocal = 480, kCx = 319.5, kCy = 239.5;
+
+std::shared_ptr<const CameraModel> camera() {
+  CameraIntrinsics intrinsics;
+  intrinsics.width = 640;
+  intrinsics.height = 480;
+  intrinsics.fx = intrinsics.fy = kFocal;
+  intrinsics.cx = kCx;
+  intrinsics.cy = kCy;
+  return makeCamera(intrinsics);
+}
+
+/// A corridor 2.2 m wide and 2.8 m high with an end wall 6 m ahead, seen by a camera at `T_W_C` (world: x right, y down,
+/// z ahead).
+cv::Mat corridor(const SE3& T_W_C, const DepthNoise& noise, unsigned seed) {
+  struct Wall {
+    Eigen::Vector3d n;
+    double d;
+  };
+  const std::vector<Wall> walls{{Eigen::Vector3d::UnitX(), 1.1},
+                                {-Eigen::Vector3d::UnitX(), 1.1},
+                                {Eigen::Vector3d::UnitY(), 1.5},
+                                {-Eigen::Vector3d::UnitY(), 1.3},
+                                {Eigen::Vector3d::UnitZ(), 6.0}};
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, 1);
+  cv::Mat_<float> depth(480, 640);
+  const Eigen::Matrix3d R = T_W_C.R();
+  for (int v = 0; v < 480; ++v) {
+    for (int u = 0; u < 640; ++u) {
+      const Eigen::Vector3d ray = R * Eigen::Vector3d((u - kCx) / kFocal, (v - kCy) / kFocal, 1);
+      double z = 1e9;
+      for (const Wall& wall : walls) {
+        const double towards = wall.n.dot(ray);
+        if (towards > 1e-9) z = std::min(z, (wall.d - wall.n.dot(T_W_C.t())) / towards);
+      }
+      depth(v, u) = static_cast<float>(z + noise.sigma(z) * normal(random));
+    }
+  }
+  return depth;
+}
+
+TEST(SurfaceTracker, PatchesLieOnTheWallsAndMatchesAgreeWithTheMotion) {
+  const DepthNoise noise;
+  SurfaceTracker tracker(camera(), noise);
+  const SE3 T_W_ref(expSO3(Eigen::Vector3d(0.02, -0.03, 0.01)), Eigen::Vector3d(0.1, 0, 0));
+  const SE3 T_W_cur = T_W_ref * SE3(expSO3(Eigen::Vector3d(0.01, 0.06, -0.02)), Eigen::Vector3d(0.03, -0.02, 0.25));
+  const cv::Mat reference = corridor(T_W_ref, noise, 1);
+  int tilted = 0;
+  for (const SurfacePatch& patch : tracker.patches(reference)) {
+    const Eigen::Vector3d n_W = T_W_ref.R() * patch.n_C;
+    EXPECT_GT(n_W.cwiseAbs().maxCoeff(), std::cos(6.0 * M_PI / 180));  // at worst a little of the next wall in the window
+    tilted += n_W.cwiseAbs().maxCoeff() < std::cos(2.0 * M_PI / 180);
+    EXPECT_LT(patch.n_C.dot(patch.p_C), 0.0);  // towards the camera
+  }
+  EXPECT_EQ(tracker.reference(), 0u);
+  tracker.setReference(reference, 7);
+  EXPECT_EQ(tracker.reference(), 7u);
+  EXPECT_LT(tilted, 0.1 * tracker.size());
+  ASSERT_GT(tracker.size(), 120u);
+  const SurfaceMatches matches = tracker.match(corridor(T_W_cur, noise, 2), T_W_cur.inverse() * T_W_ref);
+  EXPECT_EQ(matches.reference, 7u);
+  ASSERT_GT(matches.pairs.size(), 90u);
+  const SE3 T_ref_cur = T_W_ref.inverse() * T_W_cur;
+  double sum = 0;
+  int beyond = 0;
+  for (const SurfacePair& pair : matches.pairs) {
+    const double e = pair.n_ref.dot(T_ref_cur * pair.q_cur - pair.p_ref) / pair.sigma;
+    sum += std::min(9.0, e * e);
+    beyond += std::abs(e) > 4;
+  }
+  EXPECT_LT(std::sqrt(sum / matches.pairs.size()), 1.0);  // sigma must not promise more than there is
+  EXPECT_LT(beyond, 0.05 * matches.pairs.size());         // beside corners of the room a reading is the next wall's
+  tracker.clear();
+  EXPECT_EQ(tracker.match(reference, SE3()).pairs.size(), 0u);
+}
+
+TEST(SurfaceTracker, HolesAndRoughSurfacesGiveNoPatches) {
+  SurfaceTracker tracker(camera(), DepthNoise());
+  EXPECT_TRUE(tracker.patches(cv::Mat(480, 640, CV_32FC1, cv::Scalar(0))).empty());
+  cv::Mat_<float> rough(480, 640);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> z(2.0f, 3.0f);
+  for (float& value : rough) value = z(random);
+  EXPECT_TRUE(tracker.patches(rough).empty());
+}
+
+}  // namespace
+}  // namespace vip_slam
