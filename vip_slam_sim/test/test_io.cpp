@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include <opencv2/imgcodecs.hpp>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -141,6 +142,31 @@ TEST(Folder, ReadsBackAsAnRgbdFolderAndKnowsUp) {
   const double angle = std::acos(std::min(1.0, up.dot(want))) * 180 / M_PI;
   std::printf("  up found to %.3f deg\n", angle);
   EXPECT_LT(angle, 0.3);
+}
+
+TEST(Folder, SevenScenesHaveADepthCameraOfTheirOwn) {
+  const std::string path = scratch("kinect");
+  fs::create_directories(path);
+  for (const std::string stem : {"/frame-000000", "/frame-000001"}) {
+    cv::imwrite(path + stem + ".color.png", cv::Mat(480, 640, CV_8UC3, cv::Scalar(9, 9, 9)));
+    cv::imwrite(path + stem + ".depth.png", cv::Mat(480, 640, CV_16UC1, cv::Scalar(1500)));
+    std::ofstream(path + stem + ".pose.txt") << "0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n";
+  }
+  std::ofstream(path + "/camera-intrinsics.txt") << "585 0 320\n0 585 240\n0 0 1\n";
+  const RgbdFolder folder = openRgbdFolder(path, 30);
+  EXPECT_FALSE(folder.depth_registered);
+  EXPECT_EQ(folder.depth_camera.fx, 585);
+  EXPECT_EQ(folder.camera.fx, 525);
+  EXPECT_EQ(folder.depth_camera.width, 640);
+  // The poses are the depth camera's: the colour camera is 25 mm to its right, which is the world's y here.
+  const SE3 T_W_D = folder.T_W_C.front().T_W_B * folder.T_color_depth;
+  EXPECT_NEAR((T_W_D.t() - Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-12);
+  EXPECT_NEAR((folder.T_W_C.front().T_W_B.t() - Eigen::Vector3d(1, 2.025, 3)).norm(), 0, 1e-12);
+
+  const RgbdFolder registered = openRgbdFolder(path, 30, true);
+  EXPECT_TRUE(registered.depth_registered);
+  EXPECT_EQ(registered.camera.fx, 585);
+  EXPECT_NEAR((registered.T_W_C.front().T_W_B.t() - Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-12);
 }
 
 TEST(Folder, ErrorsNameTheFile) {

@@ -11,11 +11,11 @@ namespace {
 constexpr int kReach = 8;  ///< px between the points of a normal: bridges the sensor's quantisation
 
 /// Normals of locally flat patches, in the folder's world.
-void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_C,
+void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_D,
                     std::vector<Eigen::Vector3d>* out) {
   cv::Mat rgb, depth;
   loadRgbdFrame(folder, frame, &rgb, &depth);
-  const CameraIntrinsics& c = folder.camera;
+  const CameraIntrinsics& c = folder.depth_registered ? folder.camera : folder.depth_camera;
   const auto point = [&](int u, int v) {
     const double z = 0.001 * depth.at<std::uint16_t>(v, u);
     return Eigen::Vector3d((u - c.cx) / c.fx * z, (v - c.cy) / c.fy * z, z);
@@ -27,7 +27,7 @@ void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3&
       if (m.z() < 0.4 || m.z() > 4 || l.z() == 0 || r.z() == 0 || t.z() == 0 || b.z() == 0) continue;
       const double bend = 0.004 * m.z() * m.z() + 0.002;
       if ((0.5 * (l + r) - m).norm() > bend || (0.5 * (t + b) - m).norm() > bend) continue;
-      out->push_back(T_W_C.rotation() * (r - l).cross(b - t).normalized());
+      out->push_back(T_W_D.rotation() * (r - l).cross(b - t).normalized());
     }
 }
 
@@ -40,7 +40,7 @@ Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
     SE3 T_W_C;
     if (!poseAt(folder.T_W_C, folder.frames[i].t, &T_W_C)) continue;
     up += T_W_C.rotation() * Eigen::Vector3d(0, -1, 0);
-    if (i % 8 == 0) collectNormals(folder, folder.frames[i], T_W_C, &normals);
+    if (i % 8 == 0) collectNormals(folder, folder.frames[i], T_W_C * folder.T_color_depth, &normals);
   }
   up.normalize();
   // Cameras are held level only roughly: narrow the cone in steps. A floor and a wall agree on the same direction.

@@ -36,6 +36,19 @@ Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& m) {
   return svd.matrixU() * s * svd.matrixV().transpose();
 }
 
+/// Kinect v1: the colour camera sits 25 mm to the right of the infrared one; focal length as drivers assume it.
+constexpr double kKinectBaseline = 0.025, kKinectColourFocal = 525.0;
+
+/// The folder's camera becomes the depth camera, with the poses, and a colour camera is put beside it.
+void separateColour(RgbdFolder* folder) {
+  folder->depth_registered = false;
+  folder->depth_camera = folder->camera;
+  const double scale = folder->camera.width / 640.0;
+  folder->camera.fx = folder->camera.fy = kKinectColourFocal * scale;
+  folder->T_color_depth = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-kKinectBaseline, 0, 0));
+  for (StampedPose& p : folder->T_W_C) p.T_W_B = p.T_W_B * folder->T_color_depth.inverse();
+}
+
 RgbdFolder openSevenScenes(const fs::path& folder, double rate) {
   RgbdFolder out;
   std::vector<std::pair<long, fs::path>> found;
@@ -106,9 +119,10 @@ RgbdFolder openTum(const fs::path& folder) {
 
 }  // namespace
 
-RgbdFolder openRgbdFolder(const std::string& folder, double rate) {
+RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registered) {
   if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": no such directory");
-  RgbdFolder out = fs::exists(fs::path(folder) / "rgb.txt") ? openTum(folder) : openSevenScenes(folder, rate);
+  const bool tum = fs::exists(fs::path(folder) / "rgb.txt");
+  RgbdFolder out = tum ? openTum(folder) : openSevenScenes(folder, rate);
   if (out.frames.size() < 2)
     throw std::runtime_error(
         folder + ": expected frame-N.color.* with depth and pose, or rgb.txt with depth.txt and groundtruth.txt");
@@ -116,6 +130,7 @@ RgbdFolder openRgbdFolder(const std::string& folder, double rate) {
   if (first.empty()) throw std::runtime_error(out.frames.front().colour + ": not an image");
   out.camera.width = first.cols;
   out.camera.height = first.rows;
+  if (!tum && !registered) separateColour(&out);
   return out;
 }
 

@@ -22,6 +22,7 @@ struct Settings {
   std::string folder, out, name, format = "bag";
   std::vector<double> up;  ///< in the folder's world; empty: from the depth images
   std::vector<double> intrinsics;
+  bool registered = false;
   double rate = 30, spacing = 0.15;
   int iterations = 3, seed = 1;
   ImuOptions imu;
@@ -46,6 +47,8 @@ SensorConfig sensorOf(const Settings& s, const RgbdFolder& folder, const Sequenc
   SensorConfig sensor = rig.sensorConfig();
   sensor.name = s.name;
   sensor.camera = folder.camera;
+  sensor.depth_camera = folder.depth_camera;
+  sensor.T_color_depth = folder.T_color_depth;
   sensor.color_rate = sensor.depth_rate = s.rate;
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStructuredLight);
   return sensor;
@@ -59,7 +62,9 @@ int run(int argc, char** argv) {
   app.add_option("--name", s.name, "default: the folder's name");
   app.add_option("--up", s.up, "up vector in the world of the poses; default: from floors and walls in the depth")
       ->expected(3);
-  app.add_option("--intrinsics", s.intrinsics, "fx fy cx cy, where the folder does not say")->expected(4);
+  app.add_option("--intrinsics", s.intrinsics, "fx fy cx cy of the colour camera")->expected(4);
+  app.add_flag("--registered", s.registered,
+               "7-Scenes layout: depth, intrinsics and poses belong to the colour camera, not to one of its own");
   app.add_option("--rate", s.rate, "images per second, where the folder has no stamps")->check(CLI::Range(1.0, 120.0));
   app.add_option("--spacing", s.spacing, "seconds between spline knots: smooths the poses' noise")
       ->check(CLI::Range(0.02, 2.0));
@@ -75,7 +80,7 @@ int run(int argc, char** argv) {
   if (s.name.empty())
     s.name = fs::path(s.folder).filename().empty() ? fs::path(s.folder).parent_path().filename().string()
                                                    : fs::path(s.folder).filename().string();
-  RgbdFolder folder = openRgbdFolder(s.folder, s.rate);
+  RgbdFolder folder = openRgbdFolder(s.folder, s.rate, s.registered);
   if (s.intrinsics.size() == 4) {
     folder.camera.fx = s.intrinsics[0];
     folder.camera.fy = s.intrinsics[1];
@@ -91,6 +96,7 @@ int run(int argc, char** argv) {
 
   // Level world, first camera above the origin; body = IMU of the simulator's rig.
   SequenceSpec rig;
+  rig.depth.registered = folder.depth_registered;
   const double begin = folder.T_W_C.front().t;
   const SE3 level(gravityAlignedRotation(up), Eigen::Vector3d::Zero());
   const Eigen::Vector3d origin = level * folder.T_W_C.front().T_W_B.t();

@@ -1,5 +1,7 @@
 // Folders of real RGB-D images with poses: 7-Scenes layout (frame-N.color.*, frame-N.depth.png, frame-N.pose.txt,
 // camera-intrinsics.txt) or TUM layout (rgb.txt, depth.txt, groundtruth.txt).
+// In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the colour images come from a camera
+// of their own that nobody calibrated: it gets the nominal figures of the Kinect v1.
 #pragma once
 
 #include <string>
@@ -19,13 +21,17 @@ struct RgbdFrame {
 
 struct RgbdFolder {
   std::vector<RgbdFrame> frames;
-  Trajectory T_W_C;         ///< camera poses, in the folder's own world
-  CameraIntrinsics camera;  ///< width and height from the first image; focal lengths 0 when the folder does not say
+  Trajectory T_W_C;         ///< colour camera, in the folder's own world
+  CameraIntrinsics camera;  ///< colour; width and height from the first image; focal lengths 0: the folder is silent
+  bool depth_registered = true;   ///< depth pixels belong to the colour camera
+  CameraIntrinsics depth_camera;  ///< only when not registered
+  SE3 T_color_depth;              ///< only when not registered; else identity
   double depth_scale = 0.001;
 };
 
-/// `rate`: images per second where the folder has no stamps. Throws std::runtime_error naming the file (and line).
-RgbdFolder openRgbdFolder(const std::string& folder, double rate);
+/// `rate`: images per second where the folder has no stamps. `registered`: a folder in 7-Scenes layout whose depth was
+/// registered to the colour camera. Throws std::runtime_error naming the file (and line).
+RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registered = false);
 
 /// RGB image and depth in 16UC1 millimetres (0 = invalid). Throws std::runtime_error naming the file.
 void loadRgbdFrame(const RgbdFolder& folder, const RgbdFrame& frame, cv::Mat* rgb, cv::Mat* depth_mm);
