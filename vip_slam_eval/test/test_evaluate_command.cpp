@@ -67,6 +67,35 @@ class EvaluateCommand : public ::testing::Test {
   std::string output_, error_;
 };
 
+TEST_F(EvaluateCommand, CovarianceFileAddsTheNees) {
+  const auto write = [this](double shift, const std::string& sigma2) {
+    std::ofstream file(path("covariance.csv"));
+    file << "t,xx,xy,xz,xa,xb,xc,yy,yz,ya,yb,yc,zz,za,zb,zc,aa,ab,ac,bb,bc,cc\n";
+    for (const StampedPose& pose : estimate_) {
+      char stamp[32];
+      std::snprintf(stamp, sizeof stamp, "%.9f", pose.t + shift);
+      file << stamp;
+      for (int r = 0; r < 6; ++r) {
+        for (int c = r; c < 6; ++c) file << ',' << (r == c ? sigma2 : "0");
+      }
+      file << '\n';
+    }
+  };
+  const std::string input = "--truth " + path("truth.tum") + " --estimate " + path("estimate.tum") + " --covariance ";
+  // The first pose is joined with the truth, so the others are off by 0 or 4 cm, in turn.
+  write(0, "0.0004");
+  ASSERT_EQ(run(input + path("covariance.csv") + " --out " + path("out")), 0) << error_;
+  const std::string metrics = text(path("out") + "/metrics.csv");
+  const auto at = metrics.find("position mean (honest: 3),");
+  ASSERT_NE(at, std::string::npos) << metrics;
+  EXPECT_NEAR(std::stod(metrics.substr(at + 26)), 0.5 * 0.04 * 0.04 / 0.0004, 0.02);
+  fs::remove_all(path("out"));
+  write(0.003, "0.0004");
+  expectRefused(input + path("covariance.csv"), "covariance.csv:2: no pose of the estimate has this stamp");
+  write(0, "nan");
+  expectRefused(input + path("covariance.csv"), "covariance.csv:2: expected a stamp and 21 finite numbers");
+}
+
 TEST_F(EvaluateCommand, LeavesTableCsvAndPicture) {
   ASSERT_EQ(run("--truth " + path("truth.tum") + " --estimate " + path("estimate.tum") + " --out " + path("out")), 0)
       << error_;

@@ -5,6 +5,17 @@
 #include <stdexcept>
 
 namespace vip_slam {
+namespace {
+
+/// From (theta in the body, p in odom, ...) to x y z and rotation, both in odom.
+Matrix6d poseCovariance(const TrackedFrame& frame) {
+  Matrix6d J = Matrix6d::Zero();
+  J.topRightCorner<3, 3>().setIdentity();
+  J.bottomLeftCorner<3, 3>() = frame.state.T_W_I.R();
+  return J * frame.covariance.topLeftCorner<6, 6>() * J.transpose();
+}
+
+}  // namespace
 
 Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing)
     : options_(options), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
@@ -75,6 +86,7 @@ void Pipeline::process(const ImagePair& pair) {
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
   if (frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
+    covariances_.push_back({frame.t, poseCovariance(frame)});
     if (placed_ && epoch_ == frame.epoch) realtime_.push_back({frame.t, T_map_odom_ * frame.state.T_W_I});
   }
   if (!mapping_) return;

@@ -131,6 +131,25 @@ Trajectory anchored(const Pipeline& pipeline, const MapSnapshot& map) {
   return anchorTrajectory(pipeline.odometry(), anchors);
 }
 
+/// The upper triangle of each pose's covariance, row by row.
+void writeCovariances(const std::string& path, const std::vector<OdometryCovariance>& covariances) {
+  AtomicFile file(path);
+  file.stream() << "t";
+  for (const char* name : {"xx", "xy", "xz", "xa", "xb", "xc", "yy", "yz", "ya", "yb", "yc",
+                           "zz", "za", "zb", "zc", "aa", "ab", "ac", "bb", "bc", "cc"}) {
+    file.stream() << ',' << name;
+  }
+  file.stream() << '\n';
+  for (const OdometryCovariance& sample : covariances) {
+    file.stream() << std::fixed << std::setprecision(9) << sample.t << std::scientific << std::setprecision(8);
+    for (int r = 0; r < 6; ++r) {
+      for (int c = r; c < 6; ++c) file.stream() << ',' << sample.covariance(r, c);
+    }
+    file.stream() << '\n';
+  }
+  file.commit();
+}
+
 /// Map points with the plane they are tied to (0: none), for judging the associations.
 void writePoints(const std::string& path, const std::vector<LandmarkEstimate>& landmarks) {
   AtomicFile file(path);
@@ -149,6 +168,7 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
   Trajectory odometry;
   for (const OdometryPose& pose : pipeline.odometry()) odometry.push_back({pose.t, pose.T_odom_I});
   writeTum(folder + "/odometry.tum", odometry);
+  writeCovariances(folder + "/odometry_covariance.csv", pipeline.covariances());
   MapSnapshot map;
   std::vector<PlaneEstimate> planes;
   if (const MappingThread* mapping = pipeline.mapping()) {

@@ -15,4 +15,8 @@ namespace vip_slam {
 Trajectory readTrajectory(const std::string& path, const std::string& topic = "",
                           std::vector<PoseWithCovariance>* covariances = nullptr);
 
+/// The covariances of `odometry_covariance.csv`, each with the pose of `trajectory` that has its stamp. Throws
+/// std::runtime_error naming the file and line: unreadable numbers, a stamp without a pose, unordered stamps.
+std::vector<PoseWithCovariance> readCovariances(const std::string& path, const Trajectory& trajectory);
+
 }  // namespace vip_slam

@@ -11,11 +11,13 @@ int main(int argc, char** argv) {
   using namespace vip_slam;
   CLI::App app{"Judges a trajectory, and a plane map, against ground truth."};
   EvaluationInput input;
-  std::string truth, truth_topic, estimate, estimate_topic, true_planes, planes, points, out, alignment = "yaw";
+  std::string truth, truth_topic, estimate, estimate_topic, covariance, true_planes, planes, points, out;
+  std::string alignment = "yaw";
   app.add_option("--truth", truth, "true trajectory: TUM file or bag")->required();
   app.add_option("--truth-topic", truth_topic, "topic of the truth in a bag with several");
   app.add_option("--estimate", estimate, "estimated trajectory: TUM file or bag")->required();
   app.add_option("--estimate-topic", estimate_topic, "topic of the estimate in a bag with several");
+  app.add_option("--covariance", covariance, "the estimate's covariances, CSV as run_bag writes it: adds the NEES");
   CLI::Option* true_planes_option = app.add_option("--planes-truth", true_planes, "true planes, YAML");
   CLI::Option* planes_option = app.add_option("--planes", planes, "estimated planes, YAML");
   true_planes_option->needs(planes_option);
@@ -46,6 +48,7 @@ int main(int argc, char** argv) {
     if (input.title.empty()) input.title = estimate;
     input.truth = readTrajectory(truth, truth_topic);
     input.estimate = readTrajectory(estimate, estimate_topic, &input.covariances);
+    if (!covariance.empty()) input.covariances = readCovariances(covariance, input.estimate);
     if (!true_planes.empty()) input.true_planes = readPlanesYaml(true_planes);
     if (!planes.empty()) input.planes = readPlanesYaml(planes);
     if (!points.empty()) input.points = readLabelledPoints(points);

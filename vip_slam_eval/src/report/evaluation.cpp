@@ -28,8 +28,12 @@ void addRelative(MetricTable* table, const RelativeError& error, const std::stri
   const std::string group = "RPE over " + shortNumber(error.delta) + " " + unit;
   table->push_back({group, "pairs", double(error.position.count), ""});
   if (error.position.count == 0) return;
+  table->push_back({group, "position mean", error.position.mean, "m"});
   table->push_back({group, "position rmse", error.position.rmse, "m"});
+  table->push_back({group, "position max", error.position.max, "m"});
+  table->push_back({group, "rotation mean", error.rotation.mean, "deg"});
   table->push_back({group, "rotation rmse", error.rotation.rmse, "deg"});
+  table->push_back({group, "rotation max", error.rotation.max, "deg"});
 }
 
 std::string errorsCsv(const Evaluation& evaluation) {

@@ -28,6 +28,13 @@ struct StateChange {
   TrackingStatus status;
 };
 
+/// What the front end says of its own error, ordered as in nav_msgs/Odometry: x y z in odom, then rotation about the
+/// axes of odom.
+struct OdometryCovariance {
+  double t;
+  Matrix6d covariance;
+};
+
 class Pipeline {
  public:
   Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing);
@@ -41,6 +48,7 @@ class Pipeline {
 
   std::size_t images() const { return images_; }
   const std::vector<OdometryPose>& odometry() const { return odometry_; }  ///< images with a pose
+  const std::vector<OdometryCovariance>& covariances() const { return covariances_; }  ///< one for each of odometry()
   const std::vector<StateChange>& states() const { return states_; }
   const Trajectory& realtime() const { return realtime_; }  ///< in map, as known at that time
   const FrontEnd& frontEnd() const { return *front_end_; }
@@ -66,6 +74,7 @@ class Pipeline {
   double newest_ = -1e300;
   std::size_t images_ = 0;
   std::vector<OdometryPose> odometry_;
+  std::vector<OdometryCovariance> covariances_;
   Trajectory realtime_;
   std::vector<StateChange> states_;
 };
