@@ -222,7 +222,8 @@ TEST(DepthGridTest, KeepsSurfacesAtAGrazingAngleButNoEdges) {
     }
     for (int r = 0; r < grid.rows; ++r) {  // windows that hold both surfaces
       const double v = grid.pixel(0, r).y();
-      if (0.55 * f / (v + 2 - horizon) < 6.0 && 0.55 * f / (v - 2 - horizon) > 6.0) EXPECT_EQ(grid.at(20, r), 0.0f) << v;
+      const bool both = 0.55 * f / (v + 2 - horizon) < 6.0 && 0.55 * f / (v - 2 - horizon) > 6.0;
+      if (both) { EXPECT_EQ(grid.at(20, r), 0.0f) << v; }
     }
   }
   EXPECT_GE(far_nodes, 6);
