@@ -23,7 +23,6 @@ struct MeasurementOptions {
   double outlier_chi2 = 9.0;
   double plane_prior_deg = 0.5;
   double homography_inflation = 1.0;
-  bool homography_shared_hosts = false;
 
   void visit(OptionVisitor& v) {
     v.field("pixel_sigma", pixel_sigma, 0.1, 10.0, "one sigma of a tracked feature, px");
@@ -35,8 +34,6 @@ struct MeasurementOptions {
     v.field("plane_prior_deg", plane_prior_deg, 0.01, 10.0, "one sigma of horizontal and vertical planes, degrees");
     v.field("homography_inflation", homography_inflation, 1.0, 5.0,
             "factor on the sigma of homography pairs, for noise that the pairs of one host share");
-    v.field("homography_shared_hosts", homography_shared_hosts,
-            "few hosts for many plane points: faster adjustment, more sensitive to wrong tracks");
   }
 };
 
@@ -45,12 +42,14 @@ struct LocalBaOptions {
   int max_iterations = 10;
   double max_seconds = 0.2;
   int max_fixed_keyframes = 40;
+  bool shared_hosts = false;
 
   void visit(OptionVisitor& v) {
     v.field("window", window, 3, 100, "newest keyframes that are optimised");
     v.field("max_iterations", max_iterations, 1, 100, "Levenberg-Marquardt iterations");
     v.field("max_seconds", max_seconds, 0.0, 10.0, "time limit; 0 or lockstep: none");
     v.field("max_fixed_keyframes", max_fixed_keyframes, 0, 1000, "older keyframes that hold the window's landmarks");
+    v.field("shared_hosts", shared_hosts, "few keyframes host the homographies of many plane points, instead of first views");
   }
 };
 
@@ -58,11 +57,13 @@ struct GlobalBaOptions {
   int max_iterations = 100;
   double max_seconds = 2.0;
   bool at_end = true;
+  bool shared_hosts = true;
 
   void visit(OptionVisitor& v) {
     v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
     v.field("max_seconds", max_seconds, 0.0, 600.0, "time limit; 0 or lockstep: none");
     v.field("at_end", at_end, "run one at the end of the data");
+    v.field("shared_hosts", shared_hosts, "few keyframes host the homographies of many plane points, instead of first views");
   }
 };
 

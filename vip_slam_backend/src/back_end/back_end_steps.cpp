@@ -37,7 +37,9 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   BuiltProblem built;
   {
     const ScopedTimer build_timer(log, "backend.lba_build", t);
-    built = buildProblem(map, localScope(map, options.local_ba), settings);
+    BuilderSettings local = settings;
+    local.shared_hosts = options.local_ba.shared_hosts;
+    built = buildProblem(map, localScope(map, options.local_ba), local);
   }
   SolverOptions solver_options;
   solver_options.max_iterations = options.local_ba.max_iterations;
@@ -130,6 +132,7 @@ GbaJob BackEnd::Impl::makeGlobalJob() const {
   auto problem = std::make_shared<GlobalBaProblem>();
   problem->map = std::make_shared<const Map>(map);
   problem->settings = settings;
+  problem->settings.shared_hosts = options.global_ba.shared_hosts;
   problem->options = options.global_ba;
   problem->solver = options.solver;
   problem->noise = sensor.imu_noise;

@@ -54,7 +54,7 @@ Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const 
 bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane, const Eigen::Vector2d& xy_i,
                           double* rho) {
   const double D = plane.d + plane.n.dot(i.t_W_C);
-  if (std::abs(D) < 0.15 || std::abs(plane.d + plane.n.dot(j.t_W_C)) < 0.15) return false;
+  if (std::abs(D) < kMinPlaneDistance || std::abs(plane.d + plane.n.dot(j.t_W_C)) < kMinPlaneDistance) return false;
   const Eigen::Vector3d ray(xy_i.x(), xy_i.y(), 1.0);
   const double incidence = (i.R_C_W * plane.n).dot(ray);
   if (std::abs(incidence) < 0.1736 * ray.norm()) return false;
@@ -63,7 +63,7 @@ bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const 
   const Eigen::Vector3d p_W = i.t_W_C + i.R_C_W.transpose() * (z_i * ray);
   const double z_j = j.R_C_W.row(2).dot(p_W - j.t_W_C);
   *rho = z_j / z_i;
-  return *rho >= 0.25 && *rho <= 4.0;
+  return *rho >= kMinDepthRatio && *rho <= kMaxDepthRatio;
 }
 
 double hostNoiseGain(const Vector9d& h, const Eigen::Vector2d& xy_i) {
@@ -81,9 +81,33 @@ Eigen::Matrix<double, 2, 9> homographyRows(const HomographyPair& pair) {
   return pair.weight * C;
 }
 
-void addHomographyPair(const HomographyPair& pair, Matrix9d* G) {
-  const Eigen::Matrix<double, 2, 9> C = homographyRows(pair);
-  G->noalias() += C.transpose() * C;
+void addHomographyPair(const HomographyPair& pair, HomographySums* sums) {
+  const double x = pair.xy_i.x(), y = pair.xy_i.y(), u = pair.xy_j.x(), v = pair.xy_j.y();
+  const double w = pair.weight * pair.weight;
+  const double products[6] = {x * x, x * y, x, y * y, y, 1.0};
+  const double weights[4] = {w, w * u, w * v, w * (u * u + v * v)};
+  double* s = sums->data();
+  for (const double weight : weights)
+    for (const double product : products) *s++ += weight * product;
+}
+
+Matrix9d homographyMatrix(const HomographySums& sums) {
+  const auto block = [&](int k) {
+    const double* s = sums.data() + 6 * k;
+    Eigen::Matrix3d M;
+    M << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+    return M;
+  };
+  const Eigen::Matrix3d A = block(0), B = block(1), C = block(2), Z = Eigen::Matrix3d::Zero();
+  Matrix9d G;
+  G << A, Z, -B, Z, A, -C, -B, -C, block(3);
+  return G;
+}
+
+bool isFinite(const HomographySums& sums) {
+  for (const double s : sums)
+    if (!std::isfinite(s)) return false;
+  return true;
 }
 
 int decomposeHomography(const Matrix9d& G, Matrix9d* rows) {

@@ -1,16 +1,18 @@
 #include "plane_factors.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <unordered_map>
 
-#include "vip_slam_backend/factors/reprojection.h"
+#include "homography_hosts.h"
 #include "vip_slam_backend/solver/robust.h"
 
 namespace vip_slam {
 
 PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings,
-                                       const std::unordered_map<KeyframeId, int>& frames, BuiltProblem* built)
-    : map_(map), scope_(scope), settings_(settings), frames_(frames), built_(built) {
+                                       BuiltProblem* built)
+    : map_(map), scope_(scope), settings_(settings), built_(built) {
   BaProblem& problem = built->problem;
   for (const BaFrame& f : problem.frames) geometry_.emplace_back(f.state.T_W_I, f.T_I_C);
   if (settings.variant == Variant::kVi) return;
@@ -29,136 +31,146 @@ PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope
   }
 }
 
-bool PlaneFactorBuilder::onPlane(const MapLandmark& landmark, int* index) const {
-  const auto found = planes_.find(landmark.plane);
-  if (landmark.plane == 0 || found == planes_.end()) return false;
-  *index = found->second;
-  return std::abs(built_->problem.planes[*index].plane.signedDistance(landmark.p_W)) <= 0.1;
+// What one keyframe sees of the landmarks of one host on one plane.
+struct PlaneFactorBuilder::Observer {
+  int frame = 0, pairs = 0;
+  bool usable = true;  // far enough from the plane
+  Vector9d h;          // vec(H) at the present estimate
+  HomographySums sums{};
+  std::vector<HomographyPair> uncompressed;
+};
+
+std::vector<char> PlaneFactorBuilder::addHomographies(const LandmarkViews& views) {
+  std::vector<char> taken(views.size(), 0);
+  if (planes_.empty()) return taken;
+  std::vector<int> plane(views.size(), -1);
+  for (int l = 0; l < views.size(); ++l) {
+    const MapLandmark& landmark = views.landmark(l);
+    if (landmark.plane == 0) continue;
+    const auto found = planes_.find(landmark.plane);
+    if (found == planes_.end()) continue;
+    if (std::abs(built_->problem.planes[found->second].plane.signedDistance(landmark.p_W)) <= 0.1)
+      plane[l] = found->second;
+  }
+  const std::vector<int> hosts = chooseHosts(views, plane, built_->problem.planes, geometry_, settings_.shared_hosts);
+  // Group by group of a plane and a host, so that what the pairs of a group share is computed once.
+  struct Member {
+    int plane, host, landmark;
+    bool operator<(const Member& o) const {
+      return std::tie(plane, host, landmark) < std::tie(o.plane, o.host, o.landmark);
+    }
+  };
+  std::vector<Member> members;
+  for (int l = 0; l < views.size(); ++l)
+    if (hosts[l] >= 0) members.push_back({plane[l], views.begin(l)[hosts[l]].frame, l});
+  std::sort(members.begin(), members.end());
+  std::vector<int> slot(geometry_.size(), -1);
+  std::vector<Observer> observers;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    const Member& member = members[m];
+    taken[member.landmark] =
+        collectPairs(views, member.landmark, hosts[member.landmark], member.plane, &slot, &observers);
+    const bool last =
+        m + 1 == members.size() || members[m + 1].plane != member.plane || members[m + 1].host != member.host;
+    if (last) storeGroup(member.host, member.plane, &observers, &slot);
+  }
+  return taken;
 }
 
-void PlaneFactorBuilder::chooseHosts(const std::vector<LandmarkId>& landmarks) {
-  if (planes_.empty()) return;
-  // Per plane and keyframe: the landmarks that it could host.
-  std::map<int, std::map<KeyframeId, std::vector<LandmarkId>>> candidates;
-  std::unordered_map<LandmarkId, std::vector<KeyframeId>> views;
-  for (const LandmarkId id : landmarks) {
-    const MapLandmark& landmark = map_.landmark(id);
-    int plane = 0;
-    if (!onPlane(landmark, &plane)) continue;
-    const Plane& parameters = built_->problem.planes[plane].plane;
-    for (const MapObservation& o : landmark.observations) {
-      const auto frame = frames_.find(o.keyframe);
-      if (frame == frames_.end()) continue;
-      // A host must see the plane well: its ray is what the others are compared with.
-      const FrameGeometry& g = geometry_[frame->second];
-      const Eigen::Vector2d xy = map_.feature(o).xy.cast<double>();
-      double rho = 1;
-      if (!homographyDepthRatio(g, g, parameters, xy, &rho)) continue;
-      candidates[plane][o.keyframe].push_back(id);
-      views[id].push_back(o.keyframe);
-    }
+int PlaneFactorBuilder::observerOf(int frame, int host, const Plane& plane, std::vector<int>* slot,
+                                   std::vector<Observer>* observers) const {
+  int& place = (*slot)[frame];
+  if (place < 0) {
+    place = static_cast<int>(observers->size());
+    Observer observer;
+    observer.frame = frame;
+    observer.usable = std::abs(plane.signedDistance(geometry_[frame].t_W_C)) >= kMinPlaneDistance;
+    observer.h = homographyVector(geometry_[host], geometry_[frame], plane);
+    observers->push_back(observer);
   }
-  for (auto& plane : candidates) {
-    std::map<KeyframeId, int> count;
-    std::set<std::pair<int, KeyframeId>> order;
-    for (const auto& entry : plane.second) {
-      count[entry.first] = static_cast<int>(entry.second.size());
-      order.insert({count[entry.first], entry.first});
-    }
-    if (!settings_.measurement.homography_shared_hosts) {
-      for (const auto& entry : plane.second)
-        for (const LandmarkId id : entry.second) hosts_.emplace(id, entry.first);  // ascending: the first view wins
-      continue;
-    }
-    while (!order.empty() && order.rbegin()->first > 0) {
-      const KeyframeId host = order.rbegin()->second;
-      for (const LandmarkId id : plane.second[host]) {
-        if (!hosts_.emplace(id, host).second) continue;
-        for (const KeyframeId other : views[id]) {
-          order.erase({count[other], other});
-          order.insert({--count[other], other});
-        }
-      }
-    }
-  }
+  return place;
 }
 
-bool PlaneFactorBuilder::addLandmark(const MapLandmark& landmark) {
-  int plane_index = 0;
-  const auto host_id = hosts_.find(landmark.id);
-  if (host_id == hosts_.end() || !onPlane(landmark, &plane_index)) return false;
-  const Plane& plane = built_->problem.planes[plane_index].plane;
-  std::vector<BaHomographyPair> pairs;
+bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, int host_view, int plane,
+                                      std::vector<int>* slot, std::vector<Observer>* observers) {
+  const MeasurementOptions& options = settings_.measurement;
+  const Plane& parameters = built_->problem.planes[plane].plane;
+  const LandmarkView& host = views.begin(landmark)[host_view];
+  const bool host_fixed = built_->problem.frames[host.frame].fixed;
+  const double host_sigma = 1.0 / pixelWeight(*host.feature, settings_);
+  struct Pair {
+    int slot;
+    HomographyPair pair;
+  };
+  std::vector<Pair> pairs;
   int tried = 0, refused = 0;
-  const int host = frames_.at(host_id->second);
-  const Feature* host_feature = nullptr;
-  for (const MapObservation& o : landmark.observations)
-    if (o.keyframe == host_id->second) host_feature = &map_.feature(o);
-  for (const MapObservation& o : landmark.observations) {
-    const auto frame = frames_.find(o.keyframe);
-    if (frame == frames_.end() || frame->second == host) continue;
-    const Feature& feature = map_.feature(o);
-    const bool both_fixed = built_->problem.frames[host].fixed && built_->problem.frames[frame->second].fixed;
-    if (both_fixed) continue;
-    BaHomographyPair pair;
-    pair.i = host;
-    pair.j = frame->second;
-    pair.plane = plane_index;
-    pair.pair.xy_i = host_feature->xy.cast<double>();
-    pair.pair.xy_j = feature.xy.cast<double>();
+  for (const LandmarkView* v = views.begin(landmark); v != views.end(landmark); ++v) {
+    if (v->frame == host.frame || (host_fixed && built_->problem.frames[v->frame].fixed)) continue;
     ++tried;
-    double rho = 1;
-    if (!homographyDepthRatio(geometry_[pair.i], geometry_[pair.j], plane, pair.pair.xy_i, &rho)) {
+    Pair p;
+    p.slot = observerOf(v->frame, host.frame, parameters, slot, observers);
+    const Observer& observer = (*observers)[p.slot];
+    p.pair.xy_i = host.feature->xy.cast<double>();
+    p.pair.xy_j = v->feature->xy.cast<double>();
+    // Third row of H p_i: the depth ratio.
+    const double rho = observer.h(6) * p.pair.xy_i.x() + observer.h(7) * p.pair.xy_i.y() + observer.h(8);
+    if (!observer.usable || rho < kMinDepthRatio || rho > kMaxDepthRatio) {
       ++refused;
       continue;
     }
     // The pair's noise is that of the observer and that of the host, seen from the observer.
-    const Vector9d h = homographyVector(geometry_[pair.i], geometry_[pair.j], plane);
-    const double observer = 1.0 / pixelWeight(feature, settings_), from = 1.0 / pixelWeight(*host_feature, settings_);
-    const double sigma = std::sqrt(observer * observer + hostNoiseGain(h, pair.pair.xy_i) * from * from) *
-                         settings_.measurement.homography_inflation;
-    pair.pair.weight = 1.0 / (sigma * rho);
+    const double sigma = 1.0 / pixelWeight(*v->feature, settings_);
+    const double gain = hostNoiseGain(observer.h, p.pair.xy_i);
+    const double inflated = std::sqrt(sigma * sigma + gain * host_sigma * host_sigma) * options.homography_inflation;
+    p.pair.weight = 1.0 / (inflated * rho);
     // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
-    const double chi2 = (homographyRows(pair.pair) * h).squaredNorm();
-    if (chi2 > settings_.measurement.outlier_chi2) {
+    const double chi2 = (homographyRows(p.pair) * observer.h).squaredNorm();
+    if (chi2 > options.outlier_chi2) {
       ++refused;
       continue;
     }
-    pair.pair.weight *= huberScale(chi2, settings_.measurement.huber);
-    pairs.push_back(pair);
+    p.pair.weight *= huberScale(chi2, options.huber);
+    pairs.push_back(p);
   }
   if (tried == 0 || 2 * refused > tried) return false;
-  pairs_.insert(pairs_.end(), pairs.begin(), pairs.end());
+  for (const Pair& p : pairs) {
+    Observer& observer = (*observers)[p.slot];
+    ++observer.pairs;
+    if (settings_.variant == Variant::kViP)
+      observer.uncompressed.push_back(p.pair);
+    else
+      addHomographyPair(p.pair, &observer.sums);
+  }
   return true;
 }
 
-void PlaneFactorBuilder::finish() {
-  BaProblem& problem = built_->problem;
-  if (planes_.empty()) return;
-  if (settings_.variant == Variant::kViP) {
-    problem.homography_pairs = std::move(pairs_);
-  } else {
-    for (const BaHomographyPair& pair : pairs_) {
-      BaHomography& h = homographies_[{pair.i, pair.j, pair.plane}];
-      h.i = pair.i;
-      h.j = pair.j;
-      h.plane = pair.plane;
-      addHomographyPair(pair.pair, &h.G);
-      ++h.pairs;
+void PlaneFactorBuilder::storeGroup(int host, int plane, std::vector<Observer>* observers, std::vector<int>* slot) {
+  for (const Observer& o : *observers) (*slot)[o.frame] = -1;
+  std::sort(observers->begin(), observers->end(),
+            [](const Observer& a, const Observer& b) { return a.frame < b.frame; });
+  for (const Observer& o : *observers) {
+    if (o.pairs == 0) continue;
+    if (settings_.variant == Variant::kViP) {
+      for (const HomographyPair& pair : o.uncompressed)
+        built_->problem.homography_pairs.push_back({host, o.frame, plane, pair});
+    } else {
+      built_->problem.homographies.push_back({host, o.frame, plane, o.sums, o.pairs});
     }
-    for (const auto& entry : homographies_) problem.homographies.push_back(entry.second);
   }
-  addDepthBlocks();
+  observers->clear();
 }
 
 void PlaneFactorBuilder::addDepthBlocks() {
+  if (planes_.empty()) return;
   BaProblem& problem = built_->problem;
+  std::unordered_map<KeyframeId, int> frames;
+  for (std::size_t f = 0; f < built_->frames.size(); ++f) frames[built_->frames[f]] = static_cast<int>(f);
   // Keyframes that are constants: one block per plane in the world, seen from a fixed frame at the origin.
   std::map<PlaneId, Eigen::Matrix4d> outside;
   std::map<PlaneId, int> outside_points;
   for (const auto& entry : map_.keyframes()) {
-    const auto frame = frames_.find(entry.first);
-    const bool constant = frame == frames_.end() || problem.frames[frame->second].fixed;
+    const auto frame = frames.find(entry.first);
+    const bool constant = frame == frames.end() || problem.frames[frame->second].fixed;
     if (constant && !scope_.outside_planes) continue;
     const Eigen::Matrix4d T_W_C = entry.second.T_W_C().matrix();
     for (const auto& observation : entry.second.planes) {
@@ -203,27 +215,6 @@ void PlaneFactorBuilder::addDepthBlocks() {
     factor.points = outside_points[sum.first];
     problem.point_to_plane.push_back(factor);
   }
-}
-
-Eigen::Vector3d intersectWithPlane(const Map& map, const MapLandmark& landmark) {
-  const Plane& plane = map.planes().at(landmark.plane).estimate.plane;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double weights = 0;
-  for (const MapObservation& o : landmark.observations) {
-    const MapKeyframe& kf = map.keyframe(o.keyframe);
-    const SE3 T_W_C = kf.T_W_C();
-    const Eigen::Vector2f& xy = kf.features()[o.feature].xy;
-    const Eigen::Vector3d ray = T_W_C.rotation() * Eigen::Vector3d(xy.x(), xy.y(), 1.0);
-    const double incidence = plane.n.dot(ray);
-    const double z = -plane.signedDistance(T_W_C.t()) / incidence;
-    const double cosine = std::abs(incidence) / ray.norm();
-    if (!(z > 0.05) || cosine < 0.1) continue;
-    // A ray's error on the plane grows with distance and with the slant.
-    const double weight = cosine * cosine / (z * z);
-    sum += weight * (T_W_C.t() + z * ray);
-    weights += weight;
-  }
-  return weights > 0 ? Eigen::Vector3d(sum / weights) : plane.project(landmark.p_W);
 }
 
 }  // namespace vip_slam

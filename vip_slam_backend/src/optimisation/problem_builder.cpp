@@ -4,8 +4,11 @@
 #include <cmath>
 #include <numeric>
 #include <unordered_map>
+#include <unordered_set>
 
+#include "landmark_views.h"
 #include "plane_factors.h"
+#include "plane_intersection.h"
 #include "vip_slam_backend/factors/reprojection.h"
 
 namespace vip_slam {
@@ -113,43 +116,32 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
     problem.imu.push_back(imu);
   }
 
-  // Landmarks of the free frames.
-  std::vector<LandmarkId> landmarks;
-  for (const KeyframeId id : scope.free)
-    for (const LandmarkId landmark : map.keyframe(id).landmarks)
-      if (landmark != kNoLandmark) landmarks.push_back(landmark);
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
-
-  PlaneFactorBuilder planes(map, scope, settings, index, &built);
-  planes.chooseHosts(landmarks);
-  for (const LandmarkId id : landmarks) {
-    const MapLandmark& landmark = map.landmark(id);
-    const bool plane_point = planes.addLandmark(landmark);
-    if (plane_point && settings.variant == Variant::kVip) {
-      built.plane_points.push_back(id);
+  const LandmarkViews views(map, scope, built.frames);
+  PlaneFactorBuilder planes(map, scope, settings, &built);
+  const std::vector<char> on_plane = planes.addHomographies(views);
+  for (int l = 0; l < views.size(); ++l) {
+    const MapLandmark& landmark = views.landmark(l);
+    if (on_plane[l] && settings.variant == Variant::kVip) {
+      built.plane_points.push_back(landmark.id);
       continue;
     }
     BaPoint point;
     point.p_W = landmark.p_W;
     point.first = static_cast<int>(problem.observations.size());
     bool depth = false;
-    for (const MapObservation& o : landmark.observations) {
-      const auto frame = index.find(o.keyframe);
-      if (frame == index.end()) continue;
-      const Feature& feature = map.feature(o);
+    for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
       BaObservation observation;
-      observation.frame = frame->second;
-      observation.x = feature.xy.x();
-      observation.y = feature.xy.y();
-      observation.weight = pixelWeight(feature, settings);
-      if (feature.depth > 0) {
-        observation.depth = feature.depth;
-        observation.depth_weight = 1.0 / (feature.depth_sigma * settings.measurement.depth_sigma_scale);
+      observation.frame = v->frame;
+      observation.x = v->feature->xy.x();
+      observation.y = v->feature->xy.y();
+      observation.weight = pixelWeight(*v->feature, settings);
+      if (v->feature->depth > 0) {
+        observation.depth = v->feature->depth;
+        observation.depth_weight = 1.0 / (v->feature->depth_sigma * settings.measurement.depth_sigma_scale);
         depth = true;
       }
       problem.observations.push_back(observation);
-      built.observations.push_back(o);
+      built.observations.push_back({built.frames[v->frame], v->feature_index});
     }
     point.count = static_cast<int>(problem.observations.size()) - point.first;
     // One view says nothing about poses; two without depth hang on a baseline that may be nothing.
@@ -159,9 +151,9 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
       continue;
     }
     problem.points.push_back(point);
-    built.points.push_back(id);
+    built.points.push_back(landmark.id);
   }
-  planes.finish();
+  planes.addDepthBlocks();
   addGauges(&problem);
   addMotionPriors(&problem);
   return built;
@@ -178,17 +170,19 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   }
   for (std::size_t p = 0; p < built.planes.size(); ++p)
     if (map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
-  std::set<LandmarkId> done;
+  std::unordered_set<LandmarkId> done;
+  done.reserve(built.points.size() + built.plane_points.size());
   for (std::size_t p = 0; p < built.points.size(); ++p) {
     done.insert(built.points[p]);
     if (map->hasLandmark(built.points[p])) map->setPosition(built.points[p], problem.points[p].p_W);
   }
+  PlaneIntersection intersection(*map);
   for (const LandmarkId id : built.plane_points) {
     if (!map->hasLandmark(id)) continue;
     const MapLandmark& landmark = map->landmark(id);
     if (landmark.plane == 0 || !map->hasPlane(landmark.plane)) continue;
     done.insert(id);
-    map->setPosition(id, intersectWithPlane(*map, landmark));
+    map->setPosition(id, intersection(landmark, map->planes().at(landmark.plane).estimate.plane));
   }
   for (const auto& moved : motion) {
     // Landmarks that no factor held go with the keyframe that made them.

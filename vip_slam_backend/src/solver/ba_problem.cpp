@@ -53,7 +53,7 @@ std::string validateProblem(const BaProblem& problem) {
   for (const BaImu& f : problem.imu)
     if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !f.preintegration) return "an IMU factor without its frames";
   for (const BaHomography& f : problem.homographies)
-    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane) || !f.G.allFinite())
+    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane) || !isFinite(f.sums))
       return "a compressed homography without its frames or plane, or not finite";
   for (const BaHomographyPair& f : problem.homography_pairs)
     if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane))
@@ -92,7 +92,7 @@ double evaluateCost(const BaProblem& problem) {
     cost += f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
   for (const BaHomography& f : problem.homographies) {
     const Vector9d h = homographyVector(geometry[f.i], geometry[f.j], problem.planes[f.plane].plane);
-    cost += h.dot(f.G * h);
+    cost += h.dot(homographyMatrix(f.sums) * h);
   }
   for (const BaHomographyPair& f : problem.homography_pairs)
     cost += (homographyRows(f.pair) * homographyVector(geometry[f.i], geometry[f.j], problem.planes[f.plane].plane))

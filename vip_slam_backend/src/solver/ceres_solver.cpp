@@ -91,7 +91,7 @@ void build(BaProblem& problem, Blocks& b, ceres::Problem* out, ceres::ParameterB
     out->AddResidualBlock(makeImuCost(f.preintegration, problem.gravity), nullptr, poseBlock(f.i), motionBlock(f.i),
                           poseBlock(f.j), motionBlock(f.j));
   for (const BaHomography& f : problem.homographies)
-    out->AddResidualBlock(makeHomographyCost(problem.frames[f.i].T_I_C, problem.frames[f.j].T_I_C, f.G), nullptr,
+    out->AddResidualBlock(makeHomographyCost(problem.frames[f.i].T_I_C, problem.frames[f.j].T_I_C, homographyMatrix(f.sums)), nullptr,
                           poseBlock(f.i), poseBlock(f.j), b.planes[f.plane].data());
   for (const BaHomographyPair& f : problem.homography_pairs)
     out->AddResidualBlock(makeHomographyPairCost(problem.frames[f.i].T_I_C, problem.frames[f.j].T_I_C, f.pair), nullptr,

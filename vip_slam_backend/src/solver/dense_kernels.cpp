@@ -45,10 +45,12 @@ namespace avx512 {
 
 namespace {
 
-const DenseKernels kBaseline{"baseline", baseline::factorPanel, baseline::subtractSyrk};
+const DenseKernels kBaseline{"baseline", baseline::factorPanel, baseline::negativeSyrk, baseline::forwardSubstitute,
+                             baseline::backSubstitute};
 #if defined(__x86_64__)
-const DenseKernels kAvx2{"avx2", avx2::factorPanel, avx2::subtractSyrk};
-const DenseKernels kAvx512{"avx512", avx512::factorPanel, avx512::subtractSyrk};
+const DenseKernels kAvx2{"avx2", avx2::factorPanel, avx2::negativeSyrk, avx2::forwardSubstitute, avx2::backSubstitute};
+const DenseKernels kAvx512{"avx512", avx512::factorPanel, avx512::negativeSyrk, avx512::forwardSubstitute,
+                           avx512::backSubstitute};
 #endif
 
 const DenseKernels& choose() {

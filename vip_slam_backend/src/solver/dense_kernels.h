@@ -12,8 +12,11 @@ struct DenseKernels {
   /// Cholesky of the leading c x c block of the n x n lower matrix A (leading dimension ld), rows below become L21.
   /// False when a pivot is not positive.
   bool (*factorPanel)(double* A, int n, int c, int ld);
-  /// Lower part of C (m x m, leading dimension ldc) -= P P^T with P m x k (leading dimension ldp).
-  void (*subtractSyrk)(double* C, int ldc, const double* P, int ldp, int m, int k);
+  /// Lower part of C (m x m, leading dimension ldc) = -P P^T with P m x k (leading dimension ldp).
+  void (*negativeSyrk)(double* C, int ldc, const double* P, int ldp, int m, int k);
+  /// Solves with the panel's first c columns: L11 x1 = x1, x2 -= L21 x1; and back, x1 from x2.
+  void (*forwardSubstitute)(const double* A, int n, int c, int ld, double* x);
+  void (*backSubstitute)(const double* A, int n, int c, int ld, double* x);
 };
 
 /// The fastest build that this processor runs.

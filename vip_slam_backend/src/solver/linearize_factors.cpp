@@ -20,10 +20,10 @@ void addBlock(double* values, const BlockPlace& place, const Eigen::Matrix<doubl
   }
 }
 
-// Diagonal block, gradient and diagonal of one node.
+// Diagonal block and gradient of one node.
 struct NodeSums {
   const SparseCholesky& cholesky;
-  double *values, *gradient, *full_gradient, *diagonal;
+  double *values, *gradient;
 
   template <int N>
   void add(int node, const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g) const {
@@ -32,28 +32,28 @@ struct NodeSums {
         values + cholesky.diagonalOffset(node), Eigen::OuterStride<>(SparseCholesky::leading(N))) += H;
     const int u = cholesky.unknown(node);
     Eigen::Map<Eigen::Matrix<double, N, 1>>(gradient + u) += g;
-    Eigen::Map<Eigen::Matrix<double, N, 1>>(full_gradient + u) += g;
-    Eigen::Map<Eigen::Matrix<double, N, 1>>(diagonal + u) += H.diagonal();
   }
 };
 
 }  // namespace
 
 void StructuredSolver::linearizeImu(const BaProblem& problem) {
-  const NodeSums sums{structure_.cholesky, values_.data(), gradient_.data(), full_gradient_.data(), diagonal_.data()};
+  const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
   using RowMajor15x32 = Eigen::Matrix<double, 15, 32, Eigen::RowMajor>;
   Matrix15d J[2];
   alignas(64) double J_both[15 * 32] = {0}, H_both[30 * 32], g_both[32];
+  Eigen::Map<RowMajor15x32> both(J_both);
   for (std::size_t k = 0; k < problem.imu.size(); ++k) {
     const BaImu& f = problem.imu[k];
-    const Eigen::Matrix<double, 15, 1> r = f.preintegration->residual(
-        problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity, &J[0], &J[1]);
+    const Matrix15d& W = f.preintegration->sqrtInformation();
+    const Eigen::Matrix<double, 15, 1> r =
+        W.triangularView<Eigen::Upper>() * f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state,
+                                                                      problem.gravity, &J[0], &J[1], false);
     const int nodes[4] = {structure_.pose_node[f.i], structure_.motion_node[f.i], structure_.pose_node[f.j],
                           structure_.motion_node[f.j]};
-    Eigen::Map<RowMajor15x32> both(J_both);
     both.leftCols<15>() = J[0];
     both.middleCols<15>(15) = J[1];
-    homographyKernels().gram(J_both, r.data(), H_both, g_both);
+    homographyKernels().gram(W.data(), J_both, r.data(), H_both, g_both);
     const Eigen::Map<const Eigen::Matrix<double, 30, 32, Eigen::RowMajor>> H(H_both);
     const Eigen::Map<const Eigen::Matrix<double, 32, 1>> g(g_both);
     const auto& place = structure_.imu[k].place;
@@ -71,7 +71,7 @@ void StructuredSolver::linearizeImu(const BaProblem& problem) {
 }
 
 void StructuredSolver::linearizePlanes(const BaProblem& problem) {
-  const NodeSums sums{structure_.cholesky, values_.data(), gradient_.data(), full_gradient_.data(), diagonal_.data()};
+  const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
   const auto addTriple = [&](const SystemStructure::TriplePlaces& place, int i, int j, int plane,
                              const Eigen::Matrix<double, 15, 15>& H, const Eigen::Matrix<double, 15, 1>& g) {
     sums.add<6>(structure_.pose_node[i], H.block<6, 6>(0, 0), g.segment<6>(0));
@@ -85,10 +85,8 @@ void StructuredSolver::linearizePlanes(const BaProblem& problem) {
   HomographyJacobian J;
   HomographyKernelArguments a = homographyArguments();
   a.values = values_.data();
-  a.gradient = gradient_.data();
-  a.full_gradient = full_gradient_.data();
-  a.diagonal = diagonal_.data();
-  homographyKernels().linearize(a, 0, static_cast<int>(homographies_.size()));
+  a.gradient = full_gradient_.data();
+  homographyKernels().linearize(a, static_cast<int>(problem.homographies.size()));
   for (std::size_t k = 0; k < problem.homography_pairs.size(); ++k) {
     const BaHomographyPair& f = problem.homography_pairs[k];
     const Vector9d h =
@@ -123,7 +121,7 @@ void StructuredSolver::linearizePlanes(const BaProblem& problem) {
 }
 
 void StructuredSolver::linearizePriors(const BaProblem& problem) {
-  const NodeSums sums{structure_.cholesky, values_.data(), gradient_.data(), full_gradient_.data(), diagonal_.data()};
+  const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
   for (const BaGauge& f : problem.gauges) {
     Matrix6d J;
     const Vector6d r = gaugeResidual(f.prior, problem.frames[f.frame].state.T_W_I, &J);
@@ -147,7 +145,7 @@ double StructuredSolver::factorCost(const BaProblem& problem) const {
   double cost = 0;
   for (const BaImu& f : problem.imu)
     cost += f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
-  cost += homographyKernels().cost(homographyArguments(), 0, static_cast<int>(homographies_.size()));
+  cost += homographyKernels().cost(homographyArguments(), static_cast<int>(problem.homographies.size()));
   for (const BaHomographyPair& f : problem.homography_pairs)
     cost += (homographyRows(f.pair) * homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane))
                 .squaredNorm();

@@ -7,21 +7,27 @@
 namespace vip_slam {
 
 namespace plane_baseline {
+#define WIDTH 2
 #include "plane_kernels_body.inc"
+#undef WIDTH
 }  // namespace plane_baseline
 
 #if defined(__x86_64__)
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace plane_avx2 {
+#define WIDTH 4
 #include "plane_kernels_body.inc"
+#undef WIDTH
 }  // namespace plane_avx2
 #pragma GCC pop_options
 
 #pragma GCC push_options
 #pragma GCC target("avx2,fma,avx512f,avx512dq,avx512vl,prefer-vector-width=512")
 namespace plane_avx512 {
+#define WIDTH 8
 #include "plane_kernels_body.inc"
+#undef WIDTH
 }  // namespace plane_avx512
 #pragma GCC pop_options
 #endif

@@ -1,5 +1,5 @@
-// Compressed homographies of the structured solver on plain arrays: Jacobian, J^T G J and J^T G h of one factor at a time;
-// and the product that IMU factors need.
+// Compressed homographies of the structured solver on plain arrays, eight factors at a time; and the product that IMU
+// factors need.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,9 @@
 #include "point_kernels.h"
 
 namespace vip_slam {
+
+/// Factors of one batch; the last batch is filled up with copies of any factor.
+constexpr int kHomographyLanes = 8;
 
 struct KernelPlane {
   double n[3], d;
@@ -25,15 +28,17 @@ struct HomographyKernelArguments {
   const KernelFrame* frames = nullptr;
   const KernelPlane* planes = nullptr;
   const KernelHomography* factors = nullptr;
-  const double* const* G = nullptr;   ///< 81 per factor, symmetric
-  double *values = nullptr, *gradient = nullptr, *full_gradient = nullptr, *diagonal = nullptr;
+  const double* sums = nullptr;       ///< HomographySums, [batch][24][kHomographyLanes]
+  double *values = nullptr, *gradient = nullptr;
 };
 
 struct HomographyKernels {
-  void (*linearize)(const HomographyKernelArguments& a, int begin, int end);
-  double (*cost)(const HomographyKernelArguments& a, int begin, int end);
-  /// IMU factors: H (30 x 32) = J^T J and g (32) = J^T r with J 15 x 32 row-major, columns 30 and 31 zero.
-  void (*gram)(const double* J, const double* r, double* H, double* g);
+  void (*linearize)(const HomographyKernelArguments& a, int count);
+  /// Sum of h^T G h.
+  double (*cost)(const HomographyKernelArguments& a, int count);
+  /// IMU factors: H (30 x 32) = (W J)^T W J and g (32) = (W J)^T W r with J 15 x 32 row-major, columns 30 and 31 zero, and
+  /// W upper-triangular 15 x 15 column-major. `r` is W r already.
+  void (*gram)(const double* W, const double* J, const double* r, double* H, double* g);
 };
 
 const HomographyKernels& homographyKernels();

@@ -35,10 +35,19 @@ namespace point_avx512 {
 
 namespace {
 
-const PointKernels kBaseline{"baseline", point_baseline::linearize, point_baseline::cost, point_baseline::backSubstitute};
+const PointKernels kBaseline{"baseline",
+                             point_baseline::linearize,
+                             point_baseline::eliminate,
+                             point_baseline::linearizeAndEliminate,
+                             point_baseline::cost,
+                             point_baseline::backSubstitute};
 #if defined(__x86_64__)
-const PointKernels kAvx2{"avx2", point_avx2::linearize, point_avx2::cost, point_avx2::backSubstitute};
-const PointKernels kAvx512{"avx512", point_avx512::linearize, point_avx512::cost, point_avx512::backSubstitute};
+const PointKernels kAvx2{
+    "avx2",           point_avx2::linearize,     point_avx2::eliminate, point_avx2::linearizeAndEliminate,
+    point_avx2::cost, point_avx2::backSubstitute};
+const PointKernels kAvx512{
+    "avx512",           point_avx512::linearize,     point_avx512::eliminate, point_avx512::linearizeAndEliminate,
+    point_avx512::cost, point_avx512::backSubstitute};
 #endif
 
 }  // namespace

@@ -11,11 +11,16 @@ namespace vip_slam {
 /// A frame for the kernels; matrices row-major.
 struct KernelFrame {
   double R_C_W[9], R_C_I[9], R_W_I[9];
-  double t_W_I[3], t_W_C[3], t_I_C[3];
+  double t_W_I[3], t_W_C[3];
+  double lever_C[9];           ///< R_C_I [t_I_C]x
   double offset_C[3];          ///< R_C_I t_I_C: p_C = R_C_W (p - t_W_I) - offset_C
   std::int64_t diagonal = -1;  ///< offset of its diagonal block in the values; -1: fixed
   std::int32_t unknown = 0;    ///< first unknown of the pose
+  std::int32_t position = -1;  ///< in the elimination order; -1: fixed
 };
+
+/// Per frame: a 6 x 6 block (lower triangle, columns of 8) and a gradient of 6, padded.
+constexpr int kFrameSums = 56;
 
 struct PointKernelArguments {
   const KernelFrame* frames = nullptr;
@@ -27,9 +32,9 @@ struct PointKernelArguments {
   double huber = 0, depth_huber = 0;
   double inverse_radius = 0;                    ///< damping: clamp(diag) * inverse_radius
   double* values = nullptr;                     ///< reduced matrix, lower blocks; added to
-  double* gradient = nullptr;                   ///< reduced J^T r per unknown; added to
-  double* full_gradient = nullptr;              ///< J^T r before elimination; added to
-  double* diagonal = nullptr;                   ///< diag(J^T J) per unknown, before elimination; added to
+  double* frame_sums = nullptr;                 ///< kFrameSums per frame: J^T J and J^T r of the pose; added to
+  double* eliminated = nullptr;                 ///< 8 per frame: W V^-1 g; added to
+  int first_position = 0, last_position = 0;    ///< elimination touches blocks whose later frame lies in [first, last)
   double* W = nullptr;                          ///< per observation 3 columns of 8: J_pose^T J_point
   double* point_inverse = nullptr;              ///< per point 6: damped inverse (xx, xy, xz, yy, yz, zz)
   double* point_gradient = nullptr;             ///< per point 3: J_point^T r
@@ -38,8 +43,11 @@ struct PointKernelArguments {
 
 struct PointKernels {
   const char* name;
-  /// Points [begin, end). `scratch`: 64 doubles per observation of the longest point.
-  void (*linearize)(const PointKernelArguments& a, int begin, int end, double* scratch);
+  /// Points [begin, end): their Jacobians; the elimination with the Jacobians of all; both in one sweep. A block of the
+  /// reduced matrix gets its points in ascending order whichever way, so that the sums are the same to the last bit.
+  void (*linearize)(const PointKernelArguments& a, int begin, int end);
+  void (*eliminate)(const PointKernelArguments& a, int begin, int end);
+  void (*linearizeAndEliminate)(const PointKernelArguments& a, int begin, int end);
   /// Robust cost (not halved).
   double (*cost)(const PointKernelArguments& a, int begin, int end);
   /// step_p = -V^-1 (g_p + W^T step) per point; `step` per unknown. Returns nothing else.

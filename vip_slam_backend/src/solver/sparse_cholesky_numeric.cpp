@@ -7,17 +7,38 @@
 
 namespace vip_slam {
 
+// Adds a child's update to its parent: the columns that are pivots there (`pivots`), or the others.
+void SparseCholesky::addChild(const Front& child, const double* update, int parent_columns, bool pivots, double* target,
+                              int ld) {
+  const int k = child.rows - child.columns;
+  for (std::size_t sj = 0; sj < child.to_parent.size(); ++sj) {
+    const Segment& cs = child.to_parent[sj];
+    for (int j = 0; j < cs.size; ++j) {
+      const int column = cs.parent + j;
+      if ((column < parent_columns) != pivots) continue;
+      const double* source = update + static_cast<std::size_t>(cs.child + j) * k;
+      // Rows of the other columns are counted from the parent's first update row.
+      double* to = pivots ? target + static_cast<std::size_t>(column) * ld
+                          : target + static_cast<std::size_t>(column - parent_columns) * ld - parent_columns;
+      for (int i = j; i < cs.size; ++i) to[cs.parent + i] += source[cs.child + i];
+      for (std::size_t si = sj + 1; si < child.to_parent.size(); ++si) {
+        const Segment& rs = child.to_parent[si];
+        double* t = to + rs.parent;
+        const double* s = source + rs.child;
+        for (int i = 0; i < rs.size; ++i) t[i] += s[i];
+      }
+    }
+  }
+}
+
 bool SparseCholesky::factorize(const double* values) {
   const DenseKernels& kernels = denseKernels();
   std::size_t stack = 0;
-  for (std::size_t f = 0; f < fronts_.size(); ++f) {
-    const Front& front = fronts_[f];
+  for (const Front& front : fronts_) {
     const int n = front.rows, c = front.columns, ld = front.ld, m = n - c;
-    // Pivot columns are assembled where the factor stays; the rest in the scratch front.
+    // Pivot columns are assembled where the factor stays.
     double* panel = factor_.data() + front.factor_offset;
-    double* rest = front_.data();
     std::memset(panel, 0, sizeof(double) * ld * c);
-    for (int j = 0; j < m; ++j) std::memset(rest + static_cast<std::size_t>(j) * m + j, 0, sizeof(double) * (m - j));
     for (const Entry& e : front.entries) {
       const double* source = values + e.offset;
       for (int j = 0; j < e.columns; ++j) {
@@ -26,35 +47,29 @@ bool SparseCholesky::factorize(const double* values) {
         source += e.ld;
       }
     }
-    for (auto child = front.children.rbegin(); child != front.children.rend(); ++child) {
-      const Front& from = fronts_[*child];
-      const int k = from.rows - from.columns;
-      stack -= static_cast<std::size_t>(k) * k;
-      const double* update = stack_.data() + stack;
-      for (std::size_t sj = 0; sj < from.to_parent.size(); ++sj) {
-        const Segment& cs = from.to_parent[sj];
-        for (int j = 0; j < cs.size; ++j) {
-          const double* source = update + static_cast<std::size_t>(cs.child + j) * k;
-          const int column = cs.parent + j;
-          double* target = column < c ? panel + static_cast<std::size_t>(column) * ld
-                                      : rest + static_cast<std::size_t>(column - c) * m - c;
-          for (int i = j; i < cs.size; ++i) target[cs.parent + i] += source[cs.child + i];
-          for (std::size_t si = sj + 1; si < from.to_parent.size(); ++si) {
-            const Segment& rs = from.to_parent[si];
-            double* t = target + rs.parent;
-            const double* s = source + rs.child;
-            for (int i = 0; i < rs.size; ++i) t[i] += s[i];
-          }
-        }
+    const std::size_t top = stack;
+    const auto eachChild = [&](bool pivots, double* target, int target_ld) {
+      std::size_t at = top;
+      for (auto child = front.children.rbegin(); child != front.children.rend(); ++child) {
+        const Front& from = fronts_[*child];
+        const std::size_t k = from.rows - from.columns;
+        at -= k * k;
+        addChild(from, stack_.data() + at, c, pivots, target, target_ld);
       }
-    }
+      return at;
+    };
+    stack = eachChild(true, panel, ld);
     if (!kernels.factorPanel(panel, n, c, ld)) return false;
     if (m > 0) {
-      double* update = stack_.data() + stack;
-      for (int j = 0; j < m; ++j)
-        std::memcpy(update + static_cast<std::size_t>(j) * m + j, rest + static_cast<std::size_t>(j) * m + j,
-                    sizeof(double) * (m - j));
-      kernels.subtractSyrk(update, m, panel + c, ld, m, c);
+      // The update matrix is made above the children's and takes their place when it has taken them up.
+      double* update = stack_.data() + top;
+      kernels.negativeSyrk(update, m, panel + c, ld, m, c);
+      eachChild(false, update, m);
+      if (top != stack) {
+        double* to = stack_.data() + stack;
+        for (std::size_t j = 0; j < static_cast<std::size_t>(m); ++j)
+          std::memmove(to + j * m + j, update + j * m + j, sizeof(double) * (m - j));
+      }
       stack += static_cast<std::size_t>(m) * m;
     }
   }
@@ -62,33 +77,21 @@ bool SparseCholesky::factorize(const double* values) {
 }
 
 void SparseCholesky::solve(double* b) const {
+  const DenseKernels& kernels = denseKernels();
   double* x = work_.data();
   for (const Front& front : fronts_) {
-    const int n = front.rows, c = front.columns, ld = front.ld;
-    const double* panel = factor_.data() + front.factor_offset;
+    const int n = front.rows, c = front.columns;
     for (int i = 0; i < c; ++i) x[i] = b[front.unknowns[i]];
     for (int i = c; i < n; ++i) x[i] = 0;
-    for (int j = 0; j < c; ++j) {
-      const double* column = panel + static_cast<std::size_t>(j) * ld;
-      const double v = x[j] / column[j];
-      x[j] = v;
-      for (int i = j + 1; i < n; ++i) x[i] -= v * column[i];
-    }
+    kernels.forwardSubstitute(factor_.data() + front.factor_offset, n, c, front.ld, x);
     for (int i = 0; i < c; ++i) b[front.unknowns[i]] = x[i];
     for (int i = c; i < n; ++i) b[front.unknowns[i]] += x[i];
   }
   for (std::size_t f = fronts_.size(); f-- > 0;) {
     const Front& front = fronts_[f];
-    const int n = front.rows, c = front.columns, ld = front.ld;
-    const double* panel = factor_.data() + front.factor_offset;
-    for (int i = 0; i < n; ++i) x[i] = b[front.unknowns[i]];
-    for (int j = c - 1; j >= 0; --j) {
-      const double* column = panel + static_cast<std::size_t>(j) * ld;
-      double v = x[j];
-      for (int i = j + 1; i < n; ++i) v -= column[i] * x[i];
-      x[j] = v / column[j];
-      b[front.unknowns[j]] = x[j];
-    }
+    for (int i = 0; i < front.rows; ++i) x[i] = b[front.unknowns[i]];
+    kernels.backSubstitute(factor_.data() + front.factor_offset, front.rows, front.columns, front.ld, x);
+    for (int i = 0; i < front.columns; ++i) b[front.unknowns[i]] = x[i];
   }
 }
 

@@ -149,7 +149,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   }
 
   fronts_.assign(first.size(), Front());
-  front_size_ = stack_size_ = factor_size_ = factor_nonzeros_ = 0;
+  stack_size_ = factor_size_ = factor_nonzeros_ = 0;
   factor_flops_ = 0;
   std::vector<std::vector<int>> rows_of(fronts_.size());
   std::vector<int> offset_in_front(n, -1);
@@ -169,7 +169,6 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
     if (front.ld % 64 == 0) front.ld += 8;  // columns must not fall on the same cache sets
     front.factor_offset = factor_size_;
     factor_size_ += static_cast<std::size_t>(front.ld) * front.columns;
-    front_size_ = std::max(front_size_, static_cast<std::size_t>(front.ld) * front.rows + kKernelPadding);
     for (int c = 0; c < front.columns; ++c) {
       const double below = front.rows - c;
       factor_nonzeros_ += static_cast<std::size_t>(below);
@@ -199,7 +198,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
         front.to_parent.push_back(segment);
     }
   }
-  // The stack must also hold a front's update beside its children's while it is assembled.
+  // The stack must also hold a front's update above its children's while it takes them up.
   std::size_t largest = 0;
   for (const std::size_t s : update_size) largest = std::max(largest, s);
   stack_size_ += largest + kKernelPadding;
@@ -219,7 +218,6 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
     const int a = position_[pairs[k].first], b = position_[pairs[k].second];
     place(std::max(a, b), std::min(a, b), pair_offset_[k], false);
   }
-  front_.assign(front_size_, 0.0);
   stack_.assign(stack_size_, 0.0);
   factor_.assign(factor_size_, 0.0);
   work_.assign(dimension_ + kKernelPadding, 0.0);

@@ -2,12 +2,15 @@
 // linearised, plane factors reduced to small dense blocks, one symbolic factorisation for all iterations.
 #pragma once
 
+#include <functional>
+
 #include <Eigen/Core>
 
 #include "plane_kernels.h"
 #include "point_kernels.h"
 #include "system_structure.h"
 #include "vip_slam_backend/solver/ba_solver.h"
+#include "worker.h"
 
 namespace vip_slam {
 
@@ -27,10 +30,21 @@ class StructuredSolver : public BaSolver {
   const SystemStructure& structure() const { return structure_; }
 
  private:
+  // structured_arrays.cpp
   void prepare(const BaProblem& problem);
+  void packHomographies(const BaProblem& problem);
   void loadFrames(const BaProblem& problem);
+  PointKernelArguments arguments(const BaProblem& problem, double radius);
+  HomographyKernelArguments homographyArguments() const;
+
+  // structured_linearize.cpp
+  void linearize(const BaProblem& problem, double radius, Worker* worker);
+  void storeDiagonal();
+  void addPoints();
+  void damp(double radius);
+  void forEachNode(const std::function<void(int size, int unknown, double* block)>& f);
+
   double cost(const BaProblem& problem);
-  void linearize(const BaProblem& problem, double radius, int threads);
   bool solveStep();
   /// Predicted decrease of the cost by the present step.
   double modelDecrease() const;
@@ -41,8 +55,6 @@ class StructuredSolver : public BaSolver {
   };
   void apply(const BaProblem& from, State* to) const;
   double stepNorm() const;
-  PointKernelArguments arguments(const BaProblem& problem, double radius);
-  HomographyKernelArguments homographyArguments() const;
 
   // linearize_factors.cpp
   void linearizeImu(const BaProblem& problem);
@@ -51,17 +63,16 @@ class StructuredSolver : public BaSolver {
   double factorCost(const BaProblem& problem) const;
 
   SystemStructure structure_;
+  bool loaded_ = false;  ///< the arrays below hold the present variables
   std::vector<KernelFrame> frames_;
   std::vector<FrameGeometry> geometry_;
   std::vector<Eigen::Matrix<double, 3, 2>> basis_;
   std::vector<BaObservation> observations_;
   std::vector<KernelPlane> planes_;
   std::vector<KernelHomography> homographies_;
-  std::vector<const double*> homography_G_;
+  std::vector<double> homography_sums_;
   std::vector<double> points_, values_, gradient_, full_gradient_, diagonal_, damping_, W_, point_inverse_,
-      point_gradient_, point_damping_, step_, point_step_, scratch_;
-  // Second thread's sums.
-  std::vector<double> values2_, gradient2_, full_gradient2_, diagonal2_, scratch2_;
+      point_gradient_, point_damping_, step_, point_step_, frame_sums_, eliminated_;
 };
 
 }  // namespace vip_slam

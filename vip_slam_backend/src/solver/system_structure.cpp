@@ -45,6 +45,51 @@ std::uint64_t SystemStructure::signature(const BaProblem& problem) const {
   return hash.value();
 }
 
+void SystemStructure::orderPoints(const BaProblem& problem) {
+  const int points = static_cast<int>(problem.points.size());
+  std::vector<int> oldest(points, 0);
+  for (int p = 0; p < points; ++p) {
+    const BaPoint& point = problem.points[p];
+    for (int o = point.first; o < point.first + point.count; ++o) {
+      const int frame = problem.observations[o].frame;
+      oldest[p] = o == point.first ? frame : std::min(oldest[p], frame);
+    }
+  }
+  point_at.resize(points);
+  std::iota(point_at.begin(), point_at.end(), 0);
+  std::stable_sort(point_at.begin(), point_at.end(), [&](int a, int b) { return oldest[a] < oldest[b]; });
+
+  const auto rank = [&](int o) {
+    const int node = pose_node[problem.observations[o].frame];
+    return node < 0 ? -1 : cholesky.position(node);
+  };
+  sorted.clear();
+  first.assign(1, 0);
+  for (const int p : point_at) {
+    const BaPoint& point = problem.points[p];
+    for (int o = point.first; o < point.first + point.count; ++o) sorted.push_back(o);
+    std::stable_sort(sorted.begin() + first.back(), sorted.end(), [&](int a, int b) { return rank(a) < rank(b); });
+    first.push_back(static_cast<int>(sorted.size()));
+  }
+}
+
+void SystemStructure::splitElimination(const BaProblem& problem) {
+  // A view costs one block for itself and each that is eliminated before it.
+  std::vector<std::int64_t> work(cholesky.nodes(), 0);
+  std::int64_t total = 0;
+  for (std::size_t p = 0; p < problem.points.size(); ++p) {
+    int blocks = 0;
+    for (int o = first[p]; o < first[p + 1]; ++o) {
+      const int node = pose_node[problem.observations[sorted[o]].frame];
+      if (node < 0) continue;
+      work[cholesky.position(node)] += ++blocks;
+      total += blocks;
+    }
+  }
+  half_position = 0;
+  for (std::int64_t sum = 0; half_position < cholesky.nodes() && 2 * sum < total; ++half_position) sum += work[half_position];
+}
+
 bool SystemStructure::update(const BaProblem& problem) {
   const std::uint64_t now = signature(problem);
   if (valid_ && now == signature_) return false;
@@ -163,20 +208,8 @@ bool SystemStructure::update(const BaProblem& problem) {
   for (const BaPlanePoint& f : problem.plane_points)
     plane_points.push_back(placeOf(plane_node[f.plane], pose_node[f.frame]));
 
-  // Observations in the elimination order of their frames.
-  sorted.resize(problem.observations.size());
-  std::iota(sorted.begin(), sorted.end(), 0);
-  first.clear();
-  const auto rank = [&](int o) {
-    const int node = pose_node[problem.observations[o].frame];
-    return node < 0 ? -1 : cholesky.position(node);
-  };
-  for (const BaPoint& p : problem.points) {
-    first.push_back(p.first);
-    std::stable_sort(sorted.begin() + p.first, sorted.begin() + p.first + p.count,
-                     [&](int a, int b) { return rank(a) < rank(b); });
-  }
-  first.push_back(static_cast<int>(problem.observations.size()));
+  orderPoints(problem);
+  splitElimination(problem);
   signature_ = now;
   valid_ = true;
   return true;

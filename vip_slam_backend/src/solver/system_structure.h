@@ -23,8 +23,12 @@ class SystemStructure {
 
   SparseCholesky cholesky;
   std::vector<int> pose_node, motion_node, plane_node;  ///< -1: constant
-  /// Observations sorted, per point, by the elimination order of their frames (fixed frames first).
+  /// The problem's points in the order of processing: by their oldest frame, so that neighbours touch the same blocks.
+  std::vector<int> point_at;
+  /// Observations of the points in that order, per point by the elimination order of their frames (fixed frames first).
   std::vector<int> sorted, first;
+  /// Splits the elimination order so that the eliminations of points cost the same before and after.
+  int half_position = 0;
   std::vector<std::uint32_t> pair_offset;               ///< [earlier * frames + later] pose blocks
   /// Blocks of the other factors: IMU (pose_i, motion_i, pose_j, motion_j), homographies (pose_i, pose_j, plane).
   struct ImuPlaces {
@@ -39,6 +43,8 @@ class SystemStructure {
 
  private:
   std::uint64_t signature(const BaProblem& problem) const;
+  void orderPoints(const BaProblem& problem);
+  void splitElimination(const BaProblem& problem);
   std::uint64_t signature_ = 0;
   bool valid_ = false;
 };

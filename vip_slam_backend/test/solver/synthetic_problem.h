@@ -155,7 +155,7 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
     for (const BaHomographyPair& f : p.homography_pairs) {
       BaHomography& h = homographies[{f.i, f.j, f.plane}];
       h.i = f.i, h.j = f.j, h.plane = f.plane;
-      addHomographyPair(f.pair, &h.G);
+      addHomographyPair(f.pair, &h.sums);
       ++h.pairs;
     }
     for (const auto& h : homographies) p.homographies.push_back(h.second);

@@ -100,12 +100,22 @@ TEST(DenseKernels, AllBuildsAgree) {
     ASSERT_TRUE(kernels->factorPanel(A.data(), n, c, ld));
     for (int j = 0; j < c; ++j)
       EXPECT_LT((A.col(j).segment(j, n - j) - L.col(j).tail(n - j)).norm(), 1e-12 * S.norm()) << name;
-    Eigen::MatrixXd C = S.bottomRightCorner(n - c, n - c);
-    kernels->subtractSyrk(C.data(), n - c, A.data() + c, ld, n - c, c);
+    Eigen::MatrixXd C = Eigen::MatrixXd::Constant(n - c, n - c, 7.0);
+    kernels->negativeSyrk(C.data(), n - c, A.data() + c, ld, n - c, c);
     const Eigen::MatrixXd L21 = L.bottomLeftCorner(n - c, c);
-    const Eigen::MatrixXd expected = S.bottomRightCorner(n - c, n - c) - L21 * L21.transpose();
+    const Eigen::MatrixXd expected = -L21 * L21.transpose();
     for (int j = 0; j < n - c; ++j)
       EXPECT_LT((C.col(j).tail(n - c - j) - expected.col(j).tail(n - c - j)).norm(), 1e-11 * S.norm()) << name;
+    // Forth and back with the first c columns of L.
+    const Eigen::VectorXd b = Eigen::VectorXd::Random(n);
+    Eigen::MatrixXd K = Eigen::MatrixXd::Identity(n, n);
+    K.leftCols(c) = L.leftCols(c);
+    Eigen::VectorXd x = b;
+    kernels->forwardSubstitute(A.data(), n, c, ld, x.data());
+    EXPECT_LT((K * x - b).norm(), 1e-12 * b.norm()) << name;
+    x = b;
+    kernels->backSubstitute(A.data(), n, c, ld, x.data());
+    EXPECT_LT((K.transpose() * x - b).norm(), 1e-12 * b.norm()) << name;
   }
   EXPECT_GE(tried, 1);
 }

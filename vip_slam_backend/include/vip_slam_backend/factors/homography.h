@@ -5,6 +5,8 @@
 // G_h = sum C^T C: cost 1/2 h^T G_h h, residual L^T h with G_h = L L^T.
 #pragma once
 
+#include <array>
+
 #include <Eigen/Core>
 
 #include "vip_slam_backend/factors/frame_geometry.h"
@@ -26,8 +28,13 @@ struct HomographyPair {
 Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
                           const Eigen::Matrix<double, 3, 2>* basis = nullptr, HomographyJacobian* J = nullptr);
 
-/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor: camera within
-/// 0.15 m of the plane, ray within 10 degrees of it, ratio outside [1/4, 4], point behind a camera.
+/// A homography is too weak for a factor with a camera nearer to the plane than this, metres, ...
+constexpr double kMinPlaneDistance = 0.15;
+/// ... or a depth ratio outside these.
+constexpr double kMinDepthRatio = 0.25, kMaxDepthRatio = 4.0;
+
+/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor (above), the ray
+/// is within 10 degrees of the plane, or the point behind a camera.
 bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane, const Eigen::Vector2d& xy_i,
                           double* rho);
 
@@ -38,8 +45,15 @@ double hostNoiseGain(const Vector9d& h, const Eigen::Vector2d& xy_i);
 /// The two rows C_l, weighted.
 Eigen::Matrix<double, 2, 9> homographyRows(const HomographyPair& pair);
 
+/// G_h of any number of pairs in 24 numbers. With p = (x_i, y_i, 1), (u, v) = xy_j and the pair's weight w
+///   G = [A 0 -B; 0 A -C; -B -C D],  A = sum w^2 p p^T,  B = sum w^2 u p p^T,  C = sum w^2 v p p^T,
+///   D = sum w^2 (u^2 + v^2) p p^T,  each kept as xx xy xz yy yz zz.
+using HomographySums = std::array<double, 24>;
+
 /// Adds C_l^T C_l.
-void addHomographyPair(const HomographyPair& pair, Matrix9d* G);
+void addHomographyPair(const HomographyPair& pair, HomographySums* sums);
+Matrix9d homographyMatrix(const HomographySums& sums);
+bool isFinite(const HomographySums& sums);
 
 /// Rows L^T (at most 9) with G = L L^T; eigenvalues below 1e-12 of the largest are dropped. Returns the number of rows.
 int decomposeHomography(const Matrix9d& G, Matrix9d* rows);

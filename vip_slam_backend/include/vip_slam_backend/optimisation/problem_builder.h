@@ -36,6 +36,7 @@ struct BuiltProblem {
 struct BuilderSettings {
   Variant variant = Variant::kVip;
   MeasurementOptions measurement;
+  bool shared_hosts = false;            ///< of homographies: few hosts for many landmarks, instead of first views
   double focal = 500;                   ///< px
   Eigen::Vector3d gravity = gravityVector();
 };

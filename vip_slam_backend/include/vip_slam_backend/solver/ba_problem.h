@@ -48,7 +48,7 @@ struct BaImu {
 
 struct BaHomography {      ///< compressed
   int i = 0, j = 0, plane = 0;
-  Matrix9d G = Matrix9d::Zero();
+  HomographySums sums{};
   int pairs = 0;
 };
 

@@ -55,6 +55,7 @@ class SparseCholesky {
     std::vector<int> unknowns;           // caller's unknown of each row
     std::size_t factor_offset = 0;
   };
+  static void addChild(const Front& child, const double* update, int parent_columns, bool pivots, double* target, int ld);
   void order(const std::vector<std::vector<int>>& neighbours);
 
   std::vector<int> sizes_, unknown_, position_, node_at_;
@@ -63,8 +64,8 @@ class SparseCholesky {
   double factor_flops_ = 0;
   int dimension_ = 0;
   std::vector<Front> fronts_;
-  std::size_t front_size_ = 0, stack_size_ = 0, factor_size_ = 0;
-  std::vector<double> front_, stack_, factor_;
+  std::size_t stack_size_ = 0, factor_size_ = 0;
+  std::vector<double> stack_, factor_;
   mutable std::vector<double> work_;
 };
 

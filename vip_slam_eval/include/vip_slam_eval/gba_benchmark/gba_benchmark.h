@@ -16,14 +16,17 @@ struct GbaRun {
   int threads = 1;
   int keyframes = 0;
   std::size_t points = 0, planes = 0, homographies = 0, homography_pairs = 0, point_to_plane = 0;
-  double build_ms = 0;      ///< map to problem, compression included
+  double build_ms = 0;      ///< map to problem, compression included; median
+  double store_ms = 0;      ///< problem to map, points on planes included; median
   SolverSummary summary;    ///< of the run with the median total time
+  /// From map to map.
+  double wholeMs() const { return build_ms + summary.total_ms + store_ms; }
   double rmse_before = 0, rmse = 0;  ///< ATE of the keyframes after rigid alignment, metres
 };
 
-/// Runs `repeats` times from the same start and keeps the run with the median time.
-GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats,
-              bool shared_hosts = true);
+/// Runs `repeats` times from the same start and keeps the run with the median time. Hosts of homographies as in the live
+/// system's global adjustment.
+GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats);
 
 /// The map of the first `keyframes` keyframes.
 SimulatedMap prefix(const SimulatedMap& map, int keyframes);

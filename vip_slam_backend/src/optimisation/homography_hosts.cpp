@@ -1,0 +1,75 @@
+#include "homography_hosts.h"
+
+#include <queue>
+
+#include "vip_slam_backend/factors/homography.h"
+
+namespace vip_slam {
+namespace {
+
+// Landmarks of one plane by the frames that could host them.
+struct Candidate {
+  int landmark = 0, view = 0;
+};
+
+void shareHosts(const LandmarkViews& views, const std::vector<int>& landmarks, const std::vector<char>& good,
+                int frames, std::vector<int>* hosts) {
+  std::vector<int> left(frames, 0), start(frames + 1, 0);  // landmarks still without host that a frame sees well
+  for (const int l : landmarks)
+    for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v)
+      if (good[views.first(l) + (v - views.begin(l))]) ++left[v->frame];
+  for (int f = 0; f < frames; ++f) start[f + 1] = start[f] + left[f];
+  std::vector<Candidate> candidates(start.back());
+  std::vector<int> next(start.begin(), start.end() - 1);
+  for (const int l : landmarks)
+    for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
+      const int view = static_cast<int>(v - views.begin(l));
+      if (good[views.first(l) + view]) candidates[next[v->frame]++] = {l, view};
+    }
+  std::priority_queue<std::pair<int, int>> queue;
+  for (int f = 0; f < frames; ++f)
+    if (left[f] > 0) queue.emplace(left[f], f);
+  while (!queue.empty()) {
+    const auto [count, frame] = queue.top();
+    queue.pop();
+    if (count != left[frame]) {  // others took some meanwhile
+      if (left[frame] > 0) queue.emplace(left[frame], frame);
+      continue;
+    }
+    for (int c = start[frame]; c < start[frame + 1]; ++c) {
+      const int l = candidates[c].landmark;
+      if ((*hosts)[l] >= 0) continue;
+      (*hosts)[l] = candidates[c].view;
+      for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v)
+        if (good[views.first(l) + (v - views.begin(l))]) --left[v->frame];
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>& plane,
+                             const std::vector<BaPlane>& planes, const std::vector<FrameGeometry>& geometry,
+                             bool shared) {
+  std::vector<int> hosts(views.size(), -1);
+  std::vector<char> good(views.viewCount(), 0);
+  std::vector<std::vector<int>> on_plane(planes.size());
+  for (int l = 0; l < views.size(); ++l) {
+    if (plane[l] < 0) continue;
+    on_plane[plane[l]].push_back(l);
+    for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
+      const int view = static_cast<int>(v - views.begin(l));
+      const FrameGeometry& g = geometry[v->frame];
+      double rho = 1;
+      if (!homographyDepthRatio(g, g, planes[plane[l]].plane, v->feature->xy.cast<double>(), &rho)) continue;
+      good[views.first(l) + view] = 1;
+      if (hosts[l] < 0 && !shared) hosts[l] = view;
+    }
+  }
+  if (shared)
+    for (const auto& landmarks : on_plane)
+      shareHosts(views, landmarks, good, static_cast<int>(geometry.size()), &hosts);
+  return hosts;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,34 @@
+#include "plane_intersection.h"
+
+#include <cmath>
+
+namespace vip_slam {
+
+const PlaneIntersection::Camera& PlaneIntersection::camera(KeyframeId id) {
+  const auto known = cameras_.find(id);
+  if (known != cameras_.end()) return known->second;
+  const MapKeyframe& kf = map_.keyframe(id);
+  const SE3 T_W_C = kf.T_W_C();
+  return cameras_.emplace(id, Camera{T_W_C.R(), T_W_C.t(), kf.features().data()}).first->second;
+}
+
+Eigen::Vector3d PlaneIntersection::operator()(const MapLandmark& landmark, const Plane& plane) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double weights = 0;
+  for (const MapObservation& o : landmark.observations) {
+    const Camera& c = camera(o.keyframe);
+    const Eigen::Vector2f& xy = c.features[o.feature].xy;
+    const Eigen::Vector3d ray = c.R_W_C * Eigen::Vector3d(xy.x(), xy.y(), 1.0);
+    const double incidence = plane.n.dot(ray);
+    const double z = -plane.signedDistance(c.t_W_C) / incidence;
+    const double cosine = std::abs(incidence) / ray.norm();
+    if (!(z > 0.05) || cosine < 0.1) continue;
+    // A ray's error on the plane grows with distance and with the slant.
+    const double weight = cosine * cosine / (z * z);
+    sum += weight * (c.t_W_C + z * ray);
+    weights += weight;
+  }
+  return weights > 0 ? Eigen::Vector3d(sum / weights) : plane.project(landmark.p_W);
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,30 @@
+// Landmarks on planes that were no variables: where their rays meet the plane.
+#pragma once
+
+#include <unordered_map>
+
+#include "vip_slam_backend/map/map.h"
+
+namespace vip_slam {
+
+/// Reads the map's poses as they are at the first use of each keyframe.
+class PlaneIntersection {
+ public:
+  explicit PlaneIntersection(const Map& map) : map_(map) {}
+  /// Weighted mean of where the rays of a landmark's observations meet the plane; the projection of its position when
+  /// none does.
+  Eigen::Vector3d operator()(const MapLandmark& landmark, const Plane& plane);
+
+ private:
+  struct Camera {
+    Eigen::Matrix3d R_W_C;
+    Eigen::Vector3d t_W_C;
+    const Feature* features;
+  };
+  const Camera& camera(KeyframeId id);
+
+  const Map& map_;
+  std::unordered_map<KeyframeId, Camera> cameras_;
+};
+
+}  // namespace vip_slam

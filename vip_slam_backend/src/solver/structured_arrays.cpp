@@ -1,0 +1,118 @@
+// From a problem to the plain arrays that the kernels of the structured solver read.
+#include <algorithm>
+
+#include "structured_solver.h"
+
+namespace vip_slam {
+namespace {
+
+void copyRowMajor(const Eigen::Matrix3d& M, double* out) {
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out, 3, 3) = M;
+}
+
+}  // namespace
+
+void StructuredSolver::prepare(const BaProblem& problem) {
+  loaded_ = false;
+  structure_.update(problem);
+  const SparseCholesky& cholesky = structure_.cholesky;
+  observations_.resize(structure_.sorted.size());
+  for (std::size_t o = 0; o < observations_.size(); ++o) observations_[o] = problem.observations[structure_.sorted[o]];
+  values_.resize(cholesky.valueCount() + 8);
+  for (auto* v : {&gradient_, &full_gradient_, &diagonal_, &damping_, &step_}) v->assign(cholesky.dimension(), 0.0);
+  W_.resize(24 * observations_.size());
+  points_.resize(3 * problem.points.size());
+  point_step_.resize(points_.size());
+  point_gradient_.resize(points_.size());
+  point_damping_.resize(points_.size());
+  point_inverse_.resize(2 * points_.size());
+  packHomographies(problem);
+  frame_sums_.resize(kFrameSums * problem.frames.size());
+  eliminated_.resize(8 * problem.frames.size());
+}
+
+void StructuredSolver::packHomographies(const BaProblem& problem) {
+  const std::size_t count = problem.homographies.size();
+  const std::size_t batches = (count + kHomographyLanes - 1) / kHomographyLanes;
+  homographies_.resize(batches * kHomographyLanes);
+  homography_sums_.assign(24 * homographies_.size(), 0.0);
+  for (std::size_t k = 0; k < homographies_.size(); ++k) {
+    const BaHomography& f = problem.homographies[std::min(k, count - 1)];
+    const SystemStructure::TriplePlaces& place = structure_.homographies[std::min(k, count - 1)];
+    homographies_[k] = {f.i, f.j, f.plane, place.ji.transposed, place.pi.transposed, place.pj.transposed,
+                        place.ji.offset, place.pi.offset, place.pj.offset};
+    double* sums = homography_sums_.data() + 24 * kHomographyLanes * (k / kHomographyLanes) + k % kHomographyLanes;
+    for (int s = 0; s < 24; ++s) sums[kHomographyLanes * s] = f.sums[s];
+  }
+}
+
+void StructuredSolver::loadFrames(const BaProblem& problem) {
+  loaded_ = true;
+  frames_.resize(problem.frames.size());
+  geometry_.resize(problem.frames.size());
+  for (std::size_t k = 0; k < frames_.size(); ++k) {
+    const BaFrame& f = problem.frames[k];
+    FrameGeometry& g = geometry_[k];
+    g = FrameGeometry(f.state.T_W_I, f.T_I_C);
+    KernelFrame& out = frames_[k];
+    copyRowMajor(g.R_C_W, out.R_C_W);
+    copyRowMajor(g.R_C_I, out.R_C_I);
+    copyRowMajor(g.R_W_I, out.R_W_I);
+    Eigen::Map<Eigen::Vector3d>(out.t_W_I) = g.t_W_I;
+    Eigen::Map<Eigen::Vector3d>(out.t_W_C) = g.t_W_C;
+    copyRowMajor(g.R_C_I * hat(g.t_I_C), out.lever_C);
+    Eigen::Map<Eigen::Vector3d>(out.offset_C) = g.R_C_I * g.t_I_C;
+    const int node = structure_.pose_node[k];
+    out.diagonal = node < 0 ? -1 : static_cast<std::int64_t>(structure_.cholesky.diagonalOffset(node));
+    out.unknown = node < 0 ? 0 : structure_.cholesky.unknown(node);
+    out.position = node < 0 ? -1 : structure_.cholesky.position(node);
+  }
+  for (std::size_t k = 0; k < problem.points.size(); ++k)
+    Eigen::Map<Eigen::Vector3d>(points_.data() + 3 * k) = problem.points[structure_.point_at[k]].p_W;
+  basis_.resize(problem.planes.size());
+  planes_.resize(problem.planes.size());
+  for (std::size_t k = 0; k < basis_.size(); ++k) {
+    const Plane& plane = problem.planes[k].plane;
+    basis_[k] = tangentBasis(plane.n);
+    KernelPlane& out = planes_[k];
+    Eigen::Map<Eigen::Vector3d>(out.n) = plane.n;
+    out.d = plane.d;
+    Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(out.basis) = basis_[k];
+    const int node = structure_.plane_node[k];
+    out.diagonal = static_cast<std::int64_t>(structure_.cholesky.diagonalOffset(node));
+    out.unknown = structure_.cholesky.unknown(node);
+  }
+}
+
+HomographyKernelArguments StructuredSolver::homographyArguments() const {
+  HomographyKernelArguments a;
+  a.frames = frames_.data();
+  a.planes = planes_.data();
+  a.factors = homographies_.data();
+  a.sums = homography_sums_.data();
+  return a;
+}
+
+PointKernelArguments StructuredSolver::arguments(const BaProblem& problem, double radius) {
+  PointKernelArguments a;
+  a.frames = frames_.data();
+  a.frame_count = static_cast<int>(frames_.size());
+  a.observations = observations_.data();
+  a.first = structure_.first.data();
+  a.points = points_.data();
+  a.pair_offset = structure_.pair_offset.data();
+  a.huber = problem.huber;
+  a.depth_huber = problem.depth_huber;
+  a.inverse_radius = 1.0 / radius;
+  a.values = values_.data();
+  a.frame_sums = frame_sums_.data();
+  a.eliminated = eliminated_.data();
+  a.last_position = structure_.cholesky.nodes();
+  a.W = W_.data();
+  a.point_inverse = point_inverse_.data();
+  a.point_gradient = point_gradient_.data();
+  a.point_damping = point_damping_.data();
+  return a;
+}
+
+}  // namespace vip_slam

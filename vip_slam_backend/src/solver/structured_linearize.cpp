@@ -1,0 +1,87 @@
+// The normal equations of the structured solver: factors among poses, motions and planes, points, elimination of the points.
+#include <algorithm>
+
+#include "structured_solver.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;
+
+}  // namespace
+
+// Whatever the number of threads, each number of the result is the same sum in the same order: what a thread adds to is
+// either its own (the points' sums over frames) or a part of the matrix that no other touches.
+void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker* worker) {
+  if (!loaded_) loadFrames(problem);
+  std::fill(values_.begin(), values_.end(), 0.0);
+  std::fill(full_gradient_.begin(), full_gradient_.end(), 0.0);
+  std::fill(frame_sums_.begin(), frame_sums_.end(), 0.0);
+  std::fill(eliminated_.begin(), eliminated_.end(), 0.0);
+  const PointKernels& kernels = pointKernels();
+  const int points = static_cast<int>(problem.points.size());
+  PointKernelArguments a = arguments(problem, radius);
+  const auto factors = [&] {
+    linearizeImu(problem);
+    linearizePlanes(problem);
+    linearizePriors(problem);
+    storeDiagonal();
+  };
+  if (worker->helps() && points > 0) {
+    worker->both(factors, [&] { kernels.linearize(a, 0, points); });
+    PointKernelArguments lower = a, upper = a;
+    lower.last_position = upper.first_position = structure_.half_position;
+    worker->both([&] { kernels.eliminate(lower, 0, points); }, [&] { kernels.eliminate(upper, 0, points); });
+  } else {
+    factors();
+    kernels.linearizeAndEliminate(a, 0, points);
+  }
+  addPoints();
+  damp(radius);
+}
+
+void StructuredSolver::storeDiagonal() {
+  forEachNode([&](int size, int unknown, double* block) {
+    const int ld = SparseCholesky::leading(size);
+    for (int k = 0; k < size; ++k) diagonal_[unknown + k] = block[k * ld + k];
+  });
+}
+
+// What the points gave to their frames: J^T J and J^T r before and after the elimination.
+void StructuredSolver::addPoints() {
+  gradient_ = full_gradient_;
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    if (frames_[f].diagonal < 0) continue;
+    const double* sums = frame_sums_.data() + kFrameSums * f;
+    const double* eliminated = eliminated_.data() + 8 * f;
+    double* block = values_.data() + frames_[f].diagonal;
+    const int u = frames_[f].unknown;
+    for (int c = 0; c < 6; ++c) {
+      for (int r = c; r < 6; ++r) block[8 * c + r] += sums[8 * c + r];
+      diagonal_[u + c] += sums[9 * c];
+      full_gradient_[u + c] += sums[48 + c];
+      gradient_[u + c] += sums[48 + c] - eliminated[c];
+    }
+  }
+}
+
+// Ceres' rule: diag(J^T J) / radius, the diagonal before the elimination.
+void StructuredSolver::damp(double radius) {
+  forEachNode([&](int size, int unknown, double* block) {
+    const int ld = SparseCholesky::leading(size);
+    for (int k = 0; k < size; ++k) {
+      damping_[unknown + k] = std::clamp(diagonal_[unknown + k], kMinDiagonal, kMaxDiagonal) / radius;
+      block[k * ld + k] += damping_[unknown + k];
+    }
+  });
+}
+
+void StructuredSolver::forEachNode(const std::function<void(int size, int unknown, double* block)>& f) {
+  for (const auto* nodes : {&structure_.pose_node, &structure_.motion_node, &structure_.plane_node}) {
+    const int size = nodes == &structure_.pose_node ? 6 : nodes == &structure_.motion_node ? 9 : 3;
+    for (const int node : *nodes)
+      if (node >= 0) f(size, structure_.cholesky.unknown(node), values_.data() + structure_.cholesky.diagonalOffset(node));
+  }
+}
+
+}  // namespace vip_slam

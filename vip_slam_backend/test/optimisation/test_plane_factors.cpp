@@ -1,0 +1,109 @@
+// Homographies out of a map: what becomes of views that do not belong, whichever keyframe is the host.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "vip_slam_backend/optimisation/problem_builder.h"
+
+using namespace vip_slam;
+
+namespace {
+
+constexpr double kFocal = 500;
+constexpr int kKeyframes = 8, kLandmarks = 12;
+
+// A wall at z = 3 before a camera that moves along x, without noise; `shift` pixels are added to one landmark's views.
+struct Wall {
+  Map map;
+  BuilderSettings settings;
+
+  explicit Wall(
+      LandmarkId odd = 0, const std::function<double(int)>& shift = [](int) { return 0.0; }) {
+    settings.focal = kFocal;
+    const ImuNoise noise;
+    for (int k = 0; k < kKeyframes; ++k) {
+      auto keyframe = std::make_shared<Keyframe>();
+      keyframe->id = k + 1;
+      keyframe->frame.t = 0.5 * k;
+      NavState state;
+      state.t = keyframe->frame.t;
+      state.T_W_I = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.1 * k, 0, 0));
+      keyframe->frame.state = state;
+      for (int l = 0; l < kLandmarks; ++l) {
+        const Eigen::Vector3d p = point(l) - state.T_W_I.t();
+        Feature f;
+        f.id = l + 1;
+        f.xy = Eigen::Vector2d(p.x() / p.z() + (f.id == odd ? shift(k) / kFocal : 0.0), p.y() / p.z()).cast<float>();
+        keyframe->frame.features.push_back(f);
+      }
+      map.addKeyframe(keyframe, state, noise);
+    }
+    PlaneEstimate wall;
+    wall.id = 1;
+    wall.plane = Plane(Eigen::Vector3d(0, 0, -1), 3);
+    map.setPlane(wall);
+    PlaneObservation seen;
+    seen.plane = 1;
+    seen.keyframe = 1;
+    seen.G = Eigen::Matrix4d::Identity();
+    map.setPlaneObservation(seen);
+    for (int l = 0; l < kLandmarks; ++l) {
+      map.addLandmark(l + 1, point(l), {1, static_cast<std::uint32_t>(l)});
+      for (int k = 1; k < kKeyframes; ++k)
+        map.addObservation(l + 1, {KeyframeId(k + 1), static_cast<std::uint32_t>(l)});
+      map.associate(l + 1, 1);
+    }
+  }
+  static Eigen::Vector3d point(int l) { return {0.3 * (l % 4) - 0.3, 0.4 * (l / 4) - 0.4, 3.0}; }
+
+  int pairs(bool shared) {
+    settings.shared_hosts = shared;
+    int sum = 0;
+    for (const BaHomography& h : buildProblem(map, globalScope(map), settings).problem.homographies) sum += h.pairs;
+    return sum;
+  }
+  bool isPoint(LandmarkId id, bool shared) {
+    settings.shared_hosts = shared;
+    const BuiltProblem built = buildProblem(map, globalScope(map), settings);
+    return std::count(built.points.begin(), built.points.end(), id) > 0;
+  }
+};
+
+}  // namespace
+
+TEST(PlaneFactors, EveryViewOfAPlanePointBecomesAPair) {
+  for (const bool shared : {false, true}) {
+    Wall wall;
+    EXPECT_EQ(wall.pairs(shared), kLandmarks * (kKeyframes - 1));
+    EXPECT_FALSE(wall.isPoint(5, shared));
+  }
+}
+
+TEST(PlaneFactors, AWrongViewIsLeftOut) {
+  for (const bool shared : {false, true}) {
+    Wall wall(5, [](int k) { return k == 6 ? 8.0 : 0.0; });
+    EXPECT_EQ(wall.pairs(shared), kLandmarks * (kKeyframes - 1) - 1);
+  }
+}
+
+TEST(PlaneFactors, AWrongHostMakesItAPointOfItsOwn) {
+  Wall wall(5, [](int k) { return k == 0 ? 8.0 : 0.0; });
+  EXPECT_TRUE(wall.isPoint(5, false));
+  EXPECT_EQ(wall.pairs(false), (kLandmarks - 1) * (kKeyframes - 1));
+}
+
+TEST(PlaneFactors, ATrackThatDisagreesWithThePlaneEverywhereMakesItAPoint) {
+  for (const bool shared : {false, true}) {
+    Wall wall(5, [](int k) { return 6.0 * k; });
+    EXPECT_TRUE(wall.isPoint(5, shared));
+  }
+}
+
+TEST(PlaneFactors, SharedHostsGiveFewerFactors) {
+  Wall wall;
+  wall.settings.shared_hosts = true;
+  const std::size_t shared = buildProblem(wall.map, globalScope(wall.map), wall.settings).problem.homographies.size();
+  EXPECT_EQ(shared, std::size_t(kKeyframes - 1));  // one keyframe hosts all
+}
