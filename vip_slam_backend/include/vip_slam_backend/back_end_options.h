@@ -57,7 +57,7 @@ struct GlobalBaOptions {
   int max_iterations = 100;
   double max_seconds = 2.0;
   bool at_end = true;
-  bool shared_hosts = true;
+  bool shared_hosts = false;
 
   void visit(OptionVisitor& v) {
     v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");

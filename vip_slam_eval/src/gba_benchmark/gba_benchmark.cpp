@@ -54,11 +54,11 @@ double rmseOf(const SimulatedMap& map, const BuiltProblem& built, const BaProble
 }  // namespace
 
 GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver_name, int threads, int iterations,
-              int repeats) {
+              int repeats, bool shared_hosts) {
   BuilderSettings settings;
   settings.variant = variant;
   settings.focal = map.focal;
-  settings.shared_hosts = GlobalBaOptions().shared_hosts;
+  settings.shared_hosts = shared_hosts;
   settings.measurement.pixel_sigma = map.pixel_sigma;
   // The simulation has no outliers: plain squares, so that neither solver spends time on losses.
   settings.measurement.huber = settings.measurement.depth_huber = 0;

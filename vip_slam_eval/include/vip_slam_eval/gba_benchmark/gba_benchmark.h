@@ -25,8 +25,9 @@ struct GbaRun {
 };
 
 /// Runs `repeats` times from the same start and keeps the run with the median time. Hosts of homographies as in the live
-/// system's global adjustment.
-GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats);
+/// system's global adjustment unless said otherwise.
+GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats,
+              bool shared_hosts = GlobalBaOptions().shared_hosts);
 
 /// The map of the first `keyframes` keyframes.
 SimulatedMap prefix(const SimulatedMap& map, int keyframes);
