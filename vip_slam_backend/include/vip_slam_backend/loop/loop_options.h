@@ -66,7 +66,7 @@ struct PoseGraphOptions {
 
 struct RelocalisationOptions {
   int candidates = 6;
-  int min_inliers = 30;
+  int min_inliers = 45;
   int sure_inliers = 45;
   double ambiguity = 0.6;
 
