@@ -17,6 +17,7 @@ add_library(vip_slam_bringup
   src/preflight/image_rotation.cpp
   src/preflight/record_sources.cpp
   src/preflight/recorder.cpp
+  src/stereo/disparity_refinement.cpp
   src/stereo/stereo_calibration.cpp
   src/stereo/stereo_depth.cpp
 )

@@ -120,9 +120,9 @@ TEST(StereoDepth, SlantedWallThroughTheDistortedEurocPair) {
                                     render(wall, calibration.right, calibration.T_left_right()));
   const DepthErrors e = compare(stereo, wall, frame.depth);
   EXPECT_GT(e.coverage, 0.95);
-  // A quarter of a pixel of disparity at 2 m is 2 cm.
-  EXPECT_LT(e.median, 0.015);
-  EXPECT_LT(e.p95, 0.04);
+  // A tenth of a pixel of disparity at 2 m is 8 mm.
+  EXPECT_LT(e.median, 0.006);
+  EXPECT_LT(e.p95, 0.02);
 }
 
 TEST(StereoDepth, RectifiedFrameIsTheLeftOneTurned) {

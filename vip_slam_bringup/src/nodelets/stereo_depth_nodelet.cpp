@@ -22,7 +22,8 @@ namespace vip_slam {
 class StereoDepthNodelet : public nodelet::Nodelet {
  public:
   void onInit() override {
-    ros::NodeHandle& nh = getMTNodeHandle();
+    // One callback at a time: pairs leave in the order in which they came. Matching uses the cores by itself.
+    ros::NodeHandle& nh = getNodeHandle();
     ros::NodeHandle& parameters = getPrivateNodeHandle();
     const std::string calibration = parameters.param<std::string>("calibration", "");
     try {
@@ -38,9 +39,10 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     image_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("rectified/camera_info", 5);
     depth_publisher_ = nh.advertise<sensor_msgs::Image>("depth/image", 5);
     depth_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("depth/camera_info", 5);
-    left_.subscribe(nh, "left/image_raw", 20);
-    right_.subscribe(nh, "right/image_raw", 20);
-    sync_ = std::make_unique<message_filters::Synchronizer<Policy>>(Policy(20), left_, right_);
+    // Short queues: when matching is too slow for the rate, images are left out instead of coming ever later.
+    left_.subscribe(nh, "left/image_raw", 3);
+    right_.subscribe(nh, "right/image_raw", 3);
+    sync_ = std::make_unique<message_filters::Synchronizer<Policy>>(Policy(3), left_, right_);
     sync_->setMaxIntervalDuration(ros::Duration(parameters.param("max_skew", 0.005)));
     sync_->registerCallback(&StereoDepthNodelet::onPair, this);
     watchdog_ = nh.createTimer(ros::Duration(5.0), &StereoDepthNodelet::onWatch, this);
@@ -52,7 +54,13 @@ class StereoDepthNodelet : public nodelet::Nodelet {
   void onPair(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right) {
     ++pairs_;
     try {
+      const ros::WallTime begin = ros::WallTime::now();
       const StereoDepthFrame frame = stereo_->compute(decodeGray(*left), decodeGray(*right));
+      const double taken = (ros::WallTime::now() - begin).toSec(), gap = (left->header.stamp - last_).toSec();
+      if (!last_.isZero() && gap > 0 && taken > gap)
+        NODELET_WARN_THROTTLE(10.0, "Stereo depth takes %.0f ms, pairs come every %.0f ms: some are left out",
+                              1e3 * taken, 1e3 * gap);
+      last_ = left->header.stamp;
       const sensor_msgs::CameraInfo info = cameraInfo(stereo_->rectified(), left->header);
       image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", left->header)));
       image_info_publisher_.publish(info);
@@ -72,12 +80,12 @@ class StereoDepthNodelet : public nodelet::Nodelet {
   }
 
   std::unique_ptr<StereoDepth> stereo_;
+  ros::Time last_;  ///< stamp of the last pair
   ros::Publisher image_publisher_, image_info_publisher_, depth_publisher_, depth_info_publisher_;
   message_filters::Subscriber<sensor_msgs::Image> left_, right_;
   std::unique_ptr<message_filters::Synchronizer<Policy>> sync_;
   ros::Timer watchdog_;
-  std::atomic<std::size_t> pairs_{0};
-  std::size_t pairs_seen_ = 0;
+  std::size_t pairs_ = 0, pairs_seen_ = 0;
 };
 
 }  // namespace vip_slam

@@ -5,6 +5,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_bringup/stereo/disparity_refinement.h"
+
 namespace vip_slam {
 
 struct StereoDepth::Maps {
@@ -109,6 +111,8 @@ StereoDepthFrame StereoDepth::compute(const cv::Mat& left, const cv::Mat& right)
                                               options_.speckle_size, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
   cv::Mat disparity;
   matcher->compute(out.gray, right_rectified, disparity);
+  if (options_.refinement_window > 1)
+    refineDisparity(out.gray, right_rectified, options_.refinement_window, &disparity);
 
   out.depth = cv::Mat::zeros(size_, CV_32FC1);
   const float numerator = static_cast<float>(16.0 * rectified_.fx * baseline_);  // disparity is in sixteenths

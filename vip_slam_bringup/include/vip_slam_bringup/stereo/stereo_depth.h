@@ -1,4 +1,5 @@
-// Depth from a calibrated stereo pair: rectification, OpenCV's semi-global block matching, depth = f B / disparity.
+// Depth from a calibrated stereo pair: rectification, OpenCV's semi-global block matching, sub-pixel refinement,
+// depth = f B / disparity.
 // The depth belongs to the rectified left camera, whose optical frame is the left one turned by the rectification.
 #pragma once
 
@@ -17,6 +18,7 @@ struct StereoDepthOptions {
   int uniqueness = 10;
   int speckle_size = 100;
   int left_right_difference = 1;
+  int refinement_window = 9;
   double min_depth = 0.3;
   double max_depth = 12.0;
 
@@ -26,6 +28,7 @@ struct StereoDepthOptions {
     v.field("uniqueness", uniqueness, 0, 50, "margin by which the best match must win, percent");
     v.field("speckle_size", speckle_size, 0, 2000, "smaller islands of disparity are removed, px");
     v.field("left_right_difference", left_right_difference, -1, 10, "left-right check, px; -1 switches it off");
+    v.field("refinement_window", refinement_window, 1, 31, "window of the sub-pixel refinement, px; 1: none");
     v.field("min_depth", min_depth, 0.05, 10.0, "nearer depths are dropped, m");
     v.field("max_depth", max_depth, 0.5, 100.0, "farther depths are dropped, m");
   }
