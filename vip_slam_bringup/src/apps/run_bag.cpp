@@ -122,6 +122,12 @@ int run(const Arguments& arguments) {
   std::snprintf(note, sizeof note, "%zu images in %.1f s%s, results in %s", pipeline.images(), seconds,
                 g_interrupted ? " (interrupted)" : "", arguments.out.c_str());
   progress.finish(note);
+  const auto warnings = vip_slam::runWarnings(pipeline, reader);
+  for (std::size_t i = 0; i < std::min<std::size_t>(warnings.size(), 8); ++i)
+    std::fprintf(stderr, "run_bag: warning: %s\n", warnings[i].c_str());
+  if (warnings.size() > 8) std::fprintf(stderr, "run_bag: %zu more warnings in summary.yaml\n", warnings.size() - 8);
+  if (pipeline.odometry().empty() && !g_interrupted)
+    std::fprintf(stderr, "run_bag: no image has a pose; check_bag tells what is wrong with the data\n");
   return pipeline.odometry().empty() ? 2 : 0;
 }
 

@@ -1,6 +1,7 @@
 #include "vip_slam_bringup/runner/bag_reader.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <stdexcept>
 
@@ -26,6 +27,8 @@ std::string join(const std::set<std::string>& names) {
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text.empty() ? "none" : text;
 }
+
+std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
 
 cv::Mat gray(const rosbag::MessageInstance& message) {
   if (const auto image = message.instantiate<sensor_msgs::Image>()) return decodeGray(*image);
@@ -56,7 +59,8 @@ struct BagReader::Source {
     try {
       bag.open(path, rosbag::bagmode::Read);
     } catch (const rosbag::BagUnindexedException&) {
-      throw std::runtime_error(path + ": the bag has no index (the recording was cut off); run: rosbag reindex " + path);
+      throw std::runtime_error(path + ": the bag has no index (the recording was cut off); run: rosbag reindex " +
+                               path);
     } catch (const std::exception& error) {
       throw std::runtime_error(path + ": not a readable bag: " + error.what());
     }
@@ -87,7 +91,8 @@ struct BagReader::Source {
       }
       return intrinsicsFromCameraInfo(*info);
     }
-    throw std::runtime_error(bag.getFileName() + ": topic " + topic + ": no camera_info in the bag; name the right topic " +
+    throw std::runtime_error(bag.getFileName() + ": topic " + topic +
+                             ": no camera_info in the bag; name the right topic " +
                              "or put the intrinsics into the sensor configuration");
   }
 };
@@ -157,19 +162,32 @@ void BagReader::read() {
     }
   };
 
+  cv::Size color_size;
+  const auto compareSizes = [&](const cv::Mat& depth) {
+    if (color_size.empty() || depth.size() == color_size || !complained.insert("sizes").second) return;
+    warnings_.push_back("topic " + topics.depth + ": depth is " + sizeText(depth.size()) + ", the colour images are " +
+                        sizeText(color_size) + ", so that no depth is used: switch on the driver's depth " +
+                        "registration, or set depth/registered: false with the depth camera's calibration");
+  };
+
   rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
   for (const auto& message : view) {
     if (stop_) return;
     const std::string& topic = message.getTopic();
     bool open = true;
     if (topic == topics.color) {
-      decode(message, [&] { pairer.addColor(stampOf(message), gray(message)); });
+      decode(message, [&] {
+        const cv::Mat image = gray(message);
+        color_size = image.size();
+        pairer.addColor(stampOf(message), image);
+      });
     } else if (topic == topics.depth) {
       decode(message, [&] {
         cv::Mat depth = metres(message, sensor_.depth_scale);
         if (source_->depth_camera) {
           depth = registerDepth(depth, *source_->depth_camera, *source_->color_camera, sensor_.T_color_depth.matrix());
         }
+        compareSizes(depth);
         pairer.addDepth(stampOf(message), depth);
       });
     } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
@@ -194,6 +212,12 @@ void BagReader::read() {
     }
     if (!open) return;
   }
+  const std::size_t paired = pairer.counters().pairs, alone = pairer.counters().without_depth;
+  if (alone > 5 && 20 * alone > paired + alone)
+    warnings_.push_back("topic " + topics.depth + ": " + std::to_string(alone) + " of " +
+                        std::to_string(paired + alone) + " colour images have no depth within " +
+                        std::to_string(std::lround(1e3 * options_.pairing.tolerance)) +
+                        " ms: switch on the driver's synchronisation, or equal rates");
   counters_["image_pairs"] = pairer.counters().pairs;
   counters_["images_without_depth"] = pairer.counters().without_depth;
   counters_["unused_depth_images"] = pairer.counters().unused_depth;

@@ -93,7 +93,8 @@ void writePlanesPly(const std::string& path, const std::vector<PlaneEstimate>& p
       out << line;
     }
   }
-  for (std::size_t i = 0; i < triangles.size(); ++i) out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
   file.commit();
 }
 
@@ -128,7 +129,8 @@ void writeFloorPlan(const std::string& path, const std::vector<PlaneEstimate>& p
   }
   if (!line.empty()) {
     drawing += "<path fill='none' stroke='#d5462f' stroke-width='0.04' d='" + pathData(line, false) + "'/>\n";
-    drawing += "<circle r='0.1' fill='#d5462f'" + format(" cx='%.3f' cy='%.3f'/>\n", line.front().x(), -line.front().y());
+    drawing +=
+        "<circle r='0.1' fill='#d5462f'" + format(" cx='%.3f' cy='%.3f'/>\n", line.front().x(), -line.front().y());
   }
   if (box.empty()) {
     box.add({0, 0, 0});
@@ -143,12 +145,13 @@ void writeFloorPlan(const std::string& path, const std::vector<PlaneEstimate>& p
 
   AtomicFile file(path);
   auto& out = file.stream();
-  out << "<svg xmlns='http://www.w3.org/2000/svg'" << format(" width='%.0f' height='%.0f'", scale * width, scale * height)
-      << format(" viewBox='%.3f %.3f", left, top) << format(" %.3f %.3f'>\n", width, height)
-      << "<rect" << format(" x='%.3f' y='%.3f'", left, top) << format(" width='%.3f' height='%.3f'", width, height)
+  out << "<svg xmlns='http://www.w3.org/2000/svg'"
+      << format(" width='%.0f' height='%.0f'", scale * width, scale * height)
+      << format(" viewBox='%.3f %.3f", left, top) << format(" %.3f %.3f'>\n", width, height) << "<rect"
+      << format(" x='%.3f' y='%.3f'", left, top) << format(" width='%.3f' height='%.3f'", width, height)
       << " fill='white'/>\n"
-      << drawing << "<path stroke='#2b2f36' stroke-width='0.04' d='"
-      << pathData({{x, -y, 0}, {x + 1, -y, 0}}, false) << "'/>\n<text font-family='sans-serif' font-size='0.25' fill='#2b2f36'"
+      << drawing << "<path stroke='#2b2f36' stroke-width='0.04' d='" << pathData({{x, -y, 0}, {x + 1, -y, 0}}, false)
+      << "'/>\n<text font-family='sans-serif' font-size='0.25' fill='#2b2f36'"
       << format(" x='%.3f' y='%.3f'", x + 1.1, y + 0.08) << ">1 m</text>\n</svg>\n";
   file.commit();
 }

@@ -30,7 +30,8 @@ void ProgressBar::update(double fraction, const std::string& note) {
     std::fprintf(stderr, "\r%s [%s%s] %3.0f%%  %.0f s left  %s\x1b[K", title_.c_str(), std::string(full, '#').c_str(),
                  std::string(width - full, '.').c_str(), 100 * fraction, left, note.c_str());
   } else {
-    std::fprintf(stderr, "%s %3d%%  %.0f s, %.0f s left  %s\n", title_.c_str(), 10 * tenths, elapsed, left, note.c_str());
+    std::fprintf(stderr, "%s %3d%%  %.0f s, %.0f s left  %s\n", title_.c_str(), 10 * tenths, elapsed, left,
+                 note.c_str());
   }
   std::fflush(stderr);
 }

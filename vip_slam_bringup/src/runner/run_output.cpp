@@ -86,14 +86,22 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   yaml << YAML::EndSeq;
 }
 
-std::vector<std::string> warnings(const Pipeline& pipeline, const BagReader& reader) {
+}  // namespace
+
+std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader) {
   std::vector<std::string> all = reader.warnings();
+  const FrontEndCounters& c = pipeline.frontEnd().counters();
+  if (c.imu_gaps > 0) all.push_back(std::to_string(c.imu_gaps) + " gaps in the IMU; a long one restarts the odometry");
+  if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
+  if (pipeline.images() == 0) all.push_back("no image could be used");
   if (pipeline.mapping()) {
     const auto& refusals = pipeline.mapping()->refusals();
     all.insert(all.end(), refusals.begin(), refusals.end());
   }
   return all;
 }
+
+namespace {
 
 std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader, const MapSnapshot& map,
                     std::size_t planes) {
@@ -115,10 +123,11 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   put("tracked_images", pipeline.odometry().size());
   put("distance", lengthOf(pipeline.odometry()));
   put("epochs", pipeline.frontEnd().counters().restarts + 1);
-  emitMap(yaml, map, planes, pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
+  emitMap(yaml, map, planes,
+          pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());
   emitStates(yaml, pipeline.states());
-  put("warnings", warnings(pipeline, reader));
+  put("warnings", runWarnings(pipeline, reader));
   yaml << YAML::EndMap;
   return yaml.c_str();
 }

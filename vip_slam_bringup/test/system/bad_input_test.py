@@ -7,6 +7,8 @@ import sys
 import tempfile
 import unittest
 
+import numpy as np
+import rosbag
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -14,6 +16,38 @@ from vip_slam_msgs.msg import TrackingStatus
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from live import Listener, wait_for  # noqa: E402
+
+
+def copy_bag(source, target, seconds, change):
+    """The first seconds of a bag, every message as change(topic, message, number on its topic) returns it, or left out."""
+    counts = {}
+    with rosbag.Bag(source) as bag, rosbag.Bag(target, 'w') as out:
+        begin = bag.get_start_time()
+        for topic, message, stamp in bag.read_messages():
+            if stamp.to_sec() - begin > seconds:
+                break
+            counts[topic] = counts.get(topic, -1) + 1
+            message = change(topic, message, counts[topic])
+            if message is not None:
+                out.write(topic, message, stamp)
+
+
+def halve_depth(topic, message, _):
+    if 'aligned_depth' in topic and message._type == 'sensor_msgs/Image':
+        half = np.frombuffer(message.data, np.uint16).reshape(message.height, message.width)[::2, ::2]
+        message.height, message.width = half.shape
+        message.step, message.data = 2 * message.width, half.tobytes()
+    return message
+
+
+def thin_depth(topic, message, number):
+    return None if 'aligned_depth' in topic and number % 3 else message
+
+
+def spoil_encoding(topic, message, _):
+    if topic.endswith('color/image_raw'):
+        message.encoding = 'foo8'
+    return message
 
 
 class BadInputTest(unittest.TestCase):
@@ -48,8 +82,8 @@ class BadInputTest(unittest.TestCase):
         sensor = self.sensor_with(r'(color: )\S+image_raw\S*', r'\1"/nowhere/image_raw"')
         status = Listener('/wrong/tracking_status', TrackingStatus)
         diagnostics = Listener('/diagnostics', DiagnosticArray)
-        launch = subprocess.Popen(['roslaunch', 'vip_slam_bringup', 'vip_slam.launch', 'sensor:=' + sensor, 'ns:=wrong'],
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        launch = subprocess.Popen(['roslaunch', 'vip_slam_bringup', 'vip_slam.launch', 'sensor:=' + sensor,
+                                   'ns:=wrong'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             wait_for(lambda: status.last() and '/nowhere/image_raw' in status.last().reason, 30,
                      'a tracking status that names the topic')
@@ -88,6 +122,15 @@ class BadInputTest(unittest.TestCase):
         self.assertNotEqual(code, 0)
         self.assertIn('/nowhere/depth', words)
         self.assertIn('/camera/color/image_raw', words, 'the topics of the bag are listed')
+        # Depth of another size or rate than colour, and images of an unknown encoding, are named with what to do.
+        for name, change, expected in (('size', halve_depth, '320x240'), ('rate', thin_depth, 'have no depth'),
+                                       ('encoding', spoil_encoding, "'foo8'")):
+            changed = os.path.join(self.folder, name + '.bag')
+            copy_bag(bag, changed, 3.0, change)
+            code, words = self.run_bag(changed, sensor, '--no-report')
+            self.assertIn(expected, words, name)
+        self.assertIn('no image has a pose', words)
+        self.assertNotEqual(code, 0)
         code, words = self.run_bag(bag, sensor, '--set', 'frontend/tracking/max_featurez=3')
         self.assertNotEqual(code, 0)
         self.assertIn('max_featurez', words)

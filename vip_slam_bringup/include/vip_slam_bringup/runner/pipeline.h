@@ -1,8 +1,8 @@
 // The estimators in lock-step: sensor events go in, poses come out, the same bits each time.
 //
-// The front end runs in the calling thread, planes and back end in a thread of their own. What the back end says about a
-// keyframe reaches the front end a fixed number of images later, whenever it is computed, so that the two threads never
-// race. With a lag of 0 the front end waits for it.
+// The front end runs in the calling thread, planes and back end in a thread of their own. What the back end says about
+// a keyframe reaches the front end a fixed number of images later, whenever it is computed, so that the two threads
+// never race. With a lag of 0 the front end waits for it.
 #pragma once
 
 #include <cstdint>

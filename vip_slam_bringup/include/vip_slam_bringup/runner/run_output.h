@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_bringup/runner/pipeline.h"
@@ -15,6 +16,9 @@ struct RunFacts {
   bool finished = true;
   double processing_time = 0;  ///< seconds, wall clock
 };
+
+/// What a user should know of a run that has ended, one sentence each.
+std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader);
 
 /// Throws std::runtime_error naming the file that cannot be written.
 void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader,
