@@ -111,6 +111,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
                   depth_monitor_->report().rate, 1e3 * skew, 1e3 * options_.pair_tolerance);
     complaints += (complaints.empty() ? "" : "; ") + std::string(words);
   }
+  if (!shown.size_problem.empty()) complaints += (complaints.empty() ? "" : "; ") + shown.size_problem;
   status.summary(complaints.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
                  complaints.empty() ? "all topics arrive" : complaints);
   const FrontEndCounters& c = shown.counters;

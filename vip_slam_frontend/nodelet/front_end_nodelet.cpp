@@ -145,7 +145,7 @@ void FrontEndNodelet::onColor(double t, const std::string& frame_id, const std::
   try {
     cv::Mat gray = decode();
     owner_->post(image_lane_, [this, t, gray] {
-      if (noticeTime(t)) pairer_->addColor(t, gray);
+      if (noticeTime(t, kColor)) pairer_->addColor(t, gray);
       processReady();
     });
   } catch (const std::exception& error) {
@@ -159,7 +159,7 @@ void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) 
   try {
     cv::Mat depth = decode();
     owner_->post(depth_lane_, [this, t, depth] {
-      if (noticeTime(t)) pairer_->addDepth(t, depth);
+      if (noticeTime(t, kDepth)) pairer_->addDepth(t, depth);
       processReady();
     });
   } catch (const std::exception& error) {
@@ -216,11 +216,12 @@ void FrontEndNodelet::onReconfigure(vip_slam_frontend::FrontEndConfig& config) {
   feature_image_rate_ = config.feature_image_rate;
 }
 
-bool FrontEndNodelet::noticeTime(double t) {
+bool FrontEndNodelet::noticeTime(double t, Stream stream) {
   if (paused_) return false;
-  if (t < newest_ - options_.time_jump) {
+  // Each stream by itself: an image that comes late, from a slow matcher or a busy machine, is not a jump.
+  if (t < newest_of_[stream] - options_.time_jump) {
     char words[120];
-    std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", newest_ - t);
+    std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", newest_of_[stream] - t);
     NODELET_WARN("%s: the odometry starts anew, the map stays", words);
     pairer_->clear();
     early_.clear();
@@ -229,16 +230,18 @@ bool FrontEndNodelet::noticeTime(double t) {
     }
     if (front_end_) front_end_->reset(words);
     newest_ = t;
+    newest_of_.fill(t);
     last_feature_image_ = -1e300;
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++shown_.time_jumps;
   }
   newest_ = std::max(newest_, t);
+  newest_of_[stream] = std::max(newest_of_[stream], t);
   return true;
 }
 
 void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel) {
-  if (!noticeTime(t)) return;
+  if (!noticeTime(t, gyro ? kGyro : kAccel)) return;
   if (!front_end_) {
     constexpr std::size_t kEarly = 4000;
     const Eigen::Vector3d g = gyro ? *gyro : Eigen::Vector3d::Zero(), a = accel ? *accel : Eigen::Vector3d::Zero();
@@ -297,12 +300,22 @@ void FrontEndNodelet::process(const ImagePair& pair) {
   if (depth_camera_ && !input.depth.empty()) {
     input.depth = registerDepth(pair.depth, *depth_camera_, *color_camera_, sensor_.T_color_depth.matrix());
   }
+  std::string size_problem;
+  if (!input.depth.empty() && input.depth.size() != input.gray.size()) {
+    char words[240];
+    std::snprintf(words, sizeof words, "%s is %dx%d, %s is %dx%d: depth is not used; switch on the driver's registration",
+                  sensor_.topics.depth.c_str(), input.depth.cols, input.depth.rows, sensor_.topics.color.c_str(),
+                  input.gray.cols, input.gray.rows);
+    size_problem = words;
+    NODELET_WARN_THROTTLE(10, "%s", words);
+  }
   const ros::WallTime begin = ros::WallTime::now();
   const FrameOutput output = front_end_->process(input);
   const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
   publish(pair, output);
 
   std::lock_guard<std::mutex> lock(shown_mutex_);
+  shown_.size_problem = size_problem;
   shown_.status = output.frame->status;
   shown_.counters = front_end_->counters();
   shown_.pairs = pairer_->counters();

@@ -1,6 +1,7 @@
 // The front end as a nodelet: subscribers decode and hand over, one thread owns the estimator, publishers hand on.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <deque>
 #include <functional>
@@ -60,7 +61,8 @@ class FrontEndNodelet : public nodelet::Nodelet {
 
   // In the owner thread.
   void addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
-  bool noticeTime(double t);
+  enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
+  bool noticeTime(double t, Stream stream);
   void startWhenCalibrated();
   void processReady();
   void process(const ImagePair& pair);
@@ -91,7 +93,8 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::shared_ptr<const CameraModel> color_camera_, depth_camera_;
   std::unique_ptr<ImagePairer> pairer_;
   std::deque<std::function<void()>> early_;  ///< IMU samples before the calibration is complete
-  double newest_ = -1e300;
+  double newest_ = -1e300;  ///< stamp, of all streams
+  std::array<double, kStreams> newest_of_{{-1e300, -1e300, -1e300, -1e300}};
   Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();
   Matrix15d covariance_ = Matrix15d::Zero();  ///< of the newest image; predictions between images carry it
   bool paused_ = false;
@@ -107,6 +110,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
     double processing = 0;  ///< last image, ms
     std::deque<double> recent;  ///< processing of the last images (a minute of them at 20 Hz), ms
     std::size_t time_jumps = 0;
+    std::string size_problem;  ///< depth that does not fit the colour image, in words
   };
   mutable std::mutex shown_mutex_;
   Shown shown_;
