@@ -38,7 +38,8 @@ def green_image():
 class Screen:
     def __init__(self):
         read, write = os.pipe()
-        self.process = subprocess.Popen(['Xvfb', '-displayfd', str(write), '-screen', '0', '%dx%dx24' % (WIDTH, HEIGHT)],
+        screen = '%dx%dx24' % (WIDTH, HEIGHT)
+        self.process = subprocess.Popen(['Xvfb', '-displayfd', str(write), '-screen', '0', screen],
                                         pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(write)
         with os.fdopen(read) as pipe:

@@ -46,7 +46,8 @@ class SystemTest(unittest.TestCase):
     def test_01_follows_the_truth(self):
         last = self.truth[-1, 0]
         wait_for(lambda: tracking(self.status.last()), 40, 'TRACKING')
-        wait_for(lambda: self.pose.last() and self.pose.last().header.stamp.to_sec() > last - 1.0, 60, 'the end of the bag')
+        wait_for(lambda: self.pose.last() and self.pose.last().header.stamp.to_sec() > last - 1.0, 60,
+                 'the end of the bag')
         path = os.path.join(self.folder, 'trajectory.tum')
         ok, words = self.call('save_trajectory', SaveTrajectory, path)
         self.assertTrue(ok, words)
