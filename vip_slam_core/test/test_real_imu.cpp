@@ -99,10 +99,11 @@ TEST(RealImu, PreintegrationFollowsTheTruth) {
   noise.gyro_random_walk = 1.9393e-5;
   noise.accel_noise_density = 2.0e-3;
   noise.accel_random_walk = 3.0e-3;
-  const auto evaluate = [&](std::size_t steps) {
+  const auto evaluate = [&](std::size_t steps, double late = 0) {
     Errors errors;
     for (std::size_t i = 0; i + steps < states.size(); i += 100) {
-      const auto samples = buffer.between(states[i].t, states[i + steps].t);
+      auto samples = buffer.between(states[i].t + late, states[i + steps].t + late);
+      for (ImuSample& sample : samples) sample.t -= late;
       if (!samples.empty()) errors.add(samples, states[i], states[i + steps], noise);
     }
     return errors;
@@ -115,14 +116,22 @@ TEST(RealImu, PreintegrationFollowsTheTruth) {
   EXPECT_LT(median(brief.position), 0.001);
   EXPECT_LT(median(brief.velocity), 0.015);
   EXPECT_LT(median(brief.rotation), 0.06 * kRadians);
+  EXPECT_LT(median(brief.position_levelled), 0.0003);
 
   // Two seconds. Roll and pitch of this truth wander against the gyro by some tenths of a degree a second while its yaw
-  // does not. So the heading must hold as it is, and the position gain once the start's tilt has been fitted to the
-  // end's velocity.
+  // does not; that the orientation published for V1_01 is off is known (OpenVINS recomputed it). So the heading must
+  // hold as it is, and the position gain once the start's tilt has been fitted to the end's velocity.
   const Errors full = evaluate(400);
   full.print("2 s");
   EXPECT_LT(median(full.heading), 0.15 * kRadians);
   EXPECT_LT(median(full.position_levelled), 0.5 * median(full.position));
+  EXPECT_LT(median(full.position_levelled), 0.09);
+
+  // Control: samples that are stamped 5 ms late fail all of it.
+  const Errors late = evaluate(20, 0.005);
+  late.print("0.1 s, 5 ms late");
+  EXPECT_GT(median(late.position_levelled), 2 * median(brief.position_levelled));
+  EXPECT_GT(median(late.heading), 2 * median(brief.heading));
 }
 
 }  // namespace
