@@ -1,5 +1,5 @@
-// train_vocabulary INPUT... --out FILE: a place-recognition vocabulary from bags and pictures, with the very corners and
-// descriptors that the front end computes.
+// train_vocabulary INPUT... --out FILE: a place-recognition vocabulary from bags and pictures, with the very corners
+// and descriptors that the front end computes.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -68,7 +68,8 @@ void describeBag(const std::string& path, double every, const Describer& describ
     if (const auto image = message.instantiate<sensor_msgs::Image>()) {
       if (!isDepth(*image)) gray = vip_slam::decodeGray(*image);
     } else if (const auto compressed = message.instantiate<sensor_msgs::CompressedImage>()) {
-      if (compressed->format.find("16UC1") == std::string::npos && compressed->format.find("Depth") == std::string::npos)
+      if (compressed->format.find("16UC1") == std::string::npos &&
+          compressed->format.find("Depth") == std::string::npos)
         gray = vip_slam::decodeGray(*compressed);
     }
     if (gray.empty()) continue;
@@ -92,7 +93,8 @@ void describeInput(const std::string& input, double every, const Describer& desc
     describeBag(input, every, describe, images);
   } else {
     const cv::Mat gray = cv::imread(input, cv::IMREAD_GRAYSCALE);
-    if (gray.empty()) throw std::runtime_error(input + ": cannot be read, expected a bag, a picture or a folder of pictures");
+    if (gray.empty())
+      throw std::runtime_error(input + ": cannot be read, expected a bag, a picture or a folder of pictures");
     images->push_back(describe(gray));
   }
 }
