@@ -246,13 +246,18 @@ void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const E
     constexpr std::size_t kEarly = 4000;
     const Eigen::Vector3d g = gyro ? *gyro : Eigen::Vector3d::Zero(), a = accel ? *accel : Eigen::Vector3d::Zero();
     const bool has_gyro = gyro != nullptr, has_accel = accel != nullptr;
+    // Their time has been noticed: handed over later, they must not look like a jump back.
     early_.push_back([this, t, g, a, has_gyro, has_accel] {
-      addInertial(t, has_gyro ? &g : nullptr, has_accel ? &a : nullptr);
+      feedInertial(t, has_gyro ? &g : nullptr, has_accel ? &a : nullptr);
     });
     if (early_.size() > kEarly) early_.pop_front();
     startWhenCalibrated();
     return;
   }
+  feedInertial(t, gyro, accel);
+}
+
+void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel) {
   if (gyro && accel) {
     front_end_->addImu({t, *gyro, *accel});
   } else if (gyro) {
@@ -303,7 +308,8 @@ void FrontEndNodelet::process(const ImagePair& pair) {
   std::string size_problem;
   if (!input.depth.empty() && input.depth.size() != input.gray.size()) {
     char words[240];
-    std::snprintf(words, sizeof words, "%s is %dx%d, %s is %dx%d: depth is not used; switch on the driver's registration",
+    std::snprintf(words, sizeof words,
+                  "%s is %dx%d, %s is %dx%d: depth is not used; switch on the driver's registration",
                   sensor_.topics.depth.c_str(), input.depth.cols, input.depth.rows, sensor_.topics.color.c_str(),
                   input.gray.cols, input.gray.rows);
     size_problem = words;

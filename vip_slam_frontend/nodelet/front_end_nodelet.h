@@ -61,6 +61,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
 
   // In the owner thread.
   void addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
+  void feedInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);  ///< with an estimator
   enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
   bool noticeTime(double t, Stream stream);
   void startWhenCalibrated();
