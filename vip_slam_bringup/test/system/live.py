@@ -60,6 +60,16 @@ class Listener:
     def count(self):
         return len(self.messages)
 
+    def wait_for_silence(self, silence, seconds, what):
+        """No message for `silence` seconds; what was under way before may still come in."""
+        end = time.time() + seconds
+        count, since = self.count(), time.time()
+        while time.time() - since < silence:
+            assert time.time() < end, 'not within %.0f s: %s' % (seconds, what)
+            time.sleep(0.05)
+            if self.count() != count:
+                count, since = self.count(), time.time()
+
     def wait(self, number, seconds, what):
         """`number` messages more than now."""
         target = self.count() + number
