@@ -4,24 +4,17 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "test_camera.h"
 #include "vip_slam_frontend/tracking/patch_alignment.h"
 #include "vip_slam_frontend/tracking/patch_surface.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kFocal = 400, kCx = 319.5, kCy = 239.5;
+constexpr double kFocal = 400;
 const Eigen::Vector2d kPixel(420, 200);
 
-std::shared_ptr<const CameraModel> camera() {
-  CameraIntrinsics intrinsics;
-  intrinsics.width = 640;
-  intrinsics.height = 480;
-  intrinsics.fx = intrinsics.fy = kFocal;
-  intrinsics.cx = kCx;
-  intrinsics.cy = kCy;
-  return makeCamera(intrinsics);
-}
+std::shared_ptr<const CameraModel> camera() { return testCamera(kFocal); }
 
 /// A wall on the right, along which the camera looks: seen at about 15 degrees in kPixel.
 const Eigen::Vector3d kNormal = Eigen::Vector3d(-1.0, 0.1, 0.02).normalized();

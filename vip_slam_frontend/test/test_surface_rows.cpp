@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
+#include "test_camera.h"
 #include "vip_slam_frontend/filter/square_root_filter.h"
 #include "vip_slam_frontend/filter/surface_rows.h"
 #include "vip_slam_frontend/filter/triangulation.h"
@@ -174,17 +175,9 @@ TEST(SurfaceRows, NothingFromFewPairsOrAForgottenReference) {
 
 // ---- association ----
 
-constexpr double kFocal = 480, kCx = 319.5, kCy = 239.5;
+constexpr double kFocal = 480;
 
-std::shared_ptr<const CameraModel> camera() {
-  CameraIntrinsics intrinsics;
-  intrinsics.width = 640;
-  intrinsics.height = 480;
-  intrinsics.fx = intrinsics.fy = kFocal;
-  intrinsics.cx = kCx;
-  intrinsics.cy = kCy;
-  return makeCamera(intrinsics);
-}
+std::shared_ptr<const CameraModel> camera() { return testCamera(kFocal); }
 
 /// A corridor 2.2 m wide and 2.8 m high with an end wall 6 m ahead, seen by a camera at `T_W_C` (world: x right, y down,
 /// z ahead).

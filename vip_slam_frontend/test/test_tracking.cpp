@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "test_camera.h"
 #include "vip_slam_frontend/tracking/corner_detector.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
@@ -14,17 +15,9 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFocal = 400, kCx = 319.5, kCy = 239.5;
+constexpr double kFocal = 400;
 
-std::shared_ptr<const CameraModel> camera() {
-  CameraIntrinsics intrinsics;
-  intrinsics.width = 640;
-  intrinsics.height = 480;
-  intrinsics.fx = intrinsics.fy = kFocal;
-  intrinsics.cx = kCx;
-  intrinsics.cy = kCy;
-  return makeCamera(intrinsics);
-}
+std::shared_ptr<const CameraModel> camera() { return testCamera(kFocal); }
 
 /// Smooth random texture on the plane z = 2 of the world, seen from a camera at `t` without rotation.
 cv::Mat render(const cv::Mat& texture, const Eigen::Vector3d& t, double noise, unsigned seed) {
