@@ -27,12 +27,12 @@ add_library(vip_slam_bringup_nodelets src/nodelets/stereo_depth_nodelet.cpp)
 target_link_libraries(vip_slam_bringup_nodelets vip_slam_bringup ${catkin_LIBRARIES})
 
 add_executable(convert_to_bag src/apps/convert_to_bag.cpp)
-target_link_libraries(convert_to_bag vip_slam_bringup CLI11::CLI11)
+target_link_libraries(convert_to_bag vip_slam_bringup)
 
 install(TARGETS vip_slam_bringup vip_slam_bringup_nodelets
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
 add_executable(check_bag src/apps/check_bag.cpp)
-target_link_libraries(check_bag vip_slam_bringup CLI11::CLI11)
+target_link_libraries(check_bag vip_slam_bringup)
 
 add_executable(parameter_reference src/apps/parameter_reference.cpp)
 target_link_libraries(parameter_reference vip_slam_bringup)

@@ -7,29 +7,26 @@
 #include <iostream>
 
 #include <ros/ros.h>
-#include <CLI/CLI.hpp>
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/recorder.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_ros/sensor_files.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "check_bag", ros::init_options::AnonymousName | ros::init_options::NoSigintHandler);
-  CLI::App app{"Tells what is missing or wrong in a bag or on live topics before VIP-SLAM sees them."};
+  vip_slam::CommandLine line("check_bag",
+                             "Tells what is missing or wrong in a bag or on live topics before VIP-SLAM sees them.");
   std::string bag, sensor = "simulator";
   bool live = false;
   double seconds = 0;
-  app.add_option("bag", bag, "the bag to check");
-  app.add_flag("--live", live, "listen to live topics instead");
-  app.add_option("--sensor,-s", sensor, "name of a shipped sensor or a YAML file")->capture_default_str();
-  app.add_option("--seconds", seconds, "how long to listen (10), or how much of the bag's images to look at (60)")
-      ->check(CLI::PositiveNumber);
-  try {
-    app.parse(argc, argv);
-    if (live != bag.empty()) throw CLI::ValidationError("give either a bag or --live");
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
+  line.argument("bag", bag, "the bag to check", false);
+  line.flag("live", live, "listen to live topics instead");
+  line.option("sensor,s", sensor, "name of a shipped sensor or a YAML file");
+  line.option("seconds", seconds, "how long to listen, or how much of the bag's images to look at; 0: 10 and 60",
+              vip_slam::between(0.0, 1e6));
+  if (const auto status = line.parse(argc, argv)) return *status;
+  if (live != bag.empty()) return line.mistake("give either a bag or --live");
   try {
     const std::string file = vip_slam::resolveSensor(sensor);
     const vip_slam::SensorConfig config = vip_slam::loadSensorConfig(file);

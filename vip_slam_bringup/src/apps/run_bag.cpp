@@ -8,13 +8,13 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include <CLI/CLI.hpp>
 #include <opencv2/core/utility.hpp>
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_bringup/runner/pipeline.h"
 #include "vip_slam_bringup/runner/progress_bar.h"
 #include "vip_slam_bringup/runner/run_output.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_ros/sensor_files.h"
 
 namespace {
@@ -24,24 +24,27 @@ volatile std::sig_atomic_t g_interrupted = 0;
 struct Arguments {
   std::string bag, sensor, out, parameters, variant, loop, map;
   bool localise = false;
-  bool report = true;
+  bool no_report = false;
   std::vector<std::string> settings;
   double start = 0, duration = -1;
 };
 
-void addArguments(CLI::App& app, Arguments& arguments) {
-  app.add_option("bag", arguments.bag, "the recording")->required();
-  app.add_option("--sensor", arguments.sensor, "a shipped sensor or a sensor YAML file")->required();
-  app.add_option("--out", arguments.out, "folder for the results; made when it does not exist")->required();
-  app.add_option("--variant", arguments.variant, "vi, vi_p, vi_cp or vip (default)");
-  app.add_option("--loop", arguments.loop, "loop closing: on (default) or off");
-  CLI::Option* map = app.add_option("--map", arguments.map, "stored map (map.vsm) to start in");
-  app.add_flag("--localise", arguments.localise, "leave the stored map as it is, only find the way in it")->needs(map);
-  app.add_flag("!--no-report", arguments.report, "leave report.html out");
-  app.add_option("--params", arguments.parameters, "YAML file with options, in groups");
-  app.add_option("--set", arguments.settings, "one option as group/key=value; repeatable")->take_all();
-  app.add_option("--start", arguments.start, "seconds to skip at the beginning");
-  app.add_option("--duration", arguments.duration, "seconds to process");
+void addArguments(vip_slam::CommandLine& line, Arguments& arguments) {
+  line.argument("bag", arguments.bag, "the recording");
+  line.option("sensor", arguments.sensor, "a shipped sensor or a sensor YAML file");
+  line.required("sensor");
+  line.option("out", arguments.out, "folder for the results; made when it does not exist");
+  line.required("out");
+  line.option("variant", arguments.variant, "vi, vi_p, vi_cp or vip (default)");
+  line.option("loop", arguments.loop, "loop closing: on (default) or off");
+  line.option("map", arguments.map, "stored map (map.vsm) to start in");
+  line.flag("localise", arguments.localise, "leave the stored map as it is, only find the way in it");
+  line.needs("localise", "map");
+  line.flag("no-report", arguments.no_report, "leave report.html out");
+  line.option("params", arguments.parameters, "YAML file with options, in groups");
+  line.option("set", arguments.settings, "one option as group/key=value; repeatable");
+  line.option("start", arguments.start, "seconds to skip at the beginning");
+  line.option("duration", arguments.duration, "seconds to process");
 }
 
 std::pair<std::string, std::string> splitSetting(const std::string& setting) {
@@ -117,7 +120,7 @@ int run(const Arguments& arguments) {
   facts.finished = !g_interrupted;
   facts.processing_time = seconds;
   vip_slam::writeRun(arguments.out, facts, pipeline, reader, timing);
-  if (arguments.report) makeReport(arguments.out);
+  if (!arguments.no_report) makeReport(arguments.out);
   char note[160];
   std::snprintf(note, sizeof note, "%zu images in %.1f s%s, results in %s", pipeline.images(), seconds,
                 g_interrupted ? " (interrupted)" : "", arguments.out.c_str());
@@ -134,10 +137,11 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs VIP-SLAM over a bag, as fast as the machine allows; two runs give the same bits.");
+  vip_slam::CommandLine line("run_bag",
+                             "Runs VIP-SLAM over a bag, as fast as the machine allows; two runs give the same bits.");
   Arguments arguments;
-  addArguments(app, arguments);
-  CLI11_PARSE(app, argc, argv);
+  addArguments(line, arguments);
+  if (const auto status = line.parse(argc, argv)) return *status;
   std::signal(SIGINT, [](int) { g_interrupted = 1; });
   std::signal(SIGTERM, [](int) { g_interrupted = 1; });
   // The pipeline has its own threads, one for each core; OpenCV's would only stand in their way.

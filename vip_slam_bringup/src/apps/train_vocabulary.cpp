@@ -6,17 +6,17 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include <CLI/CLI.hpp>
-#include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "vip_slam_backend/place_recognition/vocabulary_io.h"
 #include "vip_slam_backend/place_recognition/vocabulary_trainer.h"
 #include "vip_slam_bringup/runner/progress_bar.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_frontend/tracking/corner_detector.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
 #include "vip_slam_ros/image_decoding.h"
@@ -123,21 +123,23 @@ int train(const std::vector<std::string>& inputs, const std::string& out, double
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Trains a place-recognition vocabulary from bags, pictures and folders of pictures.");
+  vip_slam::CommandLine line("train_vocabulary",
+                             "Trains a place-recognition vocabulary from bags, pictures and folders of pictures.");
   std::vector<std::string> inputs;
   std::string out;
   double every = 0.5;
   int corners = 400;
   vip_slam::VocabularyTrainerOptions options;
-  app.add_option("inputs", inputs, "bags, pictures, folders of pictures")->required();
-  app.add_option("--out", out, "vocabulary file to write")->required();
-  app.add_option("--every", every, "seconds between pictures taken from a bag");
-  app.add_option("--corners", corners, "ORB corners per picture beside the tracked ones");
-  app.add_option("--branching", options.branching, "children per node");
-  app.add_option("--levels", options.levels, "levels of the tree");
-  app.add_option("--min-descriptors", options.min_descriptors, "nodes with fewer descriptors are not split");
-  app.add_option("--seed", options.seed, "of the random choice of first centres");
-  CLI11_PARSE(app, argc, argv);
+  line.argument("inputs", inputs, "bags, pictures, folders of pictures");
+  line.option("out", out, "vocabulary file to write");
+  line.required("out");
+  line.option("every", every, "seconds between pictures taken from a bag");
+  line.option("corners", corners, "ORB corners per picture beside the tracked ones");
+  line.option("branching", options.branching, "children per node");
+  line.option("levels", options.levels, "levels of the tree");
+  line.option("min-descriptors", options.min_descriptors, "nodes with fewer descriptors are not split");
+  line.option("seed", options.seed, "of the random choice of first centres");
+  if (const auto status = line.parse(argc, argv)) return *status;
   cv::setNumThreads(1);
   try {
     return train(inputs, out, every, corners, options);

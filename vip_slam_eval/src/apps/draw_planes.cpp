@@ -5,12 +5,12 @@
 #include <filesystem>
 #include <iostream>
 
-#include <CLI/CLI.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_eval/plane_picture.h"
 #include "vip_slam_ros/sensor_files.h"
 
@@ -55,16 +55,20 @@ int draw(Arguments arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Draws the planes of a run over images of its bag."};
+  vip_slam::CommandLine line("draw_planes", "Draws the planes of a run over images of its bag.");
   Arguments arguments;
-  app.add_option("bag", arguments.bag, "the recording")->required();
-  app.add_option("--sensor", arguments.sensor, "a shipped sensor or a sensor YAML file")->required();
-  app.add_option("--trajectory", arguments.trajectory, "poses of the IMU in the planes' world, TUM")->required();
-  app.add_option("--planes", arguments.planes, "planes.yaml of the run")->required();
-  app.add_option("--time", arguments.times, "seconds after the beginning of the bag; several make several pictures")
-      ->required();
-  app.add_option("--out", arguments.out, "folder for the pictures")->required();
-  CLI11_PARSE(app, argc, argv);
+  line.argument("bag", arguments.bag, "the recording");
+  line.option("sensor", arguments.sensor, "a shipped sensor or a sensor YAML file");
+  line.required("sensor");
+  line.option("trajectory", arguments.trajectory, "poses of the IMU in the planes' world, TUM");
+  line.required("trajectory");
+  line.option("planes", arguments.planes, "planes.yaml of the run");
+  line.required("planes");
+  line.option("time", arguments.times, "seconds after the beginning of the bag; several make several pictures");
+  line.required("time");
+  line.option("out", arguments.out, "folder for the pictures");
+  line.required("out");
+  if (const auto status = line.parse(argc, argv)) return *status;
   try {
     return draw(arguments);
   } catch (const std::exception& error) {

@@ -4,9 +4,8 @@
 #include <filesystem>
 #include <sstream>
 
-#include <CLI/CLI.hpp>
-
 #include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_eval/gba_benchmark/gba_benchmark.h"
 #include "vip_slam_eval/plot/line_plot.h"
 
@@ -23,31 +22,34 @@ void writeText(const std::string& path, const std::string& text) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Times the global bundle adjustment of the four variants on one simulated map");
+  CommandLine line("gba_benchmark", "Times the global bundle adjustment of the four variants on one simulated map");
   std::string out;
   SimulatedMapOptions options;
   int iterations = 10, repeats = 5;
   bool quick = false;
-  app.add_option("--out", out, "directory for table.md, table.csv, time_over_keyframes.csv and .png")->required();
-  app.add_option("--keyframes", options.keyframes, "keyframes of the table")->check(CLI::Range(20, 2000));
-  app.add_option("--plane-points", options.plane_points, "points on planes")->check(CLI::Range(50, 100000));
-  app.add_option("--free-points", options.free_points, "points on no plane")->check(CLI::Range(50, 100000));
-  app.add_option("--seed", options.seed, "seed of the simulation");
-  app.add_option("--iterations", iterations, "Levenberg-Marquardt iterations")->check(CLI::Range(1, 1000));
-  app.add_option("--repeats", repeats, "runs per figure; the median counts")->check(CLI::Range(1, 100));
-  app.add_flag("--quick", quick, "the table only, not the figure over keyframes");
-  CLI11_PARSE(app, argc, argv);
+  line.option("out", out, "directory for table.md, table.csv, time_over_keyframes.csv and .png");
+  line.required("out");
+  line.option("keyframes", options.keyframes, "keyframes of the table", between(20, 2000));
+  line.option("plane-points", options.plane_points, "points on planes", between(50, 100000));
+  line.option("free-points", options.free_points, "points on no plane", between(50, 100000));
+  line.option("seed", options.seed, "seed of the simulation");
+  line.option("iterations", iterations, "Levenberg-Marquardt iterations", between(1, 1000));
+  line.option("repeats", repeats, "runs per figure; the median counts", between(1, 100));
+  line.flag("quick", quick, "the table only, not the figure over keyframes");
+  if (const auto status = line.parse(argc, argv)) return *status;
   try {
     std::filesystem::create_directories(out);
     const SimulatedMap map = simulateMap(options);
     const Variant variants[] = {Variant::kVi, Variant::kViP, Variant::kViCp, Variant::kVip};
     std::ostringstream md;
     md << "# Global bundle adjustment of the four variants\n\n"
-       << options.keyframes << " keyframes, " << options.plane_points << " points on planes ("
-       << map.plane_observations << " observations), " << options.free_points << " free points (" << map.free_observations
+       << options.keyframes << " keyframes, " << options.plane_points << " points on planes (" << map.plane_observations
+       << " observations), " << options.free_points << " free points (" << map.free_observations
        << " observations), seed " << options.seed << ", " << iterations << " iterations, median of " << repeats
-       << " runs.\n\nThe structured solver eliminates the points while it evaluates the Jacobians, so its elimination counts "
-          "there; Ceres counts it as linear solving. Only sums compare across solvers. `Sum` is the solver's, as in the "
+       << " runs.\n\nThe structured solver eliminates the points while it evaluates the Jacobians, so its elimination "
+          "counts "
+          "there; Ceres counts it as linear solving. Only sums compare across solvers. `Sum` is the solver's, as in "
+          "the "
           "paper; `Sum from map to map` adds the gathering of the factors with their compression, and the way back.\n";
     std::vector<GbaRun> all;
     const auto table = [&](const char* title, const char* solver, int threads, int runs) {
@@ -65,12 +67,13 @@ int main(int argc, char** argv) {
     const auto own2 = table("Structured solver, two threads", "structured", 2, repeats);
     const GbaRun shared = runGba(map, Variant::kVip, "structured", 1, iterations, repeats, true);
     md << "\n## VIP with shared hosts, structured solver, one thread\n\nNot what the live system does by default "
-          "(`global_ba/shared_hosts`).\n\n" << gbaTableMarkdown({shared});
+          "(`global_ba/shared_hosts`).\n\n"
+       << gbaTableMarkdown({shared});
     const auto stock = table("Stock Ceres (SPARSE_SCHUR), one thread", "ceres", 1, std::min(repeats, 3));
     const auto ratio = [&](const char* what, const GbaRun& slow, const GbaRun& fast, const char* aim) {
       char row[200];
-      std::snprintf(row, sizeof(row), "| %s | %.2f | %.2f | %s |\n", what, slow.summary.total_ms / fast.summary.total_ms,
-                    slow.wholeMs() / fast.wholeMs(), aim);
+      std::snprintf(row, sizeof(row), "| %s | %.2f | %.2f | %s |\n", what,
+                    slow.summary.total_ms / fast.summary.total_ms, slow.wholeMs() / fast.wholeMs(), aim);
       md << row;
     };
     md << "\n## Ratios\n\n| ratio | of the solver | from map to map | aim (paper) |\n|---|---:|---:|---|\n";
@@ -84,7 +87,8 @@ int main(int argc, char** argv) {
     ratio("VI, one thread / two threads, structured", own[0], own2[0], "1");
     ratio("VIP, one thread / two threads, structured", own[3], own2[3], "1");
     char rmse[80];
-    std::snprintf(rmse, sizeof(rmse), "\nRMSE of VIP / RMSE of VI: %.2f (paper 0.84, aim 1 or less)\n", own[3].rmse / own[0].rmse);
+    std::snprintf(rmse, sizeof(rmse), "\nRMSE of VIP / RMSE of VI: %.2f (paper 0.84, aim 1 or less)\n",
+                  own[3].rmse / own[0].rmse);
     md << rmse;
 
     if (!quick) {
@@ -132,7 +136,8 @@ int main(int argc, char** argv) {
         std::snprintf(row, sizeof(row), "| %d | %.1f | %.1f | %.0f |\n", n, ms[0], ms[1], 1e3 * ms[1] / n);
         md << row;
       }
-      writeLinePlot(out + "/time_over_corridor.png", "Global bundle adjustment along a corridor", "keyframes", "ms", straight);
+      writeLinePlot(out + "/time_over_corridor.png", "Global bundle adjustment along a corridor", "keyframes", "ms",
+                    straight);
       writeText(out + "/time_over_keyframes.csv", csv.str());
       md << "\n![time over keyframes](time_over_keyframes.png)\n\n![time along a corridor](time_over_corridor.png)\n";
     }

@@ -4,7 +4,6 @@
 #include <iostream>
 #include <set>
 
-#include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
 
 #include "vip_slam_backend/loop/loop_closer.h"
@@ -12,6 +11,7 @@
 #include "vip_slam_backend/relocalisation/relocaliser.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/options.h"
 
 namespace {
@@ -41,7 +41,8 @@ void judgeLoops(const StoredMap& stored, const std::map<KeyframeId, SE3>& truth)
   for (const auto& loop : stored.loops) {
     if (!truth.count(loop.first) || !truth.count(loop.second)) continue;
     ++judged;
-    const SE3 found = stored.map.keyframe(loop.second).state.T_W_I.inverse() * stored.map.keyframe(loop.first).state.T_W_I;
+    const SE3 found =
+        stored.map.keyframe(loop.second).state.T_W_I.inverse() * stored.map.keyframe(loop.first).state.T_W_I;
     const SE3 error = (truth.at(loop.second).inverse() * truth.at(loop.first)).inverse() * found;
     const double angle = Eigen::AngleAxisd(error.rotation()).angle();
     const bool bad = error.t().norm() > kWrongMetres || angle > kWrongAngle;
@@ -74,7 +75,8 @@ void judgeRevisits(const StoredMap& stored, const std::map<KeyframeId, SE3>& tru
   for (const auto& entry : truth) {
     bool revisit = false;
     for (const auto& other : truth)
-      if (stamp(entry.first) - stamp(other.first) >= kRevisitSeconds && samePlace(entry.second, other.second)) revisit = true;
+      if (stamp(entry.first) - stamp(other.first) >= kRevisitSeconds && samePlace(entry.second, other.second))
+        revisit = true;
     if (!revisit) continue;
     if (stamp(entry.first) - last > 3.0) endEpisode();
     open = true;
@@ -173,19 +175,22 @@ void judgeRelocalisation(const StoredMap& stored, const std::map<KeyframeId, SE3
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Judges loops and relocalisation of stored maps against ground truth."};
+  vip_slam::CommandLine line("place_metrics", "Judges loops and relocalisation of stored maps against ground truth.");
   std::string map, truth, query, query_truth, sensor;
   std::vector<std::string> settings;
   bool list = false;
-  app.add_option("--map", map, "map.vsm of a run")->required();
-  app.add_option("--truth", truth, "true trajectory of that run, TUM")->required();
-  CLI::Option* query_option = app.add_option("--query", query, "map.vsm of another session in the same place");
-  app.add_option("--query-truth", query_truth, "its true trajectory, TUM");
-  app.add_option("--sensor", sensor, "sensor YAML with intrinsics, for relocalisation");
-  app.add_option("--set", settings, "option of relocalisation as key=value (`loop/` of the back end); repeatable")->take_all();
-  app.add_flag("--list", list, "one line per keyframe at a mapped place or found");
-  query_option->needs("--query-truth")->needs("--sensor");
-  CLI11_PARSE(app, argc, argv);
+  line.option("map", map, "map.vsm of a run");
+  line.required("map");
+  line.option("truth", truth, "true trajectory of that run, TUM");
+  line.required("truth");
+  line.option("query", query, "map.vsm of another session in the same place");
+  line.option("query-truth", query_truth, "its true trajectory, TUM");
+  line.option("sensor", sensor, "sensor YAML with intrinsics, for relocalisation");
+  line.option("set", settings, "option of relocalisation as key=value (`loop/` of the back end); repeatable");
+  line.flag("list", list, "one line per keyframe at a mapped place or found");
+  line.needs("query", "query-truth");
+  line.needs("query", "sensor");
+  if (const auto status = line.parse(argc, argv)) return *status;
   try {
     vip_slam::LoopOptions options;
     std::vector<std::pair<std::string, std::string>> values;
@@ -199,8 +204,8 @@ int main(int argc, char** argv) {
     judgeLoops(stored, poses);
     judgeRevisits(stored, poses);
     if (!query.empty())
-      judgeRelocalisation(stored, poses, vip_slam::loadMapFile(query, vip_slam::ImuNoise()), vip_slam::readTum(query_truth),
-                          vip_slam::loadSensorConfig(sensor), options, list);
+      judgeRelocalisation(stored, poses, vip_slam::loadMapFile(query, vip_slam::ImuNoise()),
+                          vip_slam::readTum(query_truth), vip_slam::loadSensorConfig(sensor), options, list);
   } catch (const std::exception& error) {
     std::cerr << "place_metrics: " << error.what() << "\n";
     return 1;

@@ -4,11 +4,11 @@
 #include <fstream>
 #include <iostream>
 
-#include <CLI/CLI.hpp>
 #include <opencv2/core/utility.hpp>
 
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_eval/plane_benchmark.h"
 #include "vip_slam_eval/plane_tables.h"
 
@@ -38,19 +38,23 @@ void write(const std::string& folder, const PlaneBenchmarkResult& result, const 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Runs the plane module over a bag with true poses and judges its planes and point associations."};
+  CommandLine line("plane_benchmark",
+                   "Runs the plane module over a bag with true poses and judges its planes and point associations.");
   PlaneBenchmarkInput input;
   std::string truth, true_planes, out;
   std::vector<std::string> settings;
-  app.add_option("bag", input.bag, "the recording")->required();
-  app.add_option("--sensor", input.sensor, "a shipped sensor or a sensor YAML file")->required();
-  app.add_option("--truth", truth, "true trajectory of the IMU, TUM")->required();
-  app.add_option("--planes-truth", true_planes, "true planes, YAML")->required();
-  app.add_option("--out", out, "folder for metrics.csv, planes.csv, true_planes.csv, planes.yaml, points.csv, timing.csv");
-  app.add_option("--set", settings, "one option as group/key=value, as for run_bag; repeatable")->take_all();
-  app.add_option("--start", input.start, "seconds to skip at the beginning");
-  app.add_option("--duration", input.duration, "seconds to process");
-  CLI11_PARSE(app, argc, argv);
+  line.argument("bag", input.bag, "the recording");
+  line.option("sensor", input.sensor, "a shipped sensor or a sensor YAML file");
+  line.required("sensor");
+  line.option("truth", truth, "true trajectory of the IMU, TUM");
+  line.required("truth");
+  line.option("planes-truth", true_planes, "true planes, YAML");
+  line.required("planes-truth");
+  line.option("out", out, "folder for metrics.csv, planes.csv, true_planes.csv, planes.yaml, points.csv, timing.csv");
+  line.option("set", settings, "one option as group/key=value, as for run_bag; repeatable");
+  line.option("start", input.start, "seconds to skip at the beginning");
+  line.option("duration", input.duration, "seconds to process");
+  if (const auto status = line.parse(argc, argv)) return *status;
   cv::setNumThreads(1);
   try {
     std::vector<std::pair<std::string, std::string>> values;

@@ -6,10 +6,9 @@
 #include <limits>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "progress_bar.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_sim/io/rgbd_folder.h"
 #include "vip_slam_sim/io/sequence_writer.h"
 
@@ -56,27 +55,23 @@ SensorConfig sensorOf(const Settings& s, const RgbdFolder& folder, const Sequenc
 
 int run(int argc, char** argv) {
   Settings s;
-  CLI::App app{"Gives a folder of RGB-D images with poses an IMU, and writes a bag."};
-  app.add_option("folder", s.folder, "7-Scenes or TUM layout")->required();
-  app.add_option("--out", s.out, "directory for NAME.bag, NAME_truth.tum, NAME_sensor.yaml")->required();
-  app.add_option("--name", s.name, "default: the folder's name");
-  app.add_option("--up", s.up, "up vector in the world of the poses; default: from floors and walls in the depth")
-      ->expected(3);
-  app.add_option("--intrinsics", s.intrinsics, "fx fy cx cy of the colour camera")->expected(4);
-  app.add_flag("--registered", s.registered,
-               "7-Scenes layout: depth, intrinsics and poses belong to the colour camera, not to one of its own");
-  app.add_option("--rate", s.rate, "images per second, where the folder has no stamps")->check(CLI::Range(1.0, 120.0));
-  app.add_option("--spacing", s.spacing, "seconds between spline knots: smooths the poses' noise")
-      ->check(CLI::Range(0.02, 2.0));
-  app.add_option("--iterations", s.iterations, "corrections towards the poses")->check(CLI::Range(0, 50));
-  app.add_option("--imu-rate", s.imu.rate, "Hz")->check(CLI::Range(50.0, 2000.0));
-  app.add_option("--seed", s.seed, "of the IMU's noise");
-  app.add_option("--format", s.format, "bag or folder")->check(CLI::IsMember({"bag", "folder"}));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e);
-  }
+  CommandLine line("imu_from_rgbd_folder", "Gives a folder of RGB-D images with poses an IMU, and writes a bag.");
+  line.argument("folder", s.folder, "7-Scenes or TUM layout");
+  line.option("out", s.out, "directory for NAME.bag, NAME_truth.tum, NAME_sensor.yaml");
+  line.required("out");
+  line.option("name", s.name, "default: the folder's name");
+  line.option("up", s.up, "up vector in the world of the poses; default: from floors and walls in the depth",
+              count<double>(3, 3));
+  line.option("intrinsics", s.intrinsics, "fx fy cx cy of the colour camera", count<double>(4, 4));
+  line.flag("registered", s.registered,
+            "7-Scenes layout: depth, intrinsics and poses belong to the colour camera, not to one of its own");
+  line.option("rate", s.rate, "images per second, where the folder has no stamps", between(1.0, 120.0));
+  line.option("spacing", s.spacing, "seconds between spline knots: smooths the poses' noise", between(0.02, 2.0));
+  line.option("iterations", s.iterations, "corrections towards the poses", between(0, 50));
+  line.option("imu-rate", s.imu.rate, "Hz", between(50.0, 2000.0));
+  line.option("seed", s.seed, "of the IMU's noise");
+  line.option("format", s.format, "bag or folder", oneOf("bag, folder"));
+  if (const auto status = line.parse(argc, argv)) return *status;
   if (s.name.empty())
     s.name = fs::path(s.folder).filename().empty() ? fs::path(s.folder).parent_path().filename().string()
                                                    : fs::path(s.folder).filename().string();

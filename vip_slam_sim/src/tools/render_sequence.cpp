@@ -10,7 +10,6 @@
 #include <thread>
 
 #include <ros/package.h>
-#include <CLI/CLI.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -18,6 +17,7 @@
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
+#include "vip_slam_core/util/command_line.h"
 #include "vip_slam_sim/io/sequence_writer.h"
 
 namespace fs = std::filesystem;
@@ -53,24 +53,19 @@ int run(int argc, char** argv) {
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   int snapshot_every = 0, first = 0, count = -1;
   bool list = false, keys = false, keep = false;
-  CLI::App app{"Renders an RGB-D + IMU sequence with ground truth."};
-  app.add_option("sequence", what, "name of a shipped sequence (--list) or a .yaml file");
-  app.add_option("--out", out, "directory for NAME.bag, NAME_truth.tum, NAME_planes.yaml, NAME_sensor.yaml");
-  app.add_option("--format", format, "bag, folder (EuRoC/TUM layout) or none (snapshots only)")
-      ->check(CLI::IsMember({"bag", "folder", "none"}));
-  app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 256));
-  app.add_option("--library", library, "YAML of the named sequences");
-  app.add_option("--snapshots", snapshot_every, "also save every Nth frame as PNG (colour beside depth)");
-  app.add_option("--first", first, "first frame")->check(CLI::NonNegativeNumber);
-  app.add_option("--count", count, "number of frames (default all)");
-  app.add_flag("--list", list, "list the shipped sequences");
-  app.add_flag("--keys", keys, "print the keys of a sequence with their defaults and ranges");
-  app.add_flag("--skip-existing", keep, "do nothing when the outputs are there");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e);
-  }
+  CommandLine line("render_sequence", "Renders an RGB-D + IMU sequence with ground truth.");
+  line.argument("sequence", what, "name of a shipped sequence (--list) or a .yaml file", false);
+  line.option("out", out, "directory for NAME.bag, NAME_truth.tum, NAME_planes.yaml, NAME_sensor.yaml");
+  line.option("format", format, "bag, folder (EuRoC/TUM layout) or none (snapshots only)", oneOf("bag, folder, none"));
+  line.option("threads", threads, "rendering threads", between(1, 256));
+  line.option("library", library, "YAML of the named sequences");
+  line.option("snapshots", snapshot_every, "also save every Nth frame as PNG (colour beside depth)");
+  line.option("first", first, "first frame", between(0, 1 << 30));
+  line.option("count", count, "number of frames (default all)");
+  line.flag("list", list, "list the shipped sequences");
+  line.flag("keys", keys, "print the keys of a sequence with their defaults and ranges");
+  line.flag("skip-existing", keep, "do nothing when the outputs are there");
+  if (const auto status = line.parse(argc, argv)) return *status;
   if (list) {
     for (const std::string& name : sequenceNames(library)) std::cout << name << "\n";
     return 0;
@@ -79,7 +74,7 @@ int run(int argc, char** argv) {
     std::cout << optionReference("Keys of a sequence", listOptions(SequenceSpec()));
     return 0;
   }
-  if (what.empty() || out.empty()) throw std::runtime_error("expected a sequence and --out DIR (--help)");
+  if (what.empty() || out.empty()) return line.mistake("expected a sequence and --out DIR");
 
   const SequenceSpec spec = loadSequence(what, library);
   const std::string base = (fs::path(out) / spec.name).string();
