@@ -100,11 +100,12 @@ TEST_P(CameraTest, ScalingKeepsRays) {
 
 INSTANTIATE_TEST_SUITE_P(
     Models, CameraTest,
-    ::testing::Values(Case{"pinhole", intrinsics(DistortionModel::kNone, {})},
-                      Case{"euroc", intrinsics(DistortionModel::kRadTan, {-0.28340811, 0.07395907, 1.9359e-4, 1.76187e-5})},
-                      Case{"five", intrinsics(DistortionModel::kRadTan, {0.12, -0.25, 1e-3, -8e-4, 0.09})},
-                      Case{"rational", intrinsics(DistortionModel::kRadTan, {0.55, -2.6, 5e-4, -2e-4, 1.5, 0.43, -2.4, 1.4})},
-                      Case{"fisheye", intrinsics(DistortionModel::kEquidistant, {-0.013, 0.021, -0.012, 0.0026})}),
+    ::testing::Values(
+        Case{"pinhole", intrinsics(DistortionModel::kNone, {})},
+        Case{"euroc", intrinsics(DistortionModel::kRadTan, {-0.28340811, 0.07395907, 1.9359e-4, 1.76187e-5})},
+        Case{"five", intrinsics(DistortionModel::kRadTan, {0.12, -0.25, 1e-3, -8e-4, 0.09})},
+        Case{"rational", intrinsics(DistortionModel::kRadTan, {0.55, -2.6, 5e-4, -2e-4, 1.5, 0.43, -2.4, 1.4})},
+        Case{"fisheye", intrinsics(DistortionModel::kEquidistant, {-0.013, 0.021, -0.012, 0.0026})}),
     [](const ::testing::TestParamInfo<Case>& info) { return info.param.name; });
 
 TEST(CameraFold, StrongBarrelDistortionIsNotFoldedBack) {

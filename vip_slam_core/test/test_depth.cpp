@@ -204,7 +204,8 @@ TEST(DepthGridTest, KeepsSurfacesAtAGrazingAngleButNoEdges) {
   const double f = 525, horizon = 100;
   cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(0));
   for (int v = 0; v < depth.rows; ++v) {
-    const double top = v > horizon ? 0.55 * f / (v - horizon) : 1e9, floor = v > horizon ? 0.8 * f / (v - horizon) : 1e9;
+    const double top = v > horizon ? 0.55 * f / (v - horizon) : 1e9,
+                 floor = v > horizon ? 0.8 * f / (v - horizon) : 1e9;
     depth.row(v) = top < 6.0 ? top : floor < 10.0 ? floor : 0.0;
   }
   int far_nodes = 0;
@@ -279,7 +280,8 @@ TEST(DepthSpeed, GridAndRegistrationFitTheFrameBudget) {
     for (int k = 0; k < 20; ++k) {
       const auto start = std::chrono::steady_clock::now();
       work();
-      best = std::min(best, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+      best =
+          std::min(best, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
     }
     return best;
   };

@@ -14,7 +14,9 @@ using testing::numericJacobian;
 
 class Geometry : public ::testing::Test {
  protected:
-  Eigen::Vector3d vector(double scale) { return scale * Eigen::Vector3d(normal_(random_), normal_(random_), normal_(random_)); }
+  Eigen::Vector3d vector(double scale) {
+    return scale * Eigen::Vector3d(normal_(random_), normal_(random_), normal_(random_));
+  }
   SE3 pose() { return SE3(expQuaternion(vector(1.0)), vector(2.0)); }
   Plane plane() { return Plane(vector(1.0), 2.0 * normal_(random_)); }
 
@@ -52,9 +54,11 @@ TEST_F(Geometry, JacobiansOfTheRotationGroup) {
     const Eigen::Vector3d theta = angle * vector(1).normalized();
     const Eigen::Quaterniond q = expQuaternion(theta);
     const Eigen::MatrixXd right = numericJacobian(
-        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return logSO3(q.conjugate() * expQuaternion(theta + d)); }, 3);
+        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return logSO3(q.conjugate() * expQuaternion(theta + d)); },
+        3);
     const Eigen::MatrixXd left = numericJacobian(
-        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return logSO3(expQuaternion(theta + d) * q.conjugate()); }, 3);
+        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return logSO3(expQuaternion(theta + d) * q.conjugate()); },
+        3);
     EXPECT_LT((rightJacobianSO3(theta) - right).norm(), 1e-8) << angle;
     EXPECT_LT((leftJacobianSO3(theta) - left).norm(), 1e-8) << angle;
     EXPECT_LT((rightJacobianSO3(theta) * rightJacobianInverseSO3(theta) - Eigen::Matrix3d::Identity()).norm(), 1e-12);
@@ -78,7 +82,8 @@ TEST_F(Geometry, LevellingPutsUpUpwardsWithoutYaw) {
   }
   const Eigen::Vector3d down(0, 0, -3);  // upside down: the shortest arc is not unique
   EXPECT_LT((gravityAlignedRotation(down) * Eigen::Vector3d(0, 0, -1) - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
-  EXPECT_LT((rotationBetween({1, 0, 0}, {0, 1, 0}) * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0, 1, 0)).norm(), 1e-14);
+  EXPECT_LT((rotationBetween({1, 0, 0}, {0, 1, 0}) * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0, 1, 0)).norm(),
+            1e-14);
   EXPECT_NEAR(yawOf(expQuaternion({0, 0, 2.5})), 2.5, 1e-14);
 }
 

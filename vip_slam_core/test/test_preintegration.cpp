@@ -35,7 +35,8 @@ TEST(Preintegration, FollowsExactMotion) {
     const AnalyticMotion motion(seed, 2.0);
     const Preintegration pre(motion.imu(3.0, 13.0, 200, kBg, kBa), kBg, kBa, ImuNoise());
     EXPECT_NEAR(pre.dt(), 10.0, 1e-9);
-    const NavState end = motion.stateAt(13.0), predicted = pre.predict(withBiases(motion.stateAt(3.0)), gravityVector());
+    const NavState end = motion.stateAt(13.0),
+                   predicted = pre.predict(withBiases(motion.stateAt(3.0)), gravityVector());
     // Ten seconds from noise-free samples at 200 Hz.
     EXPECT_LT((predicted.T_W_I.t() - end.T_W_I.t()).norm(), 1e-3) << seed;
     EXPECT_LT((predicted.v_W - end.v_W).norm(), 2e-4) << seed;

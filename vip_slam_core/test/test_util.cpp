@@ -73,7 +73,8 @@ std::string refusal(const std::vector<std::pair<std::string, std::string>>& valu
 
 TEST(Options, SetAndList) {
   SomeOptions options;
-  setOptions(options, {{"count", "300"}, {"enabled", "false"}, {"mode", "exact"}, {"label", "a b"}, {"inner/radius", "3"}});
+  setOptions(options,
+             {{"count", "300"}, {"enabled", "false"}, {"mode", "exact"}, {"label", "a b"}, {"inner/radius", "3"}});
   EXPECT_EQ(options.count, 300);
   EXPECT_FALSE(options.enabled);
   EXPECT_EQ(options.mode, "exact");

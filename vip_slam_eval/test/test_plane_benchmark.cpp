@@ -20,7 +20,9 @@ class PlaneBenchmark : public ::testing::Test {
   void TearDown() override { fs::remove_all(out_); }
 
   static std::string sequence(const std::string& end) { return std::string(VIP_SLAM_SEQUENCE) + end; }
-  static int run(const std::string& command) { return WEXITSTATUS(std::system((command + " >/dev/null 2>&1").c_str())); }
+  static int run(const std::string& command) {
+    return WEXITSTATUS(std::system((command + " >/dev/null 2>&1").c_str()));
+  }
   std::string benchmark(const std::string& truth) const {
     return std::string(VIP_SLAM_PLANE_BENCHMARK) + " " + sequence(".bag") + " --sensor " + sequence("_sensor.yaml") +
            " --truth " + truth + " --planes-truth " + sequence("_planes.yaml") + " --out " + out_.string();

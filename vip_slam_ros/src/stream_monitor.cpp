@@ -68,7 +68,8 @@ StreamMonitor::Report StreamMonitor::report() const {
 std::string StreamMonitor::complaint(double now) const {
   const Report r = report();
   const std::string topic = "topic " + r.topic + ": ";
-  if (r.messages == 0 && r.rejected == 0) return topic + "no message so far; is the name right, and the driver running?";
+  if (r.messages == 0 && r.rejected == 0)
+    return topic + "no message so far; is the name right, and the driver running?";
   if (r.rejected > 0 && r.messages <= r.rejected) return topic + r.last_rejection;
   const double silence = now - r.last_arrival;
   if (silence > 2.0) return topic + format("silent for %.1f s", silence, 0);

@@ -1,4 +1,5 @@
-// Pinhole with radial-tangential (Brown-Conrady) distortion, polynomial or rational; without distortion the plain pinhole.
+// Pinhole with radial-tangential (Brown-Conrady) distortion, polynomial or rational; without distortion the plain
+// pinhole.
 #pragma once
 
 #include "vip_slam_core/camera/camera_model.h"

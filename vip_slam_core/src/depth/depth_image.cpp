@@ -126,8 +126,8 @@ bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, con
   return true;
 }
 
-// With `grazing`, where the spread says edge it is judged again with the local slope taken out: floors and table tops at
-// a grazing angle rise by more than an edge over the window, yet they are surfaces.
+// With `grazing`, where the spread says edge it is judged again with the local slope taken out: floors and table tops
+// at a grazing angle rise by more than an edge over the window, yet they are surfaces.
 float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options,
              bool grazing) {
   if (!(u > -1 && v > -1 && u < depth.cols && v < depth.rows)) return 0.0f;

@@ -33,8 +33,8 @@ struct PlaneBenchmarkResult {
   PlaneMapperCounters counters;
 };
 
-/// Stages "planes.update" (all that a keyframe costs) and "planes.grow" go to `timing`. Throws std::runtime_error naming
-/// what cannot be read, or when the truth covers no keyframe.
+/// Stages "planes.update" (all that a keyframe costs) and "planes.grow" go to `timing`. Throws std::runtime_error
+/// naming what cannot be read, or when the truth covers no keyframe.
 PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing);
 
 MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing);

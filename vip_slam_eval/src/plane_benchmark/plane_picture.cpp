@@ -61,7 +61,8 @@ void annotate(const cv::Mat& index, const std::vector<PlaneEstimate>& planes, cv
     const int parts = cv::connectedComponentsWithStats(mask, labels, statistics, centres);
     int largest = 0;
     for (int i = 1; i < parts; ++i) {
-      if (!largest || statistics.at<int>(i, cv::CC_STAT_AREA) > statistics.at<int>(largest, cv::CC_STAT_AREA)) largest = i;
+      if (!largest || statistics.at<int>(i, cv::CC_STAT_AREA) > statistics.at<int>(largest, cv::CC_STAT_AREA))
+        largest = i;
     }
     if (!largest || statistics.at<int>(largest, cv::CC_STAT_AREA) < 150) continue;
     const std::string text = std::to_string(planes[k].id);

@@ -58,7 +58,8 @@ void writeLinePlot(const std::string& path, const std::string& title, const std:
   text(image, title, cv::Point(left, 30), 0.65);
   text(image, x_label, cv::Point((width - right) / 2, height - 20));
   text(image, y_label, cv::Point(8, top - 12));
-  const cv::Scalar colours[] = {{180, 90, 20}, {30, 120, 230}, {60, 160, 60}, {60, 60, 210}, {160, 70, 150}, {120, 120, 120}};
+  const cv::Scalar colours[] = {{180, 90, 20}, {30, 120, 230}, {60, 160, 60},
+                                {60, 60, 210}, {160, 70, 150}, {120, 120, 120}};
   for (std::size_t k = 0; k < series.size(); ++k) {
     const cv::Scalar& colour = colours[k % 6];
     for (std::size_t i = 0; i < series[k].x.size(); ++i) {

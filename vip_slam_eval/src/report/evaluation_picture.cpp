@@ -222,10 +222,10 @@ std::string evaluationPicture(const EvaluationInput& input, const Evaluation& ev
     true_z.push_back(evaluation.pairs[i].T_W_B.t().z());
     estimated_z.push_back(true_z.back() + e.position.z());
   }
-  drawOverTime(&page, 100, input, evaluation, "Position error", "[cm]", {{position, {"#3b528b", "none", 1.4, 1.0, ""}, ""}},
-               true);
-  drawOverTime(&page, 370, input, evaluation, "Rotation error", "[deg]", {{rotation, {"#d95f02", "none", 1.4, 1.0, ""}, ""}},
-               true);
+  drawOverTime(&page, 100, input, evaluation, "Position error", "[cm]",
+               {{position, {"#3b528b", "none", 1.4, 1.0, ""}, ""}}, true);
+  drawOverTime(&page, 370, input, evaluation, "Rotation error", "[deg]",
+               {{rotation, {"#d95f02", "none", 1.4, 1.0, ""}, ""}}, true);
   drawOverTime(&page, 640, input, evaluation, "Height", "z [m]",
                {{true_z, {"#777", "none", 2.4, 0.6, ""}, "truth"},
                 {estimated_z, {"#21918c", "none", 1.2, 1.0, ""}, "estimate"}},

@@ -44,7 +44,8 @@ void writeMetricsCsv(std::ostream& out, const MetricTable& table) {
     return text.find(',') == std::string::npos ? text : "\"" + text + "\"";
   };
   for (const Metric& metric : table) {
-    out << cell(metric.group) << ',' << cell(metric.name) << ',' << shortNumber(metric.value, 9) << ',' << metric.unit << '\n';
+    out << cell(metric.group) << ',' << cell(metric.name) << ',' << shortNumber(metric.value, 9) << ',' << metric.unit
+        << '\n';
   }
 }
 

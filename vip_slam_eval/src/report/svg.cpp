@@ -208,7 +208,8 @@ std::string colourScale(double s) {
   const std::size_t k = std::min<std::size_t>(static_cast<std::size_t>(x), kStops.size() - 2);
   char text[8];
   int rgb[3];
-  for (int c = 0; c < 3; ++c) rgb[c] = static_cast<int>(kStops[k][c] + (x - k) * (kStops[k + 1][c] - kStops[k][c]) + 0.5);
+  for (int c = 0; c < 3; ++c)
+    rgb[c] = static_cast<int>(kStops[k][c] + (x - k) * (kStops[k + 1][c] - kStops[k][c]) + 0.5);
   std::snprintf(text, sizeof text, "#%02x%02x%02x", rgb[0] & 255, rgb[1] & 255, rgb[2] & 255);
   return text;
 }

@@ -7,8 +7,8 @@
 
 namespace vip_slam {
 
-/// Takes plumb_bob, rational_polynomial, equidistant, fisheye and none; an uncalibrated K (fx = 0), a missing size or an
-/// unknown distortion model throws std::invalid_argument naming the field.
+/// Takes plumb_bob, rational_polynomial, equidistant, fisheye and none; an uncalibrated K (fx = 0), a missing size or
+/// an unknown distortion model throws std::invalid_argument naming the field.
 CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info);
 sensor_msgs::CameraInfo toCameraInfo(const CameraIntrinsics& intrinsics);
 

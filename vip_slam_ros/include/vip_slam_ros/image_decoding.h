@@ -7,8 +7,8 @@
 
 namespace vip_slam {
 
-/// 8UC1 of its own memory. Takes mono8, 8UC1, mono16, rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, yuv422, yuv422_yuy2 and 8-bit
-/// Bayer. All decoders throw std::invalid_argument naming the encoding or size found and what was expected.
+/// 8UC1 of its own memory. Takes mono8, 8UC1, mono16, rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, yuv422, yuv422_yuy2 and
+/// 8-bit Bayer. All decoders throw std::invalid_argument naming the encoding or size found and what was expected.
 cv::Mat decodeGray(const sensor_msgs::Image& image);
 /// JPEG or PNG.
 cv::Mat decodeGray(const sensor_msgs::CompressedImage& image);

@@ -1,5 +1,5 @@
-// Joins colour and depth images by their stamps. ROS-free, single owner; the nodelet and the offline runner share it, so
-// that both see the same pairs.
+// Joins colour and depth images by their stamps. ROS-free, single owner; the nodelet and the offline runner share it,
+// so that both see the same pairs.
 #pragma once
 
 #include <cstddef>

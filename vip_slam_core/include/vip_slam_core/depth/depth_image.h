@@ -20,7 +20,8 @@ struct DepthLookupOptions {
 
 /// Depth z in metres at sub-pixel (u, v): a local plane-aware robust value (median), 0 when invalid, out of range, or
 /// beside an edge. `depth` is CV_32FC1, metres; 0 and NaN are invalid.
-float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options = {});
+float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise,
+                const DepthLookupOptions& options = {});
 
 /// Converts 16UC1 (times `scale` metres) or 32FC1 to 32FC1 metres with invalid = 0. Throws std::invalid_argument on
 /// other types, naming the type.
@@ -34,7 +35,8 @@ struct DepthGrid {
   float at(int c, int r) const { return z[static_cast<std::size_t>(r) * cols + c]; }
   Eigen::Vector2d pixel(int c, int r) const { return {double(offset + c * stride), double(offset + r * stride)}; }
 };
-DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise, const DepthLookupOptions& options = {});
+DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise,
+                        const DepthLookupOptions& options = {});
 
 /// Registers depth images taken by their own camera into the colour camera (z-buffered forward warp). Rays and the
 /// footprint of each depth pixel are computed once, so that a stream of images pays for the warp only.

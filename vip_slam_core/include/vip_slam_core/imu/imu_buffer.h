@@ -23,7 +23,8 @@ class ImuBuffer {
 
   /// False (and counted) when the sample is not finite, repeats or precedes the newest stamp.
   bool add(const ImuSample& sample);
-  /// Split streams: the accelerometer is interpolated onto the gyro stamps; samples come out once both sides cover them.
+  /// Split streams: the accelerometer is interpolated onto the gyro stamps; samples come out once both sides cover
+  /// them.
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
 

@@ -54,7 +54,8 @@ class AnalyticMotion {
   }
 
   /// Samples from t0 to t1, both included, at `rate` Hz.
-  std::vector<ImuSample> imu(double t0, double t1, double rate, const Eigen::Vector3d& bias_gyro = Eigen::Vector3d::Zero(),
+  std::vector<ImuSample> imu(double t0, double t1, double rate,
+                             const Eigen::Vector3d& bias_gyro = Eigen::Vector3d::Zero(),
                              const Eigen::Vector3d& bias_accel = Eigen::Vector3d::Zero(), double g = 9.81) const {
     std::vector<ImuSample> samples;
     const int n = static_cast<int>(std::lround((t1 - t0) * rate));
@@ -71,7 +72,8 @@ class AnalyticMotion {
     Vec6 out = Vec6::Zero();
     for (int axis = 0; axis < 6; ++axis)
       for (const Sine& s : sines_[axis])
-        out[axis] += s.amplitude * std::pow(s.omega, derivative) * std::sin(s.omega * t + s.phase + derivative * M_PI / 2);
+        out[axis] +=
+            s.amplitude * std::pow(s.omega, derivative) * std::sin(s.omega * t + s.phase + derivative * M_PI / 2);
     return out;
   }
   static Eigen::Matrix3d rotation(const Vec6& x) {

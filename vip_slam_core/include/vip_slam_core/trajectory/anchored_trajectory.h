@@ -24,8 +24,8 @@ struct Anchor {
 
 /// Carries each image's odometry over to the neighbouring keyframes of its epoch: before the first and after the last
 /// keyframe it follows that one, in between the two predictions are blended by time. Blending poses (not the
-/// corrections map->odom) keeps the lever arm to the origin of odom out of it. Images of an epoch without keyframes have
-/// no pose in map and are left out. Both lists ascend in t.
+/// corrections map->odom) keeps the lever arm to the origin of odom out of it. Images of an epoch without keyframes
+/// have no pose in map and are left out. Both lists ascend in t.
 Trajectory anchorTrajectory(const std::vector<OdometryPose>& odometry, const std::vector<Anchor>& anchors);
 
 }  // namespace vip_slam

@@ -1,6 +1,7 @@
 // Plane maps as YAML: the simulator's truth and the system's result share one layout; the truth adds seen_seconds and
 // seen_area.
-//   planes: [{id, kind: horizontal|vertical|general, normal: [x,y,z], distance, area, polygons: [{outer: [[x,y,z],...], holes: [...]}]}]
+//   planes: [{id, kind: horizontal|vertical|general, normal: [x,y,z], distance, area, polygons: [{outer: [[x,y,z],...],
+//   holes: [...]}]}]
 #pragma once
 
 #include <string>

@@ -14,7 +14,8 @@ class BoundedQueue {
  public:
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity == 0 ? 1 : capacity) {}
 
-  /// Appends; when full the oldest element goes and is counted. False when something was dropped or the queue is closed.
+  /// Appends; when full the oldest element goes and is counted. False when something was dropped or the queue is
+  /// closed.
   bool push(T value) {
     std::lock_guard<std::mutex> lock(mutex_);
     if (closed_) return false;
