@@ -35,6 +35,7 @@ void FrontEndNodelet::onInit() {
   pairing.patience = sensor_.topics.depth.empty() ? -1.0 : options_.depth_patience;
   pairing.capacity = std::size_t(options_.image_queue);
   pairer_ = std::make_unique<ImagePairer>(pairing);
+  clock_ = std::make_unique<StreamClock>(kStreams, options_.time_jump);
   tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
   tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   calibration_ = std::make_unique<CalibrationSource>(sensor_, options_, tf_buffer_);
@@ -218,10 +219,10 @@ void FrontEndNodelet::onReconfigure(vip_slam_frontend::FrontEndConfig& config) {
 
 bool FrontEndNodelet::noticeTime(double t, Stream stream) {
   if (paused_) return false;
-  // Each stream by itself: an image that comes late, from a slow matcher or a busy machine, is not a jump.
-  if (t < newest_of_[stream] - options_.time_jump) {
+  const StreamClock::Verdict verdict = clock_->notice(stream, t);
+  if (verdict == StreamClock::Verdict::kJumpedBack) {
     char words[120];
-    std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", newest_of_[stream] - t);
+    std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", clock_->lastJump());
     NODELET_WARN("%s: the odometry starts anew, the map stays", words);
     pairer_->clear();
     early_.clear();
@@ -229,15 +230,11 @@ bool FrontEndNodelet::noticeTime(double t, Stream stream) {
       monitor->restart();
     }
     if (front_end_) front_end_->reset(words);
-    newest_ = t;
-    newest_of_.fill(t);
     last_feature_image_ = -1e300;
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++shown_.time_jumps;
   }
-  newest_ = std::max(newest_, t);
-  newest_of_[stream] = std::max(newest_of_[stream], t);
-  return true;
+  return verdict != StreamClock::Verdict::kStraggler;
 }
 
 void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel) {
@@ -271,7 +268,7 @@ void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const 
 }
 
 void FrontEndNodelet::startWhenCalibrated() {
-  const std::optional<SensorConfig> resolved = calibration_->resolve(newest_);
+  const std::optional<SensorConfig> resolved = calibration_->resolve(clock_->newest());
   if (!resolved) return;
   try {
     front_end_ = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr);
@@ -294,7 +291,7 @@ void FrontEndNodelet::startWhenCalibrated() {
 void FrontEndNodelet::processReady() {
   if (!front_end_) return;
   while (const ImagePair* pair = pairer_->front()) {
-    if (!front_end_->ready(pair->t) && newest_ - pair->t <= options_.imu_patience) return;
+    if (!front_end_->ready(pair->t) && clock_->newest() - pair->t <= options_.imu_patience) return;
     process(*pair);
     pairer_->pop();
   }

@@ -1,7 +1,6 @@
 // The front end as a nodelet: subscribers decode and hand over, one thread owns the estimator, publishers hand on.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <deque>
 #include <functional>
@@ -32,6 +31,7 @@
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_ros/image_pairer.h"
 #include "vip_slam_ros/owner_thread.h"
+#include "vip_slam_ros/stream_clock.h"
 #include "vip_slam_ros/stream_monitor.h"
 
 namespace vip_slam {
@@ -63,7 +63,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
   void feedInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);  ///< with an estimator
   enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
-  bool noticeTime(double t, Stream stream);
+  bool noticeTime(double t, Stream stream);  ///< false: leave the message out
   void startWhenCalibrated();
   void processReady();
   void process(const ImagePair& pair);
@@ -94,8 +94,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::shared_ptr<const CameraModel> color_camera_, depth_camera_;
   std::unique_ptr<ImagePairer> pairer_;
   std::deque<std::function<void()>> early_;  ///< IMU samples before the calibration is complete
-  double newest_ = -1e300;  ///< stamp, of all streams
-  std::array<double, kStreams> newest_of_{{-1e300, -1e300, -1e300, -1e300}};
+  std::unique_ptr<StreamClock> clock_;
   Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();
   Matrix15d covariance_ = Matrix15d::Zero();  ///< of the newest image; predictions between images carry it
   bool paused_ = false;

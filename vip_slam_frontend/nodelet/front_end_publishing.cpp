@@ -69,7 +69,7 @@ void FrontEndNodelet::publishImuRate(double t) {
 
 void FrontEndNodelet::publishCalibration() {
   calibration_pub_.publish(boost::make_shared<vip_slam_msgs::Calibration>(
-      toCalibrationMsg(sensor_, newest_, calibration_->colorFrame())));
+      toCalibrationMsg(sensor_, clock_->newest(), calibration_->colorFrame())));
 }
 
 }  // namespace vip_slam

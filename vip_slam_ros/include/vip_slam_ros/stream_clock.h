@@ -1,0 +1,40 @@
+// Tells when time ran backwards over several streams that are delivered side by side, as when a bag loops.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace vip_slam {
+
+class StreamClock {
+ public:
+  enum class Verdict {
+    kInOrder,
+    kJumpedBack,  ///< the first message after a jump: start anew
+    kStraggler,   ///< of another stream, from before the jump, delivered late: to be left out
+  };
+
+  /// `jump`: seconds by which a stamp has to be older than the newest of its stream. An image that comes late, from a
+  /// slow matcher or a busy machine, is older than other streams' newest; that is not a jump.
+  StreamClock(std::size_t streams, double jump);
+
+  /// `t`: stamp in seconds.
+  Verdict notice(std::size_t stream, double t);
+
+  /// Stamp of the newest message of all streams, seconds; -1e300 before the first.
+  double newest() const { return newest_; }
+  /// Seconds by which the last jump went back.
+  double lastJump() const { return last_jump_; }
+
+ private:
+  struct Stream {
+    double newest = -1e300;
+    double before_jump = -1e300;  ///< newest of all streams when time jumped
+    int stragglers_left = 0;      ///< until the stream has jumped too, or this many were left out
+  };
+
+  std::vector<Stream> streams_;
+  double jump_, newest_ = -1e300, last_jump_ = 0;
+};
+
+}  // namespace vip_slam
