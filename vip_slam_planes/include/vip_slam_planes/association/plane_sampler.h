@@ -1,5 +1,5 @@
 // The compressed point-to-plane measurement of one keyframe on one plane (paper section "Compressed Point-to-Plane
-// Measurement", algorithms.md 5): samples spread evenly in 3D, G = s * sum p~ p~^T / sigma^2.
+// Measurement"): samples spread evenly in 3D, G = s * sum p~ p~^T / sigma^2.
 // The back end cannot take back a wrong sample once it is summed, so the choice is strict: nodes one stride inside the
 // surface's image region, near the plane at the corrected pose, and on the surface that these nodes form by themselves.
 // The last test does not depend on the pose, so that it does not hide the pose error which the measurement is to show.

@@ -1,4 +1,4 @@
-// When two planes of the map are one surface (paper section "Plane Merging"; algorithms.md 3).
+// When two planes of the map are one surface (paper section "Plane Merging").
 #pragma once
 
 #include "vip_slam_planes/growth/plane_track.h"
