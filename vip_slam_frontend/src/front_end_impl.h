@@ -13,6 +13,7 @@
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/landmark_matcher.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
+#include "vip_slam_frontend/tracking/rolling_shutter.h"
 #include "vip_slam_frontend/tracking/surface_tracker.h"
 
 namespace vip_slam {
@@ -48,7 +49,9 @@ class FrontEnd::Impl {
   SE3 gyroRotation(double t0, double t1) const;
   bool decideStillness(double t_imu);
   bool calibrationExcited(double t_imu) const;
-  std::vector<FilterMeasurement> measurements() const;
+  /// How the colour camera moves at IMU time `t_imu`, given the state there.
+  RollingShutter shutter(double t_imu, const NavState& nav) const;
+  std::vector<FilterMeasurement> measurements(const RollingShutter& shutter) const;
   SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);

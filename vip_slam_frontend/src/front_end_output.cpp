@@ -19,7 +19,11 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
     frame->covariance = filter_.covariance();
   }
   if (with_features) {
-    for (const Track& track : tracker_.tracks()) frame->features.push_back(track.feature);
+    const RollingShutter rows = shutter(last_imu_t_, frame->state);
+    for (const Track& track : tracker_.tracks()) {
+      frame->features.push_back(track.feature);
+      frame->features.back().xy = rows.atStamp(track.feature);
+    }
   }
   return frame;
 }
@@ -48,7 +52,12 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   if (is_keyframe) {
     ScopedTimer timer(timing_, "frontend.keyframe", t);
     orb_.describe(tracker_.gray(), &frame->features);
-    for (std::size_t i = 0; i < frame->features.size(); ++i) tracker_.tracks()[i].feature = frame->features[i];
+    for (std::size_t i = 0; i < frame->features.size(); ++i) {
+      Feature& tracked = tracker_.tracks()[i].feature;
+      const Eigen::Vector2f xy = tracked.xy;  // where the tracker saw it, rows and all
+      tracked = frame->features[i];
+      tracked.xy = xy;
+    }
     output.keyframe = makeKeyframe(*frame, t_imu);
     frame->keyframe = newest_keyframe_;
   }
@@ -70,8 +79,10 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   keyframe->previous = last_keyframe_;
   std::vector<cv::Point2f> occupied;
   for (const Feature& f : frame.features) occupied.emplace_back(f.pixel.x(), f.pixel.y());
+  const RollingShutter rows = shutter(t_imu, frame.state);
   for (Feature& corner : orb_.extract(tracker_.gray(), occupied, 6.0)) {
     tracker_.measure(&corner);
+    corner.xy = rows.atStamp(corner);
     keyframe->frame.features.push_back(corner);
   }
   if (!tracker_.depth().empty()) {

@@ -53,12 +53,18 @@ SE3 FrontEnd::Impl::gyroRotation(double t0, double t1) const {
   return SE3(Eigen::Matrix3d(R_I_C.transpose() * pre.deltaR().transpose() * R_I_C), Eigen::Vector3d::Zero());
 }
 
-std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
+RollingShutter FrontEnd::Impl::shutter(double t_imu, const NavState& nav) const {
+  const std::optional<ImuSample> here = sensor_.rolling_shutter > 0 ? imu_.at(t_imu) : std::nullopt;
+  if (!here) return {};
+  return RollingShutter(sensor_.rolling_shutter, camera_->intrinsics().height, nav, here->gyro, extrinsics());
+}
+
+std::vector<FilterMeasurement> FrontEnd::Impl::measurements(const RollingShutter& shutter) const {
   std::vector<FilterMeasurement> list;
   list.reserve(tracker_.tracks().size());
   for (const Track& track : tracker_.tracks()) {
     const Feature& f = track.feature;
-    list.push_back({f.id, f.xy.cast<double>(), f.depth, f.depth_sigma});
+    list.push_back({f.id, shutter.atStamp(f).cast<double>(), f.depth, f.depth_sigma});
   }
   return list;
 }
@@ -70,7 +76,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   last_imu_t_ = t_imu;
   tracker_.track(gray, depth, rotation, false, SE3(), t);
   tracker_.replenish(SE3(), true, t);
-  const std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements()}, imu_);
+  const std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements({})}, imu_);
   if (!prior) {
     const std::string why = status_.state == TrackingState::kInitialising && !status_.reason.empty() && first
                                 ? status_.reason + "; " + initialiser_.reason()
@@ -173,7 +179,8 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   {
     ScopedTimer timer(timing_, "frontend.update", t);
     still_ = decideStillness(t_imu);
-    report = filter_.step(propagation, next_clone_++, measurements(), still_, calibrationExcited(t_imu), &surfaces);
+    report = filter_.step(propagation, next_clone_++, measurements(shutter(t_imu, propagation.predicted)), still_,
+                          calibrationExcited(t_imu), &surfaces);
   }
   renewSurfaces(depth, surfaces.pairs.size(), t);
   counters_.features_used += report.features_used;

@@ -151,6 +151,7 @@ SensorConfig configFrom(const YAML::Node& node) {
   Section color = root.section("color");
   color.choice("encoding", config.color_encoding, {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
   color.number("rate", config.color_rate, 0.1, 1000);
+  color.number("rolling_shutter", config.rolling_shutter, 0, 0.1, false);
   color.finish();
   Section depth = root.section("depth");
   depth.choice("encoding", config.depth_encoding, {"16UC1", "32FC1", "compressed"});
@@ -226,7 +227,7 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << topics.color_info << "\"\n  depth: \"" << topics.depth << "\"\n  depth_info: \"" << topics.depth_info
       << "\"\n  imu: \"" << topics.imu << "\"\n  gyro: \"" << topics.gyro << "\"\n  accel: \"" << topics.accel
       << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
-      << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
+      << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter) << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
       << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
       << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";

@@ -134,6 +134,7 @@ SensorConfig SequenceSpec::sensorConfig() const {
   s.depth_registered = depth.registered;
   s.color_rate = s.depth_rate = camera.rate;
   s.imu_rate = imu.rate;
+  s.rolling_shutter = effects.rolling_shutter;
   s.intrinsics_from_camera_info = false;
   s.camera = camera.intrinsics();
   if (!depth.registered) {

@@ -25,6 +25,8 @@ struct SensorConfig {
   bool depth_registered = true;          ///< depth pixels belong to the colour camera
   double color_rate = 30, depth_rate = 30, imu_rate = 200;  ///< Hz, nominal; for checks and messages
 
+  double rolling_shutter = 0;  ///< colour: seconds from first to last row, stamp at the middle row; 0: global shutter
+
   bool intrinsics_from_camera_info = true;  ///< else `camera` below is used
   CameraIntrinsics camera;        ///< colour camera; may be empty when from camera_info
   CameraIntrinsics depth_camera;  ///< only when not registered
