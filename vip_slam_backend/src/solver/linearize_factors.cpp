@@ -41,7 +41,7 @@ void StructuredSolver::linearizeImu(const BaProblem& problem) {
   const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
   using RowMajor15x32 = Eigen::Matrix<double, 15, 32, Eigen::RowMajor>;
   Matrix15d J[2];
-  alignas(64) double J_both[15 * 32] = {0}, H_both[30 * 32], g_both[32];
+  alignas(64) double J_both[15 * 32] = {0}, H_both[30 * 32] = {0}, g_both[32];
   Eigen::Map<RowMajor15x32> both(J_both);
   for (std::size_t k = 0; k < problem.imu.size(); ++k) {
     const BaImu& f = problem.imu[k];
@@ -54,7 +54,7 @@ void StructuredSolver::linearizeImu(const BaProblem& problem) {
     both.leftCols<15>() = J[0];
     both.middleCols<15>(15) = J[1];
     homographyKernels().gram(W.data(), J_both, r.data(), H_both, g_both);
-    const Eigen::Map<const Eigen::Matrix<double, 30, 32, Eigen::RowMajor>> H(H_both);
+    const Eigen::Map<const Eigen::Matrix<double, 32, 30>> H(H_both);  // its lower half is filled
     const Eigen::Map<const Eigen::Matrix<double, 32, 1>> g(g_both);
     const auto& place = structure_.imu[k].place;
     for (int s = 0; s < 2; ++s) {

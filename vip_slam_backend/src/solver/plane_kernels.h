@@ -36,8 +36,8 @@ struct HomographyKernels {
   void (*linearize)(const HomographyKernelArguments& a, int count);
   /// Sum of h^T G h.
   double (*cost)(const HomographyKernelArguments& a, int count);
-  /// IMU factors: H (30 x 32) = (W J)^T W J and g (32) = (W J)^T W r with J 15 x 32 row-major, columns 30 and 31 zero, and
-  /// W upper-triangular 15 x 15 column-major. `r` is W r already.
+  /// IMU factors: H (30 x 32, only its upper half) = (W J)^T W J and g (32) = (W J)^T W r with J 15 x 32 row-major,
+  /// columns 30 and 31 zero, and W upper-triangular 15 x 15 column-major. `r` is W r already.
   void (*gram)(const double* W, const double* J, const double* r, double* H, double* g);
 };
 

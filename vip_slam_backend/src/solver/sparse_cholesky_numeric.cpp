@@ -4,8 +4,20 @@
 
 #include "dense_kernels.h"
 #include "vip_slam_backend/solver/sparse_cholesky.h"
+#include "worker.h"
 
 namespace vip_slam {
+namespace {
+
+// A block of the matrix into its front. What stands above the diagonal of a diagonal block goes along and is never read.
+template <int Rows>
+void copyBlock(const double* source, int columns, double* target, int ld) {
+  for (int j = 0; j < columns; ++j)
+    std::memcpy(target + static_cast<std::size_t>(j) * ld, source + SparseCholesky::leading(Rows) * j,
+                Rows * sizeof(double));
+}
+
+}  // namespace
 
 // Adds a child's update to its parent: the columns that are pivots there (`pivots`), or the others.
 void SparseCholesky::addChild(const Front& child, const double* update, int parent_columns, bool pivots, double* target,
@@ -31,49 +43,49 @@ void SparseCholesky::addChild(const Front& child, const double* update, int pare
   }
 }
 
-bool SparseCholesky::factorize(const double* values) {
+bool SparseCholesky::factorizeFront(const Front& front, const double* values) {
   const DenseKernels& kernels = denseKernels();
-  std::size_t stack = 0;
-  for (const Front& front : fronts_) {
-    const int n = front.rows, c = front.columns, ld = front.ld, m = n - c;
-    // Pivot columns are assembled where the factor stays.
-    double* panel = factor_.data() + front.factor_offset;
-    std::memset(panel, 0, sizeof(double) * ld * c);
-    for (const Entry& e : front.entries) {
-      const double* source = values + e.offset;
-      for (int j = 0; j < e.columns; ++j) {
-        double* target = panel + static_cast<std::size_t>(e.column + j) * ld + e.row;
-        for (int i = e.diagonal ? j : 0; i < e.rows; ++i) target[i] = source[i];
-        source += e.ld;
-      }
-    }
-    const std::size_t top = stack;
-    const auto eachChild = [&](bool pivots, double* target, int target_ld) {
-      std::size_t at = top;
-      for (auto child = front.children.rbegin(); child != front.children.rend(); ++child) {
-        const Front& from = fronts_[*child];
-        const std::size_t k = from.rows - from.columns;
-        at -= k * k;
-        addChild(from, stack_.data() + at, c, pivots, target, target_ld);
-      }
-      return at;
-    };
-    stack = eachChild(true, panel, ld);
-    if (!kernels.factorPanel(panel, n, c, ld)) return false;
-    if (m > 0) {
-      // The update matrix is made above the children's and takes their place when it has taken them up.
-      double* update = stack_.data() + top;
-      kernels.negativeSyrk(update, m, panel + c, ld, m, c);
-      eachChild(false, update, m);
-      if (top != stack) {
-        double* to = stack_.data() + stack;
-        for (std::size_t j = 0; j < static_cast<std::size_t>(m); ++j)
-          std::memmove(to + j * m + j, update + j * m + j, sizeof(double) * (m - j));
-      }
-      stack += static_cast<std::size_t>(m) * m;
+  const int n = front.rows, c = front.columns, ld = front.ld, m = n - c;
+  // Pivot columns are assembled where the factor stays.
+  double* panel = factor_.data() + front.factor_offset;
+  std::memset(panel, 0, sizeof(double) * ld * c);
+  for (const Entry& e : front.entries) {
+    const double* source = values + e.offset;
+    double* target = panel + static_cast<std::size_t>(e.column) * ld + e.row;
+    switch (e.rows) {
+      case 6: copyBlock<6>(source, e.columns, target, ld); break;
+      case 9: copyBlock<9>(source, e.columns, target, ld); break;
+      default: copyBlock<3>(source, e.columns, target, ld);
     }
   }
+  const auto addChildren = [&](bool pivots, double* target, int target_ld) {
+    for (const int child : front.children)
+      addChild(fronts_[child], updates_.data() + fronts_[child].update_offset, c, pivots, target, target_ld);
+  };
+  addChildren(true, panel, ld);
+  if (!kernels.factorPanel(panel, n, c, ld)) return false;
+  if (m == 0) return true;
+  double* update = updates_.data() + front.update_offset;
+  kernels.negativeSyrk(update, m, panel + c, ld, m, c);
+  addChildren(false, update, m);
   return true;
+}
+
+bool SparseCholesky::factorize(const double* values, Worker* worker) {
+  bool good[3] = {true, true, true};
+  const auto part = [&](int which) {
+    for (const Front& front : fronts_)
+      if (front.part == which && !(good[which] = factorizeFront(front, values))) return;
+  };
+  if (worker) {
+    worker->both([&] { part(0); }, [&] { part(1); });
+  } else {
+    part(0);
+    part(1);
+  }
+  if (!good[0] || !good[1]) return false;
+  part(2);
+  return good[2];
 }
 
 void SparseCholesky::solve(double* b) const {

@@ -1,6 +1,6 @@
 // Symbolic part of the block-sparse Cholesky: ordering, elimination tree, fronts.
 #include <algorithm>
-#include <numeric>
+#include <limits>
 #include <stdexcept>
 
 #include <amd.h>
@@ -66,19 +66,118 @@ std::vector<int> postorder(const std::vector<int>& parent) {
 
 }  // namespace
 
+// Approximate minimum degree on thirds of unknowns (a pose counts two, a motion three, a plane one), so that degrees count
+// what the nodes weigh. A node goes where the first of its parts goes; they are alike, so the ordering keeps them together.
 void SparseCholesky::order(const Lists& neighbours) {
   const int n = nodes();
-  std::vector<int> starts(n + 1, 0), indices;
+  std::vector<int> first(1, 0), node_of, starts(1, 0), indices;
   for (int v = 0; v < n; ++v) {
-    indices.insert(indices.end(), neighbours[v].begin(), neighbours[v].end());
-    starts[v + 1] = static_cast<int>(indices.size());
+    first.push_back(first.back() + (sizes_[v] + 2) / 3);
+    node_of.resize(first.back(), v);
   }
+  for (int v = 0; v < n; ++v)
+    for (int part = first[v]; part < first[v + 1]; ++part) {
+      const auto add = [&](int w) {
+        for (int k = first[w]; k < first[w + 1]; ++k)
+          if (k != part) indices.push_back(k);
+      };
+      bool self = false;  // ascending, itself in between
+      for (const int w : neighbours[v]) {
+        if (w > v && !self) {
+          add(v);
+          self = true;
+        }
+        add(w);
+      }
+      if (!self) add(v);
+      starts.push_back(static_cast<int>(indices.size()));
+    }
   if (indices.empty()) indices.push_back(0);
-  std::vector<int> permutation(n);
-  const int status = n == 0 ? AMD_OK : amd_order(n, starts.data(), indices.data(), permutation.data(), nullptr, nullptr);
-  if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED) throw std::runtime_error("sparse Cholesky: ordering failed");
-  position_.resize(n);
-  for (int k = 0; k < n; ++k) position_[permutation[k]] = k;
+  std::vector<int> permutation(node_of.size());
+  const int status =
+      n == 0 ? AMD_OK : amd_order(first[n], starts.data(), indices.data(), permutation.data(), nullptr, nullptr);
+  if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED)
+    throw std::runtime_error("sparse Cholesky: ordering failed");
+  position_.assign(n, -1);
+  int next = 0;
+  for (const int part : permutation)
+    if (position_[node_of[part]] < 0) position_[node_of[part]] = next++;
+}
+
+// Two parts of the tree that cost about the same: from the roots down, the dearest subtree is opened (its root goes to what
+// is left for later) as long as that shortens the longer way.
+void SparseCholesky::splitTree() {
+  const int n = static_cast<int>(fronts_.size());
+  std::vector<double> cost(n, 0);  // of the whole subtree
+  std::vector<int> parent(n, -1);
+  for (int f = 0; f < n; ++f) {
+    for (int c = 0; c < fronts_[f].columns; ++c) cost[f] += double(fronts_[f].rows - c) * (fronts_[f].rows - c);
+    for (const int child : fronts_[f].children) {
+      cost[f] += cost[child];
+      parent[child] = f;
+    }
+  }
+  std::vector<std::pair<double, int>> open;  // subtrees, ascending by cost
+  for (int f = 0; f < n; ++f)
+    if (parent[f] < 0) open.emplace_back(cost[f], f);
+  double above = 0, best = std::numeric_limits<double>::infinity();
+  std::vector<int> best_part(n, 2);
+  constexpr int kMostOpened = 64;
+  for (int opened = 0; !open.empty() && opened < kMostOpened; ++opened) {
+    std::sort(open.begin(), open.end());
+    double sum[2] = {0, 0};
+    std::vector<int> part(n, 2);
+    for (auto it = open.rbegin(); it != open.rend(); ++it) {
+      const int lighter = sum[1] < sum[0];
+      sum[lighter] += it->first;
+      part[it->second] = lighter;
+    }
+    const double way = above + std::max(sum[0], sum[1]);
+    if (way < best) {
+      best = way;
+      best_part = part;
+    }
+    const int dearest = open.back().second;
+    open.pop_back();
+    above += cost[dearest];
+    for (const int child : fronts_[dearest].children) {
+      above -= cost[child];
+      open.emplace_back(cost[child], child);
+    }
+  }
+  for (int f = n - 1; f >= 0; --f)  // parents come after their children
+    fronts_[f].part = parent[f] >= 0 && best_part[parent[f]] < 2 ? best_part[f] = best_part[parent[f]] : best_part[f];
+}
+
+// Places of the update matrices: an update lives until its parent has taken it up; its place is then free for others of its
+// part. The first gap that is large enough is taken.
+void SparseCholesky::placeUpdates() {
+  struct Live {
+    std::size_t begin, end;
+    int front;
+  };
+  std::size_t base = 0;
+  for (int part = 0; part < 3; ++part) {
+    std::vector<Live> live;  // ascending
+    std::size_t top = base;
+    for (int f = 0; f < static_cast<int>(fronts_.size()); ++f) {
+      Front& front = fronts_[f];
+      if (front.part != part) continue;
+      const std::size_t m = front.rows - front.columns, size = (m * m + 7) / 8 * 8;
+      std::size_t at = base;
+      auto before = live.begin();
+      for (; before != live.end() && before->begin < at + size; ++before) at = before->end;
+      if (size > 0) live.insert(before, {at, at + size, f});
+      front.update_offset = at;
+      top = std::max(top, at + size);
+      const auto taken = [&](const Live& l) {
+        return std::find(front.children.begin(), front.children.end(), l.front) != front.children.end();
+      };
+      live.erase(std::remove_if(live.begin(), live.end(), taken), live.end());
+    }
+    base = top;
+  }
+  updates_.assign(base + kKernelPadding, 0.0);
 }
 
 void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<std::pair<int, int>>& pairs) {
@@ -149,7 +248,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   }
 
   fronts_.assign(first.size(), Front());
-  stack_size_ = factor_size_ = factor_nonzeros_ = 0;
+  factor_size_ = factor_nonzeros_ = 0;
   factor_flops_ = 0;
   std::vector<std::vector<int>> rows_of(fronts_.size());
   std::vector<int> offset_in_front(n, -1);
@@ -175,17 +274,10 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
       factor_flops_ += below * below;
     }
   }
-  // Rows of each front in its parent; update matrices live on a stack (the order is a postorder).
-  std::size_t stack = 0;
-  std::vector<std::size_t> update_size(fronts_.size());
+  // Rows of each front in its parent.
   for (std::size_t f = 0; f < fronts_.size(); ++f) {
     Front& front = fronts_[f];
-    const std::size_t m = front.rows - front.columns;
-    update_size[f] = m * m;
-    for (const int child : front.children) stack -= update_size[child];
-    stack += update_size[f];
-    stack_size_ = std::max(stack_size_, stack);
-    if (m == 0) continue;
+    if (front.rows == front.columns) continue;
     const int up = front_of[structure[last_of[f]].front()];
     fronts_[up].children.push_back(static_cast<int>(f));
     for (std::size_t k = 0; k < rows_of[up].size(); ++k) offset_in_front[rows_of[up][k]] = row_offset[up][k];
@@ -198,27 +290,23 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
         front.to_parent.push_back(segment);
     }
   }
-  // The stack must also hold a front's update above its children's while it takes them up.
-  std::size_t largest = 0;
-  for (const std::size_t s : update_size) largest = std::max(largest, s);
-  stack_size_ += largest + kKernelPadding;
+  splitTree();
+  placeUpdates();
 
   // Where each block of the matrix goes.
-  const auto place = [&](int later, int earlier, std::size_t value_offset, bool diagonal) {
+  const auto place = [&](int later, int earlier, std::size_t value_offset) {
     const int f = front_of[earlier];
     const auto offset = [&](int p) {
       const auto it = std::lower_bound(rows_of[f].begin(), rows_of[f].end(), p);
       return row_offset[f][it - rows_of[f].begin()];
     };
-    fronts_[f].entries.push_back({value_offset, offset(later), offset(earlier), sizeAt(later), sizeAt(earlier),
-                                  leading(sizeAt(later)), diagonal});
+    fronts_[f].entries.push_back({value_offset, offset(later), offset(earlier), sizeAt(later), sizeAt(earlier)});
   };
-  for (int v = 0; v < n; ++v) place(position_[v], position_[v], diagonal_offset_[v], true);
+  for (int v = 0; v < n; ++v) place(position_[v], position_[v], diagonal_offset_[v]);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const int a = position_[pairs[k].first], b = position_[pairs[k].second];
-    place(std::max(a, b), std::min(a, b), pair_offset_[k], false);
+    place(std::max(a, b), std::min(a, b), pair_offset_[k]);
   }
-  stack_.assign(stack_size_, 0.0);
   factor_.assign(factor_size_, 0.0);
   work_.assign(dimension_ + kKernelPadding, 0.0);
 }

@@ -17,14 +17,17 @@ constexpr double kMaxRadius = 1e16, kMinRadius = 1e-32, kMinRatio = 1e-3;
 
 }  // namespace
 
-double StructuredSolver::cost(const BaProblem& problem) {
+double StructuredSolver::cost(const BaProblem& problem, Worker* worker) {
   loadFrames(problem);
-  const int points = static_cast<int>(problem.points.size());
-  return 0.5 * (pointKernels().cost(arguments(problem, 1), 0, points) + factorCost(problem));
+  const PointKernelArguments a = arguments(problem, 1);
+  double points = 0, factors = 0;
+  worker->both([&] { factors = factorCost(problem); },
+               [&] { points = pointKernels().cost(a, 0, static_cast<int>(problem.points.size())); });
+  return 0.5 * (points + factors);
 }
 
-bool StructuredSolver::solveStep() {
-  if (!structure_.cholesky.factorize(values_.data())) return false;
+bool StructuredSolver::solveStep(Worker* worker) {
+  if (!structure_.cholesky.factorize(values_.data(), worker)) return false;
   for (std::size_t k = 0; k < step_.size(); ++k) step_[k] = -gradient_[k];
   structure_.cholesky.solve(step_.data());
   PointKernelArguments a;
@@ -34,7 +37,9 @@ bool StructuredSolver::solveStep() {
   a.W = W_.data();
   a.point_inverse = point_inverse_.data();
   a.point_gradient = point_gradient_.data();
-  pointKernels().backSubstitute(a, step_.data(), point_step_.data(), 0, static_cast<int>(points_.size() / 3));
+  const int points = static_cast<int>(points_.size() / 3);
+  worker->both([&] { pointKernels().backSubstitute(a, step_.data(), point_step_.data(), 0, points / 2); },
+               [&] { pointKernels().backSubstitute(a, step_.data(), point_step_.data(), points / 2, points); });
   for (const double v : step_)
     if (!std::isfinite(v)) return false;
   return true;
@@ -83,7 +88,7 @@ StructuredSolver::Step StructuredSolver::stepAt(const BaProblem& problem, double
   prepare(problem);
   Worker worker(false);
   linearize(problem, radius, &worker);
-  if (!solveStep()) throw std::runtime_error("structured solver: normal equations are not positive definite");
+  if (!solveStep(&worker)) throw std::runtime_error("structured solver: normal equations are not positive definite");
   const auto copy = [](const std::vector<double>& v) { return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), v.size())); };
   Eigen::VectorXd point_step(point_step_.size());
   for (std::size_t k = 0; k < structure_.point_at.size(); ++k)
@@ -109,7 +114,8 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
   };
   auto mark = Clock::now();
   summary.preprocess_ms = ms(start, mark);
-  double present = cost(problem);
+  Worker worker(options.threads > 1);
+  double present = cost(problem, &worker);
   summary.residual_ms += ms(mark, Clock::now());
   summary.initial_cost = summary.final_cost = present;
   if (!std::isfinite(present)) {
@@ -117,7 +123,6 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
     summary.message = "the initial cost is not finite";
     return summary;
   }
-  Worker worker(options.threads > 1);
   double radius = options.initial_radius, decrease_factor = 2;
   summary.message = "iterations used up";
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
@@ -139,7 +144,7 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
       }
     }
     mark = next;
-    const bool solved = solveStep();
+    const bool solved = solveStep(&worker);
     next = Clock::now();
     summary.linear_ms += ms(mark, next);
     ++summary.iterations;
@@ -152,7 +157,7 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
       log.step_norm = stepNorm();
       apply(problem, &other);
       exchange();
-      const double trial = cost(problem);
+      const double trial = cost(problem, &worker);
       summary.residual_ms += ms(mark, Clock::now());
       const double decrease = present - trial, ratio = decrease / predicted;
       log.cost = trial;

@@ -44,8 +44,8 @@ class StructuredSolver : public BaSolver {
   void damp(double radius);
   void forEachNode(const std::function<void(int size, int unknown, double* block)>& f);
 
-  double cost(const BaProblem& problem);
-  bool solveStep();
+  double cost(const BaProblem& problem, Worker* worker);
+  bool solveStep(Worker* worker);
   /// Predicted decrease of the cost by the present step.
   double modelDecrease() const;
   struct State {

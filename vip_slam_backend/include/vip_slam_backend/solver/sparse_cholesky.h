@@ -1,6 +1,7 @@
 // Block-sparse Cholesky of a symmetric positive definite matrix whose unknowns come in nodes (6 pose, 9 motion, 3 plane):
-// approximate minimum degree on the nodes, then a multifrontal factorisation on dense fronts. The symbolic part is done
-// once per structure; numbers go straight from the caller's blocks into the fronts.
+// approximate minimum degree, then a multifrontal factorisation on dense fronts. The symbolic part is done once per
+// structure; numbers go straight from the caller's blocks into the fronts. Two disjoint parts of the elimination tree can be
+// factorised side by side; the numbers are the same to the last bit.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +9,8 @@
 #include <vector>
 
 namespace vip_slam {
+
+class Worker;
 
 class SparseCholesky {
  public:
@@ -29,8 +32,8 @@ class SparseCholesky {
   std::size_t diagonalOffset(int node) const { return diagonal_offset_[node]; }
   std::size_t pairOffset(int pair) const { return pair_offset_[pair]; }
 
-  /// False when the matrix is not positive definite.
-  bool factorize(const double* values);
+  /// False when the matrix is not positive definite. `worker` (may be null) helps with one half of the tree.
+  bool factorize(const double* values, Worker* worker = nullptr);
   /// Solves in place; after a successful factorize().
   void solve(double* b) const;
 
@@ -41,8 +44,7 @@ class SparseCholesky {
   struct Entry {          // a block of the matrix inside its front
     std::size_t offset;   // into values
     int row, column;      // inside the front
-    int rows, columns, ld;
-    bool diagonal;
+    int rows, columns;
   };
   struct Segment {        // rows of a child's update that stay together in the parent's front
     int child, parent, size;
@@ -54,9 +56,15 @@ class SparseCholesky {
     std::vector<Segment> to_parent;
     std::vector<int> unknowns;           // caller's unknown of each row
     std::size_t factor_offset = 0;
+    std::size_t update_offset = 0;       // of the update matrix, (rows - columns) squared
+    int part = 2;                        // 0 and 1: disjoint parts of the tree; 2: what lies above both
   };
-  static void addChild(const Front& child, const double* update, int parent_columns, bool pivots, double* target, int ld);
+  static void addChild(const Front& child, const double* update, int parent_columns, bool pivots, double* target,
+                       int ld);
+  bool factorizeFront(const Front& front, const double* values);
   void order(const std::vector<std::vector<int>>& neighbours);
+  void splitTree();
+  void placeUpdates();
 
   std::vector<int> sizes_, unknown_, position_, node_at_;
   std::vector<std::size_t> diagonal_offset_, pair_offset_;
@@ -64,8 +72,8 @@ class SparseCholesky {
   double factor_flops_ = 0;
   int dimension_ = 0;
   std::vector<Front> fronts_;
-  std::size_t stack_size_ = 0, factor_size_ = 0;
-  std::vector<double> stack_, factor_;
+  std::size_t factor_size_ = 0;
+  std::vector<double> updates_, factor_;
   mutable std::vector<double> work_;
 };
 
