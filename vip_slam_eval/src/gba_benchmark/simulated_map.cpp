@@ -138,15 +138,19 @@ class Simulator {
     points_ = std::move(kept);
   }
 
-  // The start: a random walk away from the truth, as odometry would leave it.
+  // The start: a random walk of position and yaw away from the truth, as odometry would leave it. Gravity holds the tilt:
+  // its error wanders without growing.
   void drift() {
     SE3 error;
+    Eigen::Vector2d tilt = Eigen::Vector2d::Zero();
     for (const NavState& truth : truth_) {
       NavState s = truth;
       s.T_W_I = error * truth.T_W_I;
       s.v_W = error.rotation() * truth.v_W + gauss3(0.02);
       start_.push_back(s);
-      const Eigen::Vector3d turn(gauss(1e-4), gauss(1e-4), gauss(3e-4));
+      const Eigen::Vector2d before = tilt;
+      tilt = 0.95 * tilt + Eigen::Vector2d(gauss(1e-4), gauss(1e-4));
+      const Eigen::Vector3d turn(tilt.x() - before.x(), tilt.y() - before.y(), gauss(3e-4));
       const SE3 about(expQuaternion(turn), truth.T_W_I.t() - expSO3(turn) * truth.T_W_I.t() + gauss3(0.002));
       error = error * about;
     }
