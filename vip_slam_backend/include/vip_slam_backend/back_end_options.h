@@ -15,9 +15,12 @@ Variant variantFromName(const std::string& name);
 const char* variantName(Variant variant);
 
 struct MeasurementOptions {
-  double pixel_sigma = 0.7;
+  double pixel_sigma = 0.15;
+  double pixel_creep = 0.12;
+  double max_pixel_sigma = 1.5;
+  double gate_sigma = 0.4;
   double matched_pixel_sigma = 1.0;
-  double huber = 2.0;
+  double huber = 1.0;
   double depth_huber = 2.0;
   double depth_sigma_scale = 1.0;
   double outlier_chi2 = 9.0;
@@ -25,7 +28,10 @@ struct MeasurementOptions {
   double homography_inflation = 1.0;
 
   void visit(OptionVisitor& v) {
-    v.field("pixel_sigma", pixel_sigma, 0.1, 10.0, "one sigma of a tracked feature, px");
+    v.field("pixel_sigma", pixel_sigma, 0.05, 10.0, "one sigma of a tracked feature in its landmark's first keyframe, px");
+    v.field("pixel_creep", pixel_creep, 0.0, 10.0, "error that a track takes up with each further keyframe, px");
+    v.field("max_pixel_sigma", max_pixel_sigma, 0.1, 10.0, "the sigma of a tracked feature grows no further than this, px");
+    v.field("gate_sigma", gate_sigma, 0.1, 10.0, "outliers are judged against at least this sigma, px");
     v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0, "one sigma of an untracked ORB corner, px per octave");
     v.field("huber", huber, 0.5, 20.0, "reprojection residuals above this many sigmas weigh less");
     v.field("depth_huber", depth_huber, 0.5, 20.0, "depth residuals above this many sigmas weigh less");
@@ -42,7 +48,7 @@ struct LocalBaOptions {
   int max_iterations = 10;
   double max_seconds = 0.2;
   int max_fixed_keyframes = 40;
-  bool shared_hosts = false;
+  bool shared_hosts = true;
 
   void visit(OptionVisitor& v) {
     v.field("window", window, 3, 100, "newest keyframes that are optimised");
@@ -57,7 +63,7 @@ struct GlobalBaOptions {
   int max_iterations = 100;
   double max_seconds = 2.0;
   bool at_end = true;
-  bool shared_hosts = false;
+  bool shared_hosts = true;
 
   void visit(OptionVisitor& v) {
     v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");

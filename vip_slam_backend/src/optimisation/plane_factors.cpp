@@ -6,13 +6,14 @@
 #include <unordered_map>
 
 #include "homography_hosts.h"
+#include "plane_gate.h"
 #include "vip_slam_backend/solver/robust.h"
 
 namespace vip_slam {
 
 PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings,
                                        BuiltProblem* built)
-    : map_(map), scope_(scope), settings_(settings), built_(built) {
+    : map_(map), scope_(scope), settings_(settings), noise_(settings.measurement, settings.focal), built_(built) {
   BaProblem& problem = built->problem;
   for (const BaFrame& f : problem.frames) geometry_.emplace_back(f.state.T_W_I, f.T_I_C);
   if (settings.variant == Variant::kVi) return;
@@ -97,7 +98,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
   const Plane& parameters = built_->problem.planes[plane].plane;
   const LandmarkView& host = views.begin(landmark)[host_view];
   const bool host_fixed = built_->problem.frames[host.frame].fixed;
-  const double host_sigma = 1.0 / pixelWeight(*host.feature, settings_);
+  const double host_sigma = noise_.sigma(*host.feature, host.order), gate_sigma = noise_.gateSigma();
   struct Pair {
     int slot;
     HomographyPair pair;
@@ -119,13 +120,16 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
       continue;
     }
     // The pair's noise is that of the observer and that of the host, seen from the observer.
-    const double sigma = 1.0 / pixelWeight(*v->feature, settings_);
     const double gain = hostNoiseGain(observer.h, p.pair.xy_i);
-    const double inflated = std::sqrt(sigma * sigma + gain * host_sigma * host_sigma) * options.homography_inflation;
-    p.pair.weight = 1.0 / (inflated * rho);
+    const auto inflated = [&](double sigma_j, double sigma_i) {
+      return std::sqrt(sigma_j * sigma_j + gain * sigma_i * sigma_i) * options.homography_inflation;
+    };
+    const double sigma = noise_.sigma(*v->feature, v->order), pair_sigma = inflated(sigma, host_sigma);
+    const double judged = inflated(std::max(sigma, gate_sigma), std::max(host_sigma, gate_sigma)) / pair_sigma;
+    p.pair.weight = 1.0 / (pair_sigma * rho);
     // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
     const double chi2 = (homographyRows(p.pair) * observer.h).squaredNorm();
-    if (chi2 > options.outlier_chi2) {
+    if (chi2 > options.outlier_chi2 * judged * judged) {
       ++refused;
       continue;
     }
@@ -177,12 +181,18 @@ void PlaneFactorBuilder::addDepthBlocks() {
       const auto plane = planes_.find(observation.first);
       if (plane == planes_.end()) continue;
       const PlaneObservation& o = observation.second;
+      const Plane& parameters = problem.planes[plane->second].plane;
+      Eigen::Vector4d plane_W;
+      plane_W << parameters.n, parameters.d;
+      const PlaneGate gate(o, T_W_C.transpose() * plane_W);
+      if (!gate.all() && gate.kept().empty()) continue;
       if (constant) {
         const auto sum = outside.emplace(observation.first, Eigen::Matrix4d::Zero()).first;
-        sum->second += T_W_C * o.G * T_W_C.transpose();
+        sum->second += T_W_C * gate.G() * T_W_C.transpose();
         ++outside_points[observation.first];
       } else if (settings_.variant == Variant::kViP) {
-        for (const PlanePoint& p : o.points) {
+        for (int k = 0; k < gate.points(); ++k) {
+          const PlanePoint& p = o.points[gate.all() ? k : gate.kept()[k]];
           BaPlanePoint factor;
           factor.frame = frame->second;
           factor.plane = plane->second;
@@ -194,8 +204,8 @@ void PlaneFactorBuilder::addDepthBlocks() {
         BaPointToPlane factor;
         factor.frame = frame->second;
         factor.plane = plane->second;
-        factor.G = o.G;
-        factor.points = static_cast<int>(o.points.size());
+        factor.G = gate.G();
+        factor.points = gate.points();
         problem.point_to_plane.push_back(factor);
       }
     }

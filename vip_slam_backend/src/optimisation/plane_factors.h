@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "landmark_views.h"
+#include "pixel_noise.h"
 #include "vip_slam_backend/factors/frame_geometry.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
 
@@ -31,6 +32,7 @@ class PlaneFactorBuilder {
   const Map& map_;
   const ProblemScope& scope_;
   const BuilderSettings& settings_;
+  PixelNoise noise_;
   BuiltProblem* built_;
   std::vector<FrameGeometry> geometry_;
   std::map<PlaneId, int> planes_;

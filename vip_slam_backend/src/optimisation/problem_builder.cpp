@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "landmark_views.h"
+#include "pixel_noise.h"
 #include "plane_factors.h"
 #include "plane_intersection.h"
 #include "vip_slam_backend/factors/reprojection.h"
@@ -72,13 +73,6 @@ void addMotionPriors(BaProblem* problem) {
 
 }  // namespace
 
-double pixelWeight(const Feature& feature, const BuilderSettings& settings) {
-  const double sigma = feature.id != kNoLandmark
-                           ? settings.measurement.pixel_sigma
-                           : settings.measurement.matched_pixel_sigma * std::pow(1.2, feature.octave);
-  return settings.focal / sigma;
-}
-
 BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings) {
   BuiltProblem built;
   BaProblem& problem = built.problem;
@@ -116,6 +110,8 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
     problem.imu.push_back(imu);
   }
 
+  const PixelNoise noise(settings.measurement, settings.focal);
+  built.gate_weight = 1.0 / noise.gateSigma();
   const LandmarkViews views(map, scope, built.frames);
   PlaneFactorBuilder planes(map, scope, settings, &built);
   const std::vector<char> on_plane = planes.addHomographies(views);
@@ -134,7 +130,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
       observation.frame = v->frame;
       observation.x = v->feature->xy.x();
       observation.y = v->feature->xy.y();
-      observation.weight = pixelWeight(*v->feature, settings);
+      observation.weight = 1.0 / noise.sigma(*v->feature, v->order);
       if (v->feature->depth > 0) {
         observation.depth = v->feature->depth;
         observation.depth_weight = 1.0 / (v->feature->depth_sigma * settings.measurement.depth_sigma_scale);
@@ -204,7 +200,8 @@ int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
     for (int o = point.first; o < point.first + point.count; ++o) {
       const BaObservation& b = problem.observations[o];
       Eigen::Vector2d r;
-      const bool front = reprojectionResidual(geometry[b.frame], point.p_W, Eigen::Vector2d(b.x, b.y), b.weight, &r);
+      const bool front = reprojectionResidual(geometry[b.frame], point.p_W, Eigen::Vector2d(b.x, b.y),
+                                              std::min(b.weight, built.gate_weight), &r);
       if (front && r.squaredNorm() <= chi2) continue;
       if (!map->hasLandmark(built.points[p])) break;
       map->removeObservation(built.points[p], built.observations[o].keyframe);

@@ -31,12 +31,13 @@ struct BuiltProblem {
   std::vector<LandmarkId> plane_points; ///< landmarks that stand for homographies only (vip)
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
+  double gate_weight = 0;               ///< largest weight by which an observation is judged
 };
 
 struct BuilderSettings {
   Variant variant = Variant::kVip;
   MeasurementOptions measurement;
-  bool shared_hosts = false;            ///< of homographies: few hosts for many landmarks, instead of first views
+  bool shared_hosts = true;             ///< of homographies: few hosts for many landmarks, instead of first views
   double focal = 500;                   ///< px
   Eigen::Vector3d gravity = gravityVector();
 };
@@ -47,10 +48,8 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
 /// plane, single views move with their keyframe. Keyframes that are gone meanwhile are skipped.
 void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);
 
-/// Observations whose residual is above `chi2` (squared sigmas) or behind the camera are removed from the map; their number.
+/// Observations whose residual is above `chi2` (squared sigmas, at least `gate_sigma` each) or behind the camera are
+/// removed from the map; their number.
 int removeOutliers(const BuiltProblem& built, double chi2, Map* map);
-
-/// Weight (focal length / sigma) of a feature's pixel.
-double pixelWeight(const Feature& feature, const BuilderSettings& settings);
 
 }  // namespace vip_slam

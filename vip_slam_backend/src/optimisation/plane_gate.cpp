@@ -1,0 +1,43 @@
+#include "plane_gate.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam {
+namespace {
+
+constexpr double kGoodFit = 1.5;   // mean squared sigmas of an observation that needs no closer look
+constexpr double kSigmas = 3.0;
+constexpr double kFarthest = 0.05; // metres
+
+}  // namespace
+
+PlaneGate::PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d& plane_C) : observation_(observation) {
+  const std::vector<PlanePoint>& points = observation.points;
+  if (points.empty() || plane_C.dot(observation.G * plane_C) <= kGoodFit * observation.weight_scale * points.size())
+    return;
+  std::vector<double> distance;
+  for (const PlanePoint& p : points) distance.push_back(plane_C.dot(p.p_C.cast<double>().homogeneous()));
+  std::vector<double> sorted = distance;
+  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+  const double median = sorted[sorted.size() / 2];
+  all_ = false;
+  if (std::abs(median) > kFarthest) return;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    if (std::abs(distance[k] - median) <= kSigmas * points[k].sigma) kept_.push_back(static_cast<int>(k));
+  all_ = kept_.size() == points.size();
+  if (2 * kept_.size() < points.size()) kept_.clear();
+}
+
+Eigen::Matrix4d PlaneGate::G() const {
+  if (all_) return observation_.G;
+  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+  for (const int k : kept_) {
+    const Eigen::Vector4d p = observation_.points[k].p_C.cast<double>().homogeneous();
+    const double sigma = observation_.points[k].sigma;
+    sum += p * p.transpose() / (sigma * sigma);
+  }
+  return observation_.weight_scale * sum;
+}
+
+}  // namespace vip_slam
