@@ -51,8 +51,8 @@ Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const 
   return h;
 }
 
-bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane, const Eigen::Vector2d& xy_i,
-                          double* rho) {
+bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
+                          const Eigen::Vector2d& xy_i, double* rho) {
   const double D = plane.d + plane.n.dot(i.t_W_C);
   if (std::abs(D) < kMinPlaneDistance || std::abs(plane.d + plane.n.dot(j.t_W_C)) < kMinPlaneDistance) return false;
   const Eigen::Vector3d ray(xy_i.x(), xy_i.y(), 1.0);
@@ -67,7 +67,8 @@ bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const 
 }
 
 double hostNoiseGain(const Vector9d& h, const Eigen::Vector2d& xy_i) {
-  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> H = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(h.data());
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> H =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(h.data());
   const Eigen::Vector3d p = H * Eigen::Vector3d(xy_i.x(), xy_i.y(), 1.0);
   const Eigen::Matrix2d A =
       (H.topLeftCorner<2, 2>() - p.head<2>() / p.z() * H.bottomLeftCorner<1, 2>()) / p.z();

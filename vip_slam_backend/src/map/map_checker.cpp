@@ -33,7 +33,8 @@ std::string checkKeyframe(const Map& map, KeyframeId id, const MapKeyframe& kf) 
   }
   for (const auto& entry : kf.planes) {
     if (!map.hasPlane(entry.first)) return name + "observes plane " + std::to_string(entry.first) + " that is gone";
-    if (entry.second.plane != entry.first || entry.second.keyframe != id) return name + "a plane observation of another";
+    if (entry.second.plane != entry.first || entry.second.keyframe != id)
+      return name + "a plane observation of another";
     if (!entry.second.G.allFinite()) return name + "a plane observation is not finite";
   }
   return "";

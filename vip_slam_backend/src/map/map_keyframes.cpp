@@ -163,7 +163,8 @@ void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) 
 void Map::moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I) {
   std::map<KeyframeId, SE3> motion;  // new world from old world, per keyframe
   for (const auto& entry : T_W_I) {
-    if (!entry.second.isFinite()) throw MapError("keyframe " + std::to_string(entry.first) + ": new pose is not finite");
+    if (!entry.second.isFinite())
+      throw MapError("keyframe " + std::to_string(entry.first) + ": new pose is not finite");
     motion[entry.first] = entry.second * keyframe(entry.first).state.T_W_I.inverse();
   }
   for (auto& entry : landmarks_) {

@@ -157,7 +157,8 @@ void Map::updateDescriptor(MapLandmark& landmark) {
   for (std::size_t i = begin; i < n; ++i) {
     const Descriptor& candidate = feature(landmark.observations[i]).descriptor;
     int sum = 0;
-    for (std::size_t j = begin; j < n; ++j) sum += hammingDistance(candidate, feature(landmark.observations[j]).descriptor);
+    for (std::size_t j = begin; j < n; ++j)
+      sum += hammingDistance(candidate, feature(landmark.observations[j]).descriptor);
     if (sum < best_sum) {
       best_sum = sum;
       landmark.descriptor = candidate;

@@ -13,7 +13,8 @@ class FeatureGrid {
   FeatureGrid(const std::vector<Feature>& features, int width, int height, double cell)
       : cell_(cell), cols_(static_cast<int>(width / cell) + 1), rows_(static_cast<int>(height / cell) + 1),
         cells_(static_cast<std::size_t>(cols_) * rows_), features_(features) {
-    for (std::uint32_t k = 0; k < features.size(); ++k) cells_[index(features[k].pixel.x(), features[k].pixel.y())].push_back(k);
+    for (std::uint32_t k = 0; k < features.size(); ++k)
+      cells_[index(features[k].pixel.x(), features[k].pixel.y())].push_back(k);
   }
 
   template <class Visit>

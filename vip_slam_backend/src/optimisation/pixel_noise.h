@@ -1,6 +1,7 @@
-// How far a feature's pixel is off. A track is aligned with the patch that it started from or, when the view has changed
-// too much for that, with a later one: each change of patch leaves an error that all later views share. Against true poses
-// the error grows from a tenth of a pixel in the first keyframes to one pixel after ten, and that is the model:
+// How far a feature's pixel is off. A track is aligned with the patch that it started from or, when the view has
+// changed too much for that, with a later one: each change of patch leaves an error that all later views share. Against
+// true poses the error grows from a tenth of a pixel in the first keyframes to one pixel after ten, and that is the
+// model:
 //   sigma^2 = pixel_sigma^2 + (pixel_creep * keyframes since the landmark's first)^2, at most max_pixel_sigma.
 #pragma once
 

@@ -1,5 +1,6 @@
-// Which depth points of an observation belong to its plane. A cupboard or a notice board before a wall can enter the samples
-// of the wall; compressed into G they cannot be told apart any more and pull the keyframe off, so they are left out before.
+// Which depth points of an observation belong to its plane. A cupboard or a notice board before a wall can enter the
+// samples of the wall; compressed into G they cannot be told apart any more and pull the keyframe off, so they are left
+// out before.
 #pragma once
 
 #include <vector>
@@ -10,9 +11,9 @@
 
 namespace vip_slam {
 
-/// `plane_C`: (n, d) of the plane in the observation's camera, as estimated now. Kept is what lies within three sigmas of
-/// the points' median distance, since the keyframe's own error moves all of them alike; nothing when the median is farther
-/// than 5 cm from the plane or less than half is left.
+/// `plane_C`: (n, d) of the plane in the observation's camera, as estimated now. Kept is what lies within three sigmas
+/// of the points' median distance, since the keyframe's own error moves all of them alike; nothing when the median is
+/// farther than 5 cm from the plane or less than half is left.
 class PlaneGate {
  public:
   PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d& plane_C);

@@ -89,7 +89,8 @@ double evaluateCost(const BaProblem& problem) {
   for (const BaPlane& p : problem.planes)
     cost += planePriorResidual(p.kind, p.plane, p.prior_weight).squaredNorm();
   for (const BaImu& f : problem.imu)
-    cost += f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
+    cost +=
+        f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
   for (const BaHomography& f : problem.homographies) {
     const Vector9d h = homographyVector(geometry[f.i], geometry[f.j], problem.planes[f.plane].plane);
     cost += h.dot(homographyMatrix(f.sums) * h);
@@ -102,7 +103,8 @@ double evaluateCost(const BaProblem& problem) {
     cost += u.dot(f.G * u);
   }
   for (const BaPlanePoint& f : problem.plane_points) {
-    const double r = f.weight * planeInCamera(geometry[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
+    const double r =
+        f.weight * planeInCamera(geometry[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
     cost += r * r;
   }
   for (const BaGauge& f : problem.gauges)

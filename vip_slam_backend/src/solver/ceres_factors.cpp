@@ -107,7 +107,8 @@ class DepthCost : public ceres::SizedCostFunction<1, 7, 3> {
     Eigen::Matrix<double, 1, 3> Jp = Eigen::Matrix<double, 1, 3>::Zero();
     // Switched off together with the pixel rows of the same observation.
     const bool in_front = frame.R_C_W.row(2).dot(p - frame.t_W_C) >= kMinProjectionDepth;
-    residuals[0] = in_front ? depthResidual(frame, p, o_.depth, o_.depth_weight, J ? &Jx : nullptr, J ? &Jp : nullptr) : 0;
+    residuals[0] =
+        in_front ? depthResidual(frame, p, o_.depth, o_.depth_weight, J ? &Jx : nullptr, J ? &Jp : nullptr) : 0;
     if (J) {
       writePose<1>(J[0], Jx);
       if (J[1]) Eigen::Map<Eigen::Matrix<double, 1, 3, Eigen::RowMajor>>(J[1], 1, 3) = Jp;
@@ -122,12 +123,14 @@ class DepthCost : public ceres::SizedCostFunction<1, 7, 3> {
 
 class ImuCost : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
  public:
-  ImuCost(std::shared_ptr<const Preintegration> p, const Eigen::Vector3d& g) : preintegration_(std::move(p)), gravity_(g) {}
+  ImuCost(std::shared_ptr<const Preintegration> p, const Eigen::Vector3d& g)
+      : preintegration_(std::move(p)), gravity_(g) {}
   bool Evaluate(double const* const* x, double* residuals, double** J) const override {
     NavState state[2];
     for (int s = 0; s < 2; ++s) {
       const double *pose = x[2 * s], *motion = x[2 * s + 1];
-      state[s].T_W_I = SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(pose)), Eigen::Vector3d(pose[4], pose[5], pose[6]));
+      state[s].T_W_I =
+          SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(pose)), Eigen::Vector3d(pose[4], pose[5], pose[6]));
       state[s].v_W = Eigen::Map<const Eigen::Vector3d>(motion);
       state[s].bias_gyro = Eigen::Map<const Eigen::Vector3d>(motion + 3);
       state[s].bias_accel = Eigen::Map<const Eigen::Vector3d>(motion + 6);
@@ -221,7 +224,8 @@ class GaugeCost : public ceres::SizedCostFunction<6, 7> {
   explicit GaugeCost(const GaugePrior& prior) : prior_(prior) {}
   bool Evaluate(double const* const* x, double* residuals, double** J) const override {
     Matrix6d Jx;
-    const SE3 T(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x[0])), Eigen::Vector3d(x[0][4], x[0][5], x[0][6]));
+    const SE3 T(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x[0])),
+                Eigen::Vector3d(x[0][4], x[0][5], x[0][6]));
     Eigen::Map<Vector6d>(residuals, 6) = gaugeResidual(prior_, T, J ? &Jx : nullptr);
     if (J) writePose<6>(J[0], Jx);
     return true;

@@ -1,7 +1,7 @@
 // Ceres cost functions over the shared factors. Parameter blocks: pose 7 (quaternion x y z w, position), motion 9
-// (v, b_g, b_a), plane 4 (n, d), point 3. Pose Jacobians are given in the tangent: the pose manifold lifts by [I; 0], so
-// that the first six columns of an ambient Jacobian are the tangent's and nothing is computed twice. Plane Jacobians are
-// ambient.
+// (v, b_g, b_a), plane 4 (n, d), point 3. Pose Jacobians are given in the tangent: the pose manifold lifts by [I; 0],
+// so that the first six columns of an ambient Jacobian are the tangent's and nothing is computed twice. Plane Jacobians
+// are ambient.
 #pragma once
 
 #include <memory>

@@ -91,8 +91,9 @@ void build(BaProblem& problem, Blocks& b, ceres::Problem* out, ceres::ParameterB
     out->AddResidualBlock(makeImuCost(f.preintegration, problem.gravity), nullptr, poseBlock(f.i), motionBlock(f.i),
                           poseBlock(f.j), motionBlock(f.j));
   for (const BaHomography& f : problem.homographies)
-    out->AddResidualBlock(makeHomographyCost(problem.frames[f.i].T_I_C, problem.frames[f.j].T_I_C, homographyMatrix(f.sums)), nullptr,
-                          poseBlock(f.i), poseBlock(f.j), b.planes[f.plane].data());
+    out->AddResidualBlock(
+        makeHomographyCost(problem.frames[f.i].T_I_C, problem.frames[f.j].T_I_C, homographyMatrix(f.sums)), nullptr,
+        poseBlock(f.i), poseBlock(f.j), b.planes[f.plane].data());
   for (const BaHomographyPair& f : problem.homography_pairs)
     out->AddResidualBlock(makeHomographyPairCost(problem.frames[f.i].T_I_C, problem.frames[f.j].T_I_C, f.pair), nullptr,
                           poseBlock(f.i), poseBlock(f.j), b.planes[f.plane].data());
@@ -181,7 +182,8 @@ void ceresNormalEquations(BaProblem& problem, Eigen::MatrixXd* JtJ, Eigen::Vecto
   for (std::size_t k = 0; k < problem.frames.size(); ++k)
     if (!problem.frames[k].fixed) options.parameter_blocks.push_back(blocks.poses[k].data());
   for (std::size_t k = 0; k < problem.frames.size(); ++k)
-    if (!problem.frames[k].fixed && problem.frames[k].motion) options.parameter_blocks.push_back(blocks.motions[k].data());
+    if (!problem.frames[k].fixed && problem.frames[k].motion)
+      options.parameter_blocks.push_back(blocks.motions[k].data());
   for (auto& plane : blocks.planes) options.parameter_blocks.push_back(plane.data());
   for (BaPoint& p : problem.points) options.parameter_blocks.push_back(p.p_W.data());
   std::vector<double> residuals;

@@ -16,8 +16,8 @@ class CeresSolver : public BaSolver {
   SolverSummary solve(BaProblem& problem, const SolverOptions& options) override;
 };
 
-/// For tests: J^T J and J^T r by Ceres at the problem's present state. Unknowns: free frames' poses in frame order, free
-/// motions in frame order, planes, points.
+/// For tests: J^T J and J^T r by Ceres at the problem's present state. Unknowns: free frames' poses in frame order,
+/// free motions in frame order, planes, points.
 void ceresNormalEquations(BaProblem& problem, Eigen::MatrixXd* JtJ, Eigen::VectorXd* Jtr);
 
 }  // namespace vip_slam

@@ -1,5 +1,5 @@
-// Dense kernels of the multifrontal Cholesky on plain arrays, column-major. One of three builds (AVX-512, AVX2, baseline)
-// is chosen at run time; nothing but plain pointers crosses, so no Eigen object meets another alignment.
+// Dense kernels of the multifrontal Cholesky on plain arrays, column-major. One of three builds (AVX-512, AVX2,
+// baseline) is chosen at run time; nothing but plain pointers crosses, so no Eigen object meets another alignment.
 #pragma once
 
 namespace vip_slam {

@@ -10,13 +10,11 @@ template <int R, int C>
 void addBlock(double* values, const BlockPlace& place, const Eigen::Matrix<double, R, C>& block) {
   if (place.offset < 0) return;
   if (place.transposed) {
-    Eigen::Map<Eigen::Matrix<double, C, R>, 0, Eigen::OuterStride<>>(values + place.offset,
-                                                                     Eigen::OuterStride<>(SparseCholesky::leading(C))) +=
-        block.transpose();
+    Eigen::Map<Eigen::Matrix<double, C, R>, 0, Eigen::OuterStride<>>(
+        values + place.offset, Eigen::OuterStride<>(SparseCholesky::leading(C))) += block.transpose();
   } else {
-    Eigen::Map<Eigen::Matrix<double, R, C>, 0, Eigen::OuterStride<>>(values + place.offset,
-                                                                     Eigen::OuterStride<>(SparseCholesky::leading(R))) +=
-        block;
+    Eigen::Map<Eigen::Matrix<double, R, C>, 0, Eigen::OuterStride<>>(
+        values + place.offset, Eigen::OuterStride<>(SparseCholesky::leading(R))) += block;
   }
 }
 
@@ -47,8 +45,9 @@ void StructuredSolver::linearizeImu(const BaProblem& problem) {
     const BaImu& f = problem.imu[k];
     const Matrix15d& W = f.preintegration->sqrtInformation();
     const Eigen::Matrix<double, 15, 1> r =
-        W.triangularView<Eigen::Upper>() * f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state,
-                                                                      problem.gravity, &J[0], &J[1], false);
+        W.triangularView<Eigen::Upper>() * f.preintegration->residual(problem.frames[f.i].state,
+                                                                      problem.frames[f.j].state, problem.gravity, &J[0],
+                                                                      &J[1], false);
     const int nodes[4] = {structure_.pose_node[f.i], structure_.motion_node[f.i], structure_.pose_node[f.j],
                           structure_.motion_node[f.j]};
     both.leftCols<15>() = J[0];
@@ -144,7 +143,8 @@ void StructuredSolver::linearizePriors(const BaProblem& problem) {
 double StructuredSolver::factorCost(const BaProblem& problem) const {
   double cost = 0;
   for (const BaImu& f : problem.imu)
-    cost += f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
+    cost +=
+        f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
   cost += homographyKernels().cost(homographyArguments(), static_cast<int>(problem.homographies.size()));
   for (const BaHomographyPair& f : problem.homography_pairs)
     cost += (homographyRows(f.pair) * homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane))
@@ -154,10 +154,12 @@ double StructuredSolver::factorCost(const BaProblem& problem) const {
     cost += u.dot(f.G * u);
   }
   for (const BaPlanePoint& f : problem.plane_points) {
-    const double r = f.weight * planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
+    const double r =
+        f.weight * planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
     cost += r * r;
   }
-  for (const BaGauge& f : problem.gauges) cost += gaugeResidual(f.prior, problem.frames[f.frame].state.T_W_I).squaredNorm();
+  for (const BaGauge& f : problem.gauges)
+    cost += gaugeResidual(f.prior, problem.frames[f.frame].state.T_W_I).squaredNorm();
   for (const BaMotionPrior& f : problem.motion_priors)
     cost += motionPriorResidual(f.prior, problem.frames[f.frame].state).squaredNorm();
   for (const BaPlane& p : problem.planes) cost += planePriorResidual(p.kind, p.plane, p.prior_weight).squaredNorm();

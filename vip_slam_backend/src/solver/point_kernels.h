@@ -1,5 +1,5 @@
-// The hot loop of the structured solver on plain arrays: linearises all observations of a point and eliminates the point
-// at once, so that its Jacobians never leave the first-level cache.
+// The hot loop of the structured solver on plain arrays: linearises all observations of a point and eliminates the
+// point at once, so that its Jacobians never leave the first-level cache.
 #pragma once
 
 #include <cstdint>

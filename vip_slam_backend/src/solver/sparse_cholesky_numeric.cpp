@@ -9,7 +9,8 @@
 namespace vip_slam {
 namespace {
 
-// A block of the matrix into its front. What stands above the diagonal of a diagonal block goes along and is never read.
+// A block of the matrix into its front. What stands above the diagonal of a diagonal block goes along and is never
+// read.
 template <int Rows>
 void copyBlock(const double* source, int columns, double* target, int ld) {
   for (int j = 0; j < columns; ++j)

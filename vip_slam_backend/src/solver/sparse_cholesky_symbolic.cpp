@@ -66,8 +66,9 @@ std::vector<int> postorder(const std::vector<int>& parent) {
 
 }  // namespace
 
-// Approximate minimum degree on thirds of unknowns (a pose counts two, a motion three, a plane one), so that degrees count
-// what the nodes weigh. A node goes where the first of its parts goes; they are alike, so the ordering keeps them together.
+// Approximate minimum degree on thirds of unknowns (a pose counts two, a motion three, a plane one), so that degrees
+// count what the nodes weigh. A node goes where the first of its parts goes; they are alike, so the ordering keeps them
+// together.
 void SparseCholesky::order(const Lists& neighbours) {
   const int n = nodes();
   std::vector<int> first(1, 0), node_of, starts(1, 0), indices;
@@ -104,8 +105,8 @@ void SparseCholesky::order(const Lists& neighbours) {
     if (position_[node_of[part]] < 0) position_[node_of[part]] = next++;
 }
 
-// Two parts of the tree that cost about the same: from the roots down, the dearest subtree is opened (its root goes to what
-// is left for later) as long as that shortens the longer way.
+// Two parts of the tree that cost about the same: from the roots down, the dearest subtree is opened (its root goes to
+// what is left for later) as long as that shortens the longer way.
 void SparseCholesky::splitTree() {
   const int n = static_cast<int>(fronts_.size());
   std::vector<double> cost(n, 0);  // of the whole subtree
@@ -149,8 +150,8 @@ void SparseCholesky::splitTree() {
     fronts_[f].part = parent[f] >= 0 && best_part[parent[f]] < 2 ? best_part[f] = best_part[parent[f]] : best_part[f];
 }
 
-// Places of the update matrices: an update lives until its parent has taken it up; its place is then free for others of its
-// part. The first gap that is large enough is taken.
+// Places of the update matrices: an update lives until its parent has taken it up; its place is then free for others of
+// its part. The first gap that is large enough is taken.
 void SparseCholesky::placeUpdates() {
   struct Live {
     std::size_t begin, end;

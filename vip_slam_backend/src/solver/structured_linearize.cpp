@@ -1,4 +1,5 @@
-// The normal equations of the structured solver: factors among poses, motions and planes, points, elimination of the points.
+// The normal equations of the structured solver: factors among poses, motions and planes, points, elimination of the
+// points.
 #include <algorithm>
 
 #include "structured_solver.h"
@@ -80,7 +81,8 @@ void StructuredSolver::forEachNode(const std::function<void(int size, int unknow
   for (const auto* nodes : {&structure_.pose_node, &structure_.motion_node, &structure_.plane_node}) {
     const int size = nodes == &structure_.pose_node ? 6 : nodes == &structure_.motion_node ? 9 : 3;
     for (const int node : *nodes)
-      if (node >= 0) f(size, structure_.cholesky.unknown(node), values_.data() + structure_.cholesky.diagonalOffset(node));
+      if (node >= 0)
+        f(size, structure_.cholesky.unknown(node), values_.data() + structure_.cholesky.diagonalOffset(node));
   }
 }
 

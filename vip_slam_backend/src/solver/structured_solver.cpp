@@ -89,7 +89,9 @@ StructuredSolver::Step StructuredSolver::stepAt(const BaProblem& problem, double
   Worker worker(false);
   linearize(problem, radius, &worker);
   if (!solveStep(&worker)) throw std::runtime_error("structured solver: normal equations are not positive definite");
-  const auto copy = [](const std::vector<double>& v) { return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), v.size())); };
+  const auto copy = [](const std::vector<double>& v) {
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), v.size()));
+  };
   Eigen::VectorXd point_step(point_step_.size());
   for (std::size_t k = 0; k < structure_.point_at.size(); ++k)
     point_step.segment<3>(3 * structure_.point_at[k]) = Eigen::Map<const Eigen::Vector3d>(point_step_.data() + 3 * k);

@@ -1,5 +1,5 @@
-// Levenberg-Marquardt that knows the structure of a bundle adjustment: fixed-size blocks, points eliminated while they are
-// linearised, plane factors reduced to small dense blocks, one symbolic factorisation for all iterations.
+// Levenberg-Marquardt that knows the structure of a bundle adjustment: fixed-size blocks, points eliminated while they
+// are linearised, plane factors reduced to small dense blocks, one symbolic factorisation for all iterations.
 #pragma once
 
 #include <functional>

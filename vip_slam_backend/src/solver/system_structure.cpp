@@ -87,7 +87,8 @@ void SystemStructure::splitElimination(const BaProblem& problem) {
     }
   }
   half_position = 0;
-  for (std::int64_t sum = 0; half_position < cholesky.nodes() && 2 * sum < total; ++half_position) sum += work[half_position];
+  for (std::int64_t sum = 0; half_position < cholesky.nodes() && 2 * sum < total; ++half_position)
+    sum += work[half_position];
 }
 
 bool SystemStructure::update(const BaProblem& problem) {

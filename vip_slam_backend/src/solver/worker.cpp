@@ -3,8 +3,8 @@
 namespace vip_slam {
 namespace {
 
-// Jobs follow each other within microseconds during a solve: looking again is cheaper than sleeping, for this many times.
-// Afterwards the processor belongs to others.
+// Jobs follow each other within microseconds during a solve: looking again is cheaper than sleeping, for this many
+// times. Afterwards the processor belongs to others.
 constexpr int kLooks = 2000;
 
 }  // namespace

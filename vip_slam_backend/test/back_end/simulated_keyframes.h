@@ -1,5 +1,5 @@
-// A landmark-level front end for back-end tests: keyframes with tracked features, IMU and drifting odometry in a room with
-// walls, floor and free points; and the plane module's answers.
+// A landmark-level front end for back-end tests: keyframes with tracked features, IMU and drifting odometry in a room
+// with walls, floor and free points; and the plane module's answers.
 #pragma once
 
 #include <map>
@@ -98,7 +98,8 @@ class SimulatedKeyframes {
     return kf;
   }
 
-  /// What a perfect plane module says after the newest keyframe: true planes seen by depth, all tracks on them associated.
+  /// What a perfect plane module says after the newest keyframe: true planes seen by depth, all tracks on them
+  /// associated.
   PlaneUpdate planes() {
     PlaneUpdate update;
     const NavState state = truth(last_->frame.t);

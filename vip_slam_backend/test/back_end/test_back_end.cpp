@@ -64,11 +64,12 @@ TEST(BackEnd, AllVariantsBeatTheOdometry) {
     EXPECT_LT(result.rmse, 0.5 * result.odometry_rmse) << variant;
     EXPECT_GT(result.snapshot.landmarks.size(), 50u) << variant;
     RecordProperty(variant, std::to_string(result.rmse));
-    std::printf("%s: rmse %.4f m, odometry %.4f m, %zu keyframes, %zu landmarks, reobserved %lu merged %lu outliers %lu\n", variant,
-                result.rmse, result.odometry_rmse, result.snapshot.keyframes.size(), result.snapshot.landmarks.size(),
-                static_cast<unsigned long>(result.snapshot.statistics.reobserved),
-                static_cast<unsigned long>(result.snapshot.statistics.merged),
-                static_cast<unsigned long>(result.snapshot.statistics.outliers));
+    std::printf(
+        "%s: rmse %.4f m, odometry %.4f m, %zu keyframes, %zu landmarks, reobserved %lu merged %lu outliers %lu\n",
+        variant, result.rmse, result.odometry_rmse, result.snapshot.keyframes.size(), result.snapshot.landmarks.size(),
+        static_cast<unsigned long>(result.snapshot.statistics.reobserved),
+        static_cast<unsigned long>(result.snapshot.statistics.merged),
+        static_cast<unsigned long>(result.snapshot.statistics.outliers));
   }
 }
 

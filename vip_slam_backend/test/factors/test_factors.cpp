@@ -149,7 +149,8 @@ TEST(Factors, CompressedHomographyEqualsThePairs) {
     EXPECT_GE(rank, 8);
     EXPECT_LT((rows.transpose() * rows - G).norm(), 1e-9 * G.norm());
     // At random states, not only where the pairs were made.
-    const FrameGeometry i(Ti.boxplus(0.05 * Vector6d::Random()), s.T_I_C), j(Tj.boxplus(0.05 * Vector6d::Random()), s.T_I_C);
+    const FrameGeometry i(Ti.boxplus(0.05 * Vector6d::Random()), s.T_I_C),
+        j(Tj.boxplus(0.05 * Vector6d::Random()), s.T_I_C);
     const Plane moved = plane.boxplus(0.05 * Eigen::Vector3d::Random());
     const Eigen::Matrix<double, 3, 2> basis = tangentBasis(moved.n);
     HomographyJacobian J;
@@ -179,7 +180,8 @@ TEST(Factors, NoiseFreeHomographyHasRankEight) {
 
 TEST(Factors, WeakHomographiesAreRefused) {
   const SE3 identity;
-  const FrameGeometry i(identity, identity), j(SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.3, 0, 0)), identity);
+  const FrameGeometry i(identity, identity),
+      j(SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.3, 0, 0)), identity);
   double rho;
   EXPECT_TRUE(homographyDepthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 2), Eigen::Vector2d(0, 0), &rho));
   // Camera nearly in the plane; ray nearly along it; plane behind.
@@ -243,7 +245,9 @@ TEST(Factors, GaugeHoldsPositionAndYawOnly) {
   for (const bool tilt : {false, true}) {
     prior.tilt = tilt;
     const SE3 T = prior.T_W_I.boxplus(0.2 * Vector6d::Random());
-    const auto f = [&](const Eigen::VectorXd& d) { return Eigen::VectorXd(gaugeResidual(prior, T.boxplus(d.head<6>()))); };
+    const auto f = [&](const Eigen::VectorXd& d) {
+      return Eigen::VectorXd(gaugeResidual(prior, T.boxplus(d.head<6>())));
+    };
     Matrix6d J;
     gaugeResidual(prior, T, &J);
     EXPECT_LT(relativeError(J, numericJacobian(f, 6)), kTolerance);
@@ -292,7 +296,8 @@ TEST(Factors, PosePlaneJacobians) {
 
 TEST(Factors, ImuJacobians) {
   const vip_slam::testing::AnalyticMotion motion(3);
-  const Preintegration p(motion.imu(1.0, 1.5, 200), Eigen::Vector3d(0.01, -0.02, 0.01), Eigen::Vector3d(0.1, 0, -0.1), ImuNoise());
+  const Preintegration p(motion.imu(1.0, 1.5, 200), Eigen::Vector3d(0.01, -0.02, 0.01), Eigen::Vector3d(0.1, 0, -0.1),
+                         ImuNoise());
   const Eigen::Vector3d G = gravityVector();
   Scene s;
   const auto perturbed = [](NavState x, const Eigen::VectorXd& d) {

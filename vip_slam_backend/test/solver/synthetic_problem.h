@@ -1,4 +1,5 @@
-// A small room for solver tests: a camera with an IMU on a closed curve, free points, points on four walls and the floor.
+// A small room for solver tests: a camera with an IMU on a closed curve, free points, points on four walls and the
+// floor.
 #pragma once
 
 #include <array>
@@ -76,14 +77,15 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
     }
     BaImu f;
     f.i = k, f.j = k + 1;
-    f.preintegration = std::make_shared<Preintegration>(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), noise);
+    f.preintegration =
+        std::make_shared<Preintegration>(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), noise);
     p.imu.push_back(f);
   }
-  const std::vector<std::pair<Plane, PlaneKind>> walls = {
-      {Plane(Eigen::Vector3d(-1, 0, 0), 4), PlaneKind::kVertical}, {Plane(Eigen::Vector3d(1, 0, 0), 4), PlaneKind::kVertical},
-      {Plane(Eigen::Vector3d(0, -1, 0), 3.5), PlaneKind::kVertical},
-      {Plane(Eigen::Vector3d(0, 1, 0), 3.5), PlaneKind::kVertical},
-      {Plane(Eigen::Vector3d(0, 0, 1), 0), PlaneKind::kHorizontal}};
+  const std::vector<std::pair<Plane, PlaneKind>> walls = {{Plane(Eigen::Vector3d(-1, 0, 0), 4), PlaneKind::kVertical},
+                                                          {Plane(Eigen::Vector3d(1, 0, 0), 4), PlaneKind::kVertical},
+                                                          {Plane(Eigen::Vector3d(0, -1, 0), 3.5), PlaneKind::kVertical},
+                                                          {Plane(Eigen::Vector3d(0, 1, 0), 3.5), PlaneKind::kVertical},
+                                                          {Plane(Eigen::Vector3d(0, 0, 1), 0), PlaneKind::kHorizontal}};
   const bool planes = options.compressed || options.uncompressed;
   if (planes)
     for (const auto& wall : walls) {
@@ -124,7 +126,8 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
         pair.pair.xy_i = Eigen::Vector2d(seen[0].x, seen[0].y);
         pair.pair.xy_j = Eigen::Vector2d(seen[s].x, seen[s].y);
         double rho = 1;
-        if (!homographyDepthRatio(geometry[pair.i], geometry[pair.j], walls[wall].first, pair.pair.xy_i, &rho)) continue;
+        if (!homographyDepthRatio(geometry[pair.i], geometry[pair.j], walls[wall].first, pair.pair.xy_i, &rho))
+          continue;
         pair.pair.weight = focal / (1.4 * sigma_px * rho);
         p.homography_pairs.push_back(pair);
       }

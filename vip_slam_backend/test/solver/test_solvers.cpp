@@ -49,7 +49,8 @@ TEST(Solvers, CostIsThePlainDefinition) {
     const double expected = evaluateCost(problem);
     for (const char* name : {"structured", "ceres"}) {
       BaProblem copy = problem;
-      EXPECT_NEAR(makeSolver(name)->solve(copy, exact(1)).initial_cost, expected, 1e-9 * expected) << v.name << ' ' << name;
+      EXPECT_NEAR(makeSolver(name)->solve(copy, exact(1)).initial_cost, expected, 1e-9 * expected)
+          << v.name << ' ' << name;
     }
   }
 }
@@ -86,7 +87,8 @@ TEST(Solvers, SameIteratesAndMinimum) {
     const SolverSummary mine = makeSolver("structured")->solve(a, exact(12));
     const SolverSummary reference = makeSolver("ceres")->solve(b, exact(12));
     for (std::size_t k = 0; k < std::min<std::size_t>({mine.log.size(), reference.log.size(), 6}); ++k)
-      EXPECT_NEAR(mine.log[k].cost, reference.log[k].cost, 1e-5 * reference.log[k].cost) << v.name << " iteration " << k;
+      EXPECT_NEAR(mine.log[k].cost, reference.log[k].cost, 1e-5 * reference.log[k].cost)
+          << v.name << " iteration " << k;
     EXPECT_LT(mine.final_cost, 0.5 * mine.initial_cost) << v.name;
     EXPECT_NEAR(mine.final_cost, reference.final_cost, 1e-6 * reference.final_cost) << v.name;
     for (std::size_t k = 0; k < a.frames.size(); ++k)

@@ -1,4 +1,5 @@
-// The block-sparse Cholesky against Eigen's dense one on random structures, for every instruction set this machine runs.
+// The block-sparse Cholesky against Eigen's dense one on random structures, for every instruction set this machine
+// runs.
 #include <random>
 #include <set>
 

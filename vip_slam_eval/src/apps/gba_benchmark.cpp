@@ -66,8 +66,10 @@ int main(int argc, char** argv) {
     const auto own = table("Structured solver, one thread", "structured", 1, repeats);
     const auto own2 = table("Structured solver, two threads", "structured", 2, repeats);
     const GbaRun first = runGba(map, Variant::kVip, "structured", 1, iterations, repeats, false);
-    md << "\n## VIP with first views as hosts, structured solver, one thread\n\nNot what the live system does by default "
-          "(`global_ba/shared_hosts`).\n\n" << gbaTableMarkdown({first});
+    md << "\n## VIP with first views as hosts, structured solver, one thread\n\nNot what the live system does by "
+          "default "
+          "(`global_ba/shared_hosts`).\n\n"
+       << gbaTableMarkdown({first});
     const auto stock = table("Stock Ceres (SPARSE_SCHUR), one thread", "ceres", 1, std::min(repeats, 3));
     const auto ratio = [&](const char* what, const GbaRun& slow, const GbaRun& fast, const char* aim) {
       char row[200];
@@ -115,7 +117,8 @@ int main(int argc, char** argv) {
       std::vector<PlotSeries> straight(2);
       straight[0].name = "vi, structured";
       straight[1].name = "vip, structured";
-      md << "\n## Corridor\n\n| keyframes | vi (ms) | vip (ms) | vip per keyframe (us) | points | homographies | residual "
+      md << "\n## Corridor\n\n| keyframes | vi (ms) | vip (ms) | vip per keyframe (us) | points | homographies | "
+            "residual "
             "| Jacobians | linear | pre-processor |\n|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
       for (const int n : {100, 200, 400, 800}) {
         SimulatedMapOptions corridor = options;
@@ -136,9 +139,9 @@ int main(int argc, char** argv) {
         }
         char row[200];
         const SolverSummary& s = run.summary;
-        std::snprintf(row, sizeof(row), "| %d | %.1f | %.1f | %.0f | %zu | %zu | %.1f | %.1f | %.1f | %.1f |\n", n, ms[0],
-                      ms[1], 1e3 * ms[1] / n, run.points, run.homographies, s.residual_ms, s.jacobian_ms, s.linear_ms,
-                      s.preprocess_ms);
+        std::snprintf(row, sizeof(row), "| %d | %.1f | %.1f | %.0f | %zu | %zu | %.1f | %.1f | %.1f | %.1f |\n", n,
+                      ms[0], ms[1], 1e3 * ms[1] / n, run.points, run.homographies, s.residual_ms, s.jacobian_ms,
+                      s.linear_ms, s.preprocess_ms);
         md << row;
       }
       writeLinePlot(out + "/time_over_corridor.png", "Global bundle adjustment along a corridor", "keyframes", "ms",

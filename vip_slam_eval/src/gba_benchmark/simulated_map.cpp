@@ -24,8 +24,8 @@ struct SimulatedPoint {
   Eigen::Vector3d first_ray = Eigen::Vector3d::Zero();
 };
 
-// How a tracker treats the two kinds. A mark on a flat surface looks alike over a wide range of views; a corner of clutter
-// is a silhouette that changes with the view and is soon hidden.
+// How a tracker treats the two kinds. A mark on a flat surface looks alike over a wide range of views; a corner of
+// clutter is a silhouette that changes with the view and is soon hidden.
 struct TrackerModel {
   double keep;         // probability that a track survives one keyframe
   double find;         // probability that a visible, lost point is found again within kForgotten keyframes
@@ -93,7 +93,8 @@ class Simulator {
   bool visible(const SimulatedPoint& p, const SE3& T_W_C, const TrackerModel& model) {
     const Eigen::Vector3d c = T_W_C.inverse() * p.x;
     if (c.z() < 0.4 || c.z() > model.range) return false;
-    if (std::abs(c.x() / c.z()) > 0.5 * kWidth / kFocal || std::abs(c.y() / c.z()) > 0.5 * kHeight / kFocal) return false;
+    if (std::abs(c.x() / c.z()) > 0.5 * kWidth / kFocal || std::abs(c.y() / c.z()) > 0.5 * kHeight / kFocal)
+      return false;
     const Eigen::Vector3d ray = (p.x - T_W_C.t()).normalized();
     if (p.plane >= 0 && -ray.dot(world_.planes[p.plane].plane.n) < 0.2) return false;
     if (!p.frames.empty() && ray.dot(p.first_ray) < std::cos(model.view_angle)) return false;
@@ -138,8 +139,8 @@ class Simulator {
     points_ = std::move(kept);
   }
 
-  // The start: a random walk of position and yaw away from the truth, as odometry would leave it. Gravity holds the tilt:
-  // its error wanders without growing.
+  // The start: a random walk of position and yaw away from the truth, as odometry would leave it. Gravity holds the
+  // tilt: its error wanders without growing.
   void drift() {
     SE3 error;
     Eigen::Vector2d tilt = Eigen::Vector2d::Zero();

@@ -10,7 +10,8 @@ namespace {
 using Eigen::Vector3d;
 
 // A wall, floor or table top: a rectangle on a plane of its own.
-void addPlane(World* w, const Vector3d& corner, const Vector3d& u, const Vector3d& v, const Vector3d& normal, PlaneKind kind) {
+void addPlane(World* w, const Vector3d& corner, const Vector3d& u, const Vector3d& v, const Vector3d& normal,
+              PlaneKind kind) {
   WorldPlane plane;
   plane.plane = Plane::fromPointNormal(corner, normal);
   plane.kind = kind;
@@ -39,14 +40,15 @@ World rooms() {
   addPlane(&w, {0.9, 5.5, 0.9}, {0.8, 0, 0}, {0, 1.8, 0}, Vector3d::UnitZ(), H);
   addPlane(&w, {7.6, 1.2, 0.72}, {1.5, 0, 0}, {0, 0.9, 0}, Vector3d::UnitZ(), H);
   addPlane(&w, {12.4, 5.2, 0.45}, {0.9, 0, 0}, {0, 1.6, 0}, Vector3d::UnitZ(), H);
-  for (const Vector3d& c : {Vector3d(4.9, 4.1, 0.95), Vector3d(1.2, 6.2, 1.1), Vector3d(8.3, 1.6, 0.9), Vector3d(12.8, 6, 0.7),
-                            Vector3d(4.6, 4.6, 0.4), Vector3d(9.4, 4.4, 0.4), Vector3d(2.4, 8.7, 0.5), Vector3d(11, 8.7, 0.5),
-                            Vector3d(1.4, 2.0, 0.6), Vector3d(12.6, 2.0, 0.6), Vector3d(6.3, 5.2, 1.2), Vector3d(7.7, 5.2, 1.2)})
+  for (const Vector3d& c :
+       {Vector3d(4.9, 4.1, 0.95), Vector3d(1.2, 6.2, 1.1), Vector3d(8.3, 1.6, 0.9), Vector3d(12.8, 6, 0.7),
+        Vector3d(4.6, 4.6, 0.4), Vector3d(9.4, 4.4, 0.4), Vector3d(2.4, 8.7, 0.5), Vector3d(11, 8.7, 0.5),
+        Vector3d(1.4, 2.0, 0.6), Vector3d(12.6, 2.0, 0.6), Vector3d(6.3, 5.2, 1.2), Vector3d(7.7, 5.2, 1.2)})
     w.clutter.push_back({c - Vector3d(0.5, 0.5, 0.35), c + Vector3d(0.5, 0.5, 0.45)});
   // Through both rooms and back: first looking around outwards, on the way back the other way.
-  const std::vector<Vector3d> way = {{3.2, 1.8, 1.4}, {2.6, 3.4, 1.5}, {2.8, 5.2, 1.4}, {3.6, 7.0, 1.5}, {5.4, 8.0, 1.4},
-                                     {7.0, 8.1, 1.5}, {8.8, 7.9, 1.5}, {10.3, 6.8, 1.4}, {11.0, 5.0, 1.5}, {10.8, 3.2, 1.4},
-                                     {10.2, 1.9, 1.5}};
+  const std::vector<Vector3d> way = {{3.2, 1.8, 1.4},  {2.6, 3.4, 1.5},  {2.8, 5.2, 1.4}, {3.6, 7.0, 1.5},
+                                     {5.4, 8.0, 1.4},  {7.0, 8.1, 1.5},  {8.8, 7.9, 1.5}, {10.3, 6.8, 1.4},
+                                     {11.0, 5.0, 1.5}, {10.8, 3.2, 1.4}, {10.2, 1.9, 1.5}};
   const std::vector<double> yaw_there = {3.6, 3.8, 1.0, -0.9, 0.6, 0.4, -0.4, -0.9, 0.1, -1.0, -2.2};
   const std::vector<double> yaw_back = {-3.2, -3.9, -3.3, -2.4, -3.0, -2.8, -3.5, -4.0, -4.9, -6.2, -7.4};
   const int n = static_cast<int>(way.size());
@@ -67,19 +69,23 @@ World corridor(int keyframes) {
       w.clutter.push_back({Vector3d(x + 2, side - 0.3, 0.1), Vector3d(x + 6, side + 0.3, 1.0)});
   }
   addPlane(&w, {-2, -width / 2, 0}, {length + 10, 0, 0}, {0, width, 0}, Vector3d::UnitZ(), PlaneKind::kHorizontal);
-  addPlane(&w, {-2, -width / 2, height}, {length + 10, 0, 0}, {0, width, 0}, -Vector3d::UnitZ(), PlaneKind::kHorizontal);
+  addPlane(&w, {-2, -width / 2, height}, {length + 10, 0, 0}, {0, width, 0}, -Vector3d::UnitZ(),
+           PlaneKind::kHorizontal);
   for (double x = 0; x < length; x += 1.5)
     w.path.emplace_back(x, 0.2 * std::sin(x), 1.4 + 0.1 * std::cos(1.3 * x), 0.35 * std::sin(0.7 * x));
   return w;
 }
 
 // Value and first two derivatives of the spline with respect to its parameter.
-void evaluate(const std::vector<Eigen::Vector4d>& c, double s, Eigen::Vector4d* x, Eigen::Vector4d* dx, Eigen::Vector4d* ddx) {
+void evaluate(const std::vector<Eigen::Vector4d>& c, double s, Eigen::Vector4d* x, Eigen::Vector4d* dx,
+              Eigen::Vector4d* ddx) {
   const int last = static_cast<int>(c.size()) - 4;
   const int k = std::clamp(static_cast<int>(std::floor(s)), 0, last);
   const double u = s - k, v = 1 - u;
   const Eigen::Vector4d &a = c[k], &b = c[k + 1], &d = c[k + 2], &e = c[k + 3];
-  *x = (v * v * v * a + (3 * u * u * u - 6 * u * u + 4) * b + (-3 * u * u * u + 3 * u * u + 3 * u + 1) * d + u * u * u * e) / 6;
+  *x = (v * v * v * a + (3 * u * u * u - 6 * u * u + 4) * b + (-3 * u * u * u + 3 * u * u + 3 * u + 1) * d +
+        u * u * u * e) /
+       6;
   *dx = (-v * v * a + (3 * u * u - 4 * u) * b + (-3 * u * u + 2 * u + 1) * d + u * u * e) / 2;
   *ddx = v * a + (3 * u - 2) * b + (-3 * u + 1) * d + u * e;
 }

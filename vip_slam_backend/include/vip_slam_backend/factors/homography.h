@@ -33,10 +33,10 @@ constexpr double kMinPlaneDistance = 0.15;
 /// ... or a depth ratio outside these.
 constexpr double kMinDepthRatio = 0.25, kMaxDepthRatio = 4.0;
 
-/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor (above), the ray
-/// is within 10 degrees of the plane, or the point behind a camera.
-bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane, const Eigen::Vector2d& xy_i,
-                          double* rho);
+/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor (above), the
+/// ray is within 10 degrees of the plane, or the point behind a camera.
+bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
+                          const Eigen::Vector2d& xy_i, double* rho);
 
 /// Mean square of the factor by which noise of xy_i grows on its way into frame j: half the squared Frobenius norm of
 /// d p^_j / d p_i. The noise of a pair is that of j and the grown one of i.

@@ -1,4 +1,5 @@
-// A weak prior on velocity and biases of one keyframe: used where no IMU factor reaches (first keyframe, gap in the IMU).
+// A weak prior on velocity and biases of one keyframe: used where no IMU factor reaches (first keyframe, gap in the
+// IMU).
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +9,8 @@
 namespace vip_slam {
 
 struct MotionPrior {
-  Eigen::Vector3d v_W = Eigen::Vector3d::Zero(), bias_gyro = Eigen::Vector3d::Zero(), bias_accel = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero(), bias_gyro = Eigen::Vector3d::Zero(),
+                  bias_accel = Eigen::Vector3d::Zero();
   double sigma_v = 1.0, sigma_bg = 0.01, sigma_ba = 0.1;  ///< m/s, rad/s, m/s^2
 };
 

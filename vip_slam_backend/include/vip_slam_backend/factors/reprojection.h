@@ -12,8 +12,8 @@ namespace vip_slam {
 /// Nearest depth at which a projection counts; nearer (or behind) the factor is switched off for this evaluation.
 constexpr double kMinProjectionDepth = 0.05;
 
-/// Residual in normalised coordinates times `weight` (focal length / sigma in px). False when the point is not in front.
-/// J_pose 2x6 (theta, t), J_point 2x3; both or none.
+/// Residual in normalised coordinates times `weight` (focal length / sigma in px). False when the point is not in
+/// front. J_pose 2x6 (theta, t), J_point 2x3; both or none.
 inline bool reprojectionResidual(const FrameGeometry& frame, const Eigen::Vector3d& p_W, const Eigen::Vector2d& xy,
                                  double weight, Eigen::Vector2d* r, Eigen::Matrix<double, 2, 6>* J_pose = nullptr,
                                  Eigen::Matrix<double, 2, 3>* J_point = nullptr) {

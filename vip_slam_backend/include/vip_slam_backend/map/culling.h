@@ -8,12 +8,12 @@
 
 namespace vip_slam {
 
-/// Removes landmarks with fewer than three views once their track ended, and those that are predicted into keyframes far
-/// more often than found. Landmarks that a keyframe at or above `recent` sees are spared. Returns their number.
+/// Removes landmarks with fewer than three views once their track ended, and those that are predicted into keyframes
+/// far more often than found. Landmarks that a keyframe at or above `recent` sees are spared. Returns their number.
 int cullLandmarks(KeyframeId recent, Map* map);
 
-/// Removes keyframes outside the newest `window` whose landmarks are seen elsewhere: at least `redundancy` of them by three
-/// other keyframes. Never the first of a chain, the end of a loop, or one whose removal would tear the IMU chain.
+/// Removes keyframes outside the newest `window` whose landmarks are seen elsewhere: at least `redundancy` of them by
+/// three other keyframes. Never the first of a chain, the end of a loop, or one whose removal would tear the IMU chain.
 std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise, Map* map);
 
 }  // namespace vip_slam

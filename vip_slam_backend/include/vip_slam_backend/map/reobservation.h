@@ -1,5 +1,6 @@
-// Finds landmarks of nearby keyframes again in a new keyframe: projection, pixel gate, Hamming distance. Untracked corners
-// become observations; a tracked feature that has a landmark of its own is the same point seen anew, and the two merge.
+// Finds landmarks of nearby keyframes again in a new keyframe: projection, pixel gate, Hamming distance. Untracked
+// corners become observations; a tracked feature that has a landmark of its own is the same point seen anew, and the
+// two merge.
 #pragma once
 
 #include <functional>
@@ -25,7 +26,8 @@ class Reobservation {
   /// `allowed` names the keyframes whose landmarks may be looked for (empty: all).
   ReobservationResult process(KeyframeId id, Map* map, const std::function<bool(KeyframeId)>& allowed = {}) const;
   /// Keyframes whose landmarks are looked for: covisible ones, then near ones that look the same way.
-  std::vector<KeyframeId> neighbours(const Map& map, KeyframeId id, const std::function<bool(KeyframeId)>& allowed = {}) const;
+  std::vector<KeyframeId> neighbours(const Map& map, KeyframeId id,
+                                     const std::function<bool(KeyframeId)>& allowed = {}) const;
 
  private:
   ReobservationOptions options_;

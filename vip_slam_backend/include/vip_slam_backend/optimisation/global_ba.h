@@ -1,5 +1,5 @@
-// Global bundle adjustment beside the running back end: a copy of the problem goes in, a solution comes out, and is merged
-// with what the map has become meanwhile.
+// Global bundle adjustment beside the running back end: a copy of the problem goes in, a solution comes out, and is
+// merged with what the map has become meanwhile.
 #pragma once
 
 #include <memory>
@@ -25,11 +25,12 @@ struct GlobalBaSolution {
   int rounds = 0;
 };
 
-/// Solves in rounds: between them homographies are compressed anew at the better estimate (depth ratios, gates, weights).
+/// Solves in rounds: between them homographies are compressed anew at the better estimate (depth ratios, gates,
+/// weights).
 GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job);
 
-/// Writes the solution into `map`. Keyframes and landmarks that came meanwhile move rigidly with the newest keyframe of the
-/// solution; what was removed meanwhile stays removed.
+/// Writes the solution into `map`. Keyframes and landmarks that came meanwhile move rigidly with the newest keyframe of
+/// the solution; what was removed meanwhile stays removed.
 void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map* map);
 
 }  // namespace vip_slam

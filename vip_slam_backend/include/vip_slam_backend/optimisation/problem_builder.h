@@ -1,5 +1,5 @@
-// From the map to a bundle adjustment and back: which keyframes are free, which are held, and how the four variants turn
-// landmarks and planes into factors.
+// From the map to a bundle adjustment and back: which keyframes are free, which are held, and how the four variants
+// turn landmarks and planes into factors.
 #pragma once
 
 #include <set>

@@ -1,5 +1,5 @@
-// The interface of the two bundle adjusters. Both run Levenberg-Marquardt with the same damping (Ceres' rule) on the same
-// factors, so that their iterates agree.
+// The interface of the two bundle adjusters. Both run Levenberg-Marquardt with the same damping (Ceres' rule) on the
+// same factors, so that their iterates agree.
 #pragma once
 
 #include <functional>
@@ -46,8 +46,8 @@ class BaSolver {
   virtual SolverSummary solve(BaProblem& problem, const SolverOptions& options) = 0;
 };
 
-/// "structured" or "ceres"; throws std::invalid_argument on others. A structured solver keeps its symbolic factorisation
-/// from call to call while the structure stays the same.
+/// "structured" or "ceres"; throws std::invalid_argument on others. A structured solver keeps its symbolic
+/// factorisation from call to call while the structure stays the same.
 std::unique_ptr<BaSolver> makeSolver(const std::string& name);
 
 }  // namespace vip_slam

@@ -1,7 +1,7 @@
-// Block-sparse Cholesky of a symmetric positive definite matrix whose unknowns come in nodes (6 pose, 9 motion, 3 plane):
-// approximate minimum degree, then a multifrontal factorisation on dense fronts. The symbolic part is done once per
-// structure; numbers go straight from the caller's blocks into the fronts. Two disjoint parts of the elimination tree can be
-// factorised side by side; the numbers are the same to the last bit.
+// Block-sparse Cholesky of a symmetric positive definite matrix whose unknowns come in nodes (6 pose, 9 motion, 3
+// plane): approximate minimum degree, then a multifrontal factorisation on dense fronts. The symbolic part is done once
+// per structure; numbers go straight from the caller's blocks into the fronts. Two disjoint parts of the elimination
+// tree can be factorised side by side; the numbers are the same to the last bit.
 #pragma once
 
 #include <cstddef>

@@ -24,10 +24,10 @@ struct GbaRun {
   double rmse_before = 0, rmse = 0;  ///< ATE of the keyframes after rigid alignment, metres
 };
 
-/// Runs `repeats` times from the same start and keeps the run with the median time. Hosts of homographies as in the live
-/// system's global adjustment unless said otherwise.
-GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations, int repeats,
-              bool shared_hosts = GlobalBaOptions().shared_hosts);
+/// Runs `repeats` times from the same start and keeps the run with the median time. Hosts of homographies as in the
+/// live system's global adjustment unless said otherwise.
+GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations,
+              int repeats, bool shared_hosts = GlobalBaOptions().shared_hosts);
 
 /// The map of the first `keyframes` keyframes.
 SimulatedMap prefix(const SimulatedMap& map, int keyframes);

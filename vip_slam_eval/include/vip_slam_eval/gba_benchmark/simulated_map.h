@@ -1,5 +1,5 @@
-// A map as the system would have it at the end of a sequence, from a landmark-level simulation: geometry, visibility with
-// occlusion, a tracker that loses and finds points, pixel, depth and IMU noise, and a start that drifted.
+// A map as the system would have it at the end of a sequence, from a landmark-level simulation: geometry, visibility
+// with occlusion, a tracker that loses and finds points, pixel, depth and IMU noise, and a start that drifted.
 #pragma once
 
 #include <map>
@@ -11,7 +11,8 @@
 namespace vip_slam {
 
 struct SimulatedMapOptions {
-  std::string world = "rooms";     ///< "rooms": two rooms seen there and back; "corridor": a straight one, never seen again
+  std::string world =
+      "rooms";  ///< "rooms": two rooms seen there and back; "corridor": a straight one, never seen again
   int keyframes = 215;
   double keyframe_interval = 0.35; ///< s
   int plane_points = 2236;         ///< points on planes that the map keeps
