@@ -8,7 +8,8 @@ namespace {
 
 constexpr double kGoodFit = 1.5;   // mean squared sigmas of an observation that needs no closer look
 constexpr double kSigmas = 3.0;
-constexpr double kFarthest = 0.05; // metres
+constexpr double kFarthest = 0.05;                      // metres
+constexpr double kMostNear = 0.5, kMostFar = 0.9;       // shares that must be kept, by where the median lies
 
 }  // namespace
 
@@ -21,12 +22,11 @@ PlaneGate::PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d&
   std::vector<double> sorted = distance;
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
   const double median = sorted[sorted.size() / 2];
-  all_ = false;
-  if (std::abs(median) > kFarthest) return;
   for (std::size_t k = 0; k < points.size(); ++k)
     if (std::abs(distance[k] - median) <= kSigmas * points[k].sigma) kept_.push_back(static_cast<int>(k));
   all_ = kept_.size() == points.size();
-  if (2 * kept_.size() < points.size()) kept_.clear();
+  const double share = std::abs(median) > kFarthest ? kMostFar : kMostNear;
+  if (kept_.size() < share * points.size()) kept_.clear();
 }
 
 Eigen::Matrix4d PlaneGate::G() const {

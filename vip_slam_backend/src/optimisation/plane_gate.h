@@ -12,8 +12,9 @@
 namespace vip_slam {
 
 /// `plane_C`: (n, d) of the plane in the observation's camera, as estimated now. Kept is what lies within three sigmas
-/// of the points' median distance, since the keyframe's own error moves all of them alike; nothing when the median is
-/// farther than 5 cm from the plane or less than half is left.
+/// of the points' median distance, since the keyframe's own error moves all of them alike: at least half of them, or
+/// nothing. With the median more than 5 cm off, either the keyframe has drifted or most points lie on something else;
+/// nine tenths must agree then, which is a drifted keyframe.
 class PlaneGate {
  public:
   PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d& plane_C);
