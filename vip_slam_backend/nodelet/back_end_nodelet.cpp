@@ -172,7 +172,8 @@ void BackEndNodelet::distribute(const MapUpdate& update) {
   pose_.apply(update);
   display_.apply(update);
   map_update_pub_.publish(boost::make_shared<vip_slam_msgs::MapUpdate>(toMsg(update, options_.map_frame)));
-  for (const LoopEvent& loop : update.loops) loop_pub_.publish(boost::make_shared<vip_slam_msgs::LoopEvent>(toMsg(loop)));
+  for (const LoopEvent& loop : update.loops)
+    loop_pub_.publish(boost::make_shared<vip_slam_msgs::LoopEvent>(toMsg(loop)));
   publishDisplay(update.t, update.global);
 
   auto statistics = boost::make_shared<vip_slam_msgs::BackEndStatistics>();

@@ -1,5 +1,5 @@
-// The map as rviz shows it: keyframes, trajectory, loop edges, landmarks. Follows the map by its updates, so that nothing
-// has to be copied from the estimator.
+// The map as rviz shows it: keyframes, trajectory, loop edges, landmarks. Follows the map by its updates, so that
+// nothing has to be copied from the estimator.
 #pragma once
 
 #include <cstdint>

@@ -21,7 +21,8 @@ class PoseInMap {
   void apply(const MapUpdate& update);
   void clear();
 
-  /// Remembers the image's odometry for trajectory(). Empty while the back end has not placed this epoch of the odometry.
+  /// Remembers the image's odometry for trajectory(). Empty while the back end has not placed this epoch of the
+  /// odometry.
   std::optional<SE3> add(double t, std::uint32_t epoch, const SE3& T_odom_I);
   /// T_map_base with covariance (x, y, z, rotation about the fixed axes of map) of the odometry seen from map.
   geometry_msgs::PoseWithCovarianceStamped message(double t, const SE3& T_map_odom, const SE3& T_odom_I,

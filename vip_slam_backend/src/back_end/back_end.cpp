@@ -34,7 +34,8 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   }
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   maker.process(keyframe->id, &map);
-  // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by chance.
+  // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
+  // chance.
   const std::set<KeyframeId> part = connectedKeyframes(map, keyframe->id, loop_closer.loops());
   const ReobservationResult found =
       reobservation.process(keyframe->id, &map, [&part](KeyframeId id) { return part.count(id) != 0; });
@@ -134,7 +135,7 @@ void BackEnd::Impl::reset() {
   maker.clear();
   loop_closer.clear();
   searching = false;
-  found_before.clear();
+  relocaliser.clear();
   held.clear();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();

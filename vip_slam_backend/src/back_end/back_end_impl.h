@@ -51,7 +51,7 @@ struct BackEnd::Impl {
   // back_end_maps.cpp
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);
-  bool findInMap(const Keyframe& keyframe, Relocalisation* found);
+  bool findInMap(const KeyframePtr& keyframe, Relocalisation* found);
   /// Recognises the loaded map; on success the keyframe and those held before it enter it.
   bool enterLoadedMap(const KeyframePtr& keyframe);
   /// Localisation only: T_map_odom follows, the map stays.
@@ -74,7 +74,6 @@ struct BackEnd::Impl {
   Relocaliser relocaliser;
   bool searching = false;          ///< a loaded map is not recognised yet
   bool localisation_only = false;
-  PlaceAgreement found_before;     ///< where keyframes were found that were not believed at once
   std::vector<KeyframePtr> held;   ///< keyframes that wait for that
 
   SE3 T_map_odom;

@@ -24,7 +24,8 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
     // everything each time.
     const SE3 moved = before.inverse() * map.keyframe(id).state.T_W_I;
     const double t = map.keyframe(id).data->frame.t;
-    const bool far = moved.t().norm() > 0.02 || before.rotation().angularDistance(map.keyframe(id).state.T_W_I.rotation()) > 0.005;
+    const bool far =
+        moved.t().norm() > 0.02 || before.rotation().angularDistance(map.keyframe(id).state.T_W_I.rotation()) > 0.005;
     if (far) ++correction;  // small ones may follow each other faster than an adjustment takes: they leave it valid
     if (far || t - last_global > kRestSeconds) {
       global_wanted = true;

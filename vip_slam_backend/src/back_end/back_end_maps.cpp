@@ -27,20 +27,13 @@ MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
   return update;
 }
 
-bool BackEnd::Impl::findInMap(const Keyframe& keyframe, Relocalisation* found) {
-  const ScopedTimer timer(log, "backend.relocalise", keyframe.frame.t);
+bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found) {
+  const ScopedTimer timer(log, "backend.relocalise", keyframe->frame.t);
   std::string reason;
-  auto result = relocaliser.relocalise(map, loop_closer, keyframe, {}, &reason);
-  if (result) {
-    const bool agrees = found_before.add(keyframe.frame, result->T_W_I);
-    if (!agrees && result->inliers < options.loop.relocalisation.sure_inliers) {
-      reason = std::to_string(result->inliers) + " inliers, waits for another keyframe that agrees";
-      result.reset();
-    }
-  }
+  const auto result = relocaliser.relocalise(map, loop_closer, keyframe, {}, &reason);
   LoopEvent event;
-  event.query = keyframe.id;
-  event.t = keyframe.frame.t;
+  event.query = keyframe->id;
+  event.t = keyframe->frame.t;
   event.accepted = result.has_value();
   event.reason = "relocalisation: " + reason;
   if (result) {
@@ -48,7 +41,6 @@ bool BackEnd::Impl::findInMap(const Keyframe& keyframe, Relocalisation* found) {
     event.match = result->match;
     event.inliers = result->inliers;
     event.T_match_query = map.keyframe(result->match).state.T_W_I.inverse() * result->T_W_I;
-    event.reason = "relocalisation: " + std::to_string(result->inliers) + " inliers";
   }
   loops.push_back(event);
   new_loops.push_back(event);
@@ -58,7 +50,7 @@ bool BackEnd::Impl::findInMap(const Keyframe& keyframe, Relocalisation* found) {
 
 bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
-  if (!findInMap(*keyframe, &found)) {
+  if (!findInMap(keyframe, &found)) {
     if (held.size() < kMostHeld) held.push_back(keyframe);
     return false;
   }
@@ -82,7 +74,7 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   std::optional<Relocalisation> found;
   if (known) found = relocaliser.track(map, loop_closer, *keyframe, T_map_odom * keyframe->frame.state.T_W_I);
   Relocalisation place;
-  if (!found && findInMap(*keyframe, &place)) found = place;
+  if (!found && findInMap(keyframe, &place)) found = place;
   if (!found) return;
   searching = false;
   epoch = keyframe->frame.epoch;

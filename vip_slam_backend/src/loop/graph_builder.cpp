@@ -88,7 +88,8 @@ PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<K
       const bool apart = other.data->frame.epoch != kf.data->frame.epoch ||
                          std::abs(other.data->frame.t - kf.data->frame.t) > min_seconds;
       if (neighbour.first < entry.first && apart)
-        graph.addEdge(RelativePoseEdge{neighbour.first, entry.first, relative(neighbour.first, entry.first), loop_information});
+        graph.addEdge(
+            RelativePoseEdge{neighbour.first, entry.first, relative(neighbour.first, entry.first), loop_information});
     }
     const Eigen::Vector3d plane_sigma(0.5 * kDegree, 0.5 * kDegree, 0.02);
     for (const auto& seen : kf.planes) {

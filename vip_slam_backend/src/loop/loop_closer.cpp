@@ -31,7 +31,8 @@ LoopCloser::LoopCloser(const LoopOptions& options, std::shared_ptr<const CameraM
       timing_(timing),
       vocabulary_(openVocabulary(options.vocabulary)),
       database_(vocabulary_->words()),
-      verifier_(options.verification, camera) {}
+      verifier_(options.verification, camera),
+      joins_(options.relocalisation) {}
 
 BowResult LoopCloser::describe(const Keyframe& keyframe) const {
   std::vector<Descriptor> descriptors;
@@ -127,17 +128,9 @@ std::vector<LoopEvent> LoopCloser::close(Map& map, KeyframeId query) {
 }
 
 LoopEvent LoopCloser::joinParts(Map& map, KeyframeId query, const std::set<KeyframeId>& part) {
-  const MapKeyframe& kf = map.keyframe(query);
-  PlaceVerification refused;
-  const auto place = uniquePlace(map, database_, verifier_, options_.relocalisation, *kf.data, database_.bow(query),
-                                 [&part](KeyframeId id) { return part.count(id) == 0; }, &refused.reason);
-  if (!place) return correct(map, query, refused);
-  // Nothing but looks speaks for it: one keyframe is not enough.
-  if (joins_.add(kf.data->frame, place->T_W_I)) return correct(map, query, *place);
-  refused = *place;
-  refused.accepted = false;
-  refused.reason = "waits for another keyframe that agrees";
-  return correct(map, query, refused);
+  const auto elsewhere = [&part](KeyframeId id) { return part.count(id) == 0; };
+  return correct(map, query,
+                 joins_.add(map, database_, verifier_, map.keyframe(query).data, database_.bow(query), elsewhere));
 }
 
 }  // namespace vip_slam

@@ -1,6 +1,6 @@
-// RANSAC with two points. With gravity known the pose has four degrees of freedom: yaw and position. Two rays levelled by
-// R_G_C are given lengths (by depth, or by the height difference and distance of the two map points), the horizontal
-// direction between the two ends gives yaw, the rest position.
+// RANSAC with two points. With gravity known the pose has four degrees of freedom: yaw and position. Two rays levelled
+// by R_G_B are given lengths (by depth, or for rays of one camera by the height difference and distance of the two map
+// points), the horizontal direction between the two ends gives yaw, the rest position.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -15,7 +15,8 @@ struct Lengths {
 };
 
 // Lengths of two rays so that (b fb - a fa) has height D.z and norm |D|: linear in height, quadratic in norm.
-std::vector<Lengths> lengthsFromDifference(const Eigen::Vector3d& fa, const Eigen::Vector3d& fb, const Eigen::Vector3d& D) {
+std::vector<Lengths> lengthsFromDifference(const Eigen::Vector3d& fa, const Eigen::Vector3d& fb,
+                                           const Eigen::Vector3d& D) {
   std::vector<Lengths> result;
   // Express the length of the steeper ray by the other: solve with fb the steeper one, else swap.
   const bool swap = std::abs(fa.z()) > std::abs(fb.z());
@@ -34,14 +35,15 @@ std::vector<Lengths> lengthsFromDifference(const Eigen::Vector3d& fa, const Eige
   return result;
 }
 
-bool poseFromPair(const Eigen::Vector3d& pa, const Eigen::Vector3d& pb, const Eigen::Vector3d& ea, const Eigen::Vector3d& eb,
-                  const Eigen::Quaterniond& R_G_C, SE3* T_W_C) {
+// ea, eb: the ends of the rays from the body's origin, in the axes of G.
+bool poseFromPair(const Eigen::Vector3d& pa, const Eigen::Vector3d& pb, const Eigen::Vector3d& ea,
+                  const Eigen::Vector3d& eb, const Eigen::Quaterniond& R_G_B, SE3* T_W_B) {
   const Eigen::Vector3d D = pb - pa, E = eb - ea;
   const double horizontal = D.head<2>().norm();
   if (horizontal < 0.05 || E.head<2>().norm() < 0.05) return false;  // yaw is not determined
   const double yaw = std::atan2(D.y(), D.x()) - std::atan2(E.y(), E.x());
   const Eigen::Quaterniond R_W_G(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
-  *T_W_C = SE3(R_W_G * R_G_C, 0.5 * (pa + pb) - R_W_G * (0.5 * (ea + eb)));
+  *T_W_B = SE3(R_W_G * R_G_B, 0.5 * (pa + pb) - R_W_G * (0.5 * (ea + eb)));
   return true;
 }
 
@@ -52,45 +54,53 @@ bool explains(const SE3& T_W_C, const PlaceMatch& match, double max_px, const Pl
   if (p.z() < 0.05) return false;
   const double limit = max_px * match.scale / options.focal;
   if ((p.head<2>() / p.z() - match.xy).squaredNorm() > limit * limit) return false;
-  return match.depth <= 0 || std::abs(p.z() - match.depth) <= options.depth_sigmas * match.depth_sigma + 0.02 + 0.01 * p.z();
+  return match.depth <= 0 ||
+         std::abs(p.z() - match.depth) <= options.depth_sigmas * match.depth_sigma + 0.02 + 0.01 * p.z();
 }
 
-PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const Eigen::Quaterniond& R_G_C,
+CameraRig singleCamera() { return {SE3()}; }
+
+PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const Eigen::Quaterniond& R_G_B,
                           const PlacePoseOptions& options) {
   PlacePose best;
   const std::size_t n = matches.size();
   if (n < 2) return best;
-  std::vector<Eigen::Vector3d> rays(n);
-  for (std::size_t k = 0; k < n; ++k) rays[k] = R_G_C * Eigen::Vector3d(matches[k].xy.x(), matches[k].xy.y(), 1.0);
+  std::vector<Eigen::Vector3d> eyes(rig.size()), rays(n);  // in the axes of G
+  for (std::size_t c = 0; c < rig.size(); ++c) eyes[c] = R_G_B * rig[c].t();
+  for (std::size_t k = 0; k < n; ++k)
+    rays[k] = R_G_B * (rig[matches[k].camera].rotation() * Eigen::Vector3d(matches[k].xy.x(), matches[k].xy.y(), 1.0));
 
   std::mt19937_64 random(options.seed);
+  std::vector<SE3> T_W_C(rig.size());
   std::size_t best_count = 0;
   int needed = options.iterations;
   for (int iteration = 0; iteration < needed; ++iteration) {
     const std::size_t a = random() % n, b = random() % n;
     if (a == b) continue;
     const PlaceMatch &ma = matches[a], &mb = matches[b];
+    const Eigen::Vector3d &ea = eyes[ma.camera], &eb = eyes[mb.camera];
     const Eigen::Vector3d D = mb.p_W - ma.p_W;
     std::vector<Lengths> lengths;
     if (ma.depth > 0 && mb.depth > 0) {
       // Distance and height do not depend on the pose: most wrong pairs end here.
-      const Eigen::Vector3d E = mb.depth * rays[b] - ma.depth * rays[a];
+      const Eigen::Vector3d E = eb + mb.depth * rays[b] - ea - ma.depth * rays[a];
       const double slack = options.depth_sigmas * (ma.depth_sigma + mb.depth_sigma) + 0.05;
       if (std::abs(E.norm() - D.norm()) > slack || std::abs(E.z() - D.z()) > slack) continue;
       lengths.push_back({ma.depth, mb.depth});
-    } else {
+    } else if (ma.camera == mb.camera) {
       lengths = lengthsFromDifference(rays[a], rays[b], D);
     }
     for (const Lengths& l : lengths) {
-      SE3 T_W_C;
-      if (!poseFromPair(ma.p_W, mb.p_W, l.a * rays[a], l.b * rays[b], R_G_C, &T_W_C)) continue;
+      SE3 T_W_B;
+      if (!poseFromPair(ma.p_W, mb.p_W, ea + l.a * rays[a], eb + l.b * rays[b], R_G_B, &T_W_B)) continue;
+      for (std::size_t c = 0; c < rig.size(); ++c) T_W_C[c] = T_W_B * rig[c];
       std::vector<std::uint32_t> inliers;
       for (std::uint32_t k = 0; k < n; ++k)
-        if (explains(T_W_C, matches[k], options.ransac_px, options)) inliers.push_back(k);
+        if (explains(T_W_C[matches[k].camera], matches[k], options.ransac_px, options)) inliers.push_back(k);
       if (inliers.size() <= best_count) continue;
       best_count = inliers.size();
       best.found = true;
-      best.T_W_C = T_W_C;
+      best.T_W_B = T_W_B;
       best.inliers = std::move(inliers);
       // Enough samples for a pair of inliers with 99.9 % probability, with a margin for their noise.
       const double w = static_cast<double>(best_count) / static_cast<double>(n);

@@ -3,47 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <set>
+#include <limits>
 
 #include <Eigen/LU>
 
+#include "vip_slam_backend/loop/guided_matching.h"
 #include "vip_slam_backend/loop/place_matching.h"
 #include "vip_slam_backend/loop/scene_agreement.h"
 
 namespace vip_slam {
 namespace {
 
-// ORB pyramids here and in common vocabularies grow by 1.2 to 1.4 per octave.
-double octaveScale(const Feature& f) { return std::pow(1.3, f.octave); }
-
 std::string words(const char* format, double a, double b) {
   char text[128];
   std::snprintf(text, sizeof text, format, a, b);
   return text;
-}
-
-// A feature's point in the map: its landmark, or its own depth. False when it has neither.
-bool pointOf(const Map& map, const MapKeyframe& kf, std::uint32_t feature, Eigen::Vector3d* p_W, double* sigma) {
-  const Feature& f = kf.features()[feature];
-  if (const MapLandmark* landmark = map.findLandmark(kf.landmarks[feature])) {
-    *p_W = landmark->p_W;
-    *sigma = 0.01;
-    return true;
-  }
-  if (f.depth <= 0) return false;
-  *p_W = kf.T_W_C() * (f.depth * Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0));
-  *sigma = f.depth_sigma;
-  return true;
-}
-
-PlaceMatch makeMatch(const Feature& f, const Eigen::Vector3d& p_W, double sigma) {
-  PlaceMatch m;
-  m.p_W = p_W;
-  m.xy = f.xy.cast<double>();
-  m.depth = f.depth;
-  m.depth_sigma = std::hypot(f.depth_sigma, sigma);
-  m.scale = octaveScale(f);
-  return m;
 }
 
 std::vector<KeyframeId> neighbourhood(const Map& map, KeyframeId match, int most,
@@ -62,11 +36,6 @@ std::vector<KeyframeId> neighbourhood(const Map& map, KeyframeId match, int most
 
 }  // namespace
 
-struct PlaceVerifier::Guided {
-  std::vector<PlaceMatch> matches;
-  std::vector<std::pair<std::uint32_t, LandmarkId>> source;  ///< query feature, landmark or kNoLandmark
-};
-
 PlaceVerifier::PlaceVerifier(const PlaceVerificationOptions& options, std::shared_ptr<const CameraModel> camera)
     : options_(options), camera_(std::move(camera)) {
   pose_options_.focal = camera_->focal();
@@ -75,70 +44,23 @@ PlaceVerifier::PlaceVerifier(const PlaceVerificationOptions& options, std::share
   pose_options_.inlier_px = options_.inlier_px;
 }
 
-PlaceVerifier::Guided PlaceVerifier::guide(const Map& map, const Keyframe& query, const SE3& T_W_C, double radius,
-                                           const std::vector<KeyframeId>& around) const {
-  const auto& features = query.frame.features;
-  const FeatureGrid grid(features, camera_->width(), camera_->height());
-  const SE3 T_C_W = T_W_C.inverse();
-  struct Best {
-    int distance = 1000;
-    PlaceMatch match;
-    LandmarkId landmark = kNoLandmark;
-  };
-  std::vector<Best> best(features.size());
-  std::set<LandmarkId> done;
-  for (const KeyframeId id : around) {
-    const MapKeyframe& kf = map.keyframe(id);
-    for (std::uint32_t f = 0; f < kf.features().size(); ++f) {
-      const LandmarkId landmark = kf.landmarks[f];
-      if (landmark != kNoLandmark && !done.insert(landmark).second) continue;
-      Eigen::Vector3d p_W;
-      double sigma;
-      if (!pointOf(map, kf, f, &p_W, &sigma)) continue;
-      Eigen::Vector2d uv;
-      const Eigen::Vector3d p_C = T_C_W * p_W;
-      if (p_C.z() < 0.1 || !camera_->project(p_C, &uv) || !camera_->inImage(uv)) continue;
-      const Descriptor& descriptor =
-          landmark != kNoLandmark ? map.landmark(landmark).descriptor : kf.features()[f].descriptor;
-      int first = 1000, second = 1000;
-      std::uint32_t nearest = 0;
-      for (const std::uint32_t candidate : grid.near(uv, radius)) {
-        const int distance = hammingDistance(descriptor, features[candidate].descriptor);
-        if (distance < first) {
-          second = first;
-          first = distance;
-          nearest = candidate;
-        } else if (distance < second) {
-          second = distance;
-        }
-      }
-      if (first > options_.max_hamming || first > 0.9 * second || first >= best[nearest].distance) continue;
-      best[nearest] = {first, makeMatch(features[nearest], p_W, sigma), landmark};
-    }
-  }
-  Guided result;
-  for (std::uint32_t f = 0; f < best.size(); ++f) {
-    if (best[f].distance > options_.max_hamming) continue;
-    result.matches.push_back(best[f].match);
-    result.source.emplace_back(f, best[f].landmark);
-  }
-  return result;
-}
-
 void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G_I, const SE3& start,
                            const std::vector<KeyframeId>& around, PlaceVerification* result) const {
   SE3 T_W_C = start;
-  Guided guided;
+  GuidedMatches guided;
   PlacePose pose;
+  const std::vector<MapPoint> points = mapPointsOf(map, around);
   for (const double factor : {1.0, 0.5}) {
-    guided = guide(map, query, T_W_C, factor * options_.guided_radius, around);
-    pose = refinePlacePose(guided.matches, T_W_C, pose_options_);
+    guided = matchGuided(map, query.frame.features, T_W_C, factor * options_.guided_radius, points, *camera_,
+                         options_.max_hamming, GuidedLooks::kStrict);
+    pose = refinePlacePose(guided.matches, singleCamera(), T_W_C, T_G_I.rotation() * query.frame.T_I_C.rotation(),
+                           pose_options_);
     result->inliers = static_cast<int>(pose.inliers.size());
     if (!pose.found || result->inliers < options_.min_ransac_inliers) {
       result->reason = words("%.0f inliers after guided matching, needs %.0f", result->inliers, options_.min_inliers);
       return;
     }
-    T_W_C = pose.T_W_C;
+    T_W_C = pose.T_W_B;
   }
   result->T_W_I = T_W_C * query.frame.T_I_C.inverse();
   result->information = pose.information;
@@ -168,11 +90,13 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
   if (depth.compared >= 100) {
     result->depth_agreement = depth.agreement();
     if (depth.agreement() < options_.min_depth_agreement) {
-      result->reason = words("%.2f of the common depth agrees, needs %.2f", depth.agreement(), options_.min_depth_agreement);
+      result->reason =
+          words("%.2f of the common depth agrees, needs %.2f", depth.agreement(), options_.min_depth_agreement);
       return;
     }
     if (depth.seeThrough() > options_.max_see_through) {
-      result->reason = words("%.2f of the surfaces are seen through, at most %.2f", depth.seeThrough(), options_.max_see_through);
+      result->reason =
+          words("%.2f of the surfaces are seen through, at most %.2f", depth.seeThrough(), options_.max_see_through);
       return;
     }
   }
@@ -182,29 +106,27 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
 
 // A keyframe in poor texture has few corners that come again; those around it have others.
 std::vector<PlaceMatch> PlaceVerifier::match(const Map& map, const Keyframe& query, const BowResult& query_bow,
-                                             const std::vector<KeyframeId>& around,
-                                             const KeyframeDatabase& database) const {
+                                             KeyframeId match, const KeyframeDatabase& database,
+                                             const std::function<bool(KeyframeId)>& allowed) const {
   struct Best {
-    int distance = 1000;
+    int distance = std::numeric_limits<int>::max();
     PlaceMatch match;
   };
   const auto& features = query.frame.features;
   std::vector<Best> best(features.size());
-  for (const KeyframeId id : around) {
+  for (const KeyframeId id : neighbourhood(map, match, options_.matched_keyframes, allowed)) {
     if (!database.has(id)) continue;
-    const MapKeyframe& kf = map.keyframe(id);
-    for (const auto& pair :
-         matchByDirectIndex(features, query_bow.direct, kf.features(), database.bow(id).direct, options_)) {
-      Eigen::Vector3d p_W;
-      double sigma;
-      const int distance = hammingDistance(features[pair.first].descriptor, kf.features()[pair.second].descriptor);
-      if (distance < best[pair.first].distance && pointOf(map, kf, pair.second, &p_W, &sigma))
-        best[pair.first] = {distance, makeMatch(features[pair.first], p_W, sigma)};
+    const std::vector<Feature>& theirs = map.keyframe(id).features();
+    for (const auto& pair : matchByDirectIndex(features, query_bow.direct, theirs, database.bow(id).direct, options_)) {
+      MapPoint point;
+      const int distance = hammingDistance(features[pair.first].descriptor, theirs[pair.second].descriptor);
+      if (distance < best[pair.first].distance && mapPointOf(map, id, pair.second, &point))
+        best[pair.first] = {distance, makePlaceMatch(features[pair.first], point)};
     }
   }
   std::vector<PlaceMatch> matches;
   for (const Best& b : best)
-    if (b.distance < 1000) matches.push_back(b.match);
+    if (b.distance < std::numeric_limits<int>::max()) matches.push_back(b.match);
   return matches;
 }
 
@@ -213,8 +135,7 @@ PlaceVerification PlaceVerifier::verify(const Map& map, const Keyframe& query, c
                                         const std::function<bool(KeyframeId)>& allowed) const {
   PlaceVerification result;
   result.match = match;
-  const std::vector<PlaceMatch> matches = this->match(
-      map, query, query_bow, neighbourhood(map, match, options_.matched_keyframes, allowed), database);
+  const std::vector<PlaceMatch> matches = this->match(map, query, query_bow, match, database, allowed);
   result.matches = static_cast<int>(matches.size());
   if (result.matches < options_.min_matches) {
     result.reason = words("%.0f descriptor matches, needs %.0f", result.matches, options_.min_matches);
@@ -222,13 +143,14 @@ PlaceVerification PlaceVerifier::verify(const Map& map, const Keyframe& query, c
   }
   PlacePoseOptions pose_options = pose_options_;
   pose_options.seed = query.id * 1000003ull + match;
-  const PlacePose pose = ransacPlacePose(matches, T_G_I.rotation() * query.frame.T_I_C.rotation(), pose_options);
+  const PlacePose pose =
+      ransacPlacePose(matches, singleCamera(), T_G_I.rotation() * query.frame.T_I_C.rotation(), pose_options);
   result.inliers = static_cast<int>(pose.inliers.size());
   if (result.inliers < options_.min_ransac_inliers) {
     result.reason = words("%.0f inliers of RANSAC, needs %.0f", result.inliers, options_.min_ransac_inliers);
     return result;
   }
-  finish(map, query, T_G_I, pose.T_W_C, neighbourhood(map, match, options_.guided_keyframes, allowed), &result);
+  finish(map, query, T_G_I, pose.T_W_B, neighbourhood(map, match, options_.guided_keyframes, allowed), &result);
   return result;
 }
 

@@ -15,7 +15,8 @@ using YawPosition = std::array<double, 4>;  // yaw turned since the start, posit
 using PlaneVector = std::array<double, 4>;  // n, d
 
 SE3 poseOf(const Eigen::Quaterniond& R_0, const double* x) {
-  return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(x[0], Eigen::Vector3d::UnitZ())) * R_0, Eigen::Vector3d(x[1], x[2], x[3]));
+  return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(x[0], Eigen::Vector3d::UnitZ())) * R_0,
+             Eigen::Vector3d(x[1], x[2], x[3]));
 }
 
 // d(perturbation)/d(yaw, position): Exp(yaw z) R = R Exp(R^T z yaw).
@@ -136,7 +137,8 @@ PosePlaneSolution PosePlaneGraph::solve(int max_iterations) const {
     parts.join(pose_part[e.i], pose_part[e.j]);
   }
   for (const PosePlaneEdge& e : pose_plane_) {
-    problem.AddResidualBlock(new PosePlaneCost(e, poses_.at(e.i).rotation()), nullptr, x[e.i].data(), y[e.plane].data());
+    problem.AddResidualBlock(new PosePlaneCost(e, poses_.at(e.i).rotation()), nullptr, x[e.i].data(),
+                             y[e.plane].data());
     parts.join(pose_part[e.i], plane_part[e.plane]);
   }
   for (auto& p : y)

@@ -196,7 +196,8 @@ void readPayload(ByteReader& in, const ImuNoise& noise, StoredMap* stored) {
   std::vector<std::vector<MapObservation>> seen;
   for (std::size_t k = 0; k < keyframes; ++k) readKeyframe(in, landmark_limit, noise, map, seen);
   const std::size_t landmarks = in.count(map_file::kLandmarkBytes, "landmarks");
-  if (seen.size() > landmarks) in.fail("keyframes see more landmarks than the " + std::to_string(landmarks) + " stored");
+  if (seen.size() > landmarks)
+    in.fail("keyframes see more landmarks than the " + std::to_string(landmarks) + " stored");
   seen.resize(landmarks);
   for (std::uint32_t k = 0; k < landmarks; ++k) readLandmark(in, k, std::move(seen[k]), map);
   const std::size_t loops = in.count(16, "loops");
@@ -223,7 +224,8 @@ StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string
   if (in.get<std::uint32_t>("reserved") != 0) in.fail("reserved field is not 0");
   const auto length = in.get<std::uint64_t>("length");
   if (length != in.left() - 4)
-    in.fail("payload of " + std::to_string(in.left() - 4) + " bytes, expected " + std::to_string(length) + " (truncated?)");
+    in.fail("payload of " + std::to_string(in.left() - 4) + " bytes, expected " + std::to_string(length) +
+            " (truncated?)");
   std::uint32_t crc;
   std::memcpy(&crc, data + size - 4, 4);
   if (crc32(data, size - 4) != crc) in.fail("checksum is wrong, the file is damaged");

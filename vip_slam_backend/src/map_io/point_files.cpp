@@ -29,8 +29,8 @@ void writePointsPly(const std::string& path, const Map& map) {
 void writePointsPcd(const std::string& path, const Map& map) {
   AtomicFile file(path);
   const std::size_t n = map.landmarks().size();
-  file.stream() << "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z label\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH " << n
-                << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << n << "\nDATA ascii\n";
+  file.stream() << "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z label\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH "
+                << n << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << n << "\nDATA ascii\n";
   writeRows(file.stream(), map);
   file.commit();
 }

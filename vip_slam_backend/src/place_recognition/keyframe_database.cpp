@@ -29,8 +29,9 @@ void KeyframeDatabase::remove(KeyframeId id) {
   const std::uint32_t slot = it->second;
   for (const auto& word : entries_[slot].bow.bow) {
     auto& postings = index_[word.first];
-    postings.erase(std::remove_if(postings.begin(), postings.end(), [slot](const Posting& p) { return p.slot == slot; }),
-                   postings.end());
+    postings.erase(
+        std::remove_if(postings.begin(), postings.end(), [slot](const Posting& p) { return p.slot == slot; }),
+        postings.end());
   }
   entries_[slot] = {};
   free_.push_back(slot);
@@ -54,7 +55,8 @@ std::vector<DatabaseMatch> KeyframeDatabase::query(const BowVector& bow, std::si
   }
   std::vector<DatabaseMatch> matches;
   for (std::size_t slot = 0; slot < score.size(); ++slot)
-    if (score[slot] > 0 && (!allowed || allowed(entries_[slot].id))) matches.push_back({entries_[slot].id, score[slot]});
+    if (score[slot] > 0 && (!allowed || allowed(entries_[slot].id)))
+      matches.push_back({entries_[slot].id, score[slot]});
   const std::size_t keep = std::min(max_results, matches.size());
   std::partial_sort(matches.begin(), matches.begin() + static_cast<std::ptrdiff_t>(keep), matches.end(),
                     [](const DatabaseMatch& a, const DatabaseMatch& b) {

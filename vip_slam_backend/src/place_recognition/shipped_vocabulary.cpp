@@ -11,9 +11,10 @@ extern const std::uint8_t vip_slam_shipped_vocabulary_end[];
 namespace vip_slam {
 
 std::shared_ptr<const Vocabulary> shippedVocabulary() {
-  static const auto vocabulary = std::make_shared<const Vocabulary>(parseVocabulary(
-      vip_slam_shipped_vocabulary_begin,
-      static_cast<std::size_t>(vip_slam_shipped_vocabulary_end - vip_slam_shipped_vocabulary_begin), "shipped vocabulary"));
+  static const auto vocabulary = std::make_shared<const Vocabulary>(
+      parseVocabulary(vip_slam_shipped_vocabulary_begin,
+                      static_cast<std::size_t>(vip_slam_shipped_vocabulary_end - vip_slam_shipped_vocabulary_begin),
+                      "shipped vocabulary"));
   return vocabulary;
 }
 

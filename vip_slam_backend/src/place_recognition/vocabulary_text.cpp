@@ -35,7 +35,8 @@ class TextReader {
     long value = 0;
     const auto r = std::from_chars(at_, end_, value);
     if (r.ec != std::errc() || value < min || value > max)
-      fail(std::string("bad ") + name + ", expected a number from " + std::to_string(min) + " to " + std::to_string(max));
+      fail(std::string("bad ") + name + ", expected a number from " + std::to_string(min) + " to " +
+           std::to_string(max));
     at_ = r.ptr;
     return value;
   }
@@ -88,7 +89,8 @@ Vocabulary parseTextVocabulary(const std::string& text, const std::string& sourc
     for (std::uint8_t& byte : node.descriptor) byte = static_cast<std::uint8_t>(in.integer("descriptor byte", 0, 255));
     node.weight = in.number("weight");
     if (nodes[node.parent].leaf) in.fail("parent " + std::to_string(node.parent) + " is a leaf");
-    if (children[node.parent].size() >= 255) in.fail("parent " + std::to_string(node.parent) + " has over 255 children");
+    if (children[node.parent].size() >= 255)
+      in.fail("parent " + std::to_string(node.parent) + " has over 255 children");
     children[node.parent].push_back(static_cast<std::uint32_t>(nodes.size()));
     nodes.push_back(node);
     children.emplace_back();

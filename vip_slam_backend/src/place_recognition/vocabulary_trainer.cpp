@@ -142,7 +142,8 @@ Vocabulary trainVocabulary(const std::vector<std::vector<Descriptor>>& images, c
     for (const WordId w : words) ++seen_in[w];
   }
   for (std::size_t w = 0; w < seen_in.size(); ++w)
-    tree.weights[w] = static_cast<float>(std::log((1.0 + static_cast<double>(images.size())) / std::max(1u, seen_in[w])));
+    tree.weights[w] =
+        static_cast<float>(std::log((1.0 + static_cast<double>(images.size())) / std::max(1u, seen_in[w])));
   return Vocabulary(std::move(tree));
 }
 

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "vip_slam_backend/loop/unique_place.h"
-
 namespace vip_slam {
 namespace {
 
@@ -24,13 +22,15 @@ SE3 alignOdometry(const SE3& T_map_I, const SE3& T_odom_I) {
   return SE3(R, T_map_I.t() - R * T_odom_I.t());
 }
 
-std::optional<Relocalisation> Relocaliser::relocalise(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
+std::optional<Relocalisation> Relocaliser::relocalise(const Map& map, const LoopCloser& places,
+                                                      const KeyframePtr& keyframe,
                                                       const std::function<bool(KeyframeId)>& allowed,
-                                                      std::string* reason) const {
-  const auto place = uniquePlace(map, places.database(), places.verifier(), options_, keyframe, places.describe(keyframe),
-                                 allowed, reason);
-  if (!place) return std::nullopt;
-  return fromPlace(*place);
+                                                      std::string* reason) {
+  const PlaceVerification place =
+      search_.add(map, places.database(), places.verifier(), keyframe, places.describe(*keyframe), allowed);
+  if (reason) *reason = place.reason;
+  if (!place.accepted) return std::nullopt;
+  return fromPlace(place);
 }
 
 std::optional<Relocalisation> Relocaliser::track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,

@@ -1,4 +1,5 @@
-// A camera on a circle that looks at a round wall full of points; the estimate drifts. For loop and relocalisation tests.
+// A camera on a circle that looks at a round wall full of points; the estimate drifts. For loop and relocalisation
+// tests.
 #pragma once
 
 #include <cmath>
@@ -93,7 +94,9 @@ class RingWorld {
         if (map.hasLandmark(feature.id))
           map.addObservation(feature.id, o);
         else
-          map.addLandmark(feature.id, estimate * (T_I_C() * (feature.depth * Eigen::Vector3d(feature.xy.x(), feature.xy.y(), 1))), o);
+          map.addLandmark(feature.id,
+                          estimate * (T_I_C() * (feature.depth * Eigen::Vector3d(feature.xy.x(), feature.xy.y(), 1))),
+                          o);
       }
       truths->push_back(T);
     }

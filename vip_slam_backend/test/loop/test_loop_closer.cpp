@@ -122,15 +122,17 @@ TEST(Relocaliser, FindsItsPlaceAndRefusesTwoThatLookAlike) {
     world.walk(map, 0.9, 0.0, &truth);
     LoopCloser places(LoopOptions(), world.camera());
     places.rebuild(map, {});
-    const Relocaliser relocaliser{RelocalisationOptions()};
+    Relocaliser relocaliser{RelocalisationOptions()};
     int found = 0;
     for (int k = 0; k < 20; ++k) {
       // Off the path, another heading, and an odometry frame of its own.
       SE3 T = world.truth(0.3 + 0.22 * k);
-      T = T * SE3(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(-0.3, 0.2, 0.1));
-      const SE3 T_odom_map(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(7, 8, 0));
+      T = T *
+          SE3(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(-0.3, 0.2, 0.1));
+      const SE3 T_odom_map(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ())),
+                           Eigen::Vector3d(7, 8, 0));
       const KeyframePtr query = world.see(1000, 900, T, T_odom_map * T, 500000);
-      const auto result = relocaliser.relocalise(map, places, *query);
+      const auto result = relocaliser.relocalise(map, places, query);
       if (!result) continue;
       ++found;
       EXPECT_LT((result->T_W_I.t() - T.t()).norm(), 0.03);

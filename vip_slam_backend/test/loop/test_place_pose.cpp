@@ -38,11 +38,11 @@ class PlacePoseTest : public ::testing::Test {
   }
   void expectFound(double position, double angle) {
     PlacePoseOptions options;
-    const PlacePose coarse = ransacPlacePose(matches_, R_G_C_, options);
+    const PlacePose coarse = ransacPlacePose(matches_, singleCamera(), R_G_C_, options);
     ASSERT_TRUE(coarse.found);
-    const PlacePose fine = refinePlacePose(matches_, coarse.T_W_C, options);
+    const PlacePose fine = refinePlacePose(matches_, singleCamera(), coarse.T_W_B, R_G_C_, options);
     ASSERT_TRUE(fine.found);
-    const Vector6d error = fine.T_W_C.boxminus(T_W_C_);
+    const Vector6d error = fine.T_W_B.boxminus(T_W_C_);
     EXPECT_LT(error.tail<3>().norm(), position);
     EXPECT_LT(error.head<3>().norm(), angle);
     int right = 0, wrong = 0;
@@ -84,25 +84,79 @@ TEST_F(PlacePoseTest, NothingButOutliersGivesFewInliers) {
   int worst = 0;
   for (int trial = 0; trial < 50; ++trial) {
     make(80, 0.0, true);
-    const PlacePose pose = ransacPlacePose(matches_, R_G_C_, {});
+    const PlacePose pose = ransacPlacePose(matches_, singleCamera(), R_G_C_, {});
     worst = std::max(worst, static_cast<int>(pose.inliers.size()));
   }
   EXPECT_LT(worst, 8);
 }
 
+// Three cameras of one body, each too poor alone.
+TEST_F(PlacePoseTest, RigOfCameras) {
+  for (int trial = 0; trial < 20; ++trial) {
+    make(1, 1.0, true);
+    const SE3 T_W_B = T_W_C_;
+    const Eigen::Quaterniond R_G_B = R_G_C_;
+    CameraRig rig;
+    std::vector<PlaceMatch> matches;
+    for (std::uint32_t c = 0; c < 3; ++c) {
+      const Eigen::Vector3d axis(normal(1), normal(1), normal(1));
+      rig.emplace_back(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, axis.normalized())),
+                       Eigen::Vector3d(uniform(-0.5, 0.5), uniform(-0.5, 0.5), uniform(-0.5, 0.5)));
+      for (int k = 0; k < 12; ++k) {
+        PlaceMatch m;
+        const double z = uniform(1, 6);
+        m.camera = c;
+        m.xy = Eigen::Vector2d(uniform(-0.6, 0.6), uniform(-0.45, 0.45));
+        m.depth = z;
+        m.depth_sigma = 0.005 * z;
+        m.p_W = T_W_B * (rig[c] * Eigen::Vector3d(m.xy.x() * z, m.xy.y() * z, z));
+        if (k % 3 == 2) m.p_W += Eigen::Vector3d(uniform(1, 3), uniform(-3, 3), uniform(-1, 1));  // a wrong match
+        matches.push_back(m);
+      }
+    }
+    PlacePoseOptions options;
+    options.iterations = 1000;
+    const PlacePose coarse = ransacPlacePose(matches, rig, R_G_B, options);
+    ASSERT_TRUE(coarse.found);
+    EXPECT_GE(coarse.inliers.size(), 20u);
+    // Without noise the pose is exact, and so it stays when gravity has a say.
+    for (const double tilt_sigma : {0.0, 0.003}) {
+      options.tilt_sigma = tilt_sigma;
+      const PlacePose fine = refinePlacePose(matches, rig, coarse.T_W_B, R_G_B, options);
+      ASSERT_TRUE(fine.found);
+      EXPECT_LT(fine.T_W_B.boxminus(T_W_B).norm(), 1e-5);
+    }
+  }
+}
+
+TEST_F(PlacePoseTest, GravityHoldsTheTiltThatFewPointsLeaveFree) {
+  make(4, 1.0, true);
+  PlacePoseOptions options;
+  const PlacePose free = refinePlacePose(matches_, singleCamera(), T_W_C_, R_G_C_, options);
+  options.tilt_sigma = 1e-4;
+  const PlacePose held = refinePlacePose(matches_, singleCamera(), T_W_C_, R_G_C_, options);
+  const auto tilt = [&](const PlacePose& pose) {
+    return (pose.T_W_B.rotation().conjugate() * Eigen::Vector3d::UnitZ() -
+            R_G_C_.conjugate() * Eigen::Vector3d::UnitZ()).norm();
+  };
+  EXPECT_LT(tilt(held), 1e-4);
+  EXPECT_GT(tilt(free), tilt(held));
+}
+
 TEST_F(PlacePoseTest, SameSeedSameAnswer) {
   make(80, 0.4, true);
-  const PlacePose a = ransacPlacePose(matches_, R_G_C_, {}), b = ransacPlacePose(matches_, R_G_C_, {});
+  const PlacePose a = ransacPlacePose(matches_, singleCamera(), R_G_C_, {}),
+                  b = ransacPlacePose(matches_, singleCamera(), R_G_C_, {});
   EXPECT_EQ(a.inliers, b.inliers);
-  EXPECT_EQ(a.T_W_C.matrix(), b.T_W_C.matrix());
+  EXPECT_EQ(a.T_W_B.matrix(), b.T_W_B.matrix());
 }
 
 TEST_F(PlacePoseTest, DegenerateInput) {
-  EXPECT_FALSE(ransacPlacePose({}, Eigen::Quaterniond::Identity(), {}).found);
+  EXPECT_FALSE(ransacPlacePose({}, singleCamera(), Eigen::Quaterniond::Identity(), {}).found);
   make(10, 1.0, true);
   for (PlaceMatch& m : matches_) m = matches_[0];
-  EXPECT_FALSE(ransacPlacePose(matches_, R_G_C_, {}).found);
-  EXPECT_FALSE(refinePlacePose(matches_, T_W_C_, {}).found);
+  EXPECT_FALSE(ransacPlacePose(matches_, singleCamera(), R_G_C_, {}).found);
+  EXPECT_FALSE(refinePlacePose(matches_, singleCamera(), T_W_C_, R_G_C_, {}).found);
 }
 
 }  // namespace

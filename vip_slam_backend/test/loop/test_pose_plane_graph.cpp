@@ -26,7 +26,8 @@ class GraphTest : public ::testing::Test {
       SE3 step = truth_[k - 1].inverse() * truth_[k];
       SE3 next = estimate_.back() * step;
       const Eigen::Quaterniond yaw(Eigen::AngleAxisd(0.002 + 0.001 * noise(random), Eigen::Vector3d::UnitZ()));
-      estimate_.push_back(SE3(yaw * next.rotation(), next.t() + 0.005 * Eigen::Vector3d(noise(random), noise(random), 0.3)));
+      estimate_.push_back(
+          SE3(yaw * next.rotation(), next.t() + 0.005 * Eigen::Vector3d(noise(random), noise(random), 0.3)));
     }
   }
   PosePlaneGraph chain() const {

@@ -64,7 +64,8 @@ inline Map syntheticMap(int keyframes, int features, double imu_rate, std::uint6
     g.rows = grid;
     for (int n = 0; n < grid * grid; ++n) g.z.push_back(n % 5 ? static_cast<float>(uniform(0.5, 6)) : 0.f);
     NavState state = kf->frame.state;
-    state.T_W_I = SE3(Eigen::Quaterniond(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), 2).normalized(), state.T_W_I.t());
+    state.T_W_I =
+        SE3(Eigen::Quaterniond(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), 2).normalized(), state.T_W_I.t());
     map.addKeyframe(kf, state, noise);
     // Two of three features see landmarks of the keyframe before, the rest are new.
     for (int f = 0; f < features; ++f) {

@@ -39,7 +39,10 @@ TEST(FuzzCorpus, Maps) {
     }
     seal(&bytes);
     try {
-      EXPECT_EQ(checkMap(parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), "corpus", ImuNoise()).map), "");
+      EXPECT_EQ(
+          checkMap(
+              parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), "corpus", ImuNoise()).map),
+          "");
       ++good;
     } catch (const std::runtime_error& e) {
       EXPECT_EQ(std::string(e.what()).rfind("corpus: ", 0), 0u) << e.what();

@@ -95,7 +95,8 @@ TEST(MapFile, EveryFlippedByteAndEveryTruncationIsRefused) {
     bad[k] = static_cast<char>(bad[k] ^ (1 << (k % 8)));
     EXPECT_THROW(parse(bad), std::runtime_error) << "byte " << k;
   }
-  for (std::size_t size = 0; size < bytes.size(); size += 7) EXPECT_THROW(parse(bytes.substr(0, size)), std::runtime_error);
+  for (std::size_t size = 0; size < bytes.size(); size += 7)
+    EXPECT_THROW(parse(bytes.substr(0, size)), std::runtime_error);
   EXPECT_THROW(parse(bytes + '\0'), std::runtime_error);
 }
 
@@ -181,7 +182,8 @@ TEST(MapFile, TenMinutesSaveAndLoadInTime) {
   const StoredMap stored = loadMapFile(path, ImuNoise());
   const auto t2 = now();
   std::ifstream file(path, std::ios::ate | std::ios::binary);
-  std::printf("10-minute map: %.1f MB, save %.2f s, load %.2f s\n", file.tellg() / 1e6, seconds(t0, t1), seconds(t1, t2));
+  std::printf("10-minute map: %.1f MB, save %.2f s, load %.2f s\n", file.tellg() / 1e6, seconds(t0, t1),
+              seconds(t1, t2));
   std::remove(path.c_str());
   EXPECT_EQ(stored.map.keyframes().size(), 1200u);
   EXPECT_LE(seconds(t0, t1), 2.0);

@@ -16,7 +16,8 @@ inline Descriptor randomDescriptor(std::mt19937_64& random) {
 
 inline Descriptor noisy(Descriptor d, double flip, std::mt19937_64& random) {
   for (int bit = 0; bit < 256; ++bit)
-    if (static_cast<double>(random() >> 11) * 0x1.0p-53 < flip) d[bit >> 3] ^= static_cast<std::uint8_t>(1 << (bit & 7));
+    if (static_cast<double>(random() >> 11) * 0x1.0p-53 < flip)
+      d[bit >> 3] ^= static_cast<std::uint8_t>(1 << (bit & 7));
   return d;
 }
 

@@ -150,7 +150,8 @@ TEST_F(VocabularyTest, ReadsTheTextFormat) {
   }
   const Vocabulary read = parseTextVocabulary(text.str(), "test.txt");
   ASSERT_EQ(read.words(), vocabulary_.words());
-  for (const Descriptor& d : stock_) EXPECT_NEAR(read.weight(read.word(d)), vocabulary_.weight(vocabulary_.word(d)), 1e-4);
+  for (const Descriptor& d : stock_)
+    EXPECT_NEAR(read.weight(read.word(d)), vocabulary_.weight(vocabulary_.word(d)), 1e-4);
   EXPECT_NEAR(bowScore(read.transform(images_[0]).bow, read.transform(images_[1]).bow),
               bowScore(vocabulary_.transform(images_[0]).bow, vocabulary_.transform(images_[1]).bow), 1e-4);
 

@@ -1,14 +1,15 @@
 // rosrun vip_slam_eval place_metrics --map M.vsm --truth T.tum [--query Q.vsm --query-truth QT.tum]
 // Judges loops (right or wrong, revisits closed) of a stored map, and relocalisation of another session in it.
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <set>
 
 #include <Eigen/Geometry>
 
-#include "vip_slam_backend/loop/loop_closer.h"
+#include "place_metrics/relocalisation_trials.h"
+#include "place_metrics/true_poses.h"
 #include "vip_slam_backend/map_io/map_file.h"
-#include "vip_slam_backend/relocalisation/relocaliser.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/util/command_line.h"
@@ -18,25 +19,10 @@ namespace {
 
 using namespace vip_slam;
 
-constexpr double kRevisitSeconds = 30, kRevisitMetres = 2, kRevisitAngle = 30 * M_PI / 180;
+constexpr double kRevisitSeconds = 30;
 constexpr double kWrongMetres = 0.3, kWrongAngle = 5 * M_PI / 180;
 
-/// Keyframes with their true poses; those outside the truth are left out.
-std::map<KeyframeId, SE3> truePoses(const Map& map, const Trajectory& truth) {
-  std::map<KeyframeId, SE3> poses;
-  for (const auto& entry : map.keyframes()) {
-    const TrackedFrame& frame = entry.second.data->frame;
-    SE3 T;
-    if (poseAt(truth, frame.t + frame.time_offset, &T)) poses[entry.first] = T;
-  }
-  return poses;
-}
-
-bool samePlace(const SE3& a, const SE3& b) {
-  return (a.t() - b.t()).norm() <= kRevisitMetres && a.rotation().angularDistance(b.rotation()) <= kRevisitAngle;
-}
-
-void judgeLoops(const StoredMap& stored, const std::map<KeyframeId, SE3>& truth) {
+void judgeLoops(const StoredMap& stored, const TruePoses& truth) {
   int wrong = 0, judged = 0;
   for (const auto& loop : stored.loops) {
     if (!truth.count(loop.first) || !truth.count(loop.second)) continue;
@@ -53,7 +39,7 @@ void judgeLoops(const StoredMap& stored, const std::map<KeyframeId, SE3>& truth)
   std::printf("loops judged %d, wrong %d\n", judged, wrong);
 }
 
-void judgeRevisits(const StoredMap& stored, const std::map<KeyframeId, SE3>& truth) {
+void judgeRevisits(const StoredMap& stored, const TruePoses& truth) {
   const Map& map = stored.map;
   const auto stamp = [&map](KeyframeId id) { return map.keyframe(id).data->frame.t; };
   std::set<KeyframeId> closed;  // share landmarks with, or are looped to, a keyframe seen long before
@@ -75,8 +61,7 @@ void judgeRevisits(const StoredMap& stored, const std::map<KeyframeId, SE3>& tru
   for (const auto& entry : truth) {
     bool revisit = false;
     for (const auto& other : truth)
-      if (stamp(entry.first) - stamp(other.first) >= kRevisitSeconds && samePlace(entry.second, other.second))
-        revisit = true;
+      revisit |= stamp(entry.first) - stamp(other.first) >= kRevisitSeconds && samePlace(entry.second, other.second);
     if (!revisit) continue;
     if (stamp(entry.first) - last > 3.0) endEpisode();
     open = true;
@@ -92,84 +77,38 @@ void judgeRevisits(const StoredMap& stored, const std::map<KeyframeId, SE3>& tru
               episodes ? 100.0 * episodes_closed / episodes : 100.0);
 }
 
-/// The map's frame in the frame of the truth: yaw and position, least squares over keyframes.
-SE3 alignMap(const Map& map, const std::map<KeyframeId, SE3>& truth) {
-  Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = a;
-  for (const auto& entry : truth) {
-    a += map.keyframe(entry.first).state.T_W_I.t();
-    b += entry.second.t();
-  }
-  a /= static_cast<double>(truth.size());
-  b /= static_cast<double>(truth.size());
-  double sine = 0, cosine = 0;
-  for (const auto& entry : truth) {
-    const Eigen::Vector3d p = map.keyframe(entry.first).state.T_W_I.t() - a, q = entry.second.t() - b;
-    cosine += p.x() * q.x() + p.y() * q.y();
-    sine += p.x() * q.y() - p.y() * q.x();
-  }
-  const Eigen::Quaterniond R(Eigen::AngleAxisd(std::atan2(sine, cosine), Eigen::Vector3d::UnitZ()));
-  return SE3(R, b - R * a);
-}
+/// A place counts as mapped when a keyframe of the map within 2 m and 30 degrees shows half of what is seen there.
+constexpr double kMappedOverlap = 0.5;
+constexpr int kFewCorners = 30;
+constexpr double kRightMetres = 0.03;
 
-void judgeRelocalisation(const StoredMap& stored, const std::map<KeyframeId, SE3>& truth, const StoredMap& query,
-                         const Trajectory& query_truth, const SensorConfig& sensor, const LoopOptions& options,
-                         bool list) {
-  LoopCloser places(options, makeCamera(sensor.camera));
-  places.rebuild(stored.map, stored.loops);
-  const Relocaliser relocaliser(options.relocalisation);
-  const SE3 T_truth_map = alignMap(stored.map, truth);
-  const auto poses = truePoses(query.map, query_truth);
-  struct Try {
-    KeyframeId id;
-    double t, error;
-    bool mapped, found, right;
-    std::string reason;
-    int inliers;
-    SE3 T_W_I;
-  };
-  std::vector<Try> tries;
+void judgeRelocalisation(const std::vector<RelocalisationTrial>& trials, bool list) {
+  int mapped = 0, right = 0, textured = 0, textured_right = 0, found = 0, wrong = 0;
   std::vector<double> errors;
-  for (const auto& entry : poses) {
-    Try attempt{entry.first, query.map.keyframe(entry.first).data->frame.t, 0, false, false, false, "", 0, SE3()};
-    for (const auto& other : truth) attempt.mapped |= samePlace(entry.second, other.second);
-    const auto found =
-        relocaliser.relocalise(stored.map, places, *query.map.keyframe(entry.first).data, {}, &attempt.reason);
-    if (found) {
-      attempt.error = ((T_truth_map * found->T_W_I).t() - entry.second.t()).norm();
-      attempt.found = true;
-      attempt.inliers = found->inliers;
-      attempt.T_W_I = found->T_W_I;
-      attempt.right = attempt.error <= 0.03;
-      errors.push_back(attempt.error);
-      attempt.reason = std::to_string(found->inliers) + " inliers with " + std::to_string(found->match);
-    }
-    if (list && (attempt.mapped || attempt.found))
-      std::printf("query %5lu  t %.2f  %s  %s  %.3f m  %s\n", static_cast<unsigned long>(attempt.id), attempt.t,
-                  attempt.mapped ? "mapped" : "unmapped", attempt.found ? "found" : "missed", attempt.error,
-                  attempt.reason.c_str());
-    tries.push_back(attempt);
+  for (const RelocalisationTrial& trial : trials) {
+    const bool is_mapped = trial.view.overlap >= kMappedOverlap;
+    const bool is_right = trial.found && trial.error <= kRightMetres;
+    const bool is_wrong = trial.found && (trial.error > kWrongMetres || trial.angle > kWrongAngle);
+    found += trial.found;
+    wrong += is_wrong;
+    mapped += is_mapped;
+    right += is_mapped && is_right;
+    textured += is_mapped && trial.view.corners >= kFewCorners;
+    textured_right += is_mapped && trial.view.corners >= kFewCorners && is_right;
+    if (trial.found) errors.push_back(trial.error);
+    if (list && (is_mapped || trial.found))
+      std::printf("trial at %5lu  t %.2f  overlap %.2f, %3d corners  %s after %.2f s  %.3f m%s  %s\n",
+                  static_cast<unsigned long>(trial.first), trial.t, trial.view.overlap, trial.view.corners,
+                  trial.found ? "found" : "missed", trial.seconds, trial.error, is_wrong ? "  WRONG" : "",
+                  trial.reason.c_str());
   }
-  // Each keyframe at a mapped place begins a trial; the first answer that the system would believe counts.
-  int trials = 0, right = 0, wrong = 0, wrong_believed = 0;
-  for (std::size_t k = 0; k < tries.size(); ++k) {
-    PlaceAgreement agreement;
-    for (std::size_t j = k; j < tries.size() && tries[j].t <= tries[k].t + 1.0; ++j) {
-      if (!tries[j].found) continue;
-      const bool agrees = agreement.add(query.map.keyframe(tries[j].id).data->frame, tries[j].T_W_I);
-      if (!agrees && tries[j].inliers < options.relocalisation.sure_inliers) continue;
-      right += tries[k].mapped && tries[j].right;
-      wrong_believed += tries[j].error > kWrongMetres;
-      break;
-    }
-    trials += tries[k].mapped;
-  }
-  for (const double e : errors) wrong += e > kWrongMetres;
   std::sort(errors.begin(), errors.end());
-  const double median = errors.empty() ? 0 : errors[errors.size() / 2];
-  std::printf("relocalisation: %zu keyframes tried, %zu found, median error %.4f m, wrong (> 0.3 m) %d, believed %d\n",
-              tries.size(), errors.size(), median, wrong, wrong_believed);
-  std::printf("trials at mapped places %d, within 1 s and 3 cm %d (%.1f %%)\n", trials, right,
-              trials ? 100.0 * right / trials : 100.0);
+  const auto percent = [](int part, int all) { return all ? 100.0 * part / all : 100.0; };
+  std::printf("relocalisation: %zu trials, %d found, median error %.4f m, wrong (> 0.3 m or 5 deg) %d\n", trials.size(),
+              found, errors.empty() ? 0 : errors[errors.size() / 2], wrong);
+  std::printf("trials at mapped places %d, within 1 s and 3 cm %d (%.1f %%)\n", mapped, right, percent(right, mapped));
+  std::printf("of these with %d corners of the map in view %d, within 1 s and 3 cm %d (%.1f %%)\n", kFewCorners,
+              textured, textured_right, percent(textured_right, textured));
 }
 
 }  // namespace
@@ -203,9 +142,13 @@ int main(int argc, char** argv) {
     const auto poses = truePoses(stored.map, vip_slam::readTum(truth));
     judgeLoops(stored, poses);
     judgeRevisits(stored, poses);
-    if (!query.empty())
-      judgeRelocalisation(stored, poses, vip_slam::loadMapFile(query, vip_slam::ImuNoise()),
-                          vip_slam::readTum(query_truth), vip_slam::loadSensorConfig(sensor), options, list);
+    if (!query.empty()) {
+      const vip_slam::StoredMap session = vip_slam::loadMapFile(query, vip_slam::ImuNoise());
+      const auto session_poses = truePoses(session.map, vip_slam::readTum(query_truth));
+      judgeRelocalisation(vip_slam::relocalisationTrials(stored, poses, session, session_poses,
+                                                         vip_slam::loadSensorConfig(sensor), options),
+                          list);
+    }
   } catch (const std::exception& error) {
     std::cerr << "place_metrics: " << error.what() << "\n";
     return 1;

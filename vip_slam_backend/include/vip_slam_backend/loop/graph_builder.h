@@ -15,9 +15,9 @@ namespace vip_slam {
 /// Diagonal square-root information of a relative pose: angles in radians, position in metres, one sigma each.
 Matrix6d diagonalSqrtInformation(double sigma_angle, double sigma_position);
 
-/// All measurements at their present values (the graph is at its minimum), except for what the caller adds.
-/// `loops`: accepted ones (query, match); `same_planes`: (from, into) are one surface; `min_seconds`: keyframes nearer in
-/// time are joined by odometry alone.
+/// All measurements at their present values (the graph is at its minimum), except for what the caller adds. `loops`:
+/// accepted ones (query, match); `same_planes`: (from, into) are one surface; `min_seconds`: keyframes nearer in time
+/// are joined by odometry alone.
 PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
                                    const std::vector<std::pair<PlaneId, PlaneId>>& same_planes, double min_seconds,
                                    const PoseGraphOptions& options);

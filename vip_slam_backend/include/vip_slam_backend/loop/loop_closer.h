@@ -10,7 +10,7 @@
 
 #include "vip_slam_backend/loop/loop_options.h"
 #include "vip_slam_backend/loop/place_verifier.h"
-#include "vip_slam_backend/loop/unique_place.h"
+#include "vip_slam_backend/loop/place_search.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/place_recognition/keyframe_database.h"
 #include "vip_slam_core/types/map_update.h"
@@ -62,7 +62,7 @@ class LoopCloser {
   KeyframeDatabase database_;
   PlaceVerifier verifier_;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops_;
-  PlaceAgreement joins_;  ///< where the keyframes of a part that nothing ties yet were found
+  PlaceSearch joins_;  ///< for the newest part of the map when nothing ties it to the rest yet
   std::deque<std::set<KeyframeId>> recent_places_;  ///< neighbourhoods that the last keyframes pointed to, newest last
 };
 

@@ -28,7 +28,8 @@ struct PlaceVerificationOptions {
   void visit(OptionVisitor& v) {
     v.field("max_hamming", max_hamming, 10, 128, "largest descriptor distance of a match, bits");
     v.field("ratio", ratio, 0.3, 1.0, "best over second-best descriptor distance");
-    v.field("matched_keyframes", matched_keyframes, 1, 100, "keyframes around a candidate that are matched by descriptor");
+    v.field("matched_keyframes", matched_keyframes, 1, 100,
+            "keyframes around a candidate that are matched by descriptor");
     v.field("min_matches", min_matches, 4, 500, "descriptor matches needed to try a pose");
     v.field("ransac_iterations", ransac_iterations, 10, 10000, "samples drawn by the pose RANSAC");
     v.field("ransac_px", ransac_px, 0.5, 20.0, "inlier threshold of the RANSAC, px");
@@ -40,7 +41,8 @@ struct PlaceVerificationOptions {
     v.field("max_sigma_position", max_sigma_position, 0.001, 1.0, "largest one-sigma of the relative position, m");
     v.field("max_gravity_deg", max_gravity_deg, 0.1, 45.0, "largest tilt between the found pose and gravity, degrees");
     v.field("min_depth_agreement", min_depth_agreement, 0.0, 1.0, "fraction of common depth that must agree");
-    v.field("max_see_through", max_see_through, 0.0, 1.0, "fraction of common depth that may lie behind the other's surface");
+    v.field("max_see_through", max_see_through, 0.0, 1.0,
+            "fraction of common depth that may lie behind the other's surface");
   }
 };
 
@@ -54,10 +56,13 @@ struct PoseGraphOptions {
   int max_iterations = 50;
 
   void visit(OptionVisitor& v) {
-    v.field("odometry_sigma_position", odometry_sigma_position, 1e-4, 1.0, "drift of position, m per square root of metre");
-    v.field("odometry_sigma_yaw_deg", odometry_sigma_yaw_deg, 1e-3, 10.0, "drift of yaw, degrees per square root of metre");
+    v.field("odometry_sigma_position", odometry_sigma_position, 1e-4, 1.0,
+            "drift of position, m per square root of metre");
+    v.field("odometry_sigma_yaw_deg", odometry_sigma_yaw_deg, 1e-3, 10.0,
+            "drift of yaw, degrees per square root of metre");
     v.field("loop_sigma_position", loop_sigma_position, 1e-4, 1.0, "smallest one-sigma of a loop edge's position, m");
-    v.field("loop_sigma_angle_deg", loop_sigma_angle_deg, 1e-3, 10.0, "smallest one-sigma of a loop edge's angles, degrees");
+    v.field("loop_sigma_angle_deg", loop_sigma_angle_deg, 1e-3, 10.0,
+            "smallest one-sigma of a loop edge's angles, degrees");
     v.field("covisible_edge", covisible_edge, 10, 1000, "shared landmarks that make an edge between two keyframes");
     v.field("max_chi2", max_chi2, 5.0, 10000.0, "a loop that costs the graph more than this is rejected");
     v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
@@ -65,16 +70,31 @@ struct PoseGraphOptions {
 };
 
 struct RelocalisationOptions {
-  int candidates = 6;
-  int min_inliers = 45;
-  int sure_inliers = 45;
-  double ambiguity = 0.6;
+  int candidates = 8;
+  int rivals = 32;
+  int keyframes = 5;
+  double seconds = 2.0;
+  int ransac_iterations = 1000;
+  int min_seed_inliers = 8;
+  int min_points = 20;
+  double min_evidence = 400;
+  double sure_evidence = 600;
+  double min_covered = 0.25;
+  double ambiguity = 0.25;
 
   void visit(OptionVisitor& v) {
-    v.field("candidates", candidates, 1, 100, "places verified per keyframe");
-    v.field("min_inliers", min_inliers, 6, 500, "inliers needed; there is no odometry to contradict a wrong place");
-    v.field("sure_inliers", sure_inliers, 6, 1000, "below these a second keyframe must be found where the odometry says");
-    v.field("ambiguity", ambiguity, 0.0, 1.0, "refused when another place has more than this fraction of the best's inliers");
+    v.field("candidates", candidates, 1, 100, "views of the map tried per keyframe");
+    v.field("rivals", rivals, 0, 1000, "further views tried before a place is believed");
+    v.field("keyframes", keyframes, 1, 50, "newest keyframes that are judged together");
+    v.field("seconds", seconds, 0.0, 10.0, "age of the oldest of them, s");
+    v.field("ransac_iterations", ransac_iterations, 10, 10000, "samples drawn per place");
+    v.field("min_seed_inliers", min_seed_inliers, 4, 500, "descriptor matches that agree, to look at a place at all");
+    v.field("min_points", min_points, 6, 1000, "distinct points of the map that must be found again");
+    v.field("min_evidence", min_evidence, 0.0, 1e6,
+            "points times share of features and of image cells explained, over the share of depth that disagrees");
+    v.field("sure_evidence", sure_evidence, 0.0, 1e6, "below it the next keyframe must come to the same place");
+    v.field("min_covered", min_covered, 0.0, 1.0, "share of the features that must be in sight of the map");
+    v.field("ambiguity", ambiguity, 0.0, 1.0, "refused when another place has more than this fraction of the evidence");
   }
 };
 

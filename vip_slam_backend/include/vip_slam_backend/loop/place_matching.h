@@ -1,5 +1,5 @@
-// Descriptor matches between two keyframes that may show the same place, guided by the direct index: only features below
-// the same vocabulary node are compared.
+// Descriptor matches between two keyframes that may show the same place, guided by the direct index: only features
+// below the same vocabulary node are compared.
 #pragma once
 
 #include <utility>
@@ -11,8 +11,8 @@
 
 namespace vip_slam {
 
-/// (feature of a, feature of b), each used once, ascending a. Best distance below max_hamming and clearly better than the
-/// second best; matches whose change of ORB angle differs from the bulk are dropped.
+/// (feature of a, feature of b), each used once, ascending a. Best distance below max_hamming and clearly better than
+/// the second best; matches whose change of ORB angle differs from the bulk are dropped.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> matchByDirectIndex(const std::vector<Feature>& a,
                                                                         const DirectIndex& index_a,
                                                                         const std::vector<Feature>& b,

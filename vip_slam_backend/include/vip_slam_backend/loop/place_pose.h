@@ -1,5 +1,7 @@
-// The pose of a camera among points of the map: a RANSAC on pairs of points that uses depth and the known direction of
-// gravity, then Gauss-Newton on pixels and depths. World is any frame with z up in which the points are given.
+// The pose of a camera, or of a rig of cameras, among points of the map: a RANSAC on pairs of points that uses depth
+// and the known direction of gravity, then Gauss-Newton on pixels and depths. World is any frame with z up in which
+// the points are given. Several keyframes of one odometry are a rig: over a second or two its drift is far below a
+// pixel.
 #pragma once
 
 #include <vector>
@@ -8,11 +10,16 @@
 
 namespace vip_slam {
 
-/// A point of the map and where the query camera sees it.
+/// T_B_C of each camera in the body B of the rig. A single camera is its own body.
+using CameraRig = std::vector<SE3>;
+CameraRig singleCamera();
+
+/// A point of the map and where a camera of the rig sees it.
 struct PlaceMatch {
+  std::uint32_t camera = 0;
   Eigen::Vector3d p_W;
-  Eigen::Vector2d xy;       ///< normalised coordinates in the query camera
-  double depth = 0;         ///< z in the query camera, metres; 0 unknown
+  Eigen::Vector2d xy;       ///< normalised coordinates in that camera
+  double depth = 0;         ///< z in that camera, metres; 0 unknown
   double depth_sigma = 0;   ///< one sigma of it together with the point's own error, metres
   double scale = 1;         ///< pixel noise relative to octave 0
 };
@@ -23,27 +30,30 @@ struct PlacePoseOptions {
   double ransac_px = 4.0;
   double inlier_px = 3.0;    ///< after refinement
   double depth_sigmas = 4.0; ///< gate on depth
+  double tilt_sigma = 0;     ///< of the refined attitude against the given one, radians; 0: gravity has no say in it
   std::uint64_t seed = 1;
 };
 
 struct PlacePose {
   bool found = false;
-  SE3 T_W_C;
+  SE3 T_W_B;
   std::vector<std::uint32_t> inliers;  ///< ascending
-  /// Of the perturbation (theta, t) of T_W_C, with pixel noise of one pixel.
+  /// Of the perturbation (theta, t) of T_W_B, with pixel noise of one pixel.
   Matrix6d information = Matrix6d::Zero();
 };
 
 /// Whether T_W_C explains a match within the thresholds (px at octave 0; depth by its sigma).
 bool explains(const SE3& T_W_C, const PlaceMatch& match, double max_px, const PlacePoseOptions& options);
 
-/// R_G_C: attitude of the query camera in any gravity-aligned frame (its yaw is not used). The best hypothesis with its
+/// R_G_B: attitude of the body in any gravity-aligned frame (its yaw is not used). The best hypothesis with its
 /// inliers at ransac_px; not found with fewer than two matches.
-PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const Eigen::Quaterniond& R_G_C,
+PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const Eigen::Quaterniond& R_G_B,
                           const PlacePoseOptions& options);
 
-/// All six degrees of freedom from `start`: robust Gauss-Newton, inliers chosen anew at inlier_px. Not found when fewer
-/// than three inliers are left or the pose is not observable.
-PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const SE3& start, const PlacePoseOptions& options);
+/// All six degrees of freedom from `start` (T_W_B): robust Gauss-Newton, inliers chosen anew at inlier_px. The tilt of
+/// R_G_B is one more measurement when options.tilt_sigma is set. Not found when fewer than three inliers are left or
+/// the pose is not observable.
+PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const SE3& start,
+                          const Eigen::Quaterniond& R_G_B, const PlacePoseOptions& options);
 
 }  // namespace vip_slam

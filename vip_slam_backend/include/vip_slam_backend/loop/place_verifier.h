@@ -31,8 +31,8 @@ class PlaceVerifier {
  public:
   PlaceVerifier(const PlaceVerificationOptions& options, std::shared_ptr<const CameraModel> camera);
 
-  /// `T_G_I`: the query's pose in any gravity-aligned frame. Landmarks are taken from keyframes that `allowed` lets pass
-  /// (empty: all); `database` knows those around `match`.
+  /// `T_G_I`: the query's pose in any gravity-aligned frame. Landmarks are taken from keyframes that `allowed` lets
+  /// pass (empty: all); `database` knows those around `match`.
   PlaceVerification verify(const Map& map, const Keyframe& query, const SE3& T_G_I, const BowResult& query_bow,
                            KeyframeId match, const KeyframeDatabase& database,
                            const std::function<bool(KeyframeId)>& allowed) const;
@@ -40,12 +40,15 @@ class PlaceVerifier {
   PlaceVerification track(const Map& map, const Keyframe& query, const SE3& T_W_I, KeyframeId match,
                           const std::function<bool(KeyframeId)>& allowed) const;
 
+  /// Points of the map around `match` that features of the query look like, by the direct index; of camera 0.
+  std::vector<PlaceMatch> match(const Map& map, const Keyframe& query, const BowResult& query_bow, KeyframeId match,
+                                const KeyframeDatabase& database, const std::function<bool(KeyframeId)>& allowed) const;
+
+  const PlaceVerificationOptions& options() const { return options_; }
+  const CameraModel& camera() const { return *camera_; }
+  const PlacePoseOptions& poseOptions() const { return pose_options_; }
+
  private:
-  struct Guided;
-  std::vector<PlaceMatch> match(const Map& map, const Keyframe& query, const BowResult& query_bow,
-                                const std::vector<KeyframeId>& around, const KeyframeDatabase& database) const;
-  Guided guide(const Map& map, const Keyframe& query, const SE3& T_W_C, double radius,
-               const std::vector<KeyframeId>& around) const;
   void finish(const Map& map, const Keyframe& query, const SE3& T_G_I, const SE3& start,
               const std::vector<KeyframeId>& around, PlaceVerification* result) const;
 

@@ -29,8 +29,8 @@ struct StoredMap {
 
 std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
                          std::uint64_t vocabulary_id);
-/// Throws std::runtime_error "source: what, expected what" on anything that is not a whole, undamaged, consistent map of
-/// this version. Allocates no more than a small multiple of `size`.
+/// Throws std::runtime_error "source: what, expected what" on anything that is not a whole, undamaged, consistent map
+/// of this version. Allocates no more than a small multiple of `size`.
 StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise);
 
 /// Whole or not at all. Throws std::runtime_error naming the path.

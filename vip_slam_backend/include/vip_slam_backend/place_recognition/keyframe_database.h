@@ -28,8 +28,8 @@ class KeyframeDatabase {
   /// Throws std::out_of_range when it is not there.
   const BowResult& bow(KeyframeId id) const;
 
-  /// Keyframes sharing words with `bow`, best first (ties: smaller id), at most `max_results`; only those that `allowed`
-  /// lets pass (empty: all).
+  /// Keyframes sharing words with `bow`, best first (ties: smaller id), at most `max_results`; only those that
+  /// `allowed` lets pass (empty: all).
   std::vector<DatabaseMatch> query(const BowVector& bow, std::size_t max_results,
                                    const std::function<bool(KeyframeId)>& allowed = {}) const;
 

@@ -1,5 +1,5 @@
 // Where in the map is this keyframe? Without any prior pose: after LOST, in a loaded map, in localisation-only mode.
-// See loop/unique_place.h for what makes it refuse.
+// See loop/place_search.h for what makes it refuse.
 #pragma once
 
 #include <functional>
@@ -19,18 +19,21 @@ struct Relocalisation {
 
 class Relocaliser {
  public:
-  explicit Relocaliser(const RelocalisationOptions& options) : options_(options) {}
+  explicit Relocaliser(const RelocalisationOptions& options) : search_(options) {}
 
-  /// By appearance. Empty when no place fits, or two do; `reason` (may be null) then says which.
-  std::optional<Relocalisation> relocalise(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
+  /// By appearance, of this keyframe and those given before it. Empty when no place fits, or two do; `reason` (may be
+  /// null) says what was seen.
+  std::optional<Relocalisation> relocalise(const Map& map, const LoopCloser& places, const KeyframePtr& keyframe,
                                            const std::function<bool(KeyframeId)>& allowed = {},
-                                           std::string* reason = nullptr) const;
+                                           std::string* reason = nullptr);
   /// From a predicted pose: the landmarks around it are looked for at once.
   std::optional<Relocalisation> track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
                                       const SE3& T_W_I) const;
+  /// Forgets the keyframes before (another map, another odometry).
+  void clear() { search_.clear(); }
 
  private:
-  RelocalisationOptions options_;
+  PlaceSearch search_;
 };
 
 /// T_map_odom that brings T_odom_I to T_map_I with gravity kept: yaw and position.

@@ -1,0 +1,129 @@
+#include "vip_slam_backend/loop/guided_matching.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "vip_slam_backend/loop/place_matching.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kFarthestView = 6.0, kCosineOfView = 0.5;
+constexpr double kMetresPerCosine = 4.0;  // how a change of direction compares with a change of place
+constexpr double kRatio = 0.9;            // around a projection there are few rivals
+constexpr float kSameCorner2 = 4.0f;      // px^2: two detections of one corner are no rivals
+
+// ORB pyramids here and in common vocabularies grow by 1.2 to 1.4 per octave.
+double octaveScale(const Feature& f) { return std::pow(1.3, f.octave); }
+
+// A landmark looks different from its sides.
+int distanceOf(const Map& map, const MapPoint& point, const Descriptor& descriptor, GuidedLooks looks) {
+  if (point.landmark == kNoLandmark)
+    return hammingDistance(map.keyframe(point.keyframe).features()[point.feature].descriptor, descriptor);
+  if (looks == GuidedLooks::kStrict) return hammingDistance(map.landmark(point.landmark).descriptor, descriptor);
+  int nearest = std::numeric_limits<int>::max();
+  for (const MapObservation& o : map.landmark(point.landmark).observations)
+    nearest = std::min(nearest, hammingDistance(map.feature(o).descriptor, descriptor));
+  return nearest;
+}
+
+}  // namespace
+
+bool mapPointOf(const Map& map, KeyframeId keyframe, std::uint32_t feature, MapPoint* point) {
+  const MapKeyframe& kf = map.keyframe(keyframe);
+  const Feature& f = kf.features()[feature];
+  if (const MapLandmark* landmark = map.findLandmark(kf.landmarks[feature])) {
+    *point = {landmark->p_W, 0.01, landmark->id, keyframe, feature};
+    return true;
+  }
+  if (f.depth <= 0) return false;
+  *point = {kf.T_W_C() * (f.depth * Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0)), f.depth_sigma, kNoLandmark, keyframe,
+            feature};
+  return true;
+}
+
+std::vector<MapPoint> mapPointsOf(const Map& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<MapPoint> points;
+  std::set<LandmarkId> done;
+  for (const KeyframeId id : keyframes)
+    for (std::uint32_t f = 0; f < map.keyframe(id).features().size(); ++f) {
+      MapPoint point;
+      if (!mapPointOf(map, id, f, &point)) continue;
+      if (point.landmark != kNoLandmark && !done.insert(point.landmark).second) continue;
+      points.push_back(point);
+    }
+  return points;
+}
+
+PlaceMatch makePlaceMatch(const Feature& feature, const MapPoint& point) {
+  PlaceMatch m;
+  m.p_W = point.p_W;
+  m.xy = feature.xy.cast<double>();
+  m.depth = feature.depth;
+  m.depth_sigma = std::hypot(feature.depth_sigma, point.sigma);
+  m.scale = octaveScale(feature);
+  return m;
+}
+
+std::vector<KeyframeId> viewsAlong(const Map& map, const SE3& T_W_C, std::size_t most,
+                                   const std::function<bool(KeyframeId)>& allowed) {
+  const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
+  std::vector<std::pair<double, KeyframeId>> near;
+  for (const auto& entry : map.keyframes()) {
+    const SE3 other = entry.second.T_W_C();
+    const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
+    const double distance = (other.t() - T_W_C.t()).norm();
+    if (cosine < kCosineOfView || distance > kFarthestView || (allowed && !allowed(entry.first))) continue;
+    near.emplace_back(distance + kMetresPerCosine * (1.0 - cosine), entry.first);
+  }
+  std::sort(near.begin(), near.end());
+  if (near.size() > most) near.resize(most);
+  std::vector<KeyframeId> views;
+  for (const auto& view : near) views.push_back(view.second);
+  return views;
+}
+
+GuidedMatches matchGuided(const Map& map, const std::vector<Feature>& features, const SE3& T_W_C, double radius,
+                          const std::vector<MapPoint>& points, const CameraModel& camera, int max_hamming,
+                          GuidedLooks looks) {
+  struct Best {
+    int distance = std::numeric_limits<int>::max();
+    const MapPoint* point = nullptr;
+  };
+  const FeatureGrid grid(features, camera.width(), camera.height());
+  const SE3 T_C_W = T_W_C.inverse();
+  std::vector<Best> best(features.size());
+  for (const MapPoint& point : points) {
+    const Eigen::Vector3d p_C = T_C_W * point.p_W;
+    Eigen::Vector2d uv;
+    if (p_C.z() < 0.1 || !camera.project(p_C, &uv) || !camera.inImage(uv)) continue;
+    int first = std::numeric_limits<int>::max(), second = first;
+    std::uint32_t nearest = 0;
+    for (const std::uint32_t candidate : grid.near(uv, radius)) {
+      const int distance = distanceOf(map, point, features[candidate].descriptor, looks);
+      const bool rival = first < std::numeric_limits<int>::max() &&
+                         (looks == GuidedLooks::kStrict ||
+                          (features[candidate].pixel - features[nearest].pixel).squaredNorm() > kSameCorner2);
+      if (distance < first) {
+        if (rival) second = first;
+        first = distance;
+        nearest = candidate;
+      } else if (rival && distance < second) {
+        second = distance;
+      }
+    }
+    if (first > max_hamming || first > kRatio * second || first >= best[nearest].distance) continue;
+    best[nearest] = {first, &point};
+  }
+  GuidedMatches result;
+  for (std::uint32_t f = 0; f < best.size(); ++f) {
+    if (!best[f].point) continue;
+    result.matches.push_back(makePlaceMatch(features[f], *best[f].point));
+    result.source.emplace_back(f, best[f].point->landmark);
+  }
+  return result;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,194 @@
+#include "vip_slam_backend/loop/place_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <Eigen/LU>
+
+#include "vip_slam_backend/loop/guided_matching.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kNewGuesses = 4, kKeptGuesses = 4, kRivalGuesses = 8;
+
+// Keyframes that look at the same scene: verifying both says nothing about other places.
+bool sameView(const SE3& T_W_C_a, const SE3& T_W_C_b) {
+  return (T_W_C_a.t() - T_W_C_b.t()).norm() < 1.0 && T_W_C_a.rotation().angularDistance(T_W_C_b.rotation()) < 0.5;
+}
+
+// Poses that are one place, up to what two matches of it differ by.
+bool samePlace(const SE3& a, const SE3& b) {
+  return (a.t() - b.t()).norm() < 0.3 && a.rotation().angularDistance(b.rotation()) < 0.2;
+}
+
+template <class... Values>
+std::string words(const char* format, Values... values) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+}  // namespace
+
+void PlaceSearch::clear() {
+  keyframes_.clear();
+  bows_.clear();
+  guesses_.clear();
+  believed_.reset();
+}
+
+std::vector<KeyframeId> PlaceSearch::viewsLikeNewest(const Scene& scene) const {
+  const auto there = [&](KeyframeId id) { return scene.map.hasKeyframe(id) && (!scene.allowed || scene.allowed(id)); };
+  const std::size_t most = static_cast<std::size_t>(options_.candidates + options_.rivals);
+  std::vector<KeyframeId> views;
+  std::vector<SE3> poses;
+  for (const DatabaseMatch& candidate : scene.database.query(bows_.back().bow, 20 * most, there)) {
+    if (views.size() >= most) break;
+    const SE3 view = scene.map.keyframe(candidate.keyframe).T_W_C();
+    if (std::any_of(poses.begin(), poses.end(), [&](const SE3& other) { return sameView(other, view); })) continue;
+    views.push_back(candidate.keyframe);
+    poses.push_back(view);
+  }
+  return views;
+}
+
+std::vector<SE3> PlaceSearch::guesses(const Scene& scene, std::size_t first, std::size_t last, std::size_t most) const {
+  const Keyframe& newest = *keyframes_.back();
+  const SE3 T_odom_B = newest.frame.state.T_W_I * newest.frame.T_I_C;
+  const CameraRig rig = rigOf(keyframes_);
+  std::vector<std::pair<std::size_t, SE3>> found;
+  for (std::size_t v = first; v < std::min(last, scene.views.size()); ++v) {
+    std::vector<PlaceMatch> matches;
+    for (std::uint32_t c = 0; c < keyframes_.size(); ++c)
+      for (PlaceMatch m : scene.verifier.match(scene.map, *keyframes_[c], bows_[c], scene.views[v], scene.database,
+                                               scene.allowed)) {
+        m.camera = c;
+        matches.push_back(m);
+      }
+    PlacePoseOptions pose_options = scene.verifier.poseOptions();
+    pose_options.iterations = options_.ransac_iterations;
+    pose_options.seed = newest.id * 1000003ull + scene.views[v];
+    const PlacePose pose = ransacPlacePose(matches, rig, T_odom_B.rotation(), pose_options);
+    if (static_cast<int>(pose.inliers.size()) < options_.min_seed_inliers) continue;
+    const auto same =
+        std::find_if(found.begin(), found.end(), [&](const auto& f) { return samePlace(f.second, pose.T_W_B); });
+    if (same == found.end())
+      found.emplace_back(pose.inliers.size(), pose.T_W_B);
+    else if (same->first < pose.inliers.size())
+      *same = {pose.inliers.size(), pose.T_W_B};
+  }
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  if (found.size() > most) found.resize(most);
+  std::vector<SE3> result;
+  for (const auto& f : found) result.push_back(f.second * T_odom_B.inverse());
+  return result;
+}
+
+void PlaceSearch::weigh(const Scene& scene, const std::vector<SE3>& T_W_odom) {
+  const SE3 T_odom_B = keyframes_.back()->frame.state.T_W_I * keyframes_.back()->frame.T_I_C;
+  for (const SE3& guess : T_W_odom) {
+    const auto atGuess = [&](const Guess& g) { return samePlace(g.support.T_W_C, guess * T_odom_B); };
+    if (std::any_of(guesses_.begin(), guesses_.end(), atGuess)) continue;
+    PlaceSupport support = placeSupport(scene.map, keyframes_, guess, scene.verifier, scene.allowed);
+    if (!support.found || support.points < options_.min_seed_inliers) continue;
+    // What the matches moved together is one place.
+    const auto same = std::find_if(guesses_.begin(), guesses_.end(),
+                                   [&](const Guess& g) { return samePlace(g.support.T_W_C, support.T_W_C); });
+    if (same == guesses_.end())
+      guesses_.push_back({support.T_W_C * T_odom_B.inverse(), std::move(support)});
+    else if (same->support.evidence() < support.evidence())
+      *same = {support.T_W_C * T_odom_B.inverse(), std::move(support)};
+  }
+  std::stable_sort(guesses_.begin(), guesses_.end(),
+                   [](const Guess& a, const Guess& b) { return a.support.evidence() > b.support.evidence(); });
+}
+
+PlaceVerification PlaceSearch::add(const Map& map, const KeyframeDatabase& database, const PlaceVerifier& verifier,
+                                   const KeyframePtr& keyframe, const BowResult& bow,
+                                   const std::function<bool(KeyframeId)>& allowed) {
+  if (!keyframes_.empty() && keyframes_.back()->frame.epoch != keyframe->frame.epoch) clear();
+  keyframes_.push_back(keyframe);
+  bows_.push_back(bow);
+  while (keyframes_.size() > static_cast<std::size_t>(options_.keyframes) ||
+         keyframe->frame.t - keyframes_.front()->frame.t > options_.seconds) {
+    keyframes_.erase(keyframes_.begin());
+    bows_.erase(bows_.begin());
+  }
+
+  Scene scene{map, database, verifier, allowed, {}};
+  scene.views = viewsLikeNewest(scene);
+  const std::size_t candidates = static_cast<std::size_t>(options_.candidates);
+  std::vector<SE3> T_W_odom;
+  for (const Guess& guess : guesses_) T_W_odom.push_back(guess.T_W_odom);
+  const std::vector<SE3> fresh = guesses(scene, 0, candidates, kNewGuesses);
+  T_W_odom.insert(T_W_odom.end(), fresh.begin(), fresh.end());
+  guesses_.clear();
+  weigh(scene, T_W_odom);
+  PlaceVerification result = judge(scene);
+  if (result.accepted) {
+    // Before it is believed, views that look less alike must not hold it as well: corridors repeat themselves.
+    weigh(scene, guesses(scene, candidates, scene.views.size(), kRivalGuesses));
+    result = judge(scene);
+  }
+  if (result.accepted) {
+    // Chance resemblance passes with the view; a place stays.
+    const SE3& T_W_odom_now = guesses_.front().T_W_odom;
+    const SE3 T_odom_B = keyframe->frame.state.T_W_I * keyframe->frame.T_I_C;
+    const bool again = believed_ && samePlace(*believed_ * T_odom_B, T_W_odom_now * T_odom_B);
+    believed_ = T_W_odom_now;
+    if (!again && guesses_.front().support.evidence() < options_.sure_evidence) {
+      result.accepted = false;
+      result.reason += "; waits for another keyframe that comes to the same place";
+    }
+  } else {
+    believed_.reset();
+  }
+  if (guesses_.size() > kKeptGuesses) guesses_.resize(kKeptGuesses);
+  return result;
+}
+
+PlaceVerification PlaceSearch::judge(const Scene& scene) const {
+  PlaceVerification result;
+  result.reason = "nothing in the map looks like it";
+  if (guesses_.empty()) return result;
+  const PlaceSupport& best = guesses_.front().support;
+  result.match = best.match;
+  result.T_W_I = best.T_W_C * keyframes_.back()->frame.T_I_C.inverse();
+  result.information = best.information;
+  result.matches = best.matches;
+  result.inliers = best.points;
+  result.landmarks = best.landmarks;
+  if (best.depth.compared >= 100) result.depth_agreement = best.depth.agreement();
+
+  const PlaceVerificationOptions& limits = scene.verifier.options();
+  int features = 0;
+  for (const KeyframePtr& keyframe : keyframes_)
+    for (const Feature& f : keyframe->frame.features) features += f.depth > 0;
+  const double sigma = std::sqrt(Matrix6d(best.information.inverse()).bottomRightCorner<3, 3>().diagonal().maxCoeff());
+  const double evidence = best.evidence(), covered = features ? static_cast<double>(best.covered) / features : 0;
+  result.reason =
+      words("%d points, %.2f of the features and %.2f of the image in sight of the map, depth agreement %.2f",
+            best.points, best.explainedShare(), best.explainedCells(), result.depth_agreement);
+  if (best.points < options_.min_points) {
+    result.reason += words("; needs %d points", options_.min_points);
+  } else if (evidence < options_.min_evidence) {
+    result.reason += words("; evidence %.0f, needs %.0f", evidence, options_.min_evidence);
+  } else if (covered < options_.min_covered) {
+    result.reason += words("; the map covers %.2f of the features, needs %.2f", covered, options_.min_covered);
+  } else if (!(sigma <= limits.max_sigma_position)) {
+    result.reason += words("; position is known to %.3f m only", sigma);
+  } else if (best.depth.compared >= 100 && best.depth.agreement() < limits.min_depth_agreement) {
+    result.reason += words("; needs %.2f agreement", limits.min_depth_agreement);
+  } else if (best.depth.compared >= 100 && best.depth.seeThrough() > limits.max_see_through) {
+    result.reason += words("; %.2f of the surfaces are seen through", best.depth.seeThrough());
+  } else if (guesses_.size() > 1 && guesses_[1].support.evidence() > options_.ambiguity * evidence) {
+    result.reason += words("; evidence %.0f, for another place %.0f", evidence, guesses_[1].support.evidence());
+  } else {
+    result.accepted = true;
+  }
+  return result;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,22 @@
+// A stored map and the truth of its trajectory.
+#pragma once
+
+#include <map>
+
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/trajectory/tum_io.h"
+
+namespace vip_slam {
+
+using TruePoses = std::map<KeyframeId, SE3>;
+
+/// Keyframes with their true poses (IMU); those outside the truth are left out.
+TruePoses truePoses(const Map& map, const Trajectory& truth);
+
+/// T_truth_map: yaw and position, least squares over keyframes.
+SE3 alignMap(const Map& map, const TruePoses& truth);
+
+/// Within 2 m and 30 degrees.
+bool samePlace(const SE3& a, const SE3& b);
+
+}  // namespace vip_slam
