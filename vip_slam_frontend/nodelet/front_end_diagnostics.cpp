@@ -62,6 +62,7 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("processing, median of the last minute (ms)", quantile(shown.recent, 0.5));
   status.add("processing, 99 % of the last minute (ms)", quantile(shown.recent, 0.99));
   status.add("latency, stamp to odometry (ms)", 1e3 * shown.latency);
+  status.add("depth surfaces used", c.surfaces_used);
   status.add("NIS per degree of freedom", c.nis_per_dof);
   status.add("pixel sigma in use", c.sigma_px);
   status.add("images", c.images);

@@ -72,7 +72,8 @@ void FrontEndNodelet::advertise() {
   private_nh.setParam("publish_tf", options_.publish_tf);
   private_nh.setParam("imu_rate_odometry", options_.imu_rate_odometry);
   reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_frontend::FrontEndConfig>>(private_nh);
-  reconfigure_->setCallback([this](vip_slam_frontend::FrontEndConfig& config, std::uint32_t) { onReconfigure(config); });
+  reconfigure_->setCallback(
+      [this](vip_slam_frontend::FrontEndConfig& config, std::uint32_t) { onReconfigure(config); });
 }
 
 void FrontEndNodelet::subscribe() {

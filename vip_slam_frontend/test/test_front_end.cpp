@@ -55,7 +55,8 @@ struct World {
   static cv::Mat depth(double t) {
     return cv::Mat(240, 320, CV_32FC1, cv::Scalar(kWall - position(t).x()));
   }
-  /// The same wall with a floor 0.9 m below and another wall 1.1 m to the left: three directions that depth alone holds.
+  /// The same wall with a floor 0.9 m below and another wall 1.1 m to the left: three directions that depth alone
+  /// holds.
   static cv::Mat cornerDepth(double t) {
     const Eigen::Vector3d p = position(t);
     cv::Mat_<float> depth(240, 320);

@@ -23,7 +23,9 @@ struct Pairs {
   int total(bool of_good) const { return static_cast<int>(std::count(good.begin(), good.end(), of_good)); }
 };
 
-Eigen::Vector3d onRay(const PointPair& pair, double z) { return {pair.xy_previous.x() * z, pair.xy_previous.y() * z, z}; }
+Eigen::Vector3d onRay(const PointPair& pair, double z) {
+  return {pair.xy_previous.x() * z, pair.xy_previous.y() * z, z};
+}
 
 Pairs make(Scene scene, bool with_depth, unsigned seed) {
   std::mt19937 random(seed);

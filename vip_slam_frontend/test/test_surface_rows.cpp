@@ -25,7 +25,8 @@ WindowState makeWindow(unsigned seed, const CalibrationFlags& calibration) {
   for (int i = 0; i < 4; ++i) {
     Clone clone;
     clone.id = 10 + i;
-    clone.T_W_I = SE3(expSO3(Eigen::Vector3d(gauss(&random, 0.1))), Eigen::Vector3d(0.1 * i, 0, 1) + gauss(&random, 0.05));
+    clone.T_W_I =
+        SE3(expSO3(Eigen::Vector3d(gauss(&random, 0.1))), Eigen::Vector3d(0.1 * i, 0, 1) + gauss(&random, 0.05));
     clone.T_W_I_fej = clone.T_W_I;
     clone.omega_I = gauss(&random, 0.5);
     clone.v_W = gauss(&random, 0.5);
@@ -179,8 +180,8 @@ constexpr double kFocal = 480;
 
 std::shared_ptr<const CameraModel> camera() { return testCamera(kFocal); }
 
-/// A corridor 2.2 m wide and 2.8 m high with an end wall 6 m ahead, seen by a camera at `T_W_C` (world: x right, y down,
-/// z ahead).
+/// A corridor 2.2 m wide and 2.8 m high with an end wall 6 m ahead, seen by a camera at `T_W_C` (world: x right, y
+/// down, z ahead).
 cv::Mat corridor(const SE3& T_W_C, const DepthNoise& noise, unsigned seed) {
   struct Wall {
     Eigen::Vector3d n;
@@ -218,7 +219,8 @@ TEST(SurfaceTracker, PatchesLieOnTheWallsAndMatchesAgreeWithTheMotion) {
   int tilted = 0;
   for (const SurfacePatch& patch : tracker.patches(reference)) {
     const Eigen::Vector3d n_W = T_W_ref.R() * patch.n_C;
-    EXPECT_GT(n_W.cwiseAbs().maxCoeff(), std::cos(6.0 * M_PI / 180));  // at worst a little of the next wall in the window
+    // At worst a little of the next wall is in the window.
+    EXPECT_GT(n_W.cwiseAbs().maxCoeff(), std::cos(6.0 * M_PI / 180));
     tilted += n_W.cwiseAbs().maxCoeff() < std::cos(2.0 * M_PI / 180);
     EXPECT_LT(patch.n_C.dot(patch.p_C), 0.0);  // towards the camera
   }

@@ -33,11 +33,13 @@ struct FrontEndNodeOptions {
     v.field("publish_tf", publish_tf, "publish odom -> base_link");
     v.field("imu_rate_odometry", imu_rate_odometry, "publish odom_imu_rate, predicted at each IMU sample");
     v.field("pair_tolerance", pair_tolerance, 0.0, 0.5, "largest difference between colour and depth stamps, s");
-    v.field("depth_patience", depth_patience, 0.0, 5.0, "a colour image waits for its depth until newer images are this far, s");
+    v.field("depth_patience", depth_patience, 0.0, 5.0,
+            "a colour image waits for its depth until newer images are this far, s");
     v.field("imu_patience", imu_patience, 0.01, 10.0,
             "an image waits for the IMU to cover its stamp until other data is this much newer, s");
     v.field("image_queue", image_queue, 1, 200, "images that may wait; older ones are dropped and counted");
-    v.field("time_jump", time_jump, 0.1, 60.0, "stamps this much older than the newest restart the odometry (looping bag), s");
+    v.field("time_jump", time_jump, 0.1, 60.0,
+            "stamps this much older than the newest restart the odometry (looping bag), s");
     front_end.visit(v);
   }
 };

@@ -13,8 +13,8 @@ namespace {
 constexpr double kGateSigmas = 4.0;
 // Fewer surviving pairs say too little about themselves to be believed.
 constexpr int kLeastPairs = 20;
-// Pairs share errors (the reference's patches with all its images, one warp of the depth, the calibration): many of them
-// tell no more than so many independent ones.
+// Pairs share errors (the reference's patches with all its images, one warp of the depth, the calibration): many of
+// them tell no more than so many independent ones.
 constexpr double kMostEffective = 50.0;
 
 /// Columns of the rows before compression: newest clone (theta, p), calibration, reference's clone (theta, p).

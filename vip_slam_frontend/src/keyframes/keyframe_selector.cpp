@@ -33,7 +33,8 @@ std::string KeyframeSelector::decide(double t, const SE3& T_odom_C, const std::v
     if (p.z() > 0.1) parallax += (p.head<2>() / p.z() - it->second.cast<double>()).norm() * focal_px;
   }
   // Of a handful of features the ratio says nothing.
-  if (features_.size() >= kLeastForRatio && common < options_.min_tracked_ratio * static_cast<double>(features_.size())) return "tracked ratio";
+  const auto before = static_cast<double>(features_.size());
+  if (features_.size() >= kLeastForRatio && common < options_.min_tracked_ratio * before) return "tracked ratio";
   if (common > 0 && parallax / common > options_.min_parallax_px) return "parallax";
   if (t - t_ > options_.max_seconds) return "time";
   return "";

@@ -11,7 +11,8 @@ namespace {
 constexpr int kRadius = 6;  // of the patch
 constexpr int kStride = 2;
 constexpr int kFewest = 20;
-// Slopes are a few per cent a pixel at the flattest angles that can be tracked; the prior decides where readings are few.
+// Slopes are a few per cent a pixel at the flattest angles that can be tracked; the prior decides where readings are
+// few.
 constexpr double kPriorSlope = 0.03;
 constexpr double kSteepest = 0.06;
 

@@ -86,7 +86,8 @@ struct FilterOptions {
     v.field("huber", huber, 0.5, 100.0, "Huber threshold on whitened residuals, sigmas");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");
     v.field("use_depth", use_depth, "use depth measurements");
-    v.field("use_surfaces", use_surfaces, "tie each depth image to the flat patches of an earlier one; needs no corners");
+    v.field("use_surfaces", use_surfaces,
+            "tie each depth image to the flat patches of an earlier one; needs no corners");
     v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise; below 1: medians of pixels");
     v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
     v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the gate turns away too many features");

@@ -1,5 +1,6 @@
 // Rows from depth alone: points of the newest depth image lie on the flat patches that an earlier one saw. They need no
-// corners, so they hold five degrees of freedom in a corridor whose walls show nothing. Per pair, in the patch's camera:
+// corners, so they hold five degrees of freedom in a corridor whose walls show nothing. Per pair, in the patch's
+// camera:
 //   n^T (T_ref_cur q - p) = 0.
 // The rows depend on the relative pose of two clones only: position and yaw of the window stay unobservable.
 #pragma once
@@ -33,6 +34,7 @@ struct SurfaceRows {
 /// Rows between the reference's clone and the newest one. `R` is the filter's factor: pairs beyond four sigmas of what
 /// state and noise allow are gated (another surface), the rest is Huber-weighted at `huber`. Residuals at the present
 /// estimate, Jacobians at the first estimates.
-SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, const SurfaceMatches& matches, double huber);
+SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, const SurfaceMatches& matches,
+                        double huber);
 
 }  // namespace vip_slam

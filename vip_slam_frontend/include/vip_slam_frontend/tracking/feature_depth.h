@@ -1,6 +1,7 @@
-// Depth of the surface a tracked corner belongs to. Corners gather where surfaces end (door frames, rims of boxes), where
-// a window of readings holds two surfaces, and on walls seen at a flat angle, where it holds a wide range of depths.
-// The edge-safe look-up refuses both; here planes decide. A plane is affine in inverse depth: 1/z = a + b u + c v.
+// Depth of the surface a tracked corner belongs to. Corners gather where surfaces end (door frames, rims of boxes),
+// where a window of readings holds two surfaces, and on walls seen at a flat angle, where it holds a wide range of
+// depths. The edge-safe look-up refuses both; here planes decide. A plane is affine in inverse depth:
+// 1/z = a + b u + c v.
 #pragma once
 
 #include <opencv2/core.hpp>

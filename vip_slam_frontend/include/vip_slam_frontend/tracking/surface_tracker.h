@@ -31,8 +31,8 @@ class SurfaceTracker {
   void clear();
   CloneId reference() const { return reference_; }  ///< 0: none
   std::size_t size() const { return patches_.size(); }
-  /// Pairs of the reference's patches with patches of `depth`, looked up where `T_cur_ref` (cameras) puts them. Both are
-  /// fitted in the same way, so that what a fit makes of noise and curvature cancels.
+  /// Pairs of the reference's patches with patches of `depth`, looked up where `T_cur_ref` (cameras) puts them. Both
+  /// are fitted in the same way, so that what a fit makes of noise and curvature cancels.
   SurfaceMatches match(const cv::Mat& depth, const SE3& T_cur_ref) const;
 
  private:
