@@ -119,7 +119,7 @@ TEST_F(EvaluateCommand, JudgesPlanesAndPoints) {
   floor.polygons.push_back({{{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}}, {}});
   floor.area = 16;
   writePlanesYaml(path("planes.yaml"), {floor});
-  std::ofstream(path("points.csv")) << "id,x,y,z,plane\n1,0.5,0.5,0,1\n2,0.5,0.5,0.5,1\n";
+  std::ofstream(path("points.csv")) << "id,x,y,z,plane,keyframes\n1,0.5,0.5,0,1,4\n2,0.5,0.5,0.5,1,4\n";
   ASSERT_EQ(run("--truth " + path("truth.tum") + " --estimate " + path("truth.tum") + " --planes-truth " +
                 path("planes.yaml") + " --planes " + path("planes.yaml") + " --points " + path("points.csv") +
                 " --out " + path("out")),

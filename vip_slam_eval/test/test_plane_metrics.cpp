@@ -136,13 +136,14 @@ TEST(AssociationMetricsTest, PrecisionAndRecall) {
   const std::vector<PlaneEstimate> truth = room();
   const PlaneMetrics planes = planeMetrics(truth, {rectangle(10, O, 4 * X, 3 * Y), rectangle(11, O, 3 * Y, 2.5 * Z)});
   const std::vector<LabelledPoint> points = {
-      {1, {1, 1, 0.01}, 10},   // right
-      {2, {2, 2, 0.30}, 10},   // floats above the floor
-      {3, {0, 1, 1.0}, 11},    // right
-      {4, {0, 2, 1.0}, 10},    // a wall point tied to the floor
-      {5, {3, 1, 0.0}, 0},     // on the floor, not tied
-      {6, {2, 3, 1.0}, 0},     // on the wall nobody found
-      {7, {8, 1, 0.0}, 10}};   // the floor's height outside of it
+      {1, {1, 1, 0.01}, 10, 4},   // right
+      {2, {2, 2, 0.30}, 10, 9},   // floats above the floor
+      {3, {0, 1, 1.0}, 11, 5},    // right
+      {4, {0, 2, 1.0}, 10, 4},    // a wall point tied to the floor
+      {5, {3, 1, 0.0}, 0, 4},     // on the floor, not tied
+      {6, {2, 3, 1.0}, 0, 4},     // on the wall nobody found
+      {7, {8, 1, 0.0}, 10, 4},    // the floor's height outside of it
+      {8, {3, 2, 0.0}, 0, 3}};    // on the floor, not tied, not seen often enough to be
   const AssociationMetrics m = associationMetrics(points, truth, planes);
   EXPECT_EQ(m.labelled, 5u);
   EXPECT_EQ(m.correct, 2u);
@@ -153,13 +154,14 @@ TEST(AssociationMetricsTest, PrecisionAndRecall) {
 
 TEST(LabelledPointsFile, RoundTripAndErrors) {
   const std::string path = ::testing::TempDir() + "points.csv";
-  writeLabelledPoints(path, {{5, {1, -2, 0.25}, 3}, {6, {0, 0, 1}, 0}});
+  writeLabelledPoints(path, {{5, {1, -2, 0.25}, 3, 7}, {6, {0, 0, 1}, 0, 2}});
   const auto points = readLabelledPoints(path);
   ASSERT_EQ(points.size(), 2u);
   EXPECT_EQ(points[0].id, 5);
   EXPECT_EQ(points[0].plane, 3u);
+  EXPECT_EQ(points[0].keyframes, 7);
   EXPECT_LT((points[0].p_W - Eigen::Vector3d(1, -2, 0.25)).norm(), 1e-9);
-  std::ofstream(path) << "id,x,y,z,plane\n1,2,3,4,5\n1,2,nan,4,5\n";
+  std::ofstream(path) << "id,x,y,z,plane,keyframes\n1,2,3,4,5,6\n1,2,nan,4,5,6\n";
   try {
     readLabelledPoints(path);
     FAIL();

@@ -35,7 +35,8 @@ TEST(Consistency, OnAndOffThePlane) {
   int on = 0, off = 0;
   for (unsigned seed = 0; seed < 50; ++seed) {
     const Eigen::Vector3d p(3, -0.8 + 0.03 * seed, 0.7 + 0.02 * seed), q = p - Eigen::Vector3d(0.08, 0, 0);
-    on += testConsistency(sightings(p, 1.5, 5, 0.01, seed), wall, p + Eigen::Vector3d(0.02, 0, 0), 525, options).consistent;
+    const Eigen::Vector3d start = p + Eigen::Vector3d(0.02, 0, 0);
+    on += testConsistency(sightings(p, 1.5, 5, 0.01, seed), wall, start, 525, options).consistent;
     off += testConsistency(sightings(q, 1.5, 5, 0.01, seed), wall, q, 525, options).consistent;
   }
   EXPECT_GE(on, 49);

@@ -159,13 +159,13 @@ void writeCovariances(const std::string& path, const std::vector<OdometryCovaria
   file.commit();
 }
 
-/// Map points with the plane they are tied to (0: none), for judging the associations.
+/// Map points with the plane they are tied to (0: none) and the keyframes that see them, for judging the associations.
 void writePoints(const std::string& path, const std::vector<LandmarkEstimate>& landmarks) {
   AtomicFile file(path);
-  file.stream() << "id,x,y,z,plane\n" << std::fixed << std::setprecision(5);
+  file.stream() << "id,x,y,z,plane,keyframes\n" << std::fixed << std::setprecision(5);
   for (const LandmarkEstimate& landmark : landmarks) {
     file.stream() << landmark.id << ',' << landmark.p_W.x() << ',' << landmark.p_W.y() << ',' << landmark.p_W.z() << ','
-                  << landmark.plane << '\n';
+                  << landmark.plane << ',' << landmark.observations << '\n';
   }
   file.commit();
 }

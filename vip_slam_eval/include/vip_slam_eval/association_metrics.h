@@ -15,9 +15,10 @@ struct LabelledPoint {
   std::int64_t id = 0;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
   PlaneId plane = 0;
+  int keyframes = 0;  ///< that see it
 };
 
-/// CSV with the header id,x,y,z,plane. Throws std::runtime_error "file:line: what, expected what".
+/// CSV with the header id,x,y,z,plane,keyframes. Throws std::runtime_error "file:line: what, expected what".
 std::vector<LabelledPoint> readLabelledPoints(const std::string& path);
 /// Whole or not at all.
 void writeLabelledPoints(const std::string& path, const std::vector<LabelledPoint>& points);
@@ -25,14 +26,15 @@ void writeLabelledPoints(const std::string& path, const std::vector<LabelledPoin
 struct AssociationMetrics {
   std::size_t labelled = 0;       ///< points tied to a plane
   std::size_t correct = 0;        ///< of these, on the true plane (distance and outline)
-  std::size_t on_found_planes = 0;///< points that truly lie on a true plane that was found
+  std::size_t on_found_planes = 0;///< points seen often enough that truly lie on a true plane that was found
   std::size_t recovered = 0;      ///< of these, tied to it
   double precision = 1, recall = 1;
 };
 
 /// `points` in the truth's world. A point is on a plane when within `tolerance` metres of it and inside its outline
-/// (or within `tolerance` of a place inside).
+/// (or within `tolerance` of a place inside). Points that fewer than `min_keyframes` see cannot be tied to a plane yet,
+/// by the paper's rule, and do not count for recall; wrongly tied ones count wherever they are.
 AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<PlaneEstimate>& truth,
-                                      const PlaneMetrics& planes, double tolerance = 0.05);
+                                      const PlaneMetrics& planes, int min_keyframes = 4, double tolerance = 0.05);
 
 }  // namespace vip_slam

@@ -27,7 +27,7 @@ struct PlaneBenchmarkInput {
 struct PlaneBenchmarkResult {
   std::size_t images = 0, keyframes = 0;
   std::vector<PlaneEstimate> planes;
-  std::vector<LabelledPoint> points;  ///< landmarks that as many keyframes see as an association needs
+  std::vector<LabelledPoint> points;
   PlaneMetrics metrics;
   AssociationMetrics associations;
   PlaneMapperCounters counters;

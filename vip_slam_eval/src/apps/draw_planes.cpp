@@ -1,5 +1,5 @@
 // rosrun vip_slam_eval draw_planes BAG --sensor S --trajectory T.tum --planes P.yaml --time SECONDS... --out DIR
-// The planes of a run over the images of its bag.
+// [--heights] The planes of a run over the images of its bag; how steady the height of its level planes is.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -10,7 +10,9 @@
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
+#include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_eval/plane_heights.h"
 #include "vip_slam_eval/plane_picture.h"
 #include "vip_slam_ros/sensor_files.h"
 
@@ -21,6 +23,7 @@ using namespace vip_slam;
 struct Arguments {
   std::string bag, sensor, trajectory, planes, out;
   std::vector<double> times;
+  bool heights = false;
 };
 
 int draw(Arguments arguments) {
@@ -33,12 +36,18 @@ int draw(Arguments arguments) {
   std::sort(arguments.times.begin(), arguments.times.end());
   std::size_t next = 0;
   int written = 0;
+  PlaneHeights heights;
   reader.start();
   while (const auto event = reader.next()) {
     const auto* pair = std::get_if<ImagePair>(&*event);
-    if (!pair || next == arguments.times.size() || pair->t < reader.beginTime() + arguments.times[next]) continue;
+    if (!pair) continue;
+    const bool due = next < arguments.times.size() && pair->t >= reader.beginTime() + arguments.times[next];
     SE3 T_map_I;
-    if (!poseAt(trajectory, pair->t, &T_map_I)) continue;  // the next image that has a pose
+    if (!(due || arguments.heights) || !poseAt(trajectory, pair->t, &T_map_I)) continue;
+    if (arguments.heights && !pair->depth.empty()) {
+      measureHeights(pair->t, pair->depth, *camera, T_map_I * sensor.T_imu_cam, planes, &heights);
+    }
+    if (!due) continue;
     const cv::Mat picture = drawPlanes(pair->gray, pair->depth, *camera, T_map_I * sensor.T_imu_cam, planes);
     char name[64];
     std::snprintf(name, sizeof name, "planes_%07.2f.png", pair->t - reader.beginTime());
@@ -48,7 +57,15 @@ int draw(Arguments arguments) {
     ++written;
     while (next < arguments.times.size() && pair->t >= reader.beginTime() + arguments.times[next]) ++next;
   }
-  if (written == 0) throw std::runtime_error("no image with a pose at or after the given times");
+  if (arguments.heights) {
+    std::cout << heightTable(heights, planes);
+    AtomicFile file((std::filesystem::path(arguments.out) / "heights.csv").string());
+    file.stream() << heightsCsv(heights);
+    file.commit();
+  }
+  if (written == 0 && !arguments.times.empty()) {
+    throw std::runtime_error("no image with a pose at or after the given times");
+  }
   return 0;
 }
 
@@ -65,7 +82,8 @@ int main(int argc, char** argv) {
   line.option("planes", arguments.planes, "planes.yaml of the run");
   line.required("planes");
   line.option("time", arguments.times, "seconds after the beginning of the bag; several make several pictures");
-  line.required("time");
+  line.flag("heights", arguments.heights,
+            "also print how the height of each level plane varies over the images, and write heights.csv");
   line.option("out", arguments.out, "folder for the pictures");
   line.required("out");
   if (const auto status = line.parse(argc, argv)) return *status;

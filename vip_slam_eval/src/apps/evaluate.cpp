@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   line.option("planes", planes, "estimated planes, YAML");
   line.needs("planes-truth", "planes");
   line.needs("planes", "planes-truth");
-  line.option("points", points, "map points with their plane, CSV id,x,y,z,plane");
+  line.option("points", points, "map points with their plane, CSV id,x,y,z,plane,keyframes");
   line.needs("points", "planes");
   line.option("align", alignment, "alignment of the picture, the planes and the points",
               oneOf("none, position, yaw, se3"));

@@ -23,7 +23,7 @@ bool liesOn(const PlaneEstimate& plane, const FlatRegion& region, const Eigen::V
 }  // namespace
 
 AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<PlaneEstimate>& truth,
-                                      const PlaneMetrics& planes, double tolerance) {
+                                      const PlaneMetrics& planes, int min_keyframes, double tolerance) {
   // One estimate may stand for several true planes in one plane (tables of one height): all within its reach count.
   std::map<PlaneId, Plane> represented;
   for (const PlaneMatch& match : planes.matches) {
@@ -49,7 +49,7 @@ AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, 
       ++result.labelled;
       if (correct) ++result.correct;
     }
-    if (on_found) {
+    if (on_found && point.keyframes >= min_keyframes) {
       ++result.on_found_planes;
       if (correct) ++result.recovered;
     }

@@ -39,9 +39,10 @@ class Bench {
   PlaneBenchmarkResult finish(const PlaneBenchmarkInput& input) {
     map_.apply(mapper_.applyMapUpdate({}));  // what was grown since the last keyframe
     result_.planes = mapper_.planes();
-    result_.points = map_.points(input.options.planes.association.min_keyframes);
+    result_.points = map_.points();
     result_.metrics = planeMetrics(input.true_planes, result_.planes);
-    result_.associations = associationMetrics(result_.points, input.true_planes, result_.metrics);
+    result_.associations = associationMetrics(result_.points, input.true_planes, result_.metrics,
+                                              input.options.planes.association.min_keyframes);
     result_.counters = mapper_.counters();
     return result_;
   }

@@ -56,11 +56,11 @@ void TrueMap::apply(const PlaneUpdate& update) {
   for (const auto& [id, plane] : update.associated) landmarks_[id].plane = plane;
 }
 
-std::vector<LabelledPoint> TrueMap::points(int min_keyframes) const {
+std::vector<LabelledPoint> TrueMap::points() const {
   std::vector<LabelledPoint> points;
   for (const auto& [id, landmark] : landmarks_) {
-    if (landmark.keyframes < min_keyframes || landmark.weight == 0) continue;
-    points.push_back({id, landmark.sum / landmark.weight, landmark.plane});
+    if (landmark.weight == 0) continue;
+    points.push_back({id, landmark.sum / landmark.weight, landmark.plane, landmark.keyframes});
   }
   return points;
 }

@@ -24,8 +24,8 @@ class TrueMap {
   MapUpdate addKeyframe(const Keyframe& keyframe);
   /// What the plane module says about landmarks.
   void apply(const PlaneUpdate& update);
-  /// Landmarks that at least `min_keyframes` keyframes see, with their plane.
-  std::vector<LabelledPoint> points(int min_keyframes) const;
+  /// Landmarks with a place, and their plane.
+  std::vector<LabelledPoint> points() const;
 
  private:
   struct Landmark {

@@ -44,8 +44,8 @@ bool estimate(const std::vector<PointSighting>& sightings, const Eigen::Matrix<d
   return p->allFinite();
 }
 
-bool reprojectionErrors(const std::vector<PointSighting>& sightings, const Eigen::Vector3d& p, double focal, double* rms,
-                        double* worst) {
+bool reprojectionErrors(const std::vector<PointSighting>& sightings, const Eigen::Vector3d& p, double focal,
+                        double* rms, double* worst) {
   double sum = 0;
   *worst = 0;
   for (const PointSighting& s : sightings) {
@@ -80,8 +80,8 @@ ConsistencyResult testConsistency(const std::vector<PointSighting>& sightings, c
   result.solved = true;
   result.distance = std::abs(plane.signedDistance(free));
   const double scale = std::max(1.0, information.trace());
-  result.distance_sigma =
-      std::sqrt(std::max(0.0, plane.n.dot((information + 1e-12 * scale * Eigen::Matrix3d::Identity()).inverse() * plane.n)));
+  const Eigen::Matrix3d covariance = (information + 1e-12 * scale * Eigen::Matrix3d::Identity()).inverse();
+  result.distance_sigma = std::sqrt(std::max(0.0, plane.n.dot(covariance * plane.n)));
   result.consistent = result.rms_forced <= result.rms_free + options.similar_px &&
                       result.max_forced <= options.max_error_px &&
                       result.distance <= options.max_distance + std::min(options.max_distance, result.distance_sigma);

@@ -50,7 +50,8 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
   std::vector<double> sorted = sigmas;
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
   Plane local;
-  if (!fitPlaneRobust(*points, weights, sorted[sorted.size() / 2], PlaneKind::kGeneral, n_C, &local, nullptr)) return false;
+  const double median = sorted[sorted.size() / 2];
+  if (!fitPlaneRobust(*points, weights, median, PlaneKind::kGeneral, n_C, &local, nullptr)) return false;
   std::vector<Eigen::Vector3d> kept;
   PlaneMoments moments;
   for (std::size_t i = 0; i < points->size(); ++i) {
@@ -64,7 +65,8 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
   const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
   const double spread =
       std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
-  const double slack = 3.0 * (sorted[sorted.size() / 2] + 0.3 * noise_.bias_floor) / spread / std::sqrt(double(kept.size()) / 9.0);
+  const double slack =
+      3.0 * (median + 0.3 * noise_.bias_floor) / spread / std::sqrt(double(kept.size()) / 9.0);
   const double turned = std::acos(std::min(1.0, std::abs(local.n.dot(n_C))));
   *points = std::move(kept);
   return turned < 5.0 * M_PI / 180.0 + slack;

@@ -107,7 +107,8 @@ bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const Dept
   int missing = 0;
   const float d = -triangle.n_C.dot(triangle.centre_C);
   for (int k = 0; k < 3; ++k) {
-    const MeshVertex &a = mesh_.vertices[triangle.vertex[(k + 1) % 3]], &b = mesh_.vertices[triangle.vertex[(k + 2) % 3]];
+    const MeshVertex& a = mesh_.vertices[triangle.vertex[(k + 1) % 3]];
+    const MeshVertex& b = mesh_.vertices[triangle.vertex[(k + 2) % 3]];
     const Eigen::Vector2f middle = 0.5f * (a.pixel + b.pixel);
     // Between neighbouring nodes there is no third one to ask.
     const bool neighbours = a.feature < 0 && b.feature < 0 &&
@@ -140,7 +141,8 @@ bool DepthMeshBuilder::brokenBetween(const MeshVertex& a, const MeshVertex& b, c
     return c < 0 || r < 0 || c >= grid.cols || r >= grid.rows ? 0.0f : grid.at(c, r);
   };
   const float za = a.p_C.z(), zb = b.p_C.z(), z = 0.5f * (za + zb);
-  const float tolerance = float(options_.gap_sigmas * noise_.sigma(z)) * kMedianGain * 2.45f + 0.005f;  // sqrt(1 + 4 + 1)
+  constexpr float kSpread = 2.45f;  // sqrt(1 + 4 + 1): a second difference
+  const float tolerance = float(options_.gap_sigmas * noise_.sigma(z)) * kMedianGain * kSpread + 0.005f;
   const auto straight = [&](float first, float middle, float last) {
     return first > 0 && middle > 0 && std::abs(1.0f / first - 2.0f / middle + 1.0f / last) * z * z < tolerance;
   };

@@ -1,0 +1,32 @@
+// How steady the level planes of a map are: their height as each image's depth measures it, under the estimated poses.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/types/plane_map.h"
+
+namespace vip_slam {
+
+struct PlaneHeight {
+  double t = 0;            ///< seconds
+  double height = 0;       ///< metres, z in the planes' world: median over the depth points on the plane
+  std::size_t points = 0;
+};
+using PlaneHeights = std::map<PlaneId, std::vector<PlaneHeight>>;  ///< per horizontal plane, in order of time
+
+/// Adds what one depth image (32FC1 metres, of `camera`) says about every horizontal plane that it shows from its own
+/// side: points inside the outline and within 10 cm of the plane, at least `min_points` of every fourth row and column.
+void measureHeights(double t, const cv::Mat& depth, const CameraModel& camera, const SE3& T_map_C,
+                    const std::vector<PlaneEstimate>& planes, PlaneHeights* heights, std::size_t min_points = 200);
+
+/// One line per plane: id, area, images, mean height, standard deviation and range, in centimetres.
+std::string heightTable(const PlaneHeights& heights, const std::vector<PlaneEstimate>& planes);
+/// CSV plane,t,height_m,points.
+std::string heightsCsv(const PlaneHeights& heights);
+
+}  // namespace vip_slam
