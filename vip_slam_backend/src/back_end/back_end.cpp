@@ -81,6 +81,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
 }
 
 void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
+  if (localisation_only && !map.empty()) return;  // the map stays as it is
   const ScopedTimer timer(log, "backend.planes", update.t);
   for (const PlaneMerge& merge : update.merges) map.mergePlanes(merge.from, merge.into);
   for (const PlaneId id : update.removed) map.removePlane(id);
@@ -176,7 +177,7 @@ GbaResult BackEnd::run(const GbaJob& job) const {
 MapUpdate BackEnd::merge(const GbaResult& result) { return impl_->mergeGlobal(result); }
 
 MapUpdate BackEnd::finish() {
-  if (!impl_->options.global_ba.at_end) {
+  if (!impl_->options.global_ba.at_end || (impl_->localisation_only && !impl_->map.empty())) {
     MapUpdate update = impl_->beginUpdate(0);
     impl_->finishUpdate(&update);
     return update;
