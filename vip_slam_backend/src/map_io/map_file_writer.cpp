@@ -20,7 +20,9 @@ void write(ByteWriter& out, const SE3& T) {
     if (n.coeffs() == q.coeffs()) break;
     q = n;
   }
-  out.vector(q.coeffs());
+  // Some go to and fro between two neighbours: the same one of them whichever is in memory.
+  const Eigen::Vector4d a = q.coeffs(), b = q.normalized().coeffs();
+  out.vector(std::lexicographical_compare(a.data(), a.data() + 4, b.data(), b.data() + 4) ? a : b);
   out.vector(T.t());
 }
 
