@@ -64,7 +64,7 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements(const RollingShutter
   list.reserve(tracker_.tracks().size());
   for (const Track& track : tracker_.tracks()) {
     const Feature& f = track.feature;
-    list.push_back({f.id, shutter.atStamp(f).cast<double>(), f.depth, f.depth_sigma});
+    list.push_back({f.id, shutter.atStamp(f).cast<double>(), f.depth, f.depth_sigma, track.whitening});
   }
   return list;
 }

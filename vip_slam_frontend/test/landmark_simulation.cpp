@@ -30,6 +30,8 @@ LandmarkSimulation::LandmarkSimulation(const SimulationOptions& options) : optio
     points_.push_back(p);
   }
   track_.assign(points_.size(), kNoLandmark);
+  creep_.assign(points_.size(), Eigen::Vector2d::Zero());
+  crept_ = creep_;
   generateImu(0.0);
 }
 
@@ -115,11 +117,19 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
         if (running) track_[i] = kNoLandmark;
         continue;
       }
-      if (!running) track_[i] = next_++;
+      if (!running) {
+        track_[i] = next_++;
+        if (options_.creep_ratio > 0) {
+          const bool creeps = unit(random_) < options_.creep_ratio;
+          creep_[i] = gaussian(random_, creeps ? options_.creep_px : 0.0).head<2>();
+          crept_[i].setZero();
+        }
+      }
+      crept_[i] += creep_[i];
       FilterMeasurement m;
       m.id = track_[i];
       const Eigen::Vector3d noise = gaussian(random_, 1.0);
-      m.xy = p.head<2>() / p.z() + noise.head<2>() * options_.sigma_px / options_.focal;
+      m.xy = p.head<2>() / p.z() + (noise.head<2>() * options_.sigma_px + crept_[i]) / options_.focal;
       if (unit(random_) < options_.outlier_ratio) m.xy += Eigen::Vector2d(0.05, -0.04);
       if (options_.depth) {
         m.depth_sigma = options_.depth_a + options_.depth_c * p.z() * p.z();

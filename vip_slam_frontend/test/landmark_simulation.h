@@ -20,6 +20,9 @@ struct SimulationOptions {
   bool imu_noise = true;
   int points = 1200;
   double outlier_ratio = 0;
+  /// Tracks that are no points: each creeps by its own constant rate, Gaussian of this size, px per image.
+  double creep_px = 0;
+  double creep_ratio = 0;  ///< share of such tracks
   double speed = 1.0;  ///< factor on the motion's frequencies; 0: standing
   ImuNoise noise{1.7e-3, 2e-5, 2e-2, 3e-4};
   double time_offset = 0;  ///< t_imu = t_image + time_offset
@@ -46,6 +49,7 @@ class LandmarkSimulation {
   SE3 T_I_C_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<LandmarkId> track_;
+  std::vector<Eigen::Vector2d> creep_, crept_;  ///< px per image, px; per point
   LandmarkId next_ = 1;
   std::vector<ImuSample> imu_;
   std::vector<Eigen::Vector3d> bias_gyro_, bias_accel_;

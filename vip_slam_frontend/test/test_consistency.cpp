@@ -16,13 +16,30 @@ FilterOptions filterOptions() {
   return options;
 }
 
+/// For a simulation whose tracks are points with errors independent from image to image.
+FilterOptions independentNoise() {
+  FilterOptions options = filterOptions();
+  options.pixel_inflation = 1.0;
+  options.own_noise = false;
+  return options;
+}
+
+double meanNees(SimulationOptions simulation, const FilterOptions& options, int seeds) {
+  double nees = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    simulation.seed = static_cast<std::uint32_t>(seed);
+    nees += runFilter(simulation, options, 30.0, false).nees / seeds;
+  }
+  return nees;
+}
+
 TEST(Consistency, NeesInsideTheBandOverTwentySeeds) {
   constexpr int kSeeds = 20;
   double nees = 0, nis = 0, drift = 0;
   for (int seed = 1; seed <= kSeeds; ++seed) {
     SimulationOptions simulation;
     simulation.seed = static_cast<std::uint32_t>(seed);
-    const RunResult run = runFilter(simulation, filterOptions(), 30.0, false);
+    const RunResult run = runFilter(simulation, independentNoise(), 30.0, false);
     nees += run.nees / kSeeds;
     nis += run.nis_per_dof / kSeeds;
     drift += run.final_position / run.length / kSeeds;
@@ -35,6 +52,21 @@ TEST(Consistency, NeesInsideTheBandOverTwentySeeds) {
   EXPECT_LT(nees, high);
   EXPECT_NEAR(nis, 1.0, 0.1);
   EXPECT_LT(drift, 0.004);
+}
+
+/// What the defaults are for: tracks of which two in five are no points and creep along with the motion.
+TEST(Consistency, CreepingTracksDoNotMakeItSurerThanItIs) {
+  constexpr int kSeeds = 20, kControlSeeds = 5;
+  SimulationOptions simulation;
+  simulation.sigma_px = 0.1;
+  simulation.creep_ratio = 0.4;
+  simulation.creep_px = 0.15;
+  const double nees = meanNees(simulation, filterOptions(), kSeeds);
+  const double without = meanNees(simulation, independentNoise(), kControlSeeds);
+  std::printf("NEES %.2f; were all tracks points with independent noise: %.2f\n", nees, without);
+  EXPECT_GT(nees, chiSquareQuantile(0.025, 6 * kSeeds) / kSeeds);
+  EXPECT_LT(nees, chiSquareQuantile(0.975, 6 * kSeeds) / kSeeds);
+  EXPECT_GT(without, chiSquareQuantile(0.975, 6 * kControlSeeds) / kControlSeeds);
 }
 
 }  // namespace

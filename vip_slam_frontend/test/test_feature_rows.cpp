@@ -39,7 +39,9 @@ Scene makeScene() {
     scene.window.clones.push_back(clone);
     const Eigen::Vector3d p_C = (clone.T_W_I * scene.window.T_I_C).inverse() * scene.f_W;
     const Eigen::Vector2d xy = p_C.head<2>() / p_C.z() + Eigen::Vector2d(1e-3, -2e-3);
-    scene.observations.push_back({clone.id, xy, p_C.z() + 0.01, 0.01});
+    Eigen::Matrix2d whitening;
+    whitening << 0.9, 0.0, -0.2 * i, 0.4;
+    scene.observations.push_back({clone.id, xy, p_C.z() + 0.01, 0.01, whitening});
   }
   scene.window.v_W = scene.window.v_W_fej = scene.window.clones.back().v_W;
   return scene;

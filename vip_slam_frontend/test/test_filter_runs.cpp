@@ -8,10 +8,12 @@
 namespace vip_slam::testing {
 namespace {
 
-/// The simulation's depth readings are single pixels, not medians.
+/// The simulation's depth readings are single pixels, not medians, and its pixel errors independent.
 FilterOptions filterOptions() {
   FilterOptions options;
   options.depth_inflation = 1.0;
+  options.pixel_inflation = 1.0;
+  options.own_noise = false;
   return options;
 }
 

@@ -3,6 +3,7 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
 #include <opencv2/imgproc.hpp>
 
 #include "test_camera.h"
@@ -11,6 +12,7 @@
 #include "vip_slam_frontend/tracking/orb_extractor.h"
 #include "vip_slam_frontend/tracking/outlier_rejection.h"
 #include "vip_slam_frontend/tracking/patch_alignment.h"
+#include "vip_slam_frontend/tracking/pixel_noise.h"
 
 namespace vip_slam {
 namespace {
@@ -102,6 +104,62 @@ TEST(PatchAlignment, RefusesADifferentPatch) {
     accepted += alignPatch(image, a, Eigen::Matrix2d::Identity(), image, b).ok;
   }
   EXPECT_LT(accepted, 8);
+}
+
+/// Half dark, half bright along a slanted edge that fades a little along it, shifted by `shift`, with noise. (Where the
+/// image shows nothing along the edge but noise, the noise's own gradients pass for texture.)
+cv::Mat edgePatch(const Eigen::Vector2d& shift, double noise, unsigned seed) {
+  cv::Mat image(60, 60, CV_8U);
+  cv::RNG random(seed);
+  for (int v = 0; v < 60; ++v) {
+    for (int u = 0; u < 60; ++u) {
+      const double x = u - 30.3 - shift.x(), y = v - 29.6 - shift.y();
+      const double edge = 60.0 * std::tanh(0.8 * (0.8 * x + 0.6 * y)), along = 0.8 * y - 0.6 * x;
+      image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(
+          110.0 + edge + 20.0 * std::tanh(0.4 * along) + random.gaussian(noise));
+    }
+  }
+  return image;
+}
+
+TEST(PixelNoise, AlongAnEdgeTheAlignmentScattersAsTheTextureSays) {
+  const Eigen::Vector2d centre(30, 30), shift(0.3, -0.2);
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero(), texture = Eigen::Matrix2d::Zero();
+  int count = 0;
+  for (unsigned seed = 1; seed <= 400; ++seed) {
+    const cv::Mat reference = edgePatch(Eigen::Vector2d::Zero(), 2.0, seed);
+    const cv::Mat current = edgePatch(shift, 2.0, 1000 + seed);
+    const PatchAlignment found = alignPatch(reference, centre, Eigen::Matrix2d::Identity(), current, centre);
+    if (!found.ok) continue;
+    const Eigen::Vector2d e = found.pixel - centre - shift;
+    scatter += e * e.transpose();
+    texture += found.texture;
+    ++count;
+  }
+  ASSERT_GT(count, 350);
+  scatter /= count;
+  texture /= count;
+  const Eigen::Vector2d across(0.8, 0.6), along(-0.6, 0.8);
+  const double measured = std::sqrt((along.dot(scatter * along)) / (across.dot(scatter * across)));
+  const Eigen::Matrix2d inverse = texture.inverse();
+  const double predicted = std::sqrt((along.dot(inverse * along)) / (across.dot(inverse * across)));
+  std::printf("scatter along to across: %.1f, by the texture %.1f\n", measured, predicted);
+  EXPECT_GT(measured, 4.0);
+  EXPECT_NEAR(predicted / measured, 1.0, 0.35);
+
+  const Eigen::Matrix2d L = pixelWhitening(texture, 0.0, false);
+  EXPECT_NEAR(L(0, 1), 0.0, 1e-12);
+  const Eigen::Matrix2d covariance = (L.transpose() * L).inverse();
+  EXPECT_GT(along.dot(covariance * along), 4.0 * across.dot(covariance * across));
+}
+
+TEST(PixelNoise, GrowsWithFaintnessResidualAndEdges) {
+  const Eigen::Matrix2d strong = 1e6 * Eigen::Matrix2d::Identity(), faint = 1e3 * Eigen::Matrix2d::Identity();
+  EXPECT_NEAR(pixelSigma(pixelWhitening(strong, 0, false)), 1.0, 0.01);
+  EXPECT_GT(pixelSigma(pixelWhitening(faint, 0, false)), 3.0);
+  EXPECT_GT(pixelSigma(pixelWhitening(faint, 10, false)), 3.0 * pixelSigma(pixelWhitening(faint, 1, false)));
+  EXPECT_GT(pixelSigma(pixelWhitening(strong, 0, true)), 2.0 * pixelSigma(pixelWhitening(strong, 0, false)));
+  EXPECT_TRUE(pixelWhitening(Eigen::Matrix2d::Zero(), 0, false).allFinite());
 }
 
 TEST(OutlierRejection, FindsTheMotionOnAPlaneWithManyOutliers) {

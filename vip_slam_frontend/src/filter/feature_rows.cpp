@@ -33,11 +33,13 @@ void stackFeature(const WindowState& window, const std::vector<Observation>& obs
     const double iz = 1.0 / q_C.z();
     J_measure << iz, 0, -q_C.x() * iz * iz, 0, iz, -q_C.y() * iz * iz, 0, 0, 1;
     const double sigma_z = with_depth ? o.depth_sigma * noise.depth_inflation : 1.0;
-    const Eigen::Vector3d weight(1.0 / noise.sigma_xy, 1.0 / noise.sigma_xy, 1.0 / sigma_z);
-    J_measure = weight.asDiagonal() * J_measure;
+    Eigen::Matrix3d weight = Eigen::Matrix3d::Zero();
+    weight.topLeftCorner<2, 2>() = o.whitening / noise.sigma_xy;
+    weight(2, 2) = 1.0 / sigma_z;
+    J_measure = weight * J_measure;
 
     Eigen::Vector3d residual(o.xy.x() - p_C.x() / p_C.z(), o.xy.y() - p_C.y() / p_C.z(), o.depth - p_C.z());
-    residual = weight.cwiseProduct(residual);
+    residual = weight * residual;
 
     const Eigen::Matrix3d M_theta = J_measure * J_theta, M_f = J_measure * J_f;
     const int column = window.cloneColumn(index);

@@ -10,7 +10,9 @@ NoiseMonitor::NoiseMonitor(double sigma_px, double min_px, double max_px, bool a
 
 void NoiseMonitor::add(double chi2_per_dof, int dof) {
   if (!adapt_ || dof < 20 || !(chi2_per_dof > 0) || !std::isfinite(chi2_per_dof)) return;
-  const double step = 0.05 * std::clamp(0.5 * std::log(chi2_per_dof), -1.0, 1.0);
+  // The first images count as much as those after them, so that a wrong start is soon forgotten.
+  const double gain = 1.0 / (updates_ = std::min(updates_ + 1, 20));
+  const double step = gain * std::clamp(0.5 * std::log(chi2_per_dof), -1.0, 1.0);
   sigma_ = std::clamp(sigma_ * std::exp(step), min_, std::max(min_, max_));
 }
 

@@ -101,10 +101,12 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
       Eigen::Matrix3d ds;
       ds << view.R.col(0), view.R.col(1), view.t;
       const Eigen::Vector2d predicted(s.x() / s.z(), s.y() / s.z());
-      const Eigen::Vector2d r = (view.observation->xy - predicted) / noise.sigma_xy;
+      const Eigen::Matrix2d L = view.observation->whitening / noise.sigma_xy;
+      const Eigen::Vector2d r = L * (view.observation->xy - predicted);
       Eigen::Matrix<double, 2, 3> J;
-      J.row(0) = (ds.row(0) - predicted.x() * ds.row(2)) / (s.z() * noise.sigma_xy);
-      J.row(1) = (ds.row(1) - predicted.y() * ds.row(2)) / (s.z() * noise.sigma_xy);
+      J.row(0) = (ds.row(0) - predicted.x() * ds.row(2)) / s.z();
+      J.row(1) = (ds.row(1) - predicted.y() * ds.row(2)) / s.z();
+      J = L * J;
       const double e2 = r.squaredNorm();
       const double w = e2 > 9.0 ? 3.0 / std::sqrt(e2) : 1.0;
       A += w * J.transpose() * J;

@@ -18,6 +18,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(options.gate_probability),
+      explained_(0.95),
       noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px),
       imu_monitor_(options.adapt_imu_noise) {}
 
@@ -94,7 +95,7 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
   for (const FilterMeasurement& m : measurements) {
     FilterTrack& track = tracks_[m.id];
     track.id = m.id;
-    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma});
+    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma, m.whitening});
   }
 }
 
@@ -114,6 +115,12 @@ std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool w
   return candidates;
 }
 
+double VioFilter::ownNoise(const Triangulation& point) const {
+  const int dof = point.pixel_rows - 3;
+  if (!options_.own_noise || dof <= 0 || point.pixel_chi2 < explained_.threshold(dof)) return 1.0;
+  return point.pixel_chi2 / dof;
+}
+
 void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report) {
   const WindowState& window = filter_.window();
   MeasurementNoise noise;
@@ -130,7 +137,9 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
     const auto& observations = candidate.track->observations;
     const Triangulation point = triangulate(window, observations, noise);
     if (!point.ok) continue;
-    FeatureRows feature = featureRows(window, observations, point.p_W, noise);
+    MeasurementNoise row_noise = noise;
+    row_noise.sigma_xy *= options_.pixel_inflation * ownNoise(point);
+    FeatureRows feature = featureRows(window, observations, point.p_W, row_noise);
     const int dof = static_cast<int>(feature.r.size());
     if (dof == 0) continue;
     if (!calibrate && window.calibration.size() > 0) {

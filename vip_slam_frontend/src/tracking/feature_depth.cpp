@@ -76,6 +76,7 @@ int countExplained(const Reading* readings, int n, const InversePlane& plane, co
 
 FeatureDepth evaluate(const InversePlane& plane, FeatureDepth::Source source, const DepthNoise& noise) {
   FeatureDepth result;
+  result.source = FeatureDepth::Source::kUnclear;
   const double z = plane.z(0, 0);
   const double slope = z * z * plane.c.tail<2>().norm();  // metres per px
   const double fitted = z * z * std::sqrt(std::max(0.0, plane.covariance(0, 0)));
@@ -89,6 +90,8 @@ FeatureDepth evaluate(const InversePlane& plane, FeatureDepth::Source source, co
 
 /// The nearer of two surfaces, split at the widest gap between sorted readings.
 FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
+  FeatureDepth unclear;
+  unclear.source = FeatureDepth::Source::kUnclear;
   double sorted[kMost];
   for (int i = 0; i < n; ++i) sorted[i] = readings[i].z;
   std::sort(sorted, sorted + n);
@@ -101,12 +104,12 @@ FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
       split = i;
     }
   }
-  if (split < 0 || widest < 6.0 * noise.sigma(sorted[split - 1])) return {};
+  if (split < 0 || widest < 6.0 * noise.sigma(sorted[split - 1])) return unclear;
   const double limit = 0.5 * (sorted[split] + sorted[split - 1]);
   const auto near = [limit](const Reading& r) { return r.z < limit; };
   InversePlane plane;
-  if (!fit(readings, n, near, &plane)) return {};
-  if (countExplained(readings, n, plane, near) < 0.85 * split) return {};
+  if (!fit(readings, n, near, &plane)) return unclear;
+  if (countExplained(readings, n, plane, near) < 0.85 * split) return unclear;
   // What lies beyond the gap must lie behind the plane, too: else the gap was a column of a slanted surface.
   int behind = 0;
   double off2 = 1e300;
@@ -118,7 +121,7 @@ FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
       off2 = std::min(off2, r.x * r.x + r.y * r.y);
     }
   }
-  if (behind < 0.85 * (n - split) || off2 > kMostOffRim * kMostOffRim) return {};
+  if (behind < 0.85 * (n - split) || off2 > kMostOffRim * kMostOffRim) return unclear;
   return evaluate(plane, FeatureDepth::Source::kRim, noise);
 }
 
@@ -144,6 +147,7 @@ FeatureDepth featureDepth(const cv::Mat& depth, double u, double v, const DepthN
       readings[n++] = {x - u, y - v, row[x], noise.sigma(row[x])};
     }
   }
+  if (n > 0) result.source = FeatureDepth::Source::kUnclear;
   if (n < kLeastReadings) return result;
   const auto all = [](const Reading&) { return true; };
   InversePlane plane;

@@ -6,9 +6,9 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "vip_slam_frontend/tracking/corner_detector.h"
-#include "vip_slam_frontend/tracking/feature_depth.h"
 #include "vip_slam_frontend/tracking/outlier_rejection.h"
 #include "vip_slam_frontend/tracking/patch_alignment.h"
+#include "vip_slam_frontend/tracking/pixel_noise.h"
 
 namespace vip_slam {
 
@@ -35,13 +35,20 @@ void FeatureTracker::clear() {
   depth_ = cv::Mat();
 }
 
-void FeatureTracker::measure(Feature* feature) const {
+FeatureDepth::Source FeatureTracker::measure(Feature* feature) const {
   Eigen::Vector2d xy;
   camera_->undistort(feature->pixel.cast<double>(), &xy);
   feature->xy = xy.cast<float>();
   const FeatureDepth surface = featureDepth(depth_, feature->pixel.x(), feature->pixel.y(), noise_);
   feature->depth = surface.z;
   feature->depth_sigma = surface.sigma;
+  return surface.source;
+}
+
+void FeatureTracker::measure(Track* track) const {
+  const FeatureDepth::Source source = measure(&track->feature);
+  const bool at_edge = source != FeatureDepth::Source::kSmooth && source != FeatureDepth::Source::kNone;
+  track->whitening = pixelWhitening(track->texture, track->residual, at_edge);
 }
 
 void FeatureTracker::matchExposure(const cv::Mat& gray) {
@@ -107,6 +114,8 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
       alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, A, gray_, start);
   if (!aligned.ok || (aligned.pixel - start).norm() > most_px) return false;
   track->feature.pixel = aligned.pixel.cast<float>();
+  track->texture = aligned.texture;
+  track->residual = aligned.residual;
   return true;
 }
 
@@ -114,6 +123,8 @@ void FeatureTracker::setReference(Track* track, const std::shared_ptr<const Refe
   track->reference = reference;
   track->reference_pixel = track->feature.pixel.cast<double>();
   track->surface = patchSurface(depth_, track->reference_pixel, track->feature.depth, noise_);
+  track->texture = patchTexture(gray_, track->reference_pixel);
+  track->residual = 0;
 }
 
 void FeatureTracker::addTrack(Track track, const SE3& T_odom_C) {
@@ -123,6 +134,7 @@ void FeatureTracker::addTrack(Track track, const SE3& T_odom_C) {
     here->T_odom_C = T_odom_C;
     setReference(&track, here);
   }
+  measure(&track);
   tracks_.push_back(std::move(track));
 }
 
@@ -204,7 +216,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   }
   tracks_.swap(kept);
   if (options_.refine_against_reference) alignWithReferences(T_odom_C);
-  for (Track& track : tracks_) measure(&track.feature);
+  for (Track& track : tracks_) measure(&track);
   result.tracked = static_cast<int>(tracks_.size());
   return result;
 }
@@ -228,6 +240,7 @@ std::vector<std::size_t> FeatureTracker::replenish(const SE3& T_odom_C, bool for
     track.feature.pixel = Eigen::Vector2f(corner.pixel.x, corner.pixel.y);
     measure(&track.feature);
     setReference(&track, here);
+    measure(&track);
     added.push_back(tracks_.size());
     tracks_.push_back(std::move(track));
   }

@@ -21,20 +21,8 @@ inline float bilinear(const cv::Mat& image, float x, float y) {
   return (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) + fy * ((1 - fx) * q[0] + fx * q[1]);
 }
 
-}  // namespace
-
-PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
-                          const Eigen::Matrix2d& A_ref_cur, const cv::Mat& current, const Eigen::Vector2d& start) {
-  PatchAlignment result;
-  float wide[kWide * kWide];
-  for (int y = 0; y < kWide; ++y) {
-    for (int x = 0; x < kWide; ++x) {
-      const Eigen::Vector2d p = reference_pixel + A_ref_cur * Eigen::Vector2d(x - kHalf - 1, y - kHalf - 1);
-      if (!(p.x() >= 0) || !(p.y() >= 0) || p.x() >= reference.cols - 1 || p.y() >= reference.rows - 1) return result;
-      wide[y * kWide + x] = bilinear(reference, static_cast<float>(p.x()), static_cast<float>(p.y()));
-    }
-  }
-  float patch[kCount], gx[kCount], gy[kCount];
+/// Gradients of the inner (kSide x kSide) part; returns the sums of products of (g_x, g_y, 1).
+Eigen::Matrix3d gradients(const float* wide, float* patch, float* gx, float* gy) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
@@ -47,6 +35,42 @@ PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& refer
       A += g * g.transpose();
     }
   }
+  return A;
+}
+
+/// What the position keeps when the brightness is estimated along.
+Eigen::Matrix2d textureOf(const Eigen::Matrix3d& A) {
+  return A.topLeftCorner<2, 2>() - A.topRightCorner<2, 1>() * A.topRightCorner<2, 1>().transpose() / A(2, 2);
+}
+
+/// Samples the patch with its margin; false outside the image.
+bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const Eigen::Matrix2d& A, float* wide) {
+  for (int y = 0; y < kWide; ++y) {
+    for (int x = 0; x < kWide; ++x) {
+      const Eigen::Vector2d p = pixel + A * Eigen::Vector2d(x - kHalf - 1, y - kHalf - 1);
+      if (!(p.x() >= 0) || !(p.y() >= 0) || p.x() >= image.cols - 1 || p.y() >= image.rows - 1) return false;
+      wide[y * kWide + x] = bilinear(image, static_cast<float>(p.x()), static_cast<float>(p.y()));
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel) {
+  float wide[kWide * kWide], patch[kCount], gx[kCount], gy[kCount];
+  if (!sample(image, pixel, Eigen::Matrix2d::Identity(), wide)) return Eigen::Matrix2d::Zero();
+  return textureOf(gradients(wide, patch, gx, gy));
+}
+
+PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
+                          const Eigen::Matrix2d& A_ref_cur, const cv::Mat& current, const Eigen::Vector2d& start) {
+  PatchAlignment result;
+  float wide[kWide * kWide];
+  if (!sample(reference, reference_pixel, A_ref_cur, wide)) return result;
+  float patch[kCount], gx[kCount], gy[kCount];
+  const Eigen::Matrix3d A = gradients(wide, patch, gx, gy);
+  result.texture = textureOf(A);
   double mean = 0, square = 0;
   for (float value : patch) {
     mean += value;

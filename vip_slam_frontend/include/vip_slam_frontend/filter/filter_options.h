@@ -61,8 +61,10 @@ struct FilterOptions {
   int window = 11;
   double sigma_px = 0.5;
   bool adapt_sigma_px = true;
-  double sigma_px_min = 0.15;
+  double sigma_px_min = 0.01;
   double sigma_px_max = 2.0;
+  double pixel_inflation = 2.0;
+  bool own_noise = true;
   double gate_probability = 0.95;
   double huber = 1.5;
   int max_update_features = 30;
@@ -78,10 +80,13 @@ struct FilterOptions {
 
   void visit(OptionVisitor& v) {
     v.field("window", window, 4, 30, "clones kept");
-    v.field("sigma_px", sigma_px, 0.05, 10.0, "one-sigma of a tracked pixel at the start, px");
+    v.field("sigma_px", sigma_px, 0.05, 10.0, "one-sigma of a well textured patch's pixel at the start, px");
     v.field("adapt_sigma_px", adapt_sigma_px, "adapt sigma_px to the normalised innovations");
-    v.field("sigma_px_min", sigma_px_min, 0.02, 10.0, "lower bound of the adaptation, px");
+    v.field("sigma_px_min", sigma_px_min, 0.01, 10.0, "lower bound of the adaptation, px");
     v.field("sigma_px_max", sigma_px_max, 0.05, 20.0, "upper bound of the adaptation, px");
+    v.field("pixel_inflation", pixel_inflation, 1.0, 20.0,
+            "factor on the adapted sigma_px; above 1: what a track errs in one image it errs in the next, too");
+    v.field("own_noise", own_noise, "a feature whose residuals sigma_px does not explain gets a larger one of its own");
     v.field("gate_probability", gate_probability, 0.5, 0.9999, "chi-square quantile of the feature gate");
     v.field("huber", huber, 0.5, 100.0, "Huber threshold on whitened residuals, sigmas");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");

@@ -14,6 +14,7 @@ class NoiseMonitor {
  private:
   double sigma_, min_, max_;
   bool adapt_;
+  int updates_ = 0;
 };
 
 /// Widens the IMU's noise when the gate turns away far more features than its probability explains: then the prediction

@@ -15,6 +15,8 @@ struct Observation {
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< undistorted normalised coordinates
   double depth = 0;                              ///< z, metres; 0: none
   double depth_sigma = 0;                        ///< metres
+  /// L with L^T L the inverse of the pixel's covariance in units of MeasurementNoise::sigma_xy^2.
+  Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
 };
 
 struct FilterTrack {

@@ -12,6 +12,7 @@
 #include "vip_slam_frontend/filter/observation.h"
 #include "vip_slam_frontend/filter/square_root_filter.h"
 #include "vip_slam_frontend/filter/surface_rows.h"
+#include "vip_slam_frontend/filter/triangulation.h"
 
 namespace vip_slam {
 
@@ -20,6 +21,7 @@ struct FilterMeasurement {
   LandmarkId id = kNoLandmark;
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();
   double depth = 0, depth_sigma = 0;
+  Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< see Observation
 };
 
 /// Where the estimate starts and how well that is known.
@@ -74,6 +76,10 @@ class VioFilter {
   };
   void addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements);
   std::vector<Candidate> chooseCandidates(CloneId id, bool window_full);
+  /// Factor on the common pixel noise for a feature whose residuals that does not explain: its patch shows something
+  /// that is no point (an occluding edge, a reflection). Such patches also wander along with the motion, by much more
+  /// than their residuals say: measured against true poses about as the square of them.
+  double ownNoise(const Triangulation& point) const;
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, bool calibrate, StepReport* report);
   void forgetClone(CloneId id);
@@ -83,7 +89,7 @@ class VioFilter {
   SE3 T_I_C_;
   double time_offset_, focal_;
   Eigen::Vector3d G_;
-  Gate gate_;
+  Gate gate_, explained_;
   NoiseMonitor noise_;
   ImuNoiseMonitor imu_monitor_;
   SquareRootFilter filter_;

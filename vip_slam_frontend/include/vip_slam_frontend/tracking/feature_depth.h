@@ -12,7 +12,8 @@ namespace vip_slam {
 
 struct FeatureDepth {
   enum class Source {
-    kNone,     ///< no depth
+    kNone,     ///< no readings around
+    kUnclear,  ///< readings, but no explanation for them
     kSmooth,   ///< the edge-safe look-up gave it
     kSlanted,  ///< one plane, seen at a flat angle
     kRim       ///< the nearer of two surfaces

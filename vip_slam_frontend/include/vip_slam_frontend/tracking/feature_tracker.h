@@ -14,6 +14,7 @@
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/types/feature.h"
 #include "vip_slam_core/util/timing.h"
+#include "vip_slam_frontend/tracking/feature_depth.h"
 #include "vip_slam_frontend/tracking/patch_surface.h"
 #include "vip_slam_frontend/tracking/tracking_options.h"
 
@@ -31,6 +32,9 @@ struct Track {
   std::shared_ptr<const ReferenceImage> reference;
   Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
   PatchSurface surface;       ///< what the reference patch shows
+  Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< of the patch in the newest image (patch_alignment.h)
+  double residual = 0;        ///< of its match with the reference, grey levels
+  Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< of the newest pixel (pixel_noise.h)
 };
 
 struct TrackingResult {
@@ -68,8 +72,10 @@ class FeatureTracker {
   const std::vector<Track>& tracks() const { return tracks_; }
   const cv::Mat& gray() const { return gray_; }
   const cv::Mat& depth() const { return depth_; }
-  /// Fills xy, depth and depth_sigma from the pixel and the newest depth image.
-  void measure(Feature* feature) const;
+  /// Fills xy, depth and depth_sigma from the pixel and the newest depth image; tells where the depth is from.
+  FeatureDepth::Source measure(Feature* feature) const;
+  /// Same for a track, and how well its patch fixes the pixel.
+  void measure(Track* track) const;
 
  private:
   /// After a jump of the exposure: gives the last image's pyramid the contrast and brightness of the new image.

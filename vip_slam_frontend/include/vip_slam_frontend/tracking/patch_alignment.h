@@ -11,7 +11,13 @@ struct PatchAlignment {
   bool ok = false;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double residual = 0;  ///< root mean square after gain and offset, grey levels
+  Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< see patchTexture, of the warped patch in `current`'s pixels
 };
+
+/// Sum of the gradient products over the patch around `pixel`, the mean gradient taken out since brightness is
+/// estimated along: (grey levels / px)^2, times the variance of a grey level's inverse the information of its position.
+/// Zero outside the image.
+Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel);
 
 /// Finds in `current` the patch that `reference` shows at `reference_pixel`. `A_ref_cur` maps small pixel offsets of
 /// the current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge.

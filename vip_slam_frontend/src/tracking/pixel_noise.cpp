@@ -1,0 +1,41 @@
+#include "vip_slam_frontend/tracking/pixel_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace vip_slam {
+
+namespace {
+
+// Beside noise the scatter of a grey level has a part of its own for every patch: interpolation, blur, shading, slope.
+// This much in grey levels brings the errors of faint and strong patches, measured against true poses, to one level.
+constexpr double kGrey = 5.0;
+// A match that leaves more than noise behind is as uncertain as what it left.
+constexpr double kResidual = 2.0;
+// What is left over for a patch of infinite contrast, px: the unit.
+constexpr double kFloor = 0.05;
+constexpr double kAtEdge = 2.5;
+// (grey levels / px)^2 that no patch falls below, so that a bare edge keeps a finite covariance.
+constexpr double kLeastTexture = 20.0;
+
+}  // namespace
+
+Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, bool at_edge) {
+  const double grey = std::max(kGrey, kResidual * residual) / kFloor;
+  const Eigen::Matrix2d G = texture + kLeastTexture * Eigen::Matrix2d::Identity();
+  Eigen::Matrix2d covariance;
+  covariance << G(1, 1), -G(0, 1), -G(1, 0), G(0, 0);
+  covariance *= grey * grey / (G(0, 0) * G(1, 1) - G(0, 1) * G(1, 0));
+  covariance += Eigen::Matrix2d::Identity();
+  if (at_edge) covariance *= kAtEdge * kAtEdge;
+  const Eigen::Matrix2d root = covariance.llt().matrixL();
+  Eigen::Matrix2d L;
+  L << 1.0 / root(0, 0), 0.0, -root(1, 0) / (root(0, 0) * root(1, 1)), 1.0 / root(1, 1);
+  return L;
+}
+
+double pixelSigma(const Eigen::Matrix2d& whitening) { return 1.0 / std::sqrt(whitening(0, 0) * whitening(1, 1)); }
+
+}  // namespace vip_slam
