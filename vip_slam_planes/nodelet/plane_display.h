@@ -18,8 +18,8 @@ namespace vip_slam {
 
 class PlaneDisplay {
  public:
-  /// Translucent polygons with outlines: grey when horizontal, else one colour a plane. Planes shown before that are gone
-  /// are deleted.
+  /// Translucent polygons with outlines: grey when horizontal, else one colour a plane. Planes shown before that are
+  /// gone are deleted.
   visualization_msgs::MarkerArray markers(const std::vector<PlaneEstimate>& planes, const std_msgs::Header& header,
                                           double opacity);
 

@@ -1,5 +1,5 @@
-// The plane module as a nodelet: keyframes, tracked frames and map updates in; plane updates, the plane map, rviz markers
-// and a cloud out. One thread owns the estimator.
+// The plane module as a nodelet: keyframes, tracked frames and map updates in; plane updates, the plane map, rviz
+// markers and a cloud out. One thread owns the estimator.
 #pragma once
 
 #include <atomic>

@@ -95,7 +95,7 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
       }
       track.coverPolygon(outer, holes);
     }
-    track.confirmed = true;
+    track.confirmed = track.determined = true;
     track.keyframes_seen = static_cast<int>(estimate.keyframes);
     tracks_.emplace(estimate.id, std::move(track));
   }

@@ -48,7 +48,7 @@ class PlaneMapper::Impl {
   void startPlanes(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
                    std::vector<int>* label, std::vector<PlaneTrack*>* tracks);
   void observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
-               const std::vector<int>& label, const DepthMesh& mesh, bool first_time);
+               const std::vector<int>& label, const SurfaceLabels& labels, const DepthMesh& mesh, bool first_time);
   void mergePlanes(const std::vector<PlaneId>& changed);
   void mergeInto(PlaneId from, PlaneId into);
   void removePlane(PlaneId id);

@@ -13,7 +13,8 @@ namespace vip_slam {
 void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_time) {
   const ScopedTimer timer(timing, "planes.keyframe", keyframe.frame.t);
   const SE3& T_map_C = poses_.at(keyframe.id);
-  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, keyframe.frame.depth_grid);
+  const DepthGrid& grid = keyframe.frame.depth_grid;
+  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid);
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
@@ -26,13 +27,17 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
     }
     if (!first_time) continue;
     for (const CellIndex& c : seen_again) tracks[k]->hit(c);
-    clearSeenThrough(keyframe.frame.depth_grid, *camera, noise, T_map_C, options.support.see_through, tracks[k]);
   }
+  const std::size_t known = tracks.size();
   if (first_time) {
     startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
     ++counters.keyframes;
   }
-  observe(keyframe, T_map_C, tracks, label, mesh, first_time);
+  const SurfaceLabels labels = labelNodes(mesh, label, grid);
+  for (std::size_t k = 0; first_time && k < known; ++k) {
+    clearRefuted(grid, labels, static_cast<int>(k), *camera, noise, T_map_C, options.support.see_through, tracks[k]);
+  }
+  observe(keyframe, T_map_C, tracks, label, labels, mesh, first_time);
   if (first_time) {
     for (auto& [id, track] : tracks_) ++track.keyframes_waited;
   }
@@ -58,9 +63,8 @@ void PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C
 }
 
 void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
-                                const std::vector<int>& label, const DepthMesh& mesh, bool first_time) {
-  const DepthGrid& grid = keyframe.frame.depth_grid;
-  const SurfaceLabels labels = labelNodes(mesh, label, grid);
+                                const std::vector<int>& label, const SurfaceLabels& labels, const DepthMesh& mesh,
+                                bool first_time) {
   std::vector<double> area(tracks.size(), 0);
   for (std::size_t i = 0; i < label.size(); ++i) {
     if (label[i] >= 0) area[label[i]] += mesh.triangles[i].area;
@@ -71,8 +75,8 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
     PlaneTrack& track = *tracks[k];
     ids.push_back(track.id());
     if (area[k] > 0) {
-      auto observation = sampler_.sample(keyframe, labels, static_cast<int>(k), rays_(grid), T_map_C, track.id(),
-                                         track.plane());
+      auto observation = sampler_.sample(keyframe, labels, static_cast<int>(k), rays_(keyframe.frame.depth_grid),
+                                         T_map_C, track.id(), track.plane());
       if (observation) {
         track.observations().insert_or_assign(keyframe.id, std::move(*observation));
         fresh_.emplace(track.id(), keyframe.id);
@@ -82,7 +86,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
     if (first_time && area[k] >= options.support.min_area) ++track.keyframes_seen;
     track.confirmed = track.confirmed || track.keyframes_seen >= options.support.min_keyframes ||
                       (track.keyframes_seen > 0 && track.area() >= options.support.sure_area);
-    trusted.push_back(track.confirmed);
+    trusted.push_back(track.confirmed && track.determined);
   }
   points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });
 }

@@ -9,6 +9,7 @@ namespace {
 
 // Keyframes looked at anew per update after the map has moved under their observations.
 constexpr std::size_t kMostRenewed = 10;
+constexpr double kSureDirection = 2.0 * M_PI / 180.0;  // one sigma of a wall's direction
 constexpr double kMovedTurn = 0.5 * M_PI / 180.0, kMovedShift = 0.02;  // of a keyframe by one update
 
 }  // namespace
@@ -89,9 +90,15 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
 }
 
 void PlaneMapper::Impl::refit(PlaneTrack* track) {
+  if (track->optimised() && track->determined) return;
+  const PlaneMoments moments = track->moments(poses_);
+  if (!(moments.weight() > 0)) return;
+  track->determined = normalSigma(moments, track->kind()) < kSureDirection;
   if (track->optimised()) return;
-  Plane plane;
-  if (fitPlane(track->moments(poses_), track->kind(), track->plane().n, &plane)) track->setPlane(plane);
+  // Until the samples tell the direction, detection knows it better: it had the surface up to its border.
+  Plane plane = Plane::fromPointNormal(moments.centroid(), track->plane().n);
+  if (track->determined && !fitPlane(moments, track->kind(), track->plane().n, &plane)) return;
+  track->setPlane(plane);
 }
 
 void PlaneMapper::Impl::withdrawBrokenObservations() {
@@ -163,7 +170,7 @@ void PlaneMapper::Impl::publish(PlaneUpdate* result) {
       it = fresh_.erase(it);
       continue;
     }
-    if (!track->second.confirmed) {
+    if (!track->second.confirmed || !track->second.determined) {
       ++it;
       continue;
     }

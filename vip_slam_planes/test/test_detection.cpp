@@ -124,7 +124,8 @@ TEST(Detection, ARoundColumnIsNoPlane) {
     Scene scene;
     for (int i = 0; i < 64; ++i) {
       const double a = 2 * M_PI * i / 64, b = 2 * M_PI * (i + 1) / 64;
-      const Eigen::Vector3d p(radius * std::cos(a), radius * std::sin(a), 0), q(radius * std::cos(b), radius * std::sin(b), 0);
+      const Eigen::Vector3d p(radius * std::cos(a), radius * std::sin(a), 0);
+      const Eigen::Vector3d q(radius * std::cos(b), radius * std::sin(b), 0);
       scene.add(p, q - p, {0, 0, 4});
     }
     SceneCamera camera(testing::quietNoise(), 1.0);
@@ -145,6 +146,16 @@ TEST(Detection, TwoTablesOfOneHeightAreTwo) {
   const auto planes = detect(&camera, scene, lookAt({-0.5, 0, 1.9}, {1.6, 0, 0.74}));
   ASSERT_EQ(2u, planes.size());
   for (const DetectedPlane& p : planes) EXPECT_NEAR(-0.74, p.plane.d, 0.002);
+}
+
+TEST(Detection, DeskAcrossTheRoomIsFoundAtAFlatAngle) {
+  Scene scene;
+  scene.addRoom({-1, -3, 0}, {7, 3, 4});
+  scene.add({4.5, -0.8, 0.74}, {0.8, 0, 0}, {0, 1.6, 0});
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  for (double x : {1.2, 1.9}) {  // two or three nodes high in the image
+    EXPECT_TRUE(find(detect(&camera, scene, lookAt({x, 0.5, 1.5}, {4, 0, 1.2})), Plane({0, 0, 1}, -0.74))) << x;
+  }
 }
 
 TEST(Detection, MeshDropsTrianglesAcrossDepthEdges) {

@@ -128,6 +128,18 @@ TEST(Mapper, FarPiecesOfOneWallAreOneButNotThoseOfTwo) {
   }
 }
 
+TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
+  for (const double step : {0.0, 0.04}) {
+    Rig rig;
+    Scene scene;
+    scene.add({-4, 1, 0}, {3, 0, 0}, {0, 0, 1.4});
+    scene.add({0.8, 1 + step, 0}, {0.4, 0, 0}, {0, 0, 1.4});  // 1.8 m further on, 0.56 m^2
+    for (int i = 0; i < 4; ++i) rig.look(scene, {-2.5 + 0.2 * i, -1.5, 1.3}, {-2.5 + 0.2 * i, 1, 0.9});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {1 + 0.1 * i, -1.2, 1.3}, {1.2, 1, 0.9});
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
 TEST(Mapper, TablesOfOneHeightStayTwo) {
   Rig rig;
   Scene scene;
@@ -246,7 +258,8 @@ TEST(Mapper, OneWallMappedTwiceBecomesOneWhenTheLoopCloses) {
   for (int visit = 0; visit < 2; ++visit) {
     for (int i = 0; i < 3; ++i) {
       const SE3 truth = lookAt({0, -0.5 + 0.4 * i, 1.4}, {3, -0.5 + 0.4 * i, 1.3});
-      rig.place(rig.camera.keyframe(scene, truth), SE3(truth.rotation(), truth.t() - Eigen::Vector3d(0.4 * visit, 0, 0)));
+      const SE3 drifted(truth.rotation(), truth.t() - Eigen::Vector3d(0.4 * visit, 0, 0));
+      rig.place(rig.camera.keyframe(scene, truth), drifted);
     }
   }
   ASSERT_EQ(2u, rig.mapper.planes().size());

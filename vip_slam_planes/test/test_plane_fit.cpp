@@ -1,3 +1,4 @@
+#include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -71,6 +72,22 @@ TEST(PlaneFit, MomentsMoveWithTheirPoints) {
     after.add(T * p, 0.7);
   }
   EXPECT_LT((before.transformed(T).M - after.M).norm(), 1e-9 * after.M.norm());
+}
+
+TEST(PlaneFit, AColumnOfPointsDoesNotTellWhichWayItsWallRuns) {
+  const double sigma = 0.01, width = 0.6;
+  PlaneMoments column, wall;
+  for (int i = 0; i < 30; ++i) {
+    column.add({3 + sigma * (i % 3 - 1), 1, 0.1 * i}, 1 / (sigma * sigma));
+    wall.add({3, 1 + width * (i % 10 / 9.0 - 0.5), 0.1 * i}, 1 / (sigma * sigma));
+  }
+  EXPECT_GT(normalSigma(column, PlaneKind::kVertical), 0.1);
+  // Thirty points, spread over the width: sigma / sqrt(sum x^2).
+  double sum = 0;
+  for (int i = 0; i < 10; ++i) sum += 3 * std::pow(width * (i / 9.0 - 0.5), 2);
+  EXPECT_NEAR(sigma / std::sqrt(sum), normalSigma(wall, PlaneKind::kVertical), 1e-9);
+  EXPECT_EQ(0, normalSigma(wall, PlaneKind::kHorizontal));
+  EXPECT_TRUE(std::isinf(normalSigma(PlaneMoments(), PlaneKind::kGeneral)));
 }
 
 TEST(PlaneFit, RefusesWhatDoesNotDetermineAPlane) {

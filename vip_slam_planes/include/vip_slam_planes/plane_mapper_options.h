@@ -29,7 +29,7 @@ struct PlaneDetectionOptions {
   double height_bin = 0.05;
   double distance_bin = 0.05;
   double angle_bin_deg = 3.0;
-  double min_area = 0.2;
+  double min_area = 0.15;
   double min_width = 0.25;
   double max_rms = 0.02;
   double max_tilt_deg = 2.5;
@@ -126,7 +126,8 @@ struct PointAssociationOptions {
     v.field("similar_px", similar_px, 0.05, 10.0,
             "what forcing a point onto the plane may add to its reprojection error, RMS, px");
     v.field("max_error_px", max_error_px, 0.5, 50.0, "largest reprojection error of a plane point, px");
-    v.field("max_distance", max_distance, 0.002, 0.5, "largest distance of the free point to the plane beyond noise, m");
+    v.field("max_distance", max_distance, 0.002, 0.5,
+            "largest distance of the free point to the plane beyond noise, m");
     v.field("max_failures", max_failures, 1, 50, "failed tests that end a candidacy");
   }
 };

@@ -169,8 +169,8 @@ class Detector {
     return parts;
   }
 
-  // Triangles that span a step between two surfaces line up into strips one triangle wide: all their vertices lie on the
-  // strip's border, those of a true surface mostly inside.
+  // Triangles that span a step between two surfaces line up into strips one triangle wide: all their vertices lie on
+  // the strip's border, those of a true surface mostly inside.
   bool solid(const std::vector<int>& surface) const {
     std::vector<int> sides, all;
     for (int i : surface) {
@@ -190,8 +190,8 @@ class Detector {
     return inside >= 4 && 10 * inside >= surface.size();
   }
 
-  // A strip of a round column passes for a plane by its distances and normals; a quadric tells them apart. True when the
-  // surface bends for certain, or when it is too narrow for its noise to exclude a column: a nearer view will tell.
+  // A strip of a round column passes for a plane by its distances and normals; a quadric tells them apart. True when
+  // the surface bends for certain, or when it is too narrow for its noise to exclude a column: a nearer view will tell.
   bool curved(const std::vector<int>& surface, const Plane& plane, double sigma) const {
     constexpr double kBends = 1 / 4.0;   // 1/m, for certain; lens and depth distortion bend walls less than that
     constexpr double kColumn = 1 / 1.0;  // 1/m, possibly
@@ -230,7 +230,8 @@ class Detector {
       result.area += triangles_[i].area;
       for (const Eigen::Vector3d& p : triangles_[i].corner) moments.add(p - camera_, triangles_[i].area / 3);
     }
-    if (result.area < options_.min_area || !solid(surface)) return false;
+    // Level surfaces are seen at a flat angle, a few nodes high; what spans a step is level by accident only.
+    if (result.area < options_.min_area || (kind != PlaneKind::kHorizontal && !solid(surface))) return false;
     double rms = 0;
     if (!fit(surface, kind, &result.plane, &rms)) return false;
     const double sigma = medianSigma(surface);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Eigenvalues>
 
@@ -38,6 +39,20 @@ bool fitPlane(const PlaneMoments& moments, PlaneKind kind, const Eigen::Vector3d
   if (n.dot(towards) < 0) n = -n;
   *plane = Plane::fromPointNormal(mean, n);
   return true;
+}
+
+double normalSigma(const PlaneMoments& moments, PlaneKind kind) {
+  if (!(moments.weight() > 0)) return std::numeric_limits<double>::infinity();
+  if (kind == PlaneKind::kHorizontal) return 0;
+  const Eigen::Vector3d mean = moments.centroid();
+  const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() - moments.weight() * mean * mean.transpose();
+  double information;  // sum w x^2 about the axis that a turn has the least leverage on
+  if (kind == PlaneKind::kVertical) {
+    information = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter.topLeftCorner<2, 2>()).eigenvalues()(1);
+  } else {
+    information = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1);
+  }
+  return information > 0 ? 1.0 / std::sqrt(information) : std::numeric_limits<double>::infinity();
 }
 
 bool fitPlaneRobust(const std::vector<Eigen::Vector3d>& points, const std::vector<double>& weights, double sigma,

@@ -152,6 +152,7 @@ void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
   }
   keyframes_seen = std::max<int>(keyframes_seen, static_cast<int>(observations_.size()));
   confirmed = confirmed || other.confirmed;
+  determined = determined || other.determined;
 }
 
 PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {

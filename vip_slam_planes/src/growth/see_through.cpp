@@ -24,13 +24,13 @@ bool mayBeInView(const PlaneTrack& track, const SE3& T_map_C, double range) {
   return std::hypot(dx, dy) == 0;
 }
 
-int clearSeenThrough(const DepthGrid& grid, const CameraModel& camera, const DepthNoise& noise, const SE3& T_map_C,
-                     double margin, PlaneTrack* track) {
+int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, const CameraModel& camera,
+                 const DepthNoise& noise, const SE3& T_map_C, double margin, PlaneTrack* track) {
   constexpr double kGrazing = 0.25;  // cosine of 75 degrees
   if (grid.empty()) return 0;
   const SE3 T_C_map = T_map_C.inverse();
   const Eigen::Vector3d n_C = T_C_map.rotation() * track->plane().n;
-  std::vector<CellIndex> through;
+  std::vector<CellIndex> refuted;
   track->cells().forEach([&](CellIndex cell, int) {
     const Eigen::Vector3d p = T_C_map * track->cellCentre(cell);
     if (p.z() < noise.min_range || p.z() > noise.max_range || -n_C.dot(p) < kGrazing * p.norm()) return;
@@ -40,15 +40,17 @@ int clearSeenThrough(const DepthGrid& grid, const CameraModel& camera, const Dep
     const int r = static_cast<int>(std::floor((uv.y() - grid.offset) / grid.stride));
     if (c < 0 || r < 0 || c + 1 >= grid.cols || r + 1 >= grid.rows) return;
     const double facing = -n_C.dot(p) / p.z();  // |n . ray|
-    const double behind = (margin + 3 * noise.sigma(p.z()) * facing) / facing;
+    const double slack = (margin + 3 * noise.sigma(p.z()) * facing) / facing;
     for (int k = 0; k < 4; ++k) {
-      const double z = grid.at(c + (k & 1), r + (k >> 1));
-      if (!(z > p.z() + behind)) return;
+      const int col = c + (k & 1), row = r + (k >> 1), label = labels.at(col, row);
+      const double z = grid.at(col, row);
+      const bool behind = z > p.z() + slack, another = z > p.z() - slack && label >= 0 && label != own;
+      if (!behind && !another) return;
     }
-    through.push_back(cell);
+    refuted.push_back(cell);
   });
-  for (const CellIndex& cell : through) track->miss(cell);
-  return static_cast<int>(through.size());
+  for (const CellIndex& cell : refuted) track->miss(cell);
+  return static_cast<int>(refuted.size());
 }
 
 }  // namespace vip_slam

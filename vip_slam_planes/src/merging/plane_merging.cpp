@@ -9,9 +9,11 @@ namespace {
 // Smaller walls and ceilings are furniture. What one can put things on stays apart until it is a floor: two tables are
 // two.
 constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
+constexpr double kSmallGap = 4.0;  // a smaller piece of a wall may be as many of its own widths away
 
 bool isBorder(const CellGrid& cells, CellIndex c) {
-  return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) || !cells.at({c.x, c.y + 1});
+  return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) ||
+         !cells.at({c.x, c.y + 1});
 }
 
 // What the smaller plane's area looks like from the larger one.
@@ -99,10 +101,16 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
   // apart two pieces of one plane may be follows from how well the smaller one determines its plane, not from a length.
   const double smaller = std::min(area_a, area_b);
   const double large_from = a.plane().n.z() > 0.5 ? kLargeFloor : kLargeWall;
-  const double gap = smaller >= large_from ? std::max(options.gap, options.gap_per_area * smaller) : options.gap;
+  double gap = smaller >= large_from ? std::max(options.gap, options.gap_per_area * smaller) : options.gap;
+  // The rest of a parapet behind a stair is small, but on its plane to the centimetre; furniture is seldom.
+  double apart = options.distance_apart;
+  if (smaller < large_from && a.kind() == PlaneKind::kVertical && std::max(area_a, area_b) >= large_from) {
+    gap = std::max(options.gap, std::min(options.gap_per_area * kLargeWall, kSmallGap * std::sqrt(smaller)));
+    apart *= 0.5;
+  }
   if (boundsGap(small, large) > gap) return false;
   const Contact meeting = contact(small, large, options.gap);
-  if (meeting.near == 0 && (gap <= options.gap || meeting.worst_border > options.distance_apart)) return false;
+  if (meeting.near == 0 && (gap <= options.gap || meeting.worst_border > apart)) return false;
   if (meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) return false;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
   // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift

@@ -1,5 +1,5 @@
-// Which landmarks lie on which plane: the paper's candidate set and its decisions. Landmarks keep their identity through
-// the back end's merges; what is known about one follows its MapUpdates.
+// Which landmarks lie on which plane: the paper's candidate set and its decisions. Landmarks keep their identity
+// through the back end's merges; what is known about one follows its MapUpdates.
 #pragma once
 
 #include <functional>

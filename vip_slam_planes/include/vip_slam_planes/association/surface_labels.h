@@ -12,7 +12,9 @@ struct SurfaceLabels {
   int stride = 0, offset = 0, cols = 0, rows = 0;
   std::vector<int> label;  ///< -1: none
 
-  int at(int c, int r) const { return c < 0 || r < 0 || c >= cols || r >= rows ? -1 : label[std::size_t(r) * cols + c]; }
+  int at(int c, int r) const {
+    return c < 0 || r < 0 || c >= cols || r >= rows ? -1 : label[std::size_t(r) * cols + c];
+  }
   /// The only label of the four nodes around a pixel when at least two have it, else -1.
   int around(const Eigen::Vector2f& pixel) const;
   /// The label of a node whose eight neighbours have it too, else -1: a margin of one stride to every border.

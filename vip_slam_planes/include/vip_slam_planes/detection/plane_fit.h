@@ -34,7 +34,11 @@ struct PlaneMoments {
 /// `towards` (n . towards >= 0). False when the points do not determine it (no weight, or no extent).
 bool fitPlane(const PlaneMoments& moments, PlaneKind kind, const Eigen::Vector3d& towards, Plane* plane);
 
-/// The same with Tukey's weights: points beyond about 4.7 times the scale (never below sigma) count nothing.
+/// One sigma of the least certain direction of that plane's normal, radians, when the weights are inverse variances: a
+/// column of samples tells nothing about which way its wall runs. 0 for horizontal planes, infinite without points.
+double normalSigma(const PlaneMoments& moments, PlaneKind kind);
+
+/// fitPlane() with Tukey's weights: points beyond about 4.7 times the scale (never below sigma) count nothing.
 /// `weights` are the points' areas or inverse variances. `rms` (may be null) is that of the weighted inliers.
 bool fitPlaneRobust(const std::vector<Eigen::Vector3d>& points, const std::vector<double>& weights, double sigma,
                     PlaneKind kind, const Eigen::Vector3d& towards, Plane* plane, double* rms);

@@ -59,7 +59,8 @@ class CellGrid {
 
 /// Calls f(CellIndex) for the cells (side `cell`, metres) whose centre lies in the triangle abc of the plane.
 template <class F>
-void forCellsOfTriangle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c, double cell, F f) {
+void forCellsOfTriangle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c, double cell,
+                        F f) {
   const Eigen::Vector2d low = a.cwiseMin(b).cwiseMin(c) / cell, high = a.cwiseMax(b).cwiseMax(c) / cell;
   const auto cross = [](const Eigen::Vector2d& u, const Eigen::Vector2d& v) { return u.x() * v.y() - u.y() * v.x(); };
   const double sign = cross(b - a, c - a) < 0 ? -1.0 : 1.0;

@@ -86,6 +86,7 @@ class PlaneTrack {
 
   // Book-keeping of the mapper.
   bool confirmed = false;
+  bool determined = false;       ///< its observations tell its direction; until then the back end does not get them
   int keyframes_seen = 0;        ///< keyframes that saw a fair part of it, ever
   int keyframes_waited = 0;      ///< processed since the plane started
 

@@ -1,4 +1,4 @@
-// Evidence against a plane: a keyframe's depth lies behind its covered cells.
+// Evidence against a plane: a keyframe's depth lies behind its covered cells, or belongs to another plane there.
 #pragma once
 
 #include <memory>
@@ -6,15 +6,17 @@
 #include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_planes/association/surface_labels.h"
 #include "vip_slam_planes/growth/plane_track.h"
 
 namespace vip_slam {
 
-/// Takes a hit from every cell that the keyframe looks through: all four grid nodes around its image measure depth more
-/// than `margin` metres (plus noise) behind the plane, which is seen from its own side and not at a grazing angle.
-/// Returns the number of such cells.
-int clearSeenThrough(const DepthGrid& grid, const CameraModel& camera, const DepthNoise& noise, const SE3& T_map_C,
-                     double margin, PlaneTrack* track);
+/// Takes a hit from every cell that the keyframe refutes: each of the four grid nodes around its image either measures
+/// depth more than `margin` metres (plus noise) behind the plane, or is nearer than that and shows another plane than
+/// `own` (what looks like one slanted surface from afar, wall and door of a recess, is two from near). The plane must
+/// be seen from its own side and not at a grazing angle. Returns the number of such cells.
+int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, const CameraModel& camera,
+                 const DepthNoise& noise, const SE3& T_map_C, double margin, PlaneTrack* track);
 
 /// Whether the covered area's bounds may be in front of the camera within `range` metres.
 bool mayBeInView(const PlaneTrack& track, const SE3& T_map_C, double range);

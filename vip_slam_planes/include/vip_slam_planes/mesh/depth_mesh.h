@@ -1,9 +1,9 @@
 // The image's Delaunay mesh lifted to 3D by depth (paper section "Plane Detection"), in the camera's optical frame.
 //
 // The paper triangulates the features alone. White walls, the very planes that hold the drift down, have none; so nodes
-// of the image's grid of edge-safe depths fill in wherever no feature with depth is near: coarsely on flat blocks, every
-// node beside depth edges. Triangles that cross a depth edge, are long and thin, or are seen at a grazing angle are
-// dropped.
+// of the image's grid of edge-safe depths fill in wherever no feature with depth is near: coarsely on flat blocks,
+// every node beside depth edges. Triangles that cross a depth edge, are long and thin, or are seen at a grazing angle
+// are dropped.
 #pragma once
 
 #include <array>
