@@ -55,7 +55,8 @@ TEST(GbaBenchmark, BothSolversReachTheSameCostInAllVariants) {
     EXPECT_LT(own.summary.final_cost, 0.5 * own.summary.initial_cost) << variantName(v);
   }
   // Compression changes nothing but the time.
-  const GbaRun p = runGba(map, Variant::kViP, "structured", 1, 10, 1), cp = runGba(map, Variant::kViCp, "structured", 1, 10, 1);
+  const GbaRun p = runGba(map, Variant::kViP, "structured", 1, 10, 1),
+               cp = runGba(map, Variant::kViCp, "structured", 1, 10, 1);
   EXPECT_NEAR(p.summary.final_cost, cp.summary.final_cost, 1e-5 * p.summary.final_cost);
   EXPECT_NEAR(p.rmse, cp.rmse, 1e-4);
 }

@@ -28,11 +28,14 @@ struct MeasurementOptions {
   double homography_inflation = 1.0;
 
   void visit(OptionVisitor& v) {
-    v.field("pixel_sigma", pixel_sigma, 0.05, 10.0, "one sigma of a tracked feature in its landmark's first keyframe, px");
+    v.field("pixel_sigma", pixel_sigma, 0.05, 10.0,
+            "one sigma of a tracked feature in its landmark's first keyframe, px");
     v.field("pixel_creep", pixel_creep, 0.0, 10.0, "error that a track takes up with each further keyframe, px");
-    v.field("max_pixel_sigma", max_pixel_sigma, 0.1, 10.0, "the sigma of a tracked feature grows no further than this, px");
+    v.field("max_pixel_sigma", max_pixel_sigma, 0.1, 10.0,
+            "the sigma of a tracked feature grows no further than this, px");
     v.field("gate_sigma", gate_sigma, 0.1, 10.0, "outliers are judged against at least this sigma, px");
-    v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0, "one sigma of an untracked ORB corner, px per octave");
+    v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0,
+            "one sigma of an untracked ORB corner, px per octave");
     v.field("huber", huber, 0.5, 20.0, "reprojection residuals above this many sigmas weigh less");
     v.field("depth_huber", depth_huber, 0.5, 20.0, "depth residuals above this many sigmas weigh less");
     v.field("depth_sigma_scale", depth_sigma_scale, 0.1, 20.0, "factor on the depth sigma given by the front end");
@@ -55,7 +58,8 @@ struct LocalBaOptions {
     v.field("max_iterations", max_iterations, 1, 100, "Levenberg-Marquardt iterations");
     v.field("max_seconds", max_seconds, 0.0, 10.0, "time limit; 0 or lockstep: none");
     v.field("max_fixed_keyframes", max_fixed_keyframes, 0, 1000, "older keyframes that hold the window's landmarks");
-    v.field("shared_hosts", shared_hosts, "few keyframes host the homographies of many plane points, instead of first views");
+    v.field("shared_hosts", shared_hosts,
+            "few keyframes host the homographies of many plane points, instead of first views");
   }
 };
 
@@ -69,7 +73,8 @@ struct GlobalBaOptions {
     v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
     v.field("max_seconds", max_seconds, 0.0, 600.0, "time limit; 0 or lockstep: none");
     v.field("at_end", at_end, "run one at the end of the data");
-    v.field("shared_hosts", shared_hosts, "few keyframes host the homographies of many plane points, instead of first views");
+    v.field("shared_hosts", shared_hosts,
+            "few keyframes host the homographies of many plane points, instead of first views");
   }
 };
 
@@ -96,7 +101,8 @@ struct CullingOptions {
 
   void visit(OptionVisitor& v) {
     v.field("enabled", enabled, "remove redundant keyframes and poor landmarks");
-    v.field("redundancy", redundancy, 0.5, 1.0, "fraction of landmarks seen by three other keyframes that makes one redundant");
+    v.field("redundancy", redundancy, 0.5, 1.0,
+            "fraction of landmarks seen by three other keyframes that makes one redundant");
     v.field("max_imu_seconds", max_imu_seconds, 0.5, 10.0, "longest IMU factor that culling may leave");
   }
 };
@@ -115,7 +121,8 @@ struct BackEndOptions {
 
   void visit(OptionVisitor& v) {
     v.field("variant", variant, {"vi", "vi_p", "vi_cp", "vip"}, "which of the paper's systems runs");
-    v.field("solver", solver, {"structured", "ceres"}, "the structure-aware Levenberg-Marquardt or the Ceres reference");
+    v.field("solver", solver, {"structured", "ceres"},
+            "the structure-aware Levenberg-Marquardt or the Ceres reference");
     v.field("loop_closing", loop_closing, "recognise places and close loops");
     v.field("lockstep", lockstep, "ignore time limits so that two runs give the same bits");
     v.group("measurement", measurement);

@@ -227,7 +227,8 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << topics.color_info << "\"\n  depth: \"" << topics.depth << "\"\n  depth_info: \"" << topics.depth_info
       << "\"\n  imu: \"" << topics.imu << "\"\n  gyro: \"" << topics.gyro << "\"\n  accel: \"" << topics.accel
       << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
-      << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter) << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
+      << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter)
+      << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
       << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
       << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";

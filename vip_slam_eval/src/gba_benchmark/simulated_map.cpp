@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "vip_slam_planes/detection/plane_fit.h"
 #include "world.h"
 
 namespace vip_slam {
@@ -248,11 +249,17 @@ class Simulator {
         observations.push_back(std::move(o));
       }
     }
+    std::map<int, PlaneMoments> surfaces;
+    for (std::size_t p = 0; p < points_.size(); ++p)
+      if (points_[p].plane >= 0)
+        surfaces[points_[p].plane].add(out->map.landmark(static_cast<LandmarkId>(p)).p_W, 1.0);
     for (const auto& entry : first_seen) {
       PlaneEstimate e;
       e.id = entry.first + 1;
       e.kind = world_.planes[entry.first].kind;
-      e.plane = transformPlane(entry.second, world_.planes[entry.first].plane).boxplus(gauss3(0.005));
+      // As the plane module leaves it: fitted to what is known of its surface.
+      const Plane drifted = transformPlane(entry.second, world_.planes[entry.first].plane);
+      if (!fitPlane(surfaces[entry.first], PlaneKind::kGeneral, drifted.n, &e.plane)) e.plane = drifted;
       out->map.setPlane(e);
     }
     for (const PlaneObservation& o : observations) out->map.setPlaneObservation(o);
