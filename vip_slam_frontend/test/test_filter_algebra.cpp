@@ -10,6 +10,7 @@
 #include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/filter/qr.h"
 #include "vip_slam_frontend/filter/square_root_filter.h"
+#include "vip_slam_frontend/filter/triangular_solve.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
 namespace vip_slam {

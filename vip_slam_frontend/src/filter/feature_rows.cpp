@@ -1,17 +1,59 @@
 #include "vip_slam_frontend/filter/feature_rows.h"
 
-#include "vip_slam_frontend/filter/qr.h"
+#include <algorithm>
+#include <cmath>
+
+#include "packs.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
 namespace vip_slam {
 
-void stackFeature(const WindowState& window, const std::vector<Observation>& observations, const Eigen::Vector3d& f_W,
-                  const MeasurementNoise& noise, Eigen::MatrixXd* H_x, Eigen::MatrixXd* H_f, Eigen::VectorXd* r) {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Householder reflections of the rows begin .. end that leave the three columns from `feature` on upper triangular.
+/// The columns before `column` are zero in these rows; `stride` leaves room for a pack beyond `width`.
+VIP_SLAM_VECTOR_CLONES
+void eliminateFeature(double* A, long stride, int width, int feature, int begin, int end, int column) {
+  for (int pivot = 0; pivot < 3 && begin + pivot < end; ++pivot) {
+    double* head = A + (begin + pivot) * stride;
+    double* const last = A + end * stride;
+    double tail2 = 0;
+    for (double* row = head + stride; row < last; row += stride) tail2 += row[feature + pivot] * row[feature + pivot];
+    if (tail2 == 0.0) continue;
+    const double alpha = head[feature + pivot], beta = std::sqrt(alpha * alpha + tail2);
+    // (alpha - beta) without cancellation
+    const double v0 = alpha <= 0 ? alpha - beta : -tail2 / (alpha + beta);
+    const double tau = 2.0 / (tail2 + v0 * v0);
+    double v[5];  // a view has up to three rows, the views after it hand up three
+    int rows = 0;
+    for (double* row = head + stride; row < last; row += stride) v[rows++] = row[feature + pivot];
+    for (int c = column; c < width; c += 4) {
+      Pack sum = spread(v0) * load(head + c);
+      for (int k = 0; k < rows; ++k) sum += spread(v[k]) * load(head + (k + 1) * stride + c);
+      sum *= spread(tau);
+      store(head + c, load(head + c) - spread(v0) * sum);
+      for (int k = 0; k < rows; ++k) {
+        double* x = head + (k + 1) * stride + c;
+        store(x, load(x) - spread(v[k]) * sum);
+      }
+    }
+    for (double* row = head + stride; row < last; row += stride) row[feature + pivot] = 0.0;
+  }
+}
+
+}  // namespace
+
+std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<Observation>& observations,
+                                   const Eigen::Vector3d& f_W, const MeasurementNoise& noise, Eigen::MatrixXd* H_x,
+                                   Eigen::MatrixXd* H_f, Eigen::VectorXd* r) {
   const int most = 3 * static_cast<int>(observations.size());
   *H_x = Eigen::MatrixXd::Zero(most, window.dimension());
   *H_f = Eigen::MatrixXd::Zero(most, 3);
   *r = Eigen::VectorXd::Zero(most);
   const Eigen::Matrix3d R_C_I = window.T_I_C.R().transpose();
+  std::vector<ViewRows> views;
   int row = 0;
   for (const Observation& o : observations) {
     const int index = window.indexOf(o.clone);
@@ -43,6 +85,7 @@ void stackFeature(const WindowState& window, const std::vector<Observation>& obs
 
     const Eigen::Matrix3d M_theta = J_measure * J_theta, M_f = J_measure * J_f;
     const int column = window.cloneColumn(index);
+    views.push_back({row, column});
     H_x->block(row, column, rows, 3) = M_theta.topRows(rows);
     H_x->block(row, column + 3, rows, 3) = -M_f.topRows(rows);
     H_f->middleRows(row, rows) = M_f.topRows(rows);
@@ -61,24 +104,33 @@ void stackFeature(const WindowState& window, const std::vector<Observation>& obs
   H_x->conservativeResize(row, Eigen::NoChange);
   H_f->conservativeResize(row, Eigen::NoChange);
   r->conservativeResize(row);
+  return views;
 }
 
 FeatureRows featureRows(const WindowState& window, const std::vector<Observation>& observations,
                         const Eigen::Vector3d& f_W, const MeasurementNoise& noise) {
   Eigen::MatrixXd H_x, H_f;
   Eigen::VectorXd r;
-  stackFeature(window, observations, f_W, noise, &H_x, &H_f, &r);
+  const std::vector<ViewRows> views = stackFeature(window, observations, f_W, noise, &H_x, &H_f, &r);
   FeatureRows result;
   const int rows = static_cast<int>(r.size());
   if (rows <= 3) return result;
-  const int n = window.dimension();
-  Eigen::MatrixXd A(rows, 3 + n + 1);
-  A.leftCols(3) = H_f;
-  A.middleCols(3, n) = H_x;
-  A.col(3 + n) = r;
-  triangularise(A, 3);
-  result.H = A.block(3, 3, rows - 3, n);
-  result.r = A.col(3 + n).tail(rows - 3);
+  const int nav = window.navColumn(), width = nav + 4;
+  RowMajor A = RowMajor::Zero(rows, width + 4);
+  A.leftCols(nav) = H_x.leftCols(nav);
+  A.middleCols<3>(nav) = H_f;
+  A.col(nav + 3) = r;
+  // From the last view to the first: the three rows that hold the feature go on to the view before, those that are
+  // free of it stay and keep the zeros of the clones before their view.
+  int below = 0;  // rows that hold the feature in the views done so far
+  for (int i = static_cast<int>(views.size()) - 1; i >= 0; --i) {
+    const int begin = views[i].begin, next = i + 1 < static_cast<int>(views.size()) ? views[i + 1].begin : rows;
+    eliminateFeature(A.data(), A.cols(), width, nav, begin, next + below, views[i].column);
+    below = std::min(3, next + below - begin);
+  }
+  result.H = Eigen::MatrixXd::Zero(rows - 3, window.dimension());
+  result.H.leftCols(nav) = A.block(3, 0, rows - 3, nav);
+  result.r = A.col(nav + 3).tail(rows - 3);
   return result;
 }
 

@@ -2,10 +2,6 @@
 
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
-#include "vip_slam_frontend/filter/qr.h"
-
 namespace vip_slam {
 
 namespace {
@@ -45,14 +41,6 @@ double chiSquareQuantile(double probability, int dof) {
     (gammaP(0.5 * dof, 0.5 * middle) < probability ? low : high) = middle;
   }
   return 0.5 * (low + high);
-}
-
-double mahalanobis(const Eigen::MatrixXd& R, const Eigen::MatrixXd& H, const Eigen::VectorXd& r) {
-  Eigen::MatrixXd Z = H;
-  solveRight(R, Z);
-  Eigen::MatrixXd S = Eigen::MatrixXd::Identity(H.rows(), H.rows());
-  S.selfadjointView<Eigen::Lower>().rankUpdate(Z);
-  return r.dot(S.selfadjointView<Eigen::Lower>().llt().solve(r));
 }
 
 Gate::Gate(double probability) : table_(200), probability_(probability) {

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "vip_slam_frontend/filter/qr.h"
+#include "vip_slam_frontend/filter/triangular_solve.h"
 
 namespace vip_slam {
 

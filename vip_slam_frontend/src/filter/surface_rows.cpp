@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "vip_slam_frontend/filter/qr.h"
+#include "vip_slam_frontend/filter/triangular_solve.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
 namespace vip_slam {

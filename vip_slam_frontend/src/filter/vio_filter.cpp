@@ -4,10 +4,39 @@
 #include <cmath>
 
 #include "vip_slam_frontend/filter/feature_rows.h"
+#include "vip_slam_frontend/filter/triangular_solve.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
 
 namespace vip_slam {
+
+namespace {
+
+/// All features' rows, those that begin further right below: what the triangularisation likes best.
+void stackStaircase(const std::vector<FeatureRows>& features, int rows, Eigen::MatrixXd* H, Eigen::VectorXd* h) {
+  struct Row {
+    int column, feature, row;
+  };
+  std::vector<Row> order;
+  order.reserve(rows);
+  for (std::size_t f = 0; f < features.size(); ++f) {
+    const Eigen::MatrixXd& from = features[f].H;
+    for (int i = 0; i < from.rows(); ++i) {
+      int column = 0;
+      while (column < from.cols() && from(i, column) == 0.0) ++column;
+      order.push_back({column, static_cast<int>(f), i});
+    }
+  }
+  std::stable_sort(order.begin(), order.end(), [](const Row& a, const Row& b) { return a.column < b.column; });
+  H->resize(rows, features.front().H.cols());
+  h->resize(rows);
+  for (int i = 0; i < rows; ++i) (*h)(i) = features[order[i].feature].r(order[i].row);
+  for (int c = 0; c < H->cols(); ++c) {
+    for (int i = 0; i < rows; ++i) (*H)(i, c) = features[order[i].feature].H(order[i].row, c);
+  }
+}
+
+}  // namespace
 
 VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, const SE3& T_I_C, double time_offset,
                      double focal_px, double gravity)
@@ -169,14 +198,9 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
     noise_.add(1.05 * chi2[chi2.size() / 2], chi2_rows);
   }
   if (rows == 0) return;
-  Eigen::MatrixXd H(rows, window.dimension());
-  Eigen::VectorXd h(rows);
-  int at = 0;
-  for (const FeatureRows& feature : accepted) {
-    H.middleRows(at, feature.r.size()) = feature.H;
-    h.segment(at, feature.r.size()) = feature.r;
-    at += static_cast<int>(feature.r.size());
-  }
+  Eigen::MatrixXd H;
+  Eigen::VectorXd h;
+  stackStaircase(accepted, rows, &H, &h);
   const UpdateResult result = filter_.update(H, h);
   report->features_used = static_cast<int>(accepted.size());
   report->rows = rows;

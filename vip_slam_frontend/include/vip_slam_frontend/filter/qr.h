@@ -1,5 +1,5 @@
 // In-place Householder triangularisations for the square-root filter. Columns are contiguous (Eigen's default), the
-// inner loops run along rows, so they vectorise; on x86 the AVX2 build of the loops is chosen at run time.
+// inner loops run along rows, so they vectorise; four reflectors are applied at once.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,10 +13,7 @@ namespace vip_slam {
 void triangularise(Eigen::MatrixXd& A, int pivots);
 
 /// [R; H] -> [R'; 0] with the right-hand sides [r; h] -> [r'; e], exploiting that R (n x n) is upper triangular.
-/// H (m x n) is overwritten. On return |e|^2 is the part of the residual that the state cannot explain.
+/// H (m x n) is overwritten; it costs least when rows that begin further right come last. On return |e|^2 is the part of the residual that the state cannot explain.
 void stackTriangular(Eigen::MatrixXd& R, Eigen::VectorXd& r, Eigen::MatrixXd& H, Eigen::VectorXd& h);
-
-/// Z with R^T Z^T = H^T, row-wise: Z = H R^-1 (m x n), R upper triangular. Used by the gate and for covariances.
-void solveRight(const Eigen::MatrixXd& R, Eigen::MatrixXd& H);
 
 }  // namespace vip_slam
