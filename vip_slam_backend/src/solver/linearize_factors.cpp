@@ -35,38 +35,27 @@ struct NodeSums {
 
 }  // namespace
 
+// What the rotation's residual needs beside the states: trigonometry, which stays out of the vectors.
 void StructuredSolver::linearizeImu(const BaProblem& problem) {
-  const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
-  using RowMajor15x32 = Eigen::Matrix<double, 15, 32, Eigen::RowMajor>;
-  Matrix15d J[2];
-  alignas(64) double J_both[15 * 32] = {0}, H_both[30 * 32] = {0}, g_both[32];
-  Eigen::Map<RowMajor15x32> both(J_both);
   for (std::size_t k = 0; k < problem.imu.size(); ++k) {
-    const BaImu& f = problem.imu[k];
-    const Matrix15d& W = f.preintegration->sqrtInformation();
-    const Eigen::Matrix<double, 15, 1> r =
-        W.triangularView<Eigen::Upper>() * f.preintegration->residual(problem.frames[f.i].state,
-                                                                      problem.frames[f.j].state, problem.gravity, &J[0],
-                                                                      &J[1], false);
-    const int nodes[4] = {structure_.pose_node[f.i], structure_.motion_node[f.i], structure_.pose_node[f.j],
-                          structure_.motion_node[f.j]};
-    both.leftCols<15>() = J[0];
-    both.middleCols<15>(15) = J[1];
-    homographyKernels().gram(W.data(), J_both, r.data(), H_both, g_both);
-    const Eigen::Map<const Eigen::Matrix<double, 32, 30>> H(H_both);  // its lower half is filled
-    const Eigen::Map<const Eigen::Matrix<double, 32, 1>> g(g_both);
-    const auto& place = structure_.imu[k].place;
-    for (int s = 0; s < 2; ++s) {
-      const int o = 15 * s;
-      sums.add<6>(nodes[2 * s], H.block<6, 6>(o, o), g.segment<6>(o));
-      sums.add<9>(nodes[2 * s + 1], H.block<9, 9>(o + 6, o + 6), g.segment<9>(o + 6));
-      addBlock<9, 6>(values_.data(), place[2 * s + 1][2 * s], H.block<9, 6>(o + 6, o));
-    }
-    addBlock<6, 6>(values_.data(), place[2][0], H.block<6, 6>(15, 0));
-    addBlock<6, 9>(values_.data(), place[2][1], H.block<6, 9>(15, 6));
-    addBlock<9, 6>(values_.data(), place[3][0], H.block<9, 6>(21, 0));
-    addBlock<9, 9>(values_.data(), place[3][1], H.block<9, 9>(21, 6));
+    const Preintegration& p = *problem.imu[k].preintegration;
+    double* rows = imu_states_.data() + kImuStateRows * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
+    Eigen::Vector3d r_theta;
+    for (int c = 0; c < 3; ++c) r_theta(c) = rows[kKernelLanes * (kImuResidual + c)];
+    const Eigen::Vector3d dbg = problem.frames[problem.imu[k].i].state.bias_gyro - p.biasGyro();
+    const Eigen::Matrix3d Jr_inv = rightJacobianInverseSO3(r_theta);
+    const Eigen::Matrix3d theta_bg =
+        -expSO3(-r_theta) * rightJacobianSO3(p.J_theta_bg() * dbg) * p.J_theta_bg();
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) {
+        rows[kKernelLanes * (kImuInverseJr + 3 * r + c)] = Jr_inv(r, c);
+        rows[kKernelLanes * (kImuThetaBg + 3 * r + c)] = theta_bg(r, c);
+      }
   }
+  ImuKernelArguments a = imuArguments();
+  a.values = values_.data();
+  a.gradient = full_gradient_.data();
+  imuKernels().linearize(a, static_cast<int>(problem.imu.size()));
 }
 
 void StructuredSolver::linearizePlanes(const BaProblem& problem) {
@@ -142,9 +131,7 @@ void StructuredSolver::linearizePriors(const BaProblem& problem) {
 
 double StructuredSolver::factorCost(const BaProblem& problem) const {
   double cost = 0;
-  for (const BaImu& f : problem.imu)
-    cost +=
-        f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();
+  cost += imuKernels().cost(imuArguments(), static_cast<int>(problem.imu.size()));
   cost += homographyKernels().cost(homographyArguments(), static_cast<int>(problem.homographies.size()));
   for (const BaHomographyPair& f : problem.homography_pairs)
     cost += (homographyRows(f.pair) * homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane))

@@ -8,6 +8,7 @@ namespace vip_slam {
 
 namespace plane_baseline {
 #define WIDTH 2
+#include "lane_algebra.inc"
 #include "plane_kernels_body.inc"
 #undef WIDTH
 }  // namespace plane_baseline
@@ -17,6 +18,7 @@ namespace plane_baseline {
 #pragma GCC target("avx2,fma")
 namespace plane_avx2 {
 #define WIDTH 4
+#include "lane_algebra.inc"
 #include "plane_kernels_body.inc"
 #undef WIDTH
 }  // namespace plane_avx2
@@ -26,6 +28,7 @@ namespace plane_avx2 {
 #pragma GCC target("avx2,fma,avx512f,avx512dq,avx512vl,prefer-vector-width=512")
 namespace plane_avx512 {
 #define WIDTH 8
+#include "lane_algebra.inc"
 #include "plane_kernels_body.inc"
 #undef WIDTH
 }  // namespace plane_avx512
@@ -34,10 +37,10 @@ namespace plane_avx512 {
 
 namespace {
 
-const HomographyKernels kBaseline{plane_baseline::linearize, plane_baseline::cost, plane_baseline::gram};
+const HomographyKernels kBaseline{plane_baseline::linearize, plane_baseline::cost};
 #if defined(__x86_64__)
-const HomographyKernels kAvx2{plane_avx2::linearize, plane_avx2::cost, plane_avx2::gram};
-const HomographyKernels kAvx512{plane_avx512::linearize, plane_avx512::cost, plane_avx512::gram};
+const HomographyKernels kAvx2{plane_avx2::linearize, plane_avx2::cost};
+const HomographyKernels kAvx512{plane_avx512::linearize, plane_avx512::cost};
 #endif
 
 }  // namespace

@@ -10,6 +10,14 @@ void copyRowMajor(const Eigen::Matrix3d& M, double* out) {
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out, 3, 3) = M;
 }
 
+// A matrix, row by row, into one lane.
+template <typename Derived>
+void storeRows(const Eigen::MatrixBase<Derived>& expression, double* rows) {
+  const typename Derived::PlainObject M = expression;
+  for (int r = 0; r < M.rows(); ++r)
+    for (int c = 0; c < M.cols(); ++c) rows[kKernelLanes * (r * M.cols() + c)] = M(r, c);
+}
+
 }  // namespace
 
 void StructuredSolver::prepare(const BaProblem& problem) {
@@ -27,22 +35,77 @@ void StructuredSolver::prepare(const BaProblem& problem) {
   point_damping_.resize(points_.size());
   point_inverse_.resize(2 * points_.size());
   packHomographies(problem);
+  packImu(problem);
   frame_sums_.resize(kFrameSums * problem.frames.size());
   eliminated_.resize(8 * problem.frames.size());
 }
 
 void StructuredSolver::packHomographies(const BaProblem& problem) {
   const std::size_t count = problem.homographies.size();
-  const std::size_t batches = (count + kHomographyLanes - 1) / kHomographyLanes;
-  homographies_.resize(batches * kHomographyLanes);
+  const std::size_t batches = (count + kKernelLanes - 1) / kKernelLanes;
+  homographies_.resize(batches * kKernelLanes);
   homography_sums_.assign(24 * homographies_.size(), 0.0);
   for (std::size_t k = 0; k < homographies_.size(); ++k) {
     const BaHomography& f = problem.homographies[std::min(k, count - 1)];
     const SystemStructure::TriplePlaces& place = structure_.homographies[std::min(k, count - 1)];
     homographies_[k] = {f.i, f.j, f.plane, place.ji.transposed, place.pi.transposed, place.pj.transposed,
                         place.ji.offset, place.pi.offset, place.pj.offset};
-    double* sums = homography_sums_.data() + 24 * kHomographyLanes * (k / kHomographyLanes) + k % kHomographyLanes;
-    for (int s = 0; s < 24; ++s) sums[kHomographyLanes * s] = f.sums[s];
+    double* sums = homography_sums_.data() + 24 * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
+    for (int s = 0; s < 24; ++s) sums[kKernelLanes * s] = f.sums[s];
+  }
+}
+
+void StructuredSolver::packImu(const BaProblem& problem) {
+  const std::size_t count = problem.imu.size();
+  imu_.resize((count + kKernelLanes - 1) / kKernelLanes * kKernelLanes);
+  imu_constants_.resize(kImuConstantRows * imu_.size());
+  imu_states_.assign(kImuStateRows * imu_.size(), 0.0);
+  const SparseCholesky& cholesky = structure_.cholesky;
+  for (std::size_t k = 0; k < imu_.size(); ++k) {
+    const BaImu& f = problem.imu[std::min(k, count - 1)];
+    const auto& place = structure_.imu[std::min(k, count - 1)].place;
+    KernelImu& out = imu_[k];
+    const int nodes[4] = {structure_.pose_node[f.i], structure_.motion_node[f.i], structure_.pose_node[f.j],
+                          structure_.motion_node[f.j]};
+    for (int n = 0; n < 4; ++n) {
+      out.diagonal[n] = nodes[n] < 0 ? -1 : static_cast<std::int64_t>(cholesky.diagonalOffset(nodes[n]));
+      out.unknown[n] = nodes[n] < 0 ? 0 : cholesky.unknown(nodes[n]);
+    }
+    const auto at = [&](int row, int column) {
+      return KernelImu::Place{place[row][column].offset, place[row][column].transposed};
+    };
+    out.motion_pose_i = at(1, 0), out.motion_pose_j = at(3, 2);
+    out.pose_pose = at(2, 0), out.pose_motion = at(2, 1), out.motion_pose = at(3, 0), out.motion_motion = at(3, 1);
+
+    double* rows = imu_constants_.data() + kImuConstantRows * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
+    const Preintegration& p = *f.preintegration;
+    const Matrix15d& W = p.sqrtInformation();  // upper-triangular
+    for (int r = 0; r < 15; ++r)
+      for (int c = 0; c <= r; ++c)
+        rows[kKernelLanes * (kImuInformation + r * (r + 1) / 2 + c)] = W.col(r).head(c + 1).dot(W.col(c).head(c + 1));
+    storeRows(p.J_alpha_bg(), rows + kKernelLanes * kImuAlphaBg);
+    storeRows(p.J_alpha_ba(), rows + kKernelLanes * kImuAlphaBa);
+    storeRows(p.J_beta_bg(), rows + kKernelLanes * kImuBetaBg);
+    storeRows(p.J_beta_ba(), rows + kKernelLanes * kImuBetaBa);
+    rows[kKernelLanes * kImuDt] = p.dt();
+  }
+}
+
+void StructuredSolver::loadImu(const BaProblem& problem) {
+  for (std::size_t k = 0; k < problem.imu.size(); ++k) {
+    const BaImu& f = problem.imu[k];
+    const Preintegration& p = *f.preintegration;
+    const NavState &i = problem.frames[f.i].state, &j = problem.frames[f.j].state;
+    const Eigen::Matrix<double, 15, 1> r = p.residual(i, j, problem.gravity, nullptr, nullptr, false);
+    const Eigen::Vector3d dbg = i.bias_gyro - p.biasGyro(), dba = i.bias_accel - p.biasAccel();
+    double* rows = imu_states_.data() + kImuStateRows * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
+    storeRows(geometry_[f.i].R_W_I, rows + kKernelLanes * kImuR);
+    storeRows(geometry_[f.j].R_W_I.transpose() * geometry_[f.i].R_W_I, rows + kKernelLanes * kImuRji);
+    storeRows(r.segment<3>(3) + p.alpha() + p.J_alpha_bg() * dbg + p.J_alpha_ba() * dba,
+              rows + kKernelLanes * kImuPosition);
+    storeRows(r.segment<3>(6) + p.beta() + p.J_beta_bg() * dbg + p.J_beta_ba() * dba,
+              rows + kKernelLanes * kImuVelocity);
+    storeRows(r, rows + kKernelLanes * kImuResidual);
   }
 }
 
@@ -82,6 +145,15 @@ void StructuredSolver::loadFrames(const BaProblem& problem) {
     out.diagonal = static_cast<std::int64_t>(structure_.cholesky.diagonalOffset(node));
     out.unknown = structure_.cholesky.unknown(node);
   }
+  loadImu(problem);
+}
+
+ImuKernelArguments StructuredSolver::imuArguments() const {
+  ImuKernelArguments a;
+  a.factors = imu_.data();
+  a.constants = imu_constants_.data();
+  a.states = imu_states_.data();
+  return a;
 }
 
 HomographyKernelArguments StructuredSolver::homographyArguments() const {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "imu_kernels.h"
 #include "plane_kernels.h"
 #include "point_kernels.h"
 #include "system_structure.h"
@@ -33,9 +34,12 @@ class StructuredSolver : public BaSolver {
   // structured_arrays.cpp
   void prepare(const BaProblem& problem);
   void packHomographies(const BaProblem& problem);
+  void packImu(const BaProblem& problem);
   void loadFrames(const BaProblem& problem);
+  void loadImu(const BaProblem& problem);
   PointKernelArguments arguments(const BaProblem& problem, double radius);
   HomographyKernelArguments homographyArguments() const;
+  ImuKernelArguments imuArguments() const;
 
   // structured_linearize.cpp
   void linearize(const BaProblem& problem, double radius, Worker* worker);
@@ -71,6 +75,8 @@ class StructuredSolver : public BaSolver {
   std::vector<KernelPlane> planes_;
   std::vector<KernelHomography> homographies_;
   std::vector<double> homography_sums_;
+  std::vector<KernelImu> imu_;
+  std::vector<double> imu_constants_, imu_states_;
   std::vector<double> points_, values_, gradient_, full_gradient_, diagonal_, damping_, W_, point_inverse_,
       point_gradient_, point_damping_, step_, point_step_, frame_sums_, eliminated_;
 };

@@ -1,0 +1,46 @@
+// IMU factors of the structured solver on plain arrays, eight factors at a time.
+#pragma once
+
+#include <cstdint>
+
+#include "kernel_lanes.h"
+
+namespace vip_slam {
+
+/// Rows of what a factor's preintegration gives: the information matrix (lower triangle, row by row, order theta, p, v,
+/// b_g, b_a), the increments' derivatives by the biases (3 x 3, row-major) and the time between the frames.
+constexpr int kImuInformation = 0, kImuAlphaBg = 120, kImuAlphaBa = 129, kImuBetaBg = 138, kImuBetaBa = 147,
+              kImuDt = 156, kImuConstantRows = 157;
+/// Rows of what depends on the states: R_W_I of frame i, R_j_i, position and velocity increments seen from frame i, the
+/// residual (15); and, for the Jacobians, the inverse right Jacobian of the rotation's residual and the derivative by
+/// b_g of the rotation before it.
+constexpr int kImuR = 0, kImuRji = 9, kImuPosition = 18, kImuVelocity = 21, kImuResidual = 24, kImuInverseJr = 39,
+              kImuThetaBg = 48, kImuStateRows = 57;
+
+/// Where a factor's blocks go. Nodes: pose i, motion i, pose j, motion j; -1 where one is a constant.
+struct KernelImu {
+  std::int64_t diagonal[4];
+  std::int32_t unknown[4];
+  struct Place {
+    std::int64_t offset;
+    bool transposed;
+  } motion_pose_i, motion_pose_j, pose_pose, pose_motion, motion_pose, motion_motion;  ///< the last four: (j, i)
+};
+
+struct ImuKernelArguments {
+  const KernelImu* factors = nullptr;
+  const double* constants = nullptr;  ///< [batch][kImuConstantRows][kKernelLanes]
+  const double* states = nullptr;     ///< [batch][kImuStateRows][kKernelLanes]
+  double *values = nullptr, *gradient = nullptr;
+};
+
+struct ImuKernels {
+  /// Adds J^T J and J^T r of `count` factors.
+  void (*linearize)(const ImuKernelArguments& a, int count);
+  /// Sum of r^T r, whitened.
+  double (*cost)(const ImuKernelArguments& a, int count);
+};
+
+const ImuKernels& imuKernels();
+
+}  // namespace vip_slam

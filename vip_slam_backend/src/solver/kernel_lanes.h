@@ -1,0 +1,9 @@
+// Kernels of plane and IMU factors work on batches of factors side by side.
+#pragma once
+
+namespace vip_slam {
+
+/// Factors of one batch; the last batch is filled up with copies of any factor.
+constexpr int kKernelLanes = 8;
+
+}  // namespace vip_slam
