@@ -138,6 +138,26 @@ TEST(Detection, ARoundColumnIsNoPlane) {
   }
 }
 
+TEST(Detection, WallAndDoorOfARecessAreNotOneSlantedPlane) {
+  // A structured-light sensor across a room: the door stands back by a few sigma of a pixel.
+  DepthNoise noise;
+  noise.a = 0.001, noise.b = 0, noise.c = 0.001425, noise.min_range = 0.3, noise.max_range = 10;
+  Scene scene;
+  scene.add({4.5, 2.85, 0}, {0, 0.65, 0}, {0, 0, 2.1});
+  scene.add({4.62, 1.9, 0}, {0, 0.95, 0}, {0, 0, 2.1});
+  for (double x : {0.0, 1.5}) {
+    int planes = 0;
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      SceneCamera camera(noise, 1.0, seed);
+      for (const DetectedPlane& p : detect(&camera, scene, lookAt({x, 2.9, 1.4}, {4.5, 2.9, 1.2}))) {
+        EXPECT_LT(std::acos(-p.plane.n.x()) * 180 / M_PI, 2.5) << seed << ": " << p.area << " m^2";
+        ++planes;
+      }
+    }
+    EXPECT_GE(planes, 5) << x;
+  }
+}
+
 TEST(Detection, TwoTablesOfOneHeightAreTwo) {
   Scene scene;
   scene.add({1.2, -1.6, 0.74}, {0.8, 0, 0}, {0, 1.2, 0});

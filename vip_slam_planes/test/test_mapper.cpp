@@ -128,6 +128,18 @@ TEST(Mapper, FarPiecesOfOneWallAreOneButNotThoseOfTwo) {
   }
 }
 
+TEST(Mapper, TheFurtherApartTheBetterPiecesOfOneWallMustAgree) {
+  for (const double step : {0.0, 0.018}) {
+    Rig rig(0.3);
+    Scene scene;
+    scene.add({-4, 1, 0}, {3, 0, 0}, {0, 0, 2.5});
+    scene.add({4.2, 1 + step, 0}, {0.6, 0, 0}, {0, 0, 2.1});  // 5.2 m further on, 1.26 m^2
+    for (int i = 0; i < 4; ++i) rig.look(scene, {-2.5 + 0.3 * i, -1.5, 1.3}, {-2.5 + 0.3 * i, 1, 1.2});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {4.3 + 0.1 * i, -1.5, 1.3}, {4.5, 1, 1.1});
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
 TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
   for (const double step : {0.0, 0.04}) {
     Rig rig;

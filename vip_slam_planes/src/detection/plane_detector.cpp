@@ -222,6 +222,28 @@ class Detector {
     return false;
   }
 
+  // A plane laid across a step, such as wall and door of a recess, leans against both: the facets of either one point
+  // where that one points. Their median, as facets on the step itself lean the other way. `axis` (unit, in the plane)
+  // is where the fit was free to lean.
+  bool facetsLean(const std::vector<int>& surface, const Plane& plane, const Eigen::Vector3d& axis) const {
+    std::vector<std::pair<double, double>> leans;  // angle, area
+    double variance = 0, area = 0;
+    for (int i : surface) {
+      const MapTriangle& t = triangles_[i];
+      leans.emplace_back(std::atan2(axis.dot(t.n), plane.n.dot(t.n)), t.area);
+      variance += t.sigma_angle * t.sigma_angle;
+      area += t.area;
+    }
+    std::sort(leans.begin(), leans.end());
+    double below = 0;
+    const auto median = std::find_if(leans.begin(), leans.end(), [&](const auto& lean) {
+      below += lean.second;
+      return 2 * below >= area;
+    });
+    const double uncertainty = std::sqrt(variance) / double(surface.size());
+    return median != leans.end() && std::abs(median->first) > options_.max_tilt_deg * kDegree + uncertainty;
+  }
+
   bool accept(const std::vector<int>& surface, PlaneKind kind) {
     DetectedPlane result;
     result.kind = kind;
@@ -236,6 +258,10 @@ class Detector {
     if (!fit(surface, kind, &result.plane, &rms)) return false;
     const double sigma = medianSigma(surface);
     if (rms > options_.max_rms + 1.5 * sigma) return false;
+    const Eigen::Vector3d& n = result.plane.n;
+    if (kind == PlaneKind::kVertical && facetsLean(surface, result.plane, Eigen::Vector3d::UnitZ().cross(n))) {
+      return false;
+    }
 
     const Eigen::Vector3d mean = moments.centroid();
     const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();

@@ -10,6 +10,7 @@ namespace {
 // two.
 constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
 constexpr double kSmallGap = 4.0;  // a smaller piece of a wall may be as many of its own widths away
+constexpr double kCloser = 4.0;    // as many times as far apart when they agree as many times better
 
 bool isBorder(const CellGrid& cells, CellIndex c) {
   return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) ||
@@ -108,8 +109,12 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
     gap = std::max(options.gap, std::min(options.gap_per_area * kLargeWall, kSmallGap * std::sqrt(smaller)));
     apart *= 0.5;
   }
-  if (boundsGap(small, large) > gap) return false;
+  // That two surfaces lie in one plane by accident is the likelier the further one looks and the less is asked of them:
+  // the same chance, with a gap as much wider as they agree better.
+  const double between = boundsGap(small, large), widest = smaller >= large_from ? kCloser * gap : gap;
+  if (between > widest) return false;
   const Contact meeting = contact(small, large, options.gap);
+  if (between > gap && meeting.worst_border * between > apart * gap) return false;
   if (meeting.near == 0 && (gap <= options.gap || meeting.worst_border > apart)) return false;
   if (meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) return false;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
