@@ -123,6 +123,29 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
   }
 }
 
+TEST(Stillness, AStartAtRestBeforeABareWallLastsUntilTheImuShowsAMotion) {
+  const ZuptOptions options;
+  StillnessDetector detector(options);
+  StillnessCues blind = quiet();
+  blind.tracks = 0;
+  blind.disparity_px = -1;
+  blind.imu.mean_gyro = {0.01, -0.02, 0.005};
+  blind.imu.mean_accel = {0.3, -9.7, 0.2};
+  EXPECT_FALSE(detector.update(blind));  // sees nothing, knows nothing
+  detector.begin(blind.imu);
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_TRUE(detector.update(blind));
+    blind.imu.mean_accel.x() += 0.0003;  // a walking bias
+  }
+  StillnessCues leaves = blind, turns = blind;
+  leaves.imu.mean_accel.z() += 0.12;
+  turns.imu.mean_gyro.y() += 0.01;
+  for (const StillnessCues& cues : {leaves, turns}) {
+    detector.begin(blind.imu);
+    EXPECT_FALSE(detector.update(cues));
+  }
+}
+
 std::vector<Feature> features(double shift) {
   std::vector<Feature> list;
   for (int i = 0; i < 100; ++i) {

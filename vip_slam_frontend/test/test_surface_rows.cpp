@@ -246,6 +246,59 @@ TEST(SurfaceTracker, PatchesLieOnTheWallsAndMatchesAgreeWithTheMotion) {
   EXPECT_EQ(tracker.match(reference, SE3()).pairs.size(), 0u);
 }
 
+/// Information on the newest position along the unit vector `along` (world), its other poses given.
+double informationAlong(const SurfaceMatches& matches, const Eigen::Vector3d& along) {
+  WindowState window = makeWindow(14, {});
+  for (Clone& clone : window.clones) clone.T_W_I = clone.T_W_I_fej = SE3();
+  window.T_I_C = SE3();
+  SurfaceMatches of_window = matches;
+  of_window.reference = window.clones[1].id;
+  const int n = window.dimension();
+  const SurfaceRows rows = surfaceRows(window, 1e-3 * Eigen::MatrixXd::Identity(n, n), of_window, 1.5);
+  return (rows.rows.H.middleCols<3>(window.cloneColumn(3) + 3) * along).squaredNorm();
+}
+
+TEST(SurfaceTracker, ABareWallSaysNothingOfMotionAlongIt) {
+  const DepthNoise noise;
+  SurfaceTracker tracker(camera(), noise);
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal(0, 1);
+  const auto wall = [&] {
+    cv::Mat_<float> depth(480, 640);
+    for (float& z : depth) z = static_cast<float>(1.5 + noise.sigma(1.5) * normal(random));
+    return cv::Mat(depth);
+  };
+  tracker.setReference(wall(), 3);
+  ASSERT_GT(tracker.size(), 200u);
+  double across = 0, along = 0;
+  for (int i = 0; i < 100; ++i) {  // some seconds of standing before it
+    const SurfaceMatches matches = tracker.match(wall(), SE3());
+    across += informationAlong(matches, Eigen::Vector3d::UnitZ());
+    along += informationAlong(matches, Eigen::Vector3d::UnitX());
+  }
+  EXPECT_LT(1.0 / std::sqrt(across), 1e-4);
+  EXPECT_GT(1.0 / std::sqrt(along), 0.1);
+}
+
+TEST(PatchGrouping, PatchesOfTheSameWallShareOneNormalAndLonersGo) {
+  const DepthNoise noise;
+  SurfaceTracker tracker(camera(), noise);
+  const SE3 T_W_ref(expSO3(Eigen::Vector3d(0.02, -0.03, 0.01)), Eigen::Vector3d(0.1, 0, 0));
+  std::vector<SurfacePatch> patches = tracker.patches(corridor(T_W_ref, noise, 5));
+  const std::size_t on_walls = patches.size();
+  SurfacePatch loner = patches.front();
+  loner.n_C = Eigen::Vector3d(0.6, 0.0, -0.8);
+  loner.p_C = Eigen::Vector3d(0, 0, 2);
+  patches.push_back(loner);
+  const std::vector<SurfacePatch> shared = shareNormals(patches);
+  EXPECT_LE(shared.size(), on_walls);
+  EXPECT_GT(shared.size(), on_walls * 8 / 10);
+  for (const SurfacePatch& patch : shared) {
+    EXPECT_GT((T_W_ref.R() * patch.n_C).cwiseAbs().maxCoeff(), std::cos(0.3 * M_PI / 180));
+    EXPECT_GT((patch.p_C - loner.p_C).norm(), 1e-9);
+  }
+}
+
 TEST(SurfaceTracker, HolesAndRoughSurfacesGiveNoPatches) {
   SurfaceTracker tracker(camera(), DepthNoise());
   EXPECT_TRUE(tracker.patches(cv::Mat(480, 640, CV_32FC1, cv::Scalar(0))).empty());

@@ -9,6 +9,17 @@ namespace {
 
 // Beyond this many repeats the sigmas stay: without an end to their growth the IMU's noise would carry the pose away.
 constexpr int kMostRepeats = 8;
+// Without an image, the IMU's means may leave those at rest by this much (or five sigmas of their noise), ...
+constexpr double kMostGyroShift = 0.005;  // rad/s
+constexpr double kMostAccelShift = 0.05;  // m/s^2
+// ... and those at rest follow by this share per image, as the biases walk.
+constexpr double kRestFollows = 0.01;
+
+bool restsAs(const ImuSpread& now, const ImuSpread& rest) {
+  const double root = std::sqrt(static_cast<double>(std::max<std::size_t>(1, now.count)));
+  return (now.mean_gyro - rest.mean_gyro).norm() < std::max(kMostGyroShift, 5.0 * now.gyro_floor / root) &&
+         (now.mean_accel - rest.mean_accel).norm() < std::max(kMostAccelShift, 5.0 * now.accel_floor / root);
+}
 
 }  // namespace
 
@@ -48,10 +59,15 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   bool wants = options_.enabled && quiet && cues.speed < options_.max_speed;
   if (still_) {
     // Inside, an image without features (lights off) does not end the standing; one that moves does.
-    wants = wants && (!image_known || cues.disparity_px < 1.5 * options_.max_disparity_px) &&
+    wants = wants && (image_known ? cues.disparity_px < 1.5 * options_.max_disparity_px : restsAs(cues.imu, rest_)) &&
             cues.anchor_disparity_px < 3.0 * options_.max_disparity_px;
   } else {
     wants = wants && image_known && cues.disparity_px < options_.max_disparity_px;
+  }
+  if (wants) {
+    const double share = image_known ? 1.0 : kRestFollows;
+    rest_.mean_gyro += share * (cues.imu.mean_gyro - rest_.mean_gyro);
+    rest_.mean_accel += share * (cues.imu.mean_accel - rest_.mean_accel);
   }
   if (wants == still_) {
     in_a_row_ = 0;
@@ -61,6 +77,12 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   }
   // A first doubt already suspends the updates; it takes frames_in images to start them.
   return still_ && wants;
+}
+
+void StillnessDetector::begin(const ImuSpread& rest) {
+  still_ = options_.enabled;
+  in_a_row_ = 0;
+  rest_ = rest;
 }
 
 void StillnessDetector::reset() {

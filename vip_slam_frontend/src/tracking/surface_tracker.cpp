@@ -73,6 +73,9 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   if (towards < kLeastCosine * ray.norm()) return false;
   const double fitted = std::sqrt(covariance(0, 0)) / (c.x() * c.x());
   patch->sigma = towards * std::max(fitted, kLeastShare * noise_.sigma(1.0 / c.x()));
+  // Turning N by the gradient's errors; the camera's own magnification is left out.
+  const double slope = std::sqrt(std::max(covariance(1, 1), covariance(2, 2))) / kSampleStep;
+  patch->sigma_normal = slope * d_uv_xy.norm() / N.norm();
   return true;
 }
 
@@ -88,7 +91,7 @@ std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth) const {
 }
 
 void SurfaceTracker::setReference(const cv::Mat& depth, CloneId clone) {
-  patches_ = patches(depth);
+  patches_ = shareNormals(patches(depth));
   reference_ = clone;
 }
 

@@ -33,11 +33,14 @@ struct StillnessCues {
 };
 
 /// Still only when the IMU is quiet and the image stands and the estimate is slow; with hysteresis both ways. The image
-/// alone is never enough: a wall that moves along would fool it.
+/// alone is never enough: a wall that moves along would fool it. Who stands and sees nothing (darkness, a bare wall) goes
+/// on standing as long as the IMU's means stay where they were: no motion begins without an acceleration or a turn.
 class StillnessDetector {
  public:
   explicit StillnessDetector(const ZuptOptions& options) : options_(options) {}
   bool update(const StillnessCues& cues);
+  /// A start at rest: still from here on. `rest`: the IMU while it stood.
+  void begin(const ImuSpread& rest);
   bool still() const { return still_; }
   void reset();
 
@@ -45,6 +48,7 @@ class StillnessDetector {
   ZuptOptions options_;
   bool still_ = false;
   int in_a_row_ = 0;
+  ImuSpread rest_;  ///< the IMU's means at rest
 };
 
 /// Whitened rows on the newest clone and the nav state: v = 0, and no rotation or translation against the clone at

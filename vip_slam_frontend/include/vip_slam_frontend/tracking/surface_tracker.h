@@ -11,14 +11,9 @@
 #include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_frontend/filter/surface_rows.h"
+#include "vip_slam_frontend/tracking/patch_grouping.h"
 
 namespace vip_slam {
-
-struct SurfacePatch {
-  Eigen::Vector3d p_C = Eigen::Vector3d::Zero();  ///< camera frame, metres
-  Eigen::Vector3d n_C = Eigen::Vector3d::Zero();  ///< unit normal towards the camera
-  double sigma = 0;                               ///< one sigma of the plane's distance at p_C, metres
-};
 
 class SurfaceTracker {
  public:
@@ -26,7 +21,7 @@ class SurfaceTracker {
 
   /// Patches of an image, one at most per cell of the raster; none where the window is not flat or seen too obliquely.
   std::vector<SurfacePatch> patches(const cv::Mat& depth) const;
-  /// The image of `clone` becomes the reference.
+  /// The image of `clone` becomes the reference, with those of its patches that lie on planes.
   void setReference(const cv::Mat& depth, CloneId clone);
   void clear();
   CloneId reference() const { return reference_; }  ///< 0: none

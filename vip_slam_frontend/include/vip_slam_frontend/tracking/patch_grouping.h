@@ -1,0 +1,22 @@
+// Patches that lie on one plane share its normal. A single patch is some centimetres wide and knows its normal to a
+// degree; rows with such normals would claim to see motion along a bare wall, again and again.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace vip_slam {
+
+struct SurfacePatch {
+  Eigen::Vector3d p_C = Eigen::Vector3d::Zero();  ///< camera frame, metres
+  Eigen::Vector3d n_C = Eigen::Vector3d::Zero();  ///< unit normal towards the camera
+  double sigma = 0;                               ///< one sigma of the plane's distance at p_C, metres
+  double sigma_normal = 0;                        ///< one sigma of the normal's direction, rad
+};
+
+/// Finds planes among the patches and gives each patch on one the plane's normal. Patches on none are dropped: what
+/// they say across their normal is noise.
+std::vector<SurfacePatch> shareNormals(std::vector<SurfacePatch> patches);
+
+}  // namespace vip_slam

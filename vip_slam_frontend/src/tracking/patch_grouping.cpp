@@ -1,0 +1,84 @@
+#include "vip_slam_frontend/tracking/patch_grouping.h"
+
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+namespace vip_slam {
+
+namespace {
+
+constexpr int kLeastPatches = 6;
+constexpr int kRefinements = 3;
+constexpr double kSigmas = 3.5;
+// A wall's own unevenness, m, and the turn of a patch beside an edge, rad.
+constexpr double kUneven = 0.003;
+constexpr double kTurned = 0.03;
+
+/// N^T x = 1, in the camera frame.
+struct PlaneFit {
+  Eigen::Vector3d N = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal() const { return -N.normalized(); }  ///< towards the camera
+
+  bool holds(const SurfacePatch& patch) const {
+    const double distance = (N.dot(patch.p_C) - 1.0) / N.norm();
+    const double turned = normal().cross(patch.n_C).norm();
+    return std::abs(distance) < kSigmas * std::hypot(patch.sigma, kUneven) && normal().dot(patch.n_C) > 0 &&
+           turned < kSigmas * std::hypot(patch.sigma_normal, kTurned);
+  }
+};
+
+/// Least squares over the distances of the patches with `member`; false when they do not span a plane.
+bool fitPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>& member, PlaneFit* plane) {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    if (!member[i]) continue;
+    const double w = patches[i].n_C.dot(patches[i].p_C) / std::hypot(patches[i].sigma, kUneven);
+    A += w * w * patches[i].p_C * patches[i].p_C.transpose();
+    b += w * w * patches[i].p_C;
+  }
+  const Eigen::LDLT<Eigen::Matrix3d> ldlt(A);
+  if (!(ldlt.vectorD().minCoeff() > 1e-9 * ldlt.vectorD().maxCoeff())) return false;
+  plane->N = ldlt.solve(b);
+  return plane->N.allFinite() && plane->N.norm() > 1e-6;
+}
+
+}  // namespace
+
+std::vector<SurfacePatch> shareNormals(std::vector<SurfacePatch> patches) {
+  std::vector<SurfacePatch> result;
+  std::vector<char> done(patches.size(), 0), member(patches.size());
+  for (std::size_t seed = 0; seed < patches.size(); ++seed) {
+    if (done[seed]) continue;
+    // First those within what the seed's own normal allows, then those on the plane they give.
+    const SurfacePatch& from = patches[seed];
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      const Eigen::Vector3d step = patches[i].p_C - from.p_C;
+      const double sigma = std::hypot(std::hypot(from.sigma, patches[i].sigma), from.sigma_normal * step.norm());
+      member[i] = !done[i] && std::abs(from.n_C.dot(step)) < kSigmas * sigma && from.n_C.dot(patches[i].n_C) > 0.9;
+    }
+    PlaneFit plane;
+    int count = 0;
+    for (int k = 0; k < kRefinements; ++k) {
+      if (!fitPlane(patches, member, &plane)) {
+        count = 0;
+        break;
+      }
+      count = 0;
+      for (std::size_t i = 0; i < patches.size(); ++i) count += member[i] = !done[i] && plane.holds(patches[i]);
+      if (count < kLeastPatches) break;
+    }
+    if (count < kLeastPatches || !fitPlane(patches, member, &plane)) continue;
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      if (!member[i]) continue;
+      done[i] = 1;
+      result.push_back(patches[i]);
+      result.back().n_C = plane.normal();
+    }
+  }
+  return result;
+}
+
+}  // namespace vip_slam
