@@ -144,11 +144,7 @@ std::string BackEndNodelet::loadMap(const std::string& path) {
 }
 
 std::string BackEndNodelet::saveTrajectory(const std::string& path) {
-  std::vector<Anchor> anchors;
-  for (const SnapshotKeyframe& keyframe : backEnd().snapshot().keyframes) {
-    anchors.push_back({keyframe.t, keyframe.epoch, keyframe.T_odom_I, keyframe.state.T_W_I});
-  }
-  const Trajectory trajectory = pose_.trajectory(anchors);
+  const Trajectory trajectory = pose_.trajectory(anchorsOf(backEnd().snapshot()));
   if (trajectory.empty()) throw std::runtime_error("no image has a pose in map yet");
   writeTum(requirePath(path), trajectory);
   return std::to_string(trajectory.size()) + " poses written to " + path;

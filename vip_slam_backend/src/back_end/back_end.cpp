@@ -122,6 +122,7 @@ MapSnapshot BackEnd::Impl::snapshot() const {
   for (const LandmarkId id : map.landmarkIds()) snapshot.landmarks.push_back(estimateOf(map.landmark(id)));
   for (const auto& entry : map.planes()) snapshot.planes.push_back(entry.second.estimate);
   snapshot.loops = loops;
+  snapshot.localised = localised;
   snapshot.statistics = statistics;
   snapshot.statistics.landmarks = snapshot.landmarks.size();
   for (const LandmarkEstimate& landmark : snapshot.landmarks) {
@@ -138,6 +139,7 @@ void BackEnd::Impl::reset() {
   searching = false;
   relocaliser.clear();
   held.clear();
+  localised.clear();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;

@@ -75,6 +75,7 @@ struct BackEnd::Impl {
   bool searching = false;          ///< a loaded map is not recognised yet
   bool localisation_only = false;
   std::vector<KeyframePtr> held;   ///< keyframes that wait for that
+  std::vector<Anchor> localised;   ///< keyframes found in the map without entering it
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;

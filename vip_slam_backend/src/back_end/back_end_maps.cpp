@@ -78,7 +78,9 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   if (!found) return;
   searching = false;
   epoch = keyframe->frame.epoch;
-  T_map_odom = alignOdometry(found->T_W_I, keyframe->frame.state.T_W_I);
+  const SE3& T_odom_I = keyframe->frame.state.T_W_I;
+  T_map_odom = alignOdometry(found->T_W_I, T_odom_I);
+  localised.push_back({keyframe->frame.t, epoch, T_odom_I, T_map_odom * T_odom_I});
 }
 
 }  // namespace vip_slam

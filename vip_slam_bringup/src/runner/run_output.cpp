@@ -132,14 +132,6 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   return yaml.c_str();
 }
 
-Trajectory anchored(const Pipeline& pipeline, const MapSnapshot& map) {
-  std::vector<Anchor> anchors;
-  for (const SnapshotKeyframe& keyframe : map.keyframes) {
-    anchors.push_back({keyframe.t, keyframe.epoch, keyframe.T_odom_I, keyframe.state.T_W_I});
-  }
-  return anchorTrajectory(pipeline.odometry(), anchors);
-}
-
 /// The upper triangle of each pose's covariance, row by row.
 void writeCovariances(const std::string& path, const std::vector<OdometryCovariance>& covariances) {
   AtomicFile file(path);
@@ -183,7 +175,7 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
   if (const MappingThread* mapping = pipeline.mapping()) {
     map = mapping->backEnd().snapshot();
     planes = mapping->planes();
-    const Trajectory trajectory = anchored(pipeline, map);
+    const Trajectory trajectory = anchorTrajectory(pipeline.odometry(), anchorsOf(map));
     writeTum(folder + "/trajectory.tum", trajectory);
     writeTum(folder + "/realtime.tum", pipeline.realtime());
     writePlanesYaml(folder + "/planes.yaml", planes);

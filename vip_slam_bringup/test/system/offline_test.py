@@ -61,6 +61,17 @@ class OfflineTest(unittest.TestCase):
         self.assertEqual((summary['variant'], summary['loop_closing'], summary['planes']), ('vi', False, 0))
         self.assertLess(abs(summary['images'] - 100), 3)
 
+    def test_04_localisation_only_gives_the_trajectory_in_the_stored_map(self):
+        stored = os.path.join(self.folder, 'a', 'map.vsm')
+        subprocess.run(self.command('e', '--map', stored, '--localise', '--no-report'), check=True, timeout=120)
+        mapped, found = (np.loadtxt(os.path.join(self.folder, out, 'trajectory.tum')) for out in ('a', 'e'))
+        _, i, j = np.intersect1d(mapped[:, 0], found[:, 0], return_indices=True)
+        self.assertGreater(len(i), 0.9 * len(mapped))
+        error = np.linalg.norm(mapped[i, 1:4] - found[j, 1:4], axis=1)
+        self.assertLess(np.median(error), 0.01)
+        self.assertLess(error.max(), 0.05)
+        self.assertTrue(filecmp.cmp(stored, os.path.join(self.folder, 'e', 'map.vsm'), shallow=False))
+
 
 if __name__ == '__main__':
     rostest.rosrun('vip_slam_bringup', 'offline_test', OfflineTest)

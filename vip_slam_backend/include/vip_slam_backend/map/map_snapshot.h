@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "vip_slam_core/trajectory/anchored_trajectory.h"
 #include "vip_slam_core/types/map_update.h"
 #include "vip_slam_core/types/plane_map.h"
 
@@ -36,7 +37,12 @@ struct MapSnapshot {
   std::vector<LandmarkEstimate> landmarks;   ///< ascending id
   std::vector<PlaneEstimate> planes;         ///< parameters as optimised
   std::vector<LoopEvent> loops;              ///< all so far
+  /// Localisation only: keyframes that were found in the map without entering it, oldest first.
+  std::vector<Anchor> localised;
   BackEndStatistics statistics;
 };
+
+/// Where the odometry lies in the map, by the map's keyframes and those that were only found in it; ascending times.
+std::vector<Anchor> anchorsOf(const MapSnapshot& snapshot);
 
 }  // namespace vip_slam
