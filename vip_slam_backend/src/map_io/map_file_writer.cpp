@@ -12,17 +12,26 @@
 namespace vip_slam {
 namespace {
 
-void write(ByteWriter& out, const SE3& T) {
-  // Reading normalises; what is written must be a fixed point of that, or the next save would differ.
-  Eigen::Quaterniond q = T.rotation();
-  for (int k = 0; k < 8; ++k) {
-    const Eigen::Quaterniond n = q.normalized();
-    if (n.coeffs() == q.coeffs()) break;
-    q = n;
+// Reading normalises, and rounding lets some rotations wander when that is done again and again. So three coefficients
+// are written on a grid coarser than that by some bits, and the fourth, a large one, follows from them: whatever the last
+// bits in memory are, the next save finds the same four.
+Eigen::Vector4d settled(const Eigen::Quaterniond& rotation) {
+  constexpr double kGrid = 0x1p-49, kLarge = 0.4;  // one of four is at least a half
+  Eigen::Vector4d q = rotation.coeffs();
+  int large = 0;
+  while (large < 3 && std::abs(q(large)) < kLarge) ++large;
+  double rest = 1.0;
+  for (int k = 0; k < 4; ++k) {
+    if (k == large) continue;
+    q(k) = std::round(q(k) / kGrid) * kGrid;
+    rest -= q(k) * q(k);
   }
-  // Some go to and fro between two neighbours: the same one of them whichever is in memory.
-  const Eigen::Vector4d a = q.coeffs(), b = q.normalized().coeffs();
-  out.vector(std::lexicographical_compare(a.data(), a.data() + 4, b.data(), b.data() + 4) ? a : b);
+  q(large) = std::copysign(std::sqrt(rest), q(large));
+  return q;
+}
+
+void write(ByteWriter& out, const SE3& T) {
+  out.vector(settled(T.rotation()));
   out.vector(T.t());
 }
 
