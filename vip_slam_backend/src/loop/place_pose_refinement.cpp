@@ -1,4 +1,4 @@
-// Gauss-Newton on pixels and depths over the inliers.
+// Gauss-Newton on pixels and depths over the inliers, and on the distances of surfaces to their planes.
 #include <algorithm>
 #include <cmath>
 
@@ -13,8 +13,12 @@ namespace {
 class Refinement {
  public:
   Refinement(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const Eigen::Quaterniond& R_G_B,
-             const PlacePoseOptions& options)
-      : matches_(matches), rig_(rig), up_B_(R_G_B.conjugate() * Eigen::Vector3d::UnitZ()), options_(options) {
+             const PlacePoseOptions& options, const std::vector<PlaceSurface>& surfaces)
+      : matches_(matches),
+        surfaces_(surfaces),
+        rig_(rig),
+        up_B_(R_G_B.conjugate() * Eigen::Vector3d::UnitZ()),
+        options_(options) {
     for (const SE3& T_B_C : rig) R_C_B_.push_back(T_B_C.R().transpose());
   }
 
@@ -58,6 +62,13 @@ class Refinement {
         add(depth_weight * (p.z() - m.depth), depth_weight * dp.row(2));
       }
     }
+    for (const PlaceSurface& s : surfaces_) {
+      const Eigen::Vector3d p_B = rig_[s.camera] * s.p_C;
+      const Eigen::RowVector3d n_B = (R_B_W * s.plane_W.n).transpose();
+      Eigen::Matrix<double, 1, 6> J;
+      J << -n_B * hat(p_B), s.plane_W.n.transpose();
+      add(s.plane_W.signedDistance(T_W_B * p_B) / s.sigma, J / s.sigma);
+    }
     if (options_.tilt_sigma > 0) {
       // The direction of up in the body: the third carries no information of its own.
       const Eigen::Vector3d up = R_B_W * Eigen::Vector3d::UnitZ();
@@ -97,6 +108,7 @@ class Refinement {
 
  private:
   const std::vector<PlaceMatch>& matches_;
+  const std::vector<PlaceSurface>& surfaces_;
   const CameraRig& rig_;
   std::vector<Eigen::Matrix3d> R_C_B_;
   Eigen::Vector3d up_B_;
@@ -106,8 +118,9 @@ class Refinement {
 }  // namespace
 
 PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const SE3& start,
-                          const Eigen::Quaterniond& R_G_B, const PlacePoseOptions& options) {
-  const Refinement refinement(matches, rig, R_G_B, options);
+                          const Eigen::Quaterniond& R_G_B, const PlacePoseOptions& options,
+                          const std::vector<PlaceSurface>& surfaces) {
+  const Refinement refinement(matches, rig, R_G_B, options, surfaces);
   PlacePose result;
   result.T_W_B = start;
   // The gate closes in rounds: the start may be a few pixels off, the end is not.

@@ -138,7 +138,8 @@ PlaceVerification PlaceSearch::add(const Map& map, const KeyframeDatabase& datab
     const SE3 T_odom_B = keyframe->frame.state.T_W_I * keyframe->frame.T_I_C;
     const bool again = believed_ && samePlace(*believed_ * T_odom_B, T_W_odom_now * T_odom_B);
     believed_ = T_W_odom_now;
-    if (!again && guesses_.front().support.evidence() < options_.sure_evidence) {
+    const PlaceSupport& support = guesses_.front().support;
+    if (!again && (support.evidence() < options_.sure_evidence || support.points < options_.sure_points)) {
       result.accepted = false;
       result.reason += "; waits for another keyframe that comes to the same place";
     }
@@ -162,6 +163,11 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
   result.landmarks = best.landmarks;
   if (best.depth.compared >= 100) result.depth_agreement = best.depth.agreement();
 
+  // Where another place has the same posters on a wall of another shape, this one's shape proves little: the place that
+  // is really seen may have it too and not be in the map.
+  int alike = 0;
+  for (std::size_t g = 1; g < guesses_.size(); ++g) alike = std::max(alike, guesses_[g].support.points);
+
   const PlaceVerificationOptions& limits = scene.verifier.options();
   int features = 0;
   for (const KeyframePtr& keyframe : keyframes_)
@@ -169,9 +175,11 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
   const double sigma = std::sqrt(Matrix6d(best.information.inverse()).bottomRightCorner<3, 3>().diagonal().maxCoeff());
   const double evidence = best.evidence(), covered = features ? static_cast<double>(best.covered) / features : 0;
   result.reason =
-      words("%d points, %.2f of the features and %.2f of the image in sight of the map, depth agreement %.2f",
-            best.points, best.explainedShare(), best.explainedCells(), result.depth_agreement);
-  if (best.points < options_.min_points) {
+      words("%d points, %d of %d landmarks and %.2f of the image in sight of the map, depth agreement %.2f",
+            best.points, best.refound, best.established, best.explainedCells(), result.depth_agreement);
+  if (best.match == 0) {
+    result.reason += "; the map has no view along the newest keyframe";
+  } else if (best.points < options_.min_points) {
     result.reason += words("; needs %d points", options_.min_points);
   } else if (evidence < options_.min_evidence) {
     result.reason += words("; evidence %.0f, needs %.0f", evidence, options_.min_evidence);
@@ -185,6 +193,8 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
     result.reason += words("; %.2f of the surfaces are seen through", best.depth.seeThrough());
   } else if (guesses_.size() > 1 && guesses_[1].support.evidence() > options_.ambiguity * evidence) {
     result.reason += words("; evidence %.0f, for another place %.0f", evidence, guesses_[1].support.evidence());
+  } else if (alike > options_.resemblance * best.points) {
+    result.reason += words("; another place has %d of such points", alike);
   } else {
     result.accepted = true;
   }

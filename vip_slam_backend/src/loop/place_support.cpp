@@ -6,6 +6,7 @@
 #include <set>
 
 #include "vip_slam_backend/loop/guided_matching.h"
+#include "vip_slam_backend/loop/place_surfaces.h"
 
 namespace vip_slam {
 namespace {
@@ -13,17 +14,18 @@ namespace {
 constexpr std::size_t kViews = 15, kCoveringViews = 5;
 constexpr double kPointSize = 0.05;        // metres
 constexpr double kTiltSigma = 0.003;       // radians: odometry against gravity, and the map against it
-constexpr double kLeastDisagreement = 0.02, kUnknownDisagreement = 0.1;  // of depth
+constexpr double kLeastContradiction = 0.005, kUnknownContradiction = 0.05;  // of depth
+constexpr double kOccludedWeight = 0.25;
+constexpr std::size_t kEstablishedViews = 4;
 constexpr int kFewDepths = 100;
 constexpr double kDepthSlack = 0.1, kDepthSlackPerMetre = 0.05;
 
 SE3 cameraInOdom(const Keyframe& keyframe) { return keyframe.frame.state.T_W_I * keyframe.frame.T_I_C; }
 
-// Whether the view shows what lies at p_V (its camera's frame): in its image and not behind a nearer surface.
-bool shows(const MapKeyframe& view, const Eigen::Vector3d& p_V, const CameraModel& camera) {
+// Whether a view shows what lies at p_V (its camera's frame): in its image and not behind a nearer surface.
+bool shows(const DepthGrid& grid, const Eigen::Vector3d& p_V, const CameraModel& camera) {
   Eigen::Vector2d uv;
   if (p_V.z() < 0.2 || !camera.project(p_V, &uv) || !camera.inImage(uv, 10)) return false;
-  const DepthGrid& grid = view.data->frame.depth_grid;
   if (grid.empty()) return true;
   const int c = static_cast<int>(std::lround((uv.x() - grid.offset) / grid.stride));
   const int r = static_cast<int>(std::lround((uv.y() - grid.offset) / grid.stride));
@@ -41,9 +43,13 @@ int cellOf(const Feature& feature, const CameraModel& camera) {
 }  // namespace
 
 double PlaceSupport::evidence() const {
-  const double disagreement =
-      depth.compared < kFewDepths ? kUnknownDisagreement : std::max(kLeastDisagreement, 1.0 - depth.agreement());
-  return points * explainedShare() * explainedCells() / disagreement;
+  // What the pose lets one camera see through is not there; what it puts behind another surface is often only hidden.
+  double contradiction = kUnknownContradiction;
+  if (depth.compared >= kFewDepths)
+    contradiction = kLeastContradiction + depth.seeThrough() + kOccludedWeight * depth.occluded / depth.compared;
+  // Corners of few views come and go even at the right place; with few landmarks the share is a guess.
+  const double there = (refound + 2.0) / (established + 10.0);
+  return points * explainedCells() * there / contradiction;
 }
 
 CameraRig rigOf(const std::vector<KeyframePtr>& keyframes) {
@@ -69,15 +75,16 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
     views.push_back(viewsAlong(map, support.T_W_C * T_B_C, kViews, allowed));
     points.push_back(mapPointsOf(map, views.back()));
   }
-  if (views.back().empty()) return support;
-  support.match = views.back().front();
+  if (!views.back().empty()) support.match = views.back().front();
 
   std::vector<PlaceMatch> matches;
   std::vector<std::pair<std::uint32_t, LandmarkId>> source;
+  std::vector<PlaceSurface> surfaces;
   PlacePose pose;
   for (const double factor : {1.0, 0.5}) {
     matches.clear();
     source.clear();
+    surfaces.clear();
     for (std::uint32_t c = 0; c < rig.size(); ++c) {
       const GuidedMatches guided =
           matchGuided(map, keyframes[c]->frame.features, support.T_W_C * rig[c], factor * options.guided_radius,
@@ -87,8 +94,13 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
         matches.push_back(m);
       }
       source.insert(source.end(), guided.source.begin(), guided.source.end());
+      if (views[c].empty()) continue;
+      const std::vector<PlaceSurface> seen =
+          matchSurfaces(map, views[c].front(), keyframes[c]->frame.depth_grid, support.T_W_C * rig[c],
+                        verifier.camera(), c);
+      surfaces.insert(surfaces.end(), seen.begin(), seen.end());
     }
-    pose = refinePlacePose(matches, rig, support.T_W_C, T_odom_B.rotation(), pose_options);
+    pose = refinePlacePose(matches, rig, support.T_W_C, T_odom_B.rotation(), pose_options, surfaces);
     if (!pose.found) return support;
     support.T_W_C = pose.T_W_B;
   }
@@ -108,6 +120,8 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
   }
   support.points = static_cast<int>(distinct.size());
 
+  std::set<std::pair<std::uint32_t, LandmarkId>> found;
+  for (const std::uint32_t k : pose.inliers) found.emplace(matches[k].camera, source[k].second);
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const SE3 T_W_C = support.T_W_C * rig[c];
     const TrackedFrame& frame = keyframes[c]->frame;
@@ -122,10 +136,16 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
       const Eigen::Vector3d p_C = feature.depth * Eigen::Vector3d(feature.xy.x(), feature.xy.y(), 1.0);
       bool shown = false;
       for (std::size_t v = 0; v < T_V_C.size() && !shown; ++v)
-        shown = shows(map.keyframe(views[c][v]), T_V_C[v] * p_C, verifier.camera());
+        shown = shows(map.keyframe(views[c][v]).data->frame.depth_grid, T_V_C[v] * p_C, verifier.camera());
       support.covered += shown;
-      support.explained += shown && inlier[c][f];
       if (shown) covered_cells.insert(cellOf(feature, verifier.camera()));
+    }
+    for (const MapPoint& point : points[c]) {
+      const MapLandmark* landmark = map.findLandmark(point.landmark);
+      if (!landmark || landmark->observations.size() < kEstablishedViews) continue;
+      if (!shows(frame.depth_grid, T_W_C.inverse() * point.p_W, verifier.camera())) continue;
+      ++support.established;
+      support.refound += found.count({static_cast<std::uint32_t>(c), point.landmark}) != 0;
     }
     support.covered_cells += static_cast<int>(covered_cells.size());
     for (const int cell : covered_cells) support.explained_cells += static_cast<int>(inlier_cells.count(cell));

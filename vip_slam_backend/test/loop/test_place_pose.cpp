@@ -143,6 +143,41 @@ TEST_F(PlacePoseTest, GravityHoldsTheTiltThatFewPointsLeaveFree) {
   EXPECT_GT(tilt(free), tilt(held));
 }
 
+TEST_F(PlacePoseTest, ABareWallHoldsTheYawThatFewCornersLeaveUncertain) {
+  // Five corners in the middle of a wall four metres ahead, and the wall in the depth image.
+  const SE3 T_W_C(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d(1, 2, 1.5));
+  const Plane wall(Eigen::Vector3d(-1, 0, 0), 5.0);
+  PlacePoseOptions options;
+  options.tilt_sigma = 0.003;
+  double free = 0, held = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    std::vector<PlaceMatch> matches;
+    for (int k = 0; k < 5; ++k) {
+      PlaceMatch m;
+      m.xy = Eigen::Vector2d(uniform(-0.1, 0.1), uniform(-0.1, 0.1));
+      m.p_W = T_W_C * Eigen::Vector3d(4 * m.xy.x(), 4 * m.xy.y(), 4);
+      m.xy += Eigen::Vector2d(normal(0.7), normal(0.7)) / 500.0;
+      m.depth_sigma = 0.02;
+      m.depth = 4 + normal(m.depth_sigma);
+      matches.push_back(m);
+    }
+    std::vector<PlaceSurface> surfaces;
+    for (int k = 0; k < 60; ++k) {
+      const Eigen::Vector3d p(4 * uniform(-0.6, 0.6), 4 * uniform(-0.45, 0.45), 4 + normal(0.01));
+      surfaces.push_back({0, p, wall, 0.03});
+    }
+    const SE3 start(T_W_C.rotation() * expQuaternion({0, 0.01, 0}), T_W_C.t() + Eigen::Vector3d(0.02, 0, 0));
+    const PlacePose without = refinePlacePose(matches, singleCamera(), start, T_W_C.rotation(), options);
+    const PlacePose with = refinePlacePose(matches, singleCamera(), start, T_W_C.rotation(), options, surfaces);
+    ASSERT_TRUE(without.found && with.found);
+    free += without.T_W_B.boxminus(T_W_C).head<3>().squaredNorm();
+    held += with.T_W_B.boxminus(T_W_C).head<3>().squaredNorm();
+    EXPECT_LT(std::abs(with.T_W_B.t().x() - 1.0), 0.01);
+  }
+  EXPECT_LT(std::sqrt(held / 40), 0.004);
+  EXPECT_LT(held, 0.25 * free);
+}
+
 TEST_F(PlacePoseTest, SameSeedSameAnswer) {
   make(80, 0.4, true);
   const PlacePose a = ransacPlacePose(matches_, singleCamera(), R_G_C_, {}),

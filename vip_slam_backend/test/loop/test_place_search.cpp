@@ -56,7 +56,8 @@ TEST_F(PlaceSearchTest, SupportMovesAWrongStartToTheTruth) {
   const SE3 truth = poseAt(2) * world_->T_I_C();
   EXPECT_LT((support.T_W_C.t() - truth.t()).norm(), 0.01);
   EXPECT_LT(support.T_W_C.rotation().angularDistance(truth.rotation()), 0.003);
-  EXPECT_GT(support.explainedShare(), 0.7);
+  EXPECT_GT(support.established, 100);
+  EXPECT_GT(support.refound, 0.7 * support.established);
   EXPECT_GT(support.explainedCells(), 0.8);
   // Three keyframes see many of the points more than once: these count once.
   EXPECT_LT(support.points, support.matches);

@@ -76,11 +76,13 @@ struct RelocalisationOptions {
   double seconds = 2.0;
   int ransac_iterations = 1000;
   int min_seed_inliers = 8;
-  int min_points = 20;
-  double min_evidence = 400;
+  int min_points = 12;
+  int sure_points = 20;
+  double min_evidence = 300;
   double sure_evidence = 600;
   double min_covered = 0.25;
   double ambiguity = 0.25;
+  double resemblance = 0.6;
 
   void visit(OptionVisitor& v) {
     v.field("candidates", candidates, 1, 100, "views of the map tried per keyframe");
@@ -91,10 +93,12 @@ struct RelocalisationOptions {
     v.field("min_seed_inliers", min_seed_inliers, 4, 500, "descriptor matches that agree, to look at a place at all");
     v.field("min_points", min_points, 6, 1000, "distinct points of the map that must be found again");
     v.field("min_evidence", min_evidence, 0.0, 1e6,
-            "points times share of features and of image cells explained, over the share of depth that disagrees");
-    v.field("sure_evidence", sure_evidence, 0.0, 1e6, "below it the next keyframe must come to the same place");
+            "points times share of image cells and of landmarks explained, over the share of depth that contradicts");
+    v.field("sure_points", sure_points, 6, 1000, "below it the next keyframe must come to the same place");
+    v.field("sure_evidence", sure_evidence, 0.0, 1e6, "the same for the evidence");
     v.field("min_covered", min_covered, 0.0, 1.0, "share of the features that must be in sight of the map");
     v.field("ambiguity", ambiguity, 0.0, 1.0, "refused when another place has more than this fraction of the evidence");
+    v.field("resemblance", resemblance, 0.0, 10.0, "refused when another place has more than this fraction of the points");
   }
 };
 

@@ -6,6 +6,7 @@
 
 #include <vector>
 
+#include "vip_slam_core/geometry/plane.h"
 #include "vip_slam_core/geometry/se3.h"
 
 namespace vip_slam {
@@ -22,6 +23,14 @@ struct PlaceMatch {
   double depth = 0;         ///< z in that camera, metres; 0 unknown
   double depth_sigma = 0;   ///< one sigma of it together with the point's own error, metres
   double scale = 1;         ///< pixel noise relative to octave 0
+};
+
+/// A point of a depth image and the plane of the map it lies on.
+struct PlaceSurface {
+  std::uint32_t camera = 0;
+  Eigen::Vector3d p_C;
+  Plane plane_W;
+  double sigma = 0.02;      ///< of the distance, metres
 };
 
 struct PlacePoseOptions {
@@ -51,9 +60,10 @@ PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const CameraRi
                           const PlacePoseOptions& options);
 
 /// All six degrees of freedom from `start` (T_W_B): robust Gauss-Newton, inliers chosen anew at inlier_px. The tilt of
-/// R_G_B is one more measurement when options.tilt_sigma is set. Not found when fewer than three inliers are left or
-/// the pose is not observable.
+/// R_G_B is one more measurement when options.tilt_sigma is set, and so are the surfaces. Not found when fewer than three
+/// inliers are left or the pose is not observable.
 PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const SE3& start,
-                          const Eigen::Quaterniond& R_G_B, const PlacePoseOptions& options);
+                          const Eigen::Quaterniond& R_G_B, const PlacePoseOptions& options,
+                          const std::vector<PlaceSurface>& surfaces = {});
 
 }  // namespace vip_slam
