@@ -3,6 +3,8 @@
 #include <cstring>
 #include <initializer_list>
 
+#include "vip_slam_backend/solver/sparse_cholesky.h"
+
 namespace vip_slam {
 
 namespace baseline {
@@ -45,12 +47,12 @@ namespace avx512 {
 
 namespace {
 
-const DenseKernels kBaseline{"baseline", baseline::factorPanel, baseline::negativeSyrk, baseline::forwardSubstitute,
-                             baseline::backSubstitute};
+const DenseKernels kBaseline{"baseline", baseline::factorPanel, baseline::negativeSyrk, baseline::backSubstitute,
+                             baseline::extendAdd};
 #if defined(__x86_64__)
-const DenseKernels kAvx2{"avx2", avx2::factorPanel, avx2::negativeSyrk, avx2::forwardSubstitute, avx2::backSubstitute};
-const DenseKernels kAvx512{"avx512", avx512::factorPanel, avx512::negativeSyrk, avx512::forwardSubstitute,
-                           avx512::backSubstitute};
+const DenseKernels kAvx2{"avx2", avx2::factorPanel, avx2::negativeSyrk, avx2::backSubstitute, avx2::extendAdd};
+const DenseKernels kAvx512{"avx512", avx512::factorPanel, avx512::negativeSyrk, avx512::backSubstitute,
+                           avx512::extendAdd};
 #endif
 
 const DenseKernels& choose() {

@@ -4,19 +4,25 @@
 
 namespace vip_slam {
 
-/// Rows that must be readable (and zero) below the last one of every matrix given to the kernels.
+struct FrontSegment;
+
+/// Rows that must be readable (and zero) below the last one of every panel given to the kernels.
 constexpr int kKernelPadding = 16;
 
 struct DenseKernels {
   const char* name;
   /// Cholesky of the leading c x c block of the n x n lower matrix A (leading dimension ld), rows below become L21.
-  /// False when a pivot is not positive.
+  /// False when a pivot is not positive. What stands above the diagonal is not kept.
   bool (*factorPanel)(double* A, int n, int c, int ld);
-  /// Lower part of C (m x m, leading dimension ldc) = -P P^T with P m x k (leading dimension ldp).
-  void (*negativeSyrk)(double* C, int ldc, const double* P, int ldp, int m, int k);
-  /// Solves with the panel's first c columns: L11 x1 = x1, x2 -= L21 x1; and back, x1 from x2.
-  void (*forwardSubstitute)(const double* A, int n, int c, int ld, double* x);
+  /// Lower part of the first `columns` columns of C (m rows; leading dimension ldc, a multiple of 8) = -P P^T with P
+  /// m x k (leading dimension ldp). What stands above the diagonal and below row m is not kept.
+  void (*negativeSyrk)(double* C, int ldc, const double* P, int ldp, int m, int columns, int k);
+  /// Solves L11^T x1 = x1 - L21^T x2 with the panel's first c columns.
   void (*backSubstitute)(const double* A, int n, int c, int ld, double* x);
+  /// Adds columns [begin, end) of a child's lower update matrix (leading dimension ldu) to its parent's: row and column
+  /// r of a segment's child range go to those of its parent range. `target` is where the parent's row and column 0 are.
+  void (*extendAdd)(double* target, int ld, const double* update, int ldu, const FrontSegment* segments, int count,
+                    int begin, int end);
 };
 
 /// The fastest build that this processor runs.

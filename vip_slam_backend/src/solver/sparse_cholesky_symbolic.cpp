@@ -11,6 +11,11 @@
 namespace vip_slam {
 namespace {
 
+// Doubles that a block takes, rounded up to whole cache lines.
+std::size_t blockValues(int rows, int columns) {
+  return (static_cast<std::size_t>(SparseCholesky::leading(rows)) * columns + 7) / 8 * 8;
+}
+
 using Lists = std::vector<std::vector<int>>;
 
 // Structure of the factor below each node, in positions, with the given order.
@@ -164,7 +169,7 @@ void SparseCholesky::placeUpdates() {
     for (int f = 0; f < static_cast<int>(fronts_.size()); ++f) {
       Front& front = fronts_[f];
       if (front.part != part) continue;
-      const std::size_t m = front.rows - front.columns, size = (m * m + 7) / 8 * 8;
+      const std::size_t m = front.updateRows() - 1, size = m * front.updateLeading();
       std::size_t at = base;
       auto before = live.begin();
       for (; before != live.end() && before->begin < at + size; ++before) at = before->end;
@@ -178,7 +183,7 @@ void SparseCholesky::placeUpdates() {
     }
     base = top;
   }
-  updates_.assign(base + kKernelPadding, 0.0);
+  updates_.resize(base + kKernelPadding);
 }
 
 void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<std::pair<int, int>>& pairs) {
@@ -192,7 +197,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
     unknown_[v] = dimension_;
     dimension_ += sizes[v];
     diagonal_offset_[v] = value_count_;
-    value_count_ += static_cast<std::size_t>(leading(sizes[v])) * sizes[v];
+    value_count_ += blockValues(sizes[v], sizes[v]);
   }
   Lists neighbours(n);
   pair_offset_.resize(pairs.size());
@@ -215,7 +220,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
     int later = pairs[k].first, earlier = pairs[k].second;
     if (position_[later] < position_[earlier]) std::swap(later, earlier);
     pair_offset_[k] = value_count_;
-    value_count_ += static_cast<std::size_t>(leading(sizes[later])) * sizes[earlier];
+    value_count_ += blockValues(sizes[later], sizes[earlier]);
   }
   const auto sizeAt = [&](int p) { return sizes_[node_at_[p]]; };
 
@@ -265,12 +270,13 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
       front.rows += sizeAt(p);
       if (p <= last_of[f]) front.columns += sizeAt(p);
     }
+    ++front.rows;  // the right-hand side
     front.ld = (front.rows + kKernelPadding + 7) / 8 * 8;
     if (front.ld % 64 == 0) front.ld += 8;  // columns must not fall on the same cache sets
     front.factor_offset = factor_size_;
     factor_size_ += static_cast<std::size_t>(front.ld) * front.columns;
     for (int c = 0; c < front.columns; ++c) {
-      const double below = front.rows - c;
+      const double below = front.rows - 1 - c;
       factor_nonzeros_ += static_cast<std::size_t>(below);
       factor_flops_ += below * below;
     }
@@ -278,18 +284,20 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   // Rows of each front in its parent.
   for (std::size_t f = 0; f < fronts_.size(); ++f) {
     Front& front = fronts_[f];
-    if (front.rows == front.columns) continue;
+    if (front.updateRows() == 1) continue;
     const int up = front_of[structure[last_of[f]].front()];
     fronts_[up].children.push_back(static_cast<int>(f));
     for (std::size_t k = 0; k < rows_of[up].size(); ++k) offset_in_front[rows_of[up][k]] = row_offset[up][k];
-    for (const int p : structure[last_of[f]]) {
+    const auto append = [&](int parent_row, int size) {
       const int child_row = front.to_parent.empty() ? 0 : front.to_parent.back().child + front.to_parent.back().size;
-      Segment segment{child_row, offset_in_front[p], sizeAt(p)};
-      if (!front.to_parent.empty() && front.to_parent.back().parent + front.to_parent.back().size == segment.parent)
-        front.to_parent.back().size += segment.size;
+      if (!front.to_parent.empty() && front.to_parent.back().parent + front.to_parent.back().size == parent_row)
+        front.to_parent.back().size += size;
       else
-        front.to_parent.push_back(segment);
-    }
+        front.to_parent.push_back({child_row, parent_row, size});
+      if (parent_row < fronts_[up].columns) front.parent_pivots += size;
+    };
+    for (const int p : structure[last_of[f]]) append(offset_in_front[p], sizeAt(p));
+    append(fronts_[up].rows - 1, 1);
   }
   splitTree();
   placeUpdates();
@@ -308,7 +316,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
     const int a = position_[pairs[k].first], b = position_[pairs[k].second];
     place(std::max(a, b), std::min(a, b), pair_offset_[k]);
   }
-  factor_.assign(factor_size_, 0.0);
+  factor_.resize(factor_size_);
   work_.assign(dimension_ + kKernelPadding, 0.0);
 }
 

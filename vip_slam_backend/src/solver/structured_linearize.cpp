@@ -15,10 +15,10 @@ constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;
 // either its own (the points' sums over frames) or a part of the matrix that no other touches.
 void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker* worker) {
   if (!loaded_) loadFrames(problem);
-  std::fill(values_.begin(), values_.end(), 0.0);
+  values_.fillZero();
   std::fill(full_gradient_.begin(), full_gradient_.end(), 0.0);
-  std::fill(frame_sums_.begin(), frame_sums_.end(), 0.0);
-  std::fill(eliminated_.begin(), eliminated_.end(), 0.0);
+  frame_sums_.fillZero();
+  eliminated_.fillZero();
   const PointKernels& kernels = pointKernels();
   const int points = static_cast<int>(problem.points.size());
   PointKernelArguments a = arguments(problem, radius);

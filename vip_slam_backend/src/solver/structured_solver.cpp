@@ -27,9 +27,8 @@ double StructuredSolver::cost(const BaProblem& problem, Worker* worker) {
 }
 
 bool StructuredSolver::solveStep(Worker* worker) {
-  if (!structure_.cholesky.factorize(values_.data(), worker)) return false;
   for (std::size_t k = 0; k < step_.size(); ++k) step_[k] = -gradient_[k];
-  structure_.cholesky.solve(step_.data());
+  if (!structure_.cholesky.solve(values_.data(), step_.data(), worker)) return false;
   PointKernelArguments a;
   a.frames = frames_.data();
   a.observations = observations_.data();

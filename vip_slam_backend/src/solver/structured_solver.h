@@ -11,6 +11,7 @@
 #include "point_kernels.h"
 #include "system_structure.h"
 #include "vip_slam_backend/solver/ba_solver.h"
+#include "vip_slam_backend/solver/kernel_array.h"
 #include "worker.h"
 
 namespace vip_slam {
@@ -77,8 +78,9 @@ class StructuredSolver : public BaSolver {
   std::vector<double> homography_sums_;
   std::vector<KernelImu> imu_;
   std::vector<double> imu_constants_, imu_states_;
-  std::vector<double> points_, values_, gradient_, full_gradient_, diagonal_, damping_, W_, point_inverse_,
-      point_gradient_, point_damping_, step_, point_step_, frame_sums_, eliminated_;
+  KernelArray values_, W_, frame_sums_, eliminated_;
+  std::vector<double> points_, gradient_, full_gradient_, diagonal_, damping_, point_inverse_, point_gradient_,
+      point_damping_, step_, point_step_;
 };
 
 }  // namespace vip_slam

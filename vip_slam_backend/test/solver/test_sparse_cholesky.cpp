@@ -71,10 +71,9 @@ Case makeCase(int frames, int reach, int planes, unsigned seed) {
 TEST(SparseCholesky, SolvesLikeTheDenseOne) {
   for (const auto& shape : {std::array<int, 3>{1, 0, 0}, {2, 1, 1}, {7, 2, 3}, {40, 6, 5}, {60, 59, 0}}) {
     Case c = makeCase(shape[0], shape[1], shape[2], 7 + shape[0]);
-    ASSERT_TRUE(c.cholesky.factorize(c.values.data()));
-    Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(c.cholesky.dimension(), -1, 2);
+    const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(c.cholesky.dimension(), -1, 2);
     Eigen::VectorXd x = b;
-    c.cholesky.solve(x.data());
+    ASSERT_TRUE(c.cholesky.solve(c.values.data(), x.data()));
     const Eigen::VectorXd expected = c.A.llt().solve(b);
     EXPECT_LT((x - expected).norm(), 1e-11 * expected.norm()) << shape[0] << " frames";
   }
@@ -83,7 +82,8 @@ TEST(SparseCholesky, SolvesLikeTheDenseOne) {
 TEST(SparseCholesky, RefusesAnIndefiniteMatrix) {
   Case c = makeCase(5, 2, 1, 3);
   c.values[c.cholesky.diagonalOffset(4)] = -1;
-  EXPECT_FALSE(c.cholesky.factorize(c.values.data()));
+  Eigen::VectorXd b = Eigen::VectorXd::Ones(c.cholesky.dimension());
+  EXPECT_FALSE(c.cholesky.solve(c.values.data(), b.data()));
 }
 
 TEST(DenseKernels, AllBuildsAgree) {
@@ -101,22 +101,30 @@ TEST(DenseKernels, AllBuildsAgree) {
     ASSERT_TRUE(kernels->factorPanel(A.data(), n, c, ld));
     for (int j = 0; j < c; ++j)
       EXPECT_LT((A.col(j).segment(j, n - j) - L.col(j).tail(n - j)).norm(), 1e-12 * S.norm()) << name;
-    Eigen::MatrixXd C = Eigen::MatrixXd::Constant(n - c, n - c, 7.0);
-    kernels->negativeSyrk(C.data(), n - c, A.data() + c, ld, n - c, c);
+    const int m = n - c, columns = m - 1;
+    Eigen::MatrixXd C = Eigen::MatrixXd::Constant((m + 7) / 8 * 8, m, 7.0);
+    kernels->negativeSyrk(C.data(), static_cast<int>(C.rows()), A.data() + c, ld, m, columns, c);
+    EXPECT_EQ(C(m - 1, m - 1), 7.0) << name;
     const Eigen::MatrixXd L21 = L.bottomLeftCorner(n - c, c);
     const Eigen::MatrixXd expected = -L21 * L21.transpose();
-    for (int j = 0; j < n - c; ++j)
-      EXPECT_LT((C.col(j).tail(n - c - j) - expected.col(j).tail(n - c - j)).norm(), 1e-11 * S.norm()) << name;
-    // Forth and back with the first c columns of L.
+    for (int j = 0; j < columns; ++j)
+      EXPECT_LT((C.col(j).segment(j, m - j) - expected.col(j).tail(m - j)).norm(), 1e-11 * S.norm()) << name;
+    // Back with the first c columns of L.
     const Eigen::VectorXd b = Eigen::VectorXd::Random(n);
     Eigen::MatrixXd K = Eigen::MatrixXd::Identity(n, n);
     K.leftCols(c) = L.leftCols(c);
     Eigen::VectorXd x = b;
-    kernels->forwardSubstitute(A.data(), n, c, ld, x.data());
-    EXPECT_LT((K * x - b).norm(), 1e-12 * b.norm()) << name;
-    x = b;
     kernels->backSubstitute(A.data(), n, c, ld, x.data());
     EXPECT_LT((K.transpose() * x - b).norm(), 1e-12 * b.norm()) << name;
+    // Three columns of an update of five rows into a front of nine.
+    const FrontSegment segments[] = {{0, 1, 2}, {2, 5, 3}};
+    Eigen::MatrixXd to = Eigen::MatrixXd::Zero(9, 9), sum = to;
+    const Eigen::MatrixXd from = Eigen::MatrixXd::Random(8, 5);
+    kernels->extendAdd(to.data(), 9, from.data(), 8, segments, 2, 1, 4);
+    const int row[] = {1, 2, 5, 6, 7};
+    for (int q = 1; q < 4; ++q)
+      for (int r = q; r < 5; ++r) sum(row[r], row[q]) = from(r, q);
+    EXPECT_EQ(to, sum) << name;
   }
   EXPECT_GE(tried, 1);
 }

@@ -1,16 +1,24 @@
 // Block-sparse Cholesky of a symmetric positive definite matrix whose unknowns come in nodes (6 pose, 9 motion, 3
 // plane): approximate minimum degree, then a multifrontal factorisation on dense fronts. The symbolic part is done once
-// per structure; numbers go straight from the caller's blocks into the fronts. Two disjoint parts of the elimination
-// tree can be factorised side by side; the numbers are the same to the last bit.
+// per structure; numbers go straight from the caller's blocks into the fronts. The right-hand side goes along as the
+// last row of every front, so that the forward substitution is part of the factorisation. Two disjoint parts of the
+// elimination tree can be factorised side by side; the numbers are the same to the last bit.
 #pragma once
 
 #include <cstddef>
 #include <utility>
 #include <vector>
 
+#include "vip_slam_backend/solver/kernel_array.h"
+
 namespace vip_slam {
 
 class Worker;
+
+/// Rows of a child's update that stay together in the parent's front.
+struct FrontSegment {
+  int child, parent, size;
+};
 
 class SparseCholesky {
  public:
@@ -26,16 +34,16 @@ class SparseCholesky {
 
   /// Values: column-major blocks in one array of valueCount() doubles. Diagonal blocks are square (lower half read);
   /// the block of pair k has the rows of the node eliminated later and the columns of the one eliminated earlier.
-  /// Columns are leading(rows) apart: those of poses are padded so that a column is a whole number of vectors.
+  /// Columns are leading(rows) apart: those of poses are padded so that a column is a whole number of vectors. Blocks
+  /// begin at multiples of 8.
   static int leading(int rows) { return rows == 6 ? 8 : rows; }
   std::size_t valueCount() const { return value_count_; }
   std::size_t diagonalOffset(int node) const { return diagonal_offset_[node]; }
   std::size_t pairOffset(int pair) const { return pair_offset_[pair]; }
 
-  /// False when the matrix is not positive definite. `worker` (may be null) helps with one half of the tree.
-  bool factorize(const double* values, Worker* worker = nullptr);
-  /// Solves in place; after a successful factorize().
-  void solve(double* b) const;
+  /// Solves in place. False when the matrix is not positive definite. `worker` (may be null) helps with one half of the
+  /// tree.
+  bool solve(const double* values, double* b, Worker* worker = nullptr);
 
   std::size_t factorNonzeros() const { return factor_nonzeros_; }
   double factorFlops() const { return factor_flops_; }
@@ -46,22 +54,22 @@ class SparseCholesky {
     int row, column;      // inside the front
     int rows, columns;
   };
-  struct Segment {        // rows of a child's update that stay together in the parent's front
-    int child, parent, size;
-  };
   struct Front {
-    int columns = 0, rows = 0, ld = 0;   // pivots, pivots + update rows, leading dimension
+    int columns = 0, rows = 0, ld = 0;   // pivots, pivots + update rows + right-hand side, leading dimension
     std::vector<Entry> entries;
     std::vector<int> children;
-    std::vector<Segment> to_parent;
-    std::vector<int> unknowns;           // caller's unknown of each row
+    std::vector<FrontSegment> to_parent;
+    int parent_pivots = 0;               // update columns that are pivots of the parent
+    std::vector<int> unknowns;           // caller's unknown of each row but the last
     std::size_t factor_offset = 0;
-    std::size_t update_offset = 0;       // of the update matrix, (rows - columns) squared
+    std::size_t update_offset = 0;       // of the update matrix
+    int updateRows() const { return rows - columns; }
+    int updateLeading() const { return (updateRows() + 7) / 8 * 8; }
     int part = 2;                        // 0 and 1: disjoint parts of the tree; 2: what lies above both
   };
-  static void addChild(const Front& child, const double* update, int parent_columns, bool pivots, double* target,
-                       int ld);
-  bool factorizeFront(const Front& front, const double* values);
+  bool factorizeFront(const Front& front, const double* values, const double* b);
+  bool factorize(const double* values, const double* b, Worker* worker);
+  void backSubstitute(double* b) const;
   void order(const std::vector<std::vector<int>>& neighbours);
   void splitTree();
   void placeUpdates();
@@ -73,7 +81,7 @@ class SparseCholesky {
   int dimension_ = 0;
   std::vector<Front> fronts_;
   std::size_t factor_size_ = 0;
-  std::vector<double> updates_, factor_;
+  KernelArray updates_, factor_;
   mutable std::vector<double> work_;
 };
 
