@@ -7,7 +7,7 @@
 namespace vip_slam {
 namespace {
 
-// Landmarks of one plane by the frames that could host them.
+// A landmark in the list of a frame that could host it.
 struct Candidate {
   int landmark = 0, view = 0;
 };
@@ -53,10 +53,10 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
                              bool shared) {
   std::vector<int> hosts(views.size(), -1);
   std::vector<char> good(views.viewCount(), 0);
-  std::vector<std::vector<int>> on_plane(planes.size());
+  std::vector<int> on_plane;
   for (int l = 0; l < views.size(); ++l) {
     if (plane[l] < 0) continue;
-    on_plane[plane[l]].push_back(l);
+    on_plane.push_back(l);
     for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
       const int view = static_cast<int>(v - views.begin(l));
       const FrameGeometry& g = geometry[v->frame];
@@ -66,9 +66,7 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
       if (hosts[l] < 0 && !shared) hosts[l] = view;
     }
   }
-  if (shared)
-    for (const auto& landmarks : on_plane)
-      shareHosts(views, landmarks, good, static_cast<int>(geometry.size()), &hosts);
+  if (shared) shareHosts(views, on_plane, good, static_cast<int>(geometry.size()), &hosts);
   return hosts;
 }
 
