@@ -94,8 +94,9 @@ void StructuredSolver::linearizePlanes(const BaProblem& problem) {
   for (std::size_t k = 0; k < problem.point_to_plane.size(); ++k) {
     const BaPointToPlane& f = problem.point_to_plane[k];
     const Eigen::Vector4d u = planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane, &basis_[f.plane], &Jp);
-    const PlaneInCameraJacobian GJ = f.G * Jp;
-    Hp.noalias() = Jp.transpose() * GJ;
+    // Eigen's general product would cost more than the numbers themselves.
+    const PlaneInCameraJacobian GJ = f.G.lazyProduct(Jp);
+    Hp = Jp.transpose().lazyProduct(GJ);
     addPair(structure_.point_to_plane[k], f.frame, f.plane, GJ.transpose() * u);
   }
   for (std::size_t k = 0; k < problem.plane_points.size(); ++k) {

@@ -10,16 +10,20 @@ namespace vip_slam {
 
 /// A frame for the kernels; matrices row-major.
 struct KernelFrame {
-  double R_C_W[9], R_C_I[9], R_W_I[9];
-  double t_W_I[3], t_W_C[3];
-  double lever_C[9];           ///< R_C_I [t_I_C]x
-  double offset_C[3];          ///< R_C_I t_I_C: p_C = R_C_W (p - t_W_I) - offset_C
-  std::int64_t diagonal = -1;  ///< offset of its diagonal block in the values; -1: fixed
-  std::int32_t unknown = 0;    ///< first unknown of the pose
-  std::int32_t position = -1;  ///< in the elimination order; -1: fixed
+  alignas(64) double R_C_W[9];
+  double t_W_I[3];
+  double offset_C[3];             ///< R_C_I t_I_C: p_C = R_C_W (p - t_W_I) - offset_C
+  std::int64_t diagonal = -1;     ///< offset of its diagonal block in the values; -1: fixed
+  alignas(64) double turn[3][8];  ///< lines of R_C_I, then zeros
+  alignas(64) double move[3][8];  ///< three zeros, lines of -R_C_W, two zeros
+  double R_C_I[9];
+  double t_W_C[3];
+  double lever_C[9];              ///< R_C_I [t_I_C]x
+  std::int32_t unknown = 0;       ///< first unknown of the pose
+  std::int32_t position = -1;     ///< in the elimination order; -1: fixed
 };
 
-/// Per frame: a 6 x 6 block (lower triangle, columns of 8) and a gradient of 6, padded.
+/// Per frame: a 6 x 6 block (columns of 8) and a gradient of 6, padded.
 constexpr int kFrameSums = 56;
 
 struct PointKernelArguments {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <tuple>
 
 #include <amd.h>
 
@@ -196,8 +197,6 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   for (int v = 0; v < n; ++v) {
     unknown_[v] = dimension_;
     dimension_ += sizes[v];
-    diagonal_offset_[v] = value_count_;
-    value_count_ += blockValues(sizes[v], sizes[v]);
   }
   Lists neighbours(n);
   pair_offset_.resize(pairs.size());
@@ -216,12 +215,6 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   const Lists structure = eliminate(neighbours, position_, &parent);
   node_at_.resize(n);
   for (int v = 0; v < n; ++v) node_at_[position_[v]] = v;
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    int later = pairs[k].first, earlier = pairs[k].second;
-    if (position_[later] < position_[earlier]) std::swap(later, earlier);
-    pair_offset_[k] = value_count_;
-    value_count_ += blockValues(sizes[later], sizes[earlier]);
-  }
   const auto sizeAt = [&](int p) { return sizes_[node_at_[p]]; };
 
   // Supernodes: a chain in the tree joins while the zeros it stores stay few.
@@ -302,19 +295,30 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   splitTree();
   placeUpdates();
 
-  // Where each block of the matrix goes.
-  const auto place = [&](int later, int earlier, std::size_t value_offset) {
+  // Where each block of the matrix goes. The values lie in the order in which the fronts read them.
+  std::vector<std::vector<std::pair<Entry, std::size_t*>>> entries(fronts_.size());
+  const auto place = [&](int later, int earlier, std::size_t* value_offset) {
     const int f = front_of[earlier];
     const auto offset = [&](int p) {
       const auto it = std::lower_bound(rows_of[f].begin(), rows_of[f].end(), p);
       return row_offset[f][it - rows_of[f].begin()];
     };
-    fronts_[f].entries.push_back({value_offset, offset(later), offset(earlier), sizeAt(later), sizeAt(earlier)});
+    entries[f].push_back({{0, offset(later), offset(earlier), sizeAt(later), sizeAt(earlier)}, value_offset});
   };
-  for (int v = 0; v < n; ++v) place(position_[v], position_[v], diagonal_offset_[v]);
+  for (int v = 0; v < n; ++v) place(position_[v], position_[v], &diagonal_offset_[v]);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const int a = position_[pairs[k].first], b = position_[pairs[k].second];
-    place(std::max(a, b), std::min(a, b), pair_offset_[k]);
+    place(std::max(a, b), std::min(a, b), &pair_offset_[k]);
+  }
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    std::sort(entries[f].begin(), entries[f].end(), [](const auto& a, const auto& b) {
+      return std::tie(a.first.column, a.first.row) < std::tie(b.first.column, b.first.row);
+    });
+    for (auto& entry : entries[f]) {
+      entry.first.offset = *entry.second = value_count_;
+      value_count_ += blockValues(entry.first.rows, entry.first.columns);
+      fronts_[f].entries.push_back(entry.first);
+    }
   }
   factor_.resize(factor_size_);
   work_.assign(dimension_ + kKernelPadding, 0.0);

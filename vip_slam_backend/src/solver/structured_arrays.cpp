@@ -120,7 +120,11 @@ void StructuredSolver::loadFrames(const BaProblem& problem) {
     KernelFrame& out = frames_[k];
     copyRowMajor(g.R_C_W, out.R_C_W);
     copyRowMajor(g.R_C_I, out.R_C_I);
-    copyRowMajor(g.R_W_I, out.R_W_I);
+    for (int r = 0; r < 3; ++r) {
+      std::fill(out.turn[r], out.turn[r] + 8, 0.0);
+      std::fill(out.move[r], out.move[r] + 8, 0.0);
+      for (int c = 0; c < 3; ++c) out.turn[r][c] = g.R_C_I(r, c), out.move[r][3 + c] = -g.R_C_W(r, c);
+    }
     Eigen::Map<Eigen::Vector3d>(out.t_W_I) = g.t_W_I;
     Eigen::Map<Eigen::Vector3d>(out.t_W_C) = g.t_W_C;
     copyRowMajor(g.R_C_I * hat(g.t_I_C), out.lever_C);
