@@ -81,17 +81,19 @@ World world() {
   return w;
 }
 
-TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
-  const World w = world();
-  SceneCamera camera(testing::quietNoise(), 1.0);
-  PlaneMapper mapper({}, camera.camera, camera.noise);
-  std::map<LandmarkId, PlaneId> associated;
-  std::map<LandmarkId, int> seen;
+struct Associations {
+  std::map<LandmarkId, PlaneId> plane;  ///< of the associated ones
+  std::map<LandmarkId, int> seen;       ///< keyframes
+};
+
+/// Eight keyframes; the landmarks are where the points are.
+Associations associate(const World& w, SceneCamera* camera, PlaneMapper* mapper) {
+  Associations result;
   for (int i = 0; i < 8; ++i) {
     const SE3 T_W_C = lookAt({-0.8, -1.2 + 0.35 * i, 1.4}, {3, -0.5 + 0.1 * i, 0.9});
-    const auto keyframe = camera.keyframe(w.scene, T_W_C, w.points, 0.5);
-    for (const Feature& f : keyframe->frame.features) ++seen[f.id];
-    mapper.addKeyframe(keyframe);
+    const auto keyframe = camera->keyframe(w.scene, T_W_C, w.points, 0.5);
+    for (const Feature& f : keyframe->frame.features) ++result.seen[f.id];
+    mapper->addKeyframe(keyframe);
     MapUpdate update = testing::updateFor(*keyframe, T_W_C);
     for (std::size_t k = 0; k < w.points.size(); ++k) {
       LandmarkEstimate estimate;
@@ -99,10 +101,41 @@ TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
       estimate.p_W = w.points[k];
       update.landmarks.push_back(estimate);
     }
-    const PlaneUpdate result = mapper.applyMapUpdate(update);
-    for (const auto& [id, plane] : result.associated) associated[id] = plane;
-    for (LandmarkId id : result.dissociated) associated.erase(id);
+    const PlaneUpdate answer = mapper->applyMapUpdate(update);
+    for (const auto& [id, plane] : answer.associated) result.plane[id] = plane;
+    for (LandmarkId id : answer.dissociated) result.plane.erase(id);
   }
+  return result;
+}
+
+TEST(Points, BesideACreaseEachFindsItsSide) {
+  World w;
+  w.scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  w.scene.add({-3, -3, 0}, {6, 0, 0}, {0, 6, 0});
+  for (double y = -1.2; y < 1.2; y += 0.05) {
+    w.points.emplace_back(3, y, 0.015);
+    w.points.emplace_back(2.98, y + 0.02, 0);
+  }
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  PlaneMapper mapper({}, camera.camera, camera.noise);
+  const Associations found = associate(w, &camera, &mapper);
+  ASSERT_EQ(2u, mapper.planes().size());
+  std::size_t wrong = 0;
+  for (const auto& [id, plane] : found.plane) {
+    for (const PlaneEstimate& p : mapper.planes()) {
+      wrong += p.id == plane && std::abs(p.plane.signedDistance(w.points[id])) > 0.01;
+    }
+  }
+  EXPECT_GE(found.plane.size(), w.points.size() * 9 / 10);
+  EXPECT_LE(wrong, found.plane.size() / 20);
+}
+
+TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
+  const World w = world();
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  PlaneMapper mapper({}, camera.camera, camera.noise);
+  const Associations found_on = associate(w, &camera, &mapper);
+  const std::map<LandmarkId, PlaneId>& associated = found_on.plane;
   PlaneId wall = 0, floor = 0;
   for (const PlaneEstimate& p : mapper.planes()) {
     if (p.kind == PlaneKind::kHorizontal) floor = p.id;
@@ -118,7 +151,7 @@ TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
         : ++wrong;
   }
   int found = 0;
-  for (const auto& [id, count] : seen) {
+  for (const auto& [id, count] : found_on.seen) {
     if (count < 5 || w.truth[id] < 1) continue;
     ++expected;
     found += associated.count(id) ? 1 : 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "vip_slam_planes/association/consistency_test.h"
@@ -97,6 +98,39 @@ void PointAssociation::test(LandmarkId id, Landmark* landmark, const CameraPoses
   setPlane(id, landmark, 0);
 }
 
+PlaneId PointAssociation::chooseCandidate(const Feature& f, const Landmark& landmark, const SurfaceLabels& labels,
+                                          const std::vector<PlaneId>& plane_of_label, const SE3& T_map_C,
+                                          const FindPlane& find_plane) const {
+  const std::vector<SurfaceLabels::Node> nodes = labels.nodesAround(f.pixel);
+  if (nodes.size() < 2) return 0;
+  // Beside a hollow edge, where floor and wall meet, either plane may be it: the nearer one first, and the other one
+  // when the test refuses. Points on an edge that stands out belong to an outline, which moves with the view.
+  const Eigen::Matrix3d R = T_map_C.R();
+  const auto range = [&](const Plane& plane, const Eigen::Vector3d& ray) {
+    const double facing = plane.n.dot(ray);
+    return facing < 0 ? -plane.signedDistance(T_map_C.t()) / facing : std::numeric_limits<double>::infinity();
+  };
+  double nearest = options_.candidate_distance;
+  PlaneId best = 0;
+  for (const SurfaceLabels::Node& node : nodes) {
+    const Plane* own = find_plane(plane_of_label[node.label]);
+    if (!own) return 0;
+    const Eigen::Vector2f xy = f.xy + (node.pixel - f.pixel) / float(focal_);
+    const Eigen::Vector3d ray = R * Eigen::Vector3d(xy.x(), xy.y(), 1.0);
+    for (const SurfaceLabels::Node& other : nodes) {
+      if (other.label == node.label) continue;
+      const Plane* plane = find_plane(plane_of_label[other.label]);
+      if (!plane || range(*own, ray) > range(*plane, ray)) return 0;
+    }
+    const PlaneId id = plane_of_label[node.label];
+    const double distance = std::abs(own->signedDistance(landmark.p_W));
+    if (distance >= nearest || std::count(landmark.refused.begin(), landmark.refused.end(), id) > 0) continue;
+    nearest = distance;
+    best = id;
+  }
+  return best;
+}
+
 void PointAssociation::process(const Keyframe& keyframe, const SurfaceLabels& labels,
                                const std::vector<PlaneId>& plane_of_label, const std::vector<char>& trusted,
                                const CameraPoses& poses, const FindPlane& find_plane) {
@@ -112,15 +146,9 @@ void PointAssociation::process(const Keyframe& keyframe, const SurfaceLabels& la
       if (!(f.depth > 0)) continue;
       landmark.p_W = pose->second * (Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0) * f.depth);
     }
-    const int k = labels.around(f.pixel);
-    if (k >= 0 && !landmark.candidate) {
-      const PlaneId plane_id = plane_of_label[k];
-      const Plane* plane = find_plane(plane_id);
-      const bool refused = std::count(landmark.refused.begin(), landmark.refused.end(), plane_id) > 0;
-      if (plane && !refused && std::abs(plane->signedDistance(landmark.p_W)) < options_.candidate_distance) {
-        landmark.candidate = plane_id;
-        landmark.failures = 0;
-      }
+    if (!landmark.candidate) {
+      landmark.candidate = chooseCandidate(f, landmark, labels, plane_of_label, pose->second, find_plane);
+      landmark.failures = 0;
     }
     if (!landmark.candidate) continue;
     // Decided points are asked again when their evidence has doubled.

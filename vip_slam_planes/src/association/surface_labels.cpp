@@ -20,6 +20,18 @@ int SurfaceLabels::around(const Eigen::Vector2f& pixel) const {
   return count >= 2 ? shared : -1;
 }
 
+std::vector<SurfaceLabels::Node> SurfaceLabels::nodesAround(const Eigen::Vector2f& pixel) const {
+  std::vector<Node> nodes;
+  if (stride == 0) return nodes;
+  const int c = static_cast<int>(std::floor((pixel.x() - float(offset)) / float(stride)));
+  const int r = static_cast<int>(std::floor((pixel.y() - float(offset)) / float(stride)));
+  for (int i = 0; i < 4; ++i) {
+    const int col = c + (i & 1), row = r + (i >> 1), k = at(col, row);
+    if (k >= 0) nodes.push_back({k, Eigen::Vector2f(float(offset + col * stride), float(offset + row * stride))});
+  }
+  return nodes;
+}
+
 int SurfaceLabels::inner(int c, int r) const {
   const int k = at(c, r);
   if (k < 0) return -1;

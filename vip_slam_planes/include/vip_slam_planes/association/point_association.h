@@ -63,6 +63,10 @@ class PointAssociation {
     std::vector<PlaneId> refused;
   };
   LandmarkId resolve(LandmarkId id) const;
+  /// The plane that a feature may lie on by the labels around it, 0: none.
+  PlaneId chooseCandidate(const Feature& feature, const Landmark& landmark, const SurfaceLabels& labels,
+                          const std::vector<PlaneId>& plane_of_label, const SE3& T_map_C,
+                          const FindPlane& plane) const;
   void setPlane(LandmarkId id, Landmark* landmark, PlaneId plane);
   void test(LandmarkId id, Landmark* landmark, const CameraPoses& poses, const Plane& plane);
 

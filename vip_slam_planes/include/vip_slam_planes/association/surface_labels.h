@@ -17,6 +17,12 @@ struct SurfaceLabels {
   }
   /// The only label of the four nodes around a pixel when at least two have it, else -1.
   int around(const Eigen::Vector2f& pixel) const;
+  struct Node {
+    int label;
+    Eigen::Vector2f pixel;
+  };
+  /// The labelled ones of the four nodes around a pixel.
+  std::vector<Node> nodesAround(const Eigen::Vector2f& pixel) const;
   /// The label of a node whose eight neighbours have it too, else -1: a margin of one stride to every border.
   int inner(int c, int r) const;
 };
