@@ -39,7 +39,9 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   }
   observe(keyframe, T_map_C, tracks, label, labels, mesh, first_time);
   if (first_time) {
-    for (auto& [id, track] : tracks_) ++track.keyframes_waited;
+    for (PlaneTrack* track : tracks) {
+      if (!track->confirmed && showsIn(*track, *camera, noise, T_map_C)) ++track->keyframes_waited;
+    }
   }
 }
 

@@ -152,6 +152,19 @@ TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
   }
 }
 
+TEST(Mapper, APlaneWaitsForASecondSightingWhileNobodyLooks) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -0.4, 0.8}, {0, 0.8, 0}, {0, 0, 0.8});  // a board, too small to be sure of at once
+  scene.add({-3, -2, 0}, {0, 4, 0}, {0, 0, 2.5});
+  const Plane board({-1, 0, 0}, 3);
+  rig.look(scene, {0, 0, 1.2}, {3, 0, 1.2});
+  for (int i = 0; i < 12; ++i) rig.look(scene, {0.1 * i, 0, 1.2}, {-3, 0.1 * i, 1.2});
+  EXPECT_FALSE(rig.find(board));
+  rig.look(scene, {0, 0.2, 1.2}, {3, 0, 1.2});
+  EXPECT_TRUE(rig.find(board));
+}
+
 TEST(Mapper, TablesOfOneHeightStayTwo) {
   Rig rig;
   Scene scene;

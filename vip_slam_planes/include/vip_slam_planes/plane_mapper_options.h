@@ -144,7 +144,7 @@ struct PlaneSupportOptions {
     v.field("sure_area", sure_area, 0.0, 100.0, "... unless its area is at least this, m^2");
     v.field("min_area", min_area, 0.0, 10.0, "planes that shrink below this disappear, m^2");
     v.field("see_through", see_through, 0.02, 1.0, "depth measured this far behind a plane speaks against it, m");
-    v.field("patience", patience, 1, 1000, "keyframes that an unconfirmed plane may wait for its confirmation");
+    v.field("patience", patience, 1, 1000, "keyframes that may look at an unconfirmed plane without confirming it");
   }
 };
 

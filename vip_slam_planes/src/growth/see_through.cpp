@@ -24,6 +24,19 @@ bool mayBeInView(const PlaneTrack& track, const SE3& T_map_C, double range) {
   return std::hypot(dx, dy) == 0;
 }
 
+bool showsIn(const PlaneTrack& track, const CameraModel& camera, const DepthNoise& noise, const SE3& T_map_C) {
+  if (track.plane().signedDistance(T_map_C.t()) <= 0) return false;
+  const SE3 T_C_map = T_map_C.inverse();
+  bool shows = false;
+  track.cells().forEach([&](CellIndex cell, int) {
+    if (shows) return;
+    const Eigen::Vector3d p = T_C_map * track.cellCentre(cell);
+    Eigen::Vector2d uv;
+    shows = noise.inRange(p.z()) && camera.project(p, &uv) && camera.inImage(uv);
+  });
+  return shows;
+}
+
 int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, const CameraModel& camera,
                  const DepthNoise& noise, const SE3& T_map_C, double margin, PlaneTrack* track) {
   constexpr double kGrazing = 0.25;  // cosine of 75 degrees

@@ -88,7 +88,7 @@ class PlaneTrack {
   bool confirmed = false;
   bool determined = false;       ///< its observations tell its direction; until then the back end does not get them
   int keyframes_seen = 0;        ///< keyframes that saw a fair part of it, ever
-  int keyframes_waited = 0;      ///< processed since the plane started
+  int keyframes_waited = 0;      ///< that looked its way before it was confirmed
 
  private:
   /// Few enough that a surface which has gone is forgotten after as many sightings of what is behind it.

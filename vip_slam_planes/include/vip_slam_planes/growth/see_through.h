@@ -18,6 +18,9 @@ namespace vip_slam {
 int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, const CameraModel& camera,
                  const DepthNoise& noise, const SE3& T_map_C, double margin, PlaneTrack* track);
 
+/// Whether a covered cell lies in the image, within the depth's range and seen from the plane's own side.
+bool showsIn(const PlaneTrack& track, const CameraModel& camera, const DepthNoise& noise, const SE3& T_map_C);
+
 /// Whether the covered area's bounds may be in front of the camera within `range` metres.
 bool mayBeInView(const PlaneTrack& track, const SE3& T_map_C, double range);
 
