@@ -35,16 +35,21 @@ std::vector<PlaceSurface> matchSurfaces(const Map& map, KeyframeId view, const D
       const Eigen::Vector3d q_W = T_W_V * model.unproject(theirs.pixel(tc, tr), theirs.at(tc, tr));
       const Eigen::Vector3d p_W = T_W_C * p_C;
       // At an edge between two planes the spot says nothing about which of them it is.
-      const MapPlane* plane = nullptr;
+      const MapPlane *shown = nullptr, *nearest = nullptr;
       int on = 0;
       for (const auto& seen : kf.planes) {
         const auto it = map.planes().find(seen.first);
-        if (it == map.planes().end() || std::abs(it->second.estimate.plane.signedDistance(q_W)) > kOnPlane) continue;
-        plane = &it->second;
+        if (it == map.planes().end()) continue;
+        const Plane& plane = it->second.estimate.plane;
+        if (!nearest ||
+            std::abs(plane.signedDistance(p_W)) < std::abs(nearest->estimate.plane.signedDistance(p_W)))
+          nearest = &it->second;
+        if (std::abs(plane.signedDistance(q_W)) > kOnPlane) continue;
+        shown = &it->second;
         ++on;
       }
-      if (on != 1 || std::abs(plane->estimate.plane.signedDistance(p_W)) > kNear) continue;
-      found[plane->estimate.id].push_back({camera, p_C, plane->estimate.plane, kSigma});
+      if (on != 1 || shown != nearest || std::abs(shown->estimate.plane.signedDistance(p_W)) > kNear) continue;
+      found[shown->estimate.id].push_back({camera, p_C, shown->estimate.plane, kSigma});
     }
   for (auto& plane : found) {
     if (plane.second.size() < kFewest) continue;

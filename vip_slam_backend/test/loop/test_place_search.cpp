@@ -102,6 +102,26 @@ TEST_F(PlaceSearchTest, PlacesThatRepeatThemselvesAreRefused) {
   }
 }
 
+TEST_F(PlaceSearchTest, APlaceTheMapDoesNotShowToTheNewestKeyframeIsNotForgotten) {
+  map(1);
+  // The newest keyframe looks at the middle of the ring, where the map has no view; the one before speaks for the place.
+  auto turned = std::make_shared<Keyframe>(*query(1));
+  turned->frame.features.clear();
+  turned->frame.state.T_W_I =
+      turned->frame.state.T_W_I *
+      SE3(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero());
+  const PlaceSupport support =
+      placeSupport(map_, {query(0), turned}, T_odom_map_.inverse(), places_->verifier(), {});
+  EXPECT_TRUE(support.found);
+  EXPECT_GT(support.points, 50);
+  EXPECT_EQ(support.match, 0u);
+  PlaceSearch search{RelocalisationOptions()};
+  ASSERT_TRUE(add(search, query(0)).accepted);
+  const PlaceVerification place = add(search, turned);
+  EXPECT_FALSE(place.accepted);
+  EXPECT_NE(place.reason.find("no view along the newest"), std::string::npos) << place.reason;
+}
+
 TEST_F(PlaceSearchTest, AnotherOdometryBeginsAnew) {
   map(1);
   PlaceSearch search{RelocalisationOptions()};
