@@ -7,7 +7,7 @@ namespace vip_slam {
 struct FrontSegment;
 
 /// Rows that must be readable (and zero) below the last one of every panel given to the kernels.
-constexpr int kKernelPadding = 16;
+constexpr int kKernelPadding = 8;
 
 struct DenseKernels {
   const char* name;
