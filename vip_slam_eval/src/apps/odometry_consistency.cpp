@@ -1,0 +1,111 @@
+// rosrun vip_slam_eval odometry_consistency SEQUENCE [--seeds N] [--seconds S]
+// Is the odometry as uncertain as it says? One rendering goes through the whole front end many times, each time with
+// noise of its own in images, depth and IMU. What all runs err alike is the scene's, what they scatter is the noise's.
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+
+#include <opencv2/imgproc.hpp>
+#include <ros/package.h>
+
+#include "vip_slam_core/util/command_line.h"
+#include "vip_slam_eval/trajectory_consistency.h"
+#include "vip_slam_frontend/filter/gating.h"
+#include "vip_slam_frontend/front_end.h"
+#include "vip_slam_sim/sequence/sequence_renderer.h"
+
+namespace {
+
+using namespace vip_slam;
+
+constexpr int kFirstSeed = 1000, kSeedStep = 37;
+constexpr double kImuAhead = 0.02;  ///< s of IMU handed over beyond the image
+
+/// One noise seed.
+class Run {
+ public:
+  Run(const SequenceRenderer& sequence, int seed)
+      : sequence_(sequence),
+        front_end_(FrontEndOptions(), sequence.sensor()),
+        effects_(sequence.spec().effects, sequence.spec().depth, *sequence.camera(), seed),
+        imu_(synthesiseImu(sequence.trajectory(), sequence.spec().imu, seed, sequence.sensor().gravity)) {}
+
+  void add(const SimFrame& frame) {
+    const double t = sequence_.toSeconds(frame.stamp_ns);
+    const cv::Mat rgb = effects_.colour(frame.exact, frame.index, t);
+    cv::Mat gray, depth;
+    cv::cvtColor(rgb, gray, cv::COLOR_RGB2GRAY);
+    effects_.depth(frame.exact, rgb, frame.index).convertTo(depth, CV_32F, 0.001);
+    const double until = t + sequence_.spec().imu.time_offset + kImuAhead;
+    for (; next_ < imu_.samples.size() && imu_.samples[next_].t < until; ++next_) front_end_.addImu(imu_.samples[next_]);
+    const TrackedFramePtr tracked = front_end_.process({t, gray, depth}).frame;
+    if (tracked->status.state != TrackingState::kTracking && tracked->status.state != TrackingState::kDegraded) return;
+    // From (theta in the body, p in odom) to x y z and rotation, both in odom.
+    Matrix6d J = Matrix6d::Zero();
+    J.topRightCorner<3, 3>().setIdentity();
+    J.bottomLeftCorner<3, 3>() = tracked->state.T_W_I.R();
+    poses_.push_back({t, tracked->state.T_W_I, J * tracked->covariance.topLeftCorner<6, 6>() * J.transpose()});
+  }
+  const std::vector<PoseWithCovariance>& poses() const { return poses_; }
+
+ private:
+  const SequenceRenderer& sequence_;
+  FrontEnd front_end_;
+  SensorEffects effects_;
+  ImuLog imu_;
+  std::size_t next_ = 0;
+  std::vector<PoseWithCovariance> poses_;
+};
+
+void judge(const SequenceSpec& spec, int seeds, double seconds, int threads) {
+  if (!spec.depth.registered) throw std::invalid_argument(spec.name + ": needs depth registered to the colour camera");
+  RenderOptions options;
+  options.threads = threads;
+  options.count = static_cast<int>(seconds * spec.camera.rate);
+  SequenceRenderer sequence(spec, options);
+  std::vector<std::unique_ptr<Run>> runs;
+  for (int i = 0; i < seeds; ++i) runs.push_back(std::make_unique<Run>(sequence, kFirstSeed + kSeedStep * i));
+  Trajectory truth;
+  sequence.render([&](const SimFrame& frame) {
+    const double t = sequence.toSeconds(frame.stamp_ns);
+    truth.push_back({t, sequence.stateAt(t + spec.imu.time_offset).T_W_I});
+    for (const auto& run : runs) run->add(frame);
+    return true;
+  });
+  double pose = 0, position = 0, rotation = 0;
+  for (int i = 0; i < seeds; ++i) {
+    const Nees result = nees(truth, runs[i]->poses());
+    std::printf("seed %2d  NEES pose %6.2f  position %6.2f  rotation %6.2f  poses %zu\n", i, result.pose.mean,
+                result.position.mean, result.rotation.mean, runs[i]->poses().size());
+    pose += result.pose.mean / seeds;
+    position += result.position.mean / seeds;
+    rotation += result.rotation.mean / seeds;
+  }
+  const double low = chiSquareQuantile(0.025, 6 * seeds) / seeds, high = chiSquareQuantile(0.975, 6 * seeds) / seeds;
+  std::printf("mean over %d seeds: pose %.2f (honest: 6, 95 %% band %.2f to %.2f: %s), position %.2f, rotation %.2f\n",
+              seeds, pose, low, high, pose >= low && pose <= high ? "inside" : "outside", position, rotation);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  vip_slam::CommandLine line("odometry_consistency",
+                             "NEES of the odometry over many noise seeds of one rendered sequence.");
+  std::string sequence;
+  int seeds = 20, threads = 2;
+  double seconds = 30;
+  line.argument("sequence", sequence, "name of a shipped sequence or a .yaml file");
+  line.option("seeds", seeds, "noise seeds", vip_slam::above(0));
+  line.option("seconds", seconds, "length of the sequence's beginning that is used, s", vip_slam::above(0.0));
+  line.option("threads", threads, "rendering threads", vip_slam::above(0));
+  if (const auto status = line.parse(argc, argv)) return *status;
+  try {
+    const std::string library = ros::package::getPath("vip_slam_sim") + "/config/sequences.yaml";
+    judge(vip_slam::loadSequence(sequence, library), seeds, seconds, threads);
+  } catch (const std::exception& e) {
+    std::cerr << "odometry_consistency: " << e.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
