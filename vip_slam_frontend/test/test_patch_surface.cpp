@@ -85,14 +85,40 @@ TEST(PatchSurface, WarpIsTheHomographysDerivative) {
   }
   const Eigen::Matrix2d exact = A_cur_ref.inverse();
   const PatchSurface surface = patchSurface(wallDepthImage(0), kPixel, wallDepth(kPixel), noise());
-  Eigen::Matrix2d A;
-  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &A));
-  EXPECT_LT((A - exact).norm(), 0.01);
+  PatchWarp warp;
+  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &warp));
+  EXPECT_LT((warp.A - exact).norm(), 0.01);
   PatchSurface facing = surface;
   facing.slope.setZero();
-  ASSERT_TRUE(patchWarp(*camera(), kPixel, facing, kMotion, &A));
-  EXPECT_GT((A - exact).norm(), 0.1);  // what the slope is there for
-  EXPECT_FALSE(patchWarp(*camera(), kPixel, surface, SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &A));
+  ASSERT_TRUE(patchWarp(*camera(), kPixel, facing, kMotion, &warp));
+  EXPECT_GT((warp.A - exact).norm(), 0.1);  // what the slope is there for
+  EXPECT_FALSE(patchWarp(*camera(), kPixel, surface, SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &warp));
+}
+
+TEST(PatchSurface, WarpFollowsTheHomographyOverTheWholePatch) {
+  const PatchSurface surface = patchSurface(wallDepthImage(0), kPixel, wallDepth(kPixel), noise());
+  PatchWarp warp;
+  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &warp));
+  const Eigen::Vector2d middle = transfer(kMotion, kPixel);
+  double linear = 0, second = 0, mean_linear = 0, mean_second = 0;
+  int count = 0;
+  for (int y = -6; y <= 6; ++y) {
+    for (int x = -6; x <= 6; ++x) {
+      const Eigen::Vector2d d(x, y);
+      // From the reference by the warp and on by the exact homography: back at the current offset.
+      const auto off = [&](const Eigen::Vector2d& in_reference) -> Eigen::Vector2d {
+        return transfer(kMotion, kPixel + in_reference) - middle - d;
+      };
+      linear = std::max(linear, off(warp.A * d).norm());
+      second = std::max(second, off(warp(x, y)).norm());
+      mean_linear += off(warp.A * d).x();
+      mean_second += off(warp(x, y)).x();
+      ++count;
+    }
+  }
+  EXPECT_LT(second, 0.3 * linear);
+  EXPECT_LT(std::abs(mean_second), 0.1 * std::abs(mean_linear));
+  EXPECT_GT(std::abs(mean_linear) / count, 0.01);  // px: the shift that a linear warp mistakes for motion
 }
 
 TEST(PatchSurface, AlignmentOnASlantedWallFindsTheExactPixel) {
@@ -112,9 +138,9 @@ TEST(PatchSurface, AlignmentOnASlantedWallFindsTheExactPixel) {
 
   const Eigen::Vector2d exact = transfer(kMotion, kPixel);
   const PatchSurface surface = patchSurface(wallDepthImage(0.0017), kPixel, wallDepth(kPixel), noise());
-  Eigen::Matrix2d A;
-  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &A));
-  const PatchAlignment aligned = alignPatch(reference, kPixel, A, current, exact + Eigen::Vector2d(0.6, -0.4));
+  PatchWarp warp;
+  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &warp));
+  const PatchAlignment aligned = alignPatch(reference, kPixel, warp, current, exact + Eigen::Vector2d(0.6, -0.4));
   ASSERT_TRUE(aligned.ok);
   EXPECT_LT((aligned.pixel - exact).norm(), 0.1);
 }

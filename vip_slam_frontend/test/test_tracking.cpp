@@ -84,7 +84,7 @@ TEST(PatchAlignment, RecoversSubPixelShiftUnderExposureChange) {
   int count = 0;
   for (const Corner& corner : detectCorners(reference, {}, 100, TrackingOptions())) {
     const Eigen::Vector2d p(corner.pixel.x, corner.pixel.y);
-    const PatchAlignment aligned = alignPatch(reference, p, Eigen::Matrix2d::Identity(), current, p);
+    const PatchAlignment aligned = alignPatch(reference, p, PatchWarp(), current, p);
     if (!aligned.ok) continue;
     const double error = (aligned.pixel - p - Eigen::Vector2d(0.37, -0.21)).norm();
     worst = std::max(worst, error);
@@ -101,7 +101,7 @@ TEST(PatchAlignment, RefusesADifferentPatch) {
   int accepted = 0;
   for (int i = 0; i < 40; ++i) {
     const Eigen::Vector2d a(60 + 12 * i, 100), b(70 + 12 * i, 350);
-    accepted += alignPatch(image, a, Eigen::Matrix2d::Identity(), image, b).ok;
+    accepted += alignPatch(image, a, PatchWarp(), image, b).ok;
   }
   EXPECT_LT(accepted, 8);
 }
@@ -129,7 +129,7 @@ TEST(PixelNoise, AlongAnEdgeTheAlignmentScattersAsTheTextureSays) {
   for (unsigned seed = 1; seed <= 400; ++seed) {
     const cv::Mat reference = edgePatch(Eigen::Vector2d::Zero(), 2.0, seed);
     const cv::Mat current = edgePatch(shift, 2.0, 1000 + seed);
-    const PatchAlignment found = alignPatch(reference, centre, Eigen::Matrix2d::Identity(), current, centre);
+    const PatchAlignment found = alignPatch(reference, centre, PatchWarp(), current, centre);
     if (!found.ok) continue;
     const Eigen::Vector2d e = found.pixel - centre - shift;
     scatter += e * e.transpose();

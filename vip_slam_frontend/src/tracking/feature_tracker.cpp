@@ -103,15 +103,15 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
 
 bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_px) const {
   if (!track->reference) return false;
-  Eigen::Matrix2d A;
+  PatchWarp warp;
   const SE3 T_cur_ref = T_odom_C.inverse() * track->reference->T_odom_C;
-  if (!patchWarp(*camera_, track->reference_pixel, track->surface, T_cur_ref, &A)) return false;
-  const double scale = std::sqrt(A.determinant());
-  const double shear = (A / scale - (A / scale).inverse().transpose()).norm();
+  if (!patchWarp(*camera_, track->reference_pixel, track->surface, T_cur_ref, &warp)) return false;
+  const double scale = std::sqrt(warp.A.determinant());
+  const double shear = (warp.A / scale - (warp.A / scale).inverse().transpose()).norm();
   if (!(scale > 0.45) || !(scale < 2.2) || !(shear < 1.5)) return false;
   const Eigen::Vector2d start = track->feature.pixel.cast<double>();
   const PatchAlignment aligned =
-      alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, A, gray_, start);
+      alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, warp, gray_, start);
   if (!aligned.ok || (aligned.pixel - start).norm() > most_px) return false;
   track->feature.pixel = aligned.pixel.cast<float>();
   track->texture = aligned.texture;

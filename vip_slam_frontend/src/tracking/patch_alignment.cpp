@@ -44,10 +44,13 @@ Eigen::Matrix2d textureOf(const Eigen::Matrix3d& A) {
 }
 
 /// Samples the patch with its margin; false outside the image.
-bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const Eigen::Matrix2d& A, float* wide) {
+bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp, float* wide) {
   for (int y = 0; y < kWide; ++y) {
+    const double dy = y - kHalf - 1;
+    const Eigen::Vector2d begin = pixel + warp(0, dy), slope = warp.A.col(0) + warp.xy * dy, bend = 0.5 * warp.xx;
     for (int x = 0; x < kWide; ++x) {
-      const Eigen::Vector2d p = pixel + A * Eigen::Vector2d(x - kHalf - 1, y - kHalf - 1);
+      const double dx = x - kHalf - 1;
+      const Eigen::Vector2d p = begin + (slope + bend * dx) * dx;
       if (!(p.x() >= 0) || !(p.y() >= 0) || p.x() >= image.cols - 1 || p.y() >= image.rows - 1) return false;
       wide[y * kWide + x] = bilinear(image, static_cast<float>(p.x()), static_cast<float>(p.y()));
     }
@@ -59,15 +62,15 @@ bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const Eigen::Mat
 
 Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel) {
   float wide[kWide * kWide], patch[kCount], gx[kCount], gy[kCount];
-  if (!sample(image, pixel, Eigen::Matrix2d::Identity(), wide)) return Eigen::Matrix2d::Zero();
+  if (!sample(image, pixel, PatchWarp(), wide)) return Eigen::Matrix2d::Zero();
   return textureOf(gradients(wide, patch, gx, gy));
 }
 
 PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
-                          const Eigen::Matrix2d& A_ref_cur, const cv::Mat& current, const Eigen::Vector2d& start) {
+                          const PatchWarp& warp, const cv::Mat& current, const Eigen::Vector2d& start) {
   PatchAlignment result;
   float wide[kWide * kWide];
-  if (!sample(reference, reference_pixel, A_ref_cur, wide)) return result;
+  if (!sample(reference, reference_pixel, warp, wide)) return result;
   float patch[kCount], gx[kCount], gy[kCount];
   const Eigen::Matrix3d A = gradients(wide, patch, gx, gy);
   result.texture = textureOf(A);

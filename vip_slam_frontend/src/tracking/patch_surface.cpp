@@ -56,24 +56,36 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
 }
 
 bool patchWarp(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, const PatchSurface& surface,
-               const SE3& T_cur_ref, Eigen::Matrix2d* A_ref_cur) {
+               const SE3& T_cur_ref, PatchWarp* warp_ref_cur) {
   PatchSurface plane = surface;
   if (!(plane.depth > 0)) plane.depth = 1e4;
   const double h = 3.0;
-  Eigen::Matrix2d A_cur_ref;
-  for (int axis = 0; axis < 2; ++axis) {
-    Eigen::Vector2d ends[2];
-    for (int side = 0; side < 2; ++side) {
-      Eigen::Vector2d offset = Eigen::Vector2d::Zero();
-      offset(axis) = side ? h : -h;
+  // The way there by differences over nine points ...
+  Eigen::Vector2d seen[3][3];
+  for (int y = 0; y < 3; ++y) {
+    for (int x = 0; x < 3; ++x) {
+      const Eigen::Vector2d offset(h * (x - 1), h * (y - 1));
       const Eigen::Vector3d p = camera.unproject(reference_pixel + offset, plane.depthAt(offset));
-      if (!camera.project(T_cur_ref * p, &ends[side])) return false;
+      if (!camera.project(T_cur_ref * p, &seen[y][x])) return false;
     }
-    A_cur_ref.col(axis) = (ends[1] - ends[0]) / (2 * h);
   }
+  Eigen::Matrix2d A_cur_ref;
+  A_cur_ref.col(0) = (seen[1][2] - seen[1][0]) / (2 * h);
+  A_cur_ref.col(1) = (seen[2][1] - seen[0][1]) / (2 * h);
   const double det = A_cur_ref.determinant();
   if (!(det > 0.05) || !(det < 20.0)) return false;
-  *A_ref_cur = A_cur_ref.inverse();
+  const Eigen::Vector2d xx = (seen[1][2] - 2.0 * seen[1][1] + seen[1][0]) / (h * h);
+  const Eigen::Vector2d yy = (seen[2][1] - 2.0 * seen[1][1] + seen[0][1]) / (h * h);
+  const Eigen::Vector2d xy = (seen[2][2] - seen[2][0] - seen[0][2] + seen[0][0]) / (4 * h * h);
+  // ... and back: d_ref = A d - A G(A d, A d) / 2, with G the second derivatives of the way there.
+  const Eigen::Matrix2d A = A_cur_ref.inverse();
+  const auto second = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) -> Eigen::Vector2d {
+    return -(A * (xx * (a.x() * b.x()) + xy * (a.x() * b.y() + a.y() * b.x()) + yy * (a.y() * b.y())));
+  };
+  warp_ref_cur->A = A;
+  warp_ref_cur->xx = second(A.col(0), A.col(0));
+  warp_ref_cur->xy = second(A.col(0), A.col(1));
+  warp_ref_cur->yy = second(A.col(1), A.col(1));
   return true;
 }
 

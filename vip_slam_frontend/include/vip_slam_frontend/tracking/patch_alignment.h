@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "vip_slam_frontend/tracking/patch_surface.h"
+
 namespace vip_slam {
 
 struct PatchAlignment {
@@ -19,9 +21,9 @@ struct PatchAlignment {
 /// Zero outside the image.
 Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel);
 
-/// Finds in `current` the patch that `reference` shows at `reference_pixel`. `A_ref_cur` maps small pixel offsets of
-/// the current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge.
+/// Finds in `current` the patch that `reference` shows at `reference_pixel`. `warp` maps pixel offsets of the
+/// current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge.
 PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
-                          const Eigen::Matrix2d& A_ref_cur, const cv::Mat& current, const Eigen::Vector2d& start);
+                          const PatchWarp& warp, const cv::Mat& current, const Eigen::Vector2d& start);
 
 }  // namespace vip_slam

@@ -1,5 +1,5 @@
-// The small piece of surface that a patch shows. With its depth and slope the patch can be warped into another view
-// exactly (to first order), also on a wall seen at a flat angle, where a patch taken to face the camera would creep.
+// The small piece of surface that a patch shows. With its depth and slope the patch can be warped into another view to
+// second order, also on a wall seen at a flat angle, where a patch taken to face the camera would creep.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,8 +24,21 @@ struct PatchSurface {
 PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
                           const DepthNoise& noise);
 
-/// d(reference pixel) / d(current pixel) at the middle of the patch; false when it is out of sight or all but edge-on.
+/// Offsets from the patch's middle in the current image, px, into those in the reference. The second order counts: over
+/// a patch its mean is a shift in the direction of the motion, the same for all patches of a wall or of a turn.
+struct PatchWarp {
+  Eigen::Matrix2d A = Eigen::Matrix2d::Identity();
+  Eigen::Vector2d xx = Eigen::Vector2d::Zero(), xy = xx, yy = xx;  ///< second derivatives, 1/px
+
+  PatchWarp() = default;
+  PatchWarp(const Eigen::Matrix2d& linear) : A(linear) {}  // NOLINT: a linear map is a warp
+  Eigen::Vector2d operator()(double x, double y) const {
+    return A.col(0) * x + A.col(1) * y + xx * (0.5 * x * x) + xy * (x * y) + yy * (0.5 * y * y);
+  }
+};
+
+/// False when the patch is out of sight or all but edge-on.
 bool patchWarp(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, const PatchSurface& surface,
-               const SE3& T_cur_ref, Eigen::Matrix2d* A_ref_cur);
+               const SE3& T_cur_ref, PatchWarp* warp_ref_cur);
 
 }  // namespace vip_slam
