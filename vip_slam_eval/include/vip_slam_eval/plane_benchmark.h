@@ -33,7 +33,8 @@ struct PlaneBenchmarkResult {
   PlaneMapperCounters counters;
 };
 
-/// Stages "planes.update" (all that a keyframe costs) and "planes.grow" go to `timing`. Throws std::runtime_error
+/// Stages "planes.update" (all that a keyframe costs) and "planes.grow" go to `timing` (not null), the same with ".cpu"
+/// as computing time of the thread. Throws std::runtime_error
 /// naming what cannot be read, or when the truth covers no keyframe.
 PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing);
 

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <unordered_map>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
+#include "vip_slam_planes/detection/surface_shape.h"
 #include "vip_slam_planes/growth/triangle_association.h"
 
 namespace vip_slam {
@@ -169,81 +169,6 @@ class Detector {
     return parts;
   }
 
-  // Triangles that span a step between two surfaces line up into strips one triangle wide: all their vertices lie on
-  // the strip's border, those of a true surface mostly inside.
-  bool solid(const std::vector<int>& surface) const {
-    std::vector<int> sides, all;
-    for (int i : surface) {
-      const MapTriangle& t = triangles_[i];
-      for (int k = 0; k < 3; ++k) {
-        all.push_back(t.vertex[k]);
-        if (t.neighbour[k] >= 0 && std::binary_search(surface.begin(), surface.end(), t.neighbour[k])) continue;
-        sides.push_back(t.vertex[(k + 1) % 3]);
-        sides.push_back(t.vertex[(k + 2) % 3]);
-      }
-    }
-    const auto distinct = [](std::vector<int>* v) {
-      std::sort(v->begin(), v->end());
-      return std::size_t(std::unique(v->begin(), v->end()) - v->begin());
-    };
-    const std::size_t inside = distinct(&all) - distinct(&sides);
-    return inside >= 4 && 10 * inside >= surface.size();
-  }
-
-  // A strip of a round column passes for a plane by its distances and normals; a quadric tells them apart. True when
-  // the surface bends for certain, or when it is too narrow for its noise to exclude a column: a nearer view will tell.
-  bool curved(const std::vector<int>& surface, const Plane& plane, double sigma) const {
-    constexpr double kBends = 1 / 4.0;   // 1/m, for certain; lens and depth distortion bend walls less than that
-    constexpr double kColumn = 1 / 1.0;  // 1/m, possibly
-    using Vector6 = Eigen::Matrix<double, 6, 1>;
-    const Eigen::Matrix<double, 3, 2> basis = tangentBasis(plane.n);
-    Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-    Vector6 g = Vector6::Zero();
-    const Eigen::Vector3d origin = triangles_[surface.front()].centre;
-    for (int i : surface) {
-      const Eigen::Vector2d q = basis.transpose() * (triangles_[i].centre - origin);
-      const Vector6 row = (Vector6() << 1, q.x(), q.y(), q.x() * q.x(), q.x() * q.y(), q.y() * q.y()).finished();
-      const double w = 1.0 / (triangles_[i].sigma * triangles_[i].sigma + sigma * sigma);
-      H.noalias() += w * row * row.transpose();
-      g.noalias() += w * row * plane.signedDistance(triangles_[i].centre);
-    }
-    const auto solver = (H + 1e-9 * H.trace() * Eigen::Matrix<double, 6, 6>::Identity()).ldlt();
-    const Vector6 x = solver.solve(g);
-    Eigen::Matrix2d bend;
-    bend << 2 * x(3), x(4), x(4), 2 * x(5);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(bend);
-    for (int k = 0; k < 2; ++k) {
-      const Eigen::Vector2d a = axes.eigenvectors().col(k);
-      const Vector6 j = (Vector6() << 0, 0, 0, 2 * a.x() * a.x(), 2 * a.x() * a.y(), 2 * a.y() * a.y()).finished();
-      const double error = std::sqrt(std::max(0.0, j.dot(solver.solve(j))));
-      const double bends = std::abs(axes.eigenvalues()(k));
-      if (bends - 3 * error > kBends || bends + error > kColumn) return true;
-    }
-    return false;
-  }
-
-  // A plane laid across a step, such as wall and door of a recess, leans against both: the facets of either one point
-  // where that one points. Their median, as facets on the step itself lean the other way. `axis` (unit, in the plane)
-  // is where the fit was free to lean.
-  bool facetsLean(const std::vector<int>& surface, const Plane& plane, const Eigen::Vector3d& axis) const {
-    std::vector<std::pair<double, double>> leans;  // angle, area
-    double variance = 0, area = 0;
-    for (int i : surface) {
-      const MapTriangle& t = triangles_[i];
-      leans.emplace_back(std::atan2(axis.dot(t.n), plane.n.dot(t.n)), t.area);
-      variance += t.sigma_angle * t.sigma_angle;
-      area += t.area;
-    }
-    std::sort(leans.begin(), leans.end());
-    double below = 0;
-    const auto median = std::find_if(leans.begin(), leans.end(), [&](const auto& lean) {
-      below += lean.second;
-      return 2 * below >= area;
-    });
-    const double uncertainty = std::sqrt(variance) / double(surface.size());
-    return median != leans.end() && std::abs(median->first) > options_.max_tilt_deg * kDegree + uncertainty;
-  }
-
   bool accept(const std::vector<int>& surface, PlaneKind kind) {
     DetectedPlane result;
     result.kind = kind;
@@ -253,13 +178,15 @@ class Detector {
       for (const Eigen::Vector3d& p : triangles_[i].corner) moments.add(p - camera_, triangles_[i].area / 3);
     }
     // Level surfaces are seen at a flat angle, a few nodes high; what spans a step is level by accident only.
-    if (result.area < options_.min_area || (kind != PlaneKind::kHorizontal && !solid(surface))) return false;
+    if (result.area < options_.min_area) return false;
+    if (kind != PlaneKind::kHorizontal && !isSolid(triangles_, surface)) return false;
     double rms = 0;
     if (!fit(surface, kind, &result.plane, &rms)) return false;
     const double sigma = medianSigma(surface);
     if (rms > options_.max_rms + 1.5 * sigma) return false;
     const Eigen::Vector3d& n = result.plane.n;
-    if (kind == PlaneKind::kVertical && facetsLean(surface, result.plane, Eigen::Vector3d::UnitZ().cross(n))) {
+    if (kind == PlaneKind::kVertical && facetsLean(triangles_, surface, result.plane, Eigen::Vector3d::UnitZ().cross(n),
+                                                   options_.max_tilt_deg * kDegree)) {
       return false;
     }
 
@@ -282,7 +209,7 @@ class Detector {
       const double tilt = kind == PlaneKind::kHorizontal ? std::acos(z) : std::asin(z);
       if (tilt > limit + 2 * uncertainty) return false;
     }
-    if (curved(surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
+    if (isCurved(triangles_, surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
     result.centroid = mean + camera_;
     for (int i : surface) {
       // The free triangles were gathered around the whole peak; keep those on this surface's own plane.

@@ -1,0 +1,82 @@
+#include "vip_slam_planes/detection/surface_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+namespace vip_slam {
+
+bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface) {
+  std::vector<int> sides, all;
+  for (int i : surface) {
+    const MapTriangle& t = triangles[i];
+    for (int k = 0; k < 3; ++k) {
+      all.push_back(t.vertex[k]);
+      if (t.neighbour[k] >= 0 && std::binary_search(surface.begin(), surface.end(), t.neighbour[k])) continue;
+      sides.push_back(t.vertex[(k + 1) % 3]);
+      sides.push_back(t.vertex[(k + 2) % 3]);
+    }
+  }
+  const auto distinct = [](std::vector<int>* v) {
+    std::sort(v->begin(), v->end());
+    return std::size_t(std::unique(v->begin(), v->end()) - v->begin());
+  };
+  const std::size_t inside = distinct(&all) - distinct(&sides);
+  return inside >= 4 && 10 * inside >= surface.size();
+}
+
+bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
+              double sigma) {
+  constexpr double kBends = 1 / 4.0;   // 1/m, for certain; lens and depth distortion bend walls less than that
+  constexpr double kColumn = 1 / 1.0;  // 1/m, possibly
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  const Eigen::Matrix<double, 3, 2> basis = tangentBasis(plane.n);
+  Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
+  Vector6 g = Vector6::Zero();
+  const Eigen::Vector3d origin = triangles[surface.front()].centre;
+  for (int i : surface) {
+    const Eigen::Vector2d q = basis.transpose() * (triangles[i].centre - origin);
+    const Vector6 row = (Vector6() << 1, q.x(), q.y(), q.x() * q.x(), q.x() * q.y(), q.y() * q.y()).finished();
+    const double w = 1.0 / (triangles[i].sigma * triangles[i].sigma + sigma * sigma);
+    H.noalias() += w * row * row.transpose();
+    g.noalias() += w * row * plane.signedDistance(triangles[i].centre);
+  }
+  const auto solver = (H + 1e-9 * H.trace() * Eigen::Matrix<double, 6, 6>::Identity()).ldlt();
+  const Vector6 x = solver.solve(g);
+  Eigen::Matrix2d bend;
+  bend << 2 * x(3), x(4), x(4), 2 * x(5);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(bend);
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Vector2d a = axes.eigenvectors().col(k);
+    const Vector6 j = (Vector6() << 0, 0, 0, 2 * a.x() * a.x(), 2 * a.x() * a.y(), 2 * a.y() * a.y()).finished();
+    const double error = std::sqrt(std::max(0.0, j.dot(solver.solve(j))));
+    const double bends = std::abs(axes.eigenvalues()(k));
+    if (bends - 3 * error > kBends || bends + error > kColumn) return true;
+  }
+  return false;
+}
+
+bool facetsLean(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
+                const Eigen::Vector3d& axis, double tolerance) {
+  std::vector<std::pair<double, double>> leans;  // angle, area
+  double variance = 0, area = 0;
+  for (int i : surface) {
+    const MapTriangle& t = triangles[i];
+    leans.emplace_back(std::atan2(axis.dot(t.n), plane.n.dot(t.n)), t.area);
+    variance += t.sigma_angle * t.sigma_angle;
+    area += t.area;
+  }
+  std::sort(leans.begin(), leans.end());
+  double below = 0;
+  const auto median = std::find_if(leans.begin(), leans.end(), [&](const auto& lean) {
+    below += lean.second;
+    return 2 * below >= area;
+  });
+  const double uncertainty = std::sqrt(variance) / double(surface.size());
+  return median != leans.end() && std::abs(median->first) > tolerance + uncertainty;
+}
+
+}  // namespace vip_slam
