@@ -57,22 +57,19 @@ bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const 
   if (std::abs(D) < kMinPlaneDistance || std::abs(plane.d + plane.n.dot(j.t_W_C)) < kMinPlaneDistance) return false;
   const Eigen::Vector3d ray(xy_i.x(), xy_i.y(), 1.0);
   const double incidence = (i.R_C_W * plane.n).dot(ray);
-  if (std::abs(incidence) < 0.1736 * ray.norm()) return false;
+  if (std::abs(incidence) < kMinIncidence * ray.norm()) return false;
   const double z_i = -D / incidence;
-  if (z_i < 0.05) return false;
+  if (z_i < kMinPlaneDepth) return false;
   const Eigen::Vector3d p_W = i.t_W_C + i.R_C_W.transpose() * (z_i * ray);
   const double z_j = j.R_C_W.row(2).dot(p_W - j.t_W_C);
   *rho = z_j / z_i;
   return *rho >= kMinDepthRatio && *rho <= kMaxDepthRatio;
 }
 
-double hostNoiseGain(const Vector9d& h, const Eigen::Vector2d& xy_i) {
-  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> H =
-      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(h.data());
-  const Eigen::Vector3d p = H * Eigen::Vector3d(xy_i.x(), xy_i.y(), 1.0);
-  const Eigen::Matrix2d A =
-      (H.topLeftCorner<2, 2>() - p.head<2>() / p.z() * H.bottomLeftCorner<1, 2>()) / p.z();
-  return 0.5 * A.squaredNorm();
+double hostNoiseGain(const Vector9d& h, const Eigen::Vector3d& p) {
+  const double inverse = 1.0 / p.z(), u = p.x() * inverse, v = p.y() * inverse;
+  const double a = h(0) - u * h(6), b = h(1) - u * h(7), c = h(3) - v * h(6), d = h(4) - v * h(7);
+  return 0.5 * inverse * inverse * (a * a + b * b + c * c + d * d);
 }
 
 Eigen::Matrix<double, 2, 9> homographyRows(const HomographyPair& pair) {

@@ -1,5 +1,6 @@
 #include "homography_hosts.h"
 
+#include <cmath>
 #include <queue>
 
 #include "vip_slam_backend/factors/homography.h"
@@ -46,6 +47,22 @@ void shareHosts(const LandmarkViews& views, const std::vector<int>& landmarks, c
   }
 }
 
+// A plane as one frame sees it: normal in the camera's axes and distance of the camera.
+struct SeenPlane {
+  Eigen::Vector3d n_C = Eigen::Vector3d::Zero();
+  double distance = 0;
+  bool known = false;
+};
+
+// As homographyDepthRatio() of a frame with itself.
+bool seesWell(const SeenPlane& plane, const Eigen::Vector2f& xy) {
+  if (std::abs(plane.distance) < kMinPlaneDistance) return false;
+  const double x = xy.x(), y = xy.y();
+  const double incidence = plane.n_C.x() * x + plane.n_C.y() * y + plane.n_C.z();
+  return incidence * incidence >= kMinIncidence * kMinIncidence * (x * x + y * y + 1.0) &&
+         -plane.distance / incidence >= kMinPlaneDepth;
+}
+
 }  // namespace
 
 std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>& plane,
@@ -54,14 +71,19 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
   std::vector<int> hosts(views.size(), -1);
   std::vector<char> good(views.viewCount(), 0);
   std::vector<int> on_plane;
+  std::vector<SeenPlane> seen(planes.size() * geometry.size());
   for (int l = 0; l < views.size(); ++l) {
     if (plane[l] < 0) continue;
     on_plane.push_back(l);
     for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
       const int view = static_cast<int>(v - views.begin(l));
-      const FrameGeometry& g = geometry[v->frame];
-      double rho = 1;
-      if (!homographyDepthRatio(g, g, planes[plane[l]].plane, v->feature->xy.cast<double>(), &rho)) continue;
+      SeenPlane& plane_seen = seen[plane[l] * geometry.size() + v->frame];
+      if (!plane_seen.known) {
+        const FrameGeometry& g = geometry[v->frame];
+        const Plane& p = planes[plane[l]].plane;
+        plane_seen = {g.R_C_W * p.n, p.signedDistance(g.t_W_C), true};
+      }
+      if (!seesWell(plane_seen, v->feature->xy)) continue;
       good[views.first(l) + view] = 1;
       if (hosts[l] < 0 && !shared) hosts[l] = view;
     }

@@ -98,47 +98,42 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
   const Plane& parameters = built_->problem.planes[plane].plane;
   const LandmarkView& host = views.begin(landmark)[host_view];
   const bool host_fixed = built_->problem.frames[host.frame].fixed;
-  const double host_sigma = noise_.sigma(*host.feature, host.order), gate_sigma = noise_.gateSigma();
-  struct Pair {
-    int slot;
-    HomographyPair pair;
-  };
-  std::vector<Pair> pairs;
+  // Variances, inflated; an outlier is judged against at least the gate's.
+  const auto square = [](double x) { return x * x; };
+  const double inflation = square(options.homography_inflation), gate = square(noise_.gateSigma()) * inflation;
+  const double host_variance = square(noise_.sigma(*host.feature, host.order)) * inflation;
+  const double host_judged = std::max(host_variance, gate);
+  const Eigen::Vector2d xy_i = host.feature->xy.cast<double>();
+  pairs_.clear();
   int tried = 0, refused = 0;
   for (const LandmarkView* v = views.begin(landmark); v != views.end(landmark); ++v) {
     if (v->frame == host.frame || (host_fixed && built_->problem.frames[v->frame].fixed)) continue;
     ++tried;
-    Pair p;
-    p.slot = observerOf(v->frame, host.frame, parameters, slot, observers);
-    const Observer& observer = (*observers)[p.slot];
-    p.pair.xy_i = host.feature->xy.cast<double>();
-    p.pair.xy_j = v->feature->xy.cast<double>();
-    // Third row of H p_i: the depth ratio.
-    const double rho = observer.h(6) * p.pair.xy_i.x() + observer.h(7) * p.pair.xy_i.y() + observer.h(8);
+    const int place = observerOf(v->frame, host.frame, parameters, slot, observers);
+    const Observer& observer = (*observers)[place];
+    const Eigen::Vector3d p = transfer(observer.h, xy_i);
+    const double rho = p.z();
     if (!observer.usable || rho < kMinDepthRatio || rho > kMaxDepthRatio) {
       ++refused;
       continue;
     }
     // The pair's noise is that of the observer and that of the host, seen from the observer.
-    const double gain = hostNoiseGain(observer.h, p.pair.xy_i);
-    const auto inflated = [&](double sigma_j, double sigma_i) {
-      return std::sqrt(sigma_j * sigma_j + gain * sigma_i * sigma_i) * options.homography_inflation;
-    };
-    const double sigma = noise_.sigma(*v->feature, v->order), pair_sigma = inflated(sigma, host_sigma);
-    const double judged = inflated(std::max(sigma, gate_sigma), std::max(host_sigma, gate_sigma)) / pair_sigma;
-    p.pair.weight = 1.0 / (pair_sigma * rho);
+    const double gain = hostNoiseGain(observer.h, p);
+    const double own = square(noise_.sigma(*v->feature, v->order)) * inflation;
+    const double variance = own + gain * host_variance, judged = std::max(own, gate) + gain * host_judged;
     // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
-    const double chi2 = (homographyRows(p.pair) * observer.h).squaredNorm();
-    if (chi2 > options.outlier_chi2 * judged * judged) {
+    const Eigen::Vector2d xy_j = v->feature->xy.cast<double>();
+    const double error = (p.head<2>() - rho * xy_j).squaredNorm() / (rho * rho);
+    if (error > options.outlier_chi2 * judged) {
       ++refused;
       continue;
     }
-    p.pair.weight *= huberScale(chi2, options.huber);
-    pairs.push_back(p);
+    const double weight = huberScale(error / variance, options.huber) / (std::sqrt(variance) * rho);
+    pairs_.push_back({place, {xy_i, xy_j, weight}});
   }
   if (tried == 0 || 2 * refused > tried) return false;
-  for (const Pair& p : pairs) {
-    Observer& observer = (*observers)[p.slot];
+  for (const PairOfObserver& p : pairs_) {
+    Observer& observer = (*observers)[p.observer];
     ++observer.pairs;
     if (settings_.variant == Variant::kViP)
       observer.uncompressed.push_back(p.pair);

@@ -32,7 +32,12 @@ class PlaneFactorBuilder {
   const Map& map_;
   const ProblemScope& scope_;
   const BuilderSettings& settings_;
+  struct PairOfObserver {
+    int observer;
+    HomographyPair pair;
+  };
   PixelNoise noise_;
+  std::vector<PairOfObserver> pairs_;  // of the landmark at hand
   BuiltProblem* built_;
   std::vector<FrameGeometry> geometry_;
   std::map<PlaneId, int> planes_;

@@ -30,17 +30,22 @@ Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const 
 
 /// A homography is too weak for a factor with a camera nearer to the plane than this, metres, ...
 constexpr double kMinPlaneDistance = 0.15;
-/// ... or a depth ratio outside these.
-constexpr double kMinDepthRatio = 0.25, kMaxDepthRatio = 4.0;
+/// ... or a depth ratio outside these, or a host's ray within 10 degrees of the plane, or a point nearer than this.
+constexpr double kMinDepthRatio = 0.25, kMaxDepthRatio = 4.0, kMinIncidence = 0.1736, kMinPlaneDepth = 0.05;
 
-/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor (above), the
-/// ray is within 10 degrees of the plane, or the point behind a camera.
+/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor (above).
 bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
                           const Eigen::Vector2d& xy_i, double* rho);
 
+/// H p_i of p_i = (xy_i, 1), whose third number is the depth ratio.
+inline Eigen::Vector3d transfer(const Vector9d& h, const Eigen::Vector2d& xy_i) {
+  const double x = xy_i.x(), y = xy_i.y();
+  return {h(0) * x + h(1) * y + h(2), h(3) * x + h(4) * y + h(5), h(6) * x + h(7) * y + h(8)};
+}
+
 /// Mean square of the factor by which noise of xy_i grows on its way into frame j: half the squared Frobenius norm of
-/// d p^_j / d p_i. The noise of a pair is that of j and the grown one of i.
-double hostNoiseGain(const Vector9d& h, const Eigen::Vector2d& xy_i);
+/// d p^_j / d p_i. The noise of a pair is that of j and the grown one of i. `p` = H p_i.
+double hostNoiseGain(const Vector9d& h, const Eigen::Vector3d& p);
 
 /// The two rows C_l, weighted.
 Eigen::Matrix<double, 2, 9> homographyRows(const HomographyPair& pair);
