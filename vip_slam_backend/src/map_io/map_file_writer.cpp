@@ -13,8 +13,8 @@ namespace vip_slam {
 namespace {
 
 // Reading normalises, and rounding lets some rotations wander when that is done again and again. So three coefficients
-// are written on a grid coarser than that by some bits, and the fourth, a large one, follows from them: whatever the last
-// bits in memory are, the next save finds the same four.
+// are written on a grid coarser than that by some bits, and the fourth, a large one, follows from them: whatever the
+// last bits in memory are, the next save finds the same four.
 Eigen::Vector4d settled(const Eigen::Quaterniond& rotation) {
   constexpr double kGrid = 0x1p-49, kLarge = 0.4;  // one of four is at least a half
   Eigen::Vector4d q = rotation.coeffs();

@@ -104,7 +104,8 @@ TEST_F(PlaceSearchTest, PlacesThatRepeatThemselvesAreRefused) {
 
 TEST_F(PlaceSearchTest, APlaceTheMapDoesNotShowToTheNewestKeyframeIsNotForgotten) {
   map(1);
-  // The newest keyframe looks at the middle of the ring, where the map has no view; the one before speaks for the place.
+  // The newest keyframe looks at the middle of the ring, where the map has no view; the one before speaks for the
+  // place.
   auto turned = std::make_shared<Keyframe>(*query(1));
   turned->frame.features.clear();
   turned->frame.state.T_W_I =

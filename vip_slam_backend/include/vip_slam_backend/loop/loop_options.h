@@ -98,7 +98,8 @@ struct RelocalisationOptions {
     v.field("sure_evidence", sure_evidence, 0.0, 1e6, "the same for the evidence");
     v.field("min_covered", min_covered, 0.0, 1.0, "share of the features that must be in sight of the map");
     v.field("ambiguity", ambiguity, 0.0, 1.0, "refused when another place has more than this fraction of the evidence");
-    v.field("resemblance", resemblance, 0.0, 10.0, "refused when another place has more than this fraction of the points");
+    v.field("resemblance", resemblance, 0.0, 10.0,
+            "refused when another place has more than this fraction of the points");
   }
 };
 

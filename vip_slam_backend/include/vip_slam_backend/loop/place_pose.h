@@ -60,8 +60,8 @@ PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const CameraRi
                           const PlacePoseOptions& options);
 
 /// All six degrees of freedom from `start` (T_W_B): robust Gauss-Newton, inliers chosen anew at inlier_px. The tilt of
-/// R_G_B is one more measurement when options.tilt_sigma is set, and so are the surfaces. Not found when fewer than three
-/// inliers are left or the pose is not observable.
+/// R_G_B is one more measurement when options.tilt_sigma is set, and so are the surfaces. Not found when fewer than
+/// three inliers are left or the pose is not observable.
 PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const SE3& start,
                           const Eigen::Quaterniond& R_G_B, const PlacePoseOptions& options,
                           const std::vector<PlaceSurface>& surfaces = {});

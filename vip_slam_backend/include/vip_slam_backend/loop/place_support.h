@@ -28,9 +28,9 @@ struct PlaceSupport {
   KeyframeId match = 0;      ///< the nearest view of the newest keyframe, 0 when the map has none
   std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< inliers of the newest: feature, landmark of the map
   double explainedCells() const { return covered_cells ? static_cast<double>(explained_cells) / covered_cells : 0; }
-  /// How much speaks for it: points found again, weighed by what they leave unexplained of the image, by how many of the
-  /// landmarks that should be there are, and by the depth that contradicts. A wrong place can be strong in one of them,
-  /// a door frame in points, a bare wall in depth, not in all.
+  /// How much speaks for it: points found again, weighed by what they leave unexplained of the image, by how many of
+  /// the landmarks that should be there are, and by the depth that contradicts. A wrong place can be strong in one of
+  /// them, a door frame in points, a bare wall in depth, not in all.
   double evidence() const;
 };
 
