@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <stdexcept>
 
 #include "map_file_format.h"
 #include "vip_slam_backend/map_io/byte_stream.h"
@@ -165,7 +166,11 @@ void readKeyframe(ByteReader& in, std::size_t landmark_limit, const ImuNoise& no
     if (k > 0 && !(imu[k].t > imu[k - 1].t)) in.fail("IMU samples are not in order");
   }
   if (!imu.empty() && imu.back().t - imu.front().t > 1e4) in.fail("IMU samples span hours");
-  map.restoreKeyframe(data, state, previous, imu, noise).loop_keyframe = loop_keyframe;
+  try {
+    map.restoreKeyframe(data, state, previous, imu, noise).loop_keyframe = loop_keyframe;
+  } catch (const std::invalid_argument& e) {  // numbers, each in its range, that cannot be integrated together
+    in.fail(std::string("IMU samples: ") + e.what());
+  }
   const std::size_t planes = in.count(8 + 11 * 8 + 4, "plane observations");
   for (std::size_t k = 0; k < planes; ++k) {
     const PlaneObservation observation = readObservation(in, data->id);
