@@ -76,7 +76,7 @@ TEST(CommandLine, MistakesAreNamedOnOneLineWithStatusTwo) {
                   {{"x.bag", "--out", "d", "--threads", "9"}, "--threads 9: expected a number from 1 to 8"},
                   {{"x.bag", "--out", "d", "--threads", "many"}, "--threads"},
                   {{"x.bag", "--out", "d", "--mode", "odd"}, "--mode odd: expected one of fast, slow"},
-                  {{"x.bag", "--out", "d", "--up", "1", "2"}, "--up 1 2: expected 3 to 3 values"},
+                  {{"x.bag", "--out", "d", "--up", "1", "2"}, "--up 1 2: expected 3 values"},
                   {{"x.bag", "y.bag", "--out", "d"}, "too many positional options"},
                   {{"x.bag", "--out", "d", "-f"}, "--force needs --mode"},
                   {{"x.bag", "--out"}, "'--out'"}};

@@ -1,5 +1,6 @@
 // Tracking pieces on small synthetic images with known motion.
 #include <cmath>
+#include <map>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -231,6 +232,34 @@ TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
   }
   ASSERT_GT(old, 60);
   EXPECT_LT(std::sqrt(sum / old), 0.12);  // px, after 25 images and more
+}
+
+TEST(FeatureTracker, ATrackBeginsAnewWhenDepthFirstShowsItsSurface) {
+  const cv::Mat texture = makeTexture();
+  DepthNoise noise;
+  FeatureTracker tracker(TrackingOptions(), camera(), noise, nullptr);
+  const auto poseAt = [](int k) { return SE3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.004 * k, 0, 0)); };
+  const cv::Mat wall(480, 640, CV_32F, cv::Scalar(2.0)), nothing(480, 640, CV_32F, cv::Scalar(0.0));
+  std::map<LandmarkId, float> blind, seeing;
+  for (int k = 0; k < 12; ++k) {
+    const cv::Mat image = render(texture, poseAt(k).t(), 1.0, k + 1);
+    const SE3 motion = k == 0 ? SE3() : poseAt(k).inverse() * poseAt(k - 1);
+    tracker.track(image, k < 6 ? nothing : wall, motion, true, poseAt(k), k);
+    if (k == 0) tracker.replenish(poseAt(k), true, k);
+    for (const Track& track : tracker.tracks()) (k < 6 ? blind : seeing)[track.feature.id] = track.feature.pixel_sigma;
+    if (k == 6) EXPECT_FALSE(tracker.ended().empty());
+    if (k > 6) EXPECT_TRUE(tracker.ended().size() < 10) << k;  // once and no more
+  }
+  ASSERT_GT(blind.size(), 60u);
+  ASSERT_GT(seeing.size(), 60u);
+  int kept = 0, sharp = 0;
+  for (const auto& [id, sigma] : seeing) {
+    kept += blind.count(id);
+    sharp += sigma < 0.1f;
+  }
+  EXPECT_LT(kept, static_cast<int>(seeing.size() / 20));
+  EXPECT_GT(sharp, static_cast<int>(0.9 * seeing.size()));
+  for (const auto& [id, sigma] : blind) EXPECT_GT(sigma, 0.5f) << id;
 }
 
 TEST(OrbExtractor, DescriptorsSurviveARotationAndTellPointsApart) {

@@ -62,6 +62,7 @@ vip_slam_msgs::Feature toMsg(const Feature& feature) {
   msg.id = feature.id;
   msg.pixel = {feature.pixel.x(), feature.pixel.y()};
   msg.xy = {feature.xy.x(), feature.xy.y()};
+  msg.pixel_sigma = feature.pixel_sigma;
   msg.depth = feature.depth;
   msg.depth_sigma = feature.depth_sigma;
   msg.angle = feature.angle;
@@ -76,6 +77,7 @@ Feature fromMsg(const vip_slam_msgs::Feature& msg) {
   feature.id = msg.id;
   feature.pixel = {msg.pixel[0], msg.pixel[1]};
   feature.xy = {msg.xy[0], msg.xy[1]};
+  feature.pixel_sigma = msg.pixel_sigma;
   feature.depth = msg.depth;
   feature.depth_sigma = msg.depth_sigma;
   feature.angle = msg.angle;

@@ -44,6 +44,7 @@ class Conversions : public ::testing::Test {
     f.id = LandmarkId(random_()) - (LandmarkId(1) << 31);
     f.pixel = vector().head<2>().cast<float>();
     f.xy = vector().head<2>().cast<float>();
+    f.pixel_sigma = float(number());
     f.depth = float(number());
     f.depth_sigma = float(number());
     f.angle = float(number());
@@ -116,6 +117,7 @@ void expectSame(const TrackedFrame& a, const TrackedFrame& b) {
     EXPECT_EQ(f.id, g.id);
     EXPECT_EQ(f.pixel, g.pixel);
     EXPECT_EQ(f.xy, g.xy);
+    EXPECT_EQ(f.pixel_sigma, g.pixel_sigma);
     EXPECT_EQ(f.depth, g.depth);
     EXPECT_EQ(f.depth_sigma, g.depth_sigma);
     EXPECT_EQ(f.angle, g.angle);

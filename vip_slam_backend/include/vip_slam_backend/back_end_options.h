@@ -15,8 +15,7 @@ Variant variantFromName(const std::string& name);
 const char* variantName(Variant variant);
 
 struct MeasurementOptions {
-  double pixel_sigma = 0.15;
-  double pixel_creep = 0.12;
+  double pixel_sigma = 0.08;
   double max_pixel_sigma = 1.5;
   double gate_sigma = 0.4;
   double matched_pixel_sigma = 1.0;
@@ -29,10 +28,8 @@ struct MeasurementOptions {
 
   void visit(OptionVisitor& v) {
     v.field("pixel_sigma", pixel_sigma, 0.05, 10.0,
-            "one sigma of a tracked feature in its landmark's first keyframe, px");
-    v.field("pixel_creep", pixel_creep, 0.0, 10.0, "error that a track takes up with each further keyframe, px");
-    v.field("max_pixel_sigma", max_pixel_sigma, 0.1, 10.0,
-            "the sigma of a tracked feature grows no further than this, px");
+            "a tracked feature's sigma as told by the front end counts for at least this, px");
+    v.field("max_pixel_sigma", max_pixel_sigma, 0.1, 10.0, "and for at most this, px");
     v.field("gate_sigma", gate_sigma, 0.1, 10.0, "outliers are judged against at least this sigma, px");
     v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0,
             "one sigma of an untracked ORB corner, px per octave");

@@ -29,7 +29,8 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   const auto& features = keyframe.frame.features;
   for (std::size_t k = 0; k < features.size(); ++k) {
     const Feature& f = features[k];
-    if (!f.pixel.allFinite() || !f.xy.allFinite() || !std::isfinite(f.depth) || !std::isfinite(f.depth_sigma))
+    if (!f.pixel.allFinite() || !f.xy.allFinite() || !std::isfinite(f.depth) || !std::isfinite(f.depth_sigma) ||
+        !std::isfinite(f.pixel_sigma))
       return name + "feature " + std::to_string(k) + " is not finite";
     if (f.depth < 0 || (f.depth > 0 && !(f.depth_sigma > 0)))
       return name + "feature " + std::to_string(k) + " has depth " + std::to_string(f.depth) + " with sigma " +

@@ -8,7 +8,9 @@ namespace vip_slam {
 namespace map_file {
 
 constexpr char kMagic[8] = {'V', 'I', 'P', 'M', 'A', 'P', 0, 0};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kOldestVersion = 1;       ///< without the features' pixel_sigma
+constexpr float kPixelSigmaOfVersion1 = 0.3f;     ///< what tracks were worth on average, px
 constexpr std::size_t kHeader = 8 + 4 + 4 + 8;
 constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;
 constexpr double kDepthUnit = 0.001;  ///< metres per unit of a stored depth grid

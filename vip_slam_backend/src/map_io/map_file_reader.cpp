@@ -105,10 +105,11 @@ PlaneObservation readObservation(ByteReader& in, KeyframeId keyframe) {
   return o;
 }
 
-Feature readFeature(ByteReader& in, std::size_t landmark_limit, std::uint32_t* landmark) {
+Feature readFeature(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, std::uint32_t* landmark) {
   Feature f;
   f.pixel = in.vector<Eigen::Vector2f>("feature");
   f.xy = in.vector<Eigen::Vector2f>("feature");
+  f.pixel_sigma = version < 2 ? map_file::kPixelSigmaOfVersion1 : in.get<float>("feature");
   f.depth = in.get<float>("feature");
   f.depth_sigma = in.get<float>("feature");
   f.angle = in.get<float>("feature");
@@ -124,7 +125,7 @@ Feature readFeature(ByteReader& in, std::size_t landmark_limit, std::uint32_t* l
 }
 
 // One keyframe into the map; its observations by landmark into `seen`.
-void readKeyframe(ByteReader& in, std::size_t landmark_limit, const ImuNoise& noise, Map& map,
+void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, const ImuNoise& noise, Map& map,
                   std::vector<std::vector<MapObservation>>& seen) {
   auto data = std::make_shared<Keyframe>();
   TrackedFrame& frame = data->frame;
@@ -150,7 +151,7 @@ void readKeyframe(ByteReader& in, std::size_t landmark_limit, const ImuNoise& no
   frame.features.reserve(features);
   for (std::uint32_t k = 0; k < features; ++k) {
     std::uint32_t landmark;
-    frame.features.push_back(readFeature(in, landmark_limit, &landmark));
+    frame.features.push_back(readFeature(in, version, landmark_limit, &landmark));
     if (landmark == map_file::kNoIndex) continue;
     if (landmark >= seen.size()) seen.resize(landmark + 1);
     seen[landmark].push_back({data->id, k});
@@ -191,7 +192,7 @@ void readLandmark(ByteReader& in, std::uint32_t index, std::vector<MapObservatio
   map.restoreLandmark(landmark);
 }
 
-void readPayload(ByteReader& in, const ImuNoise& noise, StoredMap* stored) {
+void readPayload(ByteReader& in, std::uint32_t version, const ImuNoise& noise, StoredMap* stored) {
   Map& map = stored->map;
   stored->vocabulary_id = in.get<std::uint64_t>("vocabulary id");
   const std::size_t planes = in.count(map_file::kPlaneBytes, "planes");
@@ -199,7 +200,7 @@ void readPayload(ByteReader& in, const ImuNoise& noise, StoredMap* stored) {
   const std::size_t keyframes = in.count(map_file::kKeyframeBytes, "keyframes");
   const std::size_t landmark_limit = in.left() / map_file::kLandmarkBytes;
   std::vector<std::vector<MapObservation>> seen;
-  for (std::size_t k = 0; k < keyframes; ++k) readKeyframe(in, landmark_limit, noise, map, seen);
+  for (std::size_t k = 0; k < keyframes; ++k) readKeyframe(in, version, landmark_limit, noise, map, seen);
   const std::size_t landmarks = in.count(map_file::kLandmarkBytes, "landmarks");
   if (seen.size() > landmarks)
     in.fail("keyframes see more landmarks than the " + std::to_string(landmarks) + " stored");
@@ -224,8 +225,9 @@ StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string
   in.bytes(magic, 8, "magic");
   if (std::memcmp(magic, map_file::kMagic, 8) != 0) in.fail("not a map file, expected it to start with VIPMAP");
   const auto version = in.get<std::uint32_t>("version");
-  if (version != map_file::kVersion)
-    in.fail("map file version " + std::to_string(version) + ", expected " + std::to_string(map_file::kVersion));
+  if (version < map_file::kOldestVersion || version > map_file::kVersion)
+    in.fail("map file version " + std::to_string(version) + ", expected " +
+            std::to_string(map_file::kOldestVersion) + " to " + std::to_string(map_file::kVersion));
   if (in.get<std::uint32_t>("reserved") != 0) in.fail("reserved field is not 0");
   const auto length = in.get<std::uint64_t>("length");
   if (length != in.left() - 4)
@@ -238,7 +240,7 @@ StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string
   ByteReader payload(data + map_file::kHeader, static_cast<std::size_t>(length), source);
   StoredMap stored;
   try {
-    readPayload(payload, noise, &stored);
+    readPayload(payload, version, noise, &stored);
   } catch (const MapError& e) {
     payload.fail(e.what());
   }

@@ -105,6 +105,7 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch,
     const LandmarkId landmark = kf.landmarks[k];
     out.vector(f.pixel);
     out.vector(f.xy);
+    out.put(f.pixel_sigma);
     out.put(f.depth);
     out.put(f.depth_sigma);
     out.put(f.angle);

@@ -31,11 +31,10 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
   first_.reserve(landmarks_.size() + 1);
   for (const MapLandmark* landmark : landmarks_) {
     first_.push_back(viewCount());
-    for (std::size_t k = 0; k < landmark->observations.size(); ++k) {
-      const MapObservation& o = landmark->observations[k];
+    for (const MapObservation& o : landmark->observations) {
       if (o.keyframe < lowest || o.keyframe - lowest >= frame_of.size()) continue;
       const int frame = frame_of[o.keyframe - lowest];
-      if (frame >= 0) views_.push_back({frame, o.feature, static_cast<int>(k), features[frame] + o.feature});
+      if (frame >= 0) views_.push_back({frame, o.feature, features[frame] + o.feature});
     }
   }
   first_.push_back(viewCount());

@@ -12,7 +12,6 @@ namespace vip_slam {
 struct LandmarkView {
   int frame = 0;                    ///< of the problem
   std::uint32_t feature_index = 0;  ///< in the keyframe
-  int order = 0;                    ///< among all observations of the landmark, also those outside the problem
   const Feature* feature = nullptr;
 };
 

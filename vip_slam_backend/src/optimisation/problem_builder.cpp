@@ -130,7 +130,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
       observation.frame = v->frame;
       observation.x = v->feature->xy.x();
       observation.y = v->feature->xy.y();
-      observation.weight = 1.0 / noise.sigma(*v->feature, v->order);
+      observation.weight = 1.0 / noise.sigma(*v->feature);
       if (v->feature->depth > 0) {
         observation.depth = v->feature->depth;
         observation.depth_weight = 1.0 / (v->feature->depth_sigma * settings.measurement.depth_sigma_scale);

@@ -51,6 +51,7 @@ inline Map syntheticMap(int keyframes, int features, double imu_rate, std::uint6
       if (f % 4) {
         feature.depth = static_cast<float>(uniform(0.5, 6));
         feature.depth_sigma = 0.01f;
+        feature.pixel_sigma = 0.25f;
       }
       feature.angle = static_cast<float>(uniform(0, 6));
       feature.octave = static_cast<std::uint8_t>(f % 3);

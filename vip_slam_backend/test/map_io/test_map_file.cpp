@@ -89,6 +89,7 @@ TEST(MapFile, EverythingComesBack) {
     ASSERT_EQ(a.features().size(), b.features().size());
     EXPECT_EQ(a.features()[7].descriptor, b.features()[7].descriptor);
     EXPECT_EQ(a.features()[7].xy, b.features()[7].xy);
+    EXPECT_EQ(a.features()[7].pixel_sigma, b.features()[7].pixel_sigma);
     EXPECT_EQ(bool(a.preintegration), bool(b.preintegration));
     if (a.preintegration) {
       EXPECT_EQ(a.preintegration->alpha(), b.preintegration->alpha());
@@ -151,8 +152,8 @@ TEST(MapFile, ForeignAndNewerFilesAreNamed) {
   EXPECT_NE(message("\x89PNG and what follows, surely not one of ours").find("not a map file"), std::string::npos);
   EXPECT_NE(message("").find("too short"), std::string::npos);
   std::string newer = serialiseMap(syntheticMap(3, 12, 100), {}, 5);
-  newer[8] = 2;
-  EXPECT_NE(message(sealed(newer)).find("version 2, expected 1"), std::string::npos);
+  newer[8] = 3;
+  EXPECT_NE(message(sealed(newer)).find("version 3, expected 1 to 2"), std::string::npos);
   try {
     loadMapFile("/nonexistent/map.vsm", ImuNoise());
     FAIL();

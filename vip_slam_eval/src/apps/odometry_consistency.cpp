@@ -38,7 +38,9 @@ class Run {
     cv::cvtColor(rgb, gray, cv::COLOR_RGB2GRAY);
     effects_.depth(frame.exact, rgb, frame.index).convertTo(depth, CV_32F, 0.001);
     const double until = t + sequence_.spec().imu.time_offset + kImuAhead;
-    for (; next_ < imu_.samples.size() && imu_.samples[next_].t < until; ++next_) front_end_.addImu(imu_.samples[next_]);
+    for (; next_ < imu_.samples.size() && imu_.samples[next_].t < until; ++next_) {
+      front_end_.addImu(imu_.samples[next_]);
+    }
     const TrackedFramePtr tracked = front_end_.process({t, gray, depth}).frame;
     if (tracked->status.state != TrackingState::kTracking && tracked->status.state != TrackingState::kDegraded) return;
     // From (theta in the body, p in odom) to x y z and rotation, both in odom.

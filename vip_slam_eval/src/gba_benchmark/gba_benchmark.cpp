@@ -60,7 +60,6 @@ GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solve
   settings.focal = map.focal;
   settings.shared_hosts = shared_hosts;
   settings.measurement.pixel_sigma = map.pixel_sigma;
-  settings.measurement.pixel_creep = 0;  // the simulated tracker does not creep
   // The simulation has no outliers: plain squares, so that neither solver spends time on losses.
   settings.measurement.huber = settings.measurement.depth_huber = 0;
   settings.measurement.outlier_chi2 = 1e6;

@@ -18,7 +18,17 @@ namespace {
 constexpr double kExposureGain = 0.1;
 constexpr double kExposureShift = 6.0;
 
+// Of a corner that was recognised by its descriptor, px^2.
+constexpr double kCornerVariance = 1.0;
+
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
+
+/// Of the newest pixel as a view of what the track began with, px^2. What is wrong in the reference grows with the
+/// patch.
+double pixelVariance(const Track& track) {
+  const double sigma = matchSigma(track.surface), m2 = track.magnification * track.magnification;
+  return sigma * sigma * std::max(1.0, m2) + track.reference_variance * m2;
+}
 
 }  // namespace
 
@@ -49,6 +59,7 @@ void FeatureTracker::measure(Track* track) const {
   const FeatureDepth::Source source = measure(&track->feature);
   const bool at_edge = source != FeatureDepth::Source::kSmooth && source != FeatureDepth::Source::kNone;
   track->whitening = pixelWhitening(track->texture, track->residual, at_edge);
+  track->feature.pixel_sigma = static_cast<float>(std::sqrt(pixelVariance(*track)));
 }
 
 void FeatureTracker::matchExposure(const cv::Mat& gray) {
@@ -114,6 +125,7 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
       alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, warp, gray_, start);
   if (!aligned.ok || (aligned.pixel - start).norm() > most_px) return false;
   track->feature.pixel = aligned.pixel.cast<float>();
+  track->magnification = 1.0 / scale;
   track->texture = aligned.texture;
   track->residual = aligned.residual;
   return true;
@@ -122,6 +134,7 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
 void FeatureTracker::setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const {
   track->reference = reference;
   track->reference_pixel = track->feature.pixel.cast<double>();
+  track->magnification = 1.0;
   track->surface = patchSurface(depth_, track->reference_pixel, track->feature.depth, noise_);
   track->texture = patchTexture(gray_, track->reference_pixel);
   track->residual = 0;
@@ -133,6 +146,7 @@ void FeatureTracker::addTrack(Track track, const SE3& T_odom_C) {
     here->gray = gray_;
     here->T_odom_C = T_odom_C;
     setReference(&track, here);
+    track.reference_variance = kCornerVariance;
   }
   measure(&track);
   tracks_.push_back(std::move(track));
@@ -150,16 +164,33 @@ void FeatureTracker::restartReferences(const SE3& T_odom_C) {
 void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
   std::shared_ptr<ReferenceImage> here;
   for (Track& track : tracks_) {
-    if (alignTrack(&track, T_odom_C, options_.reference_max_correction_px)) continue;
-    // The view changed too much for the old patch: the present one becomes the reference.
+    const bool aligned = alignTrack(&track, T_odom_C, options_.reference_max_correction_px);
+    const bool known = track.surface.known;
+    if (aligned && (known || !surfaceIsKnown(&track))) continue;
     if (!here) {
       here = std::make_shared<ReferenceImage>();
       here->gray = gray_;
       here->T_odom_C = T_odom_C;
     }
     measure(&track.feature);
+    if (!known && surfaceIsKnown(&track)) {
+      // Patches warped without depth slide over what they show; from here on this one stays where it is. It begins
+      // anew, so that nobody takes the two for views of one point.
+      ended_.push_back(track);
+      track.feature.id = next_id_++;
+      track.feature.age = 0;
+      track.reference_variance = 0;
+    } else {
+      // The view changed too much for the old patch: the present one becomes the reference, where it was found.
+      track.reference_variance = pixelVariance(track);
+    }
     setReference(&track, here);
   }
+}
+
+bool FeatureTracker::surfaceIsKnown(Track* track) const {
+  if (measure(&track->feature) != FeatureDepth::Source::kSmooth) return false;
+  return patchSurface(depth_, track->feature.pixel.cast<double>(), track->feature.depth, noise_).known;
 }
 
 TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, const SE3& predicted,

@@ -52,6 +52,7 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   // A step or a rim inside the window is no plane, and its slope would be worse than none.
   if (residual > 2.0 * sigma + 0.002 || !(fit.tail<2>().norm() < kSteepest)) return surface;
   surface.slope = fit.tail<2>();
+  surface.known = true;
   return surface;
 }
 

@@ -36,6 +36,11 @@ Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, 
   return L;
 }
 
+double matchSigma(const PatchSurface& surface) {
+  if (surface.known) return 0.08;
+  return surface.depth > 0 ? 0.25 : 0.6;
+}
+
 double pixelSigma(const Eigen::Matrix2d& whitening) { return 1.0 / std::sqrt(whitening(0, 0) * whitening(1, 1)); }
 
 }  // namespace vip_slam

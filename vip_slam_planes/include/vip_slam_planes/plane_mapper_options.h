@@ -113,7 +113,7 @@ struct PlaneObservationOptions {
 struct PointAssociationOptions {
   double candidate_distance = 0.10;
   int min_keyframes = 4;
-  double pixel_sigma = 1.0;
+  double pixel_sigma = 0.25;
   double similar_px = 0.5;
   double max_error_px = 4.0;
   double max_distance = 0.03;
@@ -122,7 +122,7 @@ struct PointAssociationOptions {
   void visit(OptionVisitor& v) {
     v.field("candidate_distance", candidate_distance, 0.01, 1.0, "largest distance of a candidate to the plane, m");
     v.field("min_keyframes", min_keyframes, 2, 50, "keyframes that must see a candidate before it is decided on");
-    v.field("pixel_sigma", pixel_sigma, 0.1, 10.0, "one sigma of a feature's position, px");
+    v.field("pixel_sigma", pixel_sigma, 0.1, 10.0, "one sigma of a feature's position, px; at least, the front end tells it");
     v.field("similar_px", similar_px, 0.05, 10.0,
             "what forcing a point onto the plane may add to its reprojection error, RMS, px");
     v.field("max_error_px", max_error_px, 0.5, 50.0, "largest reprojection error of a plane point, px");

@@ -11,8 +11,8 @@ namespace {
 
 // Gauss-Newton over p = p0 + B x, B with 3 columns (free) or 2 (on the plane).
 template <int N>
-bool estimate(const std::vector<PointSighting>& sightings, const Eigen::Matrix<double, 3, N>& B, double sigma_xy,
-              Eigen::Vector3d* p, Eigen::Matrix<double, N, N>* information) {
+bool estimate(const std::vector<PointSighting>& sightings, const Eigen::Matrix<double, 3, N>& B, double focal,
+              double least_pixel_sigma, Eigen::Vector3d* p, Eigen::Matrix<double, N, N>* information) {
   using MatrixN = Eigen::Matrix<double, N, N>;
   using VectorN = Eigen::Matrix<double, N, 1>;
   constexpr int kRounds = 5;
@@ -30,7 +30,7 @@ bool estimate(const std::vector<PointSighting>& sightings, const Eigen::Matrix<d
       const Eigen::Vector3d q = s.T_C_map * *p;
       if (q.z() < 0.05) return false;
       const Eigen::Matrix3d R = s.T_C_map.R();
-      const double iz = 1.0 / q.z();
+      const double iz = 1.0 / q.z(), sigma_xy = std::max(s.pixel_sigma, least_pixel_sigma) / focal;
       addRow((R.row(0) - q.x() * iz * R.row(2)) * iz / sigma_xy, (q.x() * iz - s.xy.x()) / sigma_xy);
       addRow((R.row(1) - q.y() * iz * R.row(2)) * iz / sigma_xy, (q.y() * iz - s.xy.y()) / sigma_xy);
       if (s.depth > 0) addRow(R.row(2) / s.depth_sigma, (q.z() - s.depth) / s.depth_sigma);
@@ -65,13 +65,13 @@ ConsistencyResult testConsistency(const std::vector<PointSighting>& sightings, c
                                   const Eigen::Vector3d& start, double focal, const PointAssociationOptions& options) {
   ConsistencyResult result;
   if (sightings.size() < 2) return result;
-  const double sigma_xy = options.pixel_sigma / focal;
   Eigen::Vector3d free = start;
   Eigen::Matrix3d information;
-  if (!estimate<3>(sightings, Eigen::Matrix3d::Identity(), sigma_xy, &free, &information)) return result;
+  const Eigen::Matrix3d everywhere = Eigen::Matrix3d::Identity();
+  if (!estimate<3>(sightings, everywhere, focal, options.pixel_sigma, &free, &information)) return result;
   Eigen::Vector3d forced = plane.project(free);
   Eigen::Matrix2d unused;
-  if (!estimate<2>(sightings, tangentBasis(plane.n), sigma_xy, &forced, &unused)) return result;
+  if (!estimate<2>(sightings, tangentBasis(plane.n), focal, options.pixel_sigma, &forced, &unused)) return result;
   double max_free = 0;
   if (!reprojectionErrors(sightings, free, focal, &result.rms_free, &max_free) ||
       !reprojectionErrors(sightings, forced, focal, &result.rms_forced, &result.max_forced)) {

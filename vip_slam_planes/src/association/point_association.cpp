@@ -61,7 +61,7 @@ void PointAssociation::applyMapUpdate(const MapUpdate& update) {
 void PointAssociation::addSightings(const Keyframe& keyframe) {
   for (const Feature& f : keyframe.frame.features) {
     if (f.id == kNoLandmark) continue;
-    landmarks_[resolve(f.id)].sightings.push_back({keyframe.id, f.xy, f.depth, f.depth_sigma});
+    landmarks_[resolve(f.id)].sightings.push_back({keyframe.id, f.xy, f.depth, f.depth_sigma, f.pixel_sigma});
   }
 }
 
@@ -81,7 +81,7 @@ void PointAssociation::test(LandmarkId id, Landmark* landmark, const CameraPoses
     const auto pose = poses.find(s.keyframe);
     if (pose == poses.end()) continue;
     sightings.push_back({pose->second.inverse(), s.xy.cast<double>(), double(s.depth),
-                         std::hypot(double(s.depth_sigma), depth_floor_)});
+                         std::hypot(double(s.depth_sigma), depth_floor_), double(s.pixel_sigma)});
   }
   if (sightings.size() < std::size_t(options_.min_keyframes)) return;
   landmark->tested = landmark->sightings.size();

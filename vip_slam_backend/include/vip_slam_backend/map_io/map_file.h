@@ -1,8 +1,9 @@
 // Map files (.vsm): everything a later session needs to relocalise and to go on mapping.
 //
-// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 1 | u32 reserved = 0 | u64 payload bytes | payload |
-// u32 CRC-32 of all before it. The payload holds the vocabulary's id, planes, keyframes (state, features with
-// descriptors, depth grid in mm, IMU samples, plane observations), landmarks and loops.
+// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 2 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
+// of all before it. Version 1, without the features' pixel_sigma, is read, too. The payload holds the vocabulary's id,
+// planes, keyframes (state, features with descriptors, depth grid in mm, IMU samples, plane observations), landmarks
+// and loops.
 //
 // A file is the same bytes for the same map: landmarks and epochs are numbered anew in ascending order when written.
 // Read back, landmarks get ids from kLoadedLandmarks and epochs from kLoadedEpochs on, so that they never meet those of

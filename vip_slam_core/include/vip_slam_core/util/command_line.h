@@ -47,12 +47,15 @@ ValueCheck<std::vector<T>> each(ValueCheck<T> check) {
   };
 }
 
-/// A list has `low` to `high` elements.
+/// A list has `low` to `high` elements, both inclusive.
 template <class T>
 ValueCheck<std::vector<T>> count(std::size_t low, std::size_t high) {
   return [low, high](const std::vector<T>& values) {
     std::ostringstream text;
-    if (values.size() < low || values.size() > high) text << low << " to " << high << " values";
+    if (values.size() < low || values.size() > high) {
+      if (low < high) text << low << " to ";
+      text << high << (high == 1 ? " value" : " values");
+    }
     return text.str();
   };
 }

@@ -33,8 +33,8 @@ struct StillnessCues {
 };
 
 /// Still only when the IMU is quiet and the image stands and the estimate is slow; with hysteresis both ways. The image
-/// alone is never enough: a wall that moves along would fool it. Who stands and sees nothing (darkness, a bare wall) goes
-/// on standing as long as the IMU's means stay where they were: no motion begins without an acceleration or a turn.
+/// alone is never enough: a wall that moves along would fool it. Who stands and sees nothing (darkness, a bare wall)
+/// goes on standing as long as the IMU's means stay where they were: no motion begins without an acceleration or a turn.
 class StillnessDetector {
  public:
   explicit StillnessDetector(const ZuptOptions& options) : options_(options) {}

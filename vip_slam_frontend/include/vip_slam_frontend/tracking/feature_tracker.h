@@ -32,6 +32,8 @@ struct Track {
   std::shared_ptr<const ReferenceImage> reference;
   Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
   PatchSurface surface;       ///< what the reference patch shows
+  double reference_variance = 0;  ///< of the reference pixel as a view of what the track began with, px^2
+  double magnification = 1;       ///< of the newest image over the reference image, at the patch
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< of the patch in the newest image (patch_alignment.h)
   double residual = 0;        ///< of its match with the reference, grey levels
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< of the newest pixel (pixel_noise.h)
@@ -84,6 +86,8 @@ class FeatureTracker {
               std::vector<char>* found);
   void alignWithReferences(const SE3& T_odom_C);
   void setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const;
+  /// Whether the track's patch in the newest image lies on one plane of the depth image; measures the feature.
+  bool surfaceIsKnown(Track* track) const;
 
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;

@@ -15,6 +15,7 @@ namespace vip_slam {
 struct PatchSurface {
   double depth = 0;                                 ///< z at the patch's middle, metres; 0: unknown, far away
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< 1/pixel; zero: facing the camera
+  bool known = false;                               ///< one plane explains the depth readings of the whole patch
 
   double depthAt(const Eigen::Vector2d& offset_px) const { return depth / (1.0 + slope.dot(offset_px)); }
 };

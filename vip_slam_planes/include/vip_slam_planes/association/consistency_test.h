@@ -16,6 +16,7 @@ struct PointSighting {
   Eigen::Vector2d xy;      ///< normalised
   double depth = 0;        ///< metres, 0: none
   double depth_sigma = 0;  ///< metres, systematic part included
+  double pixel_sigma = 0;  ///< px; the options' counts when it is larger
 };
 
 struct ConsistencyResult {

@@ -50,7 +50,7 @@ class PointAssociation {
   struct Sighting {
     KeyframeId keyframe;
     Eigen::Vector2f xy;
-    float depth, depth_sigma;
+    float depth, depth_sigma, pixel_sigma;
   };
   struct Landmark {
     std::vector<Sighting> sightings;
