@@ -58,8 +58,19 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   const std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
   const auto host_pose = poses_.find(frame.keyframe);
   const KeyframeId host = host_pose == poses_.end() ? newest_ : frame.keyframe;
+  std::vector<double> area(tracks.size(), 0);
   for (std::size_t i = 0; i < triangles.size(); ++i) {
-    if (label[i] >= 0) tracks[label[i]]->cover(triangles[i], host, poses_.at(host), nullptr);
+    if (label[i] < 0) continue;
+    tracks[label[i]]->cover(triangles[i], host, poses_.at(host), nullptr);
+    area[label[i]] += triangles[i].area;
+  }
+  // Frames from further on speak for a plane that one keyframe has started, as a second keyframe would.
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    PlaneTrack& track = *tracks[k];
+    if (track.confirmed || track.keyframes_seen == 0 || area[k] < options.support.min_area) continue;
+    if ((T_map_C.t() - track.viewed_from).norm() < options.support.view_distance) continue;
+    track.viewed_from = T_map_C.t();
+    track.confirmed = ++track.views_seen >= options.support.min_views;
   }
 }
 

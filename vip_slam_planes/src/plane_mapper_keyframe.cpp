@@ -85,7 +85,10 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
         refit(&track);
       }
     }
-    if (first_time && area[k] >= options.support.min_area) ++track.keyframes_seen;
+    if (first_time && area[k] >= options.support.min_area) {
+      ++track.keyframes_seen;
+      track.viewed_from = T_map_C.t();
+    }
     track.confirmed = track.confirmed || track.keyframes_seen >= options.support.min_keyframes ||
                       (track.keyframes_seen > 0 && track.area() >= options.support.sure_area);
     trusted.push_back(track.confirmed && track.determined);

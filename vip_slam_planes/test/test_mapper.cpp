@@ -165,6 +165,21 @@ TEST(Mapper, APlaneWaitsForASecondSightingWhileNobodyLooks) {
   EXPECT_TRUE(rig.find(board));
 }
 
+TEST(Mapper, FramesFromFurtherOnConfirmAPlaneThatOneKeyframeSaw) {
+  Scene scene;
+  scene.add({3, -0.4, 0.8}, {0, 0.8, 0}, {0, 0, 0.8});
+  for (const double step : {0.05, 0.1}) {  // two places 0.1 m apart are not enough, five are
+    Rig rig;
+    rig.look(scene, {0, 0, 1.2}, {3, 0, 1.2});
+    for (int i = 1; i <= 5; ++i) {
+      const SE3 T_W_C = lookAt({0, i * step, 1.2}, {3, 0, 1.2});
+      rig.mapper.grow(rig.camera.frame(scene, T_W_C, 1 + 0.1 * i, 16), SE3());
+    }
+    rig.mapper.applyMapUpdate({});
+    EXPECT_EQ(step > 0.07, rig.find(Plane({-1, 0, 0}, 3)) != nullptr) << step;
+  }
+}
+
 TEST(Mapper, TablesOfOneHeightStayTwo) {
   Rig rig;
   Scene scene;

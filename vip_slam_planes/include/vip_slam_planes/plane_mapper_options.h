@@ -134,6 +134,8 @@ struct PointAssociationOptions {
 
 struct PlaneSupportOptions {
   int min_keyframes = 2;
+  int min_views = 3;
+  double view_distance = 0.1;
   double sure_area = 1.0;
   double min_area = 0.1;
   double see_through = 0.10;
@@ -141,6 +143,8 @@ struct PlaneSupportOptions {
 
   void visit(OptionVisitor& v) {
     v.field("min_keyframes", min_keyframes, 1, 20, "keyframes that must have seen a plane before it is published");
+    v.field("min_views", min_views, 1, 100, "... or one keyframe, and growth frames from as many places further on");
+    v.field("view_distance", view_distance, 0.0, 5.0, "such places are this far apart, m");
     v.field("sure_area", sure_area, 0.0, 100.0, "... unless its area is at least this, m^2");
     v.field("min_area", min_area, 0.0, 10.0, "planes that shrink below this disappear, m^2");
     v.field("see_through", see_through, 0.02, 1.0, "depth measured this far behind a plane speaks against it, m");

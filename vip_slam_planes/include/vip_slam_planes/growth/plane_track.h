@@ -88,6 +88,8 @@ class PlaneTrack {
   bool confirmed = false;
   bool determined = false;       ///< its observations tell its direction; until then the back end does not get them
   int keyframes_seen = 0;        ///< keyframes that saw a fair part of it, ever
+  int views_seen = 0;            ///< growth frames that did so before it was confirmed, each from another place
+  Eigen::Vector3d viewed_from = Eigen::Vector3d::Zero();  ///< camera centre of the last keyframe or view that did
   int keyframes_waited = 0;      ///< that looked its way before it was confirmed
 
  private:
