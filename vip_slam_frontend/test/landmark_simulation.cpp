@@ -146,7 +146,10 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   LandmarkSimulation simulation(options);
   simulation.generateImu(seconds + 1.0);
   std::mt19937 random(options.seed + 1000);
-  VioFilter filter(filter_options, options.noise, simulation.T_I_C() * extrinsic_error, time_offset_guess,
+  ImuNoise noise = options.noise;
+  noise.gyro_noise_density *= options.noise_told;
+  noise.accel_noise_density *= options.noise_told;
+  VioFilter filter(filter_options, noise, simulation.T_I_C() * extrinsic_error, time_offset_guess,
                    options.focal, 9.81);
   FilterPrior prior;
   const NavState truth0 = simulation.stateAt(0.2);

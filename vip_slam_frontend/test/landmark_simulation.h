@@ -25,6 +25,7 @@ struct SimulationOptions {
   double creep_ratio = 0;  ///< share of such tracks
   double speed = 1.0;  ///< factor on the motion's frequencies; 0: standing
   ImuNoise noise{1.7e-3, 2e-5, 2e-2, 3e-4};
+  double noise_told = 1.0;  ///< share of the IMU's noise that the filter is told
   double time_offset = 0;  ///< t_imu = t_image + time_offset
 };
 

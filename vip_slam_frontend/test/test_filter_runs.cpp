@@ -36,6 +36,30 @@ TEST(FilterRuns, PixelNoiseIsLearnt) {
   EXPECT_NEAR(run.nis_per_dof, 1.0, 0.25);
 }
 
+/// A data sheet's IMU that shakes: the images know better, and the filter must come to say so.
+TEST(FilterRuns, AnImuNoisierThanToldIsFoundOut) {
+  SimulationOptions simulation;
+  simulation.noise_told = 0.1;
+  FilterOptions options = filterOptions();
+  double told = 0, honest = 0, error_told = 0, error_honest = 0;
+  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+    simulation.seed = seed;
+    options.adapt_imu_noise = false;
+    const RunResult without = runFilter(simulation, options, 15.0, false);
+    options.adapt_imu_noise = true;
+    const RunResult with = runFilter(simulation, options, 15.0, false);
+    told += without.nees / 5;
+    honest += with.nees / 5;
+    error_told += without.final_position / 5;
+    error_honest += with.final_position / 5;
+  }
+  std::printf("NEES %.1f, error %.1f mm; with the noise found out %.1f, %.1f mm\n", told, 1e3 * error_told, honest,
+              1e3 * error_honest);
+  EXPECT_GT(told, 20.0);
+  EXPECT_LT(honest, 0.5 * told);
+  EXPECT_LT(error_honest, error_told);
+}
+
 TEST(StandingStill, FiveMinutesWithoutDrift) {
   SimulationOptions simulation;
   simulation.seed = 2;

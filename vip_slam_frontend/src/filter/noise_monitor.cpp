@@ -5,6 +5,17 @@
 
 namespace vip_slam {
 
+namespace {
+
+constexpr double kGain = 0.05;  // per image, of the moving averages
+constexpr double kMostCorrection = 20.0;  // one image may not decide
+// Three sigmas above 1 for the moving average of six honest degrees of freedom.
+constexpr double kContradiction = 1.3;
+constexpr double kManyGated = 0.3;
+constexpr double kWidest = 10.0;
+
+}  // namespace
+
 NoiseMonitor::NoiseMonitor(double sigma_px, double min_px, double max_px, bool adapt)
     : sigma_(std::clamp(sigma_px, min_px, std::max(min_px, max_px))), min_(min_px), max_(max_px), adapt_(adapt) {}
 
@@ -16,19 +27,20 @@ void NoiseMonitor::add(double chi2_per_dof, int dof) {
   sigma_ = std::clamp(sigma_ * std::exp(step), min_, std::max(min_, max_));
 }
 
-void ImuNoiseMonitor::add(int used, int gated) {
-  if (!adapt_ || used + gated < 5) return;
-  gated_ratio_ += 0.05 * (static_cast<double>(gated) / (used + gated) - gated_ratio_);
-  if (gated_ratio_ > 0.3) {
-    scale_ = std::min(10.0, scale_ * 1.05);
-  } else if (gated_ratio_ < 0.15) {
-    scale_ = std::max(1.0, scale_ / 1.02);
+void ImuNoiseMonitor::add(double correction, int used, int gated) {
+  if (!adapt_ || used + gated < 5 || !std::isfinite(correction)) return;
+  gated_ratio_ += kGain * (static_cast<double>(gated) / (used + gated) - gated_ratio_);
+  correction_ += kGain * (std::clamp(correction, 0.0, kMostCorrection) - correction_);
+  if (correction_ > kContradiction) {
+    scale_ *= std::pow(correction_, kGain);
+  } else if (gated_ratio_ > kManyGated) {
+    scale_ *= 1.05;
+  } else if (correction_ < 1.0 && gated_ratio_ < 0.5 * kManyGated) {
+    scale_ /= 1.02;
   }
+  scale_ = std::clamp(scale_, 1.0, kWidest);
 }
 
-void ImuNoiseMonitor::reset() {
-  scale_ = 1.0;
-  gated_ratio_ = 0.05;
-}
+void ImuNoiseMonitor::reset() { *this = ImuNoiseMonitor(adapt_); }
 
 }  // namespace vip_slam

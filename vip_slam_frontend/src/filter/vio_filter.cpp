@@ -36,6 +36,17 @@ void stackStaircase(const std::vector<FeatureRows>& features, int rows, Eigen::M
   }
 }
 
+/// Squared correction of orientation and velocity per degree of freedom, whitened by what the covariance lost.
+double correctionPerDof(const NavState& before, const Matrix15d& P_before, const NavState& after,
+                        const Matrix15d& P_after) {
+  Vector6d d;
+  d << logSO3(Eigen::Matrix3d(before.T_W_I.R().transpose() * after.T_W_I.R())), after.v_W - before.v_W;
+  Matrix6d S;
+  const Matrix15d lost = P_before - P_after;
+  S << lost.block<3, 3>(0, 0), lost.block<3, 3>(0, 6), lost.block<3, 3>(6, 0), lost.block<3, 3>(6, 6);
+  return d.dot(S.ldlt().solve(d)) / 6.0;
+}
+
 }  // namespace
 
 VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, const SE3& T_I_C, double time_offset,
@@ -251,11 +262,14 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     still_images_ = 0;
   }
 
+  const NavState predicted = nav();
+  const Matrix15d P_predicted = covariance();
   const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full);
   if (!candidates.empty()) updateWithFeatures(candidates, calibrate, &report);
-  imu_monitor_.add(report.features_used, report.features_gated);
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, calibrate, &report);
+  report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
+  if (!still) imu_monitor_.add(report.correction, report.features_used, report.features_gated);
 
   // Used sightings may not be used again: lost tracks go, those at the window's end start anew with the next image.
   const int used = std::min<int>(report.features_tried, static_cast<int>(candidates.size()));

@@ -95,7 +95,7 @@ struct FilterOptions {
             "tie each depth image to the flat patches of an earlier one; needs no corners");
     v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise; below 1: medians of pixels");
     v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
-    v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the gate turns away too many features");
+    v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the images contradict the IMU");
     v.field("sigma_bias_gyro", sigma_bias_gyro, 1e-5, 1.0, "initial one-sigma of the gyro bias, rad/s");
     v.field("sigma_bias_accel", sigma_bias_accel, 1e-4, 5.0, "initial one-sigma of the accelerometer bias, m/s^2");
     v.group("calibration", calibration);

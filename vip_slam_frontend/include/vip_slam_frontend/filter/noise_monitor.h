@@ -17,18 +17,22 @@ class NoiseMonitor {
   int updates_ = 0;
 };
 
-/// Widens the IMU's noise when the gate turns away far more features than its probability explains: then the prediction
-/// is surer of itself than it should be (noise figures from a data sheet, vibration). Narrows again when all is well.
+/// Widens the IMU's noise when the images contradict it by more than both admit: by the corrections they make to the
+/// predicted motion, which should scatter as the covariance shrinks by them, or when the gate turns away far more
+/// features than its probability explains. Then the prediction is surer of itself than it should be (noise figures from
+/// a data sheet, vibration, stamps). Narrows again when all is well.
 class ImuNoiseMonitor {
  public:
   explicit ImuNoiseMonitor(bool adapt) : adapt_(adapt) {}
-  void add(int used, int gated);
+  /// `correction`: squared correction of the predicted motion per degree of freedom, whitened by what the covariance
+  /// shrank; honest: 1, less when the pixels' noise is rated high to be safe.
+  void add(double correction, int used, int gated);
   double scale() const { return scale_; }
   void reset();
 
  private:
   bool adapt_;
-  double scale_ = 1.0, gated_ratio_ = 0.05;
+  double scale_ = 1.0, gated_ratio_ = 0.05, correction_ = 0.5;
 };
 
 }  // namespace vip_slam

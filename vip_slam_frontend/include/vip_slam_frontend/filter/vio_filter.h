@@ -45,6 +45,7 @@ struct StepReport {
   int surfaces_used = 0, surfaces_gated = 0;  ///< point-to-patch pairs
   int rows = 0;
   double nis = 0;
+  double correction = 0;  ///< of the predicted motion, see ImuNoiseMonitor
 };
 
 class VioFilter {
