@@ -19,6 +19,7 @@ struct MeasurementOptions {
   double max_pixel_sigma = 1.5;
   double gate_sigma = 0.4;
   double matched_pixel_sigma = 1.0;
+  double between_tracks_sigma = 0.55;
   double huber = 1.0;
   double depth_huber = 2.0;
   double depth_sigma_scale = 1.0;
@@ -33,6 +34,8 @@ struct MeasurementOptions {
     v.field("gate_sigma", gate_sigma, 0.1, 10.0, "outliers are judged against at least this sigma, px");
     v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0,
             "one sigma of an untracked ORB corner, px per octave");
+    v.field("between_tracks_sigma", between_tracks_sigma, 0.01, 10.0,
+            "how far the points are apart that two tracks of one landmark follow, px");
     v.field("huber", huber, 0.5, 20.0, "reprojection residuals above this many sigmas weigh less");
     v.field("depth_huber", depth_huber, 0.5, 20.0, "depth residuals above this many sigmas weigh less");
     v.field("depth_sigma_scale", depth_sigma_scale, 0.1, 20.0, "factor on the depth sigma given by the front end");

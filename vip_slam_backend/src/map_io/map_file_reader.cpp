@@ -115,12 +115,12 @@ Feature readFeature(ByteReader& in, std::uint32_t version, std::size_t landmark_
   f.angle = in.get<float>("feature");
   if (!std::isfinite(f.angle)) in.fail("feature angle is not finite");
   f.octave = in.get<std::uint8_t>("feature");
-  const bool tracked = flag(in, "feature flag");
+  const int track = version < 3 ? flag(in, "feature flag") : in.get<std::uint8_t>("feature track");
   in.bytes(f.descriptor.data(), f.descriptor.size(), "feature");
   *landmark = in.get<std::uint32_t>("feature");
   if (*landmark != map_file::kNoIndex && *landmark >= landmark_limit)
     in.fail("landmark " + std::to_string(*landmark) + " cannot exist in a file of this size");
-  if (tracked && *landmark != map_file::kNoIndex) f.id = kLoadedLandmarks + *landmark;
+  if (track > 0 && *landmark != map_file::kNoIndex) f.id = kLoadedLandmarks + *landmark + track * kLoadedTracks;
   return f;
 }
 

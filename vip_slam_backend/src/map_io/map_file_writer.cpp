@@ -85,8 +85,23 @@ void write(ByteWriter& out, const PlaneObservation& observation) {
   }
 }
 
-void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch,
-           const std::unordered_map<LandmarkId, std::uint32_t>& index) {
+// Landmarks by their place in the file, and the tracks of each that were written so far.
+struct LandmarkNumbers {
+  std::unordered_map<LandmarkId, std::uint32_t> index;
+  std::vector<std::vector<LandmarkId>> tracks;
+
+  // 1, 2, 3, ...; 0: not tracked, or a track that is no landmark and means nothing to a later session.
+  std::uint8_t track(const Feature& f, LandmarkId landmark) {
+    if (f.id == kNoLandmark || landmark == kNoLandmark) return 0;
+    std::vector<LandmarkId>& known = tracks[index.at(landmark)];
+    const auto at = std::find(known.begin(), known.end(), f.id);
+    const std::size_t number = static_cast<std::size_t>(at - known.begin()) + 1;
+    if (at == known.end() && number <= map_file::kMostTracks) known.push_back(f.id);
+    return static_cast<std::uint8_t>(std::min(number, map_file::kMostTracks));
+  }
+};
+
+void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch, LandmarkNumbers* numbers) {
   const TrackedFrame& frame = kf.data->frame;
   out.put(kf.id());
   out.put(frame.t);
@@ -110,10 +125,9 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch,
     out.put(f.depth_sigma);
     out.put(f.angle);
     out.put(f.octave);
-    // A track means nothing to a later session unless it is a landmark.
-    out.put(static_cast<std::uint8_t>(f.id != kNoLandmark && landmark != kNoLandmark));
+    out.put(numbers->track(f, landmark));
     out.bytes(f.descriptor.data(), f.descriptor.size());
-    out.put(landmark == kNoLandmark ? map_file::kNoIndex : index.at(landmark));
+    out.put(landmark == kNoLandmark ? map_file::kNoIndex : numbers->index.at(landmark));
   }
   write(out, frame.depth_grid);
   const std::size_t samples = kf.previous != 0 && kf.imu ? kf.imu->size() : 0;
@@ -144,13 +158,14 @@ std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId,
   for (const auto& entry : map.planes()) write(out, entry.second);
 
   const std::vector<LandmarkId> landmarks = map.landmarkIds();
-  std::unordered_map<LandmarkId, std::uint32_t> index;
-  for (std::size_t k = 0; k < landmarks.size(); ++k) index[landmarks[k]] = static_cast<std::uint32_t>(k);
+  LandmarkNumbers numbers;
+  for (std::size_t k = 0; k < landmarks.size(); ++k) numbers.index[landmarks[k]] = static_cast<std::uint32_t>(k);
+  numbers.tracks.resize(landmarks.size());
   std::unordered_map<std::uint32_t, std::uint32_t> epochs;
   out.put(static_cast<std::uint32_t>(map.keyframes().size()));
   for (const auto& entry : map.keyframes()) {
     const auto epoch = epochs.emplace(entry.second.data->frame.epoch, static_cast<std::uint32_t>(epochs.size())).first;
-    write(out, entry.second, epoch->second, index);
+    write(out, entry.second, epoch->second, &numbers);
   }
   out.put(static_cast<std::uint32_t>(landmarks.size()));
   for (const LandmarkId id : landmarks) {

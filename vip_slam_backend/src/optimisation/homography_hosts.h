@@ -9,7 +9,8 @@
 namespace vip_slam {
 
 /// Per landmark the view (counted from its first) that is its host, -1: none sees it well enough or it is on no plane.
-/// `plane`: per landmark, -1: none. A host must see the plane well, since its ray is what the others are compared with.
+/// `plane`: per landmark, -1: none. A host must see the plane well and be of the point's own track, since its ray is
+/// what the others are compared with.
 /// The first such view; with `shared`, the frame that could host most of the landmarks still without host becomes
 /// theirs, whichever plane they are on, and so on: few hosts, so that few pairs of frames share a factor and the system
 /// is sparse.

@@ -4,10 +4,35 @@
 
 namespace vip_slam {
 
+namespace {
+
+// Views of one track among those of a landmark.
+struct TrackOfLandmark {
+  LandmarkId id;
+  int views;
+};
+
+std::vector<TrackOfLandmark> tracksOf(const std::vector<LandmarkView>& views) {
+  std::vector<TrackOfLandmark> tracks;
+  for (const LandmarkView& v : views) {
+    if (v.feature->id == kNoLandmark) continue;
+    const auto known =
+        std::find_if(tracks.begin(), tracks.end(), [&v](const auto& t) { return t.id == v.feature->id; });
+    if (known == tracks.end())
+      tracks.push_back({v.feature->id, 1});
+    else
+      ++known->views;
+  }
+  return tracks;
+}
+
+}  // namespace
+
 LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes) {
+  std::vector<const MapLandmark*> landmarks;
   if (scope.free.size() == map.keyframes().size()) {
-    landmarks_.reserve(map.landmarks().size());
-    for (const auto& entry : map.landmarks()) landmarks_.push_back(&entry.second);
+    landmarks.reserve(map.landmarks().size());
+    for (const auto& entry : map.landmarks()) landmarks.push_back(&entry.second);
   } else {
     std::vector<LandmarkId> ids;
     for (const KeyframeId id : scope.free)
@@ -15,9 +40,9 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
         if (landmark != kNoLandmark) ids.push_back(landmark);
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-    for (const LandmarkId id : ids) landmarks_.push_back(&map.landmark(id));
+    for (const LandmarkId id : ids) landmarks.push_back(&map.landmark(id));
   }
-  std::sort(landmarks_.begin(), landmarks_.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
+  std::sort(landmarks.begin(), landmarks.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
 
   // Keyframes lie close together in their ids: a table finds a frame without hashing.
   std::vector<const Feature*> features;
@@ -28,16 +53,46 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
     frame_of.back() = static_cast<int>(f);
     features.push_back(map.keyframe(keyframes[f]).features().data());
   }
-  first_.reserve(landmarks_.size() + 1);
-  for (const MapLandmark* landmark : landmarks_) {
-    first_.push_back(viewCount());
+  first_.reserve(landmarks.size() + 1);
+  points_.reserve(landmarks.size());
+  std::vector<LandmarkView> seen;
+  for (const MapLandmark* landmark : landmarks) {
+    seen.clear();
     for (const MapObservation& o : landmark->observations) {
       if (o.keyframe < lowest || o.keyframe - lowest >= frame_of.size()) continue;
       const int frame = frame_of[o.keyframe - lowest];
-      if (frame >= 0) views_.push_back({frame, o.feature, features[frame] + o.feature});
+      if (frame >= 0) seen.push_back({frame, true, o.feature, features[frame] + o.feature});
     }
+    addPoints(*landmark, seen);
   }
   first_.push_back(viewCount());
+}
+
+void LandmarkViews::addPoints(const MapLandmark& landmark, std::vector<LandmarkView>& seen) {
+  const std::vector<TrackOfLandmark> tracks = tracksOf(seen);
+  const auto longest = std::max_element(tracks.begin(), tracks.end(),
+                                        [](const auto& a, const auto& b) { return a.views < b.views; });
+  points_.push_back(&landmark);
+  first_.push_back(viewCount());
+  // Of each other track the view in its middle.
+  std::vector<int> until_tie;
+  for (const TrackOfLandmark& track : tracks) until_tie.push_back(track.views / 2);
+  for (LandmarkView& view : seen) {
+    const auto track =
+        std::find_if(tracks.begin(), tracks.end(), [&view](const auto& t) { return t.id == view.feature->id; });
+    view.own_track = track != tracks.end() && track == longest;
+    if (view.own_track || track == tracks.end() || until_tie[track - tracks.begin()]-- == 0) views_.push_back(view);
+  }
+  for (auto track = tracks.begin(); track != tracks.end(); ++track) {
+    if (track == longest || track->views < 2) continue;
+    points_.push_back(&landmark);
+    first_.push_back(viewCount());
+    for (LandmarkView& view : seen) {
+      if (view.feature->id != track->id) continue;
+      view.own_track = true;
+      views_.push_back(view);
+    }
+  }
 }
 
 }  // namespace vip_slam

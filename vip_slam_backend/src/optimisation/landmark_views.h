@@ -1,5 +1,10 @@
 // The landmarks of a problem and who sees them, in flat arrays: looked up in the map once, read by all who build
 // factors.
+//
+// A landmark that was found again is known by several tracks. Within a track every view matches one reference patch,
+// and its error is constant to a few hundredths of a pixel; another track began at a corner detected anew, half a pixel
+// beside the first. So each track becomes a point of its own, and one view of it, as uncertain as that, ties it to the
+// landmark's longest track.
 #pragma once
 
 #include <unordered_map>
@@ -11,18 +16,21 @@ namespace vip_slam {
 
 struct LandmarkView {
   int frame = 0;                    ///< of the problem
+  bool own_track = true;            ///< false: of another track than the point, or a corner that is not tracked
   std::uint32_t feature_index = 0;  ///< in the keyframe
   const Feature* feature = nullptr;
 };
 
 class LandmarkViews {
  public:
-  /// Landmarks that a free keyframe sees, ascending; their views by the problem's frames, ascending. `keyframes`: the
-  /// frames' keyframes, ascending.
+  /// Points of the landmarks that a free keyframe sees, ascending by landmark; their views by the problem's frames,
+  /// ascending. `keyframes`: the frames' keyframes, ascending.
   LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes);
 
-  int size() const { return static_cast<int>(landmarks_.size()); }
-  const MapLandmark& landmark(int l) const { return *landmarks_[l]; }
+  int size() const { return static_cast<int>(points_.size()); }
+  const MapLandmark& landmark(int l) const { return *points_[l]; }
+  /// Of the points of one landmark the first, which holds its longest track, stands for it.
+  bool standsForLandmark(int l) const { return l == 0 || points_[l - 1] != points_[l]; }
   const LandmarkView* begin(int l) const { return views_.data() + first_[l]; }
   const LandmarkView* end(int l) const { return views_.data() + first_[l + 1]; }
   /// Place of a landmark's first view in arrays over all views.
@@ -30,7 +38,9 @@ class LandmarkViews {
   int viewCount() const { return static_cast<int>(views_.size()); }
 
  private:
-  std::vector<const MapLandmark*> landmarks_;
+  void addPoints(const MapLandmark& landmark, std::vector<LandmarkView>& seen);
+
+  std::vector<const MapLandmark*> points_;
   std::vector<int> first_;
   std::vector<LandmarkView> views_;
 };

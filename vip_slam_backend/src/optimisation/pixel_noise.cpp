@@ -10,11 +10,14 @@ PixelNoise::PixelNoise(const MeasurementOptions& options, double focal)
       least_(options.pixel_sigma / focal),
       most_(std::max(options.max_pixel_sigma, options.pixel_sigma) / focal),
       matched_(options.matched_pixel_sigma / focal),
+      between_tracks_(options.between_tracks_sigma / focal),
       gate_sigma_(options.gate_sigma / focal) {}
 
-double PixelNoise::sigma(const Feature& feature) const {
+double PixelNoise::sigma(const LandmarkView& view) const {
+  const Feature& feature = *view.feature;
   if (feature.id == kNoLandmark) return matched_ * std::pow(1.2, feature.octave);  // found by its descriptor
-  return std::clamp(feature.pixel_sigma / focal_, least_, most_);
+  const double tracked = std::clamp(feature.pixel_sigma / focal_, least_, most_);
+  return view.own_track ? tracked : std::hypot(tracked, between_tracks_);
 }
 
 }  // namespace vip_slam

@@ -101,7 +101,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
   // Variances, inflated; an outlier is judged against at least the gate's.
   const auto square = [](double x) { return x * x; };
   const double inflation = square(options.homography_inflation), gate = square(noise_.gateSigma()) * inflation;
-  const double host_variance = square(noise_.sigma(*host.feature)) * inflation;
+  const double host_variance = square(noise_.sigma(host)) * inflation;
   const double host_judged = std::max(host_variance, gate);
   const Eigen::Vector2d xy_i = host.feature->xy.cast<double>();
   pairs_.clear();
@@ -119,7 +119,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     }
     // The pair's noise is that of the observer and that of the host, seen from the observer.
     const double gain = hostNoiseGain(observer.h, p);
-    const double own = square(noise_.sigma(*v->feature)) * inflation;
+    const double own = square(noise_.sigma(*v)) * inflation;
     const double variance = own + gain * host_variance, judged = std::max(own, gate) + gain * host_judged;
     // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
     const Eigen::Vector2d xy_j = v->feature->xy.cast<double>();

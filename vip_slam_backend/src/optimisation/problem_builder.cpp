@@ -118,7 +118,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
   for (int l = 0; l < views.size(); ++l) {
     const MapLandmark& landmark = views.landmark(l);
     if (on_plane[l] && settings.variant == Variant::kVip) {
-      built.plane_points.push_back(landmark.id);
+      if (views.standsForLandmark(l)) built.plane_points.push_back(landmark.id);
       continue;
     }
     BaPoint point;
@@ -130,7 +130,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
       observation.frame = v->frame;
       observation.x = v->feature->xy.x();
       observation.y = v->feature->xy.y();
-      observation.weight = 1.0 / noise.sigma(*v->feature);
+      observation.weight = 1.0 / noise.sigma(*v);
       if (v->feature->depth > 0) {
         observation.depth = v->feature->depth;
         observation.depth_weight = 1.0 / (v->feature->depth_sigma * settings.measurement.depth_sigma_scale);
@@ -169,7 +169,7 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   std::unordered_set<LandmarkId> done;
   done.reserve(built.points.size() + built.plane_points.size());
   for (std::size_t p = 0; p < built.points.size(); ++p) {
-    done.insert(built.points[p]);
+    if (!done.insert(built.points[p]).second) continue;  // another track of it
     if (map->hasLandmark(built.points[p])) map->setPosition(built.points[p], problem.points[p].p_W);
   }
   PlaneIntersection intersection(*map);

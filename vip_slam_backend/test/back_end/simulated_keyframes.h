@@ -80,10 +80,19 @@ class SimulatedKeyframes {
         p.track = kNoLandmark;
         continue;
       }
-      if (p.track == kNoLandmark || random_() % 20 == 0) p.track = next_track_++;
+      if (p.track == kNoLandmark || random_() % 20 == 0) {
+        // A track follows its reference patch to a tenth of a pixel, but that began at a corner beside the point.
+        p.track = next_track_++;
+        p.beside = Eigen::Vector2d(gauss(0.5), gauss(0.5));
+      }
       Feature f;
-      f.id = random_() % 12 == 0 ? kNoLandmark : p.track;  // some are corners the tracker missed
-      uv += Eigen::Vector2d(gauss(0.5), gauss(0.5));
+      if (random_() % 12 == 0) {  // a corner the tracker missed
+        uv += Eigen::Vector2d(gauss(0.7), gauss(0.7));
+      } else {
+        f.id = p.track;
+        f.pixel_sigma = 0.1f;
+        uv += p.beside + Eigen::Vector2d(gauss(0.1), gauss(0.1));
+      }
       f.pixel = uv.cast<float>();
       f.xy = Eigen::Vector2f((uv.x() - 320) / 460, (uv.y() - 240) / 460);
       if (random_() % 5 != 0) {
@@ -140,6 +149,7 @@ class SimulatedKeyframes {
     Eigen::Vector3d x;
     int wall = -1;
     LandmarkId track = kNoLandmark;
+    Eigen::Vector2d beside = Eigen::Vector2d::Zero();  // px
     Descriptor descriptor{};
   };
   std::mt19937 random_;

@@ -45,7 +45,7 @@ inline Map syntheticMap(int keyframes, int features, double imu_rate, std::uint6
     if (!first) kf->imu = motion.imu(t - 0.5, t, imu_rate);
     for (int f = 0; f < features; ++f) {
       Feature feature;
-      feature.id = f % 3 ? next + f : kNoLandmark;
+      feature.id = f % 3 ? 1000 * f + k / 3 : kNoLandmark;  // a track lives for three keyframes
       feature.pixel = Eigen::Vector2f(uniform(0, 640), uniform(0, 480));
       feature.xy = Eigen::Vector2f((feature.pixel.x() - 320) / 500, (feature.pixel.y() - 240) / 500);
       if (f % 4) {

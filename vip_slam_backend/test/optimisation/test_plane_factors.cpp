@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "vip_slam_backend/optimisation/problem_builder.h"
+#include "vip_slam_backend/solver/ba_solver.h"
 
 using namespace vip_slam;
 
@@ -55,6 +56,12 @@ struct Wall {
         map.addObservation(l + 1, {KeyframeId(k + 1), static_cast<std::uint32_t>(l)});
       map.associate(l + 1, 1);
     }
+  }
+  /// View `k` of a landmark becomes one of another track.
+  void track(int k, LandmarkId landmark, LandmarkId track) {
+    auto data = std::make_shared<Keyframe>(*map.keyframe(k + 1).data);
+    data->frame.features[static_cast<std::size_t>(landmark - 1)].id = track;
+    map.keyframe(k + 1).data = data;
   }
   static Eigen::Vector3d point(int l) { return {0.3 * (l % 4) - 0.3, 0.4 * (l / 4) - 0.4, 3.0}; }
 
@@ -106,6 +113,41 @@ TEST(PlaneFactors, SharedHostsGiveFewerFactors) {
   wall.settings.shared_hosts = true;
   const std::size_t shared = buildProblem(wall.map, globalScope(wall.map), wall.settings).problem.homographies.size();
   EXPECT_EQ(shared, std::size_t(kKeyframes - 1));  // one keyframe hosts all
+}
+
+// The second half of one landmark's views belong to another track, that of a corner a little beside the first.
+TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
+  const auto beside = [](int k) { return k < 5 ? 0.0 : 0.7; };
+  for (const bool shared : {false, true})
+    for (const Variant variant : {Variant::kVip, Variant::kVi}) {
+      Wall wall(5, beside);
+      Wall one(5, beside);
+      for (int k = 5; k < kKeyframes; ++k) wall.track(k, 5, 900);
+      wall.settings.variant = one.settings.variant = variant;
+      wall.settings.shared_hosts = one.settings.shared_hosts = shared;
+      BuiltProblem split = buildProblem(wall.map, globalScope(wall.map), wall.settings);
+      BuiltProblem joint = buildProblem(one.map, globalScope(one.map), one.settings);
+      if (variant == Variant::kVi) {
+        EXPECT_EQ(split.points.size(), joint.points.size() + 1);
+        EXPECT_EQ(split.problem.observations.size(), joint.problem.observations.size() + 1);
+        EXPECT_EQ(std::count(split.points.begin(), split.points.end(), 5), 2);
+      } else {
+        EXPECT_EQ(wall.pairs(shared), one.pairs(shared));  // one host more takes a view, and the tie is a pair
+        EXPECT_EQ(split.plane_points, joint.plane_points);
+      }
+      // Each track agrees with itself; only the tie pays for what lies between them.
+      for (BuiltProblem* built : {&split, &joint}) {
+        for (BaFrame& frame : built->problem.frames) frame.fixed = true;
+        built->problem.gauges.clear();
+        built->problem.motion_priors.clear();
+        built->problem.imu.clear();
+        built->problem.point_to_plane.clear();
+        EXPECT_TRUE(makeSolver("ceres")->solve(built->problem, SolverOptions()).usable);
+      }
+      const double between = wall.settings.measurement.between_tracks_sigma;
+      EXPECT_LT(evaluateCost(split.problem), 0.5 * 0.7 * 0.7 / (between * between));
+      EXPECT_GT(evaluateCost(joint.problem), 3 * evaluateCost(split.problem));
+    }
 }
 
 TEST(PlaneFactors, DepthPointsBesideThePlaneAreLeftOut) {

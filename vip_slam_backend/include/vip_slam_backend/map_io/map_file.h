@@ -1,13 +1,14 @@
 // Map files (.vsm): everything a later session needs to relocalise and to go on mapping.
 //
-// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 2 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
-// of all before it. Version 1, without the features' pixel_sigma, is read, too. The payload holds the vocabulary's id,
-// planes, keyframes (state, features with descriptors, depth grid in mm, IMU samples, plane observations), landmarks
-// and loops.
+// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 3 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
+// of all before it. Version 1, without the features' pixel_sigma, and version 2, which does not tell a landmark's
+// tracks apart, are read, too. The payload holds the vocabulary's id, planes, keyframes (state, features with
+// descriptors, depth grid in mm, IMU samples, plane observations), landmarks and loops.
 //
-// A file is the same bytes for the same map: landmarks and epochs are numbered anew in ascending order when written.
-// Read back, landmarks get ids from kLoadedLandmarks and epochs from kLoadedEpochs on, so that they never meet those of
-// the running odometry. Keyframe and plane ids stay as they are.
+// A file is the same bytes for the same map: landmarks and epochs are numbered anew in ascending order when written,
+// the tracks of a landmark in the order of their first views. Read back, landmarks get ids from kLoadedLandmarks and
+// epochs from kLoadedEpochs on, so that they never meet those of the running odometry. Tracks get ids of their own, no
+// landmark's: whoever finds a landmark again begins another track. Keyframe and plane ids stay as they are.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +21,7 @@
 namespace vip_slam {
 
 constexpr LandmarkId kLoadedLandmarks = LandmarkId(1) << 40;
+constexpr LandmarkId kLoadedTracks = LandmarkId(1) << 42;  ///< times a track's number, added to the landmark's id
 constexpr std::uint32_t kLoadedEpochs = 0x80000000u;
 
 struct StoredMap {

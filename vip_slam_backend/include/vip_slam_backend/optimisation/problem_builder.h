@@ -26,7 +26,7 @@ ProblemScope globalScope(const Map& map);
 struct BuiltProblem {
   BaProblem problem;
   std::vector<KeyframeId> frames;       ///< per problem frame; 0: the world frame of outside planes
-  std::vector<LandmarkId> points;
+  std::vector<LandmarkId> points;       ///< one per track: a landmark's first is its longest
   std::vector<PlaneId> planes;
   std::vector<LandmarkId> plane_points; ///< landmarks that stand for homographies only (vip)
   /// Landmark and keyframe of every observation, for outlier removal.
