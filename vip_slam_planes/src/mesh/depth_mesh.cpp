@@ -9,7 +9,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr float kDegree = float(M_PI / 180.0);
 // Share of a pixel's depth sigma left in a safe depth, which is the median of a 5x5 window of correlated pixels.
 constexpr float kMedianGain = 0.5f;
 constexpr float kSameSurface = 0.9f;  // cosine between neighbouring normals that are averaged (26 degrees)
@@ -172,7 +171,7 @@ bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid,
   triangle->area = 0.5f * twice;
   const float z = triangle->centre_C.z();
   const float facing = -triangle->n_C.dot(triangle->centre_C);
-  if (facing < std::cos(float(options_.max_incidence_deg) * kDegree) * triangle->centre_C.norm()) return false;
+  if (facing < std::cos(float(options_.max_incidence_deg * M_PI / 180.0)) * triangle->centre_C.norm()) return false;
   triangle->sigma = float(noise_.sigma(z)) * kMedianGain * facing / z;
   triangle->sigma_angle = triangle->sigma / altitude;
   return step < 2 || grid.empty() || !crossesDepthEdge(*triangle, grid);
