@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "homography_hosts.h"
-#include "plane_gate.h"
+#include "plane_noise.h"
 #include "vip_slam_backend/solver/robust.h"
 
 namespace vip_slam {
@@ -159,14 +159,11 @@ void PlaneFactorBuilder::storeGroup(int host, int plane, std::vector<Observer>* 
   observers->clear();
 }
 
-void PlaneFactorBuilder::addDepthBlocks() {
-  if (planes_.empty()) return;
-  BaProblem& problem = built_->problem;
+std::vector<PlaneFactorBuilder::DepthBlock> PlaneFactorBuilder::collectDepthBlocks() const {
+  const BaProblem& problem = built_->problem;
   std::unordered_map<KeyframeId, int> frames;
   for (std::size_t f = 0; f < built_->frames.size(); ++f) frames[built_->frames[f]] = static_cast<int>(f);
-  // Keyframes that are constants: one block per plane in the world, seen from a fixed frame at the origin.
-  std::map<PlaneId, Eigen::Matrix4d> outside;
-  std::map<PlaneId, int> outside_points;
+  std::vector<DepthBlock> blocks;
   for (const auto& entry : map_.keyframes()) {
     const auto frame = frames.find(entry.first);
     const bool constant = frame == frames.end() || problem.frames[frame->second].fixed;
@@ -175,34 +172,52 @@ void PlaneFactorBuilder::addDepthBlocks() {
     for (const auto& observation : entry.second.planes) {
       const auto plane = planes_.find(observation.first);
       if (plane == planes_.end()) continue;
-      const PlaneObservation& o = observation.second;
       const Plane& parameters = problem.planes[plane->second].plane;
       Eigen::Vector4d plane_W;
       plane_W << parameters.n, parameters.d;
-      const PlaneGate gate(o, T_W_C.transpose() * plane_W);
+      const Eigen::Vector4d plane_C = T_W_C.transpose() * plane_W;
+      PlaneGate gate(observation.second, plane_C);
       if (!gate.all() && gate.kept().empty()) continue;
-      if (constant) {
-        const auto sum = outside.emplace(observation.first, Eigen::Matrix4d::Zero()).first;
-        sum->second += T_W_C * gate.G() * T_W_C.transpose();
-        ++outside_points[observation.first];
-      } else if (settings_.variant == Variant::kViP) {
-        for (int k = 0; k < gate.points(); ++k) {
-          const PlanePoint& p = o.points[gate.all() ? k : gate.kept()[k]];
-          BaPlanePoint factor;
-          factor.frame = frame->second;
-          factor.plane = plane->second;
-          factor.p_C = p.p_C.cast<double>();
-          factor.weight = std::sqrt(o.weight_scale) / p.sigma;
-          problem.plane_points.push_back(factor);
-        }
-      } else {
-        BaPointToPlane factor;
-        factor.frame = frame->second;
-        factor.plane = plane->second;
-        factor.G = gate.G();
-        factor.points = gate.points();
-        problem.point_to_plane.push_back(factor);
+      const Eigen::Matrix4d G = gate.G();
+      blocks.push_back({constant ? -1 : frame->second, plane->second, T_W_C, G, planeMisfit(G, plane_C),
+                        &observation.second, std::move(gate)});
+    }
+  }
+  return blocks;
+}
+
+void PlaneFactorBuilder::addDepthBlocks() {
+  if (planes_.empty()) return;
+  BaProblem& problem = built_->problem;
+  const std::vector<DepthBlock> blocks = collectDepthBlocks();
+  std::vector<double> misfits;
+  for (const DepthBlock& block : blocks) misfits.push_back(block.misfit);
+  const double scale = planeInformationScale(std::move(misfits));
+  // Keyframes that are constants: one block per plane in the world, seen from a fixed frame at the origin.
+  std::map<int, BaPointToPlane> outside;
+  for (const DepthBlock& block : blocks) {
+    const PlaneObservation& o = *block.observation;
+    if (block.frame < 0) {
+      BaPointToPlane& sum = outside[block.plane];
+      sum.G += scale * block.T_W_C * block.G * block.T_W_C.transpose();
+      ++sum.points;
+    } else if (settings_.variant == Variant::kViP) {
+      for (int k = 0; k < block.gate.points(); ++k) {
+        const PlanePoint& p = o.points[block.gate.all() ? k : block.gate.kept()[k]];
+        BaPlanePoint factor;
+        factor.frame = block.frame;
+        factor.plane = block.plane;
+        factor.p_C = p.p_C.cast<double>();
+        factor.weight = std::sqrt(scale * o.weight_scale) / p.sigma;
+        problem.plane_points.push_back(factor);
       }
+    } else {
+      BaPointToPlane factor;
+      factor.frame = block.frame;
+      factor.plane = block.plane;
+      factor.G = scale * block.G;
+      factor.points = block.gate.points();
+      problem.point_to_plane.push_back(factor);
     }
   }
   if (outside.empty()) return;
@@ -212,13 +227,10 @@ void PlaneFactorBuilder::addDepthBlocks() {
   const int world_frame = static_cast<int>(problem.frames.size());
   problem.frames.push_back(world);
   built_->frames.push_back(0);
-  for (const auto& sum : outside) {
-    BaPointToPlane factor;
-    factor.frame = world_frame;
-    factor.plane = planes_[sum.first];
-    factor.G = sum.second;
-    factor.points = outside_points[sum.first];
-    problem.point_to_plane.push_back(factor);
+  for (auto& sum : outside) {
+    sum.second.frame = world_frame;
+    sum.second.plane = sum.first;
+    problem.point_to_plane.push_back(sum.second);
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "landmark_views.h"
 #include "pixel_noise.h"
+#include "plane_gate.h"
 #include "vip_slam_backend/factors/frame_geometry.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
 
@@ -18,7 +19,7 @@ class PlaneFactorBuilder {
   /// Turns landmarks on planes into host-observer pairs, compressed unless the variant says otherwise. Per landmark
   /// whether it was; one that is on no plane or fails the gate stays a free point.
   std::vector<char> addHomographies(const LandmarkViews& views);
-  /// Blocks of the depth points of the keyframes.
+  /// Blocks of the depth points of the keyframes, weighed by how well they agree with the planes.
   void addDepthBlocks();
 
  private:
@@ -27,6 +28,15 @@ class PlaneFactorBuilder {
                  std::vector<Observer>* observers) const;
   bool collectPairs(const LandmarkViews& views, int landmark, int host_view, int plane, std::vector<int>* slot,
                     std::vector<Observer>* observers);
+  // Depth points of one keyframe on one plane, as far as they belong to it.
+  struct DepthBlock {
+    int frame, plane;          // frame -1: a constant
+    Eigen::Matrix4d T_W_C, G;
+    double misfit;
+    const PlaneObservation* observation;
+    PlaneGate gate;
+  };
+  std::vector<DepthBlock> collectDepthBlocks() const;
   void storeGroup(int host, int plane, std::vector<Observer>* observers, std::vector<int>* slot);
 
   const Map& map_;

@@ -1,0 +1,38 @@
+#include "plane_noise.h"
+
+#include <algorithm>
+
+#include <Eigen/Eigenvalues>
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kLeastObservations = 30;
+constexpr double kMedian = 2.366;  // of a chi square with three degrees of freedom
+// A sigma shrinks to a fifth at most: planes and poses are fitted to the same points, so that a map of few planes
+// agrees with itself too well. It does not grow: with a camera that bends its depth that would take away what holds
+// the map.
+constexpr double kLeast = 1.0, kMost = 25.0;
+
+}  // namespace
+
+double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C) {
+  const double weight = G(3, 3);
+  if (!(weight > 0)) return 0;
+  const Eigen::Vector3d centre = G.topRightCorner<3, 1>() / weight;
+  const Eigen::Matrix3d scatter = G.topLeftCorner<3, 3>() - weight * centre * centre.transpose();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(scatter, Eigen::EigenvaluesOnly);
+  const Eigen::Vector3d n = plane_C.head<3>();
+  const double distance = n.dot(centre) + plane_C(3), tilt = n.dot(scatter * n) - eigen.eigenvalues()(0);
+  return weight * distance * distance + std::max(0.0, tilt);
+}
+
+double planeInformationScale(std::vector<double> misfits) {
+  if (misfits.size() < kLeastObservations) return 1.0;
+  const auto middle = misfits.begin() + misfits.size() / 2;
+  std::nth_element(misfits.begin(), middle, misfits.end());
+  return std::clamp(kMedian / std::max(*middle, 1e-9), kLeast, kMost);
+}
+
+}  // namespace vip_slam

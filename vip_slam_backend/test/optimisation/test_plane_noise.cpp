@@ -1,0 +1,70 @@
+// How the weight of depth points on planes follows from how well they agree with the planes.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "../../src/optimisation/plane_noise.h"
+
+using namespace vip_slam;
+
+namespace {
+
+constexpr double kSigma = 0.005;
+constexpr int kPoints = 50;
+
+// Depth points on the plane z = 2 + offset + slope x, scattered along z, weighted for kSigma.
+Eigen::Matrix4d observation(double offset, double slope, double scatter, std::mt19937* random) {
+  std::normal_distribution<double> normal;
+  Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
+  for (int k = 0; k < kPoints; ++k) {
+    const double x = 0.2 * (k % 10) - 0.9, y = 0.4 * (k / 10) - 0.8;
+    const Eigen::Vector4d p(x, y, 2.0 + offset + slope * x + scatter * normal(*random), 1.0);
+    G += p * p.transpose() / (kSigma * kSigma);
+  }
+  return G;
+}
+
+const Eigen::Vector4d kPlane(0, 0, -1, 2);
+
+}  // namespace
+
+TEST(PlaneNoise, MisfitIsDistanceAndTiltWithoutScatter) {
+  std::mt19937 random(1);
+  EXPECT_NEAR(planeMisfit(observation(0, 0, 0, &random), kPlane), 0, 1e-6);
+  const double distance = 0.003;
+  EXPECT_NEAR(planeMisfit(observation(distance, 0, 0, &random), kPlane),
+              kPoints * distance * distance / (kSigma * kSigma), 1e-6);
+  // Tilt: the squared distances along x that the slope makes; the best plane has none left.
+  const double slope = 0.01, spread = 0.33;  // mean of x^2
+  EXPECT_NEAR(planeMisfit(observation(0, slope, 0, &random), kPlane),
+              kPoints * slope * slope * spread / (kSigma * kSigma), 1e-3 * kPoints);
+  // Points that scatter by their sigma say little about the plane being wrong: three degrees of freedom, not 50.
+  double sum = 0;
+  constexpr int kDraws = 300;
+  for (int k = 0; k < kDraws; ++k) sum += planeMisfit(observation(0, 0, kSigma, &random), kPlane);
+  EXPECT_NEAR(sum / kDraws, 3.0, 0.5);
+}
+
+TEST(PlaneNoise, WeightsFollowTheAgreement) {
+  std::mt19937 random(2);
+  const auto scaleOf = [&](double scatter, int observations) {
+    std::vector<double> misfits;
+    for (int k = 0; k < observations; ++k) misfits.push_back(planeMisfit(observation(0, 0, scatter, &random), kPlane));
+    return planeInformationScale(misfits);
+  };
+  EXPECT_NEAR(scaleOf(kSigma / 3, 1000), 9.0, 1.0);
+  EXPECT_NEAR(scaleOf(kSigma, 1000), 1.0, 0.15);
+  EXPECT_EQ(scaleOf(5 * kSigma, 1000), 1.0);       // never less than the noise model says
+  EXPECT_EQ(scaleOf(kSigma / 1000, 1000), 25.0);   // nor more than a fifth of its sigma
+  EXPECT_EQ(scaleOf(kSigma / 3, 10), 1.0);         // too few to tell
+}
+
+TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {
+  std::mt19937 random(3);
+  std::vector<double> misfits;
+  for (int k = 0; k < 1000; ++k)
+    misfits.push_back(planeMisfit(observation(k % 5 ? 0 : 0.03, 0, kSigma / 3, &random), kPlane));
+  const double scale = planeInformationScale(misfits);
+  EXPECT_GT(scale, 5.0);
+  EXPECT_LT(scale, 9.0);
+}
