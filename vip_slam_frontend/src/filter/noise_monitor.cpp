@@ -12,7 +12,7 @@ constexpr double kMostCorrection = 20.0;  // one image may not decide
 // Three sigmas above 1 for the moving average of six honest degrees of freedom.
 constexpr double kContradiction = 1.3;
 constexpr double kManyGated = 0.3;
-constexpr double kWidest = 10.0;
+constexpr double kWidest = 30.0;
 
 }  // namespace
 
