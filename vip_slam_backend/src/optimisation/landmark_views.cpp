@@ -3,7 +3,6 @@
 #include <algorithm>
 
 namespace vip_slam {
-
 namespace {
 
 // Views of one track among those of a landmark.
