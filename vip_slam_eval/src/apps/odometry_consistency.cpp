@@ -1,6 +1,9 @@
 // rosrun vip_slam_eval odometry_consistency SEQUENCE [--seeds N] [--seconds S]
 // Is the odometry as uncertain as it says? One rendering goes through the whole front end many times, each time with
 // noise of its own in images, depth and IMU. What all runs err alike is the scene's, what they scatter is the noise's.
+// With --seeds 1 also the drift of a sequence too long to keep as a bag.
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -11,6 +14,7 @@
 
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_eval/trajectory_consistency.h"
+#include "vip_slam_eval/trajectory_metrics.h"
 #include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_sim/sequence/sequence_renderer.h"
@@ -20,6 +24,7 @@ namespace {
 using namespace vip_slam;
 
 constexpr int kFirstSeed = 1000, kSeedStep = 37;
+constexpr double kDriftMetres = 10.0;
 constexpr double kImuAhead = 0.02;  ///< s of IMU handed over beyond the image
 
 /// One noise seed.
@@ -60,6 +65,28 @@ class Run {
   std::vector<PoseWithCovariance> poses_;
 };
 
+/// Drift over 10 m of the path, or where the camera stays put the farthest it seemed to go.
+void printDrift(const Trajectory& truth, const std::vector<PoseWithCovariance>& poses) {
+  Trajectory estimate;
+  for (const PoseWithCovariance& pose : poses) estimate.push_back({pose.t, pose.T_M_B});
+  const std::vector<PosePair> pairs = associate(truth, estimate);
+  const RelativeError drift = relativeErrorOverDistance(pairs, kDriftMetres);
+  if (drift.position.count > 0) {
+    std::printf("  over %.0f m: %.3f %% mean, %.3f rmse; %.4f deg/m mean\n", kDriftMetres,
+                100 * drift.position.mean / kDriftMetres, 100 * drift.position.rmse / kDriftMetres,
+                drift.rotation.mean / kDriftMetres);
+    return;
+  }
+  double farthest = 0, turned = 0;
+  for (const PosePair& pair : pairs) {
+    const SE3 truly = pairs.front().T_W_B.inverse() * pair.T_W_B;
+    const SE3 seemingly = pairs.front().T_M_B.inverse() * pair.T_M_B;
+    farthest = std::max(farthest, (seemingly.t() - truly.t()).norm());
+    turned = std::max(turned, logSO3(truly.rotation().conjugate() * seemingly.rotation()).norm());
+  }
+  std::printf("  off at most %.2f mm, %.3f deg\n", 1000 * farthest, turned * 180 / M_PI);
+}
+
 void judge(const SequenceSpec& spec, int seeds, double seconds, int threads) {
   if (!spec.depth.registered) throw std::invalid_argument(spec.name + ": needs depth registered to the colour camera");
   RenderOptions options;
@@ -78,8 +105,9 @@ void judge(const SequenceSpec& spec, int seeds, double seconds, int threads) {
   double pose = 0, position = 0, rotation = 0;
   for (int i = 0; i < seeds; ++i) {
     const Nees result = nees(truth, runs[i]->poses());
-    std::printf("seed %2d  NEES pose %6.2f  position %6.2f  rotation %6.2f  poses %zu\n", i, result.pose.mean,
+    std::printf("seed %2d  NEES pose %6.2f  position %6.2f  rotation %6.2f  poses %zu,", i, result.pose.mean,
                 result.position.mean, result.rotation.mean, runs[i]->poses().size());
+    printDrift(truth, runs[i]->poses());
     pose += result.pose.mean / seeds;
     position += result.position.mean / seeds;
     rotation += result.rotation.mean / seeds;
