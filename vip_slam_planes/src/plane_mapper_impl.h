@@ -6,6 +6,7 @@
 
 #include "vip_slam_planes/association/plane_sampler.h"
 #include "vip_slam_planes/association/point_association.h"
+#include "vip_slam_planes/detection/plane_evidence.h"
 #include "vip_slam_planes/growth/plane_track.h"
 #include "vip_slam_planes/mesh/depth_mesh.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
@@ -47,6 +48,8 @@ class PlaneMapper::Impl {
   std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C);
   void startPlanes(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
                    std::vector<int>* label, std::vector<PlaneTrack*>* tracks);
+  void startJointPlanes(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
+                        std::vector<int>* label, std::vector<PlaneTrack*>* tracks);
   void observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
                const std::vector<int>& label, const SurfaceLabels& labels, const DepthMesh& mesh, bool first_time);
   void mergePlanes(const std::vector<PlaneId>& changed);
@@ -58,6 +61,7 @@ class PlaneMapper::Impl {
   GridRays rays_;
   PlaneSampler sampler_;
   PointAssociation points_;
+  PlaneEvidence evidence_;
 
   std::map<KeyframeId, KeyframePtr> placed_;  ///< processed keyframes that the map still has
   CameraPoses poses_;                         ///< T_map_C of all of those

@@ -31,6 +31,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const std::size_t known = tracks.size();
   if (first_time) {
     startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
+    startJointPlanes(keyframe, T_map_C, triangles, &label, &tracks);
     ++counters.keyframes;
   }
   const SurfaceLabels labels = labelNodes(mesh, label, grid);
@@ -59,6 +60,32 @@ void PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C
       track.cover(triangles[i], keyframe.id, T_map_C, nullptr);
       (*label)[i] = static_cast<int>(tracks->size());
     }
+    if (track.area() < options.support.sure_area) {
+      track.keyframes_seen = evidence_.seenBy(track, poses_, options.support.min_area);
+    }
+    tracks->push_back(&track);
+    ++counters.planes_started;
+  }
+}
+
+void PlaneMapper::Impl::startJointPlanes(const Keyframe& keyframe, const SE3& T_map_C,
+                                         const std::vector<MapTriangle>& triangles, std::vector<int>* label,
+                                         std::vector<PlaneTrack*>* tracks) {
+  evidence_.add(keyframe.id, T_map_C, triangles, *label);
+  for (const JointPlane& found : evidence_.detect(poses_, {tracks->begin(), tracks->end()})) {
+    const PlaneId id = next_plane_++;
+    PlaneTrack& track =
+        tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;
+    std::set<KeyframeId> earlier;
+    for (const EvidenceTriangle& e : found.triangles) {
+      track.cover(e.triangle, e.keyframe, poses_.at(e.keyframe), nullptr);
+      if (e.keyframe == keyframe.id) {
+        (*label)[e.index] = static_cast<int>(tracks->size());
+      } else {
+        earlier.insert(e.keyframe);
+      }
+    }
+    track.keyframes_seen = static_cast<int>(earlier.size());
     tracks->push_back(&track);
     ++counters.planes_started;
   }

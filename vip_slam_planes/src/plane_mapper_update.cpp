@@ -84,6 +84,7 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
     fresh_.erase({plane, id});
   }
   points_.removeKeyframe(id);
+  evidence_.remove(id);
   placed_.erase(it);
   poses_.erase(id);
   if (newest_ == id) newest_ = placed_.empty() ? 0 : placed_.rbegin()->first;

@@ -180,6 +180,19 @@ TEST(Mapper, FramesFromFurtherOnConfirmAPlaneThatOneKeyframeSaw) {
   }
 }
 
+TEST(Mapper, WhoHasSeenAPlaneBeforeItsStartCounts) {
+  Scene corner, whole;
+  corner.add({3, -0.4, 0.8}, {0, 0.4, 0}, {0, 0, 0.35});  // too little to start a plane
+  whole.add({3, -0.4, 0.8}, {0, 0.8, 0}, {0, 0, 0.8});
+  for (const bool before : {false, true}) {
+    Rig rig;
+    if (before) rig.look(corner, {0, 0, 1.2}, {3, 0, 1.2});
+    EXPECT_TRUE(rig.mapper.planes().empty());
+    rig.look(whole, {0, 0.1, 1.2}, {3, 0, 1.2});
+    EXPECT_EQ(before, rig.find(Plane({-1, 0, 0}, 3)) != nullptr);
+  }
+}
+
 TEST(Mapper, TablesOfOneHeightStayTwo) {
   Rig rig;
   Scene scene;

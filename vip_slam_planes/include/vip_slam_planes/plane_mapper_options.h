@@ -33,6 +33,8 @@ struct PlaneDetectionOptions {
   double min_width = 0.25;
   double max_rms = 0.02;
   double max_tilt_deg = 2.5;
+  int keyframes = 10;
+  int min_keyframes = 3;
   bool general = false;
 
   void visit(OptionVisitor& v) {
@@ -46,6 +48,8 @@ struct PlaneDetectionOptions {
     v.field("max_rms", max_rms, 0.001, 0.2, "largest distance of a new plane's points beyond depth noise, RMS, m");
     v.field("max_tilt_deg", max_tilt_deg, 0.5, 20.0,
             "surfaces that lean more than this from horizontal or vertical are slanted, degrees");
+    v.field("keyframes", keyframes, 1, 100, "last keyframes whose left-over triangles may start a plane together");
+    v.field("min_keyframes", min_keyframes, 2, 100, "keyframes that must agree on such a plane");
     v.field("general", general, "also detect planes that are neither horizontal nor vertical");
   }
 };

@@ -28,6 +28,17 @@ class Detector {
     return std::move(found_);
   }
 
+  std::vector<DetectedPlane> runAt(PlaneKind kind) {
+    std::vector<int> members;
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      if (!taken_[i]) members.push_back(static_cast<int>(i));
+    }
+    Plane plane;
+    if (members.empty() || !fit(members, kind, &plane, nullptr)) return {};
+    for (const std::vector<int>& surface : surfaces(gather(plane), plane)) accept(surface, kind);
+    return std::move(found_);
+  }
+
  private:
   bool kindOf(const MapTriangle& t, PlaneKind* kind) const {
     const double gate = angleGate(t, options_.gravity_deg);
@@ -235,6 +246,12 @@ std::vector<DetectedPlane> detectPlanes(const std::vector<MapTriangle>& triangle
                                         const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options,
                                         const PlaneGrowthOptions& growth) {
   return Detector(triangles, taken, camera_centre, options, growth).run();
+}
+
+std::vector<DetectedPlane> detectPlanesAt(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
+                                          PlaneKind kind, const Eigen::Vector3d& camera_centre,
+                                          const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth) {
+  return Detector(triangles, taken, camera_centre, options, growth).runAt(kind);
 }
 
 }  // namespace vip_slam

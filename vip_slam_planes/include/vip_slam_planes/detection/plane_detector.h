@@ -23,4 +23,9 @@ std::vector<DetectedPlane> detectPlanes(const std::vector<MapTriangle>& triangle
                                         const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options,
                                         const PlaneGrowthOptions& growth);
 
+/// The same tests for what the free triangles make of one plane; they are near it already (a peak of votes).
+std::vector<DetectedPlane> detectPlanesAt(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
+                                          PlaneKind kind, const Eigen::Vector3d& camera_centre,
+                                          const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth);
+
 }  // namespace vip_slam

@@ -1,0 +1,215 @@
+#include "vip_slam_planes/detection/plane_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "vip_slam_planes/detection/plane_histogram.h"
+#include "vip_slam_planes/detection/surface_shape.h"
+#include "vip_slam_planes/growth/triangle_association.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+constexpr double kPatchReach = 0.4;            // metres from the patch's first triangle
+constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegree;
+constexpr double kLeastPatch = 0.01;           // m^2
+constexpr std::size_t kLeastTriangles = 4;
+constexpr double kLeastJoint = 2.0;            // of what starts a plane in one image: this is not for furniture
+constexpr int kMostTests = 4;                  // peaks tested per keyframe, the largest ones
+
+MapTriangle moved(const SE3& T, MapTriangle t) {
+  for (Eigen::Vector3d& p : t.corner) p = T * p;
+  t.centre = T * t.centre;
+  t.n = T.rotation() * t.n;
+  return t;
+}
+
+// Enough keyframes show a part of the plane, and two of them more than a strip: what spans a step is a strip in every
+// image, however many there are.
+bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::vector<MapTriangle>& triangles,
+                    const DetectedPlane& plane, int min_keyframes) {
+  std::map<KeyframeId, std::vector<int>> parts;
+  for (int i : plane.triangles) parts[evidence[i].keyframe].push_back(i);
+  if (int(parts.size()) < min_keyframes) return false;
+  if (plane.kind == PlaneKind::kHorizontal) return true;
+  return std::count_if(parts.begin(), parts.end(), [&](auto& part) {
+    std::sort(part.second.begin(), part.second.end());
+    return isSolid(triangles, part.second);
+  }) >= 2;
+}
+
+}  // namespace
+
+void PlaneEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
+                        const std::vector<int>& label) {
+  Frame frame{id, {}};
+  const SE3 T_C_map = T_map_C.inverse();
+  const double level = std::cos(detection_.gravity_deg * kDegree), upright = std::sin(detection_.gravity_deg * kDegree);
+  std::vector<int> place(triangles.size(), -1);  // in its patch; -1: open
+  std::vector<std::size_t> first(triangles.size(), triangles.size());  // triangle of its patch
+  std::vector<int> members;
+  for (std::size_t seed = 0; seed < triangles.size(); ++seed) {
+    if (label[seed] >= 0 || place[seed] >= 0) continue;
+    members.assign(1, static_cast<int>(seed));
+    place[seed] = 0;
+    first[seed] = seed;
+    Eigen::Vector3d normals = triangles[seed].area * triangles[seed].n;
+    Eigen::Vector3d centres = triangles[seed].area * triangles[seed].centre;
+    double area = triangles[seed].area;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      for (int g : triangles[members[k]].neighbour) {
+        if (g < 0 || label[g] >= 0 || place[g] >= 0) continue;
+        const MapTriangle& t = triangles[g];
+        if ((t.centre - triangles[seed].centre).norm() > kPatchReach) continue;
+        const Eigen::Vector3d n = normals.normalized();
+        if (n.dot(t.n) < std::cos(std::clamp(2.0 * t.sigma_angle, kPatchAngle, kWidestPatchAngle))) continue;
+        if (std::abs(n.dot(t.centre - centres / area)) > distanceGate(t, growth_.distance)) continue;
+        place[g] = static_cast<int>(members.size());
+        first[g] = seed;
+        members.push_back(g);
+        normals += t.area * t.n;
+        centres += t.area * t.centre;
+        area += t.area;
+      }
+    }
+    const Eigen::Vector3d n = normals.normalized();
+    const double z = std::abs(n.z());
+    if (members.size() < kLeastTriangles || area < kLeastPatch || (z < level && z > upright)) continue;
+    Patch patch;
+    patch.kind = z >= level ? PlaneKind::kHorizontal : PlaneKind::kVertical;
+    patch.n_C = T_C_map.rotation() * n;
+    patch.centre_C = T_C_map * (centres / area);
+    patch.area = area;
+    patch.index = members;
+    for (int i : members) {
+      patch.triangles.push_back(moved(T_C_map, triangles[i]));
+      for (int& g : patch.triangles.back().neighbour) g = g >= 0 && first[g] == seed ? place[g] : -1;
+    }
+    frame.patches.push_back(std::move(patch));
+  }
+  frames_.push_back(std::move(frame));
+  while (frames_.size() > std::size_t(detection_.keyframes)) frames_.pop_front();
+}
+
+void PlaneEvidence::remove(KeyframeId id) {
+  frames_.erase(std::remove_if(frames_.begin(), frames_.end(), [id](const Frame& f) { return f.id == id; }),
+                frames_.end());
+}
+
+std::vector<EvidenceTriangle> PlaneEvidence::collect(const std::vector<Vote>& votes, const CameraPoses& poses) const {
+  std::vector<EvidenceTriangle> all;
+  int vertices = 0;
+  for (const Vote& v : votes) {
+    const Patch& patch = frames_[v.frame].patches[v.patch];
+    const SE3& T_map_C = poses.at(frames_[v.frame].id);
+    const int first = static_cast<int>(all.size());
+    int next = vertices;
+    for (std::size_t i = 0; i < patch.triangles.size(); ++i) {
+      MapTriangle t = moved(T_map_C, patch.triangles[i]);
+      for (int& g : t.neighbour) g = g < 0 ? -1 : g + first;
+      for (int& k : t.vertex) k += vertices, next = std::max(next, k + 1);
+      all.push_back({t, frames_[v.frame].id, patch.index[i]});
+    }
+    vertices = next;
+  }
+  return all;
+}
+
+int PlaneEvidence::seenBy(const PlaneTrack& plane, const CameraPoses& poses, double area) const {
+  int count = 0;
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    const auto pose = poses.find(frames_[f].id);
+    if (pose == poses.end()) continue;
+    std::vector<Vote> near;
+    for (std::size_t k = 0; k < frames_[f].patches.size(); ++k) {
+      const Patch& patch = frames_[f].patches[k];
+      const double off = std::abs(plane.plane().signedDistance(pose->second * patch.centre_C));
+      if (patch.kind == plane.kind() && off < 2 * growth_.distance) near.push_back({f, k});
+    }
+    std::vector<MapTriangle> triangles;
+    for (const EvidenceTriangle& e : collect(near, poses)) triangles.push_back(e.triangle);
+    const std::vector<int> label = associateTriangles(triangles, {&plane}, growth_);
+    double sum = 0;
+    for (std::size_t i = 0; i < triangles.size(); ++i) sum += label[i] >= 0 ? triangles[i].area : 0.0;
+    count += sum >= area;
+  }
+  return count;
+}
+
+void PlaneEvidence::forget(const std::vector<Vote>& votes, const std::vector<EvidenceTriangle>& all,
+                           const std::vector<char>& used) {
+  std::size_t first = 0;
+  for (const Vote& v : votes) {
+    Patch& patch = frames_[v.frame].patches[v.patch];
+    std::size_t count = 0;
+    const std::size_t size = patch.triangles.size();
+    for (std::size_t i = first; i < std::min(first + size, all.size()); ++i) count += used[i] != 0;
+    first += size;
+    if (2 * count > size) patch.area = 0;
+  }
+}
+
+std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const std::vector<const PlaneTrack*>& known) {
+  std::vector<JointPlane> found;
+  if (frames_.size() < 2 || !poses.count(frames_.back().id)) return found;
+  const Eigen::Vector3d origin = poses.at(frames_.back().id).t();
+  PlaneHistogram histogram(detection_.distance_bin, detection_.angle_bin_deg);
+  std::vector<Vote> all;
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    const auto pose = poses.find(frames_[f].id);
+    if (pose == poses.end()) continue;
+    for (std::size_t k = 0; k < frames_[f].patches.size(); ++k) {
+      const Patch& patch = frames_[f].patches[k];
+      if (!(patch.area > 0)) continue;
+      const Eigen::Vector3d n = pose->second.rotation() * patch.n_C, p = pose->second * patch.centre_C - origin;
+      if (patch.kind == PlaneKind::kHorizontal) {
+        histogram.addHorizontal(n, p, patch.area, static_cast<int>(all.size()));
+      } else {
+        histogram.addVertical(n, p, patch.area, static_cast<int>(all.size()));
+      }
+      all.push_back({f, k});
+    }
+  }
+  for (int tests = 0; tests < kMostTests;) {
+    const PlaneHistogram::Peak peak = histogram.peak();
+    if (peak.area < detection_.min_area) break;
+    std::vector<Vote> votes;
+    std::set<std::size_t> frames;
+    for (int i : peak.members) {
+      votes.push_back(all[i]);
+      frames.insert(all[i].frame);
+      histogram.remove(i);
+    }
+    if (int(frames.size()) < detection_.min_keyframes || *frames.rbegin() + 1 != frames_.size()) continue;
+    ++tests;
+    const PlaneKind kind = frames_[votes.front().frame].patches[votes.front().patch].kind;
+    const std::vector<EvidenceTriangle> evidence = collect(votes, poses);
+    std::vector<MapTriangle> triangles;
+    for (const EvidenceTriangle& e : evidence) triangles.push_back(e.triangle);
+    const std::vector<int> label = associateTriangles(triangles, known, growth_);
+    std::vector<char> taken(triangles.size());
+    for (std::size_t i = 0; i < triangles.size(); ++i) taken[i] = label[i] >= 0;
+    for (const DetectedPlane& plane : detectPlanesAt(triangles, taken, kind, origin, detection_, growth_)) {
+      // Each keyframe sees the same surface: what counts is the area that they cover together.
+      PlaneTrack area(0, kind, plane.plane, plane.centroid, 0.5 * growth_.cell);
+      for (int i : plane.triangles) area.cover(triangles[i], 1, SE3(), nullptr);
+      if (area.area() < kLeastJoint * detection_.min_area ||
+          !shownBySeveral(evidence, triangles, plane, detection_.min_keyframes)) {
+        continue;
+      }
+      JointPlane joint{kind, plane.plane, plane.centroid, {}};
+      for (int i : plane.triangles) {
+        joint.triangles.push_back(evidence[i]);
+        taken[i] = 1;
+      }
+      found.push_back(std::move(joint));
+    }
+    forget(votes, evidence, taken);
+  }
+  return found;
+}
+
+}  // namespace vip_slam

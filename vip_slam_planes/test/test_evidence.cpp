@@ -1,0 +1,106 @@
+// Planes from several keyframes together.
+#include <gtest/gtest.h>
+
+#include "vip_slam_planes/detection/plane_evidence.h"
+
+namespace vip_slam {
+namespace {
+
+// A meshed rectangle in the plane x = 3 that faces the origin, cells of 10 cm.
+std::vector<MapTriangle> board(double y0, double z0, int columns, int rows, double lean = 0) {
+  constexpr double kCell = 0.1;
+  std::vector<MapTriangle> mesh;
+  const Eigen::Vector3d n = Eigen::Vector3d(-1, lean, 0).normalized();
+  const auto vertex = [&](int c, int r) {
+    return Eigen::Vector3d(3 + lean * c * kCell, y0 + c * kCell, z0 + r * kCell);
+  };
+  const auto number = [&](int c, int r) { return r * (columns + 1) + c; };
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) {
+      const int lower = 2 * (r * columns + c), upper = lower + 1;
+      MapTriangle a, b;
+      a.corner = {vertex(c, r), vertex(c + 1, r), vertex(c, r + 1)};
+      a.vertex = {number(c, r), number(c + 1, r), number(c, r + 1)};
+      a.neighbour = {upper, c > 0 ? lower - 1 : -1, r > 0 ? lower - 2 * columns + 1 : -1};
+      b.corner = {vertex(c + 1, r + 1), vertex(c, r + 1), vertex(c + 1, r)};
+      b.vertex = {number(c + 1, r + 1), number(c, r + 1), number(c + 1, r)};
+      b.neighbour = {lower, c + 1 < columns ? upper + 1 : -1, r + 1 < rows ? upper + 2 * columns - 1 : -1};
+      for (MapTriangle* t : {&a, &b}) {
+        t->n = n;
+        t->centre = (t->corner[0] + t->corner[1] + t->corner[2]) / 3;
+        t->area = 0.5 * kCell * kCell;
+        t->sigma = 0.004;
+        t->sigma_angle = 0.05;
+        mesh.push_back(*t);
+      }
+    }
+  }
+  return mesh;
+}
+
+class Evidence : public ::testing::Test {
+ protected:
+  std::vector<JointPlane> add(KeyframeId id, const std::vector<MapTriangle>& mesh) {
+    poses[id] = SE3(Eigen::Quaterniond::Identity(), {0, 0.1 * double(id), 1});
+    evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1));
+    return evidence.detect(poses, {});
+  }
+  CameraPoses poses;
+  PlaneEvidence evidence{PlaneDetectionOptions{}, PlaneGrowthOptions{}};
+};
+
+TEST_F(Evidence, PiecesOfOneWallInThreeKeyframesStartIt) {
+  EXPECT_TRUE(add(1, board(0.0, 0.8, 5, 5)).empty());
+  EXPECT_TRUE(add(2, board(0.2, 0.8, 5, 5)).empty());
+  const std::vector<JointPlane> found = add(3, board(0.4, 0.8, 5, 5));
+  ASSERT_EQ(1u, found.size());
+  EXPECT_EQ(PlaneKind::kVertical, found[0].kind);
+  EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), found[0].plane), 1e-6);
+  EXPECT_NEAR(3, found[0].plane.d, 1e-6);
+  EXPECT_GT(found[0].triangles.size(), 140u);  // of 150: corners may fall out of the patches
+  EXPECT_TRUE(add(4, {}).empty());  // what it took is not there any more
+}
+
+TEST_F(Evidence, SeeingASmallThingOftenDoesNotMakeItLarge) {
+  for (KeyframeId id = 1; id <= 8; ++id) EXPECT_TRUE(add(id, board(0.0, 0.8, 5, 5)).empty()) << id;
+}
+
+TEST_F(Evidence, StripsOneCellWideAreNoWall) {
+  for (KeyframeId id = 1; id <= 4; ++id) EXPECT_TRUE(add(id, board(0.1 * double(id), 0.0, 1, 20)).empty()) << id;
+}
+
+TEST_F(Evidence, WallsThatDisagreeAreNotOne) {
+  EXPECT_TRUE(add(1, board(0.0, 0.8, 5, 5, -0.5)).empty());
+  EXPECT_TRUE(add(2, board(0.2, 0.8, 5, 5, 0.0)).empty());
+  EXPECT_TRUE(add(3, board(0.4, 0.8, 5, 5, 0.5)).empty());
+}
+
+TEST_F(Evidence, FollowsTheKeyframesAndForgetsThem) {
+  add(1, board(0.0, 0.8, 5, 5));
+  add(2, board(0.2, 0.8, 5, 5));
+  PlaneTrack track(1, PlaneKind::kVertical, Plane({-1, 0, 0}, 3), {3, 0.2, 1}, 0.1);
+  for (const MapTriangle& t : board(0.0, 0.8, 7, 5)) track.cover(t, 1, poses[1], nullptr);
+  EXPECT_EQ(2, evidence.seenBy(track, poses, 0.1));
+  EXPECT_EQ(0, evidence.seenBy(track, poses, 0.3));
+  poses[2].t().x() += 0.3;  // corrected: it saw something else
+  EXPECT_EQ(1, evidence.seenBy(track, poses, 0.1));
+  evidence.remove(1);
+  EXPECT_EQ(0, evidence.seenBy(track, poses, 0.1));
+  // With one of three gone, the others do not suffice.
+  poses[2].t().x() -= 0.3;
+  EXPECT_TRUE(add(3, board(0.4, 0.8, 5, 5)).empty());
+}
+
+TEST_F(Evidence, WhatAKnownPlaneExplainsStartsNoOther) {
+  PlaneTrack track(1, PlaneKind::kVertical, Plane({-1, 0, 0}, 3), {3, 0.2, 1}, 0.1);
+  for (const MapTriangle& t : board(0.0, 0.8, 9, 5)) track.cover(t, 1, SE3(), nullptr);
+  for (KeyframeId id = 1; id <= 4; ++id) {
+    poses[id] = SE3(Eigen::Quaterniond::Identity(), {0, 0.1 * double(id), 1});
+    const std::vector<MapTriangle> mesh = board(0.1 * double(id), 0.8, 5, 5);
+    evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1));
+    EXPECT_TRUE(evidence.detect(poses, {&track}).empty()) << id;
+  }
+}
+
+}  // namespace
+}  // namespace vip_slam
