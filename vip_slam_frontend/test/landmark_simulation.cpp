@@ -134,6 +134,7 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
       if (options_.depth) {
         m.depth_sigma = options_.depth_a + options_.depth_c * p.z() * p.z();
         m.depth = p.z() + noise.z() * m.depth_sigma;
+        m.depth_sigma *= options_.depth_told;
       }
       seen.push_back(m);
     }
@@ -198,6 +199,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   result.nees /= std::max(1, count);
   result.nis_per_dof = rows > 0 ? nis / rows : 0;
   result.window = filter.window();
+  result.depth_scale = filter.depthScale();
   return result;
 }
 

@@ -16,6 +16,7 @@ struct SimulationOptions {
   double focal = 500;
   double imu_rate = 200, image_rate = 20;
   double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
+  double depth_told = 1.0;  ///< share of that sigma which the filter is told
   bool depth = true;
   bool imu_noise = true;
   int points = 1200;
@@ -62,6 +63,7 @@ struct RunResult {
   double final_rotation = 0;  ///< rad
   double length = 0;          ///< m travelled
   double nis_per_dof = 0;
+  double depth_scale = 1;     ///< factor on the depth noise that the filter found, at the end
   int gated = 0, used = 0;
   WindowState window;         ///< at the end
   Matrix15d covariance = Matrix15d::Zero();

@@ -36,6 +36,16 @@ TEST(FilterRuns, PixelNoiseIsLearnt) {
   EXPECT_NEAR(run.nis_per_dof, 1.0, 0.25);
 }
 
+TEST(FilterRuns, DepthNoisierThanToldIsFoundOut) {
+  SimulationOptions simulation;
+  simulation.seed = 6;
+  EXPECT_LT(runFilter(simulation, filterOptions(), 10.0, false).depth_scale, 1.1);
+  simulation.depth_told = 1.0 / 3.0;
+  const RunResult run = runFilter(simulation, filterOptions(), 10.0, false);
+  std::printf("depth noise three times what was told: found %.2f\n", run.depth_scale);
+  EXPECT_NEAR(run.depth_scale, 3.0, 0.6);
+}
+
 /// A data sheet's IMU that shakes: the images know better, and the filter must come to say so.
 TEST(FilterRuns, AnImuNoisierThanToldIsFoundOut) {
   SimulationOptions simulation;

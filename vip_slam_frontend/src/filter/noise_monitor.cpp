@@ -16,8 +16,8 @@ constexpr double kWidest = 30.0;
 
 }  // namespace
 
-NoiseMonitor::NoiseMonitor(double sigma_px, double min_px, double max_px, bool adapt)
-    : sigma_(std::clamp(sigma_px, min_px, std::max(min_px, max_px))), min_(min_px), max_(max_px), adapt_(adapt) {}
+NoiseMonitor::NoiseMonitor(double sigma, double lowest, double highest, bool adapt)
+    : sigma_(std::clamp(sigma, lowest, std::max(lowest, highest))), min_(lowest), max_(highest), adapt_(adapt) {}
 
 void NoiseMonitor::add(double chi2_per_dof, int dof) {
   if (!adapt_ || dof < 20 || !(chi2_per_dof > 0) || !std::isfinite(chi2_per_dof)) return;

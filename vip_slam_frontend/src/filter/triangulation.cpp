@@ -90,7 +90,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
     double cost = 0;
     bool valid = x.z() > 1e-3;
     result.depth_rows = result.pixel_rows = 0;
-    result.pixel_chi2 = 0;
+    result.pixel_chi2 = result.depth_chi2 = 0;
     for (const View& view : views) {
       // rho p_C = R (alpha, beta, 1) + rho t
       const Eigen::Vector3d s = view.R * Eigen::Vector3d(x.x(), x.y(), 1.0) + x.z() * view.t;
@@ -125,6 +125,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
         A += wz * Jz.transpose() * Jz;
         b += wz * Jz.transpose() * rz;
         cost += wz * rz * rz;
+        result.depth_chi2 += rz * rz;
         ++result.depth_rows;
       }
     }

@@ -12,6 +12,20 @@ namespace vip_slam {
 
 namespace {
 
+// A depth camera may be this much worse than its noise model before readings are wrong rather than noisy.
+constexpr double kMostDepthNoise = 5.0;
+constexpr double kLeastDepthNoise = 0.3;
+// Up to here a sensor is as good as its model says.
+constexpr double kWorseThanModel = 1.1;
+
+/// Tells a monitor the median of what the features left over per degree of freedom, and the rows behind it.
+void tell(NoiseMonitor* monitor, std::vector<double>& chi2, int rows) {
+  if (chi2.size() < 3) return;
+  // The median of a chi-square per degree of freedom with the usual dozen of rows lies some 5 % below its mean.
+  std::nth_element(chi2.begin(), chi2.begin() + chi2.size() / 2, chi2.end());
+  monitor->add(1.05 * chi2[chi2.size() / 2], rows);
+}
+
 /// All features' rows, those that begin further right below: what the triangularisation likes best.
 void stackStaircase(const std::vector<FeatureRows>& features, int rows, Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   struct Row {
@@ -60,6 +74,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       gate_(options.gate_probability),
       explained_(0.95),
       noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px),
+      depth_noise_(1.0, kLeastDepthNoise, kMostDepthNoise, options.adapt_depth_noise),
       imu_monitor_(options.adapt_imu_noise) {}
 
 void VioFilter::stop() {
@@ -161,16 +176,21 @@ double VioFilter::ownNoise(const Triangulation& point) const {
   return point.pixel_chi2 / dof;
 }
 
+double VioFilter::depthScale() const {
+  // Errors of a depth camera last longer than those between images: what scatters less is not more exact.
+  return depth_noise_.sigma() > kWorseThanModel ? depth_noise_.sigma() : 1.0;
+}
+
 void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report) {
   const WindowState& window = filter_.window();
   MeasurementNoise noise;
   noise.sigma_xy = noise_.sigma() / focal_;
-  noise.depth_inflation = options_.depth_inflation;
+  noise.depth_inflation = options_.depth_inflation * depthScale();
   noise.use_depth = options_.use_depth;
 
   std::vector<FeatureRows> accepted;
-  std::vector<double> chi2;
-  int rows = 0, chi2_rows = 0;
+  std::vector<double> chi2, depth_chi2;
+  int rows = 0, chi2_rows = 0, depth_rows = 0;
   for (const Candidate& candidate : candidates) {
     if (static_cast<int>(accepted.size()) >= options_.max_update_features) break;
     ++report->features_tried;
@@ -189,6 +209,11 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
       chi2.push_back(point.pixel_chi2 / (point.pixel_rows - 3));
       chi2_rows += point.pixel_rows - 3;
     }
+    if (point.depth_rows >= 5) {
+      const double scale = depthScale() / depth_noise_.sigma();  // of what they were whitened by
+      depth_chi2.push_back(scale * scale * point.depth_chi2 / (point.depth_rows - 1));
+      depth_rows += point.depth_rows - 1;
+    }
     const double distance = mahalanobis(filter_.R(), feature.H, feature.r);
     if (!(distance < gate_.threshold(dof))) {
       ++report->features_gated;
@@ -203,11 +228,8 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
     rows += dof;
     accepted.push_back(std::move(feature));
   }
-  if (chi2.size() >= 3) {
-    // The median of a chi-square per degree of freedom with the usual dozen of rows lies some 5 % below its mean.
-    std::nth_element(chi2.begin(), chi2.begin() + chi2.size() / 2, chi2.end());
-    noise_.add(1.05 * chi2[chi2.size() / 2], chi2_rows);
-  }
+  tell(&noise_, chi2, chi2_rows);
+  tell(&depth_noise_, depth_chi2, depth_rows);
   if (rows == 0) return;
   Eigen::MatrixXd H;
   Eigen::VectorXd h;

@@ -71,6 +71,7 @@ struct FilterOptions {
   bool use_depth = true;
   bool use_surfaces = true;
   double depth_inflation = 0.7;
+  bool adapt_depth_noise = true;
   double imu_noise_inflation = 1.0;
   bool adapt_imu_noise = true;
   double sigma_bias_gyro = 0.02;
@@ -94,6 +95,7 @@ struct FilterOptions {
     v.field("use_surfaces", use_surfaces,
             "tie each depth image to the flat patches of an earlier one; needs no corners");
     v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise; below 1: medians of pixels");
+    v.field("adapt_depth_noise", adapt_depth_noise, "widen the depth noise while the sightings of points say so");
     v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
     v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the images contradict the IMU");
     v.field("sigma_bias_gyro", sigma_bias_gyro, 1e-5, 1.0, "initial one-sigma of the gyro bias, rad/s");

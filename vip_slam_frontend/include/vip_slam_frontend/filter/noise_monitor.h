@@ -1,13 +1,15 @@
-// Adapts the pixel noise to what the triangulations leave over: log-domain moving average, clamped, adopted by the
-// next image. Pixels only, so that a wrong depth noise model does not leak into it.
+// Adapts the noise of pixels, and that of depth, to what the triangulations leave over: log-domain moving average,
+// clamped, adopted by the next image. Each by its own rows, so that a wrong noise model of the one does not leak into
+// the other.
 #pragma once
 
 namespace vip_slam {
 
 class NoiseMonitor {
  public:
-  NoiseMonitor(double sigma_px, double min_px, double max_px, bool adapt);
-  /// `chi2_per_dof`: squared pixel residuals whitened by sigma() over their degrees of freedom; `dof` rows behind it.
+  /// Begins with `sigma`, px for pixels, for depth a factor on the sensor's noise model.
+  NoiseMonitor(double sigma, double lowest, double highest, bool adapt);
+  /// `chi2_per_dof`: squared residuals whitened by sigma() over their degrees of freedom; `dof` rows behind it.
   void add(double chi2_per_dof, int dof);
   double sigma() const { return sigma_; }
 

@@ -16,6 +16,7 @@ struct Triangulation {
   double sigma_inverse_depth = 0;  ///< one-sigma of 1/z in the first camera, from the normal matrix
   double inverse_depth = 0;
   double pixel_chi2 = 0;    ///< sum of squared whitened pixel residuals after the fit
+  double depth_chi2 = 0;  ///< squared depth residuals, whitened
   int pixel_rows = 0;
 };
 

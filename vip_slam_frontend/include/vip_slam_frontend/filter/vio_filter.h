@@ -68,6 +68,7 @@ class VioFilter {
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
   double sigmaPx() const { return noise_.sigma(); }
+  double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
  private:
@@ -91,7 +92,7 @@ class VioFilter {
   double time_offset_, focal_;
   Eigen::Vector3d G_;
   Gate gate_, explained_;
-  NoiseMonitor noise_;
+  NoiseMonitor noise_, depth_noise_;
   ImuNoiseMonitor imu_monitor_;
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
