@@ -64,8 +64,8 @@ bool seesWell(const SeenPlane& plane, const Eigen::Vector2f& xy) {
          -plane.distance / incidence >= kMinPlaneDepth;
 }
 
-// Within the middle half of a track's views.
-bool inTheMiddle(int view, int views) { return std::abs(4 * view - 2 * (views - 1)) <= views; }
+// Within the middle third of a track's views; both of two.
+bool inTheMiddle(int view, int views) { return std::abs(6 * view - 3 * (views - 1)) <= std::max(views, 3); }
 
 }  // namespace
 

@@ -63,6 +63,14 @@ struct Wall {
     data->frame.features[static_cast<std::size_t>(landmark - 1)].id = track;
     map.keyframe(k + 1).data = data;
   }
+  // Makes views of a landmark those of a track that began beyond the reach of the depth camera.
+  void slide(const std::vector<int>& views, LandmarkId landmark) {
+    for (const int k : views) {
+      auto data = std::make_shared<Keyframe>(*map.keyframe(k + 1).data);
+      data->frame.features[static_cast<std::size_t>(landmark - 1)].pixel_sigma = 0.6f;
+      map.keyframe(k + 1).data = data;
+    }
+  }
   static Eigen::Vector3d point(int l) { return {0.3 * (l % 4) - 0.3, 0.4 * (l / 4) - 0.4, 3.0}; }
 
   int pairs(bool shared) {
@@ -125,6 +133,8 @@ TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
       for (int k = 5; k < kKeyframes; ++k) wall.track(k, 5, 900);
       wall.settings.variant = one.settings.variant = variant;
       wall.settings.shared_hosts = one.settings.shared_hosts = shared;
+      // A loss would forgive what is counted here.
+      wall.settings.measurement.huber = one.settings.measurement.huber = 0;
       BuiltProblem split = buildProblem(wall.map, globalScope(wall.map), wall.settings);
       BuiltProblem joint = buildProblem(one.map, globalScope(one.map), one.settings);
       if (variant == Variant::kVi) {
@@ -148,6 +158,33 @@ TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
       EXPECT_LT(evaluateCost(split.problem), 0.5 * 0.7 * 0.7 / (between * between));
       EXPECT_GT(evaluateCost(joint.problem), 3 * evaluateCost(split.problem));
     }
+}
+
+// A view that slides is in no pair, and a host that slides gives none; the rest of the landmark's views stay.
+TEST(PlaneFactors, TracksThatSlideTellNothingAboutThePlane) {
+  Wall wall;
+  const int all = wall.pairs(true);
+  wall.slide({2}, 5);
+  EXPECT_EQ(wall.pairs(true), all - 1);
+  EXPECT_FALSE(wall.isPoint(5, true));
+  Wall everywhere;
+  everywhere.slide({0, 1, 2, 3, 4, 5, 6, 7}, 5);
+  EXPECT_EQ(everywhere.pairs(true), all - (kKeyframes - 1));
+}
+
+// A view two pixels off weighs next to nothing beside the others, though it is no outlier yet.
+TEST(PlaneFactors, PairsFarOffWeighLittle) {
+  const auto information = [](double shift) {
+    Wall wall(5, [shift](int k) { return k == 6 ? shift : 0.0; });
+    wall.settings.measurement.gate_sigma = 2;
+    double sum = 0;
+    for (const BaHomography& h : buildProblem(wall.map, globalScope(wall.map), wall.settings).problem.homographies)
+      if (h.j == 6) sum += h.sums[5];  // of the squared weights
+    return sum;
+  };
+  const double one = information(0) / kLandmarks;
+  EXPECT_NEAR(information(2.0), (kLandmarks - 1) * one, 0.01 * one);
+  EXPECT_GT(information(0.05), (kLandmarks - 0.3) * one);
 }
 
 TEST(PlaneFactors, DepthPointsBesideThePlaneAreLeftOut) {

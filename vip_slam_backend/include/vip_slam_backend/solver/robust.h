@@ -1,4 +1,4 @@
-// Huber's loss on a squared, whitened residual.
+// Losses of a squared, whitened residual.
 #pragma once
 
 #include <cmath>
@@ -14,5 +14,8 @@ inline double huberCost(double s, double delta) {
 inline double huberScale(double s, double delta) {
   return delta <= 0 || s <= delta * delta ? 1.0 : std::sqrt(delta / std::sqrt(s));
 }
+
+/// sqrt of the weight of Geman and McClure's loss: what is far beyond `delta` sigmas does not count at all. 0: plain.
+inline double redescendingScale(double s, double delta) { return delta <= 0 ? 1.0 : 1.0 / (1.0 + s / (delta * delta)); }
 
 }  // namespace vip_slam
