@@ -1,6 +1,5 @@
 #include "homography_hosts.h"
 
-#include <algorithm>
 #include <cmath>
 #include <queue>
 
@@ -64,9 +63,6 @@ bool seesWell(const SeenPlane& plane, const Eigen::Vector2f& xy) {
          -plane.distance / incidence >= kMinPlaneDepth;
 }
 
-// Within the middle third of a track's views; both of two.
-bool inTheMiddle(int view, int views) { return std::abs(6 * view - 3 * (views - 1)) <= std::max(views, 3); }
-
 }  // namespace
 
 std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>& plane,
@@ -79,9 +75,6 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
   for (int l = 0; l < views.size(); ++l) {
     if (plane[l] < 0) continue;
     on_plane.push_back(l);
-    const auto views_of_track = static_cast<int>(
-        std::count_if(views.begin(l), views.end(l), [](const LandmarkView& v) { return v.own_track; }));
-    int own = 0;
     for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
       const int view = static_cast<int>(v - views.begin(l));
       SeenPlane& plane_seen = seen[plane[l] * geometry.size() + v->frame];
@@ -90,9 +83,7 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
         const Plane& p = planes[plane[l]].plane;
         plane_seen = {g.R_C_W * p.n, p.signedDistance(g.t_W_C), true};
       }
-      if (!v->own_track) continue;
-      const int rank = own++;
-      if ((shared && !inTheMiddle(rank, views_of_track)) || !seesWell(plane_seen, v->feature->xy)) continue;
+      if (!v->own_track || !seesWell(plane_seen, v->feature->xy)) continue;
       good[views.first(l) + view] = 1;
       if (hosts[l] < 0 && !shared) hosts[l] = view;
     }

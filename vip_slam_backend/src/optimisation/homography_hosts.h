@@ -13,8 +13,7 @@ namespace vip_slam {
 /// what the others are compared with.
 /// The first such view; with `shared`, the frame that could host most of the landmarks still without host becomes
 /// theirs, whichever plane they are on, and so on: few hosts, so that few pairs of frames share a factor and the system
-/// is sparse. Shared hosts lie within the middle third of the track's views: a star of pairs about the middle says
-/// nearly as much about the frames' relative poses as all pairs would, one about an end much less.
+/// is sparse.
 std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>& plane,
                              const std::vector<BaPlane>& planes, const std::vector<FrameGeometry>& geometry,
                              bool shared);
