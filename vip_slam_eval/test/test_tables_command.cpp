@@ -23,6 +23,7 @@ name=$(basename "$1" .bag); echo "$name $5 $7" >> )" + path("calls") + R"(
 case $name in lost) echo "run_bag: $1: no pose" >&2; exit 2;; slow) sleep 20;; esac
 : > "$9/trajectory.tum"
 echo "real_time_factor: 2" > "$9/summary.yaml"; echo "peak_memory_mb: 90" >> "$9/summary.yaml"
+[ "$name" != stopped ] || echo "finished: false" >> "$9/summary.yaml"
 [ "$name $7" = "looped on" ] && echo "  - {accepted: true}" >> "$9/summary.yaml"; exit 0)");
     // evaluate --truth T --estimate E --out DIR
     program("vip_slam_eval", "evaluate", R"(
@@ -69,14 +70,15 @@ for end in .bag _sensor.yaml _truth.tum; do : > "$3/$1$end"; done)");
 };
 
 TEST_F(TablesCommand, AFailureIsAnXAndItsReasonIsTold) {
-  EXPECT_EQ(run("--sequences good lost short unknown slow --variants vi vip --timeout 1"), 1);
+  EXPECT_EQ(run("--sequences good lost short unknown slow stopped --variants vi vip --timeout 1"), 1);
   EXPECT_TRUE(says("| good | 1.23 / 1.23 | 0.45 / 0.45 |")) << table_;
-  for (const char* name : {"lost", "short", "unknown", "slow"})
+  for (const char* name : {"lost", "short", "unknown", "slow", "stopped"})
     EXPECT_TRUE(says("| " + std::string(name) + " | X / X | X / X |")) << table_;
   EXPECT_TRUE(says("| mean | X / X | X / X |")) << table_;
   EXPECT_TRUE(says("- lost, VI-SLAM, loop closing on: exit status 2: run_bag: lost.bag: no pose")) << table_;
   EXPECT_TRUE(says("- short, VIP-SLAM, loop closing off: only 40 % of the time has a pose")) << table_;
   EXPECT_TRUE(says("- slow, VI-SLAM, loop closing on: took longer than 1 s")) << table_;
+  EXPECT_TRUE(says("- stopped, VI-SLAM, loop closing on: interrupted")) << table_;
   EXPECT_TRUE(says("- unknown, VI-SLAM, loop closing on: rendering: exit status 1: sequence is not known")) << table_;
   EXPECT_FALSE(says(folder_.string())) << table_;
   EXPECT_FALSE(says("not better")) << table_;
