@@ -1,6 +1,7 @@
-// Dense kernels of the multifrontal Cholesky on plain arrays, column-major. One of three builds (AVX-512, AVX2,
-// baseline) is chosen at run time; nothing but plain pointers crosses, so no Eigen object meets another alignment.
+// Dense kernels of the multifrontal Cholesky on plain arrays, column-major.
 #pragma once
+
+#include "instruction_set.h"
 
 namespace vip_slam {
 
@@ -10,7 +11,6 @@ struct FrontSegment;
 constexpr int kKernelPadding = 8;
 
 struct DenseKernels {
-  const char* name;
   /// Cholesky of the leading c x c block of the n x n lower matrix A (leading dimension ld), rows below become L21.
   /// False when a pivot is not positive. What stands above the diagonal is not kept.
   bool (*factorPanel)(double* A, int n, int c, int ld);
@@ -27,7 +27,7 @@ struct DenseKernels {
 
 /// The fastest build that this processor runs.
 const DenseKernels& denseKernels();
-/// By name ("avx512", "avx2", "baseline"); null when this processor does not run it.
-const DenseKernels* denseKernelsByName(const char* name);
+/// For tests: one build, which this processor must be able to run.
+const DenseKernels& denseKernels(InstructionSet set);
 
 }  // namespace vip_slam

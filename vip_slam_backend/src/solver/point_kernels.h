@@ -46,7 +46,6 @@ struct PointKernelArguments {
 };
 
 struct PointKernels {
-  const char* name;
   /// Points [begin, end): their Jacobians; the elimination with the Jacobians of all; both in one sweep. A block of the
   /// reduced matrix gets its points in ascending order whichever way, so that the sums are the same to the last bit.
   void (*linearize)(const PointKernelArguments& a, int begin, int end);

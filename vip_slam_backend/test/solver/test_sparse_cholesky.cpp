@@ -3,8 +3,8 @@
 #include <random>
 #include <set>
 
-#include <Eigen/Dense>
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
 
 #include "../../src/solver/dense_kernels.h"
 #include "vip_slam_backend/solver/sparse_cholesky.h"
@@ -92,18 +92,19 @@ TEST(DenseKernels, AllBuildsAgree) {
   const Eigen::MatrixXd S = M * M.transpose() + n * Eigen::MatrixXd::Identity(n, n);
   const Eigen::MatrixXd L = Eigen::LLT<Eigen::MatrixXd>(S).matrixL();
   int tried = 0;
-  for (const char* name : {"baseline", "avx2", "avx512"}) {
-    const DenseKernels* kernels = denseKernelsByName(name);
-    if (!kernels) continue;
+  for (const InstructionSet set : {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+    if (!runsHere(set)) continue;
+    const DenseKernels& kernels = denseKernels(set);
+    const char* name = instructionSetName(set);
     ++tried;
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(ld, n + 1);
     A.topLeftCorner(n, n) = S;
-    ASSERT_TRUE(kernels->factorPanel(A.data(), n, c, ld));
+    ASSERT_TRUE(kernels.factorPanel(A.data(), n, c, ld));
     for (int j = 0; j < c; ++j)
       EXPECT_LT((A.col(j).segment(j, n - j) - L.col(j).tail(n - j)).norm(), 1e-12 * S.norm()) << name;
     const int m = n - c, columns = m - 1;
     Eigen::MatrixXd C = Eigen::MatrixXd::Constant((m + 7) / 8 * 8, m, 7.0);
-    kernels->negativeSyrk(C.data(), static_cast<int>(C.rows()), A.data() + c, ld, m, columns, c);
+    kernels.negativeSyrk(C.data(), static_cast<int>(C.rows()), A.data() + c, ld, m, columns, c);
     EXPECT_EQ(C(m - 1, m - 1), 7.0) << name;
     const Eigen::MatrixXd L21 = L.bottomLeftCorner(n - c, c);
     const Eigen::MatrixXd expected = -L21 * L21.transpose();
@@ -114,13 +115,13 @@ TEST(DenseKernels, AllBuildsAgree) {
     Eigen::MatrixXd K = Eigen::MatrixXd::Identity(n, n);
     K.leftCols(c) = L.leftCols(c);
     Eigen::VectorXd x = b;
-    kernels->backSubstitute(A.data(), n, c, ld, x.data());
+    kernels.backSubstitute(A.data(), n, c, ld, x.data());
     EXPECT_LT((K.transpose() * x - b).norm(), 1e-12 * b.norm()) << name;
     // Three columns of an update of five rows into a front of nine.
     const FrontSegment segments[] = {{0, 1, 2}, {2, 5, 3}};
     Eigen::MatrixXd to = Eigen::MatrixXd::Zero(9, 9), sum = to;
     const Eigen::MatrixXd from = Eigen::MatrixXd::Random(8, 5);
-    kernels->extendAdd(to.data(), 9, from.data(), 8, segments, 2, 1, 4);
+    kernels.extendAdd(to.data(), 9, from.data(), 8, segments, 2, 1, 4);
     const int row[] = {1, 2, 5, 6, 7};
     for (int q = 1; q < 4; ++q)
       for (int r = q; r < 5; ++r) sum(row[r], row[q]) = from(r, q);
