@@ -8,6 +8,7 @@
 #include "homography_hosts.h"
 #include "plane_noise.h"
 #include "vip_slam_backend/solver/robust.h"
+#include "vip_slam_core/types/sliding_tracks.h"
 
 namespace vip_slam {
 namespace {
@@ -15,11 +16,8 @@ namespace {
 // At true poses half of the pairs of one track are off by less than half of what their sigmas expect, and a few per
 // cent by several times that: a loss that forgets the far ones, and the sigma of the others.
 constexpr double kCore = 0.6, kTail = 3.0;
-// Tracks that began beyond the reach of the depth camera, px (see the front end's pixel_noise.h). Warped as if far away
-// they slide with the motion, all the same way: on planes they make it 0.1 to 0.3 % too long, which no sigma describes.
-constexpr float kMostSigma = 0.4f;
 
-bool slides(const LandmarkView& view) { return view.own_track && view.feature->pixel_sigma > kMostSigma; }
+bool slides(const LandmarkView& view) { return view.own_track && view.feature->pixel_sigma > kSlidingPixelSigma; }
 
 }  // namespace
 

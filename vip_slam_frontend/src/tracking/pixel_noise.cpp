@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "vip_slam_core/types/sliding_tracks.h"
+
 namespace vip_slam {
 
 namespace {
@@ -37,8 +39,11 @@ Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, 
 }
 
 double matchSigma(const PatchSurface& surface) {
-  if (surface.known) return 0.08;
-  return surface.depth > 0 ? 0.25 : 0.6;
+  constexpr double kKnown = 0.08, kUneven = 0.25, kNoDepth = 0.6;
+  // What reads the sigma tells by it which tracks slide.
+  static_assert(kUneven < kSlidingPixelSigma && kNoDepth > kSlidingPixelSigma, "the kinds of tracks cannot be told");
+  if (surface.known) return kKnown;
+  return surface.depth > 0 ? kUneven : kNoDepth;
 }
 
 double pixelSigma(const Eigen::Matrix2d& whitening) { return 1.0 / std::sqrt(whitening(0, 0) * whitening(1, 1)); }
