@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
+#include <limits>
 
 #include <Eigen/Eigenvalues>
 
@@ -18,17 +18,32 @@ std::vector<Eigen::Vector3d> PlaneSampler::spreadEvenly(const std::vector<Eigen:
                                                         const Eigen::Vector3d& n) const {
   // One sample per voxel of the plane: the mean of its points. Coarser voxels when there would be too many.
   const Eigen::Matrix<double, 3, 2> basis = tangentBasis(n);
-  double voxel = options_.voxel;
+  std::vector<Eigen::Vector2d> at;
+  at.reserve(points.size());
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::max()), high = -low;
+  for (const Eigen::Vector3d& p : points) {
+    at.push_back(basis.transpose() * p);
+    low = low.cwiseMin(at.back()), high = high.cwiseMax(at.back());
+  }
+  // The number of a voxel's sum, by its place within the points' bounds; not finer than this many can tell.
+  constexpr double kMostVoxels = 1e6;
+  std::vector<int> index;
+  double voxel = std::max(options_.voxel, std::sqrt((high - low).prod() / kMostVoxels));
+  std::vector<std::pair<Eigen::Vector3d, int>> sums;
   while (true) {
-    std::unordered_map<std::int64_t, std::size_t> index;
-    std::vector<std::pair<Eigen::Vector3d, int>> sums;
-    for (const Eigen::Vector3d& p : points) {
-      const Eigen::Vector2d q = basis.transpose() * p / voxel;
-      const std::int64_t x = std::llround(std::floor(q.x())), y = std::llround(std::floor(q.y()));
-      const auto [it, fresh] = index.try_emplace((x << 32) ^ (y & 0xffffffff), sums.size());
-      if (fresh) sums.emplace_back(Eigen::Vector3d::Zero(), 0);
-      sums[it->second].first += p;
-      ++sums[it->second].second;
+    const Eigen::Vector2d first = (low / voxel).array().floor(), last = (high / voxel).array().floor();
+    const auto width = static_cast<std::size_t>(last.x() - first.x()) + 1;
+    index.assign(width * (static_cast<std::size_t>(last.y() - first.y()) + 1), -1);
+    sums.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector2d q = (at[i] / voxel).array().floor();
+      int& sum = index[static_cast<std::size_t>(q.y() - first.y()) * width + static_cast<std::size_t>(q.x() - first.x())];
+      if (sum < 0) {
+        sum = static_cast<int>(sums.size());
+        sums.emplace_back(Eigen::Vector3d::Zero(), 0);
+      }
+      sums[sum].first += points[i];
+      ++sums[sum].second;
     }
     if (sums.size() > std::size_t(options_.max_points)) {
       voxel *= 1.02 * std::sqrt(double(sums.size()) / options_.max_points);

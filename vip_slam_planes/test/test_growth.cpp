@@ -1,0 +1,85 @@
+// Which triangles join a plane: the gates of 10 degrees and 5 cm, the side, and the reach of the covered area.
+#include <gtest/gtest.h>
+
+#include "vip_slam_planes/growth/triangle_association.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+
+class Growth : public ::testing::Test {
+ protected:
+  // A wall at x = 3 that faces the origin, 2 x 2 m of it covered around y = z = 0.
+  static PlaneTrack wall(double x, PlaneId id = 1) {
+    PlaneTrack track(id, PlaneKind::kVertical, Plane({-1, 0, 0}, x), {x, 0, 0}, 0.1);
+    for (int b = -10; b < 10; ++b)
+      for (int a = -10; a < 10; ++a) track.coverCell({a, b}, 1, 1, SE3());
+    return track;
+  }
+  // A small triangle about `centre`, turned by `angle` about the vertical from the wall's normal.
+  static MapTriangle triangle(const Eigen::Vector3d& centre, double angle, double sigma = 0) {
+    MapTriangle t;
+    t.n = Eigen::Vector3d(-std::cos(angle), std::sin(angle), 0);
+    const Eigen::Vector3d across = 0.05 * Eigen::Vector3d::UnitZ().cross(t.n), up(0, 0, 0.05);
+    t.corner = {centre - across - up, centre + across - up, centre + 2 * up};
+    t.vertex = {0, 1, 2};
+    t.neighbour = {-1, -1, -1};
+    t.centre = centre;
+    t.area = 0.0075;
+    t.sigma = sigma;
+    t.sigma_angle = sigma / 0.1;
+    return t;
+  }
+  static int label(const MapTriangle& t, const std::vector<const PlaneTrack*>& tracks) {
+    return associateTriangles({t}, tracks, PlaneGrowthOptions()).front();
+  }
+  const PlaneTrack at_three = wall(3.0);
+};
+
+TEST_F(Growth, FiveCentimetresAndTenDegrees) {
+  EXPECT_EQ(0, label(triangle({3.049, 0, 0}, 0), {&at_three}));
+  EXPECT_EQ(0, label(triangle({2.951, 0, 0}, 0), {&at_three}));
+  EXPECT_EQ(-1, label(triangle({3.051, 0, 0}, 0), {&at_three}));
+  EXPECT_EQ(-1, label(triangle({2.949, 0, 0}, 0), {&at_three}));
+  EXPECT_EQ(0, label(triangle({3, 0, 0}, 9.9 * kDegree), {&at_three}));
+  EXPECT_EQ(0, label(triangle({3, 0, 0}, -9.9 * kDegree), {&at_three}));
+  EXPECT_EQ(-1, label(triangle({3, 0, 0}, 10.1 * kDegree), {&at_three}));
+  EXPECT_EQ(-1, label(triangle({3, 0, 0}, -10.1 * kDegree), {&at_three}));
+}
+
+TEST_F(Growth, NoiseWidensTheGatesWithinLimits) {
+  EXPECT_EQ(0, label(triangle({3.08, 0, 0}, 20 * kDegree, 0.03), {&at_three}));
+  EXPECT_EQ(-1, label(triangle({3.11, 0, 0}, 0, 1.0), {&at_three}));
+  EXPECT_EQ(-1, label(triangle({3, 0, 0}, 26 * kDegree, 1.0), {&at_three}));
+}
+
+TEST_F(Growth, TheOtherFaceOfAWallDoesNotJoin) {
+  EXPECT_EQ(-1, label(triangle({3, 0, 0}, M_PI), {&at_three}));
+}
+
+TEST_F(Growth, OfTwoPlanesTheNearerOneTakesIt) {
+  const PlaneTrack door = wall(2.92, 2);
+  EXPECT_EQ(0, label(triangle({2.97, 0, 0}, 0), {&at_three, &door}));
+  EXPECT_EQ(1, label(triangle({2.95, 0, 0}, 0), {&at_three, &door}));
+}
+
+TEST_F(Growth, ASurfaceReachesNoFurtherThanItsGap) {
+  EXPECT_EQ(0, label(triangle({3, 1.25, 0}, 0), {&at_three}));
+  EXPECT_EQ(-1, label(triangle({3, 1.45, 0}, 0), {&at_three}));
+  std::vector<MapTriangle> patch{triangle({3, 1.25, 0}, 0), triangle({3, 1.45, 0}, 0)};
+  patch[0].neighbour[0] = 1;
+  patch[1].neighbour[0] = 0;
+  EXPECT_EQ((std::vector<int>{0, 0}), associateTriangles(patch, {&at_three}, PlaneGrowthOptions()))
+      << "a connected patch joins as a whole";
+}
+
+TEST_F(Growth, WhenTheNearerPlaneIsOutOfReachTheNextOneIsAsked) {
+  PlaneTrack far(2, PlaneKind::kVertical, Plane({-1, 0, 0}, 3.01), {3.01, 8, 0}, 0.1);
+  far.coverCell({0, 0}, 1, 1, SE3());
+  EXPECT_EQ((std::vector<int>{1, 1}), associateTriangles({triangle({3, 0, 0}, 0), triangle({3.01, 0.3, 0}, 0)},
+                                                         {&far, &at_three}, PlaneGrowthOptions()));
+}
+
+}  // namespace
+}  // namespace vip_slam
