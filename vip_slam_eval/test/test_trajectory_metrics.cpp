@@ -59,6 +59,36 @@ TEST(Alignment, ReturnsTheTransformation) {
   EXPECT_EQ(alignmentFromName("yaw"), Alignment::kYaw);
 }
 
+TEST(Alignment, OfACameraThatStoodComesFromItsOrientations) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 0.002);
+  const SE3 at(expQuaternion({0.2, -0.1, 0.7}), {1, 2, 1.4});
+  Trajectory truth, estimate;
+  for (int k = 0; k < 400; ++k) {
+    truth.push_back({0.1 * k, at});
+    const SE3 jitter(expQuaternion({0, 0, noise(random)}), {noise(random), noise(random), noise(random)});
+    estimate.push_back({0.1 * k, at * jitter});
+  }
+  for (const Alignment alignment : {Alignment::kYaw, Alignment::kSe3}) {
+    const AbsoluteError error = absoluteError(associate(truth, moved(kTurned, estimate)), alignment);
+    EXPECT_LT(error.rotation.rmse, 0.3) << alignmentName(alignment);
+    EXPECT_LT(error.position.rmse, 0.005) << alignmentName(alignment);
+  }
+}
+
+TEST(Alignment, OfAStraightPathTakesTheRollFromTheOrientations) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0, 0.002);
+  Trajectory truth, estimate;
+  for (int k = 0; k < 400; ++k) {
+    truth.push_back({0.1 * k, SE3(Eigen::Quaterniond::Identity(), {0.01 * k, 0, 1.4})});
+    estimate.push_back(truth.back());
+    estimate.back().T_W_B.t() += Eigen::Vector3d(noise(random), noise(random), noise(random));
+  }
+  const AbsoluteError error = absoluteError(associate(truth, moved(kTilted, estimate)), Alignment::kSe3);
+  EXPECT_LT(error.rotation.rmse, 0.3);
+}
+
 TEST(AbsoluteErrorTest, AlternatingOffsetsGiveTheirSize) {
   const Trajectory truth = motion(20, 50);
   Trajectory estimate = truth;

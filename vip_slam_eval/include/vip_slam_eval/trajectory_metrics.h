@@ -28,7 +28,8 @@ enum class Alignment { kNone, kPosition, kYaw, kSe3 };
 Alignment alignmentFromName(const std::string& name);
 std::string alignmentName(Alignment alignment);
 
-/// T_W_M that minimises the squared distances of the positions. Throws std::invalid_argument without pairs.
+/// T_W_M that minimises the squared distances of the positions. Orientations take part with a lever shorter than
+/// the positions err, which decides what those leave open and no more. Throws std::invalid_argument without pairs.
 SE3 align(const std::vector<PosePair>& pairs, Alignment alignment);
 
 /// Errors of one pair after alignment.

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 
 namespace vip_slam {
 namespace {
@@ -28,6 +29,40 @@ std::vector<double> cumulativePath(const std::vector<PosePair>& pairs) {
     path[i] = path[i - 1] + (pairs[i].T_W_B.t() - pairs[i - 1].T_W_B.t()).norm();
   }
   return path;
+}
+
+// sum truth * estimate^T of the positions about their means
+Eigen::Matrix3d crossCovariance(const std::vector<PosePair>& pairs, const Eigen::Vector3d& mean_truth,
+                                const Eigen::Vector3d& mean_estimate) {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const PosePair& pair : pairs) {
+    covariance += (pair.T_W_B.t() - mean_truth) * (pair.T_M_B.t() - mean_estimate).transpose();
+  }
+  return covariance;
+}
+
+// The admitted rotation R that maximises the trace of R^T M.
+Eigen::Matrix3d bestRotation(const Eigen::Matrix3d& M, Alignment alignment) {
+  if (alignment == Alignment::kYaw) {
+    return expSO3(Eigen::Vector3d(0, 0, std::atan2(M(1, 0) - M(0, 1), M(0, 0) + M(1, 1))));
+  }
+  if (alignment != Alignment::kSe3) return Eigen::Matrix3d::Identity();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
+// Weight of the orientations beside the positions, m^2: a tenth of the mean square of what the positions err by, a
+// square millimetre at least. Positions that spread further than they err rule; of a camera that stood, or about the
+// line along which it went, they would fit a rotation to the noise.
+double orientationWeight(const std::vector<PosePair>& pairs, const Eigen::Vector3d& mean_truth,
+                         const Eigen::Vector3d& mean_estimate, const Eigen::Matrix3d& R) {
+  constexpr double kShare = 0.1, kLeast = 1e-6;
+  double sum = 0;
+  for (const PosePair& pair : pairs) {
+    sum += (pair.T_W_B.t() - mean_truth - R * (pair.T_M_B.t() - mean_estimate)).squaredNorm();
+  }
+  return std::max(kLeast, kShare * sum / double(pairs.size()));
 }
 
 }  // namespace
@@ -71,21 +106,12 @@ SE3 align(const std::vector<PosePair>& pairs, Alignment alignment) {
   mean_truth /= double(pairs.size());
   mean_estimate /= double(pairs.size());
 
-  // covariance = sum truth * estimate^T
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  for (const PosePair& pair : pairs) {
-    covariance += (pair.T_W_B.t() - mean_truth) * (pair.T_M_B.t() - mean_estimate).transpose();
-  }
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  if (alignment == Alignment::kYaw) {
-    // Maximise the trace of Rz(yaw)^T covariance.
-    const double yaw = std::atan2(covariance(1, 0) - covariance(0, 1), covariance(0, 0) + covariance(1, 1));
-    R = expSO3(Eigen::Vector3d(0, 0, yaw));
-  } else if (alignment == Alignment::kSe3) {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-    R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
-  }
+  const Eigen::Matrix3d covariance = crossCovariance(pairs, mean_truth, mean_estimate);
+  const double weight =
+      orientationWeight(pairs, mean_truth, mean_estimate, bestRotation(covariance, alignment));
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
+  for (const PosePair& pair : pairs) turns += pair.T_W_B.R() * pair.T_M_B.R().transpose();
+  const Eigen::Matrix3d R = bestRotation(covariance + weight * turns, alignment);
   return SE3(R, mean_truth - R * mean_estimate);
 }
 
