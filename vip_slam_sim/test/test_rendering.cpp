@@ -254,6 +254,23 @@ TEST(Sequence, RollingShutterAndTimeOffsetShiftWhatTheyShould) {
   EXPECT_LT(worst, 1e-4);
 }
 
+TEST(Sequence, ExposureJumpsToAndFroAtItsInterval) {
+  SequenceSpec spec = cleanSequence("smoke");
+  spec.effects.exposure = 1.0;
+  spec.effects.exposure_jump = 2.0;
+  spec.effects.exposure_jump_interval = 0.5;
+  const auto camera = makeCamera(spec.camera.intrinsics());
+  const SensorEffects effects(spec.effects, spec.depth, *camera, spec.seed);
+  FrameBuffers frame;
+  frame.radiance = cv::Mat(480, 640, CV_32FC4, cv::Scalar::all(0.2));
+  std::vector<double> level;  // linear
+  for (int k = 0; k < 40; ++k) level.push_back(std::pow(cv::mean(effects.colour(frame, k, 0.05 * k + 0.025))[0], 2));
+  for (int k = 1; k < 40; ++k) {
+    const double ratio = std::max(level[k] / level[k - 1], level[k - 1] / level[k]);
+    EXPECT_NEAR(ratio, k % 10 == 0 ? 2.0 : 1.0, 0.05) << k;
+  }
+}
+
 TEST(Sequence, MotionBlurSmearsAlongTheFlow) {
   SequenceSpec sharp = cleanSequence("10"), blurred = sharp;
   blurred.effects.motion_blur = true;

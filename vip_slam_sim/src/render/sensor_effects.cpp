@@ -67,11 +67,18 @@ void SensorEffects::motionBlur(const CameraTwist& twist, FrameBuffers* frame) co
   frame->radiance = out;
 }
 
-cv::Mat SensorEffects::colour(const FrameBuffers& frame, int index, double t) const {
-  const int w = camera_.width(), h = camera_.height();
+double SensorEffects::gain(double t) const {
   const double phase = static_cast<double>(seed_ % 17);
   const double drift = 0.65 * std::sin(2 * M_PI * t / 19.0 + phase) + 0.35 * std::sin(2 * M_PI * t / 7.3 + 2 * phase);
-  const auto gain = static_cast<float>(effects_.exposure * (1 + effects_.exposure_drift * drift));
+  // From one level to the other and back; the seed says where it begins.
+  const auto jumps = static_cast<long>(std::floor(t / effects_.exposure_jump_interval)) + static_cast<long>(seed_ % 2);
+  const double level = std::pow(effects_.exposure_jump, jumps % 2 == 0 ? 0.5 : -0.5);
+  return effects_.exposure * level * (1 + effects_.exposure_drift * drift);
+}
+
+cv::Mat SensorEffects::colour(const FrameBuffers& frame, int index, double t) const {
+  const int w = camera_.width(), h = camera_.height();
+  const auto gain = static_cast<float>(this->gain(t));
   const auto read = static_cast<float>(effects_.read_noise), shot = static_cast<float>(effects_.shot_noise);
   cv::Mat out(h, w, CV_8UC3);
   std::vector<float> line(4 * static_cast<std::size_t>(w));

@@ -100,6 +100,8 @@ void ImuOptions::visit(OptionVisitor& v) {
 void EffectOptions::visit(OptionVisitor& v) {
   v.field("exposure", exposure, 0.05, 20, "gain of the image");
   v.field("exposure_drift", exposure_drift, 0, 0.5, "slow change of gain, amplitude");
+  v.field("exposure_jump", exposure_jump, 1, 10, "gain before over gain after a sudden change, or the other way");
+  v.field("exposure_jump_interval", exposure_jump_interval, 0.05, 1000, "between sudden changes of gain, s");
   v.field("vignetting", vignetting, 0, 0.9, "darkening in the corners");
   v.field("read_noise", read_noise, 0, 30, "one sigma in black, grey levels");
   v.field("shot_noise", shot_noise, 0, 30, "one sigma added in white, grey levels");

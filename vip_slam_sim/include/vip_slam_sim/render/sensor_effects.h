@@ -29,6 +29,7 @@ class SensorEffects {
 
  private:
   const float* noise(std::uint64_t key) const;
+  double gain(double t) const;
 
   EffectOptions effects_;
   DepthOptions depth_;

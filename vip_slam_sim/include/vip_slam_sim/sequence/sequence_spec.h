@@ -56,6 +56,7 @@ struct ImuOptions {
 
 struct EffectOptions {
   double exposure = 1.0, exposure_drift = 0.06, vignetting = 0.18;
+  double exposure_jump = 1.0, exposure_jump_interval = 2.0;
   double read_noise = 1.0, shot_noise = 0.9;
   double exposure_time = 0.005;
   bool motion_blur = false;
