@@ -138,10 +138,13 @@ PlaceVerification PlaceSearch::add(const Map& map, const KeyframeDatabase& datab
     const SE3 T_odom_B = keyframe->frame.state.T_W_I * keyframe->frame.T_I_C;
     const bool again = believed_ && samePlace(*believed_ * T_odom_B, T_W_odom_now * T_odom_B);
     believed_ = T_W_odom_now;
-    const PlaceSupport& support = guesses_.front().support;
-    if (!again && (support.evidence() < options_.sure_evidence || support.points < options_.sure_points)) {
+    // The next keyframe that comes to it lifts one doubt, not two: a wall like the right one stays in view as well.
+    const std::vector<std::string> left = doubts();
+    if (left.size() > 1) believed_.reset();
+    if (left.size() > (again ? 1 : 0)) {
       result.accepted = false;
-      result.reason += "; waits for another keyframe that comes to the same place";
+      for (const std::string& doubt : left) result.reason += "; " + doubt;
+      if (left.size() == 1) result.reason += ", waits for another keyframe that comes to the same place";
     }
   } else {
     believed_.reset();
@@ -162,11 +165,6 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
   result.inliers = best.points;
   result.landmarks = best.landmarks;
   if (best.depth.compared >= 100) result.depth_agreement = best.depth.agreement();
-
-  // Where another place has the same posters on a wall of another shape, this one's shape proves little: the place that
-  // is really seen may have it too and not be in the map.
-  int alike = 0;
-  for (std::size_t g = 1; g < guesses_.size(); ++g) alike = std::max(alike, guesses_[g].support.points);
 
   const PlaceVerificationOptions& limits = scene.verifier.options();
   int features = 0;
@@ -193,12 +191,23 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
     result.reason += words("; %.2f of the surfaces are seen through", best.depth.seeThrough());
   } else if (guesses_.size() > 1 && guesses_[1].support.evidence() > options_.ambiguity * evidence) {
     result.reason += words("; evidence %.0f, for another place %.0f", evidence, guesses_[1].support.evidence());
-  } else if (alike > options_.resemblance * best.points) {
-    result.reason += words("; another place has %d of such points", alike);
   } else {
     result.accepted = true;
   }
   return result;
+}
+
+std::vector<std::string> PlaceSearch::doubts() const {
+  const PlaceSupport& best = guesses_.front().support;
+  std::vector<std::string> doubts;
+  // Where another place has the same posters on a wall of another shape, this one's shape proves little: the place that
+  // is really seen may have it too and not be in the map.
+  int alike = 0;
+  for (std::size_t g = 1; g < guesses_.size(); ++g) alike = std::max(alike, guesses_[g].support.points);
+  if (alike > options_.resemblance * best.points) doubts.push_back(words("another place has %d of such points", alike));
+  if (best.points < options_.sure_points || best.evidence() < options_.sure_evidence)
+    doubts.push_back(words("evidence %.0f of %d points is not sure", best.evidence(), best.points));
+  return doubts;
 }
 
 }  // namespace vip_slam

@@ -92,6 +92,26 @@ TEST_F(PlaceSearchTest, KeyframesTooPoorAloneConvinceTogether) {
   EXPECT_GE(together, 2);
 }
 
+TEST_F(PlaceSearchTest, TheNextKeyframeLiftsOneDoubtNotTwo) {
+  map(1);
+  RelocalisationOptions never_sure, always_alike, both;
+  never_sure.sure_evidence = both.sure_evidence = 1e9;
+  always_alike.resemblance = both.resemblance = -1;
+  for (const RelocalisationOptions& one : {never_sure, always_alike}) {
+    PlaceSearch search{one};
+    const PlaceVerification first = add(search, query(0));
+    EXPECT_FALSE(first.accepted);
+    EXPECT_NE(first.reason.find("waits for another keyframe"), std::string::npos) << first.reason;
+    EXPECT_TRUE(add(search, query(1)).accepted);
+  }
+  PlaceSearch search{both};
+  for (int k = 0; k < 4; ++k) {
+    const PlaceVerification place = add(search, query(k));
+    EXPECT_FALSE(place.accepted);
+    EXPECT_NE(place.reason.find("another place"), std::string::npos) << place.reason;
+  }
+}
+
 TEST_F(PlaceSearchTest, PlacesThatRepeatThemselvesAreRefused) {
   map(6);
   PlaceSearch search{RelocalisationOptions()};

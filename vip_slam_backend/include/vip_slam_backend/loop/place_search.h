@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "vip_slam_backend/loop/loop_options.h"
@@ -47,6 +48,8 @@ class PlaceSearch {
   /// Adds to guesses_ what speaks for places that are not among them, and sorts them.
   void weigh(const Scene& scene, const std::vector<SE3>& T_W_odom);
   PlaceVerification judge(const Scene& scene) const;
+  /// Why the strongest place is not believed on the word of one keyframe, in words; empty: it is.
+  std::vector<std::string> doubts() const;
 
   RelocalisationOptions options_;
   std::vector<KeyframePtr> keyframes_;  ///< of the last seconds, oldest first
