@@ -12,6 +12,7 @@
 #include "vip_slam_ros/plane_conversions.h"
 #include "vip_slam_ros/process_memory.h"
 #include "vip_slam_ros/sensor_files.h"
+#include "vip_slam_ros/thread_priority.h"
 
 namespace vip_slam {
 
@@ -44,7 +45,7 @@ void BackEndNodelet::onInit() {
   update_lane_ = owner_->addLane("plane updates", std::size_t(options_.keyframe_queue));
   control_lane_ = owner_->addLane("control", 100);
   advertise();
-  owner_->start();
+  owner_->start(kMappingNiceness);
   advertiseServices();
   subscribe();
   timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0),
@@ -155,15 +156,18 @@ void BackEndNodelet::startGlobalBa() {
   if (adjustment_.joinable()) adjustment_.join();
   adjusting_ = true;
   adjustment_ = std::thread([this, job = back_end_->startGlobalBa()] {
+    lowerThreadPriority(kAdjustmentNiceness);
     const ros::WallTime begin = ros::WallTime::now();
     const GbaResult result = back_end_->run(job);
     const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
     owner_->post(control_lane_, [this, result, milliseconds] {
       adjusting_ = false;
+      {
+        std::lock_guard<std::mutex> lock(shown_mutex_);
+        shown_.global_ms = milliseconds;
+        ++shown_.global_adjustments;
+      }
       distribute(back_end_->merge(result));
-      std::lock_guard<std::mutex> lock(shown_mutex_);
-      shown_.global_ms = milliseconds;
-      ++shown_.global_adjustments;
     });
   });
 }

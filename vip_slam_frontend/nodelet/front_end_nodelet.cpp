@@ -316,7 +316,7 @@ void FrontEndNodelet::process(const ImagePair& pair) {
   const ros::WallTime begin = ros::WallTime::now();
   const FrameOutput output = front_end_->process(input);
   const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
-  publish(pair, output);
+  publish(pair, output, milliseconds);
 
   std::lock_guard<std::mutex> lock(shown_mutex_);
   shown_.size_problem = size_problem;

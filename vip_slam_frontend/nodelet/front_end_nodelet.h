@@ -67,7 +67,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void startWhenCalibrated();
   void processReady();
   void process(const ImagePair& pair);
-  void publish(const ImagePair& pair, const FrameOutput& output);
+  void publish(const ImagePair& pair, const FrameOutput& output, double milliseconds);
   void publishFeatureImage(const ImagePair& pair, const TrackedFrame& frame);
   void publishImuRate(double t);
   void publishCalibration();

@@ -24,7 +24,7 @@ double gyroSigma(const SensorConfig& sensor) {
 
 }  // namespace
 
-void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output) {
+void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, double milliseconds) {
   const TrackedFrame& frame = *output.frame;
   covariance_ = frame.covariance;
   // A message that is published is shared with all receivers and never changed again.
@@ -38,7 +38,9 @@ void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output) 
   if (output.keyframe) {
     keyframe_pub_.publish(boost::make_shared<vip_slam_msgs::Keyframe>(toMsg(*output.keyframe, frames_.odom)));
   }
-  frame_pub_.publish(boost::make_shared<vip_slam_msgs::TrackedFrame>(toMsg(frame, frames_.odom)));
+  auto tracked = boost::make_shared<vip_slam_msgs::TrackedFrame>(toMsg(frame, frames_.odom));
+  tracked->processing_ms = milliseconds;
+  frame_pub_.publish(tracked);
   status_pub_.publish(boost::make_shared<vip_slam_msgs::TrackingStatus>(toMsg(frame.status)));
   publishFeatureImage(pair, frame);
 }

@@ -11,6 +11,7 @@
 #include "vip_slam_ros/parameters.h"
 #include "vip_slam_ros/plane_conversions.h"
 #include "vip_slam_ros/sensor_files.h"
+#include "vip_slam_ros/thread_priority.h"
 
 namespace vip_slam {
 
@@ -47,7 +48,7 @@ void PlanesNodelet::onInit() {
   reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_planes::PlanesConfig>>(getPrivateNodeHandle());
   reconfigure_->setCallback(
       [this](vip_slam_planes::PlanesConfig& config, std::uint32_t) { onReconfigure(config); });
-  owner_->start();
+  owner_->start(kMappingNiceness);
 
   // One callback queue in order: a keyframe is handed over before the update that places it.
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::Calibration>(

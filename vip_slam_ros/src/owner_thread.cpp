@@ -6,6 +6,8 @@
 #include <exception>
 #include <memory>
 
+#include "vip_slam_ros/thread_priority.h"
+
 namespace vip_slam {
 
 OwnerThread::OwnerThread(ErrorHandler on_error) : on_error_(std::move(on_error)) {}
@@ -17,8 +19,11 @@ OwnerThread::Lane OwnerThread::addLane(const std::string& name, std::size_t capa
   return lanes_.size() - 1;
 }
 
-void OwnerThread::start() {
-  thread_ = std::thread([this] { loop(); });
+void OwnerThread::start(int niceness) {
+  thread_ = std::thread([this, niceness] {
+    lowerThreadPriority(niceness);
+    loop();
+  });
 }
 
 void OwnerThread::stop() {

@@ -1,7 +1,15 @@
+#include <algorithm>
 #include <atomic>
 #include <future>
 #include <stdexcept>
+#include <thread>
 #include <vector>
+
+#ifdef __linux__
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
 
 #include <gtest/gtest.h>
 
@@ -56,6 +64,24 @@ TEST(OwnerThread, ACallThatComesTooLateNeverRuns) {
   EXPECT_TRUE(owner.call(lane, [] {}, 10));
   EXPECT_FALSE(ran);
 }
+
+#ifdef __linux__
+TEST(OwnerThread, GivesWayWhenAskedTo) {
+  const auto niceness = [] { return getpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid))); };
+  const int before = niceness();
+  OwnerThread owner([](const std::string&) {});
+  const auto lane = owner.addLane("work", 10);
+  int inside = 0, of_its_thread = 0;
+  owner.start(3);
+  EXPECT_TRUE(owner.call(lane, [&] {
+    inside = niceness();
+    std::thread([&] { of_its_thread = niceness(); }).join();
+  }, 10));
+  EXPECT_EQ(inside, std::min(before + 3, 19));
+  EXPECT_EQ(of_its_thread, inside);
+  EXPECT_EQ(niceness(), before);
+}
+#endif
 
 TEST(OwnerThread, StopsWithWorkWaiting) {
   auto owner = std::make_unique<OwnerThread>([](const std::string&) {});

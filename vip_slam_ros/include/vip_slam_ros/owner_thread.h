@@ -28,7 +28,8 @@ class OwnerThread {
 
   /// Before start().
   Lane addLane(const std::string& name, std::size_t capacity);
-  void start();
+  /// `niceness`: how far the thread gives way, see thread_priority.h.
+  void start(int niceness = 0);
   void stop();
 
   /// False when the lane was full and its oldest task went, or when the thread has stopped.
