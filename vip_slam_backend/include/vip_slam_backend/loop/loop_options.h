@@ -99,7 +99,7 @@ struct RelocalisationOptions {
     v.field("min_covered", min_covered, 0.0, 1.0, "share of the features that must be in sight of the map");
     v.field("ambiguity", ambiguity, 0.0, 1.0, "refused when another place has more than this fraction of the evidence");
     v.field("resemblance", resemblance, 0.0, 10.0,
-            "the same when another place has more than this fraction of the points");
+            "the next keyframe must come to it, too, when another place has more than this fraction of the points");
   }
 };
 
