@@ -102,7 +102,8 @@ struct CullingOptions {
   double max_imu_seconds = 3.0;
 
   void visit(OptionVisitor& v) {
-    v.field("enabled", enabled, "remove redundant keyframes and poor landmarks: smaller maps, for many minutes in one room, and less exact");
+    v.field("enabled", enabled,
+            "remove redundant keyframes and poor landmarks: smaller maps, for many minutes in one room, and less exact");
     v.field("redundancy", redundancy, 0.5, 1.0,
             "fraction of landmarks seen by three other keyframes that makes one redundant");
     v.field("max_imu_seconds", max_imu_seconds, 0.5, 10.0, "longest IMU factor that culling may leave");
