@@ -148,7 +148,7 @@ TEST(PixelNoise, AlongAnEdgeTheAlignmentScattersAsTheTextureSays) {
   EXPECT_GT(measured, 4.0);
   EXPECT_NEAR(predicted / measured, 1.0, 0.35);
 
-  const Eigen::Matrix2d L = pixelWhitening(texture, 0.0, false);
+  const Eigen::Matrix2d L = pixelWhitening(texture, 0.0, 1.0);
   EXPECT_NEAR(L(0, 1), 0.0, 1e-12);
   const Eigen::Matrix2d covariance = (L.transpose() * L).inverse();
   EXPECT_GT(along.dot(covariance * along), 4.0 * across.dot(covariance * across));
@@ -156,11 +156,18 @@ TEST(PixelNoise, AlongAnEdgeTheAlignmentScattersAsTheTextureSays) {
 
 TEST(PixelNoise, GrowsWithFaintnessResidualAndEdges) {
   const Eigen::Matrix2d strong = 1e6 * Eigen::Matrix2d::Identity(), faint = 1e3 * Eigen::Matrix2d::Identity();
-  EXPECT_NEAR(pixelSigma(pixelWhitening(strong, 0, false)), 1.0, 0.01);
-  EXPECT_GT(pixelSigma(pixelWhitening(faint, 0, false)), 3.0);
-  EXPECT_GT(pixelSigma(pixelWhitening(faint, 10, false)), 3.0 * pixelSigma(pixelWhitening(faint, 1, false)));
-  EXPECT_GT(pixelSigma(pixelWhitening(strong, 0, true)), 2.0 * pixelSigma(pixelWhitening(strong, 0, false)));
-  EXPECT_TRUE(pixelWhitening(Eigen::Matrix2d::Zero(), 0, false).allFinite());
+  EXPECT_NEAR(pixelSigma(pixelWhitening(strong, 0, 1)), 1.0, 0.01);
+  EXPECT_GT(pixelSigma(pixelWhitening(faint, 0, 1)), 3.0);
+  EXPECT_GT(pixelSigma(pixelWhitening(faint, 10, 1)), 3.0 * pixelSigma(pixelWhitening(faint, 1, 1)));
+  EXPECT_NEAR(pixelSigma(pixelWhitening(strong, 0, 3)), 3.0, 0.03);
+  PatchSurface known, rim, unknown;
+  known.depth = rim.depth = 2.0;
+  known.known = true;
+  EXPECT_EQ(patchWander(known, false), 1.0);
+  EXPECT_GT(patchWander(known, true), 2.0);
+  EXPECT_GT(patchWander(rim, false), 2.0);
+  EXPECT_GT(patchWander(unknown, false), patchWander(rim, true));
+  EXPECT_TRUE(pixelWhitening(Eigen::Matrix2d::Zero(), 0, 1).allFinite());
 }
 
 TEST(OutlierRejection, FindsTheMotionOnAPlaneWithManyOutliers) {

@@ -58,7 +58,7 @@ FeatureDepth::Source FeatureTracker::measure(Feature* feature) const {
 void FeatureTracker::measure(Track* track) const {
   const FeatureDepth::Source source = measure(&track->feature);
   const bool at_edge = source != FeatureDepth::Source::kSmooth && source != FeatureDepth::Source::kNone;
-  track->whitening = pixelWhitening(track->texture, track->residual, at_edge);
+  track->whitening = pixelWhitening(track->texture, track->residual, patchWander(track->surface, at_edge));
   track->feature.pixel_sigma = static_cast<float>(std::sqrt(pixelVariance(*track)));
 }
 

@@ -19,19 +19,24 @@ constexpr double kResidual = 2.0;
 // What is left over for a patch of infinite contrast, px: the unit.
 constexpr double kFloor = 0.05;
 constexpr double kAtEdge = 2.5;
+// Matches with a patch whose surface the depth shows, shows in parts, does not show; px.
+constexpr double kKnownSurface = 0.08, kUnclearSurface = 0.25, kNoSurface = 0.6;
+// What reads the sigma tells by it which tracks slide.
+static_assert(kUnclearSurface < kSlidingPixelSigma && kNoSurface > kSlidingPixelSigma,
+              "the kinds of tracks cannot be told");
 // (grey levels / px)^2 that no patch falls below, so that a bare edge keeps a finite covariance.
 constexpr double kLeastTexture = 20.0;
 
 }  // namespace
 
-Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, bool at_edge) {
+Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, double wander) {
   const double grey = std::max(kGrey, kResidual * residual) / kFloor;
   const Eigen::Matrix2d G = texture + kLeastTexture * Eigen::Matrix2d::Identity();
   Eigen::Matrix2d covariance;
   covariance << G(1, 1), -G(0, 1), -G(1, 0), G(0, 0);
   covariance *= grey * grey / (G(0, 0) * G(1, 1) - G(0, 1) * G(1, 0));
   covariance += Eigen::Matrix2d::Identity();
-  if (at_edge) covariance *= kAtEdge * kAtEdge;
+  covariance *= wander * wander;
   const Eigen::Matrix2d root = covariance.llt().matrixL();
   Eigen::Matrix2d L;
   L << 1.0 / root(0, 0), 0.0, -root(1, 0) / (root(0, 0) * root(1, 1)), 1.0 / root(1, 1);
@@ -39,11 +44,12 @@ Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, 
 }
 
 double matchSigma(const PatchSurface& surface) {
-  constexpr double kKnown = 0.08, kUneven = 0.25, kNoDepth = 0.6;
-  // What reads the sigma tells by it which tracks slide.
-  static_assert(kUneven < kSlidingPixelSigma && kNoDepth > kSlidingPixelSigma, "the kinds of tracks cannot be told");
-  if (surface.known) return kKnown;
-  return surface.depth > 0 ? kUneven : kNoDepth;
+  if (surface.known) return kKnownSurface;
+  return surface.depth > 0 ? kUnclearSurface : kNoSurface;
+}
+
+double patchWander(const PatchSurface& surface, bool at_edge) {
+  return std::max(at_edge ? kAtEdge : 1.0, matchSigma(surface) / kKnownSurface);
 }
 
 double pixelSigma(const Eigen::Matrix2d& whitening) { return 1.0 / std::sqrt(whitening(0, 0) * whitening(1, 1)); }

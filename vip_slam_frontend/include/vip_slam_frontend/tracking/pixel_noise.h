@@ -11,9 +11,8 @@ namespace vip_slam {
 
 /// Lower triangular L with L^T L the inverse of the pixel's covariance in units of the best patches' variance:
 /// residuals in pixels times L / sigma_px are white. `texture`: sum of gradient products, (grey levels / px)^2;
-/// `residual`: of the match, grey levels; `at_edge`: the patch shows two surfaces, or one that the depth does not
-/// explain, so that what it shows changes with the view.
-Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, bool at_edge);
+/// `residual`: of the match, grey levels; `wander`: factor on the sigmas, see there.
+Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, double wander);
 
 /// Geometric mean of the two standard deviations, same unit.
 double pixelSigma(const Eigen::Matrix2d& whitening);
@@ -22,5 +21,11 @@ double pixelSigma(const Eigen::Matrix2d& whitening);
 /// is right, and the error stays below a tenth of a pixel for as long as the track lives. At the rims of things, and
 /// far more beyond the reach of the depth camera, the patch slides over what it shows.
 double matchSigma(const PatchSurface& surface);
+
+/// How many times farther than the best patches this one may be off. What slides does so as smoothly as the camera
+/// moves: residuals over a few images do not show it, but points that are taken to be fixed pull at the motion. `at_edge`:
+/// the newest view shows two surfaces there, or one that the depth does not explain, so that what the patch shows
+/// changes.
+double patchWander(const PatchSurface& surface, bool at_edge);
 
 }  // namespace vip_slam
