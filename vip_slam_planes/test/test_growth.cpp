@@ -6,8 +6,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kDegree = M_PI / 180.0;
-
 class Growth : public ::testing::Test {
  protected:
   // A wall at x = 3 that faces the origin, 2 x 2 m of it covered around y = z = 0.
@@ -77,6 +75,7 @@ TEST_F(Growth, ASurfaceReachesNoFurtherThanItsGap) {
 TEST_F(Growth, WhenTheNearerPlaneIsOutOfReachTheNextOneIsAsked) {
   PlaneTrack far(2, PlaneKind::kVertical, Plane({-1, 0, 0}, 3.01), {3.01, 8, 0}, 0.1);
   far.coverCell({0, 0}, 1, 1, SE3());
+  EXPECT_EQ(1, label(triangle({3.01, 0.3, 0}, 0), {&far, &at_three})) << "also when nothing else joined it yet";
   EXPECT_EQ((std::vector<int>{1, 1}), associateTriangles({triangle({3, 0, 0}, 0), triangle({3.01, 0.3, 0}, 0)},
                                                          {&far, &at_three}, PlaneGrowthOptions()));
 }

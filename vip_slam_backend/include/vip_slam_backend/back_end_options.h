@@ -94,16 +94,18 @@ struct ReobservationOptions {
   }
 };
 
-/// Off: what is seen again and again is measured again and again. A keyframe whose landmarks others see as well still
-/// holds pixels of a tenth of a pixel and depth on planes, and a landmark of two views still ties two keyframes.
+/// A map is kept whole as long as it is small: a keyframe whose landmarks others see as well still holds pixels of a
+/// tenth of a pixel and depth on planes, and a landmark of two views still ties two keyframes. Beyond, a robot that
+/// stays in one room for hours must not fill its memory with it.
 struct CullingOptions {
-  bool enabled = false;
+  bool enabled = true;
+  int above_keyframes = 1000;
   double redundancy = 0.9;
   double max_imu_seconds = 3.0;
 
   void visit(OptionVisitor& v) {
-    v.field("enabled", enabled,
-            "remove redundant keyframes and poor landmarks: smaller maps, for many minutes in one room, and less exact");
+    v.field("enabled", enabled, "remove redundant keyframes and poor landmarks from large maps");
+    v.field("above_keyframes", above_keyframes, 0, 1000000, "maps of up to this many keyframes are kept whole");
     v.field("redundancy", redundancy, 0.5, 1.0,
             "fraction of landmarks seen by three other keyframes that makes one redundant");
     v.field("max_imu_seconds", max_imu_seconds, 0.5, 10.0, "longest IMU factor that culling may leave");

@@ -68,7 +68,8 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
 }
 
 void BackEnd::Impl::cull(MapUpdate* update) {
-  if (!options.culling.enabled || map.keyframes().size() < 4) return;
+  const std::size_t kept_whole = std::max(3, options.culling.above_keyframes);
+  if (!options.culling.enabled || map.keyframes().size() <= kept_whole) return;
   auto it = map.keyframes().rbegin();
   std::advance(it, 2);
   cullLandmarks(it->first, &map);

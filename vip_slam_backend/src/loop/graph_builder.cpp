@@ -4,10 +4,10 @@
 #include <cmath>
 #include <map>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 namespace {
-
-constexpr double kDegree = M_PI / 180.0;
 
 // Odometry between neighbours: drift grows with the square root of the way; a coasting front end knows far less.
 Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, const PoseGraphOptions& options) {

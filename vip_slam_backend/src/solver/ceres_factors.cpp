@@ -15,13 +15,6 @@ FrameGeometry frameOf(const double* x, const SE3& T_I_C) {
                        T_I_C);
 }
 
-Plane planeOf(const double* x) {
-  Plane plane;
-  plane.n = Eigen::Map<const Eigen::Vector3d>(x);
-  plane.d = x[3];
-  return plane;
-}
-
 // Tangent (rows x 6) into the ambient row-major rows x 7 of the lifted pose manifold.
 template <int R, class Derived>
 void writePose(double* jacobian, const Eigen::MatrixBase<Derived>& J) {

@@ -34,6 +34,14 @@ class PlaneManifold : public ceres::Manifold {
   bool MinusJacobian(const double* x, double* jacobian) const override;
 };
 
+/// The plane of a parameter block.
+inline Plane planeOf(const double* x) {
+  Plane plane;
+  plane.n = Eigen::Map<const Eigen::Vector3d>(x);
+  plane.d = x[3];
+  return plane;
+}
+
 ceres::CostFunction* makeReprojectionCost(const SE3& T_I_C, const BaObservation& observation, bool with_depth);
 ceres::CostFunction* makeDepthCost(const SE3& T_I_C, const BaObservation& observation);
 ceres::CostFunction* makeImuCost(std::shared_ptr<const Preintegration> preintegration, const Eigen::Vector3d& gravity);

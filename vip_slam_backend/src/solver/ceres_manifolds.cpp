@@ -10,13 +10,6 @@ SE3 poseOf(const double* x) {
   return SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x)), Eigen::Vector3d(x[4], x[5], x[6]));
 }
 
-Plane planeOf(const double* x) {
-  Plane plane;
-  plane.n = Eigen::Map<const Eigen::Vector3d>(x);
-  plane.d = x[3];
-  return plane;
-}
-
 }  // namespace
 
 bool PoseManifold::Plus(const double* x, const double* delta, double* out) const {

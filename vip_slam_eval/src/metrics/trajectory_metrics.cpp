@@ -7,10 +7,10 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 namespace {
-
-constexpr double kDegrees = 180.0 / M_PI;
 
 double angleOf(const Eigen::Quaterniond& q) { return logSO3(q).norm(); }
 
@@ -20,7 +20,7 @@ void addRelative(const PosePair& a, const PosePair& b, std::vector<double>* posi
   const SE3 estimate = a.T_M_B.inverse() * b.T_M_B;
   const SE3 error = truth.inverse() * estimate;
   position->push_back(error.t().norm());
-  rotation->push_back(angleOf(error.rotation()) * kDegrees);
+  rotation->push_back(angleOf(error.rotation()) / kDegree);
 }
 
 std::vector<double> cumulativePath(const std::vector<PosePair>& pairs) {
@@ -126,7 +126,7 @@ AbsoluteError absoluteError(const std::vector<PosePair>& pairs, Alignment alignm
     error.position = estimate.t() - pair.T_W_B.t();
     error.rotation = angleOf(pair.T_W_B.rotation().conjugate() * estimate.rotation());
     position.push_back(error.position.norm());
-    rotation.push_back(error.rotation * kDegrees);
+    rotation.push_back(error.rotation / kDegree);
     result.errors.push_back(error);
   }
   result.position = summarise(std::move(position));

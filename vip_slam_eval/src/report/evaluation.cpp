@@ -8,13 +8,12 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_eval/plane_tables.h"
 
 namespace vip_slam {
 namespace {
-
-constexpr double kDegrees = 180.0 / M_PI;
 
 void addStatistics(MetricTable* table, const std::string& group, const std::string& what, const ErrorStatistics& s,
                    const std::string& unit) {
@@ -42,7 +41,7 @@ std::string errorsCsv(const Evaluation& evaluation) {
   out << "t,x,y,z,position_m,rotation_deg\n" << std::fixed;
   for (const PoseError& e : evaluation.shown.errors) {
     out << std::setprecision(9) << e.t << std::setprecision(6) << ',' << e.position.x() << ',' << e.position.y() << ','
-        << e.position.z() << ',' << e.position.norm() << ',' << e.rotation * kDegrees << '\n';
+        << e.position.z() << ',' << e.position.norm() << ',' << e.rotation / kDegree << '\n';
   }
   return out.str();
 }

@@ -3,12 +3,12 @@
 #include <limits>
 
 #include "vip_slam_eval/evaluation.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_eval/svg.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kDegrees = 180.0 / M_PI;
 constexpr double kPageWidth = 1500, kPageHeight = 900;
 
 struct Box {
@@ -218,7 +218,7 @@ std::string evaluationPicture(const EvaluationInput& input, const Evaluation& ev
   for (std::size_t i = 0; i < evaluation.pairs.size(); ++i) {
     const PoseError& e = evaluation.shown.errors[i];
     position.push_back(100 * e.position.norm());
-    rotation.push_back(e.rotation * kDegrees);
+    rotation.push_back(e.rotation / kDegree);
     true_z.push_back(evaluation.pairs[i].T_W_B.t().z());
     estimated_z.push_back(true_z.back() + e.position.z());
   }

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
 #include "vip_slam_planes/detection/surface_shape.h"
@@ -13,8 +14,6 @@
 
 namespace vip_slam {
 namespace {
-
-constexpr double kDegree = M_PI / 180.0;
 
 class Detector {
  public:

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
 #include "vip_slam_planes/detection/surface_shape.h"
 #include "vip_slam_planes/growth/triangle_association.h"
@@ -12,7 +13,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kDegree = M_PI / 180.0;
 constexpr double kPatchReach = 0.4;            // metres from the patch's first triangle
 constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegree;
 constexpr double kLeastPatch = 0.01;           // m^2

@@ -3,23 +3,24 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 namespace {
 
-constexpr double kDegree = M_PI / 180.0;
 constexpr double kWidestAngle = 25.0 * kDegree;
 constexpr int kNone = -1;
 
-// The nearest admissible plane of each open triangle.
+// The nearest admissible plane of each open triangle, but for the one that let it go.
 void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
-                   const std::vector<char>& usable, const PlaneGrowthOptions& options, std::vector<int>* label) {
+                   const std::vector<int>& refused, const PlaneGrowthOptions& options, std::vector<int>* label) {
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     if ((*label)[i] != kNone) continue;
     const MapTriangle& t = triangles[i];
     const double min_cos = std::cos(angleGate(t, options.angle_deg));
     double best = distanceGate(t, options.distance);
     for (std::size_t k = 0; k < tracks.size(); ++k) {
-      if (!usable[k]) continue;
+      if (refused[i] == static_cast<int>(k)) continue;
       const Plane& plane = tracks[k]->plane();
       const double distance = std::abs(plane.signedDistance(t.centre));
       if (distance < best && plane.n.dot(t.n) > min_cos) best = distance, (*label)[i] = static_cast<int>(k);
@@ -27,9 +28,10 @@ void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<
   }
 }
 
-// Takes the label from connected patches that come nowhere near the area of their plane. Returns true when any did.
+// Takes the label from connected patches that come nowhere near the area of their plane, and notes who refused them.
+// Returns true when any did.
 bool dropDetached(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
-                  const std::vector<char>& settled, double gap, std::vector<int>* label, std::vector<char>* attached) {
+                  const std::vector<char>& settled, double gap, std::vector<int>* label, std::vector<int>* refused) {
   std::vector<char> visited(triangles.size(), 0);
   std::vector<int> patch;
   bool any = false;
@@ -50,12 +52,9 @@ bool dropDetached(const std::vector<MapTriangle>& triangles, const std::vector<c
         patch.push_back(g);
       }
     }
-    if (touches) {
-      (*attached)[k] = 1;
-      continue;
-    }
+    if (touches) continue;
     any = true;
-    for (int i : patch) (*label)[i] = kNone;
+    for (int i : patch) (*refused)[i] = (*label)[i], (*label)[i] = kNone;
   }
   return any;
 }
@@ -73,13 +72,14 @@ double distanceGate(const MapTriangle& triangle, double distance) {
 std::vector<int> associateTriangles(const std::vector<MapTriangle>& triangles,
                                     const std::vector<const PlaneTrack*>& tracks, const PlaneGrowthOptions& options) {
   std::vector<int> label(triangles.size(), kNone);
-  std::vector<char> usable(tracks.size(), 1), settled(triangles.size(), 0), attached(tracks.size(), 0);
-  nearestPlanes(triangles, tracks, usable, options, &label);
-  if (!dropDetached(triangles, tracks, settled, options.gap, &label, &attached)) return label;
-  // A plane far away in its own extent may have been a little nearer than the right one; ask again without those.
+  std::vector<int> refused(triangles.size(), kNone);
+  std::vector<char> settled(triangles.size(), 0);
+  nearestPlanes(triangles, tracks, refused, options, &label);
+  if (!dropDetached(triangles, tracks, settled, options.gap, &label, &refused)) return label;
+  // A plane far away in its own extent may have been a little nearer than the right one; ask again without it.
   for (std::size_t i = 0; i < triangles.size(); ++i) settled[i] = label[i] != kNone;
-  nearestPlanes(triangles, tracks, attached, options, &label);
-  dropDetached(triangles, tracks, settled, options.gap, &label, &attached);
+  nearestPlanes(triangles, tracks, refused, options, &label);
+  dropDetached(triangles, tracks, settled, options.gap, &label, &refused);
   return label;
 }
 

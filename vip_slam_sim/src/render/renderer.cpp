@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_sim/scene/vec_eigen.h"
+
 namespace vip_slam {
 namespace {
-
-Vec3 toVec(const Eigen::Vector3d& v) {
-  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
 
 /// Share of a pixel of width f at u that lies in [a, b].
 inline float coverage(float u, float f, float a, float b) {

@@ -4,13 +4,10 @@
 #include <cmath>
 
 #include "surface_grouping.h"
+#include "vip_slam_sim/scene/vec_eigen.h"
 
 namespace vip_slam {
 namespace {
-
-Vec3 toVec(const Eigen::Vector3d& v) {
-  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
 
 const Vec4 kFrameTint = {0.62f, 0.60f, 0.57f, 1};
 

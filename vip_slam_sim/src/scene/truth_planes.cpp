@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include "vip_slam_sim/scene/vec_eigen.h"
+
 namespace vip_slam {
 namespace {
 
@@ -13,16 +15,14 @@ constexpr double kCell = 0.1;         ///< m, seen-area grid
 constexpr int kStride = 8;            ///< px between samples
 constexpr double kSeenShare = 0.005;  ///< of the image, to count as seen
 
-Eigen::Vector3d toEigen(const Vec3& v) { return {v.x, v.y, v.z}; }
-
-struct Rect {
+struct SurfaceRect {
   double u0, v0, u1, v1;
 };
 
 /// Pieces in the frame of the surface, exact to float rounding; coordinates closer than 1 mm are made equal.
-std::vector<Rect> surfaceRects(const Scene& scene, const Surface& surface) {
+std::vector<SurfaceRect> surfaceRects(const Scene& scene, const Surface& surface) {
   const Chart& f = scene.charts[surface.frame_chart];
-  std::vector<Rect> rects;
+  std::vector<SurfaceRect> rects;
   for (int index : surface.pieces) {
     const Piece& piece = scene.pieces[index];
     const Chart& c = scene.charts[piece.chart];
@@ -123,9 +123,9 @@ std::vector<std::vector<Node>> traceCells(const std::vector<std::vector<char>>& 
 }  // namespace
 
 std::vector<PlanePolygon> surfaceOutline(const Scene& scene, const Surface& surface) {
-  const std::vector<Rect> rects = surfaceRects(scene, surface);
+  const std::vector<SurfaceRect> rects = surfaceRects(scene, surface);
   std::vector<double> us, vs;
-  for (const Rect& r : rects) {
+  for (const SurfaceRect& r : rects) {
     us.insert(us.end(), {r.u0, r.u1});
     vs.insert(vs.end(), {r.v0, r.v1});
   }
@@ -133,7 +133,7 @@ std::vector<PlanePolygon> surfaceOutline(const Scene& scene, const Surface& surf
   vs = distinct(vs);
   if (us.size() < 2 || vs.size() < 2) return {};
   std::vector<std::vector<char>> cell(us.size() - 1, std::vector<char>(vs.size() - 1, 0));
-  for (const Rect& r : rects)
+  for (const SurfaceRect& r : rects)
     for (std::size_t i = indexOf(us, r.u0); i < indexOf(us, r.u1); ++i)
       for (std::size_t j = indexOf(vs, r.v0); j < indexOf(vs, r.v1); ++j) cell[i][j] = 1;
 
@@ -172,8 +172,8 @@ std::vector<PlanePolygon> surfaceOutline(const Scene& scene, const Surface& surf
 VisibilityCounter::VisibilityCounter(std::shared_ptr<const Scene> scene)
     : scene_(std::move(scene)), seconds_(scene_->surfaces.size(), 0.0) {
   for (const Surface& s : scene_->surfaces) {
-    Rect all{1e9, 1e9, -1e9, -1e9};
-    for (const Rect& r : surfaceRects(*scene_, s))
+    SurfaceRect all{1e9, 1e9, -1e9, -1e9};
+    for (const SurfaceRect& r : surfaceRects(*scene_, s))
       all = {std::min(all.u0, r.u0), std::min(all.v0, r.v0), std::max(all.u1, r.u1), std::max(all.v1, r.v1)};
     Grid g;
     g.u0 = static_cast<float>(all.u0);
