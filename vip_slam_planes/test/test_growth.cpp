@@ -1,6 +1,7 @@
 // Which triangles join a plane: the gates of 10 degrees and 5 cm, the side, and the reach of the covered area.
 #include <gtest/gtest.h>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/growth/triangle_association.h"
 
 namespace vip_slam {
