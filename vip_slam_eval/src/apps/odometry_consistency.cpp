@@ -27,12 +27,21 @@ constexpr int kFirstSeed = 1000, kSeedStep = 37;
 constexpr double kDriftMetres = 10.0;
 constexpr double kImuAhead = 0.02;  ///< s of IMU handed over beyond the image
 
+/// The filter can be as uncertain as it is only if it starts from what is true of the sensor: the seeds draw their
+/// biases with these sigmas, the defaults are wider, for sensors that nobody knows.
+FrontEndOptions knowing(const SequenceSpec& spec) {
+  FrontEndOptions options;
+  if (spec.imu.gyro_bias > 0) options.filter.sigma_bias_gyro = spec.imu.gyro_bias;
+  if (spec.imu.accel_bias > 0) options.filter.sigma_bias_accel = spec.imu.accel_bias;
+  return options;
+}
+
 /// One noise seed.
 class Run {
  public:
   Run(const SequenceRenderer& sequence, int seed)
       : sequence_(sequence),
-        front_end_(FrontEndOptions(), sequence.sensor()),
+        front_end_(knowing(sequence.spec()), sequence.sensor()),
         effects_(sequence.spec().effects, sequence.spec().depth, *sequence.camera(), seed),
         imu_(synthesiseImu(sequence.trajectory(), sequence.spec().imu, seed, sequence.sensor().gravity)) {}
 
