@@ -2,8 +2,8 @@
 #include <cmath>
 #include <limits>
 
-#include "vip_slam_eval/evaluation.h"
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_eval/evaluation.h"
 #include "vip_slam_eval/svg.h"
 
 namespace vip_slam {
