@@ -98,14 +98,14 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
   for (std::size_t i = 0; i < label.size(); ++i) {
     if (label[i] >= 0) area[label[i]] += mesh.triangles[i].area;
   }
+  const auto shown = pointsByLabel(keyframe, labels, rays_(keyframe.frame.depth_grid), tracks.size());
   std::vector<PlaneId> ids;
   std::vector<char> trusted;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     PlaneTrack& track = *tracks[k];
     ids.push_back(track.id());
     if (area[k] > 0) {
-      auto observation = sampler_.sample(keyframe, labels, static_cast<int>(k), rays_(keyframe.frame.depth_grid),
-                                         T_map_C, track.id(), track.plane());
+      auto observation = sampler_.sample(keyframe.id, shown[k], T_map_C, track.id(), track.plane());
       if (observation) {
         track.observations().insert_or_assign(keyframe.id, std::move(*observation));
         fresh_.emplace(track.id(), keyframe.id);
@@ -116,8 +116,11 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
       ++track.keyframes_seen;
       track.viewed_from = T_map_C.t();
     }
-    track.confirmed = track.confirmed || track.keyframes_seen >= options.support.min_keyframes ||
-                      (track.keyframes_seen > 0 && track.area() >= options.support.sure_area);
+    const double covered = track.area();
+    track.confirmed =
+        track.confirmed ||
+        (track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area) ||
+        (track.keyframes_seen > 0 && covered >= options.support.sure_area);
     trusted.push_back(track.confirmed && track.determined);
   }
   points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });

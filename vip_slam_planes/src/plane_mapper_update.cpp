@@ -46,6 +46,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
 
 void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   map_moved_ = update.global;
+  std::vector<KeyframeId> moved;
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto it = placed_.find(estimate.id);
     if (it == placed_.end()) continue;
@@ -53,6 +54,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     const SE3 corrected = estimate.state.T_W_I * it->second->frame.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
     map_moved_ = map_moved_ || move.t().norm() > kMovedShift || logSO3(move.rotation()).norm() > kMovedTurn;
+    if (T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);
     T_map_C = corrected;
   }
   for (const auto& [id, plane] : update.planes) {
@@ -63,9 +65,13 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   }
   for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
   points_.applyMapUpdate(update);
+  const bool removed = !update.removed_keyframes.empty();
   for (auto& [id, track] : tracks_) {
-    if (!track.optimised()) refit(&track);
-    track.followKeyframes(poses_);
+    const bool concerned = removed || std::any_of(moved.begin(), moved.end(), [&track = track](KeyframeId keyframe) {
+                             return track.restsOn(keyframe);
+                           });
+    if (!track.optimised() && (concerned || track.refit_due)) refit(&track);
+    if (concerned) track.followKeyframes(poses_);
   }
   if (map_moved_) withdrawBrokenObservations();
   if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
@@ -91,6 +97,7 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
 }
 
 void PlaneMapper::Impl::refit(PlaneTrack* track) {
+  track->refit_due = false;
   if (track->optimised() && track->determined) return;
   const PlaneMoments moments = track->moments(poses_);
   if (!(moments.weight() > 0)) return;
@@ -125,6 +132,7 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
       fresh_.erase({id, it->first});
       renewed.insert(it->first);
       it = track.observations().erase(it);
+      track.refit_due = true;
     }
   }
   while (renewed.size() > kMostRenewed) renewed.erase(renewed.begin());  // the newest matter most
@@ -134,7 +142,8 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
 void PlaneMapper::Impl::dropUnsupported(PlaneUpdate* result) {
   std::vector<PlaneId> gone;
   for (const auto& [id, track] : tracks_) {
-    const bool shrunk = track.area() < options.support.min_area || track.mostlyGone();
+    // One that several keyframes have started small may still grow; until then nobody hears of it.
+    const bool shrunk = (track.confirmed && track.area() < options.support.min_area) || track.mostlyGone();
     const bool never_confirmed = !track.confirmed && track.keyframes_waited > options.support.patience;
     if (shrunk || never_confirmed) gone.push_back(id);
   }

@@ -1,3 +1,5 @@
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "vip_slam_planes/growth/cell_grid.h"
@@ -33,6 +35,26 @@ TEST(CellGrid, GrowsInAllDirections) {
   EXPECT_EQ(2, grid.count(2));
   EXPECT_TRUE(grid.near({-42, 9}, 2));
   EXPECT_FALSE(grid.near({-43, 7}, 2));
+}
+
+TEST(CellGrid, CountsAndVisitsWhatHasHits) {
+  CellGrid grid;
+  std::mt19937 random(3);
+  std::uniform_int_distribution<int> place(-30, 30), hits(-1, 3);
+  for (int i = 0; i < 3000; ++i) grid.set({place(random), place(random)}, hits(random));
+  int all = 0, twice = 0, inside = 0, visited = 0;
+  grid.forEach([&](CellIndex c, int h) {
+    ++all;
+    twice += h >= 2;
+    inside += c.x >= -5 && c.x <= 8 && c.y >= 2 && c.y <= 100;
+  });
+  grid.forEachIn({-5, 2}, {8, 100}, [&](CellIndex c, int h) { visited += grid.at(c) == h; });
+  EXPECT_GT(all, 1000);
+  EXPECT_EQ(all, grid.count(1));
+  EXPECT_EQ(twice, grid.count(2));
+  EXPECT_EQ(inside, visited);
+  grid.clear();
+  EXPECT_EQ(0, grid.count(1));
 }
 
 TEST(CellGrid, TrianglesCoverTheCellsWithCentresInside) {

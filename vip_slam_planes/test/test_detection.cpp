@@ -168,6 +168,18 @@ TEST(Detection, TwoTablesOfOneHeightAreTwo) {
   for (const DetectedPlane& p : planes) EXPECT_NEAR(-0.74, p.plane.d, 0.002);
 }
 
+TEST(Detection, ATrayOnAShelfLiesAboveIt) {
+  Scene scene;
+  scene.add({1.2, -0.5, 0.9}, {0.6, 0, 0}, {0, 1.0, 0});
+  scene.add({1.3, -0.4, 0.95}, {0.4, 0, 0}, {0, 0.7, 0});
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  const auto planes = detect(&camera, scene, lookAt({0, 0.2, 1.6}, {1.5, 0, 0.9}));
+  ASSERT_EQ(2u, planes.size());
+  const auto [low, high] = std::minmax(planes[0].plane.d, planes[1].plane.d);
+  EXPECT_NEAR(-0.95, low, 0.003);
+  EXPECT_NEAR(-0.90, high, 0.003);
+}
+
 TEST(Detection, DeskAcrossTheRoomIsFoundAtAFlatAngle) {
   Scene scene;
   scene.addRoom({-1, -3, 0}, {7, 3, 4});

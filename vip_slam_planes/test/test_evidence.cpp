@@ -38,6 +38,27 @@ std::vector<MapTriangle> board(double y0, double z0, int columns, int rows, doub
   return mesh;
 }
 
+// A meshed rectangle at height z that faces up.
+std::vector<MapTriangle> shelf(double x0, double y0, double z, int columns, int rows) {
+  // The board turned about the y axis: its x = 3 becomes the height.
+  std::vector<MapTriangle> mesh = board(y0, 0, columns, rows);
+  for (MapTriangle& t : mesh) {
+    for (Eigen::Vector3d* p : {&t.corner[0], &t.corner[1], &t.corner[2], &t.centre}) *p = {x0 + p->z(), p->y(), z};
+    t.n = Eigen::Vector3d::UnitZ();
+  }
+  return mesh;
+}
+
+std::vector<MapTriangle> together(std::vector<MapTriangle> a, const std::vector<MapTriangle>& b) {
+  const int triangles = static_cast<int>(a.size()), vertices = 1000;  // more than a has
+  for (MapTriangle t : b) {
+    for (int& g : t.neighbour) g = g < 0 ? -1 : g + triangles;
+    for (int& k : t.vertex) k += vertices;
+    a.push_back(t);
+  }
+  return a;
+}
+
 class Evidence : public ::testing::Test {
  protected:
   std::vector<JointPlane> add(KeyframeId id, const std::vector<MapTriangle>& mesh) {
@@ -67,6 +88,36 @@ TEST_F(Evidence, SeeingASmallThingOftenDoesNotMakeItLarge) {
 
 TEST_F(Evidence, StripsOneCellWideAreNoWall) {
   for (KeyframeId id = 1; id <= 4; ++id) EXPECT_TRUE(add(id, board(0.1 * double(id), 0.0, 1, 20)).empty()) << id;
+}
+
+TEST_F(Evidence, WhatShowsOfAWorktopStartsItBetweenTheTraysOnIt) {
+  // A dark worktop gives depth in a small piece only; the trays beside it are larger, but too narrow for a plane.
+  const auto view = [](double shift) {
+    return together(shelf(1.0 + shift, 0.0, 0.0, 3, 2), shelf(1.0, 0.4, 0.045, 8, 2));
+  };
+  EXPECT_TRUE(add(1, view(0.0)).empty());
+  EXPECT_TRUE(add(2, view(0.05)).empty());
+  const std::vector<JointPlane> found = add(3, view(0.1));
+  ASSERT_EQ(1u, found.size());
+  EXPECT_EQ(PlaneKind::kHorizontal, found[0].kind);
+  EXPECT_NEAR(0.0, found[0].plane.d, 1e-3);
+  EXPECT_EQ(36u, found[0].triangles.size());
+}
+
+TEST_F(Evidence, WhatLiesOnAFloorStartsNothing) {
+  for (const double height : {0.06, 0.14}) {
+    evidence.clear();
+    PlaneTrack floor(1, PlaneKind::kHorizontal, Plane({0, 0, 1}, 0), {1, 0, 0}, 0.1);
+    for (const MapTriangle& t : shelf(0, -1, 0, 20, 20)) floor.cover(t, 1, SE3(), nullptr);
+    std::size_t found = 0;
+    for (KeyframeId id = 1; id <= 4; ++id) {
+      poses[id] = SE3(Eigen::Quaterniond::Identity(), {0, 0.1 * double(id), 1});
+      const std::vector<MapTriangle> mesh = shelf(1.0, 0.0, height, 3, 4);
+      evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1));
+      found += evidence.detect(poses, {&floor}).size();
+    }
+    EXPECT_EQ(height > 0.1 ? 1u : 0u, found) << height;
+  }
 }
 
 TEST_F(Evidence, WallsThatDisagreeAreNotOne) {

@@ -193,6 +193,25 @@ TEST(Mapper, WhoHasSeenAPlaneBeforeItsStartCounts) {
   }
 }
 
+TEST(Mapper, WhatKeyframesStartSmallIsPublishedWhenFramesHaveGrownIt) {
+  // Of a dark worktop the keyframes see a corner, a later frame more.
+  Scene corner, more;
+  corner.add({1.0, 0, 0.9}, {0.34, 0, 0}, {0, 0.30, 0});
+  more.add({1.0, 0, 0.9}, {0.6, 0, 0}, {0, 0.5, 0});
+  const auto eye = [](int i) { return Eigen::Vector3d(0, 0.1 * i, 1.5); };
+  for (const bool grown : {false, true}) {
+    Rig rig(0.5);
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(rig.look(corner, eye(i), {1.1, 0.1, 0.9}).planes.empty());
+    EXPECT_EQ(1u, rig.mapper.counters().planes_started);
+    TrackedFrame frame = rig.camera.frame(grown ? more : corner, lookAt(eye(4), {1.1, 0.1, 0.9}), 2, 16);
+    frame.keyframe = 3;
+    rig.mapper.grow(frame, SE3());
+    rig.look(corner, eye(5), {1.1, 0.1, 0.9});
+    EXPECT_EQ(grown, rig.find(Plane({0, 0, 1}, -0.9)) != nullptr);
+    EXPECT_EQ(grown ? 1u : 0u, rig.mapper.planes().size());
+  }
+}
+
 TEST(Mapper, TablesOfOneHeightStayTwo) {
   Rig rig;
   Scene scene;

@@ -43,7 +43,7 @@ struct PlaneDetectionOptions {
     v.field("height_bin", height_bin, 0.01, 0.5, "bins of the histogram of horizontal triangles, m");
     v.field("distance_bin", distance_bin, 0.01, 0.5, "bins of the histogram of vertical triangles, m");
     v.field("angle_bin_deg", angle_bin_deg, 0.5, 20.0, "bins of the histogram of vertical triangles, degrees");
-    v.field("min_area", min_area, 0.01, 10.0, "smallest area that starts a plane, m^2");
+    v.field("min_area", min_area, 0.01, 10.0, "smallest area that starts a plane in one image, m^2");
     v.field("min_width", min_width, 0.0, 2.0, "narrower strips do not start a plane, m");
     v.field("max_rms", max_rms, 0.001, 0.2, "largest distance of a new plane's points beyond depth noise, RMS, m");
     v.field("max_tilt_deg", max_tilt_deg, 0.5, 20.0,
@@ -150,7 +150,8 @@ struct PlaneSupportOptions {
     v.field("min_views", min_views, 1, 100, "... or one keyframe, and growth frames from as many places further on");
     v.field("view_distance", view_distance, 0.0, 5.0, "such places are this far apart, m");
     v.field("sure_area", sure_area, 0.0, 100.0, "... unless its area is at least this, m^2");
-    v.field("min_area", min_area, 0.0, 10.0, "planes that shrink below this disappear, m^2");
+    v.field("min_area", min_area, 0.0, 10.0,
+            "smaller planes are not published, and those that shrink below it disappear, m^2");
     v.field("see_through", see_through, 0.02, 1.0, "depth measured this far behind a plane speaks against it, m");
     v.field("patience", patience, 1, 1000, "keyframes that may look at an unconfirmed plane without confirming it");
   }

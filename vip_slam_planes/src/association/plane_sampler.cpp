@@ -10,6 +10,25 @@
 
 namespace vip_slam {
 
+std::vector<std::vector<Eigen::Vector3d>> pointsByLabel(const Keyframe& keyframe, const SurfaceLabels& labels,
+                                                        const std::vector<Eigen::Vector2f>& rays, std::size_t count) {
+  const DepthGrid& grid = keyframe.frame.depth_grid;
+  std::vector<std::vector<Eigen::Vector3d>> points(count);
+  for (int r = 1; r + 1 < grid.rows; ++r) {
+    for (int c = 1; c + 1 < grid.cols; ++c) {
+      const int label = grid.at(c, r) > 0 ? labels.inner(c, r) : -1;
+      if (label < 0) continue;
+      const Eigen::Vector2f& ray = rays[std::size_t(r) * grid.cols + c];
+      points[label].push_back(Eigen::Vector3d(ray.x(), ray.y(), 1.0) * grid.at(c, r));
+    }
+  }
+  for (const Feature& f : keyframe.frame.features) {
+    const int label = f.depth > 0 ? labels.around(f.pixel) : -1;
+    if (label >= 0) points[label].push_back(Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0) * f.depth);
+  }
+  return points;
+}
+
 double PlaneSampler::sigmaAlong(const Eigen::Vector3d& n_C, const Eigen::Vector3d& p_C) const {
   return noise_.sigma(p_C.z()) * std::abs(n_C.dot(p_C)) / p_C.z();
 }
@@ -99,33 +118,20 @@ void PlaneSampler::accumulate(const Eigen::Vector3d& n_C, PlaneObservation* obse
   observation->G = observation->weight_scale * moments.M;
 }
 
-std::optional<PlaneObservation> PlaneSampler::sample(const Keyframe& keyframe, const SurfaceLabels& labels, int label,
-                                                     const std::vector<Eigen::Vector2f>& rays, const SE3& T_map_C,
-                                                     PlaneId plane_id, const Plane& plane) const {
-  const DepthGrid& grid = keyframe.frame.depth_grid;
+std::optional<PlaneObservation> PlaneSampler::sample(KeyframeId keyframe, const std::vector<Eigen::Vector3d>& shown,
+                                                     const SE3& T_map_C, PlaneId plane_id, const Plane& plane) const {
   const Plane plane_C = transformPlane(T_map_C.inverse(), plane);
   std::vector<Eigen::Vector3d> points;
-  const auto consider = [&](const Eigen::Vector3d& p) {
+  for (const Eigen::Vector3d& p : shown) {
     const double gate = std::max(distance_gate_, 3.0 * sigmaAlong(plane_C.n, p));
     if (std::abs(plane_C.signedDistance(p)) < gate) points.push_back(p);
-  };
-  for (int r = 1; r + 1 < grid.rows; ++r) {
-    for (int c = 1; c + 1 < grid.cols; ++c) {
-      if (grid.at(c, r) > 0 && labels.inner(c, r) == label) {
-        const Eigen::Vector2f& ray = rays[std::size_t(r) * grid.cols + c];
-        consider(Eigen::Vector3d(ray.x(), ray.y(), 1.0) * grid.at(c, r));
-      }
-    }
-  }
-  for (const Feature& f : keyframe.frame.features) {
-    if (f.depth > 0 && labels.around(f.pixel) == label) consider(Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0) * f.depth);
   }
   if (points.size() < std::size_t(options_.min_points)) return {};
   points = spreadEvenly(points, plane_C.n);
   if (points.size() < std::size_t(options_.min_points) || !keepLocalSurface(plane_C.n, &points)) return {};
 
   PlaneObservation observation;
-  observation.keyframe = keyframe.id;
+  observation.keyframe = keyframe;
   observation.plane = plane_id;
   for (const Eigen::Vector3d& p : points) observation.points.push_back({p.cast<float>(), 0.0f});
   accumulate(plane_C.n, &observation);

@@ -9,6 +9,7 @@
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
+#include "vip_slam_planes/detection/surface_layers.h"
 #include "vip_slam_planes/detection/surface_shape.h"
 #include "vip_slam_planes/growth/triangle_association.h"
 
@@ -32,9 +33,7 @@ class Detector {
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
       if (!taken_[i]) members.push_back(static_cast<int>(i));
     }
-    Plane plane;
-    if (members.empty() || !fit(members, kind, &plane, nullptr)) return {};
-    for (const std::vector<int>& surface : surfaces(gather(plane), plane)) accept(surface, kind);
+    if (!members.empty()) startFrom(members, kind);
     return std::move(found_);
   }
 
@@ -70,20 +69,41 @@ class Detector {
       for (int i : peak.members) histogram.remove(i);
       PlaneKind kind;
       kindOf(triangles_[peak.members.front()], &kind);
-      Plane plane;
-      if (!fit(peak.members, kind, &plane, nullptr)) continue;
-      const std::vector<int> members = gather(plane);
-      for (const std::vector<int>& surface : surfaces(members, plane)) {
-        if (accept(surface, kind)) {
-          for (int i : surface) histogram.remove(i);
-        }
+      for (int i : startFrom(peak.members, kind)) histogram.remove(i);
+    }
+  }
+
+  // Starts planes from the triangles of a peak; what their surfaces consist of.
+  std::vector<int> startFrom(const std::vector<int>& members, PlaneKind kind) {
+    std::vector<int> used;
+    Plane plane;
+    if (!fit(members, kind, &plane, nullptr)) return used;
+    std::vector<double> offset, area;
+    for (int i : members) {
+      offset.push_back(plane.signedDistance(triangles_[i].centre));
+      area.push_back(triangles_[i].area);
+    }
+    const auto layers = splitLayers(offset, area, medianSigma(members));
+    for (const std::vector<int>& layer : layers) {
+      std::vector<int> own;
+      for (int k : layer) own.push_back(members[k]);
+      if (layers.size() > 1 && !fit(own, kind, &plane, nullptr)) continue;
+      std::vector<char> apart(triangles_.size(), 0);
+      if (layers.size() > 1) {
+        for (int i : members) apart[i] = 1;
+        for (int i : own) apart[i] = 0;
+      }
+      for (const std::vector<int>& surface : surfaces(gather(plane, apart), plane)) {
+        if (accept(surface, kind)) used.insert(used.end(), surface.begin(), surface.end());
       }
     }
+    return used;
   }
 
   // Flood fill over the mesh, after the peaks; accept() takes what is neither horizontal nor vertical.
   void generalSurfaces() {
     std::vector<char> visited(triangles_.size(), 0);
+    const std::vector<char> nowhere(triangles_.size(), 0);
     for (std::size_t seed = 0; seed < triangles_.size(); ++seed) {
       if (visited[seed] || taken_[seed]) continue;
       const Plane start = Plane::fromPointNormal(triangles_[seed].centre, triangles_[seed].n);
@@ -100,7 +120,9 @@ class Detector {
       }
       Plane plane;
       if (area < options_.min_area || !fit(patch, PlaneKind::kGeneral, &plane, nullptr)) continue;
-      for (const std::vector<int>& surface : surfaces(gather(plane), plane)) accept(surface, PlaneKind::kGeneral);
+      for (const std::vector<int>& surface : surfaces(gather(plane, nowhere), plane)) {
+        accept(surface, PlaneKind::kGeneral);
+      }
     }
   }
 
@@ -109,10 +131,11 @@ class Detector {
            std::abs(plane.signedDistance(t.centre)) < widening * distanceGate(t, growth_.distance);
   }
 
-  std::vector<int> gather(const Plane& plane) const {
+  // The free triangles on the plane, but for those of another layer.
+  std::vector<int> gather(const Plane& plane, const std::vector<char>& apart) const {
     std::vector<int> members;
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
-      if (!taken_[i] && joins(triangles_[i], plane, 1.0)) members.push_back(static_cast<int>(i));
+      if (!taken_[i] && !apart[i] && joins(triangles_[i], plane, 1.0)) members.push_back(static_cast<int>(i));
     }
     return members;
   }

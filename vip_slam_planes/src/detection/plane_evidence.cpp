@@ -17,7 +17,9 @@ constexpr double kPatchReach = 0.4;            // metres from the patch's first 
 constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegree;
 constexpr double kLeastPatch = 0.01;           // m^2
 constexpr std::size_t kLeastTriangles = 4;
-constexpr double kLeastJoint = 2.0;            // of what starts a plane in one image: this is not for furniture
+// Of the area that starts a plane in one image. Small upright things are furniture. Dark or polished table tops show in
+// pieces only: what is left of them starts small and waits for frames to grow it.
+constexpr double kLeastUpright = 2.0, kLeastLevel = 0.4;
 constexpr int kMostTests = 4;                  // peaks tested per keyframe, the largest ones
 
 MapTriangle moved(const SE3& T, MapTriangle t) {
@@ -39,6 +41,16 @@ bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::ve
     std::sort(part.second.begin(), part.second.end());
     return isSolid(triangles, part.second);
   }) >= 2;
+}
+
+// What lies on a floor or table, hardly higher than what joins those, is no surface of its own.
+bool liesOn(const DetectedPlane& plane, const std::vector<const PlaneTrack*>& known, const PlaneGrowthOptions& growth) {
+  return std::any_of(known.begin(), known.end(), [&](const PlaneTrack* track) {
+    if (track->kind() != plane.kind || track->plane().n.dot(plane.plane.n) < 0) return false;
+    if (std::abs(track->plane().signedDistance(plane.centroid)) > 2 * growth.distance) return false;
+    const int reach = static_cast<int>(std::ceil(growth.gap / track->cellSize()));
+    return track->cells().near(track->cellAt(track->toPlane(plane.centroid)), reach);
+  });
 }
 
 }  // namespace
@@ -175,7 +187,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
   }
   for (int tests = 0; tests < kMostTests;) {
     const PlaneHistogram::Peak peak = histogram.peak();
-    if (peak.area < detection_.min_area) break;
+    if (peak.area < kLeastLevel * detection_.min_area) break;
     std::vector<Vote> votes;
     std::set<std::size_t> frames;
     for (int i : peak.members) {
@@ -184,19 +196,23 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
       histogram.remove(i);
     }
     if (int(frames.size()) < detection_.min_keyframes || *frames.rbegin() + 1 != frames_.size()) continue;
-    ++tests;
     const PlaneKind kind = frames_[votes.front().frame].patches[votes.front().patch].kind;
+    PlaneDetectionOptions together = detection_;
+    together.min_area *= kind == PlaneKind::kHorizontal ? kLeastLevel : kLeastUpright;
+    if (peak.area < together.min_area) continue;
+    ++tests;
     const std::vector<EvidenceTriangle> evidence = collect(votes, poses);
     std::vector<MapTriangle> triangles;
     for (const EvidenceTriangle& e : evidence) triangles.push_back(e.triangle);
     const std::vector<int> label = associateTriangles(triangles, known, growth_);
     std::vector<char> taken(triangles.size());
     for (std::size_t i = 0; i < triangles.size(); ++i) taken[i] = label[i] >= 0;
-    for (const DetectedPlane& plane : detectPlanesAt(triangles, taken, kind, origin, detection_, growth_)) {
+    for (const DetectedPlane& plane : detectPlanesAt(triangles, taken, kind, origin, together, growth_)) {
       // Each keyframe sees the same surface: what counts is the area that they cover together.
       PlaneTrack area(0, kind, plane.plane, plane.centroid, 0.5 * growth_.cell);
       for (int i : plane.triangles) area.cover(triangles[i], 1, SE3(), nullptr);
-      if (area.area() < kLeastJoint * detection_.min_area ||
+      const bool small = area.area() < kLeastUpright * detection_.min_area;
+      if (area.area() < together.min_area || (small && liesOn(plane, known, growth_)) ||
           !shownBySeveral(evidence, triangles, plane, detection_.min_keyframes)) {
         continue;
       }

@@ -27,11 +27,14 @@ void CellGrid::cover(CellIndex c) {
 void CellGrid::set(CellIndex c, int hits) {
   if (hits == 0 && at(c) == 0) return;
   cover(c);
-  hits_[static_cast<std::size_t>(c.y - y0_) * width_ + (c.x - x0_)] =
-      static_cast<std::uint8_t>(std::clamp(hits, 0, 255));
+  std::uint8_t& cell = hits_[static_cast<std::size_t>(c.y - y0_) * width_ + (c.x - x0_)];
+  covered_ -= cell > 0;
+  cell = static_cast<std::uint8_t>(std::clamp(hits, 0, 255));
+  covered_ += cell > 0;
 }
 
 int CellGrid::count(int min_hits) const {
+  if (min_hits == 1) return covered_;  // asked for several times per keyframe and plane
   return static_cast<int>(std::count_if(hits_.begin(), hits_.end(), [&](int h) { return h >= min_hits; }));
 }
 
@@ -49,7 +52,7 @@ bool CellGrid::near(CellIndex c, int reach) const {
 
 void CellGrid::clear() {
   hits_.clear();
-  x0_ = y0_ = width_ = height_ = 0;
+  x0_ = y0_ = width_ = height_ = covered_ = 0;
 }
 
 void CellGrid::closePinholes() {

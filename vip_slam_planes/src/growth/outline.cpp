@@ -12,15 +12,23 @@ constexpr int kDx[4] = {1, 0, -1, 0}, kDy[4] = {0, 1, 0, -1};
 class Tracer {
  public:
   Tracer(const CellGrid& grid, int min_hits)
-      : grid_(grid), min_hits_(min_hits), width_(grid.width() + 1),
-        done_(static_cast<std::size_t>(width_) * (grid.height() + 1), 0) {}
+      : x0_(grid.x0()), y0_(grid.y0()), width_(grid.width() + 1), height_(grid.height() + 1),
+        covered_(static_cast<std::size_t>(width_ + 1) * (height_ + 1), 0),
+        done_(static_cast<std::size_t>(width_) * height_, 0) {
+    grid.forEach([&](CellIndex c, int hits) { covered_[cell(c.x, c.y)] = hits >= min_hits; });
+  }
 
   std::vector<std::vector<CellIndex>> rings() {
     std::vector<std::vector<CellIndex>> all;
-    for (int y = grid_.y0(); y <= grid_.y0() + grid_.height(); ++y) {
-      for (int x = grid_.x0(); x <= grid_.x0() + grid_.width(); ++x) {
+    for (int y = y0_; y < y0_ + height_; ++y) {
+      const unsigned char *below = &covered_[cell(x0_ - 1, y - 1)], *above = &covered_[cell(x0_ - 1, y)];
+      for (int i = 0; i < width_; ++i) {
+        // Most corners have the same on all sides.
+        const int around = below[i] + below[i + 1] + above[i] + above[i + 1];
+        if (around == 0 || around == 4) continue;
+        const CellIndex c{x0_ + i, y};
         for (int direction = 0; direction < 4; ++direction) {
-          if (border({x, y}, direction) && !done({x, y}, direction)) all.push_back(follow({x, y}, direction));
+          if (border(c, direction) && !done(c, direction)) all.push_back(follow(c, direction));
         }
       }
     }
@@ -28,7 +36,11 @@ class Tracer {
   }
 
  private:
-  bool covered(int x, int y) const { return grid_.at({x, y}) >= min_hits_; }
+  // A rim of one empty cell all around spares the checks of the bounds.
+  std::size_t cell(int x, int y) const {
+    return static_cast<std::size_t>(y - y0_ + 1) * (width_ + 1) + static_cast<std::size_t>(x - x0_ + 1);
+  }
+  bool covered(int x, int y) const { return covered_[cell(x, y)]; }
   // A step from corner (x, y) is a border when the cell on its left is covered and the one on its right is not.
   bool border(CellIndex c, int direction) const {
     switch (direction) {
@@ -38,16 +50,15 @@ class Tracer {
       default: return covered(c.x, c.y - 1) && !covered(c.x - 1, c.y - 1);
     }
   }
-  bool done(CellIndex c, int direction) const { return mark(c) >> direction & 1; }
-  unsigned char mark(CellIndex c) const {
-    return done_[static_cast<std::size_t>(c.y - grid_.y0()) * width_ + (c.x - grid_.x0())];
+  bool done(CellIndex c, int direction) const { return done_[corner(c)] >> direction & 1; }
+  std::size_t corner(CellIndex c) const {
+    return static_cast<std::size_t>(c.y - y0_) * width_ + static_cast<std::size_t>(c.x - x0_);
   }
   std::vector<CellIndex> follow(CellIndex c, int direction) {
     std::vector<CellIndex> ring;
     int last = -1;
     while (!done(c, direction)) {
-      done_[static_cast<std::size_t>(c.y - grid_.y0()) * width_ + (c.x - grid_.x0())] |=
-          static_cast<unsigned char>(1 << direction);
+      done_[corner(c)] |= static_cast<unsigned char>(1 << direction);
       if (direction != last) ring.push_back(c);
       last = direction;
       c.x += kDx[direction];
@@ -63,9 +74,8 @@ class Tracer {
     return ring;
   }
 
-  const CellGrid& grid_;
-  int min_hits_, width_;
-  std::vector<unsigned char> done_;
+  int x0_, y0_, width_, height_;  ///< of the corners
+  std::vector<unsigned char> covered_, done_;
 };
 
 double distanceToSegment(const Eigen::Vector2d& p, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {

@@ -5,6 +5,32 @@
 #include <vector>
 
 namespace vip_slam {
+namespace {
+
+constexpr double kGrazing = 0.25;  // cosine of 75 degrees
+
+struct CellBox {
+  CellIndex first, last;
+};
+
+// Cells that may lie in the image no further than `range` along its axis: a floor has tens of thousands, an image shows
+// a few hundred of them. The bounds of the view's pyramid, laid onto the plane.
+CellBox cellsInView(const PlaneTrack& track, const CameraModel& camera, const SE3& T_map_C, double range) {
+  constexpr double kSlack = 1.02;  // lens distortion bends the sides of the image between the points asked
+  const CellGrid& cells = track.cells();
+  const CellBox all{{cells.x0(), cells.y0()}, {cells.x0() + cells.width() - 1, cells.y0() + cells.height() - 1}};
+  Eigen::Vector2d low = track.toPlane(T_map_C.t()), high = low;
+  for (int k = 0; k < 9; ++k) {
+    Eigen::Vector2d xy;
+    const Eigen::Vector2d uv(0.5 * (k % 3) * camera.width(), 0.5 * (k / 3) * camera.height());
+    if (!camera.undistort(uv - Eigen::Vector2d(0.5, 0.5), &xy)) return all;
+    const Eigen::Vector2d q = track.toPlane(T_map_C * (range * Eigen::Vector3d(kSlack * xy.x(), kSlack * xy.y(), 1.0)));
+    low = low.cwiseMin(q), high = high.cwiseMax(q);
+  }
+  return {track.cellAt(low), track.cellAt(high)};
+}
+
+}  // namespace
 
 bool mayBeInView(const PlaneTrack& track, const SE3& T_map_C, double range) {
   const CellGrid& cells = track.cells();
@@ -39,14 +65,17 @@ bool showsIn(const PlaneTrack& track, const CameraModel& camera, const DepthNois
 
 int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, const CameraModel& camera,
                  const DepthNoise& noise, const SE3& T_map_C, double margin, PlaneTrack* track) {
-  constexpr double kGrazing = 0.25;  // cosine of 75 degrees
   if (grid.empty()) return 0;
   const SE3 T_C_map = T_map_C.inverse();
   const Eigen::Vector3d n_C = T_C_map.rotation() * track->plane().n;
+  // Nothing is refuted far behind all that was measured.
+  const double deepest = *std::max_element(grid.z.begin(), grid.z.end());
+  const double range = std::min(noise.max_range, deepest + margin / kGrazing + 3 * noise.sigma(noise.max_range));
+  const CellBox view = cellsInView(*track, camera, T_map_C, range);
   std::vector<CellIndex> refuted;
-  track->cells().forEach([&](CellIndex cell, int) {
+  track->cells().forEachIn(view.first, view.last, [&](CellIndex cell, int) {
     const Eigen::Vector3d p = T_C_map * track->cellCentre(cell);
-    if (p.z() < noise.min_range || p.z() > noise.max_range || -n_C.dot(p) < kGrazing * p.norm()) return;
+    if (p.z() < noise.min_range || p.z() > range || -n_C.dot(p) < kGrazing * p.norm()) return;
     Eigen::Vector2d uv;
     if (!camera.project(p, &uv) || !camera.inImage(uv)) return;
     const int c = static_cast<int>(std::floor((uv.x() - grid.offset) / grid.stride));

@@ -17,6 +17,11 @@
 
 namespace vip_slam {
 
+/// The depth points that show each of `count` labels, in the camera frame: the nodes inside its region of the image and
+/// the features in it. `rays` belong to the keyframe's depth grid.
+std::vector<std::vector<Eigen::Vector3d>> pointsByLabel(const Keyframe& keyframe, const SurfaceLabels& labels,
+                                                        const std::vector<Eigen::Vector2f>& rays, std::size_t count);
+
 class PlaneSampler {
  public:
   PlaneSampler(const PlaneObservationOptions& options, double distance_gate, const DepthNoise& noise)
@@ -25,10 +30,9 @@ class PlaneSampler {
   /// One sigma of the distance along n_C of a depth point, without bias: sigma_z(z) |n.ray| / |ray.e_z|.
   double sigmaAlong(const Eigen::Vector3d& n_C, const Eigen::Vector3d& p_C) const;
 
-  /// Samples of label `label`; empty when too few remain or they lie on another surface. `rays` belong to the grid.
-  std::optional<PlaneObservation> sample(const Keyframe& keyframe, const SurfaceLabels& labels, int label,
-                                         const std::vector<Eigen::Vector2f>& rays, const SE3& T_map_C, PlaneId plane_id,
-                                         const Plane& plane) const;
+  /// Samples of the points that show a plane; empty when too few remain or they lie on another surface.
+  std::optional<PlaneObservation> sample(KeyframeId keyframe, const std::vector<Eigen::Vector3d>& shown,
+                                         const SE3& T_map_C, PlaneId plane_id, const Plane& plane) const;
 
   /// Sums the samples with sigmas for normal n_C into observation->G; sets weight_scale.
   void accumulate(const Eigen::Vector3d& n_C, PlaneObservation* observation) const;

@@ -1,4 +1,6 @@
-// Evidence of planes that no single image shows enough of: a wall far away behind an opening, whose normals are noisy.
+// Evidence of planes that no single image shows enough of: a wall far away behind an opening, whose normals are noisy,
+// or a dark worktop, which gives depth in pieces only. Level planes may start smaller than in one image; frames grow
+// them.
 //
 // What detection leaves over in a keyframe is kept as patches, small connected pieces of one orientation. Their votes
 // go into one histogram over the last keyframes (paper section "Plane Detection": histograms of the whole map); where

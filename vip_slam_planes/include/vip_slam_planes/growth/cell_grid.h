@@ -2,6 +2,7 @@
 // Memory follows the covered area, whatever the number of frames; area, containment, overlap and polygons come from it.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -39,10 +40,17 @@ class CellGrid {
   /// f(CellIndex, hits) for every cell with hits, row by row.
   template <class F>
   void forEach(F f) const {
-    for (int j = 0; j < height_; ++j) {
-      for (int i = 0; i < width_; ++i) {
-        const int h = hits_[static_cast<std::size_t>(j) * width_ + i];
-        if (h) f(CellIndex{x0_ + i, y0_ + j}, h);
+    forEachIn({x0_, y0_}, {x0_ + width_ - 1, y0_ + height_ - 1}, f);
+  }
+  /// The same for those from `first` to `last`, both included.
+  template <class F>
+  void forEachIn(CellIndex first, CellIndex last, F f) const {
+    const int i0 = std::max(0, first.x - x0_), i1 = std::min(width_ - 1, last.x - x0_);
+    const int j0 = std::max(0, first.y - y0_), j1 = std::min(height_ - 1, last.y - y0_);
+    for (int j = j0; j <= j1; ++j) {
+      const std::uint8_t* row = hits_.data() + static_cast<std::size_t>(j) * width_;
+      for (int i = i0; i <= i1; ++i) {
+        if (row[i]) f(CellIndex{x0_ + i, y0_ + j}, int(row[i]));
       }
     }
   }
@@ -54,6 +62,7 @@ class CellGrid {
   void cover(CellIndex c);
 
   int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;
+  int covered_ = 0;  ///< cells with hits
   std::vector<std::uint8_t> hits_;
 };
 

@@ -72,6 +72,8 @@ class PlaneTrack {
 
   std::map<KeyframeId, PlaneObservation>& observations() { return observations_; }
   const std::map<KeyframeId, PlaneObservation>& observations() const { return observations_; }
+  /// Whether some of its area or an observation belongs to a keyframe.
+  bool restsOn(KeyframeId keyframe) const { return observations_.count(keyframe) > 0 || patches_.count(keyframe) > 0; }
   /// Moments of all observations in `map`.
   PlaneMoments moments(const CameraPoses& poses) const;
 
@@ -82,11 +84,12 @@ class PlaneTrack {
 
   /// Most of what was covered has been looked through since: the surface is gone, and what is left are the rims that
   /// no view can refute (the foot of a partition has the floor close behind it).
-  bool mostlyGone() const { return lost_ > 2 * cells_.count(1); }
+  bool mostlyGone() const { return lost_ > cells_.count(1); }
 
   // Book-keeping of the mapper.
   bool confirmed = false;
   bool determined = false;       ///< its observations tell its direction; until then the back end does not get them
+  bool refit_due = false;        ///< observations have gone since the last fit
   int keyframes_seen = 0;        ///< keyframes that saw a fair part of it, ever
   int views_seen = 0;            ///< growth frames that did so before it was confirmed, each from another place
   Eigen::Vector3d viewed_from = Eigen::Vector3d::Zero();  ///< camera centre of the last keyframe or view that did
