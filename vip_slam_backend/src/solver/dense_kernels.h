@@ -21,6 +21,7 @@ struct DenseKernels {
   void (*backSubstitute)(const double* A, int n, int c, int ld, double* x);
   /// Adds columns [begin, end) of a child's lower update matrix (leading dimension ldu) to its parent's: row and column
   /// r of a segment's child range go to those of its parent range. `target` is where the parent's row and column 0 are.
+  /// What stands above the diagonal is not kept.
   void (*extendAdd)(double* target, int ld, const double* update, int ldu, const FrontSegment* segments, int count,
                     int begin, int end);
 };

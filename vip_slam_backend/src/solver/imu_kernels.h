@@ -35,8 +35,8 @@ struct ImuKernelArguments {
 };
 
 struct ImuKernels {
-  /// Adds J^T J and J^T r of `count` factors.
-  void (*linearize)(const ImuKernelArguments& a, int count);
+  /// Adds J^T J and J^T r of `count` factors; the sum of r^T r.
+  double (*linearize)(const ImuKernelArguments& a, int count);
   /// Sum of r^T r, whitened.
   double (*cost)(const ImuKernelArguments& a, int count);
 };

@@ -36,7 +36,7 @@ struct NodeSums {
 }  // namespace
 
 // What the rotation's residual needs beside the states: trigonometry, which stays out of the vectors.
-void StructuredSolver::linearizeImu(const BaProblem& problem) {
+double StructuredSolver::linearizeImu(const BaProblem& problem) {
   for (std::size_t k = 0; k < problem.imu.size(); ++k) {
     const Preintegration& p = *problem.imu[k].preintegration;
     double* rows = imu_states_.data() + kImuStateRows * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
@@ -55,10 +55,10 @@ void StructuredSolver::linearizeImu(const BaProblem& problem) {
   ImuKernelArguments a = imuArguments();
   a.values = values_.data();
   a.gradient = full_gradient_.data();
-  imuKernels().linearize(a, static_cast<int>(problem.imu.size()));
+  return imuKernels().linearize(a, static_cast<int>(problem.imu.size()));
 }
 
-void StructuredSolver::linearizePlanes(const BaProblem& problem) {
+double StructuredSolver::linearizePlanes(const BaProblem& problem) {
   const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
   const auto addTriple = [&](const SystemStructure::TriplePlaces& place, int i, int j, int plane,
                              const Eigen::Matrix<double, 15, 15>& H, const Eigen::Matrix<double, 15, 1>& g) {
@@ -74,7 +74,8 @@ void StructuredSolver::linearizePlanes(const BaProblem& problem) {
   HomographyKernelArguments a = homographyArguments();
   a.values = values_.data();
   a.gradient = full_gradient_.data();
-  homographyKernels().linearize(a, static_cast<int>(problem.homographies.size()));
+  double cost = homographyKernels().linearize(a, static_cast<int>(problem.homographies.size()));
+  cost += pointToPlaneKernels().linearize(pointToPlaneArguments(), static_cast<int>(problem.point_to_plane.size()));
   for (std::size_t k = 0; k < problem.homography_pairs.size(); ++k) {
     const BaHomographyPair& f = problem.homography_pairs[k];
     const Vector9d h =
@@ -82,7 +83,9 @@ void StructuredSolver::linearizePlanes(const BaProblem& problem) {
     const Eigen::Matrix<double, 2, 9> C = homographyRows(f.pair);
     const Eigen::Matrix<double, 2, 15> CJ = C * J;
     H.noalias() = CJ.transpose() * CJ;
-    addTriple(structure_.homography_pairs[k], f.i, f.j, f.plane, H, CJ.transpose() * (C * h));
+    const Eigen::Vector2d r = C * h;
+    cost += r.squaredNorm();
+    addTriple(structure_.homography_pairs[k], f.i, f.j, f.plane, H, CJ.transpose() * r);
   }
   PlaneInCameraJacobian Jp;
   Eigen::Matrix<double, 9, 9> Hp;
@@ -91,34 +94,32 @@ void StructuredSolver::linearizePlanes(const BaProblem& problem) {
     sums.add<3>(structure_.plane_node[plane], Hp.bottomRightCorner<3, 3>(), g.tail<3>());
     addBlock<3, 6>(values_.data(), place, Hp.bottomLeftCorner<3, 6>());
   };
-  for (std::size_t k = 0; k < problem.point_to_plane.size(); ++k) {
-    const BaPointToPlane& f = problem.point_to_plane[k];
-    const Eigen::Vector4d u = planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane, &basis_[f.plane], &Jp);
-    // Eigen's general product would cost more than the numbers themselves.
-    const PlaneInCameraJacobian GJ = f.G.lazyProduct(Jp);
-    Hp = Jp.transpose().lazyProduct(GJ);
-    addPair(structure_.point_to_plane[k], f.frame, f.plane, GJ.transpose() * u);
-  }
   for (std::size_t k = 0; k < problem.plane_points.size(); ++k) {
     const BaPlanePoint& f = problem.plane_points[k];
     const Eigen::Vector4d u = planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane, &basis_[f.plane], &Jp);
     const Eigen::Vector4d p = f.weight * f.p_C.homogeneous();
     const Eigen::Matrix<double, 1, 9> row = p.transpose() * Jp;
     Hp.noalias() = row.transpose() * row;
-    addPair(structure_.plane_points[k], f.frame, f.plane, row.transpose() * u.dot(p));
+    const double r = u.dot(p);
+    cost += r * r;
+    addPair(structure_.plane_points[k], f.frame, f.plane, row.transpose() * r);
   }
+  return cost;
 }
 
-void StructuredSolver::linearizePriors(const BaProblem& problem) {
+double StructuredSolver::linearizePriors(const BaProblem& problem) {
+  double cost = 0;
   const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
   for (const BaGauge& f : problem.gauges) {
     Matrix6d J;
     const Vector6d r = gaugeResidual(f.prior, problem.frames[f.frame].state.T_W_I, &J);
+    cost += r.squaredNorm();
     sums.add<6>(structure_.pose_node[f.frame], J.transpose() * J, J.transpose() * r);
   }
   for (const BaMotionPrior& f : problem.motion_priors) {
     const Eigen::Matrix<double, 9, 1> w = motionPriorWeights(f.prior);
     const Eigen::Matrix<double, 9, 1> r = motionPriorResidual(f.prior, problem.frames[f.frame].state);
+    cost += r.squaredNorm();
     sums.add<9>(structure_.motion_node[f.frame], w.cwiseProduct(w).asDiagonal().toDenseMatrix(), w.cwiseProduct(r));
   }
   for (std::size_t p = 0; p < problem.planes.size(); ++p) {
@@ -126,8 +127,10 @@ void StructuredSolver::linearizePriors(const BaProblem& problem) {
     if (!(plane.prior_weight > 0) || plane.kind == PlaneKind::kGeneral) continue;
     Eigen::Matrix<double, 2, 3> J;
     const Eigen::Vector2d r = planePriorResidual(plane.kind, plane.plane, plane.prior_weight, &basis_[p], &J);
+    cost += r.squaredNorm();
     sums.add<3>(structure_.plane_node[p], J.transpose() * J, J.transpose() * r);
   }
+  return cost;
 }
 
 double StructuredSolver::factorCost(const BaProblem& problem) const {

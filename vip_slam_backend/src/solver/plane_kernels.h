@@ -1,4 +1,4 @@
-// Compressed homographies of the structured solver on plain arrays, eight factors at a time.
+// Compressed plane factors of the structured solver on plain arrays, eight factors at a time.
 #pragma once
 
 #include <cstdint>
@@ -25,16 +25,40 @@ struct HomographyKernelArguments {
   const KernelFrame* frames = nullptr;
   const KernelPlane* planes = nullptr;
   const KernelHomography* factors = nullptr;
+  bool shared_mounting = false;       ///< all frames have the same T_I_C
   const double* sums = nullptr;       ///< HomographySums, [batch][24][kKernelLanes]
   double *values = nullptr, *gradient = nullptr;
 };
 
 struct HomographyKernels {
-  void (*linearize)(const HomographyKernelArguments& a, int count);
+  /// Adds J^T G J and J^T G h of `count` factors; the sum of h^T G h.
+  double (*linearize)(const HomographyKernelArguments& a, int count);
   /// Sum of h^T G h.
   double (*cost)(const HomographyKernelArguments& a, int count);
 };
 
 const HomographyKernels& homographyKernels();
+
+struct KernelPointToPlane {
+  std::int32_t frame, plane;
+  bool transposed;
+  std::int64_t place;          ///< offset of the block (plane, pose); -1: none
+};
+
+struct PointToPlaneKernelArguments {
+  const KernelFrame* frames = nullptr;
+  const KernelPlane* planes = nullptr;
+  const KernelPointToPlane* factors = nullptr;
+  bool shared_mounting = false;       ///< all frames have the same T_I_C
+  const double* sums = nullptr;       ///< G as [batch][10][kKernelLanes]: its 3 x 3 (upper triangle by rows), g, s
+  double *values = nullptr, *gradient = nullptr;
+};
+
+struct PointToPlaneKernels {
+  /// Adds J^T G J and J^T G u of `count` factors; the sum of u^T G u.
+  double (*linearize)(const PointToPlaneKernelArguments& a, int count);
+};
+
+const PointToPlaneKernels& pointToPlaneKernels();
 
 }  // namespace vip_slam

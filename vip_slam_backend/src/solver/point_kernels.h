@@ -40,20 +40,21 @@ struct PointKernelArguments {
   double* eliminated = nullptr;                 ///< 8 per frame: W V^-1 g; added to
   int first_position = 0, last_position = 0;    ///< elimination touches blocks whose later frame lies in [first, last)
   double* W = nullptr;                          ///< per observation 3 columns of 8: J_pose^T J_point
-  double* point_inverse = nullptr;              ///< per point 6: damped inverse (xx, xy, xz, yy, yz, zz)
+  double* point_system = nullptr;               ///< per point 6: J_point^T J_point (xx, xy, xz, yy, yz, zz)
   double* point_gradient = nullptr;             ///< per point 3: J_point^T r
   double* point_damping = nullptr;              ///< per point 3: clamp(diag) * inverse_radius
 };
 
 struct PointKernels {
-  /// Points [begin, end): their Jacobians; the elimination with the Jacobians of all; both in one sweep. A block of the
-  /// reduced matrix gets its points in ascending order whichever way, so that the sums are the same to the last bit.
+  /// Points [begin, end): their Jacobians, which do not depend on the radius; the elimination with the Jacobians of all;
+  /// both in one sweep. A block of the reduced matrix gets its points in ascending order whichever way, so that the sums
+  /// are the same to the last bit.
   void (*linearize)(const PointKernelArguments& a, int begin, int end);
   void (*eliminate)(const PointKernelArguments& a, int begin, int end);
   void (*linearizeAndEliminate)(const PointKernelArguments& a, int begin, int end);
   /// Robust cost (not halved).
   double (*cost)(const PointKernelArguments& a, int begin, int end);
-  /// step_p = -V^-1 (g_p + W^T step) per point; `step` per unknown. Returns nothing else.
+  /// step_p = -V^-1 (g_p + W^T step) per point, and its damping; `step` per unknown.
   void (*backSubstitute)(const PointKernelArguments& a, const double* step, double* point_step, int begin, int end);
 };
 

@@ -1,8 +1,8 @@
 // Symbolic part of the block-sparse Cholesky: ordering, elimination tree, fronts.
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
-#include <tuple>
 
 #include <amd.h>
 
@@ -200,6 +200,9 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   }
   Lists neighbours(n);
   pair_offset_.resize(pairs.size());
+  std::vector<int> degree(n, 0);
+  for (const auto& pair : pairs) ++degree[pair.first], ++degree[pair.second];
+  for (int v = 0; v < n; ++v) neighbours[v].reserve(degree[v]);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     neighbours[pairs[k].first].push_back(pairs[k].second);
     neighbours[pairs[k].second].push_back(pairs[k].first);
@@ -207,12 +210,18 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   for (auto& list : neighbours) std::sort(list.begin(), list.end());
   order(neighbours);
   std::vector<int> parent;
-  eliminate(neighbours, position_, &parent);
+  Lists eliminated = eliminate(neighbours, position_, &parent);
   const std::vector<int> post = postorder(parent);
   std::vector<int> renumber(n);
   for (int k = 0; k < n; ++k) renumber[post[k]] = k;
   for (int v = 0; v < n; ++v) position_[v] = renumber[position_[v]];
-  const Lists structure = eliminate(neighbours, position_, &parent);
+  Lists structure(n);  // the same elimination by other numbers
+  for (int k = 0; k < n; ++k) {
+    for (int& p : eliminated[k]) p = renumber[p];
+    std::sort(eliminated[k].begin(), eliminated[k].end());
+    structure[renumber[k]] = std::move(eliminated[k]);
+  }
+  for (int k = 0; k < n; ++k) parent[k] = structure[k].empty() ? -1 : structure[k].front();
   node_at_.resize(n);
   for (int v = 0; v < n; ++v) node_at_[position_[v]] = v;
   const auto sizeAt = [&](int p) { return sizes_[node_at_[p]]; };
@@ -296,29 +305,39 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   placeUpdates();
 
   // Where each block of the matrix goes. The values lie in the order in which the fronts read them.
-  std::vector<std::vector<std::pair<Entry, std::size_t*>>> entries(fronts_.size());
-  const auto place = [&](int later, int earlier, std::size_t* value_offset) {
-    const int f = front_of[earlier];
-    const auto offset = [&](int p) {
-      const auto it = std::lower_bound(rows_of[f].begin(), rows_of[f].end(), p);
-      return row_offset[f][it - rows_of[f].begin()];
-    };
-    entries[f].push_back({{0, offset(later), offset(earlier), sizeAt(later), sizeAt(earlier)}, value_offset});
+  struct Placed {
+    int earlier, later;
+    std::size_t* value_offset;
   };
-  for (int v = 0; v < n; ++v) place(position_[v], position_[v], &diagonal_offset_[v]);
+  std::vector<Placed> placed, ordered(n + pairs.size());
+  placed.reserve(ordered.size());
+  for (int v = 0; v < n; ++v) placed.push_back({position_[v], position_[v], &diagonal_offset_[v]});
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const int a = position_[pairs[k].first], b = position_[pairs[k].second];
-    place(std::max(a, b), std::min(a, b), &pair_offset_[k]);
+    placed.push_back({std::min(a, b), std::max(a, b), &pair_offset_[k]});
   }
-  for (std::size_t f = 0; f < fronts_.size(); ++f) {
-    std::sort(entries[f].begin(), entries[f].end(), [](const auto& a, const auto& b) {
-      return std::tie(a.first.column, a.first.row) < std::tie(b.first.column, b.first.row);
-    });
-    for (auto& entry : entries[f]) {
-      entry.first.offset = *entry.second = value_count_;
-      value_count_ += blockValues(entry.first.rows, entry.first.columns);
-      fronts_[f].entries.push_back(entry.first);
+  // By column, then by row: two rounds of buckets, the last key first.
+  std::vector<int> begin;
+  const auto sortBy = [&](int Placed::*key) {
+    begin.assign(n + 1, 0);
+    for (const Placed& b : placed) ++begin[b.*key + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    for (const Placed& b : placed) ordered[begin[b.*key]++] = b;
+    placed.swap(ordered);
+  };
+  sortBy(&Placed::later);
+  sortBy(&Placed::earlier);
+  int front = -1;
+  for (const Placed& b : placed) {
+    if (front_of[b.earlier] != front) {
+      front = front_of[b.earlier];
+      for (std::size_t k = 0; k < rows_of[front].size(); ++k) offset_in_front[rows_of[front][k]] = row_offset[front][k];
     }
+    const Entry entry{value_count_, offset_in_front[b.later], offset_in_front[b.earlier], sizeAt(b.later),
+                      sizeAt(b.earlier)};
+    *b.value_offset = value_count_;
+    value_count_ += blockValues(entry.rows, entry.columns);
+    fronts_[front].entries.push_back(entry);
   }
   factor_.resize(factor_size_);
   work_.assign(dimension_ + kKernelPadding, 0.0);

@@ -33,8 +33,12 @@ void StructuredSolver::prepare(const BaProblem& problem) {
   point_step_.resize(points_.size());
   point_gradient_.resize(points_.size());
   point_damping_.resize(points_.size());
-  point_inverse_.resize(2 * points_.size());
+  point_system_.resize(2 * points_.size());
+  shared_mounting_ = true;
+  for (const BaFrame& f : problem.frames)
+    shared_mounting_ &= f.T_I_C.R() == problem.frames[0].T_I_C.R() && f.T_I_C.t() == problem.frames[0].T_I_C.t();
   packHomographies(problem);
+  packPointToPlane(problem);
   packImu(problem);
   frame_sums_.resize(kFrameSums * problem.frames.size());
   eliminated_.resize(8 * problem.frames.size());
@@ -52,6 +56,21 @@ void StructuredSolver::packHomographies(const BaProblem& problem) {
                         place.ji.offset, place.pi.offset, place.pj.offset};
     double* sums = homography_sums_.data() + 24 * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
     for (int s = 0; s < 24; ++s) sums[kKernelLanes * s] = f.sums[s];
+  }
+}
+
+void StructuredSolver::packPointToPlane(const BaProblem& problem) {
+  const std::size_t count = problem.point_to_plane.size();
+  point_to_plane_.resize((count + kKernelLanes - 1) / kKernelLanes * kKernelLanes);
+  point_to_plane_sums_.resize(10 * point_to_plane_.size());
+  for (std::size_t k = 0; k < point_to_plane_.size(); ++k) {
+    const BaPointToPlane& f = problem.point_to_plane[std::min(k, count - 1)];
+    const BlockPlace& place = structure_.point_to_plane[std::min(k, count - 1)];
+    point_to_plane_[k] = {f.frame, f.plane, place.transposed, place.offset};
+    double* sums = point_to_plane_sums_.data() + 10 * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
+    for (int r = 0; r < 3; ++r)
+      for (int c = r; c < 3; ++c, sums += kKernelLanes) *sums = f.G(r, c);
+    for (int r = 0; r < 4; ++r, sums += kKernelLanes) *sums = f.G(r, 3);
   }
 }
 
@@ -165,7 +184,20 @@ HomographyKernelArguments StructuredSolver::homographyArguments() const {
   a.frames = frames_.data();
   a.planes = planes_.data();
   a.factors = homographies_.data();
+  a.shared_mounting = shared_mounting_;
   a.sums = homography_sums_.data();
+  return a;
+}
+
+PointToPlaneKernelArguments StructuredSolver::pointToPlaneArguments() {
+  PointToPlaneKernelArguments a;
+  a.frames = frames_.data();
+  a.planes = planes_.data();
+  a.factors = point_to_plane_.data();
+  a.shared_mounting = shared_mounting_;
+  a.sums = point_to_plane_sums_.data();
+  a.values = values_.data();
+  a.gradient = full_gradient_.data();
   return a;
 }
 
@@ -185,7 +217,7 @@ PointKernelArguments StructuredSolver::arguments(const BaProblem& problem, doubl
   a.eliminated = eliminated_.data();
   a.last_position = structure_.cholesky.nodes();
   a.W = W_.data();
-  a.point_inverse = point_inverse_.data();
+  a.point_system = point_system_.data();
   a.point_gradient = point_gradient_.data();
   a.point_damping = point_damping_.data();
   return a;

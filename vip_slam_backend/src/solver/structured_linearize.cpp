@@ -14,31 +14,42 @@ constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;
 // Whatever the number of threads, each number of the result is the same sum in the same order: what a thread adds to is
 // either its own (the points' sums over frames) or a part of the matrix that no other touches.
 void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker* worker) {
-  if (!loaded_) loadFrames(problem);
-  values_.fillZero();
-  std::fill(full_gradient_.begin(), full_gradient_.end(), 0.0);
-  frame_sums_.fillZero();
+  if (!loaded_) {
+    loadFrames(problem);
+    ahead_ = false;
+  }
   eliminated_.fillZero();
   const PointKernels& kernels = pointKernels();
   const int points = static_cast<int>(problem.points.size());
-  PointKernelArguments a = arguments(problem, radius);
-  const auto factors = [&] {
-    linearizeImu(problem);
-    linearizePlanes(problem);
-    linearizePriors(problem);
-    storeDiagonal();
-  };
-  if (worker->helps() && points > 0) {
-    worker->both(factors, [&] { kernels.linearize(a, 0, points); });
+  const PointKernelArguments a = arguments(problem, radius);
+  if (worker->helps()) {
+    if (!ahead_) worker->both([&] { linearizeFactors(problem); }, [&] { linearizePoints(a); });
     PointKernelArguments lower = a, upper = a;
     lower.last_position = upper.first_position = structure_.half_position;
     worker->both([&] { kernels.eliminate(lower, 0, points); }, [&] { kernels.eliminate(upper, 0, points); });
   } else {
-    factors();
+    if (!ahead_) linearizeFactors(problem);
+    frame_sums_.fillZero();
     kernels.linearizeAndEliminate(a, 0, points);
   }
+  ahead_ = false;
   addPoints();
   damp(radius);
+}
+
+double StructuredSolver::linearizeFactors(const BaProblem& problem) {
+  values_.fillZero();
+  std::fill(full_gradient_.begin(), full_gradient_.end(), 0.0);
+  double cost = linearizeImu(problem);
+  cost += linearizePlanes(problem);
+  cost += linearizePriors(problem);
+  storeDiagonal();
+  return cost;
+}
+
+void StructuredSolver::linearizePoints(const PointKernelArguments& a) {
+  frame_sums_.fillZero();
+  pointKernels().linearize(a, 0, static_cast<int>(structure_.point_at.size()));
 }
 
 void StructuredSolver::storeDiagonal() {

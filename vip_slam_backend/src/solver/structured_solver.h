@@ -35,22 +35,27 @@ class StructuredSolver : public BaSolver {
   // structured_arrays.cpp
   void prepare(const BaProblem& problem);
   void packHomographies(const BaProblem& problem);
+  void packPointToPlane(const BaProblem& problem);
   void packImu(const BaProblem& problem);
   void loadFrames(const BaProblem& problem);
   void loadImu(const BaProblem& problem);
   PointKernelArguments arguments(const BaProblem& problem, double radius);
   HomographyKernelArguments homographyArguments() const;
+  PointToPlaneKernelArguments pointToPlaneArguments();
   ImuKernelArguments imuArguments() const;
 
   // structured_linearize.cpp
   void linearize(const BaProblem& problem, double radius, Worker* worker);
+  double linearizeFactors(const BaProblem& problem);
+  void linearizePoints(const PointKernelArguments& a);
   void storeDiagonal();
   void addPoints();
   void damp(double radius);
   void forEachNode(const std::function<void(int size, int unknown, double* block)>& f);
 
-  double cost(const BaProblem& problem, Worker* worker);
-  bool solveStep(Worker* worker);
+  /// `ahead`: what the next linearisation needs of the same state and does not depend on the radius is done on the way.
+  double cost(const BaProblem& problem, bool ahead, Worker* worker);
+  bool solveStep(const BaProblem& problem, double radius, Worker* worker);
   /// Predicted decrease of the cost by the present step.
   double modelDecrease() const;
   struct State {
@@ -61,25 +66,29 @@ class StructuredSolver : public BaSolver {
   void apply(const BaProblem& from, State* to) const;
   double stepNorm() const;
 
-  // linearize_factors.cpp
-  void linearizeImu(const BaProblem& problem);
-  void linearizePlanes(const BaProblem& problem);
-  void linearizePriors(const BaProblem& problem);
+  // linearize_factors.cpp; the cost of the factors (not halved)
+  double linearizeImu(const BaProblem& problem);
+  double linearizePlanes(const BaProblem& problem);
+  double linearizePriors(const BaProblem& problem);
   double factorCost(const BaProblem& problem) const;
 
   SystemStructure structure_;
   bool loaded_ = false;  ///< the arrays below hold the present variables
+  bool ahead_ = false;   ///< the matrix holds the factors at the present variables, and nothing else
+  double ahead_ms_ = 0;  ///< what that took, all in all
   std::vector<KernelFrame> frames_;
   std::vector<FrameGeometry> geometry_;
   std::vector<Eigen::Matrix<double, 3, 2>> basis_;
   std::vector<BaObservation> observations_;
   std::vector<KernelPlane> planes_;
   std::vector<KernelHomography> homographies_;
-  std::vector<double> homography_sums_;
+  bool shared_mounting_ = false;  ///< all frames have the same T_I_C
+  std::vector<KernelPointToPlane> point_to_plane_;
+  std::vector<double> homography_sums_, point_to_plane_sums_;
   std::vector<KernelImu> imu_;
   std::vector<double> imu_constants_, imu_states_;
   KernelArray values_, W_, frame_sums_, eliminated_;
-  std::vector<double> points_, gradient_, full_gradient_, diagonal_, damping_, point_inverse_, point_gradient_,
+  std::vector<double> points_, gradient_, full_gradient_, diagonal_, damping_, point_system_, point_gradient_,
       point_damping_, step_, point_step_;
 };
 

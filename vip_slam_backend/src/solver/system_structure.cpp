@@ -4,7 +4,6 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-#include <unordered_map>
 
 namespace vip_slam {
 namespace {
@@ -19,6 +18,33 @@ class Hash {
 
  private:
   std::uint64_t value_ = 0x2545f4914f6cdd1dull;
+};
+
+// Pairs that some factor asks for, each once, in ascending order of (second, first); and for every request its pair.
+struct Requests {
+  std::vector<std::pair<int, int>> wanted;  // first < second
+  std::vector<int> pair_of;
+
+  // Buckets and marks instead of sorting: requests outnumber the pairs.
+  std::vector<std::pair<int, int>> unite(int nodes) {
+    std::vector<int> begin(nodes + 1, 0), at(wanted.size()), last(nodes, -1), index(nodes, 0);
+    for (const auto& w : wanted) ++begin[w.second + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    std::vector<int> next(begin.begin(), begin.end() - 1);
+    for (std::size_t r = 0; r < wanted.size(); ++r) at[next[wanted[r].second]++] = static_cast<int>(r);
+    std::vector<std::pair<int, int>> pairs;
+    pair_of.resize(wanted.size());
+    for (const int r : at) {
+      const auto& w = wanted[r];
+      if (last[w.first] != w.second) {
+        last[w.first] = w.second;
+        index[w.first] = static_cast<int>(pairs.size());
+        pairs.push_back(w);
+      }
+      pair_of[r] = index[w.first];
+    }
+    return pairs;
+  }
 };
 
 }  // namespace
@@ -47,28 +73,32 @@ std::uint64_t SystemStructure::signature(const BaProblem& problem) const {
 
 void SystemStructure::orderPoints(const BaProblem& problem) {
   const int points = static_cast<int>(problem.points.size());
-  std::vector<int> oldest(points, 0);
+  const int frames = static_cast<int>(problem.frames.size());
+  std::vector<int> oldest(points, 0), begin(frames + 1, 0);
   for (int p = 0; p < points; ++p) {
     const BaPoint& point = problem.points[p];
-    for (int o = point.first; o < point.first + point.count; ++o) {
-      const int frame = problem.observations[o].frame;
-      oldest[p] = o == point.first ? frame : std::min(oldest[p], frame);
-    }
+    oldest[p] = problem.observations[point.first].frame;
+    for (int o = point.first; o < point.first + point.count; ++o)
+      oldest[p] = std::min(oldest[p], problem.observations[o].frame);
+    ++begin[oldest[p] + 1];
   }
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
   point_at.resize(points);
-  std::iota(point_at.begin(), point_at.end(), 0);
-  std::stable_sort(point_at.begin(), point_at.end(), [&](int a, int b) { return oldest[a] < oldest[b]; });
+  for (int p = 0; p < points; ++p) point_at[begin[oldest[p]]++] = p;
 
-  const auto rank = [&](int o) {
-    const int node = pose_node[problem.observations[o].frame];
-    return node < 0 ? -1 : cholesky.position(node);
-  };
+  std::vector<std::int64_t> rank(frames), views;  // a view: its rank, then its index
+  for (int f = 0; f < frames; ++f)
+    rank[f] = (pose_node[f] < 0 ? 0 : std::int64_t{1} + cholesky.position(pose_node[f])) << 32;
   sorted.clear();
+  sorted.reserve(problem.observations.size());
   first.assign(1, 0);
   for (const int p : point_at) {
     const BaPoint& point = problem.points[p];
-    for (int o = point.first; o < point.first + point.count; ++o) sorted.push_back(o);
-    std::stable_sort(sorted.begin() + first.back(), sorted.end(), [&](int a, int b) { return rank(a) < rank(b); });
+    views.clear();
+    for (int o = point.first; o < point.first + point.count; ++o)
+      views.push_back(rank[problem.observations[o].frame] + o);
+    std::sort(views.begin(), views.end());
+    for (const std::int64_t v : views) sorted.push_back(static_cast<int>(v & 0xffffffff));
     first.push_back(static_cast<int>(sorted.size()));
   }
 }
@@ -109,16 +139,16 @@ bool SystemStructure::update(const BaProblem& problem) {
   for (std::size_t p = 0; p < problem.planes.size(); ++p)
     plane_node[p] = static_cast<int>(sizes.size()), sizes.push_back(3);
 
-  // Pairs: poses among each other in a bit table, the few others in a list.
+  // Pairs: poses among each other in a table, the few others as requests.
   std::vector<char> linked(static_cast<std::size_t>(poses) * poses, 0);
-  std::vector<std::pair<int, int>> pairs;
+  Requests requests;
   const auto link = [&](int a, int b) {
-    if (a < 0 || b < 0 || a == b) return;
+    if (a < 0 || b < 0) return;
     if (a > b) std::swap(a, b);
     if (b < poses)
       linked[static_cast<std::size_t>(a) * poses + b] = 1;
     else
-      pairs.emplace_back(a, b);
+      requests.wanted.emplace_back(a, b);
   };
   std::vector<int> seen;
   for (const BaPoint& p : problem.points) {
@@ -141,16 +171,15 @@ bool SystemStructure::update(const BaProblem& problem) {
       for (int b = 0; b < a; ++b) link(nodes[a], nodes[b]);
   }
   const auto linkTriple = [&](int i, int j, int plane) {
-    link(pose_node[i], pose_node[j]);
-    link(pose_node[i], plane_node[plane]);
-    link(pose_node[j], plane_node[plane]);
+    link(pose_node[j], pose_node[i]);
+    link(plane_node[plane], pose_node[i]);
+    link(plane_node[plane], pose_node[j]);
   };
   for (const BaHomography& f : problem.homographies) linkTriple(f.i, f.j, f.plane);
   for (const BaHomographyPair& f : problem.homography_pairs) linkTriple(f.i, f.j, f.plane);
-  for (const BaPointToPlane& f : problem.point_to_plane) link(pose_node[f.frame], plane_node[f.plane]);
-  for (const BaPlanePoint& f : problem.plane_points) link(pose_node[f.frame], plane_node[f.plane]);
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  for (const BaPointToPlane& f : problem.point_to_plane) link(plane_node[f.plane], pose_node[f.frame]);
+  for (const BaPlanePoint& f : problem.plane_points) link(plane_node[f.plane], pose_node[f.frame]);
+  std::vector<std::pair<int, int>> pairs = requests.unite(static_cast<int>(sizes.size()));
   const std::size_t others = pairs.size();
   for (int a = 0; a < poses; ++a)
     for (int b = a + 1; b < poses; ++b)
@@ -169,9 +198,9 @@ bool SystemStructure::update(const BaProblem& problem) {
     pair_offset[static_cast<std::size_t>(frame_of[earlier]) * frames + frame_of[later]] =
         static_cast<std::uint32_t>(cholesky.pairOffset(k));
   }
-  std::vector<std::pair<std::pair<int, int>, std::size_t>> other_offsets;
-  for (std::size_t k = 0; k < others; ++k) other_offsets.push_back({pairs[k], cholesky.pairOffset(k)});
 
+  // The places are asked for in the order of the links above.
+  std::size_t request = 0;
   const auto placeOf = [&](int row, int column) {
     BlockPlace place;
     if (row < 0 || column < 0) return place;
@@ -180,10 +209,7 @@ bool SystemStructure::update(const BaProblem& problem) {
       const int later = place.transposed ? column : row, earlier = place.transposed ? row : column;
       place.offset = pair_offset[static_cast<std::size_t>(frame_of[earlier]) * frames + frame_of[later]];
     } else {
-      const std::pair<int, int> key(std::min(row, column), std::max(row, column));
-      const auto it = std::lower_bound(other_offsets.begin(), other_offsets.end(), key,
-                                       [](const auto& entry, const auto& k) { return entry.first < k; });
-      place.offset = static_cast<std::int64_t>(it->second);
+      place.offset = static_cast<std::int64_t>(cholesky.pairOffset(requests.pair_of[request++]));
     }
     return place;
   };
@@ -195,8 +221,11 @@ bool SystemStructure::update(const BaProblem& problem) {
       for (int b = 0; b < a; ++b) imu[k].place[a][b] = placeOf(nodes[a], nodes[b]);
   }
   const auto placeTriple = [&](int i, int j, int plane) {
-    return TriplePlaces{placeOf(pose_node[j], pose_node[i]), placeOf(plane_node[plane], pose_node[i]),
-                        placeOf(plane_node[plane], pose_node[j])};
+    TriplePlaces places;  // one after the other: the order counts
+    places.ji = placeOf(pose_node[j], pose_node[i]);
+    places.pi = placeOf(plane_node[plane], pose_node[i]);
+    places.pj = placeOf(plane_node[plane], pose_node[j]);
+    return places;
   };
   homographies.clear();
   for (const BaHomography& f : problem.homographies) homographies.push_back(placeTriple(f.i, f.j, f.plane));

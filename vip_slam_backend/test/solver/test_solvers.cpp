@@ -98,6 +98,33 @@ TEST(Solvers, SameIteratesAndMinimum) {
   }
 }
 
+// The trial's factors are linearised with its cost; when the trial is refused, nothing of that may stay: the next step is
+// that of a solver which starts there.
+TEST(Solvers, RefusedStepsLeaveNothingBehind) {
+  for (const Named& v : variants())
+    for (const int threads : {1, 2}) {
+      BaProblem start = makeSyntheticProblem(v.options);
+      for (std::size_t k = 0; k < start.frames.size(); ++k) {
+        NavState& state = start.frames[k].state;
+        state.T_W_I = state.T_W_I.boxplus((Vector6d() << 0, 0, k % 2 ? 1 : -1, 0, 0, 0).finished());
+      }
+      SolverOptions options = exact(6);
+      options.initial_radius = 1e8;
+      options.threads = threads;
+      BaProblem a = start, b = start;
+      const SolverSummary whole = makeSolver("structured")->solve(a, options);
+      int refused = 0;
+      while (refused < 5 && whole.log[refused].accepted) ++refused;
+      ASSERT_LT(refused, 5) << v.name;
+      options.max_iterations = refused;
+      makeSolver("structured")->solve(b, options);
+      options.max_iterations = 1;
+      options.initial_radius = whole.log[refused + 1].radius;
+      const double expected = makeSolver("structured")->solve(b, options).log[0].cost;
+      EXPECT_NEAR(whole.log[refused + 1].cost, expected, 1e-6 * expected) << v.name << ", threads: " << threads;
+    }
+}
+
 TEST(Solvers, FindTheTruthWithoutNoise) {
   for (const Named& v : variants()) {
     SyntheticOptions options = v.options;

@@ -1,0 +1,15 @@
+#include "instruction_set.h"
+#include "plane_kernels.h"
+
+namespace vip_slam {
+
+#define KERNEL_BODY "point_to_plane_body.inc"
+#define KERNEL_TABLE PointToPlaneKernels
+#include "kernel_builds.inc"
+
+const PointToPlaneKernels& pointToPlaneKernels() {
+  static const PointToPlaneKernels& chosen = kernelsOf(fastestInstructionSet());
+  return chosen;
+}
+
+}  // namespace vip_slam
