@@ -19,7 +19,7 @@ struct MeasurementOptions {
   double max_pixel_sigma = 1.5;
   double gate_sigma = 0.4;
   double matched_pixel_sigma = 1.0;
-  double between_tracks_sigma = 0.55;
+  double between_tracks_sigma = 0.45;
   double huber = 1.0;
   double depth_huber = 2.0;
   double depth_sigma_scale = 1.0;
@@ -35,7 +35,7 @@ struct MeasurementOptions {
     v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0,
             "one sigma of an untracked ORB corner, px per octave");
     v.field("between_tracks_sigma", between_tracks_sigma, 0.01, 10.0,
-            "how far the points are apart that two tracks of one landmark follow, px");
+            "how far a track's corner lies beside the point its landmark's other tracks show, px where it began");
     v.field("huber", huber, 0.5, 20.0, "reprojection residuals above this many sigmas weigh less");
     v.field("depth_huber", depth_huber, 0.5, 20.0, "depth residuals above this many sigmas weigh less");
     v.field("depth_sigma_scale", depth_sigma_scale, 0.1, 20.0, "factor on the depth sigma given by the front end");
@@ -52,6 +52,7 @@ struct LocalBaOptions {
   double max_seconds = 0.2;
   int max_fixed_keyframes = 40;
   bool shared_hosts = true;
+  bool middle_hosts = true;
 
   void visit(OptionVisitor& v) {
     v.field("window", window, 3, 100, "newest keyframes that are optimised");
@@ -60,6 +61,8 @@ struct LocalBaOptions {
     v.field("max_fixed_keyframes", max_fixed_keyframes, 0, 1000, "older keyframes that hold the window's landmarks");
     v.field("shared_hosts", shared_hosts,
             "few keyframes host the homographies of many plane points, instead of first views");
+    v.field("middle_hosts", middle_hosts,
+            "shared hosts see their points in the middle of the points' tracks: more hosts, less of their noise");
   }
 };
 
@@ -68,6 +71,7 @@ struct GlobalBaOptions {
   double max_seconds = 2.0;
   bool at_end = true;
   bool shared_hosts = true;
+  bool middle_hosts = true;
 
   void visit(OptionVisitor& v) {
     v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
@@ -75,6 +79,8 @@ struct GlobalBaOptions {
     v.field("at_end", at_end, "run one at the end of the data");
     v.field("shared_hosts", shared_hosts,
             "few keyframes host the homographies of many plane points, instead of first views");
+    v.field("middle_hosts", middle_hosts,
+            "shared hosts see their points in the middle of the points' tracks: more hosts, less of their noise");
   }
 };
 

@@ -39,6 +39,7 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
     const ScopedTimer build_timer(log, "backend.lba_build", t);
     BuilderSettings local = settings;
     local.shared_hosts = options.local_ba.shared_hosts;
+    local.middle_hosts = options.local_ba.middle_hosts;
     built = buildProblem(map, localScope(map, options.local_ba), local);
   }
   SolverOptions solver_options;
@@ -134,6 +135,7 @@ GbaJob BackEnd::Impl::makeGlobalJob() const {
   problem->map = std::make_shared<const Map>(map);
   problem->settings = settings;
   problem->settings.shared_hosts = options.global_ba.shared_hosts;
+  problem->settings.middle_hosts = options.global_ba.middle_hosts;
   problem->options = options.global_ba;
   problem->solver = options.solver;
   problem->noise = sensor.imu_noise;

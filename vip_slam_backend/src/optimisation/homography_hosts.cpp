@@ -1,5 +1,6 @@
 #include "homography_hosts.h"
 
+#include <algorithm>
 #include <cmath>
 #include <queue>
 
@@ -63,11 +64,23 @@ bool seesWell(const SeenPlane& plane, const Eigen::Vector2f& xy) {
          -plane.distance / incidence >= kMinPlaneDepth;
 }
 
+// Takes the first and the last third of a track's views out of those that may host it.
+void leaveMiddle(const LandmarkViews& views, int landmark, std::vector<char>* good) {
+  const int first = views.first(landmark), end = first + static_cast<int>(views.end(landmark) - views.begin(landmark));
+  const int count = static_cast<int>(std::count(good->begin() + first, good->begin() + end, 1));
+  const int outside = (count - 1) / 3;
+  for (int v = first, k = 0; v < end; ++v) {
+    if (!(*good)[v]) continue;
+    if (k < outside || k >= count - outside) (*good)[v] = 0;
+    ++k;
+  }
+}
+
 }  // namespace
 
 std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>& plane,
                              const std::vector<BaPlane>& planes, const std::vector<FrameGeometry>& geometry,
-                             bool shared) {
+                             bool shared, bool middle) {
   std::vector<int> hosts(views.size(), -1);
   std::vector<char> good(views.viewCount(), 0);
   std::vector<int> on_plane;
@@ -87,6 +100,7 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
       good[views.first(l) + view] = 1;
       if (hosts[l] < 0 && !shared) hosts[l] = view;
     }
+    if (shared && middle) leaveMiddle(views, l, &good);
   }
   if (shared) shareHosts(views, on_plane, good, static_cast<int>(geometry.size()), &hosts);
   return hosts;

@@ -13,9 +13,10 @@ namespace vip_slam {
 /// what the others are compared with.
 /// The first such view; with `shared`, the frame that could host most of the landmarks still without host becomes
 /// theirs, whichever plane they are on, and so on: few hosts, so that few pairs of frames share a factor and the system
-/// is sparse.
+/// is sparse. `middle`: only views from the middle of its track may host a landmark then. The host's noise is in all of
+/// its pairs; with views before and after it, what it does to the motion cancels.
 std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>& plane,
                              const std::vector<BaPlane>& planes, const std::vector<FrameGeometry>& geometry,
-                             bool shared);
+                             bool shared, bool middle);
 
 }  // namespace vip_slam

@@ -1,6 +1,7 @@
 #include "landmark_views.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace vip_slam {
 namespace {
@@ -10,6 +11,26 @@ struct TrackOfLandmark {
   LandmarkId id;
   int views;
 };
+
+constexpr double kLeastDepth = 0.05, kMostApart = 4.0;
+
+double depthIn(const Map& map, KeyframeId keyframe, const Eigen::Vector3d& p_W) {
+  const SE3 T_W_C = map.keyframe(keyframe).T_W_C();
+  return std::max(kLeastDepth, T_W_C.R().col(2).dot(p_W - T_W_C.t()));
+}
+
+// Depth of a landmark where one of its tracks began, as far as the map knows.
+double firstDepth(const Map& map, const MapLandmark& landmark, LandmarkId track) {
+  for (const MapObservation& o : landmark.observations)
+    if (map.feature(o).id == track) return depthIn(map, o.keyframe, landmark.p_W);
+  return kLeastDepth;
+}
+
+// See LandmarkView::apart.
+double cornersApart(const Map& map, const MapLandmark& landmark, LandmarkId a, LandmarkId b, KeyframeId here) {
+  const double depth = depthIn(map, here, landmark.p_W);
+  return std::min(kMostApart, std::hypot(firstDepth(map, landmark, a), firstDepth(map, landmark, b)) / depth);
+}
 
 std::vector<TrackOfLandmark> tracksOf(const std::vector<LandmarkView>& views) {
   std::vector<TrackOfLandmark> tracks;
@@ -62,12 +83,13 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
       const int frame = frame_of[o.keyframe - lowest];
       if (frame >= 0) seen.push_back({frame, true, o.feature, features[frame] + o.feature});
     }
-    addPoints(*landmark, seen);
+    addPoints(map, *landmark, keyframes, seen);
   }
   first_.push_back(viewCount());
 }
 
-void LandmarkViews::addPoints(const MapLandmark& landmark, std::vector<LandmarkView>& seen) {
+void LandmarkViews::addPoints(const Map& map, const MapLandmark& landmark, const std::vector<KeyframeId>& keyframes,
+                              std::vector<LandmarkView>& seen) {
   const std::vector<TrackOfLandmark> tracks = tracksOf(seen);
   const auto longest = std::max_element(tracks.begin(), tracks.end(),
                                         [](const auto& a, const auto& b) { return a.views < b.views; });
@@ -80,7 +102,9 @@ void LandmarkViews::addPoints(const MapLandmark& landmark, std::vector<LandmarkV
     const auto track =
         std::find_if(tracks.begin(), tracks.end(), [&view](const auto& t) { return t.id == view.feature->id; });
     view.own_track = track != tracks.end() && track == longest;
-    if (view.own_track || track == tracks.end() || until_tie[track - tracks.begin()]-- == 0) views_.push_back(view);
+    const bool tie = !view.own_track && track != tracks.end() && until_tie[track - tracks.begin()]-- == 0;
+    if (tie) view.apart = cornersApart(map, landmark, longest->id, view.feature->id, keyframes[view.frame]);
+    if (view.own_track || track == tracks.end() || tie) views_.push_back(view);
   }
   for (auto track = tracks.begin(); track != tracks.end(); ++track) {
     if (track == longest || track->views < 2) continue;
@@ -89,6 +113,7 @@ void LandmarkViews::addPoints(const MapLandmark& landmark, std::vector<LandmarkV
     for (LandmarkView& view : seen) {
       if (view.feature->id != track->id) continue;
       view.own_track = true;
+      view.apart = 1;
       views_.push_back(view);
     }
   }

@@ -3,8 +3,8 @@
 //
 // A landmark that was found again is known by several tracks. Within a track every view matches one reference patch,
 // and its error is constant to a few hundredths of a pixel; another track began at a corner detected anew, half a pixel
-// beside the first. So each track becomes a point of its own, and one view of it, as uncertain as that, ties it to the
-// landmark's longest track.
+// of that image beside the first. So each track becomes a point of its own, and one view of it, as uncertain as that,
+// ties it to the landmark's longest track.
 #pragma once
 
 #include <unordered_map>
@@ -19,6 +19,9 @@ struct LandmarkView {
   bool own_track = true;            ///< false: of another track than the point, or a corner that is not tracked
   std::uint32_t feature_index = 0;  ///< in the keyframe
   const Feature* feature = nullptr;
+  /// Of the view that ties another track to the point: how far apart the corners of the two tracks are here, as a factor
+  /// on the error of one where it was detected. What is half a pixel from afar is more from near by.
+  double apart = 1;
 };
 
 class LandmarkViews {
@@ -38,7 +41,8 @@ class LandmarkViews {
   int viewCount() const { return static_cast<int>(views_.size()); }
 
  private:
-  void addPoints(const MapLandmark& landmark, std::vector<LandmarkView>& seen);
+  void addPoints(const Map& map, const MapLandmark& landmark, const std::vector<KeyframeId>& keyframes,
+                 std::vector<LandmarkView>& seen);
 
   std::vector<const MapLandmark*> points_;
   std::vector<int> first_;

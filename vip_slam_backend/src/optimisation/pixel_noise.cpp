@@ -17,7 +17,7 @@ double PixelNoise::sigma(const LandmarkView& view) const {
   const Feature& feature = *view.feature;
   if (feature.id == kNoLandmark) return matched_ * std::pow(1.2, feature.octave);  // found by its descriptor
   const double tracked = std::clamp(feature.pixel_sigma / focal_, least_, most_);
-  return view.own_track ? tracked : std::hypot(tracked, between_tracks_);
+  return view.own_track ? tracked : std::hypot(tracked, view.apart * between_tracks_);
 }
 
 }  // namespace vip_slam

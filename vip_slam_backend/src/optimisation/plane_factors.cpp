@@ -17,6 +17,9 @@ namespace {
 // cent by several times that: a loss that forgets the far ones, and the sigma of the others.
 constexpr double kCore = 0.6, kTail = 3.0;
 
+// How many squared errors of the expected size a track is believed to have shown before its own are counted.
+constexpr double kTrackFreedom = 4.0;
+
 bool slides(const LandmarkView& view) { return view.own_track && view.feature->pixel_sigma > kSlidingPixelSigma; }
 
 }  // namespace
@@ -63,7 +66,8 @@ std::vector<char> PlaneFactorBuilder::addHomographies(const LandmarkViews& views
     if (std::abs(built_->problem.planes[found->second].plane.signedDistance(landmark.p_W)) <= 0.1)
       plane[l] = found->second;
   }
-  const std::vector<int> hosts = chooseHosts(views, plane, built_->problem.planes, geometry_, settings_.shared_hosts);
+  const std::vector<int> hosts = chooseHosts(views, plane, built_->problem.planes, geometry_, settings_.shared_hosts,
+                                             settings_.middle_hosts);
   // Group by group of a plane and a host, so that what the pairs of a group share is computed once.
   struct Member {
     int plane, host, landmark;
@@ -141,11 +145,12 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
       continue;
     }
     const double scale = options.huber > 0 && v->own_track ? kCore : 1.0;
-    const double tail = redescendingScale(error / (scale * scale * variance), kTail * options.huber);
-    const double weight = tail / (scale * std::sqrt(variance) * rho);
-    pairs_.push_back({place, {xy_i, xy_j, weight}});
+    const double squared = error / (scale * scale * variance);
+    const double weight = redescendingScale(squared, kTail * options.huber) / (scale * std::sqrt(variance) * rho);
+    pairs_.push_back({place, {xy_i, xy_j, weight}, v->own_track, squared});
   }
   if (tried == 0 || 2 * refused > tried) return false;
+  if (options.huber > 0) weighTrack();
   for (const PairOfObserver& p : pairs_) {
     Observer& observer = (*observers)[p.observer];
     ++observer.pairs;
@@ -155,6 +160,21 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
       addHomographyPair(p.pair, &observer.sums);
   }
   return true;
+}
+
+// What is wrong with a track is wrong with most of its pairs: the patch slides, shows a rim, or lies beside the plane.
+// So its variance is a variable of its own with a prior, which makes its errors jointly Student's t.
+void PlaneFactorBuilder::weighTrack() {
+  double expected = kTrackFreedom, found = kTrackFreedom;
+  for (const PairOfObserver& p : pairs_) {
+    if (!p.own_track) continue;
+    expected += 2;
+    found += p.error;
+  }
+  if (found <= expected) return;
+  const double factor = std::sqrt(expected / found);
+  for (PairOfObserver& p : pairs_)
+    if (p.own_track) p.pair.weight *= factor;
 }
 
 void PlaneFactorBuilder::storeGroup(int host, int plane, std::vector<Observer>* observers, std::vector<int>* slot) {

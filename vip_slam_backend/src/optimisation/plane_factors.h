@@ -45,7 +45,11 @@ class PlaneFactorBuilder {
   struct PairOfObserver {
     int observer;
     HomographyPair pair;
+    bool own_track;  // of the host's
+    double error;    // squared, in sigmas
   };
+  /// A track whose pairs disagree more than they should counts for less altogether.
+  void weighTrack();
   PixelNoise noise_;
   std::vector<PairOfObserver> pairs_;  // of the landmark at hand
   BuiltProblem* built_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include "vip_slam_backend/optimisation/problem_builder.h"
 #include "vip_slam_backend/solver/ba_solver.h"
@@ -123,6 +124,23 @@ TEST(PlaneFactors, SharedHostsGiveFewerFactors) {
   EXPECT_EQ(shared, std::size_t(kKeyframes - 1));  // one keyframe hosts all
 }
 
+// Of eight views the first two and the last two host nothing, in the second track of a landmark neither.
+TEST(PlaneFactors, HostsComeFromTheMiddleOfATrack) {
+  Wall wall;
+  for (int k = 4; k < kKeyframes; ++k) wall.track(k, 5, 900);  // views 0 to 3 and 4 to 7
+  wall.settings.shared_hosts = true;
+  const auto hosts = [&wall](bool middle) {
+    wall.settings.middle_hosts = middle;
+    std::set<int> frames;
+    for (const BaHomography& h : buildProblem(wall.map, globalScope(wall.map), wall.settings).problem.homographies)
+      frames.insert(h.i);
+    return frames;
+  };
+  for (const int frame : hosts(true)) EXPECT_TRUE(frame >= 1 && frame <= 6) << frame;
+  EXPECT_EQ(hosts(true).count(1) + hosts(true).count(2) > 0, true);
+  EXPECT_EQ(hosts(false).count(kKeyframes - 1), 1u);
+}
+
 // The second half of one landmark's views belong to another track, that of a corner a little beside the first.
 TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
   const auto beside = [](int k) { return k < 5 ? 0.0 : 0.7; };
@@ -185,6 +203,41 @@ TEST(PlaneFactors, PairsFarOffWeighLittle) {
   const double one = information(0) / kLandmarks;
   EXPECT_NEAR(information(2.0), (kLandmarks - 1) * one, 0.01 * one);
   EXPECT_GT(information(0.05), (kLandmarks - 0.3) * one);
+}
+
+// A track that is off in some views is believed less in the others, too: the less the more of them are off.
+TEST(PlaneFactors, ATrackCountsAsItsPairsAgree) {
+  const auto information = [](int wrong) {  // of the pairs with view 1, which is right as the host is, view 0
+    Wall wall(5, [wrong](int k) { return k > 7 - wrong ? 0.3 : 0.0; });
+    wall.settings.shared_hosts = false;
+    double sum = 0;
+    for (const BaHomography& h : buildProblem(wall.map, globalScope(wall.map), wall.settings).problem.homographies)
+      if (h.j == 1) sum += h.sums[5];  // of the squared weights
+    return sum;
+  };
+  const double all = information(0), one = all / kLandmarks;
+  EXPECT_LT(information(1), all - 0.1 * one);
+  EXPECT_LT(information(4), information(1) - 0.3 * one);
+  EXPECT_GT(information(4), all - one);
+}
+
+// What lies between the corners of two tracks was detected from twice as far: it is twice as many pixels here.
+TEST(PlaneFactors, CornersOfTwoTracksLieFartherApartWhenSeenFromNearer) {
+  const auto weight = [](double z) {  // of the tie
+    Wall wall(0);
+    for (int k = 5; k < kKeyframes; ++k) {
+      wall.track(k, 5, 900);
+      NavState state = wall.map.keyframe(k + 1).state;
+      state.T_W_I = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.1 * k, 0, k == 5 ? 0 : 3.0 - z));
+      wall.map.setState(k + 1, state, ImuNoise());
+    }
+    wall.settings.variant = Variant::kVi;
+    const BuiltProblem built = buildProblem(wall.map, globalScope(wall.map), wall.settings);
+    double least = 1e9;
+    for (const BaObservation& o : built.problem.observations) least = std::min(least, o.weight);
+    return least;
+  };
+  EXPECT_NEAR(weight(1.5), 0.5 * weight(3.0), 0.01 * weight(3.0));
 }
 
 TEST(PlaneFactors, DepthPointsBesideThePlaneAreLeftOut) {

@@ -54,11 +54,12 @@ double rmseOf(const SimulatedMap& map, const BuiltProblem& built, const BaProble
 }  // namespace
 
 GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver_name, int threads, int iterations,
-              int repeats, bool shared_hosts) {
+              int repeats, HomographyHosts hosts) {
   BuilderSettings settings;
   settings.variant = variant;
   settings.focal = map.focal;
-  settings.shared_hosts = shared_hosts;
+  settings.shared_hosts = hosts != HomographyHosts::kFirstViews;
+  settings.middle_hosts = hosts == HomographyHosts::kSharedMiddle;
   settings.measurement.pixel_sigma = map.pixel_sigma;
   // The simulation has no outliers: plain squares, so that neither solver spends time on losses.
   settings.measurement.huber = settings.measurement.depth_huber = 0;

@@ -38,6 +38,7 @@ struct BuilderSettings {
   Variant variant = Variant::kVip;
   MeasurementOptions measurement;
   bool shared_hosts = true;             ///< of homographies: few hosts for many landmarks, instead of first views
+  bool middle_hosts = false;            ///< shared ones from the middle of the landmarks' tracks only
   double focal = 500;                   ///< px
   Eigen::Vector3d gravity = gravityVector();
 };

@@ -24,10 +24,13 @@ struct GbaRun {
   double rmse_before = 0, rmse = 0;  ///< ATE of the keyframes after rigid alignment, metres
 };
 
-/// Runs `repeats` times from the same start and keeps the run with the median time. Hosts of homographies as in the
-/// live system's global adjustment unless said otherwise.
+/// Which keyframes are the hosts of homographies: each landmark's first view, few that many landmarks share, or, as in
+/// the live system, few from the middle of the landmarks' tracks.
+enum class HomographyHosts { kFirstViews, kShared, kSharedMiddle };
+
+/// Runs `repeats` times from the same start and keeps the run with the median time.
 GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations,
-              int repeats, bool shared_hosts = GlobalBaOptions().shared_hosts);
+              int repeats, HomographyHosts hosts = HomographyHosts::kShared);
 
 /// The map of the first `keyframes` keyframes.
 SimulatedMap prefix(const SimulatedMap& map, int keyframes);
