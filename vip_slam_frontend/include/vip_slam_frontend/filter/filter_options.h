@@ -63,7 +63,7 @@ struct FilterOptions {
   bool adapt_sigma_px = true;
   double sigma_px_min = 0.01;
   double sigma_px_max = 2.0;
-  double pixel_inflation = 2.0;
+  double pixel_inflation = 1.3;
   bool own_noise = true;
   double gate_probability = 0.95;
   double huber = 1.5;
