@@ -88,5 +88,15 @@ TEST(CommandLine, MistakesAreNamedOnOneLineWithStatusTwo) {
   }
 }
 
+TEST(CommandLine, SettingsAreSplitAtTheirFirstEqualsSign) {
+  const auto values = splitSettings({"a/b=1", "c=d=e", "empty="});
+  ASSERT_EQ(values.size(), 3u);
+  EXPECT_EQ(values[0], std::make_pair(std::string("a/b"), std::string("1")));
+  EXPECT_EQ(values[1], std::make_pair(std::string("c"), std::string("d=e")));
+  EXPECT_EQ(values[2], std::make_pair(std::string("empty"), std::string()));
+  EXPECT_THROW(splitSettings({"a/b"}), std::invalid_argument);
+  EXPECT_THROW(splitSettings({"=1"}), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace vip_slam

@@ -47,14 +47,6 @@ void addArguments(vip_slam::CommandLine& line, Arguments& arguments) {
   line.option("duration", arguments.duration, "seconds to process");
 }
 
-std::pair<std::string, std::string> splitSetting(const std::string& setting) {
-  const auto equals = setting.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    throw std::invalid_argument("--set " + setting + ": expected group/key=value");
-  }
-  return {setting.substr(0, equals), setting.substr(equals + 1)};
-}
-
 std::string onOff(const std::string& name, const std::string& text) {
   if (text == "on" || text == "off") return text == "on" ? "true" : "false";
   throw std::invalid_argument(name + " " + text + ": expected on or off");
@@ -66,7 +58,7 @@ vip_slam::PipelineOptions loadPipelineOptions(const Arguments& arguments) {
   std::vector<std::pair<std::string, std::string>> values;
   if (!arguments.variant.empty()) values.emplace_back("backend/variant", arguments.variant);
   if (!arguments.loop.empty()) values.emplace_back("backend/loop_closing", onOff("--loop", arguments.loop));
-  for (const auto& setting : arguments.settings) values.push_back(splitSetting(setting));
+  for (auto& value : vip_slam::splitSettings(arguments.settings)) values.push_back(std::move(value));
   vip_slam::setOptions(options, values);
   return options;
 }

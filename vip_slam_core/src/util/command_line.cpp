@@ -92,4 +92,15 @@ int CommandLine::mistake(const std::string& what) const {
   return 2;
 }
 
+std::vector<std::pair<std::string, std::string>> splitSettings(const std::vector<std::string>& settings) {
+  std::vector<std::pair<std::string, std::string>> values;
+  for (const std::string& setting : settings) {
+    const auto equals = setting.find('=');
+    if (equals == std::string::npos || equals == 0)
+      throw std::invalid_argument("--set " + setting + ": expected group/key=value");
+    values.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
+  }
+  return values;
+}
+
 }  // namespace vip_slam

@@ -29,6 +29,17 @@ struct PoseWithCovariance {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
+/// Error of a pose with the truth joined to the estimate at its first pose, in position and yaw: the filter's uncertainty
+/// counts from its start.
+struct JoinedError {
+  double t = 0;
+  Vector6d error = Vector6d::Zero();  ///< x y z, rotation, both in M; metres and radians
+  Matrix6d covariance = Matrix6d::Zero();
+  double nees = 0;  ///< negative when the covariance is not positive definite
+};
+std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate,
+                                  double max_gap = 0.1, double time_offset = 0.0);
+
 /// Normalised estimation error squared: e^T P^-1 e. An honest filter has a mean of `dof`.
 struct Nees {
   ErrorStatistics pose;      ///< 6 degrees of freedom
@@ -37,7 +48,6 @@ struct Nees {
   double within_95 = 0;      ///< fraction of poses below the 95 % bound of chi-square with 6 degrees of freedom
   std::size_t unusable = 0;  ///< covariances that are not positive definite
 };
-/// The filter's uncertainty counts from its start, so the worlds are joined there: position and yaw of the first pose.
 Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap = 0.1,
           double time_offset = 0.0);
 

@@ -1,4 +1,4 @@
-// rosrun vip_slam_eval odometry_consistency SEQUENCE [--seeds N] [--seconds S]
+// rosrun vip_slam_eval odometry_consistency SEQUENCE [--seeds N] [--seconds S] [--out FILE]
 // Is the odometry as uncertain as it says? One rendering goes through the whole front end many times, each time with
 // noise of its own in images, depth and IMU. What all runs err alike is the scene's, what they scatter is the noise's.
 // With --seeds 1 also the drift of a sequence too long to keep as a bag.
@@ -7,11 +7,13 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include <opencv2/imgproc.hpp>
 #include <ros/package.h>
 
+#include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_eval/trajectory_consistency.h"
 #include "vip_slam_eval/trajectory_metrics.h"
@@ -23,14 +25,13 @@ namespace {
 
 using namespace vip_slam;
 
-constexpr int kFirstSeed = 1000, kSeedStep = 37;
+constexpr int kSeedStep = 37;
 constexpr double kDriftMetres = 10.0;
 constexpr double kImuAhead = 0.02;  ///< s of IMU handed over beyond the image
 
 /// The filter can be as uncertain as it is only if it starts from what is true of the sensor: the seeds draw their
 /// biases with these sigmas, the defaults are wider, for sensors that nobody knows.
-FrontEndOptions knowing(const SequenceSpec& spec) {
-  FrontEndOptions options;
+FrontEndOptions knowing(const SequenceSpec& spec, FrontEndOptions options) {
   if (spec.imu.gyro_bias > 0) options.filter.sigma_bias_gyro = spec.imu.gyro_bias;
   if (spec.imu.accel_bias > 0) options.filter.sigma_bias_accel = spec.imu.accel_bias;
   return options;
@@ -39,9 +40,9 @@ FrontEndOptions knowing(const SequenceSpec& spec) {
 /// One noise seed.
 class Run {
  public:
-  Run(const SequenceRenderer& sequence, int seed)
+  Run(const SequenceRenderer& sequence, const FrontEndOptions& options, int seed)
       : sequence_(sequence),
-        front_end_(knowing(sequence.spec()), sequence.sensor()),
+        front_end_(knowing(sequence.spec(), options), sequence.sensor()),
         effects_(sequence.spec().effects, sequence.spec().depth, *sequence.camera(), seed),
         imu_(synthesiseImu(sequence.trajectory(), sequence.spec().imu, seed, sequence.sensor().gravity)) {}
 
@@ -96,14 +97,35 @@ void printDrift(const Trajectory& truth, const std::vector<PoseWithCovariance>& 
   std::printf("  off at most %.2f mm, %.3f deg\n", 1000 * farthest, turned * 180 / M_PI);
 }
 
-void judge(const SequenceSpec& spec, int seeds, double seconds, int threads) {
+/// Errors and the sigmas that the filter told, image by image.
+void writeErrors(std::ostream& out, int seed, const std::vector<JoinedError>& errors) {
+  for (const JoinedError& e : errors) {
+    out << seed << ',' << e.t << ',' << e.nees;
+    for (int k = 0; k < 6; ++k) out << ',' << e.error[k];
+    for (int k = 0; k < 6; ++k) out << ',' << std::sqrt(e.covariance(k, k));
+    out << '\n';
+  }
+}
+
+struct Study {
+  SequenceSpec spec;
+  FrontEndOptions options;
+  int seeds = 20, first_seed = 1000, threads = 2;
+  double seconds = 30;
+  std::string out;
+};
+
+void judge(const Study& study) {
+  const SequenceSpec& spec = study.spec;
+  const int seeds = study.seeds;
   if (!spec.depth.registered) throw std::invalid_argument(spec.name + ": needs depth registered to the colour camera");
   RenderOptions options;
-  options.threads = threads;
-  options.count = static_cast<int>(seconds * spec.camera.rate);
+  options.threads = study.threads;
+  options.count = static_cast<int>(study.seconds * spec.camera.rate);
   SequenceRenderer sequence(spec, options);
   std::vector<std::unique_ptr<Run>> runs;
-  for (int i = 0; i < seeds; ++i) runs.push_back(std::make_unique<Run>(sequence, kFirstSeed + kSeedStep * i));
+  for (int i = 0; i < seeds; ++i)
+    runs.push_back(std::make_unique<Run>(sequence, study.options, study.first_seed + kSeedStep * i));
   Trajectory truth;
   sequence.render([&](const SimFrame& frame) {
     const double t = sequence.toSeconds(frame.stamp_ns);
@@ -111,8 +133,14 @@ void judge(const SequenceSpec& spec, int seeds, double seconds, int threads) {
     for (const auto& run : runs) run->add(frame);
     return true;
   });
+  std::optional<AtomicFile> file;
+  if (!study.out.empty()) {
+    file.emplace(study.out);
+    file->stream() << "seed,t,nees,x,y,z,rx,ry,rz,sx,sy,sz,srx,sry,srz\n";
+  }
   double pose = 0, position = 0, rotation = 0;
   for (int i = 0; i < seeds; ++i) {
+    if (file) writeErrors(file->stream(), i, joinedErrors(truth, runs[i]->poses()));
     const Nees result = nees(truth, runs[i]->poses());
     std::printf("seed %2d  NEES pose %6.2f  position %6.2f  rotation %6.2f  poses %zu,", i, result.pose.mean,
                 result.position.mean, result.rotation.mean, runs[i]->poses().size());
@@ -124,6 +152,7 @@ void judge(const SequenceSpec& spec, int seeds, double seconds, int threads) {
   const double low = chiSquareQuantile(0.025, 6 * seeds) / seeds, high = chiSquareQuantile(0.975, 6 * seeds) / seeds;
   std::printf("mean over %d seeds: pose %.2f (honest: 6, 95 %% band %.2f to %.2f: %s), position %.2f, rotation %.2f\n",
               seeds, pose, low, high, pose >= low && pose <= high ? "inside" : "outside", position, rotation);
+  if (file) file->commit();
 }
 
 }  // namespace
@@ -131,17 +160,22 @@ void judge(const SequenceSpec& spec, int seeds, double seconds, int threads) {
 int main(int argc, char** argv) {
   vip_slam::CommandLine line("odometry_consistency",
                              "NEES of the odometry over many noise seeds of one rendered sequence.");
+  Study study;
   std::string sequence;
-  int seeds = 20, threads = 2;
-  double seconds = 30;
+  std::vector<std::string> settings;
   line.argument("sequence", sequence, "name of a shipped sequence or a .yaml file");
-  line.option("seeds", seeds, "noise seeds", vip_slam::above(0));
-  line.option("seconds", seconds, "length of the sequence's beginning that is used, s", vip_slam::above(0.0));
-  line.option("threads", threads, "rendering threads", vip_slam::above(0));
+  line.option("seeds", study.seeds, "noise seeds", vip_slam::above(0));
+  line.option("first-seed", study.first_seed, "the first of them");
+  line.option("seconds", study.seconds, "length of the sequence's beginning that is used, s", vip_slam::above(0.0));
+  line.option("threads", study.threads, "rendering threads", vip_slam::above(0));
+  line.option("set", settings, "one option of the front end as group/key=value; repeatable");
+  line.option("out", study.out, "CSV file for the errors and sigmas of every image");
   if (const auto status = line.parse(argc, argv)) return *status;
   try {
     const std::string library = ros::package::getPath("vip_slam_sim") + "/config/sequences.yaml";
-    judge(vip_slam::loadSequence(sequence, library), seeds, seconds, threads);
+    study.spec = vip_slam::loadSequence(sequence, library);
+    vip_slam::setOptions(study.options, vip_slam::splitSettings(settings));
+    judge(study);
   } catch (const std::exception& e) {
     std::cerr << "odometry_consistency: " << e.what() << '\n';
     return 1;

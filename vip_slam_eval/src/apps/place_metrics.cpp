@@ -132,12 +132,7 @@ int main(int argc, char** argv) {
   if (const auto status = line.parse(argc, argv)) return *status;
   try {
     vip_slam::LoopOptions options;
-    std::vector<std::pair<std::string, std::string>> values;
-    for (const std::string& setting : settings) {
-      const auto equals = std::min(setting.find('='), setting.size() - 1);
-      values.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
-    }
-    vip_slam::setOptions(options, values);
+    vip_slam::setOptions(options, vip_slam::splitSettings(settings));
     const vip_slam::StoredMap stored = vip_slam::loadMapFile(map, vip_slam::ImuNoise());
     const auto poses = truePoses(stored.map, vip_slam::readTum(truth));
     judgeLoops(stored, poses);

@@ -57,13 +57,7 @@ int main(int argc, char** argv) {
   if (const auto status = line.parse(argc, argv)) return *status;
   cv::setNumThreads(1);
   try {
-    std::vector<std::pair<std::string, std::string>> values;
-    for (const std::string& setting : settings) {
-      const auto equals = setting.find('=');
-      if (equals == std::string::npos) throw std::invalid_argument("--set " + setting + ": expected group/key=value");
-      values.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
-    }
-    setOptions(input.options, values);
+    setOptions(input.options, splitSettings(settings));
     input.truth = readTum(truth);
     input.true_planes = readPlanesYaml(true_planes);
     if (!out.empty()) std::filesystem::create_directories(out);

@@ -30,11 +30,9 @@ Coverage coverage(const Trajectory& truth, const Trajectory& estimate, double ga
   return result;
 }
 
-Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap,
-          double time_offset) {
-  Nees result;
-  std::vector<double> pose, position, rotation;
-  std::size_t within = 0;
+std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate,
+                                  double max_gap, double time_offset) {
+  std::vector<JoinedError> result;
   bool joined = false;
   SE3 T_M_W;
   for (const PoseWithCovariance& sample : estimate) {
@@ -47,19 +45,33 @@ Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estima
       T_M_W = SE3(q, sample.T_M_B.t() - q * T_W_B.t());
     }
     const SE3 T_M_B = T_M_W * T_W_B;
-    Vector6d error;
-    error << sample.T_M_B.t() - T_M_B.t(), logSO3(sample.T_M_B.rotation() * T_M_B.rotation().conjugate());
-    const Eigen::LLT<Matrix6d> llt(sample.covariance);
-    const Eigen::LLT<Eigen::Matrix3d> llt_p(sample.covariance.topLeftCorner<3, 3>());
-    const Eigen::LLT<Eigen::Matrix3d> llt_r(sample.covariance.bottomRightCorner<3, 3>());
-    if (llt.info() != Eigen::Success || llt_p.info() != Eigen::Success || llt_r.info() != Eigen::Success) {
+    JoinedError e;
+    e.t = sample.t;
+    e.error << sample.T_M_B.t() - T_M_B.t(), logSO3(sample.T_M_B.rotation() * T_M_B.rotation().conjugate());
+    e.covariance = sample.covariance;
+    const Eigen::LLT<Matrix6d> llt(e.covariance);
+    e.nees = llt.info() == Eigen::Success ? e.error.dot(llt.solve(e.error)) : -1.0;
+    result.push_back(e);
+  }
+  return result;
+}
+
+Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap,
+          double time_offset) {
+  Nees result;
+  std::vector<double> pose, position, rotation;
+  std::size_t within = 0;
+  for (const JoinedError& e : joinedErrors(truth, estimate, max_gap, time_offset)) {
+    const Eigen::LLT<Eigen::Matrix3d> llt_p(e.covariance.topLeftCorner<3, 3>());
+    const Eigen::LLT<Eigen::Matrix3d> llt_r(e.covariance.bottomRightCorner<3, 3>());
+    if (e.nees < 0 || llt_p.info() != Eigen::Success || llt_r.info() != Eigen::Success) {
       ++result.unusable;
       continue;
     }
-    pose.push_back(error.dot(llt.solve(error)));
-    position.push_back(error.head<3>().dot(llt_p.solve(error.head<3>())));
-    rotation.push_back(error.tail<3>().dot(llt_r.solve(error.tail<3>())));
-    if (pose.back() <= kChiSquare95Of6) ++within;
+    pose.push_back(e.nees);
+    position.push_back(e.error.head<3>().dot(llt_p.solve(e.error.head<3>())));
+    rotation.push_back(e.error.tail<3>().dot(llt_r.solve(e.error.tail<3>())));
+    if (e.nees <= kChiSquare95Of6) ++within;
   }
   if (!pose.empty()) result.within_95 = double(within) / double(pose.size());
   result.pose = summarise(std::move(pose));

@@ -148,4 +148,8 @@ class CommandLine {
   std::vector<std::pair<std::string, std::function<void()>>> checks_;  ///< of values that were given
 };
 
+/// What a repeatable option like `--set group/key=value` was given, as pairs for setOptions. Throws
+/// std::invalid_argument that names the text without a key or an equals sign.
+std::vector<std::pair<std::string, std::string>> splitSettings(const std::vector<std::string>& settings);
+
 }  // namespace vip_slam
