@@ -89,7 +89,7 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
     track.rehost(id, heir, poses_);
     fresh_.erase({plane, id});
   }
-  points_.removeKeyframe(id);
+  points_.removeKeyframe(*it->second);
   evidence_.remove(id);
   placed_.erase(it);
   poses_.erase(id);

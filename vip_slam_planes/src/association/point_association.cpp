@@ -20,9 +20,35 @@ LandmarkId PointAssociation::resolve(LandmarkId id) const {
   return id;
 }
 
+void PointAssociation::assign(LandmarkId id, Landmark* landmark, PlaneId candidate, PlaneId plane) {
+  undecided_ -= undecided(*landmark);
+  for (PlaneId old : {landmark->candidate, landmark->plane}) {
+    const auto it = old && old != candidate && old != plane ? on_plane_.find(old) : on_plane_.end();
+    if (it == on_plane_.end()) continue;
+    it->second.erase(id);
+    if (it->second.empty()) on_plane_.erase(it);
+  }
+  for (PlaneId fresh : {candidate, plane}) {
+    if (fresh) on_plane_[fresh].insert(id);
+  }
+  landmark->candidate = candidate;
+  landmark->plane = plane;
+  undecided_ += undecided(*landmark);
+}
+
+void PointAssociation::erase(Landmarks::iterator it) {
+  assign(it->first, &it->second, 0, 0);
+  landmarks_.erase(it);
+}
+
+std::vector<LandmarkId> PointAssociation::landmarksOf(PlaneId plane) const {
+  const auto it = on_plane_.find(plane);
+  return it == on_plane_.end() ? std::vector<LandmarkId>() : std::vector<LandmarkId>(it->second.begin(), it->second.end());
+}
+
 void PointAssociation::setPlane(LandmarkId id, Landmark* landmark, PlaneId plane) {
   if (landmark->plane == plane) return;
-  landmark->plane = plane;
+  assign(id, landmark, landmark->candidate, plane);
   if (plane) {
     associated_.emplace_back(id, plane);
   } else {
@@ -37,20 +63,23 @@ void PointAssociation::applyMapUpdate(const MapUpdate& update) {
     alias_[source] = target;
     const auto it = landmarks_.find(source);
     if (it == landmarks_.end()) continue;
-    Landmark moved = std::move(it->second);
-    landmarks_.erase(it);
+    const Landmark moved = it->second;
+    erase(it);
     Landmark& kept = landmarks_[target];
     for (const Sighting& s : moved.sightings) {
       const bool known = std::any_of(kept.sightings.begin(), kept.sightings.end(),
                                      [&](const Sighting& o) { return o.keyframe == s.keyframe; });
       if (!known) kept.sightings.push_back(s);
     }
-    if (!kept.candidate) kept.candidate = moved.candidate;
+    if (!kept.candidate) assign(target, &kept, moved.candidate, kept.plane);
     if (!kept.placed) kept.p_W = moved.p_W, kept.placed = moved.placed;
     // The back end gave the joint landmark a plane by its own rule; stating ours settles it.
     if (!kept.plane && moved.plane) setPlane(target, &kept, moved.plane);
   }
-  for (LandmarkId id : update.removed_landmarks) landmarks_.erase(resolve(id));
+  for (LandmarkId id : update.removed_landmarks) {
+    const auto it = landmarks_.find(resolve(id));
+    if (it != landmarks_.end()) erase(it);
+  }
   for (const LandmarkEstimate& estimate : update.landmarks) {
     Landmark& landmark = landmarks_[resolve(estimate.id)];
     landmark.p_W = estimate.p_W;
@@ -65,11 +94,13 @@ void PointAssociation::addSightings(const Keyframe& keyframe) {
   }
 }
 
-void PointAssociation::removeKeyframe(KeyframeId id) {
-  for (auto it = landmarks_.begin(); it != landmarks_.end();) {
+void PointAssociation::removeKeyframe(const Keyframe& keyframe) {
+  for (const Feature& f : keyframe.frame.features) {
+    const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(resolve(f.id));
+    if (it == landmarks_.end()) continue;
     std::vector<Sighting>& s = it->second.sightings;
-    s.erase(std::remove_if(s.begin(), s.end(), [&](const Sighting& o) { return o.keyframe == id; }), s.end());
-    it = s.empty() && !it->second.placed ? landmarks_.erase(it) : std::next(it);
+    s.erase(std::remove_if(s.begin(), s.end(), [&](const Sighting& o) { return o.keyframe == keyframe.id; }), s.end());
+    if (s.empty() && !it->second.placed) erase(it);
   }
 }
 
@@ -93,7 +124,7 @@ void PointAssociation::test(LandmarkId id, Landmark* landmark, const CameraPoses
   }
   if (++landmark->failures < options_.max_failures) return;
   landmark->refused.push_back(landmark->candidate);
-  landmark->candidate = 0;
+  assign(id, landmark, 0, landmark->plane);
   landmark->failures = 0;
   setPlane(id, landmark, 0);
 }
@@ -147,7 +178,8 @@ void PointAssociation::process(const Keyframe& keyframe, const SurfaceLabels& la
       landmark.p_W = pose->second * (Eigen::Vector3d(f.xy.x(), f.xy.y(), 1.0) * f.depth);
     }
     if (!landmark.candidate) {
-      landmark.candidate = chooseCandidate(f, landmark, labels, plane_of_label, pose->second, find_plane);
+      const PlaneId chosen = chooseCandidate(f, landmark, labels, plane_of_label, pose->second, find_plane);
+      assign(id, &landmark, chosen, landmark.plane);
       landmark.failures = 0;
     }
     if (!landmark.candidate) continue;
@@ -167,28 +199,32 @@ void PointAssociation::recheck(const FindPlane& find_plane) {
     if (!landmark.plane || !landmark.placed) continue;
     const Plane* plane = find_plane(landmark.plane);
     if (plane && std::abs(plane->signedDistance(landmark.p_W)) < options_.candidate_distance) continue;
-    landmark.candidate = 0;
+    assign(id, &landmark, 0, landmark.plane);
     landmark.tested = 0;
     setPlane(id, &landmark, 0);
   }
 }
 
 void PointAssociation::renamePlane(PlaneId from, PlaneId into) {
-  for (auto& [id, landmark] : landmarks_) {
-    if (landmark.candidate == from) landmark.candidate = into;
-    if (landmark.plane == from) landmark.plane = into;  // the back end renames by the merge itself
+  for (LandmarkId id : landmarksOf(from)) {
+    Landmark& landmark = landmarks_.at(id);
+    const auto renamed = [from, into](PlaneId plane) { return plane == from ? into : plane; };
+    assign(id, &landmark, renamed(landmark.candidate), renamed(landmark.plane));  // the back end knows by the merge
   }
 }
 
 void PointAssociation::removePlane(PlaneId plane) {
-  for (auto& [id, landmark] : landmarks_) {
-    if (landmark.candidate == plane) landmark.candidate = 0, landmark.tested = 0;
+  for (LandmarkId id : landmarksOf(plane)) {
+    Landmark& landmark = landmarks_.at(id);
+    if (landmark.candidate == plane) assign(id, &landmark, 0, landmark.plane), landmark.tested = 0;
     if (landmark.plane == plane) setPlane(id, &landmark, 0);
   }
 }
 
 void PointAssociation::clear() {
   landmarks_.clear();
+  on_plane_.clear();
+  undecided_ = 0;
   alias_.clear();
   associated_.clear();
   dissociated_.clear();
@@ -219,12 +255,6 @@ std::vector<LandmarkId> PointAssociation::takeDissociated() {
 PlaneId PointAssociation::planeOf(LandmarkId id) const {
   const auto it = landmarks_.find(resolve(id));
   return it == landmarks_.end() ? 0 : it->second.plane;
-}
-
-std::size_t PointAssociation::candidates() const {
-  return static_cast<std::size_t>(std::count_if(landmarks_.begin(), landmarks_.end(), [](const auto& entry) {
-    return entry.second.candidate && !entry.second.plane;
-  }));
 }
 
 }  // namespace vip_slam

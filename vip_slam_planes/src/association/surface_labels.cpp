@@ -4,6 +4,15 @@
 #include <cmath>
 
 namespace vip_slam {
+namespace {
+
+// The first index at or after `at`, not below zero.
+int firstNode(float at) {
+  const int i = std::max(0, static_cast<int>(at));
+  return float(i) < at ? i + 1 : i;
+}
+
+}  // namespace
 
 int SurfaceLabels::around(const Eigen::Vector2f& pixel) const {
   if (stride == 0) return -1;
@@ -48,7 +57,6 @@ SurfaceLabels labelNodes(const DepthMesh& mesh, const std::vector<int>& triangle
   labels.stride = grid.stride, labels.offset = grid.offset, labels.cols = grid.cols, labels.rows = grid.rows;
   labels.label.assign(grid.z.size(), -1);
   if (grid.empty()) return labels;
-  const auto cross = [](const Eigen::Vector2f& u, const Eigen::Vector2f& v) { return u.x() * v.y() - u.y() * v.x(); };
   const float stride = float(grid.stride), offset = float(grid.offset);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     if (triangle_label[i] < 0) continue;
@@ -56,15 +64,18 @@ SurfaceLabels labelNodes(const DepthMesh& mesh, const std::vector<int>& triangle
     const Eigen::Vector2f& b = mesh.vertices[mesh.triangles[i].vertex[1]].pixel;
     const Eigen::Vector2f& c = mesh.vertices[mesh.triangles[i].vertex[2]].pixel;
     const Eigen::Vector2f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-    const int c0 = std::max(0, static_cast<int>(std::ceil((low.x() - offset) / stride)));
-    const int c1 = std::min(grid.cols - 1, static_cast<int>(std::floor((high.x() - offset) / stride)));
-    const int r0 = std::max(0, static_cast<int>(std::ceil((low.y() - offset) / stride)));
-    const int r1 = std::min(grid.rows - 1, static_cast<int>(std::floor((high.y() - offset) / stride)));
+    const int c0 = firstNode((low.x() - offset) / stride), r0 = firstNode((low.y() - offset) / stride);
+    const int c1 = std::min(grid.cols - 1, static_cast<int>((high.x() - offset) / stride));
+    const int r1 = std::min(grid.rows - 1, static_cast<int>((high.y() - offset) / stride));
+    const Eigen::Vector2f ab = b - a, bc = c - b, ca = a - c;
     for (int row = r0; row <= r1; ++row) {
+      const float y = offset + float(row) * stride;
+      const float up_ab = ab.x() * (y - a.y()), up_bc = bc.x() * (y - b.y()), up_ca = ca.x() * (y - c.y());
+      int* node = &labels.label[std::size_t(row) * grid.cols];
       for (int col = c0; col <= c1; ++col) {
-        const Eigen::Vector2f p(offset + float(col) * stride, offset + float(row) * stride);
-        if (cross(b - a, p - a) >= 0 && cross(c - b, p - b) >= 0 && cross(a - c, p - c) >= 0) {
-          labels.label[std::size_t(row) * grid.cols + col] = triangle_label[i];
+        const float x = offset + float(col) * stride;
+        if (up_ab >= ab.y() * (x - a.x()) && up_bc >= bc.y() * (x - b.x()) && up_ca >= ca.y() * (x - c.x())) {
+          node[col] = triangle_label[i];
         }
       }
     }

@@ -169,35 +169,46 @@ class Detector {
   std::vector<std::vector<int>> surfaces(const std::vector<int>& members, const Plane& plane) const {
     const Eigen::Matrix<double, 3, 2> basis = tangentBasis(plane.n);
     const auto key = [](std::int64_t x, std::int64_t y) { return (x << 32) ^ (y & 0xffffffff); };
-    std::unordered_map<std::int64_t, std::vector<int>> cells;
-    std::vector<std::pair<std::int64_t, std::int64_t>> at;
+    struct Cell {
+      std::int64_t x, y;
+      int part;  ///< -1: open
+    };
+    std::vector<Cell> cells;
+    std::unordered_map<std::int64_t, int> cell_at;
+    std::vector<int> cell_of;
     const double side = std::max(0.05, growth_.gap);
     for (int i : members) {
       const Eigen::Vector2d q = basis.transpose() * (triangles_[i].centre - camera_) / side;
-      at.emplace_back(std::llround(std::floor(q.x())), std::llround(std::floor(q.y())));
-      cells[key(at.back().first, at.back().second)].push_back(static_cast<int>(at.size()) - 1);
+      const auto x = static_cast<std::int64_t>(std::floor(q.x())), y = static_cast<std::int64_t>(std::floor(q.y()));
+      // Triangles come in the order of the mesh: the next one is often in the same cell.
+      if (cell_of.empty() || cells[cell_of.back()].x != x || cells[cell_of.back()].y != y) {
+        const auto [it, fresh] = cell_at.emplace(key(x, y), static_cast<int>(cells.size()));
+        if (fresh) cells.push_back({x, y, -1});
+        cell_of.push_back(it->second);
+      } else {
+        cell_of.push_back(cell_of.back());
+      }
     }
-    std::vector<char> visited(members.size(), 0);
     std::vector<std::vector<int>> parts;
-    for (std::size_t seed = 0; seed < members.size(); ++seed) {
-      if (visited[seed]) continue;
-      std::vector<int> queue{static_cast<int>(seed)};
-      visited[seed] = 1;
-      for (std::size_t i = 0; i < queue.size(); ++i) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          for (int dy = -1; dy <= 1; ++dy) {
-            const auto cell = cells.find(key(at[queue[i]].first + dx, at[queue[i]].second + dy));
-            if (cell == cells.end()) continue;
-            for (int j : cell->second) {
-              if (!visited[j]) visited[j] = 1, queue.push_back(j);
-            }
-            cell->second.clear();
+    std::vector<int> queue;
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      if (cells[cell_of[i]].part < 0) {
+        const int part = static_cast<int>(parts.size());
+        parts.emplace_back();
+        cells[cell_of[i]].part = part;
+        queue.assign(1, cell_of[i]);
+        while (!queue.empty()) {
+          const Cell cell = cells[queue.back()];
+          queue.pop_back();
+          for (int k = 0; k < 9; ++k) {
+            const auto near = cell_at.find(key(cell.x + k % 3 - 1, cell.y + k / 3 - 1));
+            if (near == cell_at.end() || cells[near->second].part >= 0) continue;
+            cells[near->second].part = part;
+            queue.push_back(near->second);
           }
         }
       }
-      std::sort(queue.begin(), queue.end());
-      for (int& j : queue) j = members[j];
-      parts.push_back(std::move(queue));
+      parts[cells[cell_of[i]].part].push_back(members[i]);
     }
     return parts;
   }

@@ -7,6 +7,28 @@
 #include <Eigen/Eigenvalues>
 
 namespace vip_slam {
+namespace {
+
+// PlaneMoments of many points: the sums of one triangle, in registers.
+class MomentSum {
+ public:
+  void add(const Eigen::Vector3d& p, double w) {
+    const double wx = w * p.x(), wy = w * p.y(), wz = w * p.z();
+    w_ += w, x_ += wx, y_ += wy, z_ += wz;
+    xx_ += wx * p.x(), xy_ += wy * p.x(), xz_ += wz * p.x();
+    yy_ += wy * p.y(), yz_ += wz * p.y(), zz_ += wz * p.z();
+  }
+  PlaneMoments moments() const {
+    PlaneMoments m;
+    m.M << xx_, xy_, xz_, x_, xy_, yy_, yz_, y_, xz_, yz_, zz_, z_, x_, y_, z_, w_;
+    return m;
+  }
+
+ private:
+  double w_ = 0, x_ = 0, y_ = 0, z_ = 0, xx_ = 0, xy_ = 0, xz_ = 0, yy_ = 0, yz_ = 0, zz_ = 0;
+};
+
+}  // namespace
 
 double PlaneMoments::meanSquare(const Plane& plane) const {
   const Eigen::Vector4d pi = plane.coefficients();
@@ -60,26 +82,26 @@ bool fitPlaneRobust(const std::vector<Eigen::Vector3d>& points, const std::vecto
   constexpr int kRounds = 8, kAbsolute = 4;  // least absolute distances first: Tukey needs a start near the majority
   constexpr double kTukey = 4.685;
   std::vector<double> residuals(points.size()), sorted;
-  PlaneMoments moments;
-  for (std::size_t i = 0; i < points.size(); ++i) moments.add(points[i], weights[i]);
+  MomentSum sum;
+  for (std::size_t i = 0; i < points.size(); ++i) sum.add(points[i], weights[i]);
   for (int round = 0; round < kRounds; ++round) {
-    if (!fitPlane(moments, kind, towards, plane)) return false;
+    if (!fitPlane(sum.moments(), kind, towards, plane)) return false;
     for (std::size_t i = 0; i < points.size(); ++i) residuals[i] = std::abs(plane->signedDistance(points[i]));
     sorted = residuals;
     std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
     const double scale = std::max(sigma, 1.4826 * sorted[sorted.size() / 2]), cut = kTukey * scale;
-    moments = PlaneMoments();
+    sum = MomentSum();
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (round < kAbsolute) {
-        moments.add(points[i], weights[i] * scale / std::max(0.2 * scale, residuals[i]));
+        sum.add(points[i], weights[i] * scale / std::max(0.2 * scale, residuals[i]));
         continue;
       }
       const double x = residuals[i] / cut;
-      if (x < 1) moments.add(points[i], weights[i] * (1 - x * x) * (1 - x * x));
+      if (x < 1) sum.add(points[i], weights[i] * (1 - x * x) * (1 - x * x));
     }
   }
-  if (!fitPlane(moments, kind, towards, plane)) return false;
-  if (rms) *rms = std::sqrt(moments.meanSquare(*plane));
+  if (!fitPlane(sum.moments(), kind, towards, plane)) return false;
+  if (rms) *rms = std::sqrt(sum.moments().meanSquare(*plane));
   return true;
 }
 

@@ -21,34 +21,34 @@ std::uint64_t PlaneHistogram::key(int space, int angle, int distance) {
          std::uint64_t(std::uint32_t(distance));
 }
 
-template <class F>
-void PlaneHistogram::forNeighbours(const Bin& bin, F f) {
-  const int reach = bin.space == 2 ? 1 : 0;
-  const int space = bin.space, angle = bin.angle, distance = bin.distance;
-  for (int a = -reach; a <= reach; ++a) {
-    for (int d = -1; d <= 1; ++d) {
-      const auto it = index_.find(key(space, reach ? (angle + a + angles_) % angles_ : 0, distance + d));
-      if (it != index_.end()) f(bins_[it->second]);
-    }
-  }
-}
-
 std::size_t PlaneHistogram::binAt(int space, int angle, int distance) {
   const std::uint64_t k = key(space, angle, distance);
   const auto it = index_.find(k);
   if (it != index_.end()) return it->second;
-  Bin fresh{space, angle, distance, 0, 0, {}};
-  forNeighbours(fresh, [&](const Bin& other) { fresh.neighbourhood += other.area; });
-  index_.emplace(k, bins_.size());
+  Bin fresh{space, angle, distance, 0, 0, {}, {}};
+  const std::size_t own = bins_.size();
+  index_.emplace(k, own);
+  const int reach = space == 2 ? 1 : 0;
+  for (int a = -reach; a <= reach; ++a) {
+    for (int d = -1; d <= 1; ++d) {
+      const auto other = index_.find(key(space, reach ? (angle + a + angles_) % angles_ : 0, distance + d));
+      if (other == index_.end()) continue;
+      fresh.near.push_back(other->second);
+      if (other->second == own) continue;
+      fresh.neighbourhood += bins_[other->second].area;
+      bins_[other->second].near.push_back(own);
+    }
+  }
   bins_.push_back(std::move(fresh));
-  return bins_.size() - 1;
+  return own;
 }
 
 void PlaneHistogram::add(int space, int angle, int distance, double area, int index) {
   const std::size_t at = binAt(space, angle, distance);
-  forNeighbours(bins_[at], [&](Bin& bin) { bin.neighbourhood += area; });
+  for (std::size_t k : bins_[at].near) bins_[k].neighbourhood += area;
   bins_[at].area += area;
   bins_[at].members.push_back(index);
+  if (votes_.size() <= std::size_t(index)) votes_.resize(index + 1);
   votes_[index] = {at, area};
 }
 
@@ -69,9 +69,9 @@ PlaneHistogram::Peak PlaneHistogram::peak() {
   });
   Peak peak;
   if (highest == bins_.end()) return peak;
-  forNeighbours(*highest, [&](const Bin& bin) {
-    peak.members.insert(peak.members.end(), bin.members.begin(), bin.members.end());
-  });
+  for (std::size_t k : highest->near) {
+    peak.members.insert(peak.members.end(), bins_[k].members.begin(), bins_[k].members.end());
+  }
   if (peak.members.empty()) return peak;
   peak.area = highest->neighbourhood;
   std::sort(peak.members.begin(), peak.members.end());
@@ -79,14 +79,13 @@ PlaneHistogram::Peak PlaneHistogram::peak() {
 }
 
 void PlaneHistogram::remove(int index) {
-  const auto it = votes_.find(index);
-  if (it == votes_.end()) return;
-  Bin& own = bins_[it->second.bin];
-  const double area = it->second.area;
-  forNeighbours(own, [area](Bin& bin) { bin.neighbourhood -= area; });
+  if (std::size_t(index) >= votes_.size() || votes_[index].bin == kNoBin) return;
+  Bin& own = bins_[votes_[index].bin];
+  const double area = votes_[index].area;
+  for (std::size_t k : own.near) bins_[k].neighbourhood -= area;
   own.area -= area;
   own.members.erase(std::find(own.members.begin(), own.members.end(), index));
-  votes_.erase(it);
+  votes_[index] = Vote();
 }
 
 }  // namespace vip_slam

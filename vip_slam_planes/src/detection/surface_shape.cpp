@@ -1,6 +1,7 @@
 #include "vip_slam_planes/detection/surface_shape.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -10,21 +11,22 @@
 namespace vip_slam {
 
 bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface) {
-  std::vector<int> sides, all;
+  enum : char { kNone, kInside, kOnBorder };
+  std::vector<char> member(triangles.size(), 0), place;
+  for (int i : surface) {
+    member[i] = 1;
+    const std::array<int, 3>& v = triangles[i].vertex;
+    place.resize(std::max<std::size_t>(place.size(), 1 + std::max({v[0], v[1], v[2]})), kNone);
+    for (int k : v) place[k] = kInside;
+  }
   for (int i : surface) {
     const MapTriangle& t = triangles[i];
     for (int k = 0; k < 3; ++k) {
-      all.push_back(t.vertex[k]);
-      if (t.neighbour[k] >= 0 && std::binary_search(surface.begin(), surface.end(), t.neighbour[k])) continue;
-      sides.push_back(t.vertex[(k + 1) % 3]);
-      sides.push_back(t.vertex[(k + 2) % 3]);
+      if (t.neighbour[k] >= 0 && member[t.neighbour[k]]) continue;
+      place[t.vertex[(k + 1) % 3]] = place[t.vertex[(k + 2) % 3]] = kOnBorder;
     }
   }
-  const auto distinct = [](std::vector<int>* v) {
-    std::sort(v->begin(), v->end());
-    return std::size_t(std::unique(v->begin(), v->end()) - v->begin());
-  };
-  const std::size_t inside = distinct(&all) - distinct(&sides);
+  const auto inside = static_cast<std::size_t>(std::count(place.begin(), place.end(), kInside));
   return inside >= 4 && 10 * inside >= surface.size();
 }
 

@@ -73,8 +73,11 @@ int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, co
   const double range = std::min(noise.max_range, deepest + margin / kGrazing + 3 * noise.sigma(noise.max_range));
   const CellBox view = cellsInView(*track, camera, T_map_C, range);
   std::vector<CellIndex> refuted;
+  // Centres are an affine function of the index.
+  const Eigen::Vector3d p0 = T_C_map * track->cellCentre({0, 0});
+  const Eigen::Vector3d px = T_C_map * track->cellCentre({1, 0}) - p0, py = T_C_map * track->cellCentre({0, 1}) - p0;
   track->cells().forEachIn(view.first, view.last, [&](CellIndex cell, int) {
-    const Eigen::Vector3d p = T_C_map * track->cellCentre(cell);
+    const Eigen::Vector3d p = p0 + cell.x * px + cell.y * py;
     if (p.z() < noise.min_range || p.z() > range || -n_C.dot(p) < kGrazing * p.norm()) return;
     Eigen::Vector2d uv;
     if (!camera.project(p, &uv) || !camera.inImage(uv)) return;

@@ -16,23 +16,34 @@ constexpr float kSameSurface = 0.9f;  // cosine between neighbouring normals tha
 }  // namespace
 
 const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid) {
-  if (grid.stride == stride_ && grid.offset == offset_ && grid.cols == cols_ && grid.rows == rows_) return rays_;
-  stride_ = grid.stride, offset_ = grid.offset, cols_ = grid.cols, rows_ = grid.rows;
-  rays_.clear();
-  rays_.reserve(static_cast<std::size_t>(cols_) * rows_);
-  for (int r = 0; r < rows_; ++r) {
-    for (int c = 0; c < cols_; ++c) {
+  for (std::size_t i : {last_, 1 - last_}) {
+    const Layout& known = layouts_[i];
+    if (grid.stride != known.stride || grid.offset != known.offset || grid.cols != known.cols ||
+        grid.rows != known.rows) {
+      continue;
+    }
+    last_ = i;
+    return known.rays;
+  }
+  last_ = 1 - last_;
+  Layout& layout = layouts_[last_];
+  layout.stride = grid.stride, layout.offset = grid.offset, layout.cols = grid.cols, layout.rows = grid.rows;
+  layout.rays.clear();
+  layout.rays.reserve(static_cast<std::size_t>(grid.cols) * grid.rows);
+  for (int r = 0; r < grid.rows; ++r) {
+    for (int c = 0; c < grid.cols; ++c) {
       Eigen::Vector2d xy;
       if (!camera_->undistort(grid.pixel(c, r), &xy)) xy.setConstant(std::numeric_limits<double>::quiet_NaN());
-      rays_.push_back(xy.cast<float>());
+      layout.rays.push_back(xy.cast<float>());
     }
   }
-  return rays_;
+  return layout.rays;
 }
 
 DepthMeshBuilder::DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera,
                                    const DepthNoise& noise)
-    : options_(options), camera_(camera), noise_(noise), rays_(camera) {}
+    : options_(options), camera_(camera), noise_(noise),
+      least_facing_(std::cos(float(options.max_incidence_deg * M_PI / 180.0))), rays_(camera) {}
 
 int DepthMeshBuilder::gridStep(const DepthGrid& grid) const {
   return std::max(1, static_cast<int>(std::lround(options_.spacing / std::max(1, grid.stride))));
@@ -171,7 +182,7 @@ bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid,
   triangle->area = 0.5f * twice;
   const float z = triangle->centre_C.z();
   const float facing = -triangle->n_C.dot(triangle->centre_C);
-  if (facing < std::cos(float(options_.max_incidence_deg * M_PI / 180.0)) * triangle->centre_C.norm()) return false;
+  if (facing < least_facing_ * triangle->centre_C.norm()) return false;
   triangle->sigma = float(noise_.sigma(z)) * kMedianGain * facing / z;
   triangle->sigma_angle = triangle->sigma / altitude;
   return step < 2 || grid.empty() || !crossesDepthEdge(*triangle, grid);

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -25,7 +26,7 @@ class PointAssociation {
   void applyMapUpdate(const MapUpdate& update);
   /// Sightings of a placed keyframe, once per keyframe.
   void addSightings(const Keyframe& keyframe);
-  void removeKeyframe(KeyframeId id);
+  void removeKeyframe(const Keyframe& keyframe);
 
   using FindPlane = std::function<const Plane*(PlaneId)>;
   /// Candidates from a keyframe whose nodes are labelled with indices into `plane_of_label`; decides on those that
@@ -44,7 +45,8 @@ class PointAssociation {
   std::vector<LandmarkId> takeDissociated();
   /// The plane of a landmark, 0: none.
   PlaneId planeOf(LandmarkId id) const;
-  std::size_t candidates() const;
+  /// Landmarks with a candidate that is not decided on; counted along, as there are many landmarks.
+  std::size_t candidates() const { return undecided_; }
 
  private:
   struct Sighting {
@@ -62,7 +64,12 @@ class PointAssociation {
     std::size_t tested = 0; ///< sightings at the last test
     std::vector<PlaneId> refused;
   };
+  using Landmarks = std::unordered_map<LandmarkId, Landmark>;
+  static bool undecided(const Landmark& landmark) { return landmark.candidate && !landmark.plane; }
   LandmarkId resolve(LandmarkId id) const;
+  void assign(LandmarkId id, Landmark* landmark, PlaneId candidate, PlaneId plane);
+  void erase(Landmarks::iterator it);
+  std::vector<LandmarkId> landmarksOf(PlaneId plane) const;
   /// The plane that a feature may lie on by the labels around it, 0: none.
   PlaneId chooseCandidate(const Feature& feature, const Landmark& landmark, const SurfaceLabels& labels,
                           const std::vector<PlaneId>& plane_of_label, const SE3& T_map_C,
@@ -72,7 +79,9 @@ class PointAssociation {
 
   PointAssociationOptions options_;
   double focal_, depth_floor_;
-  std::unordered_map<LandmarkId, Landmark> landmarks_;
+  Landmarks landmarks_;
+  std::unordered_map<PlaneId, std::unordered_set<LandmarkId>> on_plane_;  ///< candidates and associated ones
+  std::size_t undecided_ = 0;
   std::unordered_map<LandmarkId, LandmarkId> alias_;
   std::vector<std::pair<LandmarkId, PlaneId>> associated_;
   std::vector<LandmarkId> dissociated_;

@@ -19,6 +19,7 @@ class PlaneHistogram {
 
   void clear();
   /// A vote for the plane through p with unit normal n; `index` comes back with the peak. The mode says which space.
+  /// Indices count from zero without large gaps.
   void addHorizontal(const Eigen::Vector3d& n, const Eigen::Vector3d& p_local, double area, int index);
   void addVertical(const Eigen::Vector3d& n, const Eigen::Vector3d& p_local, double area, int index);
 
@@ -36,23 +37,22 @@ class PlaneHistogram {
     double area = 0;
     double neighbourhood = 0;    ///< area of this bin and its direct neighbours, kept up to date
     std::vector<int> members;    ///< in order of their addition
+    std::vector<std::size_t> near;  ///< this bin and its direct neighbours, those that exist
   };
   struct Vote {
-    std::size_t bin;
-    double area;
+    std::size_t bin = kNoBin;
+    double area = 0;
   };
+  static constexpr std::size_t kNoBin = ~std::size_t(0);
   static std::uint64_t key(int space, int angle, int distance);
   void add(int space, int angle, int distance, double area, int index);
   std::size_t binAt(int space, int angle, int distance);
-  /// f(Bin&) for the bin and those direct neighbours that hold votes.
-  template <class F>
-  void forNeighbours(const Bin& bin, F f);
 
   double distance_bin_, angle_bin_;
   int angles_;
   std::vector<Bin> bins_;  ///< in order of their first vote, so that ties break the same way everywhere
   std::unordered_map<std::uint64_t, std::size_t> index_;
-  std::unordered_map<int, Vote> votes_;
+  std::vector<Vote> votes_;  ///< by index
 };
 
 }  // namespace vip_slam

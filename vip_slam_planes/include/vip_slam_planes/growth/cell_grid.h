@@ -70,13 +70,30 @@ class CellGrid {
 template <class F>
 void forCellsOfTriangle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c, double cell,
                         F f) {
-  const Eigen::Vector2d low = a.cwiseMin(b).cwiseMin(c) / cell, high = a.cwiseMax(b).cwiseMax(c) / cell;
-  const auto cross = [](const Eigen::Vector2d& u, const Eigen::Vector2d& v) { return u.x() * v.y() - u.y() * v.x(); };
-  const double sign = cross(b - a, c - a) < 0 ? -1.0 : 1.0;
-  for (int y = static_cast<int>(std::ceil(low.y() - 0.5)); y + 0.5 <= high.y(); ++y) {
-    for (int x = static_cast<int>(std::ceil(low.x() - 0.5)); x + 0.5 <= high.x(); ++x) {
-      const Eigen::Vector2d p((x + 0.5) * cell, (y + 0.5) * cell);
-      if (sign * cross(b - a, p - a) >= 0 && sign * cross(c - b, p - b) >= 0 && sign * cross(a - c, p - c) >= 0) {
+  // Half the triangles cover no centre: most of the time goes into the bounds, so they stay cheap.
+  const auto first = [cell](double low) {
+    const double q = low / cell - 0.5;
+    const int i = static_cast<int>(q);
+    return i < q ? i + 1 : i;
+  };
+  const int x0 = first(std::min({a.x(), b.x(), c.x()})), y0 = first(std::min({a.y(), b.y(), c.y()}));
+  const double x1 = std::max({a.x(), b.x(), c.x()}) / cell, y1 = std::max({a.y(), b.y(), c.y()}) / cell;
+  if (x0 + 0.5 > x1 || y0 + 0.5 > y1) return;
+  // A side from p along s has the centre q on its left when s.x (q - p).y >= s.y (q - p).x.
+  struct Side {
+    double px, py, sx, sy;
+  };
+  const double turn = (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x()) < 0 ? -1.0 : 1.0;
+  const auto side = [turn](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
+    return Side{p.x(), p.y(), turn * (q.x() - p.x()), turn * (q.y() - p.y())};
+  };
+  const Side ab = side(a, b), bc = side(b, c), ca = side(c, a);
+  for (int y = y0; y + 0.5 <= y1; ++y) {
+    const double cy = (y + 0.5) * cell;
+    const double up_ab = ab.sx * (cy - ab.py), up_bc = bc.sx * (cy - bc.py), up_ca = ca.sx * (cy - ca.py);
+    for (int x = x0; x + 0.5 <= x1; ++x) {
+      const double cx = (x + 0.5) * cell;
+      if (up_ab >= ab.sy * (cx - ab.px) && up_bc >= bc.sy * (cx - bc.px) && up_ca >= ca.sy * (cx - ca.px)) {
         f(CellIndex{x, y});
       }
     }

@@ -43,13 +43,18 @@ struct DepthMesh {
 class GridRays {
  public:
   explicit GridRays(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {}
-  /// Recomputed only when the layout of the grid changes.
+  /// Computed once for the grids of keyframes and once for the coarser ones of frames, which take turns; the result is
+  /// valid until the next but one call.
   const std::vector<Eigen::Vector2f>& operator()(const DepthGrid& grid);
 
  private:
+  struct Layout {
+    int stride = 0, offset = 0, cols = 0, rows = 0;
+    std::vector<Eigen::Vector2f> rays;
+  };
   std::shared_ptr<const CameraModel> camera_;
-  int stride_ = 0, offset_ = 0, cols_ = 0, rows_ = 0;
-  std::vector<Eigen::Vector2f> rays_;
+  std::array<Layout, 2> layouts_;
+  std::size_t last_ = 0;
 };
 
 class DepthMeshBuilder {
@@ -70,6 +75,7 @@ class DepthMeshBuilder {
   PlaneMeshOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   DepthNoise noise_;
+  float least_facing_;  ///< cosine of the angle between normal and viewing ray
   GridRays rays_;
   const std::vector<Eigen::Vector2f>* grid_rays_ = nullptr;
   Delaunay delaunay_;
