@@ -86,6 +86,14 @@ TEST_F(Evidence, SeeingASmallThingOftenDoesNotMakeItLarge) {
   for (KeyframeId id = 1; id <= 8; ++id) EXPECT_TRUE(add(id, board(0.0, 0.8, 5, 5)).empty()) << id;
 }
 
+TEST_F(Evidence, WhatWasTooSmallIsTestedAgainWhenMoreOfItHasShown) {
+  KeyframeId id = 1;
+  for (; id <= 6; ++id) EXPECT_TRUE(add(id, board(0.0, 0.8, 5, 5)).empty()) << id;
+  std::size_t found = 0;
+  for (; id <= 9; ++id) found += add(id, board(0.1 * double(id - 5), 0.8, 5, 5)).size();
+  EXPECT_EQ(1u, found);
+}
+
 TEST_F(Evidence, StripsOneCellWideAreNoWall) {
   for (KeyframeId id = 1; id <= 4; ++id) EXPECT_TRUE(add(id, board(0.1 * double(id), 0.0, 1, 20)).empty()) << id;
 }

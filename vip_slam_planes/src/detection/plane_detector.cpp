@@ -20,7 +20,8 @@ class Detector {
  public:
   Detector(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
            const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth)
-      : triangles_(triangles), taken_(taken), camera_(camera_centre), options_(options), growth_(growth) {}
+      : triangles_(triangles), taken_(taken), camera_(camera_centre), options_(options), growth_(growth),
+        level_(options.gravity_deg), joins_(growth.angle_deg) {}
 
   std::vector<DetectedPlane> run() {
     histogramPeaks();
@@ -39,7 +40,7 @@ class Detector {
 
  private:
   bool kindOf(const MapTriangle& t, PlaneKind* kind) const {
-    const double gate = angleGate(t, options_.gravity_deg);
+    const double gate = level_.angle(t);
     if (std::abs(t.n.z()) > std::cos(gate)) {
       *kind = PlaneKind::kHorizontal;
     } else if (std::abs(t.n.z()) < std::sin(gate)) {
@@ -127,7 +128,7 @@ class Detector {
   }
 
   bool joins(const MapTriangle& t, const Plane& plane, double widening) const {
-    return plane.n.dot(t.n) > std::cos(angleGate(t, growth_.angle_deg)) &&
+    return plane.n.dot(t.n) > joins_.cosine(t) &&
            std::abs(plane.signedDistance(t.centre)) < widening * distanceGate(t, growth_.distance);
   }
 
@@ -270,6 +271,7 @@ class Detector {
   Eigen::Vector3d camera_;
   const PlaneDetectionOptions& options_;
   const PlaneGrowthOptions& growth_;
+  const AngleGate level_, joins_;
   std::vector<DetectedPlane> found_;
 };
 

@@ -21,6 +21,7 @@ constexpr std::size_t kLeastTriangles = 4;
 // pieces only: what is left of them starts small and waits for frames to grow it.
 constexpr double kLeastUpright = 2.0, kLeastLevel = 0.4;
 constexpr int kMostTests = 4;                  // peaks tested per keyframe, the largest ones
+constexpr double kFreshShare = 0.25;           // of a peak's area that must be new since its patches were tested
 
 MapTriangle moved(const SE3& T, MapTriangle t) {
   for (Eigen::Vector3d& p : t.corner) p = T * p;
@@ -200,6 +201,13 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     PlaneDetectionOptions together = detection_;
     together.min_area *= kind == PlaneKind::kHorizontal ? kLeastLevel : kLeastUpright;
     if (peak.area < together.min_area) continue;
+    double fresh = 0;
+    for (const Vote& v : votes) {
+      const Patch& patch = frames_[v.frame].patches[v.patch];
+      if (!patch.tested) fresh += patch.area;
+    }
+    if (fresh < kFreshShare * peak.area) continue;
+    for (const Vote& v : votes) frames_[v.frame].patches[v.patch].tested = true;
     ++tests;
     const std::vector<EvidenceTriangle> evidence = collect(votes, poses);
     std::vector<MapTriangle> triangles;

@@ -19,7 +19,11 @@ class Tracer {
       : x0_(grid.x0()), y0_(grid.y0()), width_(grid.width() + 1), height_(grid.height() + 1),
         covered_(static_cast<std::size_t>(width_ + 1) * (height_ + 1), 0),
         done_(static_cast<std::size_t>(width_) * height_, 0) {
-    grid.forEach([&](CellIndex c, int hits) { covered_[cell(c.x, c.y)] = hits >= min_hits; });
+    for (int y = y0_; y < y0_ + grid.height(); ++y) {
+      const std::uint8_t* hits = grid.row(y);
+      unsigned char* covered = &covered_[cell(x0_, y)];
+      for (int i = 0; i < grid.width(); ++i) covered[i] = hits[i] >= min_hits;
+    }
   }
 
   std::vector<std::vector<CellIndex>> rings() {

@@ -1,6 +1,5 @@
 #include "vip_slam_planes/growth/triangle_association.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "vip_slam_core/geometry/angle.h"
@@ -14,10 +13,11 @@ constexpr int kNone = -1;
 // The nearest admissible plane of each open triangle, but for the one that let it go.
 void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
                    const std::vector<int>& refused, const PlaneGrowthOptions& options, std::vector<int>* label) {
+  const AngleGate gate(options.angle_deg);
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     if ((*label)[i] != kNone) continue;
     const MapTriangle& t = triangles[i];
-    const double min_cos = std::cos(angleGate(t, options.angle_deg));
+    const double min_cos = gate.cosine(t);
     double best = distanceGate(t, options.distance);
     for (std::size_t k = 0; k < tracks.size(); ++k) {
       if (refused[i] == static_cast<int>(k)) continue;
@@ -61,9 +61,9 @@ bool dropDetached(const std::vector<MapTriangle>& triangles, const std::vector<c
 
 }  // namespace
 
-double angleGate(const MapTriangle& triangle, double angle_deg) {
-  return std::clamp(2.0 * triangle.sigma_angle, angle_deg * kDegree, std::max(kWidestAngle, angle_deg * kDegree));
-}
+AngleGate::AngleGate(double angle_deg)
+    : narrow_(angle_deg * kDegree), wide_(std::max(kWidestAngle, narrow_)), cos_narrow_(std::cos(narrow_)),
+      cos_wide_(std::cos(wide_)) {}
 
 double distanceGate(const MapTriangle& triangle, double distance) {
   return std::clamp(3.0 * triangle.sigma, distance, 2.0 * distance);

@@ -46,7 +46,8 @@ class PlaneEvidence {
   /// Keyframes of which at least `area` m^2 was left over on the plane.
   int seenBy(const PlaneTrack& plane, const CameraPoses& poses, double area) const;
   /// Planes that patches of the newest keyframe make with those of earlier ones. `known` are the planes in view; what
-  /// they explain by now is forgotten, and so is what a new plane takes. Keyframes without a pose count for nothing.
+  /// they explain by now is forgotten, and so is what a new plane takes. Keyframes without a pose count for nothing. A
+  /// peak that made no plane is tested again when a fair part of it is new.
   std::vector<JointPlane> detect(const CameraPoses& poses, const std::vector<const PlaneTrack*>& known);
 
  private:
@@ -54,6 +55,7 @@ class PlaneEvidence {
     PlaneKind kind;
     Eigen::Vector3d centre_C, n_C;  ///< area-weighted means
     double area = 0;
+    bool tested = false;                  ///< in a peak that was tested already
     std::vector<int> index;               ///< of each triangle in the keyframe's mesh
     std::vector<MapTriangle> triangles;   ///< in the camera frame; neighbours count within the patch
   };

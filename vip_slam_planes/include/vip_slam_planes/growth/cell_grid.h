@@ -37,6 +37,9 @@ class CellGrid {
   int width() const { return width_; }
   int height() const { return height_; }
 
+  /// Hits of the stored row y, from x0 on.
+  const std::uint8_t* row(int y) const { return hits_.data() + static_cast<std::size_t>(y - y0_) * width_; }
+
   /// f(CellIndex, hits) for every cell with hits, row by row.
   template <class F>
   void forEach(F f) const {

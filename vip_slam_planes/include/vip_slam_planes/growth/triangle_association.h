@@ -1,6 +1,8 @@
 // Which triangles of a placed mesh belong to which known plane (paper: 10 degrees, 5 cm).
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "vip_slam_planes/growth/plane_track.h"
@@ -10,7 +12,19 @@
 namespace vip_slam {
 
 /// Angle within which a triangle's normal counts as a plane's: the option, widened where noise makes normals unsteady.
-double angleGate(const MapTriangle& triangle, double angle_deg);
+class AngleGate {
+ public:
+  explicit AngleGate(double angle_deg);
+  double angle(const MapTriangle& triangle) const { return std::clamp(2.0 * triangle.sigma_angle, narrow_, wide_); }
+  /// Its cosine; most triangles are steady or hopeless, and cost none.
+  double cosine(const MapTriangle& triangle) const {
+    const double gate = angle(triangle);
+    return gate == narrow_ ? cos_narrow_ : gate == wide_ ? cos_wide_ : std::cos(gate);
+  }
+
+ private:
+  double narrow_, wide_, cos_narrow_, cos_wide_;
+};
 double distanceGate(const MapTriangle& triangle, double distance);
 
 /// Index into `tracks` per triangle, -1: none. A connected patch of triangles joins only where it comes within
