@@ -182,7 +182,8 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   {
     ScopedTimer timer(timing_, "frontend.update", t);
     still_ = decideStillness(t_imu);
-    report = filter_.step(propagation, next_clone_++, measurements(shutter(t_imu, propagation.predicted)), still_,
+    report = filter_.step(propagation, next_clone_++, measurements(shutter(t_imu, propagation.predicted)),
+                          still_ ? std::optional<double>(stillness_.unrest()) : std::nullopt,
                           calibrationExcited(t_imu), &surfaces);
   }
   renewSurfaces(depth, surfaces.pairs.size(), t);

@@ -178,7 +178,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     const double t_imu_true = 0.2 + k * step;  // the image stamp is this minus the true delay
     const double t_imu = t_imu_true - options.time_offset + filter.window().time_offset;
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
-    const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200), standing, true);
+    const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200),
+                                           standing ? std::optional<double>(1.0) : std::nullopt, true);
     nis += report.nis;
     rows += report.rows;
     result.gated += report.features_gated;

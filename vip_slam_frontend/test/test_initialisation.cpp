@@ -123,6 +123,28 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
   }
 }
 
+// Between the first image of a motion and the verdict that it is one, standing still must not be claimed to a millimetre.
+TEST(Stillness, IsAsExactAsTheImagesAreQuiet) {
+  const ZuptOptions options;
+  StillnessDetector detector(options);
+  detector.begin(quiet().imu);
+  StillnessCues tripod = quiet(), sway = quiet(), leaves = quiet();
+  tripod.disparity_px = tripod.anchor_disparity_px = 0.02;
+  sway.anchor_disparity_px = 0.4;
+  leaves.disparity_px = 0.7;
+  ASSERT_TRUE(detector.update(tripod));
+  EXPECT_LE(detector.unrest(), 0.25);
+  ASSERT_TRUE(detector.update(sway));
+  EXPECT_GE(detector.unrest(), 1.0);
+  ASSERT_TRUE(detector.update(leaves));
+  EXPECT_GE(detector.unrest(), 3.0);
+  StillnessCues dark = quiet();
+  dark.tracks = 0;
+  dark.disparity_px = dark.anchor_disparity_px = -1;
+  ASSERT_TRUE(detector.update(dark));
+  EXPECT_EQ(detector.unrest(), 1.0);
+}
+
 TEST(Stillness, AStartAtRestBeforeABareWallLastsUntilTheImuShowsAMotion) {
   const ZuptOptions options;
   StillnessDetector detector(options);

@@ -7,6 +7,9 @@ namespace vip_slam {
 
 namespace {
 
+// What it begins with is a guess that may be off by this much (logarithm), and so many images may say so.
+constexpr double kMostOfGuess = 3.0;
+constexpr int kGuessed = 3;
 constexpr double kGain = 0.05;  // per image, of the moving averages
 constexpr double kMostCorrection = 20.0;  // one image may not decide
 // Three sigmas above 1 for the moving average of six honest degrees of freedom.
@@ -23,7 +26,8 @@ void NoiseMonitor::add(double chi2_per_dof, int dof) {
   if (!adapt_ || dof < 20 || !(chi2_per_dof > 0) || !std::isfinite(chi2_per_dof)) return;
   // The first images count as much as those after them, so that a wrong start is soon forgotten.
   const double gain = 1.0 / (updates_ = std::min(updates_ + 1, 20));
-  const double step = gain * std::clamp(0.5 * std::log(chi2_per_dof), -1.0, 1.0);
+  const double most = updates_ <= kGuessed ? kMostOfGuess : 1.0;
+  const double step = gain * std::clamp(0.5 * std::log(chi2_per_dof), -most, most);
   sigma_ = std::clamp(sigma_ * std::exp(step), min_, std::max(min_, max_));
 }
 

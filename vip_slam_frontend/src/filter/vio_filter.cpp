@@ -256,9 +256,11 @@ void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, bool calibrat
 }
 
 StepReport VioFilter::step(const Propagation& propagation, CloneId id,
-                           const std::vector<FilterMeasurement>& measurements, bool still, bool calibrate,
+                           const std::vector<FilterMeasurement>& measurements, std::optional<double> unrest,
+                           bool calibrate,
                            const SurfaceMatches* surfaces) {
   StepReport report;
+  const bool still = unrest.has_value();
   const CloneId previous = filter_.window().clones.back().id;
   filter_.augment(propagation, id);
 
@@ -275,7 +277,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     if (still_images_ == 0) still_anchor_ = id;
     Eigen::MatrixXd H;
     Eigen::VectorXd h;
-    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, options_.zupt, &H, &h);
+    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, *unrest, options_.zupt,
+                     &H, &h);
     const UpdateResult result = filter_.update(H, h);
     report.zero_velocity = true;
     report.healthy = result.ok;

@@ -14,6 +14,9 @@ constexpr double kMostGyroShift = 0.005;  // rad/s
 constexpr double kMostAccelShift = 0.05;  // m/s^2
 // ... and those at rest follow by this share per image, as the biases walk.
 constexpr double kRestFollows = 0.01;
+// The sigmas fit image motion at the limit and surfaces two metres away; farther ones tell so much less. However quiet
+// the image, they do not fall below a share.
+constexpr double kFar = 3.0, kLeastUnrest = 0.2;
 
 bool restsAs(const ImuSpread& now, const ImuSpread& rest) {
   const double root = std::sqrt(static_cast<double>(std::max<std::size_t>(1, now.count)));
@@ -64,6 +67,8 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   } else {
     wants = wants && image_known && cues.disparity_px < options_.max_disparity_px;
   }
+  const double moved = std::max(cues.disparity_px, cues.anchor_disparity_px) / options_.max_disparity_px;
+  unrest_ = image_known ? std::max(kLeastUnrest, kFar * moved) : 1.0;
   if (wants) {
     const double share = image_known ? 1.0 : kRestFollows;
     rest_.mean_gyro += share * (cues.imu.mean_gyro - rest_.mean_gyro);
@@ -90,11 +95,11 @@ void StillnessDetector::reset() {
   in_a_row_ = 0;
 }
 
-void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ZuptOptions& options,
+void zeroVelocityRows(const WindowState& window, int anchor, int repeats, double unrest, const ZuptOptions& options,
                       Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   const int newest = static_cast<int>(window.clones.size()) - 1;
   const bool relative = anchor >= 0 && anchor != newest;
-  const double inflation = std::sqrt(1.0 + std::min(repeats, kMostRepeats));
+  const double inflation = unrest * std::sqrt(1.0 + std::min(repeats, kMostRepeats));
   *H = Eigen::MatrixXd::Zero(relative ? 9 : 3, window.dimension());
   *h = Eigen::VectorXd::Zero(relative ? 9 : 3);
   const double wv = 1.0 / (options.sigma_velocity * inflation);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "vip_slam_core/imu/imu_types.h"
@@ -60,9 +61,9 @@ class VioFilter {
   /// Prediction from the newest clone over `samples` (first at its time); does not change the filter.
   Propagation predict(const std::vector<ImuSample>& samples, double noise_scale = 1.0) const;
   /// One image: `propagation` from predict(). Without measurements this coasts. `surfaces` (may be null) ties the new
-  /// image's depth to that of an earlier clone.
+  /// image's depth to that of an earlier clone. `unrest`: see StillnessDetector; nothing when the body moves.
   StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,
-                  bool still, bool calibrate, const SurfaceMatches* surfaces = nullptr);
+                  std::optional<double> unrest, bool calibrate, const SurfaceMatches* surfaces = nullptr);
 
   const WindowState& window() const { return filter_.window(); }
   NavState nav() const { return filter_.window().nav(); }

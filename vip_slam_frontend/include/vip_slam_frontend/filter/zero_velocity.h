@@ -42,19 +42,23 @@ class StillnessDetector {
   /// A start at rest: still from here on. `rest`: the IMU while it stood.
   void begin(const ImuSpread& rest);
   bool still() const { return still_; }
+  /// How much the images moved while still, as a share of what standing still allows; 1 when they do not tell.
+  double unrest() const { return unrest_; }
   void reset();
 
  private:
   ZuptOptions options_;
   bool still_ = false;
   int in_a_row_ = 0;
+  double unrest_ = 1.0;
   ImuSpread rest_;  ///< the IMU's means at rest
 };
 
 /// Whitened rows on the newest clone and the nav state: v = 0, and no rotation or translation against the clone at
 /// `anchor` (index in the window; -1: velocity only). `repeats` counts the images since stopping: they repeat the same
-/// statement, so the sigmas grow with its root, up to threefold.
-void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ZuptOptions& options,
+/// statement, so the sigmas grow with its root, up to threefold. `unrest` is a factor on them: who sways a little is
+/// still, but not as still as a tripod.
+void zeroVelocityRows(const WindowState& window, int anchor, int repeats, double unrest, const ZuptOptions& options,
                       Eigen::MatrixXd* H, Eigen::VectorXd* h);
 
 }  // namespace vip_slam
