@@ -1,5 +1,6 @@
 #include "vip_slam_planes/plane_mapper.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -20,7 +21,23 @@ const CameraModel& checked(const std::shared_ptr<const CameraModel>& camera, con
   return *camera;
 }
 
+bool isSound(const DepthGrid& grid) {
+  if (grid.cols < 0 || grid.rows < 0 || grid.z.size() != std::size_t(grid.cols) * std::size_t(grid.rows)) return false;
+  return grid.empty() || grid.stride > 0;
+}
+
+bool isFinite(const PlanePolygon& polygon) {
+  const auto finite = [](const Ring& ring) {
+    return std::all_of(ring.begin(), ring.end(), [](const Eigen::Vector3d& p) { return p.allFinite(); });
+  };
+  return finite(polygon.outer) && std::all_of(polygon.holes.begin(), polygon.holes.end(), finite);
+}
+
 }  // namespace
+
+bool isSound(const Plane& plane) {
+  return plane.n.allFinite() && std::isfinite(plane.d) && std::abs(plane.n.norm() - 1) < 1e-3;
+}
 
 PlaneMapper::Impl::Impl(const PlaneMapperOptions& o, std::shared_ptr<const CameraModel> c, const DepthNoise& n,
                         TimingLog* t)
@@ -39,12 +56,12 @@ std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C) {
 
 void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   const bool usable = frame.status.state == TrackingState::kTracking && !frame.depth_grid.empty() && newest_ != 0 &&
-                      frame.epoch == epoch_ && !tracks_.empty();
+                      frame.epoch == epoch_ && !tracks_.empty() && isSound(frame.depth_grid);
   const SE3 T_map_C = T_map_odom * frame.state.T_W_I * frame.T_I_C;
   const SE3 moved = grown_at_.inverse() * T_map_C;
   const bool still = has_grown_ && moved.t().norm() < options.growth.min_move &&
                      logSO3(moved.rotation()).norm() < options.growth.min_turn_deg * M_PI / 180.0;
-  if (!usable || still) {
+  if (!usable || still || !T_map_C.isFinite()) {
     ++counters.frames_skipped;
     return;
   }
@@ -75,7 +92,7 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
 }
 
 void PlaneMapper::Impl::clear() {
-  waiting.clear();
+  waiting_.clear();
   placed_.clear();
   poses_.clear();
   tracks_.clear();
@@ -95,7 +112,13 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
   clear();
   for (const PlaneEstimate& estimate : planes) {
     next_plane_ = std::max(next_plane_, estimate.id + 1);
-    if (estimate.polygons.empty() || estimate.polygons.front().outer.empty()) continue;
+    const bool sound = !estimate.polygons.empty() && !estimate.polygons.front().outer.empty() &&
+                       std::all_of(estimate.polygons.begin(), estimate.polygons.end(), isFinite) &&
+                       isSound(estimate.plane) && !tracks_.count(estimate.id);
+    if (!sound) {
+      if (!tracks_.count(estimate.id)) removed_.push_back(estimate.id);
+      continue;
+    }
     PlaneTrack track(estimate.id, estimate.kind, estimate.plane, estimate.polygons.front().outer.front(),
                      options.growth.cell);
     for (const PlanePolygon& polygon : estimate.polygons) {
@@ -110,8 +133,18 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
     track.confirmed = track.determined = true;
     track.keyframes_seen = static_cast<int>(estimate.keyframes);
     tracks_.emplace(estimate.id, std::move(track));
+    published.push_back(estimate);
   }
-  published = planes;
+}
+
+void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
+  if (!keyframe || keyframe->id == 0 || placed_.count(keyframe->id) || !isSound(keyframe->frame.depth_grid)) return;
+  waiting_.emplace(keyframe->id, keyframe);
+  while (waiting_.size() > kMostWaiting) {
+    waiting_.erase(waiting_.begin());
+    ++counters.keyframes_forgotten;
+  }
+  counters.keyframes_waiting = waiting_.size();
 }
 
 PlaneMapper::PlaneMapper(const PlaneMapperOptions& options, std::shared_ptr<const CameraModel> camera,
@@ -119,16 +152,7 @@ PlaneMapper::PlaneMapper(const PlaneMapperOptions& options, std::shared_ptr<cons
     : impl_(new Impl(options, std::move(camera), noise, timing)) {}
 PlaneMapper::~PlaneMapper() = default;
 
-void PlaneMapper::addKeyframe(KeyframePtr keyframe) {
-  if (!keyframe || keyframe->id == 0) return;
-  impl_->waiting.emplace(keyframe->id, keyframe);
-  while (impl_->waiting.size() > kMostWaiting) {
-    impl_->waiting.erase(impl_->waiting.begin());
-    ++impl_->counters.keyframes_forgotten;
-  }
-  impl_->counters.keyframes_waiting = impl_->waiting.size();
-}
-
+void PlaneMapper::addKeyframe(KeyframePtr keyframe) { impl_->addKeyframe(keyframe); }
 void PlaneMapper::grow(const TrackedFrame& frame, const SE3& T_map_odom) { impl_->grow(frame, T_map_odom); }
 PlaneUpdate PlaneMapper::applyMapUpdate(const MapUpdate& update) { return impl_->applyMapUpdate(update); }
 const std::vector<PlaneEstimate>& PlaneMapper::planes() const { return impl_->published; }

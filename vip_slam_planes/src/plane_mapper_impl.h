@@ -14,11 +14,15 @@
 
 namespace vip_slam {
 
+/// Finite, with a unit normal.
+bool isSound(const Plane& plane);
+
 class PlaneMapper::Impl {
  public:
   Impl(const PlaneMapperOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
        TimingLog* timing);
 
+  void addKeyframe(const KeyframePtr& keyframe);
   void grow(const TrackedFrame& frame, const SE3& T_map_odom);
   PlaneUpdate applyMapUpdate(const MapUpdate& update);
   void restore(const std::vector<PlaneEstimate>& planes);
@@ -30,7 +34,6 @@ class PlaneMapper::Impl {
   TimingLog* timing;
   PlaneMapperCounters counters;
   std::vector<PlaneEstimate> published;
-  std::map<KeyframeId, KeyframePtr> waiting;  ///< not placed yet
 
  private:
   using Tracks = std::map<PlaneId, PlaneTrack>;
@@ -63,6 +66,7 @@ class PlaneMapper::Impl {
   PointAssociation points_;
   PlaneEvidence evidence_;
 
+  std::map<KeyframeId, KeyframePtr> waiting_; ///< not placed yet
   std::map<KeyframeId, KeyframePtr> placed_;  ///< processed keyframes that the map still has
   CameraPoses poses_;                         ///< T_map_C of all of those
   Tracks tracks_;

@@ -22,17 +22,17 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   takeCorrections(update);
 
   for (const KeyframeEstimate& estimate : update.keyframes) {
-    const auto it = waiting.find(estimate.id);
-    if (it == waiting.end()) continue;
+    const auto it = waiting_.find(estimate.id);
+    if (it == waiting_.end() || !estimate.state.T_W_I.isFinite()) continue;
     const KeyframePtr keyframe = it->second;
-    waiting.erase(it);
+    waiting_.erase(it);
     placed_[keyframe->id] = keyframe;
     poses_[keyframe->id] = estimate.state.T_W_I * keyframe->frame.T_I_C;
     if (keyframe->id > newest_) newest_ = keyframe->id, epoch_ = keyframe->frame.epoch;
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);
   }
-  counters.keyframes_waiting = waiting.size();
+  counters.keyframes_waiting = waiting_.size();
 
   std::vector<PlaneId> changed;
   for (auto& [id, track] : tracks_) {
@@ -49,7 +49,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   std::vector<KeyframeId> moved;
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto it = placed_.find(estimate.id);
-    if (it == placed_.end()) continue;
+    if (it == placed_.end() || !estimate.state.T_W_I.isFinite()) continue;
     SE3& T_map_C = poses_[estimate.id];
     const SE3 corrected = estimate.state.T_W_I * it->second->frame.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
@@ -59,7 +59,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   }
   for (const auto& [id, plane] : update.planes) {
     const auto it = tracks_.find(id);
-    if (it == tracks_.end()) continue;
+    if (it == tracks_.end() || !isSound(plane)) continue;
     it->second.setPlane(plane);
     it->second.markOptimised();
   }
@@ -78,7 +78,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
 }
 
 void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
-  waiting.erase(id);
+  waiting_.erase(id);
   if (!placed_.count(id)) return;
   // Its share of the area goes to the neighbour in time, which moves nearly alike.
   const auto it = placed_.find(id);

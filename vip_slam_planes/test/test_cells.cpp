@@ -37,6 +37,19 @@ TEST(CellGrid, GrowsInAllDirections) {
   EXPECT_FALSE(grid.near({-43, 7}, 2));
 }
 
+TEST(CellGrid, CellsTooFarToStoreAreLeftOut) {
+  CellGrid grid;
+  grid.set({3, 4}, 2);
+  for (const CellIndex far : {CellIndex{1 << 20, 1 << 20}, CellIndex{-2147483647, 4}, CellIndex{3, 2147483647}}) {
+    grid.set(far, 1);
+    EXPECT_EQ(0, grid.at(far));
+    EXPECT_FALSE(grid.near(far, 5));
+  }
+  EXPECT_EQ(1, grid.count(1));
+  EXPECT_EQ(2, grid.at({3, 4}));
+  EXPECT_LT(grid.width() * grid.height(), 1000);
+}
+
 TEST(CellGrid, CountsAndVisitsWhatHasHits) {
   CellGrid grid;
   std::mt19937 random(3);

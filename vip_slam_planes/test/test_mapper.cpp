@@ -1,4 +1,7 @@
 // The whole plane module on exact scenes, with poses that are given as a back end would give them.
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -446,6 +449,95 @@ TEST(Mapper, RemovedKeyframesLeaveTheirArea) {
   rig.mapper.applyMapUpdate(update);
   ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3), 0.004));
   EXPECT_NEAR(area, rig.find(Plane({-1, 0, 0}, 3))->area, 1e-9);
+}
+
+bool allFinite(const std::vector<PlaneEstimate>& planes) {
+  return std::all_of(planes.begin(), planes.end(), [](const PlaneEstimate& p) {
+    return p.plane.n.allFinite() && std::isfinite(p.plane.d) && std::isfinite(p.area) && p.area < 1e4;
+  });
+}
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Mapper, AKeyframeSentAgainCountsOnce) {
+  Rig rig;
+  const auto keyframe = rig.camera.keyframe(room(), lookAt({0, 0, 1.4}, {3, 0, 1.0}));
+  for (int i = 0; i < 3; ++i) rig.place(keyframe, lookAt({0, 0, 1.4}, {3, 0, 1.0}));
+  EXPECT_EQ(1u, rig.mapper.counters().keyframes);
+  EXPECT_EQ(0u, rig.mapper.counters().keyframes_waiting);
+}
+
+TEST(Mapper, PosesThatAreNoNumbersChangeNothing) {
+  Rig rig;
+  const Scene scene = room();
+  for (int i = 0; i < 3; ++i) rig.look(scene, {0, 0.2 * i, 1.4}, {3, 0, 1.0});
+  const std::size_t planes = rig.mapper.planes().size();
+  ASSERT_GT(planes, 0u);
+  const SE3 nowhere(Eigen::Quaterniond::Identity(), {kNan, 0, 0});
+
+  MapUpdate update;  // of a keyframe that is placed, of a plane, of a landmark
+  update.keyframes.push_back({1, {}});
+  update.keyframes.back().state.T_W_I = nowhere;
+  for (const PlaneEstimate& p : rig.mapper.planes()) {
+    Plane broken = p.plane;
+    broken.n.x() = kNan;
+    update.planes.emplace_back(p.id, broken);
+  }
+  rig.mapper.applyMapUpdate(update);
+  TrackedFrame frame = rig.camera.frame(scene, lookAt({0.5, 0, 1.4}, {3, 0, 1.0}), 10, 16);
+  frame.keyframe = 1;
+  rig.mapper.grow(frame, nowhere);
+  EXPECT_EQ(0u, rig.mapper.counters().frames_grown);
+  const auto keyframe = rig.camera.keyframe(scene, lookAt({0, 0.6, 1.4}, {3, 0, 1.0}));
+  rig.place(keyframe, nowhere);
+  EXPECT_EQ(planes, rig.mapper.planes().size());
+  EXPECT_TRUE(allFinite(rig.mapper.planes()));
+  // The keyframe waits for a pose that is one.
+  EXPECT_EQ(1u, rig.mapper.counters().keyframes_waiting);
+  rig.mapper.applyMapUpdate(updateFor(*keyframe, lookAt({0, 0.6, 1.4}, {3, 0, 1.0})));
+  EXPECT_EQ(4u, rig.mapper.counters().keyframes);
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 3)));
+}
+
+TEST(Mapper, DepthGridsThatContradictThemselvesAreRefused) {
+  Rig rig;
+  const Scene scene = room();
+  const SE3 T = lookAt({0, 0, 1.4}, {3, 0, 1.0});
+  rig.look(scene, {0, 0.2, 1.4}, {3, 0, 1.0});
+  for (int fault = 0; fault < 3; ++fault) {
+    const auto break_it = [fault](DepthGrid* grid) {
+      if (fault == 0) grid->z.resize(grid->z.size() / 2);
+      if (fault == 1) grid->stride = 0;
+      if (fault == 2) grid->cols = -grid->cols, grid->rows = -grid->rows;
+    };
+    const auto keyframe = rig.camera.keyframe(scene, T);
+    break_it(&keyframe->frame.depth_grid);
+    rig.place(keyframe, T);
+    EXPECT_EQ(1u, rig.mapper.counters().keyframes) << fault;
+    TrackedFrame frame = rig.camera.frame(scene, T, 10, 16);
+    frame.keyframe = 1;
+    break_it(&frame.depth_grid);
+    rig.mapper.grow(frame, SE3());
+    EXPECT_EQ(0u, rig.mapper.counters().frames_grown) << fault;
+  }
+}
+
+TEST(Mapper, LoadedPlanesWithoutAreaGoAndTheBackEndHearsOfIt) {
+  Rig first, second;
+  for (int i = 0; i < 4; ++i) first.look(room(), {0, 0.2 * i, 1.4}, {3, 0.2, 1.0});
+  std::vector<PlaneEstimate> planes = first.mapper.planes();
+  const std::size_t sound = planes.size();
+  ASSERT_GT(sound, 0u);
+  for (const PlaneId id : {100, 101, 102}) planes.push_back(planes.front()), planes.back().id = id;
+  planes[sound].polygons.clear();
+  planes[sound + 1].polygons.front().outer[1].y() = kNan;
+  planes[sound + 2].plane.d = kNan;
+  second.mapper.restore(planes);
+  EXPECT_EQ(sound, second.mapper.planes().size());
+  const PlaneUpdate update = second.mapper.applyMapUpdate({});
+  EXPECT_EQ((std::vector<PlaneId>{100, 101, 102}), update.removed);
+  EXPECT_EQ(sound, second.mapper.planes().size());
+  EXPECT_TRUE(allFinite(second.mapper.planes()));
 }
 
 TEST(Mapper, BadInput) {

@@ -39,16 +39,19 @@ class PlaneMapper {
   PlaneMapper(const PlaneMapper&) = delete;
   PlaneMapper& operator=(const PlaneMapper&) = delete;
 
-  /// Remembered until a MapUpdate has placed it. A null keyframe or a known id is ignored.
+  /// Remembered until a MapUpdate has placed it. A null keyframe, a known id, or a depth grid whose size is not what it
+  /// says is ignored.
   void addKeyframe(KeyframePtr keyframe);
   /// Image rate: extends planes that exist; starts none. Does nothing without depth, while not tracking, or when the
   /// frame belongs to another epoch than the newest keyframe.
   void grow(const TrackedFrame& frame, const SE3& T_map_odom);
-  /// Takes the corrections, then detects, associates and merges with the keyframes that are now placed.
+  /// Takes the corrections, then detects, associates and merges with the keyframes that are now placed. Poses, planes
+  /// and landmarks that are not finite are passed over.
   PlaneUpdate applyMapUpdate(const MapUpdate& update);
   /// Confirmed planes, by id; polygons are as of the last applyMapUpdate().
   const std::vector<PlaneEstimate>& planes() const;
-  /// Starts from the planes of a loaded map; everything known before is forgotten.
+  /// Starts from the planes of a loaded map; everything known before is forgotten. Planes without area, or not finite,
+  /// are reported as removed by the next applyMapUpdate().
   void restore(const std::vector<PlaneEstimate>& planes);
   void clear();
 

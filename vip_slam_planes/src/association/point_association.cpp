@@ -81,6 +81,7 @@ void PointAssociation::applyMapUpdate(const MapUpdate& update) {
     if (it != landmarks_.end()) erase(it);
   }
   for (const LandmarkEstimate& estimate : update.landmarks) {
+    if (!estimate.p_W.allFinite()) continue;
     Landmark& landmark = landmarks_[resolve(estimate.id)];
     landmark.p_W = estimate.p_W;
     landmark.placed = true;

@@ -1,20 +1,25 @@
 #include "vip_slam_planes/growth/cell_grid.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace vip_slam {
 
-void CellGrid::cover(CellIndex c) {
+bool CellGrid::cover(CellIndex c) {
   constexpr int kSlack = 8;  // cells beyond the need, so that growth copies seldom
+  // 64 MB, 800 m x 800 m of cells of 10 cm: what lies beyond was put there by a pose that went astray.
+  constexpr std::int64_t kMostCells = 1 << 26, kFarthest = 1 << 24;
+  if (std::abs(std::int64_t(c.x)) > kFarthest || std::abs(std::int64_t(c.y)) > kFarthest) return false;
   if (hits_.empty()) {
     x0_ = c.x - kSlack, y0_ = c.y - kSlack, width_ = height_ = 2 * kSlack + 1;
     hits_.assign(static_cast<std::size_t>(width_) * height_, 0);
-    return;
+    return true;
   }
-  if (c.x >= x0_ && c.y >= y0_ && c.x < x0_ + width_ && c.y < y0_ + height_) return;
+  if (c.x >= x0_ && c.y >= y0_ && c.x < x0_ + width_ && c.y < y0_ + height_) return true;
   const int x0 = c.x < x0_ ? c.x - kSlack : x0_, y0 = c.y < y0_ ? c.y - kSlack : y0_;
   const int x1 = c.x >= x0_ + width_ ? c.x + kSlack + 1 : x0_ + width_;
   const int y1 = c.y >= y0_ + height_ ? c.y + kSlack + 1 : y0_ + height_;
+  if (std::int64_t(x1 - x0) * (y1 - y0) > kMostCells) return false;
   std::vector<std::uint8_t> hits(static_cast<std::size_t>(x1 - x0) * (y1 - y0), 0);
   for (int j = 0; j < height_; ++j) {
     std::copy_n(hits_.begin() + static_cast<std::size_t>(j) * width_, width_,
@@ -22,11 +27,11 @@ void CellGrid::cover(CellIndex c) {
   }
   hits_ = std::move(hits);
   x0_ = x0, y0_ = y0, width_ = x1 - x0, height_ = y1 - y0;
+  return true;
 }
 
 void CellGrid::set(CellIndex c, int hits) {
-  if (hits == 0 && at(c) == 0) return;
-  cover(c);
+  if ((hits == 0 && at(c) == 0) || !cover(c)) return;
   std::uint8_t& cell = hits_[static_cast<std::size_t>(c.y - y0_) * width_ + (c.x - x0_)];
   covered_ -= cell > 0;
   cell = static_cast<std::uint8_t>(std::clamp(hits, 0, 255));
@@ -39,8 +44,9 @@ int CellGrid::count(int min_hits) const {
 }
 
 bool CellGrid::near(CellIndex c, int reach) const {
-  const int xa = std::max(c.x - reach, x0_), xb = std::min(c.x + reach, x0_ + width_ - 1);
-  const int ya = std::max(c.y - reach, y0_), yb = std::min(c.y + reach, y0_ + height_ - 1);
+  const std::int64_t cx = c.x, cy = c.y;
+  const int xa = int(std::max<std::int64_t>(cx - reach, x0_)), xb = int(std::min<std::int64_t>(cx + reach, x0_ + width_ - 1));
+  const int ya = int(std::max<std::int64_t>(cy - reach, y0_)), yb = int(std::min<std::int64_t>(cy + reach, y0_ + height_ - 1));
   for (int y = ya; y <= yb; ++y) {
     const std::uint8_t* row = hits_.data() + static_cast<std::size_t>(y - y0_) * width_ - x0_;
     for (int x = xa; x <= xb; ++x) {

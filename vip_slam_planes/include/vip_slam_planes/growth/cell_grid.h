@@ -19,10 +19,10 @@ struct CellIndex {
 class CellGrid {
  public:
   int at(CellIndex c) const {
-    const int i = c.x - x0_, j = c.y - y0_;
-    return i < 0 || j < 0 || i >= width_ || j >= height_ ? 0 : hits_[static_cast<std::size_t>(j) * width_ + i];
+    const std::int64_t i = std::int64_t(c.x) - x0_, j = std::int64_t(c.y) - y0_;
+    return i < 0 || j < 0 || i >= width_ || j >= height_ ? 0 : hits_[static_cast<std::size_t>(j * width_ + i)];
   }
-  /// Grows as needed.
+  /// Grows as needed; a cell too far away to store (some 800 m at 10 cm) stays empty.
   void set(CellIndex c, int hits);
   /// Number of cells with at least `min_hits`.
   int count(int min_hits) const;
@@ -62,7 +62,7 @@ class CellGrid {
   void closePinholes();
 
  private:
-  void cover(CellIndex c);
+  bool cover(CellIndex c);
 
   int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;
   int covered_ = 0;  ///< cells with hits
