@@ -96,7 +96,7 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
         const Plane& p = planes[plane[l]].plane;
         plane_seen = {g.R_C_W * p.n, p.signedDistance(g.t_W_C), true};
       }
-      if (!v->own_track || !seesWell(plane_seen, v->feature->xy)) continue;
+      if (!v->own_track || !seesWell(plane_seen, v->xy)) continue;
       good[views.first(l) + view] = 1;
       if (hosts[l] < 0 && !shared) hosts[l] = view;
     }

@@ -2,17 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+
+#include "vip_slam_core/types/sliding_tracks.h"
 
 namespace vip_slam {
 namespace {
 
-// Views of one track among those of a landmark.
-struct TrackOfLandmark {
-  LandmarkId id;
-  int views;
-};
-
 constexpr double kLeastDepth = 0.05, kMostApart = 4.0;
+
+// How many landmarks ahead its memory is asked for: the landmark itself, the list of its observations, their features.
+constexpr std::size_t kAheadLandmark = 12, kAheadList = 8, kAheadFeatures = 4;
+
+void prefetch(const void* p, std::size_t bytes) {
+  const char* at = static_cast<const char*>(p);
+  for (std::size_t k = 0; k < bytes; k += 64) __builtin_prefetch(at + k);
+  __builtin_prefetch(at + bytes - 1);
+}
 
 double depthIn(const Map& map, KeyframeId keyframe, const Eigen::Vector3d& p_W) {
   const SE3 T_W_C = map.keyframe(keyframe).T_W_C();
@@ -26,29 +32,16 @@ double firstDepth(const Map& map, const MapLandmark& landmark, LandmarkId track)
   return kLeastDepth;
 }
 
-// See LandmarkView::apart.
+// See PixelNoise::sigma().
 double cornersApart(const Map& map, const MapLandmark& landmark, LandmarkId a, LandmarkId b, KeyframeId here) {
   const double depth = depthIn(map, here, landmark.p_W);
   return std::min(kMostApart, std::hypot(firstDepth(map, landmark, a), firstDepth(map, landmark, b)) / depth);
 }
 
-std::vector<TrackOfLandmark> tracksOf(const std::vector<LandmarkView>& views) {
-  std::vector<TrackOfLandmark> tracks;
-  for (const LandmarkView& v : views) {
-    if (v.feature->id == kNoLandmark) continue;
-    const auto known =
-        std::find_if(tracks.begin(), tracks.end(), [&v](const auto& t) { return t.id == v.feature->id; });
-    if (known == tracks.end())
-      tracks.push_back({v.feature->id, 1});
-    else
-      ++known->views;
-  }
-  return tracks;
-}
-
 }  // namespace
 
-LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes) {
+LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes,
+                             const PixelNoise& noise) {
   std::vector<const MapLandmark*> landmarks;
   if (scope.free.size() == map.keyframes().size()) {
     landmarks.reserve(map.landmarks().size());
@@ -65,57 +58,82 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
   std::sort(landmarks.begin(), landmarks.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
 
   // Keyframes lie close together in their ids: a table finds a frame without hashing.
-  std::vector<const Feature*> features;
-  std::vector<int> frame_of;
-  const KeyframeId lowest = keyframes.empty() ? 0 : keyframes.front();
+  lowest_ = keyframes.empty() ? 0 : keyframes.front();
+  std::size_t most = 0;
   for (std::size_t f = 0; f < keyframes.size(); ++f) {
-    frame_of.resize(keyframes[f] - lowest + 1, -1);
-    frame_of.back() = static_cast<int>(f);
-    features.push_back(map.keyframe(keyframes[f]).features().data());
+    frame_of_.resize(keyframes[f] - lowest_ + 1, -1);
+    frame_of_.back() = static_cast<int>(f);
+    features_.push_back(map.keyframe(keyframes[f]).features().data());
+    most += map.keyframe(keyframes[f]).features().size();
   }
   first_.reserve(landmarks.size() + 1);
   points_.reserve(landmarks.size());
-  std::vector<LandmarkView> seen;
-  for (const MapLandmark* landmark : landmarks) {
-    seen.clear();
-    for (const MapObservation& o : landmark->observations) {
-      if (o.keyframe < lowest || o.keyframe - lowest >= frame_of.size()) continue;
-      const int frame = frame_of[o.keyframe - lowest];
-      if (frame >= 0) seen.push_back({frame, true, o.feature, features[frame] + o.feature});
+  views_.reserve(most);
+  const std::size_t count = landmarks.size();
+  for (std::size_t l = 0; l < count; ++l) {
+    if (l + kAheadLandmark < count) prefetch(landmarks[l + kAheadLandmark], sizeof(MapLandmark));
+    if (l + kAheadList < count) {
+      const auto& list = landmarks[l + kAheadList]->observations;
+      prefetch(list.data(), list.size() * sizeof(MapObservation));
     }
-    addPoints(map, *landmark, keyframes, seen);
+    if (l + kAheadFeatures < count) {
+      collect(*landmarks[l + kAheadFeatures]);
+      for (const Seen& s : seen_) prefetch(s.feature, offsetof(Feature, descriptor));
+    }
+    collect(*landmarks[l]);
+    addPoints(map, *landmarks[l], keyframes, noise);
   }
   first_.push_back(viewCount());
 }
 
+void LandmarkViews::collect(const MapLandmark& landmark) {
+  seen_.clear();
+  for (const MapObservation& o : landmark.observations) {
+    if (o.keyframe < lowest_ || o.keyframe - lowest_ >= frame_of_.size()) continue;
+    const int frame = frame_of_[o.keyframe - lowest_];
+    if (frame >= 0) seen_.push_back({frame, o.feature, features_[frame] + o.feature});
+  }
+}
+
+void LandmarkViews::addView(const Seen& seen, bool own_track, double apart, const PixelNoise& noise) {
+  const Feature& f = *seen.feature;
+  views_.push_back({seen.frame, seen.feature_index, f.xy, f.depth, f.depth_sigma, noise.sigma(f, own_track, apart),
+                    own_track, own_track && f.pixel_sigma > kSlidingPixelSigma});
+}
+
 void LandmarkViews::addPoints(const Map& map, const MapLandmark& landmark, const std::vector<KeyframeId>& keyframes,
-                              std::vector<LandmarkView>& seen) {
-  const std::vector<TrackOfLandmark> tracks = tracksOf(seen);
-  const auto longest = std::max_element(tracks.begin(), tracks.end(),
-                                        [](const auto& a, const auto& b) { return a.views < b.views; });
+                              const PixelNoise& noise) {
+  const auto trackOf = [this](LandmarkId id) {
+    return std::find_if(tracks_.begin(), tracks_.end(), [id](const Track& t) { return t.id == id; });
+  };
+  tracks_.clear();
+  for (const Seen& s : seen_) {
+    if (s.feature->id == kNoLandmark) continue;
+    const auto known = trackOf(s.feature->id);
+    if (known == tracks_.end())
+      tracks_.push_back({s.feature->id, 1, 0});
+    else
+      ++known->views;
+  }
+  const auto longest = std::max_element(tracks_.begin(), tracks_.end(),
+                                        [](const Track& a, const Track& b) { return a.views < b.views; });
   points_.push_back(&landmark);
   first_.push_back(viewCount());
   // Of each other track the view in its middle.
-  std::vector<int> until_tie;
-  for (const TrackOfLandmark& track : tracks) until_tie.push_back(track.views / 2);
-  for (LandmarkView& view : seen) {
-    const auto track =
-        std::find_if(tracks.begin(), tracks.end(), [&view](const auto& t) { return t.id == view.feature->id; });
-    view.own_track = track != tracks.end() && track == longest;
-    const bool tie = !view.own_track && track != tracks.end() && until_tie[track - tracks.begin()]-- == 0;
-    if (tie) view.apart = cornersApart(map, landmark, longest->id, view.feature->id, keyframes[view.frame]);
-    if (view.own_track || track == tracks.end() || tie) views_.push_back(view);
+  for (Track& track : tracks_) track.until_tie = track.views / 2;
+  for (const Seen& s : seen_) {
+    const auto track = trackOf(s.feature->id);
+    if (track == tracks_.end() || track == longest)
+      addView(s, track != tracks_.end(), 1, noise);
+    else if (track->until_tie-- == 0)
+      addView(s, false, cornersApart(map, landmark, longest->id, track->id, keyframes[s.frame]), noise);
   }
-  for (auto track = tracks.begin(); track != tracks.end(); ++track) {
+  for (auto track = tracks_.begin(); track != tracks_.end(); ++track) {
     if (track == longest || track->views < 2) continue;
     points_.push_back(&landmark);
     first_.push_back(viewCount());
-    for (LandmarkView& view : seen) {
-      if (view.feature->id != track->id) continue;
-      view.own_track = true;
-      view.apart = 1;
-      views_.push_back(view);
-    }
+    for (const Seen& s : seen_)
+      if (s.feature->id == track->id) addView(s, true, 1, noise);
   }
 }
 

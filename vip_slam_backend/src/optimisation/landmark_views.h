@@ -1,5 +1,5 @@
 // The landmarks of a problem and who sees them, in flat arrays: looked up in the map once, read by all who build
-// factors.
+// factors. Features lie scattered over the keyframes, beyond the second-level cache: what is needed of them is copied.
 //
 // A landmark that was found again is known by several tracks. Within a track every view matches one reference patch,
 // and its error is constant to a few hundredths of a pixel; another track began at a corner detected anew, half a pixel
@@ -7,28 +7,29 @@
 // ties it to the landmark's longest track.
 #pragma once
 
-#include <unordered_map>
 #include <vector>
 
+#include "pixel_noise.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
 
 namespace vip_slam {
 
 struct LandmarkView {
-  int frame = 0;                    ///< of the problem
-  bool own_track = true;            ///< false: of another track than the point, or a corner that is not tracked
-  std::uint32_t feature_index = 0;  ///< in the keyframe
-  const Feature* feature = nullptr;
-  /// Of the view that ties another track to the point: how far apart the corners of the two tracks are here, as a factor
-  /// on the error of one where it was detected. What is half a pixel from afar is more from near by.
-  double apart = 1;
+  int frame = 0;                                 ///< of the problem
+  std::uint32_t feature_index = 0;               ///< in the keyframe
+  Eigen::Vector2f xy = Eigen::Vector2f::Zero();  ///< undistorted normalised coordinates
+  float depth = 0, depth_sigma = 0;              ///< as the feature's
+  double sigma = 0;                              ///< of the view of this point, normalised
+  bool own_track = true;  ///< false: of another track than the point, or a corner that is not tracked
+  bool slides = false;    ///< of a track that slides with the motion
 };
 
 class LandmarkViews {
  public:
   /// Points of the landmarks that a free keyframe sees, ascending by landmark; their views by the problem's frames,
   /// ascending. `keyframes`: the frames' keyframes, ascending.
-  LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes);
+  LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes,
+                const PixelNoise& noise);
 
   int size() const { return static_cast<int>(points_.size()); }
   const MapLandmark& landmark(int l) const { return *points_[l]; }
@@ -41,12 +42,33 @@ class LandmarkViews {
   int viewCount() const { return static_cast<int>(views_.size()); }
 
  private:
+  /// A view and the feature behind it, before it is known which point it belongs to.
+  struct Seen {
+    int frame;
+    std::uint32_t feature_index;
+    const Feature* feature;
+  };
+  struct Track {
+    LandmarkId id;
+    int views;
+    int until_tie;  ///< views left before the one in its middle
+  };
+  /// Views of one landmark whose keyframes are frames of the problem.
+  void collect(const MapLandmark& landmark);
   void addPoints(const Map& map, const MapLandmark& landmark, const std::vector<KeyframeId>& keyframes,
-                 std::vector<LandmarkView>& seen);
+                 const PixelNoise& noise);
+  void addView(const Seen& seen, bool own_track, double apart, const PixelNoise& noise);
 
   std::vector<const MapLandmark*> points_;
   std::vector<int> first_;
   std::vector<LandmarkView> views_;
+
+  // While the views are collected.
+  KeyframeId lowest_ = 0;
+  std::vector<int> frame_of_;              // by keyframe - lowest_
+  std::vector<const Feature*> features_;   // of each frame
+  std::vector<Seen> seen_;
+  std::vector<Track> tracks_;
 };
 
 }  // namespace vip_slam

@@ -13,11 +13,10 @@ PixelNoise::PixelNoise(const MeasurementOptions& options, double focal)
       between_tracks_(options.between_tracks_sigma / focal),
       gate_sigma_(options.gate_sigma / focal) {}
 
-double PixelNoise::sigma(const LandmarkView& view) const {
-  const Feature& feature = *view.feature;
+double PixelNoise::sigma(const Feature& feature, bool own_track, double apart) const {
   if (feature.id == kNoLandmark) return matched_ * std::pow(1.2, feature.octave);  // found by its descriptor
   const double tracked = std::clamp(feature.pixel_sigma / focal_, least_, most_);
-  return view.own_track ? tracked : std::hypot(tracked, view.apart * between_tracks_);
+  return own_track ? tracked : std::hypot(tracked, apart * between_tracks_);
 }
 
 }  // namespace vip_slam

@@ -4,8 +4,8 @@
 // landmark shows a point beside it.
 #pragma once
 
-#include "landmark_views.h"
 #include "vip_slam_backend/back_end_options.h"
+#include "vip_slam_core/types/feature.h"
 
 namespace vip_slam {
 
@@ -13,8 +13,10 @@ class PixelNoise {
  public:
   PixelNoise(const MeasurementOptions& options, double focal);
 
-  /// One sigma of a view of a point, in normalised coordinates.
-  double sigma(const LandmarkView& view) const;
+  /// One sigma of a view of a point, in normalised coordinates. `own_track`: of the point's track. Else `apart` tells how
+  /// far apart the corners of the two tracks are here, as a factor on the error of one where it was detected: what is
+  /// half a pixel from afar is more from near by.
+  double sigma(const Feature& feature, bool own_track, double apart) const;
   /// Errors are judged as outliers against at least this sigma, normalised: whoever weighs marks by a tenth of a pixel
   /// must not throw away what a camera's calibration leaves.
   double gateSigma() const { return gate_sigma_; }

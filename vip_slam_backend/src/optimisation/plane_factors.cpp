@@ -8,7 +8,6 @@
 #include "homography_hosts.h"
 #include "plane_noise.h"
 #include "vip_slam_backend/solver/robust.h"
-#include "vip_slam_core/types/sliding_tracks.h"
 
 namespace vip_slam {
 namespace {
@@ -20,13 +19,11 @@ constexpr double kCore = 0.6, kTail = 3.0;
 // How many squared errors of the expected size a track is believed to have shown before its own are counted.
 constexpr double kTrackFreedom = 4.0;
 
-bool slides(const LandmarkView& view) { return view.own_track && view.feature->pixel_sigma > kSlidingPixelSigma; }
-
 }  // namespace
 
 PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings,
                                        BuiltProblem* built)
-    : map_(map), scope_(scope), settings_(settings), noise_(settings.measurement, settings.focal), built_(built) {
+    : map_(map), scope_(scope), settings_(settings), built_(built) {
   BaProblem& problem = built->problem;
   for (const BaFrame& f : problem.frames) geometry_.emplace_back(f.state.T_W_I, f.T_I_C);
   if (settings.variant == Variant::kVi) return;
@@ -114,16 +111,16 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
   const bool host_fixed = built_->problem.frames[host.frame].fixed;
   // Variances, inflated; an outlier is judged against at least the gate's.
   const auto square = [](double x) { return x * x; };
-  const double inflation = square(options.homography_inflation), gate = square(noise_.gateSigma()) * inflation;
-  const double host_variance = square(noise_.sigma(host)) * inflation;
+  const double inflation = square(options.homography_inflation), gate = inflation / square(built_->gate_weight);
+  const double host_variance = square(host.sigma) * inflation;
   const double host_judged = std::max(host_variance, gate);
-  const Eigen::Vector2d xy_i = host.feature->xy.cast<double>();
+  const Eigen::Vector2d xy_i = host.xy.cast<double>();
   pairs_.clear();
   int tried = 0, refused = 0;
-  if (slides(host)) return true;
+  if (host.slides) return true;
   for (const LandmarkView* v = views.begin(landmark); v != views.end(landmark); ++v) {
     if (v->frame == host.frame || (host_fixed && built_->problem.frames[v->frame].fixed)) continue;
-    if (slides(*v)) continue;
+    if (v->slides) continue;
     ++tried;
     const int place = observerOf(v->frame, host.frame, parameters, slot, observers);
     const Observer& observer = (*observers)[place];
@@ -135,10 +132,10 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     }
     // The pair's noise is that of the observer and that of the host, seen from the observer.
     const double gain = hostNoiseGain(observer.h, p);
-    const double own = square(noise_.sigma(*v)) * inflation;
+    const double own = square(v->sigma) * inflation;
     const double variance = own + gain * host_variance, judged = std::max(own, gate) + gain * host_judged;
     // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
-    const Eigen::Vector2d xy_j = v->feature->xy.cast<double>();
+    const Eigen::Vector2d xy_j = v->xy.cast<double>();
     const double error = (p.head<2>() - rho * xy_j).squaredNorm() / (rho * rho);
     if (error > options.outlier_chi2 * judged) {
       ++refused;

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "landmark_views.h"
-#include "pixel_noise.h"
 #include "plane_gate.h"
 #include "vip_slam_backend/factors/frame_geometry.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
@@ -50,7 +49,6 @@ class PlaneFactorBuilder {
   };
   /// A track whose pairs disagree more than they should counts for less altogether.
   void weighTrack();
-  PixelNoise noise_;
   std::vector<PairOfObserver> pairs_;  // of the landmark at hand
   BuiltProblem* built_;
   std::vector<FrameGeometry> geometry_;

@@ -4,12 +4,20 @@
 
 namespace vip_slam {
 
+PlaneIntersection::PlaneIntersection(const Map& map)
+    : map_(map), lowest_(map.empty() ? 0 : map.keyframes().begin()->first) {
+  camera_of_.assign(map.empty() ? 0 : map.newestKeyframe() - lowest_ + 1, -1);
+}
+
 const PlaneIntersection::Camera& PlaneIntersection::camera(KeyframeId id) {
-  const auto known = cameras_.find(id);
-  if (known != cameras_.end()) return known->second;
-  const MapKeyframe& kf = map_.keyframe(id);
-  const SE3 T_W_C = kf.T_W_C();
-  return cameras_.emplace(id, Camera{T_W_C.R(), T_W_C.t(), kf.features().data()}).first->second;
+  int& place = camera_of_[id - lowest_];
+  if (place < 0) {
+    place = static_cast<int>(cameras_.size());
+    const MapKeyframe& kf = map_.keyframe(id);
+    const SE3 T_W_C = kf.T_W_C();
+    cameras_.push_back({T_W_C.R(), T_W_C.t(), kf.features().data()});
+  }
+  return cameras_[place];
 }
 
 Eigen::Vector3d PlaneIntersection::operator()(const MapLandmark& landmark, const Plane& plane) {
@@ -29,6 +37,11 @@ Eigen::Vector3d PlaneIntersection::operator()(const MapLandmark& landmark, const
     weights += weight;
   }
   return weights > 0 ? Eigen::Vector3d(sum / weights) : plane.project(landmark.p_W);
+}
+
+void PlaneIntersection::prefetch(const MapLandmark& landmark) {
+  for (const MapObservation& o : landmark.observations)
+    __builtin_prefetch(&camera(o.keyframe).features[o.feature].xy);
 }
 
 }  // namespace vip_slam

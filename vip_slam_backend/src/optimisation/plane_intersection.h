@@ -1,7 +1,7 @@
 // Landmarks on planes that were no variables: where their rays meet the plane.
 #pragma once
 
-#include <unordered_map>
+#include <vector>
 
 #include "vip_slam_backend/map/map.h"
 
@@ -10,10 +10,12 @@ namespace vip_slam {
 /// Reads the map's poses as they are at the first use of each keyframe.
 class PlaneIntersection {
  public:
-  explicit PlaneIntersection(const Map& map) : map_(map) {}
+  explicit PlaneIntersection(const Map& map);
   /// Weighted mean of where the rays of a landmark's observations meet the plane; the projection of its position when
   /// none does.
   Eigen::Vector3d operator()(const MapLandmark& landmark, const Plane& plane);
+  /// Asks for the memory that a later call with this landmark will read.
+  void prefetch(const MapLandmark& landmark);
 
  private:
   struct Camera {
@@ -21,10 +23,12 @@ class PlaneIntersection {
     Eigen::Vector3d t_W_C;
     const Feature* features;
   };
-  const Camera& camera(KeyframeId id);
+  const Camera& camera(KeyframeId id);  // until the next call
 
   const Map& map_;
-  std::unordered_map<KeyframeId, Camera> cameras_;
+  KeyframeId lowest_;
+  std::vector<int> camera_of_;  // by keyframe - lowest_: keyframes lie close together in their ids
+  std::vector<Camera> cameras_;
 };
 
 }  // namespace vip_slam

@@ -4,13 +4,10 @@
 #include <cmath>
 #include <numeric>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "landmark_views.h"
 #include "pixel_noise.h"
 #include "plane_factors.h"
-#include "plane_intersection.h"
-#include "vip_slam_backend/factors/reprojection.h"
 
 namespace vip_slam {
 namespace {
@@ -112,9 +109,11 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
 
   const PixelNoise noise(settings.measurement, settings.focal);
   built.gate_weight = 1.0 / noise.gateSigma();
-  const LandmarkViews views(map, scope, built.frames);
+  const LandmarkViews views(map, scope, built.frames, noise);
   PlaneFactorBuilder planes(map, scope, settings, &built);
   const std::vector<char> on_plane = planes.addHomographies(views);
+  problem.observations.reserve(views.viewCount());
+  built.observations.reserve(views.viewCount());
   for (int l = 0; l < views.size(); ++l) {
     const MapLandmark& landmark = views.landmark(l);
     if (on_plane[l] && settings.variant == Variant::kVip) {
@@ -128,12 +127,12 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
     for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
       BaObservation observation;
       observation.frame = v->frame;
-      observation.x = v->feature->xy.x();
-      observation.y = v->feature->xy.y();
-      observation.weight = 1.0 / noise.sigma(*v);
-      if (v->feature->depth > 0) {
-        observation.depth = v->feature->depth;
-        observation.depth_weight = 1.0 / (v->feature->depth_sigma * settings.measurement.depth_sigma_scale);
+      observation.x = v->xy.x();
+      observation.y = v->xy.y();
+      observation.weight = 1.0 / v->sigma;
+      if (v->depth > 0) {
+        observation.depth = v->depth;
+        observation.depth_weight = 1.0 / (v->depth_sigma * settings.measurement.depth_sigma_scale);
         depth = true;
       }
       problem.observations.push_back(observation);
@@ -153,62 +152,6 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
   addGauges(&problem);
   addMotionPriors(&problem);
   return built;
-}
-
-void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
-  const BaProblem& problem = built.problem;
-  std::unordered_map<KeyframeId, SE3> motion;
-  for (std::size_t f = 0; f < built.frames.size(); ++f) {
-    if (problem.frames[f].fixed || !map->hasKeyframe(built.frames[f])) continue;
-    const NavState& state = problem.frames[f].state;
-    motion[built.frames[f]] = state.T_W_I * map->keyframe(built.frames[f]).state.T_W_I.inverse();
-    map->setState(built.frames[f], state, noise);
-  }
-  for (std::size_t p = 0; p < built.planes.size(); ++p)
-    if (map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
-  std::unordered_set<LandmarkId> done;
-  done.reserve(built.points.size() + built.plane_points.size());
-  for (std::size_t p = 0; p < built.points.size(); ++p) {
-    if (!done.insert(built.points[p]).second) continue;  // another track of it
-    if (map->hasLandmark(built.points[p])) map->setPosition(built.points[p], problem.points[p].p_W);
-  }
-  PlaneIntersection intersection(*map);
-  for (const LandmarkId id : built.plane_points) {
-    if (!map->hasLandmark(id)) continue;
-    const MapLandmark& landmark = map->landmark(id);
-    if (landmark.plane == 0 || !map->hasPlane(landmark.plane)) continue;
-    done.insert(id);
-    map->setPosition(id, intersection(landmark, map->planes().at(landmark.plane).estimate.plane));
-  }
-  for (const auto& moved : motion) {
-    // Landmarks that no factor held go with the keyframe that made them.
-    for (const LandmarkId id : map->keyframe(moved.first).landmarks) {
-      if (id == kNoLandmark || map->landmark(id).host() != moved.first || done.count(id)) continue;
-      map->setPosition(id, moved.second * map->landmark(id).p_W);
-    }
-  }
-}
-
-int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
-  const BaProblem& problem = built.problem;
-  std::vector<FrameGeometry> geometry;
-  for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
-  int removed = 0;
-  for (std::size_t p = 0; p < problem.points.size(); ++p) {
-    if (!map->hasLandmark(built.points[p])) continue;
-    const BaPoint& point = problem.points[p];
-    for (int o = point.first; o < point.first + point.count; ++o) {
-      const BaObservation& b = problem.observations[o];
-      Eigen::Vector2d r;
-      const bool front = reprojectionResidual(geometry[b.frame], point.p_W, Eigen::Vector2d(b.x, b.y),
-                                              std::min(b.weight, built.gate_weight), &r);
-      if (front && r.squaredNorm() <= chi2) continue;
-      if (!map->hasLandmark(built.points[p])) break;
-      map->removeObservation(built.points[p], built.observations[o].keyframe);
-      ++removed;
-    }
-  }
-  return removed;
 }
 
 }  // namespace vip_slam

@@ -1,0 +1,103 @@
+// From a solved problem back to the map.
+#include <algorithm>
+#include <utility>
+
+#include "plane_intersection.h"
+#include "vip_slam_backend/factors/reprojection.h"
+#include "vip_slam_backend/optimisation/problem_builder.h"
+
+namespace vip_slam {
+namespace {
+
+// Landmarks whose position is settled; few bytes and no nodes, since every feature of the map is asked about.
+class LandmarkSet {
+ public:
+  explicit LandmarkSet(std::size_t most) {
+    std::size_t size = 16;
+    while (size < 2 * most) size *= 2;
+    slots_.assign(size, kNoLandmark);
+  }
+  void insert(LandmarkId id) { slots_[slotOf(id)] = id; }
+  bool contains(LandmarkId id) const { return slots_[slotOf(id)] == id; }
+
+ private:
+  // Where it is, or the free slot where it would be.
+  std::size_t slotOf(LandmarkId id) const {
+    std::size_t slot = (static_cast<std::uint64_t>(id) * 0x9e3779b97f4a7c15ull) >> 32;
+    for (slot &= slots_.size() - 1; slots_[slot] != id && slots_[slot] != kNoLandmark;)
+      slot = (slot + 1) & (slots_.size() - 1);
+    return slot;
+  }
+  std::vector<LandmarkId> slots_;
+};
+
+void storePlanePoints(const BuiltProblem& built, Map* map, LandmarkSet* done) {
+  // A few landmarks ahead their features are asked for, which lie scattered over the keyframes.
+  constexpr std::size_t kAhead = 4;
+  std::vector<const MapLandmark*> landmarks;
+  landmarks.reserve(built.plane_points.size());
+  for (const LandmarkId id : built.plane_points) {
+    const MapLandmark* landmark = map->findLandmark(id);
+    if (landmark && landmark->plane != 0 && map->hasPlane(landmark->plane)) landmarks.push_back(landmark);
+  }
+  PlaneIntersection intersection(*map);
+  for (std::size_t k = 0; k < landmarks.size(); ++k) {
+    if (k + kAhead < landmarks.size()) intersection.prefetch(*landmarks[k + kAhead]);
+    const MapLandmark& landmark = *landmarks[k];
+    done->insert(landmark.id);
+    map->setPosition(landmark.id, intersection(landmark, map->planes().at(landmark.plane).estimate.plane));
+  }
+}
+
+}  // namespace
+
+void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
+  const BaProblem& problem = built.problem;
+  std::vector<std::pair<KeyframeId, SE3>> motion;
+  for (std::size_t f = 0; f < built.frames.size(); ++f) {
+    if (problem.frames[f].fixed || !map->hasKeyframe(built.frames[f])) continue;
+    const NavState& state = problem.frames[f].state;
+    motion.emplace_back(built.frames[f], state.T_W_I * map->keyframe(built.frames[f]).state.T_W_I.inverse());
+    map->setState(built.frames[f], state, noise);
+  }
+  for (std::size_t p = 0; p < built.planes.size(); ++p)
+    if (map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
+  LandmarkSet done(built.points.size() + built.plane_points.size());
+  for (std::size_t p = 0; p < built.points.size(); ++p) {
+    if (done.contains(built.points[p])) continue;  // another track of it
+    done.insert(built.points[p]);
+    if (map->hasLandmark(built.points[p])) map->setPosition(built.points[p], problem.points[p].p_W);
+  }
+  storePlanePoints(built, map, &done);
+  for (const auto& moved : motion) {
+    // Landmarks that no factor held go with the keyframe that made them.
+    for (const LandmarkId id : map->keyframe(moved.first).landmarks) {
+      if (id == kNoLandmark || done.contains(id) || map->landmark(id).host() != moved.first) continue;
+      map->setPosition(id, moved.second * map->landmark(id).p_W);
+    }
+  }
+}
+
+int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
+  const BaProblem& problem = built.problem;
+  std::vector<FrameGeometry> geometry;
+  for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
+  int removed = 0;
+  for (std::size_t p = 0; p < problem.points.size(); ++p) {
+    if (!map->hasLandmark(built.points[p])) continue;
+    const BaPoint& point = problem.points[p];
+    for (int o = point.first; o < point.first + point.count; ++o) {
+      const BaObservation& b = problem.observations[o];
+      Eigen::Vector2d r;
+      const bool front = reprojectionResidual(geometry[b.frame], point.p_W, Eigen::Vector2d(b.x, b.y),
+                                              std::min(b.weight, built.gate_weight), &r);
+      if (front && r.squaredNorm() <= chi2) continue;
+      if (!map->hasLandmark(built.points[p])) break;
+      map->removeObservation(built.points[p], built.observations[o].keyframe);
+      ++removed;
+    }
+  }
+  return removed;
+}
+
+}  // namespace vip_slam
