@@ -38,7 +38,8 @@ struct PointKernelArguments {
   double* values = nullptr;                     ///< reduced matrix, lower blocks; added to
   double* frame_sums = nullptr;                 ///< kFrameSums per frame: J^T J and J^T r of the pose; added to
   double* eliminated = nullptr;                 ///< 8 per frame: W V^-1 g; added to
-  int first_position = 0, last_position = 0;    ///< elimination touches blocks whose later frame lies in [first, last)
+  /// Per point: elimination touches blocks whose later observation lies in [later_begin, later_end).
+  const int *later_begin = nullptr, *later_end = nullptr;
   double* W = nullptr;                          ///< per observation 3 columns of 8: J_pose^T J_point
   double* point_system = nullptr;               ///< per point 6: J_point^T J_point (xx, xy, xz, yy, yz, zz)
   double* point_gradient = nullptr;             ///< per point 3: J_point^T r

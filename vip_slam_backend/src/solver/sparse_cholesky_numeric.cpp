@@ -62,7 +62,7 @@ bool SparseCholesky::factorize(const double* values, const double* b, Worker* wo
       if (front.part == which && !(good[which] = factorizeFront(front, values, b))) return;
   };
   if (worker) {
-    worker->both([&] { part(0); }, [&] { part(1); });
+    worker->share(2, part);
   } else {
     part(0);
     part(1);

@@ -40,7 +40,7 @@ void StructuredSolver::prepare(const BaProblem& problem) {
   packHomographies(problem);
   packPointToPlane(problem);
   packImu(problem);
-  frame_sums_.resize(kFrameSums * problem.frames.size());
+  for (KernelArray& sums : frame_sums_) sums.resize(kFrameSums * problem.frames.size());
   eliminated_.resize(8 * problem.frames.size());
 }
 
@@ -213,9 +213,9 @@ PointKernelArguments StructuredSolver::arguments(const BaProblem& problem, doubl
   a.depth_huber = problem.depth_huber;
   a.inverse_radius = 1.0 / radius;
   a.values = values_.data();
-  a.frame_sums = frame_sums_.data();
   a.eliminated = eliminated_.data();
-  a.last_position = structure_.cholesky.nodes();
+  a.later_begin = structure_.first.data();
+  a.later_end = a.later_begin + 1;
   a.W = W_.data();
   a.point_system = point_system_.data();
   a.point_gradient = point_gradient_.data();

@@ -20,19 +20,33 @@ void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker
   }
   eliminated_.fillZero();
   const PointKernels& kernels = pointKernels();
-  const int points = static_cast<int>(problem.points.size());
   const PointKernelArguments a = arguments(problem, radius);
-  if (worker->helps()) {
-    if (!ahead_) worker->both([&] { linearizeFactors(problem); }, [&] { linearizePoints(a); });
-    PointKernelArguments lower = a, upper = a;
-    lower.last_position = upper.first_position = structure_.half_position;
-    worker->both([&] { kernels.eliminate(lower, 0, points); }, [&] { kernels.eliminate(upper, 0, points); });
-  } else {
-    if (!ahead_) linearizeFactors(problem);
-    frame_sums_.fillZero();
-    kernels.linearizeAndEliminate(a, 0, points);
+  if (!ahead_) {
+    points_ahead_ = worker->helps();
+    worker->share(points_ahead_ ? 1 + kPointParts : 1, [&](int piece) {
+      if (piece == 0)
+        linearizeFactors(problem);
+      else
+        linearizePoints(a, piece - 1);
+    });
   }
-  ahead_ = false;
+  if (points_ahead_) {
+    const int ranges = worker->helps() ? SystemStructure::kRanges : 1;
+    worker->share(ranges, [&](int range) {
+      PointKernelArguments part = a;
+      if (ranges > 1) {
+        part.later_begin = structure_.range_begin[range].data();
+        part.later_end = structure_.range_begin[range + 1].data();
+      }
+      kernels.eliminate(part, 0, structure_.part_begin[kPointParts]);
+    });
+  } else {
+    for (int part = 0; part < kPointParts; ++part) {
+      frame_sums_[part].fillZero();
+      kernels.linearizeAndEliminate(withSums(a, part), structure_.part_begin[part], structure_.part_begin[part + 1]);
+    }
+  }
+  ahead_ = points_ahead_ = false;
   addPoints();
   damp(radius);
 }
@@ -47,9 +61,14 @@ double StructuredSolver::linearizeFactors(const BaProblem& problem) {
   return cost;
 }
 
-void StructuredSolver::linearizePoints(const PointKernelArguments& a) {
-  frame_sums_.fillZero();
-  pointKernels().linearize(a, 0, static_cast<int>(structure_.point_at.size()));
+PointKernelArguments StructuredSolver::withSums(PointKernelArguments a, int part) {
+  a.frame_sums = frame_sums_[part].data();
+  return a;
+}
+
+void StructuredSolver::linearizePoints(const PointKernelArguments& a, int part) {
+  frame_sums_[part].fillZero();
+  pointKernels().linearize(withSums(a, part), structure_.part_begin[part], structure_.part_begin[part + 1]);
 }
 
 void StructuredSolver::storeDiagonal() {
@@ -64,15 +83,17 @@ void StructuredSolver::addPoints() {
   gradient_ = full_gradient_;
   for (std::size_t f = 0; f < frames_.size(); ++f) {
     if (frames_[f].diagonal < 0) continue;
-    const double* sums = frame_sums_.data() + kFrameSums * f;
+    static_assert(kPointParts == 2, "two sums");
+    const double *sums = frame_sums_[0].data() + kFrameSums * f, *more = frame_sums_[1].data() + kFrameSums * f;
     const double* eliminated = eliminated_.data() + 8 * f;
     double* block = values_.data() + frames_[f].diagonal;
     const int u = frames_[f].unknown;
     for (int c = 0; c < 6; ++c) {
-      for (int r = c; r < 6; ++r) block[8 * c + r] += sums[8 * c + r];
-      diagonal_[u + c] += sums[9 * c];
-      full_gradient_[u + c] += sums[48 + c];
-      gradient_[u + c] += sums[48 + c] - eliminated[c];
+      for (int r = c; r < 6; ++r) block[8 * c + r] += sums[8 * c + r] + more[8 * c + r];
+      diagonal_[u + c] += sums[9 * c] + more[9 * c];
+      const double gradient = sums[48 + c] + more[48 + c];
+      full_gradient_[u + c] += gradient;
+      gradient_[u + c] += gradient - eliminated[c];
     }
   }
 }

@@ -20,19 +20,22 @@ constexpr double kMaxRadius = 1e16, kMinRadius = 1e-32, kMinRatio = 1e-3;
 double StructuredSolver::cost(const BaProblem& problem, bool ahead, Worker* worker) {
   loadFrames(problem);
   const PointKernelArguments a = arguments(problem, 1);
-  double points = 0, factors = 0;
-  const auto start = Clock::now();
-  worker->both(
-      [&] {
-        factors = ahead ? linearizeFactors(problem) : factorCost(problem);
-        if (ahead) ahead_ms_ += ms(start, Clock::now());
-      },
-      [&] {
-        points = pointKernels().cost(a, 0, static_cast<int>(problem.points.size()));
-        if (ahead && worker->helps()) linearizePoints(a);
-      });
+  double factors = 0, points[kPointParts];
+  points_ahead_ = ahead && worker->helps();
+  worker->share(1 + kPointParts, [&](int piece) {
+    if (piece == 0) {
+      const auto start = Clock::now();
+      factors = ahead ? linearizeFactors(problem) : factorCost(problem);
+      if (ahead) ahead_ms_ += ms(start, Clock::now());
+      return;
+    }
+    const int part = piece - 1;
+    points[part] = pointKernels().cost(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
+    if (points_ahead_) linearizePoints(a, part);
+  });
   ahead_ = ahead;
-  return 0.5 * (points + factors);
+  for (const double part : points) factors += part;
+  return 0.5 * factors;
 }
 
 bool StructuredSolver::solveStep(const BaProblem& problem, double radius, Worker* worker) {
@@ -40,8 +43,11 @@ bool StructuredSolver::solveStep(const BaProblem& problem, double radius, Worker
   if (!structure_.cholesky.solve(values_.data(), step_.data(), worker)) return false;
   const PointKernelArguments a = arguments(problem, radius);
   const int points = static_cast<int>(points_.size() / 3);
-  worker->both([&] { pointKernels().backSubstitute(a, step_.data(), point_step_.data(), 0, points / 2); },
-               [&] { pointKernels().backSubstitute(a, step_.data(), point_step_.data(), points / 2, points); });
+  constexpr int kPieces = 8;
+  worker->share(kPieces, [&](int piece) {
+    pointKernels().backSubstitute(a, step_.data(), point_step_.data(), points * piece / kPieces,
+                                  points * (piece + 1) / kPieces);
+  });
   for (const double v : step_)
     if (!std::isfinite(v)) return false;
   return true;

@@ -47,7 +47,8 @@ class StructuredSolver : public BaSolver {
   // structured_linearize.cpp
   void linearize(const BaProblem& problem, double radius, Worker* worker);
   double linearizeFactors(const BaProblem& problem);
-  void linearizePoints(const PointKernelArguments& a);
+  void linearizePoints(const PointKernelArguments& a, int part);
+  PointKernelArguments withSums(PointKernelArguments a, int part);
   void storeDiagonal();
   void addPoints();
   void damp(double radius);
@@ -75,6 +76,7 @@ class StructuredSolver : public BaSolver {
   SystemStructure structure_;
   bool loaded_ = false;  ///< the arrays below hold the present variables
   bool ahead_ = false;   ///< the matrix holds the factors at the present variables, and nothing else
+  bool points_ahead_ = false;  ///< the points are linearised there, too
   double ahead_ms_ = 0;  ///< what that took, all in all
   std::vector<KernelFrame> frames_;
   std::vector<FrameGeometry> geometry_;
@@ -87,7 +89,8 @@ class StructuredSolver : public BaSolver {
   std::vector<double> homography_sums_, point_to_plane_sums_;
   std::vector<KernelImu> imu_;
   std::vector<double> imu_constants_, imu_states_;
-  KernelArray values_, W_, frame_sums_, eliminated_;
+  static constexpr int kPointParts = SystemStructure::kPointParts;
+  KernelArray values_, W_, frame_sums_[kPointParts], eliminated_;
   std::vector<double> points_, gradient_, full_gradient_, diagonal_, damping_, point_system_, point_gradient_,
       point_damping_, step_, point_step_;
 };

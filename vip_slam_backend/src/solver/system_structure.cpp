@@ -116,9 +116,27 @@ void SystemStructure::splitElimination(const BaProblem& problem) {
       total += blocks;
     }
   }
-  half_position = 0;
-  for (std::int64_t sum = 0; half_position < cholesky.nodes() && 2 * sum < total; ++half_position)
-    sum += work[half_position];
+  const std::size_t points = problem.points.size();
+  range_begin[0].assign(first.begin(), first.end() - 1);
+  range_begin[kRanges].assign(first.begin() + 1, first.end());
+  std::int64_t sum = 0;
+  for (int range = 1, position = 0; range < kRanges; ++range) {
+    for (; position < cholesky.nodes() && kRanges * sum < range * total; ++position) sum += work[position];
+    range_begin[range] = range_begin[range - 1];
+    for (std::size_t p = 0; p < points; ++p) {
+      int& o = range_begin[range][p];
+      for (; o < first[p + 1]; ++o) {
+        const int node = pose_node[problem.observations[sorted[o]].frame];
+        if (node >= 0 && cholesky.position(node) >= position) break;
+      }
+    }
+  }
+  part_begin[0] = 0;
+  part_begin[kPointParts] = static_cast<int>(points);
+  for (int part = 1; part < kPointParts; ++part) {
+    const int observations = static_cast<int>(sorted.size() * part / kPointParts);
+    part_begin[part] = static_cast<int>(std::lower_bound(first.begin(), first.end(), observations) - first.begin());
+  }
 }
 
 bool SystemStructure::update(const BaProblem& problem) {

@@ -1,16 +1,46 @@
 #include "worker.h"
 
+#if defined(__linux__)
+#include <sched.h>
+#endif
+
 namespace vip_slam {
 namespace {
 
-// Jobs follow each other within microseconds during a solve: looking again is cheaper than sleeping, for this many
-// times. Afterwards the processor belongs to others.
-constexpr int kLooks = 2000;
+// Jobs follow each other within microseconds during a solve: looking again is cheaper than sleeping, for about twenty
+// microseconds. Afterwards the processor belongs to others.
+constexpr int kLooks = 1000;
+
+// The helper is judged by stretches of this many seconds in shared jobs. It must save this share of them, since pieces
+// that can be shared are a little more work than the same in one go; else the owner does some jobs alone.
+constexpr double kStretch = 2e-3, kLeastGain = 0.1;
+constexpr int kJobsAlone = 16;
+
+inline void pause() {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#endif
+}
+
+double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
+
+// Whether this process may run on one processor only; std::thread::hardware_concurrency() counts those of the machine.
+bool oneProcessor() {
+#if defined(__linux__)
+  cpu_set_t set;
+  if (sched_getaffinity(0, sizeof(set), &set) == 0) return CPU_COUNT(&set) == 1;
+#endif
+  return std::thread::hardware_concurrency() == 1;
+}
+
+std::uint64_t pack(std::uint64_t front, std::uint64_t back) { return front << 16 | back; }
+int frontOf(std::uint64_t left) { return static_cast<int>(left >> 16 & 0xffff); }
+int backOf(std::uint64_t left) { return static_cast<int>(left & 0xffff); }
 
 }  // namespace
 
 Worker::Worker(bool helper) {
-  if (helper) thread_ = std::thread([this] { loop(); });
+  if (helper && !oneProcessor()) thread_ = std::thread([this] { loop(); });
 }
 
 Worker::~Worker() {
@@ -23,33 +53,80 @@ Worker::~Worker() {
   thread_.join();
 }
 
-void Worker::both(const std::function<void()>& here, const std::function<void()>& there) {
-  if (!helps()) {
-    there();
-    here();
+void Worker::share(int pieces, const std::function<void(int)>& job) {
+  if (!helps() || pieces < 2) {
+    if (alone_ > 0) --alone_;
+    for (int k = 0; k < pieces; ++k) job(k);
     return;
   }
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    job_.store(&there, std::memory_order_release);
-  }
-  wake_.notify_one();
-  here();
-  for (int look = 0; job_.load(std::memory_order_acquire) != nullptr; ++look)
+  const auto begin = Clock::now();
+  job_ = &job;
+  helped_ = 0;
+  left_.store(pack(0, pieces));
+  if (asleep_.load()) wake();
+  for (int k = takeFront(); k >= 0; k = takeFront()) job(k);
+  const auto done = Clock::now();
+  for (int look = 0; left_.load(std::memory_order_acquire) & kBusy; ++look) {
+    pause();
     if (look > kLooks) std::this_thread::yield();
+  }
+  judge(begin, done, Clock::now());
+}
+
+int Worker::takeFront() {
+  std::uint64_t left = left_.load(std::memory_order_acquire);
+  while (frontOf(left) < backOf(left)) {
+    const std::uint64_t taken = (left & kBusy) | pack(frontOf(left) + 1, backOf(left));
+    if (left_.compare_exchange_weak(left, taken)) return frontOf(left);
+  }
+  return -1;
+}
+
+void Worker::wake() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  wake_.notify_one();
+}
+
+void Worker::judge(Clock::time_point begin, Clock::time_point done, Clock::time_point end) {
+  gain_ += helped_ - seconds(end - done);
+  spent_ += seconds(end - begin);
+  if (spent_ < kStretch) return;
+  if (gain_ < kLeastGain * spent_) alone_ = kJobsAlone;
+  gain_ = spent_ = 0;
+}
+
+// Pieces from the back, as long as there are any; false when there was none.
+bool Worker::work() {
+  std::uint64_t left = left_.load(std::memory_order_acquire);
+  bool any = false;
+  while (frontOf(left) < backOf(left)) {
+    const int piece = backOf(left) - 1;
+    if (!left_.compare_exchange_weak(left, kBusy | pack(frontOf(left), piece))) continue;
+    const auto begin = Clock::now();
+    (*job_)(piece);
+    helped_ += seconds(Clock::now() - begin);
+    left = left_.fetch_and(~kBusy) & ~kBusy;
+    any = true;
+  }
+  return any;
 }
 
 void Worker::loop() {
+  const auto open = [this] {
+    const std::uint64_t left = left_.load();
+    return frontOf(left) < backOf(left);
+  };
   for (;;) {
-    for (int look = 0; look < kLooks && !job_.load(std::memory_order_acquire) && !stop_; ++look) {
+    for (int look = 0; look < kLooks; ++look) {
+      if (work()) look = 0;
+      if (stop_.load(std::memory_order_relaxed)) return;
+      pause();
     }
-    if (!job_.load(std::memory_order_acquire)) {
-      std::unique_lock<std::mutex> lock(mutex_);
-      wake_.wait(lock, [this] { return stop_ || job_.load(std::memory_order_acquire) != nullptr; });
-      if (job_.load(std::memory_order_acquire) == nullptr) return;
-    }
-    (*job_.load(std::memory_order_acquire))();
-    job_.store(nullptr, std::memory_order_release);
+    std::unique_lock<std::mutex> lock(mutex_);
+    asleep_ = true;
+    wake_.wait(lock, [&] { return stop_ || open(); });
+    asleep_ = false;
+    if (stop_) return;
   }
 }
 
