@@ -1,5 +1,5 @@
-// The hot loop of the structured solver on plain arrays: linearises all observations of a point and eliminates the
-// point at once, so that its Jacobians never leave the first-level cache.
+// The hot loops of the structured solver on plain arrays: all observations of a point are linearised at once, so that
+// its Jacobians never leave the first-level cache; what its elimination needs of them is kept.
 #pragma once
 
 #include <cstdint>
@@ -47,12 +47,11 @@ struct PointKernelArguments {
 };
 
 struct PointKernels {
-  /// Points [begin, end): their Jacobians, which do not depend on the radius; the elimination with the Jacobians of all;
-  /// both in one sweep. A block of the reduced matrix gets its points in ascending order whichever way, so that the sums
-  /// are the same to the last bit.
-  void (*linearize)(const PointKernelArguments& a, int begin, int end);
+  /// Points [begin, end): their Jacobians, which do not depend on the radius, and their robust cost (not halved); the
+  /// elimination with the Jacobians. A block of the reduced matrix gets its points in ascending order whatever the ranges,
+  /// so that the sums are the same to the last bit.
+  double (*linearize)(const PointKernelArguments& a, int begin, int end);
   void (*eliminate)(const PointKernelArguments& a, int begin, int end);
-  void (*linearizeAndEliminate)(const PointKernelArguments& a, int begin, int end);
   /// Robust cost (not halved).
   double (*cost)(const PointKernelArguments& a, int begin, int end);
   /// step_p = -V^-1 (g_p + W^T step) per point, and its damping; `step` per unknown.

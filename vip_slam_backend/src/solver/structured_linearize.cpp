@@ -19,34 +19,24 @@ void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker
     ahead_ = false;
   }
   eliminated_.fillZero();
-  const PointKernels& kernels = pointKernels();
   const PointKernelArguments a = arguments(problem, radius);
-  if (!ahead_) {
-    points_ahead_ = worker->helps();
-    worker->share(points_ahead_ ? 1 + kPointParts : 1, [&](int piece) {
+  if (!ahead_)
+    worker->share(1 + kPointParts, [&](int piece) {
       if (piece == 0)
         linearizeFactors(problem);
       else
         linearizePoints(a, piece - 1);
     });
-  }
-  if (points_ahead_) {
-    const int ranges = worker->helps() ? SystemStructure::kRanges : 1;
-    worker->share(ranges, [&](int range) {
-      PointKernelArguments part = a;
-      if (ranges > 1) {
-        part.later_begin = structure_.range_begin[range].data();
-        part.later_end = structure_.range_begin[range + 1].data();
-      }
-      kernels.eliminate(part, 0, structure_.part_begin[kPointParts]);
-    });
-  } else {
-    for (int part = 0; part < kPointParts; ++part) {
-      frame_sums_[part].fillZero();
-      kernels.linearizeAndEliminate(withSums(a, part), structure_.part_begin[part], structure_.part_begin[part + 1]);
+  ahead_ = false;
+  const int ranges = worker->helps() ? SystemStructure::kRanges : 1;
+  worker->share(ranges, [&](int range) {
+    PointKernelArguments part = a;
+    if (ranges > 1) {
+      part.later_begin = structure_.range_begin[range].data();
+      part.later_end = structure_.range_begin[range + 1].data();
     }
-  }
-  ahead_ = points_ahead_ = false;
+    pointKernels().eliminate(part, 0, structure_.part_begin[kPointParts]);
+  });
   addPoints();
   damp(radius);
 }
@@ -61,14 +51,10 @@ double StructuredSolver::linearizeFactors(const BaProblem& problem) {
   return cost;
 }
 
-PointKernelArguments StructuredSolver::withSums(PointKernelArguments a, int part) {
-  a.frame_sums = frame_sums_[part].data();
-  return a;
-}
-
-void StructuredSolver::linearizePoints(const PointKernelArguments& a, int part) {
+double StructuredSolver::linearizePoints(PointKernelArguments a, int part) {
   frame_sums_[part].fillZero();
-  pointKernels().linearize(withSums(a, part), structure_.part_begin[part], structure_.part_begin[part + 1]);
+  a.frame_sums = frame_sums_[part].data();
+  return pointKernels().linearize(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
 }
 
 void StructuredSolver::storeDiagonal() {

@@ -20,22 +20,21 @@ constexpr double kMaxRadius = 1e16, kMinRadius = 1e-32, kMinRatio = 1e-3;
 double StructuredSolver::cost(const BaProblem& problem, bool ahead, Worker* worker) {
   loadFrames(problem);
   const PointKernelArguments a = arguments(problem, 1);
-  double factors = 0, points[kPointParts];
-  points_ahead_ = ahead && worker->helps();
+  const auto start = Clock::now();
+  double parts[1 + kPointParts];
   worker->share(1 + kPointParts, [&](int piece) {
-    if (piece == 0) {
-      const auto start = Clock::now();
-      factors = ahead ? linearizeFactors(problem) : factorCost(problem);
-      if (ahead) ahead_ms_ += ms(start, Clock::now());
-      return;
-    }
     const int part = piece - 1;
-    points[part] = pointKernels().cost(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
-    if (points_ahead_) linearizePoints(a, part);
+    if (piece == 0)
+      parts[piece] = ahead ? linearizeFactors(problem) : factorCost(problem);
+    else
+      parts[piece] = ahead ? linearizePoints(a, part)
+                           : pointKernels().cost(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
   });
+  if (ahead) ahead_ms_ += ms(start, Clock::now());
   ahead_ = ahead;
-  for (const double part : points) factors += part;
-  return 0.5 * factors;
+  double sum = 0;
+  for (const double part : parts) sum += part;
+  return 0.5 * sum;
 }
 
 bool StructuredSolver::solveStep(const BaProblem& problem, double radius, Worker* worker) {

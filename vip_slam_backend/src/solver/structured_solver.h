@@ -47,14 +47,14 @@ class StructuredSolver : public BaSolver {
   // structured_linearize.cpp
   void linearize(const BaProblem& problem, double radius, Worker* worker);
   double linearizeFactors(const BaProblem& problem);
-  void linearizePoints(const PointKernelArguments& a, int part);
-  PointKernelArguments withSums(PointKernelArguments a, int part);
+  double linearizePoints(PointKernelArguments a, int part);
   void storeDiagonal();
   void addPoints();
   void damp(double radius);
   void forEachNode(const std::function<void(int size, int unknown, double* block)>& f);
 
-  /// `ahead`: what the next linearisation needs of the same state and does not depend on the radius is done on the way.
+  /// `ahead`: what the next linearisation needs of the same state and does not depend on the radius is done on the way,
+  /// which is all but the elimination of the points.
   double cost(const BaProblem& problem, bool ahead, Worker* worker);
   bool solveStep(const BaProblem& problem, double radius, Worker* worker);
   /// Predicted decrease of the cost by the present step.
@@ -75,8 +75,7 @@ class StructuredSolver : public BaSolver {
 
   SystemStructure structure_;
   bool loaded_ = false;  ///< the arrays below hold the present variables
-  bool ahead_ = false;   ///< the matrix holds the factors at the present variables, and nothing else
-  bool points_ahead_ = false;  ///< the points are linearised there, too
+  bool ahead_ = false;   ///< points and factors are linearised at the present variables, and no more
   double ahead_ms_ = 0;  ///< what that took, all in all
   std::vector<KernelFrame> frames_;
   std::vector<FrameGeometry> geometry_;
