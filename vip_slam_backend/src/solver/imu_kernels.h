@@ -8,9 +8,14 @@
 namespace vip_slam {
 
 /// Rows of what a factor's preintegration gives: the information matrix (lower triangle, row by row, order theta, p, v,
-/// b_g, b_a), the increments' derivatives by the biases (3 x 3, row-major) and the time between the frames.
+/// b_g, b_a), the increments' derivatives by the biases (3 x 3, row-major), the time between the frames, the increments
+/// (rotation as x, y, z, w) and the biases they hold for.
 constexpr int kImuInformation = 0, kImuAlphaBg = 120, kImuAlphaBa = 129, kImuBetaBg = 138, kImuBetaBa = 147,
-              kImuDt = 156, kImuConstantRows = 157;
+              kImuDt = 156, kImuThetaByGyro = 157, kImuAlpha = 166, kImuBeta = 169, kImuDeltaQ = 172, kImuBiasGyro = 176,
+              kImuBiasAccel = 179, kImuConstantRows = 182;
+/// Numbers of a frame's state: R_W_I (row-major), the same as x, y, z, w, position, velocity, biases.
+constexpr int kImuStateR = 0, kImuStateQ = 9, kImuStateP = 13, kImuStateV = 16, kImuStateBiasGyro = 19,
+              kImuStateBiasAccel = 22, kImuStateNumbers = 25;
 /// Rows of what depends on the states: R_W_I of frame i, R_j_i, position and velocity increments seen from frame i, the
 /// residual (15); and, for the Jacobians, the inverse right Jacobian of the rotation's residual and the derivative by
 /// b_g of the rotation before it.
@@ -19,6 +24,7 @@ constexpr int kImuR = 0, kImuRji = 9, kImuPosition = 18, kImuVelocity = 21, kImu
 
 /// Where a factor's blocks go. Nodes: pose i, motion i, pose j, motion j; -1 where one is a constant.
 struct KernelImu {
+  std::int32_t i, j;           ///< frames
   std::int64_t diagonal[4];
   std::int32_t unknown[4];
   struct Place {
@@ -30,11 +36,15 @@ struct KernelImu {
 struct ImuKernelArguments {
   const KernelImu* factors = nullptr;
   const double* constants = nullptr;  ///< [batch][kImuConstantRows][kKernelLanes]
-  const double* states = nullptr;     ///< [batch][kImuStateRows][kKernelLanes]
+  double* states = nullptr;           ///< [batch][kImuStateRows][kKernelLanes]
+  const double* frames = nullptr;     ///< kImuStateNumbers per frame
+  double gravity[3] = {};
   double *values = nullptr, *gradient = nullptr;
 };
 
 struct ImuKernels {
+  /// Fills the states of `count` factors, but for what only the Jacobians need.
+  void (*load)(const ImuKernelArguments& a, int count);
   /// Adds J^T J and J^T r of `count` factors; the sum of r^T r.
   double (*linearize)(const ImuKernelArguments& a, int count);
   /// Sum of r^T r, whitened.

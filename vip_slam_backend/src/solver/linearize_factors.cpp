@@ -52,7 +52,7 @@ double StructuredSolver::linearizeImu(const BaProblem& problem) {
         rows[kKernelLanes * (kImuThetaBg + 3 * r + c)] = theta_bg(r, c);
       }
   }
-  ImuKernelArguments a = imuArguments();
+  ImuKernelArguments a = imuArguments(problem);
   a.values = values_.data();
   a.gradient = full_gradient_.data();
   return imuKernels().linearize(a, static_cast<int>(problem.imu.size()));
@@ -133,9 +133,9 @@ double StructuredSolver::linearizePriors(const BaProblem& problem) {
   return cost;
 }
 
-double StructuredSolver::factorCost(const BaProblem& problem) const {
+double StructuredSolver::factorCost(const BaProblem& problem) {
   double cost = 0;
-  cost += imuKernels().cost(imuArguments(), static_cast<int>(problem.imu.size()));
+  cost += imuKernels().cost(imuArguments(problem), static_cast<int>(problem.imu.size()));
   cost += homographyKernels().cost(homographyArguments(), static_cast<int>(problem.homographies.size()));
   for (const BaHomographyPair& f : problem.homography_pairs)
     cost += (homographyRows(f.pair) * homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane))

@@ -84,6 +84,8 @@ void StructuredSolver::packImu(const BaProblem& problem) {
     const BaImu& f = problem.imu[std::min(k, count - 1)];
     const auto& place = structure_.imu[std::min(k, count - 1)].place;
     KernelImu& out = imu_[k];
+    out.i = f.i;
+    out.j = f.j;
     const int nodes[4] = {structure_.pose_node[f.i], structure_.motion_node[f.i], structure_.pose_node[f.j],
                           structure_.motion_node[f.j]};
     for (int n = 0; n < 4; ++n) {
@@ -107,25 +109,28 @@ void StructuredSolver::packImu(const BaProblem& problem) {
     storeRows(p.J_beta_bg(), rows + kKernelLanes * kImuBetaBg);
     storeRows(p.J_beta_ba(), rows + kKernelLanes * kImuBetaBa);
     rows[kKernelLanes * kImuDt] = p.dt();
+    storeRows(p.J_theta_bg(), rows + kKernelLanes * kImuThetaByGyro);
+    storeRows(p.alpha(), rows + kKernelLanes * kImuAlpha);
+    storeRows(p.beta(), rows + kKernelLanes * kImuBeta);
+    storeRows(Eigen::Quaterniond(p.deltaR()).coeffs(), rows + kKernelLanes * kImuDeltaQ);
+    storeRows(p.biasGyro(), rows + kKernelLanes * kImuBiasGyro);
+    storeRows(p.biasAccel(), rows + kKernelLanes * kImuBiasAccel);
   }
 }
 
 void StructuredSolver::loadImu(const BaProblem& problem) {
-  for (std::size_t k = 0; k < problem.imu.size(); ++k) {
-    const BaImu& f = problem.imu[k];
-    const Preintegration& p = *f.preintegration;
-    const NavState &i = problem.frames[f.i].state, &j = problem.frames[f.j].state;
-    const Eigen::Matrix<double, 15, 1> r = p.residual(i, j, problem.gravity, nullptr, nullptr, false);
-    const Eigen::Vector3d dbg = i.bias_gyro - p.biasGyro(), dba = i.bias_accel - p.biasAccel();
-    double* rows = imu_states_.data() + kImuStateRows * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
-    storeRows(geometry_[f.i].R_W_I, rows + kKernelLanes * kImuR);
-    storeRows(geometry_[f.j].R_W_I.transpose() * geometry_[f.i].R_W_I, rows + kKernelLanes * kImuRji);
-    storeRows(r.segment<3>(3) + p.alpha() + p.J_alpha_bg() * dbg + p.J_alpha_ba() * dba,
-              rows + kKernelLanes * kImuPosition);
-    storeRows(r.segment<3>(6) + p.beta() + p.J_beta_bg() * dbg + p.J_beta_ba() * dba,
-              rows + kKernelLanes * kImuVelocity);
-    storeRows(r, rows + kKernelLanes * kImuResidual);
+  imu_frames_.resize(kImuStateNumbers * problem.frames.size());
+  for (std::size_t k = 0; k < problem.frames.size(); ++k) {
+    const NavState& state = problem.frames[k].state;
+    double* to = imu_frames_.data() + kImuStateNumbers * k;
+    copyRowMajor(geometry_[k].R_W_I, to + kImuStateR);
+    Eigen::Map<Eigen::Vector4d>(to + kImuStateQ) = state.T_W_I.rotation().coeffs();
+    Eigen::Map<Eigen::Vector3d>(to + kImuStateP) = state.T_W_I.t();
+    Eigen::Map<Eigen::Vector3d>(to + kImuStateV) = state.v_W;
+    Eigen::Map<Eigen::Vector3d>(to + kImuStateBiasGyro) = state.bias_gyro;
+    Eigen::Map<Eigen::Vector3d>(to + kImuStateBiasAccel) = state.bias_accel;
   }
+  imuKernels().load(imuArguments(problem), static_cast<int>(problem.imu.size()));
 }
 
 void StructuredSolver::loadFrames(const BaProblem& problem) {
@@ -171,11 +176,13 @@ void StructuredSolver::loadFrames(const BaProblem& problem) {
   loadImu(problem);
 }
 
-ImuKernelArguments StructuredSolver::imuArguments() const {
+ImuKernelArguments StructuredSolver::imuArguments(const BaProblem& problem) {
   ImuKernelArguments a;
   a.factors = imu_.data();
   a.constants = imu_constants_.data();
   a.states = imu_states_.data();
+  a.frames = imu_frames_.data();
+  for (int k = 0; k < 3; ++k) a.gravity[k] = problem.gravity(k);
   return a;
 }
 

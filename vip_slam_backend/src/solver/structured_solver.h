@@ -42,7 +42,7 @@ class StructuredSolver : public BaSolver {
   PointKernelArguments arguments(const BaProblem& problem, double radius);
   HomographyKernelArguments homographyArguments() const;
   PointToPlaneKernelArguments pointToPlaneArguments();
-  ImuKernelArguments imuArguments() const;
+  ImuKernelArguments imuArguments(const BaProblem& problem);
 
   // structured_linearize.cpp
   void linearize(const BaProblem& problem, double radius, Worker* worker);
@@ -71,7 +71,7 @@ class StructuredSolver : public BaSolver {
   double linearizeImu(const BaProblem& problem);
   double linearizePlanes(const BaProblem& problem);
   double linearizePriors(const BaProblem& problem);
-  double factorCost(const BaProblem& problem) const;
+  double factorCost(const BaProblem& problem);
 
   SystemStructure structure_;
   bool loaded_ = false;  ///< the arrays below hold the present variables
@@ -87,7 +87,7 @@ class StructuredSolver : public BaSolver {
   std::vector<KernelPointToPlane> point_to_plane_;
   std::vector<double> homography_sums_, point_to_plane_sums_;
   std::vector<KernelImu> imu_;
-  std::vector<double> imu_constants_, imu_states_;
+  std::vector<double> imu_constants_, imu_states_, imu_frames_;
   static constexpr int kPointParts = SystemStructure::kPointParts;
   KernelArray values_, W_, frame_sums_[kPointParts], eliminated_;
   std::vector<double> points_, gradient_, full_gradient_, diagonal_, damping_, point_system_, point_gradient_,
