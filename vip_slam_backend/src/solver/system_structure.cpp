@@ -89,50 +89,52 @@ void SystemStructure::orderPoints(const BaProblem& problem) {
   std::vector<std::int64_t> rank(frames), views;  // a view: its rank, then its index
   for (int f = 0; f < frames; ++f)
     rank[f] = (pose_node[f] < 0 ? 0 : std::int64_t{1} + cholesky.position(pose_node[f])) << 32;
+  const std::size_t count = problem.observations.size();
   sorted.clear();
-  sorted.reserve(problem.observations.size());
+  sorted.reserve(count);
+  std::vector<int> position;  // in the elimination order, of each view; -1: a constant
+  position.reserve(count);
   first.assign(1, 0);
+  first.reserve(points + 1);
   for (const int p : point_at) {
     const BaPoint& point = problem.points[p];
     views.clear();
     for (int o = point.first; o < point.first + point.count; ++o)
       views.push_back(rank[problem.observations[o].frame] + o);
     std::sort(views.begin(), views.end());
-    for (const std::int64_t v : views) sorted.push_back(static_cast<int>(v & 0xffffffff));
+    for (const std::int64_t v : views) {
+      sorted.push_back(static_cast<int>(v & 0xffffffff));
+      position.push_back(static_cast<int>(v >> 32) - 1);
+    }
     first.push_back(static_cast<int>(sorted.size()));
   }
+  splitElimination(position);
 }
 
-void SystemStructure::splitElimination(const BaProblem& problem) {
+void SystemStructure::splitElimination(const std::vector<int>& position) {
   // A view costs one block for itself and each that is eliminated before it.
+  const int points = static_cast<int>(point_at.size());
   std::vector<std::int64_t> work(cholesky.nodes(), 0);
   std::int64_t total = 0;
-  for (std::size_t p = 0; p < problem.points.size(); ++p) {
+  for (int p = 0; p < points; ++p) {
     int blocks = 0;
     for (int o = first[p]; o < first[p + 1]; ++o) {
-      const int node = pose_node[problem.observations[sorted[o]].frame];
-      if (node < 0) continue;
-      work[cholesky.position(node)] += ++blocks;
+      if (position[o] < 0) continue;
+      work[position[o]] += ++blocks;
       total += blocks;
     }
   }
-  const std::size_t points = problem.points.size();
   range_begin[0].assign(first.begin(), first.end() - 1);
   range_begin[kRanges].assign(first.begin() + 1, first.end());
   std::int64_t sum = 0;
-  for (int range = 1, position = 0; range < kRanges; ++range) {
-    for (; position < cholesky.nodes() && kRanges * sum < range * total; ++position) sum += work[position];
+  for (int range = 1, begin = 0; range < kRanges; ++range) {
+    for (; begin < cholesky.nodes() && kRanges * sum < range * total; ++begin) sum += work[begin];
     range_begin[range] = range_begin[range - 1];
-    for (std::size_t p = 0; p < points; ++p) {
-      int& o = range_begin[range][p];
-      for (; o < first[p + 1]; ++o) {
-        const int node = pose_node[problem.observations[sorted[o]].frame];
-        if (node >= 0 && cholesky.position(node) >= position) break;
-      }
-    }
+    for (int p = 0; p < points; ++p)
+      for (int& o = range_begin[range][p]; o < first[p + 1] && position[o] < begin;) ++o;
   }
   part_begin[0] = 0;
-  part_begin[kPointParts] = static_cast<int>(points);
+  part_begin[kPointParts] = points;
   for (int part = 1; part < kPointParts; ++part) {
     const int observations = static_cast<int>(sorted.size() * part / kPointParts);
     part_begin[part] = static_cast<int>(std::lower_bound(first.begin(), first.end(), observations) - first.begin());
@@ -257,7 +259,6 @@ bool SystemStructure::update(const BaProblem& problem) {
     plane_points.push_back(placeOf(plane_node[f.plane], pose_node[f.frame]));
 
   orderPoints(problem);
-  splitElimination(problem);
   signature_ = now;
   valid_ = true;
   return true;

@@ -50,7 +50,7 @@ class SystemStructure {
  private:
   std::uint64_t signature(const BaProblem& problem) const;
   void orderPoints(const BaProblem& problem);
-  void splitElimination(const BaProblem& problem);
+  void splitElimination(const std::vector<int>& position);
   std::uint64_t signature_ = 0;
   bool valid_ = false;
 };
