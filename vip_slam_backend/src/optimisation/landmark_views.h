@@ -65,8 +65,8 @@ class LandmarkViews {
 
   // While the views are collected.
   KeyframeId lowest_ = 0;
-  std::vector<int> frame_of_;              // by keyframe - lowest_
-  std::vector<const Feature*> features_;   // of each frame
+  std::vector<int> frame_of_;             // by keyframe - lowest_
+  std::vector<const Feature*> features_;  // of each frame
   std::vector<Seen> seen_;
   std::vector<Track> tracks_;
 };

@@ -13,9 +13,9 @@ class PixelNoise {
  public:
   PixelNoise(const MeasurementOptions& options, double focal);
 
-  /// One sigma of a view of a point, in normalised coordinates. `own_track`: of the point's track. Else `apart` tells how
-  /// far apart the corners of the two tracks are here, as a factor on the error of one where it was detected: what is
-  /// half a pixel from afar is more from near by.
+  /// One sigma of a view of a point, in normalised coordinates. `own_track`: of the point's track. Else `apart` tells
+  /// how far apart the corners of the two tracks are here, as a factor on the error of one where it was detected: what
+  /// is half a pixel from afar is more from near by.
   double sigma(const Feature& feature, bool own_track, double apart) const;
   /// Errors are judged as outliers against at least this sigma, normalised: whoever weighs marks by a tenth of a pixel
   /// must not throw away what a camera's calibration leaves.

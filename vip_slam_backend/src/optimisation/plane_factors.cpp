@@ -63,8 +63,8 @@ std::vector<char> PlaneFactorBuilder::addHomographies(const LandmarkViews& views
     if (std::abs(built_->problem.planes[found->second].plane.signedDistance(landmark.p_W)) <= 0.1)
       plane[l] = found->second;
   }
-  const std::vector<int> hosts = chooseHosts(views, plane, built_->problem.planes, geometry_, settings_.shared_hosts,
-                                             settings_.middle_hosts);
+  const std::vector<int> hosts =
+      chooseHosts(views, plane, built_->problem.planes, geometry_, settings_.shared_hosts, settings_.middle_hosts);
   // Group by group of a plane and a host, so that what the pairs of a group share is computed once.
   struct Member {
     int plane, host, landmark;

@@ -29,7 +29,7 @@ class PlaneFactorBuilder {
                     std::vector<Observer>* observers);
   // Depth points of one keyframe on one plane, as far as they belong to it.
   struct DepthBlock {
-    int frame, plane;          // frame -1: a constant
+    int frame, plane;  // frame -1: a constant
     Eigen::Matrix4d T_W_C, G;
     double misfit;
     const PlaneObservation* observation;

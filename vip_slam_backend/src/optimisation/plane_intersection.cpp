@@ -40,8 +40,7 @@ Eigen::Vector3d PlaneIntersection::operator()(const MapLandmark& landmark, const
 }
 
 void PlaneIntersection::prefetch(const MapLandmark& landmark) {
-  for (const MapObservation& o : landmark.observations)
-    __builtin_prefetch(&camera(o.keyframe).features[o.feature].xy);
+  for (const MapObservation& o : landmark.observations) __builtin_prefetch(&camera(o.keyframe).features[o.feature].xy);
 }
 
 }  // namespace vip_slam

@@ -11,8 +11,8 @@ namespace vip_slam {
 /// b_g, b_a), the increments' derivatives by the biases (3 x 3, row-major), the time between the frames, the increments
 /// (rotation as x, y, z, w) and the biases they hold for.
 constexpr int kImuInformation = 0, kImuAlphaBg = 120, kImuAlphaBa = 129, kImuBetaBg = 138, kImuBetaBa = 147,
-              kImuDt = 156, kImuThetaByGyro = 157, kImuAlpha = 166, kImuBeta = 169, kImuDeltaQ = 172, kImuBiasGyro = 176,
-              kImuBiasAccel = 179, kImuConstantRows = 182;
+              kImuDt = 156, kImuThetaByGyro = 157, kImuAlpha = 166, kImuBeta = 169, kImuDeltaQ = 172,
+              kImuBiasGyro = 176, kImuBiasAccel = 179, kImuConstantRows = 182;
 /// Numbers of a frame's state: R_W_I (row-major), the same as x, y, z, w, position, velocity, biases.
 constexpr int kImuStateR = 0, kImuStateQ = 9, kImuStateP = 13, kImuStateV = 16, kImuStateBiasGyro = 19,
               kImuStateBiasAccel = 22, kImuStateNumbers = 25;
@@ -24,7 +24,7 @@ constexpr int kImuR = 0, kImuRji = 9, kImuPosition = 18, kImuVelocity = 21, kImu
 
 /// Where a factor's blocks go. Nodes: pose i, motion i, pose j, motion j; -1 where one is a constant.
 struct KernelImu {
-  std::int32_t i, j;           ///< frames
+  std::int32_t i, j;  ///< frames
   std::int64_t diagonal[4];
   std::int32_t unknown[4];
   struct Place {

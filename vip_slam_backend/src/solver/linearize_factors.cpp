@@ -44,8 +44,7 @@ double StructuredSolver::linearizeImu(const BaProblem& problem) {
     for (int c = 0; c < 3; ++c) r_theta(c) = rows[kKernelLanes * (kImuResidual + c)];
     const Eigen::Vector3d dbg = problem.frames[problem.imu[k].i].state.bias_gyro - p.biasGyro();
     const Eigen::Matrix3d Jr_inv = rightJacobianInverseSO3(r_theta);
-    const Eigen::Matrix3d theta_bg =
-        -expSO3(-r_theta) * rightJacobianSO3(p.J_theta_bg() * dbg) * p.J_theta_bg();
+    const Eigen::Matrix3d theta_bg = -expSO3(-r_theta) * rightJacobianSO3(p.J_theta_bg() * dbg) * p.J_theta_bg();
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) {
         rows[kKernelLanes * (kImuInverseJr + 3 * r + c)] = Jr_inv(r, c);

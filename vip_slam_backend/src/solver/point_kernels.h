@@ -18,9 +18,8 @@ struct KernelFrame {
   alignas(64) double move[3][8];  ///< three zeros, lines of -R_C_W, two zeros
   double R_C_I[9];
   double t_W_C[3];
-  double lever_C[9];              ///< R_C_I [t_I_C]x
-  std::int32_t unknown = 0;       ///< first unknown of the pose
-  std::int32_t position = -1;     ///< in the elimination order; -1: fixed
+  double lever_C[9];           ///< R_C_I [t_I_C]x
+  std::int32_t unknown = 0;    ///< first unknown of the pose
 };
 
 /// Per frame: a 6 x 6 block (columns of 8) and a gradient of 6, padded.
@@ -34,22 +33,22 @@ struct PointKernelArguments {
   const double* points = nullptr;               ///< 3 per point
   const std::uint32_t* pair_offset = nullptr;   ///< [earlier * frame_count + later]: offset of the block in the values
   double huber = 0, depth_huber = 0;
-  double inverse_radius = 0;                    ///< damping: clamp(diag) * inverse_radius
-  double* values = nullptr;                     ///< reduced matrix, lower blocks; added to
-  double* frame_sums = nullptr;                 ///< kFrameSums per frame: J^T J and J^T r of the pose; added to
-  double* eliminated = nullptr;                 ///< 8 per frame: W V^-1 g; added to
+  double inverse_radius = 0;     ///< damping: clamp(diag) * inverse_radius
+  double* values = nullptr;      ///< reduced matrix, lower blocks; added to
+  double* frame_sums = nullptr;  ///< kFrameSums per frame: J^T J and J^T r of the pose; added to
+  double* eliminated = nullptr;  ///< 8 per frame: W V^-1 g; added to
   /// Per point: elimination touches blocks whose later observation lies in [later_begin, later_end).
   const int *later_begin = nullptr, *later_end = nullptr;
-  double* W = nullptr;                          ///< per observation 3 columns of 8: J_pose^T J_point
-  double* point_system = nullptr;               ///< per point 6: J_point^T J_point (xx, xy, xz, yy, yz, zz)
-  double* point_gradient = nullptr;             ///< per point 3: J_point^T r
-  double* point_damping = nullptr;              ///< per point 3: clamp(diag) * inverse_radius
+  double* W = nullptr;               ///< per observation 3 columns of 8: J_pose^T J_point
+  double* point_system = nullptr;    ///< per point 6: J_point^T J_point (xx, xy, xz, yy, yz, zz)
+  double* point_gradient = nullptr;  ///< per point 3: J_point^T r
+  double* point_damping = nullptr;   ///< per point 3: clamp(diag) * inverse_radius
 };
 
 struct PointKernels {
   /// Points [begin, end): their Jacobians, which do not depend on the radius, and their robust cost (not halved); the
-  /// elimination with the Jacobians. A block of the reduced matrix gets its points in ascending order whatever the ranges,
-  /// so that the sums are the same to the last bit.
+  /// elimination with the Jacobians. A block of the reduced matrix gets its points in ascending order whatever the
+  /// ranges, so that the sums are the same to the last bit.
   double (*linearize)(const PointKernelArguments& a, int begin, int end);
   void (*eliminate)(const PointKernelArguments& a, int begin, int end);
   /// Robust cost (not halved).

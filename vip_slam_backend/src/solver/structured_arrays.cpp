@@ -156,7 +156,6 @@ void StructuredSolver::loadFrames(const BaProblem& problem) {
     const int node = structure_.pose_node[k];
     out.diagonal = node < 0 ? -1 : static_cast<std::int64_t>(structure_.cholesky.diagonalOffset(node));
     out.unknown = node < 0 ? 0 : structure_.cholesky.unknown(node);
-    out.position = node < 0 ? -1 : structure_.cholesky.position(node);
   }
   for (std::size_t k = 0; k < problem.points.size(); ++k)
     Eigen::Map<Eigen::Vector3d>(points_.data() + 3 * k) = problem.points[structure_.point_at[k]].p_W;

@@ -54,8 +54,7 @@ bool StructuredSolver::solveStep(const BaProblem& problem, double radius, Worker
 
 double StructuredSolver::modelDecrease() const {
   double sum = 0;
-  for (std::size_t k = 0; k < step_.size(); ++k)
-    sum += step_[k] * (damping_[k] * step_[k] - full_gradient_[k]);
+  for (std::size_t k = 0; k < step_.size(); ++k) sum += step_[k] * (damping_[k] * step_[k] - full_gradient_[k]);
   for (std::size_t k = 0; k < point_step_.size(); ++k)
     sum += point_step_[k] * (point_damping_[k] * point_step_[k] - point_gradient_[k]);
   return 0.5 * sum;

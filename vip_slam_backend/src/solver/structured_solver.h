@@ -23,10 +23,10 @@ class StructuredSolver : public BaSolver {
 
   /// For tests: the damped, reduced normal equations and the step at the problem's present state.
   struct Step {
-    Eigen::VectorXd gradient;      ///< J^T r of poses, motions, planes in node order, before elimination
-    Eigen::VectorXd diagonal;      ///< diag(J^T J) of the same
-    Eigen::VectorXd step;          ///< of the same
-    Eigen::VectorXd point_step;    ///< 3 per point
+    Eigen::VectorXd gradient;    ///< J^T r of poses, motions, planes in node order, before elimination
+    Eigen::VectorXd diagonal;    ///< diag(J^T J) of the same
+    Eigen::VectorXd step;        ///< of the same
+    Eigen::VectorXd point_step;  ///< 3 per point
   };
   Step stepAt(const BaProblem& problem, double radius);
   const SystemStructure& structure() const { return structure_; }

@@ -27,21 +27,21 @@ class SystemStructure {
   std::vector<int> point_at;
   /// Observations of the points in that order, per point by the elimination order of their frames (fixed frames first).
   std::vector<int> sorted, first;
-  /// Points [part_begin[k], part_begin[k + 1]) have as many observations in each part: pieces that can be linearised side
-  /// by side, each with sums of its own over the frames, whatever the number of threads.
+  /// Points [part_begin[k], part_begin[k + 1]) have as many observations in each part: pieces that can be linearised
+  /// side by side, each with sums of its own over the frames, whatever the number of threads.
   static constexpr int kPointParts = 2;
   int part_begin[kPointParts + 1] = {};
   /// Ranges of the elimination order in which the elimination of points costs the same: per point its first observation
   /// (of `sorted`) in each, and in the last place the one behind all.
   static constexpr int kRanges = 4;
   std::vector<int> range_begin[kRanges + 1];
-  std::vector<std::uint32_t> pair_offset;               ///< [earlier * frames + later] pose blocks
+  std::vector<std::uint32_t> pair_offset;  ///< [earlier * frames + later] pose blocks
   /// Blocks of the other factors: IMU (pose_i, motion_i, pose_j, motion_j), homographies (pose_i, pose_j, plane).
   struct ImuPlaces {
     BlockPlace place[4][4];  ///< [row node][column node], row > column
   };
   struct TriplePlaces {
-    BlockPlace ji, pi, pj;   ///< (j, i), (plane, i), (plane, j)
+    BlockPlace ji, pi, pj;  ///< (j, i), (plane, i), (plane, j)
   };
   std::vector<ImuPlaces> imu;
   std::vector<TriplePlaces> homographies, homography_pairs;

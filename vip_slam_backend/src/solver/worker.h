@@ -1,8 +1,8 @@
 // One helper thread that lives as long as a solve and takes pieces of what its owner has to do.
 //
-// Nothing is owed to the helper: a piece that it has not begun when the owner is through with the others is the owner's,
-// so that a helper which is slow to wake or gets no processor costs little. Where it costs more than it helps, the owner
-// goes on alone and tries again later.
+// Nothing is owed to the helper: a piece that it has not begun when the owner is through with the others is the
+// owner's, so that a helper which is slow to wake or gets no processor costs little. Where it costs more than it helps,
+// the owner goes on alone and tries again later.
 #pragma once
 
 #include <atomic>
@@ -25,8 +25,8 @@ class Worker {
 
   /// Whether pieces shared now are offered to a helper.
   bool helps() const { return thread_.joinable() && alone_ == 0; }
-  /// Runs job(0), ..., job(pieces - 1), each once, and returns when all are done: here from the front, by the helper from
-  /// the back. A job must not throw, and no two pieces may write to the same places.
+  /// Runs job(0), ..., job(pieces - 1), each once, and returns when all are done: here from the front, by the helper
+  /// from the back. A job must not throw, and no two pieces may write to the same places.
   void share(int pieces, const std::function<void(int)>& job);
 
  private:
