@@ -73,7 +73,10 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     if (!track.optimised() && (concerned || track.refit_due)) refit(&track);
     if (concerned) track.followKeyframes(poses_);
   }
-  if (map_moved_) withdrawBrokenObservations();
+  if (map_moved_) {
+    evidence_.forgetTests();
+    withdrawBrokenObservations();
+  }
   if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
 }
 

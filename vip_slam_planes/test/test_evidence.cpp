@@ -94,6 +94,22 @@ TEST_F(Evidence, WhatWasTooSmallIsTestedAgainWhenMoreOfItHasShown) {
   EXPECT_EQ(1u, found);
 }
 
+TEST_F(Evidence, WhatFailedIsTestedAgainWhenKeyframesHaveMoved) {
+  // Six views of one wall, half of them from poses that are 20 cm off: they agree on nothing that is large enough.
+  const auto view = [](KeyframeId id) { return board(id % 2 ? 0.0 : 0.3, 0.8, 5, 5); };
+  for (KeyframeId id = 1; id <= 6; ++id) {
+    poses[id] = SE3(Eigen::Quaterniond::Identity(), {id % 2 ? 0.0 : 0.2, 0.1 * double(id), 1});
+    SE3 seen_from = poses[id];
+    seen_from.t().x() = 0;
+    evidence.add(id, seen_from, view(id), std::vector<int>(view(id).size(), -1));
+    EXPECT_TRUE(evidence.detect(poses, {}).empty()) << id;
+  }
+  for (auto& [id, pose] : poses) pose.t().x() = 0;
+  EXPECT_TRUE(evidence.detect(poses, {}).empty());  // known to have failed, not known to have moved
+  evidence.forgetTests();
+  EXPECT_EQ(1u, evidence.detect(poses, {}).size());
+}
+
 TEST_F(Evidence, StripsOneCellWideAreNoWall) {
   for (KeyframeId id = 1; id <= 4; ++id) EXPECT_TRUE(add(id, board(0.1 * double(id), 0.0, 1, 20)).empty()) << id;
 }

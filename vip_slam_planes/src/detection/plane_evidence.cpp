@@ -21,7 +21,9 @@ constexpr std::size_t kLeastTriangles = 4;
 // pieces only: what is left of them starts small and waits for frames to grow it.
 constexpr double kLeastUpright = 2.0, kLeastLevel = 0.4;
 constexpr int kMostTests = 4;                  // peaks tested per keyframe, the largest ones
-constexpr double kFreshShare = 0.25;           // of a peak's area that must be new since its patches were tested
+// Of the area of a wall's peak that must be new since its patches were tested. Level ones are tested every time: what
+// shows of a dark table top comes and goes.
+constexpr double kFreshShare = 0.25;
 
 MapTriangle moved(const SE3& T, MapTriangle t) {
   for (Eigen::Vector3d& p : t.corner) p = T * p;
@@ -110,6 +112,12 @@ void PlaneEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<Map
 void PlaneEvidence::remove(KeyframeId id) {
   frames_.erase(std::remove_if(frames_.begin(), frames_.end(), [id](const Frame& f) { return f.id == id; }),
                 frames_.end());
+}
+
+void PlaneEvidence::forgetTests() {
+  for (Frame& frame : frames_) {
+    for (Patch& patch : frame.patches) patch.tested = false;
+  }
 }
 
 std::vector<EvidenceTriangle> PlaneEvidence::collect(const std::vector<Vote>& votes, const CameraPoses& poses) const {
@@ -206,7 +214,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
       const Patch& patch = frames_[v.frame].patches[v.patch];
       if (!patch.tested) fresh += patch.area;
     }
-    if (fresh < kFreshShare * peak.area) continue;
+    if (kind == PlaneKind::kVertical && fresh < kFreshShare * peak.area) continue;
     for (const Vote& v : votes) frames_[v.frame].patches[v.patch].tested = true;
     ++tests;
     const std::vector<EvidenceTriangle> evidence = collect(votes, poses);

@@ -42,12 +42,14 @@ class PlaneEvidence {
            const std::vector<int>& label);
   void remove(KeyframeId id);
   void clear() { frames_.clear(); }
+  /// Keyframes have moved against each other: what made no plane before may do now.
+  void forgetTests();
 
   /// Keyframes of which at least `area` m^2 was left over on the plane.
   int seenBy(const PlaneTrack& plane, const CameraPoses& poses, double area) const;
   /// Planes that patches of the newest keyframe make with those of earlier ones. `known` are the planes in view; what
   /// they explain by now is forgotten, and so is what a new plane takes. Keyframes without a pose count for nothing. A
-  /// peak that made no plane is tested again when a fair part of it is new.
+  /// wall's peak that made no plane is tested again when a fair part of it is new.
   std::vector<JointPlane> detect(const CameraPoses& poses, const std::vector<const PlaneTrack*>& known);
 
  private:
