@@ -314,7 +314,12 @@ void FrontEndNodelet::process(const ImagePair& pair) {
     NODELET_WARN_THROTTLE(10, "%s", words);
   }
   const ros::WallTime begin = ros::WallTime::now();
-  const FrameOutput output = front_end_->process(input);
+  bool posed = false;
+  const FrameOutput output = front_end_->process(input, [&](const TrackedFrame& frame) {
+    publishPose(frame);
+    posed = true;
+  });
+  if (!posed) publishPose(*output.frame);
   const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
   publish(pair, output, milliseconds);
 

@@ -67,6 +67,8 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void startWhenCalibrated();
   void processReady();
   void process(const ImagePair& pair);
+  /// Odometry and tf of a frame that has a pose.
+  void publishPose(const TrackedFrame& frame);
   void publish(const ImagePair& pair, const FrameOutput& output, double milliseconds);
   void publishFeatureImage(const ImagePair& pair, const TrackedFrame& frame);
   void publishImuRate(double t);

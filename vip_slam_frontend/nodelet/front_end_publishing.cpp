@@ -24,16 +24,18 @@ double gyroSigma(const SensorConfig& sensor) {
 
 }  // namespace
 
+void FrontEndNodelet::publishPose(const TrackedFrame& frame) {
+  covariance_ = frame.covariance;
+  if (!hasPose(frame)) return;
+  // A message that is published is shared with all receivers and never changed again.
+  auto odometry = boost::make_shared<nav_msgs::Odometry>(
+      toOdometry(frame.t, frame.state, frame.covariance, gyro_, gyroSigma(sensor_), frames_));
+  if (publish_tf_) tf_broadcaster_->sendTransform(toTransform(*odometry));
+  odometry_pub_.publish(odometry);
+}
+
 void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, double milliseconds) {
   const TrackedFrame& frame = *output.frame;
-  covariance_ = frame.covariance;
-  // A message that is published is shared with all receivers and never changed again.
-  if (hasPose(frame)) {
-    auto odometry = boost::make_shared<nav_msgs::Odometry>(
-        toOdometry(frame.t, frame.state, frame.covariance, gyro_, gyroSigma(sensor_), frames_));
-    if (publish_tf_) tf_broadcaster_->sendTransform(toTransform(*odometry));
-    odometry_pub_.publish(odometry);
-  }
   // Planes and back end get the keyframe before the frame that belongs to it, as in the offline runner.
   if (output.keyframe) {
     keyframe_pub_.publish(boost::make_shared<vip_slam_msgs::Keyframe>(toMsg(*output.keyframe, frames_.odom)));

@@ -12,7 +12,9 @@ bool FrontEnd::addImu(const ImuSample& sample) { return impl_->addImu(sample); }
 bool FrontEnd::addGyro(double t, const Eigen::Vector3d& gyro) { return impl_->addGyro(t, gyro); }
 bool FrontEnd::addAccel(double t, const Eigen::Vector3d& accel) { return impl_->addAccel(t, accel); }
 bool FrontEnd::ready(double t_image) const { return impl_->ready(t_image); }
-FrameOutput FrontEnd::process(const FrameInput& input) { return impl_->process(input); }
+FrameOutput FrontEnd::process(const FrameInput& input, const PoseReady& on_pose) {
+  return impl_->process(input, on_pose);
+}
 void FrontEnd::applyMapUpdate(const MapUpdate& update) { impl_->applyMapUpdate(update); }
 std::optional<NavState> FrontEnd::predict(double t) const { return impl_->predict(t); }
 void FrontEnd::reset(const std::string& reason) { impl_->reset(reason); }

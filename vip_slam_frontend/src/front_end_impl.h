@@ -26,7 +26,7 @@ class FrontEnd::Impl {
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
   bool ready(double t_image) const { return imu_.covers(t_image + timeOffset()); }
-  FrameOutput process(const FrameInput& input);
+  FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);
   void applyMapUpdate(const MapUpdate& update);
   std::optional<NavState> predict(double t) const;
   void reset(const std::string& reason);
@@ -45,7 +45,8 @@ class FrontEnd::Impl {
   void countImu();
 
   FrameOutput initialise(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth);
-  FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth);
+  FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth,
+                         const FrontEnd::PoseReady& on_pose);
   SE3 gyroRotation(double t0, double t1) const;
   bool decideStillness(double t_imu);
   bool calibrationExcited(double t_imu) const;

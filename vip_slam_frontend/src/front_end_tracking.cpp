@@ -18,7 +18,7 @@ constexpr double kLongGapNoise = 5.0;
 
 }  // namespace
 
-FrameOutput FrontEnd::Impl::process(const FrameInput& input) {
+FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::PoseReady& on_pose) {
   ScopedTimer timer(timing_, "frontend.total", input.t);
   ++counters_.images;
   cv::Mat depth;
@@ -39,7 +39,7 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input) {
     if (gap > options_.recovery.max_image_gap) {
       reset("no image for " + std::to_string(gap).substr(0, 4) + " s");
     } else {
-      return trackImage(input.t, t_imu, gray, depth);
+      return trackImage(input.t, t_imu, gray, depth, on_pose);
     }
   }
   return initialise(input.t, t_imu, gray, depth);
@@ -155,7 +155,8 @@ void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, do
   surfaces_.setReference(depth, filter_.window().clones.back().id);
 }
 
-FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth) {
+FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth,
+                                       const FrontEnd::PoseReady& on_pose) {
   double max_gap = 0;
   const double from = filter_.nav().t;
   const std::vector<ImuSample> samples = imu_.between(from, t_imu, &max_gap);
@@ -218,6 +219,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     phase_ = Phase::kTracking;
     judge(tracked.tracked, metric, surfaces_hold, t);
   }
+  if (on_pose) on_pose(*makeFrame(t, false));
   const SE3 T_now = filter_.nav().T_W_I * extrinsics();
   std::string reason;
   // A keyframe of darkness would tie nothing to anything; one of bare walls still has its planes.

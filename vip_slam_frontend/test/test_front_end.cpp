@@ -168,6 +168,25 @@ TEST_F(FrontEndTest, WholeRunFollowsAndHandsOnKeyframes) {
   EXPECT_LT((predicted->T_W_I.t() - World::position(6.05)).norm(), 0.02);
 }
 
+TEST_F(FrontEndTest, ThePoseIsToldBeforeTheRestAndIsTheOneReturned) {
+  run(0.0, 2.0);
+  for (int k = 40; k < 60; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    std::vector<TrackedFrame> told;
+    const FrameOutput output = front_end_.process({t, world_.image(t), World::depth(t)},
+                                                  [&told](const TrackedFrame& frame) { told.push_back(frame); });
+    ASSERT_EQ(told.size(), 1u);
+    EXPECT_EQ(told[0].t, t);
+    EXPECT_EQ(told[0].status.state, output.frame->status.state);
+    EXPECT_EQ(told[0].state.T_W_I.matrix(), output.frame->state.T_W_I.matrix());
+    EXPECT_EQ(told[0].covariance, output.frame->covariance);
+  }
+  const FrameOutput bad = front_end_.process({std::nan(""), world_.image(3.0), cv::Mat()},
+                                             [](const TrackedFrame&) { FAIL() << "told a pose that is not known"; });
+  EXPECT_FALSE(bad.frame->status.reason.empty());
+}
+
 TEST_F(FrontEndTest, TwoRunsAgreeBitByBit) {
   const FrameOutput a = run(0.0, 3.0);
   FrontEnd other(options(), sensor());

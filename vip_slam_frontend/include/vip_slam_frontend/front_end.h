@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -68,7 +69,11 @@ class FrontEnd {
   bool ready(double t_image) const;
 
   /// Always returns a frame. Bad input is counted and named in its status; it never throws on data.
-  FrameOutput process(const FrameInput& input);
+  /// `on_pose` (may be empty) is called as soon as an image that is tracked has its pose, before corners are renewed and
+  /// a keyframe is made: whoever waits for the pose need not wait for those. Its frame has no features yet; its state,
+  /// covariance and status are those of the frame that is returned.
+  using PoseReady = std::function<void(const TrackedFrame&)>;
+  FrameOutput process(const FrameInput& input, const PoseReady& on_pose = {});
 
   /// Landmarks of the map (so that features regain their id) and T_map_odom; odom does not move.
   void applyMapUpdate(const MapUpdate& update);
