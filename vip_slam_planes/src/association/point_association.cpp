@@ -43,7 +43,8 @@ void PointAssociation::erase(Landmarks::iterator it) {
 
 std::vector<LandmarkId> PointAssociation::landmarksOf(PlaneId plane) const {
   const auto it = on_plane_.find(plane);
-  return it == on_plane_.end() ? std::vector<LandmarkId>() : std::vector<LandmarkId>(it->second.begin(), it->second.end());
+  if (it == on_plane_.end()) return {};
+  return {it->second.begin(), it->second.end()};
 }
 
 void PointAssociation::setPlane(LandmarkId id, Landmark* landmark, PlaneId plane) {

@@ -44,12 +44,13 @@ int CellGrid::count(int min_hits) const {
 }
 
 bool CellGrid::near(CellIndex c, int reach) const {
-  const std::int64_t cx = c.x, cy = c.y;
-  const int xa = int(std::max<std::int64_t>(cx - reach, x0_)), xb = int(std::min<std::int64_t>(cx + reach, x0_ + width_ - 1));
-  const int ya = int(std::max<std::int64_t>(cy - reach, y0_)), yb = int(std::min<std::int64_t>(cy + reach, y0_ + height_ - 1));
-  for (int y = ya; y <= yb; ++y) {
+  const std::int64_t cx = c.x, cy = c.y;  // any int: the sums must not overflow
+  const std::int64_t xa = std::max<std::int64_t>(cx - reach, x0_), ya = std::max<std::int64_t>(cy - reach, y0_);
+  const std::int64_t xb = std::min<std::int64_t>(cx + reach, x0_ + width_ - 1);
+  const std::int64_t yb = std::min<std::int64_t>(cy + reach, y0_ + height_ - 1);
+  for (std::int64_t y = ya; y <= yb; ++y) {
     const std::uint8_t* row = hits_.data() + static_cast<std::size_t>(y - y0_) * width_ - x0_;
-    for (int x = xa; x <= xb; ++x) {
+    for (std::int64_t x = xa; x <= xb; ++x) {
       if (row[x]) return true;
     }
   }
