@@ -112,8 +112,6 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
   const LandmarkViews views(map, scope, built.frames, noise);
   PlaneFactorBuilder planes(map, scope, settings, &built);
   const std::vector<char> on_plane = planes.addHomographies(views);
-  problem.observations.reserve(views.viewCount());
-  built.observations.reserve(views.viewCount());
   for (int l = 0; l < views.size(); ++l) {
     const MapLandmark& landmark = views.landmark(l);
     if (on_plane[l] && settings.variant == Variant::kVip) {
