@@ -124,7 +124,12 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
   };
   auto mark = Clock::now();
   summary.preprocess_ms = ms(start, mark);
-  Worker worker(options.threads > 1);
+  // The helper outlives the solve: to wait for its end on a busy machine takes as long as a small solve.
+  if (!worker_ || helper_ != options.threads > 1) {
+    helper_ = options.threads > 1;
+    worker_ = std::make_unique<Worker>(helper_);
+  }
+  Worker& worker = *worker_;
   double present = cost(problem, options.max_iterations > 0, &worker);
   summary.residual_ms += ms(mark, Clock::now());
   summary.initial_cost = summary.final_cost = present;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include <Eigen/Core>
 
@@ -73,6 +74,8 @@ class StructuredSolver : public BaSolver {
   double linearizePriors(const BaProblem& problem);
   double factorCost(const BaProblem& problem);
 
+  std::unique_ptr<Worker> worker_;
+  bool helper_ = false;  ///< the worker has one
   SystemStructure structure_;
   bool loaded_ = false;  ///< the arrays below hold the present variables
   bool ahead_ = false;   ///< points and factors are linearised at the present variables, and no more

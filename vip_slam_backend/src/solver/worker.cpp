@@ -11,10 +11,11 @@ namespace {
 // microseconds. Afterwards the processor belongs to others.
 constexpr int kLooks = 1000;
 
-// The helper is judged by stretches of this many seconds in shared jobs. It must save this share of them, since pieces
-// that can be shared are a little more work than the same in one go; else the owner does some jobs alone.
-constexpr double kStretch = 2e-3, kLeastGain = 0.1;
-constexpr int kJobsAlone = 16;
+// The helper is judged by stretches of this many seconds in shared jobs, or as soon as it has cost that many. It must
+// save this share of a stretch, since pieces that can be shared are a little more work than the same in one go; else the
+// owner does some jobs alone, about ten iterations of a solve.
+constexpr double kStretch = 2e-3, kMostLost = 0.5e-3, kLeastGain = 0.1;
+constexpr int kJobsAlone = 40;
 
 inline void pause() {
 #if defined(__x86_64__)
@@ -90,7 +91,7 @@ void Worker::wake() {
 void Worker::judge(Clock::time_point begin, Clock::time_point done, Clock::time_point end) {
   gain_ += helped_ - seconds(end - done);
   spent_ += seconds(end - begin);
-  if (spent_ < kStretch) return;
+  if (spent_ < kStretch && gain_ > -kMostLost) return;
   if (gain_ < kLeastGain * spent_) alone_ = kJobsAlone;
   gain_ = spent_ = 0;
 }

@@ -1,4 +1,4 @@
-// One helper thread that lives as long as a solve and takes pieces of what its owner has to do.
+// One helper thread that takes pieces of what its owner has to do and sleeps between its jobs.
 //
 // Nothing is owed to the helper: a piece that it has not begun when the owner is through with the others is the
 // owner's, so that a helper which is slow to wake or gets no processor costs little. Where it costs more than it helps,
