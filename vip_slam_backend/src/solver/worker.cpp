@@ -1,5 +1,7 @@
 #include "worker.h"
 
+#include <algorithm>
+
 #if defined(__linux__)
 #include <sched.h>
 #endif
@@ -71,7 +73,7 @@ void Worker::share(int pieces, const std::function<void(int)>& job) {
     pause();
     if (look > kLooks) std::this_thread::yield();
   }
-  judge(begin, done, Clock::now());
+  judge(pieces, begin, done, Clock::now());
 }
 
 int Worker::takeFront() {
@@ -88,8 +90,10 @@ void Worker::wake() {
   wake_.notify_one();
 }
 
-void Worker::judge(Clock::time_point begin, Clock::time_point done, Clock::time_point end) {
-  gain_ += helped_ - seconds(end - done);
+// What the owner would have needed for the helper's pieces counts, not what the helper took: it may be slow.
+void Worker::judge(int pieces, Clock::time_point begin, Clock::time_point done, Clock::time_point end) {
+  const int own = std::max(1, pieces - helped_);
+  gain_ += helped_ * seconds(done - begin) / own - seconds(end - done);
   spent_ += seconds(end - begin);
   if (spent_ < kStretch && gain_ > -kMostLost) return;
   if (gain_ < kLeastGain * spent_) alone_ = kJobsAlone;
@@ -103,9 +107,8 @@ bool Worker::work() {
   while (frontOf(left) < backOf(left)) {
     const int piece = backOf(left) - 1;
     if (!left_.compare_exchange_weak(left, kBusy | pack(frontOf(left), piece))) continue;
-    const auto begin = Clock::now();
     (*job_)(piece);
-    helped_ += seconds(Clock::now() - begin);
+    ++helped_;
     left = left_.fetch_and(~kBusy) & ~kBusy;
     any = true;
   }

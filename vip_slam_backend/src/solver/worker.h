@@ -35,13 +35,13 @@ class Worker {
   int takeFront();
   bool work();
   void wake();
-  void judge(Clock::time_point begin, Clock::time_point done, Clock::time_point end);
+  void judge(int pieces, Clock::time_point begin, Clock::time_point done, Clock::time_point end);
 
   // Pieces that are left, [front, back), and whether the helper is at one: one word, so that each is taken once.
   static constexpr std::uint64_t kBusy = std::uint64_t{1} << 63;
   alignas(64) std::atomic<std::uint64_t> left_{0};
   const std::function<void(int)>* job_ = nullptr;
-  double helped_ = 0;  // seconds that the helper spent on pieces of the present job
+  int helped_ = 0;  // pieces of the present job that the helper did
 
   alignas(64) std::atomic<bool> asleep_{false}, stop_{false};
   std::mutex mutex_;

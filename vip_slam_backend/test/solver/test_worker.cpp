@@ -1,4 +1,5 @@
 // The solver's helper thread: every piece is done once, whoever does it and however late the helper is.
+#include <atomic>
 #include <chrono>
 #include <set>
 #include <thread>
@@ -43,6 +44,22 @@ TEST(Worker, WhatTheHelperWroteIsSeen) {
     });
     for (std::size_t k = 0; k < sums.size(); ++k) ASSERT_EQ(sums[k], static_cast<double>(k) * job);
   }
+}
+
+// A processor that others use as well: the helper needs ten times as long, and the owner waits for it.
+TEST(Worker, ASlowHelperIsGivenUp) {
+  Worker worker(true);
+  if (!worker.helps()) GTEST_SKIP() << "one processor";
+  const std::thread::id owner = std::this_thread::get_id();
+  std::atomic<int> helped{0};
+  for (int job = 0; job < 200 && worker.helps(); ++job)
+    worker.share(2, [&](int) {
+      const bool mine = std::this_thread::get_id() == owner;
+      if (!mine) ++helped;
+      spend(mine ? 100 : 1000);
+    });
+  if (helped == 0) GTEST_SKIP() << "the helper got no processor";
+  EXPECT_FALSE(worker.helps());
 }
 
 TEST(Worker, PiecesGoToBoth) {
