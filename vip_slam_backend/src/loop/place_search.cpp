@@ -12,6 +12,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kNewGuesses = 4, kKeptGuesses = 4, kRivalGuesses = 8;
+constexpr int kFewLandmarks = 5;  // fewer may be hidden or were seen from elsewhere
 
 // Keyframes that look at the same scene: verifying both says nothing about other places.
 bool sameView(const SE3& T_W_C_a, const SE3& T_W_C_b) {
@@ -207,6 +208,9 @@ std::vector<std::string> PlaceSearch::doubts() const {
   if (alike > options_.resemblance * best.points) doubts.push_back(words("another place has %d of such points", alike));
   if (best.points < options_.sure_points || best.evidence() < options_.sure_evidence)
     doubts.push_back(words("evidence %.0f of %d points is not sure", best.evidence(), best.points));
+  // Points fit by chance where a bare wall resembles another; what the map saw from many views is then missing.
+  if (best.refound == 0 && best.established >= kFewLandmarks)
+    doubts.push_back(words("none of %d landmarks that should be in sight is", best.established));
   return doubts;
 }
 
