@@ -11,6 +11,9 @@
 namespace vip_slam {
 namespace {
 
+// Tables go by keyframe id; a map that is three months of keyframes wide has not been made here.
+constexpr KeyframeId kWidestIds = KeyframeId{1} << 24;
+
 double finite(ByteReader& in, const char* what) {
   const auto v = in.get<double>(what);
   if (!std::isfinite(v)) in.fail(std::string(what) + " is not a finite number");
@@ -131,6 +134,9 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   TrackedFrame& frame = data->frame;
   data->id = in.get<std::uint64_t>("keyframe id");
   if (data->id <= map.newestKeyframe()) in.fail("keyframe " + std::to_string(data->id) + " is out of order");
+  if (!map.empty() && data->id - map.keyframes().begin()->first > kWidestIds)
+    in.fail("keyframe " + std::to_string(data->id) + " is too far from the first, " +
+            std::to_string(map.keyframes().begin()->first));
   frame.t = finite(in, "keyframe stamp");
   const auto epoch = in.get<std::uint32_t>("keyframe epoch");
   if (epoch > map.keyframes().size()) in.fail("epoch " + std::to_string(epoch) + " is out of order");

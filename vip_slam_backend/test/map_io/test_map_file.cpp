@@ -168,6 +168,22 @@ TEST(MapFile, DamageBehindARightChecksumDoesNoHarm) {
   EXPECT_GT(taken, 500u);
 }
 
+TEST(MapFile, IdsThatWouldTakeAllMemoryAreRefused) {
+  Map map = syntheticMap(3, 12, 100);
+  auto far = std::make_shared<Keyframe>(*map.keyframe(3).data);
+  far->id = KeyframeId{1} << 40;
+  far->previous = 0;
+  far->imu.clear();
+  far->frame.t += 1.0;
+  map.addKeyframe(far, far->frame.state, ImuNoise());
+  try {
+    parse(serialiseMap(map, {}, 5));
+    FAIL() << "taken";
+  } catch (const std::runtime_error& e) {
+    EXPECT_NE(std::string(e.what()).find("too far from the first"), std::string::npos) << e.what();
+  }
+}
+
 TEST(MapFile, ForeignAndNewerFilesAreNamed) {
   const auto message = [](const std::string& bytes) -> std::string {
     try {

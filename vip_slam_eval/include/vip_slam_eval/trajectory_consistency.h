@@ -38,7 +38,7 @@ struct JoinedError {
   double nees = 0;  ///< negative when the covariance is not positive definite
 };
 std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate,
-                                  double max_gap = 0.1, double time_offset = 0.0);
+                                      double max_gap = 0.1, double time_offset = 0.0);
 
 /// Normalised estimation error squared: e^T P^-1 e. An honest filter has a mean of `dof`.
 struct Nees {

@@ -31,7 +31,7 @@ Coverage coverage(const Trajectory& truth, const Trajectory& estimate, double ga
 }
 
 std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate,
-                                  double max_gap, double time_offset) {
+                                      double max_gap, double time_offset) {
   std::vector<JoinedError> result;
   bool joined = false;
   SE3 T_M_W;
