@@ -10,10 +10,11 @@
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/initialisation/initialiser.h"
 #include "vip_slam_frontend/keyframes/keyframe_selector.h"
+#include "vip_slam_frontend/tracking/depth_rows.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/landmark_matcher.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
-#include "vip_slam_frontend/tracking/rolling_shutter.h"
+#include "vip_slam_frontend/tracking/row_camera.h"
 #include "vip_slam_frontend/tracking/surface_tracker.h"
 
 namespace vip_slam {
@@ -25,7 +26,7 @@ class FrontEnd::Impl {
   bool addImu(const ImuSample& sample);
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
-  bool ready(double t_image) const { return imu_.covers(t_image + timeOffset()); }
+  bool ready(double t_image) const { return imu_.covers(t_image + timeOffset() + 0.5 * longestReadout()); }
   FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);
   void applyMapUpdate(const MapUpdate& update);
   std::optional<NavState> predict(double t) const;
@@ -50,9 +51,13 @@ class FrontEnd::Impl {
   SE3 gyroRotation(double t0, double t1) const;
   bool decideStillness(double t_imu);
   bool calibrationExcited(double t_imu) const;
-  /// How the colour camera moves at IMU time `t_imu`, given the state there.
-  RollingShutter shutter(double t_imu, const NavState& nav) const;
-  std::vector<FilterMeasurement> measurements(const RollingShutter& shutter) const;
+  double longestReadout() const { return std::max(sensor_.rolling_shutter, sensor_.depth_rolling_shutter); }
+  /// How the colour camera moves during a readout of so many seconds, given the state at the stamp; null: global
+  /// shutter.
+  std::shared_ptr<const RowPoses> rows(double readout, const NavState& nav) const;
+  /// A depth image whose rows were not read at once, as at the stamp.
+  cv::Mat depthAtStamp(const cv::Mat& depth, const NavState& nav) const;
+  std::vector<FilterMeasurement> measurements() const;
   SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
@@ -63,6 +68,8 @@ class FrontEnd::Impl {
 
   FrameOutput makeOutput(double t, double t_imu, const std::string& keyframe_reason);
   std::shared_ptr<TrackedFrame> makeFrame(double t, bool with_features) const;
+  /// Those who take features from here know of no rows: pixels become what a global shutter would have seen.
+  void placeAtStamp(std::vector<Feature>* features) const;
   KeyframePtr makeKeyframe(const TrackedFrame& frame, double t_imu);
   FrameOutput statusOnly(double t, TrackingState state, const std::string& reason) const;
 
@@ -70,6 +77,7 @@ class FrontEnd::Impl {
   TimingLog* timing_;
   std::shared_ptr<const CameraModel> camera_;
   ImuBuffer imu_;
+  std::unique_ptr<DepthRows> depth_rows_;  ///< null: depth of one instant
   FeatureTracker tracker_;
   SurfaceTracker surfaces_;
   LandmarkMatcher landmarks_;

@@ -19,11 +19,7 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
     frame->covariance = filter_.covariance();
   }
   if (with_features) {
-    const RollingShutter rows = shutter(last_imu_t_, frame->state);
-    for (const Track& track : tracker_.tracks()) {
-      frame->features.push_back(track.feature);
-      frame->features.back().xy = rows.atStamp(track.feature);
-    }
+    for (const Track& track : tracker_.tracks()) frame->features.push_back(track.feature);
   }
   return frame;
 }
@@ -53,14 +49,12 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
     ScopedTimer timer(timing_, "frontend.keyframe", t);
     orb_.describe(tracker_.gray(), &frame->features);
     for (std::size_t i = 0; i < frame->features.size(); ++i) {
-      Feature& tracked = tracker_.tracks()[i].feature;
-      const Eigen::Vector2f xy = tracked.xy;  // where the tracker saw it, rows and all
-      tracked = frame->features[i];
-      tracked.xy = xy;
+      tracker_.tracks()[i].feature = frame->features[i];
     }
     output.keyframe = makeKeyframe(*frame, t_imu);
     frame->keyframe = newest_keyframe_;
   }
+  placeAtStamp(&frame->features);
   if (!tracker_.depth().empty()) {
     ScopedTimer timer(timing_, "frontend.depth_grid", t);
     frame->depth_grid = makeDepthGrid(tracker_.depth(), options_.frame_grid_stride, sensor_.depth_noise);
@@ -71,6 +65,13 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   return output;
 }
 
+void FrontEnd::Impl::placeAtStamp(std::vector<Feature>* features) const {
+  if (!tracker_.camera().rolls()) return;
+  const Eigen::Vector2d last(camera_->width() - 1, camera_->height() - 1);
+  for (Feature& f : *features)
+    f.pixel = tracker_.pixelAtStamp(f).cwiseMax(0.0).cwiseMin(last).cast<float>();
+}
+
 KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu) {
   auto keyframe = std::make_shared<Keyframe>();
   keyframe->id = next_keyframe_++;
@@ -79,12 +80,11 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   keyframe->previous = last_keyframe_;
   std::vector<cv::Point2f> occupied;
   for (const Feature& f : frame.features) occupied.emplace_back(f.pixel.x(), f.pixel.y());
-  const RollingShutter rows = shutter(t_imu, frame.state);
   for (Feature& corner : orb_.extract(tracker_.gray(), occupied, 6.0)) {
     tracker_.measure(&corner);
-    corner.xy = rows.atStamp(corner);
     keyframe->frame.features.push_back(corner);
   }
+  placeAtStamp(&keyframe->frame.features);
   if (!tracker_.depth().empty()) {
     keyframe->frame.depth_grid = makeDepthGrid(tracker_.depth(), options_.keyframe_grid_stride, sensor_.depth_noise);
   }

@@ -53,30 +53,42 @@ SE3 FrontEnd::Impl::gyroRotation(double t0, double t1) const {
   return SE3(Eigen::Matrix3d(R_I_C.transpose() * pre.deltaR().transpose() * R_I_C), Eigen::Vector3d::Zero());
 }
 
-RollingShutter FrontEnd::Impl::shutter(double t_imu, const NavState& nav) const {
-  const std::optional<ImuSample> here = sensor_.rolling_shutter > 0 ? imu_.at(t_imu) : std::nullopt;
-  if (!here) return {};
-  return RollingShutter(sensor_.rolling_shutter, camera_->intrinsics().height, nav, here->gyro, extrinsics());
+std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(double readout, const NavState& nav) const {
+  if (!(readout > 0)) return nullptr;
+  const double half = 0.5 * readout;
+  const std::vector<ImuSample> around =
+      imu_.between(std::max(imu_.oldest(), nav.t - half), std::min(imu_.newest(), nav.t + half));
+  if (around.empty()) return nullptr;
+  return std::make_shared<RowPoses>(readout, nav, around, extrinsics(), sensor_.gravity);
 }
 
-std::vector<FilterMeasurement> FrontEnd::Impl::measurements(const RollingShutter& shutter) const {
+cv::Mat FrontEnd::Impl::depthAtStamp(const cv::Mat& depth, const NavState& nav) const {
+  if (!depth_rows_ || depth.empty()) return depth;
+  const std::shared_ptr<const RowPoses> poses = rows(sensor_.depth_rolling_shutter, nav);
+  return poses ? depth_rows_->atStamp(depth, *poses) : depth;
+}
+
+std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
   std::vector<FilterMeasurement> list;
   list.reserve(tracker_.tracks().size());
   for (const Track& track : tracker_.tracks()) {
     const Feature& f = track.feature;
-    list.push_back({f.id, shutter.atStamp(f).cast<double>(), f.depth, f.depth_sigma, track.whitening});
+    list.push_back({f.id, f.xy.cast<double>(), f.depth, f.depth_sigma, track.whitening});
   }
   return list;
 }
 
-FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth) {
+FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth_read) {
   const bool first = phase_ == Phase::kWaiting;
   phase_ = Phase::kInitialising;
   const SE3 rotation = first ? SE3() : gyroRotation(last_imu_t_, t_imu);
   last_imu_t_ = t_imu;
-  tracker_.track(gray, depth, rotation, false, SE3(), t);
+  NavState turning;  // how it moves along is not known yet
+  turning.t = t_imu;
+  const cv::Mat depth = depthAtStamp(depth_read, turning);
+  tracker_.track(gray, depth, rotation, false, SE3(), rows(sensor_.rolling_shutter, turning), t);
   tracker_.replenish(SE3(), true, t);
-  const std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements({})}, imu_);
+  const std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements()}, imu_);
   if (!prior) {
     const std::string why = status_.state == TrackingState::kInitialising && !status_.reason.empty() && first
                                 ? status_.reason + "; " + initialiser_.reason()
@@ -97,7 +109,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   // The tracks' references were taken under unknown poses: begin them here.
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
-  tracker_.restartReferences(T_odom_C);
+  tracker_.restartReferences(T_odom_C, rows(sensor_.rolling_shutter, filter_.nav()));
   return makeOutput(t, t_imu, "first");
 }
 
@@ -155,7 +167,7 @@ void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, do
   surfaces_.setReference(depth, filter_.window().clones.back().id);
 }
 
-FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth,
+FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth_read,
                                        const FrontEnd::PoseReady& on_pose) {
   double max_gap = 0;
   const double from = filter_.nav().t;
@@ -164,7 +176,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const bool gap = max_gap > options_.recovery.max_imu_gap;
   if (max_gap > 5.0 * options_.recovery.max_imu_gap) {
     reset("IMU gap of " + std::to_string(max_gap).substr(0, 4) + " s");
-    return initialise(t, t_imu, gray, depth);
+    return initialise(t, t_imu, gray, depth_read);
   }
   keyframe_imu_broken_ = keyframe_imu_broken_ || gap;
   const Propagation propagation = filter_.predict(samples, gap ? kLongGapNoise : 1.0);
@@ -173,9 +185,11 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const SE3 T_I_C = extrinsics();
   const SE3 T_odom_C_last = filter_.nav().T_W_I * T_I_C;
   const SE3 T_odom_C = propagation.predicted.T_W_I * T_I_C;
+  const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
   const TrackingResult tracked =
-      tracker_.track(gray, depth, T_odom_C.inverse() * T_odom_C_last, !coasting, T_odom_C, t);
+      tracker_.track(gray, depth, T_odom_C.inverse() * T_odom_C_last, !coasting, T_odom_C,
+                     rows(sensor_.rolling_shutter, propagation.predicted), t);
   for (const Track& track : tracker_.ended()) landmarks_.retire(track);
 
   const SurfaceMatches surfaces = matchSurfaces(depth, T_odom_C, t);
@@ -183,7 +197,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   {
     ScopedTimer timer(timing_, "frontend.update", t);
     still_ = decideStillness(t_imu);
-    report = filter_.step(propagation, next_clone_++, measurements(shutter(t_imu, propagation.predicted)),
+    report = filter_.step(propagation, next_clone_++, measurements(),
                           still_ ? std::optional<double>(stillness_.unrest()) : std::nullopt,
                           calibrationExcited(t_imu), &surfaces);
   }
@@ -203,7 +217,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
                                                                                : "";
   if (!failure.empty()) {
     reset(failure);
-    return initialise(t, t_imu, gray, depth);
+    return initialise(t, t_imu, gray, depth_read);
   }
   int with_depth = 0;
   for (const Track& track : tracker_.tracks()) with_depth += track.feature.depth > 0;
@@ -214,7 +228,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     // The IMU went on all the time. As long as it still tells where we are, the odometry goes on, too.
     if (coastedSigma() > options_.recovery.max_position_sigma) {
       reset("features are back after LOST");
-      return initialise(t, t_imu, gray, depth);
+      return initialise(t, t_imu, gray, depth_read);
     }
     phase_ = Phase::kTracking;
     judge(tracked.tracked, metric, surfaces_hold, t);

@@ -86,19 +86,19 @@ TEST(PatchSurface, WarpIsTheHomographysDerivative) {
   const Eigen::Matrix2d exact = A_cur_ref.inverse();
   const PatchSurface surface = patchSurface(wallDepthImage(0), kPixel, wallDepth(kPixel), noise());
   PatchWarp warp;
-  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, kMotion, &warp));
   EXPECT_LT((warp.A - exact).norm(), 0.01);
   PatchSurface facing = surface;
   facing.slope.setZero();
-  ASSERT_TRUE(patchWarp(*camera(), kPixel, facing, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, facing, kMotion, &warp));
   EXPECT_GT((warp.A - exact).norm(), 0.1);  // what the slope is there for
-  EXPECT_FALSE(patchWarp(*camera(), kPixel, surface, SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &warp));
+  EXPECT_FALSE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &warp));
 }
 
 TEST(PatchSurface, WarpFollowsTheHomographyOverTheWholePatch) {
   const PatchSurface surface = patchSurface(wallDepthImage(0), kPixel, wallDepth(kPixel), noise());
   PatchWarp warp;
-  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, kMotion, &warp));
   const Eigen::Vector2d middle = transfer(kMotion, kPixel);
   double linear = 0, second = 0, mean_linear = 0, mean_second = 0;
   int count = 0;
@@ -139,7 +139,7 @@ TEST(PatchSurface, AlignmentOnASlantedWallFindsTheExactPixel) {
   const Eigen::Vector2d exact = transfer(kMotion, kPixel);
   const PatchSurface surface = patchSurface(wallDepthImage(0.0017), kPixel, wallDepth(kPixel), noise());
   PatchWarp warp;
-  ASSERT_TRUE(patchWarp(*camera(), kPixel, surface, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, kMotion, &warp));
   const PatchAlignment aligned = alignPatch(reference, kPixel, warp, current, exact + Eigen::Vector2d(0.6, -0.4));
   ASSERT_TRUE(aligned.ok);
   EXPECT_LT((aligned.pixel - exact).norm(), 0.1);

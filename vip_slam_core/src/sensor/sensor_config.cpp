@@ -158,6 +158,7 @@ SensorConfig configFrom(const YAML::Node& node) {
   depth.number("scale", config.depth_scale, 1e-6, 1.0);
   depth.number("rate", config.depth_rate, 0.1, 1000);
   depth.get("registered", config.depth_registered);
+  depth.number("rolling_shutter", config.depth_rolling_shutter, 0, 0.1, false);
   depth.finish();
 
   root.get("intrinsics_from_camera_info", config.intrinsics_from_camera_info);
@@ -231,6 +232,7 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
       << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
+      << "\n  rolling_shutter: " << formatDouble(config.depth_rolling_shutter)
       << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";
   if (config.camera.width > 0) writeCamera(out, "camera", config.camera);
   if (!config.depth_registered) {

@@ -18,6 +18,8 @@ namespace {
 constexpr double kExposureGain = 0.1;
 constexpr double kExposureShift = 6.0;
 
+constexpr double kFarAway = 1e4;  // m
+
 // Of a corner that was recognised by its descriptor, px^2.
 constexpr double kCornerVariance = 1.0;
 
@@ -34,7 +36,7 @@ double pixelVariance(const Track& track) {
 
 FeatureTracker::FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera,
                                const DepthNoise& noise, TimingLog* timing)
-    : options_(options), camera_(std::move(camera)), noise_(noise), timing_(timing) {}
+    : options_(options), camera_(std::move(camera)), view_(camera_), noise_(noise), timing_(timing) {}
 
 void FeatureTracker::clear() {
   tracks_.clear();
@@ -46,13 +48,23 @@ void FeatureTracker::clear() {
 }
 
 FeatureDepth::Source FeatureTracker::measure(Feature* feature) const {
-  Eigen::Vector2d xy;
-  camera_->undistort(feature->pixel.cast<double>(), &xy);
-  feature->xy = xy.cast<float>();
-  const FeatureDepth surface = featureDepth(depth_, feature->pixel.x(), feature->pixel.y(), noise_);
+  const Eigen::Vector2d pixel = feature->pixel.cast<double>();
+  const auto place = [&](double z) {
+    const Eigen::Vector3d p = view_.unproject(pixel, z);
+    feature->xy = (p.head<2>() / p.z()).cast<float>();
+    const Eigen::Vector2d uv = pixelAtStamp(*feature);
+    return featureDepth(depth_, uv.x(), uv.y(), noise_);
+  };
+  FeatureDepth surface = place(kFarAway);
+  // The depth says how far the row's motion moved the pixel, which says where to look the depth up.
+  if (view_.rolls() && surface.z > 0) surface = place(surface.z);
   feature->depth = surface.z;
   feature->depth_sigma = surface.sigma;
   return surface.source;
+}
+
+Eigen::Vector2d FeatureTracker::pixelAtStamp(const Feature& feature) const {
+  return view_.rolls() ? camera_->distort(feature.xy.cast<double>()) : feature.pixel.cast<double>();
 }
 
 void FeatureTracker::measure(Track* track) const {
@@ -85,11 +97,11 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
   for (const Track& track : tracks_) {
     const Feature& f = track.feature;
     previous.emplace_back(f.pixel.x(), f.pixel.y());
-    const double z = has_translation && f.depth > 0 ? f.depth : 1e4;
+    const double z = has_translation && f.depth > 0 ? f.depth : kFarAway;
     const Eigen::Vector3d p = predicted.R() * (f.xy.homogeneous().cast<double>() * z) +
                               (has_translation ? predicted.t() : Eigen::Vector3d(Eigen::Vector3d::Zero()));
     Eigen::Vector2d uv;
-    const bool usable = camera_->project(p, &uv) && camera_->inImage(uv);
+    const bool usable = view_.project(p, &uv) && camera_->inImage(uv);
     next->push_back(usable ? cv::Point2f(static_cast<float>(uv.x()), static_cast<float>(uv.y())) : previous.back());
   }
   found->assign(tracks_.size(), 0);
@@ -116,7 +128,7 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
   if (!track->reference) return false;
   PatchWarp warp;
   const SE3 T_cur_ref = T_odom_C.inverse() * track->reference->T_odom_C;
-  if (!patchWarp(*camera_, track->reference_pixel, track->surface, T_cur_ref, &warp)) return false;
+  if (!patchWarp(track->reference->camera, view_, track->reference_pixel, track->surface, T_cur_ref, &warp)) return false;
   const double scale = std::sqrt(warp.A.determinant());
   const double shear = (warp.A / scale - (warp.A / scale).inverse().transpose()).norm();
   if (!(scale > 0.45) || !(scale < 2.2) || !(shear < 1.5)) return false;
@@ -135,28 +147,33 @@ void FeatureTracker::setReference(Track* track, const std::shared_ptr<const Refe
   track->reference = reference;
   track->reference_pixel = track->feature.pixel.cast<double>();
   track->magnification = 1.0;
-  track->surface = patchSurface(depth_, track->reference_pixel, track->feature.depth, noise_);
+  track->surface = patchSurface(depth_, pixelAtStamp(track->feature), track->feature.depth, noise_);
   track->texture = patchTexture(gray_, track->reference_pixel);
   track->residual = 0;
 }
 
 void FeatureTracker::addTrack(Track track, const SE3& T_odom_C) {
   if (!track.reference) {
-    auto here = std::make_shared<ReferenceImage>();
-    here->gray = gray_;
-    here->T_odom_C = T_odom_C;
-    setReference(&track, here);
+    setReference(&track, referenceHere(T_odom_C));
     track.reference_variance = kCornerVariance;
   }
   measure(&track);
   tracks_.push_back(std::move(track));
 }
 
-void FeatureTracker::restartReferences(const SE3& T_odom_C) {
+std::shared_ptr<ReferenceImage> FeatureTracker::referenceHere(const SE3& T_odom_C) const {
   auto here = std::make_shared<ReferenceImage>();
   here->gray = gray_;
   here->T_odom_C = T_odom_C;
+  here->camera = view_;
+  return here;
+}
+
+void FeatureTracker::restartReferences(const SE3& T_odom_C, const std::shared_ptr<const RowPoses>& rows) {
+  view_ = RowCamera(camera_, rows);
+  const std::shared_ptr<ReferenceImage> here = referenceHere(T_odom_C);
   for (Track& track : tracks_) {
+    measure(&track);
     setReference(&track, here);
   }
 }
@@ -167,11 +184,7 @@ void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
     const bool aligned = alignTrack(&track, T_odom_C, options_.reference_max_correction_px);
     const bool known = track.surface.known;
     if (aligned && (known || !surfaceIsKnown(&track))) continue;
-    if (!here) {
-      here = std::make_shared<ReferenceImage>();
-      here->gray = gray_;
-      here->T_odom_C = T_odom_C;
-    }
+    if (!here) here = referenceHere(T_odom_C);
     measure(&track.feature);
     if (!known && surfaceIsKnown(&track)) {
       // Patches warped without depth slide over what they show; from here on this one stays where it is. It begins
@@ -190,12 +203,14 @@ void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
 
 bool FeatureTracker::surfaceIsKnown(Track* track) const {
   if (measure(&track->feature) != FeatureDepth::Source::kSmooth) return false;
-  return patchSurface(depth_, track->feature.pixel.cast<double>(), track->feature.depth, noise_).known;
+  return patchSurface(depth_, pixelAtStamp(track->feature), track->feature.depth, noise_).known;
 }
 
 TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, const SE3& predicted,
-                                     bool has_translation, const SE3& T_odom_C, double t) {
+                                     bool has_translation, const SE3& T_odom_C,
+                                     const std::shared_ptr<const RowPoses>& rows, double t) {
   TrackingResult result;
+  view_ = RowCamera(camera_, rows);
   ++image_count_;
   std::vector<cv::Point2f> next;
   std::vector<char> found;
@@ -218,9 +233,9 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   std::vector<std::size_t> index;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     if (!found[i]) continue;
-    Eigen::Vector2d xy;
-    camera_->undistort(asVector(next[i]), &xy);
-    pairs.push_back({tracks_[i].feature.xy.cast<double>(), xy, tracks_[i].feature.depth});
+    const Feature& last = tracks_[i].feature;
+    const Eigen::Vector3d p = view_.unproject(asVector(next[i]), last.depth > 0 ? last.depth : kFarAway);
+    pairs.push_back({last.xy.cast<double>(), p.head<2>() / p.z(), last.depth});
     index.push_back(i);
   }
   RansacOptions ransac;
@@ -262,9 +277,7 @@ std::vector<std::size_t> FeatureTracker::replenish(const SE3& T_odom_C, bool for
   ScopedTimer timer(timing_, "frontend.detect", t);
   std::vector<cv::Point2f> occupied;
   for (const Track& track : tracks_) occupied.emplace_back(track.feature.pixel.x(), track.feature.pixel.y());
-  auto here = std::make_shared<ReferenceImage>();
-  here->gray = gray_;
-  here->T_odom_C = T_odom_C;
+  const std::shared_ptr<ReferenceImage> here = referenceHere(T_odom_C);
   for (const Corner& corner : detectCorners(gray_, occupied, missing, options_)) {
     Track track;
     track.feature.id = next_id_++;

@@ -81,7 +81,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     if (item.second.observations < 3 || tracked.count(item.first)) continue;
     const Eigen::Vector3d p_C = T_C_map * item.second.p_map;
     Eigen::Vector2d uv;
-    if (p_C.z() < 0.2 || p_C.z() > 15.0 || !camera_->project(p_C, &uv)) continue;
+    if (p_C.z() < 0.2 || p_C.z() > 15.0 || !tracker->camera().project(p_C, &uv)) continue;
     if (!camera_->inImage(uv, options_.border + options_.landmark_radius_px)) continue;
     if (free(uv, options_.min_distance)) visible.push_back({item.first, &item.second, uv, p_C.z()});
   }

@@ -56,8 +56,8 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   return surface;
 }
 
-bool patchWarp(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, const PatchSurface& surface,
-               const SE3& T_cur_ref, PatchWarp* warp_ref_cur) {
+bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen::Vector2d& reference_pixel,
+               const PatchSurface& surface, const SE3& T_cur_ref, PatchWarp* warp_ref_cur) {
   PatchSurface plane = surface;
   if (!(plane.depth > 0)) plane.depth = 1e4;
   const double h = 3.0;
@@ -66,8 +66,8 @@ bool patchWarp(const CameraModel& camera, const Eigen::Vector2d& reference_pixel
   for (int y = 0; y < 3; ++y) {
     for (int x = 0; x < 3; ++x) {
       const Eigen::Vector2d offset(h * (x - 1), h * (y - 1));
-      const Eigen::Vector3d p = camera.unproject(reference_pixel + offset, plane.depthAt(offset));
-      if (!camera.project(T_cur_ref * p, &seen[y][x])) return false;
+      const Eigen::Vector3d p = reference.unproject(reference_pixel + offset, plane.depthAt(offset));
+      if (!current.project(T_cur_ref * p, &seen[y][x])) return false;
     }
   }
   Eigen::Matrix2d A_cur_ref;

@@ -137,6 +137,7 @@ SensorConfig SequenceSpec::sensorConfig() const {
   s.color_rate = s.depth_rate = camera.rate;
   s.imu_rate = imu.rate;
   s.rolling_shutter = effects.rolling_shutter;
+  s.depth_rolling_shutter = depth.registered ? effects.rolling_shutter : 0;  // its own camera reads all at once
   s.intrinsics_from_camera_info = false;
   s.camera = camera.intrinsics();
   if (!depth.registered) {

@@ -26,6 +26,7 @@ struct SensorConfig {
   double color_rate = 30, depth_rate = 30, imu_rate = 200;  ///< Hz, nominal; for checks and messages
 
   double rolling_shutter = 0;  ///< colour: seconds from first to last row, stamp at the middle row; 0: global shutter
+  double depth_rolling_shutter = 0;  ///< of the depth image in the same way; 0: depth of one instant
 
   bool intrinsics_from_camera_info = true;  ///< else `camera` below is used
   CameraIntrinsics camera;        ///< colour camera; may be empty when from camera_info

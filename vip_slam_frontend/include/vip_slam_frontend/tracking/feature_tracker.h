@@ -16,6 +16,7 @@
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/tracking/feature_depth.h"
 #include "vip_slam_frontend/tracking/patch_surface.h"
+#include "vip_slam_frontend/tracking/row_camera.h"
 #include "vip_slam_frontend/tracking/tracking_options.h"
 
 namespace vip_slam {
@@ -25,6 +26,7 @@ struct ReferenceImage {
   cv::Mat gray;
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();  ///< pixel of gray's first element, when it is a cut-out
   SE3 T_odom_C;
+  RowCamera camera{nullptr};  ///< while it was taken
 };
 
 struct Track {
@@ -53,8 +55,9 @@ class FeatureTracker {
 
   /// Tracks into `gray`. `predicted` is the camera motion since the last image (T_current_previous), `T_odom_C` the
   /// predicted pose of this one; when the translation is unknown give only a rotation and `has_translation` false.
+  /// `rows`: how the camera moves while the image is read, null: global shutter. `depth` belongs to the stamp.
   TrackingResult track(const cv::Mat& gray, const cv::Mat& depth, const SE3& predicted, bool has_translation,
-                       const SE3& T_odom_C, double t);
+                       const SE3& T_odom_C, const std::shared_ptr<const RowPoses>& rows, double t);
   /// Adds corners where features are missing; pose of the newest image as now known. `force`: also when few are
   /// missing. Returns the indices of the new tracks.
   std::vector<std::size_t> replenish(const SE3& T_odom_C, bool force, double t);
@@ -63,8 +66,8 @@ class FeatureTracker {
   bool alignTrack(Track* track, const SE3& T_odom_C, double most_px) const;
   /// Adds a track found by others in the newest image (which becomes its reference when it has none).
   void addTrack(Track track, const SE3& T_odom_C);
-  /// The newest image becomes the reference of all tracks.
-  void restartReferences(const SE3& T_odom_C);
+  /// The newest image becomes the reference of all tracks, with what is now known of its rows.
+  void restartReferences(const SE3& T_odom_C, const std::shared_ptr<const RowPoses>& rows);
   /// Tracks that ended with the last track() call.
   const std::vector<Track>& ended() const { return ended_; }
   /// Forgets all tracks and images; ids go on.
@@ -74,7 +77,12 @@ class FeatureTracker {
   const std::vector<Track>& tracks() const { return tracks_; }
   const cv::Mat& gray() const { return gray_; }
   const cv::Mat& depth() const { return depth_; }
-  /// Fills xy, depth and depth_sigma from the pixel and the newest depth image; tells where the depth is from.
+  /// The camera while the newest image was taken.
+  const RowCamera& camera() const { return view_; }
+  /// Where the camera at the stamp sees a measured feature, px: what its pixel would be with a global shutter.
+  Eigen::Vector2d pixelAtStamp(const Feature& feature) const;
+  /// Fills xy, depth and depth_sigma, all at the stamp, from the pixel and the newest depth image; tells where the depth
+  /// is from.
   FeatureDepth::Source measure(Feature* feature) const;
   /// Same for a track, and how well its patch fixes the pixel.
   void measure(Track* track) const;
@@ -86,11 +94,13 @@ class FeatureTracker {
               std::vector<char>* found);
   void alignWithReferences(const SE3& T_odom_C);
   void setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const;
+  std::shared_ptr<ReferenceImage> referenceHere(const SE3& T_odom_C) const;
   /// Whether the track's patch in the newest image lies on one plane of the depth image; measures the feature.
   bool surfaceIsKnown(Track* track) const;
 
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;
+  RowCamera view_;
   DepthNoise noise_;
   TimingLog* timing_;
   std::vector<Track> tracks_, ended_;

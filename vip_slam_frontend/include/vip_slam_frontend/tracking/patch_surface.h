@@ -5,9 +5,9 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_frontend/tracking/row_camera.h"
 
 namespace vip_slam {
 
@@ -38,8 +38,8 @@ struct PatchWarp {
   }
 };
 
-/// False when the patch is out of sight or all but edge-on.
-bool patchWarp(const CameraModel& camera, const Eigen::Vector2d& reference_pixel, const PatchSurface& surface,
-               const SE3& T_cur_ref, PatchWarp* warp_ref_cur);
+/// `reference` and `current`: the camera during either image. False when the patch is out of sight or all but edge-on.
+bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen::Vector2d& reference_pixel,
+               const PatchSurface& surface, const SE3& T_cur_ref, PatchWarp* warp_ref_cur);
 
 }  // namespace vip_slam

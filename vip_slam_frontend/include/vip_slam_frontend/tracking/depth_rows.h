@@ -1,0 +1,32 @@
+// A depth image whose rows were read one after the other while the camera moved, as the camera at the stamp would have
+// seen it. Depth sensors with a rolling shutter only; the others' images belong to one instant.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_frontend/tracking/row_camera.h"
+
+namespace vip_slam {
+
+class DepthRows {
+ public:
+  explicit DepthRows(std::shared_ptr<const CameraModel> camera);
+
+  /// `depth`: 32FC1, metres along z, 0 or NaN where there is none. Every pixel of the result is looked up where its
+  /// surface was when its row was read: by inverse depth among four neighbours on one surface, else the nearest.
+  cv::Mat atStamp(const cv::Mat& depth, const RowPoses& rows) const;
+
+ private:
+  struct Ray {
+    float x, y;           ///< of (x, y, 1)
+    float ux, uy, vx, vy; ///< pixels per unit of x and y
+  };
+  std::shared_ptr<const CameraModel> camera_;
+  std::vector<Ray> rays_;
+};
+
+}  // namespace vip_slam
