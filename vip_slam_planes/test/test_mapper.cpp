@@ -155,6 +155,22 @@ TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
   }
 }
 
+TEST(Mapper, ASmallPieceOfFloorBelongsToAFloorThatNoTableIsAsLargeAs) {
+  for (const double step : {0.0, 0.04}) {
+    Rig rig;
+    Scene scene;
+    scene.add({0, -3, 0}, {5, 0, 0}, {0, 6, 0});
+    scene.add({6.5, -0.7, step}, {1.2, 0, 0}, {0, 1.4, 0});  // 1.5 m further on, 1.7 m^2
+    for (double y = -2; y <= 2; y += 0.4) {
+      rig.look(scene, {0.5, y, 1.4}, {2.5, y, 0});
+      rig.look(scene, {2.5, y, 1.4}, {4.5, y, 0});
+    }
+    for (int i = 0; i < 4; ++i) rig.look(scene, {5.2, 0.1 * i, 1.4}, {7.1, 0, step});
+    ASSERT_GT(rig.mapper.planes().front().area, 20.0);
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
 TEST(Mapper, APlaneWaitsForASecondSightingWhileNobodyLooks) {
   Rig rig;
   Scene scene;
