@@ -9,6 +9,7 @@
 #include "progress_bar.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_sim/io/pose_accuracy.h"
 #include "vip_slam_sim/io/rgbd_folder.h"
 #include "vip_slam_sim/io/sequence_writer.h"
 
@@ -22,13 +23,15 @@ struct Settings {
   std::vector<double> up;  ///< in the folder's world; empty: from the depth images
   std::vector<double> intrinsics;
   bool registered = false;
-  double rate = 30, spacing = 0.15;
-  int iterations = 3, seed = 1;
+  double rate = 30, spacing = 0;
+  int iterations = 20, seed = 1;
+  bool nominal_noise = false, refine = false;
   ImuOptions imu;
 };
 
-/// Largest and root-mean-square distance of the spline from the poses it was fitted to.
-void reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
+/// Prints largest and root-mean-square distance of the spline from the poses it was fitted to; the latter one of an
+/// axis.
+PoseError reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
   double position = 0, angle = 0, worst = 0;
   for (const StampedPose& p : poses) {
     const MotionState m = spline.at(p.t);
@@ -40,6 +43,50 @@ void reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
   const double n = static_cast<double>(poses.size());
   std::fprintf(stderr, "spline: %.1f mm and %.2f deg RMS from the given poses, %.1f mm at most\n",
                1000 * std::sqrt(position / n), std::sqrt(angle / n) * 180 / M_PI, 1000 * worst);
+  return {std::sqrt(angle / (3 * n)), std::sqrt(position / (3 * n))};
+}
+
+/// The noise of the IMU that is made from these poses, and what it comes from.
+ImuNoise coveringNoise(const ImuNoise& own, const PoseError& jitter, const RgbdFolder& folder) {
+  // The IMU is held against images: what the poses do in between does not count.
+  const double interval = std::max(poseInterval(folder.T_W_C), imageInterval(folder));
+  std::vector<DepthDisagreement> drift;
+  for (const DepthDisagreement& d : posesAgainstDepth(folder, folder.T_W_C, {interval, 0.1, 0.3, 1.0})) {
+    if (!drift.empty() && d.lag < 1.5 * drift.back().lag) continue;
+    drift.push_back(d);
+    if (d.pairs == 0)
+      std::fprintf(stderr, "poses against depth over %.2f s: too few images with surfaces in three directions\n",
+                   d.lag);
+    else
+      std::fprintf(stderr, "poses against depth over %.2f s: %.1f mm and %.2f deg per axis (%d pairs)\n", d.lag,
+                   1000 * d.error.position, d.error.rotation * 180 / M_PI, d.pairs);
+  }
+  const ImuNoise noise = noiseOfImuFromPoses(own, jitter, interval, drift);
+  std::fprintf(stderr,
+               "noise densities in the sensor file: gyro %.2g rad/s/sqrt(Hz), accelerometer %.2g m/s^2/sqrt(Hz)\n",
+               noise.gyro_noise_density, noise.accel_noise_density);
+  return noise;
+}
+
+/// Mends the folder's poses by its depth images, and says by how much.
+void refine(RgbdFolder* folder) {
+  const Trajectory given = folder->T_W_C;
+  const DepthDisagreement drift = posesAgainstDepth(*folder, given, {1.0})[0];
+  if (drift.pairs == 0)
+    throw std::runtime_error("--refine: too few depth images with surfaces in three directions, or less than a second");
+  folder->T_W_C = refinePoses(*folder, poseJitter(given), drift.error);
+  double sum = 0, worst = 0;
+  for (const StampedPose& p : folder->T_W_C) {
+    SE3 T;
+    if (!poseAt(given, p.t, &T)) continue;
+    const double moved = (p.T_W_B.t() - T.t()).norm();
+    sum += moved * moved;
+    worst = std::max(worst, moved);
+  }
+  std::fprintf(stderr, "given poses against depth over %.2f s: %.1f mm and %.2f deg per axis\n", drift.lag,
+               1000 * drift.error.position, drift.error.rotation * 180 / M_PI);
+  std::fprintf(stderr, "refined: poses moved by %.1f mm RMS, %.1f mm at most\n",
+               1000 * std::sqrt(sum / static_cast<double>(folder->T_W_C.size())), 1000 * worst);
 }
 
 SensorConfig sensorOf(const Settings& s, const RgbdFolder& folder, const SequenceSpec& rig) {
@@ -66,10 +113,16 @@ int run(int argc, char** argv) {
   line.flag("registered", s.registered,
             "7-Scenes layout: depth, intrinsics and poses belong to the colour camera, not to one of its own");
   line.option("rate", s.rate, "images per second, where the folder has no stamps", between(1.0, 120.0));
-  line.option("spacing", s.spacing, "seconds between spline knots: smooths the poses' noise", between(0.02, 2.0));
+  line.option("spacing", s.spacing,
+              "seconds between spline knots; default: the widest that stays within the poses' jitter",
+              between(0.02, 2.0));
   line.option("iterations", s.iterations, "corrections towards the poses", between(0, 50));
   line.option("imu-rate", s.imu.rate, "Hz", between(50.0, 2000.0));
   line.option("seed", s.seed, "of the IMU's noise");
+  line.flag("refine", s.refine,
+            "mend the poses by registering the depth images; NAME_given.tum keeps those of the folder");
+  line.flag("nominal-noise", s.nominal_noise,
+            "the sensor file states the IMU's own noise, not what the poses' errors add to it");
   line.option("format", s.format, "bag or folder", oneOf("bag, folder"));
   if (const auto status = line.parse(argc, argv)) return *status;
   if (s.name.empty())
@@ -84,6 +137,8 @@ int run(int argc, char** argv) {
   }
   if (!folder.camera.validate().empty())
     throw std::runtime_error(s.folder + ": " + folder.camera.validate() + "; give --intrinsics FX FY CX CY");
+  const Trajectory given = folder.T_W_C;
+  if (s.refine) refine(&folder);
   const Eigen::Vector3d up = s.up.empty() ? upFromDepth(folder) : Eigen::Vector3d(s.up[0], s.up[1], s.up[2]);
   if (!(up.norm() > 1e-6)) throw std::runtime_error("--up: expected a vector that is not zero");
   std::fprintf(stderr, "up in the folder's world: %.4f %.4f %.4f\n", up.x() / up.norm(), up.y() / up.norm(),
@@ -96,13 +151,25 @@ int run(int argc, char** argv) {
   const SE3 level(gravityAlignedRotation(up), Eigen::Vector3d::Zero());
   const Eigen::Vector3d origin = level * folder.T_W_C.front().T_W_B.t();
   const SE3 place(level.rotation(), -origin);
-  Trajectory body;
-  for (const StampedPose& p : folder.T_W_C) body.push_back({p.t - begin, place * p.T_W_B * rig.T_imu_cam().inverse()});
+  const auto bodyOf = [&](const Trajectory& cameras) {
+    Trajectory out;
+    for (const StampedPose& p : cameras) out.push_back({p.t - begin, place * p.T_W_B * rig.T_imu_cam().inverse()});
+    return out;
+  };
+  const Trajectory body = bodyOf(folder.T_W_C);
+  const PoseError jitter = poseJitter(body);
+  if (s.spacing == 0) s.spacing = splineSpacing(body, jitter, s.iterations);
+  std::fprintf(stderr, "jitter of the poses: %.2f mm and %.3f deg per axis; spline knots %.0f ms apart\n",
+               1000 * jitter.position, jitter.rotation * 180 / M_PI, 1000 * s.spacing);
   const SplineTrajectory spline = SplineTrajectory::fit(body, s.spacing, s.iterations);
-  reportFit(spline, body);
+  const PoseError fit = reportFit(spline, body);
   const ImuLog imu = synthesiseImu(spline, s.imu, s.seed);
 
-  const SensorConfig sensor = sensorOf(s, folder, rig);
+  SensorConfig sensor = sensorOf(s, folder, rig);
+  if (!s.nominal_noise) {
+    const PoseError error{std::max(jitter.rotation, fit.rotation), std::max(jitter.position, fit.position)};
+    sensor.imu_noise = coveringNoise(sensor.imu_noise, error, folder);
+  }
   const auto start_ns = std::llround(rig.start_time) * 1000000000LL;
   const auto stamp = [&](double t) { return start_ns + std::llround(t * 1e9); };
   fs::create_directories(s.out);
@@ -140,6 +207,11 @@ int run(int argc, char** argv) {
   imuUntil(std::numeric_limits<std::int64_t>::max());
   saveSensorConfig(base + "_sensor.yaml", sensor);
   writeTum(base + "_truth.tum", truth);
+  if (s.refine) {
+    Trajectory poses = bodyOf(given);
+    for (StampedPose& p : poses) p.t = static_cast<double>(stamp(p.t)) * 1e-9;
+    writeTum(base + "_given.tum", poses);
+  }
   writer->commit();
   return 0;
 }

@@ -1,0 +1,119 @@
+#include "vip_slam_sim/io/pose_accuracy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_sim/motion/spline_trajectory.h"
+
+namespace vip_slam {
+namespace {
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Root mean square over the three axes of each axis' robust sigma.
+double robustSigma(const std::vector<Eigen::Vector3d>& values) {
+  double sum = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> magnitude;
+    for (const Eigen::Vector3d& v : values) magnitude.push_back(std::abs(v[axis]));
+    const double sigma = medianOf(std::move(magnitude)) / 0.6745;
+    sum += sigma * sigma;
+  }
+  return std::sqrt(sum / 3);
+}
+
+PoseError residualOf(const SplineTrajectory& spline, const Trajectory& poses) {
+  PoseError e;
+  for (const StampedPose& p : poses) {
+    const SE3 s = spline.at(p.t).T_W_I;
+    e.position += (s.t() - p.T_W_B.t()).squaredNorm();
+    e.rotation += logSO3(s.rotation().conjugate() * p.T_W_B.rotation()).squaredNorm();
+  }
+  const double n = 3.0 * static_cast<double>(poses.size());
+  e.position = std::sqrt(e.position / n);
+  e.rotation = std::sqrt(e.rotation / n);
+  return e;
+}
+
+}  // namespace
+
+double poseInterval(const Trajectory& poses) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < poses.size(); ++i) steps.push_back(poses[i].t - poses[i - 1].t);
+  return medianOf(std::move(steps));
+}
+
+double imageInterval(const RgbdFolder& folder) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < folder.frames.size(); ++i) steps.push_back(folder.frames[i].t - folder.frames[i - 1].t);
+  return medianOf(std::move(steps));
+}
+
+PoseError poseJitter(const Trajectory& poses) {
+  PoseError out;
+  if (poses.size() < 20) return out;
+  const double step = poseInterval(poses);
+  std::vector<Eigen::Vector3d> position, rotation;
+  for (std::size_t i = 0; i + 4 < poses.size(); ++i) {
+    const StampedPose* p = &poses[i];
+    bool regular = true;
+    for (int k = 0; k < 4; ++k) regular &= std::abs(p[k + 1].t - p[k].t - step) < 0.1 * step;
+    if (!regular) continue;
+    const auto turn = [&](int k) { return logSO3(p[k].T_W_B.rotation().conjugate() * p[k + 1].T_W_B.rotation()); };
+    position.push_back(p[0].T_W_B.t() - 4 * p[1].T_W_B.t() + 6 * p[2].T_W_B.t() - 4 * p[3].T_W_B.t() + p[4].T_W_B.t());
+    rotation.push_back(turn(3) - 3 * turn(2) + 3 * turn(1) - turn(0));
+  }
+  if (position.size() < 10) return out;
+  const double gain = std::sqrt(70.0);  // 1 + 16 + 36 + 16 + 1
+  out.position = robustSigma(position) / gain;
+  out.rotation = robustSigma(rotation) / gain;
+  return out;
+}
+
+double splineSpacing(const Trajectory& poses, const PoseError& jitter, int iterations) {
+  const double step = poseInterval(poses);
+  for (const double factor : {6.0, 4.0, 3.0, 2.0, 1.5}) {
+    const PoseError e = residualOf(SplineTrajectory::fit(poses, factor * step, iterations), poses);
+    // Below a tenth of a millimetre nothing is cut.
+    if (e.position < std::max(1.2 * jitter.position, 1e-4) && e.rotation < std::max(1.2 * jitter.rotation, 1e-4))
+      return factor * step;
+  }
+  return step;
+}
+
+ImuNoise noiseOfImuFromPoses(const ImuNoise& sensor, const PoseError& jitter, double interval,
+                             const std::vector<DepthDisagreement>& drift, double gravity) {
+  // White noise of density N makes an angle that is off by N sqrt(t) after t, and a position off by N sqrt(t^3 / 3).
+  // Two poses an interval apart are off by sqrt(2) times their jitter; the noise has to reach that from one image to
+  // the next already, though jitter does not grow afterwards.
+  double gyro = 2 * jitter.rotation * jitter.rotation / interval;
+  double accel = 6 * jitter.position * jitter.position / std::pow(interval, 3);
+  // What grows with the lag is drift; what does not is jitter again, and the noise of the registration.
+  const DepthDisagreement* first = nullptr;
+  double rate = 0, force = 0;
+  for (const DepthDisagreement& d : drift) {
+    if (d.pairs == 0) continue;
+    if (!first) {
+      first = &d;
+      continue;
+    }
+    const auto growth = [](double now, double before) { return std::max(0.0, now * now - before * before); };
+    const double time = d.lag - first->lag;
+    const double angle = growth(d.error.rotation, first->error.rotation);
+    rate = std::max(rate, angle / time);
+    // Poses that are tilted put gravity in the wrong place, for as long as the tilt lasts.
+    force = std::max(force, 3 * growth(d.error.position, first->error.position) / std::pow(time, 3));
+    force = std::max(force, gravity * gravity * angle * time);
+  }
+  ImuNoise out = sensor;
+  out.gyro_noise_density = std::sqrt(sensor.gyro_noise_density * sensor.gyro_noise_density + gyro + rate);
+  out.accel_noise_density = std::sqrt(sensor.accel_noise_density * sensor.accel_noise_density + accel + force);
+  return out;
+}
+
+}  // namespace vip_slam
