@@ -64,6 +64,7 @@ std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(double readout, const NavSt
 
 cv::Mat FrontEnd::Impl::depthAtStamp(const cv::Mat& depth, const NavState& nav) const {
   if (!depth_rows_ || depth.empty()) return depth;
+  ScopedTimer timer(timing_, "frontend.depth_rows", nav.t);
   const std::shared_ptr<const RowPoses> poses = rows(sensor_.depth_rolling_shutter, nav);
   return poses ? depth_rows_->atStamp(depth, *poses) : depth;
 }

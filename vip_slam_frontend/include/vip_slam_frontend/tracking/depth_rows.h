@@ -21,12 +21,11 @@ class DepthRows {
   cv::Mat atStamp(const cv::Mat& depth, const RowPoses& rows) const;
 
  private:
-  struct Ray {
-    float x, y;           ///< of (x, y, 1)
-    float ux, uy, vx, vy; ///< pixels per unit of x and y
-  };
   std::shared_ptr<const CameraModel> camera_;
-  std::vector<Ray> rays_;
+  /// Per pixel: its ray (x, y, 1), and pixels per unit of x and y.
+  struct Rays {
+    std::vector<float> x, y, ux, uy, vx, vy;
+  } rays_;
 };
 
 }  // namespace vip_slam
