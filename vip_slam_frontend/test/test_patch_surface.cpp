@@ -76,6 +76,25 @@ TEST(PatchSurface, FacesTheCameraWhereTheReadingsAreNoPlane) {
   EXPECT_EQ(patchSurface(wallDepthImage(0), kPixel, 0.0, noise()).depth, 0);
 }
 
+// A step of four sigmas is hidden in every single reading, yet a patch across it creeps by pixels.
+TEST(PatchSurface, AStepHiddenInTheNoiseIsNoPlane) {
+  DepthNoise loud = noise();
+  loud.b = 0.006;
+  const cv::Mat wall = wallDepthImage(0.006);
+  int known = 0, known_across = 0, tried = 0;
+  for (int u = 400; u < 600; u += 15) {
+    for (int v = 60; v < 420; v += 15, ++tried) {
+      const Eigen::Vector2d pixel(u, v);
+      cv::Mat step = wall(cv::Rect(u - 20, v - 20, 40, 40)).clone();
+      step.colRange(21, 40) *= 1.024;
+      known += patchSurface(wall, pixel, wallDepth(pixel), loud).known;
+      known_across += patchSurface(step, {20, 20}, wallDepth(pixel), loud).known;
+    }
+  }
+  EXPECT_GT(known, 0.99 * tried);
+  EXPECT_LT(known_across, 0.2 * tried);
+}
+
 TEST(PatchSurface, WarpIsTheHomographysDerivative) {
   const double h = 1e-3;
   Eigen::Matrix2d A_cur_ref;

@@ -16,6 +16,27 @@ constexpr int kFewest = 20;
 constexpr double kPriorSlope = 0.03;
 constexpr double kSteepest = 0.06;
 
+constexpr int kSide = 2 * kRadius / kStride + 1;
+// Squared deviations of the means of the window's rows and columns from the plane, in their sigmas: ten degrees of
+// freedom. Room for noise that neighbouring readings share, and for a part of the depth that is nobody's noise.
+constexpr double kMostOfLines = 35.0, kLineFloor = 0.0003;
+constexpr int kFewestOfLine = 3;
+
+/// Readings in one row or column of the window.
+struct Line {
+  Eigen::Vector3d row = Eigen::Vector3d::Zero();
+  double value = 0;
+  int count = 0;
+
+  void add(const Eigen::Vector3d& r, double v) { row += r, value += v, ++count; }
+  /// Squared deviation of the mean from the plane over its variance.
+  double chi2(const Eigen::Vector3d& fit, double sigma) const {
+    if (count < kFewestOfLine) return 0;
+    const double mean = (value - row.dot(fit)) / count;
+    return mean * mean / (sigma * sigma / count + kLineFloor * kLineFloor);
+  }
+};
+
 }  // namespace
 
 PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
@@ -33,6 +54,7 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double square = 0;
   int count = 0;
+  Line rows[kSide], columns[kSide];
   for (int y = -kRadius; y <= kRadius; y += kStride) {
     const float* row = depth_image.ptr<float>(v + y) + u;
     for (int x = -kRadius; x <= kRadius; x += kStride) {
@@ -44,6 +66,8 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
       b += row_of_A * value;
       square += value * value;
       ++count;
+      rows[(y + kRadius) / kStride].add(row_of_A, value);
+      columns[(x + kRadius) / kStride].add(row_of_A, value);
     }
   }
   if (count < kFewest) return surface;
@@ -51,6 +75,10 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   const double residual = std::sqrt(std::max(0.0, square - b.dot(fit)) / count);
   // A step or a rim inside the window is no plane, and its slope would be worse than none.
   if (residual > 2.0 * sigma + 0.002 || !(fit.tail<2>().norm() < kSteepest)) return surface;
+  // Noise hides a step or a bend from single readings, not from the means of lines across it.
+  double chi2 = 0;
+  for (int i = 0; i < kSide; ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
+  if (chi2 > kMostOfLines) return surface;
   surface.slope = fit.tail<2>();
   surface.known = true;
   return surface;
