@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "distorted_camera.h"
 #include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_frontend/tracking/depth_rows.h"
 
@@ -10,17 +11,7 @@ namespace {
 
 constexpr double kReadout = 0.02;
 
-std::shared_ptr<const CameraModel> camera() {
-  CameraIntrinsics k;
-  k.width = 320;
-  k.height = 240;
-  k.fx = k.fy = 250;
-  k.cx = 159.5;
-  k.cy = 119.5;
-  k.model = DistortionModel::kRadTan;
-  k.distortion = {-0.1, 0.02, 0, 0};
-  return makeCamera(k);
-}
+std::shared_ptr<const CameraModel> camera() { return distortedCamera(320, 240, 250); }
 
 /// Level, turning at 1.9 rad/s and moving at 1.4 m/s.
 RowPoses motion() {

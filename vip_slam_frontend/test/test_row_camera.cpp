@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "distorted_camera.h"
 #include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_frontend/tracking/row_camera.h"
 
@@ -10,17 +11,7 @@ namespace {
 
 constexpr double kReadout = 0.02;
 
-std::shared_ptr<const CameraModel> camera() {
-  CameraIntrinsics k;
-  k.width = 640;
-  k.height = 480;
-  k.fx = k.fy = 500;
-  k.cx = 319.5;
-  k.cy = 239.5;
-  k.model = DistortionModel::kRadTan;
-  k.distortion = {-0.1, 0.02, 0, 0};
-  return makeCamera(k);
-}
+std::shared_ptr<const CameraModel> camera() { return distortedCamera(640, 480, 500); }
 
 /// A body that swings about all axes and along them, 2 rad/s and 15 rad/s^2 at most, and its IMU.
 struct Swing {
