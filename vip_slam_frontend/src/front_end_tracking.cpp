@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 
+#include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/imu/preintegration.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
@@ -84,8 +85,12 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   phase_ = Phase::kInitialising;
   const SE3 rotation = first ? SE3() : gyroRotation(last_imu_t_, t_imu);
   last_imu_t_ = t_imu;
-  NavState turning;  // how it moves along is not known yet
+  // How it moves along is not known yet; upright as the accelerometer says, so that gravity is no acceleration.
+  NavState turning;
   turning.t = t_imu;
+  if (const std::optional<ImuSample> sample = imu_.at(t_imu); sample && sample->accel.norm() > 1.0) {
+    turning.T_W_I = SE3(gravityAlignedRotation(sample->accel), Eigen::Vector3d::Zero());
+  }
   const cv::Mat depth = depthAtStamp(depth_read, turning);
   tracker_.track(gray, depth, rotation, false, SE3(), rows(sensor_.rolling_shutter, turning), t);
   tracker_.replenish(SE3(), true, t);
