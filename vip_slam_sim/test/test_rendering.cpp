@@ -287,5 +287,42 @@ TEST(Sequence, MotionBlurSmearsAlongTheFlow) {
   EXPECT_LT(cv::norm(ga, gb, cv::NORM_L1) / (640 * 480), 1.5);
 }
 
+TEST(PassersBy, HideTheSceneAndNothingElse) {
+  SequenceSpec spec = cleanSequence("06_walkers");
+  spec.depth.b = 0;
+  const SequenceRenderer with(spec, quickOptions());
+  spec.passers.count = 0;
+  const SequenceRenderer without(spec, quickOptions());
+  const SimFrame a = with.renderFrame(40), b = without.renderFrame(40);
+  EXPECT_EQ(cv::norm(a.rgb, b.rgb, cv::NORM_INF), 0);  // they come later
+  const SimFrame c = with.renderFrame(140), d = without.renderFrame(140);
+  EXPECT_EQ(with.stateAt(7.0).T_W_I.t(), without.stateAt(7.0).T_W_I.t());
+  int hidden = 0, wrong = 0;
+  for (int v = 0; v < c.exact.depth.rows; ++v)
+    for (int u = 0; u < c.exact.depth.cols; ++u) {
+      const float before = d.exact.depth.at<float>(v, u), after = c.exact.depth.at<float>(v, u);
+      const bool body = c.exact.piece.at<int>(v, u) < 0;
+      hidden += body;
+      wrong += body ? after >= before || after < 0.5 || after > 3 : after != before;
+    }
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(hidden, 0.05 * c.exact.depth.total());
+  EXPECT_LT(hidden, 0.6 * c.exact.depth.total());
+  EXPECT_EQ(cv::norm(with.renderFrame(140).rgb, c.rgb, cv::NORM_INF), 0);
+}
+
+TEST(PassersBy, WhatGoesByFillsTheViewAndIsGone) {
+  const SequenceSpec spec = cleanSequence("06_blocked");
+  const SequenceRenderer sequence(spec, quickOptions());
+  const auto share = [&](double t) {
+    const SimFrame f = sequence.renderFrame(static_cast<int>(t * spec.camera.rate));
+    return cv::countNonZero(f.exact.piece < 0) / static_cast<double>(f.exact.piece.total());
+  };
+  EXPECT_LT(share(3.8), 0.01);
+  EXPECT_GT(share(6.0), 0.9);
+  EXPECT_LT(share(11.0), 0.01);
+  EXPECT_GT(share(14.0), 0.9);
+}
+
 }  // namespace
 }  // namespace vip_slam

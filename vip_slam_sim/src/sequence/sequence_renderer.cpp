@@ -47,6 +47,10 @@ SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions
   renderer_ = std::make_unique<Renderer>(scene_, tracer_, camera_);
   if (!spec.depth.registered)
     depth_renderer_ = std::make_unique<Renderer>(scene_, tracer_, makeCamera(sensor_.depth_camera));
+  passers_ = std::make_unique<PassersBy>(
+      spec.passers,
+      [this](double t) { return trajectory_.at(std::clamp(t, 0.0, trajectory_.end())).T_W_I * sensor_.T_imu_cam; },
+      spec.seed);
   effects_ = std::make_unique<SensorEffects>(spec.effects, spec.depth, *camera_, spec.seed);
   visibility_ = std::make_unique<VisibilityCounter>(scene_);
   const double usable = trajectory_.end() - 2 * kMargin - std::abs(spec.imu.time_offset) - spec.effects.rolling_shutter;
@@ -104,14 +108,14 @@ SimFrame SequenceRenderer::renderFrame(int index) const {
   const MotionState m = trajectory_.at(t);
   f.T_W_C = m.T_W_I * sensor_.T_imu_cam;
   const double readout = spec_.effects.rolling_shutter;
+  std::function<SE3(int)> row_pose = [&](int) { return f.T_W_C; };
   if (readout > 0) {
-    const double rows = camera_->height();
-    renderer_->render(
-        [&](int row) { return trajectory_.at(t + readout * ((row + 0.5) / rows - 0.5)).T_W_I * sensor_.T_imu_cam; },
-        true, &f.exact);
-  } else {
-    renderer_->render(f.T_W_C, &f.exact);
+    row_pose = [&, rows = static_cast<double>(camera_->height())](int row) {
+      return trajectory_.at(t + readout * ((row + 0.5) / rows - 0.5)).T_W_I * sensor_.T_imu_cam;
+    };
   }
+  renderer_->render(row_pose, readout > 0, &f.exact);
+  passers_->draw(*renderer_, t, row_pose, &f.exact);
   if (spec_.effects.motion_blur) {
     CameraTwist twist;
     const Eigen::Quaterniond R_C_I = sensor_.T_imu_cam.rotation().conjugate();
@@ -125,7 +129,9 @@ SimFrame SequenceRenderer::renderFrame(int index) const {
     f.depth = effects_->depth(f.exact, f.rgb, index);
   } else {
     FrameBuffers own;
-    depth_renderer_->renderDepth(f.T_W_C * sensor_.T_color_depth, &own);
+    const SE3 T_W_D = f.T_W_C * sensor_.T_color_depth;
+    depth_renderer_->renderDepth(T_W_D, &own);
+    passers_->draw(*depth_renderer_, t, [&](int) { return T_W_D; }, &own);
     f.depth = effects_->depth(own, cv::Mat(), index);
   }
   return f;

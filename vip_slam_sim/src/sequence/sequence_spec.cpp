@@ -110,6 +110,17 @@ void EffectOptions::visit(OptionVisitor& v) {
   v.field("rolling_shutter", rolling_shutter, 0, 0.1, "time from first to last row, s; 0: global shutter");
 }
 
+void PasserOptions::visit(OptionVisitor& v) {
+  v.field("count", count, 0, 20, "bodies that move before the camera");
+  v.field("way", way, {"to_and_fro", "across"}, "how they move: all the time, or once across the view each interval");
+  v.field("width", width, 0.1, 10, "m");
+  v.field("height", height, 0.1, 10, "m");
+  v.field("distance", distance, 0.4, 20, "from the camera, m");
+  v.field("speed", speed, 0.01, 10, "largest speed, m/s");
+  v.field("start", start, 0, 3600, "when the first appears, s");
+  v.field("interval", interval, 0.5, 1000, "across: from one passage to the next, s");
+}
+
 void SequenceSpec::visit(OptionVisitor& v) {
   v.field("scene", scene, sceneNames(), "scene to fly through");
   v.field("seed", seed, 0, 1000000, "of all noise");
@@ -119,6 +130,7 @@ void SequenceSpec::visit(OptionVisitor& v) {
   v.group("depth", depth);
   v.group("imu", imu);
   v.group("effects", effects);
+  v.group("passers", passers);
 }
 
 SE3 SequenceSpec::T_imu_cam() const {

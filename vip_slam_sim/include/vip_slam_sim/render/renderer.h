@@ -33,6 +33,8 @@ class Renderer {
   /// Depth, piece and grazing angle only.
   void renderDepth(const SE3& T_W_C, FrameBuffers* out) const;
 
+  /// Direction of a pixel, z = 1 in the camera.
+  Eigen::Vector3d ray(int u, int v) const { return {x_[v * camera_->width() + u], y_[v * camera_->width() + u], 1.0}; }
   const CameraModel& camera() const { return *camera_; }
   const Scene& scene() const { return *scene_; }
 

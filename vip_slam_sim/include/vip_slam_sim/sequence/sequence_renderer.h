@@ -15,6 +15,7 @@
 #include "vip_slam_core/types/plane_map.h"
 #include "vip_slam_sim/motion/imu_synthesiser.h"
 #include "vip_slam_sim/motion/spline_trajectory.h"
+#include "vip_slam_sim/render/passers_by.h"
 #include "vip_slam_sim/render/renderer.h"
 #include "vip_slam_sim/render/sensor_effects.h"
 #include "vip_slam_sim/scene/truth_planes.h"
@@ -79,6 +80,7 @@ class SequenceRenderer {
   std::shared_ptr<const RayTracer> tracer_;
   std::shared_ptr<const CameraModel> camera_;
   std::unique_ptr<Renderer> renderer_, depth_renderer_;
+  std::unique_ptr<PassersBy> passers_;
   std::unique_ptr<SensorEffects> effects_;
   std::unique_ptr<VisibilityCounter> visibility_;
   int frame_count_ = 0;

@@ -64,6 +64,16 @@ struct EffectOptions {
   void visit(OptionVisitor& v);
 };
 
+/// Bodies that walk about before the camera.
+struct PasserOptions {
+  int count = 0;
+  std::string way = "to_and_fro";
+  double width = 0.5, height = 1.75;
+  double distance = 1.8, speed = 1.0;
+  double start = 4, interval = 8;
+  void visit(OptionVisitor& v);
+};
+
 struct SequenceSpec {
   std::string name;
   std::string scene = "room";
@@ -74,6 +84,7 @@ struct SequenceSpec {
   DepthOptions depth;
   ImuOptions imu;
   EffectOptions effects;
+  PasserOptions passers;
   void visit(OptionVisitor& v);
 
   SE3 T_imu_cam() const;  ///< the rig's own, a little off every axis

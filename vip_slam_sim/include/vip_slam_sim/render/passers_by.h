@@ -1,0 +1,33 @@
+// Bodies that walk about before the camera: upright elliptic cylinders in patterned clothes. They hide the scene from
+// colour and depth alike, belong to no true plane, and cast no shadows.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_sim/render/renderer.h"
+#include "vip_slam_sim/scene/texture.h"
+#include "vip_slam_sim/sequence/sequence_spec.h"
+
+namespace vip_slam {
+
+class PassersBy {
+ public:
+  /// `camera(t)`: T_W_C, which they stay before.
+  PassersBy(const PasserOptions& options, std::function<SE3(double t)> camera, int seed);
+
+  /// Draws those in view at time `t` over what `renderer` has rendered. `row_pose(row)`: T_W_C while the row is read.
+  void draw(const Renderer& renderer, double t, const std::function<SE3(int row)>& row_pose, FrameBuffers* frame) const;
+
+ private:
+  struct Body;
+  std::vector<Body> bodies(double t) const;
+
+  PasserOptions options_;
+  std::function<SE3(double t)> camera_;
+  std::vector<std::unique_ptr<Texture>> clothes_;
+};
+
+}  // namespace vip_slam
