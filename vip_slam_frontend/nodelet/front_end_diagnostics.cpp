@@ -70,6 +70,7 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("restarts", c.restarts);
   status.add("times lost", c.lost);
   status.add("images on the IMU alone", c.coasting);
+  status.add("images that moved by themselves", c.moving);
   status.add("images standing still", c.zero_velocity);
   status.add("landmarks of the map found again", c.landmarks_reacquired);
   status.add("memory (MB)", processMemoryMb());

@@ -61,8 +61,13 @@ class FrontEnd::Impl {
   SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
+  /// The camera's motion since the last image as the IMU has it; not to be held against the points (interval 0) while
+  /// that is in doubt.
+  ForetoldMotion foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const;
+  /// So long that it is time to begin anew.
+  bool contradictedForLong(const TrackingResult& tracking, double t) const;
   /// `metric`: depth took part, by features or surfaces.
-  void judge(int tracks, bool metric, bool surfaces_hold, double t);
+  void judge(const TrackingResult& tracking, bool metric, bool surfaces_hold, double t);
   /// What the position's one sigma has grown by since the last image with enough features, m.
   double coastedSigma() const;
 
@@ -70,6 +75,10 @@ class FrontEnd::Impl {
   std::shared_ptr<TrackedFrame> makeFrame(double t, bool with_features) const;
   /// Those who take features from here know of no rows: pixels become what a global shutter would have seen.
   void placeAtStamp(std::vector<Feature>* features) const;
+  /// Without those features that lie where something moves by itself.
+  void dropMoving(std::vector<Feature>* features) const;
+  /// Of the newest depth image; nothing where something moves by itself.
+  DepthGrid depthGrid(int stride) const;
   KeyframePtr makeKeyframe(const TrackedFrame& frame, double t_imu);
   FrameOutput statusOnly(double t, TrackingState state, const std::string& reason) const;
 
@@ -79,6 +88,8 @@ class FrontEnd::Impl {
   ImuBuffer imu_;
   std::unique_ptr<DepthRows> depth_rows_;  ///< null: depth of one instant
   FeatureTracker tracker_;
+  MovingRegions moving_;          ///< of the newest image
+  double moving_imu_t_ = -1e300;  ///< of the last image with such
   SurfaceTracker surfaces_;
   LandmarkMatcher landmarks_;
   OrbExtractor orb_;
@@ -96,6 +107,7 @@ class FrontEnd::Impl {
   KeyframeId next_keyframe_ = 1, last_keyframe_ = 0, newest_keyframe_ = 0;
   double last_keyframe_imu_t_ = 0;
   bool keyframe_imu_broken_ = false;  ///< a gap since the last keyframe
+  double started_imu_t_ = 0;          ///< of this epoch's first state
   double last_good_t_ = 0;            ///< image with enough features
   double last_good_variance_ = 0;     ///< of the position there, m^2
   double last_held_t_ = 0;            ///< image with enough features or matched depth surfaces

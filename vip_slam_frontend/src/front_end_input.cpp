@@ -135,6 +135,7 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   status_ = {TrackingState::kInitialising, reason};
   tracker_.clear();
   surfaces_.clear();
+  moving_ = {};
   filter_.stop();
   initialiser_.reset();
   stillness_.reset();

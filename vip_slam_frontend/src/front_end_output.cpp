@@ -1,4 +1,5 @@
 // Output side of the front end: tracked frames and keyframes.
+#include <algorithm>
 #include <cmath>
 
 #include "front_end_impl.h"
@@ -33,6 +34,24 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
   return {frame, nullptr};
 }
 
+void FrontEnd::Impl::dropMoving(std::vector<Feature>* features) const {
+  if (!moving_.any()) return;
+  features->erase(std::remove_if(features->begin(), features->end(),
+                                 [&](const Feature& f) { return moving_.moves(f.pixel.cast<double>(), f.depth); }),
+                  features->end());
+}
+
+DepthGrid FrontEnd::Impl::depthGrid(int stride) const {
+  DepthGrid grid = makeDepthGrid(tracker_.depth(), stride, sensor_.depth_noise);
+  for (int v = 0; v < grid.rows && moving_.any(); ++v) {
+    for (int u = 0; u < grid.cols; ++u) {
+      float& z = grid.z[static_cast<std::size_t>(v) * grid.cols + u];
+      if (z > 0 && moving_.moves(grid.pixel(u, v), z)) z = 0;
+    }
+  }
+  return grid;
+}
+
 FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string& keyframe_reason) {
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
   const bool is_keyframe = !keyframe_reason.empty();
@@ -51,13 +70,18 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
     for (std::size_t i = 0; i < frame->features.size(); ++i) {
       tracker_.tracks()[i].feature = frame->features[i];
     }
+  }
+  // Others need not know of what passes by; the tracker does, to know it again.
+  dropMoving(&frame->features);
+  if (is_keyframe) {
+    ScopedTimer timer(timing_, "frontend.keyframe", t);
     output.keyframe = makeKeyframe(*frame, t_imu);
     frame->keyframe = newest_keyframe_;
   }
   placeAtStamp(&frame->features);
   if (!tracker_.depth().empty()) {
     ScopedTimer timer(timing_, "frontend.depth_grid", t);
-    frame->depth_grid = makeDepthGrid(tracker_.depth(), options_.frame_grid_stride, sensor_.depth_noise);
+    frame->depth_grid = depthGrid(options_.frame_grid_stride);
   }
   output.frame = frame;
   const double horizon = std::max(2.0, options_.initialisation.standing_seconds + 0.5);
@@ -84,9 +108,10 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
     tracker_.measure(&corner);
     keyframe->frame.features.push_back(corner);
   }
+  dropMoving(&keyframe->frame.features);
   placeAtStamp(&keyframe->frame.features);
   if (!tracker_.depth().empty()) {
-    keyframe->frame.depth_grid = makeDepthGrid(tracker_.depth(), options_.keyframe_grid_stride, sensor_.depth_noise);
+    keyframe->frame.depth_grid = depthGrid(options_.keyframe_grid_stride);
   }
   if (last_keyframe_ != 0 && !keyframe_imu_broken_) keyframe->imu = imu_.between(last_keyframe_imu_t_, t_imu);
 

@@ -1,4 +1,4 @@
-// The steps of one image: check, predict, track, estimate, judge, hand on.
+// The steps of one image: check, predict, track, estimate, hand on.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -16,6 +16,7 @@ namespace {
 // Features gated away in this many images in a row: the estimate has left the measurements.
 constexpr int kGatedImages = 30;
 constexpr double kLongGapNoise = 5.0;
+constexpr double kPauses = 1.0;  // s
 
 }  // namespace
 
@@ -92,7 +93,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
     turning.T_W_I = SE3(gravityAlignedRotation(sample->accel), Eigen::Vector3d::Zero());
   }
   const cv::Mat depth = depthAtStamp(depth_read, turning);
-  tracker_.track(gray, depth, rotation, false, SE3(), rows(sensor_.rolling_shutter, turning), t);
+  tracker_.track(gray, depth, {rotation, 0, 0}, false, SE3(), rows(sensor_.rolling_shutter, turning), t);
   tracker_.replenish(SE3(), true, t);
   const std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements()}, imu_);
   if (!prior) {
@@ -110,6 +111,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   }
   initialiser_.reset();
   phase_ = Phase::kTracking;
+  started_imu_t_ = t_imu;
   status_ = {TrackingState::kTracking, ""};
   last_good_t_ = last_held_t_ = t;
   last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
@@ -120,6 +122,9 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
 }
 
 bool FrontEnd::Impl::decideStillness(double t_imu) {
+  if (moving_.any()) moving_imu_t_ = t_imu;
+  // What walks about pauses, and then follows the camera: for a while the image says nothing about standing still.
+  const bool image_counts = t_imu - moving_imu_t_ > kPauses;
   const ZuptOptions& options = options_.filter.zupt;
   PixelList now;
   for (const Track& track : tracker_.tracks()) now.emplace_back(track.feature.id, track.feature.pixel);
@@ -136,13 +141,13 @@ bool FrontEnd::Impl::decideStillness(double t_imu) {
   };
   StillnessCues cues;
   cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), t_imu - options.window), t_imu), &sensor_.imu_noise);
-  cues.tracks = static_cast<int>(now.size());
+  cues.tracks = image_counts ? static_cast<int>(now.size()) : 0;
   cues.speed = filter_.nav().v_W.norm();
   while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options.window - 1e-6) {
     recent_pixels_.pop_front();
   }
   if (!recent_pixels_.empty()) cues.disparity_px = disparity(recent_pixels_.front().second);
-  if (still_) cues.anchor_disparity_px = disparity(still_anchor_);
+  if (still_ && image_counts) cues.anchor_disparity_px = disparity(still_anchor_);
   recent_pixels_.emplace_back(t_imu, now);
   const bool still = stillness_.update(cues);
   if (still && !still_) still_anchor_ = std::move(now);
@@ -161,7 +166,7 @@ SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_
   if (index < 0 || depth.empty() || !options_.filter.use_surfaces) return {};
   ScopedTimer timer(timing_, "frontend.surfaces", t);
   const SE3 T_odom_ref = cameraPose(filter_.window(), filter_.window().clones[index]);
-  return surfaces_.match(depth, T_odom_C.inverse() * T_odom_ref);
+  return surfaces_.match(depth, T_odom_C.inverse() * T_odom_ref, moving_);
 }
 
 void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, double t) {
@@ -170,7 +175,7 @@ void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, do
   const bool leaving = filter_.window().indexOf(surfaces_.reference()) <= 0;
   if (!leaving && 2 * matched >= surfaces_.size()) return;
   ScopedTimer timer(timing_, "frontend.surfaces", t);
-  surfaces_.setReference(depth, filter_.window().clones.back().id);
+  surfaces_.setReference(depth, filter_.window().clones.back().id, moving_);
 }
 
 FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth_read,
@@ -189,13 +194,12 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   last_imu_t_ = t_imu;
 
   const SE3 T_I_C = extrinsics();
-  const SE3 T_odom_C_last = filter_.nav().T_W_I * T_I_C;
   const SE3 T_odom_C = propagation.predicted.T_W_I * T_I_C;
   const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
-  const TrackingResult tracked =
-      tracker_.track(gray, depth, T_odom_C.inverse() * T_odom_C_last, !coasting, T_odom_C,
-                     rows(sensor_.rolling_shutter, propagation.predicted), t);
+  const TrackingResult tracked = tracker_.track(gray, depth, foretell(propagation, T_odom_C, gap), !coasting, T_odom_C,
+                                                rows(sensor_.rolling_shutter, propagation.predicted), t);
+  moving_ = tracked.regions;
   for (const Track& track : tracker_.ended()) landmarks_.retire(track);
 
   const SurfaceMatches surfaces = matchSurfaces(depth, T_odom_C, t);
@@ -208,6 +212,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
                           calibrationExcited(t_imu), &surfaces);
   }
   renewSurfaces(depth, surfaces.pairs.size(), t);
+  counters_.moving += tracked.moves_by_itself;
   counters_.features_used += report.features_used;
   counters_.features_gated += report.features_gated;
   counters_.surfaces_used += report.surfaces_used;
@@ -220,6 +225,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const std::string failure = !report.healthy                                  ? "the filter became singular"
                               : filter_.nav().v_W.norm() > options_.recovery.max_speed ? "estimated speed is impossible"
                               : gated_in_a_row_ >= kGatedImages                ? "measurements contradict the estimate"
+                              : contradictedForLong(tracked, t)                ? "what is seen contradicts the IMU"
                                                                                : "";
   if (!failure.empty()) {
     reset(failure);
@@ -229,7 +235,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   for (const Track& track : tracker_.tracks()) with_depth += track.feature.depth > 0;
   const bool surfaces_hold = report.surfaces_used > 0;
   const bool metric = surfaces_hold || with_depth >= options_.recovery.min_tracks;
-  judge(tracked.tracked, metric, surfaces_hold, t);
+  judge(tracked, metric, surfaces_hold, t);
   if (phase_ == Phase::kLost && tracked.tracked >= 2 * options_.recovery.min_tracks && tracked.pose_ok) {
     // The IMU went on all the time. As long as it still tells where we are, the odometry goes on, too.
     if (coastedSigma() > options_.recovery.max_position_sigma) {
@@ -237,7 +243,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
       return initialise(t, t_imu, gray, depth_read);
     }
     phase_ = Phase::kTracking;
-    judge(tracked.tracked, metric, surfaces_hold, t);
+    judge(tracked, metric, surfaces_hold, t);
   }
   if (on_pose) on_pose(*makeFrame(t, false));
   const SE3 T_now = filter_.nav().T_W_I * extrinsics();
@@ -248,37 +254,6 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     reason = selector_.decide(t, T_now, frame->features, camera_->focal(), still_);
   }
   return makeOutput(t, t_imu, reason);
-}
-
-double FrontEnd::Impl::coastedSigma() const {
-  const double variance = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
-  return std::sqrt(std::max(0.0, variance - last_good_variance_));
-}
-
-void FrontEnd::Impl::judge(int tracks, bool metric, bool surfaces_hold, double t) {
-  if (tracks >= options_.recovery.min_tracks || still_) {
-    if (phase_ == Phase::kLost) return;
-    last_good_t_ = last_held_t_ = t;
-    last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
-    status_ = metric || still_ ? TrackingStatus{TrackingState::kTracking, ""}
-                                   : TrackingStatus{TrackingState::kDegraded, "no depth: visual-inertial only"};
-    return;
-  }
-  if (surfaces_hold && phase_ != Phase::kLost) last_held_t_ = t;
-  counters_.coasting += !surfaces_hold;
-  const double seconds = t - last_held_t_;
-  if (phase_ != Phase::kLost && (seconds > options_.recovery.coast_seconds ||
-                                 coastedSigma() > options_.recovery.max_position_sigma)) {
-    phase_ = Phase::kLost;
-    ++counters_.lost;
-  }
-  if (phase_ == Phase::kLost) {
-    status_ = {TrackingState::kLost, "no features for " + std::to_string(t - last_good_t_).substr(0, 4) + " s"};
-  } else {
-    status_ = {TrackingState::kDegraded, (surfaces_hold ? "held by depth surfaces and the IMU with "
-                                                        : "coasting on the IMU with ") +
-                                             std::to_string(tracks) + " features"};
-  }
 }
 
 }  // namespace vip_slam

@@ -218,7 +218,7 @@ TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
     const cv::Mat image = render(texture, poseAt(k).t(), 1.5, static_cast<unsigned>(k + 1));
     const cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(2.0));
     const SE3 motion = k == 0 ? SE3() : poseAt(k).inverse() * poseAt(k - 1);
-    const TrackingResult result = tracker.track(image, depth, motion, true, poseAt(k), nullptr, k);
+    const TrackingResult result = tracker.track(image, depth, {motion, 0, 0}, true, poseAt(k), nullptr, k);
     if (k > 0) EXPECT_GT(result.tracked, 150);
     tracker.replenish(poseAt(k), true, k);
     for (const Track& track : tracker.tracks()) {
@@ -251,7 +251,7 @@ TEST(FeatureTracker, ATrackBeginsAnewWhenDepthFirstShowsItsSurface) {
   for (int k = 0; k < 12; ++k) {
     const cv::Mat image = render(texture, poseAt(k).t(), 1.0, k + 1);
     const SE3 motion = k == 0 ? SE3() : poseAt(k).inverse() * poseAt(k - 1);
-    tracker.track(image, k < 6 ? nothing : wall, motion, true, poseAt(k), nullptr, k);
+    tracker.track(image, k < 6 ? nothing : wall, {motion, 0, 0}, true, poseAt(k), nullptr, k);
     if (k == 0) tracker.replenish(poseAt(k), true, k);
     for (const Track& track : tracker.tracks()) (k < 6 ? blind : seeing)[track.feature.id] = track.feature.pixel_sigma;
     if (k == 6) EXPECT_FALSE(tracker.ended().empty());

@@ -35,7 +35,7 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
       {"bad_depth", c.bad_depth},       {"no_depth", c.no_depth},
       {"bad_stamp", c.bad_stamp},       {"imu_rejected", c.imu_rejected},
       {"imu_gaps", c.imu_gaps},         {"imu_missing", c.imu_missing},
-      {"zero_velocity", c.zero_velocity}, {"coasting", c.coasting},
+      {"zero_velocity", c.zero_velocity}, {"coasting", c.coasting}, {"moving", c.moving},
       {"lost", c.lost},                 {"features_used", c.features_used},
       {"features_gated", c.features_gated}, {"landmarks_reacquired", c.landmarks_reacquired}};
   yaml << YAML::Key << "counters" << YAML::Value << YAML::BeginMap;

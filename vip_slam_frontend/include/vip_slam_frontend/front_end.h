@@ -45,6 +45,7 @@ struct FrontEndCounters {
   std::uint64_t imu_missing = 0;     ///< images not covered by the IMU
   std::uint64_t zero_velocity = 0;   ///< images taken standing still
   std::uint64_t coasting = 0;        ///< images passed on the IMU alone
+  std::uint64_t moving = 0;          ///< images most of which moved by itself
   std::uint64_t lost = 0;            ///< times the state went to LOST
   std::uint64_t features_used = 0, features_gated = 0;
   std::uint64_t surfaces_used = 0;   ///< pairs of a depth reading and a flat patch of an earlier image

@@ -1,5 +1,8 @@
 #include "vip_slam_frontend/filter/propagation.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
@@ -18,6 +21,13 @@ Eigen::Matrix<double, 15, 1> noiseFloor() {
 }
 
 }  // namespace
+
+double Propagation::displacementSigma(const Matrix15d& P) const {
+  Eigen::Matrix<double, 3, 15> J = Phi.middleRows<3>(3);
+  J.middleCols<3>(3).setZero();  // the position itself is at both ends
+  const Eigen::Matrix3d covariance = J * P * J.transpose() + Q.block<3, 3>(3, 3);
+  return std::sqrt(std::max(0.0, covariance.diagonal().maxCoeff()));
+}
 
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
                       const Eigen::Vector3d& G, double noise_scale) {

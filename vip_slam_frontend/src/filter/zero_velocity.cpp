@@ -14,6 +14,8 @@ constexpr double kMostGyroShift = 0.005;  // rad/s
 constexpr double kMostAccelShift = 0.05;  // m/s^2
 // ... and those at rest follow by this share per image, as the biases walk.
 constexpr double kRestFollows = 0.01;
+// So many images after standing still, slow motion may have begun without the IMU's noticing.
+constexpr int kForgotten = 40;
 // The sigmas fit image motion at the limit and surfaces two metres away; farther ones tell so much less. However quiet
 // the image, they do not fall below a share.
 constexpr double kFar = 3.0, kLeastUnrest = 0.2;
@@ -80,19 +82,22 @@ bool StillnessDetector::update(const StillnessCues& cues) {
     still_ = wants;
     in_a_row_ = 0;
   }
+  since_still_ = still_ ? 0 : std::min(since_still_ + 1, kForgotten);
+  imu_rests_ = quiet && since_still_ < kForgotten && restsAs(cues.imu, rest_);
   // A first doubt already suspends the updates; it takes frames_in images to start them.
   return still_ && wants;
 }
 
 void StillnessDetector::begin(const ImuSpread& rest) {
   still_ = options_.enabled;
-  in_a_row_ = 0;
+  in_a_row_ = since_still_ = 0;
   rest_ = rest;
 }
 
 void StillnessDetector::reset() {
-  still_ = false;
+  still_ = imu_rests_ = false;
   in_a_row_ = 0;
+  since_still_ = kForgotten;
 }
 
 void zeroVelocityRows(const WindowState& window, int anchor, int repeats, double unrest, const ZuptOptions& options,

@@ -206,7 +206,7 @@ bool FeatureTracker::surfaceIsKnown(Track* track) const {
   return patchSurface(depth_, pixelAtStamp(track->feature), track->feature.depth, noise_).known;
 }
 
-TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, const SE3& predicted,
+TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, const ForetoldMotion& predicted,
                                      bool has_translation, const SE3& T_odom_C,
                                      const std::shared_ptr<const RowPoses>& rows, double t) {
   TrackingResult result;
@@ -221,7 +221,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     cv::buildOpticalFlowPyramid(gray, pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
                                 options_.klt_levels);
     if (!last_pyramid_.empty()) matchExposure(gray);
-    if (!last_pyramid_.empty()) runKlt(gray, predicted, has_translation, &next, &found);
+    if (!last_pyramid_.empty()) runKlt(gray, predicted.T_current_previous, has_translation, &next, &found);
     gray_ = gray;
     depth_ = depth;
   }
@@ -235,19 +235,22 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     if (!found[i]) continue;
     const Feature& last = tracks_[i].feature;
     const Eigen::Vector3d p = view_.unproject(asVector(next[i]), last.depth > 0 ? last.depth : kFarAway);
-    pairs.push_back({last.xy.cast<double>(), p.head<2>() / p.z(), last.depth});
+    pairs.push_back({last.xy.cast<double>(), p.head<2>() / p.z(), last.depth, static_cast<int>(last.age)});
     index.push_back(i);
   }
   RansacOptions ransac;
   ransac.threshold = options_.ransac_px / camera_->focal();
   ransac.iterations = options_.ransac_iterations;
   ransac.seed = image_count_;
-  const RansacResult model = rejectOutliers(pairs, predicted, ransac);
+  const RansacResult model = rejectOutliers(pairs, predicted, ransac, &result.moves_by_itself);
   result.lost_klt = static_cast<int>(tracks_.size() - pairs.size());
   result.lost_outlier = static_cast<int>(pairs.size()) - model.inliers;
   result.pose_ok = model.ok && model.with_depth;
   result.T_current_previous = model.T_current_previous;
 
+  for (std::size_t k = 0; k < index.size() && predicted.interval > 0; ++k) {
+    result.regions.add({next[index[k]].x, next[index[k]].y}, pairs[k].depth_previous, model.inlier[k]);
+  }
   std::vector<Track> kept;
   kept.reserve(index.size());
   for (std::size_t k = 0; k < index.size(); ++k) {

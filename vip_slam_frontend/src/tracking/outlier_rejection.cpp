@@ -108,6 +108,9 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
     }
     return sum;
   };
+  const auto allowed = [&](const Eigen::Vector3d& t) {
+    return !(options.most_apart > 0) || (t - predicted.t()).norm() < options.most_apart;
+  };
   Eigen::Vector3d best_t = predicted.t();
   double best = cost(best_t, 1e300);
   for (int k = 0; k < options.iterations; ++k) {
@@ -115,7 +118,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
     if (sample[0] == sample[1]) continue;
     Eigen::Vector3d t;
     if (result.with_depth) {
-      if (!solveTranslation(pairs, sample, 2, R, &t)) continue;
+      if (!solveTranslation(pairs, sample, 2, R, &t) || !allowed(t)) continue;
     } else {
       const PointPair &a = pairs[sample[0]], &b = pairs[sample[1]];
       const Eigen::Vector3d n0 = (R * bearing(a.xy_previous)).cross(bearing(a.xy_current));
@@ -131,6 +134,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
     }
   }
 
+  result.t_given_rotation = best_t;
   SE3 T(predicted.rotation(), best_t);
   const auto classify = [&]() {
     const Eigen::Matrix3d Rt = T.R();
@@ -141,13 +145,16 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
     }
   };
   classify();
-  if (result.with_depth && result.inliers >= 8 && refinePose(pairs, result.inlier, 0.5 * options.threshold, &T)) {
+  // A small turn looks like a step aside before a wall: when the translation is bounded the gyro's rotation stays.
+  const bool bounded = options.most_apart > 0;
+  if (!bounded && result.with_depth && result.inliers >= 8 &&
+      refinePose(pairs, result.inlier, 0.5 * options.threshold, &T)) {
     classify();
   }
   result.T_current_previous = T;
   result.ok = result.inliers >= 5;
   const int n = static_cast<int>(pairs.size());
-  if (n >= kLeastToDoubt && 3 * result.inliers < n) {
+  if (n >= kLeastToDoubt && 3 * result.inliers < n && !bounded) {
     GeneralMotion general = poseFromDepth(pairs, predicted, options);
     if (general.model == GeneralModel::kNone) general = fundamentalOrHomography(pairs, options);
     if (3 * general.inliers > 2 * n) {

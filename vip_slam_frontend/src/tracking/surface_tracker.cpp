@@ -79,19 +79,19 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   return true;
 }
 
-std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth) const {
+std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth, const MovingRegions& moving) const {
   std::vector<SurfacePatch> result;
   for (int v = kReach; v + kReach < depth.rows; v += kStride) {
     for (int u = kReach; u + kReach < depth.cols; u += kStride) {
       SurfacePatch patch;
-      if (fit(depth, u, v, &patch)) result.push_back(patch);
+      if (fit(depth, u, v, &patch) && !moving.moves({u, v}, patch.p_C.z())) result.push_back(patch);
     }
   }
   return result;
 }
 
-void SurfaceTracker::setReference(const cv::Mat& depth, CloneId clone) {
-  patches_ = shareNormals(patches(depth));
+void SurfaceTracker::setReference(const cv::Mat& depth, CloneId clone, const MovingRegions& moving) {
+  patches_ = shareNormals(patches(depth, moving));
   reference_ = clone;
 }
 
@@ -100,7 +100,7 @@ void SurfaceTracker::clear() {
   reference_ = 0;
 }
 
-SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref) const {
+SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref, const MovingRegions& moving) const {
   SurfaceMatches result;
   result.reference = reference_;
   const Eigen::Matrix3d R_cur_ref = T_cur_ref.R();
@@ -109,6 +109,7 @@ SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref)
     SurfacePatch seen;
     if (!camera_->project(T_cur_ref * patch.p_C, &uv) || !camera_->inImage(uv)) continue;
     if (!fit(depth, static_cast<int>(std::lround(uv.x())), static_cast<int>(std::lround(uv.y())), &seen)) continue;
+    if (moving.moves(uv, seen.p_C.z())) continue;
     if (seen.n_C.dot(R_cur_ref * patch.n_C) < kMostTurned) continue;
     result.pairs.push_back(
         {patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kFloor)});

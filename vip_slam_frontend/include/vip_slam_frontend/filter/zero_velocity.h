@@ -44,12 +44,15 @@ class StillnessDetector {
   bool still() const { return still_; }
   /// How much the images moved while still, as a share of what standing still allows; 1 when they do not tell.
   double unrest() const { return unrest_; }
+  /// The IMU alone says that nothing has happened since it last stood still, not long ago.
+  bool imuRests() const { return imu_rests_; }
   void reset();
 
  private:
   ZuptOptions options_;
-  bool still_ = false;
+  bool still_ = false, imu_rests_ = false;
   int in_a_row_ = 0;
+  int since_still_ = 1 << 20;  ///< images
   double unrest_ = 1.0;
   ImuSpread rest_;  ///< the IMU's means at rest
 };

@@ -15,6 +15,8 @@
 #include "vip_slam_core/types/feature.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/tracking/feature_depth.h"
+#include "vip_slam_frontend/tracking/foretold_motion.h"
+#include "vip_slam_frontend/tracking/moving_regions.h"
 #include "vip_slam_frontend/tracking/patch_surface.h"
 #include "vip_slam_frontend/tracking/row_camera.h"
 #include "vip_slam_frontend/tracking/tracking_options.h"
@@ -46,6 +48,9 @@ struct TrackingResult {
   int lost_klt = 0, lost_outlier = 0;
   bool pose_ok = false;  ///< RANSAC gave a metric pose
   SE3 T_current_previous;
+  /// Most of what is seen moves by itself: only what agrees with the IMU was kept.
+  bool moves_by_itself = false;
+  MovingRegions regions;
 };
 
 class FeatureTracker {
@@ -53,10 +58,11 @@ class FeatureTracker {
   FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
                  TimingLog* timing);
 
-  /// Tracks into `gray`. `predicted` is the camera motion since the last image (T_current_previous), `T_odom_C` the
-  /// predicted pose of this one; when the translation is unknown give only a rotation and `has_translation` false.
+  /// Tracks into `gray`. `predicted` is the camera motion since the last image, `T_odom_C` the predicted pose of this
+  /// one; when the translation is unknown give only a rotation and `has_translation` false. Without an interval
+  /// `predicted` is where to begin, not what to hold the points against.
   /// `rows`: how the camera moves while the image is read, null: global shutter. `depth` belongs to the stamp.
-  TrackingResult track(const cv::Mat& gray, const cv::Mat& depth, const SE3& predicted, bool has_translation,
+  TrackingResult track(const cv::Mat& gray, const cv::Mat& depth, const ForetoldMotion& predicted, bool has_translation,
                        const SE3& T_odom_C, const std::shared_ptr<const RowPoses>& rows, double t);
   /// Adds corners where features are missing; pose of the newest image as now known. `force`: also when few are
   /// missing. Returns the indices of the new tracks.

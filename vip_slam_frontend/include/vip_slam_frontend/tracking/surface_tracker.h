@@ -11,6 +11,7 @@
 #include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_frontend/filter/surface_rows.h"
+#include "vip_slam_frontend/tracking/moving_regions.h"
 #include "vip_slam_frontend/tracking/patch_grouping.h"
 
 namespace vip_slam {
@@ -19,16 +20,17 @@ class SurfaceTracker {
  public:
   SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
 
-  /// Patches of an image, one at most per cell of the raster; none where the window is not flat or seen too obliquely.
-  std::vector<SurfacePatch> patches(const cv::Mat& depth) const;
+  /// Patches of an image, one at most per cell of the raster; none where the window is not flat, is seen too obliquely or
+  /// shows what moves.
+  std::vector<SurfacePatch> patches(const cv::Mat& depth, const MovingRegions& moving = {}) const;
   /// The image of `clone` becomes the reference, with those of its patches that lie on planes.
-  void setReference(const cv::Mat& depth, CloneId clone);
+  void setReference(const cv::Mat& depth, CloneId clone, const MovingRegions& moving = {});
   void clear();
   CloneId reference() const { return reference_; }  ///< 0: none
   std::size_t size() const { return patches_.size(); }
   /// Pairs of the reference's patches with patches of `depth`, looked up where `T_cur_ref` (cameras) puts them. Both
   /// are fitted in the same way, so that what a fit makes of noise and curvature cancels.
-  SurfaceMatches match(const cv::Mat& depth, const SE3& T_cur_ref) const;
+  SurfaceMatches match(const cv::Mat& depth, const SE3& T_cur_ref, const MovingRegions& moving = {}) const;
 
  private:
   bool fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch) const;

@@ -18,6 +18,7 @@ struct TrackingOptions {
   double forward_backward_px = 0.5;
   double ransac_px = 2.0;
   int ransac_iterations = 60;
+  bool leave_out_moving = true;
   bool refine_against_reference = true;
   double reference_max_correction_px = 1.0;
   int border = 12;
@@ -38,6 +39,8 @@ struct TrackingOptions {
     v.field("forward_backward_px", forward_backward_px, 0.05, 10.0, "largest forward-backward error, px");
     v.field("ransac_px", ransac_px, 0.2, 20.0, "inlier threshold of outlier rejection, px");
     v.field("ransac_iterations", ransac_iterations, 10, 1000, "samples drawn by outlier rejection");
+    v.field("leave_out_moving", leave_out_moving,
+            "new points that contradict the IMU move by themselves: no part in pose, surfaces or keyframes");
     v.field("refine_against_reference", refine_against_reference,
             "align each tracked patch with the one of its reference image, so that long tracks do not creep");
     v.field("reference_max_correction_px", reference_max_correction_px, 0.1, 10.0,

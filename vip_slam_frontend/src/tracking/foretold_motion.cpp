@@ -1,0 +1,47 @@
+#include "vip_slam_frontend/tracking/foretold_motion.h"
+
+#include <algorithm>
+
+namespace vip_slam {
+
+namespace {
+
+// Images after which a point has shown that it stands still.
+constexpr int kOld = 8;
+constexpr int kLeast = 5;
+constexpr double kSigmas = 4.0;
+// What else a translation may be off by: blur, rolling rows, a clock. m/s
+constexpr double kLeastSpeed = 0.1;
+
+}  // namespace
+
+double mostApart(const ForetoldMotion& foretold) {
+  return kSigmas * foretold.sigma + kLeastSpeed * foretold.interval;
+}
+
+bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded) {
+  int old_found = 0, old_bounded = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (pairs[i].age < kOld) continue;
+    old_found += found.inlier[i] != 0;
+    old_bounded += bounded.inlier[i] != 0;
+  }
+  return 4 * old_found < std::max(kLeast, found.inliers) || 4 * old_bounded > old_found;
+}
+
+RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldMotion& foretold, RansacOptions options,
+                            bool* moves) {
+  *moves = false;
+  options.most_apart = 0;
+  RansacResult found = rejectOutliers(pairs, foretold.T_current_previous, options);
+  if (!(foretold.interval > 0) || !found.ok || !found.with_depth) return found;
+  options.most_apart = mostApart(foretold);
+  if ((found.t_given_rotation - foretold.T_current_previous.t()).norm() < options.most_apart) return found;
+  RansacResult bounded = rejectOutliers(pairs, foretold.T_current_previous, options);
+  // Points far away or few leave the translation open: then both motions explain them.
+  if (3 * bounded.inliers > 2 * found.inliers) return bounded;
+  *moves = foretold.at_rest || movesByItself(pairs, found, bounded);
+  return *moves ? bounded : found;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,51 @@
+#include "vip_slam_frontend/tracking/moving_regions.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vip_slam {
+
+namespace {
+
+// Fewer, or a smaller share of all, are mismatches.
+constexpr std::size_t kLeast = 5;
+constexpr double kLeastShare = 0.08;
+// A body has corners at least this close, px, unless it hides nearly all else.
+constexpr float kReach = 120.0f;
+constexpr std::size_t kNearlyAll = 4;  // moving points for each that stands still
+// A body is that deep, as a share of its distance.
+constexpr double kDeep = 0.2;
+
+}  // namespace
+
+void MovingRegions::add(const Eigen::Vector2f& pixel, double z, bool still) {
+  (still ? still_ : moving_).push_back({pixel, static_cast<float>(z)});
+}
+
+bool MovingRegions::any() const {
+  return moving_.size() >= kLeast &&
+         static_cast<double>(moving_.size()) > kLeastShare * static_cast<double>(moving_.size() + still_.size());
+}
+
+float MovingRegions::nearest(const std::vector<Mark>& marks, const Eigen::Vector2f& pixel, const Mark** mark) {
+  float best = 1e30f;
+  for (const Mark& m : marks) {
+    const float d = (m.pixel - pixel).squaredNorm();
+    if (d >= best) continue;
+    best = d;
+    *mark = &m;
+  }
+  return best;
+}
+
+bool MovingRegions::moves(const Eigen::Vector2d& pixel, double z) const {
+  if (!any()) return false;
+  const Eigen::Vector2f p = pixel.cast<float>();
+  const Mark *moving = nullptr, *still = nullptr;
+  const float distance = nearest(moving_, p, &moving);
+  if (distance >= nearest(still_, p, &still)) return false;
+  if (distance > kReach * kReach && moving_.size() <= kNearlyAll * still_.size()) return false;
+  return !(z > 0) || !(moving->z > 0) || std::abs(z - moving->z) < kDeep * moving->z;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,187 @@
+// What moves by itself is not taken for the camera's motion: pairs of points, regions of an image, and a screen that is
+// carried past the camera and fills its view.
+#include <gtest/gtest.h>
+
+#include "corner_world.h"
+#include "vip_slam_frontend/front_end.h"
+#include "vip_slam_frontend/tracking/foretold_motion.h"
+#include "vip_slam_frontend/tracking/moving_regions.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kThreshold = 2.0 / 480;
+
+/// Points in a cloud before the camera, seen after it moved by `T_current_previous`.
+std::vector<PointPair> points(int n, const SE3& T_current_previous, int age, unsigned seed) {
+  cv::RNG random(seed);
+  std::vector<PointPair> pairs;
+  for (int i = 0; i < n; ++i) {
+    const double z = random.uniform(1.0, 3.0);
+    const Eigen::Vector3d p(z * random.uniform(-0.6, 0.6), z * random.uniform(-0.4, 0.4), z);
+    const Eigen::Vector3d q = T_current_previous * p;
+    pairs.push_back({p.head<2>() / p.z(), q.head<2>() / q.z(), p.z(), age});
+  }
+  return pairs;
+}
+
+std::vector<PointPair> operator+(std::vector<PointPair> a, const std::vector<PointPair>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+const SE3 kCamera(Eigen::Matrix3d(expSO3(Eigen::Vector3d(0.01, -0.02, 0.005))), Eigen::Vector3d(0.02, 0.0, -0.01));
+/// The camera as it would have to move if a body that goes sideways by 5 cm stood still.
+const SE3 kBody(kCamera.rotation(), kCamera.t() + Eigen::Vector3d(0.05, 0, 0));
+
+ForetoldMotion foretold() { return {kCamera, 0.0005, 0.05}; }
+
+RansacResult reject(const std::vector<PointPair>& pairs, const ForetoldMotion& motion, bool* moves) {
+  RansacOptions options;
+  options.threshold = kThreshold;
+  return rejectOutliers(pairs, motion, options, moves);
+}
+
+TEST(MovingBodies, NewPointsThatContradictTheImuMoveByThemselves) {
+  const std::vector<PointPair> pairs = points(60, kBody, 1, 1) + points(15, kCamera, 30, 2);
+  ASSERT_GE(rejectOutliers(pairs, kCamera, RansacOptions()).inliers, 55);  // most agree on the body's motion
+  bool moves = false;
+  const RansacResult kept = reject(pairs, foretold(), &moves);
+  EXPECT_TRUE(moves);
+  EXPECT_TRUE(kept.ok);
+  EXPECT_GE(kept.inliers, 15);
+  EXPECT_LE(kept.inliers, 17);
+  EXPECT_LT((kept.T_current_previous.t() - kCamera.t()).norm(), 1e-3);
+}
+
+TEST(MovingBodies, AnImuThatIsOffTakesThePointsNearWhatItForetells) {
+  const std::vector<PointPair> pairs = points(60, kBody, 1, 1) + points(15, kCamera, 30, 2);
+  ForetoldMotion off = foretold();
+  off.T_current_previous.t() += Eigen::Vector3d(-0.01, 0.005, 0.005);  // 5 px at the nearest
+  off.sigma = 0.005;
+  bool moves = false;
+  const RansacResult kept = reject(pairs, off, &moves);
+  EXPECT_TRUE(moves);
+  EXPECT_GE(kept.inliers, 15);
+  EXPECT_LE(kept.inliers, 17);
+  EXPECT_LT((kept.T_current_previous.t() - kCamera.t()).norm(), 1e-3);
+}
+
+TEST(MovingBodies, AnOldBodyThatSetsOffIsToldByWhatElseIsOld) {
+  bool moves = false;
+  reject(points(60, kBody, 30, 1) + points(25, kCamera, 30, 2), foretold(), &moves);
+  EXPECT_TRUE(moves);
+}
+
+TEST(MovingBodies, OldPointsThatAllContradictTheImuAreBelieved) {
+  bool moves = true;
+  const RansacResult kept = reject(points(60, kBody, 30, 1) + points(3, kCamera, 30, 2), foretold(), &moves);
+  EXPECT_FALSE(moves);
+  EXPECT_GE(kept.inliers, 60);
+}
+
+TEST(MovingBodies, WithinWhatTheImuLeavesOpenThePointsDecide) {
+  const std::vector<PointPair> pairs = points(60, kBody, 1, 1);
+  ForetoldMotion unsure = foretold();
+  unsure.sigma = 0.02;
+  bool moves = true;
+  reject(pairs, unsure, &moves);
+  EXPECT_FALSE(moves);
+  reject(pairs, foretold(), &moves);
+  EXPECT_TRUE(moves);
+  reject(points(60, kCamera, 1, 1), foretold(), &moves);
+  EXPECT_FALSE(moves);
+  ForetoldMotion nothing = foretold();
+  nothing.interval = 0;
+  reject(pairs, nothing, &moves);
+  EXPECT_FALSE(moves);
+}
+
+TEST(MovingBodies, RegionsGoByTheNearestPointAndItsDepth) {
+  MovingRegions regions;
+  for (int i = 0; i < 40; ++i) regions.add(Eigen::Vector2f(10 * i, 100), 4.0, true);
+  for (int i = 0; i < 4; ++i) regions.add(Eigen::Vector2f(300, 200 + 10 * i), 2.0, false);
+  EXPECT_FALSE(regions.any());  // stray mismatches
+  EXPECT_FALSE(regions.moves({300, 215}, 2.0));
+  for (int i = 0; i < 4; ++i) regions.add(Eigen::Vector2f(310, 200 + 10 * i), 2.0, false);
+  EXPECT_TRUE(regions.any());
+  EXPECT_TRUE(regions.moves({300, 215}, 2.1));
+  EXPECT_TRUE(regions.moves({300, 215}, 0));
+  EXPECT_FALSE(regions.moves({280, 215}, 4.0));  // the wall behind
+  EXPECT_FALSE(regions.moves({300, 120}, 2.0));
+  EXPECT_FALSE(regions.moves({300, 400}, 2.0));  // far from all
+  EXPECT_FALSE(MovingRegions().moves({10, 10}, 1.0));
+}
+
+TEST(MovingBodies, AScreenCarriedPastTheCameraMovesNothing) {
+  const CornerWorld world;
+  FrontEndOptions options;
+  options.tracking.max_features = 120;
+  options.tracking.min_distance = 10;
+  FrontEnd front_end(options, cornerSensor(0, 0));
+  double imu_t = 0, square = 0;
+  int n = 0, blocked = 0, on_screen = 0, handed_on = 0;
+  TrackingStatus status;
+  for (int k = 0; k < 140; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
+    FrameInput input;
+    input.t = t;
+    const Screen screen{0.9, -3.0 + 1.2 * (t - 1.5), 2.4};
+    world.look(t, 0, &input.gray, &input.depth, screen);
+    const FrameOutput output = front_end.process(input);
+    const TrackedFramePtr frame = output.frame;
+    status = frame->status;
+    if (output.keyframe && t > 2.0) {
+      // The first to show the screen's edge cannot know yet.
+      const SE3 T_W_C = CornerWorld::pose(t) * cornerSensor(0, 0).T_imu_cam;
+      for (const Feature& f : output.keyframe->frame.features) {
+        const Eigen::Vector3d p_W = T_W_C * Eigen::Vector3d(f.xy.homogeneous().cast<double>() * f.depth);
+        on_screen += f.depth > 0 && std::abs(p_W.x() - screen.x) < 0.05 && p_W.z() > -0.9;
+        ++handed_on;
+      }
+    }
+    blocked += status.state == TrackingState::kDegraded && status.reason.find("moves") != std::string::npos;
+    if (t < kStill + 0.05) continue;
+    square += (frame->state.T_W_I.t() - CornerWorld::pose(t).t()).squaredNorm();
+    ++n;
+  }
+  EXPECT_GT(blocked, 5);
+  EXPECT_GT(handed_on, 500);
+  EXPECT_LT(on_screen, handed_on / 50);
+  EXPECT_EQ(status.state, TrackingState::kTracking) << status.reason;
+  EXPECT_EQ(front_end.counters().restarts, 0u);
+  EXPECT_LT(std::sqrt(square / n), 0.02);
+}
+
+TEST(MovingBodies, StandsStillWhileAScreenThatHidesAllSwaysToAndFro) {
+  const CornerWorld world;
+  FrontEndOptions options;
+  options.tracking.max_features = 120;
+  options.tracking.min_distance = 10;
+  FrontEnd front_end(options, cornerSensor(0, 0));
+  double imu_t = 0, most = 0;
+  int standing = 0, images = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t < t + 0.03; imu_t += 0.005) {
+      ImuSample sample = CornerWorld::imu(0);
+      sample.t = imu_t;
+      front_end.addImu(sample);
+    }
+    FrameInput input;
+    input.t = t;
+    const Screen screen{0.9, 0.9 * std::sin(0.7 * (t - 3.0)), t < 3.0 ? 0.0 : 3.2};
+    world.look(0, 0, &input.gray, &input.depth, screen);
+    const TrackedFramePtr frame = front_end.process(input).frame;
+    if (t < 3.0) continue;
+    most = std::max(most, (frame->state.T_W_I.t() - CornerWorld::pose(0).t()).norm());
+    standing += frame->zero_velocity;
+    ++images;
+  }
+  EXPECT_LT(most, 0.005);
+  EXPECT_GT(standing, 0.9 * images);
+}
+
+}  // namespace
+}  // namespace vip_slam
