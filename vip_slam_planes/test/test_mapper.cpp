@@ -171,6 +171,19 @@ TEST(Mapper, ASmallPieceOfFloorBelongsToAFloorThatNoTableIsAsLargeAs) {
   }
 }
 
+TEST(Mapper, ASmallPieceOfCeilingBelongsToTheCeiling) {
+  for (const double step : {0.0, 0.04}) {
+    Rig rig;
+    Scene scene;
+    scene.add({0, -1.5, 2.5}, {2, 0, 0}, {0, 3, 0});
+    scene.add({6.5, -0.4, 2.5 - step}, {0.9, 0, 0}, {0, 0.9, 0});  // 4.5 m further on, 0.8 m^2
+    for (double y = -1; y <= 1; y += 0.4) rig.look(scene, {-1.0, y, 1.2}, {1.0, y, 2.5});
+    for (int i = 0; i < 6; ++i) rig.look(scene, {5.2, 0.1 * i - 0.2, 1.2}, {6.9, 0, 2.5 - step});
+    ASSERT_GT(rig.mapper.planes().front().area, 4.0);
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
 TEST(Mapper, APlaneWaitsForASecondSightingWhileNobodyLooks) {
   Rig rig;
   Scene scene;

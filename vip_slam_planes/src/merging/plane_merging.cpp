@@ -10,6 +10,7 @@ namespace {
 // two.
 constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
 constexpr double kNoTable = 20.0;  // m^2; what lies level with so large a surface is more of it, not a second table
+constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
 constexpr double kSmallGap = 4.0;  // a smaller piece of a wall may be as many of its own widths away
 constexpr double kCloser = 4.0;    // as many times as far apart when they agree as many times better
 
@@ -106,9 +107,12 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
   double gap = smaller >= large_from ? std::max(options.gap, options.gap_per_area * smaller) : options.gap;
   // The rest of a parapet behind a stair is small, but on its plane to the centimetre; furniture is seldom.
   double apart = options.distance_apart;
-  const double larger_from = a.kind() == PlaneKind::kVertical ? large_from : kNoTable;
+  const bool ceiling = a.kind() == PlaneKind::kHorizontal && a.plane().n.z() < 0;
+  const double larger_from = a.kind() == PlaneKind::kVertical ? large_from : ceiling ? kLeastCeiling : kNoTable;
   if (smaller < large_from && a.kind() != PlaneKind::kGeneral && std::max(area_a, area_b) >= larger_from) {
-    gap = std::max(options.gap, std::min(options.gap_per_area * large_from, kSmallGap * std::sqrt(smaller)));
+    const double reach = ceiling ? options.gap_per_area * kLeastCeiling
+                                 : std::min(options.gap_per_area * large_from, kSmallGap * std::sqrt(smaller));
+    gap = std::max(options.gap, reach);
     apart *= 0.5;
   }
   // That two surfaces lie in one plane by accident is the likelier the further one looks and the less is asked of them:
