@@ -11,8 +11,8 @@ namespace vip_slam {
 
 struct ForetoldMotion {
   SE3 T_current_previous;
-  double sigma = 0;     ///< of the translation in its worst direction, one sigma, m
-  double interval = 0;  ///< between the two images, s
+  double sigma = 0;      ///< of the translation along its least certain axis, m
+  double interval = 0;   ///< between the two images, s; 0: nothing is foretold
   bool at_rest = false;  ///< the IMU has not stirred since the camera stood still: points that move do so themselves
 };
 
