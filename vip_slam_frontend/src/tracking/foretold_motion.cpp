@@ -10,6 +10,8 @@ namespace {
 constexpr int kOld = 8;
 constexpr int kLeast = 5;
 constexpr double kSigmas = 4.0;
+// Shares of the inliers.
+constexpr double kSame = 0.95, kMost = 0.67;
 // What else a translation may be off by: blur, rolling rows, a clock. m/s
 constexpr double kLeastSpeed = 0.1;
 
@@ -39,7 +41,8 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldM
   if ((found.t_given_rotation - foretold.T_current_previous.t()).norm() < options.most_apart) return found;
   RansacResult bounded = rejectOutliers(pairs, foretold.T_current_previous, options);
   // Points far away or few leave the translation open: then both motions explain them.
-  if (3 * bounded.inliers > 2 * found.inliers) return bounded;
+  if (bounded.inliers > kSame * found.inliers) return found;
+  if (bounded.inliers > kMost * found.inliers) return bounded;
   *moves = foretold.at_rest || movesByItself(pairs, found, bounded);
   return *moves ? bounded : found;
 }
