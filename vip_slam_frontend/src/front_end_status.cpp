@@ -10,6 +10,8 @@ namespace {
 
 // A filter that has just started has not yet shown that its velocity is right, s.
 constexpr double kSettled = 2.0;
+// What walks about pauses, and then follows the camera, for so long, s.
+constexpr double kPauses = 1.0;
 // LOST with everything in view moving against the IMU for so many times the coasting time: the IMU is wrong after all.
 constexpr double kPatience = 2.0;
 
@@ -20,11 +22,14 @@ double FrontEnd::Impl::coastedSigma() const {
   return std::sqrt(std::max(0.0, variance - last_good_variance_));
 }
 
+bool FrontEnd::Impl::movedLately(double t_imu) const { return t_imu - moving_imu_t_ < kPauses; }
+
 ForetoldMotion FrontEnd::Impl::foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const {
   const NavState& from = filter_.nav();
   ForetoldMotion motion;
   motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * extrinsics());
   motion.sigma = propagation.displacementSigma(filter_.covariance());
+  motion.wary = movedLately(propagation.predicted.t);
   motion.at_rest = stillness_.imuRests();
   const bool settled = options_.tracking.leave_out_moving && propagation.predicted.t - started_imu_t_ > kSettled;
   motion.interval = settled && !imu_gap ? propagation.predicted.t - from.t : 0.0;

@@ -16,7 +16,6 @@ namespace {
 // Features gated away in this many images in a row: the estimate has left the measurements.
 constexpr int kGatedImages = 30;
 constexpr double kLongGapNoise = 5.0;
-constexpr double kPauses = 1.0;  // s
 
 }  // namespace
 
@@ -123,8 +122,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
 
 bool FrontEnd::Impl::decideStillness(double t_imu) {
   if (moving_.any()) moving_imu_t_ = t_imu;
-  // What walks about pauses, and then follows the camera: for a while the image says nothing about standing still.
-  const bool image_counts = t_imu - moving_imu_t_ > kPauses;
+  const bool image_counts = !movedLately(t_imu);  // what pauses says nothing about standing still
   const ZuptOptions& options = options_.filter.zupt;
   PixelList now;
   for (const Track& track : tracker_.tracks()) now.emplace_back(track.feature.id, track.feature.pixel);

@@ -41,7 +41,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldM
   if ((found.t_given_rotation - foretold.T_current_previous.t()).norm() < options.most_apart) return found;
   RansacResult bounded = rejectOutliers(pairs, foretold.T_current_previous, options);
   // Points far away or few leave the translation open: then both motions explain them.
-  if (bounded.inliers > kSame * found.inliers) return found;
+  if (!foretold.wary && bounded.inliers > kSame * found.inliers) return found;
   if (bounded.inliers > kMost * found.inliers) return bounded;
   *moves = foretold.at_rest || movesByItself(pairs, found, bounded);
   return *moves ? bounded : found;
