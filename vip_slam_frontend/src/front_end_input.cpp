@@ -136,6 +136,7 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   tracker_.clear();
   surfaces_.clear();
   moving_ = {};
+  moving_imu_t_ = -1e300;  // the clock may have run back
   filter_.stop();
   initialiser_.reset();
   stillness_.reset();

@@ -9,10 +9,19 @@
 #include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_frontend/front_end_options.h"
 
 namespace vip_slam {
 
 constexpr double kStill = 1.2;  // s at the start
+
+/// For its small images.
+inline FrontEndOptions cornerOptions() {
+  FrontEndOptions options;
+  options.tracking.max_features = 120;
+  options.tracking.min_distance = 10;
+  return options;
+}
 
 inline SensorConfig cornerSensor(double colour_readout, double depth_readout) {
   SensorConfig config;

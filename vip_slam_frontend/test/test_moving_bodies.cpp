@@ -115,10 +115,7 @@ TEST(MovingBodies, RegionsGoByTheNearestPointAndItsDepth) {
 
 TEST(MovingBodies, AScreenCarriedPastTheCameraMovesNothing) {
   const CornerWorld world;
-  FrontEndOptions options;
-  options.tracking.max_features = 120;
-  options.tracking.min_distance = 10;
-  FrontEnd front_end(options, cornerSensor(0, 0));
+  FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));
   double imu_t = 0, square = 0;
   int n = 0, blocked = 0, on_screen = 0, handed_on = 0;
   TrackingStatus status;
@@ -156,10 +153,7 @@ TEST(MovingBodies, AScreenCarriedPastTheCameraMovesNothing) {
 
 TEST(MovingBodies, StandsStillWhileAScreenThatHidesAllSwaysToAndFro) {
   const CornerWorld world;
-  FrontEndOptions options;
-  options.tracking.max_features = 120;
-  options.tracking.min_distance = 10;
-  FrontEnd front_end(options, cornerSensor(0, 0));
+  FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));
   double imu_t = 0, most = 0;
   int standing = 0, images = 0;
   for (int k = 0; k < 300; ++k) {

@@ -14,10 +14,7 @@ constexpr double kReadout = 0.03;
 /// Root mean square of the position's error over five seconds of motion, metres. `told`: the sensor's readouts.
 double errorOf(double colour_told, double depth_told, bool depth_rolls) {
   const CornerWorld world;
-  FrontEndOptions options;
-  options.tracking.max_features = 120;
-  options.tracking.min_distance = 10;
-  FrontEnd front_end(options, cornerSensor(colour_told, depth_told));
+  FrontEnd front_end(cornerOptions(), cornerSensor(colour_told, depth_told));
   double imu_t = 0, square = 0;
   int n = 0;
   for (int k = 0; k < 125; ++k) {
