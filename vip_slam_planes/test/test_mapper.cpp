@@ -89,6 +89,22 @@ TEST(Mapper, DoorBeforeTheWallStaysTwoWhateverTheView) {
   EXPECT_NEAR(2.1, rig.find(Plane({-1, 0, 0}, 2.88))->area, 0.35);
 }
 
+TEST(Mapper, ADoorWhoseRecessDidNotShowFromAfarIsStillFound) {
+  // From afar and at a flat angle the wall goes on across the recess, so all of the leaf lies where the wall is known.
+  Rig rig;
+  Scene afar, near;
+  afar.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  near.add({3, -3, 0}, {0, 2.5, 0}, {0, 0, 2.6});
+  near.add({3, 0.5, 0}, {0, 2.5, 0}, {0, 0, 2.6});
+  near.add({3.09, -0.6, 0}, {0, 1.2, 0}, {0, 0, 2.6});
+  for (int i = 0; i < 3; ++i) rig.look(afar, {0.2, -1.4 + 0.4 * i, 1.4}, {3, 0, 1.2});
+  for (int i = 0; i < 6; ++i) rig.look(near, {0.6, -1.0 + 0.4 * i, 1.4}, {3, 0, 1.2});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3.0), 0.004));
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3.09), 0.004));
+  EXPECT_NEAR(2.6, rig.find(Plane({-1, 0, 0}, 3.09))->area, 0.5);
+}
+
 TEST(Mapper, CorridorWallSeenFromBothEndsBecomesOne) {
   Rig rig;
   Scene scene;

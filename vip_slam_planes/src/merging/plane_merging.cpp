@@ -83,6 +83,21 @@ bool jointFitServes(const PlaneMoments& a, const PlaneMoments& b, const PlaneTra
   return true;
 }
 
+// Drift moves a keyframe as a whole: what one keyframe shows at two depths is two surfaces, whatever was covered from
+// afar, where a door's recess does not show.
+bool shownApart(const PlaneTrack& small, const PlaneTrack& large, const CameraPoses& poses, double distance) {
+  int apart = 0, together = 0;
+  for (const auto& [keyframe, observation] : small.observations()) {
+    const auto other = large.observations().find(keyframe);
+    const auto pose = poses.find(keyframe);
+    if (other == large.observations().end() || pose == poses.end()) continue;
+    const Eigen::Vector3d n_C = pose->second.R().transpose() * large.plane().n;
+    const PlaneMoments mine{observation.G}, theirs{other->second.G};
+    ++(std::abs(n_C.dot(mine.centroid() - theirs.centroid())) > distance ? apart : together);
+  }
+  return apart > together;
+}
+
 }  // namespace
 
 bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& poses,
@@ -126,9 +141,8 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
   // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift
   // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
-  if (shared > 2 * options.overlap || (shared > options.overlap && meeting.separation < 0.5 * options.distance)) {
-    return true;
-  }
+  if (shared > options.overlap && meeting.separation < 0.5 * options.distance) return true;
+  if (shared > 2 * options.overlap && !shownApart(small, large, poses, 0.5 * options.distance)) return true;
   return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, options.max_rms);
 }
 
