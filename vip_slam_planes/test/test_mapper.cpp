@@ -271,6 +271,19 @@ TEST(Mapper, TablesOfOneHeightStayTwo) {
   for (const PlaneEstimate& table : rig.mapper.planes()) EXPECT_NEAR(-0.75, table.plane.d, 0.004);
 }
 
+TEST(Mapper, ATableAcrossTheRoomIsFoundThoughSeenAtAFlatAngle) {
+  // From standing height, five metres away: 80 to 82 degrees off the normal, as one always sees the tables of a room.
+  Rig rig;
+  Scene scene;
+  scene.addRoom({-4, -3, 0}, {6, 3, 2.6});
+  scene.add({4.4, -0.8, 0.74}, {0.8, 0, 0}, {0, 1.6, 0});
+  for (int i = 0; i < 5; ++i) rig.look(scene, {-0.2, -0.6 + 0.3 * i, 1.5}, {4.8, 0.1, 0.9});
+  const PlaneEstimate* table = rig.find(Plane({0, 0, 1}, -0.74), 0.01);
+  ASSERT_TRUE(table);
+  EXPECT_GT(table->area, 0.4);  // a dozen pixels high
+  EXPECT_LT(table->area, 1.5);
+}
+
 TEST(Mapper, BothFacesOfAThinWallAreTwo) {
   Rig rig;
   Scene scene;

@@ -8,7 +8,7 @@ namespace vip_slam {
 struct PlaneMeshOptions {
   double spacing = 16.0;
   double min_altitude_ratio = 0.12;
-  double max_incidence_deg = 79.0;
+  double max_incidence_deg = 82.0;
   double max_edge = 1.2;
   double gap_sigmas = 5.0;
 
