@@ -4,6 +4,7 @@
 #include <random>
 
 #include "vip_slam_core/geometry/plane.h"
+#include "vip_slam_core/geometry/relative_motion.h"
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/testing/numeric_jacobian.h"
 
@@ -130,6 +131,43 @@ TEST_F(Geometry, TransformPerturbation) {
   EXPECT_LT((half.boxminus(T) - 0.5 * delta).norm(), 1e-13);
   EXPECT_LT(interpolate(T, moved, 0).boxminus(T).norm(), 1e-13);
   EXPECT_LT(interpolate(T, moved, 1).boxminus(moved).norm(), 1e-13);
+}
+
+TEST_F(Geometry, MotionsOneAfterTheOther) {
+  const auto motion = [&] {
+    RelativeMotion m;
+    m.T_a_b = pose();
+    Matrix6d L = Matrix6d::Zero();
+    for (int c = 0; c < 6; ++c) L.block<3, 1>(0, c) = vector(0.01), L.block<3, 1>(3, c) = vector(0.05);
+    m.covariance = L * L.transpose() + 1e-6 * Matrix6d::Identity();
+    return m;
+  };
+  const RelativeMotion ab = motion(), bc = motion(), ac = compose(ab, bc);
+  EXPECT_TRUE(ab.isUsable() && bc.isUsable() && ac.isUsable());
+  EXPECT_LT(ac.T_a_b.boxminus(ab.T_a_b * bc.T_a_b).norm(), 1e-14);
+  // J = d(T_ac) / d(T_ab, T_bc) by differences.
+  Matrix6d J[2];
+  constexpr double h = 1e-6;
+  for (int k = 0; k < 6; ++k) {
+    const Vector6d d = h * Vector6d::Unit(k);
+    J[0].col(k) = (ab.T_a_b.boxplus(d) * bc.T_a_b).boxminus(ab.T_a_b.boxplus(-d) * bc.T_a_b) / (2 * h);
+    J[1].col(k) = (ab.T_a_b * bc.T_a_b.boxplus(d)).boxminus(ab.T_a_b * bc.T_a_b.boxplus(-d)) / (2 * h);
+  }
+  const Matrix6d expected = J[0] * ab.covariance * J[0].transpose() + J[1] * bc.covariance * J[1].transpose();
+  EXPECT_LT((ac.covariance - expected).norm(), 1e-8 * expected.norm());
+
+  EXPECT_FALSE(RelativeMotion().known());
+  EXPECT_FALSE(compose(RelativeMotion(), bc).known());
+  EXPECT_FALSE(compose(ab, RelativeMotion()).known());
+  RelativeMotion bad = ab;
+  bad.covariance(3, 3) = -1;
+  EXPECT_FALSE(bad.isUsable());
+  bad = ab;
+  bad.covariance(0, 5) += ab.covariance(5, 5);
+  EXPECT_FALSE(bad.isUsable());
+  bad = ab;
+  bad.T_a_b.t().x() = std::nan("");
+  EXPECT_FALSE(bad.isUsable());
 }
 
 TEST_F(Geometry, PlaneBasics) {

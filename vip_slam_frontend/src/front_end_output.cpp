@@ -115,6 +115,9 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   }
   if (last_keyframe_ != 0 && !keyframe_imu_broken_) keyframe->imu = imu_.between(last_keyframe_imu_t_, t_imu);
 
+  if (last_keyframe_ != 0) keyframe->motion = filter_.motionSinceMark();
+  filter_.markNewest();
+
   selector_.accept(frame.t, frame.state.T_W_I * frame.T_I_C, frame.features);
   last_keyframe_ = newest_keyframe_ = keyframe->id;
   last_keyframe_imu_t_ = t_imu;

@@ -174,6 +174,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   int rows = 0, count = 0;
   Eigen::Vector3d last = truth0.T_W_I.t();
   const double step = 1.0 / options.image_rate;
+  int marked = 0, motions = 0;
+  NavState marked_truth, marked_estimate;
   for (int k = 1; 0.2 + k * step < seconds; ++k) {
     const double t_imu_true = 0.2 + k * step;  // the image stamp is this minus the true delay
     const double t_imu = t_imu_true - options.time_offset + filter.window().time_offset;
@@ -194,10 +196,26 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
       result.nees += error.dot(P.ldlt().solve(error));
       ++count;
     }
+    if (k - marked == (motions % 2 == 0 ? 8 : 20)) {
+      const RelativeMotion motion = filter.motionSinceMark();
+      if (marked > 0) {
+        const SE3 T_true = marked_truth.T_W_I.inverse() * truth.T_W_I;
+        const Vector6d off = T_true.boxminus(motion.T_a_b);
+        result.motion_nees += off.dot(motion.covariance.ldlt().solve(off));
+        result.motion_error += off.tail<3>().norm();
+        result.newest_error += T_true.boxminus(marked_estimate.T_W_I.inverse() * estimate.T_W_I).tail<3>().norm();
+        ++motions;
+      }
+      filter.markNewest();
+      marked = k;
+      marked_truth = truth;
+      marked_estimate = estimate;
+    }
     result.final_position = error.tail<3>().norm();
     result.final_rotation = error.head<3>().norm();
   }
   result.nees /= std::max(1, count);
+  result.motion_nees /= std::max(1, motions);
   result.nis_per_dof = rows > 0 ? nis / rows : 0;
   result.window = filter.window();
   result.depth_scale = filter.depthScale();

@@ -54,6 +54,24 @@ TEST(Consistency, NeesInsideTheBandOverTwentySeeds) {
   EXPECT_LT(drift, 0.004);
 }
 
+/// Within the window (8 images) and beyond it (20), where it is put together from pieces.
+TEST(Consistency, MotionBetweenKeyframes) {
+  constexpr int kSeeds = 20;
+  double nees = 0, error = 0, newest = 0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = static_cast<std::uint32_t>(seed);
+    const RunResult run = runFilter(simulation, independentNoise(), 30.0, false);
+    nees += run.motion_nees / kSeeds;
+    error += run.motion_error;
+    newest += run.newest_error;
+  }
+  std::printf("NEES of the motion %.2f; error %.3f of that of the newest poses\n", nees, error / newest);
+  EXPECT_GT(nees, 4.0);
+  EXPECT_LT(nees, 7.0);
+  EXPECT_LT(error, newest);
+}
+
 /// What the defaults are for: tracks of which two in five are no points and creep along with the motion.
 TEST(Consistency, CreepingTracksDoNotMakeItSurerThanItIs) {
   constexpr int kSeeds = 20, kControlSeeds = 5;

@@ -263,6 +263,30 @@ Eigen::MatrixXd nullDirections(const WindowState& window) {
   return N;
 }
 
+TEST_F(AlgebraOnSimulation, MotionBetweenClonesHasTheJointCovariance) {
+  for (int k = 1; k <= 6; ++k) advance(static_cast<CloneId>(k + 1), 0.2 + 0.05 * k);
+  const WindowState& window = filter_.window();
+  const int a = 1, b = 5;
+  // d T_a_b / d(state) by differences, clones perturbed as the window does it.
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, window.dimension());
+  constexpr double h = 1e-6;
+  for (const int clone : {a, b}) {
+    for (int k = 0; k < 6; ++k) {
+      const auto motion = [&](double step) {
+        SE3 from = window.clones[a].T_W_I, to = window.clones[b].T_W_I;
+        (clone == a ? from : to) = window.clones[clone].T_W_I.boxplus(step * Vector6d::Unit(k));
+        return from.inverse() * to;
+      };
+      J.col(window.cloneColumn(clone) + k) = motion(h).boxminus(motion(-h)) / (2 * h);
+    }
+  }
+  const RelativeMotion motion = filter_.relativeMotion(a, b);
+  const SE3 expected = window.clones[a].T_W_I.inverse() * window.clones[b].T_W_I;
+  EXPECT_LT(motion.T_a_b.boxminus(expected).norm(), 1e-14);
+  EXPECT_LT(relative(motion.covariance, J * filter_.covariance() * J.transpose()), 1e-6);
+  EXPECT_TRUE(motion.isUsable());
+}
+
 TEST_F(AlgebraOnSimulation, UnobservableDirectionsStayUnobservable) {
   MeasurementNoise noise;
   noise.sigma_xy = options_.sigma_px / options_.focal;

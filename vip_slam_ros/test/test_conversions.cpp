@@ -153,7 +153,11 @@ TEST_F(Conversions, KeyframeIsUnchanged) {
   keyframe.frame = frame();
   keyframe.previous = 17;
   for (int i = 0; i < 4; ++i) keyframe.imu.push_back({1e9 + 0.1 * i, vector(), vector()});
+  keyframe.motion.T_a_b = keyframe.frame.T_I_C;
+  for (int i = 0; i < 36; ++i) keyframe.motion.covariance(i / 6, i % 6) = vector().x();
   const Keyframe back = fromMsg(throughBytes(toMsg(keyframe, "odom")));
+  EXPECT_LT(back.motion.T_a_b.boxminus(keyframe.motion.T_a_b).norm(), 1e-14);
+  EXPECT_EQ(back.motion.covariance, keyframe.motion.covariance);
   EXPECT_EQ(back.id, keyframe.id);
   EXPECT_EQ(back.previous, keyframe.previous);
   expectSame(back.frame, keyframe.frame);

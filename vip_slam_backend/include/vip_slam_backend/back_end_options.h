@@ -26,6 +26,8 @@ struct MeasurementOptions {
   double outlier_chi2 = 9.0;
   double plane_prior_deg = 0.5;
   double homography_inflation = 1.0;
+  bool use_odometry = true;
+  double odometry_inflation = 2.0;
 
   void visit(OptionVisitor& v) {
     v.field("pixel_sigma", pixel_sigma, 0.05, 10.0,
@@ -43,6 +45,10 @@ struct MeasurementOptions {
     v.field("plane_prior_deg", plane_prior_deg, 0.01, 10.0, "one sigma of horizontal and vertical planes, degrees");
     v.field("homography_inflation", homography_inflation, 1.0, 5.0,
             "factor on the sigma of homography pairs, for noise that the pairs of one host share");
+    v.field("use_odometry", use_odometry,
+            "the odometry's motion between successive keyframes, which knows the images and depth in between, counts");
+    v.field("odometry_inflation", odometry_inflation, 1.0, 100.0,
+            "factor on the sigma that the odometry tells: what it errs in one motion it errs in the next, too");
   }
 };
 

@@ -16,8 +16,9 @@ std::string checkKeyframe(const Map& map, KeyframeId id, const MapKeyframe& kf) 
     if (!map.hasKeyframe(kf.previous)) return name + "its previous keyframe is not in the map";
     if (map.keyframe(kf.previous).next != id) return name + "its previous keyframe does not link back";
     if (kf.preintegration && !(kf.preintegration->dt() > 0)) return name + "its IMU factor has no duration";
-  } else if (kf.preintegration || kf.imu) {
-    return name + "an IMU factor without a previous keyframe";
+    if (kf.motion.known() && !kf.motion.isUsable()) return name + "the odometry's motion is unusable";
+  } else if (kf.preintegration || kf.imu || kf.motion.known()) {
+    return name + "an IMU factor or a motion without a previous keyframe";
   }
   if (kf.next != 0) {
     if (!map.hasKeyframe(kf.next)) return name + "its next keyframe is not in the map";

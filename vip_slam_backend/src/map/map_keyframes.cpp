@@ -43,6 +43,8 @@ std::string validateKeyframe(const Keyframe& keyframe) {
     if (k > 0 && !(s.t > keyframe.imu[k - 1].t))
       return name + "IMU sample " + std::to_string(k) + " is not after the one before";
   }
+  if (keyframe.motion.known() && !keyframe.motion.isUsable())
+    return name + "the odometry's motion is not finite, or its covariance is none";
   return "";
 }
 
@@ -93,6 +95,7 @@ MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, Keyfram
   kf.landmarks.assign(data->frame.features.size(), kNoLandmark);
   kf.previous = previous;
   if (previous != 0) {
+    kf.motion = data->motion;
     kf.imu = imu;
     kf.preintegration = integrate(imu, keyframe(previous).state, noise);
   }
@@ -116,6 +119,7 @@ void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_se
       joined = samples;
       chained = previous;
     }
+    n.motion = chained ? compose(kf.motion, n.motion) : RelativeMotion();
     n.previous = chained;
     n.imu = joined;
     n.preintegration = chained ? integrate(joined, keyframe(chained).state, noise) : nullptr;

@@ -127,6 +127,16 @@ Feature readFeature(ByteReader& in, std::uint32_t version, std::size_t landmark_
   return f;
 }
 
+RelativeMotion readMotion(ByteReader& in) {
+  RelativeMotion motion;
+  motion.T_a_b = readPose(in, "odometry's motion");
+  for (int r = 0; r < 6; ++r)
+    for (int c = r; c < 6; ++c)
+      motion.covariance(r, c) = motion.covariance(c, r) = finite(in, "odometry's covariance");
+  if (!motion.known() || !motion.isUsable()) in.fail("the covariance of the odometry's motion is none");
+  return motion;
+}
+
 // One keyframe into the map; its observations by landmark into `seen`.
 void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, const ImuNoise& noise, Map& map,
                   std::vector<std::vector<MapObservation>>& seen) {
@@ -163,6 +173,7 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
     seen[landmark].push_back({data->id, k});
   }
   frame.depth_grid = readGrid(in);
+  if (version >= 4 && flag(in, "motion flag")) data->motion = readMotion(in);
   std::vector<ImuSample> imu(in.count(map_file::kImuBytes, "IMU samples"));
   for (std::size_t k = 0; k < imu.size(); ++k) {
     imu[k].t = finite(in, "IMU sample");

@@ -130,6 +130,12 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch, Landmark
     out.put(landmark == kNoLandmark ? map_file::kNoIndex : numbers->index.at(landmark));
   }
   write(out, frame.depth_grid);
+  out.put(static_cast<std::uint8_t>(kf.motion.known()));
+  if (kf.motion.known()) {
+    write(out, kf.motion.T_a_b);
+    for (int r = 0; r < 6; ++r)
+      for (int c = r; c < 6; ++c) out.put(kf.motion.covariance(r, c));
+  }
   const std::size_t samples = kf.previous != 0 && kf.imu ? kf.imu->size() : 0;
   out.put(static_cast<std::uint32_t>(samples));
   for (std::size_t k = 0; k < samples; ++k) {

@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "landmark_views.h"
+#include "odometry_factors.h"
 #include "pixel_noise.h"
 #include "plane_factors.h"
 
@@ -33,6 +34,7 @@ void addGauges(BaProblem* problem) {
     for (int o = p.first + 1; o < p.first + p.count; ++o)
       parts.join(problem->observations[p.first].frame, problem->observations[o].frame);
   for (const BaImu& f : problem->imu) parts.join(f.i, f.j);
+  for (const BaRelativePose& f : problem->relative_poses) parts.join(f.i, f.j);
   for (const BaHomography& f : problem->homographies) parts.join(f.i, f.j);
   for (const BaHomographyPair& f : problem->homography_pairs) parts.join(f.i, f.j);
   const int n = static_cast<int>(problem->frames.size());
@@ -98,8 +100,12 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
   for (std::size_t f = 0; f < built.frames.size(); ++f) {
     const MapKeyframe& kf = map.keyframe(built.frames[f]);
     const auto previous = index.find(kf.previous);
-    if (!kf.preintegration || previous == index.end()) continue;
+    if (previous == index.end()) continue;
     if (problem.frames[f].fixed && problem.frames[previous->second].fixed) continue;
+    BaRelativePose odometry;
+    if (odometryFactor(kf, previous->second, static_cast<int>(f), settings.measurement, &odometry))
+      problem.relative_poses.push_back(odometry);
+    if (!kf.preintegration) continue;
     BaImu imu;
     imu.i = previous->second;
     imu.j = static_cast<int>(f);

@@ -2,6 +2,7 @@
 
 #include "vip_slam_backend/factors/plane_prior.h"
 #include "vip_slam_backend/factors/point_to_plane.h"
+#include "vip_slam_backend/factors/relative_pose.h"
 #include "vip_slam_backend/factors/reprojection.h"
 #include "vip_slam_backend/solver/robust.h"
 
@@ -9,7 +10,7 @@ namespace vip_slam {
 
 std::size_t BaProblem::residualBlocks() const {
   std::size_t n = observations.size() + imu.size() + homographies.size() + homography_pairs.size() +
-                  point_to_plane.size() + plane_points.size() + gauges.size() + motion_priors.size();
+                  point_to_plane.size() + plane_points.size() + relative_poses.size() + gauges.size() + motion_priors.size();
   for (const BaPlane& p : planes) n += p.prior_weight > 0 && p.kind != PlaneKind::kGeneral;
   return n;
 }
@@ -63,6 +64,9 @@ std::string validateProblem(const BaProblem& problem) {
       return "a compressed point-to-plane factor without its frame or plane, or not finite";
   for (const BaPlanePoint& f : problem.plane_points)
     if (!frameOk(f.frame) || !planeOk(f.plane)) return "a plane point without its frame or plane";
+  for (const BaRelativePose& f : problem.relative_poses)
+    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !f.T_i_j.isFinite() || !f.sqrt_information.allFinite())
+      return "a relative pose without its frames, or not finite";
   for (const BaGauge& f : problem.gauges)
     if (!frameOk(f.frame)) return "a gauge prior without its frame";
   for (const BaMotionPrior& f : problem.motion_priors)
@@ -107,6 +111,10 @@ double evaluateCost(const BaProblem& problem) {
         f.weight * planeInCamera(geometry[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
     cost += r * r;
   }
+  for (const BaRelativePose& f : problem.relative_poses)
+    cost += (f.sqrt_information *
+             relativePoseResidual(problem.frames[f.i].state.T_W_I, problem.frames[f.j].state.T_W_I, f.T_i_j))
+                .squaredNorm();
   for (const BaGauge& f : problem.gauges)
     cost += gaugeResidual(f.prior, problem.frames[f.frame].state.T_W_I).squaredNorm();
   for (const BaMotionPrior& f : problem.motion_priors)

@@ -2,6 +2,7 @@
 
 #include "vip_slam_backend/factors/plane_prior.h"
 #include "vip_slam_backend/factors/point_to_plane.h"
+#include "vip_slam_backend/factors/relative_pose.h"
 #include "vip_slam_backend/factors/reprojection.h"
 
 namespace vip_slam {
@@ -212,6 +213,28 @@ class PlanePriorCost : public ceres::SizedCostFunction<2, 4> {
   double weight_;
 };
 
+class RelativePoseCost : public ceres::SizedCostFunction<6, 7, 7> {
+ public:
+  explicit RelativePoseCost(const BaRelativePose& f) : f_(f) {}
+  bool Evaluate(double const* const* x, double* residuals, double** J) const override {
+    SE3 T[2];
+    for (int k = 0; k < 2; ++k)
+      T[k] = SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x[k])),
+                 Eigen::Vector3d(x[k][4], x[k][5], x[k][6]));
+    Matrix6d J_i, J_j;
+    Eigen::Map<Vector6d>(residuals, 6) =
+        f_.sqrt_information * relativePoseResidual(T[0], T[1], f_.T_i_j, J ? &J_i : nullptr, J ? &J_j : nullptr);
+    if (J) {
+      writePose<6>(J[0], f_.sqrt_information * J_i);
+      writePose<6>(J[1], f_.sqrt_information * J_j);
+    }
+    return true;
+  }
+
+ private:
+  BaRelativePose f_;
+};
+
 class GaugeCost : public ceres::SizedCostFunction<6, 7> {
  public:
   explicit GaugeCost(const GaugePrior& prior) : prior_(prior) {}
@@ -273,6 +296,7 @@ ceres::CostFunction* makePlanePointCost(const SE3& T_I_C, const Eigen::Vector3d&
   return new PointToPlaneCost<1>(T_I_C, weight * p_C.homogeneous().transpose());
 }
 ceres::CostFunction* makePlanePriorCost(PlaneKind kind, double weight) { return new PlanePriorCost(kind, weight); }
+ceres::CostFunction* makeRelativePoseCost(const BaRelativePose& factor) { return new RelativePoseCost(factor); }
 ceres::CostFunction* makeGaugeCost(const GaugePrior& prior) { return new GaugeCost(prior); }
 ceres::CostFunction* makeMotionPriorCost(const MotionPrior& prior) { return new MotionPriorCost(prior); }
 

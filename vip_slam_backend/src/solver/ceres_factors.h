@@ -50,6 +50,7 @@ ceres::CostFunction* makeHomographyPairCost(const SE3& T_I_C_i, const SE3& T_I_C
 ceres::CostFunction* makePointToPlaneCost(const SE3& T_I_C, const Eigen::Matrix4d& G);
 ceres::CostFunction* makePlanePointCost(const SE3& T_I_C, const Eigen::Vector3d& p_C, double weight);
 ceres::CostFunction* makePlanePriorCost(PlaneKind kind, double weight);
+ceres::CostFunction* makeRelativePoseCost(const BaRelativePose& factor);
 ceres::CostFunction* makeGaugeCost(const GaugePrior& prior);
 ceres::CostFunction* makeMotionPriorCost(const MotionPrior& prior);
 

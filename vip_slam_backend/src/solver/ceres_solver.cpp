@@ -107,6 +107,8 @@ void build(BaProblem& problem, Blocks& b, ceres::Problem* out, ceres::ParameterB
     if (problem.planes[p].prior_weight > 0 && problem.planes[p].kind != PlaneKind::kGeneral)
       out->AddResidualBlock(makePlanePriorCost(problem.planes[p].kind, problem.planes[p].prior_weight), nullptr,
                             b.planes[p].data());
+  for (const BaRelativePose& f : problem.relative_poses)
+    out->AddResidualBlock(makeRelativePoseCost(f), nullptr, poseBlock(f.i), poseBlock(f.j));
   for (const BaGauge& f : problem.gauges) out->AddResidualBlock(makeGaugeCost(f.prior), nullptr, poseBlock(f.frame));
   for (const BaMotionPrior& f : problem.motion_priors)
     out->AddResidualBlock(makeMotionPriorCost(f.prior), nullptr, motionBlock(f.frame));

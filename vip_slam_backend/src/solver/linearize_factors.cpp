@@ -2,6 +2,7 @@
 #include "structured_solver.h"
 #include "vip_slam_backend/factors/plane_prior.h"
 #include "vip_slam_backend/factors/point_to_plane.h"
+#include "vip_slam_backend/factors/relative_pose.h"
 
 namespace vip_slam {
 namespace {
@@ -106,6 +107,29 @@ double StructuredSolver::linearizePlanes(const BaProblem& problem) {
   return cost;
 }
 
+double StructuredSolver::linearizeRelativePoses(const BaProblem& problem) {
+  double cost = 0;
+  const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
+  Matrix6d J_i, J_j, block;
+  for (std::size_t k = 0; k < problem.relative_poses.size(); ++k) {
+    const BaRelativePose& f = problem.relative_poses[k];
+    const auto U = f.sqrt_information.triangularView<Eigen::Upper>();
+    Vector6d r = relativePoseResidual(problem.frames[f.i].state.T_W_I, problem.frames[f.j].state.T_W_I, f.T_i_j, &J_i,
+                                      &J_j);
+    r = U * r;
+    J_i = U * J_i;
+    J_j = U * J_j;
+    cost += r.squaredNorm();
+    block.noalias() = J_i.transpose() * J_i;
+    sums.add<6>(structure_.pose_node[f.i], block, J_i.transpose() * r);
+    block.noalias() = J_j.transpose() * J_j;
+    sums.add<6>(structure_.pose_node[f.j], block, J_j.transpose() * r);
+    block.noalias() = J_j.transpose() * J_i;
+    addBlock<6, 6>(values_.data(), structure_.relative_poses[k], block);
+  }
+  return cost;
+}
+
 double StructuredSolver::linearizePriors(const BaProblem& problem) {
   double cost = 0;
   const NodeSums sums{structure_.cholesky, values_.data(), full_gradient_.data()};
@@ -147,6 +171,11 @@ double StructuredSolver::factorCost(const BaProblem& problem) {
     const double r =
         f.weight * planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
     cost += r * r;
+  }
+  for (const BaRelativePose& f : problem.relative_poses) {
+    const Vector6d r =
+        relativePoseResidual(problem.frames[f.i].state.T_W_I, problem.frames[f.j].state.T_W_I, f.T_i_j);
+    cost += (f.sqrt_information.triangularView<Eigen::Upper>() * r).squaredNorm();
   }
   for (const BaGauge& f : problem.gauges)
     cost += gaugeResidual(f.prior, problem.frames[f.frame].state.T_W_I).squaredNorm();

@@ -46,6 +46,7 @@ double StructuredSolver::linearizeFactors(const BaProblem& problem) {
   std::fill(full_gradient_.begin(), full_gradient_.end(), 0.0);
   double cost = linearizeImu(problem);
   cost += linearizePlanes(problem);
+  cost += linearizeRelativePoses(problem);
   cost += linearizePriors(problem);
   storeDiagonal();
   return cost;

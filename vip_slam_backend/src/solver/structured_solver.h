@@ -71,6 +71,7 @@ class StructuredSolver : public BaSolver {
   // linearize_factors.cpp; the cost of the factors (not halved)
   double linearizeImu(const BaProblem& problem);
   double linearizePlanes(const BaProblem& problem);
+  double linearizeRelativePoses(const BaProblem& problem);
   double linearizePriors(const BaProblem& problem);
   double factorCost(const BaProblem& problem);
 

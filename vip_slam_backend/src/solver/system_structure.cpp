@@ -67,7 +67,7 @@ std::uint64_t SystemStructure::signature(const BaProblem& problem) const {
   hash.add(-4);
   for (const BaPlanePoint& f : problem.plane_points) hash.add(f.frame), hash.add(f.plane);
   hash.add(-5);
-  for (const BaMotionPrior& f : problem.motion_priors) hash.add(f.frame);
+  for (const BaRelativePose& f : problem.relative_poses) hash.add(f.i), hash.add(f.j);
   return hash.value();
 }
 
@@ -199,6 +199,7 @@ bool SystemStructure::update(const BaProblem& problem) {
   for (const BaHomographyPair& f : problem.homography_pairs) linkTriple(f.i, f.j, f.plane);
   for (const BaPointToPlane& f : problem.point_to_plane) link(plane_node[f.plane], pose_node[f.frame]);
   for (const BaPlanePoint& f : problem.plane_points) link(plane_node[f.plane], pose_node[f.frame]);
+  for (const BaRelativePose& f : problem.relative_poses) link(pose_node[f.j], pose_node[f.i]);
   std::vector<std::pair<int, int>> pairs = requests.unite(static_cast<int>(sizes.size()));
   const std::size_t others = pairs.size();
   for (int a = 0; a < poses; ++a)
@@ -257,6 +258,10 @@ bool SystemStructure::update(const BaProblem& problem) {
   plane_points.clear();
   for (const BaPlanePoint& f : problem.plane_points)
     plane_points.push_back(placeOf(plane_node[f.plane], pose_node[f.frame]));
+
+  relative_poses.clear();
+  for (const BaRelativePose& f : problem.relative_poses)
+    relative_poses.push_back(placeOf(pose_node[f.j], pose_node[f.i]));
 
   orderPoints(problem);
   signature_ = now;

@@ -60,6 +60,10 @@ class SimulatedKeyframes {
       Vector6d d;
       for (int k = 0; k < 6; ++k) d(k) = gauss(k < 3 ? (k == 2 ? 2e-3 : 2e-4) : 3e-3);
       drift_ = SE3(expQuaternion(d.head<3>()), d.tail<3>()) * drift_;
+      kf->motion.T_a_b = truth(t - interval()).T_W_I.inverse() * state.T_W_I;
+      for (int k = 0; k < 6; ++k) d(k) = gauss(k < 3 ? 1e-3 : 2e-3);
+      kf->motion.T_a_b = kf->motion.T_a_b.boxplus(d);
+      kf->motion.covariance.diagonal() << 1e-6, 1e-6, 1e-6, 4e-6, 4e-6, 4e-6;
       for (int s = 0; s <= 60; ++s) {
         ImuSample m = syntheticImu(t - interval() + s * interval() / 60);
         m.gyro += Eigen::Vector3d(gauss(.014), gauss(.014), gauss(.014));

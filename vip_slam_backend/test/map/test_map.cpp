@@ -72,8 +72,13 @@ TEST(Map, RemovingAKeyframeJoinsTheImuChain) {
   Fixture f;
   f.add(5);
   const double before = f.map.keyframe(3).preintegration->dt() + f.map.keyframe(4).preintegration->dt();
+  const RelativeMotion motion = compose(f.map.keyframe(3).motion, f.map.keyframe(4).motion);
   f.map.removeKeyframe(3, ImuNoise(), 3.0);
   EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.keyframe(4).motion.covariance, motion.covariance);
+  const SE3 T_2_4 = f.world.truth(f.map.keyframe(2).data->frame.t).T_W_I.inverse() *
+                    f.world.truth(f.map.keyframe(4).data->frame.t).T_W_I;
+  EXPECT_LT(f.map.keyframe(4).motion.T_a_b.boxminus(T_2_4).norm(), 0.02);
   EXPECT_EQ(f.map.keyframe(4).previous, 2u);
   EXPECT_NEAR(f.map.keyframe(4).preintegration->dt(), before, 1e-9);
   EXPECT_EQ(f.map.takeChanges().removed_keyframes, std::vector<KeyframeId>{3});
@@ -82,6 +87,7 @@ TEST(Map, RemovingAKeyframeJoinsTheImuChain) {
   EXPECT_EQ(checkMap(f.map), "");
   EXPECT_EQ(f.map.keyframe(5).previous, 0u);
   EXPECT_FALSE(f.map.keyframe(5).preintegration);
+  EXPECT_FALSE(f.map.keyframe(5).motion.known());
   f.map.removeKeyframe(5, ImuNoise(), 3.0);
   f.map.removeKeyframe(1, ImuNoise(), 3.0);
   f.map.removeKeyframe(2, ImuNoise(), 3.0);
@@ -183,6 +189,9 @@ TEST(Map, CheckerSeesDamage) {
   EXPECT_NE(checkMap(damaged), "");
   damaged = f.map;
   damaged.keyframe(2).next = 1;
+  EXPECT_NE(checkMap(damaged), "");
+  damaged = f.map;
+  damaged.keyframe(2).motion.covariance(4, 4) = -1;
   EXPECT_NE(checkMap(damaged), "");
   damaged = f.map;
   damaged.landmark(id).plane = 9;

@@ -43,6 +43,11 @@ inline Map syntheticMap(int keyframes, int features, double imu_rate, std::uint6
     const bool first = k == 0 || k == keyframes / 2;
     kf->previous = first ? 0 : kf->id - 1;
     if (!first) kf->imu = motion.imu(t - 0.5, t, imu_rate);
+    if (k % 4 == 1) {
+      kf->motion.T_a_b = motion.stateAt(t - 0.5).T_W_I.inverse() * kf->frame.state.T_W_I;
+      kf->motion.covariance.setConstant(1e-6);
+      kf->motion.covariance.diagonal().array() += 1e-5 * (k + 1);
+    }
     for (int f = 0; f < features; ++f) {
       Feature feature;
       feature.id = f % 3 ? 1000 * f + k / 3 : kNoLandmark;  // a track lives for three keyframes

@@ -174,6 +174,19 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
     p.homography_pairs.clear();
     p.plane_points.clear();
   }
+  for (std::size_t k = 1; k < p.frames.size(); ++k) {
+    // Every component knows of every other, as a filter's covariance does.
+    BaRelativePose f;
+    f.i = static_cast<int>(k) - 1, f.j = static_cast<int>(k);
+    f.T_i_j = p.frames[f.i].state.T_W_I.inverse() * p.frames[f.j].state.T_W_I;
+    Vector6d error;
+    error << gauss3(1e-3), gauss3(5e-3);
+    f.T_i_j = f.T_i_j.boxplus(options.noise * error);
+    f.sqrt_information.setZero();
+    for (int r = 0; r < 6; ++r)
+      for (int c = r; c < 6; ++c) f.sqrt_information(r, c) = (r == c ? 1.0 : 0.2) / (r < 3 ? 1e-3 : 5e-3);
+    p.relative_poses.push_back(f);
+  }
   BaGauge gauge;
   gauge.prior.T_W_I = p.frames[0].state.T_W_I;
   p.gauges.push_back(gauge);

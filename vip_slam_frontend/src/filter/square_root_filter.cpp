@@ -111,6 +111,23 @@ Matrix15d SquareRootFilter::navCovariance() const {
   return Y * Y.transpose();
 }
 
+RelativeMotion SquareRootFilter::relativeMotion(int a, int b) const {
+  const Clone &from = window_.clones[a], &to = window_.clones[b];
+  RelativeMotion motion;
+  motion.T_a_b = from.T_W_I.inverse() * to.T_W_I;
+  // At the first estimates as all rows of R, or some of the common uncertainty would be left.
+  const Eigen::Matrix3d R_a_W = from.T_W_I_fej.R().transpose();
+  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(6, window_.dimension());
+  Y.block<3, 3>(0, window_.cloneColumn(b)).setIdentity();
+  Y.block<3, 3>(0, window_.cloneColumn(a)) -= to.T_W_I_fej.R().transpose() * from.T_W_I_fej.R();
+  Y.block<3, 3>(3, window_.cloneColumn(a)) = hat(R_a_W * (to.T_W_I_fej.t() - from.T_W_I_fej.t()));
+  Y.block<3, 3>(3, window_.cloneColumn(b) + 3) = R_a_W;
+  Y.block<3, 3>(3, window_.cloneColumn(a) + 3) -= R_a_W;
+  solveRight(R_, Y);
+  motion.covariance = Y * Y.transpose();
+  return motion;
+}
+
 Eigen::MatrixXd SquareRootFilter::covariance() const {
   Eigen::MatrixXd Y = Eigen::MatrixXd::Identity(R_.rows(), R_.cols());
   solveRight(R_, Y);

@@ -82,6 +82,7 @@ void VioFilter::stop() {
   tracks_.clear();
   imu_monitor_.reset();
   still_images_ = 0;
+  mark_ = 0;
 }
 
 void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3d& omega_I) {
@@ -144,6 +145,24 @@ void VioFilter::forgetClone(CloneId id) {
                        observations.end());
     it = observations.empty() ? tracks_.erase(it) : std::next(it);
   }
+}
+
+void VioFilter::markNewest() {
+  mark_ = filter_.window().clones.back().id;
+  to_mark_.reset();
+}
+
+RelativeMotion VioFilter::motionSinceMark() const {
+  const int mark = filter_.window().indexOf(mark_), newest = static_cast<int>(filter_.window().clones.size()) - 1;
+  if (mark < 0 || (mark == newest && !to_mark_)) return {};
+  if (mark == newest) return *to_mark_;
+  const RelativeMotion motion = filter_.relativeMotion(mark, newest);
+  return to_mark_ ? compose(*to_mark_, motion) : motion;
+}
+
+void VioFilter::moveMark() {
+  to_mark_ = motionSinceMark();
+  mark_ = filter_.window().clones.back().id;
 }
 
 void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements) {
@@ -268,6 +287,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   // motion and does not fill with copies of one pose.
   const bool replace = still && still_images_ > 0;
   if (replace && previous != still_anchor_) {
+    if (previous == mark_) moveMark();
     filter_.marginalise({static_cast<int>(filter_.window().clones.size()) - 2});
     forgetClone(previous);
   }
@@ -308,6 +328,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   }
   if (window_full) {
     const CloneId oldest = filter_.window().clones.front().id;
+    if (oldest == mark_) moveMark();
     filter_.marginalise({0});
     forgetClone(oldest);
   }

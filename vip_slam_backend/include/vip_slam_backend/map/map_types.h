@@ -37,6 +37,8 @@ struct MapKeyframe {
   /// Samples and factor from `previous`; null when there is none or a gap made it useless.
   std::shared_ptr<const std::vector<ImuSample>> imu;
   std::shared_ptr<const Preintegration> preintegration;
+  /// The odometry's motion from `previous`; unknown when there is none.
+  RelativeMotion motion;
   /// Depth points of this keyframe on planes.
   std::map<PlaneId, PlaneObservation> planes;
   bool loop_keyframe = false;  ///< end of an accepted loop: never culled

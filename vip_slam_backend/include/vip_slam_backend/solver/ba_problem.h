@@ -69,6 +69,13 @@ struct BaPlanePoint {      ///< uncompressed
   double weight = 1;       ///< 1 / sigma
 };
 
+/// See factors/relative_pose.h.
+struct BaRelativePose {
+  int i = 0, j = 0;
+  SE3 T_i_j;
+  Matrix6d sqrt_information = Matrix6d::Identity();  ///< upper triangular, of (theta, t)
+};
+
 struct BaGauge {
   int frame = 0;
   GaugePrior prior;
@@ -93,6 +100,7 @@ struct BaProblem {
   std::vector<BaHomographyPair> homography_pairs;
   std::vector<BaPointToPlane> point_to_plane;
   std::vector<BaPlanePoint> plane_points;
+  std::vector<BaRelativePose> relative_poses;
   std::vector<BaGauge> gauges;
   std::vector<BaMotionPrior> motion_priors;
 

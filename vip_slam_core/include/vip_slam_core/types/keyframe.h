@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/geometry/relative_motion.h"
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/types/feature.h"
 #include "vip_slam_core/types/tracking_state.h"
@@ -33,6 +34,9 @@ struct Keyframe {
   /// Samples from the previous keyframe's IMU time to this one's, both ends interpolated; empty when previous == 0
   /// or when a gap made them useless.
   std::vector<ImuSample> imu;
+  /// The odometry's motion since the previous keyframe; unknown when previous == 0 or when it lost the thread. Not the
+  /// difference of the two published states: those were corrected in between.
+  RelativeMotion motion;
 };
 
 using KeyframePtr = std::shared_ptr<const Keyframe>;

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "vip_slam_core/geometry/relative_motion.h"
 #include "vip_slam_frontend/filter/propagation.h"
 #include "vip_slam_frontend/filter/window_state.h"
 
@@ -38,6 +39,9 @@ class SquareRootFilter {
 
   /// Covariance of (theta, p, v, b_g, b_a) of the newest pose.
   Matrix15d navCovariance() const;
+  /// The motion between two clones, by index, with its covariance: that of the window's position and yaw, which nobody
+  /// knows, cancels.
+  RelativeMotion relativeMotion(int a, int b) const;
   /// Joint covariance of the whole state; for tests.
   Eigen::MatrixXd covariance() const;
   /// All diagonal entries of R finite and positive.

@@ -68,6 +68,11 @@ class VioFilter {
   const WindowState& window() const { return filter_.window(); }
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
+  /// From now on the motion since the newest clone is asked for (its image became a keyframe).
+  void markNewest();
+  /// The motion from the marked clone to the newest. When the marked one has left the window meanwhile it is put together
+  /// from pieces as long as the window, whose errors count as independent. Unknown when nothing was marked.
+  RelativeMotion motionSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
@@ -86,6 +91,8 @@ class VioFilter {
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, bool calibrate, StepReport* report);
   void forgetClone(CloneId id);
+  /// The newest clone stands for the marked one, which is about to go.
+  void moveMark();
 
   FilterOptions options_;
   ImuNoise imu_noise_;
@@ -100,6 +107,8 @@ class VioFilter {
   bool started_ = false;
   int still_images_ = 0;   ///< images since the standing began; 0 when moving
   CloneId still_anchor_ = 0;
+  CloneId mark_ = 0;                      ///< 0: none
+  std::optional<RelativeMotion> to_mark_; ///< from the clone that was marked, when mark_ is another by now
 };
 
 }  // namespace vip_slam

@@ -1,0 +1,29 @@
+#include "odometry_factors.h"
+
+#include <Eigen/Cholesky>
+
+namespace vip_slam {
+namespace {
+
+// No odometry is better than this over the shortest of motions: rad, m.
+constexpr double kLeastRotation = 5e-5, kLeastTranslation = 3e-4;
+
+}  // namespace
+
+bool odometryFactor(const MapKeyframe& keyframe, int i, int j, const MeasurementOptions& options,
+                    BaRelativePose* factor) {
+  if (!options.use_odometry || !keyframe.motion.known()) return false;
+  Matrix6d covariance = options.odometry_inflation * options.odometry_inflation * keyframe.motion.covariance;
+  covariance.diagonal().head<3>().array() += kLeastRotation * kLeastRotation;
+  covariance.diagonal().tail<3>().array() += kLeastTranslation * kLeastTranslation;
+  const Matrix6d information = covariance.llt().solve(Matrix6d::Identity());
+  const Eigen::LLT<Matrix6d> root(information);
+  if (root.info() != Eigen::Success || !information.allFinite()) return false;
+  factor->i = i;
+  factor->j = j;
+  factor->T_i_j = keyframe.motion.T_a_b;
+  factor->sqrt_information = root.matrixU();
+  return true;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,21 @@
+// A measured motion of the body and how well it is known: what an odometry says about two of its poses.
+#pragma once
+
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam {
+
+struct RelativeMotion {
+  SE3 T_a_b;  ///< the body at b in its frame at a
+  /// Of (theta, t), rad and m, with R_a_b <- R_a_b Exp(theta), t_a_b <- t_a_b + t. Zero: nothing is known.
+  Matrix6d covariance = Matrix6d::Zero();
+
+  bool known() const { return covariance(0, 0) != 0; }
+  /// Finite, and the covariance symmetric and positive definite.
+  bool isUsable() const;
+};
+
+/// First the one motion, then the other; their errors count as independent. Unknown when one of them is.
+RelativeMotion compose(const RelativeMotion& ab, const RelativeMotion& bc);
+
+}  // namespace vip_slam
