@@ -174,13 +174,15 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
     p.homography_pairs.clear();
     p.plane_points.clear();
   }
+  std::mt19937 odometry_random(options.seed + 1000);  // of its own: the rest stays as it is without
+  std::normal_distribution<double> odometry_normal;
   for (std::size_t k = 1; k < p.frames.size(); ++k) {
     // Every component knows of every other, as a filter's covariance does.
     BaRelativePose f;
     f.i = static_cast<int>(k) - 1, f.j = static_cast<int>(k);
     f.T_i_j = p.frames[f.i].state.T_W_I.inverse() * p.frames[f.j].state.T_W_I;
     Vector6d error;
-    error << gauss3(1e-3), gauss3(5e-3);
+    for (int c = 0; c < 6; ++c) error(c) = (c < 3 ? 1e-3 : 5e-3) * odometry_normal(odometry_random);
     f.T_i_j = f.T_i_j.boxplus(options.noise * error);
     f.sqrt_information.setZero();
     for (int r = 0; r < 6; ++r)
