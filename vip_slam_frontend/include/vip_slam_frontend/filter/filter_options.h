@@ -94,7 +94,8 @@ struct FilterOptions {
     v.field("use_depth", use_depth, "use depth measurements");
     v.field("use_surfaces", use_surfaces,
             "tie each depth image to the flat patches of an earlier one; needs no corners");
-    v.field("depth_inflation", depth_inflation, 0.1, 20.0, "factor on the depth noise; above 1: what a corner's depth errs in one image it errs in the next, too");
+    v.field("depth_inflation", depth_inflation, 0.1, 20.0,
+            "factor on the depth noise; above 1: what a corner's depth errs in one image it errs in the next, too");
     v.field("adapt_depth_noise", adapt_depth_noise, "widen the depth noise while the sightings of points say so");
     v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
     v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the images contradict the IMU");
