@@ -71,7 +71,8 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   has_grown_ = true;
   const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
   if (tracks.empty()) return;
-  const std::vector<MapTriangle> triangles = placeMesh(mesher_.build(frame.features, frame.depth_grid), T_map_C);
+  const DepthMesh& mesh = mesher_.build(frame.features, frame.depth_grid, T_map_C.R().row(2));
+  const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   const std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
   const auto host_pose = poses_.find(frame.keyframe);
   const KeyframeId host = host_pose == poses_.end() ? newest_ : frame.keyframe;

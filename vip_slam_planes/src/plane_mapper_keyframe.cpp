@@ -14,7 +14,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const ScopedTimer timer(timing, "planes.keyframe", keyframe.frame.t);
   const SE3& T_map_C = poses_.at(keyframe.id);
   const DepthGrid& grid = keyframe.frame.depth_grid;
-  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid);
+  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2));
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);

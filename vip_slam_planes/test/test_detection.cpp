@@ -17,7 +17,8 @@ std::vector<DetectedPlane> detect(SceneCamera* camera, const Scene& scene, const
                                   PlaneDetectionOptions options = {}) {
   const auto keyframe = camera->keyframe(scene, T_W_C);
   DepthMeshBuilder builder({}, camera->camera, camera->noise);
-  const auto triangles = placeMesh(builder.build(keyframe->frame.features, keyframe->frame.depth_grid), T_W_C);
+  const TrackedFrame& frame = keyframe->frame;
+  const auto triangles = placeMesh(builder.build(frame.features, frame.depth_grid, T_W_C.R().row(2)), T_W_C);
   return detectPlanes(triangles, std::vector<char>(triangles.size(), 0), T_W_C.t(), options, {});
 }
 
@@ -198,7 +199,7 @@ TEST(Detection, MeshDropsTrianglesAcrossDepthEdges) {
   const SE3 view = lookAt({0, 0, 1}, {4, 0, 1});
   const auto keyframe = camera.keyframe(scene, view);
   DepthMeshBuilder builder({}, camera.camera, camera.noise);
-  const auto triangles = placeMesh(builder.build({}, keyframe->frame.depth_grid), view);
+  const auto triangles = placeMesh(builder.build({}, keyframe->frame.depth_grid, view.R().row(2)), view);
   ASSERT_GT(triangles.size(), 1000u);
   for (const MapTriangle& t : triangles) EXPECT_GT(-t.n.x(), 0.98);
 }

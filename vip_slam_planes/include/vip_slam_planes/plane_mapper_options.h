@@ -8,7 +8,8 @@ namespace vip_slam {
 struct PlaneMeshOptions {
   double spacing = 16.0;
   double min_altitude_ratio = 0.12;
-  double max_incidence_deg = 82.0;
+  double max_incidence_deg = 79.0;
+  double max_level_incidence_deg = 84.0;
   double max_edge = 1.2;
   double gap_sigmas = 5.0;
 
@@ -18,6 +19,8 @@ struct PlaneMeshOptions {
             "triangles with a smaller altitude over longest side (3D) are dropped");
     v.field("max_incidence_deg", max_incidence_deg, 30.0, 89.0,
             "triangles whose normal is further from the viewing ray are dropped, degrees");
+    v.field("max_level_incidence_deg", max_level_incidence_deg, 30.0, 89.0,
+            "the same for level ones, degrees: tables across a room are seen at 80, and depth is looked up to 84");
     v.field("max_edge", max_edge, 0.1, 10.0, "triangles with a longer side are dropped, m");
     v.field("gap_sigmas", gap_sigmas, 2.0, 20.0,
             "a side whose middle lies this many depth sigmas off the measured depth crosses a depth edge");

@@ -11,6 +11,7 @@ namespace {
 
 // Share of a pixel's depth sigma left in a safe depth, which is the median of a 5x5 window of correlated pixels.
 constexpr float kMedianGain = 0.5f;
+constexpr float kLevel = 0.9f;        // cosine to the vertical: before neighbours are averaged normals are noisy
 constexpr float kSameSurface = 0.9f;  // cosine between neighbouring normals that are averaged (26 degrees)
 
 }  // namespace
@@ -43,7 +44,8 @@ const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid) 
 DepthMeshBuilder::DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera,
                                    const DepthNoise& noise)
     : options_(options), camera_(camera), noise_(noise),
-      least_facing_(std::cos(float(options.max_incidence_deg * M_PI / 180.0))), rays_(camera) {}
+      least_facing_(std::cos(float(options.max_incidence_deg * M_PI / 180.0))),
+      least_level_facing_(std::cos(float(options.max_level_incidence_deg * M_PI / 180.0))), rays_(camera) {}
 
 int DepthMeshBuilder::gridStep(const DepthGrid& grid) const {
   return std::max(1, static_cast<int>(std::lround(options_.spacing / std::max(1, grid.stride))));
@@ -182,7 +184,8 @@ bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid,
   triangle->area = 0.5f * twice;
   const float z = triangle->centre_C.z();
   const float facing = -triangle->n_C.dot(triangle->centre_C);
-  if (facing < least_facing_ * triangle->centre_C.norm()) return false;
+  const bool level = std::abs(triangle->n_C.dot(up_C_)) > kLevel;
+  if (facing < (level ? least_level_facing_ : least_facing_) * triangle->centre_C.norm()) return false;
   triangle->sigma = float(noise_.sigma(z)) * kMedianGain * facing / z;
   triangle->sigma_angle = triangle->sigma / altitude;
   return step < 2 || grid.empty() || !crossesDepthEdge(*triangle, grid);
@@ -204,7 +207,9 @@ void DepthMeshBuilder::smoothNormals() {
   }
 }
 
-const DepthMesh& DepthMeshBuilder::build(const std::vector<Feature>& features, const DepthGrid& grid) {
+const DepthMesh& DepthMeshBuilder::build(const std::vector<Feature>& features, const DepthGrid& grid,
+                                         const Eigen::Vector3d& up_C) {
+  up_C_ = up_C.cast<float>();
   if (!grid.empty()) grid_rays_ = &rays_(grid);
   collectVertices(features, grid);
   pixels_.clear();

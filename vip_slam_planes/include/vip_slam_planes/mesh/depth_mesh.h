@@ -60,8 +60,9 @@ class GridRays {
 class DepthMeshBuilder {
  public:
   DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
-  /// The result is valid until the next call. The grid may be empty.
-  const DepthMesh& build(const std::vector<Feature>& features, const DepthGrid& grid);
+  /// The result is valid until the next call. The grid may be empty. `up_C` is the world's z axis in the camera frame:
+  /// what is level may be seen at a flatter angle, where upright strips may be nothing but a step in depth.
+  const DepthMesh& build(const std::vector<Feature>& features, const DepthGrid& grid, const Eigen::Vector3d& up_C);
 
  private:
   void collectVertices(const std::vector<Feature>& features, const DepthGrid& grid);
@@ -75,7 +76,8 @@ class DepthMeshBuilder {
   PlaneMeshOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   DepthNoise noise_;
-  float least_facing_;  ///< cosine of the angle between normal and viewing ray
+  float least_facing_, least_level_facing_;  ///< cosine of the angle between normal and viewing ray
+  Eigen::Vector3f up_C_;
   GridRays rays_;
   const std::vector<Eigen::Vector2f>* grid_rays_ = nullptr;
   Delaunay delaunay_;
