@@ -115,7 +115,8 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   }
   if (last_keyframe_ != 0 && !keyframe_imu_broken_) keyframe->imu = imu_.between(last_keyframe_imu_t_, t_imu);
 
-  if (last_keyframe_ != 0) keyframe->motion = filter_.motionSinceMark();
+  if (const RelativeMotion motion = filter_.motionSinceMark(); last_keyframe_ != 0 && motion.isUsable())
+    keyframe->motion = motion;
   filter_.markNewest();
 
   selector_.accept(frame.t, frame.state.T_W_I * frame.T_I_C, frame.features);

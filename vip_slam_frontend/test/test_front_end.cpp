@@ -151,6 +151,12 @@ TEST_F(FrontEndTest, WholeRunFollowsAndHandsOnKeyframes) {
       ASSERT_GT(keyframe.imu.size(), 2u);
       EXPECT_NEAR(keyframe.imu.front().t, keyframes_[i - 1]->frame.t, 1e-9);
       EXPECT_NEAR(keyframe.imu.back().t, keyframe.frame.t, 1e-9);
+      ASSERT_TRUE(keyframe.motion.isUsable());
+      const double way = (World::position(keyframe.frame.t) - World::position(keyframes_[i - 1]->frame.t)).norm();
+      EXPECT_NEAR(keyframe.motion.T_a_b.t().norm(), way, 4e-3);
+      EXPECT_LT(std::sqrt(keyframe.motion.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff()), 0.02);
+    } else {
+      EXPECT_FALSE(keyframe.motion.known());
     }
     int described = 0, untracked = 0;
     for (const Feature& f : keyframe.frame.features) {
