@@ -64,8 +64,9 @@ struct RunResult {
   double length = 0;          ///< m travelled
   double nis_per_dof = 0;
   double depth_scale = 1;     ///< factor on the depth noise that the filter found, at the end
-  /// Of the motion between every eighth and every twentieth image in turn, as between keyframes: normalised square of the
-  /// error (expectation 6), and the length of the error over that of the difference of the two newest poses.
+  /// Of the motion between every eighth and every twentieth image in turn, as between keyframes: mean normalised square
+  /// of the error (expectation 6), sum of the error's lengths, and the same for the difference of the two poses as they
+  /// were when they were the newest; m.
   double motion_nees = 0, motion_error = 0, newest_error = 0;
   int gated = 0, used = 0;
   WindowState window;         ///< at the end

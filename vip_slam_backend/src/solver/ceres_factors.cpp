@@ -12,8 +12,7 @@ template <int R, int C>
 using RowMajor = Eigen::Matrix<double, R, C, C == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
 
 FrameGeometry frameOf(const double* x, const SE3& T_I_C) {
-  return FrameGeometry(SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x)), Eigen::Vector3d(x[4], x[5], x[6])),
-                       T_I_C);
+  return FrameGeometry(poseOf(x), T_I_C);
 }
 
 // Tangent (rows x 6) into the ambient row-major rows x 7 of the lifted pose manifold.
@@ -123,8 +122,7 @@ class ImuCost : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
     NavState state[2];
     for (int s = 0; s < 2; ++s) {
       const double *pose = x[2 * s], *motion = x[2 * s + 1];
-      state[s].T_W_I =
-          SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(pose)), Eigen::Vector3d(pose[4], pose[5], pose[6]));
+      state[s].T_W_I = poseOf(pose);
       state[s].v_W = Eigen::Map<const Eigen::Vector3d>(motion);
       state[s].bias_gyro = Eigen::Map<const Eigen::Vector3d>(motion + 3);
       state[s].bias_accel = Eigen::Map<const Eigen::Vector3d>(motion + 6);
@@ -217,13 +215,10 @@ class RelativePoseCost : public ceres::SizedCostFunction<6, 7, 7> {
  public:
   explicit RelativePoseCost(const BaRelativePose& f) : f_(f) {}
   bool Evaluate(double const* const* x, double* residuals, double** J) const override {
-    SE3 T[2];
-    for (int k = 0; k < 2; ++k)
-      T[k] = SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x[k])),
-                 Eigen::Vector3d(x[k][4], x[k][5], x[k][6]));
     Matrix6d J_i, J_j;
     Eigen::Map<Vector6d>(residuals, 6) =
-        f_.sqrt_information * relativePoseResidual(T[0], T[1], f_.T_i_j, J ? &J_i : nullptr, J ? &J_j : nullptr);
+        f_.sqrt_information *
+        relativePoseResidual(poseOf(x[0]), poseOf(x[1]), f_.T_i_j, J ? &J_i : nullptr, J ? &J_j : nullptr);
     if (J) {
       writePose<6>(J[0], f_.sqrt_information * J_i);
       writePose<6>(J[1], f_.sqrt_information * J_j);
@@ -240,9 +235,7 @@ class GaugeCost : public ceres::SizedCostFunction<6, 7> {
   explicit GaugeCost(const GaugePrior& prior) : prior_(prior) {}
   bool Evaluate(double const* const* x, double* residuals, double** J) const override {
     Matrix6d Jx;
-    const SE3 T(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x[0])),
-                Eigen::Vector3d(x[0][4], x[0][5], x[0][6]));
-    Eigen::Map<Vector6d>(residuals, 6) = gaugeResidual(prior_, T, J ? &Jx : nullptr);
+    Eigen::Map<Vector6d>(residuals, 6) = gaugeResidual(prior_, poseOf(x[0]), J ? &Jx : nullptr);
     if (J) writePose<6>(J[0], Jx);
     return true;
   }

@@ -34,6 +34,11 @@ class PlaneManifold : public ceres::Manifold {
   bool MinusJacobian(const double* x, double* jacobian) const override;
 };
 
+/// The pose of a parameter block.
+inline SE3 poseOf(const double* x) {
+  return SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x)), Eigen::Vector3d(x[4], x[5], x[6]));
+}
+
 /// The plane of a parameter block.
 inline Plane planeOf(const double* x) {
   Plane plane;

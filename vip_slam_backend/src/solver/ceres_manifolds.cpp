@@ -6,10 +6,6 @@ namespace {
 using RowMajor76 = Eigen::Matrix<double, 7, 6, Eigen::RowMajor>;
 using RowMajor67 = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
 
-SE3 poseOf(const double* x) {
-  return SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(x)), Eigen::Vector3d(x[4], x[5], x[6]));
-}
-
 }  // namespace
 
 bool PoseManifold::Plus(const double* x, const double* delta, double* out) const {

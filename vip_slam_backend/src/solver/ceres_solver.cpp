@@ -30,8 +30,7 @@ struct Blocks {
     for (std::size_t k = 0; k < poses.size(); ++k) {
       NavState& s = problem->frames[k].state;
       if (problem->frames[k].fixed) continue;
-      s.T_W_I = SE3(Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(poses[k].data())),
-                    Eigen::Vector3d(poses[k][4], poses[k][5], poses[k][6]));
+      s.T_W_I = poseOf(poses[k].data());
       s.v_W = Eigen::Map<const Eigen::Vector3d>(motions[k].data());
       s.bias_gyro = Eigen::Map<const Eigen::Vector3d>(motions[k].data() + 3);
       s.bias_accel = Eigen::Map<const Eigen::Vector3d>(motions[k].data() + 6);
