@@ -117,7 +117,9 @@ void boxStack(SceneBuilder* b, const Palette& p, double x, double y, Rng* rng, i
   }
 }
 
-std::vector<std::string> sceneNames() { return {"office", "office_bare", "room", "stairs", "alias_corridor"}; }
+std::vector<std::string> sceneNames() {
+  return {"office", "office_bare", "room", "stairs", "alias_corridor", "attic", "gallery", "workshop"};
+}
 
 Scene buildScene(const std::string& name) {
   if (name == "office") return buildOffice(false);
@@ -125,6 +127,9 @@ Scene buildScene(const std::string& name) {
   if (name == "room") return buildRoom();
   if (name == "stairs") return buildStairs();
   if (name == "alias_corridor") return buildAliasCorridor();
+  if (name == "attic") return buildAttic();
+  if (name == "gallery") return buildGallery();
+  if (name == "workshop") return buildWorkshop();
   std::string known;
   for (const std::string& n : sceneNames()) known += (known.empty() ? "" : ", ") + n;
   throw std::invalid_argument("scene '" + name + "' is not known, expected one of: " + known);

@@ -43,5 +43,8 @@ Scene buildRoom();
 Scene buildOffice(bool bare);
 Scene buildStairs();
 Scene buildAliasCorridor();
+Scene buildAttic();
+Scene buildGallery();
+Scene buildWorkshop();
 
 }  // namespace vip_slam
