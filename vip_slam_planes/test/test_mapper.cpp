@@ -171,6 +171,21 @@ TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
   }
 }
 
+TEST(Mapper, APartitionWhoseMiddleIsHiddenIsOneButCupboardsAreTwo) {
+  struct Case {
+    double height, step;
+    std::size_t planes;
+  };
+  for (const Case& c : {Case{2.0, 0.0, 1}, Case{2.0, 0.03, 2}, Case{0.9, 0.0, 2}}) {
+    Rig rig(0.5);
+    Scene scene;
+    scene.add({-0.8, 1, 0}, {0.4, 0, 0}, {0, 0, c.height});  // 0.8 m^2
+    scene.add({0.4, 1 + c.step, 0}, {0.4, 0, 0}, {0, 0, c.height});
+    for (int i = 0; i < 6; ++i) rig.look(scene, {-0.5 + 0.2 * i, -1.5, 1.3}, {-0.2 + 0.1 * i, 1, 1.0});
+    EXPECT_EQ(c.planes, rig.mapper.planes().size()) << c.height << " m high, " << c.step << " m apart";
+  }
+}
+
 TEST(Mapper, ASmallPieceOfFloorBelongsToAFloorThatNoTableIsAsLargeAs) {
   for (const double step : {0.0, 0.04}) {
     Rig rig;

@@ -9,6 +9,7 @@ namespace {
 // Smaller walls and ceilings are furniture. What one can put things on stays apart until it is a floor: two tables are
 // two.
 constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
+constexpr double kPartition = 0.5;  // m^2; free-standing walls and doors, of which something hides the middle
 constexpr double kNoTable = 20.0;  // m^2; what lies level with so large a surface is more of it, not a second table
 constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
 constexpr double kSmallGap = 4.0;  // a smaller piece of a wall may be as many of its own widths away
@@ -123,7 +124,8 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
   // The rest of a parapet behind a stair is small, but on its plane to the centimetre; furniture is seldom.
   double apart = options.distance_apart;
   const bool ceiling = a.kind() == PlaneKind::kHorizontal && a.plane().n.z() < 0;
-  const double larger_from = a.kind() == PlaneKind::kVertical ? large_from : ceiling ? kLeastCeiling : kNoTable;
+  const double wall_from = smaller >= kPartition ? kPartition : large_from;
+  const double larger_from = a.kind() == PlaneKind::kVertical ? wall_from : ceiling ? kLeastCeiling : kNoTable;
   if (smaller < large_from && a.kind() != PlaneKind::kGeneral && std::max(area_a, area_b) >= larger_from) {
     const double reach = ceiling ? options.gap_per_area * kLeastCeiling
                                  : std::min(options.gap_per_area * large_from, kSmallGap * std::sqrt(smaller));
