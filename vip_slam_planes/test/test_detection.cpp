@@ -4,6 +4,7 @@
 #include "scene.h"
 #include "vip_slam_planes/detection/plane_detector.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
+#include "vip_slam_planes/detection/surface_shape.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
 
 namespace vip_slam {
@@ -157,6 +158,27 @@ TEST(Detection, WallAndDoorOfARecessAreNotOneSlantedPlane) {
     }
     EXPECT_GE(planes, 5) << x;
   }
+}
+
+TEST(Detection, AStepThatNoiseHidesMayLookLikeASurface) {
+  // A surface that begins 5 m ahead and goes on by `depth` along the view and by `across`.
+  const auto seen = [](double depth, double across, double depth_sigma) {
+    const Plane plane = Plane::fromPointNormal({5, 0, 0}, Eigen::Vector3d(-across, depth, 0).normalized());
+    const double facing = -plane.n.dot(Eigen::Vector3d::UnitX());
+    std::vector<MapTriangle> triangles(40);
+    std::vector<int> all;
+    for (int i = 0; i < 40; ++i) {
+      const double s = double(i) / 39;
+      triangles[i].centre = Eigen::Vector3d(5 + s * depth, s * across, 0.05 * (i % 7));
+      triangles[i].sigma = depth_sigma * facing;
+      all.push_back(i);
+    }
+    return mayBeAStep(triangles, all, plane, Eigen::Vector3d::Zero());
+  };
+  EXPECT_TRUE(seen(0.5, 0.2, 0.05));    // half a metre is hidden by 5 cm of noise
+  EXPECT_FALSE(seen(0.5, 0.2, 0.005));  // but not by 5 mm: a pillar's side
+  EXPECT_FALSE(seen(3.0, 1.0, 0.05));   // a wall that goes on
+  EXPECT_FALSE(seen(0.1, 0.8, 0.05));   // a wall seen from the front
 }
 
 TEST(Detection, TwoTablesOfOneHeightAreTwo) {

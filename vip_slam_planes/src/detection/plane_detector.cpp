@@ -229,6 +229,7 @@ class Detector {
     if (!fit(surface, kind, &result.plane, &rms)) return false;
     const double sigma = medianSigma(surface);
     if (rms > options_.max_rms + 1.5 * sigma) return false;
+    if (kind == PlaneKind::kVertical && mayBeAStep(triangles_, surface, result.plane, camera_)) return false;
     const Eigen::Vector3d& n = result.plane.n;
     if (kind == PlaneKind::kVertical && facetsLean(triangles_, surface, result.plane, Eigen::Vector3d::UnitZ().cross(n),
                                                    options_.max_tilt_deg * kDegree)) {

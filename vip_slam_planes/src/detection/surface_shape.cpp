@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -59,6 +60,22 @@ bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>&
     if (bends - 3 * error > kBends || bends + error > kColumn) return true;
   }
   return false;
+}
+
+bool mayBeAStep(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
+                const Eigen::Vector3d& camera) {
+  constexpr double kSteep = 0.5;              // cosine of the angle at which it is seen
+  constexpr double kHiddenStep = 5.0 * 2.45;  // sigmas; the mesh asks for five of a second difference, sqrt(1 + 4 + 1)
+  double nearest = std::numeric_limits<double>::infinity(), farthest = 0, facing = 0, sigma = 0;
+  for (int i : surface) {
+    const Eigen::Vector3d ray = triangles[i].centre - camera;
+    const double level = ray.head<2>().norm();
+    nearest = std::min(nearest, level), farthest = std::max(farthest, level);
+    facing -= plane.n.dot(ray) / ray.norm() / double(surface.size());
+    sigma += triangles[i].sigma / double(surface.size());
+  }
+  // Sigmas are along the normal: those of depth are larger by 1 / facing.
+  return facing < kSteep && (farthest - nearest) * std::max(0.0, facing) < kHiddenStep * sigma;
 }
 
 bool facetsLean(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,

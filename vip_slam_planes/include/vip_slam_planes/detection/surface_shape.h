@@ -19,6 +19,12 @@ bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& 
 bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
               double sigma);
 
+/// Depth noise hides steps from the mesh, which goes on across them, and a step looks like a surface seen at a flat
+/// angle. True when an upright surface is seen from `camera` at such an angle, and all of it is no deeper than a step
+/// that noise may hide.
+bool mayBeAStep(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
+                const Eigen::Vector3d& camera);
+
 /// A plane laid across a step, such as wall and door of a recess, leans against both: the facets of either one point
 /// where that one points. Their median, as facets on the step itself lean the other way. `axis` (unit, in the plane)
 /// is where the fit was free to lean; the tolerance, in radians, comes on top of the facets' own uncertainty.
