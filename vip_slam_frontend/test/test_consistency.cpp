@@ -21,6 +21,7 @@ FilterOptions independentNoise() {
   FilterOptions options = filterOptions();
   options.pixel_inflation = 1.0;
   options.own_noise = false;
+  options.pull_huber = 1000.0;
   return options;
 }
 

@@ -219,12 +219,19 @@ TEST_F(AlgebraOnSimulation, EqualsTheReferenceEkf) {
         ++used;
       }
       ASSERT_GT(H.rows(), 20);
-      const double gate = mahalanobis(filter_.R(), H, h);
+      const Innovation innovation = testInnovation(filter_.R(), H, h);
+      const Eigen::MatrixXd S =
+          H * ekf_.P * H.transpose() + Eigen::MatrixXd::Identity(H.rows(), H.rows());
+      const Eigen::VectorXd dx = ekf_.P * H.transpose() * S.ldlt().solve(h);
+      const double pull = dx.dot(ekf_.P.ldlt().solve(dx));
+      const double expected = double(H.rows()) - S.inverse().trace();
       const double nis = ekf_.update(H, h);
       const UpdateResult result = filter_.update(H, h);
       ASSERT_TRUE(result.ok);
       EXPECT_NEAR(result.nis, nis, 1e-9 * nis);  // |e|^2 is the NIS
-      EXPECT_NEAR(gate, nis, 1e-8 * nis);
+      EXPECT_NEAR(innovation.distance, nis, 1e-8 * nis);
+      EXPECT_NEAR(innovation.pull, pull, 1e-6 * pull);
+      EXPECT_NEAR(innovation.expected_pull, expected, 1e-8 * expected);
     }
     if (filter_.window().clones.size() > 6) {
       const int index = k % 2 == 0 ? 0 : 2;  // the oldest, and one from the middle

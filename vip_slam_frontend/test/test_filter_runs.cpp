@@ -14,6 +14,7 @@ FilterOptions filterOptions() {
   options.depth_inflation = 1.0;
   options.pixel_inflation = 1.0;
   options.own_noise = false;
+  options.pull_huber = 1000.0;
   return options;
 }
 
@@ -33,6 +34,49 @@ TEST(FilterRuns, OutliersAreGatedAway) {
   const RunResult run = runFilter(simulation, filterOptions(), 15.0, false);
   EXPECT_GT(run.gated, 50);
   EXPECT_LT(run.final_position / run.length, 0.006);
+}
+
+/// The correction of the velocity, in sigmas of what the IMU leaves of it, by one track of a point that in truth goes at
+/// `speed` (m/s): each of its residuals is small, all of them together are another motion.
+double pulled(double speed, double pull_huber) {
+  SimulationOptions still;
+  still.speed = 0;
+  still.imu_noise = false;
+  LandmarkSimulation simulation(still);
+  simulation.generateImu(1.0);
+  FilterOptions options = filterOptions();
+  options.pull_huber = pull_huber;
+  options.sigma_px = 1.0;  // one track says about as much as the start
+  VioFilter filter(options, still.noise, simulation.T_I_C(), 0.0, still.focal, 9.81);
+  FilterPrior prior;
+  prior.state = simulation.stateAt(0.2);
+  prior.sigma_velocity = 0.005;
+  prior.sigma_tilt = 1e-4, prior.sigma_bias_gyro = 1e-4, prior.sigma_bias_accel = 1e-3;
+  CloneId id = 1;
+  filter.start(prior, id++, Eigen::Vector3d::Zero());
+  const SE3 T_W_C = prior.state.T_W_I * simulation.T_I_C();
+  for (int k = 1; k <= 9; ++k) {
+    const double t = 0.2 + 0.05 * k;
+    const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t));
+    const Eigen::Vector3d p_C(speed * 0.05 * k, 0.3, 3.0);
+    FilterMeasurement m;
+    m.id = 1, m.xy = p_C.head<2>() / p_C.z(), m.depth = p_C.z(), m.depth_sigma = 0.01;
+    const bool in_view = k < 9;  // what is lost is used
+    filter.step(propagation, id++, in_view ? std::vector<FilterMeasurement>{m} : std::vector<FilterMeasurement>(),
+                std::nullopt, false);
+  }
+  return -T_W_C.R().col(0).dot(filter.nav().v_W);
+}
+
+TEST(FilterRuns, WhatAsksForTooMuchPullsLess) {
+  const double little = pulled(0.012, 1.0), much = pulled(0.12, 1.0);
+  const double little_freely = pulled(0.012, 1000.0), much_freely = pulled(0.12, 1000.0);
+  std::printf("a point at 12 mm/s gives the body %.2f mm/s, at 120 mm/s %.2f; freely %.2f and %.2f\n", 1e3 * little,
+              1e3 * much, 1e3 * little_freely, 1e3 * much_freely);
+  EXPECT_NEAR(much_freely, 10.0 * little_freely, 0.1 * much_freely);
+  EXPECT_NEAR(little, little_freely, 1e-9);
+  EXPECT_GT(much, little);
+  EXPECT_LT(much, 0.8 * much_freely);
 }
 
 TEST(FilterRuns, PixelNoiseIsLearnt) {

@@ -75,22 +75,41 @@ void innovationRaw(const double* Z, int n, int m, double* S) {
   for (int i = 0; i < m; ++i) S[static_cast<long>(i) * m + i] += 1.0;
 }
 
-/// |L^-1 r|^2 with S = L L^T; S and r are overwritten.
+/// S <- L with S = L L^T, r <- L^-1 r. The upper triangle stays as it is.
 VIP_SLAM_VECTOR_CLONES
-double choleskyDistanceRaw(double* S, int m, double* r) {
-  double distance = 0;
+void choleskyRaw(double* S, int m, double* r) {
   for (int j = 0; j < m; ++j) {
     double* column = S + static_cast<long>(j) * m;
     const double inverse = 1.0 / std::sqrt(column[j]);
     for (int i = j; i < m; ++i) column[i] *= inverse;
-    const double x = r[j] * inverse;
-    distance += x * x;
-    subtractScaled(r + j + 1, column + j + 1, x, m - j - 1);
+    r[j] *= inverse;
+    subtractScaled(r + j + 1, column + j + 1, r[j], m - j - 1);
     for (int k = j + 1; k < m; ++k) {
       subtractScaled(S + static_cast<long>(k) * m + k, column + k, column[k], m - k);
     }
   }
-  return distance;
+}
+
+/// |L^-1|^2, the trace of S^-1; and |L^-T r|^2. `work` has m entries.
+VIP_SLAM_VECTOR_CLONES
+double inverseTraceRaw(const double* L, int m, double* r, double* work, double* norm2) {
+  for (int j = m - 1; j >= 0; --j) {
+    const double* column = L + static_cast<long>(j) * m;
+    r[j] = (r[j] - dot(column + j + 1, r + j + 1, m - j - 1)) / column[j];
+  }
+  *norm2 = dot(r, r, m);
+  double trace = 0;
+  for (int c = 0; c < m; ++c) {
+    for (int i = c; i < m; ++i) work[i] = 0;
+    work[c] = 1;
+    for (int j = c; j < m; ++j) {
+      const double* column = L + static_cast<long>(j) * m;
+      const double x = work[j] / column[j];
+      trace += x * x;
+      subtractScaled(work + j + 1, column + j + 1, x, m - j - 1);
+    }
+  }
+  return trace;
 }
 
 int padded(long rows) { return static_cast<int>((rows + 3) / 4 * 4); }
@@ -105,16 +124,23 @@ void solveRight(const Eigen::MatrixXd& R, Eigen::MatrixXd& H) {
   H.conservativeResize(rows, Eigen::NoChange);
 }
 
-double mahalanobis(const Eigen::MatrixXd& R, const Eigen::MatrixXd& H, const Eigen::VectorXd& r) {
+Innovation testInnovation(const Eigen::MatrixXd& R, const Eigen::MatrixXd& H, const Eigen::VectorXd& r) {
   const int n = static_cast<int>(R.rows()), m = padded(H.rows());
   Eigen::MatrixXd Z(m, n), S(m, m);
   Z.topRows(H.rows()) = H;
   Z.bottomRows(m - H.rows()).setZero();
-  Eigen::VectorXd residual = Eigen::VectorXd::Zero(m);
+  Eigen::VectorXd residual = Eigen::VectorXd::Zero(m), work(m);
   residual.head(r.size()) = r;
   solveRightRaw(R.data(), n, Z.data(), m);
   innovationRaw(Z.data(), n, m, S.data());
-  return choleskyDistanceRaw(S.data(), m, residual.data());
+  choleskyRaw(S.data(), m, residual.data());
+  Innovation result;
+  result.distance = residual.squaredNorm();
+  double norm2 = 0;
+  result.expected_pull = m - inverseTraceRaw(S.data(), m, residual.data(), work.data(), &norm2);
+  // P H^T S^-1 r, whitened by P, is Z^T S^-1 r; and Z Z^T = S - I.
+  result.pull = result.distance - norm2;
+  return result;
 }
 
 }  // namespace vip_slam

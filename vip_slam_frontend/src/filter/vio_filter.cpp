@@ -50,6 +50,11 @@ void stackStaircase(const std::vector<FeatureRows>& features, int rows, Eigen::M
   }
 }
 
+/// Huber's weight of the information of rows with this squared residual, in sigmas.
+double huberWeight(double squared, double threshold) {
+  return squared > threshold * threshold ? threshold / std::sqrt(squared) : 1.0;
+}
+
 /// Squared correction of orientation and velocity per degree of freedom, whitened by what the covariance lost.
 double correctionPerDof(const NavState& before, const Matrix15d& P_before, const NavState& after,
                         const Matrix15d& P_after) {
@@ -233,16 +238,19 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
       depth_chi2.push_back(scale * scale * point.depth_chi2 / (point.depth_rows - 1));
       depth_rows += point.depth_rows - 1;
     }
-    const double distance = mahalanobis(filter_.R(), feature.H, feature.r);
-    if (!(distance < gate_.threshold(dof))) {
+    const Innovation innovation = testInnovation(filter_.R(), feature.H, feature.r);
+    if (!(innovation.distance < gate_.threshold(dof))) {
       ++report->features_gated;
       continue;
     }
-    const double relative = std::sqrt(distance / dof);
-    if (relative > options_.huber) {
-      const double weight = std::sqrt(options_.huber / relative);
-      feature.H *= weight;
-      feature.r *= weight;
+    // A patch that creeps along with the motion (two edges at different depths that meet) explains all its residuals by
+    // another motion: among two dozen rows that passes any gate, but it pulls at the few directions of the state that the
+    // feature measures.
+    const double weight = huberWeight(innovation.distance / dof, options_.huber) *
+                          huberWeight(innovation.pull / innovation.expected_pull, options_.pull_huber);
+    if (weight < 1) {
+      feature.H *= std::sqrt(weight);
+      feature.r *= std::sqrt(weight);
     }
     rows += dof;
     accepted.push_back(std::move(feature));

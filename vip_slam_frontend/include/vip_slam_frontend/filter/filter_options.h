@@ -67,6 +67,7 @@ struct FilterOptions {
   bool own_noise = true;
   double gate_probability = 0.95;
   double huber = 1.5;
+  double pull_huber = 1.0;
   int max_update_features = 30;
   bool use_depth = true;
   bool use_surfaces = true;
@@ -90,6 +91,8 @@ struct FilterOptions {
     v.field("own_noise", own_noise, "a feature whose residuals sigma_px does not explain gets a larger one of its own");
     v.field("gate_probability", gate_probability, 0.5, 0.9999, "chi-square quantile of the feature gate");
     v.field("huber", huber, 0.5, 100.0, "Huber threshold on whitened residuals, sigmas");
+    v.field("pull_huber", pull_huber, 0.1, 1000.0,
+            "Huber threshold on the correction that one feature asks for, in sigmas of what it may");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");
     v.field("use_depth", use_depth, "use depth measurements");
     v.field("use_surfaces", use_surfaces,
