@@ -222,12 +222,18 @@ void PlaneFactorBuilder::addDepthBlocks() {
   BaProblem& problem = built_->problem;
   const std::vector<DepthBlock> blocks = collectDepthBlocks();
   std::vector<double> misfits;
-  for (const DepthBlock& block : blocks) misfits.push_back(block.misfit);
-  const double scale = planeInformationScale(std::move(misfits));
+  std::vector<PlaneMisfit> of_planes;
+  for (const DepthBlock& block : blocks) {
+    misfits.push_back(block.misfit);
+    of_planes.push_back({block.plane, block.misfit});
+  }
+  const double map_scale = planeInformationScale(std::move(misfits));
+  const std::vector<double> weights = planeWeights(of_planes, problem.planes.size());
   // Keyframes that are constants: one block per plane in the world, seen from a fixed frame at the origin.
   std::map<int, BaPointToPlane> outside;
   for (const DepthBlock& block : blocks) {
     const PlaneObservation& o = *block.observation;
+    const double scale = map_scale * weights[block.plane];
     if (block.frame < 0) {
       BaPointToPlane& sum = outside[block.plane];
       sum.G += scale * block.T_W_C * block.G * block.T_W_C.transpose();

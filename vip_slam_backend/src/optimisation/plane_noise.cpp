@@ -1,6 +1,7 @@
 #include "plane_noise.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -13,6 +14,15 @@ constexpr double kMedian = 2.366;  // of a chi square with three degrees of free
 // agrees with itself too well. It does not grow: with a camera that bends its depth that would take away what holds
 // the map.
 constexpr double kLeast = 1.0, kMost = 25.0;
+// A plane is believed as if four observations had shown that it is one.
+constexpr double kPlaneFreedom = 12.0;
+
+/// By which the typical misfit exceeds what the noise model expects; it is below 1 / kMost with exact points only.
+double typicalMisfit(std::vector<double> misfits) {
+  const auto middle = misfits.begin() + misfits.size() / 2;
+  std::nth_element(misfits.begin(), middle, misfits.end());
+  return std::max(*middle / kMedian, 1.0 / kMost);
+}
 
 }  // namespace
 
@@ -30,9 +40,23 @@ double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C) {
 
 double planeInformationScale(std::vector<double> misfits) {
   if (misfits.size() < kLeastObservations) return 1.0;
-  const auto middle = misfits.begin() + misfits.size() / 2;
-  std::nth_element(misfits.begin(), middle, misfits.end());
-  return std::clamp(kMedian / std::max(*middle, 1e-9), kLeast, kMost);
+  return std::clamp(1.0 / typicalMisfit(std::move(misfits)), kLeast, kMost);
+}
+
+std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes) {
+  std::vector<double> weights(planes, 1.0);
+  if (misfits.size() < kLeastObservations) return weights;
+  std::vector<double> all;
+  all.reserve(misfits.size());
+  for (const PlaneMisfit& m : misfits) all.push_back(m.misfit);
+  const double unit = typicalMisfit(std::move(all));
+  std::vector<double> expected(planes, kPlaneFreedom), found(planes, kPlaneFreedom);
+  for (const PlaneMisfit& m : misfits) {
+    expected[m.plane] += 3.0;
+    found[m.plane] += m.misfit / unit;
+  }
+  for (std::size_t p = 0; p < planes; ++p) weights[p] = std::min(1.0, expected[p] / found[p]);
+  return weights;
 }
 
 }  // namespace vip_slam

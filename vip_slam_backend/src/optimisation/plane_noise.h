@@ -17,4 +17,16 @@ double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C);
 /// degrees of freedom. 1 with too few observations to tell.
 double planeInformationScale(std::vector<double> misfits);
 
+struct PlaneMisfit {
+  int plane;
+  double misfit;
+};
+
+/// Factors on the information of single planes, on top of that. What passes for one plane may be several surfaces: fronts
+/// of boxes on a shelf, a hand's breadth apart, a few degrees turned. Each keyframe sees other parts of it, and what is
+/// wrong with the plane is wrong with most of its observations. So its variance, in units of the map's typical misfit, is
+/// a variable of its own with a prior, which makes its misfits jointly Student's t. By index of plane; 1 for those that
+/// are not mentioned and for all with too few observations to tell.
+std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
+
 }  // namespace vip_slam

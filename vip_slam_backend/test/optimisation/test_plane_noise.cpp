@@ -68,3 +68,23 @@ TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {
   EXPECT_GT(scale, 5.0);
   EXPECT_LT(scale, 9.0);
 }
+
+TEST(PlaneNoise, WhatIsNoPlaneCountsForLess) {
+  for (const double unit : {0.2, 1.0, 3.0}) {  // of the sigma; weights are relative to what is typical of the map
+    std::mt19937 random(4);
+    std::normal_distribution<double> normal(0.0, 0.01 * unit);
+    std::vector<PlaneMisfit> misfits;
+    for (int k = 0; k < 400; ++k) {
+      const int plane = k % 10;
+      // Plane 9 is a row of boxes whose fronts lie a centimetre apart (in units), plane 8 had one bad keyframe.
+      const double offset = plane == 9 ? normal(random) : plane == 8 && k < 10 ? 0.01 * unit : 0.0;
+      misfits.push_back({plane, planeMisfit(observation(offset, 0, unit * kSigma, &random), kPlane)});
+    }
+    const std::vector<double> weights = planeWeights(misfits, 12);
+    for (int plane = 0; plane < 8; ++plane) EXPECT_GT(weights[plane], 0.7) << unit << " " << plane;
+    EXPECT_GT(weights[8], 0.3);
+    EXPECT_LT(weights[9], 0.03);
+    EXPECT_EQ(weights[10], 1.0);  // seen by nobody
+  }
+  EXPECT_EQ(planeWeights({{0, 1000.0}, {0, 1000.0}}, 1)[0], 1.0);  // too few to tell
+}
