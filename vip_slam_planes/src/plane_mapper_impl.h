@@ -43,6 +43,7 @@ class PlaneMapper::Impl {
   void removeKeyframe(KeyframeId id);
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();
+  void judgeAgreement();
   void dropUnsupported(PlaneUpdate* result);
   void publish(PlaneUpdate* result);
 

@@ -121,7 +121,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
         track.confirmed ||
         (track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area) ||
         (track.keyframes_seen > 0 && covered >= options.support.sure_area);
-    trusted.push_back(track.confirmed && track.determined);
+    trusted.push_back(track.confirmed && track.determined && track.agrees);
   }
   points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });
 }

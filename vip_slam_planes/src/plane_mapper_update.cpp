@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "plane_mapper_impl.h"
+#include "vip_slam_core/geometry/plane_noise.h"
 
 namespace vip_slam {
 namespace {
@@ -77,7 +78,30 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     evidence_.forgetTests();
     withdrawBrokenObservations();
   }
+  judgeAgreement();
   if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
+}
+
+void PlaneMapper::Impl::judgeAgreement() {
+  std::vector<PlaneMisfit> misfits;
+  std::size_t index = 0;
+  for (const auto& [id, track] : tracks_) {
+    Eigen::Vector4d plane_W;
+    plane_W << track.plane().n, track.plane().d;
+    for (const auto& [keyframe, observation] : track.observations()) {
+      const auto pose = poses_.find(keyframe);
+      if (pose == poses_.end()) continue;
+      misfits.push_back(
+          {static_cast<int>(index), planeMisfit(observation.G, pose->second.matrix().transpose() * plane_W)});
+    }
+    ++index;
+  }
+  const std::vector<char> agree = planesAgree(misfits, index);
+  index = 0;
+  for (auto& [id, track] : tracks_) {
+    track.agrees = agree[index++] != 0;
+    if (!track.agrees) points_.releaseFrom(id);
+  }
 }
 
 void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {

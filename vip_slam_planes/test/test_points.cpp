@@ -86,10 +86,10 @@ struct Associations {
   std::map<LandmarkId, int> seen;       ///< keyframes
 };
 
-/// Eight keyframes; the landmarks are where the points are.
-Associations associate(const World& w, SceneCamera* camera, PlaneMapper* mapper) {
+/// Some keyframes; the landmarks are where the points are.
+Associations associate(const World& w, SceneCamera* camera, PlaneMapper* mapper, int first = 0, int keyframes = 8) {
   Associations result;
-  for (int i = 0; i < 8; ++i) {
+  for (int i = first; i < first + keyframes; ++i) {
     const SE3 T_W_C = lookAt({-0.8, -1.2 + 0.35 * i, 1.4}, {3, -0.5 + 0.1 * i, 0.9});
     const auto keyframe = camera->keyframe(w.scene, T_W_C, w.points, 0.5);
     for (const Feature& f : keyframe->frame.features) ++result.seen[f.id];
@@ -172,6 +172,32 @@ TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
   away.global = true;
   away.planes.emplace_back(wall, Plane({-1, 0, 0}, 3.3));
   EXPECT_GT(mapper.applyMapUpdate(away).dissociated.size(), 20u);
+}
+
+// What the back end makes of a plane may fit none of the keyframes that saw it: then it is several surfaces.
+TEST(Points, LeaveAPlaneWhoseObservationsDisagreeAndComeBack) {
+  const World w = world();
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  PlaneMapper mapper({}, camera.camera, camera.noise);
+  const Associations found = associate(w, &camera, &mapper, 0, 16);
+  PlaneId wall = 0;
+  for (const PlaneEstimate& p : mapper.planes())
+    if (p.kind == PlaneKind::kVertical && std::abs(p.plane.d - 3) < 0.01) wall = p.id;
+  ASSERT_TRUE(wall);
+  std::size_t on_wall = 0;
+  for (const auto& [id, plane] : found.plane) on_wall += plane == wall;
+  ASSERT_GT(on_wall, 50u);
+  MapUpdate update;
+  update.planes.emplace_back(wall, Plane({-1, 0, 0}, 3.0));
+  EXPECT_EQ(mapper.applyMapUpdate(update).dissociated.size(), 0u);
+  update.planes.back().second = Plane({-1, 0, 0}, 3.03);
+  EXPECT_EQ(mapper.applyMapUpdate(update).dissociated.size(), on_wall);
+  update.planes.back().second = Plane({-1, 0, 0}, 3.0);
+  mapper.applyMapUpdate(update);
+  const Associations again = associate(w, &camera, &mapper, 8, 4);
+  std::size_t back = 0;
+  for (const auto& [id, plane] : again.plane) back += plane == wall;
+  EXPECT_GT(back, on_wall / 2);
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <unordered_map>
 
 #include "homography_hosts.h"
-#include "plane_noise.h"
 #include "vip_slam_backend/solver/robust.h"
+#include "vip_slam_core/geometry/plane_noise.h"
 
 namespace vip_slam {
 namespace {

@@ -223,6 +223,15 @@ void PointAssociation::removePlane(PlaneId plane) {
   }
 }
 
+void PointAssociation::releaseFrom(PlaneId plane) {
+  for (LandmarkId id : landmarksOf(plane)) {
+    Landmark& landmark = landmarks_.at(id);
+    if (landmark.plane != plane) continue;
+    setPlane(id, &landmark, 0);
+    landmark.tested = 0;
+  }
+}
+
 void PointAssociation::clear() {
   landmarks_.clear();
   on_plane_.clear();

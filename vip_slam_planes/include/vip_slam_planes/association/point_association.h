@@ -38,6 +38,8 @@ class PointAssociation {
 
   void renamePlane(PlaneId from, PlaneId into);
   void removePlane(PlaneId id);
+  /// The points of a plane that may be none leave it; they stay its candidates.
+  void releaseFrom(PlaneId id);
   void clear();
 
   /// Changes since the last call.

@@ -22,11 +22,15 @@ struct PlaneMisfit {
   double misfit;
 };
 
-/// Factors on the information of single planes, on top of that. What passes for one plane may be several surfaces: fronts
-/// of boxes on a shelf, a hand's breadth apart, a few degrees turned. Each keyframe sees other parts of it, and what is
-/// wrong with the plane is wrong with most of its observations. So its variance, in units of the map's typical misfit, is
-/// a variable of its own with a prior, which makes its misfits jointly Student's t. By index of plane; 1 for those that
-/// are not mentioned and for all with too few observations to tell.
+/// Factors on the information of single planes, on top of that. What passes for one plane may be several surfaces:
+/// fronts of boxes on a shelf, a hand's breadth apart, a few degrees turned. Each keyframe sees other parts of it, and
+/// what is wrong with the plane is wrong with most of its observations. So its variance, in units of the map's typical
+/// misfit, is a variable of its own with a prior, which makes its misfits jointly Student's t. By index of plane; 1 for
+/// those that are not mentioned and for all with too few observations to tell.
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
+
+/// Whether each plane, by index, is one surface: not when its median misfit is ten times what is typical of the map.
+/// (Single keyframes that saw something else beside it say nothing about the plane.) All are with too few observations.
+std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-#include "plane_noise.h"
+#include "vip_slam_core/geometry/plane_noise.h"
 
 #include <algorithm>
 #include <utility>
@@ -16,12 +16,22 @@ constexpr double kMedian = 2.366;  // of a chi square with three degrees of free
 constexpr double kLeast = 1.0, kMost = 25.0;
 // A plane is believed as if four observations had shown that it is one.
 constexpr double kPlaneFreedom = 12.0;
+// Observations that tell of a plane whether it is one, and by how much they must be worse than the map's.
+constexpr std::size_t kLeastOfPlane = 4;
+constexpr double kDisagrees = 10.0;
 
 /// By which the typical misfit exceeds what the noise model expects; it is below 1 / kMost with exact points only.
 double typicalMisfit(std::vector<double> misfits) {
   const auto middle = misfits.begin() + misfits.size() / 2;
   std::nth_element(misfits.begin(), middle, misfits.end());
   return std::max(*middle / kMedian, 1.0 / kMost);
+}
+
+double typicalMisfit(const std::vector<PlaneMisfit>& misfits) {
+  std::vector<double> all;
+  all.reserve(misfits.size());
+  for (const PlaneMisfit& m : misfits) all.push_back(m.misfit);
+  return typicalMisfit(std::move(all));
 }
 
 }  // namespace
@@ -46,10 +56,7 @@ double planeInformationScale(std::vector<double> misfits) {
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes) {
   std::vector<double> weights(planes, 1.0);
   if (misfits.size() < kLeastObservations) return weights;
-  std::vector<double> all;
-  all.reserve(misfits.size());
-  for (const PlaneMisfit& m : misfits) all.push_back(m.misfit);
-  const double unit = typicalMisfit(std::move(all));
+  const double unit = typicalMisfit(misfits);
   std::vector<double> expected(planes, kPlaneFreedom), found(planes, kPlaneFreedom);
   for (const PlaneMisfit& m : misfits) {
     expected[m.plane] += 3.0;
@@ -57,6 +64,17 @@ std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::s
   }
   for (std::size_t p = 0; p < planes; ++p) weights[p] = std::min(1.0, expected[p] / found[p]);
   return weights;
+}
+
+std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size_t planes) {
+  std::vector<char> agree(planes, 1);
+  if (misfits.size() < kLeastObservations) return agree;
+  const double unit = typicalMisfit(misfits);
+  std::vector<std::vector<double>> own(planes);
+  for (const PlaneMisfit& m : misfits) own[m.plane].push_back(m.misfit);
+  for (std::size_t p = 0; p < planes; ++p)
+    agree[p] = own[p].size() < kLeastOfPlane || typicalMisfit(std::move(own[p])) < kDisagrees * unit;
+  return agree;
 }
 
 }  // namespace vip_slam

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "../../src/optimisation/plane_noise.h"
+#include "vip_slam_core/geometry/plane_noise.h"
 
 using namespace vip_slam;
 
@@ -85,6 +85,8 @@ TEST(PlaneNoise, WhatIsNoPlaneCountsForLess) {
     EXPECT_GT(weights[8], 0.3);
     EXPECT_LT(weights[9], 0.03);
     EXPECT_EQ(weights[10], 1.0);  // seen by nobody
+    const std::vector<char> agree = planesAgree(misfits, 12);
+    for (int plane = 0; plane < 12; ++plane) EXPECT_EQ(agree[plane] != 0, plane != 9) << unit << " " << plane;
   }
   EXPECT_EQ(planeWeights({{0, 1000.0}, {0, 1000.0}}, 1)[0], 1.0);  // too few to tell
 }
