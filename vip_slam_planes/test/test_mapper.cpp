@@ -215,6 +215,22 @@ TEST(Mapper, ASmallPieceOfCeilingBelongsToTheCeiling) {
   }
 }
 
+// Two keyframes that saw one end of it first stand a little too low.
+TEST(Mapper, ACeilingWhoseEndsMeetIsOne) {
+  for (const double off : {0.025, 0.07}) {
+    Rig rig;
+    Scene scene;
+    scene.add({0, -1.5, 2.5}, {7, 0, 0}, {0, 3, 0});
+    for (int i = 0; i < 2; ++i) {
+      const Eigen::Vector3d eye(3.6, 0.4 * i - 0.2, 1.2), target(6.2, 0, 2.5);
+      const Eigen::Vector3d down(0, 0, off);
+      rig.place(rig.camera.keyframe(scene, lookAt(eye, target)), lookAt(eye - down, target - down));
+    }
+    for (double x = -1; x < 2.9; x += 0.4) rig.look(scene, {x, 0, 1.2}, {x + 0.8, 0, 2.5});
+    EXPECT_EQ(off < 0.05 ? 1u : 2u, rig.mapper.planes().size()) << off;
+  }
+}
+
 TEST(Mapper, APlaneWaitsForASecondSightingWhileNobodyLooks) {
   Rig rig;
   Scene scene;

@@ -12,6 +12,8 @@ constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
 constexpr double kPartition = 0.5;  // m^2; free-standing walls and doors, of which something hides the middle
 constexpr double kNoTable = 20.0;  // m^2; what lies level with so large a surface is more of it, not a second table
 constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
+// Ceilings are seen at the flattest angles and from afar, and nothing as wide hangs less than this below another one.
+constexpr double kCeilingSlack = 1.5;  // of max_rms
 constexpr double kSmallGap = 4.0;  // a smaller piece of a wall may be as many of its own widths away
 constexpr double kCloser = 4.0;    // as many times as far apart when they agree as many times better
 
@@ -145,7 +147,8 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
   // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
   if (shared > options.overlap && meeting.separation < 0.5 * options.distance) return true;
   if (shared > 2 * options.overlap && !shownApart(small, large, poses, 0.5 * options.distance)) return true;
-  return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, options.max_rms);
+  const double slack = options.max_rms * (ceiling ? kCeilingSlack : 1.0);
+  return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, slack);
 }
 
 }  // namespace vip_slam
