@@ -48,8 +48,9 @@ TEST(PlaneNoise, MisfitIsDistanceAndTiltWithoutScatter) {
 TEST(PlaneNoise, WeightsFollowTheAgreement) {
   std::mt19937 random(2);
   const auto scaleOf = [&](double scatter, int observations) {
-    std::vector<double> misfits;
-    for (int k = 0; k < observations; ++k) misfits.push_back(planeMisfit(observation(0, 0, scatter, &random), kPlane));
+    std::vector<PlaneMisfit> misfits;
+    for (int k = 0; k < observations; ++k)
+      misfits.push_back({0, planeMisfit(observation(0, 0, scatter, &random), kPlane)});
     return planeInformationScale(misfits);
   };
   EXPECT_NEAR(scaleOf(kSigma / 3, 1000), 9.0, 1.0);
@@ -61,9 +62,9 @@ TEST(PlaneNoise, WeightsFollowTheAgreement) {
 
 TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {
   std::mt19937 random(3);
-  std::vector<double> misfits;
+  std::vector<PlaneMisfit> misfits;
   for (int k = 0; k < 1000; ++k)
-    misfits.push_back(planeMisfit(observation(k % 5 ? 0 : 0.03, 0, kSigma / 3, &random), kPlane));
+    misfits.push_back({0, planeMisfit(observation(k % 5 ? 0 : 0.03, 0, kSigma / 3, &random), kPlane)});
   const double scale = planeInformationScale(misfits);
   EXPECT_GT(scale, 5.0);
   EXPECT_LT(scale, 9.0);

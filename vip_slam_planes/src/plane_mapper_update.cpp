@@ -82,17 +82,16 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
 }
 
+// What passes for one plane may be several surfaces, such as the fronts of boxes on a shelf.
 void PlaneMapper::Impl::judgeAgreement() {
   std::vector<PlaneMisfit> misfits;
   std::size_t index = 0;
   for (const auto& [id, track] : tracks_) {
-    Eigen::Vector4d plane_W;
-    plane_W << track.plane().n, track.plane().d;
     for (const auto& [keyframe, observation] : track.observations()) {
       const auto pose = poses_.find(keyframe);
       if (pose == poses_.end()) continue;
-      misfits.push_back(
-          {static_cast<int>(index), planeMisfit(observation.G, pose->second.matrix().transpose() * plane_W)});
+      const Plane plane_C = transformPlane(pose->second.inverse(), track.plane());
+      misfits.push_back({static_cast<int>(index), planeMisfit(observation.G, plane_C.coefficients())});
     }
     ++index;
   }

@@ -204,9 +204,7 @@ std::vector<PlaneFactorBuilder::DepthBlock> PlaneFactorBuilder::collectDepthBloc
       const auto plane = planes_.find(observation.first);
       if (plane == planes_.end()) continue;
       const Plane& parameters = problem.planes[plane->second].plane;
-      Eigen::Vector4d plane_W;
-      plane_W << parameters.n, parameters.d;
-      const Eigen::Vector4d plane_C = T_W_C.transpose() * plane_W;
+      const Eigen::Vector4d plane_C = T_W_C.transpose() * parameters.coefficients();
       PlaneGate gate(observation.second, plane_C);
       if (!gate.all() && gate.kept().empty()) continue;
       const Eigen::Matrix4d G = gate.G();
@@ -221,14 +219,11 @@ void PlaneFactorBuilder::addDepthBlocks() {
   if (planes_.empty()) return;
   BaProblem& problem = built_->problem;
   const std::vector<DepthBlock> blocks = collectDepthBlocks();
-  std::vector<double> misfits;
-  std::vector<PlaneMisfit> of_planes;
-  for (const DepthBlock& block : blocks) {
-    misfits.push_back(block.misfit);
-    of_planes.push_back({block.plane, block.misfit});
-  }
-  const double map_scale = planeInformationScale(std::move(misfits));
-  const std::vector<double> weights = planeWeights(of_planes, problem.planes.size());
+  std::vector<PlaneMisfit> misfits;
+  misfits.reserve(blocks.size());
+  for (const DepthBlock& block : blocks) misfits.push_back({block.plane, block.misfit});
+  const double map_scale = planeInformationScale(misfits);
+  const std::vector<double> weights = planeWeights(misfits, problem.planes.size());
   // Keyframes that are constants: one block per plane in the world, seen from a fixed frame at the origin.
   std::map<int, BaPointToPlane> outside;
   for (const DepthBlock& block : blocks) {

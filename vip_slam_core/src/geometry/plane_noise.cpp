@@ -13,14 +13,14 @@ constexpr double kMedian = 2.366;  // of a chi square with three degrees of free
 // A sigma shrinks to a fifth at most: planes and poses are fitted to the same points, so that a map of few planes
 // agrees with itself too well. It does not grow: with a camera that bends its depth that would take away what holds
 // the map.
-constexpr double kLeast = 1.0, kMost = 25.0;
+constexpr double kMost = 25.0;
 // A plane is believed as if four observations had shown that it is one.
 constexpr double kPlaneFreedom = 12.0;
 // Observations that tell of a plane whether it is one, and by how much they must be worse than the map's.
 constexpr std::size_t kLeastOfPlane = 4;
 constexpr double kDisagrees = 10.0;
 
-/// By which the typical misfit exceeds what the noise model expects; it is below 1 / kMost with exact points only.
+/// The median misfit, in units of what the noise model expects; below 1 / kMost points agree with themselves too well.
 double typicalMisfit(std::vector<double> misfits) {
   const auto middle = misfits.begin() + misfits.size() / 2;
   std::nth_element(misfits.begin(), middle, misfits.end());
@@ -48,9 +48,8 @@ double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C) {
   return weight * distance * distance + std::max(0.0, tilt);
 }
 
-double planeInformationScale(std::vector<double> misfits) {
-  if (misfits.size() < kLeastObservations) return 1.0;
-  return std::clamp(1.0 / typicalMisfit(std::move(misfits)), kLeast, kMost);
+double planeInformationScale(const std::vector<PlaneMisfit>& misfits) {
+  return misfits.size() < kLeastObservations ? 1.0 : std::max(1.0, 1.0 / typicalMisfit(misfits));
 }
 
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes) {

@@ -11,16 +11,17 @@ namespace vip_slam {
 /// and the best plane through the points behind G: what the points' own scatter leaves out.
 double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C);
 
-/// Factor on the information of all point-to-plane blocks. A depth camera's floor of systematic error is a figure that
-/// many cameras keep far below and some exceed, and the points of one image share it, so that it does not average out:
-/// the map itself tells. The factor brings the median of the observations' misfits to that of a chi square with three
-/// degrees of freedom. 1 with too few observations to tell.
-double planeInformationScale(std::vector<double> misfits);
-
+/// Of one keyframe's observation of a plane, which is named by an index.
 struct PlaneMisfit {
   int plane;
   double misfit;
 };
+
+/// Factor on the information of all point-to-plane blocks. A depth camera's floor of systematic error is a figure that
+/// many cameras keep far below and some exceed, and the points of one image share it, so that it does not average out:
+/// the map itself tells. The factor brings the median of the observations' misfits to that of a chi square with three
+/// degrees of freedom. 1 with too few observations to tell.
+double planeInformationScale(const std::vector<PlaneMisfit>& misfits);
 
 /// Factors on the information of single planes, on top of that. What passes for one plane may be several surfaces:
 /// fronts of boxes on a shelf, a hand's breadth apart, a few degrees turned. Each keyframe sees other parts of it, and

@@ -1,0 +1,50 @@
+// Test support: the whole plane module with poses that are given as a back end would give them.
+#pragma once
+
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "scene.h"
+#include "vip_slam_planes/plane_mapper.h"
+
+namespace vip_slam {
+namespace testing {
+
+class Rig {
+ public:
+  explicit Rig(double noise_scale = 1.0, PlaneMapperOptions options = {})
+      : camera(testing::quietNoise(), noise_scale), mapper(options, camera.camera, camera.noise) {}
+
+  PlaneUpdate look(const Scene& scene, const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
+    return place(camera.keyframe(scene, lookAt(eye, target)), lookAt(eye, target));
+  }
+  /// A keyframe that the back end puts at T_W_C, wherever it was taken.
+  PlaneUpdate place(const std::shared_ptr<Keyframe>& keyframe, const SE3& T_W_C, const MapUpdate& base = {}) {
+    mapper.addKeyframe(keyframe);
+    MapUpdate update = updateFor(*keyframe, T_W_C);
+    update.landmarks = base.landmarks;
+    update.planes = base.planes;
+    poses[keyframe->id] = T_W_C;
+    return mapper.applyMapUpdate(update);
+  }
+  const PlaneEstimate* find(const Plane& truth, double max_d = 0.02) const {
+    for (const PlaneEstimate& p : mapper.planes()) {
+      if (p.plane.n.dot(truth.n) > std::cos(0.02) && std::abs(p.plane.d - truth.d) < max_d) return &p;
+    }
+    return nullptr;
+  }
+
+  SceneCamera camera;
+  PlaneMapper mapper;
+  std::map<KeyframeId, SE3> poses;
+};
+
+inline Scene room() {
+  Scene scene;
+  scene.addRoom({-3, -2.5, 0}, {3, 2.5, 2.6});
+  return scene;
+}
+
+}  // namespace testing
+}  // namespace vip_slam

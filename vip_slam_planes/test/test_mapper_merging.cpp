@@ -1,0 +1,207 @@
+// Which pieces the plane module takes for one surface, on exact scenes.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "rig.h"
+
+namespace vip_slam {
+namespace {
+
+using testing::lookAt;
+using testing::Rig;
+using testing::Scene;
+
+TEST(Mapper, DoorBeforeTheWallStaysTwoWhateverTheView) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  scene.add({2.88, -0.5, 0}, {0, 1, 0}, {0, 0, 2.1});
+  for (int i = 0; i < 8; ++i) rig.look(scene, {0.2, -1.4 + 0.4 * i, 1.4}, {3, 0.3 * (i - 4), 1.2});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3.0), 0.004));
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 2.88), 0.004));
+  EXPECT_NEAR(2.1, rig.find(Plane({-1, 0, 0}, 2.88))->area, 0.35);
+}
+
+TEST(Mapper, CorridorWallSeenFromBothEndsBecomesOne) {
+  Rig rig;
+  Scene scene;
+  scene.add({-6, 1, 0}, {12, 0, 0}, {0, 0, 2.5});
+  // Each end looks at its own half first; what lies between comes last. The far end has drifted by 2.5 cm.
+  const auto at = [&](double x, double target_x, double drift) {
+    const SE3 truth = lookAt({x, -1, 1.3}, {target_x, 1, 1.2});
+    const auto keyframe = rig.camera.keyframe(scene, truth);
+    return rig.place(keyframe, SE3(truth.rotation(), truth.t() + Eigen::Vector3d(0, drift, 0)));
+  };
+  at(-5, -5, 0);
+  at(-4.6, -4.6, 0);
+  at(5, 5, 0.025);
+  at(4.6, 4.6, 0.025);
+  EXPECT_EQ(2u, rig.mapper.planes().size());
+  const PlaneId oldest = rig.mapper.planes().front().id;
+  std::vector<PlaneMerge> merges;
+  for (double x = -4; x <= 4.1; x += 0.8) {
+    const PlaneUpdate update = at(x, x, 0.0125 + x / 4 * 0.0125);
+    merges.insert(merges.end(), update.merges.begin(), update.merges.end());
+  }
+  ASSERT_EQ(1u, rig.mapper.planes().size());
+  EXPECT_EQ(oldest, rig.mapper.planes().front().id);
+  ASSERT_EQ(1u, merges.size());
+  EXPECT_EQ(oldest, merges.front().into);
+  EXPECT_GT(rig.mapper.planes().front().area, 20);
+}
+
+TEST(Mapper, FarPiecesOfOneWallAreOneButNotThoseOfTwo) {
+  for (const double step : {0.0, 0.05}) {
+    Rig rig;
+    Scene scene;
+    scene.add({-7, 1, 0}, {3, 0, 0}, {0, 0, 2.5});
+    scene.add({4, 1 + step, 0}, {3, 0, 0}, {0, 0, 2.5});  // eight metres further on
+    for (int i = 0; i < 4; ++i) rig.look(scene, {-6 + 0.3 * i, -1.5, 1.3}, {-6 + 0.4 * i, 1, 1.2});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {5 + 0.3 * i, -1.5, 1.3}, {5 + 0.4 * i, 1, 1.2});
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+    ASSERT_TRUE(rig.find(Plane({0, -1, 0}, 1), 0.004)) << step;
+    if (step == 0) EXPECT_GE(rig.find(Plane({0, -1, 0}, 1))->polygons.size(), 2u);
+  }
+}
+
+TEST(Mapper, TheFurtherApartTheBetterPiecesOfOneWallMustAgree) {
+  for (const double step : {0.0, 0.018}) {
+    Rig rig(0.3);
+    Scene scene;
+    scene.add({-4, 1, 0}, {3, 0, 0}, {0, 0, 2.5});
+    scene.add({4.2, 1 + step, 0}, {0.6, 0, 0}, {0, 0, 2.1});  // 5.2 m further on, 1.26 m^2
+    for (int i = 0; i < 4; ++i) rig.look(scene, {-2.5 + 0.3 * i, -1.5, 1.3}, {-2.5 + 0.3 * i, 1, 1.2});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {4.3 + 0.1 * i, -1.5, 1.3}, {4.5, 1, 1.1});
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
+TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
+  for (const double step : {0.0, 0.04}) {
+    Rig rig;
+    Scene scene;
+    scene.add({-4, 1, 0}, {3, 0, 0}, {0, 0, 1.4});
+    scene.add({0.8, 1 + step, 0}, {0.4, 0, 0}, {0, 0, 1.4});  // 1.8 m further on, 0.56 m^2
+    for (int i = 0; i < 4; ++i) rig.look(scene, {-2.5 + 0.2 * i, -1.5, 1.3}, {-2.5 + 0.2 * i, 1, 0.9});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {1 + 0.1 * i, -1.2, 1.3}, {1.2, 1, 0.9});
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
+TEST(Mapper, APartitionWhoseMiddleIsHiddenIsOneButCupboardsAreTwo) {
+  struct Case {
+    double height, step;
+    std::size_t planes;
+  };
+  for (const Case& c : {Case{2.0, 0.0, 1}, Case{2.0, 0.03, 2}, Case{0.9, 0.0, 2}}) {
+    Rig rig(0.5);
+    Scene scene;
+    scene.add({-0.8, 1, 0}, {0.4, 0, 0}, {0, 0, c.height});  // 0.8 m^2
+    scene.add({0.4, 1 + c.step, 0}, {0.4, 0, 0}, {0, 0, c.height});
+    for (int i = 0; i < 6; ++i) rig.look(scene, {-0.5 + 0.2 * i, -1.5, 1.3}, {-0.2 + 0.1 * i, 1, 1.0});
+    EXPECT_EQ(c.planes, rig.mapper.planes().size()) << c.height << " m high, " << c.step << " m apart";
+  }
+}
+
+TEST(Mapper, ASmallPieceOfFloorBelongsToAFloorThatNoTableIsAsLargeAs) {
+  for (const double step : {0.0, 0.04}) {
+    Rig rig;
+    Scene scene;
+    scene.add({0, -3, 0}, {5, 0, 0}, {0, 6, 0});
+    scene.add({6.5, -0.7, step}, {1.2, 0, 0}, {0, 1.4, 0});  // 1.5 m further on, 1.7 m^2
+    for (double y = -2; y <= 2; y += 0.4) {
+      rig.look(scene, {0.5, y, 1.4}, {2.5, y, 0});
+      rig.look(scene, {2.5, y, 1.4}, {4.5, y, 0});
+    }
+    for (int i = 0; i < 4; ++i) rig.look(scene, {5.2, 0.1 * i, 1.4}, {7.1, 0, step});
+    ASSERT_GT(rig.mapper.planes().front().area, 20.0);
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
+TEST(Mapper, ASmallPieceOfCeilingBelongsToTheCeiling) {
+  for (const double step : {0.0, 0.04}) {
+    Rig rig;
+    Scene scene;
+    scene.add({0, -1.5, 2.5}, {2, 0, 0}, {0, 3, 0});
+    scene.add({6.5, -0.4, 2.5 - step}, {0.9, 0, 0}, {0, 0.9, 0});  // 4.5 m further on, 0.8 m^2
+    for (double y = -1; y <= 1; y += 0.4) rig.look(scene, {-1.0, y, 1.2}, {1.0, y, 2.5});
+    for (int i = 0; i < 6; ++i) rig.look(scene, {5.2, 0.1 * i - 0.2, 1.2}, {6.9, 0, 2.5 - step});
+    ASSERT_GT(rig.mapper.planes().front().area, 4.0);
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
+  }
+}
+
+// Two keyframes that saw one end of it first stand a little too low.
+TEST(Mapper, ACeilingWhoseEndsMeetIsOne) {
+  for (const double off : {0.025, 0.07}) {
+    Rig rig;
+    Scene scene;
+    scene.add({0, -1.5, 2.5}, {7, 0, 0}, {0, 3, 0});
+    for (int i = 0; i < 2; ++i) {
+      const Eigen::Vector3d eye(3.6, 0.4 * i - 0.2, 1.2), target(6.2, 0, 2.5);
+      const Eigen::Vector3d down(0, 0, off);
+      rig.place(rig.camera.keyframe(scene, lookAt(eye, target)), lookAt(eye - down, target - down));
+    }
+    for (double x = -1; x < 2.9; x += 0.4) rig.look(scene, {x, 0, 1.2}, {x + 0.8, 0, 2.5});
+    EXPECT_EQ(off < 0.05 ? 1u : 2u, rig.mapper.planes().size()) << off;
+  }
+}
+
+TEST(Mapper, TablesOfOneHeightStayTwo) {
+  Rig rig;
+  Scene scene;
+  scene.add({1.0, -1.8, 0.75}, {1.0, 0, 0}, {0, 1.4, 0});
+  scene.add({1.0, 0.4, 0.75}, {1.0, 0, 0}, {0, 1.4, 0});
+  for (int i = 0; i < 4; ++i) rig.look(scene, {-0.3, -1.1 + 0.1 * i, 1.5}, {1.5, -1.1, 0.75});
+  for (int i = 0; i < 4; ++i) rig.look(scene, {-0.3, 1.1 + 0.1 * i, 1.5}, {1.5, 1.1, 0.75});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  for (const PlaneEstimate& table : rig.mapper.planes()) EXPECT_NEAR(-0.75, table.plane.d, 0.004);
+}
+
+TEST(Mapper, BothFacesOfAThinWallAreTwo) {
+  Rig rig;
+  Scene scene;
+  scene.add({0, -2, 0}, {0, 4, 0}, {0, 0, 2.5});
+  scene.add({0.08, -2, 0}, {0, 4, 0}, {0, 0, 2.5});
+  for (int i = 0; i < 3; ++i) rig.look(scene, {-2, 0.2 * i, 1.3}, {0, 0, 1.3});
+  for (int i = 0; i < 3; ++i) rig.look(scene, {2, 0.2 * i, 1.3}, {0, 0, 1.3});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 0), 0.004));
+  EXPECT_TRUE(rig.find(Plane({1, 0, 0}, -0.08), 0.004));
+}
+
+TEST(Mapper, OneWallMappedTwiceBecomesOneWhenTheLoopCloses) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  // The second visit has drifted by 40 cm: two planes until the correction.
+  for (int visit = 0; visit < 2; ++visit) {
+    for (int i = 0; i < 3; ++i) {
+      const SE3 truth = lookAt({0, -0.5 + 0.4 * i, 1.4}, {3, -0.5 + 0.4 * i, 1.3});
+      const SE3 drifted(truth.rotation(), truth.t() - Eigen::Vector3d(0.4 * visit, 0, 0));
+      rig.place(rig.camera.keyframe(scene, truth), drifted);
+    }
+  }
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  const PlaneId oldest = rig.mapper.planes()[0].id, newest = rig.mapper.planes()[1].id;
+  MapUpdate update;
+  update.global = true;
+  for (const auto& [id, T] : rig.poses) {
+    KeyframeEstimate k;
+    k.id = id;
+    k.state.T_W_I = SE3(T.rotation(), T.t() + Eigen::Vector3d(id > 3 ? 0.4 : 0.0, 0, 0));
+    update.keyframes.push_back(k);
+  }
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+  ASSERT_EQ(1u, result.planes.size());
+  ASSERT_EQ(1u, result.merges.size());
+  EXPECT_EQ(newest, result.merges[0].from);
+  EXPECT_EQ(oldest, result.merges[0].into);
+  EXPECT_NEAR(3.0, result.planes[0].plane.d, 0.004);
+}
+
+}  // namespace
+}  // namespace vip_slam
