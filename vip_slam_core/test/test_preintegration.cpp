@@ -3,6 +3,8 @@
 
 #include <random>
 
+#include <Eigen/Eigenvalues>
+
 #include "vip_slam_core/imu/preintegration.h"
 #include "vip_slam_core/testing/analytic_motion.h"
 #include "vip_slam_core/testing/numeric_jacobian.h"
@@ -204,6 +206,30 @@ TEST(Preintegration, WhiteningIsUpperTriangularAndInvertsTheCovariance) {
   const Matrix15d& W = pre.sqrtInformation();
   EXPECT_EQ(W.triangularView<Eigen::StrictlyLower>().toDenseMatrix().norm(), 0);
   EXPECT_LT((W * pre.covariance() * W.transpose() - Matrix15d::Identity()).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(Preintegration, ASingleStepHasAnInverse) {
+  // Between two images within a gap of the IMU there is the line from one sample to the next, nothing else.
+  for (const double dt : {1e-3, 0.05, 1.0}) {
+    const std::vector<ImuSample> step = {{5.0, Eigen::Vector3d(0.3, -0.2, 0.5), Eigen::Vector3d(0.5, 1, 9.6)},
+                                         {5.0 + dt, Eigen::Vector3d(-0.1, 0.4, 0.2), Eigen::Vector3d(-1, 0.2, 9.9)}};
+    std::vector<ImuSample> fine;
+    for (int k = 0; k <= 16; ++k) {
+      const double f = k / 16.0;
+      fine.push_back({5.0 + f * dt, (1 - f) * step[0].gyro + f * step[1].gyro,
+                      (1 - f) * step[0].accel + f * step[1].accel});
+    }
+    const Preintegration pre(step, kBg, kBa, ImuNoise()), exact(fine, kBg, kBa, ImuNoise());
+    const Matrix15d& W = pre.sqrtInformation();
+    EXPECT_LT((W * pre.covariance() * W.transpose() - Matrix15d::Identity()).cwiseAbs().maxCoeff(), 1e-6) << dt;
+    EXPECT_NEAR(pre.dt(), dt, 1e-12);
+    // As sure as the same time in many steps, no surer: in whitened units neither sees the other far from unity.
+    const Matrix15d relative = exact.sqrtInformation() * pre.covariance() * exact.sqrtInformation().transpose();
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix15d>(relative).eigenvalues().minCoeff(), 0.5) << dt;
+    EXPECT_LT(Eigen::SelfAdjointEigenSolver<Matrix15d>(relative).eigenvalues().maxCoeff(), 1.5) << dt;
+    EXPECT_LT((pre.beta() - exact.beta()).norm(), 2e-2 * dt) << dt;
+    EXPECT_LT((pre.alpha() - exact.alpha()).norm(), 2e-2 * dt) << dt;
+  }
 }
 
 TEST(Preintegration, BadInput) {

@@ -395,6 +395,28 @@ TEST_F(FrontEndTest, LongImuGapRestartsWithItsReason) {
   EXPECT_EQ(front_end_.counters().restarts, 1u);
 }
 
+TEST_F(FrontEndTest, ImagesWithinAnImuGapStopNothing) {
+  // Between them the IMU is a straight line from the sample before the gap to the one after it.
+  for (const double gap : {0.3, 1.0}) {
+    FrontEnd front_end(options(), sensor());
+    FrameOutput output;
+    for (int k = 0; k <= 120; ++k) {
+      const double t = 0.05 * k;
+      if (k == 0) imu_t_ = 0;
+      for (; imu_t_ < t + 0.02; imu_t_ += 0.005) front_end.addImu(World::imu(imu_t_));
+      if (k == 60) {
+        imu_t_ += gap;
+        front_end.addImu(World::imu(imu_t_));
+        imu_t_ += 0.005;
+      }
+      ASSERT_NO_THROW(output = front_end.process({t, world_.image(t), World::depth(t)})) << t;
+    }
+    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << gap << ' ' << output.frame->status.reason;
+    EXPECT_EQ(front_end.counters().imu_gaps, 1u);
+    EXPECT_EQ(front_end.counters().restarts, gap < 0.5 ? 0u : 1u);
+  }
+}
+
 TEST_F(FrontEndTest, StandsStillForAMinuteUnderNoise) {
   const cv::Mat clean = world_.image(0.0);
   cv::RNG random(3);

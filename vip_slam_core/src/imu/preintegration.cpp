@@ -65,6 +65,17 @@ Step integrateStep(const ImuSample& first, const ImuSample& second, const Eigen:
   return step;
 }
 
+// One step's noise is one vector for velocity and position alike, so that the covariance of a single step has no inverse.
+// Two images within a gap of the IMU have no more than that between them: the line between the samples is then taken
+// in two steps, which is the same motion.
+std::vector<ImuSample> halved(const std::vector<ImuSample>& step) {
+  ImuSample middle;
+  middle.t = 0.5 * (step[0].t + step[1].t);
+  middle.gyro = 0.5 * (step[0].gyro + step[1].gyro);
+  middle.accel = 0.5 * (step[0].accel + step[1].accel);
+  return {step[0], middle, step[1]};
+}
+
 // Upper-triangular W with W^T W = covariance^-1: Cholesky of the reversed matrix, so nothing is inverted twice.
 Matrix15d sqrtInformationOf(const Matrix15d& covariance) {
   const Matrix15d reversed = covariance.reverse();
@@ -78,12 +89,15 @@ Matrix15d sqrtInformationOf(const Matrix15d& covariance) {
 
 }  // namespace
 
-Preintegration::Preintegration(const std::vector<ImuSample>& samples, const Eigen::Vector3d& bias_gyro,
+Preintegration::Preintegration(const std::vector<ImuSample>& given, const Eigen::Vector3d& bias_gyro,
                                const Eigen::Vector3d& bias_accel, const ImuNoise& noise)
     : bias_gyro_(bias_gyro), bias_accel_(bias_accel) {
-  if (samples.size() < 2) {
-    throw std::invalid_argument("preintegration: " + std::to_string(samples.size()) + " samples, expected at least 2");
+  if (given.size() < 2) {
+    throw std::invalid_argument("preintegration: " + std::to_string(given.size()) + " samples, expected at least 2");
   }
+  std::vector<ImuSample> halves;
+  if (given.size() == 2) halves = halved(given);
+  const std::vector<ImuSample>& samples = halves.empty() ? given : halves;
   // One matrix carries the bias Jacobians (its columns b_g, b_a) and propagates the covariance.
   Matrix15d J = Matrix15d::Identity();
   covariance_.setZero();
