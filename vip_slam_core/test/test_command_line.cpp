@@ -59,6 +59,13 @@ TEST(CommandLine, AListOptionLeavesTheArgumentBehindItAloneWhenRepeatedWithEqual
   EXPECT_EQ(p.bag, "x.bag");
 }
 
+TEST(CommandLine, WhatRoslaunchAddsIsNotTheUsers) {
+  const Parsed p = parse({"x.bag", "--out", "dir", "__name:=tool", "__log:=/tmp/tool.log"});
+  EXPECT_FALSE(p.status) << p.messages;
+  EXPECT_EQ(p.bag, "x.bag");
+  EXPECT_EQ(p.out, "dir");
+}
+
 TEST(CommandLine, HelpShowsPurposeArgumentsAndDefaults) {
   const Parsed p = parse({"--help"});
   EXPECT_EQ(p.status.value_or(-1), 0);

@@ -151,6 +151,8 @@ TEST_F(FileFormats, PlaneErrorsNamePlaneAndKey) {
   changed("normal: [", "normal: [0, ", "normal");
   changed("planes:", "flats:", "planes");
   changed("planes:", "planes: [", "line");
+  write("summary.yaml", "bag: x.bag\nplanes: 12\n");
+  expectRefused([&] { readPlanesYaml(path("summary.yaml")); }, "summary.yaml", "planes: expected a list");
   expectRefused([&] { readPlanesYaml(path("missing.yaml")); }, "missing.yaml", "cannot be read");
 }
 

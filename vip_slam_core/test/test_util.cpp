@@ -12,6 +12,7 @@
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/bounded_queue.h"
 #include "vip_slam_core/util/options.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_core/util/timing.h"
 
 namespace vip_slam {
@@ -106,6 +107,19 @@ TEST(Options, RefusalsNameKeyValueAndExpectation) {
   EXPECT_NE(unknown.find("did you mean 'inner/radius'"), std::string::npos) << unknown;
   // All or nothing: the good value before the bad one is not kept.
   EXPECT_NE(refusal({{"count", "500"}, {"mode", "slow"}}), "accepted");
+}
+
+TEST(Options, ANameWithNothingInCommonIsNotSuggested) {
+  EXPECT_EQ(refusal({{"xyz", "3"}}).find("did you mean"), std::string::npos) << refusal({{"xyz", "3"}});
+}
+
+TEST_F(Files, AnOutputFolderIsMadeAndTried) {
+  prepareOutputFolder(path("a/b"));
+  EXPECT_TRUE(std::filesystem::is_empty(path("a/b")));
+  std::ofstream(path("file")) << "x";
+  EXPECT_THROW(prepareOutputFolder(path("file")), std::runtime_error);
+  EXPECT_THROW(prepareOutputFolder("/proc/vip_slam"), std::runtime_error);
+  EXPECT_THROW(prepareOutputFolder("/proc"), std::runtime_error);  // there, but nobody can write into it
 }
 
 TEST_F(Files, OptionsFromYaml) {

@@ -60,12 +60,18 @@ void CommandLine::printHelp() const {
 }
 
 std::optional<int> CommandLine::parse(int argc, const char* const* argv) const {
+  // roslaunch adds __name:=... and __log:=... to what a launch file gives a program.
+  std::vector<std::string> arguments;
+  for (int k = 1; k < argc; ++k) {
+    const std::string argument = argv[k];
+    if (argument.rfind("__", 0) != 0 || argument.find(":=") == std::string::npos) arguments.push_back(argument);
+  }
   try {
     po::options_description all;
     all.add(visible_).add(hidden_);
     po::variables_map values;
     // Guessing would let today's abbreviation mean something else tomorrow.
-    po::command_line_parser parser(argc, argv);
+    po::command_line_parser parser(arguments);
     parser.options(all).positional(positional_).extra_style_parser(takeNegativeNumber);
     parser.style(po::command_line_style::default_style & ~po::command_line_style::allow_guessing);
     po::store(parser.run(), values);

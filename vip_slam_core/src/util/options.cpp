@@ -136,6 +136,8 @@ void OptionSetter::finish() const {
         nearest = &name;
       }
     }
+    // With every letter exchanged any name would do.
+    if (best >= values_[k].first.size()) nearest = nullptr;
     throw std::invalid_argument((source_.empty() ? "" : source_ + ": ") + "unknown option '" + values_[k].first + "'" +
                                 (nearest ? ", did you mean '" + *nearest + "'?" : ""));
   }
