@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 
@@ -267,6 +268,8 @@ StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string
 StoredMap loadMapFile(const std::string& path, const ImuNoise& noise) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   if (!in) throw std::runtime_error(path + ": cannot be opened, expected a map file");
+  // A folder opens, and claims to be as long as can be.
+  if (std::filesystem::is_directory(path)) throw std::runtime_error(path + ": is a folder, expected a map file");
   std::string bytes(static_cast<std::size_t>(std::max<std::streamoff>(0, in.tellg())), '\0');
   in.seekg(0);
   in.read(&bytes[0], static_cast<std::streamsize>(bytes.size()));

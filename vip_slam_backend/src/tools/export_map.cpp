@@ -1,37 +1,56 @@
 // rosrun vip_slam_backend export_map MAP.vsm --out DIR: keyframe trajectory (TUM), planes (YAML), points (PLY and PCD).
+#include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <string>
 
 #include "vip_slam_backend/map_io/map_file.h"
 #include "vip_slam_backend/map_io/point_files.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
+#include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
+
+namespace {
+
+using namespace vip_slam;
+
+/// In the order of their stamps: sessions follow each other in id, not always in time, and TUM wants ascending stamps.
+Trajectory keyframePoses(const Map& map) {
+  Trajectory poses;
+  for (const auto& [id, keyframe] : map.keyframes()) poses.push_back({keyframe.data->frame.t, keyframe.state.T_W_I});
+  const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.t < b.t; };
+  std::stable_sort(poses.begin(), poses.end(), earlier);
+  // Two sessions over one recording have the same stamps.
+  const auto same = [](const StampedPose& a, const StampedPose& b) { return a.t == b.t; };
+  poses.erase(std::unique(poses.begin(), poses.end(), same), poses.end());
+  return poses;
+}
+
+void exportMap(const std::string& file, const std::string& folder) {
+  const StoredMap stored = loadMapFile(file, ImuNoise());
+  prepareOutputFolder(folder);
+  writeTum(folder + "/keyframes.tum", keyframePoses(stored.map));
+  std::vector<PlaneEstimate> planes;
+  for (const auto& entry : stored.map.planes()) planes.push_back(entry.second.estimate);
+  writePlanesYaml(folder + "/planes.yaml", planes);
+  writePointsPly(folder + "/points.ply", stored.map);
+  writePointsPcd(folder + "/points.pcd", stored.map);
+  std::printf("%zu keyframes, %zu planes, %zu points in %s\n", stored.map.keyframes().size(), planes.size(),
+              stored.map.landmarks().size(), folder.c_str());
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
-  using namespace vip_slam;
-  if (argc != 4 || std::string(argv[2]) != "--out") {
-    std::fprintf(stderr, "usage: export_map MAP.vsm --out DIR\n");
-    return 2;
-  }
+  vip_slam::CommandLine line("export_map", "Writes what a stored map holds: keyframes.tum, planes.yaml, points.ply, "
+                                           "points.pcd.");
+  std::string map, out;
+  line.argument("map", map, "map.vsm of a run");
+  line.option("out", out, "folder for the files; made when it does not exist");
+  line.required("out");
+  if (const auto status = line.parse(argc, argv)) return *status;
   try {
-    const StoredMap stored = loadMapFile(argv[1], ImuNoise());
-    const std::string folder = argv[3];
-    std::filesystem::create_directories(folder);
-    Trajectory trajectory;
-    for (const auto& entry : stored.map.keyframes()) {
-      const double t = entry.second.data->frame.t;
-      // Sessions follow each other in id, not always in time; TUM wants ascending stamps.
-      if (trajectory.empty() || t > trajectory.back().t) trajectory.push_back({t, entry.second.state.T_W_I});
-    }
-    writeTum(folder + "/keyframes.tum", trajectory);
-    std::vector<PlaneEstimate> planes;
-    for (const auto& entry : stored.map.planes()) planes.push_back(entry.second.estimate);
-    writePlanesYaml(folder + "/planes.yaml", planes);
-    writePointsPly(folder + "/points.ply", stored.map);
-    writePointsPcd(folder + "/points.pcd", stored.map);
-    std::printf("%zu keyframes, %zu planes, %zu points in %s\n", stored.map.keyframes().size(), planes.size(),
-                stored.map.landmarks().size(), folder.c_str());
+    exportMap(map, out);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "export_map: %s\n", error.what());
     return 1;
