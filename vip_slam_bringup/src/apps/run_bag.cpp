@@ -15,6 +15,7 @@
 #include "vip_slam_bringup/runner/progress_bar.h"
 #include "vip_slam_bringup/runner/run_output.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_ros/sensor_files.h"
 
 namespace {
@@ -43,8 +44,8 @@ void addArguments(vip_slam::CommandLine& line, Arguments& arguments) {
   line.flag("no-report", arguments.no_report, "leave report.html out");
   line.option("params", arguments.parameters, "YAML file with options, in groups");
   line.option("set", arguments.settings, "one option as group/key=value; repeatable");
-  line.option("start", arguments.start, "seconds to skip at the beginning");
-  line.option("duration", arguments.duration, "seconds to process");
+  line.option("start", arguments.start, "seconds to skip at the beginning", vip_slam::between(0.0, 1e6));
+  line.option("duration", arguments.duration, "seconds to process; default: to the end", vip_slam::above(0.0));
 }
 
 std::string onOff(const std::string& name, const std::string& text) {
@@ -85,7 +86,7 @@ int run(const Arguments& arguments) {
   reading.start = arguments.start;
   reading.duration = arguments.duration;
   vip_slam::BagReader reader(arguments.bag, sensor, reading);
-  std::filesystem::create_directories(arguments.out);
+  vip_slam::prepareOutputFolder(arguments.out);
 
   vip_slam::TimingLog timing;
   vip_slam::Pipeline pipeline(options, sensor, &timing);
@@ -121,8 +122,12 @@ int run(const Arguments& arguments) {
   for (std::size_t i = 0; i < std::min<std::size_t>(warnings.size(), 8); ++i)
     std::fprintf(stderr, "run_bag: warning: %s\n", warnings[i].c_str());
   if (warnings.size() > 8) std::fprintf(stderr, "run_bag: %zu more warnings in summary.yaml\n", warnings.size() - 8);
-  if (pipeline.odometry().empty() && !g_interrupted)
-    std::fprintf(stderr, "run_bag: no image has a pose; check_bag tells what is wrong with the data\n");
+  if (pipeline.odometry().empty() && !g_interrupted) {
+    const auto& states = pipeline.states();
+    std::fprintf(stderr, "run_bag: no image has a pose%s%s%s%s; check_bag tells what is wrong with the data\n",
+                 states.empty() ? "" : " (", states.empty() ? "" : trackingStateName(states.back().status.state),
+                 states.empty() ? "" : ": ", states.empty() ? "" : (states.back().status.reason + ")").c_str());
+  }
   return pipeline.odometry().empty() ? 2 : 0;
 }
 

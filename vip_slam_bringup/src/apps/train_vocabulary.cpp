@@ -17,8 +17,10 @@
 #include "vip_slam_backend/place_recognition/vocabulary_trainer.h"
 #include "vip_slam_bringup/runner/progress_bar.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_frontend/tracking/corner_detector.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
+#include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/image_decoding.h"
 
 namespace {
@@ -58,7 +60,7 @@ bool isDepth(const sensor_msgs::Image& image) {
 /// Every picture of the colour topics that lies at least `every` seconds after the one before.
 void describeBag(const std::string& path, double every, const Describer& describe, Images* images) {
   rosbag::Bag bag;
-  bag.open(path, rosbag::bagmode::Read);
+  vip_slam::openBag(path, &bag);
   std::map<std::string, double> last;
   for (const auto& message : rosbag::View(bag)) {
     const double t = message.getTime().toSec();
@@ -133,15 +135,19 @@ int main(int argc, char** argv) {
   line.argument("inputs", inputs, "bags, pictures, folders of pictures");
   line.option("out", out, "vocabulary file to write");
   line.required("out");
-  line.option("every", every, "seconds between pictures taken from a bag");
-  line.option("corners", corners, "ORB corners per picture beside the tracked ones");
-  line.option("branching", options.branching, "children per node");
-  line.option("levels", options.levels, "levels of the tree");
-  line.option("min-descriptors", options.min_descriptors, "nodes with fewer descriptors are not split");
+  line.option("every", every, "seconds between pictures taken from a bag; 0: every picture",
+              vip_slam::between(0.0, 1e6));
+  line.option("corners", corners, "ORB corners per picture beside the tracked ones", vip_slam::between(0, 100000));
+  line.option("branching", options.branching, "children per node", vip_slam::between(2, 255));
+  line.option("levels", options.levels, "levels of the tree", vip_slam::between(1, 10));
+  line.option("min-descriptors", options.min_descriptors, "nodes with fewer descriptors are not split",
+              vip_slam::between(1, 1 << 30));
   line.option("seed", options.seed, "of the random choice of first centres");
   if (const auto status = line.parse(argc, argv)) return *status;
   cv::setNumThreads(1);
   try {
+    const std::string folder = std::filesystem::path(out).parent_path().string();
+    vip_slam::prepareOutputFolder(folder.empty() ? "." : folder);
     return train(inputs, out, every, corners, options);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "train_vocabulary: %s\n", error.what());

@@ -6,6 +6,7 @@
 #include <topic_tools/shape_shifter.h>
 
 #include "vip_slam_bringup/preflight/recorder.h"
+#include "vip_slam_ros/bag_files.h"
 
 namespace vip_slam {
 namespace {
@@ -39,7 +40,8 @@ std::vector<std::string> topicsOf(const SensorConfig& sensor) {
 
 Recording recordBag(const std::string& path, const SensorConfig& sensor, double image_seconds) {
   try {
-    rosbag::Bag bag(path);
+    rosbag::Bag bag;
+    openBag(path, &bag);
     Recorder recorder(sensor, false, image_seconds);
     std::map<std::string, std::string> topics;
     for (const rosbag::ConnectionInfo* connection : rosbag::View(bag).getConnections())
@@ -50,8 +52,7 @@ Recording recordBag(const std::string& path, const SensorConfig& sensor, double 
     recorder.finish();
     return recorder.recording();
   } catch (const rosbag::BagException& e) {
-    throw std::runtime_error(path + ": cannot be read as a bag: " + e.what() +
-                             " (an unfinished recording may be repaired by 'rosbag reindex')");
+    throw std::runtime_error(path + ": the bag breaks off: " + e.what() + "; rosbag reindex may mend it");
   }
 }
 

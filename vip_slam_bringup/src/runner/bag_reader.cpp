@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <set>
 #include <stdexcept>
 
@@ -13,6 +14,7 @@
 #include <sensor_msgs/Imu.h>
 
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/image_decoding.h"
@@ -26,6 +28,21 @@ std::string join(const std::set<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text.empty() ? "none" : text;
+}
+
+/// Whether a depth image holds next to nothing that the sensor could have measured, judged on some of its pixels.
+bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise) {
+  constexpr int kStep = 8;
+  constexpr double kNothing = 0.01;
+  std::size_t all = 0, inside = 0;
+  for (int v = 0; v < metres.rows; v += kStep) {
+    for (int u = 0; u < metres.cols; u += kStep) {
+      const float z = metres.at<float>(v, u);
+      ++all;
+      inside += noise.inRange(z);
+    }
+  }
+  return double(inside) < kNothing * double(all);
 }
 
 std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
@@ -56,14 +73,7 @@ struct BagReader::Source {
   std::shared_ptr<const CameraModel> color_camera, depth_camera;  // only for depth that is not registered
 
   void open(const std::string& path) {
-    try {
-      bag.open(path, rosbag::bagmode::Read);
-    } catch (const rosbag::BagUnindexedException&) {
-      throw std::runtime_error(path + ": the bag has no index (the recording was cut off); run: rosbag reindex " +
-                               path);
-    } catch (const std::exception& error) {
-      throw std::runtime_error(path + ": not a readable bag: " + error.what());
-    }
+    openBag(path, &bag);
     if (rosbag::View(bag).size() == 0) throw std::runtime_error(path + ": an empty bag");
   }
 
@@ -89,7 +99,11 @@ struct BagReader::Source {
         throw std::runtime_error(bag.getFileName() + ": topic " + topic + " is " + message.getDataType() +
                                  ", expected sensor_msgs/CameraInfo");
       }
-      return intrinsicsFromCameraInfo(*info);
+      try {
+        return intrinsicsFromCameraInfo(*info);
+      } catch (const std::exception& error) {
+        throw std::runtime_error(bag.getFileName() + ": topic " + topic + ": " + error.what());
+      }
     }
     throw std::runtime_error(bag.getFileName() + ": topic " + topic +
                              ": no camera_info in the bag; name the right topic " +
@@ -162,7 +176,15 @@ void BagReader::read() {
     }
   };
 
+  const cv::Size calibrated(sensor_.camera.width, sensor_.camera.height);
+  const auto compareWithCalibration = [&](const cv::Mat& image) {
+    if (image.size() == calibrated) return;
+    if (++counters_["images_of_wrong_size"] > 1) return;
+    warnings_.push_back("topic " + topics.color + ": images are " + sizeText(image.size()) +
+                        ", the calibration is for " + sizeText(calibrated) + ": they cannot be used");
+  };
   cv::Size color_size;
+  std::size_t depth_images = 0, without_any = 0;
   const auto compareSizes = [&](const cv::Mat& depth) {
     if (color_size.empty() || depth.size() == color_size || !complained.insert("sizes").second) return;
     warnings_.push_back("topic " + topics.depth + ": depth is " + sizeText(depth.size()) + ", the colour images are " +
@@ -179,6 +201,7 @@ void BagReader::read() {
       decode(message, [&] {
         const cv::Mat image = gray(message);
         color_size = image.size();
+        compareWithCalibration(image);
         pairer.addColor(stampOf(message), image);
       });
     } else if (topic == topics.depth) {
@@ -188,6 +211,8 @@ void BagReader::read() {
           depth = registerDepth(depth, *source_->depth_camera, *source_->color_camera, sensor_.T_color_depth.matrix());
         }
         compareSizes(depth);
+        ++depth_images;
+        without_any += holdsNoDepth(depth, sensor_.depth_noise);
         pairer.addDepth(stampOf(message), depth);
       });
     } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
@@ -218,6 +243,17 @@ void BagReader::read() {
                         std::to_string(paired + alone) + " colour images have no depth within " +
                         std::to_string(std::lround(1e3 * options_.pairing.tolerance)) +
                         " ms: switch on the driver's synchronisation, or equal rates");
+  if (2 * without_any > depth_images) {
+    char range[60];
+    std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);
+    warnings_.push_back("topic " + topics.depth + ": " + std::to_string(without_any) + " of " +
+                        std::to_string(depth_images) + " depth images hold nothing within " + range +
+                        ", the sensor file's range: wrong depth/scale, emitter off, wrong topic?");
+  }
+  if (const std::size_t backward = pairer.counters().backward; backward > 0)
+    warnings_.push_back(std::to_string(backward) +
+                        " images are left out: their stamps repeat or precede the one before (a bag that was joined, " +
+                        "or recorded while another was played in a loop?)");
   counters_["image_pairs"] = pairer.counters().pairs;
   counters_["images_without_depth"] = pairer.counters().without_depth;
   counters_["unused_depth_images"] = pairer.counters().unused_depth;

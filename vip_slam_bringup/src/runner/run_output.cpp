@@ -93,6 +93,9 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   const FrontEndCounters& c = pipeline.frontEnd().counters();
   if (c.imu_gaps > 0) all.push_back(std::to_string(c.imu_gaps) + " gaps in the IMU; a long one restarts the odometry");
   if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
+  if (c.imu_rejected > 0)
+    all.push_back(std::to_string(c.imu_rejected) +
+                  " IMU messages are left out: not finite, or not newer than the one before");
   if (pipeline.images() == 0) all.push_back("no image could be used");
   if (pipeline.mapping()) {
     const auto& refusals = pipeline.mapping()->refusals();

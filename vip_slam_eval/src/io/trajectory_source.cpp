@@ -10,6 +10,8 @@
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 
+#include "vip_slam_ros/bag_files.h"
+
 namespace vip_slam {
 namespace {
 
@@ -50,7 +52,7 @@ bool usable(const geometry_msgs::Pose& pose) {
 
 Trajectory readBag(const std::string& path, const std::string& wanted, std::vector<PoseWithCovariance>* covariances) {
   rosbag::Bag bag;
-  bag.open(path, rosbag::bagmode::Read);
+  openBag(path, &bag);
   const std::string topic = chooseTopic(bag, path, wanted);
   Trajectory trajectory;
   rosbag::View view(bag, rosbag::TopicQuery(topic));
