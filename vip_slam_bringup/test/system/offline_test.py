@@ -72,6 +72,15 @@ class OfflineTest(unittest.TestCase):
         self.assertLess(error.max(), 0.05)
         self.assertTrue(filecmp.cmp(stored, os.path.join(self.folder, 'e', 'map.vsm'), shallow=False))
 
+    def test_05_the_launch_file_does_the_same(self):
+        out = os.path.join(self.folder, 'f')
+        subprocess.run(['roslaunch', 'vip_slam_bringup', 'offline.launch', 'bag:=' + self.data + '/smoke.bag',
+                        'sensor:=' + self.data + '/smoke_sensor.yaml', 'out:=' + out, 'loop:=false'],
+                       check=True, timeout=120)
+        self.assertFalse(self.summary('f')['loop_closing'])
+        self.assertTrue(filecmp.cmp(os.path.join(self.folder, 'a', 'odometry.tum'), os.path.join(out, 'odometry.tum'),
+                                    shallow=False))
+
 
 if __name__ == '__main__':
     rostest.rosrun('vip_slam_bringup', 'offline_test', OfflineTest)
