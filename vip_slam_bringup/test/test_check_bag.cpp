@@ -1,6 +1,7 @@
 // check_bag against bags with one fault each: the fault is found, named, and nothing else is called an error.
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -81,6 +82,10 @@ TEST_F(CheckBag, DepthOfAnotherSizeUnitOrTime) {
   options_.depth_unit_factor = 1;
   options_.depth_skew = 0.014;
   expectFound(check(), Severity::kWarning, "colour and depth", "14.0 ms after");
+  options_.depth_skew = 0;
+  options_.depth_unit_factor = 10;
+  expectFound(check(), Severity::kError, "depth image", "the sensor file uses 0.2");
+  options_.depth_unit_factor = 1;
   options_.depth_skew = 5.0;
   expectFound(check(), Severity::kError, "colour and depth", "");
 }
@@ -102,11 +107,19 @@ TEST_F(CheckBag, ImuGaps) {
   expectFound(findings, Severity::kError, "IMU", "gaps");
 }
 
+TEST_F(CheckBag, AHoleIsNoQuietTime) {
+  options_.imu_hole_at = 1.0;
+  options_.imu_hole = 0.7;
+  for (const Finding& f : check()) EXPECT_FALSE(f.about == "gravity" && f.severity > Severity::kNote) << f.text;
+}
+
 TEST_F(CheckBag, UnitsOfTheImu) {
   options_.accel_factor = 1 / 9.81;
   expectFound(check(), Severity::kError, "gravity", "in g");
   options_.accel_factor = 1.06;
   expectFound(check(), Severity::kWarning, "gravity", "10.40 m/s^2");
+  options_.accel_factor = -1;
+  expectFound(check(), Severity::kWarning, "gravity", "upside down");
   options_.accel_factor = 1;
   options_.gravity = false;
   expectFound(check(), Severity::kError, "gravity", "taken out");
@@ -156,6 +169,46 @@ TEST_F(CheckBag, FramesInTf) {
 TEST_F(CheckBag, TimeThatRunsBackwards) {
   options_.late_jump = -1.0;
   expectFound(check(), Severity::kError, "IMU", "time runs backwards");
+}
+
+TEST_F(CheckBag, StreamsThatDoNotCoverEachOther) {
+  test_support::writeDriverBag(path_, options_);
+  const Recording whole = recordBag(path_, expected_, 60);
+  Recording stopped = whole;  // the IMU ends after a third
+  stopped.imu.stamps.resize(stopped.imu.stamps.size() / 3);
+  expectFound(checkRates(stopped), Severity::kError, "IMU", "before the others");
+  Recording other_clock = whole;
+  for (double& t : other_clock.imu.stamps) t += 1000;
+  expectFound(checkRates(other_clock), Severity::kError, "IMU", "no time in common with the colour image");
+  Recording short_one = whole;
+  short_one.color.stamps.resize(1);
+  expectFound(checkRates(short_one), Severity::kError, "colour image", "1 messages in all");
+}
+
+TEST_F(CheckBag, ImagesThatShowNothing) {
+  test_support::writeDriverBag(path_, options_);
+  Recording recording = recordBag(path_, expected_, 60);
+  ASSERT_FALSE(recording.brightness.empty());
+  for (BrightnessSample& sample : recording.brightness) sample = {3, 0.5};
+  expectFound(checkImages(recording), Severity::kError, "colour image", "shows nothing");
+  for (DepthSample& sample : recording.depths) sample = {1, 1, 1.5, 0};
+  expectFound(checkImages(recording), Severity::kError, "depth image", "every pixel says 1.5 m");
+}
+
+TEST_F(CheckBag, CalibrationOfTheSensorFile) {
+  expected_.intrinsics_from_camera_info = false;
+  expectFound(check(), Severity::kError, "camera", "the images are 320x240");
+  options_.width = options_.height = 0;
+  expected_.camera.fx *= 1.1;
+  expectFound(check(), Severity::kWarning, "camera", "camera_info fx");
+}
+
+TEST_F(CheckBag, ValuesThatAreNoNumbersAreNotTakenForADelay) {
+  test_support::writeDriverBag(path_, options_);
+  Recording recording = recordBag(path_, expected_, 60);
+  for (std::size_t k = 0; k < recording.gyro_samples.size(); k += 7) recording.gyro_samples[k].value.x() = std::nan("");
+  expectFound(checkImu(recording), Severity::kError, "gyroscope", "not numbers");
+  EXPECT_NEAR(estimateMotion(recording).time_offset, expected_.time_offset, 0.002);
 }
 
 TEST_F(CheckBag, UnreadableBag) {

@@ -54,6 +54,75 @@ void checkCamera(const std::string& role, const StreamRecord& info, const Camera
                     words("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
 }
 
+/// The calibration of the sensor file against the images, and against camera_info where there is one.
+void checkSensorFileCamera(const Recording& r, Findings* out) {
+  const CameraIntrinsics& camera = r.sensor.camera;
+  if (r.color.sizes.size() == 1 && *r.color.sizes.begin() != std::make_pair(camera.width, camera.height))
+    out->push_back({Severity::kError, "camera",
+                    "the sensor file says " + sizeText({camera.width, camera.height}) + ", the images are " +
+                        sizeText(*r.color.sizes.begin()),
+                    "calibrate for the resolution that is recorded"});
+  const CameraIntrinsics& info = r.color_camera;
+  if (info.width == camera.width && info.height == camera.height &&
+      (std::abs(info.fx / camera.fx - 1) > 0.02 || std::abs(info.fy / camera.fy - 1) > 0.02 ||
+       std::abs(info.cx - camera.cx) > 0.02 * camera.width || std::abs(info.cy - camera.cy) > 0.02 * camera.width))
+    out->push_back({Severity::kWarning, "camera",
+                    words("the sensor file says fx %.1f, fy %.1f, cx %.1f, cy %.1f, camera_info fx %.1f, fy %.1f, "
+                          "cx %.1f, cy %.1f",
+                          camera.fx, camera.fy, camera.cx, camera.cy, info.fx, info.fy, info.cx, info.cy),
+                    "the sensor file's are used; set intrinsics_from_camera_info when the driver is calibrated"});
+}
+
+void checkBrightness(const std::vector<BrightnessSample>& samples, Findings* out) {
+  if (samples.empty()) return;
+  std::vector<double> mean, spread;
+  for (const BrightnessSample& s : samples) {
+    mean.push_back(s.mean);
+    spread.push_back(s.spread);
+  }
+  if (median(spread) < 2)
+    out->push_back({Severity::kError, "colour image",
+                    words("shows nothing: all pixels about %.0f of 255", median(mean)),
+                    "lens cap, exposure, or a wrong encoding?"});
+  else if (median(mean) < 15)
+    out->push_back({Severity::kWarning, "colour image", words("is dark: %.0f of 255 on average", median(mean)),
+                    "more light or exposure"});
+}
+
+void checkDepth(const Recording& r, Findings* out) {
+  std::vector<double> valid, usable, middle, spread;
+  for (const DepthSample& d : r.depths) {
+    valid.push_back(d.valid);
+    usable.push_back(d.usable);
+    spread.push_back(d.spread);
+    if (d.valid > 0) middle.push_back(d.median);
+  }
+  const double share = median(valid);
+  const DepthNoise& noise = r.sensor.depth_noise;
+  if (middle.empty() || share < 0.02) {
+    out->push_back(
+        {Severity::kError, "depth image", "holds almost no depth", "emitter off, wrong topic, or out of range?"});
+    return;
+  }
+  const double z = median(middle);
+  if (z < 0.05 || z > 50)
+    out->push_back({Severity::kError, "depth image", words("median depth is %.4g m", z),
+                    "depth scale or encoding in the sensor file is wrong (millimetres against metres?)"});
+  else if (median(usable) < 0.02)
+    out->push_back({Severity::kError, "depth image",
+                    words("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range,
+                          noise.max_range),
+                    "depth scale or depth_noise/max_range in the sensor file is wrong"});
+  else if (median(spread) < 1e-6)
+    out->push_back({Severity::kError, "depth image", words("every pixel says %.4g m", z), "the driver is broken"});
+  else if (share < 0.3)
+    out->push_back({Severity::kWarning, "depth image", words("only %.0f %% of the pixels have depth", 100 * share),
+                    "glass, sunlight or range? planes and scale suffer"});
+  else
+    out->push_back({Severity::kGood, "depth image",
+                    words("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
+}
+
 }  // namespace
 
 Findings checkImages(const Recording& r) {
@@ -62,6 +131,9 @@ Findings checkImages(const Recording& r) {
   checkEncoding("depth image", r.depth, r.sensor.depth_encoding, &out);
   if (r.sensor.intrinsics_from_camera_info)
     checkCamera("colour camera_info", r.color_info, r.color_camera, r.color_camera_error, r.color, true, &out);
+  else
+    checkSensorFileCamera(r, &out);
+  checkBrightness(r.brightness, &out);
   if (r.sensor.depth_registered && r.color.sizes.size() == 1 && r.depth.sizes.size() == 1) {
     const auto color = *r.color.sizes.begin(), depth = *r.depth.sizes.begin();
     if (color != depth)
@@ -77,29 +149,7 @@ Findings checkImages(const Recording& r) {
                      words("focal length is %.1f, that of colour %.1f", r.depth_camera.fx, r.color_camera.fx),
                      "the depth image is not registered to colour"});
   }
-  if (!r.depths.empty()) {
-    std::vector<double> valid, middle;
-    for (const DepthSample& d : r.depths) {
-      valid.push_back(d.valid);
-      if (d.valid > 0) middle.push_back(d.median);
-    }
-    const double share = median(valid);
-    if (middle.empty() || share < 0.02) {
-      out.push_back(
-          {Severity::kError, "depth image", "holds almost no depth", "emitter off, wrong topic, or out of range?"});
-    } else {
-      const double z = median(middle);
-      if (z < 0.05 || z > 50)
-        out.push_back({Severity::kError, "depth image", words("median depth is %.4g m", z),
-                       "depth scale or encoding in the sensor file is wrong (millimetres against metres?)"});
-      else if (share < 0.3)
-        out.push_back({Severity::kWarning, "depth image", words("only %.0f %% of the pixels have depth", 100 * share),
-                       "glass, sunlight or range? planes and scale suffer"});
-      else
-        out.push_back({Severity::kGood, "depth image",
-                       words("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
-    }
-  }
+  if (!r.depths.empty()) checkDepth(r, &out);
   return out;
 }
 

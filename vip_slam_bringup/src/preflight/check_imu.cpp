@@ -16,24 +16,43 @@ double spread(const std::vector<StampedVector>& samples, std::size_t begin, std:
   return std::sqrt(sum / double(end - begin));
 }
 
-/// Lengths of the mean specific force over the half seconds with the least motion (those about as quiet as the
+/// The mean specific force over the half seconds with the least motion (those about as quiet as the
 /// quietest, a fifth of all at most).
-std::vector<double> quietForces(const std::vector<StampedVector>& accel, double* least_spread) {
-  std::vector<std::pair<double, double>> windows;
+std::vector<Eigen::Vector3d> quietForces(const std::vector<StampedVector>& accel, double* least_spread) {
+  struct Window {
+    double spread;
+    Eigen::Vector3d force;
+  };
+  std::vector<Window> windows;
   std::size_t begin = 0;
   for (std::size_t i = 0; i < accel.size(); ++i) {
+    // Two samples across a gap are no quiet half second.
+    if (i > begin && std::abs(accel[i].t - accel[i - 1].t) > 0.1) begin = i;
     if (accel[i].t - accel[begin].t < 0.5) continue;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (std::size_t k = begin; k < i; ++k) mean += accel[k].value;
-    windows.emplace_back(spread(accel, begin, i), (mean / double(i - begin)).norm());
+    windows.push_back({spread(accel, begin, i), mean / double(i - begin)});
     begin = i;
   }
-  std::sort(windows.begin(), windows.end());
-  std::vector<double> out;
-  for (const auto& [window_spread, force] : windows)
-    if (window_spread <= 2 * windows.front().first + 0.02 && out.size() <= windows.size() / 5) out.push_back(force);
-  *least_spread = windows.empty() ? 0 : windows.front().first;
+  std::sort(windows.begin(), windows.end(), [](const Window& a, const Window& b) { return a.spread < b.spread; });
+  std::vector<Eigen::Vector3d> out;
+  for (const Window& window : windows)
+    if (window.spread <= 2 * windows.front().spread + 0.02 && out.size() <= windows.size() / 5)
+      out.push_back(window.force);
+  *least_spread = windows.empty() ? 0 : windows.front().spread;
   return out;
+}
+
+/// An accelerometer that reports gravity instead of the specific force against it turns the world upside down, and
+/// nothing else about it looks wrong.
+void checkUpright(const std::vector<Eigen::Vector3d>& forces, const SE3& T_imu_cam, Findings* out) {
+  double down = 0;  // of the image, against up
+  for (const Eigen::Vector3d& force : forces)
+    down += (T_imu_cam.R().transpose() * force).normalized().y() / double(forces.size());
+  if (down > 0.7)
+    out->push_back({Severity::kWarning, "gravity", "the accelerometer says that the camera is held upside down",
+                    "if it is not: the sign of the acceleration or T_imu_cam is wrong (lying still and level, the z "
+                    "axis that points up must show +9.81)"});
 }
 
 void checkGaps(const std::string& role, const std::vector<StampedVector>& samples, Findings* out) {
@@ -54,7 +73,8 @@ void checkGaps(const std::string& role, const std::vector<StampedVector>& sample
   if (gaps > 0)
     out->push_back({largest > 0.1 ? Severity::kError : Severity::kWarning, role,
                     words("%zu gaps, the largest %.0f ms at %.1f s", gaps, 1000 * largest, at),
-                    "the driver or the recording loses samples; a gap above 100 ms restarts the odometry"});
+                    "the driver or the recording loses samples; the odometry bridges short gaps with more noise and starts "
+                    "anew after long ones"});
   else
     out->push_back({Severity::kGood, role, words("no gaps, largest step %.1f ms", 1000 * largest), ""});
   if (1.0 / period < 90)
@@ -85,15 +105,17 @@ Findings checkImu(const Recording& r) {
   }
   if (!r.gyro_samples.empty()) {
     double largest = 0;
-    for (const auto& s : r.gyro_samples) largest = std::max(largest, s.value.norm());
+    for (const auto& s : r.gyro_samples) largest = std::max(largest, s.value.stableNorm());
     if (largest > 40)
-      out.push_back({Severity::kError, "gyroscope", words("rates up to %.0f", largest),
+      out.push_back({Severity::kError, "gyroscope", words("rates up to %.4g", largest),
                      "degrees a second? radians a second are expected"});
   }
   double least_spread = 0;
-  const std::vector<double> forces = quietForces(r.accel_samples, &least_spread);
+  const std::vector<Eigen::Vector3d> forces = quietForces(r.accel_samples, &least_spread);
   if (forces.empty()) return out;
-  const double g = median(forces);
+  std::vector<double> lengths;
+  for (const Eigen::Vector3d& force : forces) lengths.push_back(force.norm());
+  const double g = median(lengths);
   if (g > 0.85 && g < 1.15)
     out.push_back({Severity::kError, "gravity", words("%.2f when quiet: the accelerometer reports in g", g),
                    "multiply by 9.81 in the driver; m/s^2 are expected"});
@@ -105,6 +127,7 @@ Findings checkImu(const Recording& r) {
                    "calibrate the accelerometer (scale, bias)"});
   else
     out.push_back({Severity::kGood, "gravity", words("%.2f m/s^2 when quiet", g), ""});
+  if (g > 2.0) checkUpright(forces, r.sensor.T_imu_cam, &out);
   if (least_spread > 0.5)
     out.push_back({Severity::kNote, "start", "the sensor is never still",
                    "a second of standing still at the start helps the initialisation"});

@@ -18,7 +18,7 @@ class GyroIntegral {
  public:
   explicit GyroIntegral(const std::vector<StampedVector>& gyro) {
     for (const StampedVector& s : gyro) {
-      if (!t_.empty() && s.t <= t_.back()) continue;
+      if ((!t_.empty() && s.t <= t_.back()) || !s.value.allFinite()) continue;
       sum_.push_back(t_.empty() ? Eigen::Vector3d::Zero()
                                 : Eigen::Vector3d(sum_.back() + 0.5 * (s.t - t_.back()) * (s.value + last_)));
       t_.push_back(s.t);

@@ -52,6 +52,52 @@ std::string candidates(const Recording& r, const Wanted& w) {
                       : "of type " + w.types.front() + " " + where + ": " + list;
 }
 
+/// What to do about a topic of the wrong type.
+std::string adviceOnType(const Recording& r, const Wanted& w, const std::string& type) {
+  const std::string key = w.role == "colour image" ? "color/encoding" : "depth/encoding";
+  if (w.role.find("image") != std::string::npos && type == "sensor_msgs/CompressedImage")
+    return "set " + key + ": compressed in the sensor file";
+  if (w.role.find("image") != std::string::npos && type == "sensor_msgs/Image")
+    return "set " + key + " in the sensor file to what the driver publishes";
+  return candidates(r, w);
+}
+
+constexpr double kLate = 1.0;  // seconds by which a stream may begin later, or end earlier, than the others
+
+/// Streams that end before the others, begin after them, or have other clocks: each by itself looks well.
+void checkCoverage(const Recording& r, Findings* out) {
+  double begin = 1e300, end = -1e300;
+  std::vector<std::pair<std::string, std::pair<double, double>>> streams;
+  for (const Wanted& w : wanted(r)) {
+    if (!w.required || w.role.find("camera_info") != std::string::npos || w.stream->stamps.empty()) continue;
+    const auto [first, last] = std::minmax_element(w.stream->stamps.begin(), w.stream->stamps.end());
+    streams.push_back({w.role, {*first, *last}});
+    begin = std::min(begin, *first);
+    end = std::max(end, *last);
+  }
+  for (const auto& [role, span] : streams) {
+    for (const auto& [other, other_span] : streams) {
+      if (role >= other || (span.first <= other_span.second && other_span.first <= span.second)) continue;
+      const double apart = std::max(span.first - other_span.second, other_span.first - span.second);
+      out->push_back({Severity::kError, role,
+                      words("has no time in common with the %s, %.1f s lie between them", other.c_str(), apart),
+                      "the two streams use different clocks"});
+      return;
+    }
+  }
+  if (r.live) return;  // subscriptions come one after the other
+  for (const auto& [role, span] : streams) {
+    const double late = span.first - begin, early = end - span.second;
+    const Severity severity = std::max(late, early) > 0.1 * (end - begin) ? Severity::kError : Severity::kWarning;
+    if (late > kLate)
+      out->push_back({severity, role, words("begins %.1f s after the others", late),
+                      "started late, or stamped by another clock?"});
+    if (early > kLate)
+      out->push_back({severity, role, words("ends %.1f s before the others", early),
+                      "did the driver stop, or the disk fill up? or is it stamped by another clock?"});
+  }
+}
+
 }  // namespace
 
 Findings checkTopics(const Recording& r) {
@@ -67,7 +113,7 @@ Findings checkTopics(const Recording& r) {
       out.push_back({bad, w.role, "topic " + w.topic + " is not there", candidates(r, w)});
     } else if (std::find(w.types.begin(), w.types.end(), found->second) == w.types.end()) {
       out.push_back({bad, w.role, "topic " + w.topic + " has type " + found->second + ", expected " + w.types.front(),
-                     candidates(r, w)});
+                     adviceOnType(r, w, found->second)});
     } else if (w.stream->stamps.empty()) {
       out.push_back(
           {bad, w.role, "no message on " + w.topic, "is the driver running, and is this stream switched on?"});
@@ -83,7 +129,12 @@ Findings checkRates(const Recording& r) {
   Findings out;
   for (const Wanted& w : wanted(r)) {
     const auto& stamps = w.stream->stamps;
-    if (w.role.find("camera_info") != std::string::npos || stamps.size() < 3) continue;
+    if (w.role.find("camera_info") != std::string::npos || stamps.empty()) continue;
+    if (stamps.size() < 3) {
+      out.push_back({w.required ? Severity::kError : Severity::kNote, w.role,
+                     words("%zu messages in all", stamps.size()), "nothing can be told from so few"});
+      continue;
+    }
     std::size_t backward = 0, repeated = 0, lost = 0;
     double largest = 0, largest_at = 0;
     std::vector<double> steps;
@@ -140,6 +191,7 @@ Findings checkRates(const Recording& r) {
            words("stamps lie %.1f s %s the clock of this machine", std::abs(delay), delay > 0 ? "behind" : "ahead of"),
            "the driver stamps with the device's clock: set it to system or global time"});
   }
+  checkCoverage(r, &out);
   return out;
 }
 

@@ -1,6 +1,9 @@
 #include "vip_slam_bringup/preflight/recorder.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include <opencv2/core.hpp>
 
 #include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/depth/depth_image.h"
@@ -22,7 +25,12 @@ void note(StreamRecord* stream, double arrival, const Message& message) {
 Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds) : image_seconds_(image_seconds) {
   recording_.sensor = sensor;
   recording_.live = live;
-  if (!sensor.intrinsics_from_camera_info) rotation_ = std::make_unique<ImageRotation>(makeCamera(sensor.camera));
+  if (!sensor.intrinsics_from_camera_info) startRotation(sensor.camera);
+}
+
+void Recorder::startRotation(const CameraIntrinsics& camera) {
+  rotation_ = std::make_unique<ImageRotation>(makeCamera(camera));
+  rotation_size_ = cv::Size(camera.width, camera.height);
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message) {
@@ -74,7 +82,7 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   if (topic == topics.color_info) {
     take(&recording_.color_info, &recording_.color_camera, &recording_.color_camera_error);
     if (!rotation_ && recording_.color_camera.width > 0)
-      rotation_ = std::make_unique<ImageRotation>(makeCamera(recording_.color_camera));
+      startRotation(recording_.color_camera);
   }
   if (topic == topics.depth_info)
     take(&recording_.depth_info, &recording_.depth_camera, &recording_.depth_camera_error);
@@ -114,15 +122,23 @@ void Recorder::add(const std::string& topic, double, const tf2_msgs::TFMessage& 
 void Recorder::addDepth(double t, const cv::Mat& depth) {
   if (recording_.depth.stamps.size() % 5 == 1) {
     std::vector<double> values;
-    std::size_t all = 0;
+    std::size_t all = 0, usable = 0;
     for (int v = 0; v < depth.rows; v += 8)
       for (int u = 0; u < depth.cols; u += 8) {
         ++all;
         const float z = depth.at<float>(v, u);
         if (z > 0 && std::isfinite(z)) values.push_back(z);
+        usable += recording_.sensor.depth_noise.inRange(z);
       }
-    recording_.depths.push_back(
-        {double(values.size()) / std::max<std::size_t>(all, 1), values.empty() ? 0 : median(values)});
+    DepthSample sample;
+    sample.valid = double(values.size()) / double(std::max<std::size_t>(all, 1));
+    sample.usable = double(usable) / double(std::max<std::size_t>(all, 1));
+    if (!values.empty()) {
+      const auto [nearest, farthest] = std::minmax_element(values.begin(), values.end());
+      sample.spread = *farthest - *nearest;
+      sample.median = median(values);
+    }
+    recording_.depths.push_back(sample);
   }
   recent_depth_.push_back({t, depth});
   if (recent_depth_.size() > 12) recent_depth_.erase(recent_depth_.begin());
@@ -130,6 +146,11 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
 }
 
 void Recorder::addGray(double t, const cv::Mat& gray) {
+  if (recording_.color.stamps.size() % 5 == 1) {
+    cv::Scalar mean, sigma;
+    cv::meanStdDev(gray, mean, sigma);
+    recording_.brightness.push_back({mean[0], sigma[0]});
+  }
   waiting_gray_.push_back({t, gray});
   flushGray(false);
 }
@@ -142,8 +163,7 @@ void Recorder::flushGray(bool all) {
     for (const Stamped& d : recent_depth_)
       if (std::abs(d.t - gray.t) < 0.02 && d.image.size() == gray.image.size()) depth = &d.image;
     if (!depth && !all && waiting_gray_.size() < 4) return;
-    if (rotation_ && gray.image.cols == (recording_.color_camera.width > 0 ? recording_.color_camera.width
-                                                                           : recording_.sensor.camera.width))
+    if (rotation_ && gray.image.size() == rotation_size_)
       if (const auto step = rotation_->add(gray.t, gray.image, depth ? *depth : cv::Mat()))
         recording_.rotations.push_back(*step);
     waiting_gray_.erase(waiting_gray_.begin());

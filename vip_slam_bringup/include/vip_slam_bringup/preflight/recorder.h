@@ -38,11 +38,13 @@ class Recorder {
   void addDepth(double t, const cv::Mat& depth);
   void addGray(double t, const cv::Mat& gray);
   void flushGray(bool all);
+  void startRotation(const CameraIntrinsics& camera);
 
   Recording recording_;
   const double image_seconds_;
   double first_image_ = -1;
   std::unique_ptr<ImageRotation> rotation_;
+  cv::Size rotation_size_;  ///< of the camera that rotation_ has
   struct Stamped {
     double t;
     cv::Mat image;

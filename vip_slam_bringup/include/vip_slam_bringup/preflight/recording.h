@@ -36,8 +36,15 @@ struct RotationStep {
 };
 
 struct DepthSample {
-  double valid = 0;   ///< share of pixels with a value
-  double median = 0;  ///< metres, of those
+  double valid = 0;    ///< share of pixels with a value
+  double usable = 0;   ///< share of pixels within the sensor file's range
+  double median = 0;   ///< metres, of those with a value
+  double spread = 0;   ///< metres, between the nearest and the farthest of them
+};
+
+struct BrightnessSample {
+  double mean = 0;    ///< grey levels
+  double spread = 0;  ///< one sigma of the pixels, grey levels
 };
 
 struct TfEdge {
@@ -56,6 +63,7 @@ struct Recording {
   std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
   std::vector<RotationStep> rotations;
   std::vector<DepthSample> depths;
+  std::vector<BrightnessSample> brightness;  ///< of some colour images
   std::vector<TfEdge> tf;  ///< newest transform of each edge
 };
 
