@@ -50,7 +50,9 @@ def read_yaml(path):
 def read_planes(path):
     data = read_yaml(path)
     planes = []
-    for index, plane in enumerate((data or {}).get('planes') or []):
+    if data and (not isinstance(data, dict) or not isinstance(data.get('planes'), list)):
+        raise Unreadable('%s: planes: missing, expected a list' % path)
+    for index, plane in enumerate(data['planes'] if data else []):
         try:
             planes.append({
                 'id': int(plane['id']), 'kind': str(plane['kind']),
@@ -67,7 +69,7 @@ def read_planes(path):
 
 def read_timing(path):
     stages = {}
-    with open(path, encoding='utf-8', newline='') as file:
+    with open(path, encoding='utf-8', errors='replace', newline='') as file:
         for number, row in enumerate(csv.reader(file), 1):
             if number == 1 and row[:1] == ['stage'] or not row:
                 continue

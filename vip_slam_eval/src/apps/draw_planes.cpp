@@ -12,6 +12,7 @@
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_eval/plane_heights.h"
 #include "vip_slam_eval/plane_picture.h"
 #include "vip_slam_ros/sensor_files.h"
@@ -26,13 +27,21 @@ struct Arguments {
   bool heights = false;
 };
 
+void writePicture(const std::string& path, const cv::Mat& picture) {
+  std::vector<uchar> bytes;
+  if (!cv::imencode(".png", picture, bytes)) throw std::runtime_error(path + ": cannot be encoded as PNG");
+  AtomicFile file(path, true);
+  file.stream().write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.commit();
+}
+
 int draw(Arguments arguments) {
   SensorConfig sensor = loadSensorConfig(resolveSensor(arguments.sensor));
   BagReader reader(arguments.bag, sensor);
   const auto camera = makeCamera(sensor.camera);
   const Trajectory trajectory = readTum(arguments.trajectory);
   const std::vector<PlaneEstimate> planes = readPlanesYaml(arguments.planes);
-  std::filesystem::create_directories(arguments.out);
+  prepareOutputFolder(arguments.out);
   std::sort(arguments.times.begin(), arguments.times.end());
   std::size_t next = 0;
   int written = 0;
@@ -52,7 +61,7 @@ int draw(Arguments arguments) {
     char name[64];
     std::snprintf(name, sizeof name, "planes_%07.2f.png", pair->t - reader.beginTime());
     const std::string path = (std::filesystem::path(arguments.out) / name).string();
-    if (!cv::imwrite(path, picture)) throw std::runtime_error(path + ": cannot be written");
+    writePicture(path, picture);
     std::cout << path << "\n";
     ++written;
     while (next < arguments.times.size() && pair->t >= reader.beginTime() + arguments.times[next]) ++next;
@@ -64,7 +73,8 @@ int draw(Arguments arguments) {
     file.commit();
   }
   if (written == 0 && !arguments.times.empty()) {
-    throw std::runtime_error("no image with a pose at or after the given times");
+    throw std::runtime_error(arguments.trajectory + ": no pose for any image of " + arguments.bag +
+                             " at or after the given times");
   }
   return 0;
 }
@@ -81,12 +91,14 @@ int main(int argc, char** argv) {
   line.required("trajectory");
   line.option("planes", arguments.planes, "planes.yaml of the run");
   line.required("planes");
-  line.option("time", arguments.times, "seconds after the beginning of the bag; several make several pictures");
+  line.option("time", arguments.times, "seconds after the beginning of the bag; several make several pictures",
+              vip_slam::each(vip_slam::between(0.0, 1e6)));
   line.flag("heights", arguments.heights,
             "also print how the height of each level plane varies over the images, and write heights.csv");
   line.option("out", arguments.out, "folder for the pictures");
   line.required("out");
   if (const auto status = line.parse(argc, argv)) return *status;
+  if (arguments.times.empty() && !arguments.heights) return line.mistake("give --time, or --heights, or both");
   try {
     return draw(arguments);
   } catch (const std::exception& error) {

@@ -1,11 +1,11 @@
 // gba_benchmark --out DIR: the paper's Table III and its time-over-keyframes figure on a simulated map.
 #include <cstdio>
 #include <exception>
-#include <filesystem>
 #include <sstream>
 
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_eval/gba_benchmark/gba_benchmark.h"
 #include "vip_slam_eval/plot/line_plot.h"
 
@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
   line.flag("quick", quick, "the table only, not the figure over keyframes");
   if (const auto status = line.parse(argc, argv)) return *status;
   try {
-    std::filesystem::create_directories(out);
+    vip_slam::prepareOutputFolder(out);
     const SimulatedMap map = simulateMap(options);
     const Variant variants[] = {Variant::kVi, Variant::kViP, Variant::kViCp, Variant::kVip};
     std::ostringstream md;

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iostream>
 #include <set>
+#include <stdexcept>
 
 #include <Eigen/Geometry>
 
@@ -14,6 +15,7 @@
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/options.h"
+#include "vip_slam_ros/sensor_files.h"
 
 namespace {
 
@@ -21,6 +23,20 @@ using namespace vip_slam;
 
 constexpr double kRevisitSeconds = 30;
 constexpr double kWrongMetres = 0.3, kWrongAngle = 5 * M_PI / 180;
+
+/// A share in words; of nothing there is none.
+std::string percent(int part, int all) {
+  char text[16] = "-";
+  if (all > 0) std::snprintf(text, sizeof text, "%.1f %%", 100.0 * part / all);
+  return text;
+}
+
+TruePoses posesOf(const Map& map, const std::string& truth) {
+  const TruePoses poses = truePoses(map, readTum(truth));
+  if (poses.empty())
+    throw std::runtime_error(truth + ": no pose at the time of any keyframe of the map, expected the same clock");
+  return poses;
+}
 
 void judgeLoops(const StoredMap& stored, const TruePoses& truth) {
   int wrong = 0, judged = 0;
@@ -71,10 +87,10 @@ void judgeRevisits(const StoredMap& stored, const TruePoses& truth) {
     episode_found |= closed.count(entry.first) != 0;
   }
   endEpisode();
-  std::printf("revisiting keyframes %d, tied to the old ones %d (%.0f %%)\n", revisits, found,
-              revisits ? 100.0 * found / revisits : 100.0);
-  std::printf("revisits (runs of them) %d, closed %d (%.0f %%)\n", episodes, episodes_closed,
-              episodes ? 100.0 * episodes_closed / episodes : 100.0);
+  std::printf("revisiting keyframes %d, tied to the old ones %d (%s)\n", revisits, found,
+              percent(found, revisits).c_str());
+  std::printf("revisits (runs of them) %d, closed %d (%s)\n", episodes, episodes_closed,
+              percent(episodes_closed, episodes).c_str());
 }
 
 /// A place counts as mapped when a keyframe of the map within 2 m and 30 degrees shows half of what is seen there.
@@ -103,12 +119,12 @@ void judgeRelocalisation(const std::vector<RelocalisationTrial>& trials, bool li
                   trial.reason.c_str());
   }
   std::sort(errors.begin(), errors.end());
-  const auto percent = [](int part, int all) { return all ? 100.0 * part / all : 100.0; };
   std::printf("relocalisation: %zu trials, %d found, median error %.4f m, wrong (> 0.3 m or 5 deg) %d\n", trials.size(),
               found, errors.empty() ? 0 : errors[errors.size() / 2], wrong);
-  std::printf("trials at mapped places %d, within 1 s and 3 cm %d (%.1f %%)\n", mapped, right, percent(right, mapped));
-  std::printf("of these with %d corners of the map in view %d, within 1 s and 3 cm %d (%.1f %%)\n", kFewCorners,
-              textured, textured_right, percent(textured_right, textured));
+  std::printf("trials at mapped places %d, within 1 s and 3 cm %d (%s)\n", mapped, right,
+              percent(right, mapped).c_str());
+  std::printf("of these with %d corners of the map in view %d, within 1 s and 3 cm %d (%s)\n", kFewCorners,
+              textured, textured_right, percent(textured_right, textured).c_str());
 }
 
 }  // namespace
@@ -124,7 +140,7 @@ int main(int argc, char** argv) {
   line.required("truth");
   line.option("query", query, "map.vsm of another session in the same place");
   line.option("query-truth", query_truth, "its true trajectory, TUM");
-  line.option("sensor", sensor, "sensor YAML with intrinsics, for relocalisation");
+  line.option("sensor", sensor, "a shipped sensor or a sensor YAML file, with intrinsics; for relocalisation");
   line.option("set", settings, "option of relocalisation as key=value (`loop/` of the back end); repeatable");
   line.flag("list", list, "one line per keyframe at a mapped place or found");
   line.needs("query", "query-truth");
@@ -134,14 +150,14 @@ int main(int argc, char** argv) {
     vip_slam::LoopOptions options;
     vip_slam::setOptions(options, vip_slam::splitSettings(settings));
     const vip_slam::StoredMap stored = vip_slam::loadMapFile(map, vip_slam::ImuNoise());
-    const auto poses = truePoses(stored.map, vip_slam::readTum(truth));
+    const auto poses = posesOf(stored.map, truth);
     judgeLoops(stored, poses);
     judgeRevisits(stored, poses);
     if (!query.empty()) {
       const vip_slam::StoredMap session = vip_slam::loadMapFile(query, vip_slam::ImuNoise());
-      const auto session_poses = truePoses(session.map, vip_slam::readTum(query_truth));
+      const auto session_poses = posesOf(session.map, query_truth);
       judgeRelocalisation(vip_slam::relocalisationTrials(stored, poses, session, session_poses,
-                                                         vip_slam::loadSensorConfig(sensor), options),
+                                                         vip_slam::loadSensorConfig(vip_slam::resolveSensor(sensor)), options),
                           list);
     }
   } catch (const std::exception& error) {

@@ -9,6 +9,7 @@
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_eval/plane_benchmark.h"
 #include "vip_slam_eval/plane_tables.h"
 
@@ -52,15 +53,15 @@ int main(int argc, char** argv) {
   line.required("planes-truth");
   line.option("out", out, "folder for metrics.csv, planes.csv, true_planes.csv, planes.yaml, points.csv, timing.csv");
   line.option("set", settings, "one option as group/key=value, as for run_bag; repeatable");
-  line.option("start", input.start, "seconds to skip at the beginning");
-  line.option("duration", input.duration, "seconds to process");
+  line.option("start", input.start, "seconds to skip at the beginning", between(0.0, 1e6));
+  line.option("duration", input.duration, "seconds to process; default: to the end", above(0.0));
   if (const auto status = line.parse(argc, argv)) return *status;
   cv::setNumThreads(1);
   try {
     setOptions(input.options, splitSettings(settings));
     input.truth = readTum(truth);
     input.true_planes = readPlanesYaml(true_planes);
-    if (!out.empty()) std::filesystem::create_directories(out);
+    if (!out.empty()) prepareOutputFolder(out);
     TimingLog timing;
     const PlaneBenchmarkResult result = runPlaneBenchmark(input, &timing);
     const MetricTable table = metricsOf(result, timing);

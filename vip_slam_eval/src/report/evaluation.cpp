@@ -10,6 +10,7 @@
 
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_eval/plane_tables.h"
 
 namespace vip_slam {
@@ -120,9 +121,7 @@ void writeEvaluation(const std::string& folder, const EvaluationInput& input, co
   }
   contents.emplace_back("evaluation.svg", evaluationPicture(input, evaluation));
 
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw std::runtime_error(folder + ": cannot be created: " + error.message());
+  prepareOutputFolder(folder);
   std::vector<std::unique_ptr<AtomicFile>> files;
   for (const auto& [name, text] : contents) {
     files.push_back(std::make_unique<AtomicFile>((std::filesystem::path(folder) / name).string()));

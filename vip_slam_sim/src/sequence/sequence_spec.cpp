@@ -198,6 +198,13 @@ void flatten(const YAML::Node& node, const std::string& prefix, const std::strin
   }
 }
 
+YAML::Node loadLibrary(const std::string& path) {
+  const YAML::Node library = loadYaml(path);
+  if (!library.IsMap() || !library["sequences"] || !library["sequences"].IsMap())
+    throw std::runtime_error(path + ": sequences: expected a map of named sequences");
+  return library;
+}
+
 /// The node's values over those of the sequences it is based on; base last, so that later ones win.
 void applySequence(const YAML::Node& library, const YAML::Node& node, const std::string& where, int depth,
                    SequenceSpec* spec) {
@@ -224,13 +231,12 @@ void applySequence(const YAML::Node& library, const YAML::Node& node, const std:
 
 std::vector<std::string> sequenceNames(const std::string& library) {
   std::vector<std::string> names;
-  for (const auto& item : loadYaml(library)["sequences"]) names.push_back(item.first.as<std::string>());
+  for (const auto& item : loadLibrary(library)["sequences"]) names.push_back(item.first.as<std::string>());
   return names;
 }
 
 SequenceSpec loadSequence(const std::string& name_or_file, const std::string& library) {
-  const YAML::Node shipped = loadYaml(library);
-  if (!shipped["sequences"]) throw std::runtime_error(library + ": sequences: expected a map of named sequences");
+  const YAML::Node shipped = loadLibrary(library);
   SequenceSpec spec;
   const std::filesystem::path path(name_or_file);
   if (path.extension() == ".yaml" || path.extension() == ".yml") {

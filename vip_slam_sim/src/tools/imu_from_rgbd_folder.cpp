@@ -9,6 +9,7 @@
 #include "progress_bar.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_sim/io/pose_accuracy.h"
 #include "vip_slam_sim/io/rgbd_folder.h"
 #include "vip_slam_sim/io/sequence_writer.h"
@@ -172,7 +173,7 @@ int run(int argc, char** argv) {
   }
   const auto start_ns = std::llround(rig.start_time) * 1000000000LL;
   const auto stamp = [&](double t) { return start_ns + std::llround(t * 1e9); };
-  fs::create_directories(s.out);
+  prepareOutputFolder(s.out);
   const std::string base = (fs::path(s.out) / s.name).string();
   std::unique_ptr<SequenceWriter> writer =
       s.format == "bag" ? makeBagWriter(base + ".bag", sensor, start_ns) : makeFolderWriter(base);

@@ -18,6 +18,7 @@
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_sim/io/sequence_writer.h"
 
 namespace fs = std::filesystem;
@@ -59,9 +60,10 @@ int run(int argc, char** argv) {
   line.option("format", format, "bag, folder (EuRoC/TUM layout) or none (snapshots only)", oneOf("bag, folder, none"));
   line.option("threads", threads, "rendering threads", between(1, 256));
   line.option("library", library, "YAML of the named sequences");
-  line.option("snapshots", snapshot_every, "also save every Nth frame as PNG (colour beside depth)");
+  line.option("snapshots", snapshot_every, "also save every Nth frame as PNG (colour beside depth)",
+              between(0, 1 << 30));
   line.option("first", first, "first frame", between(0, 1 << 30));
-  line.option("count", count, "number of frames (default all)");
+  line.option("count", count, "number of frames (default all)", between(1, 1 << 30));
   line.flag("list", list, "list the shipped sequences");
   line.flag("keys", keys, "print the keys of a sequence with their defaults and ranges");
   line.flag("skip-existing", keep, "do nothing when the outputs are there");
@@ -82,7 +84,7 @@ int run(int argc, char** argv) {
     std::fprintf(stderr, "%s: there already\n", (base + ".bag").c_str());
     return 0;
   }
-  fs::create_directories(out);
+  prepareOutputFolder(out);
   RenderOptions options;
   options.threads = threads;
   options.first = first;
@@ -90,6 +92,9 @@ int run(int argc, char** argv) {
   std::fprintf(stderr, "%s: building and lighting scene '%s'\n", spec.name.c_str(), spec.scene.c_str());
   SequenceRenderer sequence(spec, options);
   const auto& imu = sequence.imu().samples;
+  if (first >= sequence.frameCount())
+    return line.mistake("--first " + std::to_string(first) + ": the sequence has " +
+                        std::to_string(sequence.frameCount()) + " frames");
   const int frames = std::min(sequence.frameCount() - first, count < 0 ? sequence.frameCount() : count);
 
   std::unique_ptr<SequenceWriter> writer;
