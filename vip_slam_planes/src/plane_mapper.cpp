@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "plane_mapper_impl.h"
+#include "vip_slam_planes/growth/other_layers.h"
 #include "vip_slam_planes/growth/see_through.h"
 #include "vip_slam_planes/growth/triangle_association.h"
 
@@ -73,7 +74,8 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   if (tracks.empty()) return;
   const DepthMesh& mesh = mesher_.build(frame.features, frame.depth_grid, T_map_C.R().row(2));
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
-  const std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
+  std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
+  releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
   const auto host_pose = poses_.find(frame.keyframe);
   const KeyframeId host = host_pose == poses_.end() ? newest_ : frame.keyframe;
   std::vector<double> area(tracks.size(), 0);

@@ -4,6 +4,7 @@
 
 #include "plane_mapper_impl.h"
 #include "vip_slam_planes/detection/plane_detector.h"
+#include "vip_slam_planes/growth/other_layers.h"
 #include "vip_slam_planes/growth/see_through.h"
 #include "vip_slam_planes/growth/triangle_association.h"
 #include "vip_slam_planes/merging/plane_merging.h"
@@ -18,6 +19,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
+  releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
 
   std::vector<CellIndex> seen_again;
   for (std::size_t k = 0; k < tracks.size(); ++k) {

@@ -15,6 +15,7 @@ class Rig {
  public:
   explicit Rig(double noise_scale = 1.0, PlaneMapperOptions options = {})
       : camera(testing::quietNoise(), noise_scale), mapper(options, camera.camera, camera.noise) {}
+  explicit Rig(const DepthNoise& noise) : camera(noise, 1.0), mapper({}, camera.camera, noise) {}
 
   PlaneUpdate look(const Scene& scene, const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
     return place(camera.keyframe(scene, lookAt(eye, target)), lookAt(eye, target));

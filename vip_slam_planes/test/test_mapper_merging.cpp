@@ -24,6 +24,26 @@ TEST(Mapper, DoorBeforeTheWallStaysTwoWhateverTheView) {
   EXPECT_NEAR(2.1, rig.find(Plane({-1, 0, 0}, 2.88))->area, 0.35);
 }
 
+// From afar noise hides the step; a wall that took the board then lets it go.
+TEST(Mapper, ABoardOnTheWallIsASurfaceOfItsOwnWhereItShows) {
+  for (const double step : {0.0, 0.045}) {
+    DepthNoise noise = testing::quietNoise();
+    noise.c = 0.002;
+    Rig rig(noise);
+    Scene scene;
+    scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+    scene.add({3 - step, -1.2, 1.0}, {0, 2.4, 0}, {0, 0, 1.0});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {-3.0 + 0.2 * i, -0.4 + 0.2 * i, 1.4}, {3, 0.1 * i, 1.3});
+    EXPECT_EQ(1u, rig.mapper.planes().size()) << step;
+    for (int i = 0; i < 10; ++i) rig.look(scene, {0.3 + 0.04 * i, -1.2 + 0.25 * i, 1.4}, {3, 0.1 * i - 0.3, 1.3});
+    ASSERT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size());
+    ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3.0), 0.006));
+    if (step == 0) continue;
+    ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3.0 - step), 0.006));
+    EXPECT_NEAR(2.4, rig.find(Plane({-1, 0, 0}, 3.0 - step), 0.006)->area, 0.4);
+  }
+}
+
 TEST(Mapper, CorridorWallSeenFromBothEndsBecomesOne) {
   Rig rig;
   Scene scene;

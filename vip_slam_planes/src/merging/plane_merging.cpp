@@ -87,16 +87,18 @@ bool jointFitServes(const PlaneMoments& a, const PlaneMoments& b, const PlaneTra
 }
 
 // Drift moves a keyframe as a whole: what one keyframe shows at two depths is two surfaces, whatever was covered from
-// afar, where a door's recess does not show.
+// afar, where a door's recess or a board on the wall does not show.
 bool shownApart(const PlaneTrack& small, const PlaneTrack& large, const CameraPoses& poses, double distance) {
+  constexpr double kTilt = 0.005;  // rad, error of the larger plane's normal
   int apart = 0, together = 0;
   for (const auto& [keyframe, observation] : small.observations()) {
     const auto other = large.observations().find(keyframe);
     const auto pose = poses.find(keyframe);
     if (other == large.observations().end() || pose == poses.end()) continue;
     const Eigen::Vector3d n_C = pose->second.R().transpose() * large.plane().n;
-    const PlaneMoments mine{observation.G}, theirs{other->second.G};
-    ++(std::abs(n_C.dot(mine.centroid() - theirs.centroid())) > distance ? apart : together);
+    const Eigen::Vector3d between = PlaneMoments{observation.G}.centroid() - PlaneMoments{other->second.G}.centroid();
+    const double off = std::abs(n_C.dot(between));
+    ++(off > distance + kTilt * between.norm() ? apart : together);
   }
   return apart > together;
 }
@@ -143,10 +145,11 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
   if (meeting.near == 0 && (gap <= options.gap || meeting.worst_border > apart)) return false;
   if (meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) return false;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
+  if (shownApart(small, large, poses, options.max_rms)) return false;
   // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift
   // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
   if (shared > options.overlap && meeting.separation < 0.5 * options.distance) return true;
-  if (shared > 2 * options.overlap && !shownApart(small, large, poses, 0.5 * options.distance)) return true;
+  if (shared > 2 * options.overlap) return true;
   const double slack = options.max_rms * (ceiling ? kCeilingSlack : 1.0);
   return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, slack);
 }

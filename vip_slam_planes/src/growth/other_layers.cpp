@@ -1,0 +1,58 @@
+#include "vip_slam_planes/growth/other_layers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_planes/detection/surface_layers.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kLeastTriangles = 30;  // fewer do not show two layers
+constexpr double kLeastStep = 0.02;          // m, between the layers
+constexpr double kStepSigmas = 3.0;
+
+double medianOf(std::vector<double> values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+void releaseOtherLayers(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
+                        std::vector<int>* label) {
+  std::vector<std::vector<int>> members(tracks.size());
+  for (std::size_t i = 0; i < label->size(); ++i) {
+    if ((*label)[i] >= 0) members[(*label)[i]].push_back(static_cast<int>(i));
+  }
+  std::vector<double> offset, area, sigma;
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (members[k].size() < kLeastTriangles) continue;
+    offset.clear(), area.clear(), sigma.clear();
+    for (int i : members[k]) {
+      offset.push_back(tracks[k]->plane().signedDistance(triangles[i].centre));
+      area.push_back(triangles[i].area);
+      sigma.push_back(triangles[i].sigma);
+    }
+    const double noise = medianOf(sigma), step = std::max(kLeastStep, kStepSigmas * noise);
+    const auto [low, high] = std::minmax_element(offset.begin(), offset.end());
+    if (*high - *low < step) continue;
+    const auto layers = splitLayers(offset, area, noise);
+    if (layers.size() < 2) continue;
+    std::vector<double> depth;
+    for (const std::vector<int>& layer : layers) {
+      std::vector<double> own;
+      for (int i : layer) own.push_back(offset[i]);
+      depth.push_back(medianOf(std::move(own)));
+    }
+    const double nearest =
+        *std::min_element(depth.begin(), depth.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+    for (std::size_t j = 0; j < layers.size(); ++j) {
+      if (std::abs(depth[j] - nearest) < step) continue;
+      for (int i : layers[j]) (*label)[members[k][i]] = -1;
+    }
+  }
+}
+
+}  // namespace vip_slam
