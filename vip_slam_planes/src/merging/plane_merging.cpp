@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
 namespace vip_slam {
 namespace {
 
@@ -14,6 +16,7 @@ constexpr double kNoTable = 20.0;  // m^2; what lies level with so large a surfa
 constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
 // Ceilings are seen at the flattest angles and from afar, and nothing as wide hangs less than this below another one.
 constexpr double kCeilingSlack = 1.5;  // of max_rms
+constexpr double kStrip = 4.0, kLeastStrip = 1.0;  // length over width, m^2; boards of shelves are smaller
 constexpr double kSmallGap = 4.0;  // a smaller piece of a wall may be as many of its own widths away
 constexpr double kCloser = 4.0;    // as many times as far apart when they agree as many times better
 
@@ -65,6 +68,37 @@ double boundsGap(const PlaneTrack& small, const PlaneTrack& large) {
   const double dx = std::max({low.x() - (l.x0() + l.width()), l.x0() - high.x(), 0.0});
   const double dy = std::max({low.y() - (l.y0() + l.height()), l.y0() - high.y(), 0.0});
   return std::hypot(dx, dy) * large.cellSize();
+}
+
+/// The directions across and along a plane's area, in its own frame.
+Eigen::Matrix2d mainAxes(const PlaneTrack& track) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  track.cells().forEach([&](CellIndex c, int) {
+    const Eigen::Vector2d q(c.x, c.y);
+    sum += q;
+    squares += q * q.transpose();
+  });
+  const double n = track.cells().count(1);
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(squares / n - sum * sum.transpose() / (n * n)).eigenvectors();
+}
+
+/// Bounds of the centres of a plane's cells along axes of another one's frame.
+Eigen::AlignedBox2d boundsAlong(const PlaneTrack& track, const PlaneTrack& frame, const Eigen::Matrix2d& axes) {
+  Eigen::AlignedBox2d bounds;
+  track.cells().forEach([&](CellIndex c, int) { bounds.extend(axes.transpose() * frame.toPlane(track.cellCentre(c))); });
+  return bounds;
+}
+
+/// The length of the larger one when it is a long strip and the smaller one lies in its continuation, between the same
+/// two edges; else 0.
+double lengthIfContinued(const PlaneTrack& small, const PlaneTrack& large) {
+  const Eigen::Matrix2d axes = mainAxes(large);
+  const Eigen::AlignedBox2d strip = boundsAlong(large, large, axes), piece = boundsAlong(small, large, axes);
+  const double cell = large.cellSize();
+  const double length = strip.sizes().y() + cell, width = strip.sizes().x() + cell;
+  const bool between = piece.min().x() > strip.min().x() - 1.5 * cell && piece.max().x() < strip.max().x() + 1.5 * cell;
+  return between && length > kStrip * width ? length : 0.0;
 }
 
 PlaneMoments surfaceMoments(const PlaneTrack& track, const CameraPoses& poses) {
@@ -135,6 +169,11 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
                                  : std::min(options.gap_per_area * large_from, kSmallGap * std::sqrt(smaller));
     gap = std::max(options.gap, reach);
     apart *= 0.5;
+  }
+  // The underside of a duct or a beam, some of which nobody looked at.
+  if (ceiling && smaller < large_from && gap <= options.gap && std::max(area_a, area_b) >= kLeastStrip) {
+    gap = std::max(gap, lengthIfContinued(small, large));
+    if (gap > options.gap) apart *= 0.5;
   }
   // That two surfaces lie in one plane by accident is the likelier the further one looks and the less is asked of them:
   // the same chance, with a gap as much wider as they agree better.
