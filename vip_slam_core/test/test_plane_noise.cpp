@@ -70,6 +70,17 @@ TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {
   EXPECT_LT(scale, 9.0);
 }
 
+// With poses as good as the points, everything else agrees far better than the noise model expects.
+TEST(PlaneNoise, WhatNoiseExplainsMayBeAPlane) {
+  for (const double misfit : {1.5, 6.0}) {
+    std::vector<PlaneMisfit> misfits(100, PlaneMisfit{0, 0.01});
+    misfits.insert(misfits.end(), 10, PlaneMisfit{1, misfit});
+    const std::vector<char> agree = planesAgree(misfits, 2);
+    EXPECT_TRUE(agree[0]);
+    EXPECT_EQ(agree[1] != 0, misfit < 2.0);
+  }
+}
+
 TEST(PlaneNoise, WhatIsNoPlaneCountsForLess) {
   for (const double unit : {0.2, 1.0, 3.0}) {  // of the sigma; weights are relative to what is typical of the map
     std::mt19937 random(4);

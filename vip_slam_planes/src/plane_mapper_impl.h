@@ -44,6 +44,7 @@ class PlaneMapper::Impl {
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();
   void judgeAgreement();
+  void decideOnPoints();
   void dropUnsupported(PlaneUpdate* result);
   void publish(PlaneUpdate* result);
 

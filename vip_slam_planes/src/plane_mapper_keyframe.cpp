@@ -163,6 +163,7 @@ void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
   into.absorb(from, poses_);
   refit(&into);
   points_.renamePlane(from_id, into_id);
+  into.takes_points = false;  // those that waited for the other one
   tracks_.erase(from_id);
   ++counters.planes_merged;
   if (known) merges_.push_back({from_id, into_id});

@@ -41,8 +41,18 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   }
   mergePlanes(changed);
   dropUnsupported(&result);
+  decideOnPoints();
   publish(&result);
   return result;
+}
+
+// Points wait for their plane to be known for one; most of them are out of view by then.
+void PlaneMapper::Impl::decideOnPoints() {
+  for (auto& [id, track] : tracks_) {
+    const bool before = track.takes_points;
+    track.takes_points = track.confirmed && track.determined && track.agrees;
+    if (track.takes_points && !before) points_.decide(id, track.plane(), poses_);
+  }
 }
 
 void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {

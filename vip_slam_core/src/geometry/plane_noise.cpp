@@ -71,8 +71,9 @@ std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size
   const double unit = typicalMisfit(misfits);
   std::vector<std::vector<double>> own(planes);
   for (const PlaneMisfit& m : misfits) own[m.plane].push_back(m.misfit);
+  const double most = std::max(1.0, kDisagrees * unit);
   for (std::size_t p = 0; p < planes; ++p)
-    agree[p] = own[p].size() < kLeastOfPlane || typicalMisfit(std::move(own[p])) < kDisagrees * unit;
+    agree[p] = own[p].size() < kLeastOfPlane || typicalMisfit(std::move(own[p])) < most;
   return agree;
 }
 

@@ -106,6 +106,12 @@ void PointAssociation::removeKeyframe(const Keyframe& keyframe) {
   }
 }
 
+bool PointAssociation::isDue(const Landmark& landmark) const {
+  // Decided points are asked again when their evidence has doubled.
+  const std::size_t due = landmark.plane ? 2 * landmark.tested : landmark.tested + 1;
+  return landmark.sightings.size() >= std::max<std::size_t>(options_.min_keyframes, due);
+}
+
 void PointAssociation::test(LandmarkId id, Landmark* landmark, const CameraPoses& poses, const Plane& plane) {
   std::vector<PointSighting> sightings;
   const std::size_t step = (landmark->sightings.size() + kMaxSightings - 1) / kMaxSightings;
@@ -185,13 +191,18 @@ void PointAssociation::process(const Keyframe& keyframe, const SurfaceLabels& la
       landmark.failures = 0;
     }
     if (!landmark.candidate) continue;
-    // Decided points are asked again when their evidence has doubled.
-    const std::size_t due = landmark.plane ? 2 * landmark.tested : landmark.tested + 1;
-    if (landmark.sightings.size() < std::max<std::size_t>(options_.min_keyframes, due)) continue;
+    if (!isDue(landmark)) continue;
     const auto label = std::find(plane_of_label.begin(), plane_of_label.end(), landmark.candidate);
     if (label != plane_of_label.end() && !trusted[label - plane_of_label.begin()]) continue;
     const Plane* plane = find_plane(landmark.candidate);
     if (plane) test(id, &landmark, poses, *plane);
+  }
+}
+
+void PointAssociation::decide(PlaneId id, const Plane& plane, const CameraPoses& poses) {
+  for (LandmarkId point : landmarksOf(id)) {
+    Landmark& landmark = landmarks_.at(point);
+    if (landmark.candidate == id && landmark.plane != id && isDue(landmark)) test(point, &landmark, poses, plane);
   }
 }
 

@@ -33,6 +33,8 @@ class PointAssociation {
   /// enough keyframes see. `trusted[k]` is false for planes that may not take points yet.
   void process(const Keyframe& keyframe, const SurfaceLabels& labels, const std::vector<PlaneId>& plane_of_label,
                const std::vector<char>& trusted, const CameraPoses& poses, const FindPlane& plane);
+  /// Decides on the candidates of a plane that may take points from now on, in view or not.
+  void decide(PlaneId id, const Plane& plane, const CameraPoses& poses);
   /// Re-checks all associated landmarks against moved planes; cheap.
   void recheck(const FindPlane& plane);
 
@@ -77,6 +79,8 @@ class PointAssociation {
                           const std::vector<PlaneId>& plane_of_label, const SE3& T_map_C,
                           const FindPlane& plane) const;
   void setPlane(LandmarkId id, Landmark* landmark, PlaneId plane);
+  /// Enough has been seen of a candidate since it was decided on last.
+  bool isDue(const Landmark& landmark) const;
   void test(LandmarkId id, Landmark* landmark, const CameraPoses& poses, const Plane& plane);
 
   PointAssociationOptions options_;

@@ -90,6 +90,7 @@ class PlaneTrack {
   bool confirmed = false;
   bool determined = false;       ///< its observations tell its direction; until then the back end does not get them
   bool agrees = true;            ///< its observations agree; otherwise it may be several surfaces: no points
+  bool takes_points = false;     ///< confirmed, determined and agreeing, as of the last update
   bool refit_due = false;        ///< observations have gone since the last fit
   int keyframes_seen = 0;        ///< keyframes that saw a fair part of it, ever
   int views_seen = 0;            ///< growth frames that did so before it was confirmed, each from another place
