@@ -6,7 +6,7 @@
 
 #include "vip_slam_planes/association/plane_sampler.h"
 #include "vip_slam_planes/association/point_association.h"
-#include "vip_slam_planes/detection/plane_evidence.h"
+#include "vip_slam_planes/detection/strip_evidence.h"
 #include "vip_slam_planes/growth/plane_track.h"
 #include "vip_slam_planes/mesh/depth_mesh.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
@@ -51,10 +51,12 @@ class PlaneMapper::Impl {
   // plane_mapper_keyframe.cpp: one placed keyframe.
   void processKeyframe(const Keyframe& keyframe, bool first_time);
   std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C);
-  void startPlanes(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
-                   std::vector<int>* label, std::vector<PlaneTrack*>* tracks);
-  void startJointPlanes(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
-                        std::vector<int>* label, std::vector<PlaneTrack*>* tracks);
+  /// Returns the strips that detection left.
+  std::vector<DetectedPlane> startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
+                                         const std::vector<MapTriangle>& triangles, std::vector<int>* label,
+                                         std::vector<PlaneTrack*>* tracks);
+  void startJointPlanes(const Keyframe& keyframe, const std::vector<JointPlane>& joint, std::vector<int>* label,
+                        std::vector<PlaneTrack*>* tracks);
   void observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
                const std::vector<int>& label, const SurfaceLabels& labels, const DepthMesh& mesh, bool first_time);
   void mergePlanes(const std::vector<PlaneId>& changed);
@@ -67,6 +69,7 @@ class PlaneMapper::Impl {
   PlaneSampler sampler_;
   PointAssociation points_;
   PlaneEvidence evidence_;
+  StripEvidence strips_;
 
   std::map<KeyframeId, KeyframePtr> waiting_; ///< not placed yet
   std::map<KeyframeId, KeyframePtr> placed_;  ///< processed keyframes that the map still has

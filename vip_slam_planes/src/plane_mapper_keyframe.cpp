@@ -32,8 +32,15 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   }
   const std::size_t known = tracks.size();
   if (first_time) {
-    startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
-    startJointPlanes(keyframe, T_map_C, triangles, &label, &tracks);
+    std::vector<DetectedPlane> strips = startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
+    evidence_.add(keyframe.id, T_map_C, triangles, label);
+    startJointPlanes(keyframe, evidence_.detect(poses_, {tracks.begin(), tracks.end()}), &label, &tracks);
+    const auto known_by_now = [&](const DetectedPlane& strip) {
+      return std::any_of(strip.triangles.begin(), strip.triangles.end(), [&](int i) { return label[i] >= 0; });
+    };
+    strips.erase(std::remove_if(strips.begin(), strips.end(), known_by_now), strips.end());
+    strips_.add(keyframe.id, T_map_C, triangles, strips);
+    startJointPlanes(keyframe, strips_.detect(poses_), &label, &tracks);
     ++counters.keyframes;
   }
   const SurfaceLabels labels = labelNodes(mesh, label, grid);
@@ -48,13 +55,14 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   }
 }
 
-void PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
-                                    const std::vector<MapTriangle>& triangles, std::vector<int>* label,
-                                    std::vector<PlaneTrack*>* tracks) {
+std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
+                                                          const std::vector<MapTriangle>& triangles,
+                                                          std::vector<int>* label, std::vector<PlaneTrack*>* tracks) {
   std::vector<char> taken(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) taken[i] = (*label)[i] >= 0;
+  std::vector<DetectedPlane> strips;
   for (const DetectedPlane& found :
-       detectPlanes(triangles, taken, T_map_C.t(), options.detection, options.growth)) {
+       detectPlanes(triangles, taken, T_map_C.t(), options.detection, options.growth, &strips)) {
     const PlaneId id = next_plane_++;
     PlaneTrack& track =
         tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;
@@ -68,13 +76,12 @@ void PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C
     tracks->push_back(&track);
     ++counters.planes_started;
   }
+  return strips;
 }
 
-void PlaneMapper::Impl::startJointPlanes(const Keyframe& keyframe, const SE3& T_map_C,
-                                         const std::vector<MapTriangle>& triangles, std::vector<int>* label,
-                                         std::vector<PlaneTrack*>* tracks) {
-  evidence_.add(keyframe.id, T_map_C, triangles, *label);
-  for (const JointPlane& found : evidence_.detect(poses_, {tracks->begin(), tracks->end()})) {
+void PlaneMapper::Impl::startJointPlanes(const Keyframe& keyframe, const std::vector<JointPlane>& joint,
+                                         std::vector<int>* label, std::vector<PlaneTrack*>* tracks) {
+  for (const JointPlane& found : joint) {
     const PlaneId id = next_plane_++;
     PlaneTrack& track =
         tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;

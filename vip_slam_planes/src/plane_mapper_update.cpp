@@ -127,6 +127,7 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   }
   points_.removeKeyframe(*it->second);
   evidence_.remove(id);
+  strips_.remove(id);
   placed_.erase(it);
   poses_.erase(id);
   if (newest_ == id) newest_ = placed_.empty() ? 0 : placed_.rbegin()->first;

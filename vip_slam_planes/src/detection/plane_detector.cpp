@@ -19,9 +19,10 @@ namespace {
 class Detector {
  public:
   Detector(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
-           const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth)
+           const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth,
+           std::vector<DetectedPlane>* strips = nullptr)
       : triangles_(triangles), taken_(taken), camera_(camera_centre), options_(options), growth_(growth),
-        level_(options.gravity_deg), joins_(growth.angle_deg) {}
+        level_(options.gravity_deg), joins_(growth.angle_deg), strips_(strips) {}
 
   std::vector<DetectedPlane> run() {
     histogramPeaks();
@@ -224,7 +225,8 @@ class Detector {
     }
     // Level surfaces are seen at a flat angle, a few nodes high; what spans a step is level by accident only.
     if (result.area < options_.min_area) return false;
-    if (kind != PlaneKind::kHorizontal && !isSolid(triangles_, surface)) return false;
+    const bool strip = kind != PlaneKind::kHorizontal && !isSolid(triangles_, surface);
+    if (strip && (!strips_ || kind != PlaneKind::kVertical)) return false;
     double rms = 0;
     if (!fit(surface, kind, &result.plane, &rms)) return false;
     const double sigma = medianSigma(surface);
@@ -255,13 +257,18 @@ class Detector {
       const double tilt = kind == PlaneKind::kHorizontal ? std::acos(z) : std::asin(z);
       if (tilt > limit + 2 * uncertainty) return false;
     }
-    if (isCurved(triangles_, surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
+    // A strip may be the rim of a column; whether it is shows when it is seen from elsewhere.
+    if (!strip && isCurved(triangles_, surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
     result.centroid = mean + camera_;
     for (int i : surface) {
       // The free triangles were gathered around the whole peak; keep those on this surface's own plane.
       if (!joins(triangles_[i], result.plane, 1.0)) continue;
       result.triangles.push_back(i);
-      taken_[i] = 1;
+      if (!strip) taken_[i] = 1;
+    }
+    if (strip) {
+      strips_->push_back(std::move(result));
+      return false;
     }
     found_.push_back(std::move(result));
     return true;
@@ -273,6 +280,7 @@ class Detector {
   const PlaneDetectionOptions& options_;
   const PlaneGrowthOptions& growth_;
   const AngleGate level_, joins_;
+  std::vector<DetectedPlane>* strips_;
   std::vector<DetectedPlane> found_;
 };
 
@@ -280,8 +288,8 @@ class Detector {
 
 std::vector<DetectedPlane> detectPlanes(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
                                         const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options,
-                                        const PlaneGrowthOptions& growth) {
-  return Detector(triangles, taken, camera_centre, options, growth).run();
+                                        const PlaneGrowthOptions& growth, std::vector<DetectedPlane>* strips) {
+  return Detector(triangles, taken, camera_centre, options, growth, strips).run();
 }
 
 std::vector<DetectedPlane> detectPlanesAt(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,

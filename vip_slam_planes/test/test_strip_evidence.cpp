@@ -1,0 +1,90 @@
+// Narrow faces, which show what they are only when they are seen from two sides.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "rig.h"
+#include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_planes/detection/strip_evidence.h"
+
+namespace vip_slam {
+namespace {
+
+using testing::lookAt;
+using testing::Rig;
+using testing::Scene;
+
+/// A strip 0.4 m wide and 2 m high that starts at (3, 0, 0.5) and runs `azimuth` from the x axis; it faces +y.
+std::vector<MapTriangle> strip(double azimuth, double sigma) {
+  const Eigen::Vector3d along(std::cos(azimuth), std::sin(azimuth), 0), n(-std::sin(azimuth), std::cos(azimuth), 0);
+  std::vector<MapTriangle> triangles;
+  const auto at = [&](double u, double z) -> Eigen::Vector3d { return Eigen::Vector3d(3, 0, 0.5 + z) + u * along; };
+  for (int r = 0; r < 10; ++r) {
+    for (const bool upper : {false, true}) {
+      MapTriangle t;
+      t.corner = {at(upper ? 0.4 : 0, 0.2 * r + (upper ? 0.2 : 0)), at(0.4, 0.2 * r), at(0, 0.2 * r + 0.2)};
+      t.vertex = {0, 0, 0}, t.neighbour = {-1, -1, -1};
+      t.n = n;
+      t.centre = (t.corner[0] + t.corner[1] + t.corner[2]) / 3;
+      t.area = 0.04, t.sigma = sigma, t.sigma_angle = 0.05;
+      triangles.push_back(t);
+    }
+  }
+  return triangles;
+}
+
+/// What keyframes make of it that look along the x axis from the side by `turn`, when the strip turns along by `share`.
+std::vector<JointPlane> facesSeenFrom(double turn, double share, double sigma = 0.002) {
+  StripEvidence evidence{PlaneDetectionOptions(), PlaneGrowthOptions()};
+  CameraPoses poses;
+  for (KeyframeId id : {1, 2}) {
+    const double sight = 20 * kDegree + (id == 2 ? turn : 0.0);
+    poses[id] = lookAt({3.2 - 3 * std::cos(sight), 3 * std::sin(sight), 1.5}, {3.2, 0, 1.5});
+    const std::vector<MapTriangle> triangles = strip(id == 2 ? -share * turn : 0.0, sigma);
+    DetectedPlane found;
+    found.kind = PlaneKind::kVertical;
+    for (const MapTriangle& t : triangles) found.centroid += t.centre / double(triangles.size());
+    found.plane = Plane::fromPointNormal(found.centroid, triangles.front().n);
+    for (std::size_t i = 0; i < triangles.size(); ++i) found.triangles.push_back(static_cast<int>(i));
+    evidence.add(id, poses[id], triangles, {found});
+    if (id == 1) EXPECT_TRUE(evidence.detect(poses).empty());
+  }
+  return evidence.detect(poses);
+}
+
+TEST(StripEvidence, AFaceKeepsItsDirection) {
+  for (double turn : {4 * kDegree, 10 * kDegree, -10 * kDegree}) {
+    const std::vector<JointPlane> found = facesSeenFrom(turn, 0.0);
+    ASSERT_EQ(1u, found.size()) << turn;
+    EXPECT_EQ(40u, found[0].triangles.size());
+    EXPECT_EQ(PlaneKind::kVertical, found[0].kind);
+    EXPECT_LT((found[0].plane.n - Eigen::Vector3d::UnitY()).norm(), 1e-6);
+    EXPECT_NEAR(found[0].plane.d, 0.0, 1e-6);
+  }
+}
+
+TEST(StripEvidence, WhatLiesAlongTheLineOfSightIsNone) {
+  for (double turn : {4 * kDegree, 10 * kDegree, -10 * kDegree}) EXPECT_TRUE(facesSeenFrom(turn, 1.0).empty()) << turn;
+}
+
+TEST(StripEvidence, NothingIsKnownFromOneSideOrUnderNoise) {
+  EXPECT_TRUE(facesSeenFrom(1 * kDegree, 0.0).empty());
+  EXPECT_TRUE(facesSeenFrom(4 * kDegree, 0.0, 0.01).empty());
+}
+
+TEST(StripEvidence, TheSideOfAPillarIsFound) {
+  Rig rig(0.5);
+  Scene scene;
+  scene.add({3, -0.225, 0}, {0, 0.45, 0}, {0, 0, 2.6});
+  scene.add({3, 0.225, 0}, {0.45, 0, 0}, {0, 0, 2.6});
+  scene.add({8, -5, 0}, {0, 10, 0}, {0, 0, 2.6});
+  for (int i = 0; i < 6; ++i) rig.look(scene, {-0.4 + 0.16 * i, 1.0 + 0.08 * i, 1.3}, {3.2, 0.3, 1.3});
+  ASSERT_EQ(3u, rig.mapper.planes().size());
+  const PlaneEstimate& side = rig.mapper.planes().back();
+  EXPECT_GT(side.plane.n.y(), std::cos(2 * kDegree));
+  EXPECT_LT(std::abs(side.plane.signedDistance({3.2, 0.225, 1.3})), 0.01);
+  EXPECT_GT(side.area, 0.4);
+}
+
+}  // namespace
+}  // namespace vip_slam
