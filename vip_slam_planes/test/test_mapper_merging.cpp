@@ -167,7 +167,8 @@ TEST(Mapper, TheUndersideOfADuctIsOneWithItsMiddleUnseen) {
     scene.add({-3, c.across - 0.2, 2.3 - c.step}, {0.7, 0, 0}, {0, 0.4, 0});  // 2.3 m further on
     for (double x = 0; x < c.length - 0.2; x += 0.4) rig.look(scene, {x - 1.2, 0.1, 1.2}, {x + 0.3, 0, 2.3});
     for (int i = 0; i < 4; ++i) rig.look(scene, {-4.2, c.across + 0.1 * i - 0.2, 1.2}, {-2.7, c.across, 2.3});
-    EXPECT_EQ(c.planes, rig.mapper.planes().size()) << c.length << " m, " << c.across << " m beside, " << c.step << " m below";
+    EXPECT_EQ(c.planes, rig.mapper.planes().size())
+        << c.length << " m, " << c.across << " m beside, " << c.step << " m below";
   }
 }
 

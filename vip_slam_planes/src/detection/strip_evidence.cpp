@@ -66,13 +66,17 @@ bool StripEvidence::isOneFace(const Placed& a, const Placed& b) const {
     return false;
   }
   const Eigen::Vector3d middle = 0.5 * (a.centroid + b.centroid);
-  const double turn = angleBetweenUnits(level(middle - a.T_C_map.inverse().t()), level(middle - b.T_C_map.inverse().t()));
+  const Eigen::Vector3d from_a = a.T_C_map.inverse().t(), from_b = b.T_C_map.inverse().t();
+  const double turn = angleBetweenUnits(level(middle - from_a), level(middle - from_b));
   if (turn < kLeastTurn || angleBetweenUnits(a.plane.n, b.plane.n) > kTurnsAlong * turn) return false;
   // How far apart its ends are shows how far off they would be.
   const Eigen::Vector3d along_C = a.T_C_map.rotation() * along;
   double low = std::numeric_limits<double>::max(), high = -low;
   for (const MapTriangle& t : a.strip->triangles) {
-    for (const Eigen::Vector3d& p : t.corner) low = std::min(low, along_C.dot(p)), high = std::max(high, along_C.dot(p));
+    for (const Eigen::Vector3d& p : t.corner) {
+      low = std::min(low, along_C.dot(p));
+      high = std::max(high, along_C.dot(p));
+    }
   }
   return 0.5 * (high - low) * turn > kShows * std::max(a.strip->sigma, b.strip->sigma);
 }

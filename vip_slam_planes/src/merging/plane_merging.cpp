@@ -86,7 +86,9 @@ Eigen::Matrix2d mainAxes(const PlaneTrack& track) {
 /// Bounds of the centres of a plane's cells along axes of another one's frame.
 Eigen::AlignedBox2d boundsAlong(const PlaneTrack& track, const PlaneTrack& frame, const Eigen::Matrix2d& axes) {
   Eigen::AlignedBox2d bounds;
-  track.cells().forEach([&](CellIndex c, int) { bounds.extend(axes.transpose() * frame.toPlane(track.cellCentre(c))); });
+  track.cells().forEach([&](CellIndex c, int) {
+    bounds.extend(axes.transpose() * frame.toPlane(track.cellCentre(c)));
+  });
   return bounds;
 }
 

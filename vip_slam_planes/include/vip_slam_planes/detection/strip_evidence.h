@@ -1,8 +1,8 @@
 // Faces seen at so flat an angle that they fill a column or two of the depth grid: sides of pillars, ends of walls.
 //
-// In one image nothing tells such a strip from one that the mesh spans across a depth edge, from the near surface to the
-// one behind it, or from the rim of something round. Those lie along the line of sight and turn with it; a face does
-// not. So two keyframes that look at it from different sides must agree on its direction.
+// In one image nothing tells such a strip from one that the mesh spans across a depth edge, from the near surface to
+// the one behind it, or from the rim of something round. Those lie along the line of sight and turn with it; a face
+// does not. So two keyframes that look at it from different sides must agree on its direction.
 #pragma once
 
 #include <deque>
