@@ -7,7 +7,6 @@
 #include <vip_slam_msgs/TrackingStatus.h>
 
 #include "vip_slam_ros/geometry_conversions.h"
-#include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/map_conversions.h"
 #include "vip_slam_ros/parameters.h"
 #include "vip_slam_ros/sensor_files.h"
@@ -74,123 +73,6 @@ void FrontEndNodelet::advertise() {
   reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_frontend::FrontEndConfig>>(private_nh);
   reconfigure_->setCallback(
       [this](vip_slam_frontend::FrontEndConfig& config, std::uint32_t) { onReconfigure(config); });
-}
-
-void FrontEndNodelet::subscribe() {
-  const SensorTopics& topics = sensor_.topics;
-  color_monitor_ = std::make_unique<StreamMonitor>(topics.color, sensor_.color_rate);
-  depth_monitor_ = std::make_unique<StreamMonitor>(topics.depth, sensor_.depth_rate);
-  imu_monitor_ = std::make_unique<StreamMonitor>(topics.imu.empty() ? topics.gyro : topics.imu, sensor_.imu_rate);
-  accel_monitor_ = std::make_unique<StreamMonitor>(topics.accel, 0);
-
-  ros::NodeHandle& nh = getMTNodeHandle();
-  const auto hints = ros::TransportHints().tcpNoDelay();
-  if (sensor_.intrinsics_from_camera_info) {
-    subscribers_.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
-        topics.color_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { calibration_->addColorInfo(*m); }));
-    if (!sensor_.depth_registered) {
-      subscribers_.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
-          topics.depth_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { calibration_->addDepthInfo(*m); }));
-    }
-  }
-  subscribeImage(
-      topics.color, sensor_.color_encoding,
-      [this](const sensor_msgs::ImageConstPtr& m) {
-        onColor(m->header.stamp.toSec(), m->header.frame_id, [m] { return decodeGray(*m); });
-      },
-      [this](const sensor_msgs::CompressedImageConstPtr& m) {
-        onColor(m->header.stamp.toSec(), m->header.frame_id, [m] { return decodeGray(*m); });
-      });
-  if (!topics.depth.empty()) {
-    const double scale = sensor_.depth_scale;
-    subscribeImage(
-        topics.depth, sensor_.depth_encoding,
-        [this, scale](const sensor_msgs::ImageConstPtr& m) {
-          onDepth(m->header.stamp.toSec(), [m, scale] { return decodeDepth(*m, scale); });
-        },
-        [this, scale](const sensor_msgs::CompressedImageConstPtr& m) {
-          onDepth(m->header.stamp.toSec(), [m, scale] { return decodeDepth(*m, scale); });
-        });
-  }
-  // One queue in order for what is small and frequent; images are decoded beside it.
-  ros::NodeHandle& ordered = getNodeHandle();
-  const auto imu = [&](const std::string& topic, void (FrontEndNodelet::*callback)(const sensor_msgs::ImuConstPtr&)) {
-    if (!topic.empty()) subscribers_.push_back(ordered.subscribe(topic, 1000, callback, this, hints));
-  };
-  imu(topics.imu, &FrontEndNodelet::onImu);
-  imu(topics.gyro, &FrontEndNodelet::onGyro);
-  imu(topics.accel, &FrontEndNodelet::onAccel);
-  subscribers_.push_back(ordered.subscribe("map_update", 20, &FrontEndNodelet::onMapUpdate, this));
-  subscribers_.push_back(ordered.subscribe("control", 20, &FrontEndNodelet::onControl, this));
-}
-
-void FrontEndNodelet::subscribeImage(
-    const std::string& topic, const std::string& encoding,
-    const std::function<void(const sensor_msgs::ImageConstPtr&)>& raw,
-    const std::function<void(const sensor_msgs::CompressedImageConstPtr&)>& compressed) {
-  // Capacity of the topic's queue: images that come while one is being decoded. Each topic keeps its order.
-  ros::NodeHandle& nh = getMTNodeHandle();
-  const auto hints = ros::TransportHints().tcpNoDelay();
-  const auto size = std::uint32_t(options_.image_queue);
-  if (encoding == "compressed") {
-    subscribers_.push_back(nh.subscribe<sensor_msgs::CompressedImage>(topic, size, compressed, nullptr, hints));
-  } else {
-    subscribers_.push_back(nh.subscribe<sensor_msgs::Image>(topic, size, raw, nullptr, hints));
-  }
-}
-
-void FrontEndNodelet::watch(StreamMonitor& monitor, double t) { monitor.add(t, ros::Time::now().toSec()); }
-
-void FrontEndNodelet::onColor(double t, const std::string& frame_id, const std::function<cv::Mat()>& decode) {
-  watch(*color_monitor_, t);
-  calibration_->addColorFrame(frame_id);
-  try {
-    cv::Mat gray = decode();
-    owner_->post(image_lane_, [this, t, gray] {
-      if (noticeTime(t, kColor)) pairer_->addColor(t, gray);
-      processReady();
-    });
-  } catch (const std::exception& error) {
-    color_monitor_->reject(error.what());
-    NODELET_WARN_THROTTLE(10, "topic %s: %s", sensor_.topics.color.c_str(), error.what());
-  }
-}
-
-void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) {
-  watch(*depth_monitor_, t);
-  try {
-    cv::Mat depth = decode();
-    owner_->post(depth_lane_, [this, t, depth] {
-      if (noticeTime(t, kDepth)) pairer_->addDepth(t, depth);
-      processReady();
-    });
-  } catch (const std::exception& error) {
-    depth_monitor_->reject(error.what());
-    NODELET_WARN_THROTTLE(10, "topic %s: %s", sensor_.topics.depth.c_str(), error.what());
-  }
-}
-
-void FrontEndNodelet::onImu(const sensor_msgs::ImuConstPtr& msg) {
-  const double t = msg->header.stamp.toSec();
-  watch(*imu_monitor_, t);
-  calibration_->addImuFrame(msg->header.frame_id, t);
-  const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity), accel = fromMsg(msg->linear_acceleration);
-  owner_->post(imu_lane_, [this, t, gyro, accel] { addInertial(t, &gyro, &accel); });
-}
-
-void FrontEndNodelet::onGyro(const sensor_msgs::ImuConstPtr& msg) {
-  const double t = msg->header.stamp.toSec();
-  watch(*imu_monitor_, t);
-  calibration_->addImuFrame(msg->header.frame_id, t);
-  const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity);
-  owner_->post(imu_lane_, [this, t, gyro] { addInertial(t, &gyro, nullptr); });
-}
-
-void FrontEndNodelet::onAccel(const sensor_msgs::ImuConstPtr& msg) {
-  const double t = msg->header.stamp.toSec();
-  watch(*accel_monitor_, t);
-  const Eigen::Vector3d accel = fromMsg(msg->linear_acceleration);
-  owner_->post(imu_lane_, [this, t, accel] { addInertial(t, nullptr, &accel); });
 }
 
 void FrontEndNodelet::onMapUpdate(const vip_slam_msgs::MapUpdateConstPtr& msg) {

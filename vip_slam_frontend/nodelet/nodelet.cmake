@@ -8,6 +8,7 @@ add_library(vip_slam_frontend_nodelets
   nodelet/calibration_source.cpp
   nodelet/feature_image.cpp
   nodelet/front_end_diagnostics.cpp
+  nodelet/front_end_input.cpp
   nodelet/front_end_nodelet.cpp
   nodelet/front_end_publishing.cpp
   nodelet/odometry_messages.cpp

@@ -1,0 +1,223 @@
+// The facade when the input is bad: refused images, no depth, darkness, light that changes, gaps, clocks that jump.
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "wall_world.h"
+
+namespace vip_slam {
+namespace {
+
+TEST_F(FrontEndTest, BadInputIsCountedNamedAndSurvived) {
+  run(0.0, 3.0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  feedImu(3.1);
+  const auto reason = [&](const FrameInput& input) {
+    const FrameOutput output = front_end_.process(input);
+    EXPECT_EQ(output.keyframe, nullptr);
+    EXPECT_NE(output.frame->status.state, TrackingState::kTracking);
+    return output.frame->status.reason;
+  };
+  EXPECT_NE(reason({3.0, cv::Mat(), World::depth(3.0)}).find("empty"), std::string::npos);
+  EXPECT_NE(reason({3.0, cv::Mat(240, 320, CV_8UC3), World::depth(3.0)}).find("8-bit grey"), std::string::npos);
+  EXPECT_NE(reason({3.0, cv::Mat(120, 160, CV_8UC1), World::depth(3.0)}).find("160x120"), std::string::npos);
+  EXPECT_NE(reason({2.95, world_.image(2.95), World::depth(2.95)}).find("repeats"), std::string::npos);
+  EXPECT_NE(reason({2.5, world_.image(2.5), World::depth(2.5)}).find("backward"), std::string::npos);
+  EXPECT_NE(reason({nan, world_.image(3.0), World::depth(3.0)}).find("finite"), std::string::npos);
+  EXPECT_NE(reason({3.5, world_.image(3.5), World::depth(3.5)}).find("IMU"), std::string::npos);
+  EXPECT_EQ(front_end_.counters().bad_image, 3u);
+  EXPECT_EQ(front_end_.counters().bad_stamp, 3u);
+  EXPECT_EQ(front_end_.counters().imu_missing, 1u);
+  EXPECT_FALSE(front_end_.addImu({3.2, Eigen::Vector3d(nan, 0, 0), gravityVector()}));
+  EXPECT_FALSE(front_end_.addImu(World::imu(3.0)));
+  EXPECT_GE(front_end_.counters().imu_rejected, 2u);
+
+  // Depth of another size, and depth of NaN and zero, count as none; the pose goes on.
+  FrameOutput output = front_end_.process({3.0, world_.image(3.0), cv::Mat(120, 160, CV_32FC1, cv::Scalar(1))});
+  EXPECT_EQ(front_end_.counters().bad_depth, 1u);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  cv::Mat holes(240, 320, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
+  holes.rowRange(0, 100).setTo(0);
+  feedImu(3.05);
+  output = front_end_.process({3.05, world_.image(3.05), holes});
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  output = run(3.1, 5.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 0.02);
+}
+
+TEST_F(FrontEndTest, WithoutDepthItGoesOnDegraded) {
+  run(0.0, 3.0);
+  const FrameOutput output = run(3.0, 6.0, false, false);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  EXPECT_NE(output.frame->status.reason.find("no depth"), std::string::npos);
+  EXPECT_LT(error(output), 0.06);
+}
+
+TEST_F(FrontEndTest, DarknessWithoutDepthCoastsWithGrowingCovarianceAndRecovers) {
+  FrameOutput output = run(0.0, 3.0);
+  const double before = output.frame->covariance(3, 3);
+  output = run(3.0, 4.0, true, false);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  EXPECT_NE(output.frame->status.reason.find("coasting"), std::string::npos);
+  EXPECT_GT(output.frame->covariance(3, 3), 2.0 * before);
+  EXPECT_LT(error(output), 0.15);
+  EXPECT_GT(front_end_.counters().coasting, 10u);
+  output = run(4.0, 5.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 0.15);
+}
+
+TEST_F(FrontEndTest, DarknessBeforeACornerIsHeldByDepth) {
+  FrameOutput output = run(0.0, 3.0);
+  const double before = output.frame->covariance(4, 4);
+  for (int k = 60; k < 260; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    output = front_end_.process({t, cv::Mat(240, 320, CV_8U, cv::Scalar(3)), World::cornerDepth(t)});
+    EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  }
+  EXPECT_NE(output.frame->status.reason.find("held by depth surfaces"), std::string::npos);
+  EXPECT_EQ(front_end_.counters().lost, 0u);
+  EXPECT_GT(front_end_.counters().surfaces_used, 200u * 20u);
+  EXPECT_LT(error(output), 0.02);  // after ten seconds; the IMU alone is off by metres then
+  EXPECT_LT(output.frame->covariance(4, 4), before + 0.02 * 0.02);
+  output = run(13.0, 14.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 0.02);
+}
+
+TEST_F(FrontEndTest, ExposureJumpsDoNotEndTheTracks) {
+  run(0.0, 3.0);
+  FrameOutput output;
+  std::size_t old = 0;
+  for (int k = 60; k < 120; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    cv::Mat image;
+    world_.image(t).convertTo(image, CV_8U, k % 10 < 5 ? 1.0 : 0.45);  // twice a second
+    output = front_end_.process({t, image, World::depth(t)});
+    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+    old = 0;
+    for (const Feature& f : output.frame->features) old += f.age >= 12;
+  }
+  EXPECT_LT(error(output), 0.015);
+  EXPECT_GT(old, 20u);  // tracks that came through at least two jumps
+}
+
+TEST_F(FrontEndTest, LowLightAndBlurAreFollowed) {
+  run(0.0, 3.0);
+  cv::RNG random(11);
+  FrameOutput output;
+  for (int k = 60; k < 160; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    cv::Mat image = world_.image(t), noise(image.size(), CV_16S), dim;
+    if (k < 110) {
+      cv::blur(image, image, cv::Size(9, 3));  // a smear of nine pixels
+    } else {
+      image.convertTo(dim, CV_16S, 0.06, 2);  // fifteen grey levels are left, under noise of 1.5
+      random.fill(noise, cv::RNG::NORMAL, 0, 1.5);
+      dim += noise;
+      dim.convertTo(image, CV_8U);
+    }
+    output = front_end_.process({t, image, World::depth(t)});
+    EXPECT_NE(output.frame->status.state, TrackingState::kLost) << t;
+  }
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 0.05);
+}
+
+TEST_F(FrontEndTest, AfterLostTheOdometryGoesOnWhileTheImuStillTellsWhere) {
+  run(0.0, 3.0);
+  FrameOutput output = run(3.0, 9.0, true, false);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
+  EXPECT_EQ(front_end_.counters().lost, 1u);
+  const double lost_sigma = std::sqrt(output.frame->covariance(4, 4));
+  EXPECT_LT(error(output), 4 * lost_sigma);
+  const std::size_t before = keyframes_.size();
+  output = run(9.0, 11.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 4 * lost_sigma);
+  ASSERT_GT(keyframes_.size(), before);
+  EXPECT_EQ(keyframes_[before]->previous, before);  // tied by six seconds of IMU
+  EXPECT_FALSE(keyframes_[before]->imu.empty());
+}
+
+TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
+  FrontEndOptions strict = options();
+  strict.recovery.max_position_sigma = 0.05;
+  FrontEnd front_end(strict, sensor());
+  const auto feed = [&](double from, double to, bool dark) {
+    FrameOutput last;
+    for (int k = static_cast<int>(std::lround(from * 20)); k < std::lround(to * 20); ++k) {
+      const double t = 0.05 * k;
+      for (; imu_t_ < t + 0.02; imu_t_ += 0.005) front_end.addImu(World::imu(imu_t_));
+      last = front_end.process({t, dark ? cv::Mat(240, 320, CV_8U, cv::Scalar(3)) : world_.image(t),
+                                dark ? cv::Mat() : World::depth(t)});
+      if (last.keyframe) keyframes_.push_back(last.keyframe);
+    }
+    return last;
+  };
+  feed(0.0, 3.0, false);
+  FrameOutput output = feed(3.0, 9.0, true);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
+  EXPECT_EQ(front_end.counters().lost, 1u);
+  const std::size_t before = keyframes_.size();
+  output = feed(9.0, 13.0, false);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+  EXPECT_GE(output.frame->epoch, 1u);
+  ASSERT_GT(keyframes_.size(), before);
+  EXPECT_EQ(keyframes_[before]->id, before + 1);  // ids go on
+  EXPECT_EQ(keyframes_[before]->previous, 0u);    // nothing ties it to the old epoch
+}
+
+TEST_F(FrontEndTest, ClockRunningBackStartsAnew) {
+  run(0.0, 3.0);
+  imu_t_ = 0.0;
+  const FrameOutput first = step(0.1);
+  EXPECT_EQ(first.frame->epoch, 1u);
+  EXPECT_NE(first.frame->status.state, TrackingState::kTracking);
+  const FrameOutput output = run(0.15, 4.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  EXPECT_EQ(output.frame->epoch, 1u);
+  EXPECT_LT(error(output), 0.02);
+}
+
+TEST_F(FrontEndTest, LongImuGapRestartsWithItsReason) {
+  run(0.0, 3.0);
+  imu_t_ = 3.8;
+  const FrameOutput output = step(3.9);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kInitialising);
+  EXPECT_NE(output.frame->status.reason.find("gap"), std::string::npos) << output.frame->status.reason;
+  EXPECT_EQ(front_end_.counters().restarts, 1u);
+}
+
+TEST_F(FrontEndTest, ImagesWithinAnImuGapStopNothing) {
+  // Between them the IMU is a straight line from the sample before the gap to the one after it.
+  for (const double gap : {0.3, 1.0}) {
+    FrontEnd front_end(options(), sensor());
+    FrameOutput output;
+    for (int k = 0; k <= 120; ++k) {
+      const double t = 0.05 * k;
+      if (k == 0) imu_t_ = 0;
+      for (; imu_t_ < t + 0.02; imu_t_ += 0.005) front_end.addImu(World::imu(imu_t_));
+      if (k == 60) {
+        imu_t_ += gap;
+        front_end.addImu(World::imu(imu_t_));
+        imu_t_ += 0.005;
+      }
+      ASSERT_NO_THROW(output = front_end.process({t, world_.image(t), World::depth(t)})) << t;
+    }
+    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << gap << ' ' << output.frame->status.reason;
+    EXPECT_EQ(front_end.counters().imu_gaps, 1u);
+    EXPECT_EQ(front_end.counters().restarts, gap < 0.5 ? 0u : 1u);
+  }
+}
+
+}  // namespace
+}  // namespace vip_slam
