@@ -5,7 +5,6 @@ add_library(vip_slam_runner
   src/runner/mapping_thread.cpp
   src/runner/pipeline.cpp
   src/runner/plane_files.cpp
-  src/runner/progress_bar.cpp
   src/runner/run_output.cpp
 )
 target_link_libraries(vip_slam_runner ${catkin_LIBRARIES} ${OpenCV_LIBRARIES} yaml-cpp)

@@ -12,10 +12,10 @@
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_bringup/runner/pipeline.h"
-#include "vip_slam_bringup/runner/progress_bar.h"
 #include "vip_slam_bringup/runner/run_output.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/output_folder.h"
+#include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_ros/sensor_files.h"
 
 namespace {

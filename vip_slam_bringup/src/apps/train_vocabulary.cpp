@@ -1,7 +1,6 @@
 // train_vocabulary INPUT... --out FILE: a place-recognition vocabulary from bags and pictures, with the very corners
 // and descriptors that the front end computes.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
@@ -15,9 +14,9 @@
 
 #include "vip_slam_backend/place_recognition/vocabulary_io.h"
 #include "vip_slam_backend/place_recognition/vocabulary_trainer.h"
-#include "vip_slam_bringup/runner/progress_bar.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/output_folder.h"
+#include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_frontend/tracking/corner_detector.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
 #include "vip_slam_ros/bag_files.h"

@@ -1,4 +1,4 @@
-#include "vip_slam_bringup/runner/progress_bar.h"
+#include "vip_slam_core/util/progress_bar.h"
 
 #include <unistd.h>
 
@@ -18,7 +18,7 @@ ProgressBar::ProgressBar(std::string title)
     : title_(std::move(title)), terminal_(isatty(STDERR_FILENO) != 0), begin_(Clock::now()), drawn_(begin_) {}
 
 void ProgressBar::update(double fraction, const std::string& note) {
-  fraction = std::clamp(fraction, 0.0, 1.0);
+  fraction = fraction > 0 ? std::min(fraction, 1.0) : 0.0;  // 0 of 0 is no number
   const int tenths = int(fraction * 10);
   if (terminal_ ? since(drawn_) < 0.1 : tenths == tenths_) return;
   drawn_ = Clock::now();

@@ -6,10 +6,10 @@
 #include <limits>
 #include <string>
 
-#include "progress_bar.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/output_folder.h"
+#include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_sim/io/pose_accuracy.h"
 #include "vip_slam_sim/io/rgbd_folder.h"
 #include "vip_slam_sim/io/sequence_writer.h"
@@ -191,7 +191,7 @@ int run(int argc, char** argv) {
       truth.push_back({static_cast<double>(stamp(imu.samples[next].t)) * 1e-9, m.T_W_I});
     }
   };
-  ProgressBar bar(s.name, static_cast<int>(folder.frames.size()));
+  ProgressBar bar(s.name);
   for (std::size_t i = 0; i < folder.frames.size(); ++i) {
     const double t = folder.frames[i].t - begin;
     if (t < 0 || t > spline.end() - 1.0 / s.imu.rate) continue;  // no IMU there
@@ -202,9 +202,9 @@ int run(int argc, char** argv) {
     loadRgbdFrame(folder, folder.frames[i], &frame.rgb, &frame.depth);
     imuUntil(frame.stamp_ns);
     writer->frame(frame);
-    bar.update(static_cast<int>(i) + 1);
+    bar.update(double(i + 1) / double(folder.frames.size()));
   }
-  bar.finish();
+  bar.finish(std::to_string(folder.frames.size()) + " images");
   imuUntil(std::numeric_limits<std::int64_t>::max());
   saveSensorConfig(base + "_sensor.yaml", sensor);
   writeTum(base + "_truth.tum", truth);

@@ -13,12 +13,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "progress_bar.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/output_folder.h"
+#include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_sim/io/sequence_writer.h"
 
 namespace fs = std::filesystem;
@@ -108,7 +108,7 @@ int run(int argc, char** argv) {
   };
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
-  ProgressBar bar(spec.name, frames);
+  ProgressBar bar(spec.name);
   int done = 0;
   sequence.render([&](const SimFrame& frame) {
     imuUntil(frame.stamp_ns);
@@ -118,10 +118,11 @@ int run(int argc, char** argv) {
       std::snprintf(number, sizeof number, "_%05d.png", frame.index);
       saveSnapshot(frame, base + number);
     }
-    bar.update(++done);
+    ++done;
+    bar.update(double(done) / frames, std::to_string(done) + "/" + std::to_string(frames));
     return !interrupted;
   });
-  bar.finish();
+  bar.finish(std::to_string(done) + " images");
   if (interrupted) throw std::runtime_error("interrupted, nothing is left behind");
   imuUntil(std::numeric_limits<std::int64_t>::max());
   if (writer) {
