@@ -1,7 +1,6 @@
 #include "driver_bag.h"
 
 #include <cmath>
-#include <functional>
 
 #include <rosbag/bag.h>
 #include <sensor_msgs/CameraInfo.h>

@@ -1,7 +1,6 @@
 // A folder in EuRoC's layout, rendered: the shipped EuRoC stereo pair and an IMU fly through the simulator's room.
 //   render_euroc_folder OUT [SECONDS]
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>

@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cstdio>
-#include <fstream>
-#include <numeric>
 #include <sstream>
 
 #include "place_recognition/synthetic_descriptors.h"

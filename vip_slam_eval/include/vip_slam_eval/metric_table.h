@@ -1,4 +1,4 @@
-// A list of named figures and its three spellings: terminal table, CSV, Markdown.
+// A list of named figures and its two spellings: terminal table and CSV.
 #pragma once
 
 #include <ostream>
@@ -18,7 +18,6 @@ using MetricTable = std::vector<Metric>;
 void printMetrics(std::ostream& out, const MetricTable& table);
 /// Columns group,name,value,unit.
 void writeMetricsCsv(std::ostream& out, const MetricTable& table);
-void writeMetricsMarkdown(std::ostream& out, const MetricTable& table);
 
 /// A number in at most `digits` significant digits, without exponent for ordinary sizes.
 std::string shortNumber(double value, int digits = 4);

@@ -1,7 +1,6 @@
 // rosrun vip_slam_eval plane_benchmark BAG --sensor S --truth T.tum --planes-truth P.yaml [--out DIR]
 // Planes with true poses: what the plane module does by itself.
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 
 #include <opencv2/core/utility.hpp>

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <set>
 #include <stdexcept>
 
 #include "vip_slam_planes/detection/plane_fit.h"

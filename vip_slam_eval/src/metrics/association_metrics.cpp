@@ -1,6 +1,5 @@
 #include "vip_slam_eval/association_metrics.h"
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 

@@ -1,6 +1,5 @@
 #include "plane_benchmark/true_map.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace vip_slam {

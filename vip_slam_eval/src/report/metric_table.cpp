@@ -49,12 +49,4 @@ void writeMetricsCsv(std::ostream& out, const MetricTable& table) {
   }
 }
 
-void writeMetricsMarkdown(std::ostream& out, const MetricTable& table) {
-  out << "| group | measure | value | unit |\n|---|---|---:|---|\n";
-  for (const Metric& metric : table) {
-    out << "| " << metric.group << " | " << metric.name << " | " << shortNumber(metric.value) << " | " << metric.unit
-        << " |\n";
-  }
-}
-
 }  // namespace vip_slam

@@ -1,8 +1,5 @@
 #include "vip_slam_frontend/filter/square_root_filter.h"
 
-#include <algorithm>
-#include <numeric>
-
 #include "vip_slam_frontend/filter/qr.h"
 #include "vip_slam_frontend/filter/triangular_solve.h"
 

@@ -1,6 +1,5 @@
 #include "vip_slam_frontend/tracking/moving_regions.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace vip_slam {

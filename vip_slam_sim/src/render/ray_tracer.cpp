@@ -1,7 +1,6 @@
 #include "vip_slam_sim/render/ray_tracer.h"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
