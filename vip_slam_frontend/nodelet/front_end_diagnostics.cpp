@@ -23,19 +23,24 @@ double quantile(std::deque<double> values, double q) {
 }  // namespace
 
 void FrontEndNodelet::tick() {
-  // Before the first image nothing else says why there is no pose.
+  // Only images bring a status: before the first one, and when they no longer come, nothing else says why there is no
+  // pose.
   bool started;
   {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     started = shown_.counters.images > 0;
   }
-  if (!started) {
-    TrackingStatus waiting{TrackingState::kWaiting, ""};
-    const double now = ros::Time::now().toSec();
+  const double now = ros::Time::now().toSec();
+  TrackingStatus waiting{TrackingState::kWaiting, ""};
+  if (started) {
+    waiting.reason = color_monitor_->silence(now);
+  } else {
     waiting.reason = color_monitor_->complaint(now);
     if (waiting.reason.empty()) waiting.reason = imu_monitor_->complaint(now);
     if (waiting.reason.empty()) waiting.reason = calibration_->waitingFor();
     if (waiting.reason.empty()) waiting.reason = "the first image waits for its depth and the IMU";
+  }
+  if (!waiting.reason.empty()) {
     status_pub_.publish(toMsg(waiting));
     NODELET_WARN_THROTTLE(10, "WAITING: %s", waiting.reason.c_str());
     std::lock_guard<std::mutex> lock(shown_mutex_);

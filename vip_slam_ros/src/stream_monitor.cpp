@@ -7,6 +7,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kWindow = 100;  // stamps over which the rate is measured
+constexpr double kSilent = 2.0;        // seconds without a message
 
 std::string format(const char* pattern, double a, double b) {
   char text[160];
@@ -65,14 +66,19 @@ StreamMonitor::Report StreamMonitor::report() const {
   return report;
 }
 
+std::string StreamMonitor::silence(double now) const {
+  const Report r = report();
+  const double seconds = now - r.last_arrival;
+  return r.messages > 0 && seconds > kSilent ? "topic " + r.topic + ": " + format("silent for %.1f s", seconds, 0) : "";
+}
+
 std::string StreamMonitor::complaint(double now) const {
   const Report r = report();
   const std::string topic = "topic " + r.topic + ": ";
   if (r.messages == 0 && r.rejected == 0)
     return topic + "no message so far; is the name right, and the driver running?";
   if (r.rejected > 0 && r.messages <= r.rejected) return topic + r.last_rejection;
-  const double silence = now - r.last_arrival;
-  if (silence > 2.0) return topic + format("silent for %.1f s", silence, 0);
+  if (const std::string silent = silence(now); !silent.empty()) return silent;
   if (r.nominal_rate > 0 && r.rate > 0 && r.rate < 0.7 * r.nominal_rate) {
     return topic + format("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
   }

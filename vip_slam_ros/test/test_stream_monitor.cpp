@@ -32,9 +32,12 @@ TEST(StreamMonitor, CountsWhatIsWrong) {
 TEST(StreamMonitor, ComplaintsNameTheTopic) {
   StreamMonitor monitor("/camera/imu", 200);
   EXPECT_NE(monitor.complaint(1).find("/camera/imu"), std::string::npos);
+  EXPECT_EQ(monitor.silence(100), "");  // it has not begun
   for (int i = 0; i < 50; ++i) monitor.add(i / 20.0, i / 20.0);
   EXPECT_NE(monitor.complaint(2.5).find("20.0 Hz"), std::string::npos) << monitor.complaint(2.5);
   EXPECT_NE(monitor.complaint(10).find("silent"), std::string::npos);
+  EXPECT_EQ(monitor.silence(2.5), "");
+  EXPECT_NE(monitor.silence(10).find("/camera/imu: silent for 7.5"), std::string::npos) << monitor.silence(10);
 }
 
 TEST(StreamMonitor, StartsAnewAfterTimeRanBackwards) {

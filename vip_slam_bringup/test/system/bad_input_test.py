@@ -103,6 +103,7 @@ class BadInputTest(unittest.TestCase):
                                'params:=' + parameters], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               timeout=60)
         self.assertIn('max_featurez', done.stdout)
+        rospy.delete_param('/vip_slam')  # the server would hand it to the next launch as well
 
     def test_04_run_bag_names_what_is_missing(self):
         bag, sensor = os.path.join(self.data, 'smoke.bag'), os.path.join(self.data, 'smoke_sensor.yaml')
@@ -134,6 +135,22 @@ class BadInputTest(unittest.TestCase):
         code, words = self.run_bag(bag, sensor, '--set', 'frontend/tracking/max_featurez=3')
         self.assertNotEqual(code, 0)
         self.assertIn('max_featurez', words)
+
+    def test_05_a_camera_that_stops_is_named(self):
+        changed = os.path.join(self.folder, 'stops.bag')
+        copy_bag(os.path.join(self.data, 'smoke.bag'), changed, 9.0,
+                 lambda topic, message, number: None if 'image_raw' in topic and number > 60 else message)
+        status = Listener('/vip_slam/tracking_status', TrackingStatus)
+        launch = subprocess.Popen(['roslaunch', 'vip_slam_bringup', 'bag.launch', 'bag:=' + changed, 'sensor:=' +
+                                   os.path.join(self.data, 'smoke_sensor.yaml'), 'rviz:=false'],
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            wait_for(lambda: any(s.state == TrackingStatus.TRACKING for s in status.all()), 40, 'tracking')
+            wait_for(lambda: 'color/image_raw: silent' in status.last().reason, 30, 'a status that names the camera')
+            self.assertEqual(status.last().state, TrackingStatus.WAITING)
+        finally:
+            launch.terminate()
+            launch.wait(30)
 
 
 if __name__ == '__main__':

@@ -32,6 +32,8 @@ class StreamMonitor {
   Report report() const;
   /// One sentence on what is wrong at time `now` ("topic /x: ..."); empty when nothing is.
   std::string complaint(double now) const;
+  /// The same only of a stream that has come and stopped: empty while messages come, and before the first one.
+  std::string silence(double now) const;
   /// After time ran backwards: the next stamp may be anything.
   void restart();
 
