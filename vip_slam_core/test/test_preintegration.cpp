@@ -216,8 +216,8 @@ TEST(Preintegration, ASingleStepHasAnInverse) {
     std::vector<ImuSample> fine;
     for (int k = 0; k <= 16; ++k) {
       const double f = k / 16.0;
-      fine.push_back({5.0 + f * dt, (1 - f) * step[0].gyro + f * step[1].gyro,
-                      (1 - f) * step[0].accel + f * step[1].accel});
+      fine.push_back(
+          {5.0 + f * dt, (1 - f) * step[0].gyro + f * step[1].gyro, (1 - f) * step[0].accel + f * step[1].accel});
     }
     const Preintegration pre(step, kBg, kBa, ImuNoise()), exact(fine, kBg, kBa, ImuNoise());
     const Matrix15d& W = pre.sqrtInformation();

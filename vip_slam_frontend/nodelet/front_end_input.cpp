@@ -1,4 +1,5 @@
-// What the sensors send: images are decoded where they arrive, then all is handed to the thread that owns the estimator.
+// What the sensors send: images are decoded where they arrive, then all is handed to the thread that owns the
+// estimator.
 #include "front_end_nodelet.h"
 
 #include "vip_slam_ros/geometry_conversions.h"

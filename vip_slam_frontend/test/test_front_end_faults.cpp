@@ -157,8 +157,8 @@ TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
     for (int k = static_cast<int>(std::lround(from * 20)); k < std::lround(to * 20); ++k) {
       const double t = 0.05 * k;
       for (; imu_t_ < t + 0.02; imu_t_ += 0.005) front_end.addImu(World::imu(imu_t_));
-      last = front_end.process({t, dark ? cv::Mat(240, 320, CV_8U, cv::Scalar(3)) : world_.image(t),
-                                dark ? cv::Mat() : World::depth(t)});
+      last = front_end.process(
+          {t, dark ? cv::Mat(240, 320, CV_8U, cv::Scalar(3)) : world_.image(t), dark ? cv::Mat() : World::depth(t)});
       if (last.keyframe) keyframes_.push_back(last.keyframe);
     }
     return last;

@@ -50,9 +50,7 @@ struct World {
     cv::remap(texture, result, mx, my, cv::INTER_LINEAR, cv::BORDER_REFLECT);
     return result;
   }
-  static cv::Mat depth(double t) {
-    return cv::Mat(240, 320, CV_32FC1, cv::Scalar(kWall - position(t).x()));
-  }
+  static cv::Mat depth(double t) { return cv::Mat(240, 320, CV_32FC1, cv::Scalar(kWall - position(t).x())); }
   /// The same wall with a floor 0.9 m below and another wall 1.1 m to the left: three directions that depth alone
   /// holds.
   static cv::Mat cornerDepth(double t) {

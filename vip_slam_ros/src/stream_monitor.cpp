@@ -7,7 +7,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kWindow = 100;  // stamps over which the rate is measured
-constexpr double kSilent = 2.0;        // seconds without a message
+constexpr double kSilent = 2.0;       // seconds without a message
 
 std::string format(const char* pattern, double a, double b) {
   char text[160];

@@ -42,8 +42,9 @@ void exportMap(const std::string& file, const std::string& folder) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  vip_slam::CommandLine line("export_map", "Writes what a stored map holds: keyframes.tum, planes.yaml, points.ply, "
-                                           "points.pcd.");
+  vip_slam::CommandLine line("export_map",
+                             "Writes what a stored map holds: keyframes.tum, planes.yaml, points.ply, "
+                             "points.pcd.");
   std::string map, out;
   line.argument("map", map, "map.vsm of a run");
   line.option("out", out, "folder for the files; made when it does not exist");

@@ -109,18 +109,18 @@ void checkDepth(const Recording& r, Findings* out) {
     out->push_back({Severity::kError, "depth image", words("median depth is %.4g m", z),
                     "depth scale or encoding in the sensor file is wrong (millimetres against metres?)"});
   else if (median(usable) < 0.02)
-    out->push_back({Severity::kError, "depth image",
-                    words("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range,
-                          noise.max_range),
-                    "depth scale or depth_noise/max_range in the sensor file is wrong"});
+    out->push_back(
+        {Severity::kError, "depth image",
+         words("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range, noise.max_range),
+         "depth scale or depth_noise/max_range in the sensor file is wrong"});
   else if (median(spread) < 1e-6)
     out->push_back({Severity::kError, "depth image", words("every pixel says %.4g m", z), "the driver is broken"});
   else if (share < 0.3)
     out->push_back({Severity::kWarning, "depth image", words("only %.0f %% of the pixels have depth", 100 * share),
                     "glass, sunlight or range? planes and scale suffer"});
   else
-    out->push_back({Severity::kGood, "depth image",
-                    words("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
+    out->push_back(
+        {Severity::kGood, "depth image", words("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
 }
 
 }  // namespace

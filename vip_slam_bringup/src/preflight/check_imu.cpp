@@ -71,10 +71,11 @@ void checkGaps(const std::string& role, const std::vector<StampedVector>& sample
   std::size_t gaps = 0;
   for (const double step : steps) gaps += step > std::max(3.5 * period, 0.012) ? 1 : 0;
   if (gaps > 0)
-    out->push_back({largest > 0.1 ? Severity::kError : Severity::kWarning, role,
-                    words("%zu gaps, the largest %.0f ms at %.1f s", gaps, 1000 * largest, at),
-                    "the driver or the recording loses samples; the odometry bridges short gaps with more noise and starts "
-                    "anew after long ones"});
+    out->push_back(
+        {largest > 0.1 ? Severity::kError : Severity::kWarning, role,
+         words("%zu gaps, the largest %.0f ms at %.1f s", gaps, 1000 * largest, at),
+         "the driver or the recording loses samples; the odometry bridges short gaps with more noise and starts "
+         "anew after long ones"});
   else
     out->push_back({Severity::kGood, role, words("no gaps, largest step %.1f ms", 1000 * largest), ""});
   if (1.0 / period < 90)

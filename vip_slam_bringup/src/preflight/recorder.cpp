@@ -81,8 +81,7 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   const SensorTopics& topics = recording_.sensor.topics;
   if (topic == topics.color_info) {
     take(&recording_.color_info, &recording_.color_camera, &recording_.color_camera_error);
-    if (!rotation_ && recording_.color_camera.width > 0)
-      startRotation(recording_.color_camera);
+    if (!rotation_ && recording_.color_camera.width > 0) startRotation(recording_.color_camera);
   }
   if (topic == topics.depth_info)
     take(&recording_.depth_info, &recording_.depth_camera, &recording_.depth_camera_error);

@@ -65,9 +65,9 @@ Step integrateStep(const ImuSample& first, const ImuSample& second, const Eigen:
   return step;
 }
 
-// One step's noise is one vector for velocity and position alike, so that the covariance of a single step has no inverse.
-// Two images within a gap of the IMU have no more than that between them: the line between the samples is then taken
-// in two steps, which is the same motion.
+// One step's noise is one vector for velocity and position alike, so that the covariance of a single step has no
+// inverse. Two images within a gap of the IMU have no more than that between them: the line between the samples is then
+// taken in two steps, which is the same motion.
 std::vector<ImuSample> halved(const std::vector<ImuSample>& step) {
   ImuSample middle;
   middle.t = 0.5 * (step[0].t + step[1].t);

@@ -123,8 +123,8 @@ void judgeRelocalisation(const std::vector<RelocalisationTrial>& trials, bool li
               found, errors.empty() ? 0 : errors[errors.size() / 2], wrong);
   std::printf("trials at mapped places %d, within 1 s and 3 cm %d (%s)\n", mapped, right,
               percent(right, mapped).c_str());
-  std::printf("of these with %d corners of the map in view %d, within 1 s and 3 cm %d (%s)\n", kFewCorners,
-              textured, textured_right, percent(textured_right, textured).c_str());
+  std::printf("of these with %d corners of the map in view %d, within 1 s and 3 cm %d (%s)\n", kFewCorners, textured,
+              textured_right, percent(textured_right, textured).c_str());
 }
 
 }  // namespace
@@ -156,9 +156,10 @@ int main(int argc, char** argv) {
     if (!query.empty()) {
       const vip_slam::StoredMap session = vip_slam::loadMapFile(query, vip_slam::ImuNoise());
       const auto session_poses = posesOf(session.map, query_truth);
-      judgeRelocalisation(vip_slam::relocalisationTrials(stored, poses, session, session_poses,
-                                                         vip_slam::loadSensorConfig(vip_slam::resolveSensor(sensor)), options),
-                          list);
+      judgeRelocalisation(
+          vip_slam::relocalisationTrials(stored, poses, session, session_poses,
+                                         vip_slam::loadSensorConfig(vip_slam::resolveSensor(sensor)), options),
+          list);
     }
   } catch (const std::exception& error) {
     std::cerr << "place_metrics: " << error.what() << "\n";

@@ -1,5 +1,5 @@
-#include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_eval/plane_benchmark.h"
+#include "vip_slam_core/util/progress_bar.h"
 
 #include <ctime>
 #include <stdexcept>

@@ -7,7 +7,8 @@
 
 namespace vip_slam {
 
-/// Opens `path` for reading. Throws std::runtime_error naming the file: not there, no bag, or cut off, with what mends it.
+/// Opens `path` for reading. Throws std::runtime_error naming the file: not there, no bag, or cut off, with what mends
+/// it.
 void openBag(const std::string& path, rosbag::Bag* bag);
 
 }  // namespace vip_slam

@@ -36,10 +36,10 @@ struct RotationStep {
 };
 
 struct DepthSample {
-  double valid = 0;    ///< share of pixels with a value
-  double usable = 0;   ///< share of pixels within the sensor file's range
-  double median = 0;   ///< metres, of those with a value
-  double spread = 0;   ///< metres, between the nearest and the farthest of them
+  double valid = 0;   ///< share of pixels with a value
+  double usable = 0;  ///< share of pixels within the sensor file's range
+  double median = 0;  ///< metres, of those with a value
+  double spread = 0;  ///< metres, between the nearest and the farthest of them
 };
 
 struct BrightnessSample {
