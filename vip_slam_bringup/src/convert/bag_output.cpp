@@ -26,7 +26,9 @@ BagOutput::~BagOutput() {
   try {
     bag_->close();
   } catch (const std::exception&) {
-    // The half-written bag is removed next; there is nothing to tell the user about it.
+    // The half-written bag is removed next; there is nothing to tell the user about it. The bag would close itself once
+    // more and, on a full disk, end the program by throwing.
+    static_cast<void>(bag_.release());
   }
   std::error_code ignored;
   std::filesystem::remove(temporary_, ignored);

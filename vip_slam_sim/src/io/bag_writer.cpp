@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <stdexcept>
 
 #include <geometry_msgs/TransformStamped.h>
@@ -70,12 +71,12 @@ class BagWriter : public SequenceWriter {
   BagWriter(const std::string& path, const SensorConfig& sensor, std::int64_t start_ns)
       : path_(path), part_(path + "." + std::to_string(getpid()) + ".part"), sensor_(sensor) {
     try {
-      bag_.open(part_, rosbag::bagmode::Write);
+      bag_->open(part_, rosbag::bagmode::Write);
     } catch (const rosbag::BagException& e) {
       throw std::runtime_error(path + ": cannot be written: " + e.what());
     }
-    bag_.setCompression(rosbag::compression::LZ4);
-    bag_.setChunkThreshold(4 << 20);
+    bag_->setCompression(rosbag::compression::LZ4);
+    bag_->setChunkThreshold(4 << 20);
     color_info_ = infoOf(sensor.camera, kColorFrame);
     depth_frame_ = sensor.depth_registered ? kColorFrame : kDepthFrame;
     depth_info_ = infoOf(sensor.depth_registered ? sensor.camera : sensor.depth_camera, depth_frame_);
@@ -92,15 +93,16 @@ class BagWriter : public SequenceWriter {
     (*latched)["type"] = ros::message_traits::DataType<tf2_msgs::TFMessage>::value();
     (*latched)["md5sum"] = ros::message_traits::MD5Sum<tf2_msgs::TFMessage>::value();
     (*latched)["message_definition"] = ros::message_traits::Definition<tf2_msgs::TFMessage>::value();
-    bag_.write("/tf_static", start, tf, latched);
+    bag_->write("/tf_static", start, tf, latched);
   }
 
   ~BagWriter() override {
     if (committed_) return;
     try {
-      bag_.close();
+      bag_->close();
     } catch (const std::exception&) {
-      // The file goes anyway.
+      // The file goes anyway. The bag would close itself once more and, on a full disk, end the program by throwing.
+      static_cast<void>(bag_.release());
     }
     std::error_code ignored;
     std::filesystem::remove(part_, ignored);
@@ -115,7 +117,7 @@ class BagWriter : public SequenceWriter {
     m.orientation_covariance[0] = -1;  // no orientation
     assign(&m.angular_velocity, s.gyro);
     assign(&m.linear_acceleration, s.accel);
-    bag_.write(sensor_.topics.imu, stamp, m);
+    put(sensor_.topics.imu, stamp, m);
 
     nav_msgs::Odometry o;
     o.header.seq = imu_seq_++;
@@ -129,7 +131,7 @@ class BagWriter : public SequenceWriter {
     o.pose.pose.orientation.z = q.z();
     o.pose.pose.orientation.w = q.w();
     assign(&o.twist.twist.linear, x.T_W_I.rotation().conjugate() * x.v_W);
-    bag_.write("/ground_truth/odometry", stamp, o);
+    put("/ground_truth/odometry", stamp, o);
   }
 
   void frame(const SimFrame& f) override {
@@ -139,13 +141,13 @@ class BagWriter : public SequenceWriter {
     write(sensor_.topics.depth, f.depth, "16UC1", depth_frame_, stamp, seq);
     color_info_.header.stamp = depth_info_.header.stamp = stamp;
     color_info_.header.seq = depth_info_.header.seq = seq;
-    bag_.write(sensor_.topics.color_info, stamp, color_info_);
-    bag_.write(sensor_.topics.depth_info, stamp, depth_info_);
+    put(sensor_.topics.color_info, stamp, color_info_);
+    put(sensor_.topics.depth_info, stamp, depth_info_);
   }
 
   void commit() override {
     try {
-      bag_.close();
+      bag_->close();
       std::filesystem::rename(part_, path_);
     } catch (const std::exception& e) {
       throw std::runtime_error(path_ + ": cannot be written: " + e.what());
@@ -154,6 +156,15 @@ class BagWriter : public SequenceWriter {
   }
 
  private:
+  template <class Message>
+  void put(const std::string& topic, const ros::Time& stamp, const Message& message) {
+    try {
+      bag_->write(topic, stamp, message);
+    } catch (const rosbag::BagException& e) {
+      throw std::runtime_error(path_ + ": cannot be written: " + e.what());
+    }
+  }
+
   void write(const std::string& topic, const cv::Mat& image, const std::string& encoding, const std::string& frame,
              const ros::Time& stamp, std::uint32_t seq) {
     sensor_msgs::Image m;
@@ -167,12 +178,12 @@ class BagWriter : public SequenceWriter {
     m.data.resize(static_cast<std::size_t>(m.step) * m.height);
     for (int v = 0; v < image.rows; ++v)
       std::memcpy(m.data.data() + static_cast<std::size_t>(v) * m.step, image.ptr(v), m.step);
-    bag_.write(topic, stamp, m);
+    put(topic, stamp, m);
   }
 
   std::string path_, part_;
   SensorConfig sensor_;
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
   sensor_msgs::CameraInfo color_info_, depth_info_;
   std::string depth_frame_;
   std::uint32_t imu_seq_ = 0;
