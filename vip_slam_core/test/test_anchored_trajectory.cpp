@@ -37,6 +37,26 @@ TEST(AnchorTrajectory, BlendsBetweenKeyframesFarFromTheOrigin) {
   EXPECT_NEAR(yawOf(trajectory[5].T_W_B.rotation()), 0.2, 1e-9);
 }
 
+TEST(AnchorTrajectory, AMountingLearntLaterStraightensWhatCameBefore) {
+  // A camera whose mounting was thought to be 2 degrees and 3 cm off: the front end told the body's poses accordingly.
+  const SE3 T_I_C(expQuaternion({-1.2, 1.2, -1.2}), {0.05, 0, 0});
+  const SE3 T_I_C_then = T_I_C * SE3(expQuaternion({0.02, -0.03, 0.01}), {0.02, 0.02, -0.01});
+  const SE3 T_now_then = T_I_C * T_I_C_then.inverse();
+  std::vector<SE3> truth;
+  std::vector<OdometryPose> odometry;
+  std::vector<Anchor> anchors;
+  for (int i = 0; i <= 10; ++i) {
+    truth.push_back(SE3(expQuaternion({0.01 * i, 0.02 * i, 0.3 * i}), {0.2 * i, 0.1 * i, 0}));
+    odometry.push_back({double(i), 1, truth.back() * T_now_then});
+    if (i == 2 || i == 6) anchors.push_back({double(i), 1, odometry.back().T_odom_I, truth.back(), T_now_then});
+  }
+  const Trajectory trajectory = anchorTrajectory(odometry, anchors);
+  ASSERT_EQ(trajectory.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    EXPECT_LT(trajectory[i].T_W_B.boxminus(truth[i]).norm(), 1e-12) << i;
+  }
+}
+
 TEST(AnchorTrajectory, EpochsDoNotMix) {
   const std::vector<OdometryPose> odometry = {{0, 0, at(0)}, {1, 1, at(5)}, {2, 1, at(6)}, {3, 2, at(9)}};
   const std::vector<Anchor> anchors = {{1, 1, at(5), at(50)}};

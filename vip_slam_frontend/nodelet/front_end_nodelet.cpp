@@ -205,7 +205,15 @@ void FrontEndNodelet::process(const ImagePair& pair) {
   const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
   publish(pair, output, milliseconds);
 
+  constexpr std::uint64_t kRenewMounting = 30;  // images: its sigmas cost an inversion
+  std::optional<MountingEstimate> mounting;
+  if (front_end_->counters().images % kRenewMounting == 0) mounting = front_end_->mounting();
+
   std::lock_guard<std::mutex> lock(shown_mutex_);
+  if (mounting) {
+    shown_.mounting = *mounting;
+    shown_.mounting_differences = mountingDifferences(front_end_->givenMounting(), *mounting);
+  }
   shown_.size_problem = size_problem;
   shown_.status = output.frame->status;
   shown_.counters = front_end_->counters();

@@ -30,6 +30,8 @@ class FrontEnd::Impl {
   FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);
   void applyMapUpdate(const MapUpdate& update);
   std::optional<NavState> predict(double t) const;
+  MountingEstimate mounting() const { return filter_.mounting(); }
+  MountingEstimate givenMounting() const { return {sensor_.T_imu_cam, sensor_.time_offset}; }
   void reset(const std::string& reason);
 
   FrontEndCounters counters_;
@@ -38,8 +40,8 @@ class FrontEnd::Impl {
  private:
   enum class Phase { kWaiting, kInitialising, kTracking, kLost };
 
-  double timeOffset() const { return filter_.started() ? filter_.window().time_offset : sensor_.time_offset; }
-  SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : sensor_.T_imu_cam; }
+  double timeOffset() const { return filter_.started() ? filter_.window().time_offset : filter_.mounting().time_offset; }
+  SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.mounting().T_I_C; }
   /// Empty when the input is usable; else what is wrong. Fixes up the depth.
   std::string checkInput(const FrameInput& input, cv::Mat* depth);
   bool noticeTimeJump(double t, double newest, const char* what);
@@ -50,7 +52,6 @@ class FrontEnd::Impl {
                          const FrontEnd::PoseReady& on_pose);
   SE3 gyroRotation(double t0, double t1) const;
   bool decideStillness(double t_imu);
-  bool calibrationExcited(double t_imu) const;
   double longestReadout() const { return std::max(sensor_.rolling_shutter, sensor_.depth_rolling_shutter); }
   /// How the colour camera moves during a readout of so many seconds, given the state at the stamp; null: global
   /// shutter.

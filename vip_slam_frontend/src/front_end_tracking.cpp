@@ -50,7 +50,7 @@ SE3 FrontEnd::Impl::gyroRotation(double t0, double t1) const {
   const std::vector<ImuSample> samples = imu_.between(t0, t1);
   if (samples.size() < 2) return SE3();
   const Preintegration pre(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), sensor_.imu_noise);
-  const Eigen::Matrix3d R_I_C = sensor_.T_imu_cam.R();
+  const Eigen::Matrix3d R_I_C = extrinsics().R();
   return SE3(Eigen::Matrix3d(R_I_C.transpose() * pre.deltaR().transpose() * R_I_C), Eigen::Vector3d::Zero());
 }
 
@@ -152,13 +152,6 @@ bool FrontEnd::Impl::decideStillness(double t_imu) {
   return still;
 }
 
-bool FrontEnd::Impl::calibrationExcited(double t_imu) const {
-  const CalibrationOptions& options = options_.filter.calibration;
-  const ImuSpread spread = imuSpread(imu_.between(std::max(imu_.oldest(), t_imu - 0.5), t_imu));
-  return spread.mean_gyro.norm() + spread.gyro_std > options.min_rotation_rate &&
-         spread.accel_std > options.min_acceleration;
-}
-
 SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const {
   const int index = filter_.window().indexOf(surfaces_.reference());
   if (index < 0 || depth.empty() || !options_.filter.use_surfaces) return {};
@@ -206,8 +199,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     ScopedTimer timer(timing_, "frontend.update", t);
     still_ = decideStillness(t_imu);
     report = filter_.step(propagation, next_clone_++, measurements(),
-                          still_ ? std::optional<double>(stillness_.unrest()) : std::nullopt,
-                          calibrationExcited(t_imu), &surfaces);
+                          still_ ? std::optional<double>(stillness_.unrest()) : std::nullopt, &surfaces);
   }
   renewSurfaces(depth, surfaces.pairs.size(), t);
   counters_.moving += tracked.moves_by_itself;

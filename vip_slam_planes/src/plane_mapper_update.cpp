@@ -28,7 +28,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
     const KeyframePtr keyframe = it->second;
     waiting_.erase(it);
     placed_[keyframe->id] = keyframe;
-    poses_[keyframe->id] = estimate.state.T_W_I * keyframe->frame.T_I_C;
+    poses_[keyframe->id] = estimate.state.T_W_I * estimate.T_I_C;
     if (keyframe->id > newest_) newest_ = keyframe->id, epoch_ = keyframe->frame.epoch;
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);
@@ -62,7 +62,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     const auto it = placed_.find(estimate.id);
     if (it == placed_.end() || !estimate.state.T_W_I.isFinite()) continue;
     SE3& T_map_C = poses_[estimate.id];
-    const SE3 corrected = estimate.state.T_W_I * it->second->frame.T_I_C;
+    const SE3 corrected = estimate.state.T_W_I * estimate.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
     map_moved_ = map_moved_ || move.t().norm() > kMovedShift || logSO3(move.rotation()).norm() > kMovedTurn;
     if (T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);

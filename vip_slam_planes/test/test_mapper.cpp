@@ -187,6 +187,26 @@ TEST(Mapper, GrowsWithFramesButStartsNothing) {
   EXPECT_EQ(6u, rig.mapper.counters().frames_grown);
 }
 
+TEST(Mapper, KeyframesLookFromTheMountingThatIsKnownNow) {
+  // The front end held the mounting to be 3 degrees off when it made the keyframes; the back end knows better.
+  Rig rig;
+  const Scene scene = room();
+  const SE3 T_I_C(expQuaternion({0.2, -0.1, 0.3}), {0.05, 0.02, 0});
+  for (int i = 0; i < 6; ++i) {
+    const SE3 T_W_C = lookAt({-1 + 0.4 * i, 0, 1.4}, {3, -1 + 0.4 * i, 1.0});
+    const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+    keyframe->frame.T_I_C = T_I_C * SE3(expQuaternion({0.03, 0.04, 0}), {0.1, 0, 0});
+    keyframe->frame.state.T_W_I = T_W_C * keyframe->frame.T_I_C.inverse();
+    rig.mapper.addKeyframe(keyframe);
+    MapUpdate update = updateFor(*keyframe, T_W_C * T_I_C.inverse());
+    update.keyframes[0].T_I_C = T_I_C;
+    rig.mapper.applyMapUpdate(update);
+  }
+  const PlaneEstimate* wall = rig.find(Plane({-1, 0, 0}, 3), 0.003);
+  ASSERT_TRUE(wall);
+  EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), wall->plane), 0.1 * M_PI / 180);
+}
+
 TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
   Rig rig;
   const Scene scene = room();

@@ -81,6 +81,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
     vip_slam_msgs::KeyframeEstimate k;
     k.id = keyframe.id;
     k.state = toMsg(keyframe.state);
+    k.imu_camera = toPoseMsg(keyframe.T_I_C);
     msg.keyframes.push_back(k);
   }
   msg.landmarks.reserve(update.landmarks.size());
@@ -112,7 +113,10 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.T_map_odom = fromMsg(msg.map_odom);
   update.newest_keyframe = msg.newest_keyframe;
   update.global = msg.global_update;
-  for (const auto& keyframe : msg.keyframes) update.keyframes.push_back({keyframe.id, fromMsg(keyframe.state)});
+  update.keyframes.reserve(msg.keyframes.size());
+  for (const auto& keyframe : msg.keyframes) {
+    update.keyframes.push_back({keyframe.id, fromMsg(keyframe.state), fromMsg(keyframe.imu_camera)});
+  }
   update.landmarks.reserve(msg.landmarks.size());
   for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));
   for (const auto& plane : msg.planes) update.planes.push_back(fromPlaneMsg(plane));

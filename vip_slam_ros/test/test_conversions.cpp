@@ -214,7 +214,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   update.T_map_odom = pose();
   update.newest_keyframe = 30;
   update.global = true;
-  update.keyframes = {{29, state()}, {30, state()}};
+  update.keyframes = {{29, state(), pose()}, {30, state(), pose()}};
   LandmarkEstimate landmark;
   landmark.id = 77;
   landmark.p_W = vector();
@@ -245,6 +245,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   ASSERT_EQ(back.keyframes.size(), 2u);
   EXPECT_EQ(back.keyframes[1].id, 30u);
   expectSame(back.keyframes[1].state, update.keyframes[1].state);
+  expectSame(back.keyframes[1].T_I_C, update.keyframes[1].T_I_C);
   ASSERT_EQ(back.landmarks.size(), 1u);
   EXPECT_EQ(back.landmarks[0].id, 77);
   EXPECT_EQ(back.landmarks[0].p_W, landmark.p_W);

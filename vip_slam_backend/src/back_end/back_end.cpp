@@ -32,6 +32,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
     epoch = epoch_before;
     throw;
   }
+  map.adoptMounting(keyframe->frame.T_I_C);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   maker.process(keyframe->id, &map);
   // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
@@ -116,6 +117,7 @@ MapSnapshot BackEnd::Impl::snapshot() const {
     out.epoch = kf.data->frame.epoch;
     out.state = kf.state;
     out.T_odom_I = kf.data->frame.state.T_W_I;
+    out.T_now_then = kf.T_I_C * kf.data->frame.T_I_C.inverse();
     for (const LandmarkId landmark : kf.landmarks) out.landmarks += landmark != kNoLandmark;
     snapshot.keyframes.push_back(out);
   }

@@ -80,7 +80,7 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   epoch = keyframe->frame.epoch;
   const SE3& T_odom_I = keyframe->frame.state.T_W_I;
   T_map_odom = alignOdometry(found->T_W_I, T_odom_I);
-  localised.push_back({keyframe->frame.t, epoch, T_odom_I, T_map_odom * T_odom_I});
+  localised.push_back({keyframe->frame.t, epoch, T_odom_I, T_map_odom * T_odom_I, SE3()});
 }
 
 }  // namespace vip_slam

@@ -60,7 +60,7 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   for (std::size_t f = 0; f < built.frames.size(); ++f) {
     if (built.problem.frames[f].fixed) continue;
     const MapKeyframe& kf = map.keyframe(built.frames[f]);
-    update->keyframes.push_back({kf.id(), kf.state});
+    update->keyframes.push_back({kf.id(), kf.state, kf.T_I_C});
     for (const LandmarkId id : kf.landmarks)
       if (id != kNoLandmark) landmarks.insert(id);
   }
@@ -108,7 +108,7 @@ void BackEnd::Impl::fillGlobal(MapUpdate* update) const {
   update->keyframes.clear();
   update->landmarks.clear();
   update->planes.clear();
-  for (const auto& entry : map.keyframes()) update->keyframes.push_back({entry.first, entry.second.state});
+  for (const auto& entry : map.keyframes()) update->keyframes.push_back({entry.first, entry.second.state, entry.second.T_I_C});
   for (const LandmarkId id : map.landmarkIds()) update->landmarks.push_back(estimateOf(map.landmark(id)));
   for (const auto& entry : map.planes()) update->planes.emplace_back(entry.first, entry.second.estimate.plane);
 }

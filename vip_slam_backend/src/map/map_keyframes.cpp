@@ -83,7 +83,9 @@ MapKeyframe& Map::restoreKeyframe(const KeyframePtr& data, const NavState& state
     throw MapError(name + ": its previous keyframe " + std::to_string(previous) + " is missing or has a successor");
   std::shared_ptr<const std::vector<ImuSample>> samples;
   if (previous != 0 && imu.size() >= 2) samples = std::make_shared<const std::vector<ImuSample>>(imu);
-  return insert(data, state, previous, samples, noise);
+  MapKeyframe& restored = insert(data, state, previous, samples, noise);
+  restored.stored = true;
+  return restored;
 }
 
 MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, KeyframeId previous,
@@ -102,6 +104,16 @@ MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, Keyfram
   MapKeyframe& inserted = keyframes_.emplace(data->id, std::move(kf)).first->second;
   if (previous != 0) keyframe(previous).next = data->id;
   return inserted;
+}
+
+void Map::adoptMounting(const SE3& T_I_C) {
+  for (auto& [id, kf] : keyframes_) {
+    if (kf.stored || kf.T_I_C.matrix() == T_I_C.matrix()) continue;
+    const SE3 T_now_then = T_I_C * kf.T_I_C.inverse();
+    kf.state.T_W_I = kf.state.T_W_I * T_now_then.inverse();
+    kf.motion.T_a_b = T_now_then * kf.motion.T_a_b * T_now_then.inverse();
+    kf.T_I_C = T_I_C;
+  }
 }
 
 void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds) {

@@ -33,7 +33,7 @@ void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map*
   SE3 motion;  // of the newest solved keyframe, new from old world
   for (std::size_t f = 0; f < solution.built.frames.size(); ++f)
     if (solution.built.frames[f] == newest)
-      motion = solution.built.problem.frames[f].state.T_W_I * map->keyframe(newest).state.T_W_I.inverse();
+      motion = solution.built.problem.frames[f].T_W_C() * map->keyframe(newest).T_W_C().inverse();
   std::map<KeyframeId, SE3> moved;
   for (const auto& entry : map->keyframes())
     if (!solved.count(entry.first)) moved[entry.first] = motion * entry.second.state.T_W_I;

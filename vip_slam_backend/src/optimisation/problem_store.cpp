@@ -56,7 +56,12 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   std::vector<std::pair<KeyframeId, SE3>> motion;
   for (std::size_t f = 0; f < built.frames.size(); ++f) {
     if (problem.frames[f].fixed || !map->hasKeyframe(built.frames[f])) continue;
-    const NavState& state = problem.frames[f].state;
+    NavState state = problem.frames[f].state;
+    // The camera is what was adjusted; how it is mounted may be known better by now.
+    const SE3& T_I_C = map->keyframe(built.frames[f]).T_I_C;
+    if (T_I_C.matrix() != problem.frames[f].T_I_C.matrix()) {
+      state.T_W_I = problem.frames[f].T_W_C() * T_I_C.inverse();
+    }
     motion.emplace_back(built.frames[f], state.T_W_I * map->keyframe(built.frames[f]).state.T_W_I.inverse());
     map->setState(built.frames[f], state, noise);
   }

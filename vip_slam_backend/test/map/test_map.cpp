@@ -39,6 +39,29 @@ TEST(Map, TracksBecomeLandmarks) {
   EXPECT_EQ(covisible.front().first, 5u);
 }
 
+TEST(Map, AMountingThatIsKnownBetterTurnsBodiesAboutTheirCameras) {
+  Fixture f;
+  f.add(4);
+  auto stored = std::make_shared<Keyframe>(*f.world.next());
+  stored->previous = 0;
+  f.map.restoreKeyframe(stored, f.world.truth(stored->frame.t), 0, {}, ImuNoise());
+  RelativeMotion& motion = f.map.keyframe(3).motion;
+  motion.T_a_b = f.map.keyframe(2).state.T_W_I.inverse() * f.map.keyframe(3).state.T_W_I;
+  std::map<KeyframeId, MapKeyframe> before = f.map.keyframes();
+
+  const SE3 T_I_C = before.at(1).T_I_C * SE3(expQuaternion({0.02, -0.01, 0.015}), {0.01, 0.02, -0.01});
+  f.map.adoptMounting(T_I_C);
+  EXPECT_EQ(checkMap(f.map), "");
+  for (const auto& [id, kf] : f.map.keyframes()) {
+    EXPECT_LT(kf.T_W_C().boxminus(before.at(id).T_W_C()).norm(), 1e-12) << id;
+    const SE3& expected = id == stored->id ? before.at(id).T_I_C : T_I_C;
+    EXPECT_EQ(kf.T_I_C.matrix(), expected.matrix()) << id;
+  }
+  // The odometry's motion between them is that of the same cameras.
+  const SE3 between = f.map.keyframe(2).state.T_W_I.inverse() * f.map.keyframe(3).state.T_W_I;
+  EXPECT_LT(f.map.keyframe(3).motion.T_a_b.boxminus(between).norm(), 1e-12);
+}
+
 TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {
   // Track 900 has no depth; while it waits, its first view is matched with landmark 800.
   Map map;

@@ -97,6 +97,10 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(std::to_string(c.imu_rejected) +
                   " IMU messages are left out: not finite, or not newer than the one before");
   if (pipeline.images() == 0) all.push_back("no image could be used");
+  for (const std::string& difference :
+       mountingDifferences(pipeline.frontEnd().givenMounting(), pipeline.frontEnd().mounting())) {
+    all.push_back(difference + " (summary.yaml: calibration)");
+  }
   if (pipeline.mapping()) {
     const auto& refusals = pipeline.mapping()->refusals();
     all.insert(all.end(), refusals.begin(), refusals.end());
@@ -105,6 +109,23 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
 }
 
 namespace {
+
+/// In the words and units of a sensor file, so that it can be copied there.
+void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting) {
+  const auto list = [&yaml](const char* key, const Eigen::VectorXd& values) {
+    yaml << YAML::Key << key << YAML::Value << YAML::Flow
+         << std::vector<double>(values.data(), values.data() + values.size());
+  };
+  yaml << YAML::Key << "calibration" << YAML::Value << YAML::BeginMap;
+  yaml << YAML::Key << "T_imu_cam" << YAML::Value << YAML::BeginSeq;
+  const Eigen::Matrix4d T = mounting.T_I_C.matrix();
+  for (int r = 0; r < 4; ++r) yaml << YAML::Flow << std::vector<double>{T(r, 0), T(r, 1), T(r, 2), T(r, 3)};
+  yaml << YAML::EndSeq;
+  yaml << YAML::Key << "time_offset" << YAML::Value << mounting.time_offset;
+  list("sigma_rotation_deg", mounting.sigma_rotation * 180 / M_PI);
+  list("sigma_translation", mounting.sigma_translation);
+  yaml << YAML::Key << "sigma_time_offset" << YAML::Value << mounting.sigma_time_offset << YAML::EndMap;
+}
 
 std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader, const MapSnapshot& map,
                     std::size_t planes) {
@@ -129,6 +150,7 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   emitMap(yaml, map, planes,
           pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());
+  emitMounting(yaml, pipeline.frontEnd().mounting());
   emitStates(yaml, pipeline.states());
   put("warnings", runWarnings(pipeline, reader));
   yaml << YAML::EndMap;

@@ -7,7 +7,8 @@ namespace vip_slam {
 namespace {
 
 SE3 carry(const Anchor& anchor, const OdometryPose& pose) {
-  return anchor.T_map_I * (anchor.T_odom_I.inverse() * pose.T_odom_I);
+  const SE3 moved = anchor.T_odom_I.inverse() * pose.T_odom_I;
+  return anchor.T_map_I * (anchor.T_now_then * moved * anchor.T_now_then.inverse());
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "vip_slam_core/types/keyframe.h"
 #include "vip_slam_core/types/map_update.h"
 #include "vip_slam_core/util/timing.h"
+#include "vip_slam_frontend/filter/mounting_estimate.h"
 #include "vip_slam_frontend/front_end_options.h"
 
 namespace vip_slam {
@@ -84,6 +85,10 @@ class FrontEnd {
   /// Starts anew: a new epoch; keyframe and landmark ids go on.
   void reset(const std::string& reason);
 
+  /// Where the camera sits on the IMU and by how much its stamps lag, as found so far.
+  MountingEstimate mounting() const;
+  /// As the sensor's configuration has it.
+  MountingEstimate givenMounting() const;
   const FrontEndCounters& counters() const;
   const FrontEndOptions& options() const;
 

@@ -80,7 +80,7 @@ double VioFilter::depthScale() const {
   return depth_noise_.sigma() > kWorseThanModel ? depth_noise_.sigma() : 1.0;
 }
 
-void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report) {
+void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, StepReport* report) {
   const WindowState& window = filter_.window();
   MeasurementNoise noise;
   noise.sigma_xy = noise_.sigma() / focal_;
@@ -101,9 +101,6 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
     FeatureRows feature = featureRows(window, observations, point.p_W, row_noise);
     const int dof = static_cast<int>(feature.r.size());
     if (dof == 0) continue;
-    if (!calibrate && window.calibration.size() > 0) {
-      feature.H.middleCols(window.calibrationColumn(), window.calibration.size()).setZero();
-    }
     if (point.pixel_rows >= 10) {
       chi2.push_back(point.pixel_chi2 / (point.pixel_rows - 3));
       chi2_rows += point.pixel_rows - 3;

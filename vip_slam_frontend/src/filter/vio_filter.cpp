@@ -12,6 +12,8 @@ namespace {
 // A depth camera may be this much worse than its noise model before readings are wrong rather than noisy.
 constexpr double kMostDepthNoise = 5.0;
 constexpr double kLeastDepthNoise = 0.3;
+// Sigmas of the prior within which a mounting that was found is kept over a restart.
+constexpr double kBelievableChange = 4.0;
 
 /// Squared correction of orientation and velocity per degree of freedom, whitened by what the covariance lost.
 double correctionPerDof(const NavState& before, const Matrix15d& P_before, const NavState& after,
@@ -30,8 +32,8 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
                      double focal_px, double gravity)
     : options_(options),
       imu_noise_(imu_noise),
-      T_I_C_(T_I_C),
-      time_offset_(time_offset),
+      given_{T_I_C, time_offset},
+      learnt_(given_),
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(options.gate_probability),
@@ -40,7 +42,43 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       depth_noise_(1.0, kLeastDepthNoise, kMostDepthNoise, options.adapt_depth_noise),
       imu_monitor_(options.adapt_imu_noise) {}
 
+MountingEstimate VioFilter::mounting() const {
+  if (!started_) return learnt_;
+  const WindowState& window = filter_.window();
+  MountingEstimate mounting;
+  mounting.T_I_C = window.T_I_C;
+  mounting.time_offset = window.time_offset;
+  if (window.calibration.size() == 0) return mounting;
+  const Eigen::VectorXd variance = filter_.covariance().diagonal();
+  if (window.calibration.rotation) {
+    mounting.sigma_rotation = variance.segment<3>(window.rotationColumn()).cwiseMax(0).cwiseSqrt();
+  }
+  if (window.calibration.translation) {
+    mounting.sigma_translation = variance.segment<3>(window.translationColumn()).cwiseMax(0).cwiseSqrt();
+  }
+  if (window.calibration.time_offset) {
+    mounting.sigma_time_offset = std::sqrt(std::max(0.0, variance(window.timeOffsetColumn())));
+  }
+  return mounting;
+}
+
+void VioFilter::learnMounting() {
+  const WindowState& window = filter_.window();
+  learnt_ = given_;
+  if (!window.isFinite()) return;
+  const CalibrationOptions& options = options_.calibration;
+  const Vector6d change = window.T_I_C.boxminus(given_.T_I_C);
+  if (change.head<3>().norm() > kBelievableChange * options.sigma_rotation ||
+      change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
+      std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset) {
+    return;
+  }
+  learnt_.T_I_C = window.T_I_C;
+  learnt_.time_offset = window.time_offset;
+}
+
 void VioFilter::stop() {
+  if (started_) learnMounting();
   started_ = false;
   tracks_.clear();
   imu_monitor_.reset();
@@ -57,13 +95,13 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   clone.T_W_I = clone.T_W_I_fej = prior.state.T_W_I;
   clone.omega_I = omega_I;
   clone.v_W = prior.state.v_W;
-  clone.time_offset = time_offset_;
+  clone.time_offset = learnt_.time_offset;
   window.clones.push_back(clone);
   window.v_W = window.v_W_fej = prior.state.v_W;
   window.bias_gyro = prior.state.bias_gyro;
   window.bias_accel = prior.state.bias_accel;
-  window.T_I_C = T_I_C_;
-  window.time_offset = time_offset_;
+  window.T_I_C = learnt_.T_I_C;
+  window.time_offset = learnt_.time_offset;
   const CalibrationOptions& calibration = options_.calibration;
   window.calibration = {calibration.rotation, calibration.translation, calibration.time_offset};
 
@@ -136,23 +174,18 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
   }
 }
 
-void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, bool calibrate, StepReport* report) {
-  const WindowState& window = filter_.window();
-  SurfaceRows surface = surfaceRows(window, filter_.R(), surfaces, options_.huber);
+void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report) {
+  SurfaceRows surface = surfaceRows(filter_.window(), filter_.R(), surfaces, options_.huber);
   report->surfaces_used = surface.used;
   report->surfaces_gated = surface.gated;
   const int dof = static_cast<int>(surface.rows.r.size());
   if (dof == 0) return;
-  if (!calibrate && window.calibration.size() > 0) {
-    surface.rows.H.middleCols(window.calibrationColumn(), window.calibration.size()).setZero();
-  }
   const UpdateResult result = filter_.update(surface.rows.H, surface.rows.r);
   report->healthy = report->healthy && result.ok;
 }
 
 StepReport VioFilter::step(const Propagation& propagation, CloneId id,
                            const std::vector<FilterMeasurement>& measurements, std::optional<double> unrest,
-                           bool calibrate,
                            const SurfaceMatches* surfaces) {
   StepReport report;
   const bool still = unrest.has_value();
@@ -187,8 +220,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const Matrix15d P_predicted = covariance();
   const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full);
-  if (!candidates.empty()) updateWithFeatures(candidates, calibrate, &report);
-  if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, calibrate, &report);
+  if (!candidates.empty()) updateWithFeatures(candidates, &report);
+  if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
   if (!still) imu_monitor_.add(report.correction, report.features_used, report.features_gated);
 

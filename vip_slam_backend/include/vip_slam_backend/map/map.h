@@ -27,6 +27,9 @@ class Map {
   /// Inserts a keyframe of a stored map: any id not taken, no check of time; the chain is given by `previous`.
   MapKeyframe& restoreKeyframe(const KeyframePtr& data, const NavState& state, KeyframeId previous,
                                const std::vector<ImuSample>& imu, const ImuNoise& noise);
+  /// The front end knows better how its camera is mounted: holds for all keyframes but those of a stored map. Their
+  /// cameras stay where they are, so that landmarks and planes fit as before; the body turns about them.
+  void adoptMounting(const SE3& T_I_C);
   /// Removes it with its observations; landmarks left without observation go too. The IMU chain is joined over the gap
   /// while the joined factor stays below `max_imu_seconds`, else it is cut.
   void removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds);

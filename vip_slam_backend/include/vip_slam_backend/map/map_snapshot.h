@@ -16,6 +16,7 @@ struct SnapshotKeyframe {
   std::uint32_t epoch = 0;
   NavState state;            ///< T_map_I, v, biases
   SE3 T_odom_I;              ///< the front end's pose when the keyframe was made
+  SE3 T_now_then;            ///< see Anchor
   std::uint32_t landmarks = 0;
 };
 

@@ -29,7 +29,8 @@ struct MapObservation {
 struct MapKeyframe {
   KeyframePtr data;   ///< as the front end published it
   NavState state;     ///< estimate in `map`: T_map_I, v, biases
-  SE3 T_I_C;          ///< extrinsics in use when it was taken
+  SE3 T_I_C;          ///< the camera's mounting as known now
+  bool stored = false;  ///< from a stored map, made by a camera whose mounting the present one says nothing about
   /// Landmark of each feature, kNoLandmark when none; same length as data->frame.features.
   std::vector<LandmarkId> landmarks;
   /// Neighbours on the IMU chain (0: none). They skip keyframes that were culled.

@@ -19,6 +19,8 @@ struct BaFrame {
   SE3 T_I_C;
   bool fixed = false;     ///< pose and motion are constants
   bool motion = true;     ///< velocity and biases are variables (when not fixed); else they are constants
+
+  SE3 T_W_C() const { return state.T_W_I * T_I_C; }
 };
 
 struct BaObservation {

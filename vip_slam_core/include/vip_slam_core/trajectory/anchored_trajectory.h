@@ -20,6 +20,9 @@ struct Anchor {
   double t = 0;
   std::uint32_t epoch = 0;
   SE3 T_odom_I, T_map_I;
+  /// Maps the body as the front end had it then into the body as known now, which differ when the camera's mounting was
+  /// learnt meanwhile: T_I_C now * (T_I_C then)^-1.
+  SE3 T_now_then;
 };
 
 /// Carries each image's odometry over to the neighbouring keyframes of its epoch: before the first and after the last

@@ -15,6 +15,7 @@ namespace vip_slam {
 struct KeyframeEstimate {
   KeyframeId id = 0;
   NavState state;  ///< T_map_I, v_map, biases
+  SE3 T_I_C;       ///< the camera's mounting as known now; the keyframe itself has what was known when it was made
 };
 
 struct LandmarkEstimate {

@@ -5,15 +5,15 @@
 
 namespace vip_slam {
 
+/// What of the camera's mounting is estimated along the way. There is no threshold of motion below which it would be
+/// frozen: to leave the calibration out of an update says that it is exact there, which a filter cannot take back.
 struct CalibrationOptions {
-  bool rotation = false;
+  bool rotation = true;
   bool translation = false;
-  bool time_offset = false;
+  bool time_offset = true;
   double sigma_rotation = 0.01;
   double sigma_translation = 0.01;
   double sigma_time_offset = 0.005;
-  double min_rotation_rate = 0.15;
-  double min_acceleration = 0.3;
 
   void visit(OptionVisitor& v) {
     v.field("rotation", rotation, "estimate the camera-IMU rotation online");
@@ -22,8 +22,6 @@ struct CalibrationOptions {
     v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "initial one-sigma of the rotation, rad");
     v.field("sigma_translation", sigma_translation, 1e-5, 1.0, "initial one-sigma of the translation, m");
     v.field("sigma_time_offset", sigma_time_offset, 1e-6, 1.0, "initial one-sigma of the delay, s");
-    v.field("min_rotation_rate", min_rotation_rate, 0.0, 10.0, "calibration is frozen below this rate (rad/s) and ...");
-    v.field("min_acceleration", min_acceleration, 0.0, 50.0, "... below this spread of acceleration, m/s^2");
   }
 };
 

@@ -8,6 +8,7 @@
 
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_frontend/filter/filter_options.h"
+#include "vip_slam_frontend/filter/mounting_estimate.h"
 #include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/filter/noise_monitor.h"
 #include "vip_slam_frontend/filter/observation.h"
@@ -63,9 +64,11 @@ class VioFilter {
   /// One image: `propagation` from predict(). Without measurements this coasts. `surfaces` (may be null) ties the new
   /// image's depth to that of an earlier clone. `unrest`: see StillnessDetector; nothing when the body moves.
   StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,
-                  std::optional<double> unrest, bool calibrate, const SurfaceMatches* surfaces = nullptr);
+                  std::optional<double> unrest, const SurfaceMatches* surfaces = nullptr);
 
   const WindowState& window() const { return filter_.window(); }
+  /// How the camera is mounted, as known now; also between two starts.
+  MountingEstimate mounting() const;
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
   /// From now on the motion since the newest clone is asked for (its image became a keyframe).
@@ -88,16 +91,20 @@ class VioFilter {
   /// that is no point (an occluding edge, a reflection). Such patches also wander along with the motion, by much more
   /// than their residuals say: measured against true poses about as the square of them.
   double ownNoise(const Triangulation& point) const;
-  void updateWithFeatures(const std::vector<Candidate>& candidates, bool calibrate, StepReport* report);
-  void updateWithSurfaces(const SurfaceMatches& surfaces, bool calibrate, StepReport* report);
+  void updateWithFeatures(const std::vector<Candidate>& candidates, StepReport* report);
+  void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
+  /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
+  /// allows: then whatever broke the estimate broke this as well.
+  void learnMounting();
   void forgetClone(CloneId id);
   /// The newest clone stands for the marked one, which is about to go.
   void moveMark();
 
   FilterOptions options_;
   ImuNoise imu_noise_;
-  SE3 T_I_C_;
-  double time_offset_, focal_;
+  const MountingEstimate given_;  ///< by the sensor's configuration
+  MountingEstimate learnt_;       ///< what a start begins with: given_, or what earlier runs found
+  double focal_;
   Eigen::Vector3d G_;
   Gate gate_, explained_;
   NoiseMonitor noise_, depth_noise_;

@@ -1,0 +1,24 @@
+// How the camera is mounted on the IMU, as the filter estimates it along the way.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam {
+
+/// Where the camera sits on the IMU and by how much its stamps lag; sigmas are zero for what is not estimated.
+struct MountingEstimate {
+  SE3 T_I_C;
+  double time_offset = 0;                                       ///< s: t_imu = t_image + time_offset
+  Eigen::Vector3d sigma_rotation = Eigen::Vector3d::Zero();     ///< rad, right perturbation
+  Eigen::Vector3d sigma_translation = Eigen::Vector3d::Zero();  ///< m, in the IMU frame
+  double sigma_time_offset = 0;                                 ///< s
+};
+
+/// What the sensor's configuration should be corrected by, in sentences: differences that are both sure (five sigmas)
+/// and large enough to matter (0.2 degrees, 5 mm, 2 ms). Empty when it is right.
+std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found);
+
+}  // namespace vip_slam

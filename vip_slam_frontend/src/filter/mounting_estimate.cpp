@@ -1,0 +1,49 @@
+#include "vip_slam_frontend/filter/mounting_estimate.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace vip_slam {
+namespace {
+
+constexpr double kSure = 5.0;  // sigmas
+constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002;
+
+template <typename... Numbers>
+std::string sentence(const char* format, Numbers... numbers) {
+  char text[256];
+  std::snprintf(text, sizeof text, format, numbers...);
+  return text;
+}
+
+/// Some component is further off than its uncertainty explains.
+bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
+  return sigma.minCoeff() > 0 && (difference.cwiseAbs().array() > kSure * sigma.array()).any();
+}
+
+}  // namespace
+
+std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found) {
+  std::vector<std::string> all;
+  const Vector6d change = found.T_I_C.boxminus(given.T_I_C);
+  const Eigen::Vector3d turn = change.head<3>(), shift = change.tail<3>();
+  if (turn.norm() > kLeastTurn && sure(turn, found.sigma_rotation)) {
+    all.push_back(sentence("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration; the one "
+                           "that was found is used",
+                           turn.norm() * 180 / M_PI));
+  }
+  if (shift.norm() > kLeastShift && sure(shift, found.sigma_translation)) {
+    all.push_back(sentence("the camera sits %.1f mm beside where T_imu_cam of the sensor's configuration has it; the place "
+                           "that was found is used",
+                           1e3 * shift.norm()));
+  }
+  const double delay = found.time_offset - given.time_offset;
+  if (std::abs(delay) > kLeastDelay && found.sigma_time_offset > 0 && std::abs(delay) > kSure * found.sigma_time_offset) {
+    all.push_back(sentence("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration; the "
+                           "delay that was found is used",
+                           1e3 * found.time_offset, 1e3 * given.time_offset));
+  }
+  return all;
+}
+
+}  // namespace vip_slam
