@@ -33,8 +33,8 @@ TEST_F(FrontEndTest, WholeRunFollowsAndHandsOnKeyframes) {
     EXPECT_EQ(keyframe.frame.depth_grid.stride, options().keyframe_grid_stride);
     if (i > 0) {
       ASSERT_GT(keyframe.imu.size(), 2u);
-      EXPECT_NEAR(keyframe.imu.front().t, keyframes_[i - 1]->frame.t, 1e-9);
-      EXPECT_NEAR(keyframe.imu.back().t, keyframe.frame.t, 1e-9);
+      EXPECT_NEAR(keyframe.imu.front().t, keyframes_[i - 1]->frame.state.t, 1e-9);
+      EXPECT_NEAR(keyframe.imu.back().t, keyframe.frame.state.t, 1e-9);
       ASSERT_TRUE(keyframe.motion.isUsable());
       const double way = (World::position(keyframe.frame.t) - World::position(keyframes_[i - 1]->frame.t)).norm();
       EXPECT_NEAR(keyframe.motion.T_a_b.t().norm(), way, 4e-3);

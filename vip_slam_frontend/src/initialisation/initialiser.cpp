@@ -9,6 +9,10 @@
 
 namespace vip_slam {
 
+namespace {
+constexpr double kWatched = 0.5;  // share of the standing time that images have to cover
+}  // namespace
+
 double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b,
                      double focal_px) {
   double sum = 0;
@@ -85,7 +89,8 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     reason_ = "moving: gathering images for a start in motion";
     return std::nullopt;
   }
-  // The oldest image inside the second shows whether the scene stood, too.
+  // The oldest image inside the second shows whether the scene stood, too: a steady motion is quiet as well. After a
+  // restart the IMU reaches back further than the images.
   const InitialisationInput* oldest = nullptr;
   for (const InitialisationInput& image : images_) {
     if (image.t_imu >= from - 1e-9) {
@@ -93,9 +98,11 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
       break;
     }
   }
-  const double disparity = oldest && oldest != &images_.back()
-                               ? meanDisparity(oldest->features, images_.back().features, focal_)
-                               : -1.0;
+  if (!oldest || now - oldest->t_imu < kWatched * options_.standing_seconds) {
+    reason_ = "IMU is quiet: watching whether the image moves";
+    return std::nullopt;
+  }
+  const double disparity = meanDisparity(oldest->features, images_.back().features, focal_);
   if (disparity > options_.max_disparity_px) {
     reason_ = "IMU is quiet but the image moves: gathering images for a start in motion";
     return std::nullopt;
