@@ -227,7 +227,7 @@ TEST(Detection, MeshDropsTrianglesAcrossDepthEdges) {
 }
 
 TEST(Detection, HistogramKeepsSidesApartAndForgets) {
-  PlaneHistogram histogram(0.05, 3);
+  PlaneHistogram histogram(0.05, 0.05, 3);
   histogram.addHorizontal({0, 0, 1}, {0, 0, 1.02}, 1.0, 0);
   histogram.addHorizontal({0, 0, -1}, {0, 0, 1.02}, 2.0, 1);
   histogram.addVertical({-1, 1e-9, 0}, {3, 0, 0}, 1.5, 2);
@@ -242,6 +242,18 @@ TEST(Detection, HistogramKeepsSidesApartAndForgets) {
   EXPECT_EQ((std::vector<int>{0}), histogram.peak().members);
   histogram.remove(0);
   EXPECT_EQ(0, histogram.peak().area);
+}
+
+TEST(Detection, HeightsAndDistancesHaveBinsOfTheirOwn) {
+  PlaneHistogram histogram(0.5, 0.05, 3);
+  histogram.addHorizontal({0, 0, 1}, {0, 0, 0.1}, 1.0, 0);
+  histogram.addHorizontal({0, 0, 1}, {0, 0, 0.6}, 1.0, 1);  // a neighbour at half a metre, not at 5 cm
+  histogram.addVertical({1, 0, 0}, {0.1, 0, 0}, 0.9, 2);
+  histogram.addVertical({1, 0, 0}, {0.6, 0, 0}, 0.9, 3);
+  EXPECT_EQ((std::vector<int>{0, 1}), histogram.peak().members);
+  histogram.remove(0);
+  histogram.remove(1);
+  EXPECT_EQ(1u, histogram.peak().members.size());
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ class Detector {
   }
 
   void histogramPeaks() {
-    PlaneHistogram histogram(options_.distance_bin, options_.angle_bin_deg);
+    PlaneHistogram histogram(options_.height_bin, options_.distance_bin, options_.angle_bin_deg);
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
       PlaneKind kind;
       const MapTriangle& t = triangles_[i];

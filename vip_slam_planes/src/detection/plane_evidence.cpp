@@ -177,7 +177,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
   std::vector<JointPlane> found;
   if (frames_.size() < 2 || !poses.count(frames_.back().id)) return found;
   const Eigen::Vector3d origin = poses.at(frames_.back().id).t();
-  PlaneHistogram histogram(detection_.distance_bin, detection_.angle_bin_deg);
+  PlaneHistogram histogram(detection_.height_bin, detection_.distance_bin, detection_.angle_bin_deg);
   std::vector<Vote> all;
   for (std::size_t f = 0; f < frames_.size(); ++f) {
     const auto pose = poses.find(frames_[f].id);

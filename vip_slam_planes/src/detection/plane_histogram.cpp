@@ -5,8 +5,10 @@
 
 namespace vip_slam {
 
-PlaneHistogram::PlaneHistogram(double distance_bin, double angle_bin_deg)
-    : distance_bin_(distance_bin), angles_(std::max(8, static_cast<int>(std::lround(360.0 / angle_bin_deg)))) {
+PlaneHistogram::PlaneHistogram(double height_bin, double distance_bin, double angle_bin_deg)
+    : height_bin_(height_bin),
+      distance_bin_(distance_bin),
+      angles_(std::max(8, static_cast<int>(std::lround(360.0 / angle_bin_deg)))) {
   angle_bin_ = 2 * M_PI / angles_;
 }
 
@@ -53,7 +55,7 @@ void PlaneHistogram::add(int space, int angle, int distance, double area, int in
 }
 
 void PlaneHistogram::addHorizontal(const Eigen::Vector3d& n, const Eigen::Vector3d& p, double area, int index) {
-  add(n.z() > 0 ? 0 : 1, 0, static_cast<int>(std::floor(p.z() / distance_bin_)), area, index);
+  add(n.z() > 0 ? 0 : 1, 0, static_cast<int>(std::floor(p.z() / height_bin_)), area, index);
 }
 
 void PlaneHistogram::addVertical(const Eigen::Vector3d& n, const Eigen::Vector3d& p, double area, int index) {

@@ -14,8 +14,9 @@ namespace vip_slam {
 
 class PlaneHistogram {
  public:
-  /// Bin sizes in metres and degrees; the angle bin is rounded so that a full circle holds a whole number of them.
-  PlaneHistogram(double distance_bin, double angle_bin_deg);
+  /// Bin sizes in metres (heights of horizontal planes, distances of vertical ones) and degrees; the angle bin is rounded
+  /// so that a full circle holds a whole number of them.
+  PlaneHistogram(double height_bin, double distance_bin, double angle_bin_deg);
 
   void clear();
   /// A vote for the plane through p with unit normal n; `index` comes back with the peak. The mode says which space.
@@ -48,7 +49,7 @@ class PlaneHistogram {
   void add(int space, int angle, int distance, double area, int index);
   std::size_t binAt(int space, int angle, int distance);
 
-  double distance_bin_, angle_bin_;
+  double height_bin_, distance_bin_, angle_bin_;
   int angles_;
   std::vector<Bin> bins_;  ///< in order of their first vote, so that ties break the same way everywhere
   std::unordered_map<std::uint64_t, std::size_t> index_;
