@@ -32,6 +32,8 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
     epoch = epoch_before;
     throw;
   }
+  // Beyond the local window bodies turn a little as well; others hear of it with the next global update, until when
+  // the cameras they know stay right.
   map.adoptMounting(keyframe->frame.T_I_C);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   maker.process(keyframe->id, &map);

@@ -108,7 +108,7 @@ void BackEnd::Impl::fillGlobal(MapUpdate* update) const {
   update->keyframes.clear();
   update->landmarks.clear();
   update->planes.clear();
-  for (const auto& entry : map.keyframes()) update->keyframes.push_back({entry.first, entry.second.state, entry.second.T_I_C});
+  for (const auto& [id, kf] : map.keyframes()) update->keyframes.push_back({id, kf.state, kf.T_I_C});
   for (const LandmarkId id : map.landmarkIds()) update->landmarks.push_back(estimateOf(map.landmark(id)));
   for (const auto& entry : map.planes()) update->planes.emplace_back(entry.first, entry.second.estimate.plane);
 }
