@@ -154,6 +154,9 @@ TEST(PixelNoise, AlongAnEdgeTheAlignmentScattersAsTheTextureSays) {
   EXPECT_GT(along.dot(covariance * along), 4.0 * across.dot(covariance * across));
 }
 
+/// Geometric mean of the two standard deviations.
+double pixelSigma(const Eigen::Matrix2d& whitening) { return 1.0 / std::sqrt(whitening.determinant()); }
+
 TEST(PixelNoise, GrowsWithFaintnessResidualAndEdges) {
   const Eigen::Matrix2d strong = 1e6 * Eigen::Matrix2d::Identity(), faint = 1e3 * Eigen::Matrix2d::Identity();
   EXPECT_NEAR(pixelSigma(pixelWhitening(strong, 0, 1)), 1.0, 0.01);

@@ -1,17 +1,28 @@
 #include "vip_slam_ros/tf_lookup.h"
 
+#include <tf2/exceptions.h>
+
 #include "vip_slam_ros/geometry_conversions.h"
 
 namespace vip_slam {
 
-std::optional<SE3> lookUpTransform(const tf2_ros::Buffer& buffer, const std::string& target,
+std::string bareFrame(const std::string& frame) { return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame; }
+
+std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::string& target,
                                    const std::string& source) {
   if (target.empty() || source.empty()) return std::nullopt;
   try {
-    return fromMsg(buffer.lookupTransform(target, source, ros::Time(0)).transform);
+    return fromMsg(buffer.lookupTransform(bareFrame(target), bareFrame(source), ros::Time(0)).transform);
   } catch (const tf2::TransformException&) {
     return std::nullopt;
   }
+}
+
+MountingGap mountingGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b) {
+  MountingGap gap;
+  gap.degrees = T_imu_cam_a.rotation().angularDistance(T_imu_cam_b.rotation()) * 180 / M_PI;
+  gap.metres = (T_imu_cam_a.t() - T_imu_cam_b.t()).norm();
+  return gap;
 }
 
 }  // namespace vip_slam

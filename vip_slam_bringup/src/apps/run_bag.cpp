@@ -27,6 +27,7 @@ struct Arguments {
   bool localise = false;
   bool no_report = false;
   std::vector<std::string> settings;
+  std::string extrinsics = "auto";
   double start = 0, duration = -1;
 };
 
@@ -42,6 +43,9 @@ void addArguments(vip_slam::CommandLine& line, Arguments& arguments) {
   line.flag("localise", arguments.localise, "leave the stored map as it is, only find the way in it");
   line.needs("localise", "map");
   line.flag("no-report", arguments.no_report, "leave report.html out");
+  line.option("extrinsics", arguments.extrinsics,
+              "where T_imu_cam comes from: tf in the bag, config (the sensor file), or auto: tf when the bag has it",
+              vip_slam::oneOf("auto, tf, config"));
   line.option("params", arguments.parameters, "YAML file with options, in groups");
   line.option("set", arguments.settings, "one option as group/key=value; repeatable");
   line.option("start", arguments.start, "seconds to skip at the beginning", vip_slam::between(0.0, 1e6));
@@ -85,6 +89,7 @@ int run(const Arguments& arguments) {
   vip_slam::BagReaderOptions reading;
   reading.start = arguments.start;
   reading.duration = arguments.duration;
+  reading.extrinsics = arguments.extrinsics;
   vip_slam::BagReader reader(arguments.bag, sensor, reading);
   vip_slam::prepareOutputFolder(arguments.out);
 

@@ -1,38 +1,12 @@
 // Frames in tf, their extrinsics against the sensor file, and all checks together.
-#include <map>
-#include <optional>
-#include <queue>
+#include <tf2/buffer_core.h>
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_ros/tf_lookup.h"
 
 namespace vip_slam {
 namespace {
-
-std::string bare(const std::string& frame) { return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame; }
-
-/// T_to_from along the tree; none when tf does not connect the two.
-std::optional<SE3> connection(const std::vector<TfEdge>& edges, const std::string& to, const std::string& from) {
-  std::map<std::string, SE3> reached{{from, SE3()}};  // T_frame_from
-  std::queue<std::string> open;
-  open.push(from);
-  while (!open.empty()) {
-    const std::string frame = open.front();
-    open.pop();
-    if (frame == to) return reached[frame];
-    for (const TfEdge& e : edges) {
-      const std::string parent = bare(e.parent), child = bare(e.child);
-      if (child == frame && !reached.count(parent)) {
-        reached[parent] = e.T_parent_child * reached[frame];
-        open.push(parent);
-      } else if (parent == frame && !reached.count(child)) {
-        reached[child] = e.T_parent_child.inverse() * reached[frame];
-        open.push(child);
-      }
-    }
-  }
-  return std::nullopt;
-}
 
 const char* label(Severity severity) {
   switch (severity) {
@@ -66,41 +40,36 @@ const char* paint(Severity severity) {
 
 Findings checkTf(const Recording& r) {
   Findings out;
-  const std::string camera = bare(r.color.frame_id);
-  const std::string imu = bare(r.sensor.topics.imu.empty() ? r.gyro.frame_id : r.imu.frame_id);
+  const std::string camera = bareFrame(r.color.frame_id);
+  const std::string imu = bareFrame(r.sensor.topics.imu.empty() ? r.gyro.frame_id : r.imu.frame_id);
   if (r.color.stamps.empty() || r.gyro_samples.empty()) return out;
   for (const auto& [role, frame] : {std::make_pair("colour image", camera), std::make_pair("IMU", imu)})
     if (frame.empty())
       out.push_back({Severity::kNote, role, "messages have an empty frame_id",
                      "tf cannot be used for it; the sensor file's extrinsics are"});
   if (camera.empty() || imu.empty()) return out;
-  const auto T_imu_cam = connection(r.tf, imu, camera);
+  tf2::BufferCore tf;
+  for (const auto& transform : r.tf) tf.setTransform(transform, "recording", true);
+  const auto T_imu_cam = lookUpTransform(tf, imu, camera);
   if (!T_imu_cam) {
-    const auto known = [&](const std::string& frame) {
-      for (const TfEdge& e : r.tf)
-        if (bare(e.parent) == frame || bare(e.child) == frame) return true;
-      return false;
-    };
     std::string missing;
     for (const std::string& frame : {camera, imu})
-      if (!known(frame)) missing += (missing.empty() ? "" : " and ") + frame;
+      if (!tf._frameExists(frame)) missing += (missing.empty() ? "" : " and ") + frame;
     out.push_back({Severity::kNote, "tf",
                    missing.empty() ? imu + " and " + camera + " are not connected" : missing + " not in tf",
                    "the extrinsics of the sensor file are used"});
     return out;
   }
-  const SE3 difference = r.sensor.T_imu_cam.inverse() * *T_imu_cam;
-  const double angle = difference.rotation().angularDistance(Eigen::Quaterniond::Identity()) * 180 / M_PI;
-  const double distance = (T_imu_cam->t() - r.sensor.T_imu_cam.t()).norm();
-  if (angle > 3 || distance > 0.02)
+  const MountingGap gap = mountingGap(r.sensor.T_imu_cam, *T_imu_cam);
+  if (gap.large())
     out.push_back({Severity::kWarning, "tf",
                    words("%s to %s differs from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",
-                         camera.c_str(), imu.c_str(), angle, 100 * distance),
-                   "one of them is wrong; tf is used when the launch file says so"});
+                         camera.c_str(), imu.c_str(), gap.degrees, 100 * gap.metres),
+                   "one of them is wrong; tf is used unless extrinsics is config"});
   else
     out.push_back({Severity::kGood, "tf",
-                   words("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", angle, 100 * distance), ""});
-  if (connection(r.tf, "base_link", imu))
+                   words("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", gap.degrees, 100 * gap.metres), ""});
+  if (lookUpTransform(tf, "base_link", imu))
     out.push_back({Severity::kGood, "tf", "IMU is connected to base_link", ""});
   else
     out.push_back(

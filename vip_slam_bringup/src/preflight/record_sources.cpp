@@ -24,7 +24,7 @@ void dispatch(Recorder* recorder, const std::string& topic, double arrival, cons
   } else if (type == "sensor_msgs/Imu") {
     if (const auto m = source.template instantiate<sensor_msgs::Imu>()) recorder->add(topic, arrival, *m);
   } else if (type == "tf2_msgs/TFMessage" || type == "tf/tfMessage") {
-    if (const auto m = source.template instantiate<tf2_msgs::TFMessage>()) recorder->add(topic, arrival, *m);
+    if (const auto m = source.template instantiate<tf2_msgs::TFMessage>()) recorder->add(*m);
   }
 }
 

@@ -99,22 +99,16 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   if (topic == topics.imu || topic == topics.accel) recording_.accel_samples.push_back({t, {a.x, a.y, a.z}});
 }
 
-void Recorder::add(const std::string& topic, double, const tf2_msgs::TFMessage& message) {
+void Recorder::add(const tf2_msgs::TFMessage& message) {
   for (const auto& transform : message.transforms) {
-    TfEdge edge;
-    edge.parent = transform.header.frame_id;
-    edge.child = transform.child_frame_id;
-    const auto& q = transform.transform.rotation;
-    const auto& p = transform.transform.translation;
-    edge.T_parent_child = SE3(Eigen::Quaterniond(q.w, q.x, q.y, q.z), Eigen::Vector3d(p.x, p.y, p.z));
-    edge.is_static = topic == "/tf_static";
-    bool known = false;
-    for (TfEdge& old : recording_.tf) {
-      if (old.child != edge.child || old.parent != edge.parent) continue;
-      old = edge;
-      known = true;
-    }
-    if (!known) recording_.tf.push_back(edge);
+    const auto same = [&](const geometry_msgs::TransformStamped& old) {
+      return old.child_frame_id == transform.child_frame_id && old.header.frame_id == transform.header.frame_id;
+    };
+    const auto old = std::find_if(recording_.tf.begin(), recording_.tf.end(), same);
+    if (old == recording_.tf.end())
+      recording_.tf.push_back(transform);
+    else
+      *old = transform;
   }
 }
 

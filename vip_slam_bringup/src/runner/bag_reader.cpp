@@ -13,11 +13,13 @@
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 
+#include "vip_slam_bringup/runner/bag_extrinsics.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/image_decoding.h"
+#include "vip_slam_ros/tf_lookup.h"
 
 namespace vip_slam {
 namespace {
@@ -123,7 +125,6 @@ BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagRea
     source_->color_camera = makeCamera(sensor.camera);
     source_->depth_camera = makeCamera(sensor.depth_camera);
   }
-  sensor_ = sensor;
 
   rosbag::View all(source_->bag);
   source_->begin = all.getBeginTime() + ros::Duration(std::max(0.0, options.start));
@@ -133,6 +134,27 @@ BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagRea
     throw std::runtime_error(path + ": --start lies behind the end of the bag, which lasts " +
                              std::to_string((all.getEndTime() - all.getBeginTime()).toSec()) + " s");
   }
+  if (options.extrinsics != "config") takeExtrinsics(&sensor);
+  sensor_ = sensor;
+}
+
+void BagReader::takeExtrinsics(SensorConfig* sensor) {
+  const BagExtrinsics found = extrinsicsInBag(source_->bag, sensor->topics, source_->begin, options_.tf_patience);
+  if (!found.T_imu_cam) {
+    if (options_.extrinsics != "tf") return;
+    throw std::runtime_error(source_->bag.getFileName() + ": tf does not connect '" + found.camera_frame + "' to '" +
+                             found.imu_frame + "'; record /tf_static, or use the sensor file's extrinsics");
+  }
+  extrinsics_source_ = "tf: " + found.camera_frame + " to " + found.imu_frame;
+  const MountingGap off = mountingGap(sensor->T_imu_cam, *found.T_imu_cam);
+  if (off.large()) {
+    char words[160];
+    std::snprintf(words, sizeof words, "differ from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",
+                  off.degrees, 100 * off.metres);
+    warnings_.push_back("extrinsics (" + extrinsics_source_ + ") " + words +
+                        ": tf is used; --extrinsics config takes the file's");
+  }
+  sensor->T_imu_cam = *found.T_imu_cam;
 }
 
 BagReader::~BagReader() {

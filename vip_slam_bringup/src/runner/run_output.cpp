@@ -136,6 +136,7 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   const auto put = [&yaml](const char* key, const auto& value) { yaml << YAML::Key << key << YAML::Value << value; };
   put("bag", facts.bag);
   put("sensor", facts.sensor);
+  put("extrinsics", reader.extrinsicsSource());
   put("variant", facts.variant);
   put("loop_closing", facts.loop_closing);
   put("finished", facts.finished);

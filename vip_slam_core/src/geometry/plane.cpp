@@ -25,14 +25,6 @@ Plane Plane::flipped() const {
   return plane;
 }
 
-Plane Plane::canonical() const {
-  if (d != 0.0) return d > 0.0 ? *this : flipped();
-  for (const double component : {n.z(), n.y(), n.x()}) {
-    if (component != 0.0) return component > 0.0 ? *this : flipped();
-  }
-  return *this;
-}
-
 Plane Plane::fromCp(const Eigen::Vector3d& eta) {
   const double distance = eta.norm();
   if (!(distance >= 1e-9)) {

@@ -34,13 +34,6 @@ TimingSummary TimingLog::summary(const std::string& stage) const {
   return summary;
 }
 
-std::vector<std::string> TimingLog::stages() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<std::string> names;
-  for (const auto& [name, rows] : rows_) names.push_back(name);
-  return names;
-}
-
 void TimingLog::writeCsv(const std::string& path) const {
   AtomicFile file(path);
   file.stream() << "stage,t,ms\n" << std::fixed;

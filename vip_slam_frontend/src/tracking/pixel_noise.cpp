@@ -52,6 +52,4 @@ double patchWander(const PatchSurface& surface, bool at_edge) {
   return std::max(at_edge ? kAtEdge : 1.0, matchSigma(surface) / kKnownSurface);
 }
 
-double pixelSigma(const Eigen::Matrix2d& whitening) { return 1.0 / std::sqrt(whitening(0, 0) * whitening(1, 1)); }
-
 }  // namespace vip_slam

@@ -4,14 +4,24 @@
 #include <optional>
 #include <string>
 
-#include <tf2_ros/buffer.h>
+#include <tf2/buffer_core.h>
 
 #include "vip_slam_core/geometry/se3.h"
 
 namespace vip_slam {
 
+/// A frame's name without the leading slash that drivers older than tf2 put before it.
+std::string bareFrame(const std::string& frame);
+
 /// The fixed transform T_target_source, newest available; empty when tf does not connect the frames (now).
-std::optional<SE3> lookUpTransform(const tf2_ros::Buffer& buffer, const std::string& target,
-                                   const std::string& source);
+std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source);
+
+/// How far two opinions on one mounting are apart.
+struct MountingGap {
+  double degrees = 0, metres = 0;
+  /// More than the tolerances of a holder: one of the two is wrong.
+  bool large() const { return degrees > 3.0 || metres > 0.02; }
+};
+MountingGap mountingGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b);
 
 }  // namespace vip_slam

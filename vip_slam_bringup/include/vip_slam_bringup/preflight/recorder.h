@@ -24,7 +24,7 @@ class Recorder {
   void add(const std::string& topic, double arrival, const sensor_msgs::CompressedImage& message);
   void add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message);
   void add(const std::string& topic, double arrival, const sensor_msgs::Imu& message);
-  void add(const std::string& topic, double arrival, const tf2_msgs::TFMessage& message);
+  void add(const tf2_msgs::TFMessage& message);
   /// Every topic that is there, wanted or not.
   void setTopics(std::map<std::string, std::string> topics) { recording_.topics = std::move(topics); }
 

@@ -1,5 +1,5 @@
-// What was seen of a sensor in a bag or on live topics, reduced to what the checks need. ROS-free, so that the checks
-// are tested on invented recordings.
+// What was seen of a sensor in a bag or on live topics, reduced to what the checks need. Neither bag nor master,
+// so that the checks are tested on invented recordings.
 #pragma once
 
 #include <map>
@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <geometry_msgs/TransformStamped.h>
 
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/sensor/sensor_config.h"
@@ -47,12 +49,6 @@ struct BrightnessSample {
   double spread = 0;  ///< one sigma of the pixels, grey levels
 };
 
-struct TfEdge {
-  std::string parent, child;
-  SE3 T_parent_child;
-  bool is_static = false;
-};
-
 struct Recording {
   SensorConfig sensor;  ///< what is expected
   bool live = false;
@@ -64,7 +60,7 @@ struct Recording {
   std::vector<RotationStep> rotations;
   std::vector<DepthSample> depths;
   std::vector<BrightnessSample> brightness;  ///< of some colour images
-  std::vector<TfEdge> tf;  ///< newest transform of each edge
+  std::vector<geometry_msgs::TransformStamped> tf;           ///< newest transform of each edge
 };
 
 }  // namespace vip_slam

@@ -35,12 +35,15 @@ struct BagReaderOptions {
   double start = 0;      ///< seconds after the first message
   double duration = -1;  ///< seconds; negative: to the end
   PairerOptions pairing;
+  std::string extrinsics = "auto";  ///< "tf", "config" (the sensor file), or tf when the bag has it
+  double tf_patience = 2.0;         ///< seconds of /tf that are looked at; /tf_static counts always
 };
 
 class BagReader {
  public:
-  /// Opens the bag and looks for the sensor's topics; fills `sensor.camera` from camera_info when the sensor says so.
-  /// Throws std::runtime_error naming the file, the topics that are missing and those that are there.
+  /// Opens the bag and looks for the sensor's topics; fills `sensor.camera` from camera_info when the sensor says so, and
+  /// `sensor.T_imu_cam` from tf. Throws std::runtime_error naming the file, the topics that are missing and those that
+  /// are there, or the frames that tf ought to connect and does not.
   BagReader(const std::string& path, SensorConfig& sensor, const BagReaderOptions& options = {});
   ~BagReader();
   BagReader(const BagReader&) = delete;
@@ -53,6 +56,8 @@ class BagReader {
 
   double beginTime() const;  ///< seconds, of the part that is read
   double endTime() const;
+  /// Where `sensor.T_imu_cam` comes from: "sensor file", or "tf" with the frames that it connects.
+  const std::string& extrinsicsSource() const { return extrinsics_source_; }
   /// After the end: what was counted ("undecodable_images", "images_without_depth", ...), and what a user should know.
   const std::map<std::string, std::uint64_t>& counters() const { return counters_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
@@ -60,12 +65,14 @@ class BagReader {
  private:
   struct Source;
   void read();
+  void takeExtrinsics(SensorConfig* sensor);
 
   std::unique_ptr<Source> source_;
   SensorConfig sensor_;
   const BagReaderOptions options_;
   Channel<SensorEvent> channel_;
   std::atomic<bool> stop_{false};
+  std::string extrinsics_source_ = "sensor file";
   std::map<std::string, std::uint64_t> counters_;
   std::vector<std::string> warnings_;
   std::thread thread_;

@@ -23,8 +23,6 @@ struct Plane {
   Eigen::Vector3d project(const Eigen::Vector3d& x) const { return x - signedDistance(x) * n; }
   Eigen::Vector4d coefficients() const { return Eigen::Vector4d(n.x(), n.y(), n.z(), d); }
   Plane flipped() const;
-  /// Same plane with d >= 0; ties (d == 0) take the normal whose first non-zero of (z, y, x) is positive.
-  Plane canonical() const;
 
   /// eta = n d (paper); blind to (n, d) -> (-n, -d).
   Eigen::Vector3d toCp() const { return n * d; }

@@ -19,7 +19,6 @@ class TimingLog {
  public:
   void add(const std::string& stage, double t, double milliseconds);
   TimingSummary summary(const std::string& stage) const;
-  std::vector<std::string> stages() const;
   /// Columns stage,t,ms. Throws std::runtime_error naming the path when it cannot be written.
   void writeCsv(const std::string& path) const;
 

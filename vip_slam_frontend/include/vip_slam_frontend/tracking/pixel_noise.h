@@ -14,9 +14,6 @@ namespace vip_slam {
 /// `residual`: of the match, grey levels; `wander`: factor on the sigmas, see there.
 Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, double wander);
 
-/// Geometric mean of the two standard deviations, same unit.
-double pixelSigma(const Eigen::Matrix2d& whitening);
-
 /// One sigma, px, of a match with a reference patch, as measured against true poses. With the surface known the warp
 /// is right, and the error stays below a tenth of a pixel for as long as the track lives. At the rims of things, and
 /// far more beyond the reach of the depth camera, the patch slides over what it shows.

@@ -1,0 +1,47 @@
+#include "vip_slam_bringup/runner/bag_extrinsics.h"
+
+#include <rosbag/view.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
+#include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "vip_slam_ros/tf_lookup.h"
+
+namespace vip_slam {
+namespace {
+
+std::string firstFrame(const rosbag::Bag& bag, const std::string& topic, const ros::Time& begin) {
+  for (const auto& message : rosbag::View(bag, rosbag::TopicQuery(topic), begin)) {
+    if (const auto image = message.instantiate<sensor_msgs::Image>()) return image->header.frame_id;
+    if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return image->header.frame_id;
+    if (const auto imu = message.instantiate<sensor_msgs::Imu>()) return imu->header.frame_id;
+    break;
+  }
+  return "";
+}
+
+void addAll(rosbag::View&& view, bool are_static, tf2::BufferCore* tf) {
+  for (const auto& message : view) {
+    const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
+    if (!transforms) continue;
+    for (const auto& transform : transforms->transforms) tf->setTransform(transform, "bag", are_static);
+  }
+}
+
+}  // namespace
+
+BagExtrinsics extrinsicsInBag(const rosbag::Bag& bag, const SensorTopics& topics, const ros::Time& begin,
+                              double patience) {
+  BagExtrinsics out;
+  out.camera_frame = firstFrame(bag, topics.color, begin);
+  out.imu_frame = firstFrame(bag, topics.imu.empty() ? topics.gyro : topics.imu, begin);
+  tf2::BufferCore tf;
+  addAll(rosbag::View(bag, rosbag::TopicQuery("/tf"), begin, begin + ros::Duration(patience)), false, &tf);
+  addAll(rosbag::View(bag, rosbag::TopicQuery("/tf_static")), true, &tf);
+  out.T_imu_cam = lookUpTransform(tf, out.imu_frame, out.camera_frame);
+  return out;
+}
+
+}  // namespace vip_slam
