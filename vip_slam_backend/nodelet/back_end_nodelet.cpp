@@ -1,8 +1,8 @@
 #include "back_end_nodelet.h"
 
-#include <pluginlib/class_list_macros.hpp>
 #include <vip_slam_msgs/LoopEvent.h>
 #include <vip_slam_msgs/MapUpdate.h>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "vip_slam_ros/calibration.h"
 #include "vip_slam_ros/frame_conversions.h"
@@ -68,24 +68,22 @@ void BackEndNodelet::advertise() {
   diagnostics_->add("map", this, &BackEndNodelet::report);
   getPrivateNodeHandle().setParam("localisation_mode", options_.localisation_mode);
   reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>>(getPrivateNodeHandle());
-  reconfigure_->setCallback(
-      [this](vip_slam_backend::BackEndConfig& config, std::uint32_t) { onReconfigure(config); });
+  reconfigure_->setCallback([this](vip_slam_backend::BackEndConfig& config, std::uint32_t) { onReconfigure(config); });
 }
 
 void BackEndNodelet::subscribe() {
   ros::NodeHandle& nh = getNodeHandle();
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::Calibration>(
-      "calibration", 1, [this](const vip_slam_msgs::CalibrationConstPtr& m) {
-        owner_->post(control_lane_, [this, m] { start(*m); });
-      }));
-  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Keyframe>(
-      "keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
+      "calibration", 1,
+      [this](const vip_slam_msgs::CalibrationConstPtr& m) { owner_->post(control_lane_, [this, m] { start(*m); }); }));
+  subscribers_.push_back(
+      nh.subscribe<vip_slam_msgs::Keyframe>("keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
         if (!owner_->post(keyframe_lane_, [this, m] { addKeyframe(*m); })) {
           NODELET_WARN_THROTTLE(5, "the back end is too slow: a keyframe was dropped");
         }
       }));
-  subscribers_.push_back(nh.subscribe<vip_slam_msgs::PlaneUpdate>(
-      "plane_update", 50, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
+  subscribers_.push_back(
+      nh.subscribe<vip_slam_msgs::PlaneUpdate>("plane_update", 50, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
         owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); });
       }));
   subscribers_.push_back(getMTNodeHandle().subscribe<vip_slam_msgs::TrackedFrame>(
@@ -224,8 +222,8 @@ void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status)
   } else if (dropped > 0) {
     status.summary(DiagnosticStatus::WARN, std::to_string(dropped) + " messages dropped: the back end is too slow");
   } else {
-    status.summary(DiagnosticStatus::OK, std::to_string(shown_.keyframes) + " keyframes, " +
-                                             std::to_string(shown_.landmarks) + " landmarks");
+    status.summary(DiagnosticStatus::OK,
+                   std::to_string(shown_.keyframes) + " keyframes, " + std::to_string(shown_.landmarks) + " landmarks");
   }
   status.add("keyframes", shown_.keyframes);
   status.add("landmarks", shown_.landmarks);

@@ -23,11 +23,11 @@
 #include <vip_slam_msgs/PlaneUpdate.h>
 #include <vip_slam_msgs/TrackedFrame.h>
 
-#include "vip_slam_backend/back_end_node_options.h"
 #include "map_display.h"
 #include "pose_in_map.h"
 #include "vip_slam_backend/BackEndConfig.h"
 #include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/back_end_node_options.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_ros/owner_thread.h"
 
@@ -80,7 +80,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   MapDisplay display_;
   double last_display_ = -1e300;
   double ignore_before_ = -1e300;  ///< stamp of the last reset
-  bool adjusting_ = false;  ///< a global adjustment is under way
+  bool adjusting_ = false;         ///< a global adjustment is under way
   std::thread adjustment_;
 
   mutable std::mutex shown_mutex_;

@@ -28,7 +28,8 @@ bool BackEndNodelet::askOwner(const std::function<std::string()>& work, std::str
   try {
     // Copies: a call that comes too late must not touch what this function has left behind.
     auto words = std::make_shared<std::string>();
-    success = owner_->call(control_lane_, [words, work] { *words = work(); }, kPatience);
+    success = owner_->call(
+        control_lane_, [words, work] { *words = work(); }, kPatience);
     *message = success ? *words : "the back end was busy for too long; nothing was done";
   } catch (const std::exception& error) {
     *message = error.what();

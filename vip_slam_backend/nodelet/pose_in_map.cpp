@@ -47,8 +47,7 @@ geometry_msgs::PoseWithCovarianceStamped PoseInMap::message(double t, const SE3&
   J.block<3, 3>(0, 0) = -T_map_I.R() * hat(T_imu_base.t());
   J.block<3, 3>(0, 3) = T_map_odom.R();
   J.block<3, 3>(3, 0) = T_map_I.R();
-  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(msg.pose.covariance.data()) =
-      J * covariance * J.transpose();
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(msg.pose.covariance.data()) = J * covariance * J.transpose();
   return msg;
 }
 

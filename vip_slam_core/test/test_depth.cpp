@@ -224,7 +224,9 @@ TEST(DepthGridTest, KeepsSurfacesAtAGrazingAngleButNoEdges) {
     for (int r = 0; r < grid.rows; ++r) {  // windows that hold both surfaces
       const double v = grid.pixel(0, r).y();
       const bool both = 0.55 * f / (v + 2 - horizon) < 6.0 && 0.55 * f / (v - 2 - horizon) > 6.0;
-      if (both) { EXPECT_EQ(grid.at(20, r), 0.0f) << v; }
+      if (both) {
+        EXPECT_EQ(grid.at(20, r), 0.0f) << v;
+      }
     }
   }
   EXPECT_GE(far_nodes, 6);
@@ -258,9 +260,9 @@ TEST(RegisterDepth, NearestSurfaceWinsAndShadowsStayEmpty) {
   cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(3.0));
   depth(cv::Rect(300, 200, 40, 40)) = 1.0;  // a box in front: moves by 100 px, the wall by 33
   const cv::Mat seen = registerDepth(depth, *k, *k, T);
-  EXPECT_NEAR(seen.at<float>(220, 220), 1.0, 1e-5);   // pixel 320 moved by -100
+  EXPECT_NEAR(seen.at<float>(220, 220), 1.0, 1e-5);  // pixel 320 moved by -100
   EXPECT_NEAR(seen.at<float>(220, 150), 3.0, 1e-5);
-  EXPECT_EQ(seen.at<float>(220, 285), 0.0f);          // hidden from the depth camera by the box
+  EXPECT_EQ(seen.at<float>(220, 285), 0.0f);  // hidden from the depth camera by the box
 }
 
 TEST(RegisterDepth, RefusesOtherSizes) {

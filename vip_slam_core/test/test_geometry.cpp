@@ -189,8 +189,8 @@ TEST_F(Geometry, ClosestPointVectorAndItsSign) {
     const Plane back = Plane::fromCp(p.toCp());
     EXPECT_GE(back.d, 0);
     EXPECT_LT((back.coefficients() - (p.d < 0 ? p.flipped() : p).coefficients()).norm(), 1e-12);
-    EXPECT_LT((p.toCp() - p.flipped().toCp()).norm(), 1e-15);          // blind to the side
-    EXPECT_NEAR(p.signedDistance(-p.toCp()), 0, 1e-12);                 // eta is minus the closest point
+    EXPECT_LT((p.toCp() - p.flipped().toCp()).norm(), 1e-15);  // blind to the side
+    EXPECT_NEAR(p.signedDistance(-p.toCp()), 0, 1e-12);        // eta is minus the closest point
   }
   EXPECT_THROW(Plane::fromCp({0, 0, 1e-10}), std::invalid_argument);
 }
@@ -207,8 +207,8 @@ TEST_F(Geometry, PlaneManifold) {
     EXPECT_LT((moved.boxminus(p) - delta).norm(), 1e-12);
     EXPECT_LT(p.boxminus(p).norm(), 1e-15);
     EXPECT_NEAR(angleBetween(p, p.boxplus(Eigen::Vector3d(0.2, 0, 5))), 0.2, 1e-12);
-    const Eigen::MatrixXd J = numericJacobian(
-        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return p.boxplus(d).coefficients(); }, 3);
+    const Eigen::MatrixXd J =
+        numericJacobian([&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return p.boxplus(d).coefficients(); }, 3);
     Eigen::Matrix<double, 4, 3> analytic = Eigen::Matrix<double, 4, 3>::Zero();
     analytic.topLeftCorner<3, 2>() = B;
     analytic(3, 2) = 1;

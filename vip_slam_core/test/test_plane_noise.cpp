@@ -55,9 +55,9 @@ TEST(PlaneNoise, WeightsFollowTheAgreement) {
   };
   EXPECT_NEAR(scaleOf(kSigma / 3, 1000), 9.0, 1.0);
   EXPECT_NEAR(scaleOf(kSigma, 1000), 1.0, 0.15);
-  EXPECT_EQ(scaleOf(5 * kSigma, 1000), 1.0);       // never less than the noise model says
-  EXPECT_EQ(scaleOf(kSigma / 1000, 1000), 25.0);   // nor more than a fifth of its sigma
-  EXPECT_EQ(scaleOf(kSigma / 3, 10), 1.0);         // too few to tell
+  EXPECT_EQ(scaleOf(5 * kSigma, 1000), 1.0);      // never less than the noise model says
+  EXPECT_EQ(scaleOf(kSigma / 1000, 1000), 25.0);  // nor more than a fifth of its sigma
+  EXPECT_EQ(scaleOf(kSigma / 3, 10), 1.0);        // too few to tell
 }
 
 TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {

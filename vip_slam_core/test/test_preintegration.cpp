@@ -156,7 +156,7 @@ TEST_P(MonteCarlo, CovarianceMatchesScatter) {
   ImuNoise noise;
   noise.gyro_noise_density = 2e-3;
   noise.accel_noise_density = 2e-2;
-  noise.gyro_random_walk = 1e-3;   // large, so that the walk shows in half a second
+  noise.gyro_random_walk = 1e-3;  // large, so that the walk shows in half a second
   noise.accel_random_walk = 2e-2;
   const AnalyticMotion motion(6);
   const auto clean = motion.imu(1, 1 + duration, rate, kBg, kBa);

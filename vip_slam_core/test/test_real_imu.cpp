@@ -59,10 +59,11 @@ struct Errors {
     position_levelled.push_back((pre.predict(levelled, gravityVector(9.81)).T_W_I.t() - end.T_W_I.t()).norm());
   }
   void print(const char* duration) const {
-    std::printf("after %s, medians of %zu windows: position %.1f mm (start levelled: %.1f mm), velocity %.1f mm/s, "
-                "rotation %.3f deg, of it heading %.3f deg\n",
-                duration, position.size(), 1e3 * median(position), 1e3 * median(position_levelled),
-                1e3 * median(velocity), median(rotation) / kRadians, median(heading) / kRadians);
+    std::printf(
+        "after %s, medians of %zu windows: position %.1f mm (start levelled: %.1f mm), velocity %.1f mm/s, "
+        "rotation %.3f deg, of it heading %.3f deg\n",
+        duration, position.size(), 1e3 * median(position), 1e3 * median(position_levelled), 1e3 * median(velocity),
+        median(rotation) / kRadians, median(heading) / kRadians);
   }
 };
 

@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 class EvaluateCommand : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / ("evaluate_" + std::string(::testing::UnitTest::GetInstance()
-                                                                                ->current_test_info()->name()));
+    folder_ = fs::path(::testing::TempDir()) /
+              ("evaluate_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     const testing::AnalyticMotion motion(2);
@@ -42,8 +42,8 @@ class EvaluateCommand : public ::testing::Test {
 
   // Exit status; standard output and error in output_ and error_.
   int run(const std::string& arguments) {
-    const std::string command = std::string(VIP_SLAM_EVALUATE) + " " + arguments + " >" + path("stdout") + " 2>" +
-                                path("stderr");
+    const std::string command =
+        std::string(VIP_SLAM_EVALUATE) + " " + arguments + " >" + path("stdout") + " 2>" + path("stderr");
     const int status = std::system(command.c_str());
     output_ = text(path("stdout"));
     error_ = text(path("stderr"));

@@ -71,11 +71,11 @@ TEST(PlaneMetricsTest, ErrorsOfNormalAndDistanceAreMeasured) {
 
 TEST(PlaneMetricsTest, MissedDuplicatedAndInventedPlanes) {
   std::vector<PlaneEstimate> estimate = {
-      rectangle(1, O, 2 * X, 3 * Y),                              // floor, one half
-      rectangle(2, 2 * X, 2 * X, 3 * Y),                          // floor, other half: a duplicate
-      rectangle(3, O, 3 * Y, 2.5 * Z),                            // wall
-      rectangle(4, Eigen::Vector3d(0, 0, 1.5), 4 * X, 3 * Y),     // nothing there
-      rectangle(5, Eigen::Vector3d(10, 0, 0), 4 * X, 3 * Y)};     // floor's height, but outside the floor
+      rectangle(1, O, 2 * X, 3 * Y),                           // floor, one half
+      rectangle(2, 2 * X, 2 * X, 3 * Y),                       // floor, other half: a duplicate
+      rectangle(3, O, 3 * Y, 2.5 * Z),                         // wall
+      rectangle(4, Eigen::Vector3d(0, 0, 1.5), 4 * X, 3 * Y),  // nothing there
+      rectangle(5, Eigen::Vector3d(10, 0, 0), 4 * X, 3 * Y)};  // floor's height, but outside the floor
   const PlaneMetrics m = planeMetrics(room(), estimate);
   EXPECT_EQ(m.expected, 3u);
   EXPECT_EQ(m.found, 2u);
@@ -97,8 +97,8 @@ TEST(PlaneMetricsTest, SlantedPlanesAreNotExpectedAndMustNotBeForced) {
 }
 
 TEST(PlaneMetricsTest, OnlyLargeInventionsAreLarge) {
-  const PlaneMetrics m = planeMetrics(room(), {rectangle(1, {1, 1, 1.5}, 0.6 * X, 0.6 * Y),
-                                               rectangle(2, {2, 1, 1.9}, 0.8 * X, 0.8 * Y)});
+  const PlaneMetrics m =
+      planeMetrics(room(), {rectangle(1, {1, 1, 1.5}, 0.6 * X, 0.6 * Y), rectangle(2, {2, 1, 1.9}, 0.8 * X, 0.8 * Y)});
   EXPECT_EQ(m.false_planes, 2u);
   EXPECT_EQ(m.large_false_planes, 1u);
 }
@@ -136,14 +136,14 @@ TEST(AssociationMetricsTest, PrecisionAndRecall) {
   const std::vector<PlaneEstimate> truth = room();
   const PlaneMetrics planes = planeMetrics(truth, {rectangle(10, O, 4 * X, 3 * Y), rectangle(11, O, 3 * Y, 2.5 * Z)});
   const std::vector<LabelledPoint> points = {
-      {1, {1, 1, 0.01}, 10, 4},   // right
-      {2, {2, 2, 0.30}, 10, 9},   // floats above the floor
-      {3, {0, 1, 1.0}, 11, 5},    // right
-      {4, {0, 2, 1.0}, 10, 4},    // a wall point tied to the floor
-      {5, {3, 1, 0.0}, 0, 4},     // on the floor, not tied
-      {6, {2, 3, 1.0}, 0, 4},     // on the wall nobody found
-      {7, {8, 1, 0.0}, 10, 4},    // the floor's height outside of it
-      {8, {3, 2, 0.0}, 0, 3}};    // on the floor, not tied, not seen often enough to be
+      {1, {1, 1, 0.01}, 10, 4},  // right
+      {2, {2, 2, 0.30}, 10, 9},  // floats above the floor
+      {3, {0, 1, 1.0}, 11, 5},   // right
+      {4, {0, 2, 1.0}, 10, 4},   // a wall point tied to the floor
+      {5, {3, 1, 0.0}, 0, 4},    // on the floor, not tied
+      {6, {2, 3, 1.0}, 0, 4},    // on the wall nobody found
+      {7, {8, 1, 0.0}, 10, 4},   // the floor's height outside of it
+      {8, {3, 2, 0.0}, 0, 3}};   // on the floor, not tied, not seen often enough to be
   const AssociationMetrics m = associationMetrics(points, truth, planes);
   EXPECT_EQ(m.labelled, 5u);
   EXPECT_EQ(m.correct, 2u);

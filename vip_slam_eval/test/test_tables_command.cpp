@@ -18,8 +18,10 @@ class TablesCommand : public ::testing::Test {
               ("tables_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
     fs::remove_all(folder_);
     // run_bag BAG --sensor S --variant V --loop L --out DIR --no-report
-    program("vip_slam_bringup", "run_bag", R"(
-name=$(basename "$1" .bag); echo "$name $5 $7" >> )" + path("calls") + R"(
+    program("vip_slam_bringup", "run_bag",
+            R"(
+name=$(basename "$1" .bag); echo "$name $5 $7" >> )" +
+                path("calls") + R"(
 case $name in lost) echo "run_bag: $1: no pose" >&2; exit 2;; slow) sleep 20;; esac
 : > "$9/trajectory.tum"
 echo "real_time_factor: 2" > "$9/summary.yaml"; echo "peak_memory_mb: 90" >> "$9/summary.yaml"

@@ -9,8 +9,8 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <tf2_ros/buffer.h>
 
-#include "vip_slam_frontend/front_end_node_options.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_frontend/front_end_node_options.h"
 
 namespace vip_slam {
 

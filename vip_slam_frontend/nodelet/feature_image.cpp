@@ -21,9 +21,12 @@ cv::Scalar depthColour(float z) {
 
 cv::Scalar stateColour(TrackingState state) {
   switch (state) {
-    case TrackingState::kTracking: return {80, 220, 80};
-    case TrackingState::kLost: return {60, 60, 240};
-    default: return {40, 220, 240};
+    case TrackingState::kTracking:
+      return {80, 220, 80};
+    case TrackingState::kLost:
+      return {60, 60, 240};
+    default:
+      return {40, 220, 240};
   }
 }
 

@@ -1,10 +1,10 @@
 #include "front_end_nodelet.h"
 
-#include <pluginlib/class_list_macros.hpp>
 #include <vip_slam_msgs/Calibration.h>
 #include <vip_slam_msgs/Keyframe.h>
 #include <vip_slam_msgs/TrackedFrame.h>
 #include <vip_slam_msgs/TrackingStatus.h>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/map_conversions.h"
@@ -127,9 +127,8 @@ void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const E
     const Eigen::Vector3d g = gyro ? *gyro : Eigen::Vector3d::Zero(), a = accel ? *accel : Eigen::Vector3d::Zero();
     const bool has_gyro = gyro != nullptr, has_accel = accel != nullptr;
     // Their time has been noticed: handed over later, they must not look like a jump back.
-    early_.push_back([this, t, g, a, has_gyro, has_accel] {
-      feedInertial(t, has_gyro ? &g : nullptr, has_accel ? &a : nullptr);
-    });
+    early_.push_back(
+        [this, t, g, a, has_gyro, has_accel] { feedInertial(t, has_gyro ? &g : nullptr, has_accel ? &a : nullptr); });
     if (early_.size() > kEarly) early_.pop_front();
     startWhenCalibrated();
     return;

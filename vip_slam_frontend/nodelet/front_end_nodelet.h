@@ -24,11 +24,11 @@
 #include <vip_slam_msgs/MapUpdate.h>
 
 #include "calibration_source.h"
-#include "vip_slam_frontend/front_end_node_options.h"
 #include "odometry_messages.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/FrontEndConfig.h"
 #include "vip_slam_frontend/front_end.h"
+#include "vip_slam_frontend/front_end_node_options.h"
 #include "vip_slam_ros/image_pairer.h"
 #include "vip_slam_ros/owner_thread.h"
 #include "vip_slam_ros/stream_clock.h"
@@ -110,8 +110,8 @@ class FrontEndNodelet : public nodelet::Nodelet {
     std::vector<std::string> mounting_differences;  ///< against the configuration
     PairerCounters pairs;
     std::size_t features = 0;
-    double latency = 0;     ///< stamp to publishing, seconds (by ROS time)
-    double processing = 0;  ///< last image, ms
+    double latency = 0;         ///< stamp to publishing, seconds (by ROS time)
+    double processing = 0;      ///< last image, ms
     std::deque<double> recent;  ///< processing of the last images (a minute of them at 20 Hz), ms
     std::size_t time_jumps = 0;
     std::string size_problem;  ///< depth that does not fit the colour image, in words

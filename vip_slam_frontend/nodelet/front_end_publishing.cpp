@@ -66,8 +66,8 @@ void FrontEndNodelet::publishFeatureImage(const ImagePair& pair, const TrackedFr
 void FrontEndNodelet::publishImuRate(double t) {
   if (imu_rate_pub_.getNumSubscribers() == 0) return;
   if (const auto state = front_end_->predict(t)) {
-    imu_rate_pub_.publish(boost::make_shared<nav_msgs::Odometry>(toOdometry(
-        t - sensor_.time_offset, *state, covariance_, gyro_, gyroSigma(sensor_), frames_)));
+    imu_rate_pub_.publish(boost::make_shared<nav_msgs::Odometry>(
+        toOdometry(t - sensor_.time_offset, *state, covariance_, gyro_, gyroSigma(sensor_), frames_)));
   }
 }
 

@@ -23,8 +23,7 @@ nav_msgs::Odometry toOdometry(double t, const NavState& state, const Matrix15d& 
   J.block<3, 3>(0, 0) = -R_odom_imu * hat(arm);
   J.block<3, 3>(0, 3).setIdentity();
   J.block<3, 3>(3, 0) = R_odom_imu;
-  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(msg.pose.covariance.data()) =
-      J * covariance * J.transpose();
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(msg.pose.covariance.data()) = J * covariance * J.transpose();
 
   const Eigen::Vector3d v_imu = R_odom_imu.transpose() * state.v_W;  // of the IMU, in its own axes
   msg.twist.twist.linear = toVectorMsg(R_base_imu * (v_imu + rate.cross(arm)));

@@ -105,8 +105,8 @@ class FrontEnd::Impl {
   Phase phase_ = Phase::kWaiting;
   TrackingStatus status_{TrackingState::kWaiting, "waiting for the first image"};
   std::uint32_t epoch_ = 0;
-  double last_image_t_ = -1e300;   ///< image clock
-  double last_imu_t_ = -1e300;     ///< IMU time of the newest image
+  double last_image_t_ = -1e300;  ///< image clock
+  double last_imu_t_ = -1e300;    ///< IMU time of the newest image
   CloneId next_clone_ = 1;
   KeyframeId next_keyframe_ = 1, last_keyframe_ = 0, newest_keyframe_ = 0;
   double last_keyframe_imu_t_ = 0;

@@ -92,8 +92,7 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
 void FrontEnd::Impl::placeAtStamp(std::vector<Feature>* features) const {
   if (!tracker_.camera().rolls()) return;
   const Eigen::Vector2d last(camera_->width() - 1, camera_->height() - 1);
-  for (Feature& f : *features)
-    f.pixel = tracker_.pixelAtStamp(f).cwiseMax(0.0).cwiseMin(last).cast<float>();
+  for (Feature& f : *features) f.pixel = tracker_.pixelAtStamp(f).cwiseMax(0.0).cwiseMin(last).cast<float>();
 }
 
 KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu) {

@@ -54,8 +54,8 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
   if (surfaces_hold && phase_ != Phase::kLost) last_held_t_ = t;
   counters_.coasting += !surfaces_hold;
   const double seconds = t - last_held_t_;
-  if (phase_ != Phase::kLost && (seconds > options_.recovery.coast_seconds ||
-                                 coastedSigma() > options_.recovery.max_position_sigma)) {
+  if (phase_ != Phase::kLost &&
+      (seconds > options_.recovery.coast_seconds || coastedSigma() > options_.recovery.max_position_sigma)) {
     phase_ = Phase::kLost;
     ++counters_.lost;
   }

@@ -212,11 +212,11 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const bool all_gated = report.features_gated >= 5 && report.features_used * 5 < report.features_gated;
   gated_in_a_row_ = all_gated ? gated_in_a_row_ + 1 : (report.features_used > 0 ? 0 : gated_in_a_row_);
 
-  const std::string failure = !report.healthy                                  ? "the filter became singular"
+  const std::string failure = !report.healthy                                          ? "the filter became singular"
                               : filter_.nav().v_W.norm() > options_.recovery.max_speed ? "estimated speed is impossible"
-                              : gated_in_a_row_ >= kGatedImages                ? "measurements contradict the estimate"
-                              : contradictedForLong(tracked, t)                ? "what is seen contradicts the IMU"
-                                                                               : "";
+                              : gated_in_a_row_ >= kGatedImages ? "measurements contradict the estimate"
+                              : contradictedForLong(tracked, t) ? "what is seen contradicts the IMU"
+                                                                : "";
   if (!failure.empty()) {
     reset(failure);
     return initialise(t, t_imu, gray, depth_read);

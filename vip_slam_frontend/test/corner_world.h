@@ -1,5 +1,5 @@
-// A textured corner of a room, seen by a camera with an IMU that turns and sways: images and depth for tests of the whole
-// front end.
+// A textured corner of a room, seen by a camera with an IMU that turns and sways: images and depth for tests of the
+// whole front end.
 #pragma once
 
 #include <cmath>
@@ -41,9 +41,9 @@ inline SensorConfig cornerSensor(double colour_readout, double depth_readout) {
 
 /// Something with the same texture that stands across the view, from wall to wall upright.
 struct Screen {
-  double x = 0.9;     ///< m before the start of the camera
-  double y = 0;       ///< its middle
-  double width = 0;   ///< 0: not there
+  double x = 0.9;    ///< m before the start of the camera
+  double y = 0;      ///< its middle
+  double width = 0;  ///< 0: not there
 };
 
 class CornerWorld {
@@ -58,10 +58,10 @@ class CornerWorld {
   /// Up to 1.3 rad/s and 6 rad/s^2, 0.6 m/s.
   static SE3 pose(double t) {
     const double s = std::max(0.0, t - kStill), ramp = 1.0 - std::exp(-s * s);
-    const Eigen::Vector3d angles = ramp * Eigen::Vector3d(0.1 * std::sin(2.9 * s), 0.15 * std::sin(3.7 * s),
-                                                          0.25 * std::sin(4.3 * s));
-    const Eigen::Vector3d p = ramp * Eigen::Vector3d(0.2 * std::sin(1.1 * s), 0.4 * std::sin(1.3 * s),
-                                                     0.2 * std::sin(1.6 * s));
+    const Eigen::Vector3d angles =
+        ramp * Eigen::Vector3d(0.1 * std::sin(2.9 * s), 0.15 * std::sin(3.7 * s), 0.25 * std::sin(4.3 * s));
+    const Eigen::Vector3d p =
+        ramp * Eigen::Vector3d(0.2 * std::sin(1.1 * s), 0.4 * std::sin(1.3 * s), 0.2 * std::sin(1.6 * s));
     return SE3(Eigen::Matrix3d(expSO3(angles)), p);
   }
   static ImuSample imu(double t) {
@@ -84,14 +84,14 @@ class CornerWorld {
       double d;
     };
     const double c = std::sqrt(0.5);
-    const Face faces[] = {{{c, c, 0}, {c, -c, 0}, {0, 0, 1}, 1.9}, {{c, -c, 0}, {c, c, 0}, {0, 0, 1}, 1.9},
+    const Face faces[] = {{{c, c, 0}, {c, -c, 0}, {0, 0, 1}, 1.9},
+                          {{c, -c, 0}, {c, c, 0}, {0, 0, 1}, 1.9},
                           {{0, 0, -1}, {1, 0, 0}, {0, 1, 0}, 1.1}};
     for (int v = 0; v < 240; ++v) {
       const SE3 T_W_C = pose(t + readout * ((v + 0.5) / 240 - 0.5)) * config.T_imu_cam;
       for (int u = 0; u < 320; ++u) {
-        const Eigen::Vector3d ray =
-            T_W_C.R() * Eigen::Vector3d((u - config.camera.cx) / config.camera.fx,
-                                        (v - config.camera.cy) / config.camera.fy, 1.0);
+        const Eigen::Vector3d ray = T_W_C.R() * Eigen::Vector3d((u - config.camera.cx) / config.camera.fx,
+                                                                (v - config.camera.cy) / config.camera.fy, 1.0);
         double nearest = 1e9, x = 0, y = 0;
         for (const Face& face : faces) {
           const double z = (face.d - face.n.dot(T_W_C.t())) / face.n.dot(ray);
@@ -110,7 +110,9 @@ class CornerWorld {
         }
         const int ix = static_cast<int>(x), iy = static_cast<int>(y);
         const double fx = x - ix, fy = y - iy;
-        const auto texel = [&](int dx, int dy) { return double(texture_.at<std::uint8_t>((iy + dy) & 1023, (ix + dx) & 1023)); };
+        const auto texel = [&](int dx, int dy) {
+          return double(texture_.at<std::uint8_t>((iy + dy) & 1023, (ix + dx) & 1023));
+        };
         image->at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(
             (1 - fy) * ((1 - fx) * texel(0, 0) + fx * texel(1, 0)) + fy * ((1 - fx) * texel(0, 1) + fx * texel(1, 1)));
         depth->at<float>(v, u) = static_cast<float>(nearest);

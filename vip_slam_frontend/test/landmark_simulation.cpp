@@ -150,8 +150,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   ImuNoise noise = options.noise;
   noise.gyro_noise_density *= options.noise_told;
   noise.accel_noise_density *= options.noise_told;
-  VioFilter filter(filter_options, noise, simulation.T_I_C() * extrinsic_error, time_offset_guess,
-                   options.focal, 9.81);
+  VioFilter filter(filter_options, noise, simulation.T_I_C() * extrinsic_error, time_offset_guess, options.focal, 9.81);
   FilterPrior prior;
   const NavState truth0 = simulation.stateAt(0.2);
   prior.state = truth0;
@@ -181,7 +180,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     const double t_imu = t_imu_true - options.time_offset + filter.window().time_offset;
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
     const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200),
-                                           standing ? std::optional<double>(1.0) : std::nullopt);
+                                          standing ? std::optional<double>(1.0) : std::nullopt);
     nis += report.nis;
     rows += report.rows;
     result.gated += report.features_gated;

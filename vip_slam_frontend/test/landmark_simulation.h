@@ -16,7 +16,7 @@ struct SimulationOptions {
   double focal = 500;
   double imu_rate = 200, image_rate = 20;
   double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
-  double depth_told = 1.0;  ///< share of that sigma which the filter is told
+  double depth_told = 1.0;                  ///< share of that sigma which the filter is told
   bool depth = true;
   bool imu_noise = true;
   int points = 1200;
@@ -24,10 +24,10 @@ struct SimulationOptions {
   /// Tracks that are no points: each creeps by its own constant rate, Gaussian of this size, px per image.
   double creep_px = 0;
   double creep_ratio = 0;  ///< share of such tracks
-  double speed = 1.0;  ///< factor on the motion's frequencies; 0: standing
+  double speed = 1.0;      ///< factor on the motion's frequencies; 0: standing
   ImuNoise noise{1.7e-3, 2e-5, 2e-2, 3e-4};
   double noise_told = 1.0;  ///< share of the IMU's noise that the filter is told
-  double time_offset = 0;  ///< t_imu = t_image + time_offset
+  double time_offset = 0;   ///< t_imu = t_image + time_offset
 };
 
 class LandmarkSimulation {
@@ -63,13 +63,13 @@ struct RunResult {
   double final_rotation = 0;  ///< rad
   double length = 0;          ///< m travelled
   double nis_per_dof = 0;
-  double depth_scale = 1;     ///< factor on the depth noise that the filter found, at the end
+  double depth_scale = 1;  ///< factor on the depth noise that the filter found, at the end
   /// Of the motion between every eighth and every twentieth image in turn, as between keyframes: mean normalised square
   /// of the error (expectation 6), sum of the error's lengths, and the same for the difference of the two poses as they
   /// were when they were the newest; m.
   double motion_nees = 0, motion_error = 0, newest_error = 0;
   int gated = 0, used = 0;
-  WindowState window;         ///< at the end
+  WindowState window;  ///< at the end
   Matrix15d covariance = Matrix15d::Zero();
 };
 

@@ -9,8 +9,9 @@
 namespace vip_slam::testing {
 namespace {
 
-/// The simulation's depth readings are single pixels, not medians. Its gyro is ten times worse than that of any camera, and
-/// the noise of a gyro that bad looks like the turning which would teach the delay (see TheMountingIsLearntHonestly).
+/// The simulation's depth readings are single pixels, not medians. Its gyro is ten times worse than that of any camera,
+/// and the noise of a gyro that bad looks like the turning which would teach the delay (see
+/// TheMountingIsLearntHonestly).
 FilterOptions filterOptions() {
   FilterOptions options;
   options.depth_inflation = 1.0;
@@ -66,8 +67,8 @@ TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
   EXPECT_LT(motion_error, newest_error);
 }
 
-/// With a gyro as cameras have them (3.4e-4 rad/s/sqrt(Hz)), the camera turned by 0.6 degrees against what is configured and
-/// its stamps late by 3 ms.
+/// With a gyro as cameras have them (3.4e-4 rad/s/sqrt(Hz)), the camera turned by 0.6 degrees against what is
+/// configured and its stamps late by 3 ms.
 TEST(Consistency, TheMountingIsLearntHonestly) {
   constexpr int kSeeds = 20;
   double nees = 0, turn = 0, delay = 0;

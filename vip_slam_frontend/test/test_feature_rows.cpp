@@ -146,8 +146,8 @@ TEST(Propagation, TransitionMatchesCentralDifferences) {
     const NavState a = predicted(h * Eigen::Matrix<double, 15, 1>::Unit(c));
     const NavState b = predicted(-h * Eigen::Matrix<double, 15, 1>::Unit(c));
     Eigen::Matrix<double, 15, 1> column;
-    column << (a.T_W_I.boxminus(nominal.predicted.T_W_I) - b.T_W_I.boxminus(nominal.predicted.T_W_I)),
-        a.v_W - b.v_W, a.bias_gyro - b.bias_gyro, a.bias_accel - b.bias_accel;
+    column << (a.T_W_I.boxminus(nominal.predicted.T_W_I) - b.T_W_I.boxminus(nominal.predicted.T_W_I)), a.v_W - b.v_W,
+        a.bias_gyro - b.bias_gyro, a.bias_accel - b.bias_accel;
     column /= 2 * h;
     EXPECT_LT((column - nominal.Phi.col(c)).norm(), 1e-5 * (1.0 + column.norm())) << "column " << c;
   }

@@ -220,8 +220,7 @@ TEST_F(AlgebraOnSimulation, EqualsTheReferenceEkf) {
       }
       ASSERT_GT(H.rows(), 20);
       const Innovation innovation = testInnovation(filter_.R(), H, h);
-      const Eigen::MatrixXd S =
-          H * ekf_.P * H.transpose() + Eigen::MatrixXd::Identity(H.rows(), H.rows());
+      const Eigen::MatrixXd S = H * ekf_.P * H.transpose() + Eigen::MatrixXd::Identity(H.rows(), H.rows());
       const Eigen::VectorXd dx = ekf_.P * H.transpose() * S.ldlt().solve(h);
       const double pull = dx.dot(ekf_.P.ldlt().solve(dx));
       const double expected = double(H.rows()) - S.inverse().trace();
@@ -299,8 +298,8 @@ TEST_F(AlgebraOnSimulation, UnobservableDirectionsStayUnobservable) {
   noise.sigma_xy = options_.sigma_px / options_.focal;
   // A prior that knows nothing of the four directions: R N = 0 must survive propagation, updates and marginalisation.
   WindowState window = filter_.window();
-  const Eigen::MatrixXd N0 = nullDirections(window).householderQr().householderQ() *
-                             Eigen::MatrixXd::Identity(window.dimension(), 4);
+  const Eigen::MatrixXd N0 =
+      nullDirections(window).householderQr().householderQ() * Eigen::MatrixXd::Identity(window.dimension(), 4);
   const Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(N0.rows(), N0.rows()) - N0 * N0.transpose();
   filter_.initialise(window, 50.0 * projector);
   double before = (filter_.R() * nullDirections(filter_.window())).norm();

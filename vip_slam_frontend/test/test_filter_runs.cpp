@@ -36,8 +36,8 @@ TEST(FilterRuns, OutliersAreGatedAway) {
   EXPECT_LT(run.final_position / run.length, 0.006);
 }
 
-/// The correction of the velocity, in sigmas of what the IMU leaves of it, by one track of a point that in truth goes at
-/// `speed` (m/s): each of its residuals is small, all of them together are another motion.
+/// The correction of the velocity, in sigmas of what the IMU leaves of it, by one track of a point that in truth goes
+/// at `speed` (m/s): each of its residuals is small, all of them together are another motion.
 double pulled(double speed, double pull_huber) {
   SimulationOptions still;
   still.speed = 0;
@@ -156,8 +156,8 @@ TEST(Calibration, FindsExtrinsicsAndDelay) {
   EXPECT_NEAR(run.window.time_offset, 0.008, 0.001);
 }
 
-// A camera that is turned by 0.8 degrees against what is configured, while the body hardly turns: what cannot be told yet
-// has to stay unsure.
+// A camera that is turned by 0.8 degrees against what is configured, while the body hardly turns: what cannot be told
+// yet has to stay unsure.
 TEST(Calibration, IsHonestWhileTheMotionSaysLittle) {
   double nees = 0, believed = 0;
   constexpr int kRuns = 8;

@@ -91,8 +91,8 @@ TEST(GeneralMotion, PoseFromDepthNeedsNoRotation) {
 TEST(GeneralMotion, OutlierRejectionFallsBackOnlyWhenTheGyroIsContradicted) {
   for (const bool depth : {true, false}) {
     const Pairs set = make(Scene::kGeneral, depth, 5);
-    const RansacResult right = rejectOutliers(set.pairs, SE3(set.truth.rotation(), Eigen::Vector3d::Zero()),
-                                              RansacOptions());
+    const RansacResult right =
+        rejectOutliers(set.pairs, SE3(set.truth.rotation(), Eigen::Vector3d::Zero()), RansacOptions());
     EXPECT_TRUE(right.ok);
     EXPECT_FALSE(right.free_rotation);
     // The gyro saw nothing of a rotation by seven degrees.
@@ -116,12 +116,11 @@ TEST(GeneralMotion, ABodyThatMovesByItselfDoesNotWinAgainstTheGyro) {
       pair.xy_current = (other * onRay(pair, pair.depth_previous)).hnormalized();
       ++on_body;
     } else {
-      pair.xy_current =
-          (set.truth * onRay(pair, pair.depth_previous)).hnormalized();
+      pair.xy_current = (set.truth * onRay(pair, pair.depth_previous)).hnormalized();
     }
   }
-  const RansacResult result = rejectOutliers(set.pairs, SE3(set.truth.rotation(), Eigen::Vector3d::Zero()),
-                                             RansacOptions());
+  const RansacResult result =
+      rejectOutliers(set.pairs, SE3(set.truth.rotation(), Eigen::Vector3d::Zero()), RansacOptions());
   EXPECT_FALSE(result.free_rotation);
   EXPECT_LE(result.inliers, static_cast<int>(set.pairs.size()) - on_body + 8);
 }

@@ -123,7 +123,8 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
   }
 }
 
-// Between the first image of a motion and the verdict that it is one, standing still must not be claimed to a millimetre.
+// Between the first image of a motion and the verdict that it is one, standing still must not be claimed to a
+// millimetre.
 TEST(Stillness, IsAsExactAsTheImagesAreQuiet) {
   const ZuptOptions options;
   StillnessDetector detector(options);

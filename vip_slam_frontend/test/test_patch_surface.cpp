@@ -111,7 +111,8 @@ TEST(PatchSurface, WarpIsTheHomographysDerivative) {
   facing.slope.setZero();
   ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, facing, kMotion, &warp));
   EXPECT_GT((warp.A - exact).norm(), 0.1);  // what the slope is there for
-  EXPECT_FALSE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &warp));
+  EXPECT_FALSE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface,
+                         SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &warp));
 }
 
 TEST(PatchSurface, WarpFollowsTheHomographyOverTheWholePatch) {
@@ -148,8 +149,7 @@ TEST(PatchSurface, AlignmentOnASlantedWallFindsTheExactPixel) {
   cv::normalize(reference, reference, 0, 255, cv::NORM_MINMAX);
   // What the second view shows, by the plane's homography (second to first).
   const Eigen::Matrix3d K = (Eigen::Matrix3d() << kFocal, 0, kCx, 0, kFocal, kCy, 0, 0, 1).finished();
-  const Eigen::Matrix3d H_2_1 =
-      K * (kMotion.R() - kMotion.t() * kNormal.transpose() / kDistance) * K.inverse();
+  const Eigen::Matrix3d H_2_1 = K * (kMotion.R() - kMotion.t() * kNormal.transpose() / kDistance) * K.inverse();
   const cv::Mat H = (cv::Mat_<double>(3, 3) << H_2_1(0, 0), H_2_1(0, 1), H_2_1(0, 2), H_2_1(1, 0), H_2_1(1, 1),
                      H_2_1(1, 2), H_2_1(2, 0), H_2_1(2, 1), H_2_1(2, 2));
   cv::Mat current;

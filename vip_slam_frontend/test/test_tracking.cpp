@@ -116,8 +116,8 @@ cv::Mat edgePatch(const Eigen::Vector2d& shift, double noise, unsigned seed) {
     for (int u = 0; u < 60; ++u) {
       const double x = u - 30.3 - shift.x(), y = v - 29.6 - shift.y();
       const double edge = 60.0 * std::tanh(0.8 * (0.8 * x + 0.6 * y)), along = 0.8 * y - 0.6 * x;
-      image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(
-          110.0 + edge + 20.0 * std::tanh(0.4 * along) + random.gaussian(noise));
+      image.at<std::uint8_t>(v, u) =
+          cv::saturate_cast<std::uint8_t>(110.0 + edge + 20.0 * std::tanh(0.4 * along) + random.gaussian(noise));
     }
   }
   return image;
@@ -280,9 +280,8 @@ TEST(OrbExtractor, DescriptorsSurviveARotationAndTellPointsApart) {
   std::vector<Feature> a, b;
   for (const Corner& corner : detectCorners(image, {}, 80, TrackingOptions())) {
     const double x = corner.pixel.x, y = corner.pixel.y;
-    const Eigen::Vector2f p(
-        static_cast<float>(M.at<double>(0, 0) * x + M.at<double>(0, 1) * y + M.at<double>(0, 2)),
-        static_cast<float>(M.at<double>(1, 0) * x + M.at<double>(1, 1) * y + M.at<double>(1, 2)));
+    const Eigen::Vector2f p(static_cast<float>(M.at<double>(0, 0) * x + M.at<double>(0, 1) * y + M.at<double>(0, 2)),
+                            static_cast<float>(M.at<double>(1, 0) * x + M.at<double>(1, 1) * y + M.at<double>(1, 2)));
     if (p.x() < 30 || p.y() < 30 || p.x() > 610 || p.y() > 450) continue;
     Feature f;
     f.pixel = Eigen::Vector2f(corner.pixel.x, corner.pixel.y);

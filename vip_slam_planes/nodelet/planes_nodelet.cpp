@@ -1,8 +1,8 @@
 #include "planes_nodelet.h"
 
-#include <pluginlib/class_list_macros.hpp>
 #include <vip_slam_msgs/PlaneMap.h>
 #include <vip_slam_msgs/PlaneUpdate.h>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "vip_slam_ros/calibration.h"
 #include "vip_slam_ros/frame_conversions.h"
@@ -46,33 +46,29 @@ void PlanesNodelet::onInit() {
   diagnostics_->setHardwareID(sensor_.name);
   diagnostics_->add("planes", this, &PlanesNodelet::report);
   reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_planes::PlanesConfig>>(getPrivateNodeHandle());
-  reconfigure_->setCallback(
-      [this](vip_slam_planes::PlanesConfig& config, std::uint32_t) { onReconfigure(config); });
+  reconfigure_->setCallback([this](vip_slam_planes::PlanesConfig& config, std::uint32_t) { onReconfigure(config); });
   owner_->start(kMappingNiceness);
 
   // One callback queue in order: a keyframe is handed over before the update that places it.
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::Calibration>(
-      "calibration", 1, [this](const vip_slam_msgs::CalibrationConstPtr& m) {
-        owner_->post(control_lane_, [this, m] { start(*m); });
-      }));
-  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Keyframe>(
-      "keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
+      "calibration", 1,
+      [this](const vip_slam_msgs::CalibrationConstPtr& m) { owner_->post(control_lane_, [this, m] { start(*m); }); }));
+  subscribers_.push_back(
+      nh.subscribe<vip_slam_msgs::Keyframe>("keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
         owner_->post(keyframe_lane_, [this, m] {
           if (mapper_) mapper_->addKeyframe(std::make_shared<const Keyframe>(fromMsg(*m)));
         });
       }));
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::TrackedFrame>(
-      "tracked_frame", 20, [this](const vip_slam_msgs::TrackedFrameConstPtr& m) {
-        owner_->post(frame_lane_, [this, m] { grow(*m); });
-      }));
-  subscribers_.push_back(nh.subscribe<vip_slam_msgs::MapUpdate>(
-      "map_update", 50, [this](const vip_slam_msgs::MapUpdateConstPtr& m) {
+      "tracked_frame", 20,
+      [this](const vip_slam_msgs::TrackedFrameConstPtr& m) { owner_->post(frame_lane_, [this, m] { grow(*m); }); }));
+  subscribers_.push_back(
+      nh.subscribe<vip_slam_msgs::MapUpdate>("map_update", 50, [this](const vip_slam_msgs::MapUpdateConstPtr& m) {
         owner_->post(update_lane_, [this, m] { applyMapUpdate(*m); });
       }));
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::Control>(
-      "control", 20, [this](const vip_slam_msgs::ControlConstPtr& m) {
-        owner_->post(control_lane_, [this, m] { obey(*m); });
-      }));
+      "control", 20,
+      [this](const vip_slam_msgs::ControlConstPtr& m) { owner_->post(control_lane_, [this, m] { obey(*m); }); }));
   timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0),
                                              [this](const ros::WallTimerEvent&) { diagnostics_->force_update(); });
 }
@@ -131,8 +127,8 @@ void PlanesNodelet::obey(const vip_slam_msgs::Control& control) {
 }
 
 void PlanesNodelet::publishMap(double t, bool now) {
-  map_pub_.publish(boost::make_shared<vip_slam_msgs::PlaneMap>(
-      toPlaneMapMsg(mapper_->planes(), t, revision_, options_.map_frame)));
+  map_pub_.publish(
+      boost::make_shared<vip_slam_msgs::PlaneMap>(toPlaneMapMsg(mapper_->planes(), t, revision_, options_.map_frame)));
   if (!now && t > last_display_ && t - last_display_ < 1.0 / display_rate_) return;
   last_display_ = t;
   std_msgs::Header header;

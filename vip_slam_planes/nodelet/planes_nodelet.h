@@ -19,10 +19,10 @@
 #include <vip_slam_msgs/TrackedFrame.h>
 
 #include "plane_display.h"
-#include "vip_slam_planes/planes_node_options.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_planes/PlanesConfig.h"
 #include "vip_slam_planes/plane_mapper.h"
+#include "vip_slam_planes/planes_node_options.h"
 #include "vip_slam_ros/owner_thread.h"
 
 namespace vip_slam {

@@ -42,9 +42,15 @@ bool isSound(const Plane& plane) {
 
 PlaneMapper::Impl::Impl(const PlaneMapperOptions& o, std::shared_ptr<const CameraModel> c, const DepthNoise& n,
                         TimingLog* t)
-    : options(o), camera(c), noise(n), timing(t), mesher_(o.mesh, c, n), rays_(c),
+    : options(o),
+      camera(c),
+      noise(n),
+      timing(t),
+      mesher_(o.mesh, c, n),
+      rays_(c),
       sampler_(o.observation, o.growth.distance, n),
-      points_(o.association, checked(c, n).focal(), n.bias_floor), evidence_(o.detection, o.growth),
+      points_(o.association, checked(c, n).focal(), n.bias_floor),
+      evidence_(o.detection, o.growth),
       strips_(o.detection, o.growth) {}
 
 std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C) {

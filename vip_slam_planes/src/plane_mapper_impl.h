@@ -71,16 +71,16 @@ class PlaneMapper::Impl {
   PlaneEvidence evidence_;
   StripEvidence strips_;
 
-  std::map<KeyframeId, KeyframePtr> waiting_; ///< not placed yet
-  std::map<KeyframeId, KeyframePtr> placed_;  ///< processed keyframes that the map still has
-  CameraPoses poses_;                         ///< T_map_C of all of those
+  std::map<KeyframeId, KeyframePtr> waiting_;  ///< not placed yet
+  std::map<KeyframeId, KeyframePtr> placed_;   ///< processed keyframes that the map still has
+  CameraPoses poses_;                          ///< T_map_C of all of those
   Tracks tracks_;
   PlaneId next_plane_ = 1;
-  std::uint32_t epoch_ = 0;                   ///< of the newest placed keyframe
+  std::uint32_t epoch_ = 0;  ///< of the newest placed keyframe
   KeyframeId newest_ = 0;
-  SE3 grown_at_;                              ///< camera pose of the last frame that grew planes
+  SE3 grown_at_;  ///< camera pose of the last frame that grew planes
   bool has_grown_ = false;
-  bool map_moved_ = false;                    ///< by this update, everywhere
+  bool map_moved_ = false;  ///< by this update, everywhere
 
   // Collected for the next PlaneUpdate.
   std::vector<PlaneMerge> merges_;

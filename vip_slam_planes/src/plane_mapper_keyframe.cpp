@@ -126,10 +126,9 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
       track.viewed_from = T_map_C.t();
     }
     const double covered = track.area();
-    track.confirmed =
-        track.confirmed ||
-        (track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area) ||
-        (track.keyframes_seen > 0 && covered >= options.support.sure_area);
+    track.confirmed = track.confirmed ||
+                      (track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area) ||
+                      (track.keyframes_seen > 0 && covered >= options.support.sure_area);
     trusted.push_back(track.confirmed && track.determined && track.agrees);
   }
   points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });

@@ -10,7 +10,7 @@ namespace {
 
 // Keyframes looked at anew per update after the map has moved under their observations.
 constexpr std::size_t kMostRenewed = 10;
-constexpr double kSureDirection = 2.0 * M_PI / 180.0;  // one sigma of a wall's direction
+constexpr double kSureDirection = 2.0 * M_PI / 180.0;                  // one sigma of a wall's direction
 constexpr double kMovedTurn = 0.5 * M_PI / 180.0, kMovedShift = 0.02;  // of a keyframe by one update
 
 }  // namespace
@@ -118,7 +118,7 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   if (!placed_.count(id)) return;
   // Its share of the area goes to the neighbour in time, which moves nearly alike.
   const auto it = placed_.find(id);
-  const KeyframeId heir = it != placed_.begin()              ? std::prev(it)->first
+  const KeyframeId heir = it != placed_.begin()            ? std::prev(it)->first
                           : std::next(it) != placed_.end() ? std::next(it)->first
                                                            : 0;
   for (auto& [plane, track] : tracks_) {
@@ -153,9 +153,9 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
     for (auto it = track.observations().begin(); it != track.observations().end();) {
       const auto pose = poses_.find(it->first);
       const PlaneMoments moments{it->second.G};
-      const bool holds = pose == poses_.end() ||
-                         moments.meanSquare(transformPlane(pose->second.inverse(), track.plane())) <
-                             options.growth.distance * options.growth.distance;
+      const bool holds =
+          pose == poses_.end() || moments.meanSquare(transformPlane(pose->second.inverse(), track.plane())) <
+                                      options.growth.distance * options.growth.distance;
       if (holds) {
         ++it;
         continue;

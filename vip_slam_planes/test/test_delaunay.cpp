@@ -3,8 +3,8 @@
 #include <random>
 #include <set>
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include "vip_slam_planes/mesh/delaunay.h"
 

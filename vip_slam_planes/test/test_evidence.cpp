@@ -79,7 +79,7 @@ TEST_F(Evidence, PiecesOfOneWallInThreeKeyframesStartIt) {
   EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), found[0].plane), 1e-6);
   EXPECT_NEAR(3, found[0].plane.d, 1e-6);
   EXPECT_GT(found[0].triangles.size(), 140u);  // of 150: corners may fall out of the patches
-  EXPECT_TRUE(add(4, {}).empty());  // what it took is not there any more
+  EXPECT_TRUE(add(4, {}).empty());             // what it took is not there any more
 }
 
 TEST_F(Evidence, SeeingASmallThingOftenDoesNotMakeItLarge) {

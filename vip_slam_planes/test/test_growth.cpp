@@ -53,9 +53,7 @@ TEST_F(Growth, NoiseWidensTheGatesWithinLimits) {
   EXPECT_EQ(-1, label(triangle({3, 0, 0}, 26 * kDegree, 1.0), {&at_three}));
 }
 
-TEST_F(Growth, TheOtherFaceOfAWallDoesNotJoin) {
-  EXPECT_EQ(-1, label(triangle({3, 0, 0}, M_PI), {&at_three}));
-}
+TEST_F(Growth, TheOtherFaceOfAWallDoesNotJoin) { EXPECT_EQ(-1, label(triangle({3, 0, 0}, M_PI), {&at_three})); }
 
 TEST_F(Growth, OfTwoPlanesTheNearerOneTakesIt) {
   const PlaneTrack door = wall(2.92, 2);

@@ -22,8 +22,7 @@ TEST(Mapper, TurningInARoomFindsSixPlanesOnce) {
   const Scene scene = room();
   for (int i = 0; i < 14; ++i) {
     const double a = i * 30 * M_PI / 180;
-    rig.look(scene, {0.2 * std::cos(a), 0.1, 1.4},
-             {3 * std::cos(a), 3 * std::sin(a), i % 2 ? 0.6 : 2.2});
+    rig.look(scene, {0.2 * std::cos(a), 0.1, 1.4}, {3 * std::cos(a), 3 * std::sin(a), i % 2 ? 0.6 : 2.2});
   }
   ASSERT_EQ(6u, rig.mapper.planes().size());
   for (const Plane& truth : {Plane({0, 0, 1}, 0), Plane({0, 0, -1}, 2.6), Plane({1, 0, 0}, 3), Plane({-1, 0, 0}, 3),
@@ -259,9 +258,9 @@ TEST(Mapper, APlaneThatIsGoneDisappears) {
 TEST(Mapper, ObservationsHoldOnlyPointsOfTheirPlane) {
   Rig rig;
   Scene scene = room();
-  scene.add({1.5, -0.4, 0}, {0, 0.8, 0}, {0, 0, 0.9});   // a box before the wall
+  scene.add({1.5, -0.4, 0}, {0, 0.8, 0}, {0, 0, 0.9});  // a box before the wall
   scene.add({1.5, -0.4, 0.9}, {0, 0.8, 0}, {0.6, 0, 0});
-  scene.add({2.95, 0.6, 0.8}, {0, 1, 0}, {0, 0, 1.0});   // a picture 5 cm off the wall
+  scene.add({2.95, 0.6, 0.8}, {0, 1, 0}, {0, 0, 1.0});  // a picture 5 cm off the wall
   std::size_t observations = 0, points = 0;
   for (int i = 0; i < 5; ++i) {
     const SE3 T_W_C = lookAt({-1.5, -0.6 + 0.3 * i, 1.5}, {3, 0.2, 0.9});

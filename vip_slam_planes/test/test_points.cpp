@@ -23,8 +23,8 @@ std::vector<PointSighting> sightings(const Eigen::Vector3d& p, double baseline, 
     const SE3 T_C_W = lookAt({0, baseline * (double(i) / (count - 1) - 0.5), 1.2}, {3, 0, 1.2}).inverse();
     const Eigen::Vector3d q = T_C_W * p;
     const Eigen::Vector2d noise = Eigen::Vector2d(gauss(random), gauss(random)) * 0.5 / 525;
-    result.push_back({T_C_W, q.head<2>() / q.z() + noise, depth_sigma > 0 ? q.z() + depth_sigma * gauss(random) : 0.0,
-                      depth_sigma});
+    result.push_back(
+        {T_C_W, q.head<2>() / q.z() + noise, depth_sigma > 0 ? q.z() + depth_sigma * gauss(random) : 0.0, depth_sigma});
   }
   return result;
 }

@@ -31,11 +31,15 @@ sensor_msgs::CameraInfo toCameraInfo(const CameraIntrinsics& intrinsics) {
   info.width = std::uint32_t(intrinsics.width);
   info.height = std::uint32_t(intrinsics.height);
   switch (intrinsics.model) {
-    case DistortionModel::kNone: info.distortion_model = "plumb_bob"; break;
+    case DistortionModel::kNone:
+      info.distortion_model = "plumb_bob";
+      break;
     case DistortionModel::kRadTan:
       info.distortion_model = intrinsics.distortion.size() > 5 ? "rational_polynomial" : "plumb_bob";
       break;
-    case DistortionModel::kEquidistant: info.distortion_model = "equidistant"; break;
+    case DistortionModel::kEquidistant:
+      info.distortion_model = "equidistant";
+      break;
   }
   info.D.assign(intrinsics.distortion.begin(), intrinsics.distortion.end());
   if (intrinsics.model != DistortionModel::kEquidistant) info.D.resize(std::max<std::size_t>(5, info.D.size()), 0.0);

@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <string>
 
+#include <sensor_msgs/image_encodings.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <sensor_msgs/image_encodings.h>
 
 #include "vip_slam_core/depth/depth_image.h"
 
@@ -87,7 +87,8 @@ cv::Mat decodeGray(const sensor_msgs::Image& image) {
     view16(image).convertTo(gray, CV_8UC1, 1.0 / 256.0);
     return gray;
   }
-  throw std::invalid_argument("image encoding '" + e + "', expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, yuv422, "
+  throw std::invalid_argument("image encoding '" + e +
+                              "', expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, yuv422, "
                               "yuv422_yuy2 or an 8-bit Bayer pattern");
 }
 

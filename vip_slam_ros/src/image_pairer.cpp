@@ -34,9 +34,7 @@ bool ImagePairer::addDepth(double t, cv::Mat depth) {
   return true;
 }
 
-double ImagePairer::newest() const {
-  return std::max(newest_color_.value_or(-1e300), newest_depth_.value_or(-1e300));
-}
+double ImagePairer::newest() const { return std::max(newest_color_.value_or(-1e300), newest_depth_.value_or(-1e300)); }
 
 const ImagePair* ImagePairer::front() {
   if (front_) return &*front_;

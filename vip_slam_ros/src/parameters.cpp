@@ -10,16 +10,20 @@ namespace {
 
 std::string toText(const std::string& name, XmlRpc::XmlRpcValue& value) {
   switch (value.getType()) {
-    case XmlRpc::XmlRpcValue::TypeBoolean: return static_cast<bool>(value) ? "true" : "false";
-    case XmlRpc::XmlRpcValue::TypeInt: return std::to_string(static_cast<int>(value));
-    case XmlRpc::XmlRpcValue::TypeString: return static_cast<std::string>(value);
+    case XmlRpc::XmlRpcValue::TypeBoolean:
+      return static_cast<bool>(value) ? "true" : "false";
+    case XmlRpc::XmlRpcValue::TypeInt:
+      return std::to_string(static_cast<int>(value));
+    case XmlRpc::XmlRpcValue::TypeString:
+      return static_cast<std::string>(value);
     case XmlRpc::XmlRpcValue::TypeDouble: {
       std::ostringstream text;
       text.precision(17);
       text << static_cast<double>(value);
       return text.str();
     }
-    default: throw std::invalid_argument("parameter " + name + ": a list, expected a single value");
+    default:
+      throw std::invalid_argument("parameter " + name + ": a list, expected a single value");
   }
 }
 

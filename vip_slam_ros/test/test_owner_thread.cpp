@@ -24,7 +24,8 @@ TEST(OwnerThread, KeepsTheOrderAcrossLanes) {
   std::vector<int> order;
   for (int i = 0; i < 10; ++i) owner.post(i % 2 ? a : b, [&order, i] { order.push_back(i); });
   owner.start();
-  EXPECT_TRUE(owner.call(a, [] {}, 10));
+  EXPECT_TRUE(owner.call(
+      a, [] {}, 10));
   EXPECT_EQ(order, (std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}));
 }
 
@@ -37,7 +38,8 @@ TEST(OwnerThread, AFullLaneLosesItsOldestOnly) {
   EXPECT_EQ(owner.lanes()[data].dropped, 3u);
   EXPECT_EQ(owner.lanes()[data].waiting, 2u);
   owner.start();
-  EXPECT_TRUE(owner.call(control, [] {}, 10));
+  EXPECT_TRUE(owner.call(
+      control, [] {}, 10));
   EXPECT_EQ(order, (std::vector<int>{100, 3, 4}));
   EXPECT_EQ(owner.lanes()[control].dropped, 0u);
 }
@@ -48,7 +50,9 @@ TEST(OwnerThread, ExceptionsReachWhoeverCares) {
   const auto lane = owner.addLane("work", 10);
   owner.start();
   owner.post(lane, [] { throw std::runtime_error("spilt"); });
-  EXPECT_THROW(owner.call(lane, [] { throw std::invalid_argument("asked"); }, 10), std::invalid_argument);
+  EXPECT_THROW(owner.call(
+                   lane, [] { throw std::invalid_argument("asked"); }, 10),
+               std::invalid_argument);
   EXPECT_EQ(words, "spilt");
 }
 
@@ -59,9 +63,11 @@ TEST(OwnerThread, ACallThatComesTooLateNeverRuns) {
   std::promise<void> release;
   owner.post(lane, [&] { release.get_future().wait(); });
   std::atomic<bool> ran{false};
-  EXPECT_FALSE(owner.call(lane, [&] { ran = true; }, 0.05));
+  EXPECT_FALSE(owner.call(
+      lane, [&] { ran = true; }, 0.05));
   release.set_value();
-  EXPECT_TRUE(owner.call(lane, [] {}, 10));
+  EXPECT_TRUE(owner.call(
+      lane, [] {}, 10));
   EXPECT_FALSE(ran);
 }
 
@@ -73,10 +79,13 @@ TEST(OwnerThread, GivesWayWhenAskedTo) {
   const auto lane = owner.addLane("work", 10);
   int inside = 0, of_its_thread = 0;
   owner.start(3);
-  EXPECT_TRUE(owner.call(lane, [&] {
-    inside = niceness();
-    std::thread([&] { of_its_thread = niceness(); }).join();
-  }, 10));
+  EXPECT_TRUE(owner.call(
+      lane,
+      [&] {
+        inside = niceness();
+        std::thread([&] { of_its_thread = niceness(); }).join();
+      },
+      10));
   EXPECT_EQ(inside, std::min(before + 3, 19));
   EXPECT_EQ(of_its_thread, inside);
   EXPECT_EQ(niceness(), before);

@@ -6,12 +6,12 @@
 #include <fstream>
 #include <sstream>
 
-#include <opencv2/imgcodecs.hpp>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "test_support.h"
 #include "vip_slam_sim/io/rgbd_folder.h"

@@ -17,7 +17,7 @@
 namespace vip_slam {
 
 class Map;
-struct GlobalBaProblem;   // optimisation/global_ba.h
+struct GlobalBaProblem;  // optimisation/global_ba.h
 struct GlobalBaSolution;
 
 /// A global bundle adjustment to run elsewhere: a copy of all it needs.

@@ -72,10 +72,10 @@ struct BackEnd::Impl {
   std::unique_ptr<BaSolver> solver;
   LoopCloser loop_closer;
   Relocaliser relocaliser;
-  bool searching = false;          ///< a loaded map is not recognised yet
+  bool searching = false;  ///< a loaded map is not recognised yet
   bool localisation_only = false;
-  std::vector<KeyframePtr> held;   ///< keyframes that wait for that
-  std::vector<Anchor> localised;   ///< keyframes found in the map without entering it
+  std::vector<KeyframePtr> held;  ///< keyframes that wait for that
+  std::vector<Anchor> localised;  ///< keyframes found in the map without entering it
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;
@@ -83,10 +83,10 @@ struct BackEnd::Impl {
   /// Counts loop corrections, loaded maps and resets: a global adjustment of the map before one must not undo it.
   std::uint64_t correction = 0;
   bool global_wanted = false;
-  double last_global = -1e300;         ///< stamp of the last one that a loop asked for
+  double last_global = -1e300;  ///< stamp of the last one that a loop asked for
   std::string refusal;
-  std::vector<LoopEvent> loops;        ///< all so far
-  std::vector<LoopEvent> new_loops;    ///< since the last update
+  std::vector<LoopEvent> loops;      ///< all so far
+  std::vector<LoopEvent> new_loops;  ///< since the last update
   BackEndStatistics statistics;
 };
 

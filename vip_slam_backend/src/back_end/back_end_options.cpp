@@ -12,10 +12,14 @@ Variant variantFromName(const std::string& name) {
 
 const char* variantName(Variant variant) {
   switch (variant) {
-    case Variant::kVi: return "vi";
-    case Variant::kViP: return "vi_p";
-    case Variant::kViCp: return "vi_cp";
-    case Variant::kVip: return "vip";
+    case Variant::kVi:
+      return "vi";
+    case Variant::kViP:
+      return "vi_p";
+    case Variant::kViCp:
+      return "vi_cp";
+    case Variant::kVip:
+      return "vip";
   }
   return "?";
 }

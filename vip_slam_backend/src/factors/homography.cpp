@@ -11,8 +11,8 @@ Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const 
   const Eigen::Vector3d& n = plane.n;
   const Eigen::Vector3d a = i.t_W_C - j.t_W_C;
   const double D = plane.d + n.dot(i.t_W_C), inv_D = 1.0 / D;
-  const Eigen::Vector3d b = j.R_C_W * a;           // R_j^T a
-  const Eigen::Vector3d m = i.R_C_W * n * inv_D;   // R_i^T n / D
+  const Eigen::Vector3d b = j.R_C_W * a;          // R_j^T a
+  const Eigen::Vector3d m = i.R_C_W * n * inv_D;  // R_i^T n / D
   const Eigen::Matrix3d R_ji = j.R_C_W * i.R_C_W.transpose();
   const Eigen::Matrix3d H = R_ji - b * m.transpose();
   Vector9d h;

@@ -14,8 +14,8 @@ Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, const P
   const double turned = a.state.T_W_I.rotation().angularDistance(b.state.T_W_I.rotation());
   // Turning on the spot drifts too: a full turn counts as two metres of way.
   const double way = (a.state.T_W_I.t() - b.state.T_W_I.t()).norm() + turned / M_PI;
-  const bool weak = a.data->frame.status.state != TrackingState::kTracking ||
-                    b.data->frame.status.state != TrackingState::kTracking;
+  const bool weak =
+      a.data->frame.status.state != TrackingState::kTracking || b.data->frame.status.state != TrackingState::kTracking;
   const double factor = std::sqrt(std::max(0.02, way)) * (weak ? 10.0 : 1.0);
   return diagonalSqrtInformation(options.odometry_sigma_yaw_deg * kDegree * factor,
                                  options.odometry_sigma_position * factor);

@@ -119,8 +119,8 @@ std::vector<LoopEvent> LoopCloser::close(Map& map, KeyframeId query) {
   for (const KeyframeId match : candidates(map, query, part)) {
     // The pose must rest on the old part of the map alone, else it confirms the drift.
     const auto old = [&](KeyframeId id) { return part.count(id) != 0 && isOld(map, id, *kf.data); };
-    const PlaceVerification place = verifier_.verify(map, *kf.data, kf.state.T_W_I, database_.bow(query), match,
-                                                     database_, old);
+    const PlaceVerification place =
+        verifier_.verify(map, *kf.data, kf.state.T_W_I, database_.bow(query), match, database_, old);
     events.push_back(correct(map, query, place));
     if (events.back().accepted) break;
   }

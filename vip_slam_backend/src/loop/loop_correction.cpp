@@ -97,8 +97,8 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
       if (ours) graph.addPlane(plane.first, transformPlane(correction, plane.second.estimate.plane));
     }
   }
-  graph.addEdge(RelativePoseEdge{place.match, query, T_match_query,
-                                 loopSqrtInformation(place, kf.T_I_C, options_.graph)});
+  graph.addEdge(
+      RelativePoseEdge{place.match, query, T_match_query, loopSqrtInformation(place, kf.T_I_C, options_.graph)});
   const PosePlaneSolution solution = graph.solve(options_.graph.max_iterations);
   if (!solution.usable || solution.chi2 > options_.graph.max_chi2) {
     std::snprintf(text, sizeof text, "closing it costs the graph chi2 %.1f, at most %.1f (moves %.3f m)", solution.chi2,

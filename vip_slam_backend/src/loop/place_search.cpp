@@ -63,8 +63,8 @@ std::vector<SE3> PlaceSearch::guesses(const Scene& scene, std::size_t first, std
   for (std::size_t v = first; v < std::min(last, scene.views.size()); ++v) {
     std::vector<PlaceMatch> matches;
     for (std::uint32_t c = 0; c < keyframes_.size(); ++c)
-      for (PlaceMatch m : scene.verifier.match(scene.map, *keyframes_[c], bows_[c], scene.views[v], scene.database,
-                                               scene.allowed)) {
+      for (PlaceMatch m :
+           scene.verifier.match(scene.map, *keyframes_[c], bows_[c], scene.views[v], scene.database, scene.allowed)) {
         m.camera = c;
         matches.push_back(m);
       }
@@ -173,9 +173,8 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
     for (const Feature& f : keyframe->frame.features) features += f.depth > 0;
   const double sigma = std::sqrt(Matrix6d(best.information.inverse()).bottomRightCorner<3, 3>().diagonal().maxCoeff());
   const double evidence = best.evidence(), covered = features ? static_cast<double>(best.covered) / features : 0;
-  result.reason =
-      words("%d points, %d of %d landmarks and %.2f of the image in sight of the map, depth agreement %.2f",
-            best.points, best.refound, best.established, best.explainedCells(), result.depth_agreement);
+  result.reason = words("%d points, %d of %d landmarks and %.2f of the image in sight of the map, depth agreement %.2f",
+                        best.points, best.refound, best.established, best.explainedCells(), result.depth_agreement);
   if (best.match == 0) {
     result.reason += "; the map has no view along the newest keyframe";
   } else if (best.points < options_.min_points) {

@@ -12,8 +12,8 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kViews = 15, kCoveringViews = 5;
-constexpr double kPointSize = 0.05;        // metres
-constexpr double kTiltSigma = 0.003;       // radians: odometry against gravity, and the map against it
+constexpr double kPointSize = 0.05;   // metres
+constexpr double kTiltSigma = 0.003;  // radians: odometry against gravity, and the map against it
 constexpr double kLeastContradiction = 0.005, kUnknownContradiction = 0.05;  // of depth
 constexpr double kOccludedWeight = 0.25;
 constexpr std::size_t kEstablishedViews = 4;
@@ -95,9 +95,8 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
       }
       source.insert(source.end(), guided.source.begin(), guided.source.end());
       if (views[c].empty()) continue;
-      const std::vector<PlaceSurface> seen =
-          matchSurfaces(map, views[c].front(), keyframes[c]->frame.depth_grid, support.T_W_C * rig[c],
-                        verifier.camera(), c);
+      const std::vector<PlaceSurface> seen = matchSurfaces(map, views[c].front(), keyframes[c]->frame.depth_grid,
+                                                           support.T_W_C * rig[c], verifier.camera(), c);
       surfaces.insert(surfaces.end(), seen.begin(), seen.end());
     }
     pose = refinePlacePose(matches, rig, support.T_W_C, T_odom_B.rotation(), pose_options, surfaces);

@@ -7,9 +7,9 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kEvery = 3;                        // nodes of the grid, in both directions
-constexpr std::size_t kFewest = 8;               // points that make a plane worth it
-constexpr double kOnPlane = 0.03, kNear = 0.10;  // metres: the view's surface, the other's
+constexpr int kEvery = 3;                          // nodes of the grid, in both directions
+constexpr std::size_t kFewest = 8;                 // points that make a plane worth it
+constexpr double kOnPlane = 0.03, kNear = 0.10;    // metres: the view's surface, the other's
 constexpr double kSigma = 0.01, kIndependent = 6;  // metres; points of one plane that err on their own
 
 }  // namespace
@@ -41,8 +41,7 @@ std::vector<PlaceSurface> matchSurfaces(const Map& map, KeyframeId view, const D
         const auto it = map.planes().find(seen.first);
         if (it == map.planes().end()) continue;
         const Plane& plane = it->second.estimate.plane;
-        if (!nearest ||
-            std::abs(plane.signedDistance(p_W)) < std::abs(nearest->estimate.plane.signedDistance(p_W)))
+        if (!nearest || std::abs(plane.signedDistance(p_W)) < std::abs(nearest->estimate.plane.signedDistance(p_W)))
           nearest = &it->second;
         if (std::abs(plane.signedDistance(q_W)) > kOnPlane) continue;
         shown = &it->second;

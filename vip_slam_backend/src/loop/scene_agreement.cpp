@@ -40,7 +40,7 @@ void warp(const DepthGrid& from, const DepthGrid& into, const SE3& T_into_from, 
 }
 
 struct Patch {
-  Plane plane;                ///< in the world of the match
+  Plane plane;                          ///< in the world of the match
   std::vector<Eigen::Vector3d> points;  ///< samples of the surface, same world
 };
 

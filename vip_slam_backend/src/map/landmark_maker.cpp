@@ -18,8 +18,8 @@ int LandmarkMaker::process(KeyframeId id, Map* map) {
     const LandmarkId known = map->resolve(f.id);
     if (const MapLandmark* landmark = map->findLandmark(known)) {
       const Eigen::Vector3d p = T_C_W * landmark->p_W;
-      const bool near = p.z() > 0.05 &&
-                        (p.head<2>() / p.z() - f.xy.cast<double>()).norm() * options_.focal < options_.gate_px;
+      const bool near =
+          p.z() > 0.05 && (p.head<2>() / p.z() - f.xy.cast<double>()).norm() * options_.focal < options_.gate_px;
       // A landmark with one view is only as good as that view's depth: the track itself is the better witness.
       if (near || landmark->observations.size() < 2) map->addObservation(known, here);
       continue;

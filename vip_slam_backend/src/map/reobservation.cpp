@@ -11,8 +11,11 @@ namespace {
 class FeatureGrid {
  public:
   FeatureGrid(const std::vector<Feature>& features, int width, int height, double cell)
-      : cell_(cell), cols_(static_cast<int>(width / cell) + 1), rows_(static_cast<int>(height / cell) + 1),
-        cells_(static_cast<std::size_t>(cols_) * rows_), features_(features) {
+      : cell_(cell),
+        cols_(static_cast<int>(width / cell) + 1),
+        rows_(static_cast<int>(height / cell) + 1),
+        cells_(static_cast<std::size_t>(cols_) * rows_),
+        features_(features) {
     for (std::uint32_t k = 0; k < features.size(); ++k)
       cells_[index(features[k].pixel.x(), features[k].pixel.y())].push_back(k);
   }
@@ -38,7 +41,7 @@ class FeatureGrid {
   const std::vector<Feature>& features_;
 };
 
-constexpr double kMaxViewAngle = 1.0;      // radians between the ray then and now
+constexpr double kMaxViewAngle = 1.0;  // radians between the ray then and now
 constexpr double kMaxDistanceRatio = 2.0;
 
 }  // namespace

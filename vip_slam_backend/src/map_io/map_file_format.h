@@ -11,11 +11,11 @@ constexpr char kMagic[8] = {'V', 'I', 'P', 'M', 'A', 'P', 0, 0};
 constexpr std::uint32_t kVersion = 4;
 /// Without the features' pixel_sigma; until 2 one track a landmark, until 3 no motion of the odometry.
 constexpr std::uint32_t kOldestVersion = 1;
-constexpr float kPixelSigmaOfVersion1 = 0.3f;     ///< what tracks were worth on average, px
+constexpr float kPixelSigmaOfVersion1 = 0.3f;  ///< what tracks were worth on average, px
 constexpr std::size_t kHeader = 8 + 4 + 4 + 8;
 constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;
-constexpr std::size_t kMostTracks = 255;          ///< of one landmark that are told apart
-constexpr double kDepthUnit = 0.001;  ///< metres per unit of a stored depth grid
+constexpr std::size_t kMostTracks = 255;  ///< of one landmark that are told apart
+constexpr double kDepthUnit = 0.001;      ///< metres per unit of a stored depth grid
 
 // Smallest sizes of elements, to refuse counts that cannot be true.
 constexpr std::size_t kFeatureBytes = 7 * 4 + 2 + 32 + 4;

@@ -132,8 +132,7 @@ RelativeMotion readMotion(ByteReader& in) {
   RelativeMotion motion;
   motion.T_a_b = readPose(in, "odometry's motion");
   for (int r = 0; r < 6; ++r)
-    for (int c = r; c < 6; ++c)
-      motion.covariance(r, c) = motion.covariance(c, r) = finite(in, "odometry's covariance");
+    for (int c = r; c < 6; ++c) motion.covariance(r, c) = motion.covariance(c, r) = finite(in, "odometry's covariance");
   if (!motion.known() || !motion.isUsable()) in.fail("the covariance of the odometry's motion is none");
   return motion;
 }
@@ -244,8 +243,8 @@ StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string
   if (std::memcmp(magic, map_file::kMagic, 8) != 0) in.fail("not a map file, expected it to start with VIPMAP");
   const auto version = in.get<std::uint32_t>("version");
   if (version < map_file::kOldestVersion || version > map_file::kVersion)
-    in.fail("map file version " + std::to_string(version) + ", expected " +
-            std::to_string(map_file::kOldestVersion) + " to " + std::to_string(map_file::kVersion));
+    in.fail("map file version " + std::to_string(version) + ", expected " + std::to_string(map_file::kOldestVersion) +
+            " to " + std::to_string(map_file::kVersion));
   if (in.get<std::uint32_t>("reserved") != 0) in.fail("reserved field is not 0");
   const auto length = in.get<std::uint64_t>("length");
   if (length != in.left() - 4)

@@ -6,10 +6,10 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kGoodFit = 1.5;   // mean squared sigmas of an observation that needs no closer look
+constexpr double kGoodFit = 1.5;  // mean squared sigmas of an observation that needs no closer look
 constexpr double kSigmas = 3.0;
-constexpr double kFarthest = 0.05;                      // metres
-constexpr double kMostNear = 0.5, kMostFar = 0.9;       // shares that must be kept, by where the median lies
+constexpr double kFarthest = 0.05;                 // metres
+constexpr double kMostNear = 0.5, kMostFar = 0.9;  // shares that must be kept, by where the median lies
 
 }  // namespace
 

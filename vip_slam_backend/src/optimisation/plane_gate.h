@@ -19,7 +19,7 @@ class PlaneGate {
  public:
   PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d& plane_C);
 
-  bool all() const { return all_; }              ///< the observation's own G will do
+  bool all() const { return all_; }                       ///< the observation's own G will do
   const std::vector<int>& kept() const { return kept_; }  ///< when not all: indices of the points that belong
   /// Their sum, scaled as the observation's; zero when none is kept.
   Eigen::Matrix4d G() const;

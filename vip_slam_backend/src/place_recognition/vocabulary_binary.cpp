@@ -37,8 +37,8 @@ Vocabulary parseVocabulary(const std::uint8_t* data, std::size_t size, const std
     fail(source, "vocabulary version " + std::to_string(version) + ", expected " + std::to_string(kVersion));
   const std::size_t nodes = readU32(data + 20), words = readU32(data + 24);
   // 64-bit sizes cannot overflow from 32-bit counts; nothing is allocated before the length is known to match.
-  const std::uint64_t expected = kHeader + std::uint64_t(nodes) + 32 * (nodes ? std::uint64_t(nodes) - 1 : 0) +
-                                 4 * std::uint64_t(words) + 4;
+  const std::uint64_t expected =
+      kHeader + std::uint64_t(nodes) + 32 * (nodes ? std::uint64_t(nodes) - 1 : 0) + 4 * std::uint64_t(words) + 4;
   if (nodes < 2 || size != expected)
     fail(source, "vocabulary of " + std::to_string(size) + " bytes, expected " + std::to_string(expected) + " for " +
                      std::to_string(nodes) + " nodes and " + std::to_string(words) + " words (truncated?)");

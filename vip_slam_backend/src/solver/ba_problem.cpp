@@ -10,7 +10,8 @@ namespace vip_slam {
 
 std::size_t BaProblem::residualBlocks() const {
   std::size_t n = observations.size() + imu.size() + homographies.size() + homography_pairs.size() +
-                  point_to_plane.size() + plane_points.size() + relative_poses.size() + gauges.size() + motion_priors.size();
+                  point_to_plane.size() + plane_points.size() + relative_poses.size() + gauges.size() +
+                  motion_priors.size();
   for (const BaPlane& p : planes) n += p.prior_weight > 0 && p.kind != PlaneKind::kGeneral;
   return n;
 }
@@ -90,8 +91,7 @@ double evaluateCost(const BaProblem& problem) {
         cost += huberCost(d * d, problem.depth_huber);
       }
     }
-  for (const BaPlane& p : problem.planes)
-    cost += planePriorResidual(p.kind, p.plane, p.prior_weight).squaredNorm();
+  for (const BaPlane& p : problem.planes) cost += planePriorResidual(p.kind, p.plane, p.prior_weight).squaredNorm();
   for (const BaImu& f : problem.imu)
     cost +=
         f.preintegration->residual(problem.frames[f.i].state, problem.frames[f.j].state, problem.gravity).squaredNorm();

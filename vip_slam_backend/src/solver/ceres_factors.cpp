@@ -11,9 +11,7 @@ namespace {
 template <int R, int C>
 using RowMajor = Eigen::Matrix<double, R, C, C == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
 
-FrameGeometry frameOf(const double* x, const SE3& T_I_C) {
-  return FrameGeometry(poseOf(x), T_I_C);
-}
+FrameGeometry frameOf(const double* x, const SE3& T_I_C) { return FrameGeometry(poseOf(x), T_I_C); }
 
 // Tangent (rows x 6) into the ambient row-major rows x 7 of the lifted pose manifold.
 template <int R, class Derived>
@@ -128,8 +126,8 @@ class ImuCost : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
       state[s].bias_accel = Eigen::Map<const Eigen::Vector3d>(motion + 6);
     }
     Matrix15d Js[2];
-    Eigen::Map<Eigen::Matrix<double, 15, 1>>(residuals, 15) = preintegration_->residual(
-        state[0], state[1], gravity_, J ? &Js[0] : nullptr, J ? &Js[1] : nullptr);
+    Eigen::Map<Eigen::Matrix<double, 15, 1>>(residuals, 15) =
+        preintegration_->residual(state[0], state[1], gravity_, J ? &Js[0] : nullptr, J ? &Js[1] : nullptr);
     if (J)
       for (int s = 0; s < 2; ++s) {
         writePose<15>(J[2 * s], Js[s].leftCols<6>());
@@ -253,8 +251,7 @@ class MotionPriorCost : public ceres::SizedCostFunction<9, 9> {
     state.bias_gyro = Eigen::Map<const Eigen::Vector3d>(x[0] + 3);
     state.bias_accel = Eigen::Map<const Eigen::Vector3d>(x[0] + 6);
     Eigen::Map<Eigen::Matrix<double, 9, 1>>(residuals, 9) = motionPriorResidual(prior_, state);
-    if (J && J[0])
-      Eigen::Map<RowMajor<9, 9>>(J[0], 9, 9) = motionPriorWeights(prior_).asDiagonal().toDenseMatrix();
+    if (J && J[0]) Eigen::Map<RowMajor<9, 9>>(J[0], 9, 9) = motionPriorWeights(prior_).asDiagonal().toDenseMatrix();
     return true;
   }
 

@@ -160,8 +160,8 @@ SolverSummary CeresSolver::solve(BaProblem& problem, const SolverOptions& option
   summary.residual_ms = 1e3 * s.residual_evaluation_time_in_seconds;
   summary.jacobian_ms = 1e3 * s.jacobian_evaluation_time_in_seconds;
   summary.linear_ms = 1e3 * s.linear_solver_time_in_seconds;
-  summary.preprocess_ms = 1e3 * s.preprocessor_time_in_seconds +
-                          std::chrono::duration<double, std::milli>(built - start).count();
+  summary.preprocess_ms =
+      1e3 * s.preprocessor_time_in_seconds + std::chrono::duration<double, std::milli>(built - start).count();
   summary.postprocess_ms = 1e3 * s.postprocessor_time_in_seconds;
   for (std::size_t k = 1; k < s.iterations.size(); ++k) {
     SolverIteration log;

@@ -114,8 +114,8 @@ double StructuredSolver::linearizeRelativePoses(const BaProblem& problem) {
   for (std::size_t k = 0; k < problem.relative_poses.size(); ++k) {
     const BaRelativePose& f = problem.relative_poses[k];
     const auto U = f.sqrt_information.triangularView<Eigen::Upper>();
-    Vector6d r = relativePoseResidual(problem.frames[f.i].state.T_W_I, problem.frames[f.j].state.T_W_I, f.T_i_j, &J_i,
-                                      &J_j);
+    Vector6d r =
+        relativePoseResidual(problem.frames[f.i].state.T_W_I, problem.frames[f.j].state.T_W_I, f.T_i_j, &J_i, &J_j);
     r = U * r;
     J_i = U * J_i;
     J_j = U * J_j;
@@ -173,8 +173,7 @@ double StructuredSolver::factorCost(const BaProblem& problem) {
     cost += r * r;
   }
   for (const BaRelativePose& f : problem.relative_poses) {
-    const Vector6d r =
-        relativePoseResidual(problem.frames[f.i].state.T_W_I, problem.frames[f.j].state.T_W_I, f.T_i_j);
+    const Vector6d r = relativePoseResidual(problem.frames[f.i].state.T_W_I, problem.frames[f.j].state.T_W_I, f.T_i_j);
     cost += (f.sqrt_information.triangularView<Eigen::Upper>() * r).squaredNorm();
   }
   for (const BaGauge& f : problem.gauges)

@@ -10,7 +10,7 @@ namespace vip_slam {
 
 struct KernelPlane {
   double n[3], d;
-  double basis[6];             ///< 3 x 2, row-major
+  double basis[6];  ///< 3 x 2, row-major
   std::int64_t diagonal;
   std::int32_t unknown;
 };
@@ -18,15 +18,15 @@ struct KernelPlane {
 struct KernelHomography {
   std::int32_t i, j, plane;
   bool ji_transposed, pi_transposed, pj_transposed;
-  std::int64_t ji, pi, pj;     ///< offsets of the blocks; -1: none
+  std::int64_t ji, pi, pj;  ///< offsets of the blocks; -1: none
 };
 
 struct HomographyKernelArguments {
   const KernelFrame* frames = nullptr;
   const KernelPlane* planes = nullptr;
   const KernelHomography* factors = nullptr;
-  bool shared_mounting = false;       ///< all frames have the same T_I_C
-  const double* sums = nullptr;       ///< HomographySums, [batch][24][kKernelLanes]
+  bool shared_mounting = false;  ///< all frames have the same T_I_C
+  const double* sums = nullptr;  ///< HomographySums, [batch][24][kKernelLanes]
   double *values = nullptr, *gradient = nullptr;
 };
 
@@ -42,15 +42,15 @@ const HomographyKernels& homographyKernels();
 struct KernelPointToPlane {
   std::int32_t frame, plane;
   bool transposed;
-  std::int64_t place;          ///< offset of the block (plane, pose); -1: none
+  std::int64_t place;  ///< offset of the block (plane, pose); -1: none
 };
 
 struct PointToPlaneKernelArguments {
   const KernelFrame* frames = nullptr;
   const KernelPlane* planes = nullptr;
   const KernelPointToPlane* factors = nullptr;
-  bool shared_mounting = false;       ///< all frames have the same T_I_C
-  const double* sums = nullptr;       ///< G as [batch][10][kKernelLanes]: its 3 x 3 (upper triangle by rows), g, s
+  bool shared_mounting = false;  ///< all frames have the same T_I_C
+  const double* sums = nullptr;  ///< G as [batch][10][kKernelLanes]: its 3 x 3 (upper triangle by rows), g, s
   double *values = nullptr, *gradient = nullptr;
 };
 

@@ -18,8 +18,8 @@ struct KernelFrame {
   alignas(64) double move[3][8];  ///< three zeros, lines of -R_C_W, two zeros
   double R_C_I[9];
   double t_W_C[3];
-  double lever_C[9];           ///< R_C_I [t_I_C]x
-  std::int32_t unknown = 0;    ///< first unknown of the pose
+  double lever_C[9];         ///< R_C_I [t_I_C]x
+  std::int32_t unknown = 0;  ///< first unknown of the pose
 };
 
 /// Per frame: a 6 x 6 block (columns of 8) and a gradient of 6, padded.

@@ -30,9 +30,14 @@ bool SparseCholesky::factorizeFront(const Front& front, const double* values, co
     const double* source = values + e.offset;
     double* target = panel + static_cast<std::size_t>(e.column) * ld + e.row;
     switch (e.rows) {
-      case 6: copyBlock<6>(source, e.columns, target, ld); break;
-      case 9: copyBlock<9>(source, e.columns, target, ld); break;
-      default: copyBlock<3>(source, e.columns, target, ld);
+      case 6:
+        copyBlock<6>(source, e.columns, target, ld);
+        break;
+      case 9:
+        copyBlock<9>(source, e.columns, target, ld);
+        break;
+      default:
+        copyBlock<3>(source, e.columns, target, ld);
     }
   }
   for (int k = 0; k < c; ++k) panel[static_cast<std::size_t>(k) * ld + n - 1] = b[front.unknowns[k]];

@@ -103,8 +103,7 @@ void SparseCholesky::order(const Lists& neighbours) {
   std::vector<int> permutation(node_of.size());
   const int status =
       n == 0 ? AMD_OK : amd_order(first[n], starts.data(), indices.data(), permutation.data(), nullptr, nullptr);
-  if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED)
-    throw std::runtime_error("sparse Cholesky: ordering failed");
+  if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED) throw std::runtime_error("sparse Cholesky: ordering failed");
   position_.assign(n, -1);
   int next = 0;
   for (const int part : permutation)

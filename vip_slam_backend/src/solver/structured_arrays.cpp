@@ -52,8 +52,15 @@ void StructuredSolver::packHomographies(const BaProblem& problem) {
   for (std::size_t k = 0; k < homographies_.size(); ++k) {
     const BaHomography& f = problem.homographies[std::min(k, count - 1)];
     const SystemStructure::TriplePlaces& place = structure_.homographies[std::min(k, count - 1)];
-    homographies_[k] = {f.i, f.j, f.plane, place.ji.transposed, place.pi.transposed, place.pj.transposed,
-                        place.ji.offset, place.pi.offset, place.pj.offset};
+    homographies_[k] = {f.i,
+                        f.j,
+                        f.plane,
+                        place.ji.transposed,
+                        place.pi.transposed,
+                        place.pj.transposed,
+                        place.ji.offset,
+                        place.pi.offset,
+                        place.pj.offset};
     double* sums = homography_sums_.data() + 24 * kKernelLanes * (k / kKernelLanes) + k % kKernelLanes;
     for (int s = 0; s < 24; ++s) sums[kKernelLanes * s] = f.sums[s];
   }

@@ -14,8 +14,8 @@ namespace {
 constexpr int kLooks = 1000;
 
 // The helper is judged by stretches of this many seconds in shared jobs, or as soon as it has cost that many. It must
-// save this share of a stretch, since pieces that can be shared are a little more work than the same in one go; else the
-// owner does some jobs alone, about ten iterations of a solve.
+// save this share of a stretch, since pieces that can be shared are a little more work than the same in one go; else
+// the owner does some jobs alone, about ten iterations of a solve.
 constexpr double kStretch = 2e-3, kMostLost = 0.5e-3, kLeastGain = 0.1;
 constexpr int kJobsAlone = 40;
 

@@ -73,7 +73,8 @@ KeyframePtr mountedWrongly(const KeyframePtr& keyframe, const SE3& error) {
 double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& world) {
   double yaw = 0, worst = 0;
   for (const SnapshotKeyframe& kf : snapshot.keyframes) {
-    yaw += yawOf(world.truth(kf.t).T_W_I.rotation() * kf.state.T_W_I.rotation().conjugate()) / snapshot.keyframes.size();
+    yaw +=
+        yawOf(world.truth(kf.t).T_W_I.rotation() * kf.state.T_W_I.rotation().conjugate()) / snapshot.keyframes.size();
   }
   const Eigen::Quaterniond turn = expQuaternion({0, 0, yaw});
   for (const SnapshotKeyframe& kf : snapshot.keyframes) {
@@ -292,15 +293,15 @@ TEST(BackEnd, SurvivesPoorKeyframes) {
   BackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 12; ++k) {
     Keyframe kf = *world.next();
-    if (k == 4 || k == 5) kf.frame.features.clear();                    // no points
-    if (k == 7) kf.imu.clear();                                          // a gap in the IMU
-    if (k == 9) kf.frame.features.clear(), kf.imu.clear();               // neither
+    if (k == 4 || k == 5) kf.frame.features.clear();        // no points
+    if (k == 7) kf.imu.clear();                             // a gap in the IMU
+    if (k == 9) kf.frame.features.clear(), kf.imu.clear();  // neither
     back_end.addKeyframe(std::make_shared<Keyframe>(kf));
     EXPECT_EQ(back_end.lastRefusal(), "") << k;
     EXPECT_EQ(checkMap(back_end.map()), "") << k;
     PlaneUpdate planes = world.planes();
     if (k == 6) {
-      PlaneEstimate through_origin;                                      // seen once, through the world origin
+      PlaneEstimate through_origin;  // seen once, through the world origin
       through_origin.id = 50;
       through_origin.plane = Plane(Eigen::Vector3d(1, 2, 0.1), 0.0);
       planes.planes.push_back(through_origin);
@@ -313,9 +314,9 @@ TEST(BackEnd, SurvivesPoorKeyframes) {
       broken.id = 51;
       broken.plane.d = std::nan("");
       planes.planes.push_back(broken);
-      once.plane = 77;                                                   // unknown plane
+      once.plane = 77;  // unknown plane
       planes.observations.push_back(once);
-      planes.associated.emplace_back(12345678, 50);                      // unknown landmark
+      planes.associated.emplace_back(12345678, 50);  // unknown landmark
     }
     back_end.applyPlaneUpdate(planes);
     EXPECT_EQ(checkMap(back_end.map()), "") << k;

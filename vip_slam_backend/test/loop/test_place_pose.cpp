@@ -137,7 +137,8 @@ TEST_F(PlacePoseTest, GravityHoldsTheTiltThatFewPointsLeaveFree) {
   const PlacePose held = refinePlacePose(matches_, singleCamera(), T_W_C_, R_G_C_, options);
   const auto tilt = [&](const PlacePose& pose) {
     return (pose.T_W_B.rotation().conjugate() * Eigen::Vector3d::UnitZ() -
-            R_G_C_.conjugate() * Eigen::Vector3d::UnitZ()).norm();
+            R_G_C_.conjugate() * Eigen::Vector3d::UnitZ())
+        .norm();
   };
   EXPECT_LT(tilt(held), 1e-4);
   EXPECT_GT(tilt(free), tilt(held));

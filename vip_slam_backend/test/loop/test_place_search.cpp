@@ -131,8 +131,7 @@ TEST_F(PlaceSearchTest, APlaceTheMapDoesNotShowToTheNewestKeyframeIsNotForgotten
   turned->frame.state.T_W_I =
       turned->frame.state.T_W_I *
       SE3(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero());
-  const PlaceSupport support =
-      placeSupport(map_, {query(0), turned}, T_odom_map_.inverse(), places_->verifier(), {});
+  const PlaceSupport support = placeSupport(map_, {query(0), turned}, T_odom_map_.inverse(), places_->verifier(), {});
   EXPECT_TRUE(support.found);
   EXPECT_GT(support.points, 50);
   EXPECT_EQ(support.match, 0u);

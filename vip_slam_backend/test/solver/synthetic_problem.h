@@ -17,8 +17,8 @@ struct SyntheticOptions {
   int free_points = 60, plane_points = 60;
   double keyframe_dt = 0.4;
   bool compressed = false, uncompressed = false, plane_point_states = true;
-  double noise = 1.0;      ///< factor on all measurement noise
-  double perturb = 0.02;   ///< disturbance of the start: metres and radians
+  double noise = 1.0;     ///< factor on all measurement noise
+  double perturb = 0.02;  ///< disturbance of the start: metres and radians
   unsigned seed = 1;
 };
 

@@ -98,8 +98,8 @@ TEST(Solvers, SameIteratesAndMinimum) {
   }
 }
 
-// The trial's factors are linearised with its cost; when the trial is refused, nothing of that may stay: the next step is
-// that of a solver which starts there.
+// The trial's factors are linearised with its cost; when the trial is refused, nothing of that may stay: the next step
+// is that of a solver which starts there.
 TEST(Solvers, RefusedStepsLeaveNothingBehind) {
   for (const Named& v : variants())
     for (const int threads : {1, 2}) {

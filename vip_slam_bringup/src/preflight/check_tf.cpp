@@ -68,7 +68,8 @@ Findings checkTf(const Recording& r) {
                    "one of them is wrong; tf is used unless extrinsics is config"});
   else
     out.push_back({Severity::kGood, "tf",
-                   words("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", gap.degrees, 100 * gap.metres), ""});
+                   words("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", gap.degrees, 100 * gap.metres),
+                   ""});
   if (lookUpTransform(tf, "base_link", imu))
     out.push_back({Severity::kGood, "tf", "IMU is connected to base_link", ""});
   else

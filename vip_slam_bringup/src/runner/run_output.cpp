@@ -30,14 +30,21 @@ double lengthOf(const std::vector<OdometryPose>& poses) {
 }
 
 void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map<std::string, std::uint64_t>& reader) {
-  const std::pair<const char*, std::uint64_t> front_end[] = {
-      {"restarts", c.restarts},         {"bad_image", c.bad_image},
-      {"bad_depth", c.bad_depth},       {"no_depth", c.no_depth},
-      {"bad_stamp", c.bad_stamp},       {"imu_rejected", c.imu_rejected},
-      {"imu_gaps", c.imu_gaps},         {"imu_missing", c.imu_missing},
-      {"zero_velocity", c.zero_velocity}, {"coasting", c.coasting}, {"moving", c.moving},
-      {"lost", c.lost},                 {"features_used", c.features_used},
-      {"features_gated", c.features_gated}, {"landmarks_reacquired", c.landmarks_reacquired}};
+  const std::pair<const char*, std::uint64_t> front_end[] = {{"restarts", c.restarts},
+                                                             {"bad_image", c.bad_image},
+                                                             {"bad_depth", c.bad_depth},
+                                                             {"no_depth", c.no_depth},
+                                                             {"bad_stamp", c.bad_stamp},
+                                                             {"imu_rejected", c.imu_rejected},
+                                                             {"imu_gaps", c.imu_gaps},
+                                                             {"imu_missing", c.imu_missing},
+                                                             {"zero_velocity", c.zero_velocity},
+                                                             {"coasting", c.coasting},
+                                                             {"moving", c.moving},
+                                                             {"lost", c.lost},
+                                                             {"features_used", c.features_used},
+                                                             {"features_gated", c.features_gated},
+                                                             {"landmarks_reacquired", c.landmarks_reacquired}};
   yaml << YAML::Key << "counters" << YAML::Value << YAML::BeginMap;
   for (const auto& [name, value] : front_end) yaml << YAML::Key << name << YAML::Value << value;
   for (const auto& [name, value] : reader) yaml << YAML::Key << name << YAML::Value << value;

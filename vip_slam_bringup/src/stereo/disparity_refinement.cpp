@@ -8,7 +8,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr float kLargestStep = 0.6f;  // px; more means that the match itself is wrong
+constexpr float kLargestStep = 0.6f;    // px; more means that the match itself is wrong
 constexpr float kLeastGradient = 2.4f;  // mean square, (grey levels / px)^2: well above what image noise makes
 
 }  // namespace

@@ -24,10 +24,10 @@ std::vector<LabelledPoint> readLabelledPoints(const std::string& path);
 void writeLabelledPoints(const std::string& path, const std::vector<LabelledPoint>& points);
 
 struct AssociationMetrics {
-  std::size_t labelled = 0;       ///< points tied to a plane
-  std::size_t correct = 0;        ///< of these, on the true plane (distance and outline)
-  std::size_t on_found_planes = 0;///< points seen often enough that truly lie on a true plane that was found
-  std::size_t recovered = 0;      ///< of these, tied to it
+  std::size_t labelled = 0;         ///< points tied to a plane
+  std::size_t correct = 0;          ///< of these, on the true plane (distance and outline)
+  std::size_t on_found_planes = 0;  ///< points seen often enough that truly lie on a true plane that was found
+  std::size_t recovered = 0;        ///< of these, tied to it
   double precision = 1, recall = 1;
 };
 

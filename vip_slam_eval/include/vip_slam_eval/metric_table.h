@@ -11,7 +11,7 @@ struct Metric {
   std::string group;  ///< "ATE yaw"
   std::string name;   ///< "position rmse"
   double value = 0;
-  std::string unit;   ///< "m"
+  std::string unit;  ///< "m"
 };
 using MetricTable = std::vector<Metric>;
 

@@ -13,8 +13,8 @@
 namespace vip_slam {
 
 struct PlaneHeight {
-  double t = 0;            ///< seconds
-  double height = 0;       ///< metres, z in the planes' world: median over the depth points on the plane
+  double t = 0;       ///< seconds
+  double height = 0;  ///< metres, z in the planes' world: median over the depth points on the plane
   std::size_t points = 0;
 };
 using PlaneHeights = std::map<PlaneId, std::vector<PlaneHeight>>;  ///< per horizontal plane, in order of time

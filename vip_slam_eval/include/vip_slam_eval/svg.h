@@ -12,7 +12,7 @@ struct SvgStyle {
   std::string stroke = "none", fill = "none";  ///< CSS colours
   double width = 1.0;                          ///< pixels
   double opacity = 1.0;
-  std::string dash;                            ///< "4 3"
+  std::string dash;  ///< "4 3"
 };
 
 enum class SvgAnchor { kStart, kMiddle, kEnd };

@@ -29,8 +29,8 @@ struct PoseWithCovariance {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-/// Error of a pose with the truth joined to the estimate at its first pose, in position and yaw: the filter's uncertainty
-/// counts from its start.
+/// Error of a pose with the truth joined to the estimate at its first pose, in position and yaw: the filter's
+/// uncertainty counts from its start.
 struct JoinedError {
   double t = 0;
   Vector6d error = Vector6d::Zero();  ///< x y z, rotation, both in M; metres and radians

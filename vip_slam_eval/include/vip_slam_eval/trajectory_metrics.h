@@ -48,9 +48,9 @@ struct AbsoluteError {
 AbsoluteError absoluteError(const std::vector<PosePair>& pairs, Alignment alignment);
 
 struct RelativeError {
-  double delta = 0;                  ///< seconds or metres
-  ErrorStatistics position;          ///< metres over delta
-  ErrorStatistics rotation;          ///< degrees over delta
+  double delta = 0;          ///< seconds or metres
+  ErrorStatistics position;  ///< metres over delta
+  ErrorStatistics rotation;  ///< degrees over delta
 };
 /// Over pairs `seconds` apart, to within half a mean interval.
 RelativeError relativeErrorOverTime(const std::vector<PosePair>& pairs, double seconds);

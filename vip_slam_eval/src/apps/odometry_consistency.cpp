@@ -10,8 +10,8 @@
 #include <optional>
 #include <stdexcept>
 
-#include <opencv2/imgproc.hpp>
 #include <ros/package.h>
+#include <opencv2/imgproc.hpp>
 
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"

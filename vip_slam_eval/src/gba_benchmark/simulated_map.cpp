@@ -18,19 +18,19 @@ constexpr double kFocal = 460;
 
 struct SimulatedPoint {
   Eigen::Vector3d x;
-  int plane = -1;                       // -1: free
+  int plane = -1;  // -1: free
   bool tracked = false;
-  std::vector<int> frames;              // that see it
+  std::vector<int> frames;  // that see it
   Eigen::Vector3d first_ray = Eigen::Vector3d::Zero();
 };
 
 // How a tracker treats the two kinds. A mark on a flat surface looks alike over a wide range of views; a corner of
 // clutter is a silhouette that changes with the view and is soon hidden.
 struct TrackerModel {
-  double keep;         // probability that a track survives one keyframe
-  double find;         // probability that a visible, lost point is found again within kForgotten keyframes
-  double view_angle;   // radians from the first view
-  double range;        // metres
+  double keep;        // probability that a track survives one keyframe
+  double find;        // probability that a visible, lost point is found again within kForgotten keyframes
+  double view_angle;  // radians from the first view
+  double range;       // metres
 };
 constexpr TrackerModel kPlaneTracker{0.98, 0.15, 1.1, 7.0};
 constexpr TrackerModel kFreeTracker{0.88, 0.05, 0.45, 4.5};
@@ -39,7 +39,8 @@ constexpr int kForgotten = 10;  // later it would be a new landmark
 class Simulator {
  public:
   explicit Simulator(const SimulatedMapOptions& o)
-      : options_(o), random_(o.seed),
+      : options_(o),
+        random_(o.seed),
         world_(gba_benchmark::makeWorld(o.world, o.keyframes, o.keyframe_interval * (o.keyframes - 1))) {
     Eigen::Matrix3d R_I_C;
     R_I_C << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -250,8 +251,7 @@ class Simulator {
     }
     std::map<int, PlaneMoments> surfaces;
     for (std::size_t p = 0; p < points_.size(); ++p)
-      if (points_[p].plane >= 0)
-        surfaces[points_[p].plane].add(out->map.landmark(static_cast<LandmarkId>(p)).p_W, 1.0);
+      if (points_[p].plane >= 0) surfaces[points_[p].plane].add(out->map.landmark(static_cast<LandmarkId>(p)).p_W, 1.0);
     for (const auto& entry : first_seen) {
       PlaneEstimate e;
       e.id = entry.first + 1;

@@ -53,8 +53,7 @@ World rooms() {
   const std::vector<double> yaw_back = {-3.2, -3.9, -3.3, -2.4, -3.0, -2.8, -3.5, -4.0, -4.9, -6.2, -7.4};
   const int n = static_cast<int>(way.size());
   for (int k = 0; k < n; ++k) w.path.emplace_back(way[k].x(), way[k].y(), way[k].z(), yaw_there[k]);
-  for (int k = n - 2; k >= 0; --k)
-    w.path.emplace_back(way[k].x(), way[k].y() + 0.2, way[k].z(), yaw_back[n - 1 - k]);
+  for (int k = n - 2; k >= 0; --k) w.path.emplace_back(way[k].x(), way[k].y() + 0.2, way[k].z(), yaw_back[n - 1 - k]);
   return w;
 }
 

@@ -11,8 +11,8 @@
 namespace vip_slam::gba_benchmark {
 
 struct Rectangle {
-  int plane = 0;                     ///< index into World::planes
-  Eigen::Vector3d corner, u, v;      ///< corner + a u + b v, a and b in [0, 1]
+  int plane = 0;                 ///< index into World::planes
+  Eigen::Vector3d corner, u, v;  ///< corner + a u + b v, a and b in [0, 1]
   bool textured = true;
 };
 
@@ -21,7 +21,7 @@ struct Box {
 };
 
 struct WorldPlane {
-  Plane plane;                       ///< normal towards the inside
+  Plane plane;  ///< normal towards the inside
   PlaneKind kind = PlaneKind::kVertical;
 };
 
@@ -29,8 +29,8 @@ struct World {
   std::vector<WorldPlane> planes;
   std::vector<Rectangle> rectangles;
   std::vector<Box> clutter;
-  std::vector<Eigen::Vector4d> path; ///< control points of a uniform cubic B-spline: x, y, z, yaw
-  double speed = 1;                  ///< control points per second
+  std::vector<Eigen::Vector4d> path;  ///< control points of a uniform cubic B-spline: x, y, z, yaw
+  double speed = 1;                   ///< control points per second
 
   double duration() const { return (static_cast<double>(path.size()) - 3.0) / speed; }
   NavState stateAt(double t) const;

@@ -29,12 +29,12 @@ std::vector<LabelledPoint> readLabelledPoints(const std::string& path) {
     char c1 = 0, c2 = 0, c3 = 0, c4 = 0, c5 = 0;
     std::istringstream in(line);
     in.imbue(std::locale::classic());
-    in >> point.id >> c1 >> point.p_W.x() >> c2 >> point.p_W.y() >> c3 >> point.p_W.z() >> c4 >> point.plane >>
-        c5 >> point.keyframes;
+    in >> point.id >> c1 >> point.p_W.x() >> c2 >> point.p_W.y() >> c3 >> point.p_W.z() >> c4 >> point.plane >> c5 >>
+        point.keyframes;
     const bool commas = c1 == ',' && c2 == ',' && c3 == ',' && c4 == ',' && c5 == ',';
     if (in.fail() || !commas || in.peek() != std::istringstream::traits_type::eof() || !point.p_W.allFinite()) {
-      throw std::runtime_error(path + ":" + std::to_string(number) + ": '" + line +
-                               "', expected " + kHeader + " with finite numbers");
+      throw std::runtime_error(path + ":" + std::to_string(number) + ": '" + line + "', expected " + kHeader +
+                               " with finite numbers");
     }
     points.push_back(point);
   }

@@ -35,8 +35,8 @@ std::string chooseTopic(const rosbag::Bag& bag, const std::string& path, const s
     throw std::runtime_error(path + ": " + wanted + ": no topic of poses; topics of poses: " + names);
   }
   if (topics.size() == 1) return *topics.begin();
-  throw std::runtime_error(path + ": expected one topic of Odometry or PoseStamped or its name; topics of poses: " +
-                           names);
+  throw std::runtime_error(path +
+                           ": expected one topic of Odometry or PoseStamped or its name; topics of poses: " + names);
 }
 
 SE3 poseOf(const geometry_msgs::Pose& pose) {

@@ -11,9 +11,9 @@ namespace {
 bool liesOn(const PlaneEstimate& plane, const FlatRegion& region, const Eigen::Vector3d& p, double tolerance) {
   if (std::abs(plane.plane.signedDistance(p)) > tolerance) return false;
   const Eigen::Vector2d at = planeCoordinates(plane.plane, p);
-  for (const Eigen::Vector2d& shift : {Eigen::Vector2d(0, 0), Eigen::Vector2d(tolerance, 0),
-                                       Eigen::Vector2d(-tolerance, 0), Eigen::Vector2d(0, tolerance),
-                                       Eigen::Vector2d(0, -tolerance)}) {
+  for (const Eigen::Vector2d& shift :
+       {Eigen::Vector2d(0, 0), Eigen::Vector2d(tolerance, 0), Eigen::Vector2d(-tolerance, 0),
+        Eigen::Vector2d(0, tolerance), Eigen::Vector2d(0, -tolerance)}) {
     if (region.contains(at + shift)) return true;
   }
   return false;

@@ -87,10 +87,14 @@ Alignment alignmentFromName(const std::string& name) {
 
 std::string alignmentName(Alignment alignment) {
   switch (alignment) {
-    case Alignment::kNone: return "none";
-    case Alignment::kPosition: return "position";
-    case Alignment::kYaw: return "yaw";
-    case Alignment::kSe3: return "se3";
+    case Alignment::kNone:
+      return "none";
+    case Alignment::kPosition:
+      return "position";
+    case Alignment::kYaw:
+      return "yaw";
+    case Alignment::kSe3:
+      return "se3";
   }
   return "unknown";
 }
@@ -107,8 +111,7 @@ SE3 align(const std::vector<PosePair>& pairs, Alignment alignment) {
   mean_estimate /= double(pairs.size());
 
   const Eigen::Matrix3d covariance = crossCovariance(pairs, mean_truth, mean_estimate);
-  const double weight =
-      orientationWeight(pairs, mean_truth, mean_estimate, bestRotation(covariance, alignment));
+  const double weight = orientationWeight(pairs, mean_truth, mean_estimate, bestRotation(covariance, alignment));
   Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
   for (const PosePair& pair : pairs) turns += pair.T_W_B.R() * pair.T_M_B.R().transpose();
   const Eigen::Matrix3d R = bestRotation(covariance + weight * turns, alignment);
@@ -142,8 +145,8 @@ RelativeError relativeErrorOverTime(const std::vector<PosePair>& pairs, double s
   std::vector<double> position, rotation;
   for (const PosePair& pair : pairs) {
     const double wanted = pair.t + seconds;
-    auto next = std::lower_bound(pairs.begin(), pairs.end(), wanted,
-                                 [](const PosePair& p, double t) { return p.t < t; });
+    auto next =
+        std::lower_bound(pairs.begin(), pairs.end(), wanted, [](const PosePair& p, double t) { return p.t < t; });
     if (next != pairs.begin() && (next == pairs.end() || wanted - std::prev(next)->t < next->t - wanted)) --next;
     if (std::abs(next->t - wanted) > tolerance || next->t <= pair.t) continue;
     addRelative(pair, *next, &position, &rotation);

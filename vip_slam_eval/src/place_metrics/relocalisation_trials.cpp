@@ -42,8 +42,7 @@ MappedView mappedView(const Map& map, const TruePoses& truth, const SE3& T_truth
     if (!samePlace(T_truth_I, other.second)) continue;
     const MapKeyframe& kf = map.keyframe(other.first);
     const SE3 T_o_q = (other.second * kf.T_I_C).inverse() * T_truth_C;
-    view.overlap =
-        std::max(view.overlap, sharedView(query.frame.depth_grid, kf.data->frame.depth_grid, T_o_q, camera));
+    view.overlap = std::max(view.overlap, sharedView(query.frame.depth_grid, kf.data->frame.depth_grid, T_o_q, camera));
     int corners = 0;
     for (const MapPoint& point : mapPointsOf(map, {other.first})) {
       const Eigen::Vector3d p_C = T_C_map * point.p_W;

@@ -21,13 +21,13 @@ struct MappedView {
 };
 
 struct RelocalisationTrial {
-  KeyframeId first = 0;     ///< keyframe that begins it
+  KeyframeId first = 0;  ///< keyframe that begins it
   double t = 0;
-  MappedView view;          ///< of that keyframe
+  MappedView view;  ///< of that keyframe
   bool found = false;
-  double seconds = 0;       ///< until the answer
+  double seconds = 0;           ///< until the answer
   double error = 0, angle = 0;  ///< of the answer against the truth: metres, radians
-  std::string reason;       ///< of the last keyframe tried
+  std::string reason;           ///< of the last keyframe tried
 };
 
 MappedView mappedView(const Map& map, const TruePoses& truth, const SE3& T_truth_map, const Keyframe& query,

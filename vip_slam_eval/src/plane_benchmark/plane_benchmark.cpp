@@ -26,7 +26,8 @@ class Bench {
   Bench(const PlaneBenchmarkInput& input, const SensorConfig& sensor, TimingLog* timing)
       : front_end_(input.options.frontend, sensor),
         mapper_(input.options.planes, makeCamera(sensor.camera), sensor.depth_noise, timing),
-        map_(input.truth, sensor), timing_(timing) {}
+        map_(input.truth, sensor),
+        timing_(timing) {}
 
   void add(const SensorEvent& event) {
     if (const auto* imu = std::get_if<ImuSample>(&event)) {
@@ -121,9 +122,9 @@ MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timin
   table.push_back({"run", "planes removed", double(result.counters.planes_removed), ""});
   appendPlaneMetrics(&table, result.metrics);
   appendAssociationMetrics(&table, result.associations);
-  for (const auto& [stage, name] : {std::pair("planes.update", "keyframe"), std::pair("planes.grow", "growth frame"),
-                                    std::pair("planes.update.cpu", "keyframe computing"),
-                                    std::pair("planes.grow.cpu", "growth frame computing")}) {
+  for (const auto& [stage, name] :
+       {std::pair("planes.update", "keyframe"), std::pair("planes.grow", "growth frame"),
+        std::pair("planes.update.cpu", "keyframe computing"), std::pair("planes.grow.cpu", "growth frame computing")}) {
     const TimingSummary time = timing.summary(stage);
     table.push_back({"time", std::string(name) + " median", time.median, "ms"});
     table.push_back({"time", std::string(name) + " 99 %", time.p99, "ms"});

@@ -12,8 +12,8 @@ namespace vip_slam {
 
 void measureHeights(double t, const cv::Mat& depth, const CameraModel& camera, const SE3& T_map_C,
                     const std::vector<PlaneEstimate>& planes, PlaneHeights* heights, std::size_t min_points) {
-  constexpr int kStep = 4;           // pixels
-  constexpr double kReach = 0.10;    // metres: wide enough not to hide a drift of several centimetres
+  constexpr int kStep = 4;         // pixels
+  constexpr double kReach = 0.10;  // metres: wide enough not to hide a drift of several centimetres
   for (const PlaneEstimate& plane : planes) {
     if (plane.kind != PlaneKind::kHorizontal || plane.plane.signedDistance(T_map_C.t()) <= 0) continue;
     const FlatRegion region(plane.polygons, plane.plane);
@@ -60,8 +60,8 @@ std::string heightsCsv(const PlaneHeights& heights) {
   out << "plane,t,height_m,points\n" << std::fixed;
   for (const auto& [id, samples] : heights) {
     for (const PlaneHeight& s : samples) {
-      out << id << ',' << std::setprecision(9) << s.t << ',' << std::setprecision(5) << s.height << ','
-          << s.points << '\n';
+      out << id << ',' << std::setprecision(9) << s.t << ',' << std::setprecision(5) << s.height << ',' << s.points
+          << '\n';
     }
   }
   return out.str();

@@ -78,8 +78,8 @@ cv::Mat drawPlanes(const cv::Mat& gray, const cv::Mat& depth, const CameraModel&
                    const std::vector<PlaneEstimate>& planes, const PlanePictureOptions& options) {
   std::vector<Layer> layers;
   for (const PlaneEstimate& plane : planes) {
-    layers.push_back({transformPlane(T_map_C.inverse(), plane.plane), plane.plane,
-                      FlatRegion(plane.polygons, plane.plane)});
+    layers.push_back(
+        {transformPlane(T_map_C.inverse(), plane.plane), plane.plane, FlatRegion(plane.polygons, plane.plane)});
   }
   cv::Mat picture, index(gray.size(), CV_32SC1, cv::Scalar(-1));
   cv::cvtColor(gray, picture, cv::COLOR_GRAY2BGR);

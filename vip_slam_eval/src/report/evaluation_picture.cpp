@@ -134,8 +134,10 @@ void drawTopView(SvgPage* page, const EvaluationInput& input, const Evaluation& 
   double x = 72;
   const double y = 884;
   const auto entry = [&](const std::string& text, const SvgStyle& style, bool dot = false) {
-    if (dot) page->circle(x + 10, y - 4, 5, style);
-    else page->line(x, y - 4, x + 22, y - 4, style);
+    if (dot)
+      page->circle(x + 10, y - 4, 5, style);
+    else
+      page->line(x, y - 4, x + 22, y - 4, style);
     page->text(x + 28, y, text, 12);
     x += 46 + 7.2 * double(text.size());
   };
@@ -158,8 +160,8 @@ struct Curve {
 };
 
 void drawOverTime(SvgPage* page, double top, const EvaluationInput& input, const Evaluation& evaluation,
-                  const std::string& title,
-                  const std::string& label, const std::vector<Curve>& curves, bool from_zero) {
+                  const std::string& title, const std::string& label, const std::vector<Curve>& curves,
+                  bool from_zero) {
   SvgAxes axes(page, 1010, top, 460, 190);
   const double t0 = evaluation.pairs.front().t;
   double low = from_zero ? 0 : std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
@@ -226,10 +228,10 @@ std::string evaluationPicture(const EvaluationInput& input, const Evaluation& ev
                {{position, {"#3b528b", "none", 1.4, 1.0, ""}, ""}}, true);
   drawOverTime(&page, 370, input, evaluation, "Rotation error", "[deg]",
                {{rotation, {"#d95f02", "none", 1.4, 1.0, ""}, ""}}, true);
-  drawOverTime(&page, 640, input, evaluation, "Height", "z [m]",
-               {{true_z, {"#777", "none", 2.4, 0.6, ""}, "truth"},
-                {estimated_z, {"#21918c", "none", 1.2, 1.0, ""}, "estimate"}},
-               false);
+  drawOverTime(
+      &page, 640, input, evaluation, "Height", "z [m]",
+      {{true_z, {"#777", "none", 2.4, 0.6, ""}, "truth"}, {estimated_z, {"#21918c", "none", 1.2, 1.0, ""}, "estimate"}},
+      false);
   return page.str();
 }
 

@@ -49,10 +49,14 @@ std::string attributes(const SvgStyle& style) {
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
-    if (c == '&') result += "&amp;";
-    else if (c == '<') result += "&lt;";
-    else if (c == '>') result += "&gt;";
-    else result += c;
+    if (c == '&')
+      result += "&amp;";
+    else if (c == '<')
+      result += "&lt;";
+    else if (c == '>')
+      result += "&gt;";
+    else
+      result += c;
   }
   return result;
 }
@@ -127,12 +131,7 @@ std::string SvgPage::str() const {
 }
 
 SvgAxes::SvgAxes(SvgPage* page, double x, double y, double width, double height)
-    : page_(page),
-      left_(x),
-      top_(y),
-      width_(width),
-      height_(height),
-      clip_(page->addClip(x, y, width, height)) {}
+    : page_(page), left_(x), top_(y), width_(width), height_(height), clip_(page->addClip(x, y, width, height)) {}
 
 void SvgAxes::range(double x0, double x1, double y0, double y1, bool equal) {
   const auto widen = [](double* low, double* high, double by) {

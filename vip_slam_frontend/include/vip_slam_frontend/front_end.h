@@ -37,22 +37,22 @@ struct FrameOutput {
 /// Everything that was counted since construction; for diagnostics.
 struct FrontEndCounters {
   std::uint64_t images = 0, keyframes = 0, restarts = 0;
-  std::uint64_t bad_image = 0;       ///< wrong size or type, or empty
-  std::uint64_t bad_depth = 0;       ///< depth of wrong size or type: treated as none
-  std::uint64_t no_depth = 0;        ///< images without depth
-  std::uint64_t bad_stamp = 0;       ///< repeated, backward or non-finite image stamps
-  std::uint64_t imu_rejected = 0;    ///< non-finite, repeated or backward samples
+  std::uint64_t bad_image = 0;     ///< wrong size or type, or empty
+  std::uint64_t bad_depth = 0;     ///< depth of wrong size or type: treated as none
+  std::uint64_t no_depth = 0;      ///< images without depth
+  std::uint64_t bad_stamp = 0;     ///< repeated, backward or non-finite image stamps
+  std::uint64_t imu_rejected = 0;  ///< non-finite, repeated or backward samples
   std::uint64_t imu_gaps = 0;
-  std::uint64_t imu_missing = 0;     ///< images not covered by the IMU
-  std::uint64_t zero_velocity = 0;   ///< images taken standing still
-  std::uint64_t coasting = 0;        ///< images passed on the IMU alone
-  std::uint64_t moving = 0;          ///< images most of which moved by itself
-  std::uint64_t lost = 0;            ///< times the state went to LOST
+  std::uint64_t imu_missing = 0;    ///< images not covered by the IMU
+  std::uint64_t zero_velocity = 0;  ///< images taken standing still
+  std::uint64_t coasting = 0;       ///< images passed on the IMU alone
+  std::uint64_t moving = 0;         ///< images most of which moved by itself
+  std::uint64_t lost = 0;           ///< times the state went to LOST
   std::uint64_t features_used = 0, features_gated = 0;
-  std::uint64_t surfaces_used = 0;   ///< pairs of a depth reading and a flat patch of an earlier image
+  std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
-  double sigma_px = 0;               ///< adapted pixel noise
-  double nis_per_dof = 0;            ///< of the last update; about 1 when consistent
+  double sigma_px = 0;     ///< adapted pixel noise
+  double nis_per_dof = 0;  ///< of the last update; about 1 when consistent
 };
 
 class FrontEnd {
@@ -71,9 +71,9 @@ class FrontEnd {
   bool ready(double t_image) const;
 
   /// Always returns a frame. Bad input is counted and named in its status; it never throws on data.
-  /// `on_pose` (may be empty) is called as soon as an image that is tracked has its pose, before corners are renewed and
-  /// a keyframe is made: whoever waits for the pose need not wait for those. Its frame has no features yet; its state,
-  /// covariance and status are those of the frame that is returned.
+  /// `on_pose` (may be empty) is called as soon as an image that is tracked has its pose, before corners are renewed
+  /// and a keyframe is made: whoever waits for the pose need not wait for those. Its frame has no features yet; its
+  /// state, covariance and status are those of the frame that is returned.
   using PoseReady = std::function<void(const TrackedFrame&)>;
   FrameOutput process(const FrameInput& input, const PoseReady& on_pose = {});
 

@@ -116,8 +116,8 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, Ste
       continue;
     }
     // A patch that creeps along with the motion (two edges at different depths that meet) explains all its residuals by
-    // another motion: among two dozen rows that passes any gate, but it pulls at the few directions of the state that the
-    // feature measures.
+    // another motion: among two dozen rows that passes any gate, but it pulls at the few directions of the state that
+    // the feature measures.
     const double weight = huberWeight(innovation.distance / dof, options_.huber) *
                           huberWeight(innovation.pull / innovation.expected_pull, options_.pull_huber);
     if (weight < 1) {

@@ -29,21 +29,24 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
   const Vector6d change = found.T_I_C.boxminus(given.T_I_C);
   const Eigen::Vector3d turn = change.head<3>(), shift = change.tail<3>();
   if (turn.norm() > kLeastTurn && sure(turn, found.sigma_rotation)) {
-    all.push_back(sentence("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration; "
-                           "the one that was found is used",
-                           turn.norm() * 180 / M_PI));
+    all.push_back(
+        sentence("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration; "
+                 "the one that was found is used",
+                 turn.norm() * 180 / M_PI));
   }
   if (shift.norm() > kLeastShift && sure(shift, found.sigma_translation)) {
-    all.push_back(sentence("the camera sits %.1f mm beside where T_imu_cam of the sensor's configuration has it; "
-                           "the place that was found is used",
-                           1e3 * shift.norm()));
+    all.push_back(
+        sentence("the camera sits %.1f mm beside where T_imu_cam of the sensor's configuration has it; "
+                 "the place that was found is used",
+                 1e3 * shift.norm()));
   }
   const double delay = found.time_offset - given.time_offset;
   const double least_delay = std::max(kLeastDelay, kSure * found.sigma_time_offset);
   if (found.sigma_time_offset > 0 && std::abs(delay) > least_delay) {
-    all.push_back(sentence("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration; "
-                           "the delay that was found is used",
-                           1e3 * found.time_offset, 1e3 * given.time_offset));
+    all.push_back(
+        sentence("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration; "
+                 "the delay that was found is used",
+                 1e3 * found.time_offset, 1e3 * given.time_offset));
   }
   return all;
 }

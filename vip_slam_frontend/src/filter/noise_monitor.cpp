@@ -10,7 +10,7 @@ namespace {
 // What it begins with is a guess that may be off by this much (logarithm), and so many images may say so.
 constexpr double kMostOfGuess = 3.0;
 constexpr int kGuessed = 3;
-constexpr double kGain = 0.05;  // per image, of the moving averages
+constexpr double kGain = 0.05;            // per image, of the moving averages
 constexpr double kMostCorrection = 20.0;  // one image may not decide
 // Three sigmas above 1 for the moving average of six honest degrees of freedom.
 constexpr double kContradiction = 1.3;

@@ -52,8 +52,7 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   // dtheta' = R'^T R dtheta + J dbg; dp', dv' from the displacement between first estimates, seen from the world.
   Phi.block<3, 3>(0, 0) = result.predicted.T_W_I.R().transpose() * R_fej;
   Phi.block<3, 3>(0, 9) = pre.J_theta_bg();
-  const Eigen::Vector3d dp =
-      result.predicted.T_W_I.t() - last.T_W_I_fej.t() - window.v_W_fej * dt + 0.5 * G * dt * dt;
+  const Eigen::Vector3d dp = result.predicted.T_W_I.t() - last.T_W_I_fej.t() - window.v_W_fej * dt + 0.5 * G * dt * dt;
   const Eigen::Vector3d dv = result.predicted.v_W - window.v_W_fej + G * dt;
   Phi.block<3, 3>(3, 0) = -hat(dp) * R_fej;
   Phi.block<3, 3>(3, 6) = I * dt;

@@ -36,11 +36,11 @@ void SquareRootFilter::augment(const Propagation& propagation, CloneId id) {
 
   std::vector<int> order;
   order.reserve(n + 15);
-  for (int c = nav; c < n; ++c) order.push_back(c);                              // E_k goes
-  for (int c = 0; c < window_.calibrationColumn(); ++c) order.push_back(c);      // clones
-  for (int c = n; c < n + 6; ++c) order.push_back(c);                            // C_k+1
-  for (int c = window_.calibrationColumn(); c < nav; ++c) order.push_back(c);    // calibration
-  for (int c = n + 6; c < n + 15; ++c) order.push_back(c);                       // E_k+1
+  for (int c = nav; c < n; ++c) order.push_back(c);                            // E_k goes
+  for (int c = 0; c < window_.calibrationColumn(); ++c) order.push_back(c);    // clones
+  for (int c = n; c < n + 6; ++c) order.push_back(c);                          // C_k+1
+  for (int c = window_.calibrationColumn(); c < nav; ++c) order.push_back(c);  // calibration
+  for (int c = n + 6; c < n + 15; ++c) order.push_back(c);                     // E_k+1
   R_ = marginaliseColumns(A, order, 9);
 
   Clone clone;

@@ -141,9 +141,9 @@ Propagation VioFilter::predict(const std::vector<ImuSample>& samples, double noi
 void VioFilter::forgetClone(CloneId id) {
   for (auto it = tracks_.begin(); it != tracks_.end();) {
     auto& observations = it->second.observations;
-    observations.erase(std::remove_if(observations.begin(), observations.end(),
-                                      [id](const Observation& o) { return o.clone == id; }),
-                       observations.end());
+    observations.erase(
+        std::remove_if(observations.begin(), observations.end(), [id](const Observation& o) { return o.clone == id; }),
+        observations.end());
     it = observations.empty() ? tracks_.erase(it) : std::next(it);
   }
 }

@@ -47,10 +47,8 @@ FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOpt
   const double inflation = 2.0 * options.imu_noise_inflation;
   const double root = std::sqrt(seconds);
   prior.sigma_bias_gyro = std::min(
-      options.sigma_bias_gyro,
-      2e-4 + inflation * (noise.gyro_noise_density / root + noise.gyro_random_walk * root));
-  prior.sigma_mean_accel =
-      0.005 + inflation * (noise.accel_noise_density / root + noise.accel_random_walk * root);
+      options.sigma_bias_gyro, 2e-4 + inflation * (noise.gyro_noise_density / root + noise.gyro_random_walk * root));
+  prior.sigma_mean_accel = 0.005 + inflation * (noise.accel_noise_density / root + noise.accel_random_walk * root);
   return prior;
 }
 

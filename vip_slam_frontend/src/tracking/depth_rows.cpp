@@ -57,9 +57,8 @@ struct RowBuffers {
 /// Where pixels begin .. end of row `row` were read, by the expected depth and offset: the row's pose to first order.
 VIP_SLAM_VECTOR_CLONES
 void findSources(const RowRays& rays, const RowMotion& m, int row, int begin, int end, RowBuffers* b) {
-  const float *__restrict x0 = rays.x, *__restrict y0 = rays.y, *__restrict ux = rays.ux, *__restrict uy = rays.uy,
-              *__restrict vx = rays.vx, *__restrict vy = rays.vy;
-  const float *__restrict z = b->z.data(), *__restrict offset = b->offset.data();
+  const float* __restrict x0 = rays.x, * __restrict y0 = rays.y, * __restrict ux = rays.ux, * __restrict uy = rays.uy, * __restrict vx = rays.vx, * __restrict vy = rays.vy;
+  const float* __restrict z = b->z.data(), * __restrict offset = b->offset.data();
   float *__restrict u = b->u.data(), *__restrict v = b->v.data(), *__restrict gain = b->gain.data(),
         *__restrict shift = b->shift.data();
   for (int i = begin; i < end; ++i) {
@@ -98,7 +97,8 @@ std::vector<RowMotion> motionOfRows(const RowPoses& rows, int height) {
 
 DepthRows::DepthRows(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {
   const std::size_t pixels = static_cast<std::size_t>(camera_->width()) * static_cast<std::size_t>(camera_->height());
-  for (std::vector<float>* list : {&rays_.x, &rays_.y, &rays_.ux, &rays_.uy, &rays_.vx, &rays_.vy}) list->reserve(pixels);
+  for (std::vector<float>* list : {&rays_.x, &rays_.y, &rays_.ux, &rays_.uy, &rays_.vx, &rays_.vy})
+    list->reserve(pixels);
   for (int v = 0; v < camera_->height(); ++v) {
     for (int u = 0; u < camera_->width(); ++u) {
       Eigen::Vector2d xy;

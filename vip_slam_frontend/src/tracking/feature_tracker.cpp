@@ -128,7 +128,8 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
   if (!track->reference) return false;
   PatchWarp warp;
   const SE3 T_cur_ref = T_odom_C.inverse() * track->reference->T_odom_C;
-  if (!patchWarp(track->reference->camera, view_, track->reference_pixel, track->surface, T_cur_ref, &warp)) return false;
+  if (!patchWarp(track->reference->camera, view_, track->reference_pixel, track->surface, T_cur_ref, &warp))
+    return false;
   const double scale = std::sqrt(warp.A.determinant());
   const double shear = (warp.A / scale - (warp.A / scale).inverse().transpose()).norm();
   if (!(scale > 0.45) || !(scale < 2.2) || !(shear < 1.5)) return false;

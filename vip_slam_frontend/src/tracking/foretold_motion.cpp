@@ -17,9 +17,7 @@ constexpr double kLeastSpeed = 0.1;
 
 }  // namespace
 
-double mostApart(const ForetoldMotion& foretold) {
-  return kSigmas * foretold.sigma + kLeastSpeed * foretold.interval;
-}
+double mostApart(const ForetoldMotion& foretold) { return kSigmas * foretold.sigma + kLeastSpeed * foretold.interval; }
 
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded) {
   int old_found = 0, old_bounded = 0;

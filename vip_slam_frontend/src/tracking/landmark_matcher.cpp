@@ -85,9 +85,8 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     if (!camera_->inImage(uv, options_.border + options_.landmark_radius_px)) continue;
     if (free(uv, options_.min_distance)) visible.push_back({item.first, &item.second, uv, p_C.z()});
   }
-  std::stable_sort(visible.begin(), visible.end(), [](const Visible& a, const Visible& b) {
-    return a.entry->observations > b.entry->observations;
-  });
+  std::stable_sort(visible.begin(), visible.end(),
+                   [](const Visible& a, const Visible& b) { return a.entry->observations > b.entry->observations; });
   if (static_cast<int>(visible.size()) > 2 * kMostPerImage) visible.resize(2 * kMostPerImage);
 
   // Where each may be: its patch aligned from the projection, and the corners around; described in one go.

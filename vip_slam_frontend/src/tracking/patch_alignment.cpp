@@ -66,8 +66,8 @@ Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel)
   return textureOf(gradients(wide, patch, gx, gy));
 }
 
-PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
-                          const PatchWarp& warp, const cv::Mat& current, const Eigen::Vector2d& start) {
+PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
+                          const cv::Mat& current, const Eigen::Vector2d& start) {
   PatchAlignment result;
   float wide[kWide * kWide];
   if (!sample(reference, reference_pixel, warp, wide)) return result;

@@ -14,7 +14,8 @@ namespace {
 constexpr double kKnotSeconds = 1e-3;
 
 ImuSample sampleAt(const std::vector<ImuSample>& imu, double t) {
-  const auto later = std::lower_bound(imu.begin(), imu.end(), t, [](const ImuSample& s, double at) { return s.t < at; });
+  const auto later =
+      std::lower_bound(imu.begin(), imu.end(), t, [](const ImuSample& s, double at) { return s.t < at; });
   if (later == imu.end()) return imu.back();
   return later == imu.begin() ? imu.front() : interpolate(*(later - 1), *later, t);
 }

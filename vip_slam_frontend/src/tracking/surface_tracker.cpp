@@ -8,9 +8,9 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kStride = 32;      // px between patches
-constexpr int kSampleStep = 3;   // px between samples of a patch
-constexpr int kHalf = 3;         // samples to each side of the centre
+constexpr int kStride = 32;     // px between patches
+constexpr int kSampleStep = 3;  // px between samples of a patch
+constexpr int kHalf = 3;        // samples to each side of the centre
 constexpr int kReach = kHalf * kSampleStep;
 constexpr int kSamples = (2 * kHalf + 1) * (2 * kHalf + 1);
 constexpr int kLeastSamples = 42;
@@ -111,8 +111,7 @@ SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref,
     if (!fit(depth, static_cast<int>(std::lround(uv.x())), static_cast<int>(std::lround(uv.y())), &seen)) continue;
     if (moving.moves(uv, seen.p_C.z())) continue;
     if (seen.n_C.dot(R_cur_ref * patch.n_C) < kMostTurned) continue;
-    result.pairs.push_back(
-        {patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kFloor)});
+    result.pairs.push_back({patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kFloor)});
   }
   return result;
 }

@@ -21,8 +21,8 @@ namespace vip_slam {
 
 /// Counted since construction; for diagnostics.
 struct PlaneMapperCounters {
-  std::uint64_t keyframes = 0;          ///< placed and processed
-  std::uint64_t keyframes_waiting = 0;  ///< not placed yet
+  std::uint64_t keyframes = 0;            ///< placed and processed
+  std::uint64_t keyframes_waiting = 0;    ///< not placed yet
   std::uint64_t keyframes_forgotten = 0;  ///< never placed by the back end, dropped
   std::uint64_t frames_grown = 0, frames_skipped = 0;
   std::uint64_t planes_started = 0, planes_merged = 0, planes_removed = 0;

@@ -95,8 +95,7 @@ struct PlaneMergingOptions {
     v.field("gap_per_area", gap_per_area, 0.0, 100.0,
             "gap allowed between walls (1 m^2 and more) and between floors (4 m^2), per m^2 of the smaller one, m");
     v.field("overlap", overlap, 0.05, 1.0, "share of the smaller area covered by both that makes them one surface");
-    v.field("max_rms", max_rms, 0.002, 0.2,
-            "what the joint fit may add to each one's RMS when they do not overlap, m");
+    v.field("max_rms", max_rms, 0.002, 0.2, "what the joint fit may add to each one's RMS when they do not overlap, m");
   }
 };
 
@@ -129,7 +128,8 @@ struct PointAssociationOptions {
   void visit(OptionVisitor& v) {
     v.field("candidate_distance", candidate_distance, 0.01, 1.0, "largest distance of a candidate to the plane, m");
     v.field("min_keyframes", min_keyframes, 2, 50, "keyframes that must see a candidate before it is decided on");
-    v.field("pixel_sigma", pixel_sigma, 0.1, 10.0, "one sigma of a feature's position, px; at least, the front end tells it");
+    v.field("pixel_sigma", pixel_sigma, 0.1, 10.0,
+            "one sigma of a feature's position, px; at least, the front end tells it");
     v.field("similar_px", similar_px, 0.05, 10.0,
             "what forcing a point onto the plane may add to its reprojection error, RMS, px");
     v.field("max_error_px", max_error_px, 0.5, 50.0, "largest reprojection error of a plane point, px");

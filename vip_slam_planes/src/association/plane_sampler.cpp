@@ -56,7 +56,8 @@ std::vector<Eigen::Vector3d> PlaneSampler::spreadEvenly(const std::vector<Eigen:
     sums.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector2d q = (at[i] / voxel).array().floor();
-      int& sum = index[static_cast<std::size_t>(q.y() - first.y()) * width + static_cast<std::size_t>(q.x() - first.x())];
+      int& sum =
+          index[static_cast<std::size_t>(q.y() - first.y()) * width + static_cast<std::size_t>(q.x() - first.x())];
       if (sum < 0) {
         sum = static_cast<int>(sums.size());
         sums.emplace_back(Eigen::Vector3d::Zero(), 0);
@@ -99,8 +100,7 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
   const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
   const double spread =
       std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
-  const double slack =
-      3.0 * (median + 0.3 * noise_.bias_floor) / spread / std::sqrt(double(kept.size()) / 9.0);
+  const double slack = 3.0 * (median + 0.3 * noise_.bias_floor) / spread / std::sqrt(double(kept.size()) / 9.0);
   const double turned = std::acos(std::min(1.0, std::abs(local.n.dot(n_C))));
   *points = std::move(kept);
   return turned < 5.0 * M_PI / 180.0 + slack;

@@ -21,8 +21,14 @@ class Detector {
   Detector(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
            const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth,
            std::vector<DetectedPlane>* strips = nullptr)
-      : triangles_(triangles), taken_(taken), camera_(camera_centre), options_(options), growth_(growth),
-        level_(options.gravity_deg), joins_(growth.angle_deg), strips_(strips) {}
+      : triangles_(triangles),
+        taken_(taken),
+        camera_(camera_centre),
+        options_(options),
+        growth_(growth),
+        level_(options.gravity_deg),
+        joins_(growth.angle_deg),
+        strips_(strips) {}
 
   std::vector<DetectedPlane> run() {
     histogramPeaks();

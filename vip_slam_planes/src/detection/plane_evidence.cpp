@@ -13,14 +13,14 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kPatchReach = 0.4;            // metres from the patch's first triangle
+constexpr double kPatchReach = 0.4;  // metres from the patch's first triangle
 constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegree;
-constexpr double kLeastPatch = 0.01;           // m^2
+constexpr double kLeastPatch = 0.01;  // m^2
 constexpr std::size_t kLeastTriangles = 4;
 // Of the area that starts a plane in one image. Small upright things are furniture. Dark or polished table tops show in
 // pieces only: what is left of them starts small and waits for frames to grow it.
 constexpr double kLeastUpright = 2.0, kLeastLevel = 0.4;
-constexpr int kMostTests = 4;                  // peaks tested per keyframe, the largest ones
+constexpr int kMostTests = 4;  // peaks tested per keyframe, the largest ones
 // Of the area of a wall's peak that must be new since its patches were tested. Level ones are tested every time: what
 // shows of a dark table top comes and goes.
 constexpr double kFreshShare = 0.25;
@@ -41,9 +41,9 @@ bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::ve
   if (int(parts.size()) < min_keyframes) return false;
   if (plane.kind == PlaneKind::kHorizontal) return true;
   return std::count_if(parts.begin(), parts.end(), [&](auto& part) {
-    std::sort(part.second.begin(), part.second.end());
-    return isSolid(triangles, part.second);
-  }) >= 2;
+           std::sort(part.second.begin(), part.second.end());
+           return isSolid(triangles, part.second);
+         }) >= 2;
 }
 
 // What lies on a floor or table, hardly higher than what joins those, is no surface of its own.
@@ -63,7 +63,7 @@ void PlaneEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<Map
   Frame frame{id, {}};
   const SE3 T_C_map = T_map_C.inverse();
   const double level = std::cos(detection_.gravity_deg * kDegree), upright = std::sin(detection_.gravity_deg * kDegree);
-  std::vector<int> place(triangles.size(), -1);  // in its patch; -1: open
+  std::vector<int> place(triangles.size(), -1);                        // in its patch; -1: open
   std::vector<std::size_t> first(triangles.size(), triangles.size());  // triangle of its patch
   std::vector<int> members;
   for (std::size_t seed = 0; seed < triangles.size(); ++seed) {

@@ -66,9 +66,8 @@ void PlaneHistogram::addVertical(const Eigen::Vector3d& n, const Eigen::Vector3d
 }
 
 PlaneHistogram::Peak PlaneHistogram::peak() {
-  const auto highest = std::max_element(bins_.begin(), bins_.end(), [](const Bin& a, const Bin& b) {
-    return a.neighbourhood < b.neighbourhood;
-  });
+  const auto highest = std::max_element(bins_.begin(), bins_.end(),
+                                        [](const Bin& a, const Bin& b) { return a.neighbourhood < b.neighbourhood; });
   Peak peak;
   if (highest == bins_.end()) return peak;
   for (std::size_t k : highest->near) {

@@ -16,7 +16,10 @@ constexpr std::uint64_t kAllCovered = 0x0101010101010101u;
 class Tracer {
  public:
   Tracer(const CellGrid& grid, int min_hits)
-      : x0_(grid.x0()), y0_(grid.y0()), width_(grid.width() + 1), height_(grid.height() + 1),
+      : x0_(grid.x0()),
+        y0_(grid.y0()),
+        width_(grid.width() + 1),
+        height_(grid.height() + 1),
         covered_(static_cast<std::size_t>(width_ + 1) * (height_ + 1), 0),
         done_(static_cast<std::size_t>(width_) * height_, 0) {
     for (int y = y0_; y < y0_ + grid.height(); ++y) {
@@ -63,10 +66,14 @@ class Tracer {
   // A step from corner (x, y) is a border when the cell on its left is covered and the one on its right is not.
   bool border(CellIndex c, int direction) const {
     switch (direction) {
-      case 0: return covered(c.x, c.y) && !covered(c.x, c.y - 1);
-      case 1: return covered(c.x - 1, c.y) && !covered(c.x, c.y);
-      case 2: return covered(c.x - 1, c.y - 1) && !covered(c.x - 1, c.y);
-      default: return covered(c.x, c.y - 1) && !covered(c.x - 1, c.y - 1);
+      case 0:
+        return covered(c.x, c.y) && !covered(c.x, c.y - 1);
+      case 1:
+        return covered(c.x - 1, c.y) && !covered(c.x, c.y);
+      case 2:
+        return covered(c.x - 1, c.y - 1) && !covered(c.x - 1, c.y);
+      default:
+        return covered(c.x, c.y - 1) && !covered(c.x - 1, c.y - 1);
     }
   }
   bool done(CellIndex c, int direction) const { return done_[corner(c)] >> direction & 1; }

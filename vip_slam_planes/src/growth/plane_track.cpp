@@ -166,8 +166,8 @@ PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {
 
 bool PlaneTrack::changed(bool reset) {
   constexpr double kTurn = 1e-3, kShift = 1e-3;  // radians, metres
-  const bool changed = grown_ || (plane_.n - last_checked_.n).norm() > kTurn ||
-                       std::abs(last_checked_.signedDistance(origin_)) > kShift;
+  const bool changed =
+      grown_ || (plane_.n - last_checked_.n).norm() > kTurn || std::abs(last_checked_.signedDistance(origin_)) > kShift;
   if (reset) grown_ = false, last_checked_ = plane_;
   return changed;
 }

@@ -62,7 +62,9 @@ bool dropDetached(const std::vector<MapTriangle>& triangles, const std::vector<c
 }  // namespace
 
 AngleGate::AngleGate(double angle_deg)
-    : narrow_(angle_deg * kDegree), wide_(std::max(kWidestAngle, narrow_)), cos_narrow_(std::cos(narrow_)),
+    : narrow_(angle_deg * kDegree),
+      wide_(std::max(kWidestAngle, narrow_)),
+      cos_narrow_(std::cos(narrow_)),
       cos_wide_(std::cos(wide_)) {}
 
 double distanceGate(const MapTriangle& triangle, double distance) {

@@ -11,14 +11,14 @@ namespace {
 // Smaller walls and ceilings are furniture. What one can put things on stays apart until it is a floor: two tables are
 // two.
 constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
-constexpr double kPartition = 0.5;  // m^2; free-standing walls and doors, of which something hides the middle
-constexpr double kNoTable = 20.0;  // m^2; what lies level with so large a surface is more of it, not a second table
+constexpr double kPartition = 0.5;     // m^2; free-standing walls and doors, of which something hides the middle
+constexpr double kNoTable = 20.0;      // m^2; what lies level with so large a surface is more of it, not a second table
 constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
 // Ceilings are seen at the flattest angles and from afar, and nothing as wide hangs less than this below another one.
-constexpr double kCeilingSlack = 1.5;  // of max_rms
+constexpr double kCeilingSlack = 1.5;              // of max_rms
 constexpr double kStrip = 4.0, kLeastStrip = 1.0;  // length over width, m^2; boards of shelves are smaller
-constexpr double kSmallGap = 4.0;  // a smaller piece of a wall may be as many of its own widths away
-constexpr double kCloser = 4.0;    // as many times as far apart when they agree as many times better
+constexpr double kSmallGap = 4.0;                  // a smaller piece of a wall may be as many of its own widths away
+constexpr double kCloser = 4.0;                    // as many times as far apart when they agree as many times better
 
 bool isBorder(const CellGrid& cells, CellIndex c) {
   return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) ||
@@ -86,9 +86,8 @@ Eigen::Matrix2d mainAxes(const PlaneTrack& track) {
 /// Bounds of the centres of a plane's cells along axes of another one's frame.
 Eigen::AlignedBox2d boundsAlong(const PlaneTrack& track, const PlaneTrack& frame, const Eigen::Matrix2d& axes) {
   Eigen::AlignedBox2d bounds;
-  track.cells().forEach([&](CellIndex c, int) {
-    bounds.extend(axes.transpose() * frame.toPlane(track.cellCentre(c)));
-  });
+  track.cells().forEach(
+      [&](CellIndex c, int) { bounds.extend(axes.transpose() * frame.toPlane(track.cellCentre(c))); });
   return bounds;
 }
 

@@ -148,8 +148,8 @@ const std::vector<DelaunayTriangle>& Delaunay::triangulate(const std::vector<Eig
     const Face& face = faces_[f];
     if (!face.alive || face.vertex[0] < kCorners || face.vertex[1] < kCorners || face.vertex[2] < kCorners) continue;
     number[f] = static_cast<int>(result_.size());
-    result_.push_back({{face.vertex[0] - kCorners, face.vertex[1] - kCorners, face.vertex[2] - kCorners},
-                       face.neighbour});
+    result_.push_back(
+        {{face.vertex[0] - kCorners, face.vertex[1] - kCorners, face.vertex[2] - kCorners}, face.neighbour});
   }
   for (DelaunayTriangle& t : result_) {
     for (int& g : t.neighbour) g = g < 0 ? -1 : number[g];

@@ -43,9 +43,12 @@ const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid) 
 
 DepthMeshBuilder::DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera,
                                    const DepthNoise& noise)
-    : options_(options), camera_(camera), noise_(noise),
+    : options_(options),
+      camera_(camera),
+      noise_(noise),
       least_facing_(std::cos(float(options.max_incidence_deg * M_PI / 180.0))),
-      least_level_facing_(std::cos(float(options.max_level_incidence_deg * M_PI / 180.0))), rays_(camera) {}
+      least_level_facing_(std::cos(float(options.max_level_incidence_deg * M_PI / 180.0))),
+      rays_(camera) {}
 
 int DepthMeshBuilder::gridStep(const DepthGrid& grid) const {
   return std::max(1, static_cast<int>(std::lround(options_.spacing / std::max(1, grid.stride))));
@@ -123,8 +126,8 @@ bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const Dept
     const MeshVertex& b = mesh_.vertices[triangle.vertex[(k + 2) % 3]];
     const Eigen::Vector2f middle = 0.5f * (a.pixel + b.pixel);
     // Between neighbouring nodes there is no third one to ask.
-    const bool neighbours = a.feature < 0 && b.feature < 0 &&
-                            (a.pixel - b.pixel).cwiseAbs().maxCoeff() < 1.5f * float(grid.stride);
+    const bool neighbours =
+        a.feature < 0 && b.feature < 0 && (a.pixel - b.pixel).cwiseAbs().maxCoeff() < 1.5f * float(grid.stride);
     if (neighbours && brokenBetween(a, b, grid)) return true;
     const int c = static_cast<int>(std::lround((middle.x() - float(grid.offset)) / float(grid.stride)));
     const int r = static_cast<int>(std::lround((middle.y() - float(grid.offset)) / float(grid.stride)));

@@ -1,12 +1,12 @@
 // Geometry: core types <-> geometry_msgs. Exact both ways up to the normalisation of quaternions.
 #pragma once
 
-#include <Eigen/Core>
 #include <geometry_msgs/Point.h>
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/Transform.h>
 #include <geometry_msgs/Vector3.h>
 #include <ros/time.h>
+#include <Eigen/Core>
 
 #include "vip_slam_core/geometry/se3.h"
 

@@ -1,9 +1,9 @@
 // Images from drivers, recordings and phones to what the front end takes: 8-bit gray, and depth in metres.
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
+#include <opencv2/core.hpp>
 
 namespace vip_slam {
 

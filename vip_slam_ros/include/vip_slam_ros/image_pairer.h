@@ -16,7 +16,7 @@ struct StampedImage {
 };
 
 struct ImagePair {
-  double t = 0;   ///< stamp of gray
+  double t = 0;  ///< stamp of gray
   cv::Mat gray;
   cv::Mat depth;  ///< empty: none came in time
 };
@@ -31,9 +31,9 @@ struct PairerCounters {
   std::size_t pairs = 0;
   std::size_t without_depth = 0;  ///< colour images that no depth matched
   std::size_t unused_depth = 0;
-  std::size_t dropped = 0;        ///< colour images that the queue could not hold
-  std::size_t backward = 0;       ///< images whose stamp was not newer than the one before
-  double skew = 0;                ///< depth stamp - colour stamp of the newest pair, seconds
+  std::size_t dropped = 0;   ///< colour images that the queue could not hold
+  std::size_t backward = 0;  ///< images whose stamp was not newer than the one before
+  double skew = 0;           ///< depth stamp - colour stamp of the newest pair, seconds
 };
 
 class ImagePairer {

@@ -3,10 +3,10 @@
 
 #include <vector>
 
-#include <Eigen/Core>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/ColorRGBA.h>
 #include <std_msgs/Header.h>
+#include <Eigen/Core>
 
 namespace vip_slam {
 

@@ -65,7 +65,8 @@ std::vector<PassersBy::Body> PassersBy::bodies(double t) const {
     const Eigen::Vector3d right(ahead.y(), -ahead.x(), 0);
     Eigen::Vector3d foot = camera_(t).t() + distance * ahead + side * right;
     foot.z() = 0;
-    list.push_back({toVec(foot), toVec(right), toVec(-ahead), static_cast<float>(0.5 * options_.width), clothes_[k].get()});
+    list.push_back(
+        {toVec(foot), toVec(right), toVec(-ahead), static_cast<float>(0.5 * options_.width), clothes_[k].get()});
   }
   return list;
 }

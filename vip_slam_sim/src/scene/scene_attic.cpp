@@ -29,8 +29,8 @@ Scene buildAttic() {
     hangPoster(&b, roof_n, p, i, 0.9 + 2.3 * i, 1.0, 0.8);
   }
   // Gables reach up behind the roof's slopes; the half-open door leads nowhere.
-  const int west = b.wall({0, 0}, {0, W}, 0, top, p.wall, {{2.4f, 3.25f, 1.95f, Opening::Kind::kClosed, 0.35f, p.door}},
-                          p.carpet);
+  const int west =
+      b.wall({0, 0}, {0, W}, 0, top, p.wall, {{2.4f, 3.25f, 1.95f, Opening::Kind::kClosed, 0.35f, p.door}}, p.carpet);
   b.wall({0, W}, {L, W}, 0, eave, p.wall);
   const int east = b.wall({L, W}, {L, 0}, 0, top, p.wall);
   b.wall({L, 0}, {0, 0}, 0, eave, p.wall);

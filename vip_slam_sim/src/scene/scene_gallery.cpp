@@ -18,8 +18,8 @@ Scene buildGallery() {
       for (int j = 0; j < 2; ++j) b.ceilingLamp(ceiling, 1.5 + 3.0 * k, 2.2 + 4.6 * j, 1.2, 0.4, 10.0);
   }
   const int west = b.wall({0, 0}, {0, Y}, 0, H, p.wall, {{4.0f, 5.2f, 2.3f, Opening::Kind::kPassage, 0.3f}}, p.carpet);
-  const int north = b.wall({0, Y}, {X, Y}, 0, H, p.wall, {{7.0f, 8.0f, 2.1f, Opening::Kind::kClosed, 0.1f, p.door}},
-                           p.carpet);
+  const int north =
+      b.wall({0, Y}, {X, Y}, 0, H, p.wall, {{7.0f, 8.0f, 2.1f, Opening::Kind::kClosed, 0.1f, p.door}}, p.carpet);
   const int east = b.wall({X, Y}, {X, 0}, 0, H, p.wall);
   const int south = b.wall({X, 0}, {0, 0}, 0, H, p.wall);
   // Behind the passage a second, dimmer room.
@@ -44,8 +44,10 @@ Scene buildGallery() {
   // Two rows of pillars: square ones and round ones.
   for (int i = 0; i < 4; ++i) {
     b.boxAt(3.0 + 4.0 * i, 2.6, 0, 0, {0.45, 0.45, H}, p.wall, p.wall);
-    if (i % 2) b.cylinder(uprightPose(3.0 + 4.0 * i, 6.4, 0), 0.3, H, p.wall, p.wall, 48);
-    else b.boxAt(3.0 + 4.0 * i, 6.4, 0, M_PI / 4, {0.5, 0.5, H}, p.wall, p.wall);
+    if (i % 2)
+      b.cylinder(uprightPose(3.0 + 4.0 * i, 6.4, 0), 0.3, H, p.wall, p.wall, 48);
+    else
+      b.boxAt(3.0 + 4.0 * i, 6.4, 0, M_PI / 4, {0.5, 0.5, H}, p.wall, p.wall);
   }
   // Panels 8 cm thick with pictures on both sides, one of them almost parallel to the wall, 35 cm before it.
   const auto panel = [&](double x, double y, double yaw, double width, int picture) {
@@ -61,8 +63,10 @@ Scene buildGallery() {
   for (int i = 0; i < 3; ++i) {
     const double x = 6.9 + 4.1 * i, y = i % 2 ? 7.6 : 1.3;
     b.boxAt(x, y, 0, 0.2 * i, {0.5, 0.5, 1.0}, p.white, p.white);
-    if (i % 2) b.sphere({x, y, 1.22}, 0.22, {-1, 1, rgb(0.7f, 0.5f, 0.3f)}, 28);
-    else b.cylinder(uprightPose(x, y, 1.0), 0.12, 0.5, p.metal, p.dark, 32);
+    if (i % 2)
+      b.sphere({x, y, 1.22}, 0.22, {-1, 1, rgb(0.7f, 0.5f, 0.3f)}, 28);
+    else
+      b.cylinder(uprightPose(x, y, 1.0), 0.12, 0.5, p.metal, p.dark, 32);
   }
   b.boxAt(16.4, 4.5, 0, 0, {2.6, 3.0, 0.16}, p.wood, p.wood);
   b.boxAt(16.7, 4.5, 0.16, 0.3, {0.7, 0.7, 0.8}, p.dark, p.dark);

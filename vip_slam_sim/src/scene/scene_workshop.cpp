@@ -17,7 +17,8 @@ Scene buildWorkshop() {
     for (int j = 0; j < 2; ++j) b.ceilingLamp(ceiling, 1.8 + 3.4 * i, 1.6 + 2.8 * j, 1.2, 0.3, 9.0);
   b.boxAt(X / 2, 3.0, H - 0.35, 0, {X, 0.35, 0.3}, p.metal, p.metal);  // a duct under the ceiling
   b.wall({0, 0}, {0, Y}, 0, H, p.wall);
-  const int north = b.wall({0, Y}, {X, Y}, 0, H, p.wall, {{4.6f, 5.6f, 2.1f, Opening::Kind::kPassage, 0.15f}}, p.carpet);
+  const int north =
+      b.wall({0, Y}, {X, Y}, 0, H, p.wall, {{4.6f, 5.6f, 2.1f, Opening::Kind::kPassage, 0.15f}}, p.carpet);
   const int east = b.wall({X, Y}, {X, 0}, 0, H, p.wall);
   const int south = b.wall({X, 0}, {0, 0}, 0, H, p.wall);
   // Store behind the opening, its door half open into the workshop.

@@ -131,7 +131,8 @@ SimFrame SequenceRenderer::renderFrame(int index) const {
     FrameBuffers own;
     const SE3 T_W_D = f.T_W_C * sensor_.T_color_depth;
     depth_renderer_->renderDepth(T_W_D, &own);
-    passers_->draw(*depth_renderer_, t, [&](int) { return T_W_D; }, &own);
+    passers_->draw(
+        *depth_renderer_, t, [&](int) { return T_W_D; }, &own);
     f.depth = effects_->depth(own, cv::Mat(), index);
   }
   return f;

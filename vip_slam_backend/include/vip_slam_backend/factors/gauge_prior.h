@@ -10,9 +10,9 @@
 namespace vip_slam {
 
 struct GaugePrior {
-  SE3 T_W_I;             ///< the pose that is held
-  double weight = 1e3;   ///< 1/m and 1/rad
-  bool tilt = false;     ///< hold roll and pitch as well (no IMU factor in the problem)
+  SE3 T_W_I;            ///< the pose that is held
+  double weight = 1e3;  ///< 1/m and 1/rad
+  bool tilt = false;    ///< hold roll and pitch as well (no IMU factor in the problem)
 };
 
 /// Rows: position (3), yaw (or all of the rotation vector when tilt).
@@ -25,8 +25,7 @@ inline Vector6d gaugeResidual(const GaugePrior& prior, const SE3& T_W_I, Matrix6
   if (J) {
     J->setZero();
     J->topRightCorner<3, 3>() = prior.weight * Eigen::Matrix3d::Identity();
-    J->bottomLeftCorner<3, 3>() =
-        prior.weight * mask.asDiagonal() * rightJacobianInverseSO3(phi) * prior.T_W_I.R();
+    J->bottomLeftCorner<3, 3>() = prior.weight * mask.asDiagonal() * rightJacobianInverseSO3(phi) * prior.T_W_I.R();
   }
   return r;
 }

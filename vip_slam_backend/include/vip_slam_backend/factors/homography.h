@@ -21,7 +21,7 @@ using HomographyJacobian = Eigen::Matrix<double, 9, 15>;
 
 struct HomographyPair {
   Eigen::Vector2d xy_i = Eigen::Vector2d::Zero(), xy_j = Eigen::Vector2d::Zero();  ///< undistorted, z = 1
-  double weight = 1;  ///< f / (sigma_px |rho|)
+  double weight = 1;                                                               ///< f / (sigma_px |rho|)
 };
 
 /// vec(H), row-major. `basis`: tangentBasis(plane.n), needed with J only.

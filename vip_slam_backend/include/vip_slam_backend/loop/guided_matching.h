@@ -15,10 +15,10 @@ namespace vip_slam {
 /// A landmark, or a corner of one keyframe that no other saw and that has depth.
 struct MapPoint {
   Eigen::Vector3d p_W;
-  double sigma = 0;                     ///< of p_W along a ray to it, metres
+  double sigma = 0;  ///< of p_W along a ray to it, metres
   LandmarkId landmark = kNoLandmark;
-  KeyframeId keyframe = 0;              ///< who sees it,
-  std::uint32_t feature = 0;            ///< and in which feature
+  KeyframeId keyframe = 0;    ///< who sees it,
+  std::uint32_t feature = 0;  ///< and in which feature
 };
 
 /// The point behind a feature of a keyframe of the map. False when it has neither landmark nor depth.

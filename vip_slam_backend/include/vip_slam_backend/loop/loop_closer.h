@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "vip_slam_backend/loop/loop_options.h"
-#include "vip_slam_backend/loop/place_verifier.h"
 #include "vip_slam_backend/loop/place_search.h"
+#include "vip_slam_backend/loop/place_verifier.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/place_recognition/keyframe_database.h"
 #include "vip_slam_core/types/map_update.h"

@@ -19,10 +19,10 @@ CameraRig singleCamera();
 struct PlaceMatch {
   std::uint32_t camera = 0;
   Eigen::Vector3d p_W;
-  Eigen::Vector2d xy;       ///< normalised coordinates in that camera
-  double depth = 0;         ///< z in that camera, metres; 0 unknown
-  double depth_sigma = 0;   ///< one sigma of it together with the point's own error, metres
-  double scale = 1;         ///< pixel noise relative to octave 0
+  Eigen::Vector2d xy;      ///< normalised coordinates in that camera
+  double depth = 0;        ///< z in that camera, metres; 0 unknown
+  double depth_sigma = 0;  ///< one sigma of it together with the point's own error, metres
+  double scale = 1;        ///< pixel noise relative to octave 0
 };
 
 /// A point of a depth image and the plane of the map it lies on.
@@ -30,16 +30,16 @@ struct PlaceSurface {
   std::uint32_t camera = 0;
   Eigen::Vector3d p_C;
   Plane plane_W;
-  double sigma = 0.02;      ///< of the distance, metres
+  double sigma = 0.02;  ///< of the distance, metres
 };
 
 struct PlacePoseOptions {
-  double focal = 500;        ///< px
+  double focal = 500;  ///< px
   int iterations = 400;
   double ransac_px = 4.0;
-  double inlier_px = 3.0;    ///< after refinement
-  double depth_sigmas = 4.0; ///< gate on depth
-  double tilt_sigma = 0;     ///< of the refined attitude against the given one, radians; 0: gravity has no say in it
+  double inlier_px = 3.0;     ///< after refinement
+  double depth_sigmas = 4.0;  ///< gate on depth
+  double tilt_sigma = 0;      ///< of the refined attitude against the given one, radians; 0: gravity has no say in it
   std::uint64_t seed = 1;
 };
 

@@ -15,17 +15,17 @@ namespace vip_slam {
 
 struct PlaceSupport {
   bool found = false;
-  SE3 T_W_C;                 ///< camera of the newest keyframe
+  SE3 T_W_C;                                ///< camera of the newest keyframe
   Matrix6d information = Matrix6d::Zero();  ///< of its perturbation (theta, t)
-  int matches = 0;           ///< inliers of all keyframes together
-  int points = 0;            ///< distinct points of the map among them, 5 cm apart
-  int covered = 0;           ///< features with depth whose spot the map's views of this place show as well
-  int covered_cells = 0;     ///< cells of the images (an eighth by a sixth) with covered features
-  int explained_cells = 0;   ///< of these, with an inlier
-  int established = 0;       ///< landmarks of several views that the keyframes should see here, each time counted
-  int refound = 0;           ///< of these, inliers
-  DepthAgreement depth;      ///< of all keyframes, each against the nearest view
-  KeyframeId match = 0;      ///< the nearest view of the newest keyframe, 0 when the map has none
+  int matches = 0;                          ///< inliers of all keyframes together
+  int points = 0;                           ///< distinct points of the map among them, 5 cm apart
+  int covered = 0;          ///< features with depth whose spot the map's views of this place show as well
+  int covered_cells = 0;    ///< cells of the images (an eighth by a sixth) with covered features
+  int explained_cells = 0;  ///< of these, with an inlier
+  int established = 0;      ///< landmarks of several views that the keyframes should see here, each time counted
+  int refound = 0;          ///< of these, inliers
+  DepthAgreement depth;     ///< of all keyframes, each against the nearest view
+  KeyframeId match = 0;     ///< the nearest view of the newest keyframe, 0 when the map has none
   std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< inliers of the newest: feature, landmark of the map
   double explainedCells() const { return covered_cells ? static_cast<double>(explained_cells) / covered_cells : 0; }
   /// How much speaks for it: points found again, weighed by what they leave unexplained of the image, by how many of

@@ -18,12 +18,12 @@ namespace vip_slam {
 
 struct PlaceVerification {
   bool accepted = false;
-  std::string reason;            ///< why not, or what convinced
+  std::string reason;  ///< why not, or what convinced
   KeyframeId match = 0;
-  SE3 T_W_I;                     ///< the query's pose in the map, by the landmarks it was matched with
+  SE3 T_W_I;                                ///< the query's pose in the map, by the landmarks it was matched with
   Matrix6d information = Matrix6d::Zero();  ///< of the perturbation (theta, t) of the query's camera pose
   int matches = 0, inliers = 0;
-  double depth_agreement = -1;   ///< -1: no depth to compare
+  double depth_agreement = -1;                                  ///< -1: no depth to compare
   std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< inliers: feature of the query, landmark of the map
 };
 

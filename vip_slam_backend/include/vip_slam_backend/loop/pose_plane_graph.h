@@ -14,14 +14,14 @@ namespace vip_slam {
 
 struct RelativePoseEdge {
   KeyframeId i = 0, j = 0;
-  SE3 T_i_j;                 ///< measured, IMU frames
-  Matrix6d sqrt_information; ///< of the residual (theta, t)
+  SE3 T_i_j;                  ///< measured, IMU frames
+  Matrix6d sqrt_information;  ///< of the residual (theta, t)
 };
 
 struct PosePlaneEdge {
   KeyframeId i = 0;
   PlaneId plane = 0;
-  Plane measured_I;          ///< in the IMU frame of i
+  Plane measured_I;  ///< in the IMU frame of i
   Eigen::Matrix3d sqrt_information;
 };
 
@@ -29,8 +29,8 @@ struct PosePlaneSolution {
   bool usable = false;
   std::map<KeyframeId, SE3> T_W_I;
   std::map<PlaneId, Plane> planes;
-  double chi2 = 0;                     ///< sum of whitened squares over all edges
-  std::vector<double> relative_chi2;   ///< per relative edge, in the order they were added
+  double chi2 = 0;                    ///< sum of whitened squares over all edges
+  std::vector<double> relative_chi2;  ///< per relative edge, in the order they were added
   int iterations = 0;
 };
 

@@ -13,10 +13,10 @@
 namespace vip_slam {
 
 struct DepthAgreement {
-  int compared = 0;       ///< nodes of either grid seen by the other
-  int agree = 0;          ///< on the same surface
-  int see_through = 0;    ///< the other camera sees something farther: this surface is not there
-  int occluded = 0;       ///< the other camera sees something nearer
+  int compared = 0;     ///< nodes of either grid seen by the other
+  int agree = 0;        ///< on the same surface
+  int see_through = 0;  ///< the other camera sees something farther: this surface is not there
+  int occluded = 0;     ///< the other camera sees something nearer
   double agreement() const { return compared ? static_cast<double>(agree) / compared : 0; }
   double seeThrough() const { return compared ? static_cast<double>(see_through) / compared : 0; }
 };
@@ -26,7 +26,7 @@ DepthAgreement compareDepth(const DepthGrid& a, const DepthGrid& b, const SE3& T
 
 struct PlaneAgreement {
   std::vector<std::pair<PlaneId, PlaneId>> same;  ///< (plane of the query, plane of the match): one surface
-  int contradictions = 0;  ///< overlapping parallel surfaces of one side at different depth
+  int contradictions = 0;                         ///< overlapping parallel surfaces of one side at different depth
 };
 
 /// Compares the planes seen by `query` keyframes with those seen by `match` keyframes, where `T_W_W` moves the query's

@@ -12,20 +12,20 @@ namespace vip_slam {
 
 struct SnapshotKeyframe {
   KeyframeId id = 0;
-  double t = 0;              ///< image stamp
+  double t = 0;  ///< image stamp
   std::uint32_t epoch = 0;
-  NavState state;            ///< T_map_I, v, biases
-  SE3 T_odom_I;              ///< the front end's pose when the keyframe was made
-  SE3 T_now_then;            ///< see Anchor
+  NavState state;  ///< T_map_I, v, biases
+  SE3 T_odom_I;    ///< the front end's pose when the keyframe was made
+  SE3 T_now_then;  ///< see Anchor
   std::uint32_t landmarks = 0;
 };
 
 struct BackEndStatistics {
   std::uint64_t keyframes_received = 0, keyframes_refused = 0, keyframes_culled = 0;
   std::uint64_t landmarks = 0, plane_landmarks = 0, observations = 0;
-  std::uint64_t reobserved = 0;     ///< landmarks found again by projection
-  std::uint64_t merged = 0;         ///< duplicate tracks joined
-  std::uint64_t outliers = 0;       ///< observations removed by residual
+  std::uint64_t reobserved = 0;  ///< landmarks found again by projection
+  std::uint64_t merged = 0;      ///< duplicate tracks joined
+  std::uint64_t outliers = 0;    ///< observations removed by residual
   std::uint64_t local_ba = 0, global_ba = 0;
   std::uint64_t loops_accepted = 0, loops_rejected = 0;
 };
@@ -34,10 +34,10 @@ struct MapSnapshot {
   std::uint64_t revision = 0;
   std::uint32_t epoch = 0;
   SE3 T_map_odom;
-  std::vector<SnapshotKeyframe> keyframes;   ///< ascending id
-  std::vector<LandmarkEstimate> landmarks;   ///< ascending id
-  std::vector<PlaneEstimate> planes;         ///< parameters as optimised
-  std::vector<LoopEvent> loops;              ///< all so far
+  std::vector<SnapshotKeyframe> keyframes;  ///< ascending id
+  std::vector<LandmarkEstimate> landmarks;  ///< ascending id
+  std::vector<PlaneEstimate> planes;        ///< parameters as optimised
+  std::vector<LoopEvent> loops;             ///< all so far
   /// Localisation only: keyframes that were found in the map without entering it, oldest first.
   std::vector<Anchor> localised;
   BackEndStatistics statistics;

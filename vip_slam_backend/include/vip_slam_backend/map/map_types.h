@@ -27,9 +27,9 @@ struct MapObservation {
 };
 
 struct MapKeyframe {
-  KeyframePtr data;   ///< as the front end published it
-  NavState state;     ///< estimate in `map`: T_map_I, v, biases
-  SE3 T_I_C;          ///< the camera's mounting as known now
+  KeyframePtr data;     ///< as the front end published it
+  NavState state;       ///< estimate in `map`: T_map_I, v, biases
+  SE3 T_I_C;            ///< the camera's mounting as known now
   bool stored = false;  ///< from a stored map, made by a camera whose mounting the present one says nothing about
   /// Landmark of each feature, kNoLandmark when none; same length as data->frame.features.
   std::vector<LandmarkId> landmarks;
@@ -52,10 +52,10 @@ struct MapKeyframe {
 struct MapLandmark {
   LandmarkId id = kNoLandmark;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
-  Descriptor descriptor{};                    ///< of the observation nearest to all others
-  std::vector<MapObservation> observations;   ///< ascending keyframe id, one per keyframe; never empty
-  PlaneId plane = 0;                          ///< 0: on none
-  std::uint32_t visible = 0, found = 0;       ///< times predicted into a keyframe, and times matched there
+  Descriptor descriptor{};                   ///< of the observation nearest to all others
+  std::vector<MapObservation> observations;  ///< ascending keyframe id, one per keyframe; never empty
+  PlaneId plane = 0;                         ///< 0: on none
+  std::uint32_t visible = 0, found = 0;      ///< times predicted into a keyframe, and times matched there
 
   KeyframeId host() const { return observations.front().keyframe; }
 };

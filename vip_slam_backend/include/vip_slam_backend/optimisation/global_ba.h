@@ -10,18 +10,18 @@
 namespace vip_slam {
 
 struct GlobalBaProblem {
-  std::shared_ptr<const Map> map;   ///< copy; keyframe data are shared
+  std::shared_ptr<const Map> map;  ///< copy; keyframe data are shared
   BuilderSettings settings;
   GlobalBaOptions options;
   std::string solver;
   ImuNoise noise;
-  double max_seconds = 0;           ///< 0: none
-  double t = 0;                     ///< stamp of the newest keyframe
+  double max_seconds = 0;  ///< 0: none
+  double t = 0;            ///< stamp of the newest keyframe
 };
 
 struct GlobalBaSolution {
   BuiltProblem built;
-  SolverSummary summary;            ///< of the last round
+  SolverSummary summary;  ///< of the last round
   int rounds = 0;
 };
 

@@ -12,8 +12,8 @@
 namespace vip_slam {
 
 struct ProblemScope {
-  std::vector<KeyframeId> free;    ///< optimised, ascending
-  std::vector<KeyframeId> fixed;   ///< held, ascending
+  std::vector<KeyframeId> free;   ///< optimised, ascending
+  std::vector<KeyframeId> fixed;  ///< held, ascending
   /// Keyframes outside both hold the planes through one block per plane (their poses are constants).
   bool outside_planes = true;
 };
@@ -25,21 +25,21 @@ ProblemScope globalScope(const Map& map);
 
 struct BuiltProblem {
   BaProblem problem;
-  std::vector<KeyframeId> frames;       ///< per problem frame; 0: the world frame of outside planes
-  std::vector<LandmarkId> points;       ///< one per track: a landmark's first is its longest
+  std::vector<KeyframeId> frames;  ///< per problem frame; 0: the world frame of outside planes
+  std::vector<LandmarkId> points;  ///< one per track: a landmark's first is its longest
   std::vector<PlaneId> planes;
-  std::vector<LandmarkId> plane_points; ///< landmarks that stand for homographies only (vip)
+  std::vector<LandmarkId> plane_points;  ///< landmarks that stand for homographies only (vip)
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
-  double gate_weight = 0;               ///< largest weight by which an observation is judged
+  double gate_weight = 0;  ///< largest weight by which an observation is judged
 };
 
 struct BuilderSettings {
   Variant variant = Variant::kVip;
   MeasurementOptions measurement;
-  bool shared_hosts = true;             ///< of homographies: few hosts for many landmarks, instead of first views
-  bool middle_hosts = false;            ///< shared ones from the middle of the landmarks' tracks only
-  double focal = 500;                   ///< px
+  bool shared_hosts = true;   ///< of homographies: few hosts for many landmarks, instead of first views
+  bool middle_hosts = false;  ///< shared ones from the middle of the landmarks' tracks only
+  double focal = 500;         ///< px
   Eigen::Vector3d gravity = gravityVector();
 };
 

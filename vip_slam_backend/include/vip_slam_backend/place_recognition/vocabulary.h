@@ -28,9 +28,9 @@ class Vocabulary {
   /// Nodes in breadth-first order; node 0 is the root. The children of a node are consecutive.
   struct Tree {
     std::uint32_t branching = 0, levels = 0;
-    std::vector<std::uint8_t> children;    ///< count per node; 0: a word
-    std::vector<Descriptor> descriptors;   ///< per node; the root's is unused (zero)
-    std::vector<float> weights;            ///< idf per word, in the order of its leaves
+    std::vector<std::uint8_t> children;   ///< count per node; 0: a word
+    std::vector<Descriptor> descriptors;  ///< per node; the root's is unused (zero)
+    std::vector<float> weights;           ///< idf per word, in the order of its leaves
   };
 
   Vocabulary() = default;

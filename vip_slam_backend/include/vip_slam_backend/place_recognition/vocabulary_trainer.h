@@ -11,10 +11,10 @@
 namespace vip_slam {
 
 struct VocabularyTrainerOptions {
-  int branching = 10;        ///< children per node, 2..255
-  int levels = 5;            ///< depth of the tree
-  int iterations = 12;       ///< k-medians rounds per node
-  int min_descriptors = 8;   ///< a node with fewer is not split: words must mean something
+  int branching = 10;       ///< children per node, 2..255
+  int levels = 5;           ///< depth of the tree
+  int iterations = 12;      ///< k-medians rounds per node
+  int min_descriptors = 8;  ///< a node with fewer is not split: words must mean something
   std::uint64_t seed = 1;
 };
 

@@ -17,18 +17,18 @@ namespace vip_slam {
 struct BaFrame {
   NavState state;
   SE3 T_I_C;
-  bool fixed = false;     ///< pose and motion are constants
-  bool motion = true;     ///< velocity and biases are variables (when not fixed); else they are constants
+  bool fixed = false;  ///< pose and motion are constants
+  bool motion = true;  ///< velocity and biases are variables (when not fixed); else they are constants
 
   SE3 T_W_C() const { return state.T_W_I * T_I_C; }
 };
 
 struct BaObservation {
   int frame = 0;
-  double x = 0, y = 0;         ///< undistorted normalised coordinates
-  double weight = 1;           ///< focal length / sigma in px
-  double depth = 0;            ///< metres
-  double depth_weight = 0;     ///< 1 / sigma; 0: no depth
+  double x = 0, y = 0;      ///< undistorted normalised coordinates
+  double weight = 1;        ///< focal length / sigma in px
+  double depth = 0;         ///< metres
+  double depth_weight = 0;  ///< 1 / sigma; 0: no depth
 };
 
 /// Its observations are observations[first .. first + count).
@@ -48,7 +48,7 @@ struct BaImu {
   std::shared_ptr<const Preintegration> preintegration;
 };
 
-struct BaHomography {      ///< compressed
+struct BaHomography {  ///< compressed
   int i = 0, j = 0, plane = 0;
   HomographySums sums{};
   int pairs = 0;
@@ -59,16 +59,16 @@ struct BaHomographyPair {  ///< uncompressed
   HomographyPair pair;
 };
 
-struct BaPointToPlane {    ///< compressed
+struct BaPointToPlane {  ///< compressed
   int frame = 0, plane = 0;
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
   int points = 0;
 };
 
-struct BaPlanePoint {      ///< uncompressed
+struct BaPlanePoint {  ///< uncompressed
   int frame = 0, plane = 0;
   Eigen::Vector3d p_C = Eigen::Vector3d::Zero();
-  double weight = 1;       ///< 1 / sigma
+  double weight = 1;  ///< 1 / sigma
 };
 
 /// See factors/relative_pose.h.
@@ -107,7 +107,7 @@ struct BaProblem {
   std::vector<BaMotionPrior> motion_priors;
 
   std::size_t residualBlocks() const;
-  std::size_t parameters() const;      ///< tangent dimension of all variables
+  std::size_t parameters() const;  ///< tangent dimension of all variables
   std::size_t pixelObservations() const { return observations.size(); }
 };
 

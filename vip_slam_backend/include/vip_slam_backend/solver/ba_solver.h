@@ -13,13 +13,13 @@ namespace vip_slam {
 
 struct SolverOptions {
   int max_iterations = 10;
-  double max_seconds = 0;            ///< 0: no limit
+  double max_seconds = 0;  ///< 0: no limit
   int threads = 1;
   double initial_radius = 1e4;       ///< trust region: damping is diag(J^T J) / radius
   double function_tolerance = 1e-6;  ///< stop when the cost falls by less than this fraction
   double gradient_tolerance = 1e-10;
   double parameter_tolerance = 1e-8;
-  bool keep_iterating = false;       ///< run all max_iterations whatever the tolerances say (benchmarks)
+  bool keep_iterating = false;  ///< run all max_iterations whatever the tolerances say (benchmarks)
 };
 
 struct SolverIteration {
@@ -29,12 +29,12 @@ struct SolverIteration {
 
 struct SolverSummary {
   double initial_cost = 0, final_cost = 0;
-  int iterations = 0;                ///< steps tried
-  bool usable = true;                ///< false: the problem was left as it was
+  int iterations = 0;  ///< steps tried
+  bool usable = true;  ///< false: the problem was left as it was
   std::string message;
   double residual_ms = 0, jacobian_ms = 0, linear_ms = 0, preprocess_ms = 0, postprocess_ms = 0, total_ms = 0;
   std::size_t residual_blocks = 0, parameters = 0, observations = 0;
-  std::size_t factor_nonzeros = 0;   ///< of the reduced system's Cholesky factor, when known
+  std::size_t factor_nonzeros = 0;  ///< of the reduced system's Cholesky factor, when known
   std::vector<SolverIteration> log;
 };
 

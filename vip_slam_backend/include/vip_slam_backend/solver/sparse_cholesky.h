@@ -49,23 +49,23 @@ class SparseCholesky {
   double factorFlops() const { return factor_flops_; }
 
  private:
-  struct Entry {          // a block of the matrix inside its front
-    std::size_t offset;   // into values
-    int row, column;      // inside the front
+  struct Entry {         // a block of the matrix inside its front
+    std::size_t offset;  // into values
+    int row, column;     // inside the front
     int rows, columns;
   };
   struct Front {
-    int columns = 0, rows = 0, ld = 0;   // pivots, pivots + update rows + right-hand side, leading dimension
+    int columns = 0, rows = 0, ld = 0;  // pivots, pivots + update rows + right-hand side, leading dimension
     std::vector<Entry> entries;
     std::vector<int> children;
     std::vector<FrontSegment> to_parent;
-    int parent_pivots = 0;               // update columns that are pivots of the parent
-    std::vector<int> unknowns;           // caller's unknown of each row but the last
+    int parent_pivots = 0;      // update columns that are pivots of the parent
+    std::vector<int> unknowns;  // caller's unknown of each row but the last
     std::size_t factor_offset = 0;
-    std::size_t update_offset = 0;       // of the update matrix
+    std::size_t update_offset = 0;  // of the update matrix
     int updateRows() const { return rows - columns; }
     int updateLeading() const { return (updateRows() + 7) / 8 * 8; }
-    int part = 2;                        // 0 and 1: disjoint parts of the tree; 2: what lies above both
+    int part = 2;  // 0 and 1: disjoint parts of the tree; 2: what lies above both
   };
   bool factorizeFront(const Front& front, const double* values, const double* b);
   bool factorize(const double* values, const double* b, Worker* worker);

@@ -59,8 +59,8 @@ struct Recording {
   std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
   std::vector<RotationStep> rotations;
   std::vector<DepthSample> depths;
-  std::vector<BrightnessSample> brightness;  ///< of some colour images
-  std::vector<geometry_msgs::TransformStamped> tf;           ///< newest transform of each edge
+  std::vector<BrightnessSample> brightness;         ///< of some colour images
+  std::vector<geometry_msgs::TransformStamped> tf;  ///< newest transform of each edge
 };
 
 }  // namespace vip_slam

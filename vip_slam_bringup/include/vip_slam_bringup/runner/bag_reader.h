@@ -41,9 +41,9 @@ struct BagReaderOptions {
 
 class BagReader {
  public:
-  /// Opens the bag and looks for the sensor's topics; fills `sensor.camera` from camera_info when the sensor says so, and
-  /// `sensor.T_imu_cam` from tf. Throws std::runtime_error naming the file, the topics that are missing and those that
-  /// are there, or the frames that tf ought to connect and does not.
+  /// Opens the bag and looks for the sensor's topics; fills `sensor.camera` from camera_info when the sensor says so,
+  /// and `sensor.T_imu_cam` from tf. Throws std::runtime_error naming the file, the topics that are missing and those
+  /// that are there, or the frames that tf ought to connect and does not.
   BagReader(const std::string& path, SensorConfig& sensor, const BagReaderOptions& options = {});
   ~BagReader();
   BagReader(const BagReader&) = delete;

@@ -15,8 +15,8 @@
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_bringup/runner/mapping_thread.h"
 #include "vip_slam_bringup/runner/pipeline_options.h"
-#include "vip_slam_core/trajectory/anchored_trajectory.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/trajectory/anchored_trajectory.h"
 #include "vip_slam_core/types/tracking_state.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/front_end.h"
@@ -47,7 +47,7 @@ class Pipeline {
   void finish();
 
   std::size_t images() const { return images_; }
-  const std::vector<OdometryPose>& odometry() const { return odometry_; }  ///< images with a pose
+  const std::vector<OdometryPose>& odometry() const { return odometry_; }              ///< images with a pose
   const std::vector<OdometryCovariance>& covariances() const { return covariances_; }  ///< one for each of odometry()
   const std::vector<StateChange>& states() const { return states_; }
   const Trajectory& realtime() const { return realtime_; }  ///< in map, as known at that time

@@ -12,8 +12,8 @@
 namespace vip_slam {
 
 struct DepthLookupOptions {
-  int radius = 2;              ///< half window in pixels
-  double edge_ratio = 0.03;    ///< a spread (max - min) above edge_ratio * z + edge_sigmas * sigma(z) is an edge
+  int radius = 2;            ///< half window in pixels
+  double edge_ratio = 0.03;  ///< a spread (max - min) above edge_ratio * z + edge_sigmas * sigma(z) is an edge
   double edge_sigmas = 6.0;
   double min_valid_fraction = 0.6;
 };
@@ -30,7 +30,7 @@ cv::Mat depthToMetres(const cv::Mat& raw, double scale);
 /// Depths on a regular pixel grid; node (c, r) sits at pixel (offset + c*stride, offset + r*stride). 0 = invalid.
 struct DepthGrid {
   int stride = 0, offset = 0, cols = 0, rows = 0;
-  std::vector<float> z;         ///< metres, row-major
+  std::vector<float> z;  ///< metres, row-major
   bool empty() const { return z.empty(); }
   float at(int c, int r) const { return z[static_cast<std::size_t>(r) * cols + c]; }
   Eigen::Vector2d pixel(int c, int r) const { return {double(offset + c * stride), double(offset + r * stride)}; }
@@ -50,7 +50,7 @@ class DepthRegistration {
 
  private:
   std::shared_ptr<const CameraModel> depth_camera_, colour_camera_;
-  Eigen::Matrix3f R_;                ///< colour from depth
+  Eigen::Matrix3f R_;  ///< colour from depth
   Eigen::Vector3f t_;
   std::vector<Eigen::Vector2f> xy_;  ///< normalised coordinates of each depth pixel, row-major; NaN without a ray
   float footprint_u_ = 1, footprint_v_ = 1;  ///< colour pixels per depth pixel

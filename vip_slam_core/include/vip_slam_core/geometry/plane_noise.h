@@ -30,9 +30,9 @@ double planeInformationScale(const std::vector<PlaneMisfit>& misfits);
 /// those that are not mentioned and for all with too few observations to tell.
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
 
-/// Whether each plane, by index, is one surface: not when its median misfit is ten times what is typical of the map, and
-/// more than the noise model expects. (Single keyframes that saw something else beside it say nothing about the plane.)
-/// All are with too few observations.
+/// Whether each plane, by index, is one surface: not when its median misfit is ten times what is typical of the map,
+/// and more than the noise model expects. (Single keyframes that saw something else beside it say nothing about the
+/// plane.) All are with too few observations.
 std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
 
 }  // namespace vip_slam

@@ -12,9 +12,9 @@ namespace vip_slam {
 inline Eigen::Vector3d gravityVector(double magnitude = 9.81) { return Eigen::Vector3d(0, 0, magnitude); }
 
 struct ImuSample {
-  double t = 0;                                    ///< seconds, IMU clock
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< rad/s, IMU frame
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero(); ///< specific force, m/s^2; at rest about +9.81 along up
+  double t = 0;                                     ///< seconds, IMU clock
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< rad/s, IMU frame
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< specific force, m/s^2; at rest about +9.81 along up
 };
 
 /// Continuous-time densities as Kalibr states them.

@@ -17,10 +17,10 @@ class Preintegration {
                  const Eigen::Vector3d& bias_accel, const ImuNoise& noise);
 
   double dt() const { return dt_; }
-  const Eigen::Matrix3d& deltaR() const { return delta_R_; }         ///< R_i_j
-  const Eigen::Vector3d& alpha() const { return alpha_; }            ///< position increment, frame i
-  const Eigen::Vector3d& beta() const { return beta_; }              ///< velocity increment, frame i
-  const Eigen::Vector3d& biasGyro() const { return bias_gyro_; }     ///< linearisation point
+  const Eigen::Matrix3d& deltaR() const { return delta_R_; }      ///< R_i_j
+  const Eigen::Vector3d& alpha() const { return alpha_; }         ///< position increment, frame i
+  const Eigen::Vector3d& beta() const { return beta_; }           ///< velocity increment, frame i
+  const Eigen::Vector3d& biasGyro() const { return bias_gyro_; }  ///< linearisation point
   const Eigen::Vector3d& biasAccel() const { return bias_accel_; }
   const Eigen::Matrix3d& J_theta_bg() const { return J_theta_bg_; }
   const Eigen::Matrix3d& J_alpha_bg() const { return J_alpha_bg_; }

@@ -29,16 +29,16 @@ struct SensorConfig {
   double depth_rolling_shutter = 0;  ///< of the depth image in the same way; 0: depth of one instant
 
   bool intrinsics_from_camera_info = true;  ///< else `camera` below is used
-  CameraIntrinsics camera;        ///< colour camera; may be empty when from camera_info
-  CameraIntrinsics depth_camera;  ///< only when not registered
-  SE3 T_color_depth;              ///< only when not registered
+  CameraIntrinsics camera;                  ///< colour camera; may be empty when from camera_info
+  CameraIntrinsics depth_camera;            ///< only when not registered
+  SE3 T_color_depth;                        ///< only when not registered
 
   SE3 T_imu_cam;   ///< colour optical frame into IMU frame
   SE3 T_base_imu;  ///< IMU into base_link; identity unless the robot says otherwise
   ImuNoise imu_noise;
   DepthNoise depth_noise;
-  double time_offset = 0;           ///< seconds; t_imu = t_image + time_offset
-  double gravity = 9.81;            ///< m/s^2
+  double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
+  double gravity = 9.81;   ///< m/s^2
 };
 
 /// Throws std::runtime_error "file: key: what, expected what" on a missing file, unknown or missing key, bad value.

@@ -10,7 +10,7 @@ namespace vip_slam {
 
 /// An image's pose as the front end gave it.
 struct OdometryPose {
-  double t = 0;             ///< image stamp, seconds
+  double t = 0;  ///< image stamp, seconds
   std::uint32_t epoch = 0;
   SE3 T_odom_I;
 };

@@ -14,23 +14,23 @@ namespace vip_slam {
 
 /// One image's result; poses in `odom`.
 struct TrackedFrame {
-  double t = 0;                  ///< image stamp, seconds
-  std::uint32_t epoch = 0;       ///< counts restarts of the odometry; poses of different epochs share no frame
+  double t = 0;             ///< image stamp, seconds
+  std::uint32_t epoch = 0;  ///< counts restarts of the odometry; poses of different epochs share no frame
   TrackingStatus status;
-  NavState state;                ///< T_odom_I, v, biases
+  NavState state;                            ///< T_odom_I, v, biases
   Matrix15d covariance = Matrix15d::Zero();  ///< of state, order (theta, p, v, b_g, b_a)
-  SE3 T_I_C;                     ///< extrinsics in use (online-calibrated)
-  double time_offset = 0;        ///< t_imu = t_image + time_offset
-  std::vector<Feature> features; ///< tracked features only
-  DepthGrid depth_grid;          ///< coarse, for plane growth; empty without depth
-  bool zero_velocity = false;    ///< standing still
-  KeyframeId keyframe = 0;       ///< newest keyframe at or before this image
+  SE3 T_I_C;                                 ///< extrinsics in use (online-calibrated)
+  double time_offset = 0;                    ///< t_imu = t_image + time_offset
+  std::vector<Feature> features;             ///< tracked features only
+  DepthGrid depth_grid;                      ///< coarse, for plane growth; empty without depth
+  bool zero_velocity = false;                ///< standing still
+  KeyframeId keyframe = 0;                   ///< newest keyframe at or before this image
 };
 
 struct Keyframe {
-  KeyframeId id = 0;             ///< 1, 2, 3, ...
-  TrackedFrame frame;            ///< features include untracked ORB corners (id == kNoLandmark) for matching
-  KeyframeId previous = 0;       ///< 0: first of its epoch
+  KeyframeId id = 0;        ///< 1, 2, 3, ...
+  TrackedFrame frame;       ///< features include untracked ORB corners (id == kNoLandmark) for matching
+  KeyframeId previous = 0;  ///< 0: first of its epoch
   /// Samples from the previous keyframe's IMU time to this one's, both ends interpolated; empty when previous == 0
   /// or when a gap made them useless.
   std::vector<ImuSample> imu;

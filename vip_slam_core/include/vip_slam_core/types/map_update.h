@@ -29,26 +29,26 @@ struct LandmarkEstimate {
 struct LoopEvent {
   KeyframeId query = 0, match = 0;
   bool accepted = false;
-  std::string reason;          ///< why rejected, or what convinced
+  std::string reason;  ///< why rejected, or what convinced
   int inliers = 0;
-  SE3 T_match_query;           ///< IMU frames
+  SE3 T_match_query;  ///< IMU frames
   double t = 0;
 };
 
 struct MapUpdate {
-  std::uint64_t revision = 0;        ///< increases by one per update
-  double t = 0;                      ///< stamp of the newest keyframe in it
-  std::uint32_t epoch = 0;           ///< epoch that T_map_odom belongs to
+  std::uint64_t revision = 0;  ///< increases by one per update
+  double t = 0;                ///< stamp of the newest keyframe in it
+  std::uint32_t epoch = 0;     ///< epoch that T_map_odom belongs to
   SE3 T_map_odom;
   KeyframeId newest_keyframe = 0;
-  bool global = false;               ///< everything moved (GBA, loop); else a local window
-  std::vector<KeyframeEstimate> keyframes;   ///< changed ones (all when global)
-  std::vector<LandmarkEstimate> landmarks;   ///< changed ones (all when global)
+  bool global = false;                            ///< everything moved (GBA, loop); else a local window
+  std::vector<KeyframeEstimate> keyframes;        ///< changed ones (all when global)
+  std::vector<LandmarkEstimate> landmarks;        ///< changed ones (all when global)
   std::vector<std::pair<PlaneId, Plane>> planes;  ///< optimised planes
   std::vector<KeyframeId> removed_keyframes;
   std::vector<LandmarkId> removed_landmarks;
   std::vector<std::pair<LandmarkId, LandmarkId>> merged_landmarks;  ///< (from, into)
-  std::vector<LoopEvent> loops;      ///< since the previous update
+  std::vector<LoopEvent> loops;                                     ///< since the previous update
 };
 
 using MapUpdatePtr = std::shared_ptr<const MapUpdate>;

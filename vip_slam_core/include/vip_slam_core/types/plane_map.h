@@ -51,14 +51,14 @@ struct PlaneMerge {
 
 /// Changes since the previous update, in this order: merges, removals, then the rest.
 struct PlaneUpdate {
-  std::uint64_t revision = 0;      ///< revision of the MapUpdate it was computed with
+  std::uint64_t revision = 0;  ///< revision of the MapUpdate it was computed with
   double t = 0;
   std::vector<PlaneMerge> merges;
   std::vector<PlaneId> removed;
-  std::vector<PlaneEstimate> planes;             ///< all planes as they are now
-  std::vector<PlaneObservation> observations;    ///< new ones, or replacing the same (keyframe, plane)
+  std::vector<PlaneEstimate> planes;                       ///< all planes as they are now
+  std::vector<PlaneObservation> observations;              ///< new ones, or replacing the same (keyframe, plane)
   std::vector<std::pair<LandmarkId, PlaneId>> associated;  ///< landmarks found to lie on a plane
-  std::vector<LandmarkId> dissociated;           ///< landmarks that no longer do
+  std::vector<LandmarkId> dissociated;                     ///< landmarks that no longer do
 };
 
 using PlaneUpdatePtr = std::shared_ptr<const PlaneUpdate>;

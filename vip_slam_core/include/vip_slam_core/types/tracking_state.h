@@ -9,11 +9,16 @@ enum class TrackingState { kWaiting = 0, kInitialising = 1, kTracking = 2, kDegr
 
 inline const char* trackingStateName(TrackingState state) {
   switch (state) {
-    case TrackingState::kWaiting: return "WAITING";
-    case TrackingState::kInitialising: return "INITIALISING";
-    case TrackingState::kTracking: return "TRACKING";
-    case TrackingState::kDegraded: return "DEGRADED";
-    case TrackingState::kLost: return "LOST";
+    case TrackingState::kWaiting:
+      return "WAITING";
+    case TrackingState::kInitialising:
+      return "INITIALISING";
+    case TrackingState::kTracking:
+      return "TRACKING";
+    case TrackingState::kDegraded:
+      return "DEGRADED";
+    case TrackingState::kLost:
+      return "LOST";
   }
   return "UNKNOWN";
 }

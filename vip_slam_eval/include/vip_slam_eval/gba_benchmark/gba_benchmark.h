@@ -16,9 +16,9 @@ struct GbaRun {
   int threads = 1;
   int keyframes = 0;
   std::size_t points = 0, planes = 0, homographies = 0, homography_pairs = 0, point_to_plane = 0;
-  double build_ms = 0;      ///< map to problem, compression included; median
-  double store_ms = 0;      ///< problem to map, points on planes included; median
-  SolverSummary summary;    ///< of the run with the median total time
+  double build_ms = 0;    ///< map to problem, compression included; median
+  double store_ms = 0;    ///< problem to map, points on planes included; median
+  SolverSummary summary;  ///< of the run with the median total time
   /// From map to map.
   double wholeMs() const { return build_ms + summary.total_ms + store_ms; }
   double rmse_before = 0, rmse = 0;  ///< ATE of the keyframes after rigid alignment, metres

@@ -14,13 +14,13 @@ struct SimulatedMapOptions {
   std::string world =
       "rooms";  ///< "rooms": two rooms seen there and back; "corridor": a straight one, never seen again
   int keyframes = 215;
-  double keyframe_interval = 0.35; ///< s
-  int plane_points = 2236;         ///< points on planes that the map keeps
+  double keyframe_interval = 0.35;  ///< s
+  int plane_points = 2236;          ///< points on planes that the map keeps
   int free_points = 2032;
-  double pixel_sigma = 0.7;        ///< px
+  double pixel_sigma = 0.7;                 ///< px
   double depth_a = 0.004, depth_b = 0.004;  ///< depth sigma = a + b z^2, metres
-  int depth_samples = 50;          ///< samples per keyframe and plane
-  double depth_sample_floor = 0.002;  ///< m
+  int depth_samples = 50;                   ///< samples per keyframe and plane
+  double depth_sample_floor = 0.002;        ///< m
   unsigned seed = 1;
 };
 

@@ -16,7 +16,8 @@ struct Propagation {
   Matrix15d Q = Matrix15d::Identity();
   /// Upper-triangular-free W with W^T W = Q^-1 (here lower triangular).
   Matrix15d W = Matrix15d::Identity();
-  /// One sigma, along the least certain axis, of the way since the newest clone, m; `P` is the covariance of the state there.
+  /// One sigma, along the least certain axis, of the way since the newest clone, m; `P` is the covariance of the state
+  /// there.
   double displacementSigma(const Matrix15d& P) const;
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
 };

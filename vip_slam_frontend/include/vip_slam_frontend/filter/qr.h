@@ -13,8 +13,8 @@ namespace vip_slam {
 void triangularise(Eigen::MatrixXd& A, int pivots);
 
 /// [R; H] -> [R'; 0] with the right-hand sides [r; h] -> [r'; e], exploiting that R (n x n) is upper triangular.
-/// H (m x n) is overwritten; it costs least when rows that begin further right come last. On return |e|^2 is the part of
-/// the residual that the state cannot explain.
+/// H (m x n) is overwritten; it costs least when rows that begin further right come last. On return |e|^2 is the part
+/// of the residual that the state cannot explain.
 void stackTriangular(Eigen::MatrixXd& R, Eigen::VectorXd& r, Eigen::MatrixXd& H, Eigen::VectorXd& h);
 
 }  // namespace vip_slam

@@ -14,9 +14,9 @@
 namespace vip_slam {
 
 struct UpdateResult {
-  bool ok = false;      ///< false: nothing was changed (non-finite result)
+  bool ok = false;  ///< false: nothing was changed (non-finite result)
   int rows = 0;
-  double nis = 0;       ///< |e|^2, the normalised innovation squared of all rows
+  double nis = 0;  ///< |e|^2, the normalised innovation squared of all rows
   Eigen::VectorXd delta;
 };
 

@@ -27,7 +27,7 @@ struct SurfaceMatches {
 };
 
 struct SurfaceRows {
-  FeatureRows rows;     ///< whitened and compressed to the relative pose's dimension; empty when too few pairs are left
+  FeatureRows rows;  ///< whitened and compressed to the relative pose's dimension; empty when too few pairs are left
   int used = 0, gated = 0;
 };
 

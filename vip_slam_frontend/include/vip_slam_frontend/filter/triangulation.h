@@ -12,10 +12,10 @@ namespace vip_slam {
 struct Triangulation {
   bool ok = false;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
-  int depth_rows = 0;       ///< depth readings that took part
+  int depth_rows = 0;              ///< depth readings that took part
   double sigma_inverse_depth = 0;  ///< one-sigma of 1/z in the first camera, from the normal matrix
   double inverse_depth = 0;
-  double pixel_chi2 = 0;    ///< sum of squared whitened pixel residuals after the fit
+  double pixel_chi2 = 0;  ///< sum of squared whitened pixel residuals after the fit
   double depth_chi2 = 0;  ///< squared depth residuals, whitened
   int pixel_rows = 0;
 };

@@ -8,8 +8,8 @@
 
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_frontend/filter/filter_options.h"
-#include "vip_slam_frontend/filter/mounting_estimate.h"
 #include "vip_slam_frontend/filter/gating.h"
+#include "vip_slam_frontend/filter/mounting_estimate.h"
 #include "vip_slam_frontend/filter/noise_monitor.h"
 #include "vip_slam_frontend/filter/observation.h"
 #include "vip_slam_frontend/filter/square_root_filter.h"
@@ -73,8 +73,8 @@ class VioFilter {
   Matrix15d covariance() const { return filter_.navCovariance(); }
   /// From now on the motion since the newest clone is asked for (its image became a keyframe).
   void markNewest();
-  /// The motion from the marked clone to the newest. When the marked one has left the window meanwhile it is put together
-  /// from pieces as long as the window, whose errors count as independent. Unknown when nothing was marked.
+  /// The motion from the marked clone to the newest. When the marked one has left the window meanwhile it is put
+  /// together from pieces as long as the window, whose errors count as independent. Unknown when nothing was marked.
   RelativeMotion motionSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
@@ -112,10 +112,10 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
-  int still_images_ = 0;   ///< images since the standing began; 0 when moving
+  int still_images_ = 0;  ///< images since the standing began; 0 when moving
   CloneId still_anchor_ = 0;
-  CloneId mark_ = 0;                      ///< 0: none
-  std::optional<RelativeMotion> to_mark_; ///< from the clone that was marked, when mark_ is another by now
+  CloneId mark_ = 0;                       ///< 0: none
+  std::optional<RelativeMotion> to_mark_;  ///< from the clone that was marked, when mark_ is another by now
 };
 
 }  // namespace vip_slam

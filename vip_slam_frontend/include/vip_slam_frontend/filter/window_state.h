@@ -15,9 +15,9 @@ using CloneId = std::uint64_t;
 /// IMU pose at one image.
 struct Clone {
   CloneId id = 0;
-  double t = 0;       ///< IMU time at which the pose holds
-  SE3 T_W_I;          ///< estimate
-  SE3 T_W_I_fej;      ///< first estimate: right after propagation; every Jacobian is taken there
+  double t = 0;   ///< IMU time at which the pose holds
+  SE3 T_W_I;      ///< estimate
+  SE3 T_W_I_fej;  ///< first estimate: right after propagation; every Jacobian is taken there
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< rad/s, for the delay's Jacobian
   Eigen::Vector3d v_W = Eigen::Vector3d::Zero();      ///< m/s, same
   double time_offset = 0;  ///< td that was used to choose t; a later td shifts the pose by (td' - td)

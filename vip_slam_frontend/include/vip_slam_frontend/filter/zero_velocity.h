@@ -13,7 +13,7 @@ namespace vip_slam {
 
 struct ImuSpread {
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
-  double gyro_std = 0, accel_std = 0;  ///< norm of the per-axis standard deviations
+  double gyro_std = 0, accel_std = 0;      ///< norm of the per-axis standard deviations
   double gyro_floor = 0, accel_floor = 0;  ///< what sensor noise alone would give, 0 when unknown
   std::size_t count = 0;
 
@@ -25,16 +25,17 @@ ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise
 
 /// What one image says about motion.
 struct StillnessCues {
-  ImuSpread imu;             ///< over ZuptOptions::window
-  double disparity_px = -1;  ///< mean image motion over the same time; < 0: unknown
+  ImuSpread imu;                    ///< over ZuptOptions::window
+  double disparity_px = -1;         ///< mean image motion over the same time; < 0: unknown
   double anchor_disparity_px = -1;  ///< since standing still began; < 0: unknown
   int tracks = 0;
-  double speed = 0;          ///< estimated, m/s
+  double speed = 0;  ///< estimated, m/s
 };
 
 /// Still only when the IMU is quiet and the image stands and the estimate is slow; with hysteresis both ways. The image
 /// alone is never enough: a wall that moves along would fool it. Who stands and sees nothing (darkness, a bare wall)
-/// goes on standing as long as the IMU's means stay where they were: no motion begins without an acceleration or a turn.
+/// goes on standing as long as the IMU's means stay where they were: no motion begins without an acceleration or a
+/// turn.
 class StillnessDetector {
  public:
   explicit StillnessDetector(const ZuptOptions& options) : options_(options) {}

@@ -18,10 +18,10 @@ struct TimedCameraPose {
 
 struct MovingStart {
   bool ok = false;
-  std::string reason;         ///< when not ok
-  FilterPrior prior;          ///< at the last pose's time; yaw and position zero there
-  double gravity_error = 0;   ///< | |g| - gravity | before the constraint, m/s^2
-  double rms_position = 0;    ///< m, of the fit
+  std::string reason;        ///< when not ok
+  FilterPrior prior;         ///< at the last pose's time; yaw and position zero there
+  double gravity_error = 0;  ///< | |g| - gravity | before the constraint, m/s^2
+  double rms_position = 0;   ///< m, of the fit
 };
 
 MovingStart solveMovingStart(const std::vector<TimedCameraPose>& poses, const ImuBuffer& imu, const SE3& T_I_C,

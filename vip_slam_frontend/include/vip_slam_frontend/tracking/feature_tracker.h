@@ -32,19 +32,19 @@ struct ReferenceImage {
 };
 
 struct Track {
-  Feature feature;            ///< of the newest image; descriptor and angle only on keyframes
+  Feature feature;  ///< of the newest image; descriptor and angle only on keyframes
   std::shared_ptr<const ReferenceImage> reference;
   Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
-  PatchSurface surface;       ///< what the reference patch shows
+  PatchSurface surface;           ///< what the reference patch shows
   double reference_variance = 0;  ///< of the reference pixel as a view of what the track began with, px^2
   double magnification = 1;       ///< of the newest image over the reference image, at the patch
-  Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< of the patch in the newest image (patch_alignment.h)
-  double residual = 0;        ///< of its match with the reference, grey levels
+  Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();        ///< of the patch in the newest image (patch_alignment.h)
+  double residual = 0;                                      ///< of its match with the reference, grey levels
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< of the newest pixel (pixel_noise.h)
 };
 
 struct TrackingResult {
-  int tracked = 0;       ///< survived everything
+  int tracked = 0;  ///< survived everything
   int lost_klt = 0, lost_outlier = 0;
   bool pose_ok = false;  ///< RANSAC gave a metric pose
   SE3 T_current_previous;
@@ -87,8 +87,8 @@ class FeatureTracker {
   const RowCamera& camera() const { return view_; }
   /// Where the camera at the stamp sees a measured feature, px: what its pixel would be with a global shutter.
   Eigen::Vector2d pixelAtStamp(const Feature& feature) const;
-  /// Fills xy, depth and depth_sigma, all at the stamp, from the pixel and the newest depth image; tells where the depth
-  /// is from.
+  /// Fills xy, depth and depth_sigma, all at the stamp, from the pixel and the newest depth image; tells where the
+  /// depth is from.
   FeatureDepth::Source measure(Feature* feature) const;
   /// Same for a track, and how well its patch fixes the pixel.
   void measure(Track* track) const;

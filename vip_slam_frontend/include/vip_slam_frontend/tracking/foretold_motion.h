@@ -26,8 +26,8 @@ double mostApart(const ForetoldMotion& foretold);
 /// further than mostApart() from the foretold one that explains most.
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded);
 
-/// Outliers rejected with both in mind. `options.most_apart` is set here. `moves`: whether what is seen moves by itself;
-/// then only points that agree with the IMU are inliers.
+/// Outliers rejected with both in mind. `options.most_apart` is set here. `moves`: whether what is seen moves by
+/// itself; then only points that agree with the IMU are inliers.
 RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldMotion& foretold, RansacOptions options,
                             bool* moves);
 

@@ -21,15 +21,16 @@ struct RansacOptions {
   double threshold = 0.004;  ///< normalised image units
   int iterations = 60;
   std::uint32_t seed = 1;
-  double most_apart = 0;  ///< of the translation from the predicted one, m; the rotation is kept. 0: whatever explains most
+  double most_apart =
+      0;  ///< of the translation from the predicted one, m; the rotation is kept. 0: whatever explains most
 };
 
 struct RansacResult {
-  bool ok = false;            ///< a model was found
-  SE3 T_current_previous;     ///< translation metric only when with_depth
+  bool ok = false;                                             ///< a model was found
+  SE3 T_current_previous;                                      ///< translation metric only when with_depth
   Eigen::Vector3d t_given_rotation = Eigen::Vector3d::Zero();  ///< what goes best with the predicted rotation
   bool with_depth = false;
-  bool free_rotation = false; ///< the predicted rotation contradicted the pairs; a model without it was taken
+  bool free_rotation = false;  ///< the predicted rotation contradicted the pairs; a model without it was taken
   std::vector<char> inlier;
   int inliers = 0;
 };

@@ -12,7 +12,7 @@ namespace vip_slam {
 struct PatchAlignment {
   bool ok = false;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  double residual = 0;  ///< root mean square after gain and offset, grey levels
+  double residual = 0;                                ///< root mean square after gain and offset, grey levels
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< see patchTexture, of the warped patch in `current`'s pixels
 };
 
@@ -23,7 +23,7 @@ Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel)
 
 /// Finds in `current` the patch that `reference` shows at `reference_pixel`. `warp` maps pixel offsets of the
 /// current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge.
-PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel,
-                          const PatchWarp& warp, const cv::Mat& current, const Eigen::Vector2d& start);
+PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
+                          const cv::Mat& current, const Eigen::Vector2d& start);
 
 }  // namespace vip_slam

@@ -20,9 +20,9 @@ Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, 
 double matchSigma(const PatchSurface& surface);
 
 /// How many times farther than the best patches this one may be off. What slides does so as smoothly as the camera
-/// moves: residuals over a few images do not show it, but points that are taken to be fixed pull at the motion. `at_edge`:
-/// the newest view shows two surfaces there, or one that the depth does not explain, so that what the patch shows
-/// changes.
+/// moves: residuals over a few images do not show it, but points that are taken to be fixed pull at the motion.
+/// `at_edge`: the newest view shows two surfaces there, or one that the depth does not explain, so that what the patch
+/// shows changes.
 double patchWander(const PatchSurface& surface, bool at_edge);
 
 }  // namespace vip_slam

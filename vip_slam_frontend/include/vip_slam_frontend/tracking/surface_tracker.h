@@ -20,8 +20,8 @@ class SurfaceTracker {
  public:
   SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
 
-  /// Patches of an image, one at most per cell of the raster; none where the window is not flat, is seen too obliquely or
-  /// shows what moves.
+  /// Patches of an image, one at most per cell of the raster; none where the window is not flat, is seen too obliquely
+  /// or shows what moves.
   std::vector<SurfacePatch> patches(const cv::Mat& depth, const MovingRegions& moving = {}) const;
   /// The image of `clone` becomes the reference, with those of its patches that lie on planes.
   void setReference(const cv::Mat& depth, CloneId clone, const MovingRegions& moving = {});

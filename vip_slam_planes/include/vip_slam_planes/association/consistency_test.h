@@ -22,8 +22,8 @@ struct PointSighting {
 struct ConsistencyResult {
   bool solved = false;
   double rms_free = 0, rms_forced = 0, max_forced = 0;  ///< px
-  double distance = 0;        ///< of the free point to the plane, metres
-  double distance_sigma = 0;  ///< metres
+  double distance = 0;                                  ///< of the free point to the plane, metres
+  double distance_sigma = 0;                            ///< metres
   bool consistent = false;
 };
 

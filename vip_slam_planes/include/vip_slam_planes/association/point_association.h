@@ -65,7 +65,7 @@ class PointAssociation {
     PlaneId plane = 0;      ///< associated
     PlaneId candidate = 0;  ///< 0: none
     int failures = 0;
-    std::size_t tested = 0; ///< sightings at the last test
+    std::size_t tested = 0;  ///< sightings at the last test
     std::vector<PlaneId> refused;
   };
   using Landmarks = std::unordered_map<LandmarkId, Landmark>;
@@ -76,8 +76,7 @@ class PointAssociation {
   std::vector<LandmarkId> landmarksOf(PlaneId plane) const;
   /// The plane that a feature may lie on by the labels around it, 0: none.
   PlaneId chooseCandidate(const Feature& feature, const Landmark& landmark, const SurfaceLabels& labels,
-                          const std::vector<PlaneId>& plane_of_label, const SE3& T_map_C,
-                          const FindPlane& plane) const;
+                          const std::vector<PlaneId>& plane_of_label, const SE3& T_map_C, const FindPlane& plane) const;
   void setPlane(LandmarkId id, Landmark* landmark, PlaneId plane);
   /// Enough has been seen of a candidate since it was decided on last.
   bool isDue(const Landmark& landmark) const;

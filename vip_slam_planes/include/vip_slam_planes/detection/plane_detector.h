@@ -11,7 +11,7 @@ namespace vip_slam {
 
 struct DetectedPlane {
   PlaneKind kind = PlaneKind::kGeneral;
-  Plane plane;                 ///< in `map`, normal towards the camera
+  Plane plane;  ///< in `map`, normal towards the camera
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
   double area = 0;             ///< m^2
   std::vector<int> triangles;  ///< indices

@@ -38,8 +38,7 @@ class PlaneEvidence {
       : detection_(detection), growth_(growth) {}
 
   /// Keeps those triangles of a placed keyframe that have no label (< 0); the oldest keyframe goes.
-  void add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
-           const std::vector<int>& label);
+  void add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles, const std::vector<int>& label);
   void remove(KeyframeId id);
   void clear() { frames_.clear(); }
   /// Keyframes have moved against each other: what made no plane before may do now.
@@ -57,9 +56,9 @@ class PlaneEvidence {
     PlaneKind kind;
     Eigen::Vector3d centre_C, n_C;  ///< area-weighted means
     double area = 0;
-    bool tested = false;                  ///< in a peak that was tested already
-    std::vector<int> index;               ///< of each triangle in the keyframe's mesh
-    std::vector<MapTriangle> triangles;   ///< in the camera frame; neighbours count within the patch
+    bool tested = false;                 ///< in a peak that was tested already
+    std::vector<int> index;              ///< of each triangle in the keyframe's mesh
+    std::vector<MapTriangle> triangles;  ///< in the camera frame; neighbours count within the patch
   };
   struct Frame {
     KeyframeId id;

@@ -14,8 +14,8 @@ namespace vip_slam {
 
 class PlaneHistogram {
  public:
-  /// Bin sizes in metres (heights of horizontal planes, distances of vertical ones) and degrees; the angle bin is rounded
-  /// so that a full circle holds a whole number of them.
+  /// Bin sizes in metres (heights of horizontal planes, distances of vertical ones) and degrees; the angle bin is
+  /// rounded so that a full circle holds a whole number of them.
   PlaneHistogram(double height_bin, double distance_bin, double angle_bin_deg);
 
   void clear();
@@ -36,8 +36,8 @@ class PlaneHistogram {
   struct Bin {
     int space, angle, distance;  ///< space 0: up, 1: down, 2: vertical
     double area = 0;
-    double neighbourhood = 0;    ///< area of this bin and its direct neighbours, kept up to date
-    std::vector<int> members;    ///< in order of their addition
+    double neighbourhood = 0;       ///< area of this bin and its direct neighbours, kept up to date
+    std::vector<int> members;       ///< in order of their addition
     std::vector<std::size_t> near;  ///< this bin and its direct neighbours, those that exist
   };
   struct Vote {

@@ -35,9 +35,7 @@ class PlaneTrack {
   const CellGrid& cells() const { return cells_; }
   double area() const { return cells_.count(1) * cell_ * cell_; }
 
-  Eigen::Vector2d toPlane(const Eigen::Vector3d& p) const {
-    return {ex_.dot(p - origin_), ey_.dot(p - origin_)};
-  }
+  Eigen::Vector2d toPlane(const Eigen::Vector3d& p) const { return {ex_.dot(p - origin_), ey_.dot(p - origin_)}; }
   Eigen::Vector3d fromPlane(const Eigen::Vector2d& q) const { return origin_ + q.x() * ex_ + q.y() * ey_; }
   CellIndex cellAt(const Eigen::Vector2d& q) const {
     return {static_cast<int>(std::floor(q.x() / cell_)), static_cast<int>(std::floor(q.y() / cell_))};
@@ -88,14 +86,14 @@ class PlaneTrack {
 
   // Book-keeping of the mapper.
   bool confirmed = false;
-  bool determined = false;       ///< its observations tell its direction; until then the back end does not get them
-  bool agrees = true;            ///< its observations agree; otherwise it may be several surfaces: no points
-  bool takes_points = false;     ///< confirmed, determined and agreeing, as of the last update
-  bool refit_due = false;        ///< observations have gone since the last fit
-  int keyframes_seen = 0;        ///< keyframes that saw a fair part of it, ever
-  int views_seen = 0;            ///< growth frames that did so before it was confirmed, each from another place
+  bool determined = false;    ///< its observations tell its direction; until then the back end does not get them
+  bool agrees = true;         ///< its observations agree; otherwise it may be several surfaces: no points
+  bool takes_points = false;  ///< confirmed, determined and agreeing, as of the last update
+  bool refit_due = false;     ///< observations have gone since the last fit
+  int keyframes_seen = 0;     ///< keyframes that saw a fair part of it, ever
+  int views_seen = 0;         ///< growth frames that did so before it was confirmed, each from another place
   Eigen::Vector3d viewed_from = Eigen::Vector3d::Zero();  ///< camera centre of the last keyframe or view that did
-  int keyframes_waited = 0;      ///< that looked its way before it was confirmed
+  int keyframes_waited = 0;                               ///< that looked its way before it was confirmed
 
  private:
   /// Few enough that a surface which has gone is forgotten after as many sightings of what is behind it.

@@ -20,8 +20,8 @@ namespace vip_slam {
 
 struct MeshVertex {
   Eigen::Vector2f pixel;
-  Eigen::Vector3f p_C;   ///< metres
-  int feature = -1;      ///< index in the features; -1: a grid node
+  Eigen::Vector3f p_C;  ///< metres
+  int feature = -1;     ///< index in the features; -1: a grid node
 };
 
 struct MeshTriangle {
@@ -29,9 +29,9 @@ struct MeshTriangle {
   std::array<int, 3> neighbour;  ///< triangles that were kept; -1: none
   Eigen::Vector3f n_C;           ///< unit, towards the camera, averaged with neighbours of the same surface
   Eigen::Vector3f centre_C;
-  float area;                    ///< m^2
-  float sigma;                   ///< one sigma of the distance along n, metres
-  float sigma_angle;             ///< one sigma of the normal, radians
+  float area;         ///< m^2
+  float sigma;        ///< one sigma of the distance along n, metres
+  float sigma_angle;  ///< one sigma of the normal, radians
 };
 
 struct DepthMesh {
