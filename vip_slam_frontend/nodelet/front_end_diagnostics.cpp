@@ -70,6 +70,8 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("depth surfaces used", c.surfaces_used);
   status.add("NIS per degree of freedom", c.nis_per_dof);
   status.add("pixel sigma in use", c.sigma_px);
+  status.add("IMU noise in use, times the configured", c.imu_noise_scale);
+  status.add("images that contradict the IMU", c.imu_contradicted);
   status.add("camera's delay in use (ms)", 1e3 * shown.mounting.time_offset);
   for (const std::string& difference : shown.mounting_differences) status.add("calibration", difference);
   status.add("images", c.images);

@@ -67,6 +67,7 @@ class FrontEnd::Impl {
   /// The camera's motion since the last image as the IMU has it; not to be held against the points (interval 0) while
   /// that is in doubt.
   ForetoldMotion foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const;
+  bool imuIsContradicted() const;
   bool movedLately(double t_imu) const;
   /// So long that it is time to begin anew.
   bool contradictedForLong(const TrackingResult& tracking, double t) const;

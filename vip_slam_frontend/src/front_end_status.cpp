@@ -14,6 +14,9 @@ constexpr double kSettled = 2.0;
 constexpr double kPauses = 1.0;
 // LOST with everything in view moving against the IMU for so many times the coasting time: the IMU is wrong after all.
 constexpr double kPatience = 2.0;
+// No IMU is worse than its data sheet by this; with axes, signs or units mixed up the factor goes to its limit of 30,
+// while a camera turned by a degree or a delay of 10 ms leave it at 1.
+constexpr double kImplausibleNoise = 10.0;
 
 }  // namespace
 
@@ -21,6 +24,8 @@ double FrontEnd::Impl::coastedSigma() const {
   const double variance = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   return std::sqrt(std::max(0.0, variance - last_good_variance_));
 }
+
+bool FrontEnd::Impl::imuIsContradicted() const { return filter_.imuNoiseScale() > kImplausibleNoise; }
 
 bool FrontEnd::Impl::movedLately(double t_imu) const { return t_imu - moving_imu_t_ < kPauses; }
 
@@ -47,8 +52,14 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
     if (phase_ == Phase::kLost) return;
     last_good_t_ = last_held_t_ = t;
     last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
-    status_ = metric || still_ ? TrackingStatus{TrackingState::kTracking, ""}
-                               : TrackingStatus{TrackingState::kDegraded, "no depth: visual-inertial only"};
+    if (imuIsContradicted()) {
+      status_ = {TrackingState::kDegraded,
+                 "the images contradict the IMU: are its axes, signs and units and T_imu_cam right? check_bag tells"};
+    } else if (!metric && !still_) {
+      status_ = {TrackingState::kDegraded, "no depth: visual-inertial only"};
+    } else {
+      status_ = {TrackingState::kTracking, ""};
+    }
     return;
   }
   if (surfaces_hold && phase_ != Phase::kLost) last_held_t_ = t;

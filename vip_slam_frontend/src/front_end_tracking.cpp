@@ -208,6 +208,8 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   counters_.surfaces_used += report.surfaces_used;
   counters_.zero_velocity += report.zero_velocity;
   counters_.sigma_px = filter_.sigmaPx();
+  counters_.imu_noise_scale = filter_.imuNoiseScale();
+  counters_.imu_contradicted += imuIsContradicted();
   if (report.rows > 0) counters_.nis_per_dof = report.nis / report.rows;
   const bool all_gated = report.features_gated >= 5 && report.features_used * 5 < report.features_gated;
   gated_in_a_row_ = all_gated ? gated_in_a_row_ + 1 : (report.features_used > 0 ? 0 : gated_in_a_row_);

@@ -17,7 +17,7 @@ struct Start {
   std::string reason;
 };
 
-Start start(double speed, bool depth) {
+Start start(double speed, bool depth, double accel_unit = 1) {
   SimulationOptions options;
   options.speed = speed;
   options.depth = depth;
@@ -31,7 +31,11 @@ Start start(double speed, bool depth) {
   Start result;
   for (int k = 0; k < 80 && !result.prior; ++k) {
     result.t = 1.0 + 0.05 * k;
-    while (simulation.imu()[next].t < result.t + 0.01) imu.add(simulation.imu()[next++]);
+    for (; simulation.imu()[next].t < result.t + 0.01; ++next) {
+      ImuSample sample = simulation.imu()[next];
+      sample.accel /= accel_unit;
+      imu.add(sample);
+    }
     result.prior = initialiser.add({result.t, simulation.sight(result.t, 200)}, imu);
     result.reason = initialiser.reason();
   }
@@ -62,6 +66,13 @@ TEST(Initialiser, StandingLevelsAndFindsTheGyroBias) {
   EXPECT_LT(tiltError(*s.prior, truth), 0.02);  // an accelerometer bias of 0.04 m/s^2 tilts by 4 mrad per axis
   EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.005);
   EXPECT_LT(s.prior->state.v_W.norm(), 1e-9);
+}
+
+TEST(Initialiser, AnAccelerometerInUnitsOfGravityIsNamed) {
+  const Start s = start(0.0, true, 9.80665);
+  EXPECT_FALSE(s.prior);
+  EXPECT_NE(s.reason.find("reads 1.0"), std::string::npos) << s.reason;
+  EXPECT_NE(s.reason.find("unit"), std::string::npos) << s.reason;
 }
 
 TEST(Initialiser, MovingFindsVelocityAndGravity) {

@@ -128,10 +128,10 @@ int run(const Arguments& arguments) {
     std::fprintf(stderr, "run_bag: warning: %s\n", warnings[i].c_str());
   if (warnings.size() > 8) std::fprintf(stderr, "run_bag: %zu more warnings in summary.yaml\n", warnings.size() - 8);
   if (pipeline.odometry().empty() && !g_interrupted) {
-    const auto& states = pipeline.states();
-    std::fprintf(stderr, "run_bag: no image has a pose%s%s%s%s; check_bag tells what is wrong with the data\n",
-                 states.empty() ? "" : " (", states.empty() ? "" : trackingStateName(states.back().status.state),
-                 states.empty() ? "" : ": ", states.empty() ? "" : (states.back().status.reason + ")").c_str());
+    const vip_slam::TrackingStatus& status = pipeline.status();
+    const std::string why =
+        pipeline.images() == 0 ? "" : std::string(" (") + trackingStateName(status.state) + ": " + status.reason + ")";
+    std::fprintf(stderr, "run_bag: no image has a pose%s; check_bag tells what is wrong with the data\n", why.c_str());
   }
   return pipeline.odometry().empty() ? 2 : 0;
 }

@@ -83,6 +83,7 @@ void Pipeline::process(const ImagePair& pair) {
   const FrameOutput output = front_end_->process({pair.t, pair.gray, pair.depth});
   ++images_;
   const TrackedFrame& frame = *output.frame;
+  status_ = frame.status;
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
   if (frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});

@@ -41,6 +41,7 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
                                                              {"zero_velocity", c.zero_velocity},
                                                              {"coasting", c.coasting},
                                                              {"moving", c.moving},
+                                                             {"imu_contradicted", c.imu_contradicted},
                                                              {"lost", c.lost},
                                                              {"features_used", c.features_used},
                                                              {"features_gated", c.features_gated},
@@ -104,9 +105,16 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(std::to_string(c.imu_rejected) +
                   " IMU messages are left out: not finite, or not newer than the one before");
   if (pipeline.images() == 0) all.push_back("no image could be used");
-  for (const std::string& difference :
-       mountingDifferences(pipeline.frontEnd().givenMounting(), pipeline.frontEnd().mounting())) {
-    all.push_back(difference + " (summary.yaml: calibration)");
+  if (c.imu_contradicted > 0)
+    all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
+                  " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
+                  "signs and units and T_imu_cam right? check_bag tells");
+  // A mounting that was learnt against a wrong IMU means nothing.
+  if (10 * c.imu_contradicted < c.images) {
+    for (const std::string& difference :
+         mountingDifferences(pipeline.frontEnd().givenMounting(), pipeline.frontEnd().mounting())) {
+      all.push_back(difference + " (summary.yaml: calibration)");
+    }
   }
   if (pipeline.mapping()) {
     const auto& refusals = pipeline.mapping()->refusals();

@@ -43,16 +43,18 @@ struct FrontEndCounters {
   std::uint64_t bad_stamp = 0;     ///< repeated, backward or non-finite image stamps
   std::uint64_t imu_rejected = 0;  ///< non-finite, repeated or backward samples
   std::uint64_t imu_gaps = 0;
-  std::uint64_t imu_missing = 0;    ///< images not covered by the IMU
-  std::uint64_t zero_velocity = 0;  ///< images taken standing still
-  std::uint64_t coasting = 0;       ///< images passed on the IMU alone
-  std::uint64_t moving = 0;         ///< images most of which moved by itself
-  std::uint64_t lost = 0;           ///< times the state went to LOST
+  std::uint64_t imu_missing = 0;       ///< images not covered by the IMU
+  std::uint64_t zero_velocity = 0;     ///< images taken standing still
+  std::uint64_t coasting = 0;          ///< images passed on the IMU alone
+  std::uint64_t moving = 0;            ///< images most of which moved by itself
+  std::uint64_t lost = 0;              ///< times the state went to LOST
+  std::uint64_t imu_contradicted = 0;  ///< images that no plausible noise of the IMU reconciles with it
   std::uint64_t features_used = 0, features_gated = 0;
   std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
-  double sigma_px = 0;     ///< adapted pixel noise
-  double nis_per_dof = 0;  ///< of the last update; about 1 when consistent
+  double sigma_px = 0;         ///< adapted pixel noise
+  double imu_noise_scale = 1;  ///< factor on the IMU's noise, see ImuNoiseMonitor
+  double nis_per_dof = 0;      ///< of the last update; about 1 when consistent
 };
 
 class FrontEnd {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "vip_slam_frontend/filter/zero_velocity.h"
 #include "vip_slam_frontend/initialisation/moving_start.h"
@@ -10,7 +11,9 @@
 namespace vip_slam {
 
 namespace {
-constexpr double kWatched = 0.5;  // share of the standing time that images have to cover
+constexpr double kWatched = 0.5;         // share of the standing time that images have to cover
+constexpr double kMostTurn = 0.3;        // rad/s, of a gyro that stands: its bias
+constexpr double kMostOffGravity = 1.5;  // m/s^2, of an accelerometer that stands
 }  // namespace
 
 double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b,
@@ -66,12 +69,13 @@ std::optional<FilterPrior> Initialiser::add(const InitialisationInput& image, co
   const double keep = std::max(options_.standing_seconds, options_.moving_seconds) + 0.5;
   while (images_.size() > 2 && images_.back().t_imu - images_.front().t_imu > keep) images_.pop_front();
   if (auto prior = standing(imu)) return prior;
-  return moving(imu);
+  return weighs_wrong_ ? std::nullopt : moving(imu);
 }
 
 std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
   const double now = images_.back().t_imu;
   const double from = now - options_.standing_seconds;
+  weighs_wrong_ = false;
   if (imu.empty() || imu.oldest() > from) {
     reason_ = "gathering " + std::to_string(options_.standing_seconds).substr(0, 3) + " s of IMU";
     return std::nullopt;
@@ -82,8 +86,17 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     reason_ = "too few IMU samples";
     return std::nullopt;
   }
-  if (!spread.quiet(options_.max_gyro_std, options_.max_accel_std) || spread.mean_gyro.norm() > 0.3 ||
-      std::abs(spread.mean_accel.norm() - gravity_) > 1.5) {
+  const bool quiet = spread.quiet(options_.max_gyro_std, options_.max_accel_std);
+  const double weight = spread.mean_accel.norm();
+  weighs_wrong_ = quiet && std::abs(weight - gravity_) > kMostOffGravity;
+  if (weighs_wrong_) {
+    char words[120];
+    std::snprintf(words, sizeof words, "the accelerometer reads %.2f at rest, expected %.2f m/s^2: is its unit right?",
+                  weight, gravity_);
+    reason_ = words;
+    return std::nullopt;
+  }
+  if (!quiet || spread.mean_gyro.norm() > kMostTurn) {
     reason_ = "moving: gathering images for a start in motion";
     return std::nullopt;
   }

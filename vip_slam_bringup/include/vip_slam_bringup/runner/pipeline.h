@@ -50,6 +50,7 @@ class Pipeline {
   const std::vector<OdometryPose>& odometry() const { return odometry_; }              ///< images with a pose
   const std::vector<OdometryCovariance>& covariances() const { return covariances_; }  ///< one for each of odometry()
   const std::vector<StateChange>& states() const { return states_; }
+  const TrackingStatus& status() const { return status_; }  ///< of the last image
   const Trajectory& realtime() const { return realtime_; }  ///< in map, as known at that time
   const FrontEnd& frontEnd() const { return *front_end_; }
   const MappingThread* mapping() const { return mapping_.get(); }  ///< null: odometry only. Read it after finish()
@@ -77,6 +78,7 @@ class Pipeline {
   std::vector<OdometryCovariance> covariances_;
   Trajectory realtime_;
   std::vector<StateChange> states_;
+  TrackingStatus status_;
 };
 
 }  // namespace vip_slam

@@ -77,6 +77,7 @@ class VioFilter {
   /// together from pieces as long as the window, whose errors count as independent. Unknown when nothing was marked.
   RelativeMotion motionSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
+  double imuNoiseScale() const { return imu_monitor_.scale(); }
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 

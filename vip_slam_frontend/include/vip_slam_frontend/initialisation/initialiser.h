@@ -38,6 +38,7 @@ class Initialiser {
   ImuNoise noise_;
   SE3 T_I_C_;
   double focal_, gravity_;
+  bool weighs_wrong_ = false;  ///< at rest, and not with a body's weight: no start is possible
   std::deque<InitialisationInput> images_;
   std::string reason_ = "waiting for images and IMU";
 };

@@ -1,0 +1,104 @@
+// An IMU whose axes or signs are not what the configuration says: the poses are wrong then, and the status does not say
+// TRACKING.
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "corner_world.h"
+#include "vip_slam_frontend/front_end.h"
+
+namespace vip_slam {
+namespace {
+
+using Fault = std::function<ImuSample(ImuSample)>;
+
+struct Verdict {
+  std::uint64_t contradicted = 0;
+  int named = 0, silent = 0;  ///< images after the first three seconds of motion: with the reason; as TRACKING
+};
+
+Verdict judge(const Fault& fault, const SensorConfig& sensor) {
+  const CornerWorld world;
+  FrontEnd front_end(cornerOptions(), sensor);
+  Verdict verdict;
+  double imu_t = 0;
+  for (int k = 0; k < 160; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(fault(CornerWorld::imu(imu_t)));
+    FrameInput input;
+    input.t = t;
+    world.look(t, 0, &input.gray, &input.depth);
+    const TrackingStatus status = front_end.process(input).frame->status;
+    if (t < kStill + 3) continue;
+    verdict.named += status.reason.find("contradict") != std::string::npos;
+    verdict.silent += status.state == TrackingState::kTracking;
+  }
+  verdict.contradicted = front_end.counters().imu_contradicted;
+  return verdict;
+}
+
+/// 76 images are judged.
+void expectNamed(const Fault& fault) {
+  const Verdict verdict = judge(fault, cornerSensor(0, 0));
+  EXPECT_GT(verdict.contradicted, 20u);
+  EXPECT_GT(verdict.named, 20);
+  EXPECT_LT(verdict.silent, 8);
+}
+
+/// Tracks do not even hold: LOST, coasting, or a start that is refused, each with its own reason.
+void expectNotTracking(const Fault& fault) { EXPECT_LT(judge(fault, cornerSensor(0, 0)).silent, 8); }
+
+TEST(WrongImu, ReversedAccelerometer) {
+  expectNamed([](ImuSample s) {
+    s.accel = -s.accel;
+    return s;
+  });
+}
+
+TEST(WrongImu, ReversedGyroscope) {
+  expectNotTracking([](ImuSample s) {
+    s.gyro = -s.gyro;
+    return s;
+  });
+}
+
+TEST(WrongImu, PermutedAxes) {
+  expectNamed([](ImuSample s) {
+    s.gyro = Eigen::Vector3d(s.gyro.y(), s.gyro.z(), s.gyro.x());
+    s.accel = Eigen::Vector3d(s.accel.y(), s.accel.z(), s.accel.x());
+    return s;
+  });
+}
+
+TEST(WrongImu, LeftHandedAxes) {
+  expectNamed([](ImuSample s) {
+    s.gyro.y() *= -1;
+    s.accel.y() *= -1;
+    return s;
+  });
+}
+
+TEST(WrongImu, DegreesPerSecond) {
+  expectNotTracking([](ImuSample s) {
+    s.gyro *= 180 / M_PI;
+    return s;
+  });
+}
+
+/// What is learnt on the way, and a scale that is off by what cheap sensors are off by, contradict nothing.
+TEST(WrongImu, ModerateErrorsAreNoContradiction) {
+  SensorConfig sensor = cornerSensor(0, 0);
+  sensor.T_imu_cam = SE3(expQuaternion({0.015, -0.01, 0.01}), {0, 0, 0}) * sensor.T_imu_cam;
+  sensor.time_offset = 0.005;
+  const Verdict verdict = judge(
+      [](ImuSample s) {
+        s.accel *= 1.01;
+        s.gyro *= 0.99;
+        return s;
+      },
+      sensor);
+  EXPECT_EQ(verdict.contradicted, 0u);
+}
+
+}  // namespace
+}  // namespace vip_slam
