@@ -14,6 +14,7 @@ add_library(vip_slam_bringup
   src/preflight/check_motion.cpp
   src/preflight/check_streams.cpp
   src/preflight/check_tf.cpp
+  src/preflight/findings.cpp
   src/preflight/image_rotation.cpp
   src/preflight/record_sources.cpp
   src/preflight/recorder.cpp

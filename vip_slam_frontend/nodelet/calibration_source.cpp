@@ -11,25 +11,23 @@ CalibrationSource::CalibrationSource(const SensorConfig& sensor, const FrontEndN
 
 void CalibrationSource::addColorInfo(const sensor_msgs::CameraInfo& info) {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (color_info_) return;
-  try {
-    sensor_.camera = intrinsicsFromCameraInfo(info);
-    color_info_ = true;
-    problem_.clear();
-  } catch (const std::exception& error) {
-    problem_ = "topic " + sensor_.topics.color_info + ": " + error.what();
-  }
+  take(info, sensor_.topics.color_info, &sensor_.camera, &color_info_);
 }
 
 void CalibrationSource::addDepthInfo(const sensor_msgs::CameraInfo& info) {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (depth_info_) return;
+  take(info, sensor_.topics.depth_info, &sensor_.depth_camera, &depth_info_);
+}
+
+void CalibrationSource::take(const sensor_msgs::CameraInfo& info, const std::string& topic, CameraIntrinsics* camera,
+                             bool* known) {
+  if (*known) return;
   try {
-    sensor_.depth_camera = intrinsicsFromCameraInfo(info);
-    depth_info_ = true;
+    *camera = intrinsicsFromCameraInfo(info);
+    *known = true;
     problem_.clear();
   } catch (const std::exception& error) {
-    problem_ = "topic " + sensor_.topics.depth_info + ": " + error.what();
+    problem_ = "topic " + topic + ": " + error.what();
   }
 }
 

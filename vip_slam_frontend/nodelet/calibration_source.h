@@ -31,6 +31,7 @@ class CalibrationSource {
   std::string colorFrame() const;
 
  private:
+  void take(const sensor_msgs::CameraInfo& info, const std::string& topic, CameraIntrinsics* camera, bool* known);
   bool intrinsicsKnown() const;
 
   mutable std::mutex mutex_;
