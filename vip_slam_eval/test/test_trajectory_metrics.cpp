@@ -198,6 +198,14 @@ TEST_F(NeesTest, HonestCovariancesGiveTheirDegreesOfFreedom) {
   EXPECT_EQ(honest.unusable, 0u);
 }
 
+/// EuRoC's IMU has its x axis up, which has no heading to join the worlds by.
+TEST_F(NeesTest, TheBodyMayStandOnItsEnd) {
+  const SE3 on_end(expQuaternion({0, -0.5 * M_PI, 0}), Eigen::Vector3d::Zero());
+  const SE3 T_first_B(truth_.front().T_W_B.rotation().conjugate() * on_end.rotation(), Eigen::Vector3d::Zero());
+  for (StampedPose& pose : truth_) pose.T_W_B = pose.T_W_B * T_first_B;
+  EXPECT_NEAR(nees(truth_, draw(1.0)).pose.mean, 6.0, 0.3);
+}
+
 TEST_F(NeesTest, OptimisticCovariancesShow) {
   const Nees optimistic = nees(truth_, draw(2.0));
   EXPECT_NEAR(optimistic.pose.mean, 24.0, 1.2);

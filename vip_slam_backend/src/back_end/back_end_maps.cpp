@@ -56,13 +56,13 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   }
   searching = false;
   epoch = keyframe->frame.epoch;
-  T_map_odom = alignOdometry(found.T_W_I, keyframe->frame.state.T_W_I);
+  T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
   // What was seen before the map was recognised belongs to it as well, as far as the odometry did not start anew since.
   std::vector<KeyframePtr> before;
   before.swap(held);
   for (const KeyframePtr& kf : before)
     if (kf->frame.epoch == epoch && kf->id < keyframe->id) insert(kf);
-  T_map_odom = alignOdometry(found.T_W_I, keyframe->frame.state.T_W_I);
+  T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
   insert(keyframe);
   loop_closer.tie(map, keyframe->id, found.match);
   fuseLandmarks(map, keyframe->id, found.landmarks);
@@ -79,7 +79,7 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   searching = false;
   epoch = keyframe->frame.epoch;
   const SE3& T_odom_I = keyframe->frame.state.T_W_I;
-  T_map_odom = alignOdometry(found->T_W_I, T_odom_I);
+  T_map_odom = alignLevelled(found->T_W_I, T_odom_I);
   localised.push_back({keyframe->frame.t, epoch, T_odom_I, T_map_odom * T_odom_I, SE3()});
 }
 

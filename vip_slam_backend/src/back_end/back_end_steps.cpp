@@ -5,20 +5,12 @@
 #include "back_end_impl.h"
 
 namespace vip_slam {
-namespace {
-
-SE3 yawAndPosition(const SE3& T_W_I) {
-  return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yawOf(T_W_I.rotation()), Eigen::Vector3d::UnitZ())), T_W_I.t());
-}
-
-}  // namespace
 
 NavState BackEnd::Impl::predict(const Keyframe& keyframe) {
   const NavState& odom = keyframe.frame.state;
   if (!map.empty() && keyframe.frame.epoch != epoch) {
     // The odometry started anew: go on where the map ends until a loop or relocalisation says better.
-    const SE3 last = map.keyframe(map.newestKeyframe()).state.T_W_I;
-    T_map_odom = yawAndPosition(last) * yawAndPosition(odom.T_W_I).inverse();
+    T_map_odom = alignLevelled(map.keyframe(map.newestKeyframe()).state.T_W_I, odom.T_W_I);
   }
   epoch = keyframe.frame.epoch;
   NavState state = odom;

@@ -16,12 +16,6 @@ Relocalisation fromPlace(const PlaceVerification& place) {
 
 }  // namespace
 
-SE3 alignOdometry(const SE3& T_map_I, const SE3& T_odom_I) {
-  const double yaw = yawOf(T_map_I.rotation() * T_odom_I.rotation().conjugate());
-  const Eigen::Quaterniond R(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
-  return SE3(R, T_map_I.t() - R * T_odom_I.t());
-}
-
 std::optional<Relocalisation> Relocaliser::relocalise(const Map& map, const LoopCloser& places,
                                                       const KeyframePtr& keyframe,
                                                       const std::function<bool(KeyframeId)>& allowed,

@@ -42,6 +42,13 @@ Vector6d SE3::boxminus(const SE3& reference) const {
   return delta;
 }
 
+SE3 alignLevelled(const SE3& T_A_B, const SE3& T_C_B) {
+  const Eigen::Matrix3d R = (T_A_B.rotation() * T_C_B.rotation().conjugate()).toRotationMatrix();
+  const double yaw = std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1));
+  const Eigen::Quaterniond q(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
+  return SE3(q, T_A_B.t() - q * T_C_B.t());
+}
+
 SE3 interpolate(const SE3& a, const SE3& b, double s) {
   return SE3(a.rotation().slerp(s, b.rotation()), (1.0 - s) * a.t() + s * b.t());
 }

@@ -83,7 +83,11 @@ double yawOf(const Eigen::Quaterniond& R_W_B) {
 
 Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up_B) {
   const Eigen::Quaterniond levelled = rotationBetween(up_B.normalized(), Eigen::Vector3d::UnitZ());
-  const Eigen::Quaterniond unyaw = expQuaternion(Eigen::Vector3d(0, 0, -yawOf(levelled)));
+  // An x axis that points up has no heading; y has one then.
+  const Eigen::Matrix3d R = levelled.toRotationMatrix();
+  const bool x_upright = R.col(0).head<2>().norm() < 0.5;
+  const double yaw = x_upright ? std::atan2(R(1, 1), R(0, 1)) - 0.5 * M_PI : yawOf(levelled);
+  const Eigen::Quaterniond unyaw = expQuaternion(Eigen::Vector3d(0, 0, -yaw));
   return (unyaw * levelled).normalized();
 }
 

@@ -40,9 +40,7 @@ std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector
     if (!poseAt(truth, sample.t + time_offset, &T_W_B, max_gap)) continue;
     if (!joined) {
       joined = true;
-      const double yaw = yawOf(sample.T_M_B.rotation()) - yawOf(T_W_B.rotation());
-      const Eigen::Quaterniond q = expQuaternion(Eigen::Vector3d(0, 0, yaw));
-      T_M_W = SE3(q, sample.T_M_B.t() - q * T_W_B.t());
+      T_M_W = alignLevelled(sample.T_M_B, T_W_B);
     }
     const SE3 T_M_B = T_M_W * T_W_B;
     JoinedError e;

@@ -36,7 +36,4 @@ class Relocaliser {
   PlaceSearch search_;
 };
 
-/// T_map_odom that brings T_odom_I to T_map_I with gravity kept: yaw and position.
-SE3 alignOdometry(const SE3& T_map_I, const SE3& T_odom_I);
-
 }  // namespace vip_slam

@@ -35,10 +35,11 @@ Eigen::Matrix3d leftJacobianSO3(const Eigen::Vector3d& theta);
 /// The rotation that takes unit vector `from` to unit vector `to` by the shortest arc.
 Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-/// Yaw about z of R_W_B in ]-pi, pi] (ZYX convention).
+/// Yaw about z of R_W_B in ]-pi, pi] (ZYX convention), the heading of its x axis; undefined where that points up.
 double yawOf(const Eigen::Quaterniond& R_W_B);
 
-/// R_W_B of a levelled world: the rotation with R * up_B = (0,0,1) and yaw(R) = 0.
+/// R_W_B of a levelled world: the rotation with R * up_B = (0,0,1) and yaw(R) = 0; for a body whose x axis points up
+/// (within 30 degrees) the one whose y axis heads along y.
 /// `up_B` is the measured specific force of a body at rest (points up), any positive length.
 Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up_B);
 
