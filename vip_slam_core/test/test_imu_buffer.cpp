@@ -138,8 +138,21 @@ TEST(ImuBufferTest, SplitStreamsAreJoinedOnTheGyroStamps) {
   EXPECT_EQ(buffer.counters().gaps, 0u);
 }
 
+TEST(ImuBufferTest, AHoleInTheAccelerometerAloneIsAGap) {
+  ImuBuffer buffer(0.05);
+  for (int k = 0; k < 400; ++k) {
+    const double t = 0.005 * k;
+    buffer.addGyro(t, at(t).gyro);
+    if (k % 2 == 0 && !(t > 1.0 && t < 1.8)) buffer.addAccel(t, at(t).accel);
+  }
+  EXPECT_EQ(buffer.counters().gaps, 1u);
+  double gap = 0;
+  buffer.between(0.5, 1.9, &gap);
+  EXPECT_NEAR(gap, 0.8, 0.011);
+}
+
 TEST(ImuBufferTest, SplitStreamsRefuseDisorderToo) {
-  ImuBuffer buffer;
+  ImuBuffer buffer(0.2);
   EXPECT_TRUE(buffer.addAccel(1.0, {0, 0, 9.81}));
   EXPECT_FALSE(buffer.addAccel(0.9, {0, 0, 9.81}));
   EXPECT_FALSE(buffer.addAccel(1.0, {0, 0, 9.81}));

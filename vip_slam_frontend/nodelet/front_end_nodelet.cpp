@@ -90,6 +90,7 @@ void FrontEndNodelet::onControl(const vip_slam_msgs::ControlConstPtr& msg) {
     if (command == Control::RESET || command == Control::RESET_ODOMETRY || resumed) {
       pairer_->clear();
       if (front_end_) front_end_->reset(resumed ? "resumed after a pause" : "reset by request");
+      if (front_end_ && command == Control::RESET) front_end_->forgetMap();
     }
   });
 }

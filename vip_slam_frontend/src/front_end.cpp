@@ -18,6 +18,7 @@ FrameOutput FrontEnd::process(const FrameInput& input, const PoseReady& on_pose)
 void FrontEnd::applyMapUpdate(const MapUpdate& update) { impl_->applyMapUpdate(update); }
 std::optional<NavState> FrontEnd::predict(double t) const { return impl_->predict(t); }
 void FrontEnd::reset(const std::string& reason) { impl_->reset(reason); }
+void FrontEnd::forgetMap() { impl_->forgetMap(); }
 MountingEstimate FrontEnd::mounting() const { return impl_->mounting(); }
 MountingEstimate FrontEnd::givenMounting() const { return impl_->givenMounting(); }
 const FrontEndCounters& FrontEnd::counters() const { return impl_->counters_; }

@@ -33,6 +33,7 @@ class FrontEnd::Impl {
   MountingEstimate mounting() const { return filter_.mounting(); }
   MountingEstimate givenMounting() const { return {sensor_.T_imu_cam, sensor_.time_offset}; }
   void reset(const std::string& reason);
+  void forgetMap() { landmarks_.clear(); }
 
   FrontEndCounters counters_;
   FrontEndOptions options_;

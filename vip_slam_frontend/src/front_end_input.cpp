@@ -134,6 +134,7 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   phase_ = Phase::kWaiting;
   status_ = {TrackingState::kInitialising, reason};
   tracker_.clear();
+  landmarks_.forgetPatches();
   surfaces_.clear();
   moving_ = {};
   moving_imu_t_ = -1e300;  // the clock may have run back

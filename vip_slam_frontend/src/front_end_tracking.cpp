@@ -94,7 +94,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   const cv::Mat depth = depthAtStamp(depth_read, turning);
   tracker_.track(gray, depth, {rotation, 0, 0}, false, SE3(), rows(sensor_.rolling_shutter, turning), t);
   tracker_.replenish(SE3(), true, t);
-  const std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements()}, imu_);
+  std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements()}, imu_);
   if (!prior) {
     const std::string why = status_.state == TrackingState::kInitialising && !status_.reason.empty() && first
                                 ? status_.reason + "; " + initialiser_.reason()
@@ -102,6 +102,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
     status_ = {TrackingState::kInitialising, why};
     return statusOnly(t, status_.state, status_.reason);
   }
+  startAtBase(sensor_.T_base_imu, &*prior);
   const std::optional<ImuSample> here = imu_.at(t_imu);
   const Eigen::Vector3d omega = here ? Eigen::Vector3d(here->gyro - prior->state.bias_gyro) : Eigen::Vector3d::Zero();
   filter_.start(*prior, next_clone_++, omega);

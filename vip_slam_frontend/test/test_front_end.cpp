@@ -163,6 +163,21 @@ TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
     ++back;
   }
   EXPECT_GT(back, 5);
+
+  // In an odometry that began anew they are found as well, once the back end says where it is.
+  const std::uint64_t reacquired = front_end_.counters().landmarks_reacquired;
+  front_end_.reset("of the test");
+  output = run(6.0, 9.0);
+  ASSERT_EQ(output.frame->status.state, TrackingState::kTracking);
+  update.epoch = output.frame->epoch;
+  const SE3 T_world_odom(Eigen::Quaterniond::Identity(),
+                         World::position(output.frame->t) - output.frame->state.T_W_I.t());
+  update.T_map_odom = update.T_map_odom * T_world_odom;
+  front_end_.applyMapUpdate(update);
+  run(9.0, 9.3, true, false);
+  run(9.3, 10.5);
+  EXPECT_GT(front_end_.counters().landmarks_reacquired, reacquired + 10);
+  front_end_.forgetMap();
 }
 
 TEST(FrontEndConstruction, RefusesAnUnusableCamera) {

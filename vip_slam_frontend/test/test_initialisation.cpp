@@ -68,6 +68,21 @@ TEST(Initialiser, StandingLevelsAndFindsTheGyroBias) {
   EXPECT_LT(s.prior->state.v_W.norm(), 1e-9);
 }
 
+TEST(Initialiser, TheRobotBeginsAtTheOriginHeadingAlongX) {
+  // As a camera's IMU sits on a robot: x right, y down, z forward; half a metre up and ahead, tilted.
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const SE3 T_base_imu(Eigen::Quaterniond(R) * expQuaternion({0.2, 0, 0}), {0.3, 0, 0.5});
+  const Eigen::Vector3d up_imu = T_base_imu.rotation().conjugate() * Eigen::Vector3d::UnitZ();
+  FilterPrior prior;
+  prior.state.T_W_I = SE3(gravityAlignedRotation(up_imu), Eigen::Vector3d::Zero());
+  prior.state.v_W = prior.state.T_W_I.rotation() * (T_base_imu.rotation().conjugate() * Eigen::Vector3d::UnitX());
+  startAtBase(T_base_imu, &prior);
+  EXPECT_LT((prior.state.T_W_I * T_base_imu.inverse()).boxminus(SE3()).norm(), 1e-9);
+  EXPECT_LT((prior.state.v_W - Eigen::Vector3d::UnitX()).norm(), 1e-9);
+  EXPECT_LT((prior.state.T_W_I.rotation() * up_imu - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+}
+
 TEST(Initialiser, AnAccelerometerInUnitsOfGravityIsNamed) {
   const Start s = start(0.0, true, 9.80665);
   EXPECT_FALSE(s.prior);

@@ -86,6 +86,8 @@ class FrontEnd {
   std::optional<NavState> predict(double t) const;
   /// Starts anew: a new epoch; keyframe and landmark ids go on.
   void reset(const std::string& reason);
+  /// The back end has forgotten its map: its landmarks are not looked for any more.
+  void forgetMap();
 
   /// Where the camera sits on the IMU and by how much its stamps lag, as found so far.
   MountingEstimate mounting() const;

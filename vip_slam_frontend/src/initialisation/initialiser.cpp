@@ -55,6 +55,15 @@ FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOpt
   return prior;
 }
 
+void startAtBase(const SE3& T_base_imu, FilterPrior* prior) {
+  if (T_base_imu.boxminus(SE3()).norm() < 1e-9) return;
+  const SE3 T_W_base = prior->state.T_W_I * T_base_imu.inverse();
+  const Eigen::Vector3d up_base = T_W_base.rotation().conjugate() * Eigen::Vector3d::UnitZ();
+  const SE3 turn = alignLevelled(SE3(gravityAlignedRotation(up_base), Eigen::Vector3d::Zero()), T_W_base);
+  prior->state.T_W_I = turn * prior->state.T_W_I;
+  prior->state.v_W = turn.rotation() * prior->state.v_W;
+}
+
 Initialiser::Initialiser(const InitialisationOptions& options, const FilterOptions& filter, const ImuNoise& noise,
                          const SE3& T_I_C, double focal_px, double gravity)
     : options_(options), filter_(filter), noise_(noise), T_I_C_(T_I_C), focal_(focal_px), gravity_(gravity) {}

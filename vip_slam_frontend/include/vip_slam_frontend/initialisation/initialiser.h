@@ -50,4 +50,7 @@ double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<
 FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOptions& options, const ImuNoise& noise,
                           double gravity);
 
+/// Moves the start so that base_link, not the IMU, begins at the origin and heads along x; gravity stays where it is.
+void startAtBase(const SE3& T_base_imu, FilterPrior* prior);
+
 }  // namespace vip_slam

@@ -23,7 +23,10 @@ class LandmarkMatcher {
   /// Adds a track for every landmark found again in the tracker's newest image; returns how many.
   int reacquire(FeatureTracker* tracker, const OrbExtractor& orb, const SE3& T_map_C, const SE3& T_odom_C) const;
   std::size_t size() const { return landmarks_.size(); }
+  /// Forgets the map.
   void clear();
+  /// Forgets the patches: where they were taken is known in an odometry that has ended.
+  void forgetPatches() { patches_.clear(); }
 
  private:
   struct Entry {
