@@ -10,6 +10,18 @@
 #include <Eigen/Eigenvalues>
 
 namespace vip_slam {
+namespace {
+
+constexpr double kUpright = 0.5;  // sine of the angle between a normal and the vertical
+constexpr double kCore = 0.25;    // share of a width that vertices inside must span: four columns have a third
+
+struct Extent {
+  double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
+  void add(double q) { low = std::min(low, q), high = std::max(high, q); }
+  double length() const { return std::max(0.0, high - low); }
+};
+
+}  // namespace
 
 bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface) {
   enum : char { kNone, kInside, kOnBorder };
@@ -28,7 +40,21 @@ bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& 
     }
   }
   const auto inside = static_cast<std::size_t>(std::count(place.begin(), place.end(), kInside));
-  return inside >= 4 && 10 * inside >= surface.size();
+  if (inside < 4 || 10 * inside < surface.size()) return false;
+
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  for (int i : surface) normal += triangles[i].area * triangles[i].n;
+  const Eigen::Vector3d along = Eigen::Vector3d::UnitZ().cross(normal.normalized());
+  if (along.norm() < kUpright) return true;
+  Extent all, core;
+  for (int i : surface) {
+    for (int k = 0; k < 3; ++k) {
+      const double q = along.dot(triangles[i].corner[k]);
+      all.add(q);
+      if (place[triangles[i].vertex[k]] == kInside) core.add(q);
+    }
+  }
+  return core.length() >= kCore * all.length();
 }
 
 bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
