@@ -1,7 +1,10 @@
 // Planes from several keyframes together.
+#include <numeric>
+
 #include <gtest/gtest.h>
 
 #include "vip_slam_planes/detection/plane_evidence.h"
+#include "vip_slam_planes/detection/surface_shape.h"
 
 namespace vip_slam {
 namespace {
@@ -69,6 +72,19 @@ class Evidence : public ::testing::Test {
   CameraPoses poses;
   PlaneEvidence evidence{PlaneDetectionOptions{}, PlaneGrowthOptions{}};
 };
+
+TEST(Shape, AFaceOfThreeColumnsIsAStrip) {
+  const auto solid = [](int cells) {
+    const std::vector<MapTriangle> mesh = board(0, 0, cells, 12);
+    std::vector<int> all(mesh.size());
+    std::iota(all.begin(), all.end(), 0);
+    return isSolid(mesh, all);
+  };
+  EXPECT_FALSE(solid(1));
+  EXPECT_FALSE(solid(2));  // one column inside: the outer two may be its neighbours'
+  EXPECT_TRUE(solid(3));
+  EXPECT_TRUE(solid(6));
+}
 
 TEST_F(Evidence, PiecesOfOneWallInThreeKeyframesStartIt) {
   EXPECT_TRUE(add(1, board(0.0, 0.8, 5, 5)).empty());
