@@ -53,13 +53,23 @@ PlaneMapper::Impl::Impl(const PlaneMapperOptions& o, std::shared_ptr<const Camer
       evidence_(o.detection, o.growth),
       strips_(o.detection, o.growth) {}
 
-std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C) {
+std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, EpochKey epoch) {
   std::vector<PlaneTrack*> tracks;
   // Planes grow into view as well: the reach goes beyond what is covered.
   for (auto& [id, track] : tracks_) {
+    if (!epochs_.tied(track.epoch, epoch)) continue;
     if (mayBeInView(track, T_map_C, noise.max_range + options.growth.gap)) tracks.push_back(&track);
   }
   return tracks;
+}
+
+const CameraPoses& PlaneMapper::Impl::posesTiedTo(EpochKey epoch) {
+  if (epochs_.allTied()) return poses_;
+  tied_poses_.clear();
+  for (const auto& [id, keyframe] : placed_) {
+    if (epochs_.tied(keyframe->frame.epoch, epoch)) tied_poses_[id] = poses_.at(id);
+  }
+  return tied_poses_;
 }
 
 void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
@@ -77,7 +87,7 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   ++counters.frames_grown;
   grown_at_ = T_map_C;
   has_grown_ = true;
-  const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
+  const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, frame.epoch);
   if (tracks.empty()) return;
   const DepthMesh& mesh = mesher_.build(frame.features, frame.depth_grid, T_map_C.R().row(2));
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
@@ -105,6 +115,8 @@ void PlaneMapper::Impl::clear() {
   waiting_.clear();
   placed_.clear();
   poses_.clear();
+  tied_poses_.clear();
+  epochs_.clear();
   tracks_.clear();
   points_.clear();
   evidence_.clear();

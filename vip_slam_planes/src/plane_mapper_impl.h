@@ -7,6 +7,7 @@
 #include "vip_slam_planes/association/plane_sampler.h"
 #include "vip_slam_planes/association/point_association.h"
 #include "vip_slam_planes/detection/strip_evidence.h"
+#include "vip_slam_planes/epochs/epoch_groups.h"
 #include "vip_slam_planes/growth/plane_track.h"
 #include "vip_slam_planes/mesh/depth_mesh.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
@@ -39,6 +40,8 @@ class PlaneMapper::Impl {
   using Tracks = std::map<PlaneId, PlaneTrack>;
 
   // plane_mapper_update.cpp: corrections from the back end.
+  /// Returns true when epochs have come together that were apart.
+  bool tieEpochs(const std::vector<LoopEvent>& loops);
   void takeCorrections(const MapUpdate& update);
   void removeKeyframe(KeyframeId id);
   void refit(PlaneTrack* track);
@@ -50,7 +53,9 @@ class PlaneMapper::Impl {
 
   // plane_mapper_keyframe.cpp: one placed keyframe.
   void processKeyframe(const Keyframe& keyframe, bool first_time);
-  std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C);
+  /// Those that keyframes and frames of an epoch may meet.
+  std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C, EpochKey epoch);
+  const CameraPoses& posesTiedTo(EpochKey epoch);
   /// Returns the strips that detection left.
   std::vector<DetectedPlane> startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
                                          const std::vector<MapTriangle>& triangles, std::vector<int>* label,
@@ -74,6 +79,8 @@ class PlaneMapper::Impl {
   std::map<KeyframeId, KeyframePtr> waiting_;  ///< not placed yet
   std::map<KeyframeId, KeyframePtr> placed_;   ///< processed keyframes that the map still has
   CameraPoses poses_;                          ///< T_map_C of all of those
+  CameraPoses tied_poses_;                     ///< of some, while not all epochs are tied
+  EpochGroups epochs_;
   Tracks tracks_;
   PlaneId next_plane_ = 1;
   std::uint32_t epoch_ = 0;  ///< of the newest placed keyframe

@@ -17,7 +17,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const DepthGrid& grid = keyframe.frame.depth_grid;
   const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2));
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
-  std::vector<PlaneTrack*> tracks = tracksInView(T_map_C);
+  std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, keyframe.frame.epoch);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
   releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
 
@@ -34,13 +34,14 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   if (first_time) {
     std::vector<DetectedPlane> strips = startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
     evidence_.add(keyframe.id, T_map_C, triangles, label);
-    startJointPlanes(keyframe, evidence_.detect(poses_, {tracks.begin(), tracks.end()}), &label, &tracks);
+    startJointPlanes(keyframe, evidence_.detect(posesTiedTo(keyframe.frame.epoch), {tracks.begin(), tracks.end()}),
+                     &label, &tracks);
     const auto known_by_now = [&](const DetectedPlane& strip) {
       return std::any_of(strip.triangles.begin(), strip.triangles.end(), [&](int i) { return label[i] >= 0; });
     };
     strips.erase(std::remove_if(strips.begin(), strips.end(), known_by_now), strips.end());
     strips_.add(keyframe.id, T_map_C, triangles, strips);
-    startJointPlanes(keyframe, strips_.detect(poses_), &label, &tracks);
+    startJointPlanes(keyframe, strips_.detect(posesTiedTo(keyframe.frame.epoch)), &label, &tracks);
     ++counters.keyframes;
   }
   const SurfaceLabels labels = labelNodes(mesh, label, grid);
@@ -66,12 +67,13 @@ std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyfra
     const PlaneId id = next_plane_++;
     PlaneTrack& track =
         tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;
+    track.epoch = keyframe.frame.epoch;
     for (int i : found.triangles) {
       track.cover(triangles[i], keyframe.id, T_map_C, nullptr);
       (*label)[i] = static_cast<int>(tracks->size());
     }
     if (track.area() < options.support.sure_area) {
-      track.keyframes_seen = evidence_.seenBy(track, poses_, options.support.min_area);
+      track.keyframes_seen = evidence_.seenBy(track, posesTiedTo(keyframe.frame.epoch), options.support.min_area);
     }
     tracks->push_back(&track);
     ++counters.planes_started;
@@ -85,6 +87,7 @@ void PlaneMapper::Impl::startJointPlanes(const Keyframe& keyframe, const std::ve
     const PlaneId id = next_plane_++;
     PlaneTrack& track =
         tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;
+    track.epoch = keyframe.frame.epoch;
     std::set<KeyframeId> earlier;
     for (const EvidenceTriangle& e : found.triangles) {
       track.cover(e.triangle, e.keyframe, poses_.at(e.keyframe), nullptr);
@@ -143,7 +146,8 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
     const auto mine = tracks_.find(id);
     if (mine == tracks_.end()) continue;
     for (auto& [other_id, other] : tracks_) {
-      if (other_id == id || !sameSurface(mine->second, other, poses_, options.merging)) continue;
+      if (other_id == id || !epochs_.tied(mine->second.epoch, other.epoch)) continue;
+      if (!sameSurface(mine->second, other, poses_, options.merging)) continue;
       // The older id stays, but one that the back end knows goes before one that it does not.
       PlaneId into = std::min(id, other_id), from = std::max(id, other_id);
       if (tracks_.at(from).confirmed && !tracks_.at(into).confirmed) std::swap(into, from);

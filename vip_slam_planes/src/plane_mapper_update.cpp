@@ -20,6 +20,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   PlaneUpdate result;
   result.revision = update.revision;
   result.t = update.t;
+  const bool came_together = tieEpochs(update.loops);
   takeCorrections(update);
 
   for (const KeyframeEstimate& estimate : update.keyframes) {
@@ -30,6 +31,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
     placed_[keyframe->id] = keyframe;
     poses_[keyframe->id] = estimate.state.T_W_I * estimate.T_I_C;
     if (keyframe->id > newest_) newest_ = keyframe->id, epoch_ = keyframe->frame.epoch;
+    epochs_.place(keyframe->id, keyframe->frame.epoch);
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);
   }
@@ -37,13 +39,25 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
 
   std::vector<PlaneId> changed;
   for (auto& [id, track] : tracks_) {
-    if (track.changed(true)) changed.push_back(id);
+    if (track.changed(true) || came_together) changed.push_back(id);
   }
   mergePlanes(changed);
   dropUnsupported(&result);
   decideOnPoints();
   publish(&result);
   return result;
+}
+
+bool PlaneMapper::Impl::tieEpochs(const std::vector<LoopEvent>& loops) {
+  const auto epoch_of = [this](KeyframeId id) {
+    const auto it = waiting_.find(id);  // the newest one is placed by the same update
+    return it == waiting_.end() ? epochs_.epochOf(id) : EpochKey(it->second->frame.epoch);
+  };
+  bool came_together = false;
+  for (const LoopEvent& loop : loops) {
+    if (loop.accepted && epochs_.tie(epoch_of(loop.query), epoch_of(loop.match))) came_together = true;
+  }
+  return came_together;
 }
 
 // Points wait for their plane to be known for one; most of them are out of view by then.
@@ -116,11 +130,17 @@ void PlaneMapper::Impl::judgeAgreement() {
 void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   waiting_.erase(id);
   if (!placed_.count(id)) return;
-  // Its share of the area goes to the neighbour in time, which moves nearly alike.
+  // Its share of the area goes to the neighbour in time, which moves nearly alike, unless its epoch is elsewhere.
   const auto it = placed_.find(id);
-  const KeyframeId heir = it != placed_.begin()            ? std::prev(it)->first
-                          : std::next(it) != placed_.end() ? std::next(it)->first
-                                                           : 0;
+  const auto moves_alike = [&](const auto& other) {
+    return epochs_.tied(other.second->frame.epoch, it->second->frame.epoch);
+  };
+  KeyframeId heir = 0;
+  if (it != placed_.begin() && moves_alike(*std::prev(it))) {
+    heir = std::prev(it)->first;
+  } else if (std::next(it) != placed_.end() && moves_alike(*std::next(it))) {
+    heir = std::next(it)->first;
+  }
   for (auto& [plane, track] : tracks_) {
     track.rehost(id, heir, poses_);
     fresh_.erase({plane, id});
@@ -130,7 +150,9 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   strips_.remove(id);
   placed_.erase(it);
   poses_.erase(id);
-  if (newest_ == id) newest_ = placed_.empty() ? 0 : placed_.rbegin()->first;
+  if (newest_ != id) return;
+  newest_ = placed_.empty() ? 0 : placed_.rbegin()->first;
+  if (newest_ != 0) epoch_ = placed_.rbegin()->second->frame.epoch;
 }
 
 void PlaneMapper::Impl::refit(PlaneTrack* track) {

@@ -2,7 +2,8 @@
 //
 // Keyframes go in with addKeyframe() and wait until a MapUpdate places them in `map`; tracked frames only grow planes
 // that exist. Everything that comes out is in `map`. Normals point to the side a plane was seen from, so that the two
-// faces of a door are two planes.
+// faces of a door are two planes. Epochs of the odometry that no accepted loop of a MapUpdate has tied yet keep planes
+// of their own.
 #pragma once
 
 #include <cstdint>

@@ -15,6 +15,7 @@
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/types/plane_map.h"
 #include "vip_slam_planes/detection/plane_fit.h"
+#include "vip_slam_planes/epochs/epoch_groups.h"
 #include "vip_slam_planes/growth/cell_grid.h"
 #include "vip_slam_planes/growth/outline.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
@@ -85,6 +86,7 @@ class PlaneTrack {
   bool mostlyGone() const { return lost_ > cells_.count(1); }
 
   // Book-keeping of the mapper.
+  EpochKey epoch = kLoadedEpoch;  ///< of the keyframe that started it
   bool confirmed = false;
   bool determined = false;    ///< its observations tell its direction; until then the back end does not get them
   bool agrees = true;         ///< its observations agree; otherwise it may be several surfaces: no points

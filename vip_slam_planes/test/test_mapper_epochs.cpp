@@ -1,0 +1,196 @@
+// What keyframes of an odometry that started anew may do to planes before and after their place in the map is known.
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "rig.h"
+
+namespace vip_slam {
+namespace {
+
+using testing::lookAt;
+using testing::Rig;
+using testing::room;
+using testing::updateFor;
+
+std::shared_ptr<Keyframe> taken(Rig* rig, const SE3& T_W_C, std::uint32_t epoch, KeyframeId first_id = 1) {
+  auto keyframe = rig->camera.keyframe(room(), T_W_C);
+  keyframe->id += first_id - 1;
+  keyframe->frame.keyframe = keyframe->id;
+  keyframe->frame.epoch = epoch;
+  return keyframe;
+}
+
+SE3 view(int i) { return lookAt({-1 + 0.3 * i, 0.1 * i, 1.4}, {3, -0.8 + 0.4 * i, 1.0}); }
+
+/// In `map` as a back end puts them that goes on where the map ends: 1.5 m off, the wall ahead seems to be further
+/// away.
+SE3 guess(const SE3& truth) { return SE3(truth.rotation(), truth.t() + Eigen::Vector3d(1.5, 0, 0)); }
+
+LoopEvent loopBetween(KeyframeId query, KeyframeId match, bool accepted) {
+  LoopEvent loop;
+  loop.query = query, loop.match = match, loop.accepted = accepted;
+  return loop;
+}
+
+/// The update in which the back end places a keyframe and closes a loop with it: it brings all to where they are.
+MapUpdate closing(const Keyframe& query, KeyframeId match, const std::map<KeyframeId, SE3>& truth) {
+  MapUpdate update = updateFor(query, truth.at(query.id));
+  update.global = true;
+  update.keyframes.clear();
+  for (const auto& [id, T] : truth) {
+    update.keyframes.emplace_back();
+    update.keyframes.back().id = id;
+    update.keyframes.back().state.T_W_I = T;
+  }
+  update.loops.push_back(loopBetween(query.id, match, true));
+  return update;
+}
+
+std::set<PlaneId> idsOf(const Rig& rig) {
+  std::set<PlaneId> ids;
+  for (const PlaneEstimate& p : rig.mapper.planes()) ids.insert(p.id);
+  return ids;
+}
+
+void expectSame(const std::vector<PlaneEstimate>& a, const std::vector<PlaneEstimate>& b) {
+  ASSERT_LE(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].id, b[i].id);
+    EXPECT_EQ(a[i].keyframes, b[i].keyframes);
+    EXPECT_EQ(a[i].area, b[i].area);
+    EXPECT_EQ(a[i].plane.n, b[i].plane.n);
+    EXPECT_EQ(a[i].plane.d, b[i].plane.d);
+    ASSERT_EQ(a[i].polygons.size(), b[i].polygons.size());
+    for (std::size_t k = 0; k < a[i].polygons.size(); ++k) EXPECT_EQ(a[i].polygons[k].outer, b[i].polygons[k].outer);
+  }
+}
+
+TEST(MapperEpochs, AGuessedPlaceSaysNothingAboutPlanesOfAnotherEpoch) {
+  Rig rig;
+  for (int i = 0; i < 6; ++i) rig.place(taken(&rig, view(i), 0), view(i));
+  const std::vector<PlaneEstimate> before = rig.mapper.planes();
+  const std::set<PlaneId> old = idsOf(rig);
+  ASSERT_GE(before.size(), 3u);
+  ASSERT_TRUE(rig.find(Plane({-1, 0, 0}, 3)));
+  for (int i = 0; i < 6; ++i) {
+    const auto keyframe = taken(&rig, view(i), 1);
+    rig.mapper.addKeyframe(keyframe);
+    MapUpdate update = updateFor(*keyframe, guess(view(i)));
+    update.loops.push_back(loopBetween(keyframe->id, 3, false));  // a candidate that was no loop
+    const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+    EXPECT_TRUE(result.removed.empty());
+    EXPECT_TRUE(result.merges.empty());
+    for (const PlaneObservation& o : result.observations) EXPECT_EQ(0u, old.count(o.plane)) << o.keyframe;
+  }
+  expectSame(before, rig.mapper.planes());
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 3)));
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 4.5)));
+  EXPECT_EQ(2 * before.size(), rig.mapper.planes().size());
+}
+
+TEST(MapperEpochs, ALoopBetweenEpochsMakesOnePlaneOfTwo) {
+  Rig rig;
+  std::map<KeyframeId, SE3> truth;
+  for (int i = 0; i < 12; ++i) {
+    const SE3 T = view(i % 6);
+    const auto keyframe = taken(&rig, T, i / 6);
+    truth[keyframe->id] = T;
+    rig.place(keyframe, i < 6 ? T : guess(T));
+  }
+  std::set<PlaneId> old, fresh;
+  for (const PlaneId id : idsOf(rig)) (old.size() < rig.mapper.planes().size() / 2 ? old : fresh).insert(id);
+  ASSERT_GE(old.size(), 3u);
+  ASSERT_EQ(old.size(), fresh.size());
+
+  const auto query = taken(&rig, view(3), 1);
+  truth[query->id] = view(3);
+  rig.mapper.addKeyframe(query);
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(closing(*query, 4, truth));
+  EXPECT_EQ(old, idsOf(rig));
+  EXPECT_TRUE(result.removed.empty());
+  std::set<PlaneId> from, into;
+  for (const PlaneMerge& merge : result.merges) from.insert(merge.from), into.insert(merge.into);
+  EXPECT_EQ(fresh, from);
+  EXPECT_EQ(old, into);
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 3), 0.004));
+
+  // From now on its keyframes see the planes of both.
+  const PlaneUpdate next = rig.place(taken(&rig, view(4), 1), view(4));
+  EXPECT_EQ(old, idsOf(rig));
+  EXPECT_TRUE(std::any_of(next.observations.begin(), next.observations.end(),
+                          [&](const PlaneObservation& o) { return o.keyframe == query->id + 1; }));
+}
+
+TEST(MapperEpochs, TheFirstEpochBesideALoadedMapBelongsToItAndALaterOneOnceItIsRecognised) {
+  constexpr KeyframeId kFirst = 100;  // the loaded map has the ids before
+  Rig first, rig;
+  for (int i = 0; i < 6; ++i) first.place(taken(&first, view(i), 0), view(i));
+  rig.mapper.restore(first.mapper.planes());
+  const std::set<PlaneId> loaded = idsOf(rig);
+  for (int i = 0; i < 3; ++i) rig.place(taken(&rig, view(i), 5, kFirst), view(i));
+  EXPECT_EQ(loaded, idsOf(rig));
+
+  std::map<KeyframeId, SE3> truth = rig.poses;
+  for (int i = 0; i < 6; ++i) {
+    const auto keyframe = taken(&rig, view(i), 6, kFirst);
+    truth[keyframe->id] = view(i);
+    EXPECT_TRUE(rig.place(keyframe, guess(view(i))).removed.empty());
+  }
+  EXPECT_EQ(2 * loaded.size(), rig.mapper.planes().size());
+
+  const auto query = taken(&rig, view(3), 6, kFirst);
+  truth[query->id] = view(3);
+  rig.mapper.addKeyframe(query);
+  rig.mapper.applyMapUpdate(closing(*query, 7, truth));  // a keyframe of the loaded map
+  EXPECT_EQ(loaded, idsOf(rig));
+}
+
+TEST(MapperEpochs, AreaOfARemovedKeyframeStaysWithItsEpoch) {
+  Rig rig;
+  for (int i = 0; i < 6; ++i) rig.place(taken(&rig, view(i), 0), view(i));
+  const std::vector<PlaneEstimate> before = rig.mapper.planes();
+  MapUpdate update;
+  for (int i = 0; i < 3; ++i) {
+    const auto keyframe = taken(&rig, view(i), 1);
+    rig.place(keyframe, guess(view(i)));
+    if (i == 0) update.removed_keyframes.push_back(keyframe->id);
+  }
+  const double area = rig.find(Plane({-1, 0, 0}, 4.5))->area;
+  rig.mapper.applyMapUpdate(update);
+  // The old epoch moves; what the new one covered stays.
+  const Eigen::Vector3d up(0, 0, 0.7);
+  MapUpdate moved;
+  for (KeyframeId id = 1; id <= 6; ++id) {
+    moved.keyframes.push_back(updateFor(*taken(&rig, view(0), 0), {}).keyframes.front());
+    moved.keyframes.back().id = id;
+    moved.keyframes.back().state.T_W_I = SE3(rig.poses.at(id).rotation(), rig.poses.at(id).t() + up);
+  }
+  rig.mapper.applyMapUpdate(moved);
+  const PlaneEstimate* wall = rig.find(Plane({-1, 0, 0}, 4.5));
+  ASSERT_TRUE(wall);
+  EXPECT_NEAR(area, wall->area, 1e-9);
+  for (const PlanePolygon& p : wall->polygons)
+    for (const Eigen::Vector3d& q : p.outer) EXPECT_LT(q.z(), 2.75);
+}
+
+TEST(MapperEpochs, OneEpochIsAsItWasWhateverItsNumberAndLoops) {
+  Rig zero, seven;
+  for (int i = 0; i < 8; ++i) {
+    for (Rig* rig : {&zero, &seven}) {
+      const auto keyframe = taken(rig, view(i), rig == &zero ? 0 : 7);
+      rig->mapper.addKeyframe(keyframe);
+      MapUpdate update = updateFor(*keyframe, view(i));
+      if (rig == &seven && i > 3) update.loops.push_back(loopBetween(keyframe->id, 2, true));
+      rig->mapper.applyMapUpdate(update);
+    }
+    ASSERT_EQ(zero.mapper.planes().size(), seven.mapper.planes().size());
+    expectSame(zero.mapper.planes(), seven.mapper.planes());
+  }
+  EXPECT_GE(zero.mapper.planes().size(), 3u);
+}
+
+}  // namespace
+}  // namespace vip_slam
