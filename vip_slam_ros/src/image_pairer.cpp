@@ -5,16 +5,22 @@
 #include <utility>
 
 namespace vip_slam {
+namespace {
+constexpr std::size_t kIntervals = 10;      // colour intervals that are remembered: a lost image does not count
+constexpr double kShortestInterval = 0.01;  // seconds; assumed until one is known
+}  // namespace
 
 bool ImagePairer::addColor(double t, cv::Mat gray) {
   if (!std::isfinite(t) || (newest_color_ && t <= *newest_color_)) {
     ++counters_.backward;
     return false;
   }
+  if (newest_color_) color_intervals_.push_back(t - *newest_color_);
+  if (color_intervals_.size() > kIntervals) color_intervals_.pop_front();
   newest_color_ = t;
   color_.push_back({t, std::move(gray)});
   if (color_.size() > options_.capacity) {
-    color_.pop_front();
+    popColor();
     ++counters_.dropped;
   }
   return true;
@@ -36,6 +42,22 @@ bool ImagePairer::addDepth(double t, cv::Mat depth) {
 
 double ImagePairer::newest() const { return std::max(newest_color_.value_or(-1e300), newest_depth_.value_or(-1e300)); }
 
+void ImagePairer::popColor() {
+  previous_color_ = color_.front().t;
+  color_.pop_front();
+}
+
+double ImagePairer::colorInterval() const {
+  const auto shortest = std::min_element(color_intervals_.begin(), color_intervals_.end());
+  return shortest == color_intervals_.end() ? kShortestInterval : *shortest;
+}
+
+bool ImagePairer::belongsToFront(double t) const {
+  const double distance = std::abs(t - color_.front().t);
+  if (previous_color_ && std::abs(t - *previous_color_) < distance) return false;
+  return color_.size() < 2 || distance <= std::abs(t - color_[1].t);
+}
+
 const ImagePair* ImagePairer::front() {
   if (front_) return &*front_;
   if (color_.empty()) return nullptr;
@@ -47,16 +69,19 @@ const ImagePair* ImagePairer::front() {
   // The nearest depth image is known once one at or after t is there; an exact match needs no waiting.
   const auto after = std::find_if(depth_.begin(), depth_.end(), [t](const StampedImage& d) { return d.t >= t; });
   auto best = depth_.end();
-  if (after != depth_.end() && after->t <= t + options_.tolerance) best = after;
+  if (after != depth_.end() && after->t <= t + options_.tolerance && belongsToFront(after->t)) best = after;
   if (after != depth_.begin()) {
     const auto before = std::prev(after);
-    if (best == depth_.end() || t - before->t < best->t - t) best = before;
+    if (belongsToFront(before->t) && (best == depth_.end() || t - before->t < best->t - t)) best = before;
   }
-  const bool decided = after != depth_.end() || newest() - t > options_.patience;
+  // A newer depth image may belong to a colour image that is still to come.
+  constexpr double kSurelyNearer = 0.45;  // of the interval: stamps jitter
+  const bool next_matters = best != depth_.end() && color_.size() < 2 && best->t - t > kSurelyNearer * colorInterval();
+  const bool decided = (after != depth_.end() && !next_matters) || newest() - t > options_.patience;
   if (!decided) return nullptr;
 
   front_ = ImagePair{t, std::move(color_.front().image), {}};
-  color_.pop_front();
+  popColor();
   if (best == depth_.end()) {
     ++counters_.without_depth;
   } else {
@@ -74,6 +99,8 @@ void ImagePairer::pop() { front_.reset(); }
 void ImagePairer::clear() {
   color_.clear();
   depth_.clear();
+  color_intervals_.clear();
+  previous_color_.reset();
   newest_color_.reset();
   newest_depth_.reset();
   front_.reset();

@@ -1,4 +1,10 @@
 // Colour and depth meet by stamp, whatever order they arrive in.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "vip_slam_ros/image_pairer.h"
@@ -88,6 +94,79 @@ TEST(ImagePairer, RepeatedAndInvalidStampsAreRefused) {
   EXPECT_EQ(pairer.counters().backward, 3u);
   pairer.clear();
   EXPECT_TRUE(pairer.addColor(0.5, image(3)));
+}
+
+/// Runs colour images 0, 1, ... and those depth images of the same number that `depth_stamp` has, in the order of their
+/// stamps; at equal stamps depth first if `depth_first`. Which depth image each colour image got, -1: none.
+std::vector<int> pairAll(int images, double interval, bool depth_first,
+                         const std::function<std::optional<double>(int)>& depth_stamp) {
+  struct Arrival {
+    double t;
+    bool depth;
+    int i;
+  };
+  std::vector<Arrival> arrivals;
+  for (int i = 0; i < images; ++i) {
+    arrivals.push_back({i * interval, false, i});
+    if (const auto t = depth_stamp(i)) arrivals.push_back({*t, true, i});
+  }
+  std::sort(arrivals.begin(), arrivals.end(), [&](const Arrival& a, const Arrival& b) {
+    return a.t != b.t ? a.t < b.t : a.depth != b.depth && a.depth == depth_first;
+  });
+  ImagePairer pairer;
+  std::vector<int> got(std::size_t(images), -2);
+  for (const Arrival& arrival : arrivals) {
+    if (arrival.depth) {
+      pairer.addDepth(arrival.t, image(arrival.i));
+    } else {
+      pairer.addColor(arrival.t, image(arrival.i));
+    }
+    for (; const ImagePair* pair = pairer.front(); pairer.pop()) {
+      got[std::size_t(valueOf(pair->gray))] = valueOf(pair->depth);
+    }
+  }
+  return got;
+}
+
+TEST(ImagePairer, ALostDepthImageShiftsNoOthers) {
+  for (const bool depth_first : {false, true}) {
+    const auto got = pairAll(120, 1 / 60.0, depth_first,
+                             [](int i) { return i == 10 ? std::nullopt : std::optional<double>(i / 60.0); });
+    for (int i = 0; i < 120; ++i) EXPECT_EQ(got[std::size_t(i)], i == 10 ? -1 : i) << depth_first;
+  }
+}
+
+TEST(ImagePairer, DepthAtHalfTheRateGoesToItsOwnColour) {
+  for (const bool depth_first : {false, true}) {
+    const auto got = pairAll(121, 1 / 60.0, depth_first,
+                             [](int i) { return i % 2 ? std::nullopt : std::optional<double>(i / 60.0); });
+    for (int i = 0; i < 121; ++i) EXPECT_EQ(got[std::size_t(i)], i % 2 ? -1 : i) << i << " " << depth_first;
+  }
+}
+
+TEST(ImagePairer, DepthThatLagsIsNotTakenForTheImageBefore) {
+  // 6 ms late of a 60 Hz colour stream, and 30 Hz depth: the odd images have none.
+  const auto got = pairAll(121, 1 / 60.0, true,
+                           [](int i) { return i % 2 ? std::nullopt : std::optional<double>(i / 60.0 + 0.006); });
+  for (int i = 0; i < 121; ++i) EXPECT_EQ(got[std::size_t(i)], i % 2 ? -1 : i) << i;
+}
+
+TEST(ImagePairer, JitterLosesNoPair) {
+  const auto got = pairAll(120, 1 / 30.0, true, [](int i) { return i / 30.0 + 0.005 * std::sin(2.3 * i); });
+  for (int i = 0; i < 119; ++i) EXPECT_EQ(got[std::size_t(i)], i);
+}
+
+TEST(ImagePairer, ANearerDepthDoesNotWaitForTheNextColour) {
+  ImagePairer pairer;
+  for (int i = 0; i < 4; ++i) {
+    pairer.addColor(i / 30.0, image(i));
+    pairer.addDepth(i / 30.0 + 0.012, image(i));
+    if (i == 0) continue;  // the interval is not known yet
+    while (pairer.front() && valueOf(pairer.front()->gray) < i) pairer.pop();
+    ASSERT_NE(pairer.front(), nullptr) << i;
+    EXPECT_EQ(valueOf(pairer.front()->depth), i);
+    pairer.pop();
+  }
 }
 
 }  // namespace

@@ -45,6 +45,8 @@ class ImagePairer {
   bool addDepth(double t, cv::Mat depth);
 
   /// The oldest colour image once its depth is there, or cannot come any more. Depth matches by the nearest stamp.
+  /// A depth image goes to no colour image but the one nearest to it. One between two colour images waits for the later
+  /// of them, unless their interval tells already that it is nearer to the earlier.
   const ImagePair* front();
   void pop();
   void clear();
@@ -54,8 +56,15 @@ class ImagePairer {
   const PairerCounters& counters() const { return counters_; }
 
  private:
+  void popColor();
+  /// A depth image at `t` is not nearer to another colour image than to the oldest that waits.
+  bool belongsToFront(double t) const;
+  double colorInterval() const;  ///< the shortest of late, seconds
+
   PairerOptions options_;
   std::deque<StampedImage> color_, depth_;
+  std::deque<double> color_intervals_;    ///< of the last colour images, seconds
+  std::optional<double> previous_color_;  ///< stamp of the one before the oldest that waits
   std::optional<double> newest_color_, newest_depth_;
   std::optional<ImagePair> front_;
   PairerCounters counters_;
