@@ -13,7 +13,10 @@ CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info) {
   intrinsics.cx = info.K[2];
   intrinsics.fy = info.K[4];
   intrinsics.cy = info.K[5];
-  const bool straight = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
+  const bool zero = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
+  // An equidistant lens without corrections is still no pinhole.
+  const bool equidistant = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";
+  const bool straight = zero && !(equidistant && !info.D.empty());
   try {
     // Drivers of rectified images leave the model empty, or name one with coefficients that are all zero.
     intrinsics.model = straight ? DistortionModel::kNone : distortionModelFromName(info.distortion_model);
@@ -42,7 +45,9 @@ sensor_msgs::CameraInfo toCameraInfo(const CameraIntrinsics& intrinsics) {
       break;
   }
   info.D.assign(intrinsics.distortion.begin(), intrinsics.distortion.end());
-  if (intrinsics.model != DistortionModel::kEquidistant) info.D.resize(std::max<std::size_t>(5, info.D.size()), 0.0);
+  // Never empty: without coefficients any model is read as a pinhole.
+  const std::size_t coefficients = intrinsics.model == DistortionModel::kEquidistant ? 4 : 5;
+  info.D.resize(std::max(coefficients, info.D.size()), 0.0);
   info.K = {intrinsics.fx, 0, intrinsics.cx, 0, intrinsics.fy, intrinsics.cy, 0, 0, 1};
   info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   info.P = {intrinsics.fx, 0, intrinsics.cx, 0, 0, intrinsics.fy, intrinsics.cy, 0, 0, 0, 1, 0};

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include <ros/serialization.h>
 
-#include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/frame_conversions.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/map_conversions.h"
@@ -289,43 +288,6 @@ TEST_F(Conversions, ContradictoryMessagesAreNamed) {
   vip_slam_msgs::PlaneObservation observation;
   observation.points = {1, 2, 3};
   EXPECT_THROW(fromMsg(observation), std::invalid_argument);
-}
-
-TEST(CameraInfo, BothWays) {
-  CameraIntrinsics intrinsics;
-  intrinsics.width = 640;
-  intrinsics.height = 480;
-  intrinsics.fx = 600;
-  intrinsics.fy = 601;
-  intrinsics.cx = 320.5;
-  intrinsics.cy = 240.25;
-  intrinsics.model = DistortionModel::kRadTan;
-  intrinsics.distortion = {0.1, -0.05, 0.001, 0.002, 0.01};
-  const CameraIntrinsics back = intrinsicsFromCameraInfo(toCameraInfo(intrinsics));
-  EXPECT_EQ(back.width, 640);
-  EXPECT_EQ(back.height, 480);
-  EXPECT_EQ(back.fx, 600);
-  EXPECT_EQ(back.fy, 601);
-  EXPECT_EQ(back.cx, 320.5);
-  EXPECT_EQ(back.cy, 240.25);
-  EXPECT_EQ(back.model, DistortionModel::kRadTan);
-  EXPECT_EQ(back.distortion, intrinsics.distortion);
-}
-
-TEST(CameraInfo, UnusableIsNamed) {
-  sensor_msgs::CameraInfo info;
-  info.width = 640;
-  info.height = 480;
-  try {
-    intrinsicsFromCameraInfo(info);
-    FAIL() << "an uncalibrated camera was taken";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("fx"), std::string::npos) << error.what();
-  }
-  info.K = {600, 0, 320, 0, 600, 240, 0, 0, 1};
-  info.distortion_model = "magic";
-  info.D = {0.1, 0, 0, 0, 0};
-  EXPECT_THROW(intrinsicsFromCameraInfo(info), std::invalid_argument);
 }
 
 }  // namespace

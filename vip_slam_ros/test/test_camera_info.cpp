@@ -1,0 +1,81 @@
+// Intrinsics to camera_info and back; what drivers leave out is understood, what cannot be used is named.
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "vip_slam_ros/camera_info.h"
+
+namespace vip_slam {
+namespace {
+
+TEST(CameraInfo, BothWays) {
+  CameraIntrinsics intrinsics;
+  intrinsics.width = 640;
+  intrinsics.height = 480;
+  intrinsics.fx = 600;
+  intrinsics.fy = 601;
+  intrinsics.cx = 320.5;
+  intrinsics.cy = 240.25;
+  intrinsics.model = DistortionModel::kRadTan;
+  intrinsics.distortion = {0.1, -0.05, 0.001, 0.002, 0.01};
+  const CameraIntrinsics back = intrinsicsFromCameraInfo(toCameraInfo(intrinsics));
+  EXPECT_EQ(back.width, 640);
+  EXPECT_EQ(back.height, 480);
+  EXPECT_EQ(back.fx, 600);
+  EXPECT_EQ(back.fy, 601);
+  EXPECT_EQ(back.cx, 320.5);
+  EXPECT_EQ(back.cy, 240.25);
+  EXPECT_EQ(back.model, DistortionModel::kRadTan);
+  EXPECT_EQ(back.distortion, intrinsics.distortion);
+}
+
+TEST(CameraInfo, ZeroCoefficientsLeaveAFisheyeAFisheye) {
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  info.K = {300, 0, 320, 0, 300, 240, 0, 0, 1};
+  const auto model = [&](const std::string& name, std::size_t coefficients) {
+    info.distortion_model = name;
+    info.D.assign(coefficients, 0.0);
+    return intrinsicsFromCameraInfo(info).model;
+  };
+  EXPECT_EQ(model("equidistant", 4), DistortionModel::kEquidistant);
+  EXPECT_EQ(model("fisheye", 4), DistortionModel::kEquidistant);
+  EXPECT_EQ(model("equidistant", 0), DistortionModel::kNone);
+  EXPECT_EQ(model("plumb_bob", 5), DistortionModel::kNone);
+  EXPECT_EQ(model("rational_polynomial", 8), DistortionModel::kNone);
+  EXPECT_EQ(model("", 0), DistortionModel::kNone);
+
+  CameraIntrinsics fisheye;
+  fisheye.width = 640;
+  fisheye.height = 480;
+  fisheye.fx = fisheye.fy = 300;
+  fisheye.cx = 320;
+  fisheye.cy = 240;
+  fisheye.model = DistortionModel::kEquidistant;
+  for (const std::vector<double>& distortion : {std::vector<double>{}, std::vector<double>(4, 0.0)}) {
+    fisheye.distortion.assign(distortion.begin(), distortion.end());
+    EXPECT_EQ(intrinsicsFromCameraInfo(toCameraInfo(fisheye)).model, DistortionModel::kEquidistant);
+  }
+}
+
+TEST(CameraInfo, UnusableIsNamed) {
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  try {
+    intrinsicsFromCameraInfo(info);
+    FAIL() << "an uncalibrated camera was taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("fx"), std::string::npos) << error.what();
+  }
+  info.K = {600, 0, 320, 0, 600, 240, 0, 0, 1};
+  info.distortion_model = "magic";
+  info.D = {0.1, 0, 0, 0, 0};
+  EXPECT_THROW(intrinsicsFromCameraInfo(info), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vip_slam
