@@ -94,7 +94,8 @@ cv::Mat decodeGray(const sensor_msgs::Image& image) {
 
 cv::Mat decodeGray(const sensor_msgs::CompressedImage& image) {
   cv::Mat gray;
-  if (!image.data.empty()) gray = cv::imdecode(image.data, cv::IMREAD_GRAYSCALE);
+  // An image that its EXIF tag turns would no longer fit the calibration; IMREAD_UNCHANGED never turns.
+  if (!image.data.empty()) gray = cv::imdecode(image.data, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (gray.empty()) throw std::invalid_argument(describe(image) + ": cannot be decoded, expected JPEG or PNG");
   return gray;
 }

@@ -90,6 +90,22 @@ TEST(DecodeGray, Compressed) {
   EXPECT_LE(difference(decodeGray(jpeg), gray), 12);
 }
 
+TEST(DecodeGray, TheExifOrientationTurnsNothing) {
+  const cv::Mat bgr = picture();
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", bgr, jpeg);
+  // An APP1 segment right after the start of the image: EXIF, big endian, orientation 6 (turned by a quarter).
+  const std::vector<std::uint8_t> exif = {0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0,    0,    'M', 'M',
+                                          0,    42,   0, 0,  0,   8,   0,   1,   0x01, 0x12, 0,   3,
+                                          0,    0,    0, 1,  0,   6,   0,   0,   0,    0,    0,   0};
+  jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
+  ASSERT_EQ(cv::imdecode(jpeg, cv::IMREAD_GRAYSCALE).rows, bgr.cols) << "the tag is not understood";
+  sensor_msgs::CompressedImage image;
+  image.format = "jpeg";
+  image.data = jpeg;
+  EXPECT_EQ(decodeGray(image).size(), bgr.size());
+}
+
 TEST(DecodeDepth, RawAndCompressedAgree) {
   const cv::Mat units = depthUnits();
   cv::Mat metres;
