@@ -10,7 +10,7 @@ constexpr std::size_t kIntervals = 10;      // colour intervals that are remembe
 constexpr double kShortestInterval = 0.01;  // seconds; assumed until one is known
 }  // namespace
 
-bool ImagePairer::addColor(double t, cv::Mat gray) {
+bool ImagePairer::addColor(double t, cv::Mat gray, std::uint64_t stamp) {
   if (!std::isfinite(t) || (newest_color_ && t <= *newest_color_)) {
     ++counters_.backward;
     return false;
@@ -18,7 +18,7 @@ bool ImagePairer::addColor(double t, cv::Mat gray) {
   if (newest_color_) color_intervals_.push_back(t - *newest_color_);
   if (color_intervals_.size() > kIntervals) color_intervals_.pop_front();
   newest_color_ = t;
-  color_.push_back({t, std::move(gray)});
+  color_.push_back({t, std::move(gray), stamp});
   if (color_.size() > options_.capacity) {
     popColor();
     ++counters_.dropped;
@@ -32,7 +32,7 @@ bool ImagePairer::addDepth(double t, cv::Mat depth) {
     return false;
   }
   newest_depth_ = t;
-  depth_.push_back({t, std::move(depth)});
+  depth_.push_back({t, std::move(depth), 0});
   if (depth_.size() > options_.capacity) {
     depth_.pop_front();
     ++counters_.unused_depth;
@@ -80,7 +80,7 @@ const ImagePair* ImagePairer::front() {
   const bool decided = (after != depth_.end() && !next_matters) || newest() - t > options_.patience;
   if (!decided) return nullptr;
 
-  front_ = ImagePair{t, std::move(color_.front().image), {}};
+  front_ = ImagePair{t, std::move(color_.front().image), {}, color_.front().stamp};
   popColor();
   if (best == depth_.end()) {
     ++counters_.without_depth;

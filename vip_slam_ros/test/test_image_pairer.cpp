@@ -28,6 +28,16 @@ TEST(ImagePairer, SameStampsPairAtOnce) {
   EXPECT_EQ(pairer.counters().pairs, 1u);
 }
 
+TEST(ImagePairer, TheStampComesOutAsItWentIn) {
+  const std::uint64_t stamp = 1700000000123456789;
+  const double t = 1e-9 * double(stamp);
+  ImagePairer pairer;
+  pairer.addColor(t, image(1), stamp);
+  pairer.addDepth(t, image(11));
+  ASSERT_NE(pairer.front(), nullptr);
+  EXPECT_EQ(pairer.front()->stamp, stamp);
+}
+
 TEST(ImagePairer, TheNearestDepthWins) {
   ImagePairer pairer;
   pairer.addDepth(0.990, image(10));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <optional>
 
@@ -13,12 +14,14 @@ namespace vip_slam {
 struct StampedImage {
   double t = 0;  ///< seconds
   cv::Mat image;
+  std::uint64_t stamp = 0;  ///< see ImagePair
 };
 
 struct ImagePair {
   double t = 0;  ///< stamp of gray
   cv::Mat gray;
-  cv::Mat depth;  ///< empty: none came in time
+  cv::Mat depth;            ///< empty: none came in time
+  std::uint64_t stamp = 0;  ///< of gray in nanoseconds, as it was handed in: t cannot hold each of them
 };
 
 struct PairerOptions {
@@ -41,7 +44,7 @@ class ImagePairer {
   explicit ImagePairer(const PairerOptions& options = {}) : options_(options) {}
 
   /// Images come in the order of their stamps per stream; others are counted and refused (false).
-  bool addColor(double t, cv::Mat gray);
+  bool addColor(double t, cv::Mat gray, std::uint64_t stamp = 0);
   bool addDepth(double t, cv::Mat depth);
 
   /// The oldest colour image once its depth is there, or cannot come any more. Depth matches by the nearest stamp.
