@@ -14,6 +14,8 @@ TEST(StreamClock, LateImagesAreNoJump) {
   EXPECT_EQ(clock.notice(0, 10.03), Verdict::kInOrder);
   EXPECT_EQ(clock.notice(1, 12.5), Verdict::kInOrder);  // within the limit
   EXPECT_EQ(clock.newest(), 13.0);
+  EXPECT_EQ(clock.newest(0), 10.03);
+  EXPECT_EQ(clock.newest(1), 13.0);
 }
 
 TEST(StreamClock, ALoopingBagJumpsOnceWhateverOrderTheStreamsComeIn) {

@@ -23,6 +23,8 @@ class StreamClock {
 
   /// Stamp of the newest message of all streams, seconds; -1e300 before the first.
   double newest() const { return newest_; }
+  /// Of one stream.
+  double newest(std::size_t stream) const { return streams_.at(stream).newest; }
   /// Seconds by which the last jump went back.
   double lastJump() const { return last_jump_; }
 
