@@ -20,6 +20,7 @@ std::optional<NavState> FrontEnd::predict(double t) const { return impl_->predic
 void FrontEnd::reset(const std::string& reason) { impl_->reset(reason); }
 void FrontEnd::forgetMap() { impl_->forgetMap(); }
 MountingEstimate FrontEnd::mounting() const { return impl_->mounting(); }
+double FrontEnd::timeOffset() const { return impl_->timeOffset(); }
 MountingEstimate FrontEnd::givenMounting() const { return impl_->givenMounting(); }
 const FrontEndCounters& FrontEnd::counters() const { return impl_->counters_; }
 const FrontEndOptions& FrontEnd::options() const { return impl_->options_; }

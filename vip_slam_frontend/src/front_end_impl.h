@@ -32,6 +32,9 @@ class FrontEnd::Impl {
   std::optional<NavState> predict(double t) const;
   MountingEstimate mounting() const { return filter_.mounting(); }
   MountingEstimate givenMounting() const { return {sensor_.T_imu_cam, sensor_.time_offset}; }
+  double timeOffset() const {
+    return filter_.started() ? filter_.window().time_offset : filter_.mounting().time_offset;
+  }
   void reset(const std::string& reason);
   void forgetMap() { landmarks_.clear(); }
 
@@ -41,9 +44,6 @@ class FrontEnd::Impl {
  private:
   enum class Phase { kWaiting, kInitialising, kTracking, kLost };
 
-  double timeOffset() const {
-    return filter_.started() ? filter_.window().time_offset : filter_.mounting().time_offset;
-  }
   SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.mounting().T_I_C; }
   /// Empty when the input is usable; else what is wrong. Fixes up the depth.
   std::string checkInput(const FrameInput& input, cv::Mat* depth);

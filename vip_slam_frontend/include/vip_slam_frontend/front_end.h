@@ -91,6 +91,8 @@ class FrontEnd {
 
   /// Where the camera sits on the IMU and by how much its stamps lag, as found so far.
   MountingEstimate mounting() const;
+  /// That of mounting(), without the cost of its sigmas.
+  double timeOffset() const;
   /// As the sensor's configuration has it.
   MountingEstimate givenMounting() const;
   const FrontEndCounters& counters() const;
