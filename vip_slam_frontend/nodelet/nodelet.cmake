@@ -6,11 +6,13 @@ find_package(OpenCV REQUIRED COMPONENTS core imgproc)
 
 add_library(vip_slam_frontend_nodelets
   nodelet/calibration_source.cpp
+  nodelet/depth_alignment.cpp
   nodelet/feature_image.cpp
   nodelet/front_end_diagnostics.cpp
   nodelet/front_end_input.cpp
   nodelet/front_end_nodelet.cpp
   nodelet/front_end_publishing.cpp
+  nodelet/gyro_history.cpp
   nodelet/odometry_messages.cpp
 )
 target_include_directories(vip_slam_frontend_nodelets PRIVATE nodelet)
@@ -23,8 +25,10 @@ install(TARGETS vip_slam_frontend_nodelets LIBRARY DESTINATION ${CATKIN_PACKAGE_
 install(FILES nodelet/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/nodelet)
 
 if(CATKIN_ENABLE_TESTING)
-  catkin_add_gtest(test_odometry_messages nodelet/test_odometry_messages.cpp)
-  target_include_directories(test_odometry_messages PRIVATE nodelet)
-  target_include_directories(test_odometry_messages SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-  target_link_libraries(test_odometry_messages vip_slam_frontend_nodelets gtest_main ${catkin_LIBRARIES})
+  foreach(thing depth_alignment gyro_history odometry_messages)
+    catkin_add_gtest(test_${thing} nodelet/test_${thing}.cpp)
+    target_include_directories(test_${thing} PRIVATE nodelet)
+    target_include_directories(test_${thing} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
+    target_link_libraries(test_${thing} vip_slam_frontend_nodelets gtest_main ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
+  endforeach()
 endif()

@@ -1,0 +1,36 @@
+#include "depth_alignment.h"
+
+#include <cstdio>
+#include <exception>
+
+namespace vip_slam {
+
+DepthAlignment::DepthAlignment(const SensorConfig& sensor)
+    : color_topic_(sensor.topics.color), depth_topic_(sensor.topics.depth) {
+  if (sensor.depth_registered) return;
+  registration_.emplace(makeCamera(sensor.depth_camera), makeCamera(sensor.camera), sensor.T_color_depth.matrix());
+}
+
+cv::Mat DepthAlignment::align(const cv::Mat& depth, const cv::Size& color, std::string* problem) const {
+  problem->clear();
+  if (depth.empty()) return depth;
+  cv::Mat aligned = depth;
+  if (registration_) {
+    try {
+      aligned = (*registration_)(depth);
+    } catch (const std::exception& error) {
+      *problem = depth_topic_ + ": " + error.what() + ": depth is not used";
+      return {};
+    }
+  }
+  if (aligned.size() != color) {
+    char words[240];
+    std::snprintf(words, sizeof words,
+                  "%s is %dx%d, %s is %dx%d: depth is not used; switch on the driver's registration",
+                  depth_topic_.c_str(), aligned.cols, aligned.rows, color_topic_.c_str(), color.width, color.height);
+    *problem = words;
+  }
+  return aligned;
+}
+
+}  // namespace vip_slam
