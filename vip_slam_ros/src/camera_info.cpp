@@ -24,6 +24,7 @@ CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info) {
     throw std::invalid_argument(std::string("camera_info.distortion_model: ") + error.what());
   }
   if (!straight) intrinsics.distortion.assign(info.D.begin(), info.D.end());
+  if (!straight && zero) intrinsics.distortion.resize(4);  // some drivers give plumb_bob's five
   const std::string wrong = intrinsics.validate();
   if (!wrong.empty()) throw std::invalid_argument("camera_info: " + wrong);
   return intrinsics;

@@ -43,6 +43,7 @@ TEST(CameraInfo, ZeroCoefficientsLeaveAFisheyeAFisheye) {
   };
   EXPECT_EQ(model("equidistant", 4), DistortionModel::kEquidistant);
   EXPECT_EQ(model("fisheye", 4), DistortionModel::kEquidistant);
+  EXPECT_EQ(model("fisheye", 5), DistortionModel::kEquidistant);
   EXPECT_EQ(model("equidistant", 0), DistortionModel::kNone);
   EXPECT_EQ(model("plumb_bob", 5), DistortionModel::kNone);
   EXPECT_EQ(model("rational_polynomial", 8), DistortionModel::kNone);
