@@ -26,12 +26,8 @@ void FrontEndNodelet::subscribe() {
   }
   subscribeImage(
       topics.color, sensor_.color_encoding,
-      [this](const sensor_msgs::ImageConstPtr& m) {
-        onColor(m->header.stamp.toSec(), m->header.frame_id, [m] { return decodeGray(*m); });
-      },
-      [this](const sensor_msgs::CompressedImageConstPtr& m) {
-        onColor(m->header.stamp.toSec(), m->header.frame_id, [m] { return decodeGray(*m); });
-      });
+      [this](const sensor_msgs::ImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m); }); },
+      [this](const sensor_msgs::CompressedImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m); }); });
   if (!topics.depth.empty()) {
     const double scale = sensor_.depth_scale;
     subscribeImage(
@@ -72,13 +68,14 @@ void FrontEndNodelet::subscribeImage(
 
 void FrontEndNodelet::watch(StreamMonitor& monitor, double t) { monitor.add(t, ros::Time::now().toSec()); }
 
-void FrontEndNodelet::onColor(double t, const std::string& frame_id, const std::function<cv::Mat()>& decode) {
+void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {
+  const double t = header.stamp.toSec();
   watch(*color_monitor_, t);
-  calibration_->addColorFrame(frame_id);
+  calibration_->addColorFrame(header.frame_id);
   try {
     cv::Mat gray = decode();
-    owner_->post(image_lane_, [this, t, gray] {
-      if (noticeTime(t, kColor)) pairer_->addColor(t, gray);
+    owner_->post(image_lane_, [this, t, gray, stamp = header.stamp.toNSec()] {
+      if (noticeTime(t, kColor)) pairer_->addColor(t, gray, stamp);
       processReady();
     });
   } catch (const std::exception& error) {

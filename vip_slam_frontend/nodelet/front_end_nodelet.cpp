@@ -114,7 +114,8 @@ bool FrontEndNodelet::noticeTime(double t, Stream stream) {
       monitor->restart();
     }
     if (front_end_) front_end_->reset(words);
-    last_feature_image_ = -1e300;
+    gyro_.clear();
+    last_feature_image_ = posed_imu_t_ = predicted_imu_t_ = -1e300;
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++shown_.time_jumps;
   }
@@ -145,7 +146,7 @@ void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const 
   } else {
     front_end_->addAccel(t, *accel);
   }
-  if (gyro) gyro_ = *gyro;
+  if (gyro) gyro_.add(t, *gyro);
   processReady();
   if (gyro && imu_rate_odometry_) publishImuRate(t);
 }
@@ -154,6 +155,7 @@ void FrontEndNodelet::startWhenCalibrated() {
   const std::optional<SensorConfig> resolved = calibration_->resolve(clock_->newest());
   if (!resolved) return;
   try {
+    alignment_ = std::make_unique<DepthAlignment>(*resolved);
     front_end_ = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr);
   } catch (const std::exception& error) {
     NODELET_ERROR_THROTTLE(5, "sensor '%s': %s", sensor_.name.c_str(), error.what());
@@ -161,47 +163,41 @@ void FrontEndNodelet::startWhenCalibrated() {
   }
   sensor_ = *resolved;
   frames_.T_base_imu = sensor_.T_base_imu;
-  if (!sensor_.depth_registered) {
-    color_camera_ = makeCamera(sensor_.camera);
-    depth_camera_ = makeCamera(sensor_.depth_camera);
-  }
   publishCalibration();
   const auto early = std::move(early_);
   early_.clear();
   for (const auto& add : early) add();
 }
 
+double FrontEndNodelet::waitedFor(double t) const {
+  const double images = std::max(clock_->newest(kColor), clock_->newest(kDepth));
+  const double imu = std::max(clock_->newest(kGyro), clock_->newest(kAccel));
+  return std::max(images - t, imu - (t + front_end_->timeOffset()));
+}
+
 void FrontEndNodelet::processReady() {
   if (!front_end_) return;
-  while (const ImagePair* pair = pairer_->front()) {
-    if (!front_end_->ready(pair->t) && clock_->newest() - pair->t <= options_.imu_patience) return;
-    process(*pair);
+  while (const ImagePair* front = pairer_->front()) {
+    if (!front_end_->ready(front->t) && waitedFor(front->t) <= options_.imu_patience) return;
+    // Taken out first: an image that cannot be processed must not come back for ever.
+    const ImagePair pair = *front;
     pairer_->pop();
+    process(pair);
   }
 }
 
 void FrontEndNodelet::process(const ImagePair& pair) {
-  FrameInput input{pair.t, pair.gray, pair.depth};
-  if (depth_camera_ && !input.depth.empty()) {
-    input.depth = registerDepth(pair.depth, *depth_camera_, *color_camera_, sensor_.T_color_depth.matrix());
-  }
   std::string size_problem;
-  if (!input.depth.empty() && input.depth.size() != input.gray.size()) {
-    char words[240];
-    std::snprintf(words, sizeof words,
-                  "%s is %dx%d, %s is %dx%d: depth is not used; switch on the driver's registration",
-                  sensor_.topics.depth.c_str(), input.depth.cols, input.depth.rows, sensor_.topics.color.c_str(),
-                  input.gray.cols, input.gray.rows);
-    size_problem = words;
-    NODELET_WARN_THROTTLE(10, "%s", words);
-  }
+  const FrameInput input{pair.t, pair.gray, alignment_->align(pair.depth, pair.gray.size(), &size_problem)};
+  if (!size_problem.empty()) NODELET_WARN_THROTTLE(10, "%s", size_problem.c_str());
+  const ros::Time stamp = ros::Time().fromNSec(pair.stamp);
   const ros::WallTime begin = ros::WallTime::now();
   bool posed = false;
   const FrameOutput output = front_end_->process(input, [&](const TrackedFrame& frame) {
-    publishPose(frame);
+    publishPose(stamp, frame);
     posed = true;
   });
-  if (!posed) publishPose(*output.frame);
+  if (!posed) publishPose(stamp, *output.frame);
   const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
   publish(pair, output, milliseconds);
 

@@ -17,6 +17,7 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
+#include <std_msgs/Header.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
@@ -24,6 +25,8 @@
 #include <vip_slam_msgs/MapUpdate.h>
 
 #include "calibration_source.h"
+#include "depth_alignment.h"
+#include "gyro_history.h"
 #include "odometry_messages.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/FrontEndConfig.h"
@@ -46,7 +49,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void subscribe();
 
   // In the callback threads: decoding, watching, handing over.
-  void onColor(double t, const std::string& frame_id, const std::function<cv::Mat()>& decode);
+  void onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode);
   void onDepth(double t, const std::function<cv::Mat()>& decode);
   void onImu(const sensor_msgs::ImuConstPtr& msg);
   void onGyro(const sensor_msgs::ImuConstPtr& msg);
@@ -66,9 +69,11 @@ class FrontEndNodelet : public nodelet::Nodelet {
   bool noticeTime(double t, Stream stream);  ///< false: leave the message out
   void startWhenCalibrated();
   void processReady();
+  /// How far the streams have gone on since an image at `t`, each by its own clock; seconds.
+  double waitedFor(double t) const;
   void process(const ImagePair& pair);
   /// Odometry and tf of a frame that has a pose.
-  void publishPose(const TrackedFrame& frame);
+  void publishPose(const ros::Time& stamp, const TrackedFrame& frame);
   void publish(const ImagePair& pair, const FrameOutput& output, double milliseconds);
   void publishFeatureImage(const ImagePair& pair, const TrackedFrame& frame);
   void publishImuRate(double t);
@@ -93,11 +98,13 @@ class FrontEndNodelet : public nodelet::Nodelet {
 
   // Owned by the thread.
   std::unique_ptr<FrontEnd> front_end_;
-  std::shared_ptr<const CameraModel> color_camera_, depth_camera_;
+  std::unique_ptr<DepthAlignment> alignment_;
   std::unique_ptr<ImagePairer> pairer_;
   std::deque<std::function<void()>> early_;  ///< IMU samples before the calibration is complete
   std::unique_ptr<StreamClock> clock_;
-  Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();
+  GyroHistory gyro_;
+  double posed_imu_t_ = -1e300;               ///< of the newest image with a pose
+  double predicted_imu_t_ = -1e300;           ///< of the newest prediction between images
   Matrix15d covariance_ = Matrix15d::Zero();  ///< of the newest image; predictions between images carry it
   bool paused_ = false;
   double last_feature_image_ = -1e300;

@@ -24,23 +24,28 @@ double gyroSigma(const SensorConfig& sensor) {
 
 }  // namespace
 
-void FrontEndNodelet::publishPose(const TrackedFrame& frame) {
+void FrontEndNodelet::publishPose(const ros::Time& stamp, const TrackedFrame& frame) {
   covariance_ = frame.covariance;
   if (!hasPose(frame)) return;
+  posed_imu_t_ = frame.state.t;
   // A message that is published is shared with all receivers and never changed again.
   auto odometry = boost::make_shared<nav_msgs::Odometry>(
-      toOdometry(frame.t, frame.state, frame.covariance, gyro_, gyroSigma(sensor_), frames_));
+      toOdometry(stamp, frame.state, frame.covariance, gyro_.at(frame.state.t), gyroSigma(sensor_), frames_));
   if (publish_tf_) tf_broadcaster_->sendTransform(toTransform(*odometry));
   odometry_pub_.publish(odometry);
 }
 
 void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, double milliseconds) {
   const TrackedFrame& frame = *output.frame;
+  const ros::Time stamp = ros::Time().fromNSec(pair.stamp);
   // Planes and back end get the keyframe before the frame that belongs to it, as in the offline runner.
   if (output.keyframe) {
-    keyframe_pub_.publish(boost::make_shared<vip_slam_msgs::Keyframe>(toMsg(*output.keyframe, frames_.odom)));
+    auto keyframe = boost::make_shared<vip_slam_msgs::Keyframe>(toMsg(*output.keyframe, frames_.odom));
+    keyframe->frame.header.stamp = stamp;
+    keyframe_pub_.publish(keyframe);
   }
   auto tracked = boost::make_shared<vip_slam_msgs::TrackedFrame>(toMsg(frame, frames_.odom));
+  tracked->header.stamp = stamp;
   tracked->processing_ms = milliseconds;
   frame_pub_.publish(tracked);
   status_pub_.publish(boost::make_shared<vip_slam_msgs::TrackingStatus>(toMsg(frame.status)));
@@ -53,7 +58,7 @@ void FrontEndNodelet::publishFeatureImage(const ImagePair& pair, const TrackedFr
   last_feature_image_ = pair.t;
   const cv::Mat picture = drawFeatureImage(pair.gray, frame);
   auto image = boost::make_shared<sensor_msgs::Image>();
-  image->header.stamp = toStamp(pair.t);
+  image->header.stamp.fromNSec(pair.stamp);
   image->header.frame_id = calibration_->colorFrame();
   image->width = std::uint32_t(picture.cols);
   image->height = std::uint32_t(picture.rows);
@@ -64,11 +69,16 @@ void FrontEndNodelet::publishFeatureImage(const ImagePair& pair, const TrackedFr
 }
 
 void FrontEndNodelet::publishImuRate(double t) {
-  if (imu_rate_pub_.getNumSubscribers() == 0) return;
-  if (const auto state = front_end_->predict(t)) {
-    imu_rate_pub_.publish(boost::make_shared<nav_msgs::Odometry>(
-        toOdometry(t - sensor_.time_offset, *state, covariance_, gyro_, gyroSigma(sensor_), frames_)));
-  }
+  // Each prediction integrates from the newest image on: without images it would cost more and more, and mean less.
+  constexpr double kLongestPrediction = 1.0;  // seconds
+  if (imu_rate_pub_.getNumSubscribers() == 0 || t - posed_imu_t_ > kLongestPrediction) return;
+  const auto state = front_end_->predict(t);
+  // With a separate accelerometer the state may lag behind the gyro's sample.
+  if (!state || state->t <= predicted_imu_t_) return;
+  predicted_imu_t_ = state->t;
+  imu_rate_pub_.publish(
+      boost::make_shared<nav_msgs::Odometry>(toOdometry(toStamp(state->t - front_end_->timeOffset()), *state,
+                                                        covariance_, gyro_.at(state->t), gyroSigma(sensor_), frames_)));
 }
 
 void FrontEndNodelet::publishCalibration() {

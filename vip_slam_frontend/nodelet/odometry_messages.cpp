@@ -4,8 +4,8 @@
 
 namespace vip_slam {
 
-nav_msgs::Odometry toOdometry(double t, const NavState& state, const Matrix15d& covariance, const Eigen::Vector3d& gyro,
-                              double gyro_sigma, const OdometryFrames& frames) {
+nav_msgs::Odometry toOdometry(const ros::Time& stamp, const NavState& state, const Matrix15d& covariance,
+                              const Eigen::Vector3d& gyro, double gyro_sigma, const OdometryFrames& frames) {
   const SE3 T_imu_base = frames.T_base_imu.inverse();
   const SE3 T_odom_base = state.T_W_I * T_imu_base;
   const Eigen::Matrix3d R_odom_imu = state.T_W_I.R(), R_base_imu = frames.T_base_imu.R();
@@ -13,7 +13,7 @@ nav_msgs::Odometry toOdometry(double t, const NavState& state, const Matrix15d& 
   const Eigen::Vector3d rate = gyro - state.bias_gyro;
 
   nav_msgs::Odometry msg;
-  msg.header.stamp = toStamp(t);
+  msg.header.stamp = stamp;
   msg.header.frame_id = frames.odom;
   msg.child_frame_id = frames.base;
   msg.pose.pose = toPoseMsg(T_odom_base);

@@ -18,8 +18,8 @@ struct OdometryFrames {
 
 /// `gyro`: measured rate in the IMU frame, rad/s (the bias of the state is taken off); `gyro_sigma`: its noise, rad/s.
 /// Covariances follow ROS: pose (x, y, z, rotation about the fixed axes of odom), twist (linear, angular) in base_link.
-nav_msgs::Odometry toOdometry(double t, const NavState& state, const Matrix15d& covariance, const Eigen::Vector3d& gyro,
-                              double gyro_sigma, const OdometryFrames& frames);
+nav_msgs::Odometry toOdometry(const ros::Time& stamp, const NavState& state, const Matrix15d& covariance,
+                              const Eigen::Vector3d& gyro, double gyro_sigma, const OdometryFrames& frames);
 
 geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry);
 

@@ -16,7 +16,7 @@ class OdometryMessage : public ::testing::Test {
     frames_.T_base_imu = SE3(expQuaternion({0.1, 0.7, -0.4}), {0.2, -0.1, 0.3});
   }
   nav_msgs::Odometry message(const NavState& state) const {
-    return toOdometry(1, state, Matrix15d::Zero(), gyro_, 0, frames_);
+    return toOdometry(ros::Time(1), state, Matrix15d::Zero(), gyro_, 0, frames_);
   }
   /// (position, rotation in odom axes) of b relative to a, and the twist's difference.
   Eigen::Matrix<double, 12, 1> difference(const nav_msgs::Odometry& a, const nav_msgs::Odometry& b) const {
@@ -43,6 +43,13 @@ class OdometryMessage : public ::testing::Test {
   OdometryFrames frames_;
 };
 
+TEST_F(OdometryMessage, TheStampIsExact) {
+  const ros::Time stamp(1700000000, 123456789);  // no double is equal to it
+  const auto msg = toOdometry(stamp, state_, Matrix15d::Zero(), gyro_, 0, frames_);
+  EXPECT_EQ(msg.header.stamp, stamp);
+  EXPECT_EQ(toTransform(msg).header.stamp, stamp);
+}
+
 TEST_F(OdometryMessage, PoseIsThatOfTheBase) {
   const SE3 T = fromMsg(message(state_).pose.pose);
   EXPECT_LT(T.boxminus(state_.T_W_I * frames_.T_base_imu.inverse()).norm(), 1e-12);
@@ -68,7 +75,7 @@ TEST_F(OdometryMessage, CovarianceIsPropagated) {
   }
   Matrix15d A = Matrix15d::Random();
   const Matrix15d P = A * A.transpose();
-  const auto msg = toOdometry(1, state_, P, gyro_, 0, frames_);
+  const auto msg = toOdometry(ros::Time(1), state_, P, gyro_, 0, frames_);
   const Eigen::Matrix<double, 12, 12> expected = J * P * J.transpose();
   using Row6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
   const Row6 pose = Eigen::Map<const Row6>(msg.pose.covariance.data());
