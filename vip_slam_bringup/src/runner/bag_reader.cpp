@@ -72,7 +72,7 @@ double stampOf(const rosbag::MessageInstance& message) {
 struct BagReader::Source {
   rosbag::Bag bag;
   ros::Time begin, end;
-  std::shared_ptr<const CameraModel> color_camera, depth_camera;  // only for depth that is not registered
+  std::unique_ptr<const DepthRegistration> registration;  // only for depth that is not registered
 
   void open(const std::string& path) {
     openBag(path, &bag);
@@ -122,8 +122,8 @@ BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagRea
     if (!sensor.depth_registered) sensor.depth_camera = source_->cameraInfo(sensor.topics.depth_info);
   }
   if (!sensor.depth_registered) {
-    source_->color_camera = makeCamera(sensor.camera);
-    source_->depth_camera = makeCamera(sensor.depth_camera);
+    source_->registration = std::make_unique<DepthRegistration>(
+        makeCamera(sensor.depth_camera), makeCamera(sensor.camera), sensor.T_color_depth.matrix());
   }
 
   rosbag::View all(source_->bag);
@@ -229,9 +229,7 @@ void BagReader::read() {
     } else if (topic == topics.depth) {
       decode(message, [&] {
         cv::Mat depth = metres(message, sensor_.depth_scale);
-        if (source_->depth_camera) {
-          depth = registerDepth(depth, *source_->depth_camera, *source_->color_camera, sensor_.T_color_depth.matrix());
-        }
+        if (source_->registration) depth = (*source_->registration)(depth);
         compareSizes(depth);
         ++depth_images;
         without_any += holdsNoDepth(depth, sensor_.depth_noise);

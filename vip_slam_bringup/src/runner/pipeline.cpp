@@ -31,27 +31,29 @@ void Pipeline::loadMap(const std::string& path, bool localise) {
 }
 
 void Pipeline::add(const SensorEvent& event) {
-  double t = newest_;
   if (const auto* imu = std::get_if<ImuSample>(&event)) {
     front_end_->addImu(*imu);
-    t = imu->t;
+    newest_imu_ = std::max(newest_imu_, imu->t);
   } else if (const auto* gyro = std::get_if<GyroSample>(&event)) {
     front_end_->addGyro(gyro->t, gyro->gyro);
-    t = gyro->t;
+    newest_imu_ = std::max(newest_imu_, gyro->t);
   } else if (const auto* accel = std::get_if<AccelSample>(&event)) {
     front_end_->addAccel(accel->t, accel->accel);
-    t = accel->t;
+    newest_imu_ = std::max(newest_imu_, accel->t);
   } else {
     waiting_.push_back(std::get<ImagePair>(event));
-    t = waiting_.back().t;
+    newest_image_ = std::max(newest_image_, waiting_.back().t);
   }
-  newest_ = std::max(newest_, t);
   processReady();
+}
+
+double Pipeline::waitedFor(double t) const {
+  return std::max(newest_image_ - t, newest_imu_ - (t + front_end_->timeOffset()));
 }
 
 void Pipeline::processReady() {
   while (!waiting_.empty() &&
-         (front_end_->ready(waiting_.front().t) || newest_ - waiting_.front().t > options_.imu_patience)) {
+         (front_end_->ready(waiting_.front().t) || waitedFor(waiting_.front().t) > options_.imu_patience)) {
     process(waiting_.front());
     waiting_.pop_front();
   }

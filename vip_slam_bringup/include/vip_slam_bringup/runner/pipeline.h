@@ -63,6 +63,8 @@ class Pipeline {
   void applyAnswers(std::size_t image);
   void process(const ImagePair& pair);
   void processReady();
+  /// How far the data has gone on since an image at `t`, seconds.
+  double waitedFor(double t) const;
 
   const PipelineOptions options_;
   std::unique_ptr<FrontEnd> front_end_;
@@ -71,8 +73,8 @@ class Pipeline {
   std::deque<Answer> answers_;
   SE3 T_map_odom_;
   std::uint32_t epoch_ = 0;
-  bool placed_ = false;  ///< T_map_odom_ is known for epoch_
-  double newest_ = -1e300;
+  bool placed_ = false;                                 ///< T_map_odom_ is known for epoch_
+  double newest_image_ = -1e300, newest_imu_ = -1e300;  ///< stamps, each by its own clock
   std::size_t images_ = 0;
   std::vector<OdometryPose> odometry_;
   std::vector<OdometryCovariance> covariances_;
