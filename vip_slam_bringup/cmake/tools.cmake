@@ -65,6 +65,9 @@ if(CATKIN_ENABLE_TESTING)
     target_compile_definitions(test_${thing} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
   endforeach()
 
+  catkin_add_gtest(test_pipeline test/test_pipeline.cpp)
+  target_link_libraries(test_pipeline vip_slam_bringup vip_slam_runner gtest_main)
+
   catkin_add_gtest(test_documents test/test_documents.cpp)
   target_link_libraries(test_documents vip_slam_bringup)
   target_compile_definitions(test_documents PRIVATE ROOT="${CMAKE_CURRENT_SOURCE_DIR}/..")
