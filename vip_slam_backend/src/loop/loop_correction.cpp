@@ -16,11 +16,6 @@ namespace {
 
 constexpr int kFusedNeighbours = 8;
 
-// The yaw and position part of a correction: tilt belongs to the IMU.
-SE3 levelled(const SE3& T) {
-  return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yawOf(T.rotation()), Eigen::Vector3d::UnitZ())), T.t());
-}
-
 // Information of the relative pose, never better than the floor.
 Matrix6d loopSqrtInformation(const PlaceVerification& place, const SE3& T_I_C, const PoseGraphOptions& options) {
   Matrix6d covariance = Matrix6d::Zero();
@@ -67,7 +62,8 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
   const SE3 T_match_query = map.keyframe(place.match).state.T_W_I.inverse() * place.T_W_I;
   event.T_match_query = T_match_query;
   if (!place.accepted) return event;
-  const SE3 correction = levelled(place.T_W_I * kf.state.T_W_I.inverse());
+  // Turns about the keyframe, not about the map's origin: far from there the least tilt would shift its planes.
+  const SE3 correction = alignLevelled(place.T_W_I, kf.state.T_W_I);
   char text[160];
 
   // Planes of the two ends must be the same or different, but not shifted copies. The newest keyframe's planes come

@@ -74,15 +74,19 @@ class RingWorld {
   }
 
   /// A walk from angle 0 to `turns` times round, two keyframes a second; position and yaw drift by `drift` metres and
-  /// radians over the walk. Tracks of the second round are new landmarks.
-  void walk(Map& map, double turns, double drift, std::vector<SE3>* truths) {
+  /// radians over the walk. Tracks of the second round are new landmarks. The map has the ring's centre at `centre`;
+  /// what is estimated tips over by `tilt` radians.
+  void walk(Map& map, double turns, double drift, std::vector<SE3>* truths,
+            const Eigen::Vector3d& centre = Eigen::Vector3d::Zero(), double tilt = 0) {
+    const SE3 T_map_ring(Eigen::Quaterniond::Identity(), centre);
     const int n = static_cast<int>(turns * 90);
     for (int k = 0; k < n; ++k) {
       const double angle = 2 * M_PI * k / 90, s = static_cast<double>(k) / n;
       const SE3 T = truth(angle);
-      const SE3 error(Eigen::Quaterniond(Eigen::AngleAxisd(0.15 * drift * s, Eigen::Vector3d::UnitZ())),
+      const SE3 error(Eigen::Quaterniond(Eigen::AngleAxisd(0.15 * drift * s, Eigen::Vector3d::UnitZ()) *
+                                         Eigen::AngleAxisd(tilt * s, Eigen::Vector3d::UnitY())),
                       drift * s * Eigen::Vector3d(0.8, -0.5, 0.2));
-      const SE3 estimate = error * T;
+      const SE3 estimate = T_map_ring * error * T;
       KeyframePtr kf = see(k + 1, 100 + 0.5 * k, T, estimate, k < 80 ? 0 : 100000);
       auto linked = std::make_shared<Keyframe>(*kf);
       linked->previous = k;
@@ -99,6 +103,35 @@ class RingWorld {
                           o);
       }
       truths->push_back(T);
+    }
+  }
+
+  /// Each keyframe of a walk sees the floor before it; from keyframe `second` on that is held to be another plane.
+  void addFloors(Map& map, const std::vector<SE3>& truths, KeyframeId second) {
+    const Plane floor(Eigen::Vector3d::UnitZ(), 0);
+    for (std::size_t k = 0; k < truths.size(); ++k) {
+      const MapKeyframe& kf = map.keyframe(k + 1);
+      PlaneObservation seen;
+      seen.keyframe = kf.id();
+      seen.plane = kf.id() < second ? 1 : 2;
+      if (!map.hasPlane(seen.plane)) {
+        PlaneEstimate estimate;
+        estimate.id = seen.plane;
+        estimate.kind = PlaneKind::kHorizontal;
+        estimate.plane = transformPlane(kf.state.T_W_I * truths[k].inverse(), floor);
+        map.setPlane(estimate);
+      }
+      const SE3 T_C_W = (truths[k] * T_I_C()).inverse();
+      for (int p = 0; p < 30; ++p) {
+        PlanePoint point;
+        point.sigma = 0.01f;
+        const Eigen::Vector3d ahead = truths[k] * Eigen::Vector3d(2 + 0.2 * (p % 6), 0.2 * (p / 6) - 0.4, -1.5);
+        point.p_C = (T_C_W * ahead).cast<float>();
+        const Eigen::Vector4d x = point.p_C.cast<double>().homogeneous();
+        seen.G += x * x.transpose() / (point.sigma * point.sigma);
+        seen.points.push_back(point);
+      }
+      map.setPlaneObservation(seen);
     }
   }
 

@@ -42,6 +42,24 @@ TEST(LoopCloser, ClosesTheRingAndRemovesTheDrift) {
   }
 }
 
+TEST(LoopCloser, ALittleTiltMattersNoMoreFarFromTheOrigin) {
+  std::vector<std::size_t> closed;
+  for (const double away : {0.0, 100.0}) {
+    RingWorld world;
+    Map map;
+    std::vector<SE3> truth;
+    world.walk(map, 1.1, 0.1, &truth, Eigen::Vector3d(away, 0, 0), 0.2 * M_PI / 180);
+    world.addFloors(map, truth, 60);
+    LoopCloser closer(LoopOptions(), world.camera());
+    const auto loops = closeAll(closer, map);
+    ASSERT_FALSE(loops.empty()) << away << " m away";
+    EXPECT_NE(loops.back().reason.find("1 planes agree"), std::string::npos) << loops.back().reason;
+    EXPECT_EQ(checkMap(map), "");
+    closed.push_back(loops.size());
+  }
+  EXPECT_EQ(closed[0], closed[1]);
+}
+
 TEST(LoopCloser, NothingToCloseOnAWayWithoutReturn) {
   RingWorld world;
   Map map;
