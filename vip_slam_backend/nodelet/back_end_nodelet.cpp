@@ -99,6 +99,7 @@ void BackEndNodelet::onReconfigure(vip_slam_backend::BackEndConfig& config) {
 }
 
 void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
+  barrier_.see(frame.header.stamp.toSec(), frame.epoch);
   const auto state = TrackingState(frame.status.state);
   if (state != TrackingState::kTracking && state != TrackingState::kDegraded) return;
   const double t = frame.header.stamp.toSec();
@@ -130,7 +131,9 @@ void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {
 }
 
 void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
-  if (!back_end_ || msg.frame.header.stamp.toSec() < ignore_before_) return;
+  const double t = msg.frame.header.stamp.toSec();
+  barrier_.see(t, msg.frame.epoch);
+  if (!back_end_ || !barrier_.passes(t, msg.frame.epoch)) return;
   const auto keyframe = std::make_shared<const Keyframe>(fromMsg(msg));
   display_.addKeyframe(*keyframe);
   const ros::WallTime begin = ros::WallTime::now();

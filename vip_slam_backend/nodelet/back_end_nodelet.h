@@ -25,6 +25,7 @@
 
 #include "map_display.h"
 #include "pose_in_map.h"
+#include "reset_barrier.h"
 #include "vip_slam_backend/BackEndConfig.h"
 #include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/back_end_node_options.h"
@@ -74,13 +75,13 @@ class BackEndNodelet : public nodelet::Nodelet {
   BackEndNodeOptions options_;
   SensorConfig sensor_;
   PoseInMap pose_;
+  ResetBarrier barrier_;
 
   // Owned by the thread.
   std::unique_ptr<BackEnd> back_end_;
   MapDisplay display_;
   double last_display_ = -1e300;
-  double ignore_before_ = -1e300;  ///< stamp of the last reset
-  bool adjusting_ = false;         ///< a global adjustment is under way
+  bool adjusting_ = false;  ///< a global adjustment is under way
   std::thread adjustment_;
 
   mutable std::mutex shown_mutex_;

@@ -122,11 +122,11 @@ std::string BackEndNodelet::reset(bool keep_map) {
     return "the odometry starts anew, the map stays";
   }
   // Keyframes that are still on their way belong to what is forgotten.
-  ignore_before_ = ros::Time::now().toSec();
+  barrier_.raise();
   if (back_end_) back_end_->reset();
   display_.clear();
   pose_.clear();
-  publishDisplay(ignore_before_, true);
+  publishDisplay(barrier_.newest(), true);
   command(vip_slam_msgs::Control::RESET);
   return "map and odometry start anew";
 }

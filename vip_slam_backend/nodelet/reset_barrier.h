@@ -1,0 +1,50 @@
+// Keeps what was seen before a reset out of the new map. Sensor stamps are compared with sensor stamps only: their
+// clock may be another than ROS time's.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <mutex>
+
+namespace vip_slam {
+
+/// Thread-safe: frames come in at image rate beside the owner of the map.
+class ResetBarrier {
+ public:
+  /// A frame or keyframe came in.
+  void see(double t, std::uint32_t epoch) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    t_ = std::max(t_, t);
+    epoch_ = std::max(epoch_, epoch);
+    seen_ = true;
+  }
+
+  /// Puts the barrier after all that was seen so far.
+  void raise() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    raised_ = seen_;
+    barrier_t_ = t_;
+    barrier_epoch_ = epoch_;
+  }
+
+  /// True for what is later than the barrier. A later epoch of the odometry is, whatever its stamps, and lifts it:
+  /// device time may begin anew.
+  bool passes(double t, std::uint32_t epoch) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (raised_ && epoch > barrier_epoch_) raised_ = false;
+    return !raised_ || t > barrier_t_;
+  }
+
+  double newest() const {  ///< stamp; 0 before the first
+    std::lock_guard<std::mutex> lock(mutex_);
+    return seen_ ? t_ : 0.0;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  bool seen_ = false, raised_ = false;
+  double t_ = -1e300, barrier_t_ = 0;
+  std::uint32_t epoch_ = 0, barrier_epoch_ = 0;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,37 @@
+#include <gtest/gtest.h>
+
+#include "../nodelet/reset_barrier.h"
+
+namespace vip_slam {
+namespace {
+
+TEST(ResetBarrier, HoldsBackWhatWasOnItsWay) {
+  ResetBarrier barrier;
+  EXPECT_TRUE(barrier.passes(0.5, 0));
+  barrier.see(12.0, 0);  // device time: seconds since power-up
+  barrier.see(11.5, 0);  // keyframes come after later frames
+  EXPECT_EQ(barrier.newest(), 12.0);
+  barrier.raise();
+  EXPECT_FALSE(barrier.passes(11.5, 0));
+  EXPECT_FALSE(barrier.passes(12.0, 0));
+  EXPECT_TRUE(barrier.passes(12.1, 0));
+}
+
+TEST(ResetBarrier, ALaterEpochLiftsIt) {
+  ResetBarrier barrier;
+  barrier.see(12.0, 3);
+  barrier.raise();
+  EXPECT_FALSE(barrier.passes(0.1, 3));
+  EXPECT_TRUE(barrier.passes(0.1, 4));  // the device's clock began anew
+  EXPECT_TRUE(barrier.passes(0.2, 4));
+}
+
+TEST(ResetBarrier, AResetBeforeAnythingCameHoldsNothingBack) {
+  ResetBarrier barrier;
+  barrier.raise();
+  EXPECT_EQ(barrier.newest(), 0.0);
+  EXPECT_TRUE(barrier.passes(-5.0, 0));
+}
+
+}  // namespace
+}  // namespace vip_slam
