@@ -1,4 +1,6 @@
 // Loop closing within the back end.
+#include <cmath>
+
 #include "back_end_impl.h"
 
 namespace vip_slam {
@@ -27,7 +29,7 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
     const bool far =
         moved.t().norm() > 0.02 || before.rotation().angularDistance(map.keyframe(id).state.T_W_I.rotation()) > 0.005;
     if (far) ++correction;  // small ones may follow each other faster than an adjustment takes: they leave it valid
-    if (far || t - last_global > kRestSeconds) {
+    if (far || std::abs(t - last_global) > kRestSeconds) {  // stamps run back where a bag starts over
       global_wanted = true;
       last_global = t;
     }
