@@ -85,6 +85,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
 
 void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
   if (localisation_only && !map.empty()) return;  // the map stays as it is
+  if (update.revision < first_revision) return;   // of a map that was forgotten or replaced meanwhile
   const ScopedTimer timer(log, "backend.planes", update.t);
   for (const PlaneMerge& merge : update.merges) map.mergePlanes(merge.from, merge.into);
   for (const PlaneId id : update.removed) map.removePlane(id);
@@ -147,6 +148,7 @@ void BackEnd::Impl::reset() {
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;
+  first_revision = revision + 1;
   ++correction;
   global_wanted = false;
   last_global = -1e300;

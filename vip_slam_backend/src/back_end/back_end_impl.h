@@ -80,6 +80,7 @@ struct BackEnd::Impl {
   SE3 T_map_odom;
   std::uint32_t epoch = 0;
   std::uint64_t revision = 0;
+  std::uint64_t first_revision = 0;  ///< of the map as it is since the last reset; older ones speak of another
   /// Counts loop corrections, loaded maps and resets: a global adjustment of the map before one must not undo it.
   std::uint64_t correction = 0;
   bool global_wanted = false;

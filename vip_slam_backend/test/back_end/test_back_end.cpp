@@ -192,58 +192,6 @@ TEST(BackEnd, GlobalAdjustmentMergesWithWhatCameMeanwhile) {
   EXPECT_LT((update.T_map_odom * newest.data->frame.state.T_W_I).boxminus(newest.state.T_W_I).norm(), 1e-9);
 }
 
-TEST(BackEnd, GlobalAdjustmentOfAMapThatIsNoMoreIsDropped) {
-  SimulatedKeyframes world(3), other(9);
-  BackEnd back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
-  const GbaResult late = back_end.run(back_end.startGlobalBa());
-  back_end.reset();
-  for (int k = 0; k < 6; ++k) back_end.addKeyframe(other.next());
-  const SE3 before = back_end.map().keyframe(3).state.T_W_I;
-  const MapUpdate update = back_end.merge(late);
-  EXPECT_FALSE(update.global);
-  EXPECT_TRUE(back_end.globalBaWanted());
-  EXPECT_EQ(back_end.map().keyframe(3).state.T_W_I.boxminus(before).norm(), 0.0);
-  EXPECT_EQ(checkMap(back_end.map()), "");
-}
-
-TEST(BackEnd, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
-  const std::string path = ::testing::TempDir() + "localisation_only.vsm";
-  SimulatedKeyframes world(4), session(4);
-  BackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 25; ++k) {
-    mapper.addKeyframe(world.next());
-    mapper.applyPlaneUpdate(world.planes());
-  }
-  mapper.finish();
-  mapper.saveMap(path);
-
-  back_end.loadMap(path);
-  back_end.setLocalisationMode(true);
-  EXPECT_TRUE(back_end.snapshot().localised.empty());
-  // The same walk in an odometry that began elsewhere and looks elsewhere.
-  const SE3 T_other_odom(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {7, -3, 1});
-  std::vector<OdometryPose> odometry;
-  for (int k = 0; k < 25; ++k) {
-    auto kf = std::make_shared<Keyframe>(*session.next());
-    kf->id += 1000;
-    kf->previous = kf->id - 1;
-    kf->frame.state.T_W_I = T_other_odom * kf->frame.state.T_W_I;
-    odometry.push_back({kf->frame.t, kf->frame.epoch, kf->frame.state.T_W_I});
-    back_end.addKeyframe(kf);
-  }
-  back_end.finish();
-  const MapSnapshot snapshot = back_end.snapshot();
-  EXPECT_EQ(snapshot.keyframes.size(), mapper.snapshot().keyframes.size());
-  ASSERT_GT(snapshot.localised.size(), 15u);
-  const Trajectory trajectory = anchorTrajectory(odometry, anchorsOf(snapshot));
-  ASSERT_EQ(trajectory.size(), odometry.size());
-  for (const auto& pose : trajectory)
-    EXPECT_LT((pose.T_W_B.t() - world.truth(pose.t).T_W_I.t()).norm(), 0.03) << "at " << pose.t;
-  back_end.reset();
-  EXPECT_TRUE(back_end.snapshot().localised.empty());
-}
-
 TEST(BackEnd, BadInputIsRefusedByName) {
   SimulatedKeyframes world(5);
   BackEnd back_end(options("vip"), world.sensor());
