@@ -52,6 +52,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   const double t = keyframe ? keyframe->frame.t : 0.0;
   const ScopedTimer timer(log, "backend.keyframe", t);
   MapUpdate update = beginUpdate(t);
+  bool entering = false;
   try {
     if (!keyframe) throw MapError("no keyframe given");
     const std::string bad = validateKeyframe(*keyframe);
@@ -65,6 +66,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (keyframe->id <= map.newestKeyframe())
       throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
                      std::to_string(map.newestKeyframe()) + " of the map");
+    entering = searching;
     if (searching && !enterLoadedMap(keyframe)) {
       finishUpdate(&update);
       return update;
@@ -79,6 +81,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   localBundleAdjustment(t, &update);
   cull(&update);
   closeLoop(&update);
+  if (entering) fillGlobal(&update);  // nobody knows yet where the keyframes lie that waited for this one
   finishUpdate(&update);
   return update;
 }

@@ -1,6 +1,7 @@
 // State of the back end, shared by the files that implement its parts.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <set>
 #include <string>
@@ -74,7 +75,7 @@ struct BackEnd::Impl {
   Relocaliser relocaliser;
   bool searching = false;  ///< a loaded map is not recognised yet
   bool localisation_only = false;
-  std::vector<KeyframePtr> held;  ///< keyframes that wait for that
+  std::deque<KeyframePtr> held;   ///< keyframes that wait for that
   std::vector<Anchor> localised;  ///< keyframes found in the map without entering it
 
   SE3 T_map_odom;

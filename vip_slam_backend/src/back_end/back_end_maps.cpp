@@ -51,17 +51,22 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found
 bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
   if (!findInMap(keyframe, &found)) {
-    if (held.size() < kMostHeld) held.push_back(keyframe);
+    held.push_back(keyframe);
+    if (held.size() > kMostHeld) held.pop_front();
     return false;
   }
   searching = false;
   epoch = keyframe->frame.epoch;
   T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
   // What was seen before the map was recognised belongs to it as well, as far as the odometry did not start anew since.
-  std::vector<KeyframePtr> before;
+  std::deque<KeyframePtr> before;
   before.swap(held);
-  for (const KeyframePtr& kf : before)
-    if (kf->frame.epoch == epoch && kf->id < keyframe->id) insert(kf);
+  for (const KeyframePtr& kf : before) {
+    if (kf->frame.epoch != epoch || kf->id >= keyframe->id) continue;
+    insert(kf);
+    loop_closer.add(map, kf->id);
+    global_wanted = true;  // most of them lie beyond the local window
+  }
   T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
   insert(keyframe);
   loop_closer.tie(map, keyframe->id, found.match);

@@ -68,6 +68,37 @@ TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   EXPECT_EQ(back_end.map().planes().size(), world.walls().size());
 }
 
+TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
+  const std::string path = ::testing::TempDir() + "waited_for.vsm";
+  SimulatedKeyframes world(4), session(4);
+  BackEnd mapper(options(), world.sensor()), back_end(options(), world.sensor());
+  for (int k = 0; k < 25; ++k) {
+    mapper.addKeyframe(world.next());
+    mapper.applyPlaneUpdate(world.planes());
+  }
+  mapper.saveMap(path);
+  back_end.loadMap(path);
+  const std::size_t loaded = back_end.map().keyframes().size();
+  MapUpdate update;
+  int waited = 0;
+  for (int k = 0; k < 25 && back_end.map().keyframes().size() == loaded; ++k, ++waited) {
+    auto kf = std::make_shared<Keyframe>(*session.next());
+    kf->id += 1000;
+    kf->previous = k == 0 ? 0 : kf->id - 1;
+    if (k < 15)
+      for (Feature& f : kf->frame.features) f.descriptor.fill(0x55);  // nothing looks as it did
+    EXPECT_FALSE(back_end.globalBaWanted());
+    update = back_end.addKeyframe(kf);
+    EXPECT_EQ(back_end.lastRefusal(), "");
+  }
+  ASSERT_GT(waited, 15);
+  EXPECT_GT(back_end.map().keyframes().size(), loaded + 15);
+  EXPECT_EQ(checkMap(back_end.map()), "");
+  EXPECT_TRUE(update.global);
+  EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
+  EXPECT_TRUE(back_end.globalBaWanted());
+}
+
 TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   const std::string path = ::testing::TempDir() + "localisation_only.vsm";
   SimulatedKeyframes world(4), session(4);
