@@ -1,8 +1,10 @@
 #include "place_metrics/true_poses.h"
 
 #include <cmath>
+#include <stdexcept>
+#include <vector>
 
-#include <Eigen/Geometry>
+#include "vip_slam_eval/trajectory_metrics.h"
 
 namespace vip_slam {
 
@@ -17,21 +19,14 @@ TruePoses truePoses(const Map& map, const Trajectory& truth) {
 }
 
 SE3 alignMap(const Map& map, const TruePoses& truth) {
-  Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = a;
+  if (truth.empty())
+    throw std::invalid_argument("truth: has no pose at the time of any keyframe, expected at least one");
+  std::vector<PosePair> pairs;
   for (const auto& entry : truth) {
-    a += map.keyframe(entry.first).state.T_W_I.t();
-    b += entry.second.t();
+    const MapKeyframe& kf = map.keyframe(entry.first);
+    pairs.push_back({kf.data->frame.t, entry.second, kf.state.T_W_I});
   }
-  a /= static_cast<double>(truth.size());
-  b /= static_cast<double>(truth.size());
-  double sine = 0, cosine = 0;
-  for (const auto& entry : truth) {
-    const Eigen::Vector3d p = map.keyframe(entry.first).state.T_W_I.t() - a, q = entry.second.t() - b;
-    cosine += p.x() * q.x() + p.y() * q.y();
-    sine += p.x() * q.y() - p.y() * q.x();
-  }
-  const Eigen::Quaterniond R(Eigen::AngleAxisd(std::atan2(sine, cosine), Eigen::Vector3d::UnitZ()));
-  return SE3(R, b - R * a);
+  return align(pairs, Alignment::kYaw);
 }
 
 bool samePlace(const SE3& a, const SE3& b) {

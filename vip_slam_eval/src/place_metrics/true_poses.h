@@ -13,7 +13,8 @@ using TruePoses = std::map<KeyframeId, SE3>;
 /// Keyframes with their true poses (IMU); those outside the truth are left out.
 TruePoses truePoses(const Map& map, const Trajectory& truth);
 
-/// T_truth_map: yaw and position, least squares over keyframes.
+/// T_truth_map: yaw and position, least squares over the positions and orientations of keyframes. Throws
+/// std::invalid_argument when the truth has none of them.
 SE3 alignMap(const Map& map, const TruePoses& truth);
 
 /// Within 2 m and 30 degrees.
