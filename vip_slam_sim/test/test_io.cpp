@@ -142,6 +142,17 @@ TEST(Folder, ReadsBackAsAnRgbdFolderAndKnowsUp) {
   const double angle = std::acos(std::min(1.0, up.dot(want))) * 180 / M_PI;
   std::printf("  up found to %.3f deg\n", angle);
   EXPECT_LT(angle, 0.3);
+  // A camera that is turned upside down half of the time does not say where up is.
+  for (std::size_t k = 0; k < folder.T_W_C.size(); k += 2) {
+    SE3& T = folder.T_W_C[k].T_W_B;
+    T = T * SE3(expQuaternion(Eigen::Vector3d(0, 0, M_PI)), Eigen::Vector3d::Zero());
+  }
+  try {
+    upFromDepth(folder);
+    ADD_FAILURE() << "must be refused";
+  } catch (const std::runtime_error& e) {
+    EXPECT_NE(std::string(e.what()).find("do not agree on which side is up; give --up"), std::string::npos) << e.what();
+  }
 }
 
 TEST(Folder, SevenScenesHaveADepthCameraOfTheirOwn) {

@@ -8,7 +8,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kReach = 8;  ///< px between the points of a normal: bridges the sensor's quantisation
+constexpr int kReach = 8;                ///< px between the points of a normal: bridges the sensor's quantisation
+constexpr double kLeastAgreement = 0.8;  ///< length of the mean of the images' up directions
 
 /// Normals of locally flat patches, in the folder's world.
 void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_D,
@@ -36,12 +37,17 @@ void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3&
 Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> normals;
+  std::size_t posed = 0;
   for (std::size_t i = 0; i < folder.frames.size(); ++i) {
     SE3 T_W_C;
     if (!poseAt(folder.T_W_C, folder.frames[i].t, &T_W_C)) continue;
     up += T_W_C.rotation() * Eigen::Vector3d(0, -1, 0);
+    ++posed;
     if (i % 8 == 0) collectNormals(folder, folder.frames[i], T_W_C * folder.T_color_depth, &normals);
   }
+  // A camera that is rolled or looks at the floor says too little of where up is: a wall could be taken for the floor.
+  if (up.norm() < kLeastAgreement * static_cast<double>(posed))
+    throw std::runtime_error("gravity: the images do not agree on which side is up; give --up X Y Z");
   up.normalize();
   // Cameras are held level only roughly: narrow the cone in steps. A floor and a wall agree on the same direction.
   std::size_t used = 0;
