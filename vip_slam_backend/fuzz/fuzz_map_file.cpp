@@ -21,10 +21,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                                           bytes.size(), "fuzz", vip_slam::ImuNoise());
     if (!vip_slam::checkMap(stored.map).empty()) std::abort();
     // What was read can be written, and read again to the same bytes.
-    const std::string again = vip_slam::serialiseMap(stored.map, stored.loops, stored.vocabulary_id);
+    const std::string again = vip_slam::serialiseMap(stored.map, stored.loops, stored.vocabulary_id, stored.camera);
     const vip_slam::StoredMap twice = vip_slam::parseMap(reinterpret_cast<const std::uint8_t*>(again.data()),
                                                          again.size(), "fuzz", vip_slam::ImuNoise());
-    if (vip_slam::serialiseMap(twice.map, twice.loops, twice.vocabulary_id) != again) std::abort();
+    if (vip_slam::serialiseMap(twice.map, twice.loops, twice.vocabulary_id, twice.camera) != again) std::abort();
   } catch (const std::runtime_error&) {
   }
   return 0;

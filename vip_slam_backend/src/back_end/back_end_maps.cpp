@@ -11,11 +11,12 @@ constexpr std::size_t kMostHeld = 1500;
 }  // namespace
 
 void BackEnd::Impl::saveMap(const std::string& path) const {
-  saveMapFile(path, map, loop_closer.loops(), loop_closer.vocabulary().id());
+  saveMapFile(path, map, loop_closer.loops(), loop_closer.vocabulary().id(), sensor.camera);
 }
 
 MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
-  StoredMap stored = loadMapFile(path, sensor.imu_noise);  // throws before anything is changed
+  StoredMap stored = loadMapFile(path, sensor.imu_noise);  // both throw before anything is changed
+  requireCamera(stored, sensor.camera, path);
   reset();
   map = std::move(stored.map);
   loop_closer.rebuild(map, stored.loops);

@@ -41,6 +41,23 @@ SE3 readPose(ByteReader& in, const char* what) {
   return SE3(Eigen::Quaterniond(q(3), q(0), q(1), q(2)), t);
 }
 
+CameraIntrinsics readCamera(ByteReader& in) {
+  CameraIntrinsics camera;
+  const auto width = in.get<std::uint32_t>("camera"), height = in.get<std::uint32_t>("camera");
+  if (width > 0xFFFF || height > 0xFFFF) in.fail("camera: image is larger than any");
+  camera.width = static_cast<int>(width);
+  camera.height = static_cast<int>(height);
+  for (double* v : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *v = finite(in, "camera");
+  const auto model = in.get<std::uint8_t>("camera model");
+  if (model > 2) in.fail("camera model " + std::to_string(model) + ", expected 0 to 2");
+  camera.model = static_cast<DistortionModel>(model);
+  camera.distortion.resize(in.count(8, "distortion coefficients"));
+  for (double& v : camera.distortion) v = finite(in, "distortion");
+  const std::string problem = camera.validate();
+  if (!problem.empty()) in.fail("camera: " + problem);
+  return camera;
+}
+
 NavState readState(ByteReader& in, const char* what) {
   NavState s;
   s.t = finite(in, what);
@@ -212,6 +229,7 @@ void readLandmark(ByteReader& in, std::uint32_t index, std::vector<MapObservatio
 void readPayload(ByteReader& in, std::uint32_t version, const ImuNoise& noise, StoredMap* stored) {
   Map& map = stored->map;
   stored->vocabulary_id = in.get<std::uint64_t>("vocabulary id");
+  if (version >= 5 && flag(in, "camera flag")) stored->camera = readCamera(in);
   const std::size_t planes = in.count(map_file::kPlaneBytes, "planes");
   for (std::size_t k = 0; k < planes; ++k) readPlane(in, map);
   const std::size_t keyframes = in.count(map_file::kKeyframeBytes, "keyframes");

@@ -34,6 +34,14 @@ void write(ByteWriter& out, const SE3& T) {
   out.vector(T.t());
 }
 
+void write(ByteWriter& out, const CameraIntrinsics& camera) {
+  for (const int v : {camera.width, camera.height}) out.put(static_cast<std::uint32_t>(v));
+  for (const double v : {camera.fx, camera.fy, camera.cx, camera.cy}) out.put(v);
+  out.put(static_cast<std::uint8_t>(camera.model));
+  out.put(static_cast<std::uint32_t>(camera.distortion.size()));
+  for (const double v : camera.distortion) out.put(v);
+}
+
 void write(ByteWriter& out, const NavState& s) {
   out.put(s.t);
   write(out, s.T_W_I);
@@ -150,7 +158,7 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch, Landmark
 }  // namespace
 
 std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
-                         std::uint64_t vocabulary_id) {
+                         std::uint64_t vocabulary_id, const std::optional<CameraIntrinsics>& camera) {
   ByteWriter out;
   out.bytes(map_file::kMagic, 8);
   out.put(map_file::kVersion);
@@ -159,6 +167,8 @@ std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId,
   out.put(std::uint64_t(0));
 
   out.put(vocabulary_id);
+  out.put(static_cast<std::uint8_t>(camera.has_value()));
+  if (camera) write(out, *camera);
   out.put(static_cast<std::uint32_t>(map.planes().size()));
   for (const auto& entry : map.planes()) write(out, entry.second);
 
@@ -199,8 +209,8 @@ std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId,
 }
 
 void saveMapFile(const std::string& path, const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
-                 std::uint64_t vocabulary_id) {
-  const std::string bytes = serialiseMap(map, loops, vocabulary_id);
+                 std::uint64_t vocabulary_id, const std::optional<CameraIntrinsics>& camera) {
+  const std::string bytes = serialiseMap(map, loops, vocabulary_id, camera);
   AtomicFile file(path, true);
   file.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file.commit();

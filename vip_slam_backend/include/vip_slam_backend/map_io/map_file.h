@@ -1,8 +1,9 @@
 // Map files (.vsm): everything a later session needs to relocalise and to go on mapping.
 //
-// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 3 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
-// of all before it. Version 1, without the features' pixel_sigma, and version 2, which does not tell a landmark's
-// tracks apart, are read, too. The payload holds the vocabulary's id, planes, keyframes (state, features with
+// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 5 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
+// of all before it. Version 1, without the features' pixel_sigma, version 2, which does not tell a landmark's tracks
+// apart, version 3, without the odometry's motion, and version 4, without the camera, are read, too. The payload holds
+// the vocabulary's id, the camera, planes, keyframes (state, features with
 // descriptors, depth grid in mm, IMU samples, plane observations), landmarks and loops.
 //
 // A file is the same bytes for the same map: landmarks and epochs are numbered anew in ascending order when written,
@@ -12,11 +13,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/camera/camera_model.h"
 
 namespace vip_slam {
 
@@ -28,17 +31,23 @@ struct StoredMap {
   Map map;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops;  ///< (query, match)
   std::uint64_t vocabulary_id = 0;
+  std::optional<CameraIntrinsics> camera;  ///< of the features and depth grids; older files do not know it
 };
 
 std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
-                         std::uint64_t vocabulary_id);
+                         std::uint64_t vocabulary_id, const std::optional<CameraIntrinsics>& camera = {});
 /// Throws std::runtime_error "source: what, expected what" on anything that is not a whole, undamaged, consistent map
 /// of this version. Allocates no more than a small multiple of `size`.
 StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise);
 
 /// Whole or not at all. Throws std::runtime_error naming the path.
 void saveMapFile(const std::string& path, const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
-                 std::uint64_t vocabulary_id);
+                 std::uint64_t vocabulary_id, const std::optional<CameraIntrinsics>& camera = {});
 StoredMap loadMapFile(const std::string& path, const ImuNoise& noise);
+
+/// Throws std::runtime_error "path: made with ..., but the camera is ..." when places of the map would not be
+/// recognised by `camera`: another image size, or a focal length that differs by more than a per cent. A map that does
+/// not know its camera is taken for one that fits.
+void requireCamera(const StoredMap& stored, const CameraIntrinsics& camera, const std::string& path);
 
 }  // namespace vip_slam
