@@ -13,7 +13,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kUpright = 0.5;  // sine of the angle between a normal and the vertical
-constexpr double kCore = 0.25;    // share of a width that vertices inside must span: four columns have a third
+constexpr double kCore = 0.12;    // share of the width that vertices inside must span; one column of a mesh zigzags
 
 struct Extent {
   double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
@@ -90,7 +90,7 @@ bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>&
 
 bool mayBeAStep(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
                 const Eigen::Vector3d& camera) {
-  constexpr double kSteep = 0.5;              // cosine of the angle at which it is seen
+  constexpr double kSteep = 0.6;              // cosine of the angle at which it is seen
   constexpr double kHiddenStep = 5.0 * 2.45;  // sigmas; the mesh asks for five of a second difference, sqrt(1 + 4 + 1)
   double nearest = std::numeric_limits<double>::infinity(), farthest = 0, facing = 0, sigma = 0;
   for (int i : surface) {
