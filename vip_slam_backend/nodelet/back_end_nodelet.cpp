@@ -116,8 +116,10 @@ void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
   }
   const Matrix15d covariance =
       Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(frame.covariance.data());
-  pose_pub_.publish(boost::make_shared<geometry_msgs::PoseWithCovarianceStamped>(
-      pose_.message(t, *T_map_odom, T_odom_I, covariance, options_.map_frame)));
+  auto pose = boost::make_shared<geometry_msgs::PoseWithCovarianceStamped>(
+      pose_.message(t, *T_map_odom, T_odom_I, covariance, options_.map_frame));
+  pose->header.stamp = frame.header.stamp;  // which t cannot hold exactly
+  pose_pub_.publish(pose);
 }
 
 void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {
