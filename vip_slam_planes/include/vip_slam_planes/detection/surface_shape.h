@@ -10,8 +10,9 @@
 namespace vip_slam {
 
 /// Triangles that span a step between two surfaces line up into strips one triangle wide: all their vertices lie on
-/// the strip's border, those of a true surface mostly inside. Of an upright surface that shows in three columns only the
-/// middle one is inside: the others may belong to its neighbours, and its direction hangs on them. It is a strip, too.
+/// the strip's border, those of a true surface mostly inside. Of an upright surface that shows in three columns only
+/// the middle one is inside: the others may belong to its neighbours, and its direction hangs on them. It is a strip,
+/// too.
 bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface);
 
 /// A strip of a round column passes for a plane by its distances and normals; a quadric tells them apart. True when
