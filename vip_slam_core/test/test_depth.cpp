@@ -232,14 +232,14 @@ TEST(DepthGridTest, KeepsSurfacesAtAGrazingAngleButNoEdges) {
   EXPECT_GE(far_nodes, 6);
 }
 
-TEST(RegisterDepth, PlaneSeenFromAnotherCamera) {
+TEST(DepthRegistration, PlaneSeenFromAnotherCamera) {
   const auto depth_camera = makeCamera(camera(640, 480, 500)), colour = makeCamera(camera(640, 480, 600));
   Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
   T(0, 3) = 0.05;
   T(2, 3) = 0.01;
   // A wall at z = 2 m of the depth camera is at 2.01 m of the colour camera, everywhere.
   const cv::Mat wall(480, 640, CV_32FC1, cv::Scalar(2.0));
-  const cv::Mat seen = registerDepth(wall, *depth_camera, *colour, T);
+  const cv::Mat seen = DepthRegistration(depth_camera, colour, T)(wall);
   ASSERT_EQ(seen.size(), cv::Size(640, 480));
   int covered = 0;
   for (int v = 20; v < 460; ++v) {
@@ -253,19 +253,19 @@ TEST(RegisterDepth, PlaneSeenFromAnotherCamera) {
   EXPECT_EQ(covered, 440 * 580);  // no holes though the colour image is finer
 }
 
-TEST(RegisterDepth, NearestSurfaceWinsAndShadowsStayEmpty) {
+TEST(DepthRegistration, NearestSurfaceWinsAndShadowsStayEmpty) {
   const auto k = makeCamera(camera(640, 480, 500));
   Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
   T(0, 3) = -0.2;  // the colour camera stands 20 cm to the right
   cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(3.0));
   depth(cv::Rect(300, 200, 40, 40)) = 1.0;  // a box in front: moves by 100 px, the wall by 33
-  const cv::Mat seen = registerDepth(depth, *k, *k, T);
+  const cv::Mat seen = DepthRegistration(k, k, T)(depth);
   EXPECT_NEAR(seen.at<float>(220, 220), 1.0, 1e-5);  // pixel 320 moved by -100
   EXPECT_NEAR(seen.at<float>(220, 150), 3.0, 1e-5);
   EXPECT_EQ(seen.at<float>(220, 285), 0.0f);  // hidden from the depth camera by the box
 }
 
-TEST(RegisterDepth, RefusesOtherSizes) {
+TEST(DepthRegistration, RefusesOtherSizes) {
   const auto k = makeCamera(camera(640, 480, 500));
   const DepthRegistration registration(k, k, Eigen::Matrix4d::Identity());
   EXPECT_THROW(registration(cv::Mat(100, 100, CV_32FC1)), std::invalid_argument);

@@ -66,10 +66,4 @@ cv::Mat DepthRegistration::operator()(const cv::Mat& depth) const {
   return registered;
 }
 
-cv::Mat registerDepth(const cv::Mat& depth, const CameraModel& depth_camera, const CameraModel& colour_camera,
-                      const Eigen::Matrix4d& T_colour_depth) {
-  return DepthRegistration(makeCamera(depth_camera.intrinsics()), makeCamera(colour_camera.intrinsics()),
-                           T_colour_depth)(depth);
-}
-
 }  // namespace vip_slam

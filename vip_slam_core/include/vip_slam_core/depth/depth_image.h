@@ -56,8 +56,4 @@ class DepthRegistration {
   float footprint_u_ = 1, footprint_v_ = 1;  ///< colour pixels per depth pixel
 };
 
-/// The same for a single image.
-cv::Mat registerDepth(const cv::Mat& depth, const CameraModel& depth_camera, const CameraModel& colour_camera,
-                      const Eigen::Matrix4d& T_colour_depth);
-
 }  // namespace vip_slam
