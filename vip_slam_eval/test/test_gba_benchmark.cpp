@@ -50,13 +50,14 @@ TEST(GbaBenchmark, TableHasAllPlanes) {
 TEST(GbaBenchmark, BothSolversReachTheSameCostInAllVariants) {
   const SimulatedMap map = simulateMap(smallMap());
   for (const Variant v : {Variant::kVi, Variant::kViP, Variant::kViCp, Variant::kVip}) {
-    const GbaRun own = runGba(map, v, "structured", 1, 10, 1), stock = runGba(map, v, "ceres", 1, 10, 1);
+    const std::vector<GbaRun> runs = runGba(map, {{v, "structured"}, {v, "ceres"}}, 10, 1);
+    const GbaRun &own = runs[0], &stock = runs[1];
     EXPECT_NEAR(own.summary.final_cost, stock.summary.final_cost, 1e-4 * stock.summary.final_cost) << variantName(v);
     EXPECT_LT(own.summary.final_cost, 0.5 * own.summary.initial_cost) << variantName(v);
   }
   // Compression changes nothing but the time.
-  const GbaRun p = runGba(map, Variant::kViP, "structured", 1, 10, 1),
-               cp = runGba(map, Variant::kViCp, "structured", 1, 10, 1);
+  const std::vector<GbaRun> runs = runGba(map, {{Variant::kViP}, {Variant::kViCp}}, 10, 1);
+  const GbaRun &p = runs[0], &cp = runs[1];
   EXPECT_NEAR(p.summary.final_cost, cp.summary.final_cost, 1e-5 * p.summary.final_cost);
   EXPECT_NEAR(p.rmse, cp.rmse, 1e-4);
 }

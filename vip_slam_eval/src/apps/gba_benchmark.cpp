@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
   CommandLine line("gba_benchmark", "Times the global bundle adjustment of the four variants on one simulated map");
   std::string out;
   SimulatedMapOptions options;
-  int iterations = 10, repeats = 5;
+  int iterations = 10, repeats = 21;
   bool quick = false;
   line.option("out", out, "directory for table.md, table.csv, time_over_keyframes.csv and .png");
   line.required("out");
@@ -34,7 +34,7 @@ int main(int argc, char** argv) {
   line.option("free-points", options.free_points, "points on no plane", between(50, 100000));
   line.option("seed", options.seed, "seed of the simulation");
   line.option("iterations", iterations, "Levenberg-Marquardt iterations", between(1, 1000));
-  line.option("repeats", repeats, "runs per figure; the median counts", between(1, 100));
+  line.option("repeats", repeats, "runs per figure, 3 at most for Ceres; the median counts", between(1, 100));
   line.flag("quick", quick, "the table only, not the figure over keyframes");
   if (const auto status = line.parse(argc, argv)) return *status;
   try {
@@ -46,34 +46,42 @@ int main(int argc, char** argv) {
        << options.keyframes << " keyframes, " << options.plane_points << " points on planes (" << map.plane_observations
        << " observations), " << options.free_points << " free points (" << map.free_observations
        << " observations), seed " << options.seed << ", " << iterations << " iterations, median of " << repeats
-       << " runs.\n\nThe structured solver eliminates the points while it evaluates the Jacobians, so its elimination "
+       << " runs (Ceres: 3) that take turns with those of the other columns.\n\nThe structured solver eliminates the "
+          "points while it evaluates the Jacobians, so its elimination "
           "counts "
           "there; Ceres counts it as linear solving. Only sums compare across solvers. `Sum` is the solver's, as in "
           "the "
           "paper; `Sum from map to map` adds the gathering of the factors with their compression, and the way back.\n";
     std::vector<GbaRun> all;
-    const auto table = [&](const char* title, const char* solver, int threads, int runs) {
-      std::vector<GbaRun> rows;
-      for (const Variant v : variants) {
-        rows.push_back(runGba(map, v, solver, threads, iterations, runs));
-        std::fprintf(stderr, "%s, %d thread(s), %s: %.1f ms, RMSE %.4f m\n", solver, threads, variantName(v),
-                     rows.back().summary.total_ms, rows.back().rmse);
-      }
-      md << "\n## " << title << "\n\n" << gbaTableMarkdown(rows);
+    const auto timed = [&](const char* title, const std::vector<GbaSetup>& setups, int runs) {
+      std::vector<GbaRun> rows = runGba(map, setups, iterations, runs);
+      for (const GbaRun& run : rows)
+        std::fprintf(stderr, "%s, %s: %.1f ms, RMSE %.4f m\n", title, variantName(run.setup.variant),
+                     run.summary.total_ms, run.rmse);
       all.insert(all.end(), rows.begin(), rows.end());
       return rows;
     };
-    const auto own = table("Structured solver, one thread", "structured", 1, repeats);
-    const auto own2 = table("Structured solver, two threads", "structured", 2, repeats);
-    const auto otherHosts = [&](const char* title, HomographyHosts hosts) {
-      const GbaRun run = runGba(map, Variant::kVip, "structured", 1, iterations, repeats, hosts);
-      md << "\n## VIP with " << title << ", structured solver, one thread\n\n" << gbaTableMarkdown({run});
-      return run;
+    const auto print = [&](const char* title, const std::vector<GbaRun>& rows) {
+      md << "\n## " << title << "\n\n" << gbaTableMarkdown(rows);
     };
-    const GbaRun first = otherHosts("first views as hosts", HomographyHosts::kFirstViews);
-    const GbaRun middle =
-        otherHosts("hosts from the middle of tracks, as the live system", HomographyHosts::kSharedMiddle);
-    const auto stock = table("Stock Ceres (SPARSE_SCHUR), one thread", "ceres", 1, std::min(repeats, 3));
+    const auto everyVariant = [&](const char* solver, int threads) {
+      std::vector<GbaSetup> setups;
+      for (const Variant v : variants) setups.push_back({v, solver, threads});
+      return setups;
+    };
+    std::vector<GbaSetup> setups = everyVariant("structured", 1);
+    setups.push_back({Variant::kVip, "structured", 1, HomographyHosts::kFirstViews});
+    setups.push_back({Variant::kVip, "structured", 1, HomographyHosts::kSharedMiddle});
+    std::vector<GbaRun> own = timed("structured, one thread", setups, repeats);
+    const GbaRun middle = own[5], first = own[4];
+    own.resize(4);
+    print("Structured solver, one thread", own);
+    const auto own2 = timed("structured, two threads", everyVariant("structured", 2), repeats);
+    print("Structured solver, two threads", own2);
+    print("VIP with first views as hosts, structured solver, one thread", {first});
+    print("VIP with hosts from the middle of tracks, as the live system, structured solver, one thread", {middle});
+    const auto stock = timed("stock Ceres, one thread", everyVariant("ceres", 1), std::min(repeats, 3));
+    print("Stock Ceres (SPARSE_SCHUR), one thread", stock);
     const auto ratio = [&](const char* what, const GbaRun& slow, const GbaRun& fast, const char* aim) {
       char row[200];
       std::snprintf(row, sizeof(row), "| %s | %.2f | %.2f | %s |\n", what,
@@ -104,13 +112,14 @@ int main(int argc, char** argv) {
       series.push_back({"vi, Ceres", {}, {}});
       for (int n = 30; n <= options.keyframes; n += std::max(10, (options.keyframes - 30) / 6)) {
         const SimulatedMap part = prefix(map, n);
+        const std::vector<GbaRun> runs = runGba(part, everyVariant("structured", 1), iterations, std::min(repeats, 5));
         for (int v = 0; v < 4; ++v) {
-          const GbaRun run = runGba(part, variants[v], "structured", 1, iterations, std::min(repeats, 3));
+          const double ms = runs[v].summary.total_ms;
           series[v].x.push_back(n);
-          series[v].y.push_back(run.summary.total_ms);
-          csv << "rooms," << n << ',' << variantName(variants[v]) << ",structured," << run.summary.total_ms << '\n';
+          series[v].y.push_back(ms);
+          csv << "rooms," << n << ',' << variantName(variants[v]) << ",structured," << ms << '\n';
         }
-        const GbaRun run = runGba(part, Variant::kVi, "ceres", 1, iterations, 1);
+        const GbaRun run = runGba(part, {{Variant::kVi, "ceres"}}, iterations, 1).front();
         series[4].x.push_back(n);
         series[4].y.push_back(run.summary.total_ms);
         csv << "rooms," << n << ",vi,ceres," << run.summary.total_ms << '\n';
@@ -131,21 +140,20 @@ int main(int argc, char** argv) {
         corridor.plane_points = 10 * n;
         corridor.free_points = 6 * n;
         const SimulatedMap map_n = simulateMap(corridor);
-        double ms[2];
-        GbaRun run;
+        const std::vector<GbaRun> runs =
+            runGba(map_n, {{Variant::kVi}, {Variant::kVip}}, iterations, std::min(repeats, 5));
         for (int k = 0; k < 2; ++k) {
-          const Variant v = k ? Variant::kVip : Variant::kVi;
-          run = runGba(map_n, v, "structured", 1, iterations, std::min(repeats, 3));
-          ms[k] = run.summary.total_ms;
+          const double ms = runs[k].summary.total_ms;
           straight[k].x.push_back(n);
-          straight[k].y.push_back(ms[k]);
-          csv << "corridor," << n << ',' << variantName(v) << ",structured," << ms[k] << '\n';
+          straight[k].y.push_back(ms);
+          csv << "corridor," << n << ',' << variantName(runs[k].setup.variant) << ",structured," << ms << '\n';
         }
         char row[200];
+        const GbaRun& run = runs[1];
         const SolverSummary& s = run.summary;
         std::snprintf(row, sizeof(row), "| %d | %.1f | %.1f | %.0f | %zu | %zu | %.1f | %.1f | %.1f | %.1f |\n", n,
-                      ms[0], ms[1], 1e3 * ms[1] / n, run.points, run.homographies, s.residual_ms, s.jacobian_ms,
-                      s.linear_ms, s.preprocess_ms);
+                      runs[0].summary.total_ms, s.total_ms, 1e3 * s.total_ms / n, run.points, run.homographies,
+                      s.residual_ms, s.jacobian_ms, s.linear_ms, s.preprocess_ms);
         md << row;
       }
       writeLinePlot(out + "/time_over_corridor.png", "Global bundle adjustment along a corridor", "keyframes", "ms",

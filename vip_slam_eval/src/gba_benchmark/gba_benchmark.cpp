@@ -50,37 +50,36 @@ double rmseOf(const SimulatedMap& map, const BuiltProblem& built, const BaProble
   return alignedRmse(truth, estimate);
 }
 
-}  // namespace
-
-GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver_name, int threads, int iterations,
-              int repeats, HomographyHosts hosts) {
+BuilderSettings builderSettings(const SimulatedMap& map, const GbaSetup& setup) {
   BuilderSettings settings;
-  settings.variant = variant;
+  settings.variant = setup.variant;
   settings.focal = map.focal;
-  settings.shared_hosts = hosts != HomographyHosts::kFirstViews;
-  settings.middle_hosts = hosts == HomographyHosts::kSharedMiddle;
+  settings.shared_hosts = setup.hosts != HomographyHosts::kFirstViews;
+  settings.middle_hosts = setup.hosts == HomographyHosts::kSharedMiddle;
   settings.measurement.pixel_sigma = map.pixel_sigma;
   // The simulation has no outliers: plain squares, so that neither solver spends time on losses.
   settings.measurement.huber = settings.measurement.depth_huber = 0;
   settings.measurement.outlier_chi2 = 1e6;
+  return settings;
+}
 
+// The runs of one setup.
+struct Repeats {
   GbaRun run;
-  run.variant = variant;
-  run.solver = solver_name;
-  run.threads = threads;
-  run.keyframes = static_cast<int>(map.map.keyframes().size());
-  SolverOptions options;
-  options.max_iterations = iterations;
-  options.keep_iterating = true;
-  options.threads = threads;
   std::vector<SolverSummary> summaries;
   std::vector<double> build, store;
-  Map result = map.map;
-  for (int k = 0; k < repeats; ++k) {
+
+  /// `adjusted`, a copy of the map, receives what was adjusted.
+  void once(const SimulatedMap& map, int iterations, Map* adjusted) {
+    SolverOptions options;
+    options.max_iterations = iterations;
+    options.keep_iterating = true;
+    options.threads = run.setup.threads;
     auto start = std::chrono::steady_clock::now();
-    BuiltProblem built = buildProblem(map.map, globalScope(map.map), settings);
+    BuiltProblem built = buildProblem(map.map, globalScope(map.map), builderSettings(map, run.setup));
     build.push_back(msSince(start));
-    if (k == 0) {
+    if (summaries.empty()) {
+      run.keyframes = static_cast<int>(map.map.keyframes().size());
       run.rmse_before = rmseOf(map, built, built.problem);
       run.points = built.problem.points.size();
       run.planes = built.problem.planes.size();
@@ -89,18 +88,34 @@ GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solve
       run.point_to_plane = built.problem.point_to_plane.size() + built.problem.plane_points.size();
     }
     // A new solver each time: nothing is kept from the run before.
-    summaries.push_back(makeSolver(solver_name)->solve(built.problem, options));
+    summaries.push_back(makeSolver(run.setup.solver)->solve(built.problem, options));
     run.rmse = rmseOf(map, built, built.problem);
     start = std::chrono::steady_clock::now();
-    storeProblem(built, map.noise, &result);
+    storeProblem(built, map.noise, adjusted);
     store.push_back(msSince(start));
   }
-  run.build_ms = median(build);
-  run.store_ms = median(store);
-  std::sort(summaries.begin(), summaries.end(),
-            [](const SolverSummary& a, const SolverSummary& b) { return a.total_ms < b.total_ms; });
-  run.summary = summaries[summaries.size() / 2];
-  return run;
+
+  GbaRun middle() {
+    run.build_ms = median(build);
+    run.store_ms = median(store);
+    std::sort(summaries.begin(), summaries.end(),
+              [](const SolverSummary& a, const SolverSummary& b) { return a.total_ms < b.total_ms; });
+    run.summary = summaries[summaries.size() / 2];
+    return run;
+  }
+};
+
+}  // namespace
+
+std::vector<GbaRun> runGba(const SimulatedMap& map, const std::vector<GbaSetup>& setups, int iterations, int repeats) {
+  std::vector<Repeats> all(setups.size());
+  for (std::size_t s = 0; s < setups.size(); ++s) all[s].run.setup = setups[s];
+  Map adjusted = map.map;
+  for (int k = 0; k < repeats; ++k)
+    for (Repeats& of_setup : all) of_setup.once(map, iterations, &adjusted);
+  std::vector<GbaRun> runs;
+  for (Repeats& of_setup : all) runs.push_back(of_setup.middle());
+  return runs;
 }
 
 SimulatedMap prefix(const SimulatedMap& map, int keyframes) {
@@ -151,12 +166,24 @@ std::string format(const Row& row, const GbaRun& run) {
   return buffer;
 }
 
+const char* hostsName(HomographyHosts hosts) {
+  switch (hosts) {
+    case HomographyHosts::kFirstViews:
+      return "first views";
+    case HomographyHosts::kShared:
+      return "shared";
+    case HomographyHosts::kSharedMiddle:
+      return "shared, middle of tracks";
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string gbaTableMarkdown(const std::vector<GbaRun>& runs) {
   std::ostringstream out;
   out << "| |";
-  for (const GbaRun& run : runs) out << ' ' << variantName(run.variant) << " |";
+  for (const GbaRun& run : runs) out << ' ' << variantName(run.setup.variant) << " |";
   out << "\n|---|";
   for (std::size_t k = 0; k < runs.size(); ++k) out << "---:|";
   out << '\n';
@@ -170,11 +197,12 @@ std::string gbaTableMarkdown(const std::vector<GbaRun>& runs) {
 
 std::string gbaTableCsv(const std::vector<GbaRun>& runs) {
   std::ostringstream out;
-  out << "variant,solver,threads";
+  out << "variant,solver,threads,hosts";
   for (const Row& row : kRows) out << ',' << row.name;
   out << '\n';
   for (const GbaRun& run : runs) {
-    out << variantName(run.variant) << ',' << run.solver << ',' << run.threads;
+    out << variantName(run.setup.variant) << ',' << run.setup.solver << ',' << run.setup.threads << ",\""
+        << hostsName(run.setup.hosts) << '"';
     for (const Row& row : kRows) out << ',' << format(row, run);
     out << '\n';
   }

@@ -10,10 +10,19 @@
 
 namespace vip_slam {
 
-struct GbaRun {
+/// Which keyframes are the hosts of homographies: each landmark's first view, few that many landmarks share, or, as in
+/// the live system, few from the middle of the landmarks' tracks.
+enum class HomographyHosts { kFirstViews, kShared, kSharedMiddle };
+
+struct GbaSetup {
   Variant variant = Variant::kVi;
   std::string solver = "structured";
   int threads = 1;
+  HomographyHosts hosts = HomographyHosts::kShared;
+};
+
+struct GbaRun {
+  GbaSetup setup;
   int keyframes = 0;
   std::size_t points = 0, planes = 0, homographies = 0, homography_pairs = 0, point_to_plane = 0;
   double build_ms = 0;    ///< map to problem, compression included; median
@@ -24,13 +33,9 @@ struct GbaRun {
   double rmse_before = 0, rmse = 0;  ///< ATE of the keyframes after rigid alignment, metres
 };
 
-/// Which keyframes are the hosts of homographies: each landmark's first view, few that many landmarks share, or, as in
-/// the live system, few from the middle of the landmarks' tracks.
-enum class HomographyHosts { kFirstViews, kShared, kSharedMiddle };
-
-/// Runs `repeats` times from the same start and keeps the run with the median time.
-GbaRun runGba(const SimulatedMap& map, Variant variant, const std::string& solver, int threads, int iterations,
-              int repeats, HomographyHosts hosts = HomographyHosts::kShared);
+/// Runs each setup `repeats` times from the same start and keeps its run with the median time. The setups take turns,
+/// so that a processor which is slow for a while is slow for all of them.
+std::vector<GbaRun> runGba(const SimulatedMap& map, const std::vector<GbaSetup>& setups, int iterations, int repeats);
 
 /// The map of the first `keyframes` keyframes.
 SimulatedMap prefix(const SimulatedMap& map, int keyframes);
