@@ -54,7 +54,8 @@ class FrontEnd::Impl {
   FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth,
                          const FrontEnd::PoseReady& on_pose);
   SE3 gyroRotation(double t0, double t1) const;
-  bool decideStillness(double t_imu);
+  /// Both in IMU time: of the last image and of this one.
+  bool decideStillness(double previous_t_imu, double t_imu);
   double longestReadout() const { return std::max(sensor_.rolling_shutter, sensor_.depth_rolling_shutter); }
   /// How the colour camera moves during a readout of so many seconds, given the state at the stamp; null: global
   /// shutter.

@@ -37,11 +37,8 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   const cv::Mat gray = input.gray.clone();
   if (filter_.started()) {
     const double gap = t_imu - last_imu_t_;
-    if (gap > options_.recovery.max_image_gap) {
-      reset("no image for " + std::to_string(gap).substr(0, 4) + " s");
-    } else {
-      return trackImage(input.t, t_imu, gray, depth, on_pose);
-    }
+    if (gap <= options_.recovery.max_image_gap) return trackImage(input.t, t_imu, gray, depth, on_pose);
+    reset("no image for " + std::to_string(gap).substr(0, 4) + " s");
   }
   return initialise(input.t, t_imu, gray, depth);
 }
@@ -121,7 +118,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   return makeOutput(t, t_imu, "first");
 }
 
-bool FrontEnd::Impl::decideStillness(double t_imu) {
+bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   if (moving_.any()) moving_imu_t_ = t_imu;
   const bool image_counts = !movedLately(t_imu);  // what pauses says nothing about standing still
   const ZuptOptions& options = options_.filter.zupt;
@@ -139,7 +136,9 @@ bool FrontEnd::Impl::decideStillness(double t_imu) {
     return static_cast<double>(moved[moved.size() / 2]);
   };
   StillnessCues cues;
-  cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), t_imu - options.window), t_imu), &sensor_.imu_noise);
+  // Back to the last image at least: while there was none it may have gone elsewhere and stopped again.
+  const double since = std::min(t_imu - options.window, previous_t_imu);
+  cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), since), t_imu), &sensor_.imu_noise);
   cues.tracks = image_counts ? static_cast<int>(now.size()) : 0;
   cues.speed = filter_.nav().v_W.norm();
   while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options.window - 1e-6) {
@@ -183,6 +182,11 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   }
   keyframe_imu_broken_ = keyframe_imu_broken_ || gap;
   const Propagation propagation = filter_.predict(samples, gap ? kLongGapNoise : 1.0);
+  // Without images the IMU carries the pose as it does in the dark, for as long as it tells where.
+  if (propagation.displacementSigma(filter_.covariance()) > options_.recovery.max_position_sigma) {
+    reset("no image for " + std::to_string(t_imu - from).substr(0, 4) + " s");
+    return initialise(t, t_imu, gray, depth_read);
+  }
   last_imu_t_ = t_imu;
 
   const SE3 T_I_C = extrinsics();
@@ -198,7 +202,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   StepReport report;
   {
     ScopedTimer timer(timing_, "frontend.update", t);
-    still_ = decideStillness(t_imu);
+    still_ = decideStillness(from, t_imu);
     report = filter_.step(propagation, next_clone_++, measurements(),
                           still_ ? std::optional<double>(stillness_.unrest()) : std::nullopt, &surfaces);
   }

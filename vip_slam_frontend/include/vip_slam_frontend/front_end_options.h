@@ -14,7 +14,7 @@ struct RecoveryOptions {
   double coast_seconds = 4.0;
   int min_tracks = 10;
   double max_imu_gap = 0.1;
-  double max_image_gap = 2.0;
+  double max_image_gap = 10.0;
   double max_position_sigma = 2.0;
   double max_speed = 20.0;
 
@@ -22,7 +22,8 @@ struct RecoveryOptions {
     v.field("coast_seconds", coast_seconds, 0.1, 60.0, "IMU-only time before LOST, s");
     v.field("min_tracks", min_tracks, 3, 500, "fewer tracks than this count as none");
     v.field("max_imu_gap", max_imu_gap, 0.01, 5.0, "IMU gap that is bridged with more noise, s; a longer one restarts");
-    v.field("max_image_gap", max_image_gap, 0.2, 60.0, "images missing for longer than this restart the tracking, s");
+    v.field("max_image_gap", max_image_gap, 0.2, 25.0,
+            "images missing for longer than this restart the tracking, s; until then the IMU carries the pose");
     v.field("max_position_sigma", max_position_sigma, 0.05, 100.0,
             "LOST when the position's sigma has grown by this without features, m; beyond, recovery is a new epoch");
     v.field("max_speed", max_speed, 0.5, 300.0, "an estimated speed above this is a failure, m/s");
