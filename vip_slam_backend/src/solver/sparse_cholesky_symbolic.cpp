@@ -1,12 +1,10 @@
-// Symbolic part of the block-sparse Cholesky: ordering, elimination tree, fronts.
+// Symbolic part of the block-sparse Cholesky: fronts, their places and their parts.
 #include <algorithm>
 #include <limits>
 #include <numeric>
-#include <stdexcept>
-
-#include <amd.h>
 
 #include "dense_kernels.h"
+#include "elimination_tree.h"
 #include "vip_slam_backend/solver/sparse_cholesky.h"
 
 namespace vip_slam {
@@ -17,98 +15,7 @@ std::size_t blockValues(int rows, int columns) {
   return (static_cast<std::size_t>(SparseCholesky::leading(rows)) * columns + 7) / 8 * 8;
 }
 
-using Lists = std::vector<std::vector<int>>;
-
-// Structure of the factor below each node, in positions, with the given order.
-Lists eliminate(const Lists& neighbours, const std::vector<int>& position, std::vector<int>* parent) {
-  const int n = static_cast<int>(neighbours.size());
-  std::vector<int> node_at(n);
-  for (int v = 0; v < n; ++v) node_at[position[v]] = v;
-  Lists structure(n), children(n);
-  std::vector<int> mark(n, -1);
-  parent->assign(n, -1);
-  for (int k = 0; k < n; ++k) {
-    mark[k] = k;
-    std::vector<int>& s = structure[k];
-    const auto take = [&](int p) {
-      if (p > k && mark[p] != k) {
-        mark[p] = k;
-        s.push_back(p);
-      }
-    };
-    for (const int v : neighbours[node_at[k]]) take(position[v]);
-    for (const int c : children[k])
-      for (const int p : structure[c]) take(p);
-    std::sort(s.begin(), s.end());
-    if (!s.empty()) {
-      (*parent)[k] = s.front();
-      children[s.front()].push_back(k);
-    }
-  }
-  return structure;
-}
-
-std::vector<int> postorder(const std::vector<int>& parent) {
-  const int n = static_cast<int>(parent.size());
-  Lists children(n);
-  std::vector<int> roots, order;
-  for (int k = 0; k < n; ++k) (parent[k] < 0 ? roots : children[parent[k]]).push_back(k);
-  std::vector<std::pair<int, std::size_t>> stack;
-  for (const int root : roots) {
-    stack.emplace_back(root, 0);
-    while (!stack.empty()) {
-      auto& top = stack.back();
-      if (top.second < children[top.first].size()) {
-        const int child = children[top.first][top.second++];
-        stack.emplace_back(child, 0);
-      } else {
-        order.push_back(top.first);
-        stack.pop_back();
-      }
-    }
-  }
-  return order;
-}
-
 }  // namespace
-
-// Approximate minimum degree on thirds of unknowns (a pose counts two, a motion three, a plane one), so that degrees
-// count what the nodes weigh. A node goes where the first of its parts goes; they are alike, so the ordering keeps them
-// together.
-void SparseCholesky::order(const Lists& neighbours) {
-  const int n = nodes();
-  std::vector<int> first(1, 0), node_of, starts(1, 0), indices;
-  for (int v = 0; v < n; ++v) {
-    first.push_back(first.back() + (sizes_[v] + 2) / 3);
-    node_of.resize(first.back(), v);
-  }
-  for (int v = 0; v < n; ++v)
-    for (int part = first[v]; part < first[v + 1]; ++part) {
-      const auto add = [&](int w) {
-        for (int k = first[w]; k < first[w + 1]; ++k)
-          if (k != part) indices.push_back(k);
-      };
-      bool self = false;  // ascending, itself in between
-      for (const int w : neighbours[v]) {
-        if (w > v && !self) {
-          add(v);
-          self = true;
-        }
-        add(w);
-      }
-      if (!self) add(v);
-      starts.push_back(static_cast<int>(indices.size()));
-    }
-  if (indices.empty()) indices.push_back(0);
-  std::vector<int> permutation(node_of.size());
-  const int status =
-      n == 0 ? AMD_OK : amd_order(first[n], starts.data(), indices.data(), permutation.data(), nullptr, nullptr);
-  if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED) throw std::runtime_error("sparse Cholesky: ordering failed");
-  position_.assign(n, -1);
-  int next = 0;
-  for (const int part : permutation)
-    if (position_[node_of[part]] < 0) position_[node_of[part]] = next++;
-}
 
 // Two parts of the tree that cost about the same: from the roots down, the dearest subtree is opened (its root goes to
 // what is left for later) as long as that shortens the longer way.
@@ -207,7 +114,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
     neighbours[pairs[k].second].push_back(pairs[k].first);
   }
   for (auto& list : neighbours) std::sort(list.begin(), list.end());
-  order(neighbours);
+  position_ = minimumDegree(sizes_, neighbours);
   std::vector<int> parent;
   Lists eliminated = eliminate(neighbours, position_, &parent);
   const std::vector<int> post = postorder(parent);

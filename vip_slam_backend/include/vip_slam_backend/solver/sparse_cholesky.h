@@ -70,7 +70,6 @@ class SparseCholesky {
   bool factorizeFront(const Front& front, const double* values, const double* b);
   bool factorize(const double* values, const double* b, Worker* worker);
   void backSubstitute(double* b) const;
-  void order(const std::vector<std::vector<int>>& neighbours);
   void splitTree();
   void placeUpdates();
 

@@ -1,0 +1,55 @@
+// How a motion is planned: where the camera is and looks at each time, made into the IMU's spline.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "vip_slam_sim/motion/motion_generator.h"
+#include "vip_slam_sim/rng.h"
+
+namespace vip_slam {
+
+constexpr double kDeg = M_PI / 180;
+
+/// Where the camera is and looks: forward has this yaw and pitch (rad), roll about forward.
+struct View {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+  double yaw = 0, pitch = 0, roll = 0;
+  double liveliness = 0;  ///< 0 standing, 1 moving: scales the shake
+
+  /// T_W_cam.
+  SE3 pose() const;
+};
+
+/// A few sines with random phases: smooth, never repeating within a sequence, about unit amplitude.
+class Wander {
+ public:
+  Wander(Rng& rng, double frequency);
+  double operator()(double t) const;
+
+ private:
+  std::vector<double> f_, phase_;
+};
+
+/// Adds what a walking hand or a hovering drone adds.
+class Shake {
+ public:
+  Shake(const std::string& style, double yaw_swing, int seed);
+  void apply(double t, View* view) const;
+
+ private:
+  std::string style_;
+  double swing_;
+  Rng rng_;
+  Wander slow_yaw_, slow_pitch_, x_, y_, z_, roll_, jitter_yaw_, jitter_pitch_;
+};
+
+/// From 0 at s = 0 to 1 at s = 1 with vanishing first and second derivatives at both.
+double smoothStep(double s);
+
+SplineTrajectory splineOf(const std::function<View(double)>& plan, double duration, const SE3& T_imu_cam);
+
+/// Along MotionOptions::waypoints. Throws std::invalid_argument that names what was expected.
+SplineTrajectory makePath(const MotionOptions& options, const SE3& T_imu_cam, int seed);
+
+}  // namespace vip_slam
