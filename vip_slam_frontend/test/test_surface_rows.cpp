@@ -299,6 +299,29 @@ TEST(PatchGrouping, PatchesOfTheSameWallShareOneNormalAndLonersGo) {
   }
 }
 
+// A door leaf set back by 12 cm: a plane that leans across the step is near stripes of both, and rows with its normal
+// would see motion along the wall that is not there.
+TEST(PatchGrouping, NoPlaneLeansAcrossAStep) {
+  const DepthNoise noise;
+  SurfaceTracker tracker(camera(), noise);
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal(0, 1);
+  for (int edge = 120; edge <= 520; edge += 20) {
+    cv::Mat_<float> depth(480, 640);
+    for (int v = 0; v < 480; ++v) {
+      for (int u = 0; u < 640; ++u) {
+        const double z = u < edge ? 0.9 : 1.02;
+        depth(v, u) = static_cast<float>(z + noise.sigma(z) * normal(random));
+      }
+    }
+    const std::vector<SurfacePatch> patches = tracker.patches(depth), shared = shareNormals(patches);
+    EXPECT_GT(shared.size(), patches.size() * 8 / 10) << edge;
+    double most = 0;
+    for (const SurfacePatch& patch : shared) most = std::max(most, std::acos(std::min(1.0, -patch.n_C.z())));
+    EXPECT_LT(most, 1.5 * M_PI / 180) << edge;
+  }
+}
+
 TEST(SurfaceTracker, HolesAndRoughSurfacesGiveNoPatches) {
   SurfaceTracker tracker(camera(), DepthNoise());
   EXPECT_TRUE(tracker.patches(cv::Mat(480, 640, CV_32FC1, cv::Scalar(0))).empty());

@@ -15,6 +15,8 @@ constexpr double kSigmas = 3.5;
 // A wall's own unevenness, m, and the turn of a patch beside an edge, rad.
 constexpr double kUneven = 0.003;
 constexpr double kTurned = 0.03;
+// By how much the normals of all patches of a plane together may be off: warped depth, rad.
+constexpr double kTurnedTogether = 0.005;
 
 /// N^T x = 1, in the camera frame.
 struct PlaneFit {
@@ -45,6 +47,42 @@ bool fitPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>&
   return plane->N.allFinite() && plane->N.norm() > 1e-6;
 }
 
+/// A plane that leans across a step from one wall to another one set back is near enough to stripes of both, and none
+/// of their patches alone knows its normal well enough to object; all of them together do.
+bool leansAcrossAStep(const std::vector<SurfacePatch>& patches, const std::vector<char>& member,
+                      const PlaneFit& plane) {
+  const Eigen::Vector3d n = plane.normal();
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
+  double weight = 0;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    if (!member[i]) continue;
+    const double w = 1.0 / (patches[i].sigma_normal * patches[i].sigma_normal + kTurned * kTurned);
+    turned += w * n.cross(patches[i].n_C);
+    weight += w;
+  }
+  return turned.norm() / weight > kSigmas * std::hypot(1.0 / std::sqrt(weight), kTurnedTogether);
+}
+
+/// The plane round patch `seed` and its members among those that are not `done`; false when there is none.
+/// `extrapolate`: begins with all that the seed's own normal allows however far away, else with its surroundings.
+bool growPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>& done, std::size_t seed,
+               bool extrapolate, std::vector<char>* member, PlaneFit* plane) {
+  const SurfacePatch& from = patches[seed];
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    const Eigen::Vector3d step = patches[i].p_C - from.p_C;
+    const double away = extrapolate ? from.sigma_normal * step.norm() : kUneven;
+    const double sigma = std::hypot(std::hypot(from.sigma, patches[i].sigma), away);
+    (*member)[i] = !done[i] && std::abs(from.n_C.dot(step)) < kSigmas * sigma && from.n_C.dot(patches[i].n_C) > 0.9;
+  }
+  for (int k = 0; k < kRefinements; ++k) {
+    if (!fitPlane(patches, *member, plane)) return false;
+    int count = 0;
+    for (std::size_t i = 0; i < patches.size(); ++i) count += (*member)[i] = !done[i] && plane->holds(patches[i]);
+    if (count < kLeastPatches) return false;
+  }
+  return fitPlane(patches, *member, plane) && !leansAcrossAStep(patches, *member, *plane);
+}
+
 }  // namespace
 
 std::vector<SurfacePatch> shareNormals(std::vector<SurfacePatch> patches) {
@@ -52,25 +90,11 @@ std::vector<SurfacePatch> shareNormals(std::vector<SurfacePatch> patches) {
   std::vector<char> done(patches.size(), 0), member(patches.size());
   for (std::size_t seed = 0; seed < patches.size(); ++seed) {
     if (done[seed]) continue;
-    // First those within what the seed's own normal allows, then those on the plane they give.
-    const SurfacePatch& from = patches[seed];
-    for (std::size_t i = 0; i < patches.size(); ++i) {
-      const Eigen::Vector3d step = patches[i].p_C - from.p_C;
-      const double sigma = std::hypot(std::hypot(from.sigma, patches[i].sigma), from.sigma_normal * step.norm());
-      member[i] = !done[i] && std::abs(from.n_C.dot(step)) < kSigmas * sigma && from.n_C.dot(patches[i].n_C) > 0.9;
-    }
     PlaneFit plane;
-    int count = 0;
-    for (int k = 0; k < kRefinements; ++k) {
-      if (!fitPlane(patches, member, &plane)) {
-        count = 0;
-        break;
-      }
-      count = 0;
-      for (std::size_t i = 0; i < patches.size(); ++i) count += member[i] = !done[i] && plane.holds(patches[i]);
-      if (count < kLeastPatches) break;
+    if (!growPlane(patches, done, seed, true, &member, &plane) &&
+        !growPlane(patches, done, seed, false, &member, &plane)) {
+      continue;
     }
-    if (count < kLeastPatches || !fitPlane(patches, member, &plane)) continue;
     for (std::size_t i = 0; i < patches.size(); ++i) {
       if (!member[i]) continue;
       done[i] = 1;
