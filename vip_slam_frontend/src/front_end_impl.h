@@ -118,6 +118,7 @@ class FrontEnd::Impl {
   double last_good_t_ = 0;            ///< image with enough features
   double last_good_variance_ = 0;     ///< of the position there, m^2
   double last_held_t_ = 0;            ///< image with enough features or matched depth surfaces
+  double last_metric_t_ = 0;          ///< image in which depth took part
   int gated_in_a_row_ = 0;
   bool still_ = false;
   SE3 T_map_odom_;

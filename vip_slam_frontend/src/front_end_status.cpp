@@ -17,6 +17,8 @@ constexpr double kPatience = 2.0;
 // No IMU is worse than its data sheet by this; with axes, signs or units mixed up the factor goes to its limit of 30,
 // while a camera turned by a degree or a delay of 10 ms leave it at 1.
 constexpr double kImplausibleNoise = 10.0;
+// Depth cameras that are slower than the colour camera leave images without depth in between, s.
+constexpr double kBetweenDepths = 0.5;
 
 }  // namespace
 
@@ -48,6 +50,7 @@ bool FrontEnd::Impl::contradictedForLong(const TrackingResult& tracking, double 
 }
 
 void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool surfaces_hold, double t) {
+  if (metric) last_metric_t_ = t;
   if (tracking.tracked >= options_.recovery.min_tracks || still_) {
     if (phase_ == Phase::kLost) return;
     last_good_t_ = last_held_t_ = t;
@@ -55,7 +58,7 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
     if (imuIsContradicted()) {
       status_ = {TrackingState::kDegraded,
                  "the images contradict the IMU: are its axes, signs and units and T_imu_cam right? check_bag tells"};
-    } else if (!metric && !still_) {
+    } else if (t - last_metric_t_ > kBetweenDepths && !still_) {
       status_ = {TrackingState::kDegraded, "no depth: visual-inertial only"};
     } else {
       status_ = {TrackingState::kTracking, ""};

@@ -110,7 +110,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   phase_ = Phase::kTracking;
   started_imu_t_ = t_imu;
   status_ = {TrackingState::kTracking, ""};
-  last_good_t_ = last_held_t_ = t;
+  last_good_t_ = last_held_t_ = last_metric_t_ = t;
   last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   // The tracks' references were taken under unknown poses: begin them here.
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();

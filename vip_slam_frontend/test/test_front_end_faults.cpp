@@ -35,13 +35,15 @@ TEST_F(FrontEndTest, BadInputIsCountedNamedAndSurvived) {
   // Depth of another size, and depth of NaN and zero, count as none; the pose goes on.
   FrameOutput output = front_end_.process({3.0, world_.image(3.0), cv::Mat(120, 160, CV_32FC1, cv::Scalar(1))});
   EXPECT_EQ(front_end_.counters().bad_depth, 1u);
-  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
   cv::Mat holes(240, 320, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   holes.rowRange(0, 100).setTo(0);
-  feedImu(3.05);
-  output = front_end_.process({3.05, world_.image(3.05), holes});
+  for (int k = 61; k < 75; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    output = front_end_.process({t, world_.image(t), holes});
+  }
   EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
-  output = run(3.1, 5.0);
+  output = run(3.75, 5.0);
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
   EXPECT_EQ(output.frame->epoch, 0u);
   EXPECT_LT(error(output), 0.02);
@@ -53,6 +55,16 @@ TEST_F(FrontEndTest, WithoutDepthItGoesOnDegraded) {
   EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
   EXPECT_NE(output.frame->status.reason.find("no depth"), std::string::npos);
   EXPECT_LT(error(output), 0.06);
+}
+
+TEST_F(FrontEndTest, DepthOfEveryFourthImageIsEnough) {
+  run(0.0, 3.0);
+  FrameOutput output;
+  for (int k = 60; k < 140; ++k) {
+    output = step(0.05 * k, false, k % 4 == 0);
+    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << k << ' ' << output.frame->status.reason;
+  }
+  EXPECT_LT(error(output), 0.02);
 }
 
 TEST_F(FrontEndTest, DarknessWithoutDepthCoastsWithGrowingCovarianceAndRecovers) {
@@ -179,6 +191,52 @@ TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
   ASSERT_GT(keyframes_.size(), before);
   EXPECT_EQ(keyframes_[before]->id, before + 1);  // ids go on
   EXPECT_EQ(keyframes_[before]->previous, 0u);    // nothing ties it to the old epoch
+}
+
+TEST_F(FrontEndTest, ImagesThatAreMissingForSecondsAreBridgedByTheImu) {
+  run(0.0, 3.0);
+  const std::size_t before = keyframes_.size();
+  const FrameOutput output = run(6.0, 8.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_EQ(front_end_.counters().restarts, 0u);
+  EXPECT_LT(error(output), 0.25);
+  EXPECT_LT(error(output), 4 * std::sqrt(output.frame->covariance.block<3, 3>(3, 3).trace()));
+  ASSERT_GT(keyframes_.size(), before);
+  EXPECT_FALSE(keyframes_[before]->imu.empty());
+}
+
+TEST_F(FrontEndTest, ImagesThatAreMissingWhileTheImuTellsNothingStartAnew) {
+  FrontEndOptions strict = options();
+  strict.recovery.max_position_sigma = 0.05;
+  FrontEnd front_end(strict, sensor());
+  FrameOutput output;
+  for (int k = 0; k <= 61; ++k) {
+    const double t = k <= 60 ? 0.05 * k : 8.0;
+    for (; imu_t_ < t + 0.02; imu_t_ += 0.005) front_end.addImu(World::imu(imu_t_));
+    output = front_end.process({t, world_.image(t), World::depth(t)});
+  }
+  EXPECT_EQ(output.frame->status.state, TrackingState::kInitialising);
+  EXPECT_NE(output.frame->status.reason.find("no image for "), std::string::npos) << output.frame->status.reason;
+  EXPECT_EQ(front_end.counters().restarts, 1u);
+}
+
+TEST_F(FrontEndTest, WhoStandsBeforeAndAfterAHoleInTheImagesMayHaveMovedInIt) {
+  // Dark from 1 s on, so that only the IMU tells of standing; 26 cm on between the images of 1.3 and 2.5 s.
+  FrameOutput output;
+  for (double t = 0; t < 3.0; t += 0.05) {
+    for (; imu_t_ < t + 0.02; imu_t_ += 0.005) {
+      ImuSample sample = World::imu(0);
+      sample.t = imu_t_;
+      sample.accel.y() += imu_t_ < 1.3501 || imu_t_ > 2.0 ? 0.0 : imu_t_ < 1.6751 ? 2.5 : -2.5;
+      front_end_.addImu(sample);
+    }
+    if (t > 1.32 && t < 2.48) continue;
+    const bool dark = t > 1.02;
+    output = front_end_.process(
+        {t, dark ? cv::Mat(240, 320, CV_8U, cv::Scalar(3)) : world_.image(0), dark ? cv::Mat() : World::depth(0)});
+  }
+  EXPECT_NEAR(output.frame->state.T_W_I.t().y(), 0.26, 0.05);
 }
 
 TEST_F(FrontEndTest, ClockRunningBackStartsAnew) {
