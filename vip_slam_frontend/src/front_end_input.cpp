@@ -35,7 +35,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       filter_(options.filter, sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset, camera_->focal(),
               sensor_.gravity),
       initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, camera_->focal(),
-                   sensor_.gravity),
+                   sensor_.gravity, sensor_.depth_noise),
       stillness_(options.filter.zupt),
       selector_(options.keyframes) {
   counters_.sigma_px = filter_.sigmaPx();

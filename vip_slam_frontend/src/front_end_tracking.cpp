@@ -91,7 +91,8 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   const cv::Mat depth = depthAtStamp(depth_read, turning);
   tracker_.track(gray, depth, {rotation, 0, 0}, false, SE3(), rows(sensor_.rolling_shutter, turning), t);
   tracker_.replenish(SE3(), true, t);
-  std::optional<FilterPrior> prior = initialiser_.add({t_imu, measurements()}, imu_);
+  std::optional<FilterPrior> prior = initialiser_.add(
+      {t_imu, measurements(), makeDepthGrid(depth, options_.frame_grid_stride, sensor_.depth_noise)}, imu_);
   if (!prior) {
     const std::string why = status_.state == TrackingState::kInitialising && !status_.reason.empty() && first
                                 ? status_.reason + "; " + initialiser_.reason()

@@ -1,5 +1,6 @@
 // Starts, standing and moving, on the landmark simulation; stillness; keyframe choice.
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -110,6 +111,35 @@ TEST(Initialiser, MovingWithoutDepthSaysWhyItWaits) {
   const Start s = start(1.0, false);
   EXPECT_FALSE(s.prior);
   EXPECT_NE(s.reason.find("features with depth"), std::string::npos) << s.reason;
+}
+
+// A slow steady turn is quiet to the IMU, and a bare wall has no features that could tell.
+TEST(Initialiser, BeforeABareWallTheDepthTellsWhetherItStands) {
+  ImuNoise noise;
+  for (const double rate : {0.0, 0.05}) {
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    ImuBuffer imu;
+    Initialiser initialiser(InitialisationOptions(), FilterOptions(), noise, SE3(), 480, 9.81, DepthNoise());
+    std::optional<FilterPrior> prior;
+    double t = 0;
+    for (int k = 0; k < 60 && !prior; ++k) {
+      for (; t <= 0.05 * k + 0.01; t += 0.005) imu.add({t, {0, rate, 0}, {0, -9.81, 0}});
+      InitialisationInput image{0.05 * k, {}};
+      image.depth.stride = 16;
+      image.depth.cols = 40;
+      image.depth.rows = 30;
+      const double yaw = rate * image.t_imu;
+      for (int i = 0; i < 1200; ++i) {
+        const double x = (i % 40 - 19.5) * 16 / 480;
+        const double z = 1.0 / (std::cos(yaw) + std::sin(yaw) * x);  // a wall 1 m away
+        image.depth.z.push_back(static_cast<float>(z + DepthNoise().sigma(z) * normal(random)));
+      }
+      prior = initialiser.add(image, imu);
+    }
+    EXPECT_EQ(prior.has_value(), rate == 0.0);
+    if (!prior) EXPECT_NE(initialiser.reason().find("start in motion"), std::string::npos) << initialiser.reason();
+  }
 }
 
 StillnessCues quiet() {

@@ -14,6 +14,7 @@ namespace {
 constexpr double kWatched = 0.5;         // share of the standing time that images have to cover
 constexpr double kMostTurn = 0.3;        // rad/s, of a gyro that stands: its bias
 constexpr double kMostOffGravity = 1.5;  // m/s^2, of an accelerometer that stands
+constexpr double kDepthMoved = 2.0;      // sigmas, and times what changes from one image to the next
 }  // namespace
 
 double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b,
@@ -30,6 +31,17 @@ double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<
     ++count;
   }
   return count < 5 ? -1.0 : sum / count;
+}
+
+double depthChange(const DepthGrid& a, const DepthGrid& b, const DepthNoise& noise) {
+  if (a.z.size() != b.z.size()) return -1.0;
+  std::vector<double> changes;
+  for (std::size_t i = 0; i < a.z.size(); ++i) {
+    if (a.z[i] > 0 && b.z[i] > 0) changes.push_back(std::abs(b.z[i] - a.z[i]) / noise.sigma(a.z[i]));
+  }
+  if (changes.size() < 30) return -1.0;
+  std::nth_element(changes.begin(), changes.begin() + changes.size() / 2, changes.end());
+  return changes[changes.size() / 2];
 }
 
 FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOptions& options, const ImuNoise& noise,
@@ -65,8 +77,14 @@ void startAtBase(const SE3& T_base_imu, FilterPrior* prior) {
 }
 
 Initialiser::Initialiser(const InitialisationOptions& options, const FilterOptions& filter, const ImuNoise& noise,
-                         const SE3& T_I_C, double focal_px, double gravity)
-    : options_(options), filter_(filter), noise_(noise), T_I_C_(T_I_C), focal_(focal_px), gravity_(gravity) {}
+                         const SE3& T_I_C, double focal_px, double gravity, const DepthNoise& depth_noise)
+    : options_(options),
+      filter_(filter),
+      noise_(noise),
+      T_I_C_(T_I_C),
+      focal_(focal_px),
+      gravity_(gravity),
+      depth_noise_(depth_noise) {}
 
 void Initialiser::reset() {
   images_.clear();
@@ -127,7 +145,18 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     reason_ = "IMU is quiet but the image moves: gathering images for a start in motion";
     return std::nullopt;
   }
+  if (disparity < 0 && depthMoved(*oldest)) {
+    reason_ = "IMU is quiet but the depth moves: gathering images for a start in motion";
+    return std::nullopt;
+  }
   return standingPrior(samples, filter_, noise_, gravity_);
+}
+
+bool Initialiser::depthMoved(const InitialisationInput& since) const {
+  // A motion adds up, noise that the model does not know of does not.
+  const double all = depthChange(since.depth, images_.back().depth, depth_noise_);
+  const double last = depthChange(images_[images_.size() - 2].depth, images_.back().depth, depth_noise_);
+  return all > kDepthMoved && all > kDepthMoved * last;
 }
 
 std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {

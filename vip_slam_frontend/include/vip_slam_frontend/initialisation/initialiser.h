@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/imu/imu_buffer.h"
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/initialisation/initialisation_options.h"
@@ -16,12 +17,13 @@ namespace vip_slam {
 struct InitialisationInput {
   double t_imu = 0;
   std::vector<FilterMeasurement> features;
+  DepthGrid depth = {};  ///< may be empty
 };
 
 class Initialiser {
  public:
   Initialiser(const InitialisationOptions& options, const FilterOptions& filter, const ImuNoise& noise,
-              const SE3& T_I_C, double focal_px, double gravity);
+              const SE3& T_I_C, double focal_px, double gravity, const DepthNoise& depth_noise = {});
 
   /// Adds one image; the prior of the start once there is enough, holding at that image's time.
   std::optional<FilterPrior> add(const InitialisationInput& image, const ImuBuffer& imu);
@@ -32,12 +34,15 @@ class Initialiser {
  private:
   std::optional<FilterPrior> standing(const ImuBuffer& imu);
   std::optional<FilterPrior> moving(const ImuBuffer& imu);
+  /// From that image to the newest one.
+  bool depthMoved(const InitialisationInput& since) const;
 
   InitialisationOptions options_;
   FilterOptions filter_;
   ImuNoise noise_;
   SE3 T_I_C_;
   double focal_, gravity_;
+  DepthNoise depth_noise_;
   bool weighs_wrong_ = false;  ///< at rest, and not with a body's weight: no start is possible
   std::deque<InitialisationInput> images_;
   std::string reason_ = "waiting for images and IMU";
@@ -45,6 +50,10 @@ class Initialiser {
 
 /// Mean image motion in pixels of features common to both; -1 when fewer than five are.
 double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b, double focal_px);
+
+/// Median change of depth at the grid's pixels, in sigmas of a single reading; -1 when fewer than thirty of them have
+/// depth in both.
+double depthChange(const DepthGrid& a, const DepthGrid& b, const DepthNoise& noise);
 
 /// Levelled prior from the mean of a rest; pure function of the samples.
 FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOptions& options, const ImuNoise& noise,
