@@ -42,6 +42,9 @@ class FrontEnd::Impl {
   FrontEndOptions options_;
 
  private:
+  /// Depth cameras that are slower than the colour camera leave images without depth in between, s.
+  static constexpr double kBetweenDepths = 0.5;
+
   enum class Phase { kWaiting, kInitialising, kTracking, kLost };
 
   SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.mounting().T_I_C; }
@@ -118,6 +121,7 @@ class FrontEnd::Impl {
   double last_good_t_ = 0;            ///< image with enough features
   double last_good_variance_ = 0;     ///< of the position there, m^2
   double last_held_t_ = 0;            ///< image with enough features or matched depth surfaces
+  double last_depth_t_ = -1e300;      ///< image with a depth image
   double last_metric_t_ = 0;          ///< image in which depth took part
   int gated_in_a_row_ = 0;
   bool still_ = false;

@@ -17,8 +17,6 @@ constexpr double kPatience = 2.0;
 // No IMU is worse than its data sheet by this; with axes, signs or units mixed up the factor goes to its limit of 30,
 // while a camera turned by a degree or a delay of 10 ms leave it at 1.
 constexpr double kImplausibleNoise = 10.0;
-// Depth cameras that are slower than the colour camera leave images without depth in between, s.
-constexpr double kBetweenDepths = 0.5;
 
 }  // namespace
 

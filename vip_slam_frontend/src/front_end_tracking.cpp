@@ -247,7 +247,11 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const SE3 T_now = filter_.nav().T_W_I * extrinsics();
   std::string reason;
   // A keyframe of darkness would tie nothing to anything; one of bare walls still has its planes.
-  if (phase_ == Phase::kTracking && (tracked.tracked >= options_.recovery.min_tracks || surfaces_hold)) {
+  // Without depth it would have no planes; where the depth camera is the slower one, an image with depth comes soon.
+  const bool depth_comes = depth.empty() && t - last_depth_t_ < kBetweenDepths;
+  if (!depth.empty()) last_depth_t_ = t;
+  if (phase_ == Phase::kTracking && !depth_comes &&
+      (tracked.tracked >= options_.recovery.min_tracks || surfaces_hold)) {
     const std::shared_ptr<TrackedFrame> frame = makeFrame(t, true);
     reason = selector_.decide(t, T_now, frame->features, camera_->focal(), still_);
   }

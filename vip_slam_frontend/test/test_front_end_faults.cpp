@@ -63,6 +63,7 @@ TEST_F(FrontEndTest, DepthOfEveryFourthImageIsEnough) {
   for (int k = 60; k < 140; ++k) {
     output = step(0.05 * k, false, k % 4 == 0);
     EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << k << ' ' << output.frame->status.reason;
+    if (output.keyframe) EXPECT_FALSE(output.keyframe->frame.depth_grid.empty()) << k;
   }
   EXPECT_LT(error(output), 0.02);
 }
