@@ -108,7 +108,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   if (c.imu_contradicted > 0)
     all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
                   " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
-                  "signs and units and T_imu_cam right? check_bag tells");
+                  "signs and units, T_imu_cam and the stamps right? check_bag tells");
   // A mounting that was learnt against a wrong IMU means nothing.
   if (10 * c.imu_contradicted < c.images) {
     for (const std::string& difference :
