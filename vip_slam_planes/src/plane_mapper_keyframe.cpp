@@ -145,9 +145,13 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
     open.erase(open.begin());
     const auto mine = tracks_.find(id);
     if (mine == tracks_.end()) continue;
+    std::vector<const PlaneTrack*> known;
+    for (const auto& [other_id, other] : tracks_) {
+      if (epochs_.tied(mine->second.epoch, other.epoch)) known.push_back(&other);
+    }
     for (auto& [other_id, other] : tracks_) {
       if (other_id == id || !epochs_.tied(mine->second.epoch, other.epoch)) continue;
-      if (!sameSurface(mine->second, other, poses_, options.merging)) continue;
+      if (!sameSurface(mine->second, other, known, poses_, options.merging)) continue;
       // The older id stays, but one that the back end knows goes before one that it does not.
       PlaneId into = std::min(id, other_id), from = std::max(id, other_id);
       if (tracks_.at(from).confirmed && !tracks_.at(into).confirmed) std::swap(into, from);

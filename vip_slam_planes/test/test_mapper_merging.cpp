@@ -154,6 +154,36 @@ TEST(Mapper, ASmallPieceOfCeilingBelongsToTheCeiling) {
   }
 }
 
+// Two corners of a ceiling, 2.4 and 0.8 m^2, seen over a wall that ends there or goes on above them; the estimator may
+// have tilted the larger one.
+TEST(Mapper, CornersOfACeilingAreOneUnlessSomethingShowsAboveThem) {
+  struct Case {
+    double wall, step, tilt;
+    int ceilings;
+  };
+  for (const Case& c : {Case{2.5, 0, 0, 1}, Case{2.5, 0, 0.0025, 1}, Case{2.5, 0.03, 0, 2}, Case{3.6, 0, 0, 2}}) {
+    Rig rig;
+    Scene scene;
+    scene.add({-1, 1, 0}, {9, 0, 0}, {0, 0, c.wall});
+    scene.add({0, -0.6, 2.5}, {1.5, 0, 0}, {0, 1.6, 0});
+    scene.add({6.5, 0.1, 2.5 - c.step}, {0.9, 0, 0}, {0, 0.9, 0});  // 5 m further on
+    for (double x = -1; x < 8; x += 0.8) rig.look(scene, {x, -2.5, 1.2}, {x, 1, 2.2});
+    for (double y = -0.6; y <= 1; y += 0.4) rig.look(scene, {-1.0, y, 1.2}, {0.7, y, 2.5});
+    MapUpdate tilted;
+    for (const PlaneEstimate& p : rig.mapper.planes()) {
+      if (p.plane.n.z() > -0.9 || c.tilt == 0) continue;
+      const Eigen::Vector3d n(std::sin(c.tilt), 0, -std::cos(c.tilt));
+      tilted.planes.emplace_back(p.id, Plane::fromPointNormal({0.75, 0.2, 2.5}, n));
+    }
+    const SE3 pose = lookAt({5.2, 0.3, 1.2}, {6.9, 0.5, 2.5});
+    rig.place(rig.camera.keyframe(scene, pose), pose, tilted);
+    for (int i = 1; i < 6; ++i) rig.look(scene, {5.2, 0.1 * i, 1.2}, {6.9, 0.5, 2.5 - c.step});
+    int ceilings = 0;
+    for (const PlaneEstimate& p : rig.mapper.planes()) ceilings += p.plane.n.z() < -0.9;
+    EXPECT_EQ(c.ceilings, ceilings) << c.wall << " m high, step " << c.step << ", tilt " << c.tilt;
+  }
+}
+
 // A duct 7 m long, and two boards that end where it would go on.
 TEST(Mapper, TheUndersideOfADuctIsOneWithItsMiddleUnseen) {
   struct Case {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 
 namespace vip_slam {
 namespace {
@@ -14,6 +15,7 @@ constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
 constexpr double kPartition = 0.5;     // m^2; free-standing walls and doors, of which something hides the middle
 constexpr double kNoTable = 20.0;      // m^2; what lies level with so large a surface is more of it, not a second table
 constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
+constexpr double kTopmostCeiling = 1.0;  // m^2; nor has any walls that end at it and nothing above
 // Ceilings are seen at the flattest angles and from afar, and nothing as wide hangs less than this below another one.
 constexpr double kCeilingSlack = 1.5;              // of max_rms
 constexpr double kStrip = 4.0, kLeastStrip = 1.0;  // length over width, m^2; boards of shelves are smaller
@@ -102,6 +104,42 @@ double lengthIfContinued(const PlaneTrack& small, const PlaneTrack& large) {
   return between && length > kStrip * width ? length : 0.0;
 }
 
+double meanHeight(const PlaneTrack& track) {
+  double sum = 0;
+  track.cells().forEach([&](CellIndex c, int) { sum += track.cellCentre(c).z(); });
+  return sum / track.cells().count(1);
+}
+
+double heightDifference(const PlaneTrack& a, const PlaneTrack& b) { return std::abs(meanHeight(a) - meanHeight(b)); }
+
+/// Whether walls end at both pieces, and of all that is known beside them and between them nothing lies higher. Over a
+/// duct or a beam the walls go on.
+bool topmost(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known) {
+  constexpr double kBeside = 0.5, kAbove = 0.3;  // m; walls end a cell or two above or below a ceiling
+  const double level = 0.5 * (meanHeight(a) + meanHeight(b));
+  Eigen::AlignedBox2d piece[2], all;
+  for (int k = 0; k < 2; ++k) {
+    const PlaneTrack& track = k ? b : a;
+    track.cells().forEach([&](CellIndex c, int) { piece[k].extend(track.cellCentre(c).head<2>()); });
+    piece[k].min().array() -= kBeside;
+    piece[k].max().array() += kBeside;
+    all.extend(piece[k]);
+  }
+  bool meets[2] = {false, false}, higher = false;
+  for (const PlaneTrack* track : known) {
+    const bool wall = track->kind() == PlaneKind::kVertical && track->area() >= kLargeWall;
+    track->cells().forEach([&](CellIndex c, int) {
+      const Eigen::Vector3d p = track->cellCentre(c);
+      if (p.z() < level - kAbove) return;
+      const Eigen::Vector2d q = p.head<2>();
+      higher = higher || (p.z() > level + kAbove && all.contains(q));
+      for (int k = 0; wall && k < 2; ++k) meets[k] = meets[k] || piece[k].contains(q);
+    });
+    if (higher) return false;
+  }
+  return meets[0] && meets[1];
+}
+
 PlaneMoments surfaceMoments(const PlaneTrack& track, const CameraPoses& poses) {
   PlaneMoments moments = track.moments(poses);
   if (moments.weight() > 0) return moments;
@@ -140,8 +178,8 @@ bool shownApart(const PlaneTrack& small, const PlaneTrack& large, const CameraPo
 
 }  // namespace
 
-bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& poses,
-                 const PlaneMergingOptions& options) {
+bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known,
+                 const CameraPoses& poses, const PlaneMergingOptions& options) {
   if (a.kind() != b.kind() || a.cells().empty() || b.cells().empty()) return false;
   if (a.plane().n.dot(b.plane().n) < std::cos(options.angle_deg * M_PI / 180.0)) return false;
   const double area_a = a.area(), area_b = b.area();
@@ -176,13 +214,26 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& po
     gap = std::max(gap, lengthIfContinued(small, large));
     if (gap > options.gap) apart *= 0.5;
   }
+  const double ceiling_reach = options.gap_per_area * kLeastCeiling;
+  if (ceiling && gap < ceiling_reach && std::max(area_a, area_b) >= kTopmostCeiling &&
+      boundsGap(small, large) <= ceiling_reach && heightDifference(a, b) < 0.5 * options.distance_apart &&
+      topmost(a, b, known)) {
+    gap = ceiling_reach;
+    apart = 0.5 * options.distance_apart;
+  }
   // That two surfaces lie in one plane by accident is the likelier the further one looks and the less is asked of them:
   // the same chance, with a gap as much wider as they agree better.
   const double between = boundsGap(small, large), widest = smaller >= large_from ? kCloser * gap : gap;
   if (between > widest) return false;
   const Contact meeting = contact(small, large, options.gap);
-  if (between > gap && meeting.worst_border * between > apart * gap) return false;
-  if (meeting.near == 0 && (gap <= options.gap || meeting.worst_border > apart)) return false;
+  // The tenth of a degree by which a level surface may be tilted in the map is centimetres some metres further on; its
+  // height is not.
+  double off = meeting.worst_border;
+  if (a.kind() == PlaneKind::kHorizontal && meeting.near == 0) {
+    off = std::min(off, heightDifference(a, b));
+  }
+  if (between > gap && off * between > apart * gap) return false;
+  if (meeting.near == 0 && (gap <= options.gap || off > apart)) return false;
   if (meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) return false;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
   if (shownApart(small, large, poses, options.max_rms)) return false;
