@@ -40,7 +40,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
       return std::any_of(strip.triangles.begin(), strip.triangles.end(), [&](int i) { return label[i] >= 0; });
     };
     strips.erase(std::remove_if(strips.begin(), strips.end(), known_by_now), strips.end());
-    strips_.add(keyframe.id, T_map_C, triangles, strips);
+    strips_.add(keyframe.id, T_map_C, triangles, label, strips);
     startJointPlanes(keyframe, strips_.detect(posesTiedTo(keyframe.frame.epoch)), &label, &tracks);
     ++counters.keyframes;
   }

@@ -33,20 +33,36 @@ std::vector<MapTriangle> strip(double azimuth, double sigma) {
   return triangles;
 }
 
+/// What the second keyframe shows of the strip: a strip as well, less of it, or a strip that a body goes on from.
+enum class Second { kStrip, kLess, kLessOfABody };
+
 /// What keyframes make of it that look along the x axis from the side by `turn`, when the strip turns along by `share`.
-std::vector<JointPlane> facesSeenFrom(double turn, double share, double sigma = 0.002) {
+std::vector<JointPlane> facesSeenFrom(double turn, double share, double sigma = 0.002, Second second = Second::kStrip) {
   StripEvidence evidence{PlaneDetectionOptions(), PlaneGrowthOptions()};
   CameraPoses poses;
   for (KeyframeId id : {1, 2}) {
     const double sight = 20 * kDegree + (id == 2 ? turn : 0.0);
     poses[id] = lookAt({3.2 - 3 * std::cos(sight), 3 * std::sin(sight), 1.5}, {3.2, 0, 1.5});
-    const std::vector<MapTriangle> triangles = strip(id == 2 ? -share * turn : 0.0, sigma);
+    std::vector<MapTriangle> triangles = strip(id == 2 ? -share * turn : 0.0, sigma);
+    if (id == 2 && second != Second::kStrip) {
+      triangles.resize(6);
+      const std::size_t all = second == Second::kLessOfABody ? 12 : 6;
+      while (triangles.size() < all) {  // turned by 24 degrees, before the near end
+        MapTriangle t = triangles[triangles.size() - 6];
+        for (Eigen::Vector3d& p : t.corner) p += Eigen::Vector3d(-0.3, -0.07, 0);
+        t.centre += Eigen::Vector3d(-0.3, -0.07, 0);
+        t.n = Eigen::AngleAxisd(24 * kDegree, Eigen::Vector3d::UnitZ()) * t.n;
+        triangles.push_back(t);
+      }
+      evidence.add(id, poses[id], triangles, std::vector<int>(triangles.size(), -1), {});
+      continue;
+    }
     DetectedPlane found;
     found.kind = PlaneKind::kVertical;
     for (const MapTriangle& t : triangles) found.centroid += t.centre / double(triangles.size());
     found.plane = Plane::fromPointNormal(found.centroid, triangles.front().n);
     for (std::size_t i = 0; i < triangles.size(); ++i) found.triangles.push_back(static_cast<int>(i));
-    evidence.add(id, poses[id], triangles, {found});
+    evidence.add(id, poses[id], triangles, std::vector<int>(triangles.size(), -1), {found});
     if (id == 1) EXPECT_TRUE(evidence.detect(poses).empty());
   }
   return evidence.detect(poses);
@@ -70,6 +86,15 @@ TEST(StripEvidence, WhatLiesAlongTheLineOfSightIsNone) {
 TEST(StripEvidence, NothingIsKnownFromOneSideOrUnderNoise) {
   EXPECT_TRUE(facesSeenFrom(1 * kDegree, 0.0).empty());
   EXPECT_TRUE(facesSeenFrom(4 * kDegree, 0.0, 0.01).empty());
+}
+
+TEST(StripEvidence, AStripAndAFewTrianglesOfItMakeAFaceButNotOfABody) {
+  const std::vector<JointPlane> found = facesSeenFrom(6 * kDegree, 0.0, 0.002, Second::kLess);
+  ASSERT_EQ(1u, found.size());
+  EXPECT_EQ(26u, found[0].triangles.size());
+  EXPECT_TRUE(facesSeenFrom(6 * kDegree, 1.0, 0.002, Second::kLess).empty());
+  EXPECT_TRUE(facesSeenFrom(1 * kDegree, 0.0, 0.002, Second::kLess).empty());
+  EXPECT_TRUE(facesSeenFrom(6 * kDegree, 0.0, 0.002, Second::kLessOfABody).empty());
 }
 
 TEST(StripEvidence, TheSideOfAPillarIsFound) {

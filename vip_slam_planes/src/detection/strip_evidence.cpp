@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include <Eigen/Geometry>
 
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/detection/plane_fit.h"
+#include "vip_slam_planes/growth/triangle_association.h"
 
 namespace vip_slam {
 namespace {
@@ -14,6 +16,13 @@ constexpr double kLeastTurn = 3.0 * kDegree;  // of the line of sight
 constexpr double kTurnsAlong = 1.0 / 3.0;     // share of that by which the face may seem to turn
 constexpr double kShows = 6.0;                // sigmas by which what turns with the line of sight would be off
 constexpr double kOff = 0.02;                 // m, of each one's middle to the other one's plane
+constexpr double kUpright = 0.5;              // sine of the angle to the vertical; normals of narrow things are noisy
+constexpr double kLeastRemains = 0.03;        // m^2
+constexpr std::size_t kLeastTriangles = 6;
+constexpr double kBeside = 0.15;  // m
+// A body bends; beyond a corner lies another face.
+constexpr double kBends = 10.0 * kDegree, kTurnsOff = 60.0 * kDegree;
+constexpr double kBendingShare = 0.25;  // of the strip's area
 
 MapTriangle moved(const SE3& T, MapTriangle t) {
   for (Eigen::Vector3d& p : t.corner) p = T * p;
@@ -24,6 +33,33 @@ MapTriangle moved(const SE3& T, MapTriangle t) {
 
 Eigen::Vector3d level(const Eigen::Vector3d& v) { return Eigen::Vector3d(v.x(), v.y(), 0).normalized(); }
 
+/// Bounds along the face and upwards, in the plane's frame.
+Eigen::AlignedBox2d boundsOf(const std::vector<MapTriangle>& triangles, const Eigen::Vector3d& along,
+                             const Eigen::Vector3d& up) {
+  Eigen::AlignedBox2d bounds;
+  for (const MapTriangle& t : triangles) {
+    for (const Eigen::Vector3d& p : t.corner) bounds.extend(Eigen::Vector2d(along.dot(p), up.dot(p)));
+  }
+  return bounds;
+}
+
+/// Whether what lies beside the triangles is turned against them, but not as another face is. All in the camera frame.
+bool bendsOn(const std::vector<MapTriangle>& triangles, const Plane& plane, const Eigen::Vector3d& up,
+             const std::vector<MapTriangle>& all) {
+  const Eigen::Vector3d along = up.cross(plane.n).normalized();
+  Eigen::AlignedBox2d around = boundsOf(triangles, along, up);
+  around.min().x() -= kBeside, around.max().x() += kBeside;
+  double own = 0, bent = 0;
+  for (const MapTriangle& t : triangles) own += t.area;
+  for (const MapTriangle& t : all) {
+    if (std::abs(plane.signedDistance(t.centre)) > kBeside) continue;
+    if (!around.contains(Eigen::Vector2d(along.dot(t.centre), up.dot(t.centre)))) continue;
+    const double angle = std::acos(std::clamp(plane.n.dot(t.n), -1.0, 1.0));
+    if (angle > std::max(kBends, 2.0 * t.sigma_angle) && angle < kTurnsOff) bent += t.area;
+  }
+  return bent > kBendingShare * own;
+}
+
 double angleBetweenUnits(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
@@ -31,9 +67,14 @@ double angleBetweenUnits(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 }  // namespace
 
 void StripEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
-                        const std::vector<DetectedPlane>& strips) {
-  Frame frame{id, {}};
+                        const std::vector<int>& label, const std::vector<DetectedPlane>& strips) {
+  Frame frame{id, {}, {}, {}};
   const SE3 T_C_map = T_map_C.inverse();
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (label[i] >= 0 || std::abs(triangles[i].n.z()) > kUpright) continue;
+    frame.upright.push_back(moved(T_C_map, triangles[i]));
+    frame.index.push_back(static_cast<int>(i));
+  }
   for (const DetectedPlane& found : strips) {
     Strip strip;
     strip.plane_C = transformPlane(T_C_map, found.plane);
@@ -43,7 +84,9 @@ void StripEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<Map
       strip.triangles.push_back(moved(T_C_map, triangles[i]));
       strip.sigma += triangles[i].sigma / double(found.triangles.size());
     }
-    if (!strip.triangles.empty()) frame.strips.push_back(std::move(strip));
+    if (strip.triangles.empty()) continue;
+    strip.bends_on = bendsOn(strip.triangles, strip.plane_C, T_C_map.R().col(2), frame.upright);
+    frame.strips.push_back(std::move(strip));
   }
   frames_.push_back(std::move(frame));
   while (frames_.size() > keyframes_) frames_.pop_front();
@@ -61,7 +104,7 @@ StripEvidence::Placed StripEvidence::place(const Frame& frame, const Strip& stri
 
 bool StripEvidence::isOneFace(const Placed& a, const Placed& b) const {
   const Eigen::Vector3d between = b.centroid - a.centroid, along = Eigen::Vector3d::UnitZ().cross(a.plane.n);
-  if (std::abs(along.dot(between)) > gap_) return false;
+  if (std::abs(along.dot(between)) > growth_.gap) return false;
   if (std::abs(a.plane.signedDistance(b.centroid)) > kOff || std::abs(b.plane.signedDistance(a.centroid)) > kOff) {
     return false;
   }
@@ -70,20 +113,77 @@ bool StripEvidence::isOneFace(const Placed& a, const Placed& b) const {
   const double turn = angleBetweenUnits(level(middle - from_a), level(middle - from_b));
   if (turn < kLeastTurn || angleBetweenUnits(a.plane.n, b.plane.n) > kTurnsAlong * turn) return false;
   // How far apart its ends are shows how far off they would be.
-  const Eigen::Vector3d along_C = a.T_C_map.rotation() * along;
-  double low = std::numeric_limits<double>::max(), high = -low;
-  for (const MapTriangle& t : a.strip->triangles) {
-    for (const Eigen::Vector3d& p : t.corner) {
-      low = std::min(low, along_C.dot(p));
-      high = std::max(high, along_C.dot(p));
-    }
+  const Eigen::Matrix3d R = a.T_C_map.R();
+  const double width = boundsOf(a.strip->triangles, R * along, R.col(2)).sizes().x();
+  return 0.5 * width * turn > kShows * std::max(a.strip->sigma, b.strip->sigma);
+}
+
+bool StripEvidence::remainsOf(const Placed& strip, const Frame& frame, const CameraPoses& poses, Strip* remains) const {
+  const SE3 &T_map_C = poses.at(frame.id), T_C_map = T_map_C.inverse();
+  const Plane plane = transformPlane(T_C_map, strip.plane);
+  const Eigen::Vector3d up = T_C_map.R().col(2), along = up.cross(plane.n).normalized();
+  const Eigen::Vector3d middle = T_C_map * strip.centroid;
+  const AngleGate gate(growth_.angle_deg);
+  *remains = Strip();
+  PlaneMoments moments;
+  double area = 0;
+  for (std::size_t i = 0; i < frame.upright.size(); ++i) {
+    const MapTriangle& t = frame.upright[i];
+    if (plane.n.dot(t.n) < gate.cosine(t) || std::abs(along.dot(t.centre - middle)) > growth_.gap) continue;
+    if (std::abs(plane.signedDistance(t.centre)) > distanceGate(t, growth_.distance)) continue;
+    for (const Eigen::Vector3d& p : t.corner) moments.add(T_map_C * p - strip.centroid, t.area);
+    area += t.area;
+    remains->sigma += t.sigma;
+    remains->triangles.push_back(t);
+    remains->index.push_back(frame.index[i]);
   }
-  return 0.5 * (high - low) * turn > kShows * std::max(a.strip->sigma, b.strip->sigma);
+  Plane fitted;
+  if (remains->triangles.size() < kLeastTriangles || area < kLeastRemains) return false;
+  if (!fitPlane(moments, PlaneKind::kVertical, strip.plane.n, &fitted)) return false;
+  remains->sigma /= double(remains->triangles.size());
+  const Eigen::Vector3d centroid = moments.centroid() + strip.centroid;
+  remains->centroid_C = T_C_map * centroid;
+  remains->plane_C = transformPlane(T_C_map, Plane::fromPointNormal(centroid, fitted.n));
+  return !bendsOn(remains->triangles, remains->plane_C, up, frame.upright);
 }
 
 std::vector<JointPlane> StripEvidence::detect(const CameraPoses& poses) {
+  if (frames_.size() < 2 || !poses.count(frames_.back().id)) return {};
+  std::vector<JointPlane> found = pairsOfStrips(poses);
+  for (JointPlane& face : stripsWithRemains(poses)) found.push_back(std::move(face));
+  return found;
+}
+
+std::vector<JointPlane> StripEvidence::stripsWithRemains(const CameraPoses& poses) {
   std::vector<JointPlane> found;
-  if (frames_.size() < 2 || !poses.count(frames_.back().id)) return found;
+  const std::size_t newest = frames_.size() - 1;
+  for (std::size_t f = 0; f <= newest; ++f) {
+    if (!poses.count(frames_[f].id)) continue;
+    std::vector<Strip>& strips = frames_[f].strips;
+    for (std::size_t k = 0; k < strips.size();) {
+      const Placed strip = place(frames_[f], strips[k], poses);
+      JointPlane face;
+      // An older strip has been held against the others when they came.
+      for (std::size_t g = f == newest ? 0 : newest; g <= newest && !strips[k].bends_on; ++g) {
+        Strip remains;
+        if (g == f || !poses.count(frames_[g].id) || !remainsOf(strip, frames_[g], poses, &remains)) continue;
+        const Placed other = place(frames_[g], remains, poses);
+        if (isOneFace(strip, other) && isOneFace(other, strip)) take(other, &face);
+      }
+      if (face.triangles.empty()) {
+        ++k;
+        continue;
+      }
+      take(strip, &face);
+      if (fit(strip, &face)) found.push_back(std::move(face));
+      strips.erase(strips.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+  }
+  return found;
+}
+
+std::vector<JointPlane> StripEvidence::pairsOfStrips(const CameraPoses& poses) {
+  std::vector<JointPlane> found;
   std::vector<Strip>& newest = frames_.back().strips;
   for (std::size_t k = 0; k < newest.size();) {
     const Placed mine = place(frames_.back(), newest[k], poses);
