@@ -87,6 +87,9 @@ class FrontEnd::Impl {
   void placeAtStamp(std::vector<Feature>* features) const;
   /// Without those features that lie where something moves by itself.
   void dropMoving(std::vector<Feature>* features) const;
+  /// Depth leaves as what it means, where tracker and filter have what the camera read; 0 stays 0.
+  float trueDepth(float reading) const;
+  void correctDepth(std::vector<Feature>* features) const;
   /// Of the newest depth image; nothing where something moves by itself.
   DepthGrid depthGrid(int stride) const;
   KeyframePtr makeKeyframe(const TrackedFrame& frame, double t_imu);

@@ -41,6 +41,15 @@ void FrontEnd::Impl::dropMoving(std::vector<Feature>* features) const {
                   features->end());
 }
 
+float FrontEnd::Impl::trueDepth(float reading) const {
+  if (!(reading > 0)) return reading;
+  return std::max(1e-3f, static_cast<float>(filter_.window().trueDepth(reading)));
+}
+
+void FrontEnd::Impl::correctDepth(std::vector<Feature>* features) const {
+  for (Feature& f : *features) f.depth = trueDepth(f.depth);
+}
+
 DepthGrid FrontEnd::Impl::depthGrid(int stride) const {
   DepthGrid grid = makeDepthGrid(tracker_.depth(), stride, sensor_.depth_noise);
   for (int v = 0; v < grid.rows && moving_.any(); ++v) {
@@ -49,6 +58,7 @@ DepthGrid FrontEnd::Impl::depthGrid(int stride) const {
       if (z > 0 && moving_.moves(grid.pixel(u, v), z)) z = 0;
     }
   }
+  for (float& z : grid.z) z = trueDepth(z);
   return grid;
 }
 
@@ -71,6 +81,7 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
       tracker_.tracks()[i].feature = frame->features[i];
     }
   }
+  correctDepth(&frame->features);
   // Others need not know of what passes by; the tracker does, to know it again.
   dropMoving(&frame->features);
   if (is_keyframe) {
@@ -103,10 +114,10 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   keyframe->previous = last_keyframe_;
   std::vector<cv::Point2f> occupied;
   for (const Feature& f : frame.features) occupied.emplace_back(f.pixel.x(), f.pixel.y());
-  for (Feature& corner : orb_.extract(tracker_.gray(), occupied, 6.0)) {
-    tracker_.measure(&corner);
-    keyframe->frame.features.push_back(corner);
-  }
+  std::vector<Feature> corners = orb_.extract(tracker_.gray(), occupied, 6.0);
+  for (Feature& corner : corners) tracker_.measure(&corner);
+  correctDepth(&corners);
+  keyframe->frame.features.insert(keyframe->frame.features.end(), corners.begin(), corners.end());
   dropMoving(&keyframe->frame.features);
   placeAtStamp(&keyframe->frame.features);
   if (!tracker_.depth().empty()) {

@@ -133,7 +133,7 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
       if (unit(random_) < options_.outlier_ratio) m.xy += Eigen::Vector2d(0.05, -0.04);
       if (options_.depth) {
         m.depth_sigma = options_.depth_a + options_.depth_c * p.z() * p.z();
-        m.depth = p.z() + noise.z() * m.depth_sigma;
+        m.depth = p.z() + options_.depth_offset + noise.z() * m.depth_sigma;
         m.depth_sigma *= options_.depth_told;
       }
       seen.push_back(m);
@@ -217,6 +217,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   result.motion_nees /= std::max(1, motions);
   result.nis_per_dof = rows > 0 ? nis / rows : 0;
   result.window = filter.window();
+  result.mounting = filter.mounting();
   result.depth_scale = filter.depthScale();
   return result;
 }

@@ -17,6 +17,7 @@ struct SimulationOptions {
   double imu_rate = 200, image_rate = 20;
   double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
   double depth_told = 1.0;                  ///< share of that sigma which the filter is told
+  double depth_offset = 0;                  ///< m, added to all readings
   bool depth = true;
   bool imu_noise = true;
   int points = 1200;
@@ -70,6 +71,7 @@ struct RunResult {
   double motion_nees = 0, motion_error = 0, newest_error = 0;
   int gated = 0, used = 0;
   WindowState window;  ///< at the end
+  MountingEstimate mounting;
   Matrix15d covariance = Matrix15d::Zero();
 };
 

@@ -24,7 +24,7 @@ Scene makeScene() {
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
   scene.window.T_I_C = simulation.T_I_C();
-  scene.window.calibration = {true, true, true};
+  scene.window.calibration = {true, true, true, true};
   scene.window.time_offset = 0.003;
   scene.f_W = simulation.stateAt(0.5).T_W_I * (simulation.T_I_C() * Eigen::Vector3d(0.3, -0.2, 2.5));
   for (int i = 0; i < 4; ++i) {

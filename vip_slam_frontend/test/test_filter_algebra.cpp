@@ -169,7 +169,7 @@ class AlgebraOnSimulation : public ::testing::Test {
     window.clones.push_back(clone);
     window.v_W = window.v_W_fej = start.v_W;
     window.T_I_C = simulation_->T_I_C();
-    window.calibration = {true, true, true};
+    window.calibration = {true, true, true, true};
     const int n = window.dimension();
     Eigen::VectorXd sigmas = Eigen::VectorXd::Constant(n, 0.02);
     sigmas.head<6>().setConstant(1e-3);

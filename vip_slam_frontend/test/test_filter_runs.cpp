@@ -176,6 +176,45 @@ TEST(Calibration, IsHonestWhileTheMotionSaysLittle) {
   EXPECT_GT(believed, 3.0 * nees);
 }
 
+TEST(Calibration, FindsWhatDepthIsTooLongBy) {
+  double nees = 0, believed = 0, offset_nees = 0;
+  constexpr int kRuns = 6;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    simulation.depth_offset = 0.01;
+    simulation.depth_a = 0.001;
+    simulation.depth_c = 0.0005;
+    simulation.sigma_px = 0.2;
+    FilterOptions options = filterOptions();
+    options.calibration.time_offset = false;  // which so noisy a gyro misleads
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    EXPECT_NEAR(run.mounting.depth_offset, -0.01, 0.002);
+    offset_nees += std::pow((run.mounting.depth_offset + 0.01) / run.mounting.sigma_depth_offset, 2) / kRuns;
+    nees += run.nees / kRuns;
+    options.calibration.depth_offset = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with depth 1 cm too long: %.2f, of the offset %.2f; depth believed: %.2f\n", nees, offset_nees,
+              believed);
+  EXPECT_LT(nees, 9.0);
+  EXPECT_LT(offset_nees, 2.5);
+  EXPECT_GT(believed, 1.5 * nees);
+}
+
+// Such as colour and depth of different moments would ask for: no offset is better than a wrong one.
+TEST(Calibration, AnOffsetOfDepthBeyondBeliefIsTakenBack) {
+  SimulationOptions simulation;
+  simulation.depth_offset = 0.06;
+  FilterOptions options = filterOptions();
+  const RunResult run = runFilter(simulation, options, 10.0, false);
+  EXPECT_TRUE(run.mounting.depth_contradicts);
+  EXPECT_NEAR(run.mounting.depth_offset, 0, 1e-4);
+  EXPECT_EQ(mountingDifferences({run.mounting.T_I_C, run.mounting.time_offset}, run.mounting).size(), 1u);
+  simulation.depth_offset = 0.01;
+  EXPECT_FALSE(runFilter(simulation, options, 10.0, false).mounting.depth_contradicts);
+}
+
 TEST(Calibration, StandingTeachesNothing) {
   SimulationOptions simulation;
   simulation.speed = 0;
@@ -185,6 +224,7 @@ TEST(Calibration, StandingTeachesNothing) {
   const Vector6d change = run.window.T_I_C.boxminus(LandmarkSimulation(simulation).T_I_C());
   EXPECT_LT(change.norm(), 0.1 * options.calibration.sigma_rotation);
   EXPECT_LT(std::abs(run.window.time_offset), 0.1 * options.calibration.sigma_time_offset);
+  EXPECT_LT(std::abs(run.window.depth_offset), 0.2 * options.calibration.sigma_depth_offset);
 }
 
 /// A filter that stands at the origin with this much said about its mounting by one measurement of it.
@@ -230,14 +270,18 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   found.sigma_rotation.setConstant(0.0005);
   found.sigma_translation.setConstant(0.001);
   found.sigma_time_offset = 0.0002;
+  found.depth_offset = -0.0098;
+  found.sigma_depth_offset = 0.0003;
   const std::vector<std::string> all = mountingDifferences(given, found);
-  ASSERT_EQ(all.size(), 3u);
+  ASSERT_EQ(all.size(), 4u);
   EXPECT_NE(all[0].find("0.57 degrees"), std::string::npos) << all[0];
   EXPECT_NE(all[1].find("20.0 mm"), std::string::npos) << all[1];
   EXPECT_NE(all[2].find("4.0 ms"), std::string::npos) << all[2];
+  EXPECT_NE(all[3].find("9.8 mm too long"), std::string::npos) << all[3];
   found.sigma_rotation.setConstant(0.01);  // not sure
   found.sigma_translation.setConstant(0.01);
   found.sigma_time_offset = 0.002;
+  found.sigma_depth_offset = 0.002;
   EXPECT_TRUE(mountingDifferences(given, found).empty());
 }
 

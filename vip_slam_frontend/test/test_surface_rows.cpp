@@ -48,14 +48,16 @@ SurfaceMatches makeMatches(const WindowState& window, unsigned seed, const std::
   for (int i = 0; i < 120; ++i) {
     const Eigen::Vector3d n_W = normals_W[i % normals_W.size()];
     // On the plane n^T x = 2, somewhere around its foot point.
-    Eigen::Vector3d x_W = gauss(&random, 1.0);
-    x_W += (2.0 - n_W.dot(x_W)) * n_W;
-    Eigen::Vector3d y_W = x_W + gauss(&random, 0.03);
-    y_W += (2.0 - n_W.dot(y_W) + error * normal(random)) * n_W;
     SurfacePair pair;
-    pair.p_ref = T_W_ref.inverse() * x_W;
-    pair.n_ref = T_W_ref.R().transpose() * n_W;
-    pair.q_cur = T_W_cur.inverse() * y_W;
+    do {
+      Eigen::Vector3d x_W = gauss(&random, 1.0);
+      x_W += (2.0 - n_W.dot(x_W)) * n_W;
+      Eigen::Vector3d y_W = x_W + gauss(&random, 0.03);
+      y_W += (2.0 - n_W.dot(y_W) + error * normal(random)) * n_W;
+      pair.p_ref = T_W_ref.inverse() * x_W;
+      pair.n_ref = T_W_ref.R().transpose() * n_W;
+      pair.q_cur = T_W_cur.inverse() * y_W;
+    } while (std::abs(pair.p_ref.z()) < 0.3 || std::abs(pair.q_cur.z()) < 0.3);  // rays have a z of 1
     pair.sigma = 0.01;
     matches.pairs.push_back(pair);
   }
@@ -67,7 +69,9 @@ double cost(const WindowState& window, const SurfaceMatches& matches) {
                         cameraPose(window, window.clones.back());
   double sum = 0;
   for (const SurfacePair& pair : matches.pairs) {
-    const double r = pair.n_ref.dot(T_ref_cur * pair.q_cur - pair.p_ref) / pair.sigma;
+    const Eigen::Vector3d q = window.trueDepth(pair.q_cur.z()) / pair.q_cur.z() * pair.q_cur;
+    const Eigen::Vector3d p = window.trueDepth(pair.p_ref.z()) / pair.p_ref.z() * pair.p_ref;
+    const double r = pair.n_ref.dot(T_ref_cur * q - p) / pair.sigma;
     sum += 0.5 * r * r;
   }
   return sum;
@@ -80,7 +84,8 @@ const std::vector<Eigen::Vector3d> kCorridor{Eigen::Vector3d::UnitY(), -Eigen::V
 
 TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
   for (const bool calibrated : {false, true}) {
-    const WindowState window = makeWindow(3, {calibrated, calibrated, calibrated});
+    WindowState window = makeWindow(3, {calibrated, calibrated, calibrated, calibrated});
+    window.depth_offset = calibrated ? 0.002 : 0;
     const SurfaceMatches matches = makeMatches(window, 4, kRoom, 0.01);
     const int n = window.dimension();
     // A weak prior, so that nothing is gated or weighted down.

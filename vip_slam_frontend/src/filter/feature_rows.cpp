@@ -80,7 +80,8 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     weight(2, 2) = 1.0 / sigma_z;
     J_measure = weight * J_measure;
 
-    Eigen::Vector3d residual(o.xy.x() - p_C.x() / p_C.z(), o.xy.y() - p_C.y() / p_C.z(), o.depth - p_C.z());
+    Eigen::Vector3d residual(o.xy.x() - p_C.x() / p_C.z(), o.xy.y() - p_C.y() / p_C.z(),
+                             window.trueDepth(o.depth) - p_C.z());
     residual = weight * residual;
 
     const Eigen::Matrix3d M_theta = J_measure * J_theta, M_f = J_measure * J_f;
@@ -98,6 +99,8 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     if (window.calibration.time_offset) {
       H_x->block(row, window.timeOffsetColumn(), rows, 1) = (M_theta * clone.omega_I - M_f * clone.v_W).topRows(rows);
     }
+    // The residual grows with the offset, where the rows are those of the prediction.
+    if (window.calibration.depth_offset && with_depth) (*H_x)(row + 2, window.depthOffsetColumn()) = -1.0 / sigma_z;
     r->segment(row, rows) = residual.head(rows);
     row += rows;
   }

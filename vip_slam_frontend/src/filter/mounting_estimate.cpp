@@ -8,7 +8,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kSure = 5.0;  // sigmas
-constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002;
+constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002, kLeastDepth = 0.005;
 
 template <typename... Numbers>
 std::string sentence(const char* format, Numbers... numbers) {
@@ -47,6 +47,16 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
         sentence("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration; "
                  "the delay that was found is used",
                  1e3 * found.time_offset, 1e3 * given.time_offset));
+  }
+  if (found.depth_contradicts) {
+    all.push_back(
+        "depth and images disagree by more than depth readings that are too long or too short; are both of the same "
+        "moment, depth registered to the colour camera, its focal length right?");
+  }
+  const double depth = found.depth_offset - given.depth_offset;
+  if (found.sigma_depth_offset > 0 && std::abs(depth) > std::max(kLeastDepth, kSure * found.sigma_depth_offset)) {
+    all.push_back(sentence("depth reads %.1f mm too %s at all distances; it is corrected by that",
+                           1e3 * std::abs(depth), depth < 0 ? "long" : "short"));
   }
   return all;
 }

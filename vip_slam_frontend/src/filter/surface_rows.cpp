@@ -47,14 +47,19 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const Eigen::Matrix3d R_I_C = window.T_I_C.R();
   const Eigen::Vector3d t_I_C = window.T_I_C.t();
   const int rotation = 6, translation = 6 + (window.calibration.rotation ? 3 : 0);
-  const int reference = layout.reference(), offset = reference - 1;
+  const int reference = layout.reference(), offset = translation + (window.calibration.translation ? 3 : 0);
+  const int depth = reference - 1;
 
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<int>(pairs.size()), layout.size() + 1);
   for (int i = 0; i < A.rows(); ++i) {
     const SurfacePair& pair = pairs[i];
     const double w = 1.0 / pair.sigma;
-    const Eigen::Vector3d q_I = R_I_C * pair.q_cur + t_I_C;  // in the newest IMU frame
-    const Eigen::Vector3d s_I = R_ab * q_I + t_ab;           // in the reference's
+    // What the offset adds lies along the rays.
+    const Eigen::Vector3d q_ray = pair.q_cur / pair.q_cur.z(), p_ray = pair.p_ref / pair.p_ref.z();
+    const Eigen::Vector3d q_cur = window.trueDepth(pair.q_cur.z()) * q_ray;
+    const Eigen::Vector3d p_ref = window.trueDepth(pair.p_ref.z()) * p_ray;
+    const Eigen::Vector3d q_I = R_I_C * q_cur + t_I_C;  // in the newest IMU frame
+    const Eigen::Vector3d s_I = R_ab * q_I + t_ab;      // in the reference's
     const Eigen::RowVector3d n_I = w * (R_I_C * pair.n_ref).transpose();
     const Eigen::RowVector3d n_W = n_I * R_a.transpose();
     A.block<1, 3>(i, 0) = -n_I * R_ab * hat(q_I);
@@ -65,7 +70,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
       // s_C = R_I_C^T (R_ab (R_I_C q + t) + t_ab - t)
       const Eigen::Vector3d s_C = R_I_C.transpose() * (s_I - t_I_C);
       const Eigen::Matrix3d R_ref_cur = R_I_C.transpose() * R_ab * R_I_C;
-      A.block<1, 3>(i, rotation) = w * pair.n_ref.transpose() * (hat(s_C) - R_ref_cur * hat(pair.q_cur));
+      A.block<1, 3>(i, rotation) = w * pair.n_ref.transpose() * (hat(s_C) - R_ref_cur * hat(q_cur));
     }
     if (window.calibration.translation) {
       A.block<1, 3>(i, translation) = n_I * (R_ab - Eigen::Matrix3d::Identity());
@@ -74,7 +79,9 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
       A(i, offset) = A.block<1, 3>(i, 0).dot(to.omega_I) + A.block<1, 3>(i, 3).dot(to.v_W) +
                      A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
     }
-    A(i, layout.size()) = -w * pair.n_ref.dot(T_ref_cur * pair.q_cur - pair.p_ref);
+    if (window.calibration.depth_offset)
+      A(i, depth) = w * pair.n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
+    A(i, layout.size()) = -w * pair.n_ref.dot(T_ref_cur * q_cur - p_ref);
   }
   return A;
 }

@@ -22,12 +22,12 @@ double medianOf(std::vector<double>& values) {
 }
 
 /// z in the anchor from the depth readings, each carried along its own ray; 0 when there are none.
-double depthInAnchor(const std::vector<View>& views) {
+double depthInAnchor(const WindowState& window, const std::vector<View>& views) {
   std::vector<double> z;
   for (const View& view : views) {
     const Observation& o = *view.observation;
     if (o.depth <= 0) continue;
-    const Eigen::Vector3d p_C(o.xy.x() * o.depth, o.xy.y() * o.depth, o.depth);
+    const Eigen::Vector3d p_C = window.trueDepth(o.depth) * Eigen::Vector3d(o.xy.x(), o.xy.y(), 1.0);
     z.push_back((view.R.transpose() * (p_C - view.t)).z());
   }
   return z.empty() ? 0.0 : medianOf(z);
@@ -75,7 +75,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
   }
   if (views.size() < 2) return result;
 
-  double z = noise.use_depth ? depthInAnchor(views) : 0.0;
+  double z = noise.use_depth ? depthInAnchor(window, views) : 0.0;
   if (z <= 0) z = depthFromRays(views);
   if (!(z > 0.05) || !(z < 200.0)) return result;
 
@@ -117,7 +117,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
       if (noise.use_depth && view.observation->depth > 0) {
         const double sigma = view.observation->depth_sigma * noise.depth_inflation;
         const double z_C = s.z() / x.z();
-        const double rz = (view.observation->depth - z_C) / sigma;
+        const double rz = (window.trueDepth(view.observation->depth) - z_C) / sigma;
         Eigen::RowVector3d Jz = ds.row(2) / x.z();
         Jz.z() -= s.z() / (x.z() * x.z());
         Jz /= sigma;

@@ -28,6 +28,7 @@ void WindowState::boxplus(const Eigen::VectorXd& delta) {
   if (calibration.translation) extrinsic.tail<3>() = delta.segment<3>(translationColumn());
   if (calibration.rotation || calibration.translation) T_I_C = T_I_C.boxplus(extrinsic);
   if (calibration.time_offset) time_offset += delta(timeOffsetColumn());
+  if (calibration.depth_offset) depth_offset += delta(depthOffsetColumn());
   v_W += delta.segment<3>(navColumn());
   bias_gyro += delta.segment<3>(navColumn() + 3);
   bias_accel += delta.segment<3>(navColumn() + 6);
@@ -38,7 +39,7 @@ bool WindowState::isFinite() const {
     if (!clone.T_W_I.isFinite()) return false;
   }
   return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
-         std::isfinite(time_offset);
+         std::isfinite(time_offset) && std::isfinite(depth_offset);
 }
 
 }  // namespace vip_slam

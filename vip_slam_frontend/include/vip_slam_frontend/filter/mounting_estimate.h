@@ -1,4 +1,4 @@
-// How the camera is mounted on the IMU, as the filter estimates it along the way.
+// How the camera is mounted on the IMU, and by how much its depth is off, as the filter estimates it along the way.
 #pragma once
 
 #include <string>
@@ -15,10 +15,13 @@ struct MountingEstimate {
   Eigen::Vector3d sigma_rotation = Eigen::Vector3d::Zero();     ///< rad, right perturbation
   Eigen::Vector3d sigma_translation = Eigen::Vector3d::Zero();  ///< m, in the IMU frame
   double sigma_time_offset = 0;                                 ///< s
+  double depth_offset = 0;         ///< m: what every reading of the depth camera has to be added
+  double sigma_depth_offset = 0;   ///< m
+  bool depth_contradicts = false;  ///< depth and images disagree by more than any offset; none is used
 };
 
 /// What the sensor's configuration should be corrected by, in sentences: differences that are both sure (five sigmas)
-/// and large enough to matter (0.2 degrees, 5 mm, 2 ms). Empty when it is right.
+/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth). Empty when it is right.
 std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found);
 
 }  // namespace vip_slam

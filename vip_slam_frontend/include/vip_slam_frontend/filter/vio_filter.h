@@ -94,6 +94,8 @@ class VioFilter {
   double ownNoise(const Triangulation& point) const;
   void updateWithFeatures(const std::vector<Candidate>& candidates, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
+  /// An offset of depth that is beyond belief stands for something else; it is taken back and estimated no more.
+  void judgeDepthOffset();
   /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
   /// allows: then whatever broke the estimate broke this as well.
   void learnMounting();
@@ -113,7 +115,8 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
-  int still_images_ = 0;  ///< images since the standing began; 0 when moving
+  bool depth_contradicts_ = false;  ///< its offset went beyond belief
+  int still_images_ = 0;            ///< images since the standing began; 0 when moving
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none
   std::optional<RelativeMotion> to_mark_;  ///< from the clone that was marked, when mark_ is another by now

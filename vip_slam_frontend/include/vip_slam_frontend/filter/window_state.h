@@ -1,5 +1,5 @@
 // The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
-// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td) that are estimated.
+// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td, depth offset) that are estimated.
 // Rotations are perturbed on the right, positions in the world.
 #pragma once
 
@@ -24,8 +24,10 @@ struct Clone {
 };
 
 struct CalibrationFlags {
-  bool rotation = false, translation = false, time_offset = false;
-  int size() const { return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0); }
+  bool rotation = false, translation = false, time_offset = false, depth_offset = false;
+  int size() const {
+    return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0) + (depth_offset ? 1 : 0);
+  }
 };
 
 struct WindowState {
@@ -36,6 +38,7 @@ struct WindowState {
   Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
   SE3 T_I_C;
   double time_offset = 0;
+  double depth_offset = 0;  ///< m: what every reading of the depth camera has to be added
   CalibrationFlags calibration;
 
   int cloneColumn(int index) const { return 6 * index; }
@@ -47,6 +50,10 @@ struct WindowState {
   int translationColumn() const { return calibrationColumn() + (calibration.rotation ? 3 : 0); }
   int timeOffsetColumn() const { return translationColumn() + (calibration.translation ? 3 : 0); }
 
+  int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
+
+  /// z that a reading of the depth camera means, m.
+  double trueDepth(double reading) const { return reading + depth_offset; }
   /// Index of the clone, -1 when it is not in the window.
   int indexOf(CloneId id) const;
   NavState nav() const;
