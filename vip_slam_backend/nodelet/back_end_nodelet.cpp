@@ -4,6 +4,7 @@
 #include <vip_slam_msgs/MapUpdate.h>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_ros/calibration.h"
 #include "vip_slam_ros/frame_conversions.h"
 #include "vip_slam_ros/geometry_conversions.h"
@@ -145,6 +146,7 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
+    scale_difference_ = scaleDifference(back_end_->scale(), sensor_.depth_scale);
   }
   distribute(update);
   startGlobalBa();
@@ -230,6 +232,7 @@ void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status)
     status.summary(DiagnosticStatus::OK,
                    std::to_string(shown_.keyframes) + " keyframes, " + std::to_string(shown_.landmarks) + " landmarks");
   }
+  if (!scale_difference_.empty()) status.add("calibration", scale_difference_);
   status.add("keyframes", shown_.keyframes);
   status.add("landmarks", shown_.landmarks);
   status.add("landmarks on planes", shown_.plane_landmarks);

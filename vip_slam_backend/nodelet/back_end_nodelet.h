@@ -86,7 +86,7 @@ class BackEndNodelet : public nodelet::Nodelet {
 
   mutable std::mutex shown_mutex_;
   vip_slam_msgs::BackEndStatistics shown_;
-  std::string problem_;
+  std::string problem_, scale_difference_;
 
   std::atomic<double> display_rate_{2.0};
   std::atomic<bool> publish_tf_{true};

@@ -56,6 +56,8 @@ class BackEnd {
   MapUpdate finish();
 
   MapSnapshot snapshot() const;
+  /// How large the map is by the accelerometer; asked after each global adjustment and now and then in between.
+  InertialScale scale() const;
   const Map& map() const;
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);

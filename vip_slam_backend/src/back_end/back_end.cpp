@@ -3,6 +3,11 @@
 #include "back_end_impl.h"
 
 namespace vip_slam {
+namespace {
+
+constexpr std::uint64_t kScaleInterval = 30;  // keyframes
+
+}  // namespace
 
 BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l)
     : options(o),
@@ -81,6 +86,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   localBundleAdjustment(t, &update);
   cull(&update);
   closeLoop(&update);
+  if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
   if (entering) fillGlobal(&update);  // nobody knows yet where the keyframes lie that waited for this one
   finishUpdate(&update);
   return update;
@@ -196,6 +202,7 @@ MapUpdate BackEnd::finish() {
   return merge(run(startGlobalBa()));
 }
 
+InertialScale BackEnd::scale() const { return impl_->statistics.scale; }
 MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }
 void BackEnd::reset() { impl_->reset(); }

@@ -46,6 +46,7 @@ struct BackEnd::Impl {
   void fillGlobal(MapUpdate* update) const;
   void finishUpdate(MapUpdate* update);
   LandmarkEstimate estimateOf(const MapLandmark& landmark) const;
+  void askForScale();
   GbaJob makeGlobalJob() const;
   MapUpdate mergeGlobal(const GbaResult& result);
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "back_end_impl.h"
+#include "vip_slam_backend/optimisation/inertial_scale.h"
 
 namespace vip_slam {
 
@@ -119,6 +120,8 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   new_loops.clear();
 }
 
+void BackEnd::Impl::askForScale() { statistics.scale = inertialScale(map, sensor.gravity, sensor.imu_noise); }
+
 GbaJob BackEnd::Impl::makeGlobalJob() const {
   GbaJob job;
   job.correction = correction;
@@ -145,6 +148,7 @@ MapUpdate BackEnd::Impl::mergeGlobal(const GbaResult& result) {
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     ++statistics.global_ba;
     followNewest();
+    askForScale();
     fillGlobal(&update);
   }
   finishUpdate(&update);

@@ -8,6 +8,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_bringup/runner/plane_files.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
@@ -117,6 +118,9 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     }
   }
   if (pipeline.mapping()) {
+    const InertialScale scale = pipeline.mapping()->backEnd().scale();
+    const std::string difference = scaleDifference(scale, reader.sensor().depth_scale);
+    if (!difference.empty()) all.push_back(difference);
     const auto& refusals = pipeline.mapping()->refusals();
     all.insert(all.end(), refusals.begin(), refusals.end());
   }
@@ -126,7 +130,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
 namespace {
 
 /// In the words and units of a sensor file, so that it can be copied there.
-void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting) {
+void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const InertialScale& scale,
+                  double depth_scale) {
   const auto list = [&yaml](const char* key, const Eigen::VectorXd& values) {
     yaml << YAML::Key << key << YAML::Value << YAML::Flow
          << std::vector<double>(values.data(), values.data() + values.size());
@@ -139,7 +144,14 @@ void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting) {
   yaml << YAML::Key << "time_offset" << YAML::Value << mounting.time_offset;
   list("sigma_rotation_deg", mounting.sigma_rotation * 180 / M_PI);
   list("sigma_translation", mounting.sigma_translation);
-  yaml << YAML::Key << "sigma_time_offset" << YAML::Value << mounting.sigma_time_offset << YAML::EndMap;
+  yaml << YAML::Key << "sigma_time_offset" << YAML::Value << mounting.sigma_time_offset;
+  yaml << YAML::Key << "depth_offset" << YAML::Value << mounting.depth_offset;
+  yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << mounting.sigma_depth_offset;
+  if (scale.sigma > 0) {
+    yaml << YAML::Key << "depth_scale_by_imu" << YAML::Value << depth_scale * scale.factor;
+    yaml << YAML::Key << "sigma_depth_scale_by_imu" << YAML::Value << depth_scale * scale.sigma;
+  }
+  yaml << YAML::EndMap;
 }
 
 std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader, const MapSnapshot& map,
@@ -166,7 +178,9 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   emitMap(yaml, map, planes,
           pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());
-  emitMounting(yaml, pipeline.frontEnd().mounting());
+  emitMounting(yaml, pipeline.frontEnd().mounting(),
+               pipeline.mapping() ? pipeline.mapping()->backEnd().scale() : InertialScale(),
+               reader.sensor().depth_scale);
   emitStates(yaml, pipeline.states());
   put("warnings", runWarnings(pipeline, reader));
   yaml << YAML::EndMap;

@@ -20,6 +20,12 @@ struct SnapshotKeyframe {
   std::uint32_t landmarks = 0;
 };
 
+/// How large the map is by the accelerometer, see optimisation/inertial_scale.h.
+struct InertialScale {
+  double factor = 1;  ///< true distance over the map's distance
+  double sigma = 0;   ///< one sigma of factor; 0: not known
+};
+
 struct BackEndStatistics {
   std::uint64_t keyframes_received = 0, keyframes_refused = 0, keyframes_culled = 0;
   std::uint64_t landmarks = 0, plane_landmarks = 0, observations = 0;
@@ -28,6 +34,7 @@ struct BackEndStatistics {
   std::uint64_t outliers = 0;    ///< observations removed by residual
   std::uint64_t local_ba = 0, global_ba = 0;
   std::uint64_t loops_accepted = 0, loops_rejected = 0;
+  InertialScale scale;  ///< as of the last global adjustment, or some keyframes ago
 };
 
 struct MapSnapshot {

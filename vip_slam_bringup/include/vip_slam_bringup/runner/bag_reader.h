@@ -60,6 +60,7 @@ class BagReader {
   const std::string& extrinsicsSource() const { return extrinsics_source_; }
   /// After the end: what was counted ("undecodable_images", "images_without_depth", ...), and what a user should know.
   const std::map<std::string, std::uint64_t>& counters() const { return counters_; }
+  const SensorConfig& sensor() const { return sensor_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:

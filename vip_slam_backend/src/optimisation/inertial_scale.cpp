@@ -1,0 +1,227 @@
+#include "vip_slam_backend/optimisation/inertial_scale.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+namespace vip_slam {
+namespace {
+
+// Shorter intervals are joined: within them the poses' noise is no longer small against what acceleration moves.
+constexpr double kLeastInterval = 0.5, kLongestInterval = 3.0;   // s
+constexpr double kLeastTime = 10.0;                              // s of all intervals
+constexpr double kLeastPoseSigma = 1e-5, kMostPoseSigma = 0.01;  // of a keyframe against its neighbour, m
+constexpr int kPoseSigmaSteps = 8;
+constexpr double kTiltSigma = 0.01;      // of the map against gravity, rad
+constexpr double kGravitySigma = 0.002;  // relative, over the earth's places
+constexpr double kBiasSigma = 0.5;       // at the beginning of each chain, m/s^2
+// Above it the motion shows no more of the scale than the noise of the poses does.
+constexpr double kLargestSigma = 0.01;
+constexpr double kSure = 5.0, kLeastDifference = 0.005;
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// Increments of position and velocity over several keyframe intervals, in the body's frame at the first.
+struct Increments {
+  double dt = 0;
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d alpha = Eigen::Vector3d::Zero(), beta = Eigen::Vector3d::Zero();      ///< at bias zero
+  Eigen::Matrix3d J_alpha = Eigen::Matrix3d::Zero(), J_beta = Eigen::Matrix3d::Zero();  ///< by the accelerometer's bias
+  Matrix6 covariance = Matrix6::Zero();
+
+  void append(const Preintegration& next) {
+    const double t = next.dt();
+    const Eigen::Vector3d& bias = next.biasAccel();
+    const Eigen::Vector3d alpha_next = next.alpha() - next.J_alpha_ba() * bias;
+    const Eigen::Vector3d beta_next = next.beta() - next.J_beta_ba() * bias;
+    alpha += beta * t + R * alpha_next;
+    J_alpha += J_beta * t + R * next.J_alpha_ba();
+    beta += R * beta_next;
+    J_beta += R * next.J_beta_ba();
+    Matrix6 A = Matrix6::Identity(), turn = Matrix6::Zero();
+    A.topRightCorner<3, 3>() = t * Eigen::Matrix3d::Identity();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R;
+    covariance = A * covariance * A.transpose() + turn * next.covariance().block<6, 6>(3, 3) * turn.transpose();
+    R *= next.deltaR();
+    dt += t;
+  }
+};
+
+/// Least squares over corrections of [what all intervals share | velocity, bias of one keyframe], the keyframes one
+/// after the other: x^T A x - 2 b^T x + c.
+class ScaleFit {
+ public:
+  static constexpr int kShared = 4;  ///< scale, tilt about the world's x and y, gravity
+  ScaleFit(double gravity, double pose_sigma) : gravity_(gravity), pose_variance_(2 * pose_sigma * pose_sigma) {
+    A_(1, 1) = A_(2, 2) = 1.0 / (kTiltSigma * kTiltSigma);
+    A_(3, 3) = 1.0 / (kGravitySigma * kGravitySigma * gravity * gravity);
+  }
+
+  /// A keyframe without IMU from the one before.
+  void begin() {
+    forgetFirst();
+    A_.diagonal().segment<3>(kShared).setConstant(1e-6);
+    A_.diagonal().segment<3>(kShared + 3).setConstant(1.0 / (kBiasSigma * kBiasSigma));
+  }
+
+  void add(const NavState& from, const NavState& to, const Increments& imu, double random_walk) {
+    const Eigen::Vector3d G = gravityVector(gravity_), dp = to.T_W_I.t() - from.T_W_I.t();
+    const Eigen::Matrix3d R = from.T_W_I.R();
+    const double dt = imu.dt;
+    // s dp - v dt + G dt^2 / 2 - R (alpha + J b), v' - v + G dt - R (beta + J b), b' - b
+    Eigen::Matrix<double, 9, kColumns> J = Eigen::Matrix<double, 9, kColumns>::Zero();
+    Eigen::Matrix<double, 9, 1> r = Eigen::Matrix<double, 9, 1>::Zero();
+    const Eigen::Vector3d p = R * (imu.alpha + imu.J_alpha * from.bias_accel);
+    const Eigen::Vector3d v = R * (imu.beta + imu.J_beta * from.bias_accel);
+    J.block<3, 1>(0, 0) = dp;
+    J.block<3, 2>(0, 1) = hat(p).leftCols<2>();
+    J.block<3, 2>(3, 1) = hat(v).leftCols<2>();
+    J(2, 3) = 0.5 * dt * dt;
+    J(5, 3) = dt;
+    J.block<3, 3>(0, kFirst) = -dt * Eigen::Matrix3d::Identity();
+    J.block<3, 3>(3, kFirst) = -Eigen::Matrix3d::Identity();
+    J.block<3, 3>(3, kSecond) = Eigen::Matrix3d::Identity();
+    J.block<3, 3>(0, kFirst + 3) = -R * imu.J_alpha;
+    J.block<3, 3>(3, kFirst + 3) = -R * imu.J_beta;
+    J.block<3, 3>(6, kFirst + 3) = -Eigen::Matrix3d::Identity();
+    J.block<3, 3>(6, kSecond + 3) = Eigen::Matrix3d::Identity();
+    r.head<3>() = p - 0.5 * G * dt * dt + from.v_W * dt - dp;
+    r.segment<3>(3) = v - G * dt + from.v_W - to.v_W;
+    r.tail<3>() = from.bias_accel - to.bias_accel;
+    Matrix6 turn = Matrix6::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R;
+    Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
+    covariance.topLeftCorner<6, 6>() = turn * imu.covariance * turn.transpose();
+    covariance.diagonal().tail<3>().setConstant(random_walk * random_walk * dt);
+    // The adjustment has the poses give way to the IMU: what is left of a residual is its share in the sum of both
+    // noises.
+    const Eigen::Matrix<double, 9, 1> share = covariance.llt().solve(r);
+    covariance.diagonal().head<3>().array() += pose_variance_;
+    r = covariance * share;
+    const Eigen::LLT<Eigen::Matrix<double, 9, 9>> llt(covariance);
+    llt.matrixL().solveInPlace(J);
+    llt.matrixL().solveInPlace(r);
+
+    A_ += J.transpose() * J;
+    b_ += J.transpose() * r;
+    c_ += r.squaredNorm();
+    time_ += dt;
+    rows_ += 3;  // of six, three are the new velocity's
+    forgetFirst();
+  }
+
+  /// Ends the last chain. False when there is too little to go by.
+  bool solve() {
+    forgetFirst();
+    if (time_ < kLeastTime || rows_ <= kShared) return false;
+    const Eigen::LDLT<Eigen::Matrix4d> ldlt(A_.topLeftCorner<kShared, kShared>());
+    const Eigen::Vector4d x = ldlt.solve(b_.head<kShared>());
+    misfit_ = (c_ - b_.head<kShared>().dot(x)) / (rows_ - kShared);
+    const double variance = ldlt.solve(Eigen::Vector4d::Unit(0))(0) * std::max(1.0, misfit_);
+    if (!std::isfinite(x(0)) || !(variance > 0) || variance > kLargestSigma * kLargestSigma) return false;
+    scale_.factor = 1 + x(0);
+    scale_.sigma = std::sqrt(variance);
+    return true;
+  }
+  const InertialScale& scale() const { return scale_; }
+  double misfit() const { return misfit_; }  ///< squared residual per degree of freedom; 1 when the noise is right
+
+ private:
+  static constexpr int kFirst = kShared, kSecond = kShared + 6, kColumns = kShared + 12;
+
+  /// Eliminates the first keyframe's velocity and bias; the second's take their place.
+  void forgetFirst() {
+    const Matrix6 first = A_.block<6, 6>(kFirst, kFirst);
+    Eigen::Matrix<double, kColumns, kColumns> A = A_;
+    Eigen::Matrix<double, kColumns, 1> b = b_;
+    if (first.diagonal().maxCoeff() > 0) {
+      const Eigen::LDLT<Matrix6> ldlt(first);
+      const Eigen::Matrix<double, 6, kColumns> X = ldlt.solve(A_.middleRows<6>(kFirst));
+      const Vector6 y = ldlt.solve(b_.segment<6>(kFirst));
+      A -= A_.middleCols<6>(kFirst) * X;
+      b -= A_.middleCols<6>(kFirst) * y;
+      c_ -= b_.segment<6>(kFirst).dot(y);
+    }
+    A_.setZero();
+    b_.setZero();
+    A_.topLeftCorner<kShared, kShared>() = A.topLeftCorner<kShared, kShared>();
+    A_.block<kShared, 6>(0, kFirst) = A.block<kShared, 6>(0, kSecond);
+    A_.block<6, kShared>(kFirst, 0) = A.block<6, kShared>(kSecond, 0);
+    A_.block<6, 6>(kFirst, kFirst) = A.block<6, 6>(kSecond, kSecond);
+    b_.head<kShared>() = b.head<kShared>();
+    b_.segment<6>(kFirst) = b.segment<6>(kSecond);
+  }
+
+  double gravity_, pose_variance_;
+  InertialScale scale_;
+  double misfit_ = 0;
+  Eigen::Matrix<double, kColumns, kColumns> A_ = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+  Eigen::Matrix<double, kColumns, 1> b_ = Eigen::Matrix<double, kColumns, 1>::Zero();
+  double c_ = 0, time_ = 0;
+  int rows_ = 0;
+};
+
+/// From keyframe to keyframe; without `from` a chain begins at `to`.
+struct Interval {
+  const MapKeyframe *from, *to;
+  Increments imu;
+};
+
+std::vector<Interval> intervalsOf(const Map& map) {
+  std::vector<Interval> intervals;
+  const MapKeyframe* from = nullptr;  // where the present interval began
+  KeyframeId newest = 0;
+  Increments imu;
+  for (const auto& [id, kf] : map.keyframes()) {
+    if (kf.stored) continue;
+    const bool linked = from && kf.previous == newest && kf.preintegration;
+    newest = id;
+    if (linked) {
+      imu.append(*kf.preintegration);
+      if (imu.dt < kLeastInterval) continue;
+    }
+    intervals.push_back({linked && imu.dt < kLongestInterval ? from : nullptr, &kf, imu});
+    from = &kf;
+    imu = Increments();
+  }
+  return intervals;
+}
+
+}  // namespace
+
+InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& noise) {
+  const std::vector<Interval> intervals = intervalsOf(map);
+  const auto fitWith = [&](double pose_sigma) {
+    ScaleFit fit(gravity, pose_sigma);
+    for (const Interval& i : intervals) {
+      i.from ? fit.add(i.from->state, i.to->state, i.imu, noise.accel_random_walk) : fit.begin();
+    }
+    fit.solve();
+    return fit;
+  };
+  // How exact the poses are, the residuals say.
+  double low = kLeastPoseSigma, high = kMostPoseSigma;
+  for (int step = 0; step < kPoseSigmaSteps; ++step) {
+    const double middle = std::sqrt(low * high);
+    (fitWith(middle).misfit() < 1 ? low : high) = middle;
+  }
+  return fitWith(low).scale();
+}
+
+std::string scaleDifference(const InertialScale& scale, double depth_scale) {
+  const double difference = scale.factor - 1;
+  if (!(scale.sigma > 0) || std::abs(difference) < std::max(kLeastDifference, kSure * scale.sigma)) return "";
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "distances are %.1f %% %s than the accelerometer says (one sigma %.2f %%): depth reads too %s, and "
+                "depth/scale in the sensor's configuration should be %.6g, unless the accelerometer is off by as much",
+                100 * std::abs(difference), difference < 0 ? "longer" : "shorter", 100 * scale.sigma,
+                difference < 0 ? "long" : "short", depth_scale * scale.factor);
+  return text;
+}
+
+}  // namespace vip_slam
