@@ -77,6 +77,27 @@ TEST_F(FrontEndTest, ThePoseIsToldBeforeTheRestAndIsTheOneReturned) {
   EXPECT_FALSE(bad.frame->status.reason.empty());
 }
 
+TEST_F(FrontEndTest, DepthIsHandedOnAsWhatItMeans) {
+  FrameOutput output;
+  KeyframePtr keyframe;
+  double t = 0;
+  for (int k = 0; k < 120; ++k) {
+    t = 0.05 * k;
+    feedImu(t + 0.05);
+    output = front_end_.process({t, world_.image(t), World::depth(t) + 0.015});
+    if (output.keyframe) keyframe = output.keyframe;
+    if (output.keyframe && t > 4) break;
+  }
+  ASSERT_TRUE(output.keyframe);
+  const double offset = front_end_.mounting().depth_offset;
+  EXPECT_LT(offset, -0.001);
+  const double z = kWall - World::position(t).x() + 0.015 + offset;
+  for (const Feature& f : keyframe->frame.features) EXPECT_NEAR(f.depth, z, 5e-4);
+  for (const Feature& f : output.frame->features) EXPECT_NEAR(f.depth, z, 5e-4);
+  EXPECT_NEAR(keyframe->frame.depth_grid.at(20, 20), z, 5e-4);
+  EXPECT_NEAR(output.frame->depth_grid.at(10, 10), z, 5e-4);
+}
+
 TEST_F(FrontEndTest, TwoRunsAgreeBitByBit) {
   const FrameOutput a = run(0.0, 3.0);
   FrontEnd other(options(), sensor());
