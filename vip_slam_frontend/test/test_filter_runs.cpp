@@ -1,7 +1,9 @@
 // Whole-filter runs on the landmark simulation: outliers, noise adaptation, standing still, calibration.
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include "landmark_simulation.h"
 
@@ -24,6 +26,33 @@ TEST(NoiseMonitor, AWrongStartIsForgottenWithinThreeImages) {
     NoiseMonitor monitor(0.5, 0.01, 2.0, true);
     for (int image = 0; image < 3; ++image) monitor.add(std::pow(truth / monitor.sigma(), 2), 60);
     EXPECT_NEAR(std::log(monitor.sigma() / truth), 0.0, 0.1) << truth;
+  }
+}
+
+TEST(StampMonitor, FindsTheJitterOfStampsAndNoneWhereThereIsNone) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  for (const double truth : {0.0, 0.001, 0.003}) {
+    StampMonitor monitor(true);
+    for (int image = 0; image < 400; ++image) {
+      const Eigen::Vector3d omega(0.5 * std::sin(0.3 * image), 0.6 * std::cos(0.21 * image), 0.1);
+      // One update: the orientation as predicted, off by the gyro's noise and the stamps', against a better
+      // measurement.
+      const double gyro = 4e-5, image_sigma = 2e-4;
+      const Eigen::Vector3d error = gyro * Eigen::Vector3d(normal(random), normal(random), normal(random)) +
+                                    std::sqrt(2.0) * truth * normal(random) * omega;
+      const Eigen::Vector3d measured =
+          error + image_sigma * Eigen::Vector3d(normal(random), normal(random), normal(random));
+      const Eigen::Matrix3d P =
+          gyro * gyro * Eigen::Matrix3d::Identity() + 2 * monitor.sigma() * monitor.sigma() * omega * omega.transpose();
+      const Eigen::Matrix3d K = P * (P + image_sigma * image_sigma * Eigen::Matrix3d::Identity()).inverse();
+      monitor.add(omega, K * measured, K * P);
+    }
+    if (truth > 0) {
+      EXPECT_NEAR(std::log(monitor.sigma() / truth), 0.0, 0.7) << truth;
+    } else {
+      EXPECT_LT(monitor.sigma(), 1e-4);
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 // An IMU whose axes or signs are not what the configuration says: the poses are wrong then, and the status does not say
 // TRACKING.
 #include <functional>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -35,6 +36,30 @@ Verdict judge(const Fault& fault, const SensorConfig& sensor) {
   }
   verdict.contradicted = front_end.counters().imu_contradicted;
   return verdict;
+}
+
+// A host that stamps images when they arrive: two milliseconds are two pixels at this rate of turn.
+TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
+  const CornerWorld world;
+  const SensorConfig sensor = cornerSensor(0, 0);
+  FrontEnd front_end(cornerOptions(), sensor);
+  std::mt19937 random(4);
+  std::normal_distribution<double> jitter(0, 0.002);
+  double imu_t = 0;
+  FrameOutput output;
+  for (int k = 0; k < 200; ++k) {
+    const double t = 0.05 * k, stamp = t + jitter(random);
+    for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
+    FrameInput input;
+    input.t = stamp;
+    world.look(t, 0, &input.gray, &input.depth);
+    output = front_end.process(input);
+    if (t < kStill + 3) continue;
+    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
+  }
+  EXPECT_EQ(front_end.counters().imu_contradicted, 0u);
+  EXPECT_LT(front_end.counters().imu_noise_scale, 2.0);
+  EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(output.frame->t).t()).norm(), 0.02);
 }
 
 /// 76 images are judged.

@@ -16,6 +16,10 @@ constexpr double kMostCorrection = 20.0;  // one image may not decide
 constexpr double kContradiction = 1.3;
 constexpr double kManyGated = 0.3;
 constexpr double kWidest = 30.0;
+// Slower turns do not tell the stamps from the gyro's noise, rad/s.
+constexpr double kLeastTurn = 0.1;
+// s: below it does no harm; more is no jitter but a wrong IMU.
+constexpr double kLeastJitter = 1e-4, kMostJitter = 5e-3;
 
 }  // namespace
 
@@ -30,6 +34,23 @@ void NoiseMonitor::add(double chi2_per_dof, int dof) {
   const double step = gain * std::clamp(0.5 * std::log(chi2_per_dof), -most, most);
   sigma_ = std::clamp(sigma_ * std::exp(step), min_, std::max(min_, max_));
 }
+
+void StampMonitor::add(const Eigen::Vector3d& omega, const Eigen::Vector3d& turned, const Eigen::Matrix3d& lost) {
+  const double expected = omega.dot(lost * omega);
+  if (!adapt_ || omega.norm() < kLeastTurn || !(expected > 0) || !turned.allFinite()) return;
+  const double along = turned.dot(omega);
+  ratio_ += kGain * (std::min(along * along / expected, kMostCorrection) - ratio_);
+  if (ratio_ > kContradiction) {
+    sigma_ = std::clamp(sigma_ * std::pow(ratio_, kGain), kLeastJitter, kMostJitter);
+  } else if (ratio_ < 1.0) {
+    sigma_ /= 1.04;
+    if (sigma_ < kLeastJitter) sigma_ = 0;
+  }
+}
+
+bool StampMonitor::isGrowing() const { return ratio_ > kContradiction && sigma_ > 0 && sigma_ < kMostJitter; }
+
+void StampMonitor::reset() { *this = StampMonitor(adapt_); }
 
 void ImuNoiseMonitor::add(double correction, int used, int gated) {
   if (!adapt_ || used + gated < 5 || !std::isfinite(correction)) return;

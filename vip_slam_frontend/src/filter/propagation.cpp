@@ -30,7 +30,7 @@ double Propagation::displacementSigma(const Matrix15d& P) const {
 }
 
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
-                      const Eigen::Vector3d& G, double noise_scale) {
+                      const Eigen::Vector3d& G, double noise_scale, double stamp_sigma) {
   Propagation result;
   ImuNoise scaled = noise;
   scaled.gyro_noise_density *= noise_scale;
@@ -67,6 +67,13 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   T.block<3, 3>(3, 3) = R_now;
   T.block<3, 3>(6, 6) = R_now;
   result.Q = T * pre.covariance() * T.transpose();
+  if (stamp_sigma > 0) {
+    // Of both images; the motion goes on as at the end.
+    Eigen::Matrix<double, 9, 1> rate;
+    rate << result.omega_I, result.predicted.v_W,
+        result.predicted.T_W_I.R() * (samples.back().accel - window.bias_accel) - G;
+    result.Q.topLeftCorner<9, 9>() += 2.0 * stamp_sigma * stamp_sigma * rate * rate.transpose();
+  }
   result.Q.diagonal() += noiseFloor().cwiseAbs2();
   const Eigen::LLT<Matrix15d> llt(result.Q);
   result.W = llt.matrixL().solve(Matrix15d::Identity());

@@ -12,6 +12,8 @@ namespace {
 // A depth camera may be this much worse than its noise model before readings are wrong rather than noisy.
 constexpr double kMostDepthNoise = 5.0;
 constexpr double kLeastDepthNoise = 0.3;
+// Features whose update tells of the stamps.
+constexpr int kLeastOfStamps = 5;
 // Sigmas of the prior within which a mounting that was found is kept over a restart.
 constexpr double kBelievableChange = 4.0;
 // One sigma of what is taken back, m.
@@ -42,6 +44,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       explained_(0.95),
       noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px),
       depth_noise_(1.0, kLeastDepthNoise, kMostDepthNoise, options.adapt_depth_noise),
+      stamp_monitor_(options.adapt_imu_noise),
       imu_monitor_(options.adapt_imu_noise) {}
 
 MountingEstimate VioFilter::mounting() const {
@@ -109,6 +112,7 @@ void VioFilter::stop() {
   if (started_) learnMounting();
   started_ = false;
   tracks_.clear();
+  stamp_monitor_.reset();
   imu_monitor_.reset();
   still_images_ = 0;
   mark_ = 0;
@@ -167,7 +171,7 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
 
 Propagation VioFilter::predict(const std::vector<ImuSample>& samples, double noise_scale) const {
   const double scale = noise_scale * options_.imu_noise_inflation * imu_monitor_.scale();
-  return propagate(filter_.window(), samples, imu_noise_, G_, scale);
+  return propagate(filter_.window(), samples, imu_noise_, G_, scale, stamp_monitor_.sigma());
 }
 
 void VioFilter::forgetClone(CloneId id) {
@@ -256,7 +260,21 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
   judgeDepthOffset();
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
-  if (!still) imu_monitor_.add(report.correction, report.features_used, report.features_gated);
+  if (!still) {
+    // What the stamps' scatter may explain yet is not held against the IMU.
+    double correction = report.correction;
+    if (report.features_used >= kLeastOfStamps) {
+      const Eigen::Vector3d& w = propagation.omega_I;
+      const Eigen::Vector3d turned = logSO3(Eigen::Matrix3d(predicted.T_W_I.R().transpose() * nav().T_W_I.R()));
+      const Eigen::Matrix3d lost = (P_predicted - covariance()).topLeftCorner<3, 3>();
+      stamp_monitor_.add(w, turned, lost);
+      const double along = turned.dot(w);
+      if (stamp_monitor_.isGrowing()) {
+        correction = std::min(correction, std::max(0.0, 6.0 * correction - along * along / w.dot(lost * w)) / 5.0);
+      }
+    }
+    imu_monitor_.add(correction, report.features_used, report.features_gated);
+  }
 
   // Used sightings may not be used again: lost tracks go, those at the window's end start anew with the next image.
   const int used = std::min<int>(report.features_tried, static_cast<int>(candidates.size()));

@@ -3,6 +3,8 @@
 // the other.
 #pragma once
 
+#include <Eigen/Core>
+
 namespace vip_slam {
 
 class NoiseMonitor {
@@ -17,6 +19,25 @@ class NoiseMonitor {
   double sigma_, min_, max_;
   bool adapt_;
   int updates_ = 0;
+};
+
+/// How far the stamps of images scatter about the times at which they were taken, when the host stamps them. A camera
+/// that turns shows it at once: the updates turn the predicted pose to and fro about the axis about which it turns
+/// anyway, by more than the covariance shrinks by them.
+class StampMonitor {
+ public:
+  explicit StampMonitor(bool adapt) : adapt_(adapt) {}
+  /// `omega`: rate of turn, rad/s; `turned`: what the update made of the predicted orientation, a rotation vector, rad;
+  /// `lost`: by how much its covariance shrank, rad^2. All in the body frame.
+  void add(const Eigen::Vector3d& omega, const Eigen::Vector3d& turned, const Eigen::Matrix3d& lost);
+  double sigma() const { return sigma_; }  ///< s; 0 while the stamps are as good as one can tell
+  /// The corrections are not explained yet, and may still be by the stamps.
+  bool isGrowing() const;
+  void reset();
+
+ private:
+  bool adapt_;
+  double sigma_ = 0, ratio_ = 0.5;
 };
 
 /// Widens the IMU's noise when the images contradict it by more than both admit: by the corrections they make to the

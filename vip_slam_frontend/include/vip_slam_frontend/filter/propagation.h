@@ -23,8 +23,9 @@ struct Propagation {
 };
 
 /// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.
-/// `noise_scale` multiplies all noise densities (IMU gaps). The window is not changed.
+/// `noise_scale` multiplies all noise densities (IMU gaps); `stamp_sigma`: the image may have been taken so much
+/// earlier or later than its stamp says, s. The window is not changed.
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
-                      const Eigen::Vector3d& G, double noise_scale = 1.0);
+                      const Eigen::Vector3d& G, double noise_scale = 1.0, double stamp_sigma = 0.0);
 
 }  // namespace vip_slam

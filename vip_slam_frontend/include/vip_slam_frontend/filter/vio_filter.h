@@ -78,7 +78,8 @@ class VioFilter {
   RelativeMotion motionSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }
-  double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
+  double stampSigma() const { return stamp_monitor_.sigma(); }  ///< of the images, s
+  double depthScale() const;                                    ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
  private:
@@ -111,6 +112,7 @@ class VioFilter {
   Eigen::Vector3d G_;
   Gate gate_, explained_;
   NoiseMonitor noise_, depth_noise_;
+  StampMonitor stamp_monitor_;
   ImuNoiseMonitor imu_monitor_;
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
