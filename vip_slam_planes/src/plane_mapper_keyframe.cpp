@@ -132,7 +132,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
     track.confirmed = track.confirmed ||
                       (track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area) ||
                       (track.keyframes_seen > 0 && covered >= options.support.sure_area);
-    trusted.push_back(track.confirmed && track.determined && track.agrees);
+    trusted.push_back(track.known() && track.determined && track.agrees);
   }
   points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });
 }
@@ -154,7 +154,7 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
       if (!sameSurface(mine->second, other, known, poses_, options.merging)) continue;
       // The older id stays, but one that the back end knows goes before one that it does not.
       PlaneId into = std::min(id, other_id), from = std::max(id, other_id);
-      if (tracks_.at(from).confirmed && !tracks_.at(into).confirmed) std::swap(into, from);
+      if (tracks_.at(from).known() && !tracks_.at(into).known()) std::swap(into, from);
       mergeInto(from, into);
       open.erase(from);
       open.insert(into);
@@ -166,7 +166,7 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
 void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
   PlaneTrack& into = tracks_.at(into_id);
   const PlaneTrack& from = tracks_.at(from_id);
-  const bool known = from.confirmed;
+  const bool known = from.known();
   for (const auto& [keyframe, observation] : from.observations()) {
     // The back end re-keys what it has; what it lacks, and what two planes of one keyframe make together, is reported.
     if (!known || into.observations().count(keyframe) || fresh_.count({from_id, keyframe})) {
@@ -187,7 +187,7 @@ void PlaneMapper::Impl::removePlane(PlaneId id) {
   const auto it = tracks_.find(id);
   if (it == tracks_.end()) return;
   for (const auto& [keyframe, observation] : it->second.observations()) fresh_.erase({id, keyframe});
-  if (it->second.confirmed) {
+  if (it->second.known()) {
     removed_.push_back(id);
     ++counters.planes_removed;
   }

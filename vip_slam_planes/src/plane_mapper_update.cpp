@@ -64,7 +64,7 @@ bool PlaneMapper::Impl::tieEpochs(const std::vector<LoopEvent>& loops) {
 void PlaneMapper::Impl::decideOnPoints() {
   for (auto& [id, track] : tracks_) {
     const bool before = track.takes_points;
-    track.takes_points = track.confirmed && track.determined && track.agrees;
+    track.takes_points = track.known() && track.determined && track.agrees;
     if (track.takes_points && !before) points_.decide(id, track.plane(), poses_);
   }
 }
@@ -84,9 +84,9 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   }
   for (const auto& [id, plane] : update.planes) {
     const auto it = tracks_.find(id);
-    if (it == tracks_.end() || !isSound(plane)) continue;
+    if (it == tracks_.end() || !it->second.known() || !isSound(plane)) continue;
     it->second.setPlane(plane);
-    it->second.markOptimised();
+    it->second.setOptimised(true);
   }
   for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
   points_.applyMapUpdate(update);
@@ -106,7 +106,9 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
 }
 
-// What passes for one plane may be several surfaces, such as the fronts of boxes on a shelf.
+// What passes for one plane may be several surfaces, such as the fronts of boxes on a shelf: it takes no points, and
+// the map does without it until its observations agree. It stays here, so that the same triangles do not start it
+// again. What lies on a table disagrees with the table as well, so that level ones stay in the map.
 void PlaneMapper::Impl::judgeAgreement() {
   std::vector<PlaneMisfit> misfits;
   std::size_t index = 0;
@@ -122,8 +124,18 @@ void PlaneMapper::Impl::judgeAgreement() {
   const std::vector<char> agree = planesAgree(misfits, index);
   index = 0;
   for (auto& [id, track] : tracks_) {
+    const bool known = track.known(), hidden = track.confirmed && !known;
     track.agrees = agree[index++] != 0;
     if (!track.agrees) points_.releaseFrom(id);
+    if (known && !track.known()) {
+      removed_.push_back(id);
+      ++counters.planes_removed;
+      track.setOptimised(false);
+      track.refit_due = true;
+    }
+    for (auto it = track.observations().begin(); hidden && track.known() && it != track.observations().end(); ++it) {
+      fresh_.emplace(id, it->first);
+    }
   }
 }
 
@@ -182,7 +194,7 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
         ++it;
         continue;
       }
-      if (track.confirmed && !fresh_.count({id, it->first})) {
+      if (track.known() && !fresh_.count({id, it->first})) {
         PlaneObservation none;
         none.keyframe = it->first;
         none.plane = id;
@@ -216,7 +228,7 @@ void PlaneMapper::Impl::dropUnsupported(PlaneUpdate* result) {
 void PlaneMapper::Impl::publish(PlaneUpdate* result) {
   published.clear();
   for (auto& [id, track] : tracks_) {
-    if (!track.confirmed) continue;
+    if (!track.known()) continue;
     PlaneEstimate estimate;
     estimate.polygons = track.polygons(options.growth.min_hits);
     estimate.area = track.cells().count(options.growth.min_hits) * track.cellSize() * track.cellSize();
@@ -239,7 +251,7 @@ void PlaneMapper::Impl::publish(PlaneUpdate* result) {
       it = fresh_.erase(it);
       continue;
     }
-    if (!track->second.confirmed || !track->second.determined) {
+    if (!track->second.known() || !track->second.determined) {
       ++it;
       continue;
     }

@@ -174,7 +174,8 @@ TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
   EXPECT_GT(mapper.applyMapUpdate(away).dissociated.size(), 20u);
 }
 
-// What the back end makes of a plane may fit none of the keyframes that saw it: then it is several surfaces.
+// What the back end makes of a plane may fit none of the keyframes that saw it: then it is several surfaces, and the
+// map does without it. This one is a surface, and comes back with all that was seen of it.
 TEST(Points, LeaveAPlaneWhoseObservationsDisagreeAndComeBack) {
   const World w = world();
   SceneCamera camera(testing::quietNoise(), 1.0);
@@ -184,19 +185,29 @@ TEST(Points, LeaveAPlaneWhoseObservationsDisagreeAndComeBack) {
   for (const PlaneEstimate& p : mapper.planes())
     if (p.kind == PlaneKind::kVertical && std::abs(p.plane.d - 3) < 0.01) wall = p.id;
   ASSERT_TRUE(wall);
+  const auto shown = [&] {
+    return std::count_if(mapper.planes().begin(), mapper.planes().end(), [&](const auto& p) { return p.id == wall; });
+  };
   std::size_t on_wall = 0;
   for (const auto& [id, plane] : found.plane) on_wall += plane == wall;
   ASSERT_GT(on_wall, 50u);
   MapUpdate update;
   update.planes.emplace_back(wall, Plane({-1, 0, 0}, 3.0));
   EXPECT_EQ(mapper.applyMapUpdate(update).dissociated.size(), 0u);
+  EXPECT_EQ(1, shown());
   update.planes.back().second = Plane({-1, 0, 0}, 3.03);
-  EXPECT_EQ(mapper.applyMapUpdate(update).dissociated.size(), on_wall);
+  const PlaneUpdate away = mapper.applyMapUpdate(update);
+  EXPECT_EQ(away.dissociated.size(), on_wall);
+  EXPECT_EQ(away.removed, std::vector<PlaneId>{wall});
+  EXPECT_EQ(0, shown());
   // What they saw still holds: nobody has to look at them again.
-  update.planes.back().second = Plane({-1, 0, 0}, 3.0);
-  std::size_t back = 0;
-  for (const auto& [id, plane] : mapper.applyMapUpdate(update).associated) back += plane == wall;
+  const PlaneUpdate again = mapper.applyMapUpdate(MapUpdate());
+  EXPECT_EQ(1, shown());
+  std::size_t back = 0, observed = 0;
+  for (const auto& [id, plane] : again.associated) back += plane == wall;
+  for (const PlaneObservation& o : again.observations) observed += o.plane == wall;
   EXPECT_GT(back, on_wall * 9 / 10);
+  EXPECT_GE(observed, 10u);
 }
 
 }  // namespace

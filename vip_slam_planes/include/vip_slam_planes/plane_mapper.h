@@ -47,7 +47,8 @@ class PlaneMapper {
   /// frame belongs to another epoch than the newest keyframe.
   void grow(const TrackedFrame& frame, const SE3& T_map_odom);
   /// Takes the corrections, then detects, associates and merges with the keyframes that are now placed. Poses, planes
-  /// and landmarks that are not finite are passed over.
+  /// and landmarks that are not finite are passed over. A wall whose observations have come to disagree is reported as
+  /// removed, and may come back by its id.
   PlaneUpdate applyMapUpdate(const MapUpdate& update);
   /// Confirmed planes, by id; polygons are as of the last applyMapUpdate().
   const std::vector<PlaneEstimate>& planes() const;

@@ -45,8 +45,8 @@ class PlaneTrack {
 
   /// New parameters; the normal is turned to the side kept so far, and the area moves along.
   void setPlane(const Plane& plane);
-  /// The back end has set the parameters: they are no longer refitted here.
-  void markOptimised() { optimised_ = true; }
+  /// While the back end sets the parameters they are not refitted here.
+  void setOptimised(bool optimised) { optimised_ = optimised; }
   bool optimised() const { return optimised_; }
 
   /// Covers the cells under a triangle, seen from keyframe `host` with camera pose T_map_C; `counted` cells gain a hit.
@@ -84,6 +84,9 @@ class PlaneTrack {
   /// Most of what was covered has been looked through since: the surface is gone, and what is left are the rims that
   /// no view can refute (the foot of a partition has the floor close behind it).
   bool mostlyGone() const { return lost_ > cells_.count(1); }
+
+  /// Whether others hear of it.
+  bool known() const { return confirmed && (agrees || kind_ != PlaneKind::kVertical); }
 
   // Book-keeping of the mapper.
   EpochKey epoch = kLoadedEpoch;  ///< of the keyframe that started it
