@@ -173,6 +173,7 @@ void BackEndNodelet::startGlobalBa() {
         ++shown_.global_adjustments;
       }
       distribute(back_end_->merge(result));
+      startGlobalBa();  // one that was asked for meanwhile: the next keyframe may never come
     });
   });
 }
