@@ -43,7 +43,7 @@ void FrontEnd::Impl::dropMoving(std::vector<Feature>* features) const {
 
 float FrontEnd::Impl::trueDepth(float reading) const {
   if (!(reading > 0)) return reading;
-  return std::max(1e-3f, static_cast<float>(filter_.window().trueDepth(reading)));
+  return std::max(1e-3f, reading + static_cast<float>(filter_.depthCorrection()));
 }
 
 void FrontEnd::Impl::correctDepth(std::vector<Feature>* features) const {

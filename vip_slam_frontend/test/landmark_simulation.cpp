@@ -181,6 +181,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
     const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200),
                                           standing ? std::optional<double>(1.0) : std::nullopt);
+    if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
+      result.most_depth_correction = filter.depthCorrection();
     nis += report.nis;
     rows += report.rows;
     result.gated += report.features_gated;

@@ -72,6 +72,7 @@ struct RunResult {
   int gated = 0, used = 0;
   WindowState window;  ///< at the end
   MountingEstimate mounting;
+  double most_depth_correction = 0;  ///< m, of all images, with its sign
   Matrix15d covariance = Matrix15d::Zero();
 };
 

@@ -219,6 +219,7 @@ TEST(Calibration, FindsWhatDepthIsTooLongBy) {
     options.calibration.time_offset = false;  // which so noisy a gyro misleads
     const RunResult run = runFilter(simulation, options, 20.0, false);
     EXPECT_NEAR(run.mounting.depth_offset, -0.01, 0.002);
+    EXPECT_NEAR(run.most_depth_correction, -0.01, 0.003);
     offset_nees += std::pow((run.mounting.depth_offset + 0.01) / run.mounting.sigma_depth_offset, 2) / kRuns;
     nees += run.nees / kRuns;
     options.calibration.depth_offset = false;
@@ -229,6 +230,17 @@ TEST(Calibration, FindsWhatDepthIsTooLongBy) {
   EXPECT_LT(nees, 9.0);
   EXPECT_LT(offset_nees, 2.5);
   EXPECT_GT(believed, 1.5 * nees);
+}
+
+// The estimate wanders about zero, and nobody is told.
+TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    const RunResult run = runFilter(simulation, filterOptions(), 10.0, false);
+    EXPECT_NE(run.mounting.depth_offset, 0.0);
+    EXPECT_EQ(run.most_depth_correction, 0.0);
+  }
 }
 
 // Such as colour and depth of different moments would ask for: no offset is better than a wrong one.

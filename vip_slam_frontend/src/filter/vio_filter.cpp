@@ -16,6 +16,8 @@ constexpr double kLeastDepthNoise = 0.3;
 constexpr int kLeastOfStamps = 5;
 // Sigmas of the prior within which a mounting that was found is kept over a restart.
 constexpr double kBelievableChange = 4.0;
+// An offset of depth is beyond doubt from so many of its sigmas and metres on, until it is half as large.
+constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
 // One sigma of what is taken back, m.
 constexpr double kHeldOffset = 1e-6;
 
@@ -96,16 +98,20 @@ void VioFilter::learnMounting() {
 void VioFilter::judgeDepthOffset() {
   const WindowState& window = filter_.window();
   const double change = window.depth_offset - given_.depth_offset;
-  if (!window.calibration.depth_offset || depth_contradicts_ ||
-      std::abs(change) <= kBelievableChange * options_.calibration.sigma_depth_offset) {
-    return;
+  if (!window.calibration.depth_offset || depth_contradicts_) return;
+  if (!depth_is_off_ && std::abs(change) > kLeastOffset) {
+    depth_is_off_ = std::abs(change) > kSureOffset * mounting().sigma_depth_offset;
+  } else if (std::abs(change) < kLeastOffset / 2) {
+    depth_is_off_ = false;
   }
+  if (std::abs(change) <= kBelievableChange * options_.calibration.sigma_depth_offset) return;
   // To measure that it is what was given makes of everything else what it would be had it never been in doubt.
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, window.dimension());
   H(0, window.depthOffsetColumn()) = 1.0 / kHeldOffset;
   Eigen::VectorXd r = Eigen::VectorXd::Constant(1, -change / kHeldOffset);
   filter_.update(H, r);
   depth_contradicts_ = true;
+  depth_is_off_ = false;
 }
 
 void VioFilter::stop() {

@@ -79,7 +79,11 @@ class VioFilter {
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }
   double stampSigma() const { return stamp_monitor_.sigma(); }  ///< of the images, s
-  double depthScale() const;                                    ///< adapted factor on the depth noise, 1 or more
+  /// What is to be added to depth readings for others, m: the offset once it is beyond doubt and large enough to
+  /// matter, else 0. The estimate itself wanders by a millimetre before it is known, which a map of exact depth would
+  /// keep.
+  double depthCorrection() const { return depth_is_off_ ? filter_.window().depth_offset : 0.0; }
+  double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
  private:
@@ -95,7 +99,8 @@ class VioFilter {
   double ownNoise(const Triangulation& point) const;
   void updateWithFeatures(const std::vector<Candidate>& candidates, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
-  /// An offset of depth that is beyond belief stands for something else; it is taken back and estimated no more.
+  /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
+  /// estimated no more.
   void judgeDepthOffset();
   /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
   /// allows: then whatever broke the estimate broke this as well.
@@ -117,6 +122,7 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
+  bool depth_is_off_ = false;       ///< beyond doubt
   bool depth_contradicts_ = false;  ///< its offset went beyond belief
   int still_images_ = 0;            ///< images since the standing began; 0 when moving
   CloneId still_anchor_ = 0;
