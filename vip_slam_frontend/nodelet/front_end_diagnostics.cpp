@@ -135,6 +135,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("images without IMU", c.imu_missing);
   status.add("IMU samples refused", c.imu_rejected);
   status.add("IMU gaps", c.imu_gaps);
+  status.add("IMU samples far off their neighbours, replaced", c.imu_spikes);
   status.add("times that time ran backwards", shown.time_jumps);
 }
 

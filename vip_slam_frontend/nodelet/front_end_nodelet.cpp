@@ -146,6 +146,12 @@ void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const 
   } else {
     front_end_->addAccel(t, *accel);
   }
+  if (front_end_->counters().imu_spikes > 0 && !told_of_spikes_) {
+    told_of_spikes_ = true;
+    NODELET_WARN(
+        "a single sample of the IMU was far off its neighbours and was replaced by them (errors on its bus?); "
+        "further ones are counted in /diagnostics");
+  }
   if (gyro) gyro_.add(t, *gyro);
   processReady();
   if (gyro && imu_rate_odometry_) publishImuRate(t);

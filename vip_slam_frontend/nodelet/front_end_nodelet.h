@@ -103,6 +103,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::deque<std::function<void()>> early_;  ///< IMU samples before the calibration is complete
   std::unique_ptr<StreamClock> clock_;
   GyroHistory gyro_;
+  bool told_of_spikes_ = false;
   double posed_imu_t_ = -1e300;               ///< of the newest image with a pose
   double predicted_imu_t_ = -1e300;           ///< of the newest prediction between images
   Matrix15d covariance_ = Matrix15d::Zero();  ///< of the newest image; predictions between images carry it

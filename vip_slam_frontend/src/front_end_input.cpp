@@ -53,6 +53,7 @@ void FrontEnd::Impl::countImu() {
   const ImuBufferCounters& c = imu_.counters();
   counters_.imu_rejected = c.out_of_order + c.duplicate + c.not_finite;
   counters_.imu_gaps = c.gaps;
+  counters_.imu_spikes = c.spikes;
 }
 
 bool FrontEnd::Impl::addImu(const ImuSample& sample) {

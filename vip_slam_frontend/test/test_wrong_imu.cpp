@@ -110,6 +110,35 @@ TEST(WrongImu, DegreesPerSecond) {
   });
 }
 
+// A bus that now and then delivers one wrong sample: 30 m/s^2 for 5 ms are 15 cm/s.
+TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
+  const CornerWorld world;
+  FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));
+  double imu_t = 0;
+  int samples = 0;
+  std::uint64_t wrong = 0;
+  FrameOutput output;
+  for (int k = 0; k < 160; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t < t + 0.03; imu_t += 0.005) {
+      ImuSample sample = CornerWorld::imu(imu_t);
+      if (++samples % 100 == 50) sample.accel.x() += 30;
+      if (samples % 100 == 90) sample.gyro.z() -= 5;
+      wrong += samples % 100 == 50 || samples % 100 == 90;
+      front_end.addImu(sample);
+    }
+    FrameInput input;
+    input.t = t;
+    world.look(t, 0, &input.gray, &input.depth);
+    output = front_end.process(input);
+    if (t < kStill + 3) continue;
+    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
+    EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(t).t()).norm(), 0.02) << t;
+  }
+  EXPECT_EQ(front_end.counters().imu_spikes, wrong);
+  EXPECT_EQ(front_end.counters().imu_contradicted, 0u);
+}
+
 /// What is learnt on the way, and a scale that is off by what cheap sensors are off by, contradict nothing.
 TEST(WrongImu, ModerateErrorsAreNoContradiction) {
   SensorConfig sensor = cornerSensor(0, 0);

@@ -38,6 +38,7 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
                                                              {"bad_stamp", c.bad_stamp},
                                                              {"imu_rejected", c.imu_rejected},
                                                              {"imu_gaps", c.imu_gaps},
+                                                             {"imu_spikes", c.imu_spikes},
                                                              {"imu_missing", c.imu_missing},
                                                              {"zero_velocity", c.zero_velocity},
                                                              {"coasting", c.coasting},
@@ -101,6 +102,10 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   std::vector<std::string> all = reader.warnings();
   const FrontEndCounters& c = pipeline.frontEnd().counters();
   if (c.imu_gaps > 0) all.push_back(std::to_string(c.imu_gaps) + " gaps in the IMU; a long one restarts the odometry");
+  if (c.imu_spikes > 0)
+    all.push_back(
+        std::to_string(c.imu_spikes) +
+        " single samples of the IMU were far off their neighbours and were replaced by them: errors on its bus?");
   if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
   if (c.imu_rejected > 0)
     all.push_back(std::to_string(c.imu_rejected) +

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace vip_slam {
 namespace {
@@ -24,35 +23,11 @@ ImuSample interpolate(const ImuSample& a, const ImuSample& b, double t) {
 ImuBuffer::ImuBuffer(double gap_seconds, double capacity_seconds)
     : gap_seconds_(gap_seconds), capacity_seconds_(capacity_seconds) {}
 
-bool ImuBuffer::add(const ImuSample& sample) {
-  if (!std::isfinite(sample.t) || !sample.gyro.allFinite() || !sample.accel.allFinite()) {
+bool ImuBuffer::acceptable(double t, bool finite, double newest) {
+  if (!std::isfinite(t) || !finite) {
     ++counters_.not_finite;
     return false;
   }
-  if (!samples_.empty()) {
-    if (sample.t == samples_.back().t) {
-      ++counters_.duplicate;
-      return false;
-    }
-    if (sample.t < samples_.back().t) {
-      ++counters_.out_of_order;
-      return false;
-    }
-    if (sample.t - samples_.back().t > gap_seconds_) ++counters_.gaps;
-  }
-  samples_.push_back(sample);
-  ++counters_.accepted;
-  while (samples_.back().t - samples_.front().t > capacity_seconds_) samples_.pop_front();
-  return true;
-}
-
-bool ImuBuffer::acceptStamped(std::deque<Stamped>* stream, double newest_joined, double t,
-                              const Eigen::Vector3d& value) {
-  if (!std::isfinite(t) || !value.allFinite()) {
-    ++counters_.not_finite;
-    return false;
-  }
-  const double newest = stream->empty() ? newest_joined : stream->back().t;
   if (t == newest) {
     ++counters_.duplicate;
     return false;
@@ -61,21 +36,49 @@ bool ImuBuffer::acceptStamped(std::deque<Stamped>* stream, double newest_joined,
     ++counters_.out_of_order;
     return false;
   }
-  stream->push_back({t, value});
-  // When the other stream never comes, memory must still be bounded.
-  while (stream->back().t - stream->front().t > capacity_seconds_) stream->pop_front();
   return true;
 }
 
+void ImuBuffer::countSpikes() {
+  counters_.spikes = united_spikes_.spikes() + gyro_spikes_.spikes() + accel_spikes_.spikes();
+}
+
+bool ImuBuffer::add(const ImuSample& sample) {
+  const bool finite = sample.gyro.allFinite() && sample.accel.allFinite();
+  if (!acceptable(sample.t, finite, united_spikes_.newest())) return false;
+  ++counters_.accepted;
+  for (const ImuSample& settled : united_spikes_.add(sample)) append(settled);
+  countSpikes();
+  return true;
+}
+
+void ImuBuffer::append(const ImuSample& sample) {
+  if (!samples_.empty() && sample.t - samples_.back().t > gap_seconds_) ++counters_.gaps;
+  samples_.push_back(sample);
+  while (samples_.back().t - samples_.front().t > capacity_seconds_) samples_.pop_front();
+}
+
 bool ImuBuffer::addGyro(double t, const Eigen::Vector3d& gyro) {
-  const double joined = samples_.empty() ? -std::numeric_limits<double>::infinity() : samples_.back().t;
-  if (!acceptStamped(&gyro_, joined, t, gyro)) return false;
+  // Where nothing is kept there is nothing to be out of order with.
+  if (samples_.empty() && gyro_.empty() && t < gyro_spikes_.newest()) gyro_spikes_.clear();
+  if (!acceptable(t, gyro.allFinite(), gyro_spikes_.newest())) return false;
+  for (const ImuSample& settled : gyro_spikes_.add({t, gyro, Eigen::Vector3d::Zero()})) {
+    gyro_.push_back({settled.t, settled.gyro});
+  }
+  // When the other stream never comes, memory must still be bounded.
+  while (!gyro_.empty() && gyro_.back().t - gyro_.front().t > capacity_seconds_) gyro_.pop_front();
+  countSpikes();
   joinStreams();
   return true;
 }
 
 bool ImuBuffer::addAccel(double t, const Eigen::Vector3d& accel) {
-  if (!acceptStamped(&accel_, -std::numeric_limits<double>::infinity(), t, accel)) return false;
+  if (!acceptable(t, accel.allFinite(), accel_spikes_.newest())) return false;
+  for (const ImuSample& settled : accel_spikes_.add({t, Eigen::Vector3d::Zero(), accel})) {
+    accel_.push_back({settled.t, settled.accel});
+  }
+  while (!accel_.empty() && accel_.back().t - accel_.front().t > capacity_seconds_) accel_.pop_front();
+  countSpikes();
   joinStreams();
   return true;
 }
@@ -103,7 +106,8 @@ void ImuBuffer::joinStreams() {
       sample.accel = (1.0 - s) * accel_[0].value + s * accel_[1].value;
     }
     gyro_.pop_front();
-    add(sample);
+    ++counters_.accepted;
+    append(sample);
   }
 }
 
@@ -143,6 +147,9 @@ void ImuBuffer::clear() {
   samples_.clear();
   gyro_.clear();
   accel_.clear();
+  united_spikes_.clear();
+  gyro_spikes_.clear();
+  accel_spikes_.clear();
 }
 
 }  // namespace vip_slam

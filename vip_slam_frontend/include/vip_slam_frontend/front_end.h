@@ -43,6 +43,7 @@ struct FrontEndCounters {
   std::uint64_t bad_stamp = 0;     ///< repeated, backward or non-finite image stamps
   std::uint64_t imu_rejected = 0;  ///< non-finite, repeated or backward samples
   std::uint64_t imu_gaps = 0;
+  std::uint64_t imu_spikes = 0;        ///< single wrong samples, replaced
   std::uint64_t imu_missing = 0;       ///< images not covered by the IMU
   std::uint64_t zero_velocity = 0;     ///< images taken standing still
   std::uint64_t coasting = 0;          ///< images passed on the IMU alone

@@ -1,4 +1,5 @@
-// Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams.
+// Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams, and takes single
+// wrong samples out (spike_filter.h): one that looks wrong is in the buffer when the next one has come.
 // Not thread-safe: one owner; shells lock around it.
 #pragma once
 
@@ -9,11 +10,13 @@
 #include <vector>
 
 #include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_core/imu/spike_filter.h"
 
 namespace vip_slam {
 
 struct ImuBufferCounters {
   std::size_t accepted = 0, out_of_order = 0, duplicate = 0, not_finite = 0, gaps = 0;
+  std::size_t spikes = 0;  ///< samples replaced by the line between their neighbours
 };
 
 class ImuBuffer {
@@ -50,12 +53,17 @@ class ImuBuffer {
     double t;
     Eigen::Vector3d value;
   };
-  bool acceptStamped(std::deque<Stamped>* stream, double newest_joined, double t, const Eigen::Vector3d& value);
+  /// Counts what is wrong with it otherwise.
+  bool acceptable(double t, bool finite, double newest);
+  void countSpikes();
+  void append(const ImuSample& sample);
   void joinStreams();
 
   double gap_seconds_, capacity_seconds_;
   std::deque<ImuSample> samples_;
   std::deque<Stamped> gyro_, accel_;
+  // Split streams are looked at before they are joined: interpolation would spread a spike over its neighbours.
+  SpikeFilter united_spikes_, gyro_spikes_, accel_spikes_;
   ImuBufferCounters counters_;
 };
 
