@@ -57,6 +57,17 @@ TEST_F(CheckBag, AGoodBagIsReady) {
   EXPECT_NE(toText(findings, false).find("Ready.\n"), std::string::npos);
 }
 
+TEST_F(CheckBag, AMaskOfAnotherSizeIsNamed) {
+  expected_.mask_file = "/rig/bumper.png";
+  expected_.mask = cv::Mat(240, 320, CV_8U, cv::Scalar(255));
+  expected_.mask.rowRange(180, 240) = 0;
+  expectFound(check(), Severity::kGood, "mask", "75 %");
+  expected_.mask = cv::Mat(480, 640, CV_8U, cv::Scalar(255));
+  const Findings findings = check();
+  expectFound(findings, Severity::kError, "mask", "/rig/bumper.png is 640x480, the colour image is 320x240");
+  expectNoErrorBut(findings, "mask");
+}
+
 TEST_F(CheckBag, WrongTopicIsNamedWithItsLikes) {
   options_.renamed["/camera/color/image_raw"] = "/cam/rgb";
   const Findings findings = check();

@@ -6,6 +6,8 @@
 #include <functional>
 #include <sstream>
 
+#include <opencv2/imgcodecs.hpp>
+
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/testing/analytic_motion.h"
 #include "vip_slam_core/trajectory/tum_io.h"
@@ -231,6 +233,41 @@ TEST_F(FileFormats, SensorRoundTrip) {
   EXPECT_TRUE(back.depth_registered);
   EXPECT_TRUE(back.intrinsics_from_camera_info);
   EXPECT_EQ(back.topics.imu, "/imu");
+}
+
+TEST_F(FileFormats, SensorMask) {
+  saveSensorConfig(path("plain.yaml"), sensor());
+  EXPECT_TRUE(loadSensorConfig(path("plain.yaml")).mask.empty());
+  EXPECT_EQ(text("plain.yaml").find("mask"), std::string::npos);
+  const auto with = [&](const std::string& mask) { write("s.yaml", text("plain.yaml") + "mask: " + mask + "\n"); };
+
+  cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(250));
+  picture.rowRange(400, 480) = cv::Scalar::all(9);
+  fs::create_directories(folder_ / "rig");
+  cv::imwrite(path("rig/bumper.png"), picture);
+  with("rig/bumper.png");  // beside the file, wherever one stands
+  const SensorConfig config = loadSensorConfig(path("s.yaml"));
+  ASSERT_EQ(config.mask.type(), CV_8UC1);
+  EXPECT_EQ(cv::countNonZero(config.mask == 255), 640 * 400);
+  EXPECT_EQ(cv::countNonZero(config.mask), 640 * 400);
+  EXPECT_EQ(config.mask.at<std::uint8_t>(399, 0), 255);
+  EXPECT_EQ(config.mask.at<std::uint8_t>(400, 639), 0);
+  EXPECT_EQ(maskProblem(config, 640, 480), "");
+  EXPECT_NE(maskProblem(config, 1280, 720).find("bumper.png is 640x480, the colour image is 1280x720"),
+            std::string::npos);
+  saveSensorConfig(path("rig/copy.yaml"), config);  // found from another folder too
+  EXPECT_EQ(cv::countNonZero(loadSensorConfig(path("rig/copy.yaml")).mask), 640 * 400);
+
+  const auto refused = [&](const std::string& mask, const std::string& what) {
+    with(mask);
+    expectRefused([&] { loadSensorConfig(path("s.yaml")); }, "s.yaml: mask: ", what);
+  };
+  refused("none.png", "none.png cannot be read");
+  refused("plain.yaml", "is no picture");
+  cv::imwrite(path("black.png"), cv::Mat(480, 640, CV_8U, cv::Scalar(0)));
+  refused("black.png", "black all over");
+  cv::imwrite(path("small.png"), cv::Mat(240, 320, CV_8U, cv::Scalar(255)));
+  refused("small.png", "is 320x240, the colour image is 640x480");
 }
 
 TEST_F(FileFormats, SensorErrorsNameFileAndKey) {

@@ -99,6 +99,7 @@ class FrontEnd::Impl {
   TimingLog* timing_;
   std::shared_ptr<const CameraModel> camera_;
   ImuBuffer imu_;
+  cv::Mat masked_;                         ///< not zero where depth is to be left out; empty: nowhere
   std::unique_ptr<DepthRows> depth_rows_;  ///< null: depth of one instant
   FeatureTracker tracker_;
   MovingRegions moving_;          ///< of the newest image

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <opencv2/imgproc.hpp>
+
 #include "vip_slam_core/imu/preintegration.h"
 
 #include "front_end_impl.h"
@@ -16,7 +18,18 @@ constexpr double kClockJump = 1.0;
 SensorConfig checked(const SensorConfig& sensor) {
   const std::string problem = sensor.camera.validate();
   if (!problem.empty()) throw std::invalid_argument("front end: camera: " + problem);
+  const std::string mask = maskProblem(sensor, sensor.camera.width, sensor.camera.height);
+  if (!mask.empty()) throw std::invalid_argument("front end: " + mask);
   return sensor;
+}
+
+/// A feature's patch must not reach over what is masked: its outline is a strong edge that goes along with the camera.
+/// So features keep away from it as from the image's own border.
+cv::Mat featureMask(const cv::Mat& mask, int border) {
+  if (mask.empty()) return mask;
+  cv::Mat shrunk;
+  cv::erode(mask, shrunk, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * border + 1, 2 * border + 1)));
+  return shrunk;
 }
 
 }  // namespace
@@ -27,8 +40,10 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       timing_(timing),
       camera_(makeCamera(sensor_.camera)),
       imu_(options.recovery.max_imu_gap, 30.0),
+      masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
       depth_rows_(sensor_.depth_rolling_shutter > 0 ? std::make_unique<DepthRows>(camera_) : nullptr),
-      tracker_(options.tracking, camera_, sensor_.depth_noise, timing),
+      tracker_(options.tracking, camera_, sensor_.depth_noise, timing,
+               featureMask(sensor_.mask, options.tracking.border)),
       surfaces_(camera_, sensor_.depth_noise),
       landmarks_(options.tracking, camera_),
       orb_(options.tracking.keyframe_corners),
@@ -101,6 +116,10 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, cv::Mat* depth) 
     ++counters_.bad_depth;
   } else {
     *depth = input.depth;
+    if (!masked_.empty()) {
+      *depth = input.depth.clone();  // the caller's own stays as it is
+      depth->setTo(0, masked_);
+    }
   }
   return "";
 }

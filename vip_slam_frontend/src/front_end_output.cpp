@@ -114,7 +114,7 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   keyframe->previous = last_keyframe_;
   std::vector<cv::Point2f> occupied;
   for (const Feature& f : frame.features) occupied.emplace_back(f.pixel.x(), f.pixel.y());
-  std::vector<Feature> corners = orb_.extract(tracker_.gray(), occupied, 6.0);
+  std::vector<Feature> corners = orb_.extract(tracker_.gray(), occupied, 6.0, tracker_.mask());
   for (Feature& corner : corners) tracker_.measure(&corner);
   correctDepth(&corners);
   keyframe->frame.features.insert(keyframe->frame.features.end(), corners.begin(), corners.end());

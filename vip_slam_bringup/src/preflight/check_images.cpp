@@ -73,6 +73,18 @@ void checkSensorFileCamera(const Recording& r, Findings* out) {
                     "the sensor file's are used; set intrinsics_from_camera_info when the driver is calibrated"});
 }
 
+void checkMask(const Recording& r, Findings* out) {
+  if (r.sensor.mask.empty() || r.color.sizes.size() != 1) return;
+  const std::string problem = maskProblem(r.sensor, r.color.sizes.begin()->first, r.color.sizes.begin()->second);
+  if (problem.empty()) {
+    const double used = cv::countNonZero(r.sensor.mask) / double(r.sensor.mask.total());
+    out->push_back({Severity::kGood, "mask", words("leaves %.0f %% of the image", 100 * used), ""});
+  } else {
+    out->push_back({Severity::kError, "mask", problem.substr(std::string("mask: ").size()),
+                    "draw it on an image as the topic carries it"});
+  }
+}
+
 void checkBrightness(const std::vector<BrightnessSample>& samples, Findings* out) {
   if (samples.empty()) return;
   std::vector<double> mean, spread;
@@ -133,6 +145,7 @@ Findings checkImages(const Recording& r) {
     checkCamera("colour camera_info", r.color_info, r.color_camera, r.color_camera_error, r.color, true, &out);
   else
     checkSensorFileCamera(r, &out);
+  checkMask(r, &out);
   checkBrightness(r.brightness, &out);
   if (r.sensor.depth_registered && r.color.sizes.size() == 1 && r.depth.sizes.size() == 1) {
     const auto color = *r.color.sizes.begin(), depth = *r.depth.sizes.begin();

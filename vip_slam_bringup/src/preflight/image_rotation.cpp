@@ -96,7 +96,8 @@ std::optional<RotationStep> ImageRotation::add(double t, const cv::Mat& gray, co
 
 std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray) const {
   std::vector<cv::Point2f> before, after;
-  cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0);
+  cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0,
+                          mask_.size() == gray_.size() ? mask_ : cv::Mat());
   if (before.size() < kLeastCorners) return std::nullopt;
   std::vector<unsigned char> found;
   std::vector<float> error;

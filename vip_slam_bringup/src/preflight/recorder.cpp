@@ -29,7 +29,7 @@ Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds) 
 }
 
 void Recorder::startRotation(const CameraIntrinsics& camera) {
-  rotation_ = std::make_unique<ImageRotation>(makeCamera(camera));
+  rotation_ = std::make_unique<ImageRotation>(makeCamera(camera), recording_.sensor.mask);
   rotation_size_ = cv::Size(camera.width, camera.height);
 }
 

@@ -1,9 +1,12 @@
 #include "vip_slam_core/sensor/sensor_config.h"
 
+#include <filesystem>
+#include <fstream>
 #include <set>
 #include <stdexcept>
 
 #include <yaml-cpp/yaml.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "util/text.h"
 #include "vip_slam_core/util/atomic_file.h"
@@ -130,7 +133,19 @@ void writeCamera(std::ostream& out, const char* key, const CameraIntrinsics& cam
   out << "]\n";
 }
 
-SensorConfig configFrom(const YAML::Node& node) {
+/// White: 255, black: 0.
+cv::Mat readMask(const std::string& path) {
+  if (!std::ifstream(path)) throw std::runtime_error("mask: " + path + " cannot be read");
+  const cv::Mat picture = cv::imread(path, cv::IMREAD_GRAYSCALE);
+  if (picture.empty()) throw std::runtime_error("mask: " + path + " is no picture, expected PNG");
+  const cv::Mat mask = picture > 127;
+  if (cv::countNonZero(mask) == 0)
+    throw std::runtime_error("mask: " + path + " is black all over; white is what is looked at");
+  return mask;
+}
+
+/// `folder`: of the file; what it names is looked for there.
+SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& folder) {
   SensorConfig config;
   Section root(node, "");
   root.get("name", config.name);
@@ -197,12 +212,27 @@ SensorConfig configFrom(const YAML::Node& node) {
   const std::string wrong = config.depth_noise.validate();
   if (!wrong.empty()) throw std::runtime_error("depth_noise: " + wrong);
 
+  root.get("mask", config.mask_file, false);
+  if (!config.mask_file.empty()) {
+    config.mask_file = std::filesystem::absolute(folder / config.mask_file).lexically_normal().string();
+    config.mask = readMask(config.mask_file);
+    const std::string problem = maskProblem(config, config.camera.width, config.camera.height);
+    if (!config.intrinsics_from_camera_info && !problem.empty()) throw std::runtime_error(problem);
+  }
+
   root.number("time_offset", config.time_offset, -1, 1, false);
   root.finish();
   return config;
 }
 
 }  // namespace
+
+std::string maskProblem(const SensorConfig& config, int width, int height) {
+  const cv::Mat& mask = config.mask;
+  if (mask.empty() || (mask.cols == width && mask.rows == height)) return "";
+  return "mask: " + config.mask_file + " is " + std::to_string(mask.cols) + "x" + std::to_string(mask.rows) +
+         ", the colour image is " + std::to_string(width) + "x" + std::to_string(height);
+}
 
 SensorConfig loadSensorConfig(const std::string& path) {
   YAML::Node root;
@@ -214,7 +244,7 @@ SensorConfig loadSensorConfig(const std::string& path) {
     throw std::runtime_error(path + ": line " + std::to_string(error.mark.line + 1) + ": " + error.msg);
   }
   try {
-    return configFrom(root);
+    return configFrom(root, std::filesystem::path(path).parent_path());
   } catch (const std::exception& error) {
     throw std::runtime_error(path + ": " + error.what());
   }
@@ -253,6 +283,7 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\n  max_range: " << formatDouble(config.depth_noise.max_range)
       << "\n  bias_floor: " << formatDouble(config.depth_noise.bias_floor)
       << "\ntime_offset: " << formatDouble(config.time_offset) << "\n";
+  if (!config.mask_file.empty()) out << "mask: \"" << config.mask_file << "\"\n";
   file.commit();
 }
 

@@ -75,7 +75,7 @@ float cornerScore(const cv::Mat& gray, int x, int y, int radius) {
 }
 
 std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Point2f>& occupied, int wanted,
-                                  const TrackingOptions& options) {
+                                  const TrackingOptions& options, const cv::Mat& mask) {
   std::vector<Corner> result;
   if (wanted <= 0) return result;
   const int cols = options.grid_columns, rows = options.grid_rows, border = options.border;
@@ -101,8 +101,12 @@ std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Poi
       // FAST looks three pixels around and leaves a frame of three: widen the cell by that.
       const cv::Rect roi(x0 - 3, y0 - 3, x1 - x0 + 6, y1 - y0 + 6);
       keypoints.clear();
-      cv::FAST(gray(roi), keypoints, options.fast_threshold, true);
-      if (keypoints.empty() && taken == 0) cv::FAST(gray(roi), keypoints, options.fast_threshold_low, true);
+      const auto search = [&](int threshold) {
+        cv::FAST(gray(roi), keypoints, threshold, true);
+        if (!mask.empty()) cv::KeyPointsFilter::runByPixelsMask(keypoints, mask(roi));
+      };
+      search(options.fast_threshold);
+      if (keypoints.empty() && taken == 0) search(options.fast_threshold_low);
       std::vector<Corner> cell;
       for (const cv::KeyPoint& k : keypoints) {
         const cv::Point2f p(k.pt.x + roi.x, k.pt.y + roi.y);

@@ -35,8 +35,8 @@ double pixelVariance(const Track& track) {
 }  // namespace
 
 FeatureTracker::FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera,
-                               const DepthNoise& noise, TimingLog* timing)
-    : options_(options), camera_(std::move(camera)), view_(camera_), noise_(noise), timing_(timing) {}
+                               const DepthNoise& noise, TimingLog* timing, const cv::Mat& mask)
+    : options_(options), camera_(std::move(camera)), view_(camera_), noise_(noise), timing_(timing), mask_(mask) {}
 
 void FeatureTracker::clear() {
   tracks_.clear();
@@ -76,8 +76,8 @@ void FeatureTracker::measure(Track* track) const {
 
 void FeatureTracker::matchExposure(const cv::Mat& gray) {
   cv::Scalar mean_last, deviation_last, mean, deviation;
-  cv::meanStdDev(gray_, mean_last, deviation_last);
-  cv::meanStdDev(gray, mean, deviation);
+  cv::meanStdDev(gray_, mean_last, deviation_last, mask_);
+  cv::meanStdDev(gray, mean, deviation, mask_);
   if (deviation_last[0] < 1.0 || deviation[0] < 1.0) return;
   const double gain = deviation[0] / deviation_last[0], offset = mean[0] - gain * mean_last[0];
   if (std::abs(gain - 1.0) < kExposureGain && std::abs(mean[0] - mean_last[0]) < kExposureShift) return;
@@ -120,7 +120,7 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
     const Eigen::Vector2d uv = asVector((*next)[i]);
     (*found)[i] = status[i] && back_status[i] && std::hypot(d.x, d.y) < options_.forward_backward_px &&
                   uv.allFinite() && uv.x() >= options_.border && uv.y() >= options_.border &&
-                  uv.x() < gray.cols - options_.border && uv.y() < gray.rows - options_.border;
+                  uv.x() < gray.cols - options_.border && uv.y() < gray.rows - options_.border && allowed(uv);
   }
 }
 
@@ -282,7 +282,7 @@ std::vector<std::size_t> FeatureTracker::replenish(const SE3& T_odom_C, bool for
   std::vector<cv::Point2f> occupied;
   for (const Track& track : tracks_) occupied.emplace_back(track.feature.pixel.x(), track.feature.pixel.y());
   const std::shared_ptr<ReferenceImage> here = referenceHere(T_odom_C);
-  for (const Corner& corner : detectCorners(gray_, occupied, missing, options_)) {
+  for (const Corner& corner : detectCorners(gray_, occupied, missing, options_, mask_)) {
     Track track;
     track.feature.id = next_id_++;
     track.feature.pixel = Eigen::Vector2f(corner.pixel.x, corner.pixel.y);

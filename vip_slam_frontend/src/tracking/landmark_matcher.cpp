@@ -82,7 +82,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     const Eigen::Vector3d p_C = T_C_map * item.second.p_map;
     Eigen::Vector2d uv;
     if (p_C.z() < 0.2 || p_C.z() > 15.0 || !tracker->camera().project(p_C, &uv)) continue;
-    if (!camera_->inImage(uv, options_.border + options_.landmark_radius_px)) continue;
+    if (!camera_->inImage(uv, options_.border + options_.landmark_radius_px) || !tracker->allowed(uv)) continue;
     if (free(uv, options_.min_distance)) visible.push_back({item.first, &item.second, uv, p_C.z()});
   }
   std::stable_sort(visible.begin(), visible.end(),
@@ -117,6 +117,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     for (const cv::KeyPoint& k : keypoints) {
       Feature f;
       f.pixel = Eigen::Vector2f(k.pt.x + std::max(0, roi.x), k.pt.y + std::max(0, roi.y));
+      if (!tracker->allowed(f.pixel.cast<double>())) continue;
       corners.push_back(f);
       owner.push_back(i);
       aligned.push_back(0);

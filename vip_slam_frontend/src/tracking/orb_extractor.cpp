@@ -62,11 +62,11 @@ void OrbExtractor::describe(const cv::Mat& gray, std::vector<Feature>* features)
 }
 
 std::vector<Feature> OrbExtractor::extract(const cv::Mat& gray, const std::vector<cv::Point2f>& occupied,
-                                           double distance) const {
+                                           double distance, const cv::Mat& mask) const {
   std::vector<Feature> result;
   if (corners_ == 0) return result;
   std::vector<cv::KeyPoint> keypoints;
-  detector_->detect(gray, keypoints);
+  detector_->detect(gray, keypoints, mask);
   std::stable_sort(keypoints.begin(), keypoints.end(),
                    [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; });
   // Even spread: at most a few per raster cell, and none beside a tracked feature.

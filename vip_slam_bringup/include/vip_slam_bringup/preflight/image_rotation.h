@@ -14,7 +14,9 @@ namespace vip_slam {
 
 class ImageRotation {
  public:
-  explicit ImageRotation(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {}
+  /// Corners are taken where `mask` is not zero; empty: anywhere.
+  explicit ImageRotation(std::shared_ptr<const CameraModel> camera, const cv::Mat& mask = cv::Mat())
+      : camera_(std::move(camera)), mask_(mask) {}
   /// `gray` 8UC1 of the camera's size, `depth` 32FC1 metres of the same size or empty. A step when the two last images
   /// are less than 0.2 s apart and enough corners agree on the motion.
   std::optional<RotationStep> add(double t, const cv::Mat& gray, const cv::Mat& depth);
@@ -25,6 +27,7 @@ class ImageRotation {
   std::shared_ptr<const CameraModel> camera_;
   double t_ = 0;
   cv::Mat gray_, depth_;
+  cv::Mat mask_;
 };
 
 }  // namespace vip_slam

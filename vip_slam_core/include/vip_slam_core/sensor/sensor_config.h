@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include <opencv2/core.hpp>
+
 #include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/imu/imu_types.h"
@@ -37,9 +39,16 @@ struct SensorConfig {
   SE3 T_base_imu;  ///< IMU into base_link; identity unless the robot says otherwise
   ImuNoise imu_noise;
   DepthNoise depth_noise;
+  /// What of the colour image, as it is published, is looked at: 255, and 0 where the robot itself is in view; empty:
+  /// all of it. `mask_file`: where it was read from.
+  cv::Mat mask;
+  std::string mask_file;
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
   double gravity = 9.81;   ///< m/s^2
 };
+
+/// Empty when the mask is as large as the colour image; else "mask: ..." in words.
+std::string maskProblem(const SensorConfig& config, int width, int height);
 
 /// Throws std::runtime_error "file: key: what, expected what" on a missing file, unknown or missing key, bad value.
 SensorConfig loadSensorConfig(const std::string& path);

@@ -15,9 +15,9 @@ struct Corner {
 };
 
 /// Up to `wanted` new corners, none nearer than min_distance to `occupied` or to each other: first the best of each
-/// cell without an occupant, then the best of all.
+/// cell without an occupant, then the best of all. None where `mask` is zero; empty: anywhere.
 std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Point2f>& occupied, int wanted,
-                                  const TrackingOptions& options);
+                                  const TrackingOptions& options, const cv::Mat& mask = cv::Mat());
 
 /// Smaller eigenvalue of the structure tensor, averaged over the (2 radius + 1)^2 window; 0 outside the image.
 float cornerScore(const cv::Mat& gray, int x, int y, int radius);

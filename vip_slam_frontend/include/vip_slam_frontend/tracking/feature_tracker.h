@@ -55,8 +55,9 @@ struct TrackingResult {
 
 class FeatureTracker {
  public:
+  /// No features where `mask` is zero; empty: anywhere.
   FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
-                 TimingLog* timing);
+                 TimingLog* timing, const cv::Mat& mask = cv::Mat());
 
   /// Tracks into `gray`. `predicted` is the camera motion since the last image, `T_odom_C` the predicted pose of this
   /// one; when the translation is unknown give only a rotation and `has_translation` false. Without an interval
@@ -82,6 +83,11 @@ class FeatureTracker {
   std::vector<Track>& tracks() { return tracks_; }
   const std::vector<Track>& tracks() const { return tracks_; }
   const cv::Mat& gray() const { return gray_; }
+  const cv::Mat& mask() const { return mask_; }
+  /// Whether features may be at this pixel of the image.
+  bool allowed(const Eigen::Vector2d& pixel) const {
+    return mask_.empty() || mask_.at<std::uint8_t>(cvRound(pixel.y()), cvRound(pixel.x())) != 0;
+  }
   const cv::Mat& depth() const { return depth_; }
   /// The camera while the newest image was taken.
   const RowCamera& camera() const { return view_; }
@@ -111,7 +117,7 @@ class FeatureTracker {
   TimingLog* timing_;
   std::vector<Track> tracks_, ended_;
   std::vector<cv::Mat> pyramid_, last_pyramid_;
-  cv::Mat gray_, depth_;
+  cv::Mat gray_, depth_, mask_;
   LandmarkId next_id_ = 1;
   std::uint32_t image_count_ = 0;
 };

@@ -16,8 +16,10 @@ class OrbExtractor {
   /// Fills angle and descriptor (level 0) of features whose pixel is set.
   void describe(const cv::Mat& gray, std::vector<Feature>* features) const;
   /// Up to the constructor's number of multi-scale ORB corners, spread evenly, with pixel, octave, angle and
-  /// descriptor; id is kNoLandmark. Corners within `distance` px of `occupied` are left out.
-  std::vector<Feature> extract(const cv::Mat& gray, const std::vector<cv::Point2f>& occupied, double distance) const;
+  /// descriptor; id is kNoLandmark. Corners within `distance` px of `occupied` are left out, and
+  /// those where `mask` is zero (empty: none).
+  std::vector<Feature> extract(const cv::Mat& gray, const std::vector<cv::Point2f>& occupied, double distance,
+                               const cv::Mat& mask = cv::Mat()) const;
 
  private:
   int corners_;
