@@ -84,7 +84,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   }
   for (const auto& [id, plane] : update.planes) {
     const auto it = tracks_.find(id);
-    if (it == tracks_.end() || !it->second.known() || !isSound(plane)) continue;
+    if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
     it->second.setPlane(plane);
     it->second.setOptimised(true);
   }

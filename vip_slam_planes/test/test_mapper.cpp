@@ -237,6 +237,26 @@ TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
   EXPECT_LT((high - high2).norm(), 0.15);
 }
 
+// The first keyframe leans by more than gravity will say; the floor far ahead shows too flat for samples.
+TEST(Mapper, APlaneThatNoObservationHoldsMovesWithTheKeyframeThatShowsIt) {
+  PlaneMapperOptions options;
+  options.observation.min_points = 1000;
+  Rig rig(0, options);
+  Scene scene;
+  scene.add({2.5, -1, 0}, {2, 0, 0}, {0, 2, 0});
+  const SE3 truth = lookAt({0, 0, 1.5}, {3.5, 0, 0});
+  const SE3 leaning(expSO3({0, 0.02, 0}) * truth.rotation(), truth.t());
+  const auto keyframe = rig.camera.keyframe(scene, truth);
+  const PlaneUpdate before = rig.place(keyframe, leaning);
+  ASSERT_EQ(1u, before.planes.size());
+  EXPECT_TRUE(before.observations.empty());
+  EXPECT_GT(before.planes[0].plane.d, 0.05);
+  const PlaneUpdate after = rig.mapper.applyMapUpdate(updateFor(*keyframe, truth));
+  ASSERT_EQ(1u, after.planes.size());
+  EXPECT_NEAR(0, after.planes[0].plane.d, 0.01);
+  EXPECT_NEAR(before.planes[0].area, after.planes[0].area, 0.05 * before.planes[0].area);
+}
+
 TEST(Mapper, APlaneThatIsGoneDisappears) {
   Rig rig;
   Scene with = room(), without = room();

@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace vip_slam {
+namespace {
+
+constexpr double kLeastTurn = 1e-3, kLeastShift = 1e-3;  // radians, metres; less is no change
+
+}  // namespace
 
 PlaneTrack::PlaneTrack(PlaneId id, PlaneKind kind, const Plane& plane, const Eigen::Vector3d& origin, double cell)
     : id_(id), kind_(kind), plane_(plane), cell_(cell) {
@@ -61,6 +66,14 @@ void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& ho
   }
 }
 
+Plane PlaneTrack::carriedAlong(const SE3& move, const SE3& T_map_C, const std::vector<Eigen::Vector3f>& cells_C) const {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), n = plane_.n;
+  for (const Eigen::Vector3f& p_C : cells_C) middle += p_C.cast<double>() / double(cells_C.size());
+  if (kind_ != PlaneKind::kHorizontal) n = move.rotation() * n;
+  if (kind_ == PlaneKind::kVertical) n.z() = 0;
+  return Plane::fromPointNormal(move * plane_.project(T_map_C * middle), n.normalized());
+}
+
 void PlaneTrack::followKeyframes(const CameraPoses& poses) {
   const Patch* main = nullptr;
   SE3 main_move;
@@ -75,6 +88,13 @@ void PlaneTrack::followKeyframes(const CameraPoses& poses) {
       moved = moved || (shift - plane_.n * plane_.n.dot(shift)).norm() > 0.5 * cell_;
     }
     if (!main || patch.cells_C.size() > main->cells_C.size()) main = &patch, main_move = move;
+  }
+  Plane carried = plane_;
+  if (main && !main->cells_C.empty() && followsHosts()) {
+    carried = carriedAlong(main_move, main->T_map_C, main->cells_C);
+    const Eigen::Vector3d p = main_move * (main->T_map_C * main->cells_C.front().cast<double>());
+    moved = moved || std::abs(carried.signedDistance(p) - plane_.signedDistance(p)) > kLeastShift ||
+            (carried.n - plane_.n).norm() > kLeastTurn;
   }
   if (!moved) return;
   area_changed_ = grown_ = true;
@@ -101,6 +121,7 @@ void PlaneTrack::followKeyframes(const CameraPoses& poses) {
     if (it != poses.end()) patch.T_map_C = it->second;
     sources.push_back(std::move(source));
   }
+  plane_ = carried;
   alignFrame(main_move.rotation() * ex_, main_move * origin_);
   for (const Source& source : sources) {
     for (std::size_t i = 0; i < source.hits.size(); ++i) {
@@ -165,9 +186,8 @@ PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {
 }
 
 bool PlaneTrack::changed(bool reset) {
-  constexpr double kTurn = 1e-3, kShift = 1e-3;  // radians, metres
   const bool changed =
-      grown_ || (plane_.n - last_checked_.n).norm() > kTurn || std::abs(last_checked_.signedDistance(origin_)) > kShift;
+      grown_ || (plane_.n - last_checked_.n).norm() > kLeastTurn || std::abs(last_checked_.signedDistance(origin_)) > kLeastShift;
   if (reset) grown_ = false, last_checked_ = plane_;
   return changed;
 }

@@ -62,7 +62,8 @@ class PlaneTrack {
   }
 
   /// Rasterises the cells anew when hosts have moved (against where they were when last rasterised) by more than half a
-  /// cell; the 2D frame follows the host with most cells, so that a rigid correction moves all without resampling.
+  /// cell; the 2D frame follows the host with most cells, so that a rigid correction moves all without resampling. So
+  /// does the plane itself while nothing else holds it.
   void followKeyframes(const CameraPoses& poses);
   /// Hands the cells of a keyframe that goes away to another one.
   void rehost(KeyframeId from, KeyframeId to, const CameraPoses& poses);
@@ -73,6 +74,8 @@ class PlaneTrack {
   const std::map<KeyframeId, PlaneObservation>& observations() const { return observations_; }
   /// Whether some of its area or an observation belongs to a keyframe.
   bool restsOn(KeyframeId keyframe) const { return observations_.count(keyframe) > 0 || patches_.count(keyframe) > 0; }
+  /// No observation holds it and no loaded map: it moves with the keyframe that shows most of it.
+  bool followsHosts() const { return observations_.empty() && !patches_.count(0); }
   /// Moments of all observations in `map`.
   PlaneMoments moments(const CameraPoses& poses) const;
 
@@ -107,6 +110,8 @@ class PlaneTrack {
     SE3 T_map_C;                           ///< of the host, when last rasterised
     std::vector<Eigen::Vector3f> cells_C;  ///< cell centres in the host's camera frame
   };
+  /// The plane moved with the keyframe that shows these cells; it stays level or upright.
+  Plane carriedAlong(const SE3& move, const SE3& T_map_C, const std::vector<Eigen::Vector3f>& cells_C) const;
   void alignFrame(const Eigen::Vector3d& ex_hint, const Eigen::Vector3d& origin_hint);
 
   PlaneId id_;
