@@ -184,6 +184,31 @@ TEST(Mapper, CornersOfACeilingAreOneUnlessSomethingShowsAboveThem) {
   }
 }
 
+// Two pieces of floor, 0.9 and 0.5 m^2, before a wall that ends there or goes on below them, as it does below tables;
+// or something lies lower in another corner of the map.
+TEST(Mapper, PiecesOfTheLowestFloorAreOneButTablesAreTwo) {
+  struct Case {
+    double foot, step;
+    bool cellar;
+    int floors;
+  };
+  for (const Case& c : {Case{0, 0, false, 1}, Case{0, 0.03, false, 2}, Case{-0.8, 0, false, 2}, Case{0, 0, true, 2}}) {
+    Rig rig;
+    Scene scene;
+    scene.add({-1, 1, c.foot}, {8, 0, 0}, {0, 0, 2.5 - c.foot});
+    scene.add({0, 0, 0}, {0.9, 0, 0}, {0, 1, 0});
+    scene.add({5, 0.3, c.step}, {0.7, 0, 0}, {0, 0.7, 0});  // 4 m further on
+    if (c.cellar) scene.add({-4, 0, -0.8}, {1.5, 0, 0}, {0, 1.5, 0});
+    for (int i = 0; c.cellar && i < 3; ++i) rig.look(scene, {-3.2, -2, 1.3}, {-3.2 + 0.1 * i, 0.7, -0.8});
+    for (double x = -0.5; x < 7; x += 0.8) rig.look(scene, {x, -2.5, 1.3}, {x, 1, 0.6});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {0.2 + 0.1 * i, -1.5, 1.5}, {0.4, 0.5, 0});
+    for (int i = 0; i < 4; ++i) rig.look(scene, {5.2 + 0.1 * i, -1.5, 1.5}, {5.3, 0.6, c.step});
+    int floors = 0;
+    for (const PlaneEstimate& p : rig.mapper.planes()) floors += p.plane.n.z() > 0.9 && p.plane.d < 0.1;
+    EXPECT_EQ(c.floors, floors) << "wall from " << c.foot << ", step " << c.step << (c.cellar ? ", cellar" : "");
+  }
+}
+
 // A duct 7 m long, and two boards that end where it would go on.
 TEST(Mapper, TheUndersideOfADuctIsOneWithItsMiddleUnseen) {
   struct Case {

@@ -186,8 +186,8 @@ PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {
 }
 
 bool PlaneTrack::changed(bool reset) {
-  const bool changed =
-      grown_ || (plane_.n - last_checked_.n).norm() > kLeastTurn || std::abs(last_checked_.signedDistance(origin_)) > kLeastShift;
+  const bool changed = grown_ || (plane_.n - last_checked_.n).norm() > kLeastTurn ||
+                       std::abs(last_checked_.signedDistance(origin_)) > kLeastShift;
   if (reset) grown_ = false, last_checked_ = plane_;
   return changed;
 }

@@ -15,7 +15,8 @@ constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
 constexpr double kPartition = 0.5;     // m^2; free-standing walls and doors, of which something hides the middle
 constexpr double kNoTable = 20.0;      // m^2; what lies level with so large a surface is more of it, not a second table
 constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
-constexpr double kTopmostCeiling = 1.0;  // m^2; nor has any walls that end at it and nothing above
+// Nor has any walls that end at it and nothing above; no table has nothing below.
+constexpr double kTopmostCeiling = 1.0, kLowestFloor = 0.5;  // m^2
 // Ceilings are seen at the flattest angles and from afar, and nothing as wide hangs less than this below another one.
 constexpr double kCeilingSlack = 1.5;              // of max_rms
 constexpr double kStrip = 4.0, kLeastStrip = 1.0;  // length over width, m^2; boards of shelves are smaller
@@ -112,11 +113,12 @@ double meanHeight(const PlaneTrack& track) {
 
 double heightDifference(const PlaneTrack& a, const PlaneTrack& b) { return std::abs(meanHeight(a) - meanHeight(b)); }
 
-/// Whether walls end at both pieces, and of all that is known beside them and between them nothing lies higher. Over a
-/// duct or a beam the walls go on.
-bool topmost(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known) {
-  constexpr double kBeside = 0.5, kAbove = 0.3;  // m; walls end a cell or two above or below a ceiling
-  const double level = 0.5 * (meanHeight(a) + meanHeight(b));
+/// Whether walls end at both pieces, and of all that is known beside them and between them nothing lies beyond. Over a
+/// duct or a beam the walls go on, under a table as well; and nothing at all that is known may lie below a floor.
+bool outermost(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known) {
+  constexpr double kBeside = 0.5, kBeyond = 0.3;  // m; walls end a cell or two above or below a ceiling
+  const bool ceiling = a.plane().n.z() < 0;
+  const double out = ceiling ? 1.0 : -1.0, level = 0.5 * (meanHeight(a) + meanHeight(b));
   Eigen::AlignedBox2d piece[2], all;
   for (int k = 0; k < 2; ++k) {
     const PlaneTrack& track = k ? b : a;
@@ -125,17 +127,18 @@ bool topmost(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const P
     piece[k].max().array() += kBeside;
     all.extend(piece[k]);
   }
-  bool meets[2] = {false, false}, higher = false;
+  bool meets[2] = {false, false}, beyond = false;
   for (const PlaneTrack* track : known) {
     const bool wall = track->kind() == PlaneKind::kVertical && track->area() >= kLargeWall;
     track->cells().forEach([&](CellIndex c, int) {
       const Eigen::Vector3d p = track->cellCentre(c);
-      if (p.z() < level - kAbove) return;
+      const double height = out * (p.z() - level);
+      if (height < -kBeyond) return;
       const Eigen::Vector2d q = p.head<2>();
-      higher = higher || (p.z() > level + kAbove && all.contains(q));
+      beyond = beyond || (height > kBeyond && (!ceiling || all.contains(q)));
       for (int k = 0; wall && k < 2; ++k) meets[k] = meets[k] || piece[k].contains(q);
     });
-    if (higher) return false;
+    if (beyond) return false;
   }
   return meets[0] && meets[1];
 }
@@ -214,11 +217,12 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
     gap = std::max(gap, lengthIfContinued(small, large));
     if (gap > options.gap) apart *= 0.5;
   }
-  const double ceiling_reach = options.gap_per_area * kLeastCeiling;
-  if (ceiling && gap < ceiling_reach && std::max(area_a, area_b) >= kTopmostCeiling &&
-      boundsGap(small, large) <= ceiling_reach && heightDifference(a, b) < 0.5 * options.distance_apart &&
-      topmost(a, b, known)) {
-    gap = ceiling_reach;
+  const double level_reach = options.gap_per_area * kLeastCeiling;
+  if (a.kind() == PlaneKind::kHorizontal && gap < level_reach &&
+      std::max(area_a, area_b) >= (ceiling ? kTopmostCeiling : kLowestFloor) &&
+      boundsGap(small, large) <= level_reach && heightDifference(a, b) < 0.5 * options.distance_apart &&
+      outermost(a, b, known)) {
+    gap = level_reach;
     apart = 0.5 * options.distance_apart;
   }
   // That two surfaces lie in one plane by accident is the likelier the further one looks and the less is asked of them:
