@@ -14,12 +14,12 @@
 
 namespace vip_slam {
 
+/// A point on a patch and one that should lie on it, both as the depth camera reads them: its offset is a state.
 struct SurfacePair {
   Eigen::Vector3d p_ref = Eigen::Vector3d::Zero();  ///< on the patch, camera frame of the reference, metres
   Eigen::Vector3d n_ref = Eigen::Vector3d::Zero();  ///< unit normal, same frame
-  Eigen::Vector3d q_cur =
-      Eigen::Vector3d::Zero();  ///< in the newest camera, metres; both as the depth camera reads them
-  double sigma = 0.01;          ///< one sigma of the distance along the normal, metres
+  Eigen::Vector3d q_cur = Eigen::Vector3d::Zero();  ///< in the newest camera, metres
+  double sigma = 0.01;                              ///< one sigma of the distance along the normal, metres
 };
 
 struct SurfaceMatches {

@@ -49,7 +49,6 @@ struct WindowState {
   int rotationColumn() const { return calibrationColumn(); }
   int translationColumn() const { return calibrationColumn() + (calibration.rotation ? 3 : 0); }
   int timeOffsetColumn() const { return translationColumn() + (calibration.translation ? 3 : 0); }
-
   int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
 
   /// z that a reading of the depth camera means, m.
