@@ -184,7 +184,7 @@ double FrontEndNodelet::waitedFor(double t) const {
 void FrontEndNodelet::processReady() {
   if (!front_end_) return;
   while (const ImagePair* front = pairer_->front()) {
-    if (!front_end_->ready(front->t) && waitedFor(front->t) <= options_.imu_patience) return;
+    if (!front_end_->ready(front->t, front->depth_lag) && waitedFor(front->t) <= options_.imu_patience) return;
     // Taken out first: an image that cannot be processed must not come back for ever.
     const ImagePair pair = *front;
     pairer_->pop();
@@ -194,7 +194,8 @@ void FrontEndNodelet::processReady() {
 
 void FrontEndNodelet::process(const ImagePair& pair) {
   std::string size_problem;
-  const FrameInput input{pair.t, pair.gray, alignment_->align(pair.depth, pair.gray.size(), &size_problem)};
+  const FrameInput input{pair.t, pair.gray, alignment_->align(pair.depth, pair.gray.size(), &size_problem),
+                         pair.depth_lag};
   if (!size_problem.empty()) NODELET_WARN_THROTTLE(10, "%s", size_problem.c_str());
   const ros::Time stamp = ros::Time().fromNSec(pair.stamp);
   const ros::WallTime begin = ros::WallTime::now();

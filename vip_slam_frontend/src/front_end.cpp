@@ -11,7 +11,7 @@ FrontEnd::~FrontEnd() = default;
 bool FrontEnd::addImu(const ImuSample& sample) { return impl_->addImu(sample); }
 bool FrontEnd::addGyro(double t, const Eigen::Vector3d& gyro) { return impl_->addGyro(t, gyro); }
 bool FrontEnd::addAccel(double t, const Eigen::Vector3d& accel) { return impl_->addAccel(t, accel); }
-bool FrontEnd::ready(double t_image) const { return impl_->ready(t_image); }
+bool FrontEnd::ready(double t_image, double depth_lag) const { return impl_->ready(t_image, depth_lag); }
 FrameOutput FrontEnd::process(const FrameInput& input, const PoseReady& on_pose) {
   return impl_->process(input, on_pose);
 }

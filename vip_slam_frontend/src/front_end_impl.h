@@ -26,7 +26,10 @@ class FrontEnd::Impl {
   bool addImu(const ImuSample& sample);
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
-  bool ready(double t_image) const { return imu_.covers(t_image + timeOffset() + 0.5 * longestReadout()); }
+  bool ready(double t_image, double depth_lag) const {
+    const double last = std::max(0.5 * sensor_.rolling_shutter, depth_lag + 0.5 * sensor_.depth_rolling_shutter);
+    return imu_.covers(t_image + timeOffset() + last);
+  }
   FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);
   void applyMapUpdate(const MapUpdate& update);
   std::optional<NavState> predict(double t) const;
@@ -48,23 +51,30 @@ class FrontEnd::Impl {
   enum class Phase { kWaiting, kInitialising, kTracking, kLost };
 
   SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.mounting().T_I_C; }
+  /// A depth image as it came; empty when there is none.
+  struct DepthReading {
+    cv::Mat image;
+    double lag = 0;  ///< its stamp after that of the colour image, seconds
+  };
+
   /// Empty when the input is usable; else what is wrong. Fixes up the depth.
-  std::string checkInput(const FrameInput& input, cv::Mat* depth);
+  std::string checkInput(const FrameInput& input, DepthReading* depth);
   bool noticeTimeJump(double t, double newest, const char* what);
   void countImu();
 
-  FrameOutput initialise(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth);
-  FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth,
+  FrameOutput initialise(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth);
+  FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth,
                          const FrontEnd::PoseReady& on_pose);
   SE3 gyroRotation(double t0, double t1) const;
   /// Both in IMU time: of the last image and of this one.
   bool decideStillness(double previous_t_imu, double t_imu);
-  double longestReadout() const { return std::max(sensor_.rolling_shutter, sensor_.depth_rolling_shutter); }
-  /// How the colour camera moves during a readout of so many seconds, given the state at the stamp; null: global
-  /// shutter.
-  std::shared_ptr<const RowPoses> rows(double readout, const NavState& nav) const;
-  /// A depth image whose rows were not read at once, as at the stamp.
-  cv::Mat depthAtStamp(const cv::Mat& depth, const NavState& nav) const;
+  /// How the colour camera moves during a readout, given the state at the stamp; null: everything at the stamp.
+  std::shared_ptr<const RowPoses> rows(const Readout& readout, const NavState& nav) const;
+  std::shared_ptr<const RowPoses> colourRows(const NavState& nav) const {
+    return rows(Readout::around(sensor_.rolling_shutter), nav);
+  }
+  /// A depth image that was not read at the stamp of the colour image, or row by row, as at that stamp.
+  cv::Mat depthAtStamp(const DepthReading& depth, const NavState& nav);
   std::vector<FilterMeasurement> measurements() const;
   SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
@@ -100,7 +110,7 @@ class FrontEnd::Impl {
   std::shared_ptr<const CameraModel> camera_;
   ImuBuffer imu_;
   cv::Mat masked_;                         ///< not zero where depth is to be left out; empty: nowhere
-  std::unique_ptr<DepthRows> depth_rows_;  ///< null: depth of one instant
+  std::unique_ptr<DepthRows> depth_rows_;  ///< null until a depth image of other times than the stamp came
   FeatureTracker tracker_;
   MovingRegions moving_;          ///< of the newest image
   double moving_imu_t_ = -1e300;  ///< of the last image with such

@@ -14,6 +14,8 @@ namespace {
 
 // A step back by more than this is a looped bag or a restarted clock, less is a sample out of order.
 constexpr double kClockJump = 1.0;
+// Half a millimetre at a fast walk: depth closer than that to the colour image counts as taken with it, seconds.
+constexpr double kSameInstant = 5e-4;
 
 SensorConfig checked(const SensorConfig& sensor) {
   const std::string problem = sensor.camera.validate();
@@ -41,7 +43,6 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       camera_(makeCamera(sensor_.camera)),
       imu_(options.recovery.max_imu_gap, 30.0),
       masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
-      depth_rows_(sensor_.depth_rolling_shutter > 0 ? std::make_unique<DepthRows>(camera_) : nullptr),
       tracker_(options.tracking, camera_, sensor_.depth_noise, timing,
                featureMask(sensor_.mask, options.tracking.border)),
       surfaces_(camera_, sensor_.depth_noise),
@@ -91,7 +92,7 @@ bool FrontEnd::Impl::addAccel(double t, const Eigen::Vector3d& accel) {
   return accepted;
 }
 
-std::string FrontEnd::Impl::checkInput(const FrameInput& input, cv::Mat* depth) {
+std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* depth) {
   if (!std::isfinite(input.t)) {
     ++counters_.bad_stamp;
     return "image stamp is not finite";
@@ -115,10 +116,11 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, cv::Mat* depth) 
   } else if (input.depth.type() != CV_32FC1 || input.depth.size() != input.gray.size()) {
     ++counters_.bad_depth;
   } else {
-    *depth = input.depth;
+    depth->image = input.depth;
+    depth->lag = std::abs(input.depth_lag) >= kSameInstant ? input.depth_lag : 0.0;
     if (!masked_.empty()) {
-      *depth = input.depth.clone();  // the caller's own stays as it is
-      depth->setTo(0, masked_);
+      depth->image = input.depth.clone();  // the caller's own stays as it is
+      depth->image.setTo(0, masked_);
     }
   }
   return "";

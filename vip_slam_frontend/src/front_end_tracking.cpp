@@ -22,7 +22,7 @@ constexpr double kLongGapNoise = 5.0;
 FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::PoseReady& on_pose) {
   ScopedTimer timer(timing_, "frontend.total", input.t);
   ++counters_.images;
-  cv::Mat depth;
+  DepthReading depth;
   const std::string problem = checkInput(input, &depth);
   const TrackingState doubtful =
       filter_.started() ? std::max(status_.state, TrackingState::kDegraded) : TrackingState::kWaiting;
@@ -51,20 +51,22 @@ SE3 FrontEnd::Impl::gyroRotation(double t0, double t1) const {
   return SE3(Eigen::Matrix3d(R_I_C.transpose() * pre.deltaR().transpose() * R_I_C), Eigen::Vector3d::Zero());
 }
 
-std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(double readout, const NavState& nav) const {
-  if (!(readout > 0)) return nullptr;
-  const double half = 0.5 * readout;
+std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(const Readout& readout, const NavState& nav) const {
+  if (readout.instant()) return nullptr;
   const std::vector<ImuSample> around =
-      imu_.between(std::max(imu_.oldest(), nav.t - half), std::min(imu_.newest(), nav.t + half));
+      imu_.between(std::max(imu_.oldest(), nav.t + std::min(readout.first, 0.0)),
+                   std::min(imu_.newest(), nav.t + std::max(readout.last, 0.0)));
   if (around.empty()) return nullptr;
   return std::make_shared<RowPoses>(readout, nav, around, extrinsics(), sensor_.gravity);
 }
 
-cv::Mat FrontEnd::Impl::depthAtStamp(const cv::Mat& depth, const NavState& nav) const {
-  if (!depth_rows_ || depth.empty()) return depth;
+cv::Mat FrontEnd::Impl::depthAtStamp(const DepthReading& depth, const NavState& nav) {
+  const Readout readout = Readout::around(sensor_.depth_rolling_shutter, depth.lag);
+  if (depth.image.empty() || readout.instant()) return depth.image;
   ScopedTimer timer(timing_, "frontend.depth_rows", nav.t);
-  const std::shared_ptr<const RowPoses> poses = rows(sensor_.depth_rolling_shutter, nav);
-  return poses ? depth_rows_->atStamp(depth, *poses) : depth;
+  if (!depth_rows_) depth_rows_ = std::make_unique<DepthRows>(camera_);  // most sensors never need its tables
+  const std::shared_ptr<const RowPoses> poses = rows(readout, nav);
+  return poses ? depth_rows_->atStamp(depth.image, *poses) : depth.image;
 }
 
 std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
@@ -77,7 +79,8 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
   return list;
 }
 
-FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth_read) {
+FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gray,
+                                       const DepthReading& depth_read) {
   const bool first = phase_ == Phase::kWaiting;
   phase_ = Phase::kInitialising;
   const SE3 rotation = first ? SE3() : gyroRotation(last_imu_t_, t_imu);
@@ -89,7 +92,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
     turning.T_W_I = SE3(gravityAlignedRotation(sample->accel), Eigen::Vector3d::Zero());
   }
   const cv::Mat depth = depthAtStamp(depth_read, turning);
-  tracker_.track(gray, depth, {rotation, 0, 0}, false, SE3(), rows(sensor_.rolling_shutter, turning), t);
+  tracker_.track(gray, depth, {rotation, 0, 0}, false, SE3(), colourRows(turning), t);
   tracker_.replenish(SE3(), true, t);
   std::optional<FilterPrior> prior = initialiser_.add(
       {t_imu, measurements(), makeDepthGrid(depth, options_.frame_grid_stride, sensor_.depth_noise)}, imu_);
@@ -115,7 +118,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   // The tracks' references were taken under unknown poses: begin them here.
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
-  tracker_.restartReferences(T_odom_C, rows(sensor_.rolling_shutter, filter_.nav()));
+  tracker_.restartReferences(T_odom_C, colourRows(filter_.nav()));
   return makeOutput(t, t_imu, "first");
 }
 
@@ -170,7 +173,7 @@ void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, do
   surfaces_.setReference(depth, filter_.window().clones.back().id, moving_);
 }
 
-FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const cv::Mat& depth_read,
+FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth_read,
                                        const FrontEnd::PoseReady& on_pose) {
   double max_gap = 0;
   const double from = filter_.nav().t;
@@ -195,7 +198,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
   const TrackingResult tracked = tracker_.track(gray, depth, foretell(propagation, T_odom_C, gap), !coasting, T_odom_C,
-                                                rows(sensor_.rolling_shutter, propagation.predicted), t);
+                                                colourRows(propagation.predicted), t);
   moving_ = tracked.regions;
   for (const Track& track : tracker_.ended()) landmarks_.retire(track);
 

@@ -20,7 +20,7 @@ RowPoses motion() {
   ImuSample s;
   s.gyro = {1.5, -1.0, 0.6};
   s.accel = gravityVector();
-  return RowPoses(kReadout, nav, {s}, SE3());
+  return RowPoses(Readout::around(kReadout), nav, {s}, SE3());
 }
 
 /// Floor and two walls seen from a pose relative to the stamp; nearest hit of a pixel's ray, z in that pose.
@@ -88,7 +88,7 @@ TEST(DepthRows, AtRestNothingChanges) {
   ImuSample s;
   s.accel = gravityVector();
   const cv::Mat truth = image(nullptr);
-  const cv::Mat result = DepthRows(camera()).atStamp(truth, RowPoses(kReadout, still, {s}, SE3()));
+  const cv::Mat result = DepthRows(camera()).atStamp(truth, RowPoses(Readout::around(kReadout), still, {s}, SE3()));
   EXPECT_LT(cv::norm(result, truth, cv::NORM_INF), 1e-3);
 }
 

@@ -1,4 +1,4 @@
-// Images and depth whose rows are read one after the other while the body turns and sways before a textured corner.
+// Images and depth whose rows are read one after the other, and depth that is taken at another time than colour, while the body turns and sways before a textured corner.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -47,6 +47,39 @@ TEST(RollingImages, DepthOfOneInstantBelongsToTheStamp) {
   EXPECT_LT(told, 0.003);
   EXPECT_GT(taken_for_rolling, 2 * told);
 }
+
+/// The same with colour of one instant and depth that is taken `lag` later. `told`: what the front end hears of it.
+double errorWithLag(double lag, double told, double depth_readout) {
+  const CornerWorld world;
+  FrontEnd front_end(cornerOptions(), cornerSensor(0, depth_readout));
+  double imu_t = 0, square = 0;
+  int n = 0;
+  for (int k = 0; k < 125; ++k) {
+    const double t = 0.05 * k;
+    FrameInput input;
+    input.t = t;
+    input.depth_lag = told;
+    for (; !front_end.ready(t, told); imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
+    cv::Mat not_used;
+    world.look(t, 0, &input.gray, &not_used);
+    world.look(t + lag, depth_readout, &not_used, &input.depth);
+    const FrameOutput output = front_end.process(input);
+    if (t < kStill + 0.05) continue;
+    square += (output.frame->state.T_W_I.t() - CornerWorld::pose(t).t()).squaredNorm();
+    ++n;
+  }
+  return std::sqrt(square / n);
+}
+
+TEST(LaggingDepth, IsCarriedOverToTheStampOfColour) {
+  for (const double lag : {-0.015, 0.015}) {
+    const double told = errorWithLag(lag, lag, 0), not_told = errorWithLag(lag, 0, 0);
+    EXPECT_LT(told, 0.003) << lag;
+    EXPECT_GT(not_told, 3 * told) << lag;
+  }
+}
+
+TEST(LaggingDepth, RowsOfALaterDepthImage) { EXPECT_LT(errorWithLag(0.012, 0.012, kReadout), 0.003); }
 
 }  // namespace
 }  // namespace vip_slam

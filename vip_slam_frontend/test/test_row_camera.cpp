@@ -65,7 +65,8 @@ TEST(RowCamera, EveryRowAgreesWithTheMotionThere) {
   double most_apart = 0;
   for (double t : {0.2, 0.5, 1.1}) {
     const RowCamera view(
-        camera(), std::make_shared<RowPoses>(kReadout, swing.nav(t), swing.imu(t - 0.01, t + 0.01), swing.T_I_C));
+        camera(), std::make_shared<RowPoses>(Readout::around(kReadout), swing.nav(t), swing.imu(t - 0.01, t + 0.01),
+                                             swing.T_I_C));
     const SE3 T_W_C = swing.T_W_I(t) * swing.T_I_C;
     for (double x = -0.5; x <= 0.5; x += 0.25) {
       for (double y = -0.4; y <= 0.4; y += 0.1) {
@@ -88,8 +89,8 @@ TEST(RowCamera, EveryRowAgreesWithTheMotionThere) {
 TEST(RowCamera, BeyondTheImuItsLastSampleCounts) {
   const Swing swing;
   const double t = 0.5;
-  const RowPoses all(kReadout, swing.nav(t), swing.imu(t - 0.01, t + 0.01), swing.T_I_C);
-  const RowPoses half(kReadout, swing.nav(t), swing.imu(t - 0.01, t), swing.T_I_C);
+  const RowPoses all(Readout::around(kReadout), swing.nav(t), swing.imu(t - 0.01, t + 0.01), swing.T_I_C);
+  const RowPoses half(Readout::around(kReadout), swing.nav(t), swing.imu(t - 0.01, t), swing.T_I_C);
   Eigen::Matrix3d R_all, R_half;
   Eigen::Vector3d t_all, t_half;
   all.at(1.0, &R_all, &t_all);

@@ -80,12 +80,12 @@ const ImagePair* ImagePairer::front() {
   const bool decided = (after != depth_.end() && !next_matters) || newest() - t > options_.patience;
   if (!decided) return nullptr;
 
-  front_ = ImagePair{t, std::move(color_.front().image), {}, color_.front().stamp};
+  front_ = ImagePair{t, std::move(color_.front().image), {}, 0, color_.front().stamp};
   popColor();
   if (best == depth_.end()) {
     ++counters_.without_depth;
   } else {
-    counters_.skew = best->t - t;
+    counters_.skew = front_->depth_lag = best->t - t;
     counters_.unused_depth += std::size_t(best - depth_.begin());
     front_->depth = std::move(best->image);
     depth_.erase(depth_.begin(), best + 1);

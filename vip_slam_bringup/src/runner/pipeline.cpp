@@ -53,7 +53,8 @@ double Pipeline::waitedFor(double t) const {
 
 void Pipeline::processReady() {
   while (!waiting_.empty() &&
-         (front_end_->ready(waiting_.front().t) || waitedFor(waiting_.front().t) > options_.imu_patience)) {
+         (front_end_->ready(waiting_.front().t, waiting_.front().depth_lag) ||
+          waitedFor(waiting_.front().t) > options_.imu_patience)) {
     process(waiting_.front());
     waiting_.pop_front();
   }
@@ -82,7 +83,7 @@ void Pipeline::applyAnswers(std::size_t image) {
 
 void Pipeline::process(const ImagePair& pair) {
   applyAnswers(images_);
-  const FrameOutput output = front_end_->process({pair.t, pair.gray, pair.depth});
+  const FrameOutput output = front_end_->process({pair.t, pair.gray, pair.depth, pair.depth_lag});
   ++images_;
   const TrackedFrame& frame = *output.frame;
   status_ = frame.status;

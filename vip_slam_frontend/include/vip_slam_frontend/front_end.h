@@ -27,6 +27,9 @@ struct FrameInput {
   double t = 0;   ///< image stamp, seconds
   cv::Mat gray;   ///< 8UC1, the size of the colour camera
   cv::Mat depth;  ///< 32FC1 metres registered to gray, 0 or NaN invalid; empty when there is none
+  /// Stamp of depth - stamp of gray, seconds: cameras that are not synchronised. Depth is carried over to the stamp of
+  /// gray by the IMU.
+  double depth_lag = 0;
 };
 
 struct FrameOutput {
@@ -70,8 +73,8 @@ class FrontEnd {
   bool addImu(const ImuSample& sample);
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
-  /// The IMU covers t_image + time offset.
-  bool ready(double t_image) const;
+  /// The IMU covers t_image + time offset, and the depth image so much later.
+  bool ready(double t_image, double depth_lag = 0) const;
 
   /// Always returns a frame. Bad input is counted and named in its status; it never throws on data.
   /// `on_pose` (may be empty) is called as soon as an image that is tracked has its pose, before corners are renewed

@@ -22,35 +22,42 @@ ImuSample sampleAt(const std::vector<ImuSample>& imu, double t) {
 
 }  // namespace
 
-RowPoses::RowPoses(double readout, const NavState& nav, const std::vector<ImuSample>& imu, const SE3& T_I_C,
+RowPoses::RowPoses(const Readout& readout, const NavState& nav, const std::vector<ImuSample>& imu, const SE3& T_I_C,
                    double gravity) {
-  const int half = std::max(1, static_cast<int>(std::ceil(0.5 * readout / kKnotSeconds)));
-  knots_.resize(static_cast<std::size_t>(2 * half + 1));
+  const double length = readout.last - readout.first;
+  const int intervals = 2 * std::max(1, static_cast<int>(std::ceil(0.5 * length / kKnotSeconds)));
+  knots_.resize(static_cast<std::size_t>(intervals + 1));
+  const auto timeOf = [&](int k) { return readout.first + length * k / intervals; };
   const Eigen::Matrix3d R_I_C = T_I_C.R();
   const Eigen::Vector3d g_stamp = nav.T_W_I.R().transpose() * gravityVector(gravity);
-  const auto knot = [&](int k, const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
-    // Body at the row seen from the body at the stamp, turned into cameras.
-    knots_[static_cast<std::size_t>(half + k)] = {R_I_C.transpose() * R * R_I_C,
-                                                  R_I_C.transpose() * (R * T_I_C.t() + p - T_I_C.t())};
-  };
-  const double h = 0.5 * readout / half;
-  for (const int way : {-1, 1}) {
+  const Eigen::Vector3d v_stamp = nav.T_W_I.R().transpose() * nav.v_W;
+  int later = 0;  // the first knot that is not before the stamp
+  while (later <= intervals && timeOf(later) < 0) ++later;
+  // From the stamp both ways: body there seen from the body at the stamp, turned into cameras.
+  const auto march = [&](int begin, int end, int way) {
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d p = Eigen::Vector3d::Zero(), v = nav.T_W_I.R().transpose() * nav.v_W;
-    knot(0, R, p);
-    for (int k = 1; k <= half; ++k) {
-      const double dt = way * h;
-      const ImuSample middle = sampleAt(imu, nav.t + (k - 0.5) * dt);
-      const Eigen::Matrix3d step = expSO3(Eigen::Vector3d((middle.gyro - nav.bias_gyro) * dt));
-      const Eigen::Vector3d a =
-          R * expSO3(Eigen::Vector3d((middle.gyro - nav.bias_gyro) * 0.5 * dt)) * (middle.accel - nav.bias_accel) -
-          g_stamp;
-      p += v * dt + 0.5 * a * dt * dt;
-      v += a * dt;
-      R = R * step;
-      knot(way * k, R, p);
+    Eigen::Vector3d p = Eigen::Vector3d::Zero(), v = v_stamp;
+    double at = 0;
+    for (int k = begin; k != end; k += way) {
+      const double to = timeOf(k);
+      const int steps = static_cast<int>(std::ceil(std::abs(to - at) / kKnotSeconds - 1e-9));
+      const double dt = steps > 0 ? (to - at) / steps : 0.0;
+      for (int i = 0; i < steps; ++i) {
+        const ImuSample middle = sampleAt(imu, nav.t + at + (i + 0.5) * dt);
+        const Eigen::Vector3d omega = middle.gyro - nav.bias_gyro;
+        const Eigen::Matrix3d half_step = expSO3(Eigen::Vector3d(omega * 0.5 * dt));
+        const Eigen::Vector3d a = R * half_step * (middle.accel - nav.bias_accel) - g_stamp;
+        p += v * dt + 0.5 * a * dt * dt;
+        v += a * dt;
+        R = R * expSO3(Eigen::Vector3d(omega * dt));
+      }
+      at = to;
+      knots_[static_cast<std::size_t>(k)] = {R_I_C.transpose() * R * R_I_C,
+                                             R_I_C.transpose() * (R * T_I_C.t() + p - T_I_C.t())};
     }
-  }
+  };
+  march(later, intervals + 1, 1);
+  march(later - 1, -1, -1);
 }
 
 void RowPoses::at(double share, Eigen::Matrix3d* R, Eigen::Vector3d* t) const {

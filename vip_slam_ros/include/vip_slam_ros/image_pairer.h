@@ -21,6 +21,7 @@ struct ImagePair {
   double t = 0;  ///< stamp of gray
   cv::Mat gray;
   cv::Mat depth;            ///< empty: none came in time
+  double depth_lag = 0;     ///< stamp of depth - stamp of gray, seconds
   std::uint64_t stamp = 0;  ///< of gray in nanoseconds, as it was handed in: t cannot hold each of them
 };
 

@@ -14,12 +14,22 @@
 
 namespace vip_slam {
 
-/// Poses of the camera while an image is read, relative to its pose at the stamp, which belongs to the middle row.
+/// When an image is read: the times of its first and its last row, seconds after the stamp that poses belong to.
+struct Readout {
+  double first = 0, last = 0;
+
+  /// `seconds` from first to last row, about the instant `lag` after that stamp.
+  static Readout around(double seconds, double lag = 0) { return {lag - 0.5 * seconds, lag + 0.5 * seconds}; }
+  /// Everything at the stamp.
+  bool instant() const { return first == 0 && last == 0; }
+};
+
+/// Poses of the camera while an image is read, relative to its pose at the stamp.
 class RowPoses {
  public:
-  /// `readout`: seconds from first to last row. `nav`: state at the stamp. `imu`: samples around the stamp on the clock
-  /// of `nav.t`; where they do not reach, the nearest counts. `T_I_C`: camera into IMU. `gravity` in m/s^2.
-  RowPoses(double readout, const NavState& nav, const std::vector<ImuSample>& imu, const SE3& T_I_C,
+  /// `nav`: state at the stamp. `imu`: samples around the readout and the stamp on the clock of `nav.t`; where they do
+  /// not reach, the nearest counts. `T_I_C`: camera into IMU. `gravity` in m/s^2.
+  RowPoses(const Readout& readout, const NavState& nav, const std::vector<ImuSample>& imu, const SE3& T_I_C,
            double gravity = 9.81);
 
   /// R and t of p_stamp = R p_row + t for the row read at `share` of the readout, 0 first and 1 last.
