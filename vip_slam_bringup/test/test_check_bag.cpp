@@ -92,7 +92,7 @@ TEST_F(CheckBag, DepthOfAnotherSizeUnitOrTime) {
   expectFound(check(), Severity::kError, "depth image", "");
   options_.depth_unit_factor = 1;
   options_.depth_skew = 0.014;
-  expectFound(check(), Severity::kWarning, "colour and depth", "14.0 ms after");
+  expectFound(check(), Severity::kNote, "colour and depth", "14.0 to 14.0 ms after");
   options_.depth_skew = 0;
   options_.depth_unit_factor = 10;
   expectFound(check(), Severity::kError, "depth image", "the sensor file uses 0.2");

@@ -53,9 +53,8 @@ SE3 FrontEnd::Impl::gyroRotation(double t0, double t1) const {
 
 std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(const Readout& readout, const NavState& nav) const {
   if (readout.instant()) return nullptr;
-  const std::vector<ImuSample> around =
-      imu_.between(std::max(imu_.oldest(), nav.t + std::min(readout.first, 0.0)),
-                   std::min(imu_.newest(), nav.t + std::max(readout.last, 0.0)));
+  const std::vector<ImuSample> around = imu_.between(std::max(imu_.oldest(), nav.t + std::min(readout.first, 0.0)),
+                                                     std::min(imu_.newest(), nav.t + std::max(readout.last, 0.0)));
   if (around.empty()) return nullptr;
   return std::make_shared<RowPoses>(readout, nav, around, extrinsics(), sensor_.gravity);
 }
@@ -79,8 +78,7 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
   return list;
 }
 
-FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gray,
-                                       const DepthReading& depth_read) {
+FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth_read) {
   const bool first = phase_ == Phase::kWaiting;
   phase_ = Phase::kInitialising;
   const SE3 rotation = first ? SE3() : gyroRotation(last_imu_t_, t_imu);

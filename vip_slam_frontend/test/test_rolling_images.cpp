@@ -1,4 +1,5 @@
-// Images and depth whose rows are read one after the other, and depth that is taken at another time than colour, while the body turns and sways before a textured corner.
+// Images and depth whose rows are read one after the other, and depth that is taken at another time than colour, while
+// the body turns and sways before a textured corner.
 #include <cmath>
 
 #include <gtest/gtest.h>

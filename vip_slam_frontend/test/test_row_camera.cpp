@@ -64,9 +64,8 @@ TEST(RowCamera, EveryRowAgreesWithTheMotionThere) {
   const Swing swing;
   double most_apart = 0;
   for (double t : {0.2, 0.5, 1.1}) {
-    const RowCamera view(
-        camera(), std::make_shared<RowPoses>(Readout::around(kReadout), swing.nav(t), swing.imu(t - 0.01, t + 0.01),
-                                             swing.T_I_C));
+    const RowCamera view(camera(), std::make_shared<RowPoses>(Readout::around(kReadout), swing.nav(t),
+                                                              swing.imu(t - 0.01, t + 0.01), swing.T_I_C));
     const SE3 T_W_C = swing.T_W_I(t) * swing.T_I_C;
     for (double x = -0.5; x <= 0.5; x += 0.25) {
       for (double y = -0.4; y <= 0.4; y += 0.1) {

@@ -46,6 +46,7 @@ TEST(ImagePairer, TheNearestDepthWins) {
   ASSERT_NE(pairer.front(), nullptr);
   EXPECT_EQ(valueOf(pairer.front()->depth), 11);
   EXPECT_NEAR(pairer.counters().skew, 0.004, 1e-12);
+  EXPECT_NEAR(pairer.front()->depth_lag, 0.004, 1e-12);
   EXPECT_EQ(pairer.counters().unused_depth, 1u);
 }
 

@@ -254,6 +254,20 @@ TEST(Sequence, RollingShutterAndTimeOffsetShiftWhatTheyShould) {
   EXPECT_LT(worst, 1e-4);
 }
 
+TEST(Sequence, DepthThatLagsByAnImageIsTheNextOnes) {
+  SequenceSpec spec = cleanSequence("unsynchronised");
+  spec.depth.a = spec.depth.b = 0;
+  SequenceSpec together = spec;
+  together.depth.lag = 0;
+  spec.depth.lag = 1 / spec.camera.rate;
+  SequenceRenderer later(spec, quickOptions()), now(together, quickOptions());
+  const SimFrame f = later.renderFrame(100), next = now.renderFrame(101);
+  EXPECT_EQ(f.depth_stamp_ns, next.stamp_ns);
+  EXPECT_EQ(next.depth_stamp_ns, next.stamp_ns);
+  EXPECT_EQ(cv::norm(f.depth, next.depth, cv::NORM_INF), 0);
+  EXPECT_GT(cv::norm(f.depth, now.renderFrame(100).depth, cv::NORM_INF), 100);
+}
+
 TEST(Sequence, ExposureJumpsToAndFroAtItsInterval) {
   SequenceSpec spec = cleanSequence("smoke");
   spec.effects.exposure = 1.0;

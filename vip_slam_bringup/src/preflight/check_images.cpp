@@ -3,6 +3,7 @@
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_ros/image_pairer.h"
 
 namespace vip_slam {
 namespace {
@@ -171,14 +172,15 @@ Findings checkSkew(const Recording& r) {
   if (r.color.stamps.size() < 3 || r.depth.stamps.size() < 3) return out;
   std::vector<double> depth = r.depth.stamps, skew;
   std::sort(depth.begin(), depth.end());
+  const double tolerance = PairerOptions{}.tolerance;
   std::size_t unmatched = 0, all = 0;
   for (const double t : r.color.stamps) {
-    if (t < depth.front() - 0.02 || t > depth.back() + 0.02) continue;
+    if (t < depth.front() - tolerance || t > depth.back() + tolerance) continue;
     const auto after = std::lower_bound(depth.begin(), depth.end(), t);
     double best = after != depth.end() ? *after - t : 1e9;
     if (after != depth.begin() && t - *(after - 1) < std::abs(best)) best = *(after - 1) - t;
     ++all;
-    if (std::abs(best) > 0.02)
+    if (std::abs(best) > tolerance)
       ++unmatched;
     else
       skew.push_back(best);
@@ -193,24 +195,22 @@ Findings checkSkew(const Recording& r) {
   const double share = double(unmatched) / all;
   if (skew.empty() || share > 0.5)
     out.push_back({Severity::kError, "colour and depth",
-                   words("%.0f %% of the colour images have no depth within 20 ms", 100 * share),
+                   words("%.0f %% of the colour images have no depth within %.0f ms", 100 * share, 1e3 * tolerance),
                    "switch on the driver's synchronisation (enable_sync, enable_frame_sync), or equal rates"});
   else if (share > 0.05)
     out.push_back({Severity::kWarning, "colour and depth",
-                   words("%.0f %% of the colour images have no depth within 20 ms", 100 * share),
+                   words("%.0f %% of the colour images have no depth within %.0f ms", 100 * share, 1e3 * tolerance),
                    "these images are tracked without depth"});
   if (!skew.empty()) {
-    const double middle = median(skew);
-    if (std::abs(middle) > 0.008)
-      out.push_back(
-          {Severity::kWarning, "colour and depth",
-           words("depth is stamped %.1f ms %s colour", 1000 * std::abs(middle), middle > 0 ? "after" : "before"),
-           "moving edges get the wrong depth: switch on the driver's synchronisation"});
+    const double early = quantile(skew, 0.05), late = quantile(skew, 0.95);
+    const double most = std::max(std::abs(early), std::abs(late));
+    if (most > 0.008)
+      out.push_back({Severity::kNote, "colour and depth",
+                     words("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
+                     "the IMU carries depth over to the colour image, as far as these stamps are right; the driver's "
+                     "synchronisation spares that"});
     else
-      out.push_back({Severity::kGood, "colour and depth",
-                     words("stamps agree within %.1f ms",
-                           1000 * std::max(std::abs(quantile(skew, 0.95)), std::abs(quantile(skew, 0.05)))),
-                     ""});
+      out.push_back({Severity::kGood, "colour and depth", words("stamps agree within %.1f ms", 1e3 * most), ""});
   }
   return out;
 }

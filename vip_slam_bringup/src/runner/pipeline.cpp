@@ -52,9 +52,8 @@ double Pipeline::waitedFor(double t) const {
 }
 
 void Pipeline::processReady() {
-  while (!waiting_.empty() &&
-         (front_end_->ready(waiting_.front().t, waiting_.front().depth_lag) ||
-          waitedFor(waiting_.front().t) > options_.imu_patience)) {
+  while (!waiting_.empty() && (front_end_->ready(waiting_.front().t, waiting_.front().depth_lag) ||
+                               waitedFor(waiting_.front().t) > options_.imu_patience)) {
     process(waiting_.front());
     waiting_.pop_front();
   }

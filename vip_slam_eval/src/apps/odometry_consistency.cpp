@@ -118,7 +118,7 @@ struct Study {
 void judge(const Study& study) {
   const SequenceSpec& spec = study.spec;
   const int seeds = study.seeds;
-  if (!spec.depth.registered) throw std::invalid_argument(spec.name + ": needs depth registered to the colour camera");
+  if (spec.depth.separate()) throw std::invalid_argument(spec.name + ": needs depth from the colour camera's own rays");
   RenderOptions options;
   options.threads = study.threads;
   options.count = static_cast<int>(study.seconds * spec.camera.rate);

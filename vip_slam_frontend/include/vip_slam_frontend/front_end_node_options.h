@@ -17,7 +17,7 @@ struct FrontEndNodeOptions {
   double tf_patience = 2.0;
   bool publish_tf = true;
   bool imu_rate_odometry = false;
-  double pair_tolerance = 0.02;
+  double pair_tolerance = 0.035;
   double depth_patience = 0.15;
   double imu_patience = 0.5;
   int image_queue = 20;

@@ -138,11 +138,13 @@ class BagWriter : public SequenceWriter {
     const ros::Time stamp = stampOf(f.stamp_ns);
     const auto seq = static_cast<std::uint32_t>(f.index);
     write(sensor_.topics.color, f.rgb, "rgb8", kColorFrame, stamp, seq);
-    write(sensor_.topics.depth, f.depth, "16UC1", depth_frame_, stamp, seq);
-    color_info_.header.stamp = depth_info_.header.stamp = stamp;
+    const ros::Time depth_stamp = stampOf(f.depth_stamp_ns);
+    write(sensor_.topics.depth, f.depth, "16UC1", depth_frame_, depth_stamp, seq);
+    color_info_.header.stamp = stamp;
+    depth_info_.header.stamp = depth_stamp;
     color_info_.header.seq = depth_info_.header.seq = seq;
     put(sensor_.topics.color_info, stamp, color_info_);
-    put(sensor_.topics.depth_info, stamp, depth_info_);
+    put(sensor_.topics.depth_info, depth_stamp, depth_info_);
   }
 
   void commit() override {

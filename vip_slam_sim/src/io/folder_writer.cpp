@@ -65,7 +65,8 @@ class FolderWriter : public SequenceWriter {
 
   void frame(const SimFrame& f) override {
     const std::string stamp = secondsText(f.stamp_ns);
-    const std::string rgb = "rgb/" + stamp + ".png", depth = "depth/" + stamp + ".png";
+    const std::string depth_stamp = secondsText(f.depth_stamp_ns);
+    const std::string rgb = "rgb/" + stamp + ".png", depth = "depth/" + depth_stamp + ".png";
     cv::Mat bgr;
     cv::cvtColor(f.rgb, bgr, cv::COLOR_RGB2BGR);
     cv::Mat fifth_millimetres;
@@ -76,8 +77,8 @@ class FolderWriter : public SequenceWriter {
       if (!cv::imwrite((work_ / name).string(), image, quick))
         throw std::runtime_error((work_ / name).string() + ": cannot be written");
     rgb_ << stamp << ' ' << rgb << '\n';
-    depth_ << stamp << ' ' << depth << '\n';
-    both_ << stamp << ' ' << rgb << ' ' << stamp << ' ' << depth << '\n';
+    depth_ << depth_stamp << ' ' << depth << '\n';
+    both_ << stamp << ' ' << rgb << ' ' << depth_stamp << ' ' << depth << '\n';
     const Eigen::Vector3d& t = f.T_W_C.t();
     const Eigen::Quaterniond& q = f.T_W_C.rotation();
     poses_ << stamp << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z()

@@ -67,7 +67,7 @@ RgbdFolder openSevenScenes(const fs::path& folder, double rate) {
     const fs::path depth = folder / (std::string(stem) + ".depth.png"),
                    pose = folder / (std::string(stem) + ".pose.txt");
     if (!fs::exists(depth)) throw std::runtime_error(depth.string() + ": missing");
-    out.frames.push_back({t, colour.string(), depth.string()});
+    out.frames.push_back({t, t, colour.string(), depth.string()});
     const std::vector<double> m = numbersOf(pose, 16);
     const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
     const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
@@ -111,7 +111,7 @@ RgbdFolder openTum(const fs::path& folder) {
   for (const auto& [t, file] : colour) {
     while (k + 1 < depth.size() && std::abs(depth[k + 1].first - t) < std::abs(depth[k].first - t)) ++k;
     if (std::abs(depth[k].first - t) > 0.02) continue;
-    out.frames.push_back({t, (folder / file).string(), (folder / depth[k].second).string()});
+    out.frames.push_back({t, depth[k].first, (folder / file).string(), (folder / depth[k].second).string()});
   }
   out.depth_scale = 1.0 / 5000;
   return out;

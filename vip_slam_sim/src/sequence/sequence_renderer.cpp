@@ -45,8 +45,9 @@ SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions
   }
   bakeLight(scene.get(), *tracer_, options_.threads, options_.light_spacing_scale);
   renderer_ = std::make_unique<Renderer>(scene_, tracer_, camera_);
-  if (!spec.depth.registered)
-    depth_renderer_ = std::make_unique<Renderer>(scene_, tracer_, makeCamera(sensor_.depth_camera));
+  if (spec.depth.separate())
+    depth_renderer_ =
+        std::make_unique<Renderer>(scene_, tracer_, spec.depth.registered ? camera_ : makeCamera(sensor_.depth_camera));
   passers_ = std::make_unique<PassersBy>(
       spec.passers,
       [this](double t) { return trajectory_.at(std::clamp(t, 0.0, trajectory_.end())).T_W_I * sensor_.T_imu_cam; },
@@ -125,14 +126,16 @@ SimFrame SequenceRenderer::renderFrame(int index) const {
     effects_->motionBlur(twist, &f.exact);
   }
   f.rgb = effects_->colour(f.exact, index, t);
-  if (spec_.depth.registered) {
+  f.depth_stamp_ns = toNanoseconds(t - spec_.imu.time_offset + spec_.depth.lag);
+  if (!spec_.depth.separate()) {
     f.depth = effects_->depth(f.exact, f.rgb, index);
   } else {
     FrameBuffers own;
-    const SE3 T_W_D = f.T_W_C * sensor_.T_color_depth;
+    const double t_depth = t + spec_.depth.lag;
+    const SE3 T_W_D = trajectory_.at(t_depth).T_W_I * sensor_.T_imu_cam * sensor_.T_color_depth;
     depth_renderer_->renderDepth(T_W_D, &own);
     passers_->draw(
-        *depth_renderer_, t, [&](int) { return T_W_D; }, &own);
+        *depth_renderer_, t_depth, [&](int) { return T_W_D; }, &own);
     f.depth = effects_->depth(own, cv::Mat(), index);
   }
   return f;

@@ -83,6 +83,7 @@ void DepthOptions::visit(OptionVisitor& v) {
   v.field("bias_amplitude", bias_amplitude, 0, 0.1, "cyclic distance error (ToF wiggling), m");
   v.field("registered", registered, "depth pixels belong to the colour camera");
   v.field("baseline", baseline, 0, 0.2, "not registered: depth camera to the left of the colour camera, m");
+  v.field("lag", lag, -0.05, 0.05, "depth is taken so much later than colour, by a global shutter, s");
 }
 
 void ImuOptions::visit(OptionVisitor& v) {
@@ -149,7 +150,7 @@ SensorConfig SequenceSpec::sensorConfig() const {
   s.color_rate = s.depth_rate = camera.rate;
   s.imu_rate = imu.rate;
   s.rolling_shutter = effects.rolling_shutter;
-  s.depth_rolling_shutter = depth.registered ? effects.rolling_shutter : 0;  // its own camera reads all at once
+  s.depth_rolling_shutter = depth.separate() ? 0 : effects.rolling_shutter;
   s.intrinsics_from_camera_info = false;
   s.camera = camera.intrinsics();
   if (!depth.registered) {

@@ -198,6 +198,7 @@ int run(int argc, char** argv) {
     SimFrame frame;
     frame.index = static_cast<int>(i);
     frame.stamp_ns = stamp(t);
+    frame.depth_stamp_ns = stamp(folder.frames[i].t_depth - begin);
     frame.T_W_C = spline.at(t).T_W_I * rig.T_imu_cam();
     loadRgbdFrame(folder, folder.frames[i], &frame.rgb, &frame.depth);
     imuUntil(frame.stamp_ns);

@@ -15,7 +15,8 @@
 namespace vip_slam {
 
 struct RgbdFrame {
-  double t = 0;  ///< s
+  double t = 0;        ///< of the colour image, s
+  double t_depth = 0;  ///< s
   std::string colour, depth;
 };
 

@@ -26,10 +26,11 @@ namespace vip_slam {
 struct SimFrame {
   int index = 0;
   std::int64_t stamp_ns = 0;  ///< header stamp (image clock), exposure middle
-  cv::Mat rgb;                ///< CV_8UC3, RGB
-  cv::Mat depth;              ///< CV_16UC1, mm, 0 = invalid; of the depth camera when not registered
-  SE3 T_W_C;                  ///< true colour camera
-  FrameBuffers exact;         ///< noise-free, colour camera
+  std::int64_t depth_stamp_ns = 0;
+  cv::Mat rgb;         ///< CV_8UC3, RGB
+  cv::Mat depth;       ///< CV_16UC1, mm, 0 = invalid; of the depth camera when not registered
+  SE3 T_W_C;           ///< true colour camera
+  FrameBuffers exact;  ///< noise-free, colour camera
 };
 
 struct RenderOptions {

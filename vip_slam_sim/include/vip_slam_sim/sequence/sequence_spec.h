@@ -41,6 +41,9 @@ struct DepthOptions {
   double dropout = 0, edge_hole = 0, grazing_limit = 0, dark_limit = 0, bias_amplitude = 0;
   bool registered = true;
   double baseline = 0.015;
+  double lag = 0;
+  /// A sensor of its own, of which each image is taken at one instant; else depth comes with the colour image's rays.
+  bool separate() const { return !registered || lag != 0; }
   void visit(OptionVisitor& v);
 };
 
