@@ -6,7 +6,7 @@
 namespace vip_slam {
 
 CalibrationSource::CalibrationSource(const SensorConfig& sensor, const FrontEndNodeOptions& options,
-                                     const tf2_ros::Buffer& tf)
+                                     const tf2::BufferCore& tf)
     : sensor_(sensor), options_(options), tf_(tf) {}
 
 void CalibrationSource::addColorInfo(const sensor_msgs::CameraInfo& info) {
@@ -34,12 +34,13 @@ void CalibrationSource::take(const sensor_msgs::CameraInfo& info, const std::str
 void CalibrationSource::addColorFrame(const std::string& frame_id) {
   std::lock_guard<std::mutex> lock(mutex_);
   color_frame_ = frame_id;
+  color_seen_ = true;
 }
 
-void CalibrationSource::addImuFrame(const std::string& frame_id, double t) {
+void CalibrationSource::addImuFrame(const std::string& frame_id) {
   std::lock_guard<std::mutex> lock(mutex_);
   imu_frame_ = frame_id;
-  if (!first_imu_ || t < *first_imu_) first_imu_ = t;
+  imu_seen_ = true;
 }
 
 bool CalibrationSource::intrinsicsKnown() const {
@@ -54,14 +55,20 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     waiting_for_ = problem_.empty() ? "no camera_info on topic " + topic + " yet" : problem_;
     return std::nullopt;
   }
-  if (!first_imu_) {
+  if (!imu_seen_) {
     waiting_for_ = "no IMU message yet";
     return std::nullopt;
   }
   if (options_.extrinsics != "config") {
+    // Without an image nobody knows which frame to ask tf for: a camera that starts late must not cost its extrinsics.
+    if (!color_seen_) {
+      waiting_for_ = "no image on topic " + sensor_.topics.color + " yet";
+      return std::nullopt;
+    }
+    if (!asked_since_ || t < *asked_since_) asked_since_ = t;
     const auto T_imu_cam = lookUpTransform(tf_, imu_frame_, color_frame_);
     const auto T_base_imu = lookUpTransform(tf_, options_.base_frame, imu_frame_);
-    const bool patient = options_.extrinsics == "tf" || t - *first_imu_ < options_.tf_patience;
+    const bool patient = options_.extrinsics == "tf" || t - *asked_since_ < options_.tf_patience;
     if (!(T_imu_cam && T_base_imu) && patient) {
       const std::string& target = T_imu_cam ? options_.base_frame : imu_frame_;
       const std::string& source = T_imu_cam ? imu_frame_ : color_frame_;

@@ -7,7 +7,7 @@
 #include <string>
 
 #include <sensor_msgs/CameraInfo.h>
-#include <tf2_ros/buffer.h>
+#include <tf2/buffer_core.h>
 
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_frontend/front_end_node_options.h"
@@ -17,12 +17,12 @@ namespace vip_slam {
 /// Thread-safe.
 class CalibrationSource {
  public:
-  CalibrationSource(const SensorConfig& sensor, const FrontEndNodeOptions& options, const tf2_ros::Buffer& tf);
+  CalibrationSource(const SensorConfig& sensor, const FrontEndNodeOptions& options, const tf2::BufferCore& tf);
 
   void addColorInfo(const sensor_msgs::CameraInfo& info);
   void addDepthInfo(const sensor_msgs::CameraInfo& info);
   void addColorFrame(const std::string& frame_id);
-  void addImuFrame(const std::string& frame_id, double t);
+  void addImuFrame(const std::string& frame_id);
 
   /// The completed configuration, once everything is known at time `t` (stamps, seconds).
   std::optional<SensorConfig> resolve(double t);
@@ -37,10 +37,10 @@ class CalibrationSource {
   mutable std::mutex mutex_;
   SensorConfig sensor_;
   const FrontEndNodeOptions options_;
-  const tf2_ros::Buffer& tf_;
-  bool color_info_ = false, depth_info_ = false;
+  const tf2::BufferCore& tf_;
+  bool color_info_ = false, depth_info_ = false, color_seen_ = false, imu_seen_ = false;
   std::string color_frame_, imu_frame_, problem_, waiting_for_;
-  std::optional<double> first_imu_;
+  std::optional<double> asked_since_;  ///< when both frames were known first, s
 };
 
 }  // namespace vip_slam

@@ -101,7 +101,7 @@ void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) 
 void FrontEndNodelet::onImu(const sensor_msgs::ImuConstPtr& msg) {
   const double t = msg->header.stamp.toSec();
   watch(*imu_monitor_, t);
-  calibration_->addImuFrame(msg->header.frame_id, t);
+  calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity), accel = fromMsg(msg->linear_acceleration);
   owner_->post(imu_lane_, [this, t, gyro, accel] { addInertial(t, &gyro, &accel); });
 }
@@ -109,7 +109,7 @@ void FrontEndNodelet::onImu(const sensor_msgs::ImuConstPtr& msg) {
 void FrontEndNodelet::onGyro(const sensor_msgs::ImuConstPtr& msg) {
   const double t = msg->header.stamp.toSec();
   watch(*imu_monitor_, t);
-  calibration_->addImuFrame(msg->header.frame_id, t);
+  calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity);
   owner_->post(imu_lane_, [this, t, gyro] { addInertial(t, &gyro, nullptr); });
 }

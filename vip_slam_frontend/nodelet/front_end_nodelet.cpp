@@ -114,7 +114,6 @@ bool FrontEndNodelet::noticeTime(double t, Stream stream) {
       monitor->restart();
     }
     if (front_end_) front_end_->reset(words);
-    gyro_.clear();
     last_feature_image_ = posed_imu_t_ = predicted_imu_t_ = -1e300;
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++shown_.time_jumps;
@@ -152,7 +151,6 @@ void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const 
         "a single sample of the IMU was far off its neighbours and was replaced by them (errors on its bus?); "
         "further ones are counted in /diagnostics");
   }
-  if (gyro) gyro_.add(t, *gyro);
   processReady();
   if (gyro && imu_rate_odometry_) publishImuRate(t);
 }
@@ -167,7 +165,11 @@ void FrontEndNodelet::startWhenCalibrated() {
     NODELET_ERROR_THROTTLE(5, "sensor '%s': %s", sensor_.name.c_str(), error.what());
     return;
   }
-  sensor_ = *resolved;
+  // Only these are found out; the rest of sensor_ is read by other threads.
+  sensor_.camera = resolved->camera;
+  sensor_.depth_camera = resolved->depth_camera;
+  sensor_.T_imu_cam = resolved->T_imu_cam;
+  sensor_.T_base_imu = resolved->T_base_imu;
   frames_.T_base_imu = sensor_.T_base_imu;
   publishCalibration();
   const auto early = std::move(early_);

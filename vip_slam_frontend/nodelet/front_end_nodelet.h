@@ -26,7 +26,6 @@
 
 #include "calibration_source.h"
 #include "depth_alignment.h"
-#include "gyro_history.h"
 #include "odometry_messages.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/FrontEndConfig.h"
@@ -102,7 +101,6 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<ImagePairer> pairer_;
   std::deque<std::function<void()>> early_;  ///< IMU samples before the calibration is complete
   std::unique_ptr<StreamClock> clock_;
-  GyroHistory gyro_;
   bool told_of_spikes_ = false;
   double posed_imu_t_ = -1e300;               ///< of the newest image with a pose
   double predicted_imu_t_ = -1e300;           ///< of the newest prediction between images

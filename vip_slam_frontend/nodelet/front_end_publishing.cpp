@@ -30,7 +30,7 @@ void FrontEndNodelet::publishPose(const ros::Time& stamp, const TrackedFrame& fr
   posed_imu_t_ = frame.state.t;
   // A message that is published is shared with all receivers and never changed again.
   auto odometry = boost::make_shared<nav_msgs::Odometry>(
-      toOdometry(stamp, frame.state, frame.covariance, gyro_.at(frame.state.t), gyroSigma(sensor_), frames_));
+      toOdometry(stamp, frame.state, frame.covariance, front_end_->gyro(frame.state.t), gyroSigma(sensor_), frames_));
   if (publish_tf_) tf_broadcaster_->sendTransform(toTransform(*odometry));
   odometry_pub_.publish(odometry);
 }
@@ -76,9 +76,9 @@ void FrontEndNodelet::publishImuRate(double t) {
   // With a separate accelerometer the state may lag behind the gyro's sample.
   if (!state || state->t <= predicted_imu_t_) return;
   predicted_imu_t_ = state->t;
-  imu_rate_pub_.publish(
-      boost::make_shared<nav_msgs::Odometry>(toOdometry(toStamp(state->t - front_end_->timeOffset()), *state,
-                                                        covariance_, gyro_.at(state->t), gyroSigma(sensor_), frames_)));
+  const ros::Time stamp = toStamp(state->t - front_end_->timeOffset());
+  imu_rate_pub_.publish(boost::make_shared<nav_msgs::Odometry>(
+      toOdometry(stamp, *state, covariance_, front_end_->gyro(state->t), gyroSigma(sensor_), frames_)));
 }
 
 void FrontEndNodelet::publishCalibration() {

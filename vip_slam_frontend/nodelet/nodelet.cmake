@@ -12,7 +12,6 @@ add_library(vip_slam_frontend_nodelets
   nodelet/front_end_input.cpp
   nodelet/front_end_nodelet.cpp
   nodelet/front_end_publishing.cpp
-  nodelet/gyro_history.cpp
   nodelet/odometry_messages.cpp
 )
 target_include_directories(vip_slam_frontend_nodelets PRIVATE nodelet)
@@ -25,7 +24,7 @@ install(TARGETS vip_slam_frontend_nodelets LIBRARY DESTINATION ${CATKIN_PACKAGE_
 install(FILES nodelet/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/nodelet)
 
 if(CATKIN_ENABLE_TESTING)
-  foreach(thing depth_alignment gyro_history odometry_messages)
+  foreach(thing calibration_source depth_alignment odometry_messages)
     catkin_add_gtest(test_${thing} nodelet/test_${thing}.cpp)
     target_include_directories(test_${thing} PRIVATE nodelet)
     target_include_directories(test_${thing} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})

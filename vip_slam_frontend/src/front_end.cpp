@@ -17,6 +17,7 @@ FrameOutput FrontEnd::process(const FrameInput& input, const PoseReady& on_pose)
 }
 void FrontEnd::applyMapUpdate(const MapUpdate& update) { impl_->applyMapUpdate(update); }
 std::optional<NavState> FrontEnd::predict(double t) const { return impl_->predict(t); }
+Eigen::Vector3d FrontEnd::gyro(double t) const { return impl_->gyro(t); }
 void FrontEnd::reset(const std::string& reason) { impl_->reset(reason); }
 void FrontEnd::forgetMap() { impl_->forgetMap(); }
 MountingEstimate FrontEnd::mounting() const { return impl_->mounting(); }

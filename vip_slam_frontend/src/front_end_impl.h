@@ -33,6 +33,7 @@ class FrontEnd::Impl {
   FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);
   void applyMapUpdate(const MapUpdate& update);
   std::optional<NavState> predict(double t) const;
+  Eigen::Vector3d gyro(double t) const;
   MountingEstimate mounting() const { return filter_.mounting(); }
   MountingEstimate givenMounting() const { return {sensor_.T_imu_cam, sensor_.time_offset}; }
   double timeOffset() const {
@@ -82,6 +83,8 @@ class FrontEnd::Impl {
   /// The camera's motion since the last image as the IMU has it; not to be held against the points (interval 0) while
   /// that is in doubt.
   ForetoldMotion foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const;
+  /// A longer one starts tracking anew, s.
+  double longestImuGap() const { return 5.0 * options_.recovery.max_imu_gap; }
   bool imuIsContradicted() const;
   bool movedLately(double t_imu) const;
   /// So long that it is time to begin anew.
@@ -104,6 +107,8 @@ class FrontEnd::Impl {
   DepthGrid depthGrid(int stride) const;
   KeyframePtr makeKeyframe(const TrackedFrame& frame, double t_imu);
   FrameOutput statusOnly(double t, TrackingState state, const std::string& reason) const;
+  /// An image that cannot be used, and why. LOST once the IMU alone has carried the pose for too long, or has ended.
+  FrameOutput unusable(double t, const std::string& why);
 
   SensorConfig sensor_;
   TimingLog* timing_;

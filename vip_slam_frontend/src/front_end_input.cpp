@@ -148,6 +148,12 @@ std::optional<NavState> FrontEnd::Impl::predict(double t) const {
   return predicted;
 }
 
+Eigen::Vector3d FrontEnd::Impl::gyro(double t) const {
+  if (imu_.empty()) return Eigen::Vector3d::Zero();
+  const auto sample = imu_.at(std::clamp(t, imu_.oldest(), imu_.newest()));
+  return sample ? sample->gyro : Eigen::Vector3d::Zero();
+}
+
 void FrontEnd::Impl::reset(const std::string& reason) {
   if (phase_ != Phase::kWaiting) {
     ++counters_.restarts;

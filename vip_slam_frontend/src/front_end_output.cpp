@@ -28,10 +28,27 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
 FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std::string& reason) const {
   std::shared_ptr<TrackedFrame> frame = makeFrame(t, false);
   frame->status = {state, reason};
-  if (const std::optional<NavState> predicted = std::isfinite(t) ? predict(t + timeOffset()) : std::nullopt) {
-    frame->state = *predicted;
+  if (filter_.started() && !imu_.empty() && std::isfinite(t)) {
+    const std::vector<ImuSample> samples = imu_.between(filter_.nav().t, std::min(t + timeOffset(), imu_.newest()));
+    if (samples.size() > 1) {
+      const Propagation to = filter_.predict(samples);
+      frame->state = to.predicted;
+      frame->covariance = to.Phi * frame->covariance * to.Phi.transpose() + to.Q;
+    }
   }
   return {frame, nullptr};
+}
+
+FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
+  if (!filter_.started()) return statusOnly(t, TrackingState::kWaiting, why);
+  // Where the IMU ends nothing carries the pose: after a hole like this one tracking starts anew, whatever comes.
+  const double t_imu = t + timeOffset();
+  const bool imu_ended = imu_.empty() || t_imu - imu_.newest() > longestImuGap();
+  if (phase_ != Phase::kLost && (imu_ended || t_imu - filter_.nav().t > options_.recovery.coast_seconds)) {
+    phase_ = Phase::kLost;
+    ++counters_.lost;
+  }
+  return statusOnly(t, phase_ == Phase::kLost ? TrackingState::kLost : TrackingState::kDegraded, why);
 }
 
 void FrontEnd::Impl::dropMoving(std::vector<Feature>* features) const {

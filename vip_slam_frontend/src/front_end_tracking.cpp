@@ -24,13 +24,11 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   ++counters_.images;
   DepthReading depth;
   const std::string problem = checkInput(input, &depth);
-  const TrackingState doubtful =
-      filter_.started() ? std::max(status_.state, TrackingState::kDegraded) : TrackingState::kWaiting;
-  if (!problem.empty()) return statusOnly(input.t, doubtful, problem);
+  if (!problem.empty()) return unusable(input.t, problem);
   const double t_imu = input.t + timeOffset();
   if (!imu_.covers(t_imu)) {
     ++counters_.imu_missing;
-    return statusOnly(input.t, doubtful, imu_.empty() ? "no IMU yet" : "the IMU does not cover the image");
+    return unusable(input.t, imu_.empty() ? "no IMU yet" : "the IMU does not cover the image");
   }
   last_image_t_ = input.t;
   // The tracker keeps images for later comparison; the caller may reuse his.
@@ -178,7 +176,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const std::vector<ImuSample> samples = imu_.between(from, t_imu, &max_gap);
   if (samples.size() < 2) return statusOnly(t, TrackingState::kDegraded, "no IMU between the images");
   const bool gap = max_gap > options_.recovery.max_imu_gap;
-  if (max_gap > 5.0 * options_.recovery.max_imu_gap) {
+  if (max_gap > longestImuGap()) {
     reset("IMU gap of " + std::to_string(max_gap).substr(0, 4) + " s");
     return initialise(t, t_imu, gray, depth_read);
   }

@@ -240,6 +240,43 @@ TEST_F(FrontEndTest, WhoStandsBeforeAndAfterAHoleInTheImagesMayHaveMovedInIt) {
   EXPECT_NEAR(output.frame->state.T_W_I.t().y(), 0.26, 0.05);
 }
 
+TEST_F(FrontEndTest, AnImuThatStopsEndsInLost) {
+  // A driver that died: a pose that stays where it was must not go out as one for ever.
+  FrameOutput output = run(0.0, 3.0);
+  const auto imageAt = [&](double t) { return front_end_.process({t, world_.image(t), World::depth(t)}); };
+  output = imageAt(3.2);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  for (int k = 65; k < 100; ++k) output = imageAt(0.05 * k);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
+  EXPECT_NE(output.frame->status.reason.find("IMU"), std::string::npos) << output.frame->status.reason;
+  EXPECT_EQ(front_end_.counters().lost, 1u);
+  imu_t_ = 6.0;
+  output = run(6.0, 9.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+  EXPECT_EQ(output.frame->epoch, 1u);
+}
+
+TEST_F(FrontEndTest, ImagesThatCannotBeUsedLeaveThePoseToTheImuAndItsGrowingCovariance) {
+  FrameOutput output = run(0.0, 3.0);
+  const double before = output.frame->covariance(4, 4);
+  const auto small = [&](double t) {
+    feedImu(t);
+    return front_end_.process({t, cv::Mat(120, 160, CV_8UC1, cv::Scalar(90)), cv::Mat()});
+  };
+  for (int k = 60; k < 80; ++k) output = small(0.05 * k);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  EXPECT_GT(output.frame->covariance(4, 4), 2.0 * before);
+  EXPECT_LT(error(output), 0.15);
+  EXPECT_LT(error(output), 4 * std::sqrt(output.frame->covariance.block<3, 3>(3, 3).trace()));
+  for (int k = 80; k < 150; ++k) output = small(0.05 * k);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
+  EXPECT_NE(output.frame->status.reason.find("160x120"), std::string::npos) << output.frame->status.reason;
+  EXPECT_EQ(front_end_.counters().lost, 1u);
+  output = run(7.5, 9.5);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+  EXPECT_EQ(output.frame->epoch, 0u);
+}
+
 TEST_F(FrontEndTest, ClockRunningBackStartsAnew) {
   run(0.0, 3.0);
   imu_t_ = 0.0;

@@ -114,7 +114,7 @@ TEST(WrongImu, DegreesPerSecond) {
 TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
   const CornerWorld world;
   FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));
-  double imu_t = 0;
+  double imu_t = 0, wrong_gyro_t = 0;
   int samples = 0;
   std::uint64_t wrong = 0;
   FrameOutput output;
@@ -123,7 +123,7 @@ TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
     for (; imu_t < t + 0.03; imu_t += 0.005) {
       ImuSample sample = CornerWorld::imu(imu_t);
       if (++samples % 100 == 50) sample.accel.x() += 30;
-      if (samples % 100 == 90) sample.gyro.z() -= 5;
+      if (samples % 100 == 90) sample.gyro.z() -= 5, wrong_gyro_t = imu_t;
       wrong += samples % 100 == 50 || samples % 100 == 90;
       front_end.addImu(sample);
     }
@@ -134,6 +134,8 @@ TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
     if (t < kStill + 3) continue;
     EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
     EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(t).t()).norm(), 0.02) << t;
+    // Nor does a twist have them.
+    EXPECT_LT((front_end.gyro(wrong_gyro_t) - CornerWorld::imu(wrong_gyro_t).gyro).norm(), 0.1) << wrong_gyro_t;
   }
   EXPECT_EQ(front_end.counters().imu_spikes, wrong);
   EXPECT_EQ(front_end.counters().imu_contradicted, 0u);

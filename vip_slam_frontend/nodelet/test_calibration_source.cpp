@@ -1,0 +1,78 @@
+// Where the calibration comes from, and how long it is waited for.
+#include <gtest/gtest.h>
+
+#include "calibration_source.h"
+
+namespace vip_slam {
+namespace {
+
+SensorConfig sensor() {
+  SensorConfig config;
+  config.topics.color = "/camera/color";
+  config.intrinsics_from_camera_info = false;
+  return config;
+}
+
+void connect(tf2::BufferCore& tf, const std::string& parent, const std::string& child, double x) {
+  geometry_msgs::TransformStamped transform;
+  transform.header.frame_id = parent;
+  transform.child_frame_id = child;
+  transform.transform.translation.x = x;
+  transform.transform.rotation.w = 1;
+  tf.setTransform(transform, "test", true);
+}
+
+class CalibrationSourceTest : public ::testing::Test {
+ protected:
+  FrontEndNodeOptions options_;
+  tf2::BufferCore tf_;
+};
+
+TEST_F(CalibrationSourceTest, ACameraThatStartsLateStillGetsItsExtrinsicsFromTf) {
+  connect(tf_, "base_link", "imu", 0.1);
+  connect(tf_, "base_link", "camera", 0.3);
+  CalibrationSource source(sensor(), options_, tf_);
+  EXPECT_FALSE(source.resolve(0));
+  EXPECT_NE(source.waitingFor().find("IMU"), std::string::npos);
+  source.addImuFrame("imu");
+  for (double t = 0; t < 10; t += 0.5) EXPECT_FALSE(source.resolve(t)) << t;
+  EXPECT_NE(source.waitingFor().find("/camera/color"), std::string::npos) << source.waitingFor();
+  source.addColorFrame("camera");
+  const auto found = source.resolve(10);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->T_imu_cam.t().x(), 0.2, 1e-12);
+  EXPECT_NEAR(found->T_base_imu.t().x(), 0.1, 1e-12);
+}
+
+TEST_F(CalibrationSourceTest, TfMayComeALittleAfterTheFrames) {
+  CalibrationSource source(sensor(), options_, tf_);
+  source.addImuFrame("imu");
+  source.addColorFrame("camera");
+  EXPECT_FALSE(source.resolve(100));
+  EXPECT_NE(source.waitingFor().find("'camera' to 'imu'"), std::string::npos) << source.waitingFor();
+  connect(tf_, "base_link", "imu", 0.1);
+  connect(tf_, "base_link", "camera", 0.3);
+  EXPECT_TRUE(source.resolve(100 + 0.5 * options_.tf_patience));
+}
+
+TEST_F(CalibrationSourceTest, WithoutTfTheConfigurationIsTakenInTheEndUnlessTfIsDemanded) {
+  SensorConfig config = sensor();
+  config.T_imu_cam = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 0.05));
+  for (const std::string from : {"auto", "tf", "config"}) {
+    options_.extrinsics = from;
+    CalibrationSource source(config, options_, tf_);
+    source.addImuFrame("imu");
+    EXPECT_EQ(bool(source.resolve(50)), from == "config") << from;  // needs no image
+    source.addColorFrame("camera");
+    EXPECT_EQ(bool(source.resolve(50)), from == "config") << from;
+    // A bag that loops meanwhile.
+    EXPECT_EQ(bool(source.resolve(1)), from == "config") << from;
+    EXPECT_EQ(bool(source.resolve(2)), from == "config") << from;
+    const auto late = source.resolve(1 + options_.tf_patience + 0.1);
+    EXPECT_EQ(bool(late), from != "tf") << from;
+    if (late) EXPECT_EQ(late->T_imu_cam.t().z(), 0.05);
+  }
+}
+
+}  // namespace
+}  // namespace vip_slam
