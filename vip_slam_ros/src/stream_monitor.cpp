@@ -79,6 +79,8 @@ std::string StreamMonitor::complaint(double now) const {
     return topic + "no message so far; is the name right, and the driver running?";
   if (r.rejected > 0 && r.messages <= r.rejected) return topic + r.last_rejection;
   if (const std::string silent = silence(now); !silent.empty()) return silent;
+  if (r.messages >= kWindow && r.repeated + 1 == r.messages)
+    return topic + "all stamps are the same: the driver does not stamp its messages";
   if (r.nominal_rate > 0 && r.rate > 0 && r.rate < 0.7 * r.nominal_rate) {
     return topic + format("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
   }

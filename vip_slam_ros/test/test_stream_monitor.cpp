@@ -40,6 +40,12 @@ TEST(StreamMonitor, ComplaintsNameTheTopic) {
   EXPECT_NE(monitor.silence(10).find("/camera/imu: silent for 7.5"), std::string::npos) << monitor.silence(10);
 }
 
+TEST(StreamMonitor, NamesADriverThatDoesNotStampItsMessages) {
+  StreamMonitor monitor("/imu", 200);
+  for (int i = 0; i < 200; ++i) monitor.add(0, 50 + i / 200.0);
+  EXPECT_NE(monitor.complaint(51).find("/imu: all stamps are the same"), std::string::npos) << monitor.complaint(51);
+}
+
 TEST(StreamMonitor, StartsAnewAfterTimeRanBackwards) {
   StreamMonitor monitor("/color", 30);
   monitor.add(100, 100);
