@@ -1,5 +1,8 @@
 #include "back_end_nodelet.h"
 
+#include <fstream>
+#include <stdexcept>
+
 #include <vip_slam_msgs/LoopEvent.h>
 #include <vip_slam_msgs/MapUpdate.h>
 #include <pluginlib/class_list_macros.hpp>
@@ -31,6 +34,8 @@ void BackEndNodelet::onInit() {
   try {
     loadOptionsFromParameters(options_, getPrivateNodeHandle());
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
+    if (!options_.load_map.empty() && !std::ifstream(options_.load_map))
+      throw std::invalid_argument("load_map: " + options_.load_map + ": no such file, or not readable");
   } catch (const std::exception& error) {
     NODELET_FATAL("%s", error.what());
     throw;
@@ -56,7 +61,7 @@ void BackEndNodelet::onInit() {
 void BackEndNodelet::advertise() {
   ros::NodeHandle& nh = getNodeHandle();
   map_update_pub_ = nh.advertise<vip_slam_msgs::MapUpdate>("map_update", 20);
-  control_pub_ = nh.advertise<vip_slam_msgs::Control>("control", 10);
+  control_pub_ = nh.advertise<vip_slam_msgs::Control>("control", 10, true);  // nodelets come up one after the other
   pose_pub_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", 50);
   path_pub_ = nh.advertise<nav_msgs::Path>("path", 1, true);
   markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("map_markers", 1, true);
@@ -93,8 +98,12 @@ void BackEndNodelet::subscribe() {
 
 void BackEndNodelet::onReconfigure(vip_slam_backend::BackEndConfig& config) {
   display_rate_ = config.display_rate;
-  options_.localisation_mode = config.localisation_mode;
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    config_ = config;
+  }
   owner_->post(control_lane_, [this, on = config.localisation_mode] {
+    localise_ = on;
     if (back_end_) setLocalisation(on);
   });
 }
@@ -129,8 +138,16 @@ void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {
   back_end_ = std::make_unique<BackEnd>(options_.back_end, sensor_);
   pose_.setBase(sensor_.T_base_imu);
   display_.setBase(sensor_.T_base_imu);
-  if (!options_.load_map.empty()) NODELET_INFO("%s", loadMap(options_.load_map).c_str());
-  if (options_.localisation_mode) setLocalisation(true);
+  if (!options_.load_map.empty()) {
+    try {
+      NODELET_INFO("%s", loadMap(options_.load_map).c_str());
+    } catch (const std::exception& error) {
+      NODELET_ERROR("%s: starting without a map", error.what());
+      std::lock_guard<std::mutex> lock(shown_mutex_);
+      load_problem_ = std::string(error.what()) + ": started without a map";
+    }
+  }
+  if (localise_) setLocalisation(true);
 }
 
 void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
@@ -163,10 +180,17 @@ void BackEndNodelet::startGlobalBa() {
   adjustment_ = std::thread([this, job = back_end_->startGlobalBa()] {
     lowerThreadPriority(kAdjustmentNiceness);
     const ros::WallTime begin = ros::WallTime::now();
-    const GbaResult result = back_end_->run(job);
+    GbaResult result;
+    std::string failure;
+    try {
+      result = back_end_->run(job);
+    } catch (const std::exception& error) {
+      failure = error.what();
+    }
     const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
-    owner_->post(control_lane_, [this, result, milliseconds] {
+    owner_->post(control_lane_, [this, result, failure, milliseconds] {
       adjusting_ = false;
+      if (!failure.empty()) throw std::runtime_error("global adjustment: " + failure);
       {
         std::lock_guard<std::mutex> lock(shown_mutex_);
         shown_.global_ms = milliseconds;
@@ -225,7 +249,9 @@ void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status)
     dropped += lane.dropped;
   }
   std::lock_guard<std::mutex> lock(shown_mutex_);
-  if (!problem_.empty()) {
+  if (!load_problem_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, load_problem_);
+  } else if (!problem_.empty()) {
     status.summary(DiagnosticStatus::WARN, problem_);
   } else if (dropped > 0) {
     status.summary(DiagnosticStatus::WARN, std::to_string(dropped) + " messages dropped: the back end is too slow");

@@ -81,12 +81,15 @@ class BackEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<BackEnd> back_end_;
   MapDisplay display_;
   double last_display_ = -1e300;
+  bool localise_ = false;   ///< as asked for, also before there is a back end
   bool adjusting_ = false;  ///< a global adjustment is under way
   std::thread adjustment_;
 
   mutable std::mutex shown_mutex_;
   vip_slam_msgs::BackEndStatistics shown_;
   std::string problem_, scale_difference_;
+  std::string load_problem_;                ///< why the map to start with could not be loaded
+  vip_slam_backend::BackEndConfig config_;  ///< as dynamic_reconfigure has it
 
   std::atomic<double> display_rate_{2.0};
   std::atomic<bool> publish_tf_{true};

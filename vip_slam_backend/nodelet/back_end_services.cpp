@@ -76,6 +76,7 @@ void BackEndNodelet::advertiseServices() {
     return setLocalisation(request.localisation);
   });
   offer<TriggerGlobalBa>("trigger_global_ba", [this](const TriggerGlobalBaRequest&) {
+    if (localise_) throw std::runtime_error("localisation mode: the map does not change");
     backEnd().requestGlobalBa();
     startGlobalBa();
     return "a global adjustment is under way; its result comes as a global map update";
@@ -139,6 +140,10 @@ std::string BackEndNodelet::saveMap(const std::string& path) {
 std::string BackEndNodelet::loadMap(const std::string& path) {
   const MapUpdate update = backEnd().loadMap(requirePath(path));
   display_.clear();
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    load_problem_.clear();
+  }
   command(vip_slam_msgs::Control::MAP_LOADED);
   distribute(update);
   return "map of " + std::to_string(update.keyframes.size()) + " keyframes loaded from " + path;
@@ -153,8 +158,15 @@ std::string BackEndNodelet::saveTrajectory(const std::string& path) {
 
 std::string BackEndNodelet::setLocalisation(bool on) {
   backEnd().setLocalisationMode(on);
-  std::lock_guard<std::mutex> lock(shown_mutex_);
-  shown_.localisation_mode = on;
+  localise_ = on;
+  vip_slam_backend::BackEndConfig config;
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown_.localisation_mode = config_.localisation_mode = on;
+    config = config_;
+  }
+  // Else a change of another parameter would bring the mode back that was set there last.
+  reconfigure_->updateConfig(config);
   return on ? "localisation: the map no longer changes" : "mapping";
 }
 

@@ -21,11 +21,15 @@ void MapDisplay::apply(const MapUpdate& update) {
     keyframes_[keyframe.id] = {stamp == stamps_.end() ? keyframe.state.t : stamp->second, keyframe.state.T_W_I};
   }
   for (const auto& landmark : update.landmarks) landmarks_[landmark.id] = {landmark.p_W.cast<float>(), landmark.plane};
-  for (const KeyframeId id : update.removed_keyframes) keyframes_.erase(id);
+  for (const KeyframeId id : update.removed_keyframes) {
+    keyframes_.erase(id);
+    stamps_.erase(id);
+  }
   for (const LandmarkId id : update.removed_landmarks) landmarks_.erase(id);
   for (const auto& [from, into] : update.merged_landmarks) landmarks_.erase(from);
   if (!update.planes.empty()) planes_ = update.planes.size();
-  loops_.insert(loops_.end(), update.loops.begin(), update.loops.end());
+  for (const LoopEvent& loop : update.loops)
+    if (loop.accepted) loops_.emplace_back(loop.query, loop.match);
 }
 
 void MapDisplay::clear() {
@@ -79,9 +83,9 @@ visualization_msgs::MarkerArray MapDisplay::markers(const std_msgs::Header& head
   Marker edges = makeMarker(header, "loops", 0, Marker::LINE_LIST);
   edges.scale.x = 0.04;
   edges.color = makeColor(0.95, 0.25, 0.2);
-  for (const LoopEvent& loop : loops_) {
-    const auto query = keyframes_.find(loop.query), match = keyframes_.find(loop.match);
-    if (!loop.accepted || query == keyframes_.end() || match == keyframes_.end()) continue;
+  for (const auto& loop : loops_) {
+    const auto query = keyframes_.find(loop.first), match = keyframes_.find(loop.second);
+    if (query == keyframes_.end() || match == keyframes_.end()) continue;
     edges.points.push_back(toPointMsg(query->second.T_map_I.t()));
     edges.points.push_back(toPointMsg(match->second.T_map_I.t()));
   }

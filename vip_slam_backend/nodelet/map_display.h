@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nav_msgs/Path.h>
@@ -35,7 +36,6 @@ class MapDisplay {
   std::size_t landmarkCount() const { return landmarks_.size(); }
   std::size_t planeLandmarkCount() const;
   std::size_t planeCount() const { return planes_; }
-  const std::vector<LoopEvent>& loops() const { return loops_; }
 
  private:
   struct Shown {
@@ -49,7 +49,7 @@ class MapDisplay {
   std::map<KeyframeId, double> stamps_;
   std::map<KeyframeId, Shown> keyframes_;
   std::map<LandmarkId, Point> landmarks_;
-  std::vector<LoopEvent> loops_;
+  std::vector<std::pair<KeyframeId, KeyframeId>> loops_;  ///< accepted ones: query, match
   std::size_t planes_ = 0;
   SE3 T_imu_base_, T_imu_cam_;
 };

@@ -66,9 +66,16 @@ void PlanesNodelet::onInit() {
       nh.subscribe<vip_slam_msgs::MapUpdate>("map_update", 50, [this](const vip_slam_msgs::MapUpdateConstPtr& m) {
         owner_->post(update_lane_, [this, m] { applyMapUpdate(*m); });
       }));
-  subscribers_.push_back(nh.subscribe<vip_slam_msgs::Control>(
-      "control", 20,
-      [this](const vip_slam_msgs::ControlConstPtr& m) { owner_->post(control_lane_, [this, m] { obey(*m); }); }));
+  subscribers_.push_back(
+      nh.subscribe<vip_slam_msgs::Control>("control", 20, [this](const vip_slam_msgs::ControlConstPtr& m) {
+        owner_->post(control_lane_, [this, m] {
+          if (mapper_) {
+            obey(*m);
+          } else if (m->command == vip_slam_msgs::Control::MAP_LOADED) {
+            early_map_ = m;
+          }
+        });
+      }));
   timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0),
                                              [this](const ros::WallTimerEvent&) { diagnostics_->force_update(); });
 }
@@ -83,6 +90,8 @@ void PlanesNodelet::start(const vip_slam_msgs::Calibration& calibration) {
   applyCalibration(calibration, &sensor_);
   mapper_ = std::make_unique<PlaneMapper>(options_.mapper, makeCamera(sensor_.camera), sensor_.depth_noise);
   display_.setCamera(sensor_.T_imu_cam);
+  if (early_map_) obey(*early_map_);
+  early_map_.reset();
 }
 
 void PlanesNodelet::grow(const vip_slam_msgs::TrackedFrame& msg) {
@@ -113,7 +122,6 @@ void PlanesNodelet::applyMapUpdate(const vip_slam_msgs::MapUpdate& msg) {
 
 void PlanesNodelet::obey(const vip_slam_msgs::Control& control) {
   using vip_slam_msgs::Control;
-  if (!mapper_) return;
   if (control.command == Control::RESET) {
     mapper_->clear();
     display_.clear();

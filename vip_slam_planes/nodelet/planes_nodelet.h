@@ -50,6 +50,7 @@ class PlanesNodelet : public nodelet::Nodelet {
   // Owned by the thread.
   std::unique_ptr<PlaneMapper> mapper_;
   PlaneDisplay display_;
+  vip_slam_msgs::ControlConstPtr early_map_;  ///< a map that was loaded before the calibration came
   SE3 T_map_odom_;
   std::uint32_t epoch_ = 0;
   bool placed_ = false;  ///< T_map_odom_ is known for epoch_

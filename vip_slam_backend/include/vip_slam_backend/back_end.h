@@ -45,7 +45,7 @@ class BackEnd {
   /// The plane module's changes; used from the next optimisation on.
   void applyPlaneUpdate(const PlaneUpdate& update);
 
-  /// True after an accepted loop or requestGlobalBa(), until startGlobalBa().
+  /// True after an accepted loop or requestGlobalBa(), until startGlobalBa(); not while localising only.
   bool globalBaWanted() const;
   void requestGlobalBa();
   GbaJob startGlobalBa();
@@ -62,6 +62,7 @@ class BackEnd {
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);
   void reset();
+  /// On: keyframes are found in the map and leave it as it is; without a map they are refused. Off: mapping goes on.
   void setLocalisationMode(bool on);
 
  private:

@@ -62,15 +62,17 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (!keyframe) throw MapError("no keyframe given");
     const std::string bad = validateKeyframe(*keyframe);
     if (!bad.empty()) throw MapError(bad);
-    if (localisation_only && !map.empty()) {
+    // Mapped, it would be all there is to localise in.
+    if (localisation_only && map.empty()) throw MapError("localisation without a map: load one, or go on mapping");
+    if (keyframe->id <= map.newestKeyframe())
+      throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
+                     std::to_string(map.newestKeyframe()) + " of the map");
+    if (frozen()) {
       localise(keyframe);
       finishUpdate(&update);
       update.removed_keyframes.push_back(keyframe->id);  // it will never be in the map
       return update;
     }
-    if (keyframe->id <= map.newestKeyframe())
-      throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
-                     std::to_string(map.newestKeyframe()) + " of the map");
     entering = searching;
     if (searching && !enterLoadedMap(keyframe)) {
       finishUpdate(&update);
@@ -93,8 +95,8 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
 }
 
 void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
-  if (localisation_only && !map.empty()) return;  // the map stays as it is
-  if (update.revision < first_revision) return;   // of a map that was forgotten or replaced meanwhile
+  if (frozen()) return;
+  if (update.revision < first_revision) return;  // of a map that was forgotten or replaced meanwhile
   const ScopedTimer timer(log, "backend.planes", update.t);
   for (const PlaneMerge& merge : update.merges) map.mergePlanes(merge.from, merge.into);
   for (const PlaneId id : update.removed) map.removePlane(id);
@@ -174,7 +176,7 @@ BackEnd::~BackEnd() = default;
 MapUpdate BackEnd::addKeyframe(KeyframePtr keyframe) { return impl_->addKeyframe(keyframe); }
 const std::string& BackEnd::lastRefusal() const { return impl_->refusal; }
 void BackEnd::applyPlaneUpdate(const PlaneUpdate& update) { impl_->applyPlaneUpdate(update); }
-bool BackEnd::globalBaWanted() const { return impl_->global_wanted; }
+bool BackEnd::globalBaWanted() const { return impl_->global_wanted && !impl_->frozen(); }
 void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }
 
 GbaJob BackEnd::startGlobalBa() {
@@ -194,7 +196,7 @@ GbaResult BackEnd::run(const GbaJob& job) const {
 MapUpdate BackEnd::merge(const GbaResult& result) { return impl_->mergeGlobal(result); }
 
 MapUpdate BackEnd::finish() {
-  if (!impl_->options.global_ba.at_end || (impl_->localisation_only && !impl_->map.empty())) {
+  if (!impl_->options.global_ba.at_end || impl_->frozen()) {
     MapUpdate update = impl_->beginUpdate(0);
     impl_->finishUpdate(&update);
     return update;

@@ -29,6 +29,8 @@ struct BackEnd::Impl {
   /// Inserts at the predicted pose and looks for known landmarks; throws MapError when refused.
   void insert(const KeyframePtr& keyframe);
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
+  /// Localisation only: what there is of a map stays as it is.
+  bool frozen() const { return localisation_only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
   MapSnapshot snapshot() const;
   void reset();

@@ -144,6 +144,8 @@ MapUpdate BackEnd::Impl::mergeGlobal(const GbaResult& result) {
   MapUpdate update = beginUpdate(0);
   if (result.correction != correction) {
     global_wanted = result.solution != nullptr && !map.empty();  // the map it came from is no more: once again
+  } else if (frozen()) {
+    global_wanted = global_wanted || result.solution != nullptr;  // once mapping goes on
   } else if (result.solution && result.solution->summary.usable) {
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     ++statistics.global_ba;

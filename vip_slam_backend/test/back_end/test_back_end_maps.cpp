@@ -99,6 +99,43 @@ TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
   EXPECT_TRUE(back_end.globalBaWanted());
 }
 
+TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {
+  SimulatedKeyframes world(4);
+  BackEnd back_end(options(), world.sensor());
+  back_end.setLocalisationMode(true);
+  for (int k = 0; k < 3; ++k) {
+    const MapUpdate update = back_end.addKeyframe(world.next());
+    EXPECT_EQ(update.newest_keyframe, 0u);
+    EXPECT_NE(back_end.lastRefusal().find("localisation without a map"), std::string::npos) << back_end.lastRefusal();
+  }
+  EXPECT_TRUE(back_end.map().empty());
+  back_end.setLocalisationMode(false);
+  back_end.addKeyframe(world.next());
+  EXPECT_EQ(back_end.lastRefusal(), "");
+  EXPECT_EQ(back_end.map().keyframes().size(), 1u);
+}
+
+TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options(), world.sensor());
+  for (int k = 0; k < 8; ++k) back_end.addKeyframe(world.next());
+  const GbaResult late = back_end.run(back_end.startGlobalBa());
+  ASSERT_TRUE(late.solution);
+  back_end.setLocalisationMode(true);
+  const SE3 before = back_end.map().keyframe(3).state.T_W_I;
+  EXPECT_FALSE(back_end.merge(late).global);
+  EXPECT_EQ(back_end.map().keyframe(3).state.T_W_I.boxminus(before).norm(), 0.0);
+  back_end.requestGlobalBa();
+  EXPECT_FALSE(back_end.globalBaWanted());
+  // A keyframe that was on its way when the map was loaded bears a number of the map's.
+  SimulatedKeyframes other(9);
+  const MapUpdate update = back_end.addKeyframe(other.next());
+  EXPECT_TRUE(update.removed_keyframes.empty());
+  EXPECT_NE(back_end.lastRefusal().find("not newer"), std::string::npos) << back_end.lastRefusal();
+  back_end.setLocalisationMode(false);
+  EXPECT_TRUE(back_end.globalBaWanted());
+}
+
 TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   const std::string path = ::testing::TempDir() + "localisation_only.vsm";
   SimulatedKeyframes world(4), session(4);
