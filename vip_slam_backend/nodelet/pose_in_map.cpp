@@ -1,5 +1,7 @@
 #include "pose_in_map.h"
 
+#include <algorithm>
+
 #include "vip_slam_ros/geometry_conversions.h"
 
 namespace vip_slam {
@@ -20,12 +22,12 @@ void PoseInMap::clear() {
   std::lock_guard<std::mutex> lock(mutex_);
   placed_ = false;
   odometry_.clear();
+  passes_ = {};
 }
 
 std::optional<SE3> PoseInMap::add(double t, std::uint32_t epoch, const SE3& T_odom_I) {
   std::lock_guard<std::mutex> lock(mutex_);
-  // A bag that loops brings the same stamps again; a trajectory has each time once.
-  if (odometry_.empty() || t > odometry_.back().t) odometry_.push_back({t, epoch, T_odom_I});
+  if (passes_.take(t)) odometry_.push_back({t, epoch, T_odom_I});
   if (!placed_ || epoch != epoch_) return std::nullopt;
   return T_map_odom_;
 }
@@ -57,7 +59,10 @@ Trajectory PoseInMap::trajectory(const std::vector<Anchor>& anchors) const {
     std::lock_guard<std::mutex> lock(mutex_);
     odometry = odometry_;
   }
-  return anchorTrajectory(odometry, anchors);
+  Trajectory trajectory = anchorTrajectory(odometry, anchors);
+  std::stable_sort(trajectory.begin(), trajectory.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.t < b.t; });
+  return trajectory;
 }
 
 }  // namespace vip_slam

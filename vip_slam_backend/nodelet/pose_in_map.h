@@ -11,6 +11,7 @@
 
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/trajectory/anchored_trajectory.h"
+#include "vip_slam_core/trajectory/time_passes.h"
 #include "vip_slam_core/types/map_update.h"
 
 namespace vip_slam {
@@ -27,7 +28,7 @@ class PoseInMap {
   /// T_map_base with covariance (x, y, z, rotation about the fixed axes of map) of the odometry seen from map.
   geometry_msgs::PoseWithCovarianceStamped message(double t, const SE3& T_map_odom, const SE3& T_odom_I,
                                                    const Matrix15d& covariance, const std::string& map_frame) const;
-  /// Every image so far, re-anchored on `anchors`.
+  /// Every image so far, re-anchored on `anchors`, in order of the stamps.
   Trajectory trajectory(const std::vector<Anchor>& anchors) const;
 
  private:
@@ -36,6 +37,7 @@ class PoseInMap {
   std::uint32_t epoch_ = 0;
   bool placed_ = false;
   std::vector<OdometryPose> odometry_;
+  TimePasses passes_;
 };
 
 }  // namespace vip_slam

@@ -59,7 +59,7 @@ if(CATKIN_ENABLE_TESTING)
 
   add_library(${PROJECT_NAME}_driver_bag test/driver_bag.cpp)
   target_link_libraries(${PROJECT_NAME}_driver_bag vip_slam_bringup)
-  foreach(thing bag_extrinsics check_bag driver_bags)
+  foreach(thing bag_extrinsics bag_reader check_bag driver_bags)
     catkin_add_gtest(test_${thing} test/test_${thing}.cpp)
     target_link_libraries(test_${thing} ${PROJECT_NAME}_driver_bag vip_slam_bringup vip_slam_runner)
     target_compile_definitions(test_${thing} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")

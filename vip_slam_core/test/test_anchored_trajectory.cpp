@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "vip_slam_core/trajectory/anchored_trajectory.h"
+#include "vip_slam_core/trajectory/time_passes.h"
 
 namespace vip_slam {
 namespace {
@@ -64,6 +65,23 @@ TEST(AnchorTrajectory, EpochsDoNotMix) {
   ASSERT_EQ(trajectory.size(), 2u);
   EXPECT_NEAR(trajectory[0].T_W_B.t().x(), 50, 1e-12);
   EXPECT_NEAR(trajectory[1].T_W_B.t().x(), 51, 1e-12);
+}
+
+std::vector<double> taken(const std::vector<double>& stamps) {
+  TimePasses passes;
+  std::vector<double> result;
+  for (const double t : stamps)
+    if (passes.take(t)) result.push_back(t);
+  return result;
+}
+
+TEST(TimePasses, EachTimeCountsOnceThatOfTheFirstPass) {
+  using List = std::vector<double>;
+  EXPECT_EQ(taken({1, 2, 3}), (List{1, 2, 3}));
+  EXPECT_EQ(taken({1, 2, 2, 3}), (List{1, 2, 3}));                             // a repeated stamp
+  EXPECT_EQ(taken({11, 12, 13, 1, 2, 3}), (List{11, 12, 13, 1, 2, 3}));        // two recordings, joined
+  EXPECT_EQ(taken({1, 2, 3, 1, 2, 3, 4, 1.5, 4.5}), (List{1, 2, 3, 4, 4.5}));  // a bag that loops, each time longer
+  EXPECT_EQ(taken({5, 6, 1, 5.5, 7, 6.5}), (List{5, 6, 1, 7}));                // the second pass goes beyond the first
 }
 
 }  // namespace

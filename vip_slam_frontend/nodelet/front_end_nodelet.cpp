@@ -118,7 +118,7 @@ bool FrontEndNodelet::noticeTime(double t, Stream stream) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++shown_.time_jumps;
   }
-  return verdict != StreamClock::Verdict::kStraggler;
+  return verdict != StreamClock::Verdict::kStray;
 }
 
 void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel) {

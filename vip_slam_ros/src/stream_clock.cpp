@@ -12,12 +12,16 @@ StreamClock::StreamClock(std::size_t streams, double jump) : streams_(streams), 
 
 StreamClock::Verdict StreamClock::notice(std::size_t stream, double t) {
   Stream& own = streams_.at(stream);
-  if (t < own.newest - jump_) {
+  const bool back = t < own.newest - jump_, confirmed = own.suspect;
+  own.suspect = back && !confirmed;
+  if (own.suspect) return Verdict::kStray;
+  if (back) {
     last_jump_ = own.newest - t;
     for (Stream& s : streams_) {
       s.before_jump = newest_;
       s.stragglers_left = &s == &own ? 0 : kMaxStragglers;
       s.newest = t;
+      s.suspect = false;
     }
     newest_ = t;
     return Verdict::kJumpedBack;
@@ -26,7 +30,7 @@ StreamClock::Verdict StreamClock::notice(std::size_t stream, double t) {
     // Old time ends within `jump` of where all streams were; new time begins anywhere below it.
     if (t > newest_ + jump_ && t > own.before_jump - last_jump_ / 2) {
       --own.stragglers_left;
-      return Verdict::kStraggler;
+      return Verdict::kStray;
     }
     own.stragglers_left = 0;
   }

@@ -115,13 +115,16 @@ int run(const Arguments& arguments) {
   facts.sensor = sensor.name;
   facts.variant = options.backend.variant;
   facts.loop_closing = options.backend.loop_closing;
-  facts.finished = !g_interrupted;
+  facts.finished = !g_interrupted && !reader.damaged();
   facts.processing_time = seconds;
   vip_slam::writeRun(arguments.out, facts, pipeline, reader, timing);
   if (!arguments.no_report) makeReport(arguments.out);
   char note[160];
   std::snprintf(note, sizeof note, "%zu images in %.1f s%s, results in %s", pipeline.images(), seconds,
-                g_interrupted ? " (interrupted)" : "", arguments.out.c_str());
+                g_interrupted      ? " (interrupted)"
+                : reader.damaged() ? " (the bag is damaged)"
+                                   : "",
+                arguments.out.c_str());
   progress.finish(note);
   const auto warnings = vip_slam::runWarnings(pipeline, reader);
   for (std::size_t i = 0; i < std::min<std::size_t>(warnings.size(), 8); ++i)
@@ -133,7 +136,8 @@ int run(const Arguments& arguments) {
         pipeline.images() == 0 ? "" : std::string(" (") + trackingStateName(status.state) + ": " + status.reason + ")";
     std::fprintf(stderr, "run_bag: no image has a pose%s; check_bag tells what is wrong with the data\n", why.c_str());
   }
-  return pipeline.odometry().empty() ? 2 : 0;
+  if (pipeline.odometry().empty()) return 2;
+  return facts.finished ? 0 : 3;
 }
 
 }  // namespace

@@ -19,6 +19,7 @@
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/image_decoding.h"
+#include "vip_slam_ros/stream_clock.h"
 #include "vip_slam_ros/tf_lookup.h"
 
 namespace vip_slam {
@@ -49,23 +50,17 @@ bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise) {
 
 std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
 
-cv::Mat gray(const rosbag::MessageInstance& message) {
-  if (const auto image = message.instantiate<sensor_msgs::Image>()) return decodeGray(*image);
-  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return decodeGray(*image);
+/// `decode` gets the image, raw or compressed.
+template <class Decode>
+StampedImage stampedImage(const rosbag::MessageInstance& message, const Decode& decode) {
+  if (const auto image = message.instantiate<sensor_msgs::Image>())
+    return {image->header.stamp.toSec(), decode(*image), 0};
+  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>())
+    return {image->header.stamp.toSec(), decode(*image), 0};
   throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
 }
 
-cv::Mat metres(const rosbag::MessageInstance& message, double scale) {
-  if (const auto image = message.instantiate<sensor_msgs::Image>()) return decodeDepth(*image, scale);
-  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return decodeDepth(*image, scale);
-  throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
-}
-
-double stampOf(const rosbag::MessageInstance& message) {
-  if (const auto image = message.instantiate<sensor_msgs::Image>()) return image->header.stamp.toSec();
-  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return image->header.stamp.toSec();
-  return message.getTime().toSec();
-}
+enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
 
 }  // namespace
 
@@ -172,6 +167,7 @@ void BagReader::start() {
       read();
     } catch (const std::exception& error) {
       warnings_.push_back(std::string("the bag breaks off: ") + error.what());
+      damaged_ = true;
     }
     channel_.close();
   });
@@ -186,10 +182,25 @@ void BagReader::read() {
     if (!name.empty()) names.push_back(name);
   }
   ImagePairer pairer(options_.pairing);
+  StreamClock clock(kStreams, options_.time_jump);
+  bool open = true;
+  // As in the live system: what belongs together is told from what comes before and after a jump of the clock.
+  const auto inTime = [&](Stream stream, double t) {
+    const StreamClock::Verdict verdict = clock.notice(stream, t);
+    if (verdict == StreamClock::Verdict::kStray) ++counters_["stray_messages"];
+    if (verdict == StreamClock::Verdict::kJumpedBack) {
+      ++counters_["time_jumps"];
+      pairer.clear();
+      open = channel_.push(TimeJump{clock.lastJump()});
+    }
+    return open && verdict != StreamClock::Verdict::kStray;
+  };
   std::set<std::string> complained;
   const auto decode = [&](const rosbag::MessageInstance& message, auto&& use) {
     try {
       use();
+    } catch (const rosbag::BagException&) {
+      throw;
     } catch (const std::exception& error) {
       ++counters_["undecodable_images"];
       if (complained.insert(message.getTopic()).second) {
@@ -214,42 +225,51 @@ void BagReader::read() {
                         "registration, or set depth/registered: false with the depth camera's calibration");
   };
 
-  rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
-  for (const auto& message : view) {
-    if (stop_) return;
+  const auto take = [&](const rosbag::MessageInstance& message) {
     const std::string& topic = message.getTopic();
-    bool open = true;
     if (topic == topics.color) {
       decode(message, [&] {
-        const cv::Mat image = gray(message);
+        const auto [t, image, stamp] = stampedImage(message, [](const auto& m) { return decodeGray(m); });
         color_size = image.size();
         compareWithCalibration(image);
-        pairer.addColor(stampOf(message), image);
+        if (inTime(kColor, t)) pairer.addColor(t, image);
       });
     } else if (topic == topics.depth) {
       decode(message, [&] {
-        cv::Mat depth = metres(message, sensor_.depth_scale);
+        auto [t, depth, stamp] =
+            stampedImage(message, [&](const auto& m) { return decodeDepth(m, sensor_.depth_scale); });
         if (source_->registration) depth = (*source_->registration)(depth);
         compareSizes(depth);
         ++depth_images;
         without_any += holdsNoDepth(depth, sensor_.depth_noise);
-        pairer.addDepth(stampOf(message), depth);
+        if (inTime(kDepth, t)) pairer.addDepth(t, depth);
       });
     } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
       const double t = imu->header.stamp.toSec();
       const Eigen::Vector3d gyro = fromMsg(imu->angular_velocity), accel = fromMsg(imu->linear_acceleration);
-      if (topic == topics.imu) {
-        open = channel_.push(ImuSample{t, gyro, accel});
-      } else if (topic == topics.gyro) {
-        open = channel_.push(GyroSample{t, gyro});
-      } else {
-        open = channel_.push(AccelSample{t, accel});
+      if (inTime(topic == topics.accel ? kAccel : kGyro, t)) {
+        SensorEvent event = ImuSample{t, gyro, accel};
+        if (topic == topics.gyro) event = GyroSample{t, gyro};
+        if (topic == topics.accel) event = AccelSample{t, accel};
+        open = channel_.push(std::move(event));
       }
     } else {
       ++counters_["messages_of_wrong_type"];
       if (complained.insert(topic).second) {
         warnings_.push_back("topic " + topic + ": type " + message.getDataType() + ", expected sensor_msgs/Imu");
       }
+    }
+  };
+
+  rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
+  for (const auto& message : view) {
+    if (stop_) return;
+    try {
+      take(message);
+    } catch (const rosbag::BagException& error) {  // a chunk that is damaged; those after it may be whole
+      damaged_ = true;
+      if (++counters_["unreadable_messages"] == 1)
+        warnings_.push_back(std::string("the bag is damaged, what cannot be read is left out: ") + error.what());
     }
     while (open && pairer.front()) {
       open = channel_.push(*pairer.front());
@@ -272,8 +292,12 @@ void BagReader::read() {
   }
   if (const std::size_t backward = pairer.counters().backward; backward > 0)
     warnings_.push_back(std::to_string(backward) +
-                        " images are left out: their stamps repeat or precede the one before (a bag that was joined, " +
-                        "or recorded while another was played in a loop?)");
+                        " images are left out: their stamps repeat or precede the one before");
+  if (const auto jumps = counters_.find("time_jumps"); jumps != counters_.end())
+    warnings_.push_back(
+        "time ran backwards " + std::to_string(jumps->second) +
+        " times (a bag that was joined, or recorded while another was played in a loop?): the odometry " +
+        "starts anew there, the map goes on");
   counters_["image_pairs"] = pairer.counters().pairs;
   counters_["images_without_depth"] = pairer.counters().without_depth;
   counters_["unused_depth_images"] = pairer.counters().unused_depth;

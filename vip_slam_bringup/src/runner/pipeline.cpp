@@ -1,6 +1,7 @@
 #include "vip_slam_bringup/runner/pipeline.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <limits>
 #include <stdexcept>
 
@@ -40,6 +41,8 @@ void Pipeline::add(const SensorEvent& event) {
   } else if (const auto* accel = std::get_if<AccelSample>(&event)) {
     front_end_->addAccel(accel->t, accel->accel);
     newest_imu_ = std::max(newest_imu_, accel->t);
+  } else if (const auto* jump = std::get_if<TimeJump>(&event)) {
+    restart(jump->seconds);
   } else {
     waiting_.push_back(std::get<ImagePair>(event));
     newest_image_ = std::max(newest_image_, waiting_.back().t);
@@ -59,11 +62,27 @@ void Pipeline::processReady() {
   }
 }
 
-void Pipeline::finish() {
+void Pipeline::processRest() {
   for (const ImagePair& pair : waiting_) {
     if (front_end_->ready(pair.t)) process(pair);
   }
   waiting_.clear();
+}
+
+void Pipeline::restart(double seconds) {
+  processRest();
+  newest_image_ = newest_imu_ = -1e300;
+  char words[80];
+  std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", seconds);
+  front_end_->reset(words);
+}
+
+void Pipeline::finish() {
+  processRest();
+  const auto earlier = [](const auto& a, const auto& b) { return a.t < b.t; };
+  std::stable_sort(odometry_.begin(), odometry_.end(), earlier);
+  std::stable_sort(covariances_.begin(), covariances_.end(), earlier);
+  std::stable_sort(realtime_.begin(), realtime_.end(), earlier);
   applyAnswers(std::numeric_limits<std::size_t>::max());
   if (mapping_) mapping_->finish();
 }
@@ -87,7 +106,8 @@ void Pipeline::process(const ImagePair& pair) {
   const TrackedFrame& frame = *output.frame;
   status_ = frame.status;
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
-  if (frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded) {
+  const bool posed = frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
+  if (posed && passes_.take(frame.t)) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
     covariances_.push_back({frame.t, poseCovariance(frame)});
     if (placed_ && epoch_ == frame.epoch) realtime_.push_back({frame.t, T_map_odom_ * frame.state.T_W_I});

@@ -36,8 +36,10 @@ class Bench {
       front_end_.addGyro(gyro->t, gyro->gyro);
     } else if (const auto* accel = std::get_if<AccelSample>(&event)) {
       front_end_.addAccel(accel->t, accel->accel);
+    } else if (const auto* pair = std::get_if<ImagePair>(&event)) {
+      waiting_.push_back(*pair);
     } else {
-      waiting_.push_back(std::get<ImagePair>(event));
+      waiting_.clear();  // time ran back; the front end notices that, too
     }
     while (!waiting_.empty() && front_end_.ready(waiting_.front().t)) {
       process(waiting_.front());

@@ -10,12 +10,13 @@ class StreamClock {
  public:
   enum class Verdict {
     kInOrder,
-    kJumpedBack,  ///< the first message after a jump: start anew
-    kStraggler,   ///< of another stream, from before the jump, delivered late: to be left out
+    kJumpedBack,  ///< time has run back: start anew
+    kStray,       ///< to be left out: a single wrong stamp, or of another stream, from before the jump, delivered late
   };
 
-  /// `jump`: seconds by which a stamp has to be older than the newest of its stream. An image that comes late, from a
-  /// slow matcher or a busy machine, is older than other streams' newest; that is not a jump.
+  /// `jump`: seconds by which stamps have to be older than the newest of their stream, two in a row: one may be wrong.
+  /// An image that comes late, from a slow matcher or a busy machine, is older than other streams' newest; that is not
+  /// a jump.
   StreamClock(std::size_t streams, double jump);
 
   /// `t`: stamp in seconds.
@@ -32,6 +33,7 @@ class StreamClock {
   struct Stream {
     double newest = -1e300;
     double before_jump = -1e300;  ///< newest of all streams when time jumped
+    bool suspect = false;         ///< the last stamp was far back
     int stragglers_left = 0;      ///< until the stream has jumped too, or this many were left out
   };
 

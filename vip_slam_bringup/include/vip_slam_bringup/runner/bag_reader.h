@@ -29,12 +29,17 @@ struct AccelSample {
   double t;
   Eigen::Vector3d accel;
 };
-using SensorEvent = std::variant<ImuSample, GyroSample, AccelSample, ImagePair>;
+/// Stamps have run back: what comes next belongs to nothing before it.
+struct TimeJump {
+  double seconds;
+};
+using SensorEvent = std::variant<ImuSample, GyroSample, AccelSample, ImagePair, TimeJump>;
 
 struct BagReaderOptions {
   double start = 0;      ///< seconds after the first message
   double duration = -1;  ///< seconds; negative: to the end
   PairerOptions pairing;
+  double time_jump = 1.0;           ///< stamps run back by more than this, seconds: a TimeJump
   std::string extrinsics = "auto";  ///< "tf", "config" (the sensor file), or tf when the bag has it
   double tf_patience = 2.0;         ///< seconds of /tf that are looked at; /tf_static counts always
 };
@@ -51,7 +56,7 @@ class BagReader {
 
   /// Starts to read ahead.
   void start();
-  /// The next event; empty at the end. A bag that breaks off in the middle ends there, with a warning.
+  /// The next event; empty at the end. What cannot be read of a damaged bag is left out, with a warning.
   std::optional<SensorEvent> next();
 
   double beginTime() const;  ///< seconds, of the part that is read
@@ -61,6 +66,7 @@ class BagReader {
   /// After the end: what was counted ("undecodable_images", "images_without_depth", ...), and what a user should know.
   const std::map<std::string, std::uint64_t>& counters() const { return counters_; }
   const SensorConfig& sensor() const { return sensor_; }
+  bool damaged() const { return damaged_; }  ///< after the end: some of the bag could not be read
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
@@ -73,6 +79,7 @@ class BagReader {
   const BagReaderOptions options_;
   Channel<SensorEvent> channel_;
   std::atomic<bool> stop_{false};
+  bool damaged_ = false;
   std::string extrinsics_source_ = "sensor file";
   std::map<std::string, std::uint64_t> counters_;
   std::vector<std::string> warnings_;

@@ -17,6 +17,7 @@
 #include "vip_slam_bringup/runner/pipeline_options.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/anchored_trajectory.h"
+#include "vip_slam_core/trajectory/time_passes.h"
 #include "vip_slam_core/types/tracking_state.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/front_end.h"
@@ -47,7 +48,9 @@ class Pipeline {
   void finish();
 
   std::size_t images() const { return images_; }
-  const std::vector<OdometryPose>& odometry() const { return odometry_; }              ///< images with a pose
+  /// Images with a pose; in order of their stamps after finish(). Where stamps ran back and come a second time, the
+  /// first pass counts.
+  const std::vector<OdometryPose>& odometry() const { return odometry_; }
   const std::vector<OdometryCovariance>& covariances() const { return covariances_; }  ///< one for each of odometry()
   const std::vector<StateChange>& states() const { return states_; }
   const TrackingStatus& status() const { return status_; }  ///< of the last image
@@ -63,6 +66,9 @@ class Pipeline {
   void applyAnswers(std::size_t image);
   void process(const ImagePair& pair);
   void processReady();
+  void processRest();  ///< what waits, as far as the IMU covers it
+  /// Stamps ran back: what waits is done with, and the odometry begins anew.
+  void restart(double seconds);
   /// How far the data has gone on since an image at `t`, seconds.
   double waitedFor(double t) const;
 
@@ -76,6 +82,7 @@ class Pipeline {
   bool placed_ = false;                                 ///< T_map_odom_ is known for epoch_
   double newest_image_ = -1e300, newest_imu_ = -1e300;  ///< stamps, each by its own clock
   std::size_t images_ = 0;
+  TimePasses passes_;
   std::vector<OdometryPose> odometry_;
   std::vector<OdometryCovariance> covariances_;
   Trajectory realtime_;

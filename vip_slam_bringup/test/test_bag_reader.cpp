@@ -1,0 +1,123 @@
+// Bags whose clock is not sound, and bags that cannot be read to their end.
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "driver_bag.h"
+#include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_bringup/runner/pipeline.h"
+
+namespace fs = std::filesystem;
+
+namespace vip_slam {
+namespace {
+
+class BagReaderTest : public testing::Test {
+ protected:
+  BagReaderTest() {
+    options_.sensor = loadSensorConfig(CONFIG_DIR "/sensors/simulator.yaml");
+    options_.sensor.camera.width = 320;
+    options_.sensor.camera.height = 240;
+    options_.sensor.camera.fx = options_.sensor.camera.fy = 260;
+    options_.sensor.camera.cx = 159.5;
+    options_.sensor.camera.cy = 119.5;
+    options_.still = 4.0;
+    options_.moving = 1.0;
+  }
+  ~BagReaderTest() override { fs::remove(bag_); }
+
+  std::size_t run(Pipeline* pipeline, BagReader* reader) {
+    std::size_t jumps = 0;
+    reader->start();
+    while (const auto event = reader->next()) {
+      jumps += std::holds_alternative<TimeJump>(*event);
+      pipeline->add(*event);
+    }
+    pipeline->finish();
+    return jumps;
+  }
+  static bool warned(const BagReader& reader, const std::string& words) {
+    return std::any_of(reader.warnings().begin(), reader.warnings().end(),
+                       [&](const std::string& w) { return w.find(words) != std::string::npos; });
+  }
+
+  test_support::DriverBagOptions options_;
+  PipelineOptions pipeline_options_;
+  const std::string bag_ =
+      (fs::temp_directory_path() / ("vip_slam_bag_reader_" + std::to_string(::getpid()) + ".bag")).string();
+};
+
+TEST_F(BagReaderTest, WhereTheClockRanBackTheOdometryStartsAnewAndTheMapGoesOn) {
+  options_.late_jump = -100;  // a second recording, joined to the first
+  test_support::writeDriverBag(bag_, options_);
+  SensorConfig sensor = options_.sensor;
+  BagReader reader(bag_, sensor);
+  Pipeline pipeline(pipeline_options_, sensor, nullptr);
+  EXPECT_EQ(run(&pipeline, &reader), 1u);
+  EXPECT_EQ(reader.counters().at("time_jumps"), 1u);
+  EXPECT_TRUE(warned(reader, "time ran backwards 1 times"));
+  EXPECT_FALSE(reader.damaged());
+  const auto& odometry = pipeline.odometry();
+  ASSERT_FALSE(odometry.empty());
+  EXPECT_EQ(odometry.front().epoch, 1u);  // it is the earlier one by its stamps
+  EXPECT_EQ(odometry.back().epoch, 0u);
+  EXPECT_GT(odometry.back().t - odometry.front().t, 90);
+  for (std::size_t i = 1; i < odometry.size(); ++i) EXPECT_LT(odometry[i - 1].t, odometry[i].t);
+  ASSERT_EQ(pipeline.covariances().size(), odometry.size());
+  for (std::size_t i = 0; i < odometry.size(); ++i) EXPECT_EQ(pipeline.covariances()[i].t, odometry[i].t);
+}
+
+TEST_F(BagReaderTest, OfTimesThatComeTwiceTheFirstPassCounts) {
+  options_.late_jump = -2.0;  // the second half repeats the times of the first
+  test_support::writeDriverBag(bag_, options_);
+  SensorConfig sensor = options_.sensor;
+  BagReader reader(bag_, sensor);
+  Pipeline pipeline(pipeline_options_, sensor, nullptr);
+  EXPECT_EQ(run(&pipeline, &reader), 1u);
+  const auto& odometry = pipeline.odometry();
+  ASSERT_FALSE(odometry.empty());
+  for (std::size_t i = 1; i < odometry.size(); ++i) EXPECT_LT(odometry[i - 1].t, odometry[i].t);
+  EXPECT_EQ(odometry.front().epoch, 0u);
+  EXPECT_EQ(odometry.back().epoch, 1u);
+  EXPECT_GT(pipeline.images(), 1.5 * odometry.size());
+}
+
+TEST_F(BagReaderTest, OfADamagedBagTheRestIsRead) {
+  test_support::writeDriverBag(bag_, options_);
+  std::string sound;
+  {
+    std::ifstream in(bag_, std::ios::binary);
+    sound.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  // The index is whole, the header of a chunk names a compression that nobody knows: of images, and of the IMU, which
+  // is written last.
+  const std::string none = "compression=none";
+  for (const std::size_t at : {sound.find(none, sound.size() * 6 / 10), sound.rfind(none)}) {
+    ASSERT_NE(at, std::string::npos);
+    std::string damaged = sound;
+    damaged.replace(at, none.size(), "compression=what");
+    std::ofstream(bag_, std::ios::binary) << damaged;
+    SensorConfig sensor = options_.sensor;
+    BagReader reader(bag_, sensor);
+    Pipeline pipeline(pipeline_options_, sensor, nullptr);
+    run(&pipeline, &reader);
+    EXPECT_TRUE(reader.damaged());
+    EXPECT_TRUE(warned(reader, "the bag is damaged"));
+    EXPECT_GT(reader.counters().at("unreadable_messages"), 1u);
+    EXPECT_GT(reader.counters().at("image_pairs"), 80u);
+  }
+}
+
+}  // namespace
+}  // namespace vip_slam
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
