@@ -213,6 +213,27 @@ TEST_F(TumConverter, DepthKeepsItsUnitAndTheGyroIsMissed) {
   EXPECT_EQ(readTum((root_ / "out_truth.tum").string()).size(), 2u);
 }
 
+TEST_F(TumConverter, TheExifOrientationTurnsNothing) {
+  makeFolder("rgbd_dataset_freiburg1_xyz");
+  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(10, 20, 30));
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", picture, jpeg);
+  // An APP1 segment right after the start of the image: EXIF, big endian, orientation 6 (turned by a quarter).
+  const std::vector<std::uint8_t> exif = {0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0,    0,    'M', 'M',
+                                          0,    42,   0, 0,  0,   8,   0,   1,   0x01, 0x12, 0,   3,
+                                          0,    0,    0, 1,  0,   6,   0,   0,   0,    0,    0,   0};
+  jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
+  ASSERT_EQ(cv::imdecode(jpeg, cv::IMREAD_COLOR).rows, picture.cols) << "the tag is not understood";
+  for (int i = 0; i < 4; ++i)
+    write("rgbd_dataset_freiburg1_xyz/rgb/" + std::to_string(i) + ".png", std::string(jpeg.begin(), jpeg.end()));
+  convertTumRgbd(options_);
+  const SensorConfig sensor = loadSensorConfig((root_ / "out_sensor.yaml").string());
+  EXPECT_EQ(sensor.camera.width, 640);
+  const auto color = read<sensor_msgs::Image>(sensor.topics.color);
+  ASSERT_EQ(color.size(), 4u);
+  EXPECT_EQ(color[0]->width, 640u);
+}
+
 TEST_F(TumConverter, UnknownCameraAndBadRowsAreNamed) {
   makeFolder("kitchen");
   EXPECT_NE(errorOf([&] { convertTumRgbd(options_); }).find("no calibration"), std::string::npos);

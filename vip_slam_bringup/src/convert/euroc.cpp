@@ -115,7 +115,7 @@ Trajectory readTruth(const std::string& path) {
 }
 
 cv::Mat readGray(const std::string& path, const CameraIntrinsics& camera) {
-  const cv::Mat image = cv::imread(path, cv::IMREAD_GRAYSCALE);
+  const cv::Mat image = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (image.empty()) throw std::runtime_error(path + ": is not a readable image");
   if (image.cols != camera.width || image.rows != camera.height)
     throw std::runtime_error(path + ": image is " + std::to_string(image.cols) + "x" + std::to_string(image.rows) +

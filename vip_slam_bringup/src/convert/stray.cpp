@@ -134,7 +134,7 @@ cv::Mat readDepth(const std::string& folder, int frame, int min_confidence, cons
   if (depth.type() != CV_16UC1) throw std::runtime_error(path + ": expected a 16-bit depth image");
   const std::string confidence_path = numbered(folder + "/confidence", frame);
   if (min_confidence > 0 && fs::exists(confidence_path)) {
-    const cv::Mat confidence = cv::imread(confidence_path, cv::IMREAD_GRAYSCALE);
+    const cv::Mat confidence = cv::imread(confidence_path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
     if (confidence.size() != depth.size())
       throw std::runtime_error(confidence_path + ": size differs from the depth image");
     depth.setTo(0, confidence < min_confidence);

@@ -131,7 +131,7 @@ double rateOf(const std::vector<StampedFile>& files) {
 
 ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   const auto color = readList(options.folder, "rgb.txt"), depth = readList(options.folder, "depth.txt");
-  const cv::Mat first = cv::imread(color.front().path, cv::IMREAD_COLOR);
+  const cv::Mat first = cv::imread(color.front().path, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (first.empty()) throw std::runtime_error(color.front().path + ": is not a readable image");
   const CameraIntrinsics camera = findCamera(options, first.size());
   const bool gyro = fs::exists(options.folder + "/imu.txt");
@@ -154,7 +154,8 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
     for (const StampedFile& file : files) {
       const ros::Time stamp(file.t);
       bag.add(stamp, [=](rosbag::Bag& out) {
-        const cv::Mat image = cv::imread(file.path, is_color ? cv::IMREAD_COLOR : cv::IMREAD_UNCHANGED);
+        const cv::Mat image =
+            cv::imread(file.path, is_color ? cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION : cv::IMREAD_UNCHANGED);
         if (image.empty()) throw std::runtime_error(file.path + ": is not a readable image");
         if (image.type() != (is_color ? CV_8UC3 : CV_16UC1))
           throw std::runtime_error(file.path + ": expected " + (is_color ? "8-bit colour" : "16-bit depth"));

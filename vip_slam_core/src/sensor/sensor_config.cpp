@@ -136,7 +136,7 @@ void writeCamera(std::ostream& out, const char* key, const CameraIntrinsics& cam
 /// White: 255, black: 0.
 cv::Mat readMask(const std::string& path) {
   if (!std::ifstream(path)) throw std::runtime_error("mask: " + path + " cannot be read");
-  const cv::Mat picture = cv::imread(path, cv::IMREAD_GRAYSCALE);
+  const cv::Mat picture = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (picture.empty()) throw std::runtime_error("mask: " + path + " is no picture, expected PNG");
   const cv::Mat mask = picture > 127;
   if (cv::countNonZero(mask) == 0)

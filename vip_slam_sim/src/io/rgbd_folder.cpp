@@ -126,7 +126,7 @@ RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registere
   if (out.frames.size() < 2)
     throw std::runtime_error(
         folder + ": expected frame-N.color.* with depth and pose, or rgb.txt with depth.txt and groundtruth.txt");
-  const cv::Mat first = cv::imread(out.frames.front().colour, cv::IMREAD_COLOR);
+  const cv::Mat first = cv::imread(out.frames.front().colour, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (first.empty()) throw std::runtime_error(out.frames.front().colour + ": not an image");
   out.camera.width = first.cols;
   out.camera.height = first.rows;
@@ -135,7 +135,7 @@ RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registere
 }
 
 void loadRgbdFrame(const RgbdFolder& folder, const RgbdFrame& frame, cv::Mat* rgb, cv::Mat* depth_mm) {
-  const cv::Mat bgr = cv::imread(frame.colour, cv::IMREAD_COLOR);
+  const cv::Mat bgr = cv::imread(frame.colour, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (bgr.empty()) throw std::runtime_error(frame.colour + ": not an image");
   const cv::Mat raw = cv::imread(frame.depth, cv::IMREAD_UNCHANGED);
   if (raw.type() != CV_16UC1) throw std::runtime_error(frame.depth + ": expected a 16-bit grey image");
