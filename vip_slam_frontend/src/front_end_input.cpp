@@ -130,9 +130,9 @@ void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
   landmarks_.apply(update);
   // A loaded map brings keyframes of its own: new ones come after them.
   next_keyframe_ = std::max(next_keyframe_, update.newest_keyframe + 1);
-  if (update.epoch != epoch_) return;
-  T_map_odom_ = update.T_map_odom;
-  have_map_ = update.newest_keyframe != 0;
+  // In a map that was loaded or begun anew nobody knows yet where this odometry lies.
+  have_map_ = update.epoch == epoch_ && update.newest_keyframe != 0;
+  if (have_map_) T_map_odom_ = update.T_map_odom;
 }
 
 std::optional<NavState> FrontEnd::Impl::predict(double t) const {

@@ -198,6 +198,23 @@ TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
   run(9.0, 9.3, true, false);
   run(9.3, 10.5);
   EXPECT_GT(front_end_.counters().landmarks_reacquired, reacquired + 10);
+
+  // A map that takes its place: nothing is looked for in it before the back end knows where the odometry lies there ...
+  MapUpdate loaded = update;
+  loaded.epoch = 1u << 31;
+  loaded.global = true;
+  front_end_.applyMapUpdate(loaded);
+  const std::uint64_t until = front_end_.counters().landmarks_reacquired;
+  run(10.5, 10.8, true, false);
+  run(10.8, 12.0);
+  EXPECT_EQ(front_end_.counters().landmarks_reacquired, until);
+  // ... and nothing of the old one afterwards.
+  loaded.epoch = update.epoch;
+  loaded.landmarks.clear();
+  front_end_.applyMapUpdate(loaded);
+  run(12.0, 12.3, true, false);
+  run(12.3, 13.5);
+  EXPECT_EQ(front_end_.counters().landmarks_reacquired, until);
   front_end_.forgetMap();
 }
 

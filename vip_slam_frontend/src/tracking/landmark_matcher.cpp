@@ -27,6 +27,7 @@ void LandmarkMatcher::clear() {
 }
 
 void LandmarkMatcher::apply(const MapUpdate& update) {
+  if (update.global) landmarks_.clear();  // it tells of all; what it does not tell of is of another map
   for (const LandmarkEstimate& l : update.landmarks) landmarks_[l.id] = {l.p_W, l.observations, l.descriptor};
   for (LandmarkId id : update.removed_landmarks) {
     landmarks_.erase(id);
