@@ -10,6 +10,12 @@ constexpr std::size_t kIntervals = 10;      // colour intervals that are remembe
 constexpr double kShortestInterval = 0.01;  // seconds; assumed until one is known
 }  // namespace
 
+bool mostlyUnpaired(const PairerCounters& before, const PairerCounters& now) {
+  constexpr std::size_t kEnough = 10;  // images
+  const std::size_t alone = now.without_depth - before.without_depth;
+  return alone > kEnough && alone > now.pairs - before.pairs;
+}
+
 bool ImagePairer::addColor(double t, cv::Mat gray, std::uint64_t stamp) {
   if (!std::isfinite(t) || (newest_color_ && t <= *newest_color_)) {
     ++counters_.backward;

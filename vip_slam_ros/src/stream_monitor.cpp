@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::size_t kWindow = 100;  // stamps over which the rate is measured
 constexpr double kSilent = 2.0;       // seconds without a message
+constexpr std::size_t kUnusable = 5;  // messages in a row that could not be used
 
 std::string format(const char* pattern, double a, double b) {
   char text[160];
@@ -26,6 +27,8 @@ StreamMonitor::StreamMonitor(std::string topic, double nominal_rate, double gap_
 StreamMonitor::Step StreamMonitor::add(double t, double arrival) {
   std::lock_guard<std::mutex> lock(mutex_);
   ++report_.messages;
+  if (!newest_rejected_) report_.rejected_in_a_row = 0;
+  newest_rejected_ = false;
   report_.delay = arrival - t;
   report_.last_arrival = arrival;
   Step step = Step::kGood;
@@ -54,6 +57,8 @@ StreamMonitor::Step StreamMonitor::add(double t, double arrival) {
 void StreamMonitor::reject(const std::string& why) {
   std::lock_guard<std::mutex> lock(mutex_);
   ++report_.rejected;
+  ++report_.rejected_in_a_row;
+  newest_rejected_ = true;
   report_.last_rejection = why;
 }
 
@@ -69,6 +74,7 @@ StreamMonitor::Report StreamMonitor::report() const {
 std::string StreamMonitor::silence(double now) const {
   const Report r = report();
   const double seconds = now - r.last_arrival;
+  if (r.rejected_in_a_row >= kUnusable && seconds <= kSilent) return "topic " + r.topic + ": " + r.last_rejection;
   return r.messages > 0 && seconds > kSilent ? "topic " + r.topic + ": " + format("silent for %.1f s", seconds, 0) : "";
 }
 

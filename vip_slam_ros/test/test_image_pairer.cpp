@@ -180,5 +180,17 @@ TEST(ImagePairer, ANearerDepthDoesNotWaitForTheNextColour) {
   }
 }
 
+TEST(ImagePairer, StreamsThatPartLateAreNoticed) {
+  PairerCounters hour_ago, then, now;
+  then.pairs = 100000;
+  now = then;
+  now.without_depth = 30;
+  now.pairs += 3;
+  EXPECT_FALSE(mostlyUnpaired(hour_ago, then));
+  EXPECT_TRUE(mostlyUnpaired(then, now));
+  now.pairs += 100;
+  EXPECT_FALSE(mostlyUnpaired(then, now));
+}
+
 }  // namespace
 }  // namespace vip_slam

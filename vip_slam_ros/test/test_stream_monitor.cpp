@@ -40,6 +40,24 @@ TEST(StreamMonitor, ComplaintsNameTheTopic) {
   EXPECT_NE(monitor.silence(10).find("/camera/imu: silent for 7.5"), std::string::npos) << monitor.silence(10);
 }
 
+TEST(StreamMonitor, NamesAStreamThatBringsNothingUsableAnyMore) {
+  StreamMonitor monitor("/color", 30);
+  double t = 0;
+  const auto message = [&](bool usable) {
+    monitor.add(t, t);
+    if (!usable) monitor.reject("image encoding 'h264', expected mono8");
+    t += 1.0 / 30;
+  };
+  for (int i = 0; i < 300; ++i) message(i % 10 != 3);  // now and then a damaged one
+  EXPECT_EQ(monitor.complaint(t), "");
+  for (int i = 0; i < 10; ++i) message(false);
+  EXPECT_NE(monitor.complaint(t).find("h264"), std::string::npos) << monitor.complaint(t);
+  EXPECT_EQ(monitor.silence(t), monitor.complaint(t));
+  message(true);
+  message(true);
+  EXPECT_EQ(monitor.complaint(t), "");
+}
+
 TEST(StreamMonitor, NamesADriverThatDoesNotStampItsMessages) {
   StreamMonitor monitor("/imu", 200);
   for (int i = 0; i < 200; ++i) monitor.add(0, 50 + i / 200.0);

@@ -40,6 +40,9 @@ struct PairerCounters {
   double skew = 0;           ///< depth stamp - colour stamp of the newest pair, seconds
 };
 
+/// Most colour images between two counts have found no depth: the streams are not synchronised.
+bool mostlyUnpaired(const PairerCounters& before, const PairerCounters& now);
+
 class ImagePairer {
  public:
   explicit ImagePairer(const PairerOptions& options = {}) : options_(options) {}

@@ -21,6 +21,7 @@ class StreamMonitor {
   struct Report {
     std::string topic;
     std::size_t messages = 0, gaps = 0, repeated = 0, backward = 0, rejected = 0;
+    std::size_t rejected_in_a_row = 0;  ///< the newest messages
     std::string last_rejection;
     double nominal_rate = 0;
     double rate = 0;         ///< Hz over the last seconds of stamps
@@ -32,7 +33,8 @@ class StreamMonitor {
   Report report() const;
   /// One sentence on what is wrong at time `now` ("topic /x: ..."); empty when nothing is.
   std::string complaint(double now) const;
-  /// The same only of a stream that has come and stopped: empty while messages come, and before the first one.
+  /// The same only of a stream that has come and stopped, or brings nothing usable any more: empty while good messages
+  /// come, and before the first one.
   std::string silence(double now) const;
   /// After time ran backwards: the next stamp may be anything.
   void restart();
@@ -42,6 +44,7 @@ class StreamMonitor {
   mutable std::mutex mutex_;
   Report report_;
   std::deque<double> stamps_;
+  bool newest_rejected_ = false;
 };
 
 }  // namespace vip_slam
