@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -180,6 +181,22 @@ TEST_F(CheckBag, FramesInTf) {
 TEST_F(CheckBag, TimeThatRunsBackwards) {
   options_.late_jump = -1.0;
   expectFound(check(), Severity::kError, "IMU", "time runs backwards");
+}
+
+TEST_F(CheckBag, StampsOfImagesThatJitter) {
+  test_support::writeDriverBag(path_, options_);
+  const Recording sound = recordBag(path_, expected_, 60);
+  Recording jittering = sound, varying = sound;
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal(0, 0.003);
+  for (double& t : jittering.color.stamps) t += normal(random);
+  expectFound(checkRates(jittering), Severity::kWarning, "colour image", "stamps jitter by");
+  // An exposure that follows the light changes the rate, and stamps that are right.
+  double t = varying.color.stamps.front();
+  for (std::size_t i = 1; i < varying.color.stamps.size(); ++i)
+    varying.color.stamps[i] = t += (1 + 0.15 * std::sin(0.3 * double(i))) / 30;
+  for (const Findings& findings : {checkRates(sound), checkRates(varying)})
+    for (const Finding& f : findings) EXPECT_EQ(f.text.find("jitter"), std::string::npos) << f.text;
 }
 
 TEST_F(CheckBag, StreamsThatDoNotCoverEachOther) {

@@ -71,6 +71,7 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("NIS per degree of freedom", c.nis_per_dof);
   status.add("pixel sigma in use", c.sigma_px);
   status.add("IMU noise in use, times the configured", c.imu_noise_scale);
+  status.add("jitter of image stamps in use (ms)", 1e3 * c.stamp_sigma);
   status.add("images that contradict the IMU", c.imu_contradicted);
   status.add("camera's delay in use (ms)", 1e3 * shown.mounting.time_offset);
   for (const std::string& difference : shown.mounting_differences) status.add("calibration", difference);
@@ -112,8 +113,10 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
     status.add(name + "unusable messages", r.rejected);
     if (!r.last_rejection.empty()) status.add(name + "last unusable", r.last_rejection);
   }
-  const std::size_t unpaired = shown.pairs.without_depth;
-  if (!sensor_.topics.depth.empty() && unpaired > 10 && unpaired > shown.pairs.pairs) {
+  constexpr std::size_t kLately = 10;  // reports, one a second
+  lately_paired_.push_back(shown.pairs);
+  if (lately_paired_.size() > kLately) lately_paired_.pop_front();
+  if (!sensor_.topics.depth.empty() && mostlyUnpaired(lately_paired_.front(), shown.pairs)) {
     const double skew = depth_monitor_->report().newest - color_monitor_->report().newest;
     char words[240];
     std::snprintf(words, sizeof words,

@@ -124,6 +124,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   };
   mutable std::mutex shown_mutex_;
   Shown shown_;
+  std::deque<PairerCounters> lately_paired_;  ///< as it was reported in the last seconds; of the diagnostics' thread
 
   std::atomic<bool> publish_tf_{true}, imu_rate_odometry_{false};
   std::atomic<double> feature_image_rate_{15.0};

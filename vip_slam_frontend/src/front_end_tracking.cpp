@@ -214,6 +214,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   counters_.zero_velocity += report.zero_velocity;
   counters_.sigma_px = filter_.sigmaPx();
   counters_.imu_noise_scale = filter_.imuNoiseScale();
+  counters_.stamp_sigma = filter_.stampSigma();
   counters_.imu_contradicted += imuIsContradicted();
   if (report.rows > 0) counters_.nis_per_dof = report.nis / report.rows;
   const bool all_gated = report.features_gated >= 5 && report.features_used * 5 < report.features_gated;

@@ -59,6 +59,7 @@ TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
   }
   EXPECT_EQ(front_end.counters().imu_contradicted, 0u);
   EXPECT_LT(front_end.counters().imu_noise_scale, 2.0);
+  EXPECT_NEAR(front_end.counters().stamp_sigma, 0.002, 0.001);
   EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(output.frame->t).t()).norm(), 0.02);
 }
 

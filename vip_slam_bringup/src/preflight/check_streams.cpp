@@ -62,6 +62,23 @@ std::string adviceOnType(const Recording& r, const Wanted& w, const std::string&
   return candidates(r, w);
 }
 
+/// One sigma by which stamps scatter about the instants they stand for, s. A stamp that is late makes the step before it
+/// longer and the one after it shorter by as much; a rate that varies does not.
+double stampJitter(const std::vector<double>& stamps, double period) {
+  constexpr std::size_t kEnough = 50;
+  double sum = 0;
+  std::size_t pairs = 0;
+  for (std::size_t i = 2; i < stamps.size(); ++i) {
+    const double before = stamps[i - 1] - stamps[i - 2] - period, after = stamps[i] - stamps[i - 1] - period;
+    if (std::max(std::abs(before), std::abs(after)) > 0.5 * period) continue;  // a hole, or time ran back
+    sum -= before * after;
+    ++pairs;
+  }
+  return pairs < kEnough ? 0.0 : std::sqrt(std::max(0.0, sum / static_cast<double>(pairs)));
+}
+
+constexpr double kLargeJitter = 0.001;  // s; a turn of 60 degrees/s is a milliradian in 1 ms, half a pixel
+
 constexpr double kLate = 1.0;  // seconds by which a stream may begin later, or end earlier, than the others
 
 /// Streams that end before the others, begin after them, or have other clocks: each by itself looks well.
@@ -175,6 +192,10 @@ Findings checkRates(const Recording& r) {
     } else {
       out.push_back({Severity::kGood, w.role, words("%.1f Hz", rate), ""});
     }
+    const double jitter = stampJitter(stamps, period);
+    if (w.role == "colour image" && jitter > kLargeJitter)
+      out.push_back({Severity::kWarning, w.role, words("stamps jitter by %.1f ms", 1e3 * jitter),
+                     "stamped on arrival? let the driver take the device's own time; poses lose accuracy in turns"});
     const double share = double(lost) / (stamps.size() + lost);
     if (share > 0.005 && lost > 1)
       out.push_back({share > 0.1 ? Severity::kError : Severity::kWarning, w.role,

@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include <yaml-cpp/yaml.h>
 
@@ -115,6 +116,14 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
                   " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
                   "signs and units, T_imu_cam and the stamps right? check_bag tells");
+  constexpr double kLargeJitter = 0.001;
+  if (c.stamp_sigma > kLargeJitter) {
+    char words[120];
+    std::snprintf(words, sizeof words,
+                  "stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
+                  1e3 * c.stamp_sigma);
+    all.push_back(words);
+  }
   // A mounting that was learnt against a wrong IMU means nothing.
   if (10 * c.imu_contradicted < c.images) {
     for (const std::string& difference :
@@ -180,6 +189,7 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   put("tracked_images", pipeline.odometry().size());
   put("distance", lengthOf(pipeline.odometry()));
   put("epochs", pipeline.frontEnd().counters().restarts + 1);
+  put("stamp_jitter", pipeline.frontEnd().counters().stamp_sigma);
   emitMap(yaml, map, planes,
           pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());

@@ -58,6 +58,7 @@ struct FrontEndCounters {
   std::uint64_t landmarks_reacquired = 0;
   double sigma_px = 0;         ///< adapted pixel noise
   double imu_noise_scale = 1;  ///< factor on the IMU's noise, see ImuNoiseMonitor
+  double stamp_sigma = 0;      ///< by which images are taken earlier or later than their stamps say, as learnt, s
   double nis_per_dof = 0;      ///< of the last update; about 1 when consistent
 };
 

@@ -78,6 +78,7 @@ class VioFilter {
   RelativeMotion motionSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }
+  double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s
   /// What is to be added to depth readings for others, m: the offset once it is beyond doubt and large enough to
   /// matter, else 0. The estimate itself wanders by a millimetre before it is known, which a map of exact depth would
   /// keep.
