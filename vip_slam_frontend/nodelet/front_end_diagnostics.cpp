@@ -32,7 +32,9 @@ void FrontEndNodelet::tick() {
   }
   const double now = ros::Time::now().toSec();
   TrackingStatus waiting{TrackingState::kWaiting, ""};
-  if (started) {
+  if (paused_) {
+    waiting.reason = "paused; the service pause (false) goes on";
+  } else if (started) {
     waiting.reason = color_monitor_->silence(now);
   } else {
     waiting.reason = color_monitor_->complaint(now);

@@ -105,7 +105,6 @@ class FrontEndNodelet : public nodelet::Nodelet {
   double posed_imu_t_ = -1e300;               ///< of the newest image with a pose
   double predicted_imu_t_ = -1e300;           ///< of the newest prediction between images
   Matrix15d covariance_ = Matrix15d::Zero();  ///< of the newest image; predictions between images carry it
-  bool paused_ = false;
   double last_feature_image_ = -1e300;
 
   // What the thread tells the diagnostics.
@@ -126,6 +125,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   Shown shown_;
   std::deque<PairerCounters> lately_paired_;  ///< as it was reported in the last seconds; of the diagnostics' thread
 
+  std::atomic<bool> paused_{false};
   std::atomic<bool> publish_tf_{true}, imu_rate_odometry_{false};
   std::atomic<double> feature_image_rate_{15.0};
 

@@ -105,7 +105,15 @@ class BadInputTest(unittest.TestCase):
         self.assertIn('max_featurez', done.stdout)
         rospy.delete_param('/vip_slam')  # the server would hand it to the next launch as well
 
-    def test_04_run_bag_names_what_is_missing(self):
+    def test_04_a_map_that_is_not_there_ends_the_launch(self):
+        sensor = os.path.join(self.data, 'smoke_sensor.yaml')
+        done = subprocess.run(['roslaunch', 'vip_slam_bringup', 'vip_slam.launch', 'sensor:=' + sensor,
+                               'map:=/nowhere/map.vsm'], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                              timeout=60)
+        self.assertIn('/nowhere/map.vsm', done.stdout)
+        rospy.delete_param('/vip_slam')
+
+    def test_05_run_bag_names_what_is_missing(self):
         bag, sensor = os.path.join(self.data, 'smoke.bag'), os.path.join(self.data, 'smoke_sensor.yaml')
         code, words = self.run_bag(bag, 'kinect_9000')
         self.assertNotEqual(code, 0)
@@ -136,7 +144,7 @@ class BadInputTest(unittest.TestCase):
         self.assertNotEqual(code, 0)
         self.assertIn('max_featurez', words)
 
-    def test_05_a_camera_that_stops_is_named(self):
+    def test_06_a_camera_that_stops_is_named(self):
         changed = os.path.join(self.folder, 'stops.bag')
         copy_bag(os.path.join(self.data, 'smoke.bag'), changed, 9.0,
                  lambda topic, message, number: None if 'image_raw' in topic and number > 60 else message)

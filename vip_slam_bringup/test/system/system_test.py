@@ -6,6 +6,7 @@ import sys
 import tempfile
 import unittest
 
+import dynamic_reconfigure.client
 import numpy as np
 import rosgraph
 import rosservice
@@ -125,6 +126,8 @@ class SystemTest(unittest.TestCase):
     def test_08_pause_and_resume(self):
         self.assertTrue(self.call('pause', Pause, True)[0])
         self.frames.wait_for_silence(1.0, 10, 'silence after pausing')
+        wait_for(lambda: self.status.last().reason.startswith('paused'), 10, 'a status that says so')
+        self.assertEqual(self.status.last().state, TrackingStatus.WAITING)
         self.assertTrue(self.call('pause', Pause, False)[0])
         self.frames.wait(10, 10, 'images after resuming')
 
@@ -159,9 +162,15 @@ class SystemTest(unittest.TestCase):
         self.assertFalse(self.call('save_map', SaveMap, '/nowhere/at/all/map.vsm')[0])
 
     def test_11_localisation_mode(self):
+        reconfigure = dynamic_reconfigure.client.Client(NS + 'backend', timeout=10)
         for on in (True, False):
             ok, words = self.call('set_localisation_mode', SetLocalisationMode, on)
             self.assertTrue(ok, words)
+            # A change of something else does not bring the mode back that was set there last.
+            changed = reconfigure.update_configuration({'display_rate': 3.0 if on else 2.0})
+            self.assertEqual(changed['localisation_mode'], on)
+            ok, words = self.call('trigger_global_ba', TriggerGlobalBa)
+            self.assertEqual(ok, not on, words)
         self.frames.wait(10, 10, 'images afterwards')
 
     def test_12_services_by_the_names_of_rtabmap(self):
