@@ -56,6 +56,7 @@ class PlaneMapper::Impl {
   /// Those that keyframes and frames of an epoch may meet.
   std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C, EpochKey epoch);
   const CameraPoses& posesTiedTo(EpochKey epoch);
+  void removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C, EpochKey epoch);
   /// Returns the strips that detection left.
   std::vector<DetectedPlane> startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
                                          const std::vector<MapTriangle>& triangles, std::vector<int>* label,

@@ -4,6 +4,7 @@
 
 #include "plane_mapper_impl.h"
 #include "vip_slam_planes/detection/plane_detector.h"
+#include "vip_slam_planes/growth/contradiction.h"
 #include "vip_slam_planes/growth/other_layers.h"
 #include "vip_slam_planes/growth/see_through.h"
 #include "vip_slam_planes/growth/triangle_association.h"
@@ -17,6 +18,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const DepthGrid& grid = keyframe.frame.depth_grid;
   const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2));
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
+  if (first_time) removeContradicted(triangles, T_map_C, keyframe.frame.epoch);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, keyframe.frame.epoch);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
   releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
@@ -25,7 +27,10 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     seen_again.clear();
     for (std::size_t i = 0; i < triangles.size(); ++i) {
-      if (label[i] == static_cast<int>(k)) tracks[k]->cover(triangles[i], keyframe.id, T_map_C, &seen_again);
+      if (label[i] != static_cast<int>(k)) continue;
+      // What noise let in covers, but does not vouch for it: a nearer view must be able to take it away at once.
+      const bool sure = distanceGate(triangles[i], options.growth.distance) <= options.growth.distance;
+      tracks[k]->cover(triangles[i], keyframe.id, T_map_C, sure ? &seen_again : nullptr);
     }
     if (!first_time) continue;
     for (const CellIndex& c : seen_again) tracks[k]->hit(c);
@@ -54,6 +59,16 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
       if (!track->confirmed && showsIn(*track, *camera, noise, T_map_C)) ++track->keyframes_waited;
     }
   }
+}
+
+// Before its triangles are asked for: they go to the planes that are there, or start what is there.
+void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C,
+                                           EpochKey epoch) {
+  std::vector<PlaneId> contradicted;
+  for (const PlaneTrack* track : tracksInView(T_map_C, epoch)) {
+    if (isContradicted(triangles, *track, options.detection, options.growth)) contradicted.push_back(track->id());
+  }
+  for (PlaneId id : contradicted) removePlane(id);
 }
 
 std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C,

@@ -61,6 +61,24 @@ TEST_F(Growth, OfTwoPlanesTheNearerOneTakesIt) {
   EXPECT_EQ(1, label(triangle({2.95, 0, 0}, 0), {&at_three, &door}));
 }
 
+// A strip of wall 8 cm behind another plane. Noise puts its triangles before the wall, a third of them nearer to the
+// other plane.
+TEST_F(Growth, ThePatchTellsWhatItsTrianglesDoNot) {
+  const PlaneTrack door = wall(2.92, 2);
+  const double off[3] = {-0.055, -0.015, -0.01};
+  std::vector<MapTriangle> strip;
+  for (int i = 0; i < 12; ++i) {
+    strip.push_back(triangle({3.0 + off[i % 3], 0.1 * i - 0.6, 0}, 0, 0.04));
+    strip.back().neighbour = {i - 1, i + 1 < 12 ? i + 1 : -1, -1};
+  }
+  EXPECT_EQ(1, label(strip[0], {&at_three, &door})) << "by itself";
+  for (int l : associateTriangles(strip, {&at_three, &door}, PlaneGrowthOptions())) EXPECT_EQ(0, l);
+  for (int l : associateTriangles(strip, {&door, &at_three}, PlaneGrowthOptions())) EXPECT_EQ(1, l);
+  for (MapTriangle& t : strip) t.sigma = 0.01;  // not noise: a step that the mesh did not notice
+  EXPECT_EQ(1, associateTriangles(strip, {&at_three, &door}, PlaneGrowthOptions())[0]);
+  EXPECT_EQ(0, associateTriangles(strip, {&at_three, &door}, PlaneGrowthOptions())[1]);
+}
+
 TEST_F(Growth, ASurfaceReachesNoFurtherThanItsGap) {
   EXPECT_EQ(0, label(triangle({3, 1.25, 0}, 0), {&at_three}));
   EXPECT_EQ(-1, label(triangle({3, 1.45, 0}, 0), {&at_three}));

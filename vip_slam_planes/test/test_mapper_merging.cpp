@@ -24,6 +24,43 @@ TEST(Mapper, DoorBeforeTheWallStaysTwoWhateverTheView) {
   EXPECT_NEAR(2.1, rig.find(Plane({-1, 0, 0}, 2.88))->area, 0.35);
 }
 
+// From almost six metres depth scatters by as much as the door stands before its wall, and one plane begins that leans
+// across both.
+TEST(Mapper, ADoorThatNoiseMadeOneWithItsWallIsOfItsOwnFromNear) {
+  DepthNoise noise = testing::quietNoise();
+  noise.a = 0.001, noise.b = 0, noise.c = 0.0035, noise.max_range = 6;
+  Scene scene;
+  scene.add({3, -2, 0}, {0, 5.95, 0}, {0, 0, 3});
+  scene.add({2.88, 0, 0}, {0, 0.95, 0}, {0, 0, 2.1});
+  for (int walk = 0; walk < 3; ++walk) {
+    Rig rig(noise);
+    const double y = -1.6 + 0.4 * walk;
+    for (int i = 0; i <= 8; ++i) rig.look(scene, {-2.75 + 0.35 * i, y, 1.5}, {3, 0.06 * i, 1.2});
+    ASSERT_EQ(2u, rig.mapper.planes().size()) << walk;
+    const PlaneEstimate* door = rig.find(Plane({-1, 0, 0}, 2.88), 0.01);
+    ASSERT_TRUE(door) << walk;
+    EXPECT_LT(door->area, 2.4) << walk;
+    EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 3.0), 0.006)) << walk;
+  }
+}
+
+TEST(Mapper, WhatNoiseLetInIsTakenAwayByOneNearView) {
+  DepthNoise noise = testing::quietNoise();
+  noise.a = 0.001, noise.b = 0, noise.c = 0.0035, noise.max_range = 6;
+  Rig rig(noise);
+  Scene afar, near;
+  afar.add({3, -1.5, 0}, {0, 3, 0}, {0, 0, 2.5});
+  near.add({3, -1.5, 0}, {0, 1.0, 0}, {0, 0, 2.5});
+  near.add({3, 0.5, 0}, {0, 1.0, 0}, {0, 0, 2.5});
+  near.add({3.5, -0.8, 0}, {0, 1.6, 0}, {0, 0, 2.5});  // a niche that did not show
+  for (int i = 0; i < 6; ++i) rig.look(afar, {-2.2, -0.5 + 0.2 * i, 1.3}, {3, 0, 1.25});
+  const Plane wall({-1, 0, 0}, 3);
+  ASSERT_TRUE(rig.find(wall, 0.03));
+  EXPECT_GT(rig.find(wall, 0.03)->area, 6.5);
+  rig.look(near, {0.6, 0, 1.3}, {3, 0, 1.25});
+  EXPECT_LT(rig.find(wall, 0.03)->area, 6.0);
+}
+
 // From afar noise hides the step; a wall that took the board then lets it go.
 TEST(Mapper, ABoardOnTheWallIsASurfaceOfItsOwnWhereItShows) {
   for (const double step : {0.0, 0.045}) {

@@ -9,23 +9,72 @@ namespace {
 
 constexpr double kWidestAngle = 25.0 * kDegree;
 constexpr int kNone = -1;
+constexpr double kToldApart = 2.0;    // sigmas of a triangle's distance by which one plane must be nearer than another
+constexpr double kLeastSigma = 1e-3;  // m
+constexpr double kWorstSquare = 9.0;  // what lies further off speaks against neither plane the more
+
+/// A triangle between two planes that its noise does not tell apart.
+struct Doubt {
+  int track[2] = {kNone, kNone};  ///< in ascending order; none: no doubt
+  double squares[2] = {0, 0};     ///< of its distance to each, in sigmas
+};
+
+// From afar half of the triangles of a wall lie nearer to whatever runs a few centimetres before it, a door or a plane
+// that noise has tilted, and would go on growing and tilting it. All of a connected patch in doubt tell better.
+void settleDoubts(const std::vector<MapTriangle>& triangles, const std::vector<Doubt>& doubts,
+                  std::vector<int>* label) {
+  std::vector<char> visited(triangles.size(), 0);
+  std::vector<int> patch;
+  for (std::size_t seed = 0; seed < triangles.size(); ++seed) {
+    if (doubts[seed].track[0] == kNone || visited[seed]) continue;
+    const Doubt& first = doubts[seed];
+    double sum[2] = {0, 0};
+    patch.assign(1, static_cast<int>(seed));
+    visited[seed] = 1;
+    for (std::size_t i = 0; i < patch.size(); ++i) {
+      for (int k = 0; k < 2; ++k) sum[k] += std::min(doubts[patch[i]].squares[k], kWorstSquare);
+      for (int g : triangles[patch[i]].neighbour) {
+        if (g < 0 || visited[g] || doubts[g].track[0] != first.track[0] || doubts[g].track[1] != first.track[1]) {
+          continue;
+        }
+        visited[g] = 1;
+        patch.push_back(g);
+      }
+    }
+    for (int i : patch) (*label)[i] = first.track[sum[1] < sum[0]];
+  }
+}
 
 // The nearest admissible plane of each open triangle, but for the one that let it go.
 void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
                    const std::vector<int>& refused, const PlaneGrowthOptions& options, std::vector<int>* label) {
   const AngleGate gate(options.angle_deg);
+  std::vector<Doubt> doubts(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     if ((*label)[i] != kNone) continue;
     const MapTriangle& t = triangles[i];
-    const double min_cos = gate.cosine(t);
-    double best = distanceGate(t, options.distance);
+    const double min_cos = gate.cosine(t), reach = distanceGate(t, options.distance);
+    double best = reach, next_best = reach;
+    int second = kNone;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
       if (refused[i] == static_cast<int>(k)) continue;
       const Plane& plane = tracks[k]->plane();
       const double distance = std::abs(plane.signedDistance(t.centre));
-      if (distance < best && plane.n.dot(t.n) > min_cos) best = distance, (*label)[i] = static_cast<int>(k);
+      if (distance >= next_best || plane.n.dot(t.n) <= min_cos) continue;
+      if (distance < best) {
+        next_best = best, second = (*label)[i];
+        best = distance, (*label)[i] = static_cast<int>(k);
+      } else {
+        next_best = distance, second = static_cast<int>(k);
+      }
     }
+    if (second == kNone || next_best - best > kToldApart * t.sigma) continue;
+    const bool ascending = (*label)[i] < second;
+    const double sigma = std::max(t.sigma, kLeastSigma);
+    doubts[i].track[!ascending] = (*label)[i], doubts[i].squares[!ascending] = best * best / (sigma * sigma);
+    doubts[i].track[ascending] = second, doubts[i].squares[ascending] = next_best * next_best / (sigma * sigma);
   }
+  settleDoubts(triangles, doubts, label);
 }
 
 // Takes the label from connected patches that come nowhere near the area of their plane, and notes who refused them.

@@ -1,0 +1,54 @@
+#include "vip_slam_planes/growth/contradiction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_planes/detection/plane_fit.h"
+#include "vip_slam_planes/growth/triangle_association.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kLeastTriangles = 10;  // fewer tell no direction
+constexpr double kFacing = 0.7;              // cosine; sides of things that stand on the plane are turned further
+constexpr double kMost = 0.5;                // of the plane's area; a part of a wall may bend, and the wall is one
+constexpr double kSigmas = 3.0;
+
+}  // namespace
+
+bool isContradicted(const std::vector<MapTriangle>& triangles, const PlaneTrack& track,
+                    const PlaneDetectionOptions& detection, const PlaneGrowthOptions& growth) {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<double> weights, sigmas;
+  double area = 0;
+  for (const MapTriangle& t : triangles) {
+    if (std::abs(track.plane().signedDistance(t.centre)) > distanceGate(t, growth.distance)) continue;
+    if (track.plane().n.dot(t.n) < kFacing || !track.cells().at(track.cellAt(track.toPlane(t.centre)))) continue;
+    const double sigma = t.sigma + 0.005;
+    points.push_back(t.centre - triangles.front().centre);
+    weights.push_back(t.area / (sigma * sigma));
+    sigmas.push_back(t.sigma);
+    area += t.area;
+  }
+  if (points.size() < kLeastTriangles || area < kMost * track.area()) return false;
+  std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
+  const double sigma = sigmas[sigmas.size() / 2];
+  Plane shown;
+  double rms = 0;
+  if (!fitPlaneRobust(points, weights, sigma + 0.002, PlaneKind::kGeneral, track.plane().n, &shown, &rms)) return false;
+  PlaneMoments moments;
+  for (const Eigen::Vector3d& p : points) moments.add(p, 1.0);
+  const Eigen::Vector3d mean = moments.centroid();
+  const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
+  const double spread =
+      std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
+  // Neighbouring triangles share vertices: a quarter of them is independent.
+  const double uncertainty = std::max(sigma, rms) / (spread * std::sqrt(double(points.size()) / 4.0));
+  const double turned = std::acos(std::min(1.0, shown.n.dot(track.plane().n)));
+  return turned > detection.max_tilt_deg * kDegree + kSigmas * uncertainty;
+}
+
+}  // namespace vip_slam
