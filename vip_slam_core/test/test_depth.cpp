@@ -7,6 +7,7 @@
 #include <random>
 
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/depth/grid_spacing.h"
 
 namespace vip_slam {
 namespace {
@@ -196,6 +197,16 @@ TEST(DepthGridTest, AgreesWithTheLookUp) {
   }
   EXPECT_TRUE(makeDepthGrid(cv::Mat(), 8, noise).empty());
   EXPECT_THROW(makeDepthGrid(depth, 0, noise), std::invalid_argument);
+}
+
+TEST(DepthGridTest, SmallImagesAreLookedUpAsOftenAsLargeOnes) {
+  EXPECT_EQ(8, strideOn(640, 480, 8));
+  EXPECT_EQ(8, strideOn(480, 640, 8)) << "on its side";
+  EXPECT_EQ(8, strideOn(1280, 720, 8));
+  EXPECT_EQ(4, strideOn(320, 240, 8));
+  EXPECT_EQ(5, strideOn(424, 240, 8));
+  EXPECT_EQ(1, strideOn(64, 48, 8));
+  EXPECT_DOUBLE_EQ(10.6, spacingOn(424, 240, 16));
 }
 
 TEST(DepthGridTest, KeepsSurfacesAtAGrazingAngleButNoEdges) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "front_end_impl.h"
+#include "vip_slam_core/depth/grid_spacing.h"
 
 namespace vip_slam {
 
@@ -68,7 +69,8 @@ void FrontEnd::Impl::correctDepth(std::vector<Feature>* features) const {
 }
 
 DepthGrid FrontEnd::Impl::depthGrid(int stride) const {
-  DepthGrid grid = makeDepthGrid(tracker_.depth(), stride, sensor_.depth_noise);
+  const int on_image = strideOn(camera_->width(), camera_->height(), stride);
+  DepthGrid grid = makeDepthGrid(tracker_.depth(), on_image, sensor_.depth_noise);
   for (int v = 0; v < grid.rows && moving_.any(); ++v) {
     for (int u = 0; u < grid.cols; ++u) {
       float& z = grid.z[static_cast<std::size_t>(v) * grid.cols + u];

@@ -8,6 +8,7 @@
 #include "vip_slam_frontend/filter/triangulation.h"
 
 #include "front_end_impl.h"
+#include "vip_slam_core/depth/grid_spacing.h"
 
 namespace vip_slam {
 
@@ -90,8 +91,9 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   const cv::Mat depth = depthAtStamp(depth_read, turning);
   tracker_.track(gray, depth, {rotation, 0, 0}, false, SE3(), colourRows(turning), t);
   tracker_.replenish(SE3(), true, t);
-  std::optional<FilterPrior> prior = initialiser_.add(
-      {t_imu, measurements(), makeDepthGrid(depth, options_.frame_grid_stride, sensor_.depth_noise)}, imu_);
+  const int stride = strideOn(camera_->width(), camera_->height(), options_.frame_grid_stride);
+  std::optional<FilterPrior> prior =
+      initialiser_.add({t_imu, measurements(), makeDepthGrid(depth, stride, sensor_.depth_noise)}, imu_);
   if (!prior) {
     const std::string why = status_.state == TrackingState::kInitialising && !status_.reason.empty() && first
                                 ? status_.reason + "; " + initialiser_.reason()

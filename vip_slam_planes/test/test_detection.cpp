@@ -226,6 +226,25 @@ TEST(Detection, MeshDropsTrianglesAcrossDepthEdges) {
   for (const MapTriangle& t : triangles) EXPECT_GT(-t.n.x(), 0.98);
 }
 
+TEST(Detection, ASmallImageMakesAsFineAMesh) {
+  Scene scene;
+  scene.add({4, -4, -2}, {0, 8, 0}, {0, 0, 6});
+  const SE3 view = lookAt({0, 0, 1}, {4, 0, 1});
+  std::size_t triangles[2];
+  for (const int half : {0, 1}) {
+    SceneCamera camera;
+    CameraIntrinsics k;
+    k.width = 640 >> half, k.height = 480 >> half, k.fx = k.fy = 525 >> half;
+    k.cx = 0.5 * (k.width - 1), k.cy = 0.5 * (k.height - 1);
+    camera.camera = makeCamera(k);
+    DepthMeshBuilder builder({}, camera.camera, camera.noise);
+    const TrackedFrame frame = camera.frame(scene, view, 0, 8 >> half);
+    triangles[half] = builder.build({}, frame.depth_grid, view.R().row(2)).triangles.size();
+  }
+  EXPECT_GT(triangles[0], 1000u);
+  EXPECT_NEAR(double(triangles[0]), double(triangles[1]), 0.1 * double(triangles[0]));
+}
+
 TEST(Detection, HistogramKeepsSidesApartAndForgets) {
   PlaneHistogram histogram(0.05, 0.05, 3);
   histogram.addHorizontal({0, 0, 1}, {0, 0, 1.02}, 1.0, 0);

@@ -47,8 +47,10 @@ struct FrontEndOptions {
     v.group("keyframes", keyframes);
     v.group("recovery", recovery);
     v.field("use_map_landmarks", use_map_landmarks, "re-acquire the back end's landmarks so that they keep their id");
-    v.field("frame_grid_stride", frame_grid_stride, 4, 64, "stride of the depth grid of every image, px");
-    v.field("keyframe_grid_stride", keyframe_grid_stride, 2, 64, "stride of the depth grid of a keyframe, px");
+    v.field("frame_grid_stride", frame_grid_stride, 4, 64,
+            "stride of the depth grid of every image, px of 640; finer in smaller images");
+    v.field("keyframe_grid_stride", keyframe_grid_stride, 2, 64,
+            "stride of the depth grid of a keyframe, px of 640; finer in smaller images");
   }
 };
 

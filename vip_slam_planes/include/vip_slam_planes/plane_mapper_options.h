@@ -14,7 +14,8 @@ struct PlaneMeshOptions {
   double gap_sigmas = 5.0;
 
   void visit(OptionVisitor& v) {
-    v.field("spacing", spacing, 4.0, 64.0, "distance of the mesh's depth-grid nodes where features are sparse, px");
+    v.field("spacing", spacing, 4.0, 64.0,
+            "distance of the mesh's depth-grid nodes where features are sparse, px of 640; finer in smaller images");
     v.field("min_altitude_ratio", min_altitude_ratio, 0.01, 0.5,
             "triangles with a smaller altitude over longest side (3D) are dropped");
     v.field("max_incidence_deg", max_incidence_deg, 30.0, 89.0,

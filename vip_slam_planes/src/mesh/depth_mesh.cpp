@@ -6,6 +6,8 @@
 
 #include <Eigen/Geometry>
 
+#include "vip_slam_core/depth/grid_spacing.h"
+
 namespace vip_slam {
 namespace {
 
@@ -50,19 +52,21 @@ DepthMeshBuilder::DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_
       least_level_facing_(std::cos(float(options.max_level_incidence_deg * M_PI / 180.0))),
       rays_(camera) {}
 
+double DepthMeshBuilder::spacing() const { return spacingOn(camera_->width(), camera_->height(), options_.spacing); }
+
 int DepthMeshBuilder::gridStep(const DepthGrid& grid) const {
-  return std::max(1, static_cast<int>(std::lround(options_.spacing / std::max(1, grid.stride))));
+  return std::max(1, static_cast<int>(std::lround(spacing() / std::max(1, grid.stride))));
 }
 
 void DepthMeshBuilder::collectVertices(const std::vector<Feature>& features, const DepthGrid& grid) {
   mesh_.vertices.clear();
-  const float spacing = float(options_.spacing);
-  const int bucket_cols = static_cast<int>(float(camera_->width()) / spacing) + 1;
-  const int bucket_rows = static_cast<int>(float(camera_->height()) / spacing) + 1;
+  const float side = float(spacing());
+  const int bucket_cols = static_cast<int>(float(camera_->width()) / side) + 1;
+  const int bucket_rows = static_cast<int>(float(camera_->height()) / side) + 1;
   taken_.assign(static_cast<std::size_t>(bucket_cols) * bucket_rows, 0);
   const auto bucket = [&](float u, float v) -> char& {
-    const int c = std::clamp(static_cast<int>(u / spacing), 0, bucket_cols - 1);
-    const int r = std::clamp(static_cast<int>(v / spacing), 0, bucket_rows - 1);
+    const int c = std::clamp(static_cast<int>(u / side), 0, bucket_cols - 1);
+    const int r = std::clamp(static_cast<int>(v / side), 0, bucket_rows - 1);
     return taken_[static_cast<std::size_t>(r) * bucket_cols + c];
   };
   // One feature per bucket: corners cluster, and triangles of a few pixels have no usable normal.

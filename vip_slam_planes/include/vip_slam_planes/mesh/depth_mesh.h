@@ -71,6 +71,7 @@ class DepthMeshBuilder {
   bool crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const;
   bool brokenBetween(const MeshVertex& a, const MeshVertex& b, const DepthGrid& grid) const;
   void smoothNormals();
+  double spacing() const;  ///< of the nodes, px of this camera
   int gridStep(const DepthGrid& grid) const;
 
   PlaneMeshOptions options_;
