@@ -167,6 +167,15 @@ TEST(DepthToMetres, TypesAndInvalidValues) {
   EXPECT_EQ(metres.at<float>(1), 0);
   EXPECT_EQ(metres.at<float>(2), 0);
   EXPECT_EQ(metres.at<float>(3), 2.5f);
+  // What is known to be added to every reading makes none of what is none.
+  metres = depthToMetres(floats, 0.001, -0.01);
+  EXPECT_EQ(metres.at<float>(1), 0);
+  EXPECT_FLOAT_EQ(metres.at<float>(3), 2.49f);
+  millimetres.at<std::uint16_t>(0, 1) = 5;
+  metres = depthToMetres(millimetres, 0.001, -0.01);
+  EXPECT_FLOAT_EQ(metres.at<float>(1, 1), 1.49f);
+  EXPECT_EQ(metres.at<float>(0, 0), 0.0f);
+  EXPECT_EQ(metres.at<float>(0, 1), 0.0f);
   try {
     depthToMetres(cv::Mat(2, 2, CV_8UC3), 1);
     FAIL();

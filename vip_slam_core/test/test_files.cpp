@@ -170,6 +170,7 @@ SensorConfig sensor() {
   c.color_encoding = "bgr8";
   c.depth_encoding = "32FC1";
   c.depth_scale = 0.0002;
+  c.depth_offset = -0.012;
   c.depth_registered = false;
   c.color_rate = 25, c.depth_rate = 15, c.imu_rate = 250;
   c.intrinsics_from_camera_info = false;
@@ -202,6 +203,7 @@ TEST_F(FileFormats, SensorRoundTrip) {
   EXPECT_EQ(b.color_encoding, a.color_encoding);
   EXPECT_EQ(b.depth_encoding, a.depth_encoding);
   EXPECT_EQ(b.depth_scale, a.depth_scale);
+  EXPECT_EQ(b.depth_offset, a.depth_offset);
   EXPECT_FALSE(b.depth_registered);
   EXPECT_EQ(b.color_rate, 25);
   EXPECT_EQ(b.depth_rate, 15);

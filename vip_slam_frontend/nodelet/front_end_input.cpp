@@ -29,14 +29,14 @@ void FrontEndNodelet::subscribe() {
       [this](const sensor_msgs::ImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m); }); },
       [this](const sensor_msgs::CompressedImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m); }); });
   if (!topics.depth.empty()) {
-    const double scale = sensor_.depth_scale;
+    const double scale = sensor_.depth_scale, offset = sensor_.depth_offset;
     subscribeImage(
         topics.depth, sensor_.depth_encoding,
-        [this, scale](const sensor_msgs::ImageConstPtr& m) {
-          onDepth(m->header.stamp.toSec(), [m, scale] { return decodeDepth(*m, scale); });
+        [this, scale, offset](const sensor_msgs::ImageConstPtr& m) {
+          onDepth(m->header.stamp.toSec(), [m, scale, offset] { return decodeDepth(*m, scale, offset); });
         },
-        [this, scale](const sensor_msgs::CompressedImageConstPtr& m) {
-          onDepth(m->header.stamp.toSec(), [m, scale] { return decodeDepth(*m, scale); });
+        [this, scale, offset](const sensor_msgs::CompressedImageConstPtr& m) {
+          onDepth(m->header.stamp.toSec(), [m, scale, offset] { return decodeDepth(*m, scale, offset); });
         });
   }
   // One queue in order for what is small and frequent; images are decoded beside it.

@@ -34,8 +34,8 @@ class FrontEnd::Impl {
   void applyMapUpdate(const MapUpdate& update);
   std::optional<NavState> predict(double t) const;
   Eigen::Vector3d gyro(double t) const;
-  MountingEstimate mounting() const { return filter_.mounting(); }
-  MountingEstimate givenMounting() const { return {sensor_.T_imu_cam, sensor_.time_offset}; }
+  MountingEstimate mounting() const;
+  MountingEstimate givenMounting() const;
   double timeOffset() const {
     return filter_.started() ? filter_.window().time_offset : filter_.mounting().time_offset;
   }

@@ -7,6 +7,18 @@
 
 namespace vip_slam {
 
+MountingEstimate FrontEnd::Impl::mounting() const {
+  MountingEstimate mounting = filter_.mounting();
+  mounting.depth_offset += sensor_.depth_offset;  // which the readings have by the time they get here
+  return mounting;
+}
+
+MountingEstimate FrontEnd::Impl::givenMounting() const {
+  MountingEstimate given{sensor_.T_imu_cam, sensor_.time_offset};
+  given.depth_offset = sensor_.depth_offset;
+  return given;
+}
+
 std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_features) const {
   auto frame = std::make_shared<TrackedFrame>();
   frame->t = t;

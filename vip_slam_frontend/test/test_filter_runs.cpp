@@ -319,6 +319,12 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   EXPECT_NE(all[1].find("20.0 mm"), std::string::npos) << all[1];
   EXPECT_NE(all[2].find("4.0 ms"), std::string::npos) << all[2];
   EXPECT_NE(all[3].find("9.8 mm too long"), std::string::npos) << all[3];
+  EXPECT_NE(all[3].find("depth/offset in the sensor's configuration should be -0.0098"), std::string::npos) << all[3];
+  given.depth_offset = -0.005;  // and is too long by what is left
+  found.depth_offset = -0.012;
+  const std::string more = mountingDifferences(given, found).back();
+  EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
+  EXPECT_NE(more.find("-0.0120"), std::string::npos) << more;
   found.sigma_rotation.setConstant(0.01);  // not sure
   found.sigma_translation.setConstant(0.01);
   found.sigma_time_offset = 0.002;

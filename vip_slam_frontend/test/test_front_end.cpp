@@ -98,6 +98,27 @@ TEST_F(FrontEndTest, DepthIsHandedOnAsWhatItMeans) {
   EXPECT_NEAR(output.frame->depth_grid.at(10, 10), z, 5e-4);
 }
 
+// Readings have what the sensor's configuration adds by the time they get here; what is found comes on top.
+TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
+  SensorConfig known = sensor();
+  known.depth_offset = -0.03;
+  FrontEnd front_end(options(), known);
+  EXPECT_EQ(front_end.givenMounting().depth_offset, -0.03);
+  EXPECT_TRUE(mountingDifferences(front_end.givenMounting(), front_end.mounting()).empty());
+  double imu_t = 0;
+  for (int k = 0; k < 120; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t < t + 0.05; imu_t += 0.005) {
+      front_end.addImu(World::imu(imu_t));
+      front_end_.addImu(World::imu(imu_t));
+    }
+    front_end.process({t, world_.image(t), World::depth(t) + 0.015});
+    front_end_.process({t, world_.image(t), World::depth(t) + 0.015});
+  }
+  EXPECT_LT(front_end_.mounting().depth_offset, -0.001);
+  EXPECT_NEAR(front_end.mounting().depth_offset, front_end_.mounting().depth_offset - 0.03, 1e-9);
+}
+
 TEST_F(FrontEndTest, TwoRunsAgreeBitByBit) {
   const FrameOutput a = run(0.0, 3.0);
   FrontEnd other(options(), sensor());

@@ -57,14 +57,14 @@ std::string describe(const sensor_msgs::CompressedImage& image) {
 }
 
 /// compressedDepth stores 32FC1 as v = a / z + b; 0 stands for invalid.
-cv::Mat inverseDepth(const cv::Mat& values, float a, float b) {
+cv::Mat inverseDepth(const cv::Mat& values, float a, float b, double offset) {
   cv::Mat depth(values.size(), CV_32FC1);
   for (int r = 0; r < values.rows; ++r) {
     const auto* v = values.ptr<std::uint16_t>(r);
     auto* z = depth.ptr<float>(r);
     for (int c = 0; c < values.cols; ++c) z[c] = v[c] == 0 ? 0.f : a / (float(v[c]) - b);
   }
-  return depthToMetres(depth, 1.0);
+  return depthToMetres(depth, 1.0, offset);
 }
 
 }  // namespace
@@ -100,34 +100,34 @@ cv::Mat decodeGray(const sensor_msgs::CompressedImage& image) {
   return gray;
 }
 
-cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale) {
+cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset) {
   const std::string& e = image.encoding;
-  if (e == encodings::TYPE_16UC1 || e == encodings::MONO16) return depthToMetres(view16(image), scale);
+  if (e == encodings::TYPE_16UC1 || e == encodings::MONO16) return depthToMetres(view16(image), scale, offset);
   if (e == encodings::TYPE_32FC1) {
     if (image.is_bigendian) throw std::invalid_argument("32FC1 depth in big-endian order, expected little-endian");
-    return depthToMetres(view(image, CV_32FC1), 1.0);
+    return depthToMetres(view(image, CV_32FC1), 1.0, offset);
   }
   throw std::invalid_argument("depth encoding '" + e + "', expected 16UC1 or 32FC1");
 }
 
-cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale) {
+cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, double offset) {
   constexpr std::size_t kHeader = 12;  // int32 kind, float a, float b: compressed_depth_image_transport
-  const std::size_t offset = isPng(image.data, 0) ? 0 : kHeader;
-  if (!isPng(image.data, offset)) {
+  const std::size_t begin = isPng(image.data, 0) ? 0 : kHeader;
+  if (!isPng(image.data, begin)) {
     throw std::invalid_argument(describe(image) + ": no PNG in it, expected a 16-bit PNG or compressedDepth with PNG");
   }
-  const cv::Mat encoded(1, int(image.data.size() - offset), CV_8UC1,
-                        const_cast<std::uint8_t*>(image.data.data()) + offset);
+  const cv::Mat encoded(1, int(image.data.size() - begin), CV_8UC1,
+                        const_cast<std::uint8_t*>(image.data.data()) + begin);
   const cv::Mat values = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
   if (values.empty() || values.type() != CV_16UC1) {
     throw std::invalid_argument(describe(image) + ": " + (values.empty() ? "a damaged PNG" : "not one 16-bit channel") +
                                 ", expected a 16-bit PNG");
   }
-  const bool quantised = offset != 0 && image.format.find(encodings::TYPE_32FC1) != std::string::npos;
-  if (!quantised) return depthToMetres(values, scale);
+  const bool quantised = begin != 0 && image.format.find(encodings::TYPE_32FC1) != std::string::npos;
+  if (!quantised) return depthToMetres(values, scale, offset);
   float parameters[2];
   std::memcpy(parameters, image.data.data() + 4, sizeof parameters);
-  return inverseDepth(values, parameters[0], parameters[1]);
+  return inverseDepth(values, parameters[0], parameters[1], offset);
 }
 
 }  // namespace vip_slam

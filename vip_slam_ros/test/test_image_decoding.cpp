@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_ros/image_decoding.h"
 
 namespace vip_slam {
@@ -121,6 +122,30 @@ TEST(DecodeDepth, RawAndCompressedAgree) {
   headed.data.assign(12, 0);
   headed.data.insert(headed.data.end(), bare.data.begin(), bare.data.end());
   EXPECT_LT(difference(decodeDepth(headed, 0.001), metres), 1e-6);
+}
+
+TEST(DecodeDepth, TheOffsetIsAddedWhateverTheEncoding) {
+  const cv::Mat units = depthUnits();
+  cv::Mat metres;
+  units.convertTo(metres, CV_32FC1, 0.001);
+  const cv::Mat expected = depthToMetres(units, 0.001, -0.02);
+  ASSERT_GT(difference(expected, metres), 0.01);
+  EXPECT_LT(difference(decodeDepth(toImage(units, "16UC1"), 0.001, -0.02), expected), 1e-6);
+  EXPECT_LT(difference(decodeDepth(toImage(metres, "32FC1"), 0.001, -0.02), expected), 1e-6);
+  sensor_msgs::CompressedImage image;
+  image.format = "png";
+  cv::imencode(".png", units, image.data);
+  EXPECT_LT(difference(decodeDepth(image, 0.001, -0.02), expected), 1e-6);
+  // v = a / z, as compressed_depth_image_transport writes 32FC1.
+  const float a = 2000, b = 0;
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", cv::Mat(1, 1, CV_16UC1, cv::Scalar(1000)), png);
+  image.format = "32FC1; compressedDepth png";
+  image.data.assign(12, 0);
+  std::memcpy(&image.data[4], &a, 4);
+  std::memcpy(&image.data[8], &b, 4);
+  image.data.insert(image.data.end(), png.begin(), png.end());
+  EXPECT_NEAR(decodeDepth(image, 0.001, -0.02).at<float>(0, 0), 1.98, 1e-6);
 }
 
 TEST(DecodeDepth, OtherByteOrder) {

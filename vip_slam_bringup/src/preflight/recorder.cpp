@@ -53,7 +53,9 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
   if (first_image_ < 0) first_image_ = arrival;
   if (arrival - first_image_ > image_seconds_) return;
   try {
-    const cv::Mat image = is_color ? decodeGray(message) : decodeDepth(message, recording_.sensor.depth_scale);
+    const SensorConfig& sensor = recording_.sensor;
+    const cv::Mat image =
+        is_color ? decodeGray(message) : decodeDepth(message, sensor.depth_scale, sensor.depth_offset);
     stream.sizes.emplace(image.cols, image.rows);
     if (is_color)
       addGray(t, image);

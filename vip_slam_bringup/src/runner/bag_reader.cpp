@@ -236,8 +236,8 @@ void BagReader::read() {
       });
     } else if (topic == topics.depth) {
       decode(message, [&] {
-        auto [t, depth, stamp] =
-            stampedImage(message, [&](const auto& m) { return decodeDepth(m, sensor_.depth_scale); });
+        auto [t, depth, stamp] = stampedImage(
+            message, [&](const auto& m) { return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset); });
         if (source_->registration) depth = (*source_->registration)(depth);
         compareSizes(depth);
         ++depth_images;

@@ -168,6 +168,15 @@ float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, 
   return 2.0f / (*median + *std::max_element(w.z, median));
 }
 
+void addOffset(double offset, cv::Mat* metres) {
+  if (offset == 0) return;
+  const auto added = static_cast<float>(offset);
+  for (int r = 0; r < metres->rows; ++r) {
+    auto* z = metres->ptr<float>(r);
+    for (int c = 0; c < metres->cols; ++c) z[c] = z[c] > 0 ? std::max(0.0f, z[c] + added) : 0.0f;
+  }
+}
+
 void requireFloatDepth(const cv::Mat& depth) {
   if (depth.type() != CV_32FC1) {
     throw std::invalid_argument("depth image: type " + std::to_string(depth.type()) + ", expected CV_32FC1 in metres");
@@ -182,10 +191,11 @@ float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& nois
   return lookUp(depth, u, v, noise, options, false);
 }
 
-cv::Mat depthToMetres(const cv::Mat& raw, double scale) {
+cv::Mat depthToMetres(const cv::Mat& raw, double scale, double offset) {
   if (raw.type() == CV_16UC1) {
     cv::Mat metres;
     raw.convertTo(metres, CV_32F, scale);
+    addOffset(offset, &metres);
     return metres;
   }
   if (raw.type() == CV_32FC1) {
@@ -197,6 +207,7 @@ cv::Mat depthToMetres(const cv::Mat& raw, double scale) {
         out[c] = (in[c] > 0.0f && in[c] < std::numeric_limits<float>::max()) ? in[c] : 0.0f;
       }
     }
+    addOffset(offset, &metres);
     return metres;
   }
   throw std::invalid_argument("depth image: OpenCV type " + cv::typeToString(raw.type()) +

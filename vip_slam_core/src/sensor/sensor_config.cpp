@@ -171,6 +171,7 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   Section depth = root.section("depth");
   depth.choice("encoding", config.depth_encoding, {"16UC1", "32FC1", "compressed"});
   depth.number("scale", config.depth_scale, 1e-6, 1.0);
+  depth.number("offset", config.depth_offset, -0.5, 0.5, false);
   depth.number("rate", config.depth_rate, 0.1, 1000);
   depth.get("registered", config.depth_registered);
   depth.number("rolling_shutter", config.depth_rolling_shutter, 0, 0.1, false);
@@ -260,7 +261,7 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
       << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter)
       << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
-      << "\n  rate: " << formatDouble(config.depth_rate)
+      << "\n  offset: " << formatDouble(config.depth_offset) << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
       << "\n  rolling_shutter: " << formatDouble(config.depth_rolling_shutter)
       << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";

@@ -55,8 +55,11 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
   }
   const double depth = found.depth_offset - given.depth_offset;
   if (found.sigma_depth_offset > 0 && std::abs(depth) > std::max(kLeastDepth, kSure * found.sigma_depth_offset)) {
-    all.push_back(sentence("depth reads %.1f mm too %s at all distances; it is corrected by that",
-                           1e3 * std::abs(depth), depth < 0 ? "long" : "short"));
+    all.push_back(
+        sentence("depth reads %.1f mm too %s at all distances, which is corrected for; depth/offset in the sensor's "
+                 "configuration should be %.4f",
+                 1e3 * std::abs(depth), depth < 0 ? "long" : "short",
+                 1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
   }
   return all;
 }

@@ -13,9 +13,10 @@ cv::Mat decodeGray(const sensor_msgs::Image& image);
 /// JPEG or PNG.
 cv::Mat decodeGray(const sensor_msgs::CompressedImage& image);
 
-/// 32FC1 metres, 0 = invalid. Takes 16UC1 and mono16 (times `scale` metres per unit) and 32FC1 (metres).
-cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale);
+/// 32FC1 metres, 0 = invalid. Takes 16UC1 and mono16 (times `scale` metres per unit) and 32FC1 (metres); `offset`
+/// metres are added to every reading.
+cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset = 0);
 /// 16-bit PNG, bare or behind the 12-byte header of compressedDepth (16UC1, or 32FC1 quantised as inverse depth).
-cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale);
+cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, double offset = 0);
 
 }  // namespace vip_slam

@@ -23,9 +23,9 @@ struct DepthLookupOptions {
 float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise,
                 const DepthLookupOptions& options = {});
 
-/// Converts 16UC1 (times `scale` metres) or 32FC1 to 32FC1 metres with invalid = 0. Throws std::invalid_argument on
-/// other types, naming the type.
-cv::Mat depthToMetres(const cv::Mat& raw, double scale);
+/// Converts 16UC1 (times `scale` metres) or 32FC1 to 32FC1 metres with invalid = 0; valid readings get `offset` metres
+/// added, and are invalid when nothing is left. Throws std::invalid_argument on other types, naming the type.
+cv::Mat depthToMetres(const cv::Mat& raw, double scale, double offset = 0);
 
 /// Depths on a regular pixel grid; node (c, r) sits at pixel (offset + c*stride, offset + r*stride). 0 = invalid.
 struct DepthGrid {

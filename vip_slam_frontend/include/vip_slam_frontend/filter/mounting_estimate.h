@@ -15,7 +15,8 @@ struct MountingEstimate {
   Eigen::Vector3d sigma_rotation = Eigen::Vector3d::Zero();     ///< rad, right perturbation
   Eigen::Vector3d sigma_translation = Eigen::Vector3d::Zero();  ///< m, in the IMU frame
   double sigma_time_offset = 0;                                 ///< s
-  double depth_offset = 0;         ///< m: what every reading of the depth camera has to be added
+  double depth_offset =
+      0;  ///< m: what every reading of the depth camera has to be added, in the words of a sensor file
   double sigma_depth_offset = 0;   ///< m
   bool depth_contradicts = false;  ///< depth and images disagree by more than any offset; none is used
 };
