@@ -26,6 +26,7 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   frame->status = status_;
   frame->T_I_C = extrinsics();
   frame->time_offset = timeOffset();
+  frame->depth_correction = filter_.depthCorrection();
   frame->zero_velocity = still_;
   frame->keyframe = newest_keyframe_;
   if (filter_.started()) {

@@ -91,6 +91,8 @@ TEST_F(FrontEndTest, DepthIsHandedOnAsWhatItMeans) {
   ASSERT_TRUE(output.keyframe);
   const double offset = front_end_.mounting().depth_offset;
   EXPECT_LT(offset, -0.001);
+  EXPECT_EQ(output.frame->depth_correction, offset);
+  EXPECT_EQ(keyframe->frame.depth_correction, offset);
   const double z = kWall - World::position(t).x() + 0.015 + offset;
   for (const Feature& f : keyframe->frame.features) EXPECT_NEAR(f.depth, z, 5e-4);
   for (const Feature& f : output.frame->features) EXPECT_NEAR(f.depth, z, 5e-4);

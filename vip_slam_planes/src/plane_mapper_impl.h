@@ -43,6 +43,8 @@ class PlaneMapper::Impl {
   /// Returns true when epochs have come together that were apart.
   bool tieEpochs(const std::vector<LoopEvent>& loops);
   void takeCorrections(const MapUpdate& update);
+  /// False when the keyframe's depth is corrected by just that already.
+  bool adoptDepthCorrection(double correction, KeyframePtr* keyframe);
   void removeKeyframe(KeyframeId id);
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();

@@ -134,6 +134,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
     if (area[k] > 0) {
       auto observation = sampler_.sample(keyframe.id, shown[k], T_map_C, track.id(), track.plane());
       if (observation) {
+        observation->depth_correction = keyframe.frame.depth_correction;
         track.observations().insert_or_assign(keyframe.id, std::move(*observation));
         fresh_.emplace(track.id(), keyframe.id);
         refit(&track);

@@ -4,6 +4,7 @@
 
 #include "plane_mapper_impl.h"
 #include "vip_slam_core/geometry/plane_noise.h"
+#include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -26,7 +27,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto it = waiting_.find(estimate.id);
     if (it == waiting_.end() || !estimate.state.T_W_I.isFinite()) continue;
-    const KeyframePtr keyframe = it->second;
+    const KeyframePtr keyframe = withDepthCorrection(it->second, estimate.depth_correction);
     waiting_.erase(it);
     placed_[keyframe->id] = keyframe;
     poses_[keyframe->id] = estimate.state.T_W_I * estimate.T_I_C;
@@ -79,7 +80,8 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     const SE3 corrected = estimate.state.T_W_I * estimate.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
     map_moved_ = map_moved_ || move.t().norm() > kMovedShift || logSO3(move.rotation()).norm() > kMovedTurn;
-    if (T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);
+    const bool other_depth = adoptDepthCorrection(estimate.depth_correction, &it->second);
+    if (other_depth || T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);
     T_map_C = corrected;
   }
   for (const auto& [id, plane] : update.planes) {
@@ -104,6 +106,19 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   }
   judgeAgreement();
   if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
+}
+
+// Covered cells and what detection has left over stay where they are: they are coarser than any such correction.
+bool PlaneMapper::Impl::adoptDepthCorrection(double correction, KeyframePtr* keyframe) {
+  const KeyframePtr corrected = withDepthCorrection(*keyframe, correction);
+  if (corrected == *keyframe) return false;
+  *keyframe = corrected;
+  points_.renewSightings(*corrected);
+  for (auto& [id, track] : tracks_) {
+    const auto observation = track.observations().find(corrected->id);
+    if (observation != track.observations().end()) setDepthCorrection(correction, &observation->second);
+  }
+  return true;
 }
 
 // What passes for one plane may be several surfaces, such as the fronts of boxes on a shelf: it takes no points, and

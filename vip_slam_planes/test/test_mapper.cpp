@@ -206,6 +206,47 @@ TEST(Mapper, KeyframesLookFromTheMountingThatIsKnownNow) {
   EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), wall->plane), 0.1 * M_PI / 180);
 }
 
+TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
+  // Read 2 cm too long at first; the back end tells of it with the sixth keyframe.
+  Rig rig;
+  const Scene scene = room();
+  const Plane truth({-1, 0, 0}, 3);
+  MapUpdate all;
+  all.global = true;
+  for (int i = 0; i < 6; ++i) {
+    const SE3 T_W_C = lookAt({-1 + 0.2 * i, 0, 1.4}, {3, -1 + 0.4 * i, 1.0});
+    const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+    for (float& z : keyframe->frame.depth_grid.z) z += z > 0 ? 0.02f : 0.0f;
+    for (Feature& f : keyframe->frame.features) f.depth += f.depth > 0 ? 0.02f : 0.0f;
+    rig.place(keyframe, T_W_C);
+    all.keyframes.push_back(updateFor(*keyframe, T_W_C).keyframes[0]);
+    all.keyframes.back().depth_correction = -0.02;
+  }
+  const PlaneEstimate* wall = rig.find(truth, 0.05);
+  ASSERT_TRUE(wall);
+  EXPECT_GT(std::abs(wall->plane.d - truth.d), 0.01);
+  rig.mapper.applyMapUpdate(all);
+  EXPECT_TRUE(rig.find(truth, 0.002));
+  // One that is placed later than that is known is corrected as well, and says so.
+  const SE3 T_W_C = lookAt({0.3, 0.1, 1.4}, {3, 0.2, 1.1});
+  const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+  for (float& z : keyframe->frame.depth_grid.z) z += z > 0 ? 0.02f : 0.0f;
+  rig.mapper.addKeyframe(keyframe);
+  MapUpdate update = updateFor(*keyframe, T_W_C);
+  update.keyframes[0].depth_correction = -0.02;
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+  EXPECT_TRUE(rig.find(truth, 0.002));
+  ASSERT_FALSE(result.observations.empty());
+  for (const PlaneObservation& o : result.observations) {
+    EXPECT_EQ(o.depth_correction, -0.02);
+    const PlaneEstimate* plane = nullptr;
+    for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
+    ASSERT_TRUE(plane);
+    const Eigen::Vector4d p_C = transformPlane(T_W_C.inverse(), plane->plane).coefficients();
+    EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.004);
+  }
+}
+
 TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
   Rig rig;
   const Scene scene = room();

@@ -82,6 +82,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
     k.id = keyframe.id;
     k.state = toMsg(keyframe.state);
     k.imu_camera = toPoseMsg(keyframe.T_I_C);
+    k.depth_correction = keyframe.depth_correction;
     msg.keyframes.push_back(k);
   }
   msg.landmarks.reserve(update.landmarks.size());
@@ -115,7 +116,8 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.global = msg.global_update;
   update.keyframes.reserve(msg.keyframes.size());
   for (const auto& keyframe : msg.keyframes) {
-    update.keyframes.push_back({keyframe.id, fromMsg(keyframe.state), fromMsg(keyframe.imu_camera)});
+    update.keyframes.push_back(
+        {keyframe.id, fromMsg(keyframe.state), fromMsg(keyframe.imu_camera), keyframe.depth_correction});
   }
   update.landmarks.reserve(msg.landmarks.size());
   for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));

@@ -60,6 +60,7 @@ class Conversions : public ::testing::Test {
     f.state = state();
     f.covariance.setRandom();
     f.T_I_C = pose();
+    f.depth_correction = number();
     f.time_offset = number();
     for (int i = 0; i < 5; ++i) f.features.push_back(feature());
     f.depth_grid.stride = 16;
@@ -109,6 +110,7 @@ void expectSame(const TrackedFrame& a, const TrackedFrame& b) {
   expectSame(a.state, b.state);
   EXPECT_EQ(a.covariance, b.covariance);
   expectSame(a.T_I_C, b.T_I_C);
+  EXPECT_EQ(a.depth_correction, b.depth_correction);
   EXPECT_EQ(a.time_offset, b.time_offset);
   ASSERT_EQ(a.features.size(), b.features.size());
   for (std::size_t i = 0; i < a.features.size(); ++i) {
@@ -180,6 +182,7 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   observation.plane = 2;
   observation.G.setRandom();
   observation.weight_scale = 0.25;
+  observation.depth_correction = -0.01;
   observation.points = {{{1, 2, 3}, 0.01f}, {{4, 5, 6}, 0.02f}};
   update.observations = {observation};
   update.associated = {{11, 2}, {12, 1}};
@@ -198,6 +201,7 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   EXPECT_EQ(back.observations[0].plane, 2u);
   EXPECT_EQ(back.observations[0].G, observation.G);
   EXPECT_EQ(back.observations[0].weight_scale, 0.25);
+  EXPECT_EQ(back.observations[0].depth_correction, -0.01);
   ASSERT_EQ(back.observations[0].points.size(), 2u);
   EXPECT_EQ(back.observations[0].points[1].p_C, observation.points[1].p_C);
   EXPECT_EQ(back.observations[0].points[1].sigma, observation.points[1].sigma);
@@ -213,7 +217,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   update.T_map_odom = pose();
   update.newest_keyframe = 30;
   update.global = true;
-  update.keyframes = {{29, state(), pose()}, {30, state(), pose()}};
+  update.keyframes = {{29, state(), pose()}, {30, state(), pose(), -0.004}};
   LandmarkEstimate landmark;
   landmark.id = 77;
   landmark.p_W = vector();
@@ -245,6 +249,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   EXPECT_EQ(back.keyframes[1].id, 30u);
   expectSame(back.keyframes[1].state, update.keyframes[1].state);
   expectSame(back.keyframes[1].T_I_C, update.keyframes[1].T_I_C);
+  EXPECT_EQ(back.keyframes[1].depth_correction, -0.004);
   ASSERT_EQ(back.landmarks.size(), 1u);
   EXPECT_EQ(back.landmarks[0].id, 77);
   EXPECT_EQ(back.landmarks[0].p_W, landmark.p_W);

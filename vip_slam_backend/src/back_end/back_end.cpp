@@ -1,11 +1,16 @@
 #include "vip_slam_backend/back_end.h"
 
+#include <cmath>
+
 #include "back_end_impl.h"
+#include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr std::uint64_t kScaleInterval = 30;  // keyframes
+// Smaller changes of the depth's correction wait for the next global adjustment, m.
+constexpr double kNewDepthCorrection = 0.001;
 
 }  // namespace
 
@@ -31,7 +36,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   const std::uint32_t epoch_before = epoch;
   const NavState state = predict(*keyframe);
   try {
-    map.addKeyframe(keyframe, state, sensor.imu_noise);
+    map.addKeyframe(withDepthCorrection(keyframe, depth_correction), state, sensor.imu_noise);
   } catch (...) {
     T_map_odom = T_map_odom_before;
     epoch = epoch_before;
@@ -40,6 +45,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // Beyond the local window bodies turn a little as well; others hear of it with the next global update, until when
   // the cameras they know stay right.
   map.adoptMounting(keyframe->frame.T_I_C);
+  followDepthCorrection(keyframe->frame.depth_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   maker.process(keyframe->id, &map);
   // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
@@ -51,12 +57,22 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   statistics.merged += found.merged;
 }
 
+void BackEnd::Impl::followDepthCorrection(double newest) {
+  newest_depth_correction = newest;
+  if (std::abs(newest - depth_correction) < kNewDepthCorrection) return;
+  depth_correction = newest;
+  map.adoptDepthCorrection(newest);
+  global_wanted = true;
+  ++correction;  // an adjustment under way has the readings as they were
+}
+
 MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   refusal.clear();
   ++statistics.keyframes_received;
   const double t = keyframe ? keyframe->frame.t : 0.0;
   const ScopedTimer timer(log, "backend.keyframe", t);
   MapUpdate update = beginUpdate(t);
+  const double depth_correction_before = depth_correction;
   bool entering = false;
   try {
     if (!keyframe) throw MapError("no keyframe given");
@@ -89,7 +105,8 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   cull(&update);
   closeLoop(&update);
   if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
-  if (entering) fillGlobal(&update);  // nobody knows yet where the keyframes lie that waited for this one
+  // Nobody knows yet where the keyframes lie that waited for this one, or what their depth means now.
+  if (entering || depth_correction != depth_correction_before) fillGlobal(&update);
   finishUpdate(&update);
   return update;
 }
@@ -163,6 +180,7 @@ void BackEnd::Impl::reset() {
   ++correction;
   global_wanted = false;
   last_global = -1e300;
+  depth_correction = newest_depth_correction = 0;
   refusal.clear();
   loops.clear();
   new_loops.clear();
@@ -181,6 +199,8 @@ void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }
 
 GbaJob BackEnd::startGlobalBa() {
   impl_->global_wanted = false;
+  impl_->depth_correction = impl_->newest_depth_correction;
+  impl_->map.adoptDepthCorrection(impl_->depth_correction);
   return impl_->makeGlobalJob();
 }
 

@@ -28,6 +28,9 @@ struct BackEnd::Impl {
   // back_end.cpp
   /// Inserts at the predicted pose and looks for known landmarks; throws MapError when refused.
   void insert(const KeyframePtr& keyframe);
+  /// All keyframes of this session get the same correction of their depth: the newest one's, once it is another one by
+  /// enough to redo the map for.
+  void followDepthCorrection(double newest);
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
   /// Localisation only: what there is of a map stays as it is.
   bool frozen() const { return localisation_only && !map.empty(); }
@@ -47,6 +50,7 @@ struct BackEnd::Impl {
   /// Fills estimates of everything (global) and what was removed and merged since the last update.
   void fillGlobal(MapUpdate* update) const;
   void finishUpdate(MapUpdate* update);
+  KeyframeEstimate estimateOf(const MapKeyframe& kf) const;
   LandmarkEstimate estimateOf(const MapLandmark& landmark) const;
   void askForScale();
   GbaJob makeGlobalJob() const;
@@ -88,7 +92,9 @@ struct BackEnd::Impl {
   /// Counts loop corrections, loaded maps and resets: a global adjustment of the map before one must not undo it.
   std::uint64_t correction = 0;
   bool global_wanted = false;
-  double last_global = -1e300;  ///< stamp of the last one that a loop asked for
+  double last_global = -1e300;         ///< stamp of the last one that a loop asked for
+  double depth_correction = 0;         ///< m, of all keyframes of this session
+  double newest_depth_correction = 0;  ///< m, as the newest keyframe came
   std::string refusal;
   std::vector<LoopEvent> loops;      ///< all so far
   std::vector<LoopEvent> new_loops;  ///< since the last update

@@ -53,7 +53,7 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   for (std::size_t f = 0; f < built.frames.size(); ++f) {
     if (built.problem.frames[f].fixed) continue;
     const MapKeyframe& kf = map.keyframe(built.frames[f]);
-    update->keyframes.push_back({kf.id(), kf.state, kf.T_I_C});
+    update->keyframes.push_back(estimateOf(kf));
     for (const LandmarkId id : kf.landmarks)
       if (id != kNoLandmark) landmarks.insert(id);
   }
@@ -86,6 +86,10 @@ MapUpdate BackEnd::Impl::beginUpdate(double t) const {
   return update;
 }
 
+KeyframeEstimate BackEnd::Impl::estimateOf(const MapKeyframe& kf) const {
+  return {kf.id(), kf.state, kf.T_I_C, kf.data->frame.depth_correction};
+}
+
 LandmarkEstimate BackEnd::Impl::estimateOf(const MapLandmark& landmark) const {
   LandmarkEstimate out;
   out.id = landmark.id;
@@ -101,7 +105,7 @@ void BackEnd::Impl::fillGlobal(MapUpdate* update) const {
   update->keyframes.clear();
   update->landmarks.clear();
   update->planes.clear();
-  for (const auto& [id, kf] : map.keyframes()) update->keyframes.push_back({id, kf.state, kf.T_I_C});
+  for (const auto& entry : map.keyframes()) update->keyframes.push_back(estimateOf(entry.second));
   for (const LandmarkId id : map.landmarkIds()) update->landmarks.push_back(estimateOf(map.landmark(id)));
   for (const auto& entry : map.planes()) update->planes.emplace_back(entry.first, entry.second.estimate.plane);
 }

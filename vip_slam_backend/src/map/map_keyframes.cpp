@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -113,6 +114,17 @@ void Map::adoptMounting(const SE3& T_I_C) {
     kf.state.T_W_I = kf.state.T_W_I * T_now_then.inverse();
     kf.motion.T_a_b = T_now_then * kf.motion.T_a_b * T_now_then.inverse();
     kf.T_I_C = T_I_C;
+  }
+}
+
+void Map::adoptDepthCorrection(double correction) {
+  for (auto& [id, kf] : keyframes_) {
+    if (kf.stored || kf.data->frame.depth_correction == correction) continue;
+    const KeyframePtr corrected = withDepthCorrection(kf.data, correction);
+    // Samples that lie in the keyframe's data must not hold on to what that was.
+    if (kf.imu && kf.imu.get() == &kf.data->imu) kf.imu = {corrected, &corrected->imu};
+    kf.data = corrected;
+    for (auto& entry : kf.planes) setDepthCorrection(correction, &entry.second);
   }
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -73,7 +74,10 @@ bool Map::setPlaneObservation(const PlaneObservation& observation) {
   if (!observation.G.allFinite() || !(observation.weight_scale > 0)) return false;
   for (const PlanePoint& p : observation.points)
     if (!p.p_C.allFinite() || !(p.sigma > 0)) return false;
-  keyframe(observation.keyframe).planes[observation.plane] = observation;
+  MapKeyframe& kf = keyframe(observation.keyframe);
+  PlaneObservation& stored = kf.planes[observation.plane] = observation;
+  // The plane module may not have heard yet of what its keyframe's depth is corrected by now.
+  setDepthCorrection(kf.data->frame.depth_correction, &stored);
   return true;
 }
 

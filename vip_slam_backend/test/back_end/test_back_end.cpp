@@ -8,6 +8,7 @@
 #include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map/map_checker.h"
+#include "vip_slam_core/types/depth_correction.h"
 
 using namespace vip_slam;
 
@@ -69,6 +70,22 @@ KeyframePtr mountedWrongly(const KeyframePtr& keyframe, const SE3& error) {
   return wrong;
 }
 
+/// The keyframe of a camera that reads `too_long` m too long, as a front end publishes it that corrects for
+/// `correction`.
+KeyframePtr readTooLong(const KeyframePtr& keyframe, double too_long, double correction) {
+  auto exact = std::make_shared<Keyframe>(*keyframe);
+  exact->frame.depth_correction = -too_long;
+  return withDepthCorrection(exact, correction);
+}
+
+PlaneUpdate readTooLong(PlaneUpdate update, double too_long, double correction) {
+  for (PlaneObservation& o : update.observations) {
+    o.depth_correction = -too_long;
+    setDepthCorrection(correction, &o);
+  }
+  return update;
+}
+
 /// Largest error of a keyframe's direction, degrees, after the best common turn about the vertical is taken out.
 double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& world) {
   double yaw = 0, worst = 0;
@@ -123,6 +140,69 @@ TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackAnOldMounting) {
   // Cameras stay where the adjustment has them, to what little it changes.
   const SE3 after = back_end.map().keyframe(5).T_W_C().inverse() * back_end.map().keyframe(17).T_W_C();
   EXPECT_LT(after.boxminus(between).norm(), 0.01);
+}
+
+// Depth reads 2 cm too long; the front end knows with the 16th keyframe, and a little better with each further one.
+TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
+  SimulatedKeyframes world(4);
+  BackEnd back_end(options("vip"), world.sensor());
+  std::map<KeyframeId, KeyframePtr> exact;
+  double correction = 0;
+  const auto worst = [&] {
+    double error = 0;
+    for (const auto& [id, kf] : back_end.map().keyframes()) {
+      for (std::size_t k = 0; k < kf.features().size(); ++k)
+        error = std::max(error, std::abs(double(kf.features()[k].depth) - exact[id]->frame.features[k].depth));
+      for (const auto& [plane, o] : kf.planes) {
+        EXPECT_EQ(o.depth_correction, kf.data->frame.depth_correction);
+        const Eigen::Vector4d p_C =
+            transformPlane(kf.T_W_C().inverse(), back_end.map().planes().at(plane).estimate.plane).coefficients();
+        EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.03);
+      }
+    }
+    return error;
+  };
+  for (int k = 0; k < 30; ++k) {
+    const KeyframePtr kf = exact[k + 1] = world.next();
+    const bool knows_now = k == 15;
+    if (k >= 15) correction = -0.0205 + 0.0001 * (k - 15) / 3;
+    const MapUpdate update = back_end.addKeyframe(readTooLong(kf, 0.02, correction));
+    ASSERT_EQ(back_end.lastRefusal(), "");
+    EXPECT_EQ(checkMap(back_end.map()), "");
+    if (k == 14) EXPECT_NEAR(worst(), 0.02, 1e-4);
+    if (knows_now) {
+      EXPECT_TRUE(update.global);
+      EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
+      for (const KeyframeEstimate& estimate : update.keyframes) EXPECT_EQ(estimate.depth_correction, correction);
+      EXPECT_LT(worst(), 0.0006);
+      EXPECT_TRUE(back_end.globalBaWanted());
+      back_end.merge(back_end.run(back_end.startGlobalBa()));
+    } else {
+      EXPECT_FALSE(back_end.globalBaWanted());
+    }
+    // Planes may lag behind by what the map knows.
+    back_end.applyPlaneUpdate(readTooLong(world.planes(), 0.02, k % 2 ? correction : 0.0));
+  }
+  back_end.finish();  // with what the newest keyframe knows
+  EXPECT_LT(worst(), std::abs(correction + 0.02) + 1e-6);
+  double rmse = 0;
+  for (const SnapshotKeyframe& kf : back_end.snapshot().keyframes)
+    rmse += (kf.state.T_W_I.t() - world.truth(kf.t).T_W_I.t()).squaredNorm() / 30;
+  const double known = std::sqrt(rmse);
+  const double never_wrong = run("vip", 30, 4).rmse;
+  std::printf("rmse %.2f mm, with exact depth %.2f mm\n", 1e3 * known, 1e3 * never_wrong);
+  EXPECT_LT(known, never_wrong + 0.001);
+}
+
+TEST(BackEnd, AGlobalAdjustmentOfDepthAsItWasReadIsDoneAgain) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 12; ++k) back_end.addKeyframe(readTooLong(world.next(), 0.02, 0));
+  const GbaResult before = back_end.run(back_end.startGlobalBa());
+  back_end.addKeyframe(readTooLong(world.next(), 0.02, -0.02));
+  back_end.startGlobalBa();
+  EXPECT_FALSE(back_end.merge(before).global);
+  EXPECT_TRUE(back_end.globalBaWanted());
 }
 
 TEST(BackEnd, AllVariantsBeatTheOdometry) {

@@ -62,6 +62,44 @@ TEST(Map, AMountingThatIsKnownBetterTurnsBodiesAboutTheirCameras) {
   EXPECT_LT(f.map.keyframe(3).motion.T_a_b.boxminus(between).norm(), 1e-12);
 }
 
+TEST(Map, DepthThatIsKnownBetterHoldsForAllKeyframesButStoredOnes) {
+  Fixture f;
+  f.add(4);
+  auto stored = std::make_shared<Keyframe>(*f.world.next());
+  stored->previous = 0;
+  f.map.restoreKeyframe(stored, f.world.truth(stored->frame.t), 0, {}, ImuNoise());
+  const PlaneUpdate planes = f.world.planes();
+  for (const PlaneEstimate& plane : planes.planes) f.map.setPlane(plane);
+  PlaneObservation observation = planes.observations.at(0);
+  for (const KeyframeId id : {KeyframeId{2}, stored->id}) {
+    observation.keyframe = id;
+    ASSERT_TRUE(f.map.setPlaneObservation(observation));
+  }
+  const std::map<KeyframeId, MapKeyframe> before = f.map.keyframes();
+
+  f.map.adoptDepthCorrection(-0.01);
+  EXPECT_EQ(checkMap(f.map), "");
+  for (const auto& [id, kf] : f.map.keyframes()) {
+    const float change = id == stored->id ? 0.0f : -0.01f;
+    for (std::size_t k = 0; k < kf.features().size(); ++k) {
+      const float z = before.at(id).features()[k].depth;
+      EXPECT_FLOAT_EQ(kf.features()[k].depth, z > 0 ? z + change : z);
+    }
+    for (const auto& [plane, o] : kf.planes)
+      EXPECT_FLOAT_EQ(o.points[0].p_C.z(), observation.points[0].p_C.z() + change) << id;
+    if (id == 1 || id == stored->id) continue;
+    ASSERT_TRUE(kf.imu);
+    EXPECT_EQ(kf.imu.get(), &kf.data->imu);
+    EXPECT_EQ(kf.imu->size(), before.at(id).imu->size());
+  }
+  // An observation made of the readings as they were is brought to what they are now.
+  observation.keyframe = 3;
+  ASSERT_TRUE(f.map.setPlaneObservation(observation));
+  const PlaneObservation& late = f.map.keyframe(3).planes.at(observation.plane);
+  EXPECT_FLOAT_EQ(late.points[0].p_C.z(), observation.points[0].p_C.z() - 0.01f);
+  EXPECT_EQ(late.depth_correction, -0.01);
+}
+
 TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {
   // Track 900 has no depth; while it waits, its first view is matched with landmark 800.
   Map map;

@@ -96,6 +96,16 @@ void PointAssociation::addSightings(const Keyframe& keyframe) {
   }
 }
 
+void PointAssociation::renewSightings(const Keyframe& keyframe) {
+  for (const Feature& f : keyframe.frame.features) {
+    const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(resolve(f.id));
+    if (it == landmarks_.end()) continue;
+    for (Sighting& s : it->second.sightings) {
+      if (s.keyframe == keyframe.id && s.xy == f.xy) s.depth = f.depth;
+    }
+  }
+}
+
 void PointAssociation::removeKeyframe(const Keyframe& keyframe) {
   for (const Feature& f : keyframe.frame.features) {
     const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(resolve(f.id));

@@ -30,6 +30,9 @@ class Map {
   /// The front end knows better how its camera is mounted: holds for all keyframes but those of a stored map. Their
   /// cameras stay where they are, so that landmarks and planes fit as before; the body turns about them.
   void adoptMounting(const SE3& T_I_C);
+  /// The front end knows better what its depth camera reads too long: holds for the readings and the depth points on
+  /// planes of all keyframes but those of a stored map. Landmarks, planes and poses are left to the next optimisation.
+  void adoptDepthCorrection(double correction);
   /// Removes it with its observations; landmarks left without observation go too. The IMU chain is joined over the gap
   /// while the joined factor stays below `max_imu_seconds`, else it is cut.
   void removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds);

@@ -27,7 +27,7 @@ struct MapObservation {
 };
 
 struct MapKeyframe {
-  KeyframePtr data;     ///< as the front end published it
+  KeyframePtr data;     ///< as the front end published it, its depth corrected by what is known now
   NavState state;       ///< estimate in `map`: T_map_I, v, biases
   SE3 T_I_C;            ///< the camera's mounting as known now
   bool stored = false;  ///< from a stored map, made by a camera whose mounting the present one says nothing about

@@ -16,6 +16,7 @@ struct KeyframeEstimate {
   KeyframeId id = 0;
   NavState state;  ///< T_map_I, v_map, biases
   SE3 T_I_C;       ///< the camera's mounting as known now; the keyframe itself has what was known when it was made
+  double depth_correction = 0;  ///< m, what its depth readings are added as known now, likewise
 };
 
 struct LandmarkEstimate {

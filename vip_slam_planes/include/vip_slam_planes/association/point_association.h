@@ -26,6 +26,8 @@ class PointAssociation {
   void applyMapUpdate(const MapUpdate& update);
   /// Sightings of a placed keyframe, once per keyframe.
   void addSightings(const Keyframe& keyframe);
+  /// Its depth is known better by now.
+  void renewSightings(const Keyframe& keyframe);
   void removeKeyframe(const Keyframe& keyframe);
 
   using FindPlane = std::function<const Plane*(PlaneId)>;

@@ -1,0 +1,22 @@
+// What a depth camera reads too long or too short, when it becomes known only after its readings were handed on: all
+// that holds readings takes over the better correction. A reading moves its point along the point's ray.
+#pragma once
+
+#include "vip_slam_core/types/keyframe.h"
+#include "vip_slam_core/types/plane_map.h"
+
+namespace vip_slam {
+
+/// A depth whose correction grows by `change` m; 0 is no depth and stays so, anything else stays before the camera.
+float shiftedDepth(float z, double change);
+/// A point in the camera frame, moved along its ray likewise.
+Eigen::Vector3f shiftedPoint(const Eigen::Vector3f& p_C, double change);
+
+/// The keyframe with `correction` m added to the camera's readings instead of what they have now; the same one when
+/// that is what it has. Sigmas stay, and so does all that is no depth.
+KeyframePtr withDepthCorrection(const KeyframePtr& keyframe, double correction);
+
+/// The same for depth points on a plane; G is summed anew from the points.
+void setDepthCorrection(double correction, PlaneObservation* observation);
+
+}  // namespace vip_slam

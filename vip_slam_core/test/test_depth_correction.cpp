@@ -1,0 +1,57 @@
+// Depth that turns out to have been read too long.
+#include <gtest/gtest.h>
+
+#include "vip_slam_core/types/depth_correction.h"
+
+namespace vip_slam {
+namespace {
+
+TEST(DepthCorrection, MovesReadingsAndLeavesTheRest) {
+  auto keyframe = std::make_shared<Keyframe>();
+  keyframe->id = 7;
+  keyframe->frame.depth_correction = 0.002;
+  Feature with, without;
+  with.depth = 2.0f;
+  with.depth_sigma = 0.01f;
+  keyframe->frame.features = {with, without};
+  keyframe->frame.depth_grid.z = {1.5f, 0.0f, 0.003f};
+  const KeyframePtr corrected = withDepthCorrection(keyframe, -0.01);
+  EXPECT_EQ(corrected->id, 7u);
+  EXPECT_EQ(corrected->frame.depth_correction, -0.01);
+  EXPECT_FLOAT_EQ(corrected->frame.features[0].depth, 2.0f - 0.012f);
+  EXPECT_EQ(corrected->frame.features[0].depth_sigma, 0.01f);
+  EXPECT_EQ(corrected->frame.features[1].depth, 0.0f);
+  EXPECT_FLOAT_EQ(corrected->frame.depth_grid.z[0], 1.5f - 0.012f);
+  EXPECT_EQ(corrected->frame.depth_grid.z[1], 0.0f);
+  EXPECT_GT(corrected->frame.depth_grid.z[2], 0.0f);
+  EXPECT_EQ(keyframe->frame.features[0].depth, 2.0f);
+  EXPECT_EQ(withDepthCorrection(keyframe, 0.002), keyframe);
+}
+
+TEST(DepthCorrection, MovesPointsOnPlanesAlongTheirRays) {
+  const Eigen::Vector3f rays[] = {{0.3f, -0.2f, 1}, {-0.5f, 0.1f, 1}, {0, 0.4f, 1}};
+  const auto observe = [&](double too_long) {
+    PlaneObservation observation;
+    observation.weight_scale = 0.4;
+    for (int k = 0; k < 3; ++k) {
+      const PlanePoint point{rays[k] * float(1.0 + 0.7 * k + too_long), 0.004f + 0.001f * float(k)};
+      const Eigen::Vector4d p = point.p_C.cast<double>().homogeneous();
+      observation.G += 0.4 * p * p.transpose() / std::pow(double(point.sigma), 2);
+      observation.points.push_back(point);
+    }
+    return observation;
+  };
+  PlaneObservation read = observe(0.01);
+  setDepthCorrection(-0.01, &read);
+  const PlaneObservation truth = observe(0);
+  EXPECT_EQ(read.depth_correction, -0.01);
+  for (int k = 0; k < 3; ++k) EXPECT_LT((read.points[k].p_C - truth.points[k].p_C).norm(), 1e-6f);
+  EXPECT_LT((read.G - truth.G).norm(), 1e-5 * truth.G.norm());
+  // What has it already stays as it is.
+  const Eigen::Matrix4d before = read.G;
+  setDepthCorrection(-0.01, &read);
+  EXPECT_EQ(read.G, before);
+}
+
+}  // namespace
+}  // namespace vip_slam
