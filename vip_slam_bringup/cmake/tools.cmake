@@ -16,6 +16,7 @@ add_library(vip_slam_bringup
   src/preflight/check_tf.cpp
   src/preflight/findings.cpp
   src/preflight/image_rotation.cpp
+  src/preflight/readout.cpp
   src/preflight/record_sources.cpp
   src/preflight/recorder.cpp
   src/stereo/disparity_refinement.cpp

@@ -8,36 +8,12 @@
 #include <Eigen/SVD>
 
 #include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/gyro_integral.h"
+#include "vip_slam_bringup/preflight/readout.h"
 #include "vip_slam_bringup/preflight/words.h"
 
 namespace vip_slam {
 namespace {
-
-/// Integral of the gyro from the first sample, piecewise linear in time.
-class GyroIntegral {
- public:
-  explicit GyroIntegral(const std::vector<StampedVector>& gyro) {
-    for (const StampedVector& s : gyro) {
-      if ((!t_.empty() && s.t <= t_.back()) || !s.value.allFinite()) continue;
-      sum_.push_back(t_.empty() ? Eigen::Vector3d::Zero()
-                                : Eigen::Vector3d(sum_.back() + 0.5 * (s.t - t_.back()) * (s.value + last_)));
-      t_.push_back(s.t);
-      last_ = s.value;
-    }
-  }
-  bool covers(double t) const { return t_.size() > 1 && t >= t_.front() && t <= t_.back(); }
-  Eigen::Vector3d at(double t) const {
-    const std::size_t i = std::min<std::size_t>(
-        std::max<std::ptrdiff_t>(std::upper_bound(t_.begin(), t_.end(), t) - t_.begin(), 1), t_.size() - 1);
-    const double s = (t - t_[i - 1]) / (t_[i] - t_[i - 1]);
-    return (1 - s) * sum_[i - 1] + s * sum_[i];
-  }
-
- private:
-  std::vector<double> t_;
-  std::vector<Eigen::Vector3d> sum_;
-  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
-};
 
 struct Fit {
   double residual = 0, variance = 0, scale = 1;  ///< residual and variance: mean squares of the gyro side
@@ -136,6 +112,18 @@ bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, do
   return true;
 }
 
+Finding readoutFinding(const Recording& r, const MotionEstimate& motion) {
+  const std::string measured =
+      words("rows are read within %.1f ms (one sigma %.1f ms), the sensor file says %.1f ms", 1000 * motion.readout,
+            1000 * motion.readout_sigma, 1000 * r.sensor.rolling_shutter);
+  if (std::abs(motion.readout - r.sensor.rolling_shutter) < std::max(0.003, 4 * motion.readout_sigma))
+    return {Severity::kGood, "rolling shutter", measured, ""};
+  if (motion.readout < 0)
+    return {Severity::kWarning, "rolling shutter", measured, "the last row comes first: is the image turned round?"};
+  return {Severity::kWarning, "rolling shutter", measured,
+          words("set color/rolling_shutter: %.4f in the sensor file", motion.readout)};
+}
+
 }  // namespace
 
 MotionEstimate estimateMotion(const Recording& r, double max_offset) {
@@ -170,6 +158,13 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
   // The rotation is known once a second axis moves: 0.05 rad/s.
   out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
   out.usable = true;
+  if (const auto rows = estimateReadout(r.rotations, gyro, {fine.offset, 0.0, out.R_imu_cam})) {
+    // A delay found without regard to rows belongs to no row in particular.
+    out.time_offset = rows->time_offset;
+    out.time_sigma = rows->time_sigma;
+    out.readout = rows->readout;
+    out.readout_sigma = rows->readout_sigma;
+  }
   return out;
 }
 
@@ -193,6 +188,8 @@ Findings checkMotion(const Recording& r) {
                    words("set time_offset: %.4f in the sensor file", motion.time_offset)});
   else
     out.push_back({Severity::kGood, "camera-IMU delay", measured, ""});
+  constexpr double kUsefulSigma = 0.003;
+  if (motion.readout_sigma > 0 && motion.readout_sigma < kUsefulSigma) out.push_back(readoutFinding(r, motion));
   if (!motion.rotation_known) {
     out.push_back({Severity::kNote, "extrinsics", "not checked: the sensor turns about one axis only", ""});
     return out;

@@ -82,10 +82,11 @@ std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& poi
 std::optional<RotationStep> ImageRotation::add(double t, const cv::Mat& gray, const cv::Mat& depth) {
   std::optional<RotationStep> step;
   if (!gray_.empty() && t > t_ && t - t_ < 0.2) {
-    if (const auto R_now_before = rotationTo(gray)) {
+    std::vector<CornerTrack> tracks;
+    if (const auto R_now_before = rotationTo(gray, &tracks)) {
       // A camera turning by w dt sees the scene turn by -w dt.
       const Eigen::Vector3d angle = logSO3(Eigen::Matrix3d(R_now_before->transpose()));
-      step = RotationStep{t_, t, angle / (t - t_)};
+      step = RotationStep{t_, t, angle / (t - t_), std::move(tracks)};
     }
   }
   t_ = t;
@@ -94,7 +95,7 @@ std::optional<RotationStep> ImageRotation::add(double t, const cv::Mat& gray, co
   return step;
 }
 
-std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray) const {
+std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray, std::vector<CornerTrack>* tracks) const {
   std::vector<cv::Point2f> before, after;
   cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0,
                           mask_.size() == gray_.size() ? mask_ : cv::Mat());
@@ -118,6 +119,8 @@ std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray) co
     if (z < 0.1f || z > 20.f) continue;
     points.emplace_back(a.x() * z, a.y() * z, z);
     images.emplace_back(b.x(), b.y());
+    const auto rowOf = [&](float y) { return (y + 0.5f) / static_cast<float>(gray.rows) - 0.5f; };
+    tracks->push_back({{points.back().x, points.back().y, z}, b.cast<float>(), rowOf(before[i].y), rowOf(after[i].y)});
   }
   if (points.size() >= kLeastCorners) {
     if (const auto R = rotationByPnp(points, images, 1.0 / camera_->focal())) return R;

@@ -47,6 +47,8 @@ struct MotionEstimate {
   bool rotation_known = false;  ///< rotated about two axes at least
   double correlation = 0;       ///< share of the gyro's variance that the images explain, 0..1
   double scale = 1;             ///< gyro rate over image rate
+  double readout = 0;           ///< seconds from the first row of an image to its last
+  double readout_sigma = 0;     ///< one sigma of it; 0: not known
 };
 MotionEstimate estimateMotion(const Recording& recording, double max_offset = 0.2);
 

@@ -22,7 +22,8 @@ class ImageRotation {
   std::optional<RotationStep> add(double t, const cv::Mat& gray, const cv::Mat& depth);
 
  private:
-  std::optional<Eigen::Matrix3d> rotationTo(const cv::Mat& gray) const;  ///< R_now_before
+  /// R_now_before, and the corners with depth.
+  std::optional<Eigen::Matrix3d> rotationTo(const cv::Mat& gray, std::vector<CornerTrack>* tracks) const;
 
   std::shared_ptr<const CameraModel> camera_;
   double t_ = 0;

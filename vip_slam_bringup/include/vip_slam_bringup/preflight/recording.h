@@ -31,10 +31,18 @@ struct StampedVector {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
 };
 
-/// Mean rotation rate of the camera between two images, rad/s, in the colour optical frame.
+/// A corner seen in two images in a row.
+struct CornerTrack {
+  Eigen::Vector3f point;   ///< metres, in the colour camera when its row of the first image was read
+  Eigen::Vector2f image;   ///< normalised coordinates in the second image
+  float row_from, row_to;  ///< its rows, -0.5 upper rim of the image, 0.5 lower
+};
+
+/// Motion of the camera between two images.
 struct RotationStep {
   double t0 = 0, t1 = 0;
-  Eigen::Vector3d rate_C = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rate_C = Eigen::Vector3d::Zero();  ///< mean rotation rate, rad/s, in the colour optical frame
+  std::vector<CornerTrack> tracks;                   ///< those with depth
 };
 
 struct DepthSample {

@@ -1,0 +1,143 @@
+#include "vip_slam_bringup/preflight/readout.h"
+
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/geometry/so3.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr std::size_t kLeastTracks = 12;
+constexpr int kRounds = 12, kUnknowns = 8;  // td, r, rotation (3), bias (3)
+using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
+
+struct State {
+  double time_offset, readout;
+  Eigen::Matrix3d R_imu_cam;
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();  // rad/s
+
+  State plus(const Unknowns& d) const {
+    return {time_offset + d(0), readout + d(1), R_imu_cam * expSO3(Eigen::Vector3d(d.segment<3>(2))),
+            bias + d.segment<3>(5)};
+  }
+};
+
+/// Where the corners of a step should be in its second image were the camera not moving along, and what each metre per
+/// second adds (two rows per corner).
+struct Prediction {
+  Eigen::VectorXd residual;
+  Eigen::MatrixX3d by_speed;
+};
+
+bool covered(const RotationStep& step, const GyroIntegral& gyro, double margin) {
+  return gyro.covers(step.t0 - margin) && gyro.covers(step.t1 + margin);
+}
+
+/// `speed`: about which the projection is taken, m/s in the first camera.
+Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const State& x, const Eigen::Vector3d& speed) {
+  const int n = static_cast<int>(step.tracks.size());
+  Prediction p{Eigen::VectorXd(2 * n), Eigen::MatrixX3d(2 * n, 3)};
+  for (int i = 0; i < n; ++i) {
+    const CornerTrack& track = step.tracks[i];
+    const double from = step.t0 + x.time_offset + x.readout * track.row_from;
+    const double to = step.t1 + x.time_offset + x.readout * track.row_to;
+    const Eigen::Vector3d turn = x.R_imu_cam.transpose() * (gyro.at(to) - gyro.at(from) - (to - from) * x.bias);
+    const Eigen::Matrix3d R_to_from = expSO3(Eigen::Vector3d(-turn));
+    const Eigen::Vector3d q = R_to_from * (track.point.cast<double>() - (to - from) * speed);
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << 1 / q.z(), 0, -q.x() / (q.z() * q.z()), 0, 1 / q.z(), -q.y() / (q.z() * q.z());
+    p.residual.segment<2>(2 * i) = q.hnormalized() - track.image.cast<double>();
+    p.by_speed.middleRows<2>(2 * i) = -(to - from) * projection * R_to_from;
+  }
+  return p;
+}
+
+/// Of each corner's two rows: by how much the corners of this step are off, with weights of Huber at twice the median. A
+/// blurred pair of images counts for little.
+Eigen::VectorXd weightsOf(const Eigen::VectorXd& residual) {
+  constexpr double kLeastError = 1e-4;  // a twentieth of a pixel
+  std::vector<double> errors;
+  for (int i = 0; i < residual.size() / 2; ++i) errors.push_back(residual.segment<2>(2 * i).norm());
+  const double typical = median(errors) + kLeastError;
+  Eigen::VectorXd weights(residual.size());
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    weights.segment<2>(2 * static_cast<int>(i))
+        .setConstant(std::min(1.0, 2 * typical / errors[i]) / (typical * typical));
+  return weights;
+}
+
+/// One step's share in the normal equations, its speed eliminated.
+struct Share {
+  Eigen::Matrix<double, kUnknowns, kUnknowns> H;
+  Unknowns g;
+};
+
+Share shareOf(const RotationStep& step, const GyroIntegral& gyro, const State& x) {
+  // The speed that fits best, by itself.
+  Eigen::Vector3d speed = Eigen::Vector3d::Zero();
+  Prediction p = predict(step, gyro, x, speed);
+  Eigen::VectorXd w;
+  for (int round = 0; round < 3; ++round) {
+    w = weightsOf(p.residual);
+    const Eigen::Matrix3d A = p.by_speed.transpose() * w.asDiagonal() * p.by_speed + 1e-9 * Eigen::Matrix3d::Identity();
+    speed -= A.ldlt().solve(p.by_speed.transpose() * (w.asDiagonal() * p.residual));
+    p = predict(step, gyro, x, speed);
+  }
+  w = weightsOf(p.residual);
+  constexpr double kDelta[kUnknowns] = {1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
+  Eigen::MatrixXd J(p.residual.size(), kUnknowns);
+  for (int c = 0; c < kUnknowns; ++c) {
+    const Unknowns d = Unknowns::Unit(c) * kDelta[c];
+    J.col(c) = (predict(step, gyro, x.plus(d), speed).residual - predict(step, gyro, x.plus(-d), speed).residual) /
+               (2 * kDelta[c]);
+  }
+  const Eigen::Matrix3d A = p.by_speed.transpose() * w.asDiagonal() * p.by_speed + 1e-9 * Eigen::Matrix3d::Identity();
+  const Eigen::MatrixXd by_speed_w = p.by_speed.transpose() * w.asDiagonal();
+  const Eigen::MatrixXd projected = J - p.by_speed * A.ldlt().solve(by_speed_w * J);
+  return {projected.transpose() * w.asDiagonal() * projected, projected.transpose() * (w.asDiagonal() * p.residual)};
+}
+
+}  // namespace
+
+std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& steps, const GyroIntegral& gyro,
+                                               const ReadoutEstimate& start) {
+  constexpr double kMargin = 0.1;  // seconds of gyro around the images
+  std::vector<const RotationStep*> used;
+  for (const RotationStep& s : steps)
+    if (s.tracks.size() >= kLeastTracks && covered(s, gyro, kMargin + std::abs(start.time_offset))) used.push_back(&s);
+  if (used.size() < 40) return std::nullopt;
+
+  State x{start.time_offset, start.readout, start.R_imu_cam.toRotationMatrix()};
+  Eigen::Matrix<double, kUnknowns, kUnknowns> covariance;
+  bool settled = false;
+  for (int round = 0; round < kRounds && !settled; ++round) {
+    Eigen::Matrix<double, kUnknowns, kUnknowns> H = 1e-12 * Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity();
+    Eigen::Matrix<double, kUnknowns, kUnknowns> scatter = 0 * H;
+    Unknowns g = Unknowns::Zero();
+    for (const RotationStep* s : used) {
+      const Share share = shareOf(*s, gyro, x);
+      H += share.H;
+      g += share.g;
+      scatter += share.g * share.g.transpose();
+    }
+    const Unknowns d = -H.ldlt().solve(g);
+    x = x.plus(d);
+    if (!d.allFinite() || std::abs(x.time_offset - start.time_offset) > kMargin / 2 || std::abs(x.readout) > kMargin)
+      return std::nullopt;
+    settled = std::abs(d(0)) < 1e-5 && std::abs(d(1)) < 1e-5;
+    // What the images of a pair have in common (blur, noise of the gyro) is in all their corners: count by pairs.
+    const Eigen::Matrix<double, kUnknowns, kUnknowns> inverse =
+        H.ldlt().solve(Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity());
+    covariance = inverse * scatter * inverse;
+  }
+  if (!settled) return std::nullopt;
+  ReadoutEstimate out{x.time_offset, x.readout, Eigen::Quaterniond(x.R_imu_cam)};
+  out.time_sigma = std::sqrt(covariance(0, 0));
+  out.readout_sigma = std::sqrt(covariance(1, 1));
+  return out;
+}
+
+}  // namespace vip_slam
