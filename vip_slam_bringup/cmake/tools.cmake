@@ -58,6 +58,9 @@ if(CATKIN_ENABLE_TESTING)
   target_link_libraries(test_sensor_files vip_slam_bringup)
   target_compile_definitions(test_sensor_files PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
 
+  catkin_add_gtest(test_readout test/test_readout.cpp)
+  target_link_libraries(test_readout vip_slam_bringup gtest_main)
+
   add_library(${PROJECT_NAME}_driver_bag test/driver_bag.cpp)
   target_link_libraries(${PROJECT_NAME}_driver_bag vip_slam_bringup)
   foreach(thing bag_extrinsics bag_reader check_bag driver_bags)

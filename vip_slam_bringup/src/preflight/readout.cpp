@@ -36,8 +36,13 @@ bool covered(const RotationStep& step, const GyroIntegral& gyro, double margin) 
   return gyro.covers(step.t0 - margin) && gyro.covers(step.t1 + margin);
 }
 
-/// `speed`: about which the projection is taken, m/s in the first camera.
-Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const State& x, const Eigen::Vector3d& speed) {
+/// How the camera goes along between two images, in the first camera: m/s in the middle between them, m/s^2.
+struct Course {
+  Eigen::Vector3d speed = Eigen::Vector3d::Zero(), acceleration = Eigen::Vector3d::Zero();
+};
+
+/// `course`: about which the projection is taken.
+Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const State& x, const Course& course) {
   const int n = static_cast<int>(step.tracks.size());
   Prediction p{Eigen::VectorXd(2 * n), Eigen::MatrixX3d(2 * n, 3)};
   for (int i = 0; i < n; ++i) {
@@ -46,6 +51,8 @@ Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const Sta
     const double to = step.t1 + x.time_offset + x.readout * track.row_to;
     const Eigen::Vector3d turn = x.R_imu_cam.transpose() * (gyro.at(to) - gyro.at(from) - (to - from) * x.bias);
     const Eigen::Matrix3d R_to_from = expSO3(Eigen::Vector3d(-turn));
+    const double late = 0.5 * x.readout * (track.row_from + track.row_to);  // after the middle between the images
+    const Eigen::Vector3d speed = course.speed + late * course.acceleration;
     const Eigen::Vector3d q = R_to_from * (track.point.cast<double>() - (to - from) * speed);
     Eigen::Matrix<double, 2, 3> projection;
     projection << 1 / q.z(), 0, -q.x() / (q.z() * q.z()), 0, 1 / q.z(), -q.y() / (q.z() * q.z());
@@ -55,8 +62,8 @@ Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const Sta
   return p;
 }
 
-/// Of each corner's two rows: by how much the corners of this step are off, with weights of Huber at twice the median. A
-/// blurred pair of images counts for little.
+/// Of each corner's two rows: by how much the corners of this step are off, with weights of Huber at twice the median.
+/// A blurred pair of images counts for little.
 Eigen::VectorXd weightsOf(const Eigen::VectorXd& residual) {
   constexpr double kLeastError = 1e-4;  // a twentieth of a pixel
   std::vector<double> errors;
@@ -75,29 +82,45 @@ struct Share {
   Unknowns g;
 };
 
-Share shareOf(const RotationStep& step, const GyroIntegral& gyro, const State& x) {
-  // The speed that fits best, by itself.
-  Eigen::Vector3d speed = Eigen::Vector3d::Zero();
-  Prediction p = predict(step, gyro, x, speed);
+/// Gives `course` the speed that fits best.
+Share shareOf(const RotationStep& step, const GyroIntegral& gyro, const State& x, Course* course) {
+  Prediction p = predict(step, gyro, x, *course);
   Eigen::VectorXd w;
   for (int round = 0; round < 3; ++round) {
     w = weightsOf(p.residual);
     const Eigen::Matrix3d A = p.by_speed.transpose() * w.asDiagonal() * p.by_speed + 1e-9 * Eigen::Matrix3d::Identity();
-    speed -= A.ldlt().solve(p.by_speed.transpose() * (w.asDiagonal() * p.residual));
-    p = predict(step, gyro, x, speed);
+    course->speed -= A.ldlt().solve(p.by_speed.transpose() * (w.asDiagonal() * p.residual));
+    p = predict(step, gyro, x, *course);
   }
   w = weightsOf(p.residual);
   constexpr double kDelta[kUnknowns] = {1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
   Eigen::MatrixXd J(p.residual.size(), kUnknowns);
   for (int c = 0; c < kUnknowns; ++c) {
     const Unknowns d = Unknowns::Unit(c) * kDelta[c];
-    J.col(c) = (predict(step, gyro, x.plus(d), speed).residual - predict(step, gyro, x.plus(-d), speed).residual) /
+    J.col(c) = (predict(step, gyro, x.plus(d), *course).residual - predict(step, gyro, x.plus(-d), *course).residual) /
                (2 * kDelta[c]);
   }
   const Eigen::Matrix3d A = p.by_speed.transpose() * w.asDiagonal() * p.by_speed + 1e-9 * Eigen::Matrix3d::Identity();
   const Eigen::MatrixXd by_speed_w = p.by_speed.transpose() * w.asDiagonal();
   const Eigen::MatrixXd projected = J - p.by_speed * A.ldlt().solve(by_speed_w * J);
   return {projected.transpose() * w.asDiagonal() * projected, projected.transpose() * (w.asDiagonal() * p.residual)};
+}
+
+/// Accelerations from the speeds before and after, where images follow each other: a drone accelerates as it tilts,
+/// which would pass for a part of the readout.
+void accelerate(const std::vector<const RotationStep*>& steps, const GyroIntegral& gyro, const State& x,
+                std::vector<Course>* courses) {
+  const auto turned = [&](double from, double to) {  // R_from_to of the camera
+    return expSO3(Eigen::Vector3d(x.R_imu_cam.transpose() * (gyro.at(to + x.time_offset) -
+                                                             gyro.at(from + x.time_offset) - (to - from) * x.bias)));
+  };
+  for (std::size_t k = 1; k + 1 < steps.size(); ++k) {
+    const RotationStep &before = *steps[k - 1], &now = *steps[k], &after = *steps[k + 1];
+    if (before.t1 != now.t0 || now.t1 != after.t0) continue;
+    const Eigen::Vector3d earlier = turned(before.t0, now.t0).transpose() * (*courses)[k - 1].speed;
+    const Eigen::Vector3d later = turned(now.t0, after.t0) * (*courses)[k + 1].speed;
+    (*courses)[k].acceleration = (later - earlier) * 2 / (after.t0 + after.t1 - before.t0 - before.t1);
+  }
 }
 
 }  // namespace
@@ -112,13 +135,14 @@ std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& 
 
   State x{start.time_offset, start.readout, start.R_imu_cam.toRotationMatrix()};
   Eigen::Matrix<double, kUnknowns, kUnknowns> covariance;
+  std::vector<Course> courses(used.size());
   bool settled = false;
   for (int round = 0; round < kRounds && !settled; ++round) {
     Eigen::Matrix<double, kUnknowns, kUnknowns> H = 1e-12 * Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity();
     Eigen::Matrix<double, kUnknowns, kUnknowns> scatter = 0 * H;
     Unknowns g = Unknowns::Zero();
-    for (const RotationStep* s : used) {
-      const Share share = shareOf(*s, gyro, x);
+    for (std::size_t k = 0; k < used.size(); ++k) {
+      const Share share = shareOf(*used[k], gyro, x, &courses[k]);
       H += share.H;
       g += share.g;
       scatter += share.g * share.g.transpose();
@@ -128,6 +152,7 @@ std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& 
     if (!d.allFinite() || std::abs(x.time_offset - start.time_offset) > kMargin / 2 || std::abs(x.readout) > kMargin)
       return std::nullopt;
     settled = std::abs(d(0)) < 1e-5 && std::abs(d(1)) < 1e-5;
+    accelerate(used, gyro, x, &courses);
     // What the images of a pair have in common (blur, noise of the gyro) is in all their corners: count by pairs.
     const Eigen::Matrix<double, kUnknowns, kUnknowns> inverse =
         H.ldlt().solve(Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity());
