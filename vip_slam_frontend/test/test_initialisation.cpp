@@ -18,13 +18,17 @@ struct Start {
   std::string reason;
 };
 
-Start start(double speed, bool depth, double accel_unit = 1) {
+/// `scene`: the images show something that moves with the camera by this share.
+Start start(double speed, bool depth, double accel_unit = 1, double scene = 0) {
   SimulationOptions options;
   options.speed = speed;
   options.depth = depth;
   options.seed = 9;
   LandmarkSimulation simulation(options);
   simulation.generateImu(6.0);
+  options.speed = (1 - scene) * speed;
+  LandmarkSimulation seen(options);
+  seen.generateImu(6.0);
   ImuBuffer imu;
   Initialiser initialiser(InitialisationOptions(), FilterOptions(), options.noise, simulation.T_I_C(), options.focal,
                           9.81);
@@ -37,7 +41,7 @@ Start start(double speed, bool depth, double accel_unit = 1) {
       sample.accel /= accel_unit;
       imu.add(sample);
     }
-    result.prior = initialiser.add({result.t, simulation.sight(result.t, 200)}, imu);
+    result.prior = initialiser.add({result.t, seen.sight(result.t, 200)}, imu);
     result.reason = initialiser.reason();
   }
   return result;
@@ -105,6 +109,14 @@ TEST(Initialiser, MovingFindsVelocityAndGravity) {
   EXPECT_LT((estimated - expected).norm(), 3.0 * s.prior->sigma_velocity);
   EXPECT_LT((estimated - expected).norm(), 0.15);
   EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.01);
+}
+
+TEST(Initialiser, WhatMovesBeforeTheCameraIsNoStart) {
+  for (const double share : {0.1, 0.2, 0.4}) {
+    const Start s = start(1.0, true, 1, share);
+    EXPECT_FALSE(s.prior) << share;
+    EXPECT_NE(s.reason.find("does something move"), std::string::npos) << s.reason;
+  }
 }
 
 TEST(Initialiser, MovingWithoutDepthSaysWhyItWaits) {
