@@ -12,64 +12,55 @@ namespace {
 
 constexpr double kReadout = 0.03;
 
-/// Root mean square of the position's error over five seconds of motion, metres. `told`: the sensor's readouts.
-double errorOf(double colour_told, double depth_told, bool depth_rolls) {
+/// Root mean square of the position's error over five seconds of motion, metres. `see`: fills the images of the time t.
+template <class See>
+double errorOf(const SensorConfig& sensor, double depth_lag, const See& see) {
   const CornerWorld world;
-  FrontEnd front_end(cornerOptions(), cornerSensor(colour_told, depth_told));
+  FrontEnd front_end(cornerOptions(), sensor);
   double imu_t = 0, square = 0;
   int n = 0;
   for (int k = 0; k < 125; ++k) {
-    const double t = 0.05 * k;
-    for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
     FrameInput input;
-    input.t = t;
-    cv::Mat instant, not_used;
-    world.look(t, kReadout, &input.gray, &input.depth);
-    if (!depth_rolls) {
-      world.look(t, 0, &not_used, &instant);
-      input.depth = instant;
-    }
+    input.t = 0.05 * k;
+    input.depth_lag = depth_lag;
+    for (; !front_end.ready(input.t, depth_lag); imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
+    see(world, &input);
     const FrameOutput output = front_end.process(input);
-    if (t < kStill + 0.05) continue;
-    square += (output.frame->state.T_W_I.t() - CornerWorld::pose(t).t()).squaredNorm();
+    if (input.t < kStill + 0.05) continue;
+    square += (output.frame->state.T_W_I.t() - CornerWorld::pose(input.t).t()).squaredNorm();
     ++n;
   }
   return std::sqrt(square / n);
 }
 
+/// Colour that is read row by row, depth as well or not. `told`: the sensor's readouts.
+double errorOfRows(double colour_told, double depth_told, bool depth_rolls) {
+  return errorOf(cornerSensor(colour_told, depth_told), 0, [&](const CornerWorld& world, FrameInput* input) {
+    world.look(input->t, kReadout, &input->gray, &input->depth);
+    cv::Mat not_used;
+    if (!depth_rolls) world.look(input->t, 0, &not_used, &input->depth);
+  });
+}
+
+/// Colour of one instant, depth that is taken `lag` later. `told`: what the front end hears of it.
+double errorWithLag(double lag, double told, double depth_readout) {
+  return errorOf(cornerSensor(0, depth_readout), told, [&](const CornerWorld& world, FrameInput* input) {
+    cv::Mat not_used;
+    world.look(input->t, 0, &input->gray, &not_used);
+    world.look(input->t + lag, depth_readout, &not_used, &input->depth);
+  });
+}
+
 TEST(RollingImages, RowsAreTakenForWhatTheyAre) {
-  const double told = errorOf(kReadout, kReadout, true), not_told = errorOf(0, 0, true);
+  const double told = errorOfRows(kReadout, kReadout, true), not_told = errorOfRows(0, 0, true);
   EXPECT_LT(told, 0.003);
   EXPECT_GT(not_told, 4 * told);
 }
 
 TEST(RollingImages, DepthOfOneInstantBelongsToTheStamp) {
-  const double told = errorOf(kReadout, 0, false), taken_for_rolling = errorOf(kReadout, kReadout, false);
+  const double told = errorOfRows(kReadout, 0, false), taken_for_rolling = errorOfRows(kReadout, kReadout, false);
   EXPECT_LT(told, 0.003);
   EXPECT_GT(taken_for_rolling, 2 * told);
-}
-
-/// The same with colour of one instant and depth that is taken `lag` later. `told`: what the front end hears of it.
-double errorWithLag(double lag, double told, double depth_readout) {
-  const CornerWorld world;
-  FrontEnd front_end(cornerOptions(), cornerSensor(0, depth_readout));
-  double imu_t = 0, square = 0;
-  int n = 0;
-  for (int k = 0; k < 125; ++k) {
-    const double t = 0.05 * k;
-    FrameInput input;
-    input.t = t;
-    input.depth_lag = told;
-    for (; !front_end.ready(t, told); imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
-    cv::Mat not_used;
-    world.look(t, 0, &input.gray, &not_used);
-    world.look(t + lag, depth_readout, &not_used, &input.depth);
-    const FrameOutput output = front_end.process(input);
-    if (t < kStill + 0.05) continue;
-    square += (output.frame->state.T_W_I.t() - CornerWorld::pose(t).t()).squaredNorm();
-    ++n;
-  }
-  return std::sqrt(square / n);
 }
 
 TEST(LaggingDepth, IsCarriedOverToTheStampOfColour) {

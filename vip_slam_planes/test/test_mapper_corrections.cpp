@@ -1,0 +1,149 @@
+// What the back end corrects, on exact scenes: poses, the camera's mounting, the depth's offset.
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "rig.h"
+
+namespace vip_slam {
+namespace {
+
+using testing::lookAt;
+using testing::Rig;
+using testing::room;
+using testing::Scene;
+using testing::updateFor;
+
+TEST(Mapper, KeyframesLookFromTheMountingThatIsKnownNow) {
+  // The front end held the mounting to be 3 degrees off when it made the keyframes; the back end knows better.
+  Rig rig;
+  const Scene scene = room();
+  const SE3 T_I_C(expQuaternion({0.2, -0.1, 0.3}), {0.05, 0.02, 0});
+  for (int i = 0; i < 6; ++i) {
+    const SE3 T_W_C = lookAt({-1 + 0.4 * i, 0, 1.4}, {3, -1 + 0.4 * i, 1.0});
+    const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+    keyframe->frame.T_I_C = T_I_C * SE3(expQuaternion({0.03, 0.04, 0}), {0.1, 0, 0});
+    keyframe->frame.state.T_W_I = T_W_C * keyframe->frame.T_I_C.inverse();
+    rig.mapper.addKeyframe(keyframe);
+    MapUpdate update = updateFor(*keyframe, T_W_C * T_I_C.inverse());
+    update.keyframes[0].T_I_C = T_I_C;
+    rig.mapper.applyMapUpdate(update);
+  }
+  const PlaneEstimate* wall = rig.find(Plane({-1, 0, 0}, 3), 0.003);
+  ASSERT_TRUE(wall);
+  EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), wall->plane), 0.1 * M_PI / 180);
+}
+
+TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
+  // Read 2 cm too long at first; the back end tells of it with the sixth keyframe.
+  Rig rig;
+  const Scene scene = room();
+  const Plane truth({-1, 0, 0}, 3);
+  MapUpdate all;
+  all.global = true;
+  for (int i = 0; i < 6; ++i) {
+    const SE3 T_W_C = lookAt({-1 + 0.2 * i, 0, 1.4}, {3, -1 + 0.4 * i, 1.0});
+    const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+    for (float& z : keyframe->frame.depth_grid.z) z += z > 0 ? 0.02f : 0.0f;
+    for (Feature& f : keyframe->frame.features) f.depth += f.depth > 0 ? 0.02f : 0.0f;
+    rig.place(keyframe, T_W_C);
+    all.keyframes.push_back(updateFor(*keyframe, T_W_C).keyframes[0]);
+    all.keyframes.back().depth_correction = -0.02;
+  }
+  const PlaneEstimate* wall = rig.find(truth, 0.05);
+  ASSERT_TRUE(wall);
+  EXPECT_GT(std::abs(wall->plane.d - truth.d), 0.01);
+  rig.mapper.applyMapUpdate(all);
+  EXPECT_TRUE(rig.find(truth, 0.002));
+  // One that is placed later than that is known is corrected as well, and says so.
+  const SE3 T_W_C = lookAt({0.3, 0.1, 1.4}, {3, 0.2, 1.1});
+  const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+  for (float& z : keyframe->frame.depth_grid.z) z += z > 0 ? 0.02f : 0.0f;
+  rig.mapper.addKeyframe(keyframe);
+  MapUpdate update = updateFor(*keyframe, T_W_C);
+  update.keyframes[0].depth_correction = -0.02;
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+  EXPECT_TRUE(rig.find(truth, 0.002));
+  ASSERT_FALSE(result.observations.empty());
+  for (const PlaneObservation& o : result.observations) {
+    EXPECT_EQ(o.depth_correction, -0.02);
+    const PlaneEstimate* plane = nullptr;
+    for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
+    ASSERT_TRUE(plane);
+    const Eigen::Vector4d p_C = transformPlane(T_W_C.inverse(), plane->plane).coefficients();
+    EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.004);
+  }
+}
+
+TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
+  Rig rig;
+  const Scene scene = room();
+  for (int i = 0; i < 6; ++i) rig.look(scene, {-1 + 0.4 * i, 0, 1.4}, {3, -1 + 0.4 * i, 1.0});
+  const std::size_t count = rig.mapper.planes().size();
+  const PlaneEstimate wall = *rig.find(Plane({-1, 0, 0}, 3));
+  const SE3 move(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())), {2, -1, 0.2});
+  MapUpdate update;
+  update.global = true;
+  for (const auto& [id, T] : rig.poses) {
+    KeyframeEstimate k;
+    k.id = id;
+    k.state.T_W_I = move * T;
+    update.keyframes.push_back(k);
+  }
+  rig.mapper.applyMapUpdate(update);
+  EXPECT_EQ(count, rig.mapper.planes().size());
+  const Plane expected = transformPlane(move, wall.plane);
+  const PlaneEstimate* moved = rig.find(expected, 0.001);
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(wall.id, moved->id);
+  EXPECT_NEAR(wall.area, moved->area, 0.1 * wall.area);
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = -low, low2 = low, high2 = high;
+  for (const auto& p : wall.polygons)
+    for (const auto& q : p.outer) low = low.cwiseMin(q), high = high.cwiseMax(q);
+  for (const auto& p : moved->polygons)
+    for (const auto& q : p.outer) low2 = low2.cwiseMin(move.inverse() * q), high2 = high2.cwiseMax(move.inverse() * q);
+  EXPECT_LT((low - low2).norm(), 0.15);
+  EXPECT_LT((high - high2).norm(), 0.15);
+}
+
+// The first keyframe leans by more than gravity will say; the floor far ahead shows too flat for samples.
+TEST(Mapper, APlaneThatNoObservationHoldsMovesWithTheKeyframeThatShowsIt) {
+  PlaneMapperOptions options;
+  options.observation.min_points = 1000;
+  Rig rig(0, options);
+  Scene scene;
+  scene.add({2.5, -1, 0}, {2, 0, 0}, {0, 2, 0});
+  const SE3 truth = lookAt({0, 0, 1.5}, {3.5, 0, 0});
+  const SE3 leaning(expSO3({0, 0.02, 0}) * truth.rotation(), truth.t());
+  const auto keyframe = rig.camera.keyframe(scene, truth);
+  const PlaneUpdate before = rig.place(keyframe, leaning);
+  ASSERT_EQ(1u, before.planes.size());
+  EXPECT_TRUE(before.observations.empty());
+  EXPECT_GT(before.planes[0].plane.d, 0.05);
+  const PlaneUpdate after = rig.mapper.applyMapUpdate(updateFor(*keyframe, truth));
+  ASSERT_EQ(1u, after.planes.size());
+  EXPECT_NEAR(0, after.planes[0].plane.d, 0.01);
+  EXPECT_NEAR(before.planes[0].area, after.planes[0].area, 0.05 * before.planes[0].area);
+}
+
+TEST(Mapper, APlaneThatIsGoneDisappears) {
+  Rig rig;
+  Scene with = room(), without = room();
+  with.add({1, -0.8, 0}, {0, 1.6, 0}, {0, 0, 1.8});  // a partition that is carried away
+  for (int i = 0; i < 3; ++i) rig.look(with, {-1.5, 0.1 * i, 1.2}, {1, 0, 1.0});
+  const PlaneEstimate* partition = rig.find(Plane({-1, 0, 0}, 1));
+  ASSERT_TRUE(partition);
+  const PlaneId id = partition->id;
+  std::set<PlaneId> removed;
+  for (int i = 0; i < 10; ++i) {
+    const PlaneUpdate update = rig.look(without, {-1.5, 0.1 * i, 1.2}, {1, 0, 1.0});
+    removed.insert(update.removed.begin(), update.removed.end());
+  }
+  EXPECT_FALSE(rig.find(Plane({-1, 0, 0}, 1)));
+  EXPECT_EQ(std::set<PlaneId>{id}, removed);
+  EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 3)));
+}
+
+}  // namespace
+}  // namespace vip_slam
