@@ -80,6 +80,7 @@ Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro
   return fit;
 }
 
+constexpr double kUsefulReadout = 0.003;  // one sigma beyond which rows are left out of account, seconds
 constexpr double kStep = 0.002;  // of the grid of delays, seconds
 
 struct Search {
@@ -158,7 +159,8 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
   // The rotation is known once a second axis moves: 0.05 rad/s.
   out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
   out.usable = true;
-  if (const auto rows = estimateReadout(r.rotations, gyro, {fine.offset, 0.0, out.R_imu_cam})) {
+  const auto rows = estimateReadout(r.rotations, gyro, {fine.offset, 0.0, out.R_imu_cam});
+  if (rows && rows->readout_sigma < kUsefulReadout) {
     // A delay found without regard to rows belongs to no row in particular.
     out.time_offset = rows->time_offset;
     out.time_sigma = rows->time_sigma;
@@ -188,8 +190,7 @@ Findings checkMotion(const Recording& r) {
                    words("set time_offset: %.4f in the sensor file", motion.time_offset)});
   else
     out.push_back({Severity::kGood, "camera-IMU delay", measured, ""});
-  constexpr double kUsefulSigma = 0.003;
-  if (motion.readout_sigma > 0 && motion.readout_sigma < kUsefulSigma) out.push_back(readoutFinding(r, motion));
+  if (motion.readout_sigma > 0) out.push_back(readoutFinding(r, motion));
   if (!motion.rotation_known) {
     out.push_back({Severity::kNote, "extrinsics", "not checked: the sensor turns about one axis only", ""});
     return out;
