@@ -184,7 +184,8 @@ SensorConfig sensor() {
   c.T_color_depth = SE3(expQuaternion({0.01, 0.02, -0.01}), {0.015, 0, 0.001});
   c.T_imu_cam = SE3(expQuaternion({-1.2, 1.2, -1.2}), {0.03, 0.02, -0.01});
   c.T_base_imu = SE3(expQuaternion({0, 0, 0.5}), {0.1, 0.2, 0.3});
-  c.imu_noise = {1.7e-4, 2e-5, 2e-3, 3e-3};
+  c.imu_noise = {1.7e-4, 2e-5, 2e-3, 3e-3, 4e-3};
+  c.gyro_correction << 0.01, 0.002, 0, -0.003, -0.02, 0.001, 0, 0.004, 0.015;
   c.depth_noise = DepthNoise::preset(DepthSensorType::kStereo);
   c.depth_noise.c = 0.0031;
   c.time_offset = -0.0123;
@@ -218,6 +219,8 @@ TEST_F(FileFormats, SensorRoundTrip) {
   EXPECT_LT(b.T_base_imu.boxminus(a.T_base_imu).norm(), 1e-12);
   EXPECT_EQ(b.imu_noise.gyro_random_walk, a.imu_noise.gyro_random_walk);
   EXPECT_EQ(b.imu_noise.accel_noise_density, a.imu_noise.accel_noise_density);
+  EXPECT_EQ(b.imu_noise.gyro_correction_sigma, a.imu_noise.gyro_correction_sigma);
+  EXPECT_EQ(b.gyro_correction, a.gyro_correction);
   EXPECT_EQ(b.depth_noise.type, DepthSensorType::kStereo);
   EXPECT_EQ(b.depth_noise.c, 0.0031);
   EXPECT_EQ(b.depth_noise.bias_floor, a.depth_noise.bias_floor);
@@ -295,6 +298,9 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("model: stereo", "model: sonar", "sonar");
   changed("min_range: 0.3", "min_range: 30", "depth_noise");
   changed("gravity: 9.807", "gravity: 1.6", "gravity");
+  changed("[0.01, 0.002, 0]", "[0.01, 0.002]", "imu/gyro_correction: row 1: expected 3 numbers");
+  changed("[0.01, 0.002, 0]", "[0.01, 0.9, 0]", "imu/gyro_correction: expected numbers from -0.2 to 0.2");
+  changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0", "imu/gyro_correction_sigma");
   changed("scale: 0.0002", "scale: 0", "depth/scale");
   changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth");
   changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam");

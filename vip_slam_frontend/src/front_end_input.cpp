@@ -4,6 +4,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
 
 #include "front_end_impl.h"
@@ -74,14 +75,14 @@ void FrontEnd::Impl::countImu() {
 
 bool FrontEnd::Impl::addImu(const ImuSample& sample) {
   if (!imu_.empty() && std::isfinite(sample.t)) noticeTimeJump(sample.t, imu_.newest(), "IMU");
-  const bool accepted = imu_.add(sample);
+  const bool accepted = imu_.add({sample.t, correctedRate(sample.gyro, sensor_.gyro_correction), sample.accel});
   countImu();
   return accepted;
 }
 
 bool FrontEnd::Impl::addGyro(double t, const Eigen::Vector3d& gyro) {
   if (!imu_.empty() && std::isfinite(t)) noticeTimeJump(t, imu_.newest(), "gyro");
-  const bool accepted = imu_.addGyro(t, gyro);
+  const bool accepted = imu_.addGyro(t, correctedRate(gyro, sensor_.gyro_correction));
   countImu();
   return accepted;
 }
@@ -142,7 +143,8 @@ std::optional<NavState> FrontEnd::Impl::predict(double t) const {
   const double until = std::min(t, imu_.newest());
   const std::vector<ImuSample> samples = imu_.between(state.t, until);
   if (samples.size() < 2) return state;
-  const Preintegration pre(samples, state.bias_gyro, state.bias_accel, sensor_.imu_noise);
+  const Preintegration pre(withGyroCorrection(samples, filter_.window().gyro_correction), state.bias_gyro,
+                           state.bias_accel, sensor_.imu_noise);
   NavState predicted = pre.predict(state, gravityVector(sensor_.gravity));
   predicted.t = until;
   return predicted;

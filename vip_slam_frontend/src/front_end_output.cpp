@@ -9,13 +9,16 @@ namespace vip_slam {
 
 MountingEstimate FrontEnd::Impl::mounting() const {
   MountingEstimate mounting = filter_.mounting();
-  mounting.depth_offset += sensor_.depth_offset;  // which the readings have by the time they get here
+  // Readings and rates have what was given by the time they get here.
+  mounting.depth_offset += sensor_.depth_offset;
+  mounting.gyro_correction += sensor_.gyro_correction + mounting.gyro_correction * sensor_.gyro_correction;
   return mounting;
 }
 
 MountingEstimate FrontEnd::Impl::givenMounting() const {
   MountingEstimate given{sensor_.T_imu_cam, sensor_.time_offset};
   given.depth_offset = sensor_.depth_offset;
+  given.gyro_correction = sensor_.gyro_correction;
   return given;
 }
 
@@ -156,6 +159,7 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
     keyframe->frame.depth_grid = depthGrid(options_.keyframe_grid_stride);
   }
   if (last_keyframe_ != 0 && !keyframe_imu_broken_) keyframe->imu = imu_.between(last_keyframe_imu_t_, t_imu);
+  keyframe->gyro_correction = filter_.gyroCorrection();
 
   if (const RelativeMotion motion = filter_.motionSinceMark(); last_keyframe_ != 0 && motion.isUsable())
     keyframe->motion = motion;

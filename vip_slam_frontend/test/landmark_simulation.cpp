@@ -73,6 +73,7 @@ void LandmarkSimulation::generateImu(double until) {
     ImuSample sample;
     sample.t = t;
     sample.gyro = logSO3(Eigen::Matrix3d(a.R().transpose() * c.R())) / (2 * h);
+    sample.gyro += options_.gyro_error * sample.gyro;
     const Eigen::Vector3d acceleration = (a.t() - 2 * b.t() + c.t()) / (h * h);
     sample.accel = b.R().transpose() * (acceleration + gravityVector());
     sample.gyro += bias_gyro_.back() + gaussian(random_, on * options_.noise.gyro_noise_density / std::sqrt(dt));
@@ -183,6 +184,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
                                           standing ? std::optional<double>(1.0) : std::nullopt);
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
+    result.gyro_correction = filter.gyroCorrection();
+    result.most_gyro_correction = std::max(result.most_gyro_correction, result.gyro_correction.cwiseAbs().maxCoeff());
     nis += report.nis;
     rows += report.rows;
     result.gated += report.features_gated;

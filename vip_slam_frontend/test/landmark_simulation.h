@@ -27,8 +27,9 @@ struct SimulationOptions {
   double creep_ratio = 0;  ///< share of such tracks
   double speed = 1.0;      ///< factor on the motion's frequencies; 0: standing
   ImuNoise noise{1.7e-3, 2e-5, 2e-2, 3e-4};
-  double noise_told = 1.0;  ///< share of the IMU's noise that the filter is told
-  double time_offset = 0;   ///< t_imu = t_image + time_offset
+  Eigen::Matrix3d gyro_error = Eigen::Matrix3d::Zero();  ///< it measures (I + this) * omega
+  double noise_told = 1.0;                               ///< share of the IMU's noise that the filter is told
+  double time_offset = 0;                                ///< t_imu = t_image + time_offset
 };
 
 class LandmarkSimulation {
@@ -72,7 +73,9 @@ struct RunResult {
   int gated = 0, used = 0;
   WindowState window;  ///< at the end
   MountingEstimate mounting;
-  double most_depth_correction = 0;  ///< m, of all images, with its sign
+  double most_depth_correction = 0;                           ///< m, of all images, with its sign
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< handed on, at the end
+  double most_gyro_correction = 0;                            ///< its largest entry of all images
   Matrix15d covariance = Matrix15d::Zero();
 };
 

@@ -1,6 +1,9 @@
 // Jacobians of the measurement rows and of the propagation against central differences.
 #include <gtest/gtest.h>
 
+#include <set>
+#include <utility>
+
 #include <Eigen/Dense>
 
 #include "landmark_simulation.h"
@@ -150,6 +153,45 @@ TEST(Propagation, TransitionMatchesCentralDifferences) {
         a.bias_gyro - b.bias_gyro, a.bias_accel - b.bias_accel;
     column /= 2 * h;
     EXPECT_LT((column - nominal.Phi.col(c)).norm(), 1e-5 * (1.0 + column.norm())) << "column " << c;
+  }
+}
+
+TEST(Propagation, GyroCorrectionMatchesCentralDifferences) {
+  testing::SimulationOptions options;
+  testing::LandmarkSimulation simulation(options);
+  simulation.generateImu(3.0);
+  WindowState window;
+  const NavState state = simulation.stateAt(0.5);
+  Clone clone;
+  clone.T_W_I = clone.T_W_I_fej = state.T_W_I;
+  window.clones.push_back(clone);
+  window.v_W = window.v_W_fej = state.v_W;
+  window.gyro_correction << 0.01, -0.02, 0.005, 0.003, -0.015, 0.01, -0.01, 0.02, 0.008;
+  const auto samples = simulation.imuBetween(0.5, 0.56);
+  for (const bool misalignment : {true, false}) {
+    window.calibration.gyro_scale = true;
+    window.calibration.gyro_misalignment = misalignment;
+    const Propagation nominal = propagate(window, samples, options.noise, gravityVector());
+    const double h = 1e-4;
+    const auto moved = [&](int k, double by) {
+      WindowState other = window;
+      other.boxplus(by * Eigen::VectorXd::Unit(window.dimension(), window.gyroColumn() + k));
+      EXPECT_NEAR((other.gyro_correction - window.gyro_correction).cwiseAbs().sum(), h, 1e-12) << "one entry";
+      return propagate(other, samples, options.noise, gravityVector()).predicted;
+    };
+    std::set<std::pair<int, int>> entries;
+    for (int k = 0; k < window.calibration.gyro(); ++k) {
+      const auto [row, column] = gyroEntry(window.calibration, k);
+      entries.insert({row, column});
+      const NavState a = moved(k, h), b = moved(k, -h);
+      Eigen::Matrix<double, 9, 1> change;
+      change << a.T_W_I.boxminus(nominal.predicted.T_W_I) - b.T_W_I.boxminus(nominal.predicted.T_W_I), a.v_W - b.v_W;
+      const Eigen::Matrix<double, 9, 1> expected = nominal.Phi_gyro.col(3 * column + row).head<9>();
+      // Jacobians take the rates for constant over the image interval.
+      EXPECT_LT((change / (2 * h) - expected).norm(), 0.02 * expected.norm() + 1e-6) << row << column;
+    }
+    EXPECT_EQ(entries.size(), misalignment ? 9u : 3u);
+    EXPECT_EQ(nominal.Phi_gyro.bottomRows<6>().norm(), 0.0);
   }
 }
 

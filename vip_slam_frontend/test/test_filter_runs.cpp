@@ -243,6 +243,69 @@ TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
   }
 }
 
+/// A gyro as cameras have them.
+SimulationOptions goodGyro(std::uint32_t seed) {
+  SimulationOptions simulation;
+  simulation.seed = seed;
+  simulation.sigma_px = 0.2;
+  simulation.noise.gyro_noise_density *= 0.2;
+  simulation.noise.accel_noise_density *= 0.2;
+  return simulation;
+}
+
+TEST(Calibration, FindsTheScaleOfTheGyro) {
+  constexpr int kRuns = 6;
+  double nees = 0, believed = 0, scale_nees = 0;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation = goodGyro(seed);
+    simulation.gyro_error.diagonal() << 0.006, -0.004, 0.008;
+    simulation.noise.gyro_correction_sigma = 0.005;
+    FilterOptions options = filterOptions();
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    const Eigen::Vector3d expected =
+        (Eigen::Vector3d::Ones() + simulation.gyro_error.diagonal()).cwiseInverse() - Eigen::Vector3d::Ones();
+    const Eigen::Vector3d off = run.mounting.gyro_correction.diagonal() - expected;
+    scale_nees += off.cwiseQuotient(run.mounting.sigma_gyro_correction.diagonal()).squaredNorm() / kRuns;
+    EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.003);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double found = run.mounting.gyro_correction(axis, axis);
+      const bool sure = std::abs(found) > 4.0 * run.mounting.sigma_gyro_correction(axis, axis);
+      EXPECT_EQ(run.gyro_correction(axis, axis), sure ? found : 0.0) << "handed on once it is beyond doubt";
+    }
+    EXPECT_GT(run.gyro_correction.cwiseAbs().maxCoeff(), 0.005);
+    nees += run.nees / kRuns;
+    options.calibration.gyro_scale = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with a gyro off by up to 0.8 %%: %.2f, of the scale (3) %.2f; gyro believed: %.2f\n", nees,
+              scale_nees, believed);
+  EXPECT_LT(nees, 9.0);
+  EXPECT_LT(scale_nees, 7.0);
+  EXPECT_GT(believed, 3 * nees);
+}
+
+TEST(Calibration, FindsHowTheGyroIsMisaligned) {
+  SimulationOptions simulation = goodGyro(3);
+  simulation.gyro_error << 0.004, 0.006, -0.005, -0.007, -0.003, 0.008, 0.006, -0.004, 0.005;
+  simulation.noise.gyro_correction_sigma = 0.005;
+  FilterOptions options = filterOptions();
+  options.calibration.gyro_misalignment = true;
+  const RunResult run = runFilter(simulation, options, 40.0, false);
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d left = (I + run.mounting.gyro_correction) * (I + simulation.gyro_error) - I;
+  EXPECT_LT(left.norm(), 0.3 * simulation.gyro_error.norm());
+  EXPECT_LT((left.array().abs() / run.mounting.sigma_gyro_correction.array()).maxCoeff(), 4.0);
+}
+
+// The estimate wanders about zero, and nobody is told.
+TEST(Calibration, AnExactGyroIsHandedOnAsItIs) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    const RunResult run = runFilter(goodGyro(seed), filterOptions(), 15.0, false);
+    EXPECT_NE(run.mounting.gyro_correction.norm(), 0.0);
+    EXPECT_EQ(run.most_gyro_correction, 0.0);
+  }
+}
+
 // Such as colour and depth of different moments would ask for: no offset is better than a wrong one.
 TEST(Calibration, AnOffsetOfDepthBeyondBeliefIsTakenBack) {
   SimulationOptions simulation;
@@ -296,6 +359,22 @@ TEST(Calibration, OutlivesARestart) {
   EXPECT_NEAR(filter.mounting().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
 }
 
+TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
+  for (const double off : {-0.02, -0.08}) {
+    VioFilter filter(filterOptions(), ImuNoise(), SE3(), 0.0, 500, 9.81);
+    filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, filter.window().dimension());
+    H(0, filter.window().gyroColumn() + 1) = 1e6;
+    Eigen::VectorXd r = Eigen::VectorXd::Constant(1, 1e6 * off);
+    const_cast<SquareRootFilter&>(filter.algebra()).update(H, r);
+    filter.stop();
+    filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
+    Eigen::Matrix3d expected = Eigen::Matrix3d::Zero();
+    if (off > -0.05) expected(1, 1) = off;
+    EXPECT_LT((filter.window().gyro_correction - expected).norm(), 1e-5);
+  }
+}
+
 TEST(Calibration, IsForgottenWhenItWentAstray) {
   const FilterOptions options = filterOptions();
   VioFilter filter = taught(options, SE3(), 6 * options.calibration.sigma_rotation * Eigen::Vector3d::UnitY());
@@ -325,6 +404,12 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   const std::string more = mountingDifferences(given, found).back();
   EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
   EXPECT_NE(more.find("-0.0120"), std::string::npos) << more;
+  found.gyro_correction(1, 1) = -0.0123;
+  found.sigma_gyro_correction(1, 1) = 0.0003;
+  const std::string gyro = mountingDifferences(given, found).back();
+  EXPECT_NE(gyro.find("up to 1.2 %"), std::string::npos) << gyro;
+  EXPECT_NE(gyro.find("[0.0000, -0.0123, 0.0000]"), std::string::npos) << gyro;
+  found.sigma_gyro_correction(1, 1) = 0.003;
   found.sigma_rotation.setConstant(0.01);  // not sure
   found.sigma_translation.setConstant(0.01);
   found.sigma_time_offset = 0.002;

@@ -121,6 +121,38 @@ TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
   EXPECT_NEAR(front_end.mounting().depth_offset, front_end_.mounting().depth_offset - 0.03, 1e-9);
 }
 
+// So have rates.
+TEST_F(FrontEndTest, TheGyroCorrectionIsTheConfiguredOneAndWhatWasFound) {
+  SensorConfig known = sensor();
+  known.gyro_correction << 0.05, 0.01, 0, -0.02, -0.1, 0.03, 0.01, 0, 0.08;
+  const Eigen::Matrix3d measures = (Eigen::Matrix3d::Identity() + known.gyro_correction).inverse();
+  FrontEnd front_end(options(), known);
+  EXPECT_EQ(front_end.givenMounting().gyro_correction, known.gyro_correction);
+  EXPECT_TRUE(mountingDifferences(front_end.givenMounting(), front_end.mounting()).empty());
+  double imu_t = 0;
+  int keyframes = 0;
+  for (int k = 0; k < 120; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t < t + 0.05; imu_t += 0.005) {
+      ImuSample sample = World::imu(imu_t);
+      front_end_.addImu(sample);
+      sample.gyro = measures * sample.gyro;
+      front_end.addImu(sample);
+    }
+    const FrameOutput a = front_end_.process({t, world_.image(t), World::depth(t)});
+    const FrameOutput b = front_end.process({t, world_.image(t), World::depth(t)});
+    EXPECT_LT(a.frame->state.T_W_I.boxminus(b.frame->state.T_W_I).norm(), 1e-6);
+    ASSERT_EQ(a.keyframe != nullptr, b.keyframe != nullptr);
+    if (!a.keyframe || a.keyframe->imu.empty()) continue;
+    EXPECT_LT((a.keyframe->imu.back().gyro - b.keyframe->imu.back().gyro).norm(), 1e-12);
+    ++keyframes;
+  }
+  EXPECT_GT(keyframes, 0);
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d both = (I + front_end_.mounting().gyro_correction) * (I + known.gyro_correction) - I;
+  EXPECT_LT((front_end.mounting().gyro_correction - both).norm(), 1e-6);
+}
+
 TEST_F(FrontEndTest, TwoRunsAgreeBitByBit) {
   const FrameOutput a = run(0.0, 3.0);
   FrontEnd other(options(), sensor());

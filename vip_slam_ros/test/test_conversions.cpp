@@ -154,6 +154,7 @@ TEST_F(Conversions, KeyframeIsUnchanged) {
   keyframe.frame = frame();
   keyframe.previous = 17;
   for (int i = 0; i < 4; ++i) keyframe.imu.push_back({1e9 + 0.1 * i, vector(), vector()});
+  keyframe.gyro_correction << 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09;
   keyframe.motion.T_a_b = keyframe.frame.T_I_C;
   for (int i = 0; i < 36; ++i) keyframe.motion.covariance(i / 6, i % 6) = vector().x();
   const Keyframe back = fromMsg(throughBytes(toMsg(keyframe, "odom")));
@@ -162,6 +163,7 @@ TEST_F(Conversions, KeyframeIsUnchanged) {
   EXPECT_EQ(back.id, keyframe.id);
   EXPECT_EQ(back.previous, keyframe.previous);
   expectSame(back.frame, keyframe.frame);
+  EXPECT_EQ(back.gyro_correction, keyframe.gyro_correction);
   ASSERT_EQ(back.imu.size(), keyframe.imu.size());
   for (std::size_t i = 0; i < back.imu.size(); ++i) {
     EXPECT_EQ(back.imu[i].t, keyframe.imu[i].t);

@@ -11,6 +11,7 @@ namespace {
 constexpr std::uint64_t kScaleInterval = 30;  // keyframes
 // Smaller changes of the depth's correction wait for the next global adjustment, m.
 constexpr double kNewDepthCorrection = 0.001;
+constexpr double kNewGyroCorrection = 5e-4;  // likewise
 
 }  // namespace
 
@@ -46,6 +47,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // the cameras they know stay right.
   map.adoptMounting(keyframe->frame.T_I_C);
   followDepthCorrection(keyframe->frame.depth_correction);
+  followGyroCorrection(keyframe->gyro_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   maker.process(keyframe->id, &map);
   // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
@@ -64,6 +66,15 @@ void BackEnd::Impl::followDepthCorrection(double newest) {
   map.adoptDepthCorrection(newest);
   global_wanted = true;
   ++correction;  // an adjustment under way has the readings as they were
+}
+
+void BackEnd::Impl::followGyroCorrection(const Eigen::Matrix3d& newest) {
+  newest_gyro_correction = newest;
+  if ((newest - gyro_correction).cwiseAbs().maxCoeff() < kNewGyroCorrection) return;
+  gyro_correction = newest;
+  map.adoptGyroCorrection(newest, sensor.imu_noise);
+  global_wanted = true;
+  ++correction;  // an adjustment under way has the factors as they were
 }
 
 MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
@@ -181,6 +192,7 @@ void BackEnd::Impl::reset() {
   global_wanted = false;
   last_global = -1e300;
   depth_correction = newest_depth_correction = 0;
+  gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   loops.clear();
   new_loops.clear();
@@ -201,6 +213,8 @@ GbaJob BackEnd::startGlobalBa() {
   impl_->global_wanted = false;
   impl_->depth_correction = impl_->newest_depth_correction;
   impl_->map.adoptDepthCorrection(impl_->depth_correction);
+  impl_->gyro_correction = impl_->newest_gyro_correction;
+  impl_->map.adoptGyroCorrection(impl_->gyro_correction, impl_->sensor.imu_noise);
   return impl_->makeGlobalJob();
 }
 

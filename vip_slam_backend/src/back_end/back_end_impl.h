@@ -31,6 +31,7 @@ struct BackEnd::Impl {
   /// All keyframes of this session get the same correction of their depth: the newest one's, once it is another one by
   /// enough to redo the map for.
   void followDepthCorrection(double newest);
+  void followGyroCorrection(const Eigen::Matrix3d& newest);
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
   /// Localisation only: what there is of a map stays as it is.
   bool frozen() const { return localisation_only && !map.empty(); }
@@ -92,9 +93,11 @@ struct BackEnd::Impl {
   /// Counts loop corrections, loaded maps and resets: a global adjustment of the map before one must not undo it.
   std::uint64_t correction = 0;
   bool global_wanted = false;
-  double last_global = -1e300;         ///< stamp of the last one that a loop asked for
-  double depth_correction = 0;         ///< m, of all keyframes of this session
-  double newest_depth_correction = 0;  ///< m, as the newest keyframe came
+  double last_global = -1e300;                                ///< stamp of the last one that a loop asked for
+  double depth_correction = 0;                                ///< m, of all keyframes of this session
+  double newest_depth_correction = 0;                         ///< m, as the newest keyframe came
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< of all keyframes of this session but for little
+  Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< as the newest keyframe came
   std::string refusal;
   std::vector<LoopEvent> loops;      ///< all so far
   std::vector<LoopEvent> new_loops;  ///< since the last update

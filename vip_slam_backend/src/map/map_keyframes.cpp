@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
@@ -14,9 +15,11 @@ bool finite(const NavState& s) {
 }
 
 std::shared_ptr<const Preintegration> integrate(const std::shared_ptr<const std::vector<ImuSample>>& imu,
-                                                const NavState& from, const ImuNoise& noise) {
+                                                const Eigen::Matrix3d& gyro_correction, const NavState& from,
+                                                const ImuNoise& noise) {
   if (!imu || imu->size() < 2) return nullptr;
-  return std::make_shared<Preintegration>(*imu, from.bias_gyro, from.bias_accel, noise);
+  return std::make_shared<Preintegration>(withGyroCorrection(*imu, gyro_correction), from.bias_gyro, from.bias_accel,
+                                          noise);
 }
 
 }  // namespace
@@ -44,6 +47,7 @@ std::string validateKeyframe(const Keyframe& keyframe) {
     if (k > 0 && !(s.t > keyframe.imu[k - 1].t))
       return name + "IMU sample " + std::to_string(k) + " is not after the one before";
   }
+  if (!keyframe.gyro_correction.allFinite()) return name + "the gyro's correction is not finite";
   if (keyframe.motion.known() && !keyframe.motion.isUsable())
     return name + "the odometry's motion is not finite, or its covariance is none";
   return "";
@@ -97,10 +101,11 @@ MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, Keyfram
   kf.T_I_C = data->frame.T_I_C;
   kf.landmarks.assign(data->frame.features.size(), kNoLandmark);
   kf.previous = previous;
+  kf.gyro_correction = data->gyro_correction;
   if (previous != 0) {
     kf.motion = data->motion;
     kf.imu = imu;
-    kf.preintegration = integrate(imu, keyframe(previous).state, noise);
+    kf.preintegration = integrate(imu, kf.gyro_correction, keyframe(previous).state, noise);
   }
   MapKeyframe& inserted = keyframes_.emplace(data->id, std::move(kf)).first->second;
   if (previous != 0) keyframe(previous).next = data->id;
@@ -128,6 +133,22 @@ void Map::adoptDepthCorrection(double correction) {
   }
 }
 
+void Map::adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise& noise) {
+  std::vector<KeyframeId> others;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  for (auto& [id, kf] : keyframes_) {
+    if (kf.stored || kf.gyro_correction == correction) continue;
+    // What stands still measures the same as before.
+    kf.state.bias_gyro = (I + correction) * (I + kf.gyro_correction).inverse() * kf.state.bias_gyro;
+    kf.gyro_correction = correction;
+    others.push_back(id);
+  }
+  for (const KeyframeId id : others) {
+    MapKeyframe& kf = keyframe(id);
+    if (kf.preintegration) kf.preintegration = integrate(kf.imu, correction, keyframe(kf.previous).state, noise);
+  }
+}
+
 void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds) {
   MapKeyframe& kf = keyframe(id);
   for (const LandmarkId landmark : std::vector<LandmarkId>(kf.landmarks))
@@ -146,7 +167,7 @@ void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_se
     n.motion = chained ? compose(kf.motion, n.motion) : RelativeMotion();
     n.previous = chained;
     n.imu = joined;
-    n.preintegration = chained ? integrate(joined, keyframe(chained).state, noise) : nullptr;
+    n.preintegration = chained ? integrate(joined, n.gyro_correction, keyframe(chained).state, noise) : nullptr;
     if (previous != 0) keyframe(previous).next = chained ? next : 0;
   } else if (previous != 0) {
     keyframe(previous).next = 0;
@@ -186,7 +207,7 @@ void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) 
   if (kf.next == 0) return;
   MapKeyframe& next = keyframe(kf.next);
   if (next.preintegration && next.preintegration->needsReintegration(state.bias_gyro, state.bias_accel))
-    next.preintegration = integrate(next.imu, state, noise);
+    next.preintegration = integrate(next.imu, next.gyro_correction, state, noise);
 }
 
 void Map::moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I) {

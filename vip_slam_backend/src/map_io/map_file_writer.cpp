@@ -6,6 +6,7 @@
 #include "vip_slam_backend/map_io/byte_stream.h"
 #include "vip_slam_backend/map_io/map_file.h"
 #include "vip_slam_backend/util/crc32.h"
+#include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/util/atomic_file.h"
 
 namespace vip_slam {
@@ -145,8 +146,9 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch, Landmark
   }
   const std::size_t samples = kf.previous != 0 && kf.imu ? kf.imu->size() : 0;
   out.put(static_cast<std::uint32_t>(samples));
-  for (std::size_t k = 0; k < samples; ++k) {
-    const ImuSample& s = (*kf.imu)[k];
+  const std::vector<ImuSample> scaled =
+      samples > 0 ? withGyroCorrection(*kf.imu, kf.gyro_correction) : std::vector<ImuSample>();
+  for (const ImuSample& s : scaled) {
     out.put(s.t);
     out.vector(s.gyro);
     out.vector(s.accel);

@@ -125,7 +125,7 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
   auto mark = Clock::now();
   summary.preprocess_ms = ms(start, mark);
   // The helper outlives the solve: to wait for its end on a busy machine takes as long as a small solve.
-  if (!worker_ || helper_ != options.threads > 1) {
+  if (!worker_ || helper_ != (options.threads > 1)) {
     helper_ = options.threads > 1;
     worker_ = std::make_unique<Worker>(helper_);
   }

@@ -194,6 +194,54 @@ TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
   EXPECT_LT(known, never_wrong + 0.001);
 }
 
+/// As from a gyro that measures 5 % too much, and what its front end knows of that.
+KeyframePtr turningTooFast(const KeyframePtr& keyframe, double correction) {
+  auto kf = std::make_shared<Keyframe>(*keyframe);
+  for (ImuSample& sample : kf->imu) sample.gyro *= 1.05;
+  kf->gyro_correction = correction * Eigen::Matrix3d::Identity();
+  return kf;
+}
+
+TEST(BackEnd, AGyroCorrectionHoldsForAllKeyframes) {
+  const auto rmse = [](bool tells) {
+    SimulatedKeyframes world(4);
+    BackEnd back_end(options("vip"), world.sensor());
+    double correction = 0;
+    for (int k = 0; k < 30; ++k) {
+      if (tells && k >= 15) correction = 1 / 1.05 - 1 + 1e-5 * (k - 15);
+      back_end.addKeyframe(turningTooFast(world.next(), correction));
+      EXPECT_EQ(back_end.lastRefusal(), "");
+      EXPECT_EQ(checkMap(back_end.map()), "");
+      EXPECT_EQ(back_end.globalBaWanted(), tells && k == 15) << k;
+      if (back_end.globalBaWanted()) back_end.merge(back_end.run(back_end.startGlobalBa()));
+      back_end.applyPlaneUpdate(world.planes());
+    }
+    back_end.finish();  // with what the newest keyframe knows
+    double sum = 0;
+    for (const auto& [id, kf] : back_end.map().keyframes()) {
+      EXPECT_EQ(kf.gyro_correction(1, 1), correction);
+      sum += (kf.state.T_W_I.t() - world.truth(kf.data->frame.t).T_W_I.t()).squaredNorm() / 30;
+    }
+    return std::sqrt(sum);
+  };
+  const double known = rmse(true), believed = rmse(false), exact = run("vip", 30, 4).rmse;
+  std::printf("rmse %.2f mm, with an exact gyro %.2f, the gyro believed %.2f mm\n", 1e3 * known, 1e3 * exact,
+              1e3 * believed);
+  EXPECT_LT(known, exact + 0.001);
+  EXPECT_GT(believed, exact + 0.001);
+}
+
+TEST(BackEnd, AGlobalAdjustmentOfAGyroAsItMeasuredIsDoneAgain) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 12; ++k) back_end.addKeyframe(turningTooFast(world.next(), 0));
+  const GbaResult before = back_end.run(back_end.startGlobalBa());
+  back_end.addKeyframe(turningTooFast(world.next(), -0.048));
+  back_end.startGlobalBa();
+  EXPECT_FALSE(back_end.merge(before).global);
+  EXPECT_TRUE(back_end.globalBaWanted());
+}
+
 TEST(BackEnd, AGlobalAdjustmentOfDepthAsItWasReadIsDoneAgain) {
   SimulatedKeyframes world(3);
   BackEnd back_end(options("vip"), world.sensor());

@@ -39,6 +39,38 @@ TEST(Map, TracksBecomeLandmarks) {
   EXPECT_EQ(covisible.front().first, 5u);
 }
 
+// Of three keyframes the one in between is culled before, one is of another session.
+TEST(Map, AGyroThatIsKnownBetterIsIntegratedAnew) {
+  Fixture f;
+  f.add(5);
+  f.map.removeKeyframe(3, ImuNoise(), 5.0);
+  auto stored = std::make_shared<Keyframe>(*f.world.next());
+  stored->previous = 0;
+  f.map.restoreKeyframe(stored, f.world.truth(stored->frame.t), 0, {}, ImuNoise());
+  const std::map<KeyframeId, MapKeyframe> before = f.map.keyframes();
+  Eigen::Matrix3d correction;
+  correction << -0.01, 0.002, 0, 0.003, 0.02, -0.001, 0.004, 0, -0.015;
+
+  f.map.adoptGyroCorrection(correction, ImuNoise());
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.keyframe(stored->id).gyro_correction, Eigen::Matrix3d::Zero());
+  for (const KeyframeId id : {2, 4, 5}) {
+    const MapKeyframe& kf = f.map.keyframe(id);
+    const NavState& from = f.map.keyframe(kf.previous).state;
+    EXPECT_EQ(kf.imu, before.at(id).imu) << "samples stay as they were measured";
+    std::vector<ImuSample> corrected = *kf.imu;
+    for (ImuSample& sample : corrected) sample.gyro = (Eigen::Matrix3d::Identity() + correction) * sample.gyro;
+    const Preintegration expected(corrected, from.bias_gyro, from.bias_accel, ImuNoise());
+    EXPECT_LT((kf.preintegration->deltaR() - expected.deltaR()).norm(), 1e-12);
+    EXPECT_GT((kf.preintegration->deltaR() - before.at(id).preintegration->deltaR()).norm(), 1e-5);
+    const Eigen::Vector3d at_rest = before.at(id).state.bias_gyro;
+    EXPECT_LT((kf.state.bias_gyro - (at_rest + correction * at_rest)).norm(), 1e-12);
+  }
+  // What was joined over a culled keyframe stays corrected when another one goes.
+  f.map.removeKeyframe(4, ImuNoise(), 5.0);
+  EXPECT_EQ(f.map.keyframe(5).gyro_correction, correction);
+}
+
 TEST(Map, AMountingThatIsKnownBetterTurnsBodiesAboutTheirCameras) {
   Fixture f;
   f.add(4);

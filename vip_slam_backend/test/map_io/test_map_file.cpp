@@ -170,6 +170,20 @@ TEST(MapFile, DamageBehindARightChecksumDoesNoHarm) {
   EXPECT_GT(taken, 500u);
 }
 
+// Another session knows nothing of that gyro.
+TEST(MapFile, KeepsTheRatesOfAGyroAsTheyWereCorrected) {
+  Map map = syntheticMap(3, 12, 100);
+  const Eigen::Vector3d measured = map.keyframe(3).imu->at(5).gyro;
+  Eigen::Matrix3d correction = Eigen::Matrix3d::Zero();
+  correction.diagonal() << 0.01, -0.02, 0.03;
+  map.adoptGyroCorrection(correction, ImuNoise());
+  const StoredMap stored = parse(serialiseMap(map, {}, 5));
+  const MapKeyframe& kf = stored.map.keyframe(3);
+  EXPECT_LT((kf.imu->at(5).gyro - (measured + correction * measured)).norm(), 1e-12);
+  EXPECT_EQ(kf.gyro_correction, Eigen::Matrix3d::Zero());
+  EXPECT_LT((kf.preintegration->deltaR() - map.keyframe(3).preintegration->deltaR()).norm(), 1e-12);
+}
+
 TEST(MapFile, IdsThatWouldTakeAllMemoryAreRefused) {
   Map map = syntheticMap(3, 12, 100);
   auto far = std::make_shared<Keyframe>(*map.keyframe(3).data);

@@ -7,6 +7,7 @@
 
 #include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/image_decoding.h"
 
@@ -97,7 +98,10 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   if (topic == topics.imu) note(&recording_.imu, arrival, message);
   if (topic == topics.gyro) note(&recording_.gyro, arrival, message);
   if (topic == topics.accel) note(&recording_.accel, arrival, message);
-  if (topic == topics.imu || topic == topics.gyro) recording_.gyro_samples.push_back({t, {w.x, w.y, w.z}});
+  if (topic == topics.imu || topic == topics.gyro) {
+    const Eigen::Matrix3d& correction = recording_.sensor.gyro_correction;
+    recording_.gyro_samples.push_back({t, correctedRate({w.x, w.y, w.z}, correction)});
+  }
   if (topic == topics.imu || topic == topics.accel) recording_.accel_samples.push_back({t, {a.x, a.y, a.z}});
 }
 

@@ -150,17 +150,21 @@ void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const I
     yaml << YAML::Key << key << YAML::Value << YAML::Flow
          << std::vector<double>(values.data(), values.data() + values.size());
   };
+  const auto rows = [&yaml](const char* key, const Eigen::MatrixXd& M) {
+    yaml << YAML::Key << key << YAML::Value << YAML::BeginSeq;
+    for (const auto& row : M.rowwise()) yaml << YAML::Flow << std::vector<double>(row.begin(), row.end());
+    yaml << YAML::EndSeq;
+  };
   yaml << YAML::Key << "calibration" << YAML::Value << YAML::BeginMap;
-  yaml << YAML::Key << "T_imu_cam" << YAML::Value << YAML::BeginSeq;
-  const Eigen::Matrix4d T = mounting.T_I_C.matrix();
-  for (int r = 0; r < 4; ++r) yaml << YAML::Flow << std::vector<double>{T(r, 0), T(r, 1), T(r, 2), T(r, 3)};
-  yaml << YAML::EndSeq;
+  rows("T_imu_cam", mounting.T_I_C.matrix());
   yaml << YAML::Key << "time_offset" << YAML::Value << mounting.time_offset;
   list("sigma_rotation_deg", mounting.sigma_rotation * 180 / M_PI);
   list("sigma_translation", mounting.sigma_translation);
   yaml << YAML::Key << "sigma_time_offset" << YAML::Value << mounting.sigma_time_offset;
   yaml << YAML::Key << "depth_offset" << YAML::Value << mounting.depth_offset;
   yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << mounting.sigma_depth_offset;
+  rows("gyro_correction", mounting.gyro_correction);
+  rows("sigma_gyro_correction", mounting.sigma_gyro_correction);
   if (scale.sigma > 0) {
     yaml << YAML::Key << "depth_scale_by_imu" << YAML::Value << depth_scale * scale.factor;
     yaml << YAML::Key << "sigma_depth_scale_by_imu" << YAML::Value << depth_scale * scale.sigma;

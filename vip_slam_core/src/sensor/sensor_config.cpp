@@ -60,19 +60,26 @@ class Section {
                                expectedType(value));
     }
   }
-  void pose(const std::string& key, SE3& T, bool required = true) {
+  template <int N>
+  void matrix(const std::string& key, Eigen::Matrix<double, N, N>& M, bool required = true) {
     if (!required && !has(key)) return;
     const YAML::Node node = need(key);
-    Eigen::Matrix4d M;
-    if (!node.IsSequence() || node.size() != 4) throw std::runtime_error(full(key) + ": expected 4 rows of 4 numbers");
-    for (int r = 0; r < 4; ++r) {
-      if (!node[r].IsSequence() || node[r].size() != 4)
-        throw std::runtime_error(full(key) + ": row " + std::to_string(r + 1) + ": expected 4 numbers");
-      for (int c = 0; c < 4; ++c) {
+    const std::string n = std::to_string(N), numbers = "expected " + n + " numbers";
+    if (!node.IsSequence() || node.size() != N)
+      throw std::runtime_error(full(key) + ": expected " + n + " rows of " + n + " numbers");
+    for (int r = 0; r < N; ++r) {
+      const std::string row = full(key) + ": row " + std::to_string(r + 1) + ": ";
+      if (!node[r].IsSequence() || node[r].size() != N) throw std::runtime_error(row + numbers);
+      for (int c = 0; c < N; ++c) {
         if (!node[r][c].IsScalar() || !parseDouble(node[r][c].Scalar(), &M(r, c)))
-          throw std::runtime_error(full(key) + ": row " + std::to_string(r + 1) + ": expected 4 numbers");
+          throw std::runtime_error(row + numbers);
       }
     }
+  }
+  void pose(const std::string& key, SE3& T, bool required = true) {
+    if (!required && !has(key)) return;
+    Eigen::Matrix4d M;
+    matrix(key, M);
     const Eigen::Matrix3d R = M.topLeftCorner<3, 3>();
     const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0;
     if (!M.allFinite() || !rotation || (M.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-9)
@@ -112,12 +119,11 @@ CameraIntrinsics cameraFrom(Section section) {
   return camera;
 }
 
-std::string text(const SE3& T) {
-  const Eigen::Matrix4d M = T.matrix();
+std::string text(const Eigen::MatrixXd& M, const char* indent) {
   std::string out;
-  for (int r = 0; r < 4; ++r) {
-    out += "\n  - [";
-    for (int c = 0; c < 4; ++c) out += (c ? ", " : "") + formatDouble(M(r, c));
+  for (int r = 0; r < M.rows(); ++r) {
+    out += std::string("\n") + indent + "- [";
+    for (int c = 0; c < M.cols(); ++c) out += (c ? ", " : "") + formatDouble(M(r, c));
     out += "]";
   }
   return out;
@@ -196,6 +202,10 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   imu.number("gyro_random_walk", config.imu_noise.gyro_random_walk, 1e-9, 10);
   imu.number("accel_noise_density", config.imu_noise.accel_noise_density, 1e-9, 10);
   imu.number("accel_random_walk", config.imu_noise.accel_random_walk, 1e-9, 10);
+  imu.matrix("gyro_correction", config.gyro_correction, false);
+  if (!(config.gyro_correction.cwiseAbs().maxCoeff() <= 0.2))
+    throw std::runtime_error("imu/gyro_correction: expected numbers from -0.2 to 0.2");
+  imu.number("gyro_correction_sigma", config.imu_noise.gyro_correction_sigma, 1e-6, 0.1, false);
   imu.number("gravity", config.gravity, 9.0, 10.5, false);
   imu.finish();
 
@@ -268,14 +278,17 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
   if (config.camera.width > 0) writeCamera(out, "camera", config.camera);
   if (!config.depth_registered) {
     writeCamera(out, "depth_camera", config.depth_camera);
-    out << "T_color_depth:" << text(config.T_color_depth) << "\n";
+    out << "T_color_depth:" << text(config.T_color_depth.matrix(), "  ") << "\n";
   }
-  out << "T_imu_cam:" << text(config.T_imu_cam) << "\nT_base_imu:" << text(config.T_base_imu)
+  out << "T_imu_cam:" << text(config.T_imu_cam.matrix(), "  ")
+      << "\nT_base_imu:" << text(config.T_base_imu.matrix(), "  ")
       << "\nimu:\n  rate: " << formatDouble(config.imu_rate)
       << "\n  gyro_noise_density: " << formatDouble(config.imu_noise.gyro_noise_density)
       << "\n  gyro_random_walk: " << formatDouble(config.imu_noise.gyro_random_walk)
       << "\n  accel_noise_density: " << formatDouble(config.imu_noise.accel_noise_density)
       << "\n  accel_random_walk: " << formatDouble(config.imu_noise.accel_random_walk)
+      << "\n  gyro_correction:" << text(config.gyro_correction, "    ")
+      << "\n  gyro_correction_sigma: " << formatDouble(config.imu_noise.gyro_correction_sigma)
       << "\n  gravity: " << formatDouble(config.gravity)
       << "\ndepth_noise:\n  model: " << depthSensorTypeName(config.depth_noise.type)
       << "\n  a: " << formatDouble(config.depth_noise.a) << "\n  b: " << formatDouble(config.depth_noise.b)

@@ -8,11 +8,12 @@ namespace vip_slam {
 namespace {
 
 constexpr double kSure = 5.0;  // sigmas
-constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002, kLeastDepth = 0.005;
+constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002, kLeastDepth = 0.005,
+                 kLeastGyroError = 0.002;
 
 template <typename... Numbers>
 std::string sentence(const char* format, Numbers... numbers) {
-  char text[256];
+  char text[512];
   std::snprintf(text, sizeof text, format, numbers...);
   return text;
 }
@@ -60,6 +61,17 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
                  "configuration should be %.4f",
                  1e3 * std::abs(depth), depth < 0 ? "long" : "short",
                  1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
+  }
+  const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
+  const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();
+  const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kLeastGyroError)).select(gyro, 0.0);
+  if (off.maxCoeff() > 0) {
+    const Eigen::Matrix3d& C = found.gyro_correction;
+    all.push_back(sentence(
+        "scale or alignment of the gyro's axes is off by up to %.1f %%, which is corrected for; imu/gyro_correction "
+        "in the sensor's configuration should have the rows [%.4f, %.4f, %.4f], [%.4f, %.4f, %.4f], "
+        "[%.4f, %.4f, %.4f]",
+        100 * off.maxCoeff(), C(0, 0), C(0, 1), C(0, 2), C(1, 0), C(1, 1), C(1, 2), C(2, 0), C(2, 1), C(2, 2)));
   }
   return all;
 }

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
 
 namespace vip_slam {
@@ -37,11 +38,12 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   scaled.accel_noise_density *= noise_scale;
   scaled.gyro_random_walk *= noise_scale;
   scaled.accel_random_walk *= noise_scale;
-  const Preintegration pre(samples, window.bias_gyro, window.bias_accel, scaled);
+  const Preintegration pre(withGyroCorrection(samples, window.gyro_correction), window.bias_gyro, window.bias_accel,
+                           scaled);
   const NavState from = window.nav();
   result.predicted = pre.predict(from, G);
   result.predicted.t = samples.back().t;
-  result.omega_I = samples.back().gyro - window.bias_gyro;
+  result.omega_I = correctedRate(samples.back().gyro, window.gyro_correction) - window.bias_gyro;
 
   const Clone& last = window.clones.back();
   const Eigen::Matrix3d R_fej = last.T_W_I_fej.R();
@@ -61,6 +63,11 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   Phi.block<3, 3>(6, 0) = -hat(dv) * R_fej;
   Phi.block<3, 3>(6, 9) = R_now * pre.J_beta_bg();
   Phi.block<3, 3>(6, 12) = R_now * pre.J_beta_ba();
+
+  // A bias that grows with the rate, which hardly changes between two images.
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : samples) mean += sample.gyro / static_cast<double>(samples.size());
+  for (int axis = 0; axis < 3; ++axis) result.Phi_gyro.block<9, 3>(0, 3 * axis) = -mean(axis) * Phi.block<9, 3>(0, 9);
 
   // The preintegrated position and velocity noise lives in the frame of the first pose.
   Matrix15d T = Matrix15d::Identity();

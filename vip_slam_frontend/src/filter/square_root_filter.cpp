@@ -33,6 +33,11 @@ void SquareRootFilter::augment(const Propagation& propagation, CloneId id) {
   A.block<15, 6>(n, last_clone) = -WPhi.leftCols<6>();
   A.block<15, 9>(n, nav) = -WPhi.rightCols<9>();
   A.block<15, 15>(n, n) = propagation.W;
+  const Eigen::Matrix<double, 15, 9> W_gyro = propagation.W * propagation.Phi_gyro;
+  for (int k = 0; k < window_.calibration.gyro(); ++k) {
+    const auto [row, column] = gyroEntry(window_.calibration, k);
+    A.block<15, 1>(n, window_.gyroColumn() + k) = -W_gyro.col(3 * column + row);
+  }
 
   std::vector<int> order;
   order.reserve(n + 15);
@@ -95,6 +100,14 @@ UpdateResult SquareRootFilter::update(Eigen::MatrixXd& H, Eigen::VectorXd& h) {
   window_.boxplus(result.delta);
   result.ok = true;
   return result;
+}
+
+Eigen::VectorXd SquareRootFilter::calibrationSigmas() const {
+  const int size = window_.calibration.size();
+  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(size, window_.dimension());
+  Y.middleCols(window_.calibrationColumn(), size).setIdentity();
+  solveRight(R_, Y);
+  return Y.rowwise().norm();
 }
 
 Matrix15d SquareRootFilter::navCovariance() const {

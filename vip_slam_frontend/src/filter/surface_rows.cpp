@@ -18,9 +18,10 @@ constexpr int kLeastPairs = 20;
 // them tell no more than so many independent ones.
 constexpr double kMostEffective = 50.0;
 
-/// Columns of the rows before compression: newest clone (theta, p), calibration, reference's clone (theta, p).
+/// Columns of the rows before compression: newest clone (theta, p), calibration of the camera, reference's clone
+/// (theta, p).
 struct Layout {
-  explicit Layout(const WindowState& window) : calibration(window.calibration.size()) {}
+  explicit Layout(const WindowState& window) : calibration(window.calibration.camera()) {}
   const int calibration;
   int reference() const { return 6 + calibration; }
   int size() const { return 12 + calibration; }

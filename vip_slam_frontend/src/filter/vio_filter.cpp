@@ -14,12 +14,6 @@ constexpr double kMostDepthNoise = 5.0;
 constexpr double kLeastDepthNoise = 0.3;
 // Features whose update tells of the stamps.
 constexpr int kLeastOfStamps = 5;
-// Sigmas of the prior within which a mounting that was found is kept over a restart.
-constexpr double kBelievableChange = 4.0;
-// An offset of depth is beyond doubt from so many of its sigmas and metres on, until it is half as large.
-constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
-// One sigma of what is taken back, m.
-constexpr double kHeldOffset = 1e-6;
 
 /// Squared correction of orientation and velocity per degree of freedom, whitened by what the covariance lost.
 double correctionPerDof(const NavState& before, const Matrix15d& P_before, const NavState& after,
@@ -49,71 +43,6 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       stamp_monitor_(options.adapt_imu_noise),
       imu_monitor_(options.adapt_imu_noise) {}
 
-MountingEstimate VioFilter::mounting() const {
-  if (!started_) {
-    MountingEstimate mounting = learnt_;
-    mounting.depth_contradicts = depth_contradicts_;
-    return mounting;
-  }
-  const WindowState& window = filter_.window();
-  MountingEstimate mounting;
-  mounting.T_I_C = window.T_I_C;
-  mounting.time_offset = window.time_offset;
-  mounting.depth_offset = window.depth_offset;
-  mounting.depth_contradicts = depth_contradicts_;
-  if (window.calibration.size() == 0) return mounting;
-  const Eigen::VectorXd variance = filter_.covariance().diagonal();
-  if (window.calibration.rotation) {
-    mounting.sigma_rotation = variance.segment<3>(window.rotationColumn()).cwiseMax(0).cwiseSqrt();
-  }
-  if (window.calibration.translation) {
-    mounting.sigma_translation = variance.segment<3>(window.translationColumn()).cwiseMax(0).cwiseSqrt();
-  }
-  if (window.calibration.time_offset) {
-    mounting.sigma_time_offset = std::sqrt(std::max(0.0, variance(window.timeOffsetColumn())));
-  }
-  if (window.calibration.depth_offset) {
-    mounting.sigma_depth_offset = std::sqrt(std::max(0.0, variance(window.depthOffsetColumn())));
-  }
-  return mounting;
-}
-
-void VioFilter::learnMounting() {
-  const WindowState& window = filter_.window();
-  learnt_ = given_;
-  if (!window.isFinite()) return;
-  const CalibrationOptions& options = options_.calibration;
-  const Vector6d change = window.T_I_C.boxminus(given_.T_I_C);
-  if (change.head<3>().norm() > kBelievableChange * options.sigma_rotation ||
-      change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
-      std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset ||
-      std::abs(window.depth_offset - given_.depth_offset) > kBelievableChange * options.sigma_depth_offset) {
-    return;
-  }
-  learnt_.T_I_C = window.T_I_C;
-  learnt_.time_offset = window.time_offset;
-  learnt_.depth_offset = window.depth_offset;
-}
-
-void VioFilter::judgeDepthOffset() {
-  const WindowState& window = filter_.window();
-  const double change = window.depth_offset - given_.depth_offset;
-  if (!window.calibration.depth_offset || depth_contradicts_) return;
-  if (!depth_is_off_ && std::abs(change) > kLeastOffset) {
-    depth_is_off_ = std::abs(change) > kSureOffset * mounting().sigma_depth_offset;
-  } else if (std::abs(change) < kLeastOffset / 2) {
-    depth_is_off_ = false;
-  }
-  if (std::abs(change) <= kBelievableChange * options_.calibration.sigma_depth_offset) return;
-  // To measure that it is what was given makes of everything else what it would be had it never been in doubt.
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, window.dimension());
-  H(0, window.depthOffsetColumn()) = 1.0 / kHeldOffset;
-  Eigen::VectorXd r = Eigen::VectorXd::Constant(1, -change / kHeldOffset);
-  filter_.update(H, r);
-  depth_contradicts_ = true;
-  depth_is_off_ = false;
-}
-
 void VioFilter::stop() {
   if (started_) learnMounting();
   started_ = false;
@@ -141,9 +70,11 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.T_I_C = learnt_.T_I_C;
   window.time_offset = learnt_.time_offset;
   window.depth_offset = learnt_.depth_offset;
+  window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = {calibration.rotation, calibration.translation, calibration.time_offset,
-                        calibration.depth_offset && !depth_contradicts_};
+  window.calibration = {calibration.rotation,    calibration.translation,
+                        calibration.time_offset, calibration.depth_offset && !depth_contradicts_,
+                        calibration.gyro_scale,  calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
@@ -158,6 +89,8 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
       sigma = calibration.sigma_translation;
     } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
       sigma = calibration.sigma_depth_offset;
+    } else if (c >= window.gyroColumn()) {
+      sigma = imu_noise_.gyro_correction_sigma;
     }
     rows(c, c) = 1.0 / sigma;
   }
@@ -265,6 +198,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (!candidates.empty()) updateWithFeatures(candidates, &report);
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
   judgeDepthOffset();
+  judgeGyroCorrection();
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
   if (!still) {
     // What the stamps' scatter may explain yet is not held against the IMU.

@@ -2,6 +2,12 @@
 
 namespace vip_slam {
 
+std::pair<int, int> gyroEntry(const CalibrationFlags& calibration, int index) {
+  if (calibration.gyro_scale && index < 3) return {index, index};
+  const int beside = index - (calibration.gyro_scale ? 3 : 0), row = beside / 2;
+  return {row, (row + 1 + beside % 2) % 3};
+}
+
 int WindowState::indexOf(CloneId id) const {
   for (std::size_t i = 0; i < clones.size(); ++i) {
     if (clones[i].id == id) return static_cast<int>(i);
@@ -29,6 +35,10 @@ void WindowState::boxplus(const Eigen::VectorXd& delta) {
   if (calibration.rotation || calibration.translation) T_I_C = T_I_C.boxplus(extrinsic);
   if (calibration.time_offset) time_offset += delta(timeOffsetColumn());
   if (calibration.depth_offset) depth_offset += delta(depthOffsetColumn());
+  for (int k = 0; k < calibration.gyro(); ++k) {
+    const auto [row, column] = gyroEntry(calibration, k);
+    gyro_correction(row, column) += delta(gyroColumn() + k);
+  }
   v_W += delta.segment<3>(navColumn());
   bias_gyro += delta.segment<3>(navColumn() + 3);
   bias_accel += delta.segment<3>(navColumn() + 6);
@@ -39,7 +49,7 @@ bool WindowState::isFinite() const {
     if (!clone.T_W_I.isFinite()) return false;
   }
   return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
-         std::isfinite(time_offset) && std::isfinite(depth_offset);
+         std::isfinite(time_offset) && std::isfinite(depth_offset) && gyro_correction.allFinite();
 }
 
 }  // namespace vip_slam

@@ -13,8 +13,14 @@ ImuLog synthesiseImu(const SplineTrajectory& trajectory, const ImuOptions& o, in
     return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
   };
   ImuBias bias{deviate(o.gyro_bias), deviate(o.accel_bias)};
-  const Eigen::Vector3d scale_gyro = Eigen::Vector3d::Ones() + deviate(o.scale_error);
-  const Eigen::Vector3d scale_accel = Eigen::Vector3d::Ones() + deviate(o.scale_error);
+  Eigen::Matrix3d M_gyro = Eigen::Matrix3d::Identity(), M_accel = M_gyro;
+  M_gyro.diagonal() += deviate(o.scale_error);
+  M_accel.diagonal() += deviate(o.scale_error);
+  for (Eigen::Matrix3d* M : {&M_gyro, &M_accel}) {
+    if (!(o.misalignment > 0)) break;  // draws nothing that other sequences do not
+    const Eigen::Vector3d right = deviate(o.misalignment), left = deviate(o.misalignment);
+    *M += (Eigen::Matrix3d() << 0, right.z(), left.y(), left.z(), 0, right.x(), right.y(), left.x(), 0).finished();
+  }
   const double root = std::sqrt(o.rate);
   const auto count = static_cast<std::size_t>((trajectory.end() - trajectory.begin()) * o.rate + 1e-6) + 1;
   ImuLog log;
@@ -23,8 +29,8 @@ ImuLog synthesiseImu(const SplineTrajectory& trajectory, const ImuOptions& o, in
     s.t = static_cast<double>(k) / o.rate;
     const MotionState m = trajectory.at(trajectory.begin() + s.t);
     const Eigen::Vector3d force = m.T_W_I.rotation().conjugate() * (m.a_W + gravityVector(gravity));
-    s.gyro = scale_gyro.cwiseProduct(m.omega_I) + bias.gyro + deviate(o.gyro_noise_density * root);
-    s.accel = scale_accel.cwiseProduct(force) + bias.accel + deviate(o.accel_noise_density * root);
+    s.gyro = M_gyro * m.omega_I + bias.gyro + deviate(o.gyro_noise_density * root);
+    s.accel = M_accel * force + bias.accel + deviate(o.accel_noise_density * root);
     log.samples.push_back(s);
     log.biases.push_back(bias);
     bias.gyro += deviate(o.gyro_random_walk / root);

@@ -95,6 +95,7 @@ void ImuOptions::visit(OptionVisitor& v) {
   v.field("gyro_bias", gyro_bias, 0, 1, "initial bias per axis, one sigma, rad/s");
   v.field("accel_bias", accel_bias, 0, 5, "initial bias per axis, one sigma, m/s^2");
   v.field("scale_error", scale_error, 0, 0.2, "scale error per axis, one sigma");
+  v.field("misalignment", misalignment, 0, 0.2, "what one axis measures of another, one sigma, rad");
   v.field("time_offset", time_offset, -0.5, 0.5, "t_imu = t_image + time_offset, s");
 }
 
@@ -164,6 +165,7 @@ SensorConfig SequenceSpec::sensorConfig() const {
   s.imu_noise.gyro_random_walk = imu.gyro_random_walk;
   s.imu_noise.accel_noise_density = imu.accel_noise_density;
   s.imu_noise.accel_random_walk = imu.accel_random_walk;
+  s.imu_noise.gyro_correction_sigma = std::max({s.imu_noise.gyro_correction_sigma, imu.scale_error, imu.misalignment});
   s.depth_noise.type = depthSensorTypeFromName(depth.model);
   s.depth_noise.a = std::max(depth.a, 0.0005);  // 16UC1 millimetres round
   s.depth_noise.b = depth.b;

@@ -33,6 +33,9 @@ class Map {
   /// The front end knows better what its depth camera reads too long: holds for the readings and the depth points on
   /// planes of all keyframes but those of a stored map. Landmarks, planes and poses are left to the next optimisation.
   void adoptDepthCorrection(double correction);
+  /// The front end knows better what its gyro gets wrong: the IMU factors of all keyframes but those of a stored map
+  /// are integrated anew.
+  void adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise& noise);
   /// Removes it with its observations; landmarks left without observation go too. The IMU chain is joined over the gap
   /// while the joined factor stays below `max_imu_seconds`, else it is cut.
   void removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds);

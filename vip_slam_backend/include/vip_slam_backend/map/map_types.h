@@ -35,9 +35,10 @@ struct MapKeyframe {
   std::vector<LandmarkId> landmarks;
   /// Neighbours on the IMU chain (0: none). They skip keyframes that were culled.
   KeyframeId previous = 0, next = 0;
-  /// Samples and factor from `previous`; null when there is none or a gap made it useless.
+  /// Samples as they were measured, and factor, from `previous`; null when there is none or a gap made it useless.
   std::shared_ptr<const std::vector<ImuSample>> imu;
   std::shared_ptr<const Preintegration> preintegration;
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< that the factor has, see Keyframe
   /// The odometry's motion from `previous`; unknown when there is none.
   RelativeMotion motion;
   /// Depth points of this keyframe on planes.

@@ -17,12 +17,13 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< specific force, m/s^2; at rest about +9.81 along up
 };
 
-/// Continuous-time densities as Kalibr states them.
+/// Continuous-time densities as Kalibr states them, and what is no noise.
 struct ImuNoise {
-  double gyro_noise_density = 1e-3;   ///< rad/s/sqrt(Hz)
-  double gyro_random_walk = 1e-5;     ///< rad/s^2/sqrt(Hz)
-  double accel_noise_density = 1e-2;  ///< m/s^2/sqrt(Hz)
-  double accel_random_walk = 1e-4;    ///< m/s^3/sqrt(Hz)
+  double gyro_noise_density = 1e-3;     ///< rad/s/sqrt(Hz)
+  double gyro_random_walk = 1e-5;       ///< rad/s^2/sqrt(Hz)
+  double accel_noise_density = 1e-2;    ///< m/s^2/sqrt(Hz)
+  double accel_random_walk = 1e-4;      ///< m/s^3/sqrt(Hz)
+  double gyro_correction_sigma = 1e-3;  ///< one sigma of each entry, see gyro_correction.h
 };
 
 /// State of the IMU (body) at time t. Tangent order wherever a 15x15 covariance appears:

@@ -39,6 +39,7 @@ struct SensorConfig {
   SE3 T_imu_cam;   ///< colour optical frame into IMU frame
   SE3 T_base_imu;  ///< IMU into base_link; identity unless the robot says otherwise
   ImuNoise imu_noise;
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   DepthNoise depth_noise;
   /// What of the colour image, as it is published, is looked at: 255, and 0 where the robot itself is in view; empty:
   /// all of it. `mask_file`: where it was read from.

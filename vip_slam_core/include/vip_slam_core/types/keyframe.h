@@ -35,6 +35,8 @@ struct Keyframe {
   /// Samples from the previous keyframe's IMU time to this one's, both ends interpolated; empty when previous == 0
   /// or when a gap made them useless.
   std::vector<ImuSample> imu;
+  /// What the front end found out by now about the rates in `imu`, which do not have it: see gyro_correction.h.
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();
   /// The odometry's motion since the previous keyframe; unknown when previous == 0 or when it lost the thread. Not the
   /// difference of the two published states: those were corrected in between.
   RelativeMotion motion;

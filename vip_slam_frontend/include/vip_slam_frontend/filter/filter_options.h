@@ -5,13 +5,15 @@
 
 namespace vip_slam {
 
-/// What of the camera is estimated along the way. There is no threshold of motion below which it would be
+/// What of camera and gyro is estimated along the way. There is no threshold of motion below which it would be
 /// frozen: to leave the calibration out of an update says that it is exact there, which a filter cannot take back.
 struct CalibrationOptions {
   bool rotation = true;
   bool translation = false;
   bool time_offset = true;
   bool depth_offset = true;
+  bool gyro_scale = true;
+  bool gyro_misalignment = false;
   double sigma_rotation = 0.01;
   double sigma_translation = 0.01;
   double sigma_time_offset = 0.005;
@@ -22,6 +24,8 @@ struct CalibrationOptions {
     v.field("translation", translation, "estimate the camera-IMU translation online");
     v.field("time_offset", time_offset, "estimate the camera-IMU delay online");
     v.field("depth_offset", depth_offset, "estimate online what all depth readings are too long or too short by");
+    v.field("gyro_scale", gyro_scale, "estimate online the scale of the gyro's axes");
+    v.field("gyro_misalignment", gyro_misalignment, "estimate online the misalignment of the gyro's axes");
     v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "initial one-sigma of the rotation, rad");
     v.field("sigma_translation", sigma_translation, 1e-5, 1.0, "initial one-sigma of the translation, m");
     v.field("sigma_time_offset", sigma_time_offset, 1e-6, 1.0, "initial one-sigma of the delay, s");

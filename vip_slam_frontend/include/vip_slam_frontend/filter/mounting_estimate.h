@@ -1,4 +1,5 @@
-// How the camera is mounted on the IMU, and by how much its depth is off, as the filter estimates it along the way.
+// How the camera is mounted on the IMU, and by how much its depth and the gyro are off, as the filter estimates it
+// along the way.
 #pragma once
 
 #include <string>
@@ -17,12 +18,14 @@ struct MountingEstimate {
   double sigma_time_offset = 0;                                 ///< s
   double depth_offset =
       0;  ///< m: what every reading of the depth camera has to be added, in the words of a sensor file
-  double sigma_depth_offset = 0;   ///< m
+  double sigma_depth_offset = 0;                              ///< m
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
+  Eigen::Matrix3d sigma_gyro_correction = Eigen::Matrix3d::Zero();
   bool depth_contradicts = false;  ///< depth and images disagree by more than any offset; none is used
 };
 
 /// What the sensor's configuration should be corrected by, in sentences: differences that are both sure (five sigmas)
-/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth). Empty when it is right.
+/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth; 0.2 % of the gyro). Empty when it is right.
 std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found);
 
 }  // namespace vip_slam

@@ -13,6 +13,8 @@ namespace vip_slam {
 struct Propagation {
   NavState predicted;
   Matrix15d Phi = Matrix15d::Identity();
+  /// What the predicted state changes by with the gyro's correction, column by column of its nine entries.
+  Eigen::Matrix<double, 15, 9> Phi_gyro = Eigen::Matrix<double, 15, 9>::Zero();
   Matrix15d Q = Matrix15d::Identity();
   /// Upper-triangular-free W with W^T W = Q^-1 (here lower triangular).
   Matrix15d W = Matrix15d::Identity();

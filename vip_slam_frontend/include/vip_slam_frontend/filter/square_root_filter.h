@@ -37,6 +37,8 @@ class SquareRootFilter {
   /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.
   UpdateResult update(Eigen::MatrixXd& H, Eigen::VectorXd& h);
 
+  /// One sigma of each calibration state.
+  Eigen::VectorXd calibrationSigmas() const;
   /// Covariance of (theta, p, v, b_g, b_a) of the newest pose.
   Matrix15d navCovariance() const;
   /// The motion between two clones, by index, with its covariance: that of the window's position and yaw, which nobody

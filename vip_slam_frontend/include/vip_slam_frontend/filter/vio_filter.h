@@ -83,6 +83,9 @@ class VioFilter {
   /// matter, else 0. The estimate itself wanders by a millimetre before it is known, which a map of exact depth would
   /// keep.
   double depthCorrection() const { return depth_is_off_ ? filter_.window().depth_offset : 0.0; }
+  /// The gyro's correction for others: of each entry the estimate once it is beyond doubt and large enough to matter,
+  /// else zero.
+  Eigen::Matrix3d gyroCorrection() const;
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
@@ -102,6 +105,7 @@ class VioFilter {
   /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
   /// estimated no more.
   void judgeDepthOffset();
+  void judgeGyroCorrection();
   /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
   /// allows: then whatever broke the estimate broke this as well.
   void learnMounting();
@@ -122,9 +126,10 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
-  bool depth_is_off_ = false;       ///< beyond doubt
-  bool depth_contradicts_ = false;  ///< its offset went beyond belief
-  int still_images_ = 0;            ///< images since the standing began; 0 when moving
+  bool depth_is_off_ = false;                                                         ///< beyond doubt
+  Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);  ///< likewise, by entries
+  bool depth_contradicts_ = false;                                                    ///< its offset went beyond belief
+  int still_images_ = 0;  ///< images since the standing began; 0 when moving
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none
   std::optional<RelativeMotion> to_mark_;  ///< from the clone that was marked, when mark_ is another by now

@@ -1,9 +1,11 @@
 // The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
-// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td, depth offset) that are estimated.
+// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td, depth offset, gyro correction) that are
+// estimated.
 // Rotations are perturbed on the right, positions in the world.
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "vip_slam_core/imu/imu_types.h"
@@ -25,10 +27,17 @@ struct Clone {
 
 struct CalibrationFlags {
   bool rotation = false, translation = false, time_offset = false, depth_offset = false;
-  int size() const {
+  bool gyro_scale = false, gyro_misalignment = false;
+  /// States of the camera, which its measurements depend on.
+  int camera() const {
     return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0) + (depth_offset ? 1 : 0);
   }
+  int gyro() const { return (gyro_scale ? 3 : 0) + (gyro_misalignment ? 6 : 0); }
+  int size() const { return camera() + gyro(); }
 };
+
+/// Row and column of the gyro's correction that its state number `index` stands for.
+std::pair<int, int> gyroEntry(const CalibrationFlags& calibration, int index);
 
 struct WindowState {
   std::vector<Clone> clones;
@@ -39,6 +48,7 @@ struct WindowState {
   SE3 T_I_C;
   double time_offset = 0;
   double depth_offset = 0;  ///< m: what every reading of the depth camera has to be added
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   CalibrationFlags calibration;
 
   int cloneColumn(int index) const { return 6 * index; }
@@ -50,6 +60,8 @@ struct WindowState {
   int translationColumn() const { return calibrationColumn() + (calibration.rotation ? 3 : 0); }
   int timeOffsetColumn() const { return translationColumn() + (calibration.translation ? 3 : 0); }
   int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
+  /// The correction's diagonal, then what lies beside it, as far as they are estimated: see gyroEntry().
+  int gyroColumn() const { return calibrationColumn() + calibration.camera(); }
 
   /// z that a reading of the depth camera means, m.
   double trueDepth(double reading) const { return reading + depth_offset; }

@@ -52,7 +52,7 @@ struct ImuOptions {
   double gyro_noise_density = 1.7e-4, gyro_random_walk = 2e-5;
   double accel_noise_density = 2e-3, accel_random_walk = 3e-3;
   double gyro_bias = 0.01, accel_bias = 0.06;
-  double scale_error = 0;
+  double scale_error = 0, misalignment = 0;
   double time_offset = 0;
   void visit(OptionVisitor& v);
 };

@@ -1,0 +1,19 @@
+// A gyro's scale errors and misaligned axes, which no white noise describes: a correction C with
+// omega = (I + C) * measured, biases counting after it. Scale errors lie on its diagonal (-0.003: measures 0.3 % too
+// much), beside it what one axis measures of the turning about another (radians).
+#pragma once
+
+#include <vector>
+
+#include "vip_slam_core/imu/imu_types.h"
+
+namespace vip_slam {
+
+inline Eigen::Vector3d correctedRate(const Eigen::Vector3d& measured, const Eigen::Matrix3d& correction) {
+  return measured + correction * measured;
+}
+
+/// `samples` with corrected rates.
+std::vector<ImuSample> withGyroCorrection(std::vector<ImuSample> samples, const Eigen::Matrix3d& correction);
+
+}  // namespace vip_slam

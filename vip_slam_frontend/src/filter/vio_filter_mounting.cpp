@@ -1,0 +1,105 @@
+// What the filter knows of the camera's mounting, of its depth and of the gyro: what of it is told, believed and kept.
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_frontend/filter/vio_filter.h"
+
+namespace vip_slam {
+
+namespace {
+
+// Sigmas of the prior within which a mounting that was found is kept over a restart; and what an entry of
+// the gyro's correction may be off by, whose sigma is that of a data sheet rather than of somebody's care.
+constexpr double kBelievableChange = 4.0, kMostGyroError = 0.05;
+// An offset of depth is beyond doubt from so many of its sigmas and metres on, until it is half as large.
+constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
+// One sigma of what is taken back, m.
+constexpr double kHeldOffset = 1e-6;
+// An entry of the gyro's correction likewise: half a thousandth of a turn by 60 degrees is 0.03 degrees.
+constexpr double kSureGyroError = 4.0, kLeastGyroError = 5e-4;
+
+}  // namespace
+
+MountingEstimate VioFilter::mounting() const {
+  if (!started_) {
+    MountingEstimate mounting = learnt_;
+    mounting.depth_contradicts = depth_contradicts_;
+    return mounting;
+  }
+  const WindowState& window = filter_.window();
+  MountingEstimate mounting;
+  mounting.T_I_C = window.T_I_C;
+  mounting.time_offset = window.time_offset;
+  mounting.depth_offset = window.depth_offset;
+  mounting.gyro_correction = window.gyro_correction;
+  mounting.depth_contradicts = depth_contradicts_;
+  if (window.calibration.size() == 0) return mounting;
+  const Eigen::VectorXd sigmas = filter_.calibrationSigmas();
+  const int first = window.calibrationColumn();
+  if (window.calibration.rotation) mounting.sigma_rotation = sigmas.segment<3>(window.rotationColumn() - first);
+  if (window.calibration.translation) {
+    mounting.sigma_translation = sigmas.segment<3>(window.translationColumn() - first);
+  }
+  if (window.calibration.time_offset) mounting.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
+  if (window.calibration.depth_offset) mounting.sigma_depth_offset = sigmas(window.depthOffsetColumn() - first);
+  for (int k = 0; k < window.calibration.gyro(); ++k) {
+    const auto [row, column] = gyroEntry(window.calibration, k);
+    mounting.sigma_gyro_correction(row, column) = sigmas(window.gyroColumn() - first + k);
+  }
+  return mounting;
+}
+
+void VioFilter::learnMounting() {
+  const WindowState& window = filter_.window();
+  learnt_ = given_;
+  if (!window.isFinite()) return;
+  const CalibrationOptions& options = options_.calibration;
+  const Vector6d change = window.T_I_C.boxminus(given_.T_I_C);
+  if (change.head<3>().norm() > kBelievableChange * options.sigma_rotation ||
+      change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
+      std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset ||
+      std::abs(window.depth_offset - given_.depth_offset) > kBelievableChange * options.sigma_depth_offset ||
+      window.gyro_correction.cwiseAbs().maxCoeff() > kMostGyroError) {
+    return;
+  }
+  learnt_.T_I_C = window.T_I_C;
+  learnt_.time_offset = window.time_offset;
+  learnt_.depth_offset = window.depth_offset;
+  learnt_.gyro_correction = window.gyro_correction;
+}
+
+void VioFilter::judgeDepthOffset() {
+  const WindowState& window = filter_.window();
+  const double change = window.depth_offset - given_.depth_offset;
+  if (!window.calibration.depth_offset || depth_contradicts_) return;
+  if (!depth_is_off_ && std::abs(change) > kLeastOffset) {
+    depth_is_off_ = std::abs(change) > kSureOffset * mounting().sigma_depth_offset;
+  } else if (std::abs(change) < kLeastOffset / 2) {
+    depth_is_off_ = false;
+  }
+  if (std::abs(change) <= kBelievableChange * options_.calibration.sigma_depth_offset) return;
+  // To measure that it is what was given makes of everything else what it would be had it never been in doubt.
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, window.dimension());
+  H(0, window.depthOffsetColumn()) = 1.0 / kHeldOffset;
+  Eigen::VectorXd r = Eigen::VectorXd::Constant(1, -change / kHeldOffset);
+  filter_.update(H, r);
+  depth_contradicts_ = true;
+  depth_is_off_ = false;
+}
+
+void VioFilter::judgeGyroCorrection() {
+  const WindowState& window = filter_.window();
+  if (window.calibration.gyro() == 0) return;
+  const Eigen::Array33d change = window.gyro_correction.cwiseAbs();
+  gyro_is_off_ = gyro_is_off_ && change > kLeastGyroError / 2;
+  if ((change > kLeastGyroError && !gyro_is_off_).any()) {
+    gyro_is_off_ = gyro_is_off_ ||
+                   (change > kLeastGyroError && change > kSureGyroError * mounting().sigma_gyro_correction.array());
+  }
+}
+
+Eigen::Matrix3d VioFilter::gyroCorrection() const {
+  return gyro_is_off_.select(filter_.window().gyro_correction, Eigen::Matrix3d::Zero());
+}
+
+}  // namespace vip_slam
