@@ -21,7 +21,9 @@ constexpr double kTopmostCeiling = 1.0, kLowestFloor = 0.5;  // m^2
 constexpr double kCeilingSlack = 1.5;              // of max_rms
 constexpr double kStrip = 4.0, kLeastStrip = 1.0;  // length over width, m^2; boards of shelves are smaller
 constexpr double kSmallGap = 4.0;                  // a smaller piece of a wall may be as many of its own widths away
-constexpr double kCloser = 4.0;                    // as many times as far apart when they agree as many times better
+constexpr double kNoise = 11.3;         // of what noise does to two planes that are one (three degrees of freedom) 99 %
+constexpr double kNoisyDistance = 2.0;  // as many times the distance when noise explains it
+constexpr double kCloser = 4.0;         // as many times as far apart when they agree as many times better
 
 bool isBorder(const CellGrid& cells, CellIndex c) {
   return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) ||
@@ -162,6 +164,21 @@ bool jointFitServes(const PlaneMoments& a, const PlaneMoments& b, const PlaneTra
   return true;
 }
 
+/// Whether one plane through both is what the noise of their depth points allows. From afar that is centimetres and
+/// degrees, which no fixed limit suits. Nothing is known of the noise of a loaded map's planes.
+bool noiseAllowsOne(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& poses) {
+  const PlaneMoments of_a = a.moments(poses), of_b = b.moments(poses);
+  if (!(of_a.weight() > 0) || !(of_b.weight() > 0)) return false;
+  Plane joint, own;
+  if (!fitPlane({of_a.M + of_b.M}, a.kind(), a.plane().n, &joint)) return false;
+  double excess = 0;
+  for (const PlaneMoments* m : {&of_a, &of_b}) {
+    if (!fitPlane(*m, a.kind(), a.plane().n, &own)) return false;
+    excess += m->weight() * (m->meanSquare(joint) - m->meanSquare(own));
+  }
+  return excess < kNoise;
+}
+
 // Drift moves a keyframe as a whole: what one keyframe shows at two depths is two surfaces, whatever was covered from
 // afar, where a door's recess or a board on the wall does not show.
 bool shownApart(const PlaneTrack& small, const PlaneTrack& large, const CameraPoses& poses, double distance) {
@@ -236,15 +253,22 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
   if (a.kind() == PlaneKind::kHorizontal && meeting.near == 0) {
     off = std::min(off, heightDifference(a, b));
   }
+  const double worst = std::max(meeting.worst_border, meeting.worst_meeting);
+  if (worst > kNoisyDistance * options.distance) return false;
+  // Of pieces far apart one plane in between serves both whatever they are.
+  const bool beside = meeting.near == 0 && off > apart;
+  const bool noise =
+      (beside || worst > options.distance) && between <= std::sqrt(smaller) && noiseAllowsOne(a, b, poses);
   if (between > gap && off * between > apart * gap) return false;
-  if (meeting.near == 0 && (gap <= options.gap || off > apart)) return false;
-  if (meeting.worst_border > options.distance || meeting.worst_meeting > options.distance) return false;
+  if ((beside || worst > options.distance) && !noise) return false;
+  if (meeting.near == 0 && gap <= options.gap) return false;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
   if (shownApart(small, large, poses, options.max_rms)) return false;
   // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift
   // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
   if (shared > options.overlap && meeting.separation < 0.5 * options.distance) return true;
   if (shared > 2 * options.overlap) return true;
+  if (noise) return true;
   const double slack = options.max_rms * (ceiling ? kCeilingSlack : 1.0);
   return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, slack);
 }
