@@ -153,7 +153,7 @@ std::optional<NavState> FrontEnd::Impl::predict(double t) const {
 Eigen::Vector3d FrontEnd::Impl::gyro(double t) const {
   if (imu_.empty()) return Eigen::Vector3d::Zero();
   const auto sample = imu_.at(std::clamp(t, imu_.oldest(), imu_.newest()));
-  return sample ? sample->gyro : Eigen::Vector3d::Zero();
+  return sample ? correctedRate(sample->gyro, filter_.window().gyro_correction) : Eigen::Vector3d::Zero();
 }
 
 void FrontEnd::Impl::reset(const std::string& reason) {

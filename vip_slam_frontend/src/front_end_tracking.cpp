@@ -4,6 +4,7 @@
 #include <map>
 
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
@@ -55,7 +56,8 @@ std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(const Readout& readout, con
   const std::vector<ImuSample> around = imu_.between(std::max(imu_.oldest(), nav.t + std::min(readout.first, 0.0)),
                                                      std::min(imu_.newest(), nav.t + std::max(readout.last, 0.0)));
   if (around.empty()) return nullptr;
-  return std::make_shared<RowPoses>(readout, nav, around, extrinsics(), sensor_.gravity);
+  return std::make_shared<RowPoses>(readout, nav, withGyroCorrection(around, filter_.window().gyro_correction),
+                                    extrinsics(), sensor_.gravity);
 }
 
 cv::Mat FrontEnd::Impl::depthAtStamp(const DepthReading& depth, const NavState& nav) {

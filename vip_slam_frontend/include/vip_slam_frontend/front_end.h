@@ -89,8 +89,8 @@ class FrontEnd {
 
   /// The newest state integrated with the IMU to time t (IMU clock), in odom; empty before tracking starts.
   std::optional<NavState> predict(double t) const;
-  /// Measured rate of turn at time t (IMU clock), rad/s in the IMU frame, bias included, wrong samples replaced; that
-  /// nearest to t outside of what is kept, zero before the first sample.
+  /// Measured rate of turn at time t (IMU clock), rad/s in the IMU frame, bias included, wrong samples replaced, its
+  /// scale corrected; that nearest to t outside of what is kept, zero before the first sample.
   Eigen::Vector3d gyro(double t) const;
   /// Starts anew: a new epoch; keyframe and landmark ids go on.
   void reset(const std::string& reason);
