@@ -253,7 +253,7 @@ void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status)
     status.summary(DiagnosticStatus::ERROR, load_problem_);
   } else if (!problem_.empty()) {
     status.summary(DiagnosticStatus::WARN, problem_);
-  } else if (dropped > 0) {
+  } else if (drops_.lately(dropped, ros::WallTime::now().toSec())) {
     status.summary(DiagnosticStatus::WARN, std::to_string(dropped) + " messages dropped: the back end is too slow");
   } else {
     status.summary(DiagnosticStatus::OK,

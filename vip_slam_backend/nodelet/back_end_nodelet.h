@@ -30,6 +30,7 @@
 #include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/back_end_node_options.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/owner_thread.h"
 
 namespace vip_slam {
@@ -85,6 +86,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   bool adjusting_ = false;  ///< a global adjustment is under way
   std::thread adjustment_;
 
+  DropWatch drops_;  ///< used by diagnostics only
   mutable std::mutex shown_mutex_;
   vip_slam_msgs::BackEndStatistics shown_;
   std::string problem_, scale_difference_;

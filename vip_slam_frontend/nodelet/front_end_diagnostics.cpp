@@ -154,7 +154,7 @@ void FrontEndNodelet::reportQueues(diagnostic_updater::DiagnosticStatusWrapper& 
   std::lock_guard<std::mutex> lock(shown_mutex_);
   status.add("images dropped while waiting for depth or IMU", shown_.pairs.dropped);
   dropped += shown_.pairs.dropped;
-  status.summary(dropped == 0 ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
+  status.summary(drops_.lately(dropped, ros::WallTime::now().toSec()) ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
                  dropped == 0 ? "nothing dropped" : std::to_string(dropped) + " messages dropped");
 }
 

@@ -31,6 +31,7 @@
 #include "vip_slam_frontend/FrontEndConfig.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_node_options.h"
+#include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/image_pairer.h"
 #include "vip_slam_ros/owner_thread.h"
 #include "vip_slam_ros/stream_clock.h"
@@ -121,6 +122,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
     std::size_t time_jumps = 0;
     std::string size_problem;  ///< depth that does not fit the colour image, in words
   };
+  DropWatch drops_;  ///< used by diagnostics only
   mutable std::mutex shown_mutex_;
   Shown shown_;
   std::deque<PairerCounters> lately_paired_;  ///< as it was reported in the last seconds; of the diagnostics' thread

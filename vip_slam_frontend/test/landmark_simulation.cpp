@@ -143,6 +143,15 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
   return seen;
 }
 
+FilterOptions singlePixels() {
+  FilterOptions options;
+  options.depth_inflation = 1.0;
+  options.pixel_inflation = 1.0;
+  options.own_noise = false;
+  options.pull_huber = 1000.0;
+  return options;
+}
+
 RunResult runFilter(const SimulationOptions& options, const FilterOptions& filter_options, double seconds,
                     bool standing, const SE3& extrinsic_error, double time_offset_guess) {
   LandmarkSimulation simulation(options);

@@ -79,6 +79,9 @@ struct RunResult {
   Matrix15d covariance = Matrix15d::Zero();
 };
 
+/// For this simulation: its depth readings are single pixels, not medians, and its pixel errors independent.
+FilterOptions singlePixels();
+
 /// Runs the filter over `seconds` of the simulation from a start drawn from its own prior.
 RunResult runFilter(const SimulationOptions& simulation, const FilterOptions& filter, double seconds, bool standing,
                     const SE3& extrinsic_error = SE3(), double time_offset_guess = 0);

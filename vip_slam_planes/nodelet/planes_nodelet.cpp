@@ -159,9 +159,10 @@ void PlanesNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status) 
   }
   std::lock_guard<std::mutex> lock(shown_mutex_);
   const PlaneMapperCounters& c = shown_.counters;
-  status.summary(dropped == 0 ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
-                 dropped == 0 ? std::to_string(shown_.planes) + " planes"
-                              : std::to_string(dropped) + " keyframes or map updates dropped");
+  const bool drops = drops_.lately(dropped, ros::WallTime::now().toSec());
+  status.summary(drops ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
+                 drops ? std::to_string(dropped) + " keyframes or map updates dropped"
+                       : std::to_string(shown_.planes) + " planes");
   status.add("planes", shown_.planes);
   status.add("depth points on planes", shown_.points);
   status.add("last update (ms)", shown_.update_ms);

@@ -23,6 +23,7 @@
 #include "vip_slam_planes/PlanesConfig.h"
 #include "vip_slam_planes/plane_mapper.h"
 #include "vip_slam_planes/planes_node_options.h"
+#include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/owner_thread.h"
 
 namespace vip_slam {
@@ -62,6 +63,7 @@ class PlanesNodelet : public nodelet::Nodelet {
     std::size_t planes = 0, points = 0;
     double update_ms = 0;
   };
+  DropWatch drops_;  ///< used by diagnostics only
   mutable std::mutex shown_mutex_;
   Shown shown_;
 

@@ -1,0 +1,267 @@
+// What the filter learns about mounting, depth and gyro: found, honest, handed on, kept, told.
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <Eigen/LU>
+
+#include "landmark_simulation.h"
+
+namespace vip_slam::testing {
+namespace {
+
+TEST(Calibration, FindsExtrinsicsAndDelay) {
+  SimulationOptions simulation;
+  simulation.seed = 4;
+  simulation.speed = 1.5;
+  simulation.time_offset = 0.008;
+  FilterOptions options = singlePixels();
+  options.calibration.translation = true;
+  options.calibration.sigma_rotation = 0.02;
+  options.calibration.sigma_translation = 0.03;
+  options.calibration.sigma_time_offset = 0.01;
+  const SE3 wrong(expSO3(Eigen::Vector3d(0.012, -0.01, 0.015)), Eigen::Vector3d(0.015, -0.01, 0.02));
+  const RunResult run = runFilter(simulation, options, 40.0, false, wrong, 0.0);
+  const LandmarkSimulation truth(simulation);
+  const Vector6d error = run.window.T_I_C.boxminus(truth.T_I_C());
+  std::printf("extrinsics off by %.2f mrad, %.1f mm; delay by %.2f ms\n", 1e3 * error.head<3>().norm(),
+              1e3 * error.tail<3>().norm(), 1e3 * std::abs(run.window.time_offset - 0.008));
+  EXPECT_LT(error.head<3>().norm(), 0.003);
+  EXPECT_LT(error.tail<3>().norm(), 0.015);
+  EXPECT_NEAR(run.window.time_offset, 0.008, 0.001);
+}
+
+// A camera that is turned by 0.8 degrees against what is configured, while the body hardly turns: what cannot be told
+// yet has to stay unsure.
+TEST(Calibration, IsHonestWhileTheMotionSaysLittle) {
+  double nees = 0, believed = 0;
+  constexpr int kRuns = 8;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    simulation.speed = 0.25;
+    FilterOptions options = singlePixels();
+    const SE3 wrong(expSO3(Eigen::Vector3d(0.008, -0.009, 0.007)), Eigen::Vector3d::Zero());
+    nees += runFilter(simulation, options, 20.0, false, wrong, 0.003).nees / kRuns;
+    options.calibration.rotation = options.calibration.time_offset = false;
+    believed += runFilter(simulation, options, 20.0, false, wrong, 0.003).nees / kRuns;
+  }
+  std::printf("NEES with a camera turned by 0.8 degrees: %.2f, the configuration believed: %.2f\n", nees, believed);
+  EXPECT_LT(nees, 9.0);
+  EXPECT_GT(believed, 3.0 * nees);
+}
+
+TEST(Calibration, FindsWhatDepthIsTooLongBy) {
+  double nees = 0, believed = 0, offset_nees = 0;
+  constexpr int kRuns = 6;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    simulation.depth_offset = 0.01;
+    simulation.depth_a = 0.001;
+    simulation.depth_c = 0.0005;
+    simulation.sigma_px = 0.2;
+    FilterOptions options = singlePixels();
+    options.calibration.time_offset = false;  // which so noisy a gyro misleads
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    EXPECT_NEAR(run.mounting.depth_offset, -0.01, 0.002);
+    EXPECT_NEAR(run.most_depth_correction, -0.01, 0.003);
+    offset_nees += std::pow((run.mounting.depth_offset + 0.01) / run.mounting.sigma_depth_offset, 2) / kRuns;
+    nees += run.nees / kRuns;
+    options.calibration.depth_offset = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with depth 1 cm too long: %.2f, of the offset %.2f; depth believed: %.2f\n", nees, offset_nees,
+              believed);
+  EXPECT_LT(nees, 9.0);
+  EXPECT_LT(offset_nees, 2.5);
+  EXPECT_GT(believed, 1.5 * nees);
+}
+
+// The estimate wanders about zero, and nobody is told.
+TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
+    EXPECT_NE(run.mounting.depth_offset, 0.0);
+    EXPECT_EQ(run.most_depth_correction, 0.0);
+  }
+}
+
+/// A gyro as cameras have them.
+SimulationOptions goodGyro(std::uint32_t seed) {
+  SimulationOptions simulation;
+  simulation.seed = seed;
+  simulation.sigma_px = 0.2;
+  simulation.noise.gyro_noise_density *= 0.2;
+  simulation.noise.accel_noise_density *= 0.2;
+  return simulation;
+}
+
+TEST(Calibration, FindsTheScaleOfTheGyro) {
+  constexpr int kRuns = 6;
+  double nees = 0, believed = 0, scale_nees = 0;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation = goodGyro(seed);
+    simulation.gyro_error.diagonal() << 0.006, -0.004, 0.008;
+    simulation.noise.gyro_correction_sigma = 0.005;
+    FilterOptions options = singlePixels();
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    const Eigen::Vector3d expected =
+        (Eigen::Vector3d::Ones() + simulation.gyro_error.diagonal()).cwiseInverse() - Eigen::Vector3d::Ones();
+    const Eigen::Vector3d off = run.mounting.gyro_correction.diagonal() - expected;
+    scale_nees += off.cwiseQuotient(run.mounting.sigma_gyro_correction.diagonal()).squaredNorm() / kRuns;
+    EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.003);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double found = run.mounting.gyro_correction(axis, axis);
+      const bool sure = std::abs(found) > 4.0 * run.mounting.sigma_gyro_correction(axis, axis);
+      EXPECT_EQ(run.gyro_correction(axis, axis), sure ? found : 0.0) << "handed on once it is beyond doubt";
+    }
+    EXPECT_GT(run.gyro_correction.cwiseAbs().maxCoeff(), 0.005);
+    nees += run.nees / kRuns;
+    options.calibration.gyro_scale = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with a gyro off by up to 0.8 %%: %.2f, of the scale (3) %.2f; gyro believed: %.2f\n", nees,
+              scale_nees, believed);
+  EXPECT_LT(nees, 9.0);
+  EXPECT_LT(scale_nees, 7.0);
+  EXPECT_GT(believed, 3 * nees);
+}
+
+TEST(Calibration, FindsHowTheGyroIsMisaligned) {
+  SimulationOptions simulation = goodGyro(3);
+  simulation.gyro_error << 0.004, 0.006, -0.005, -0.007, -0.003, 0.008, 0.006, -0.004, 0.005;
+  simulation.noise.gyro_correction_sigma = 0.005;
+  FilterOptions options = singlePixels();
+  options.calibration.gyro_misalignment = true;
+  const RunResult run = runFilter(simulation, options, 40.0, false);
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d left = (I + run.mounting.gyro_correction) * (I + simulation.gyro_error) - I;
+  EXPECT_LT(left.norm(), 0.3 * simulation.gyro_error.norm());
+  EXPECT_LT((left.array().abs() / run.mounting.sigma_gyro_correction.array()).maxCoeff(), 4.0);
+}
+
+// The estimate wanders about zero, and nobody is told.
+TEST(Calibration, AnExactGyroIsHandedOnAsItIs) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    const RunResult run = runFilter(goodGyro(seed), singlePixels(), 15.0, false);
+    EXPECT_NE(run.mounting.gyro_correction.norm(), 0.0);
+    EXPECT_EQ(run.most_gyro_correction, 0.0);
+  }
+}
+
+// Such as colour and depth of different moments would ask for: no offset is better than a wrong one.
+TEST(Calibration, AnOffsetOfDepthBeyondBeliefIsTakenBack) {
+  SimulationOptions simulation;
+  simulation.depth_offset = 0.06;
+  FilterOptions options = singlePixels();
+  const RunResult run = runFilter(simulation, options, 10.0, false);
+  EXPECT_TRUE(run.mounting.depth_contradicts);
+  EXPECT_NEAR(run.mounting.depth_offset, 0, 1e-4);
+  EXPECT_EQ(mountingDifferences({run.mounting.T_I_C, run.mounting.time_offset}, run.mounting).size(), 1u);
+  simulation.depth_offset = 0.01;
+  EXPECT_FALSE(runFilter(simulation, options, 10.0, false).mounting.depth_contradicts);
+}
+
+TEST(Calibration, StandingTeachesNothing) {
+  SimulationOptions simulation;
+  simulation.speed = 0;
+  simulation.seed = 5;
+  const FilterOptions options = singlePixels();
+  const RunResult run = runFilter(simulation, options, 60.0, true);
+  const Vector6d change = run.window.T_I_C.boxminus(LandmarkSimulation(simulation).T_I_C());
+  EXPECT_LT(change.norm(), 0.1 * options.calibration.sigma_rotation);
+  EXPECT_LT(std::abs(run.window.time_offset), 0.1 * options.calibration.sigma_time_offset);
+  EXPECT_LT(std::abs(run.window.depth_offset), 0.2 * options.calibration.sigma_depth_offset);
+}
+
+/// A filter that stands at the origin with this much said about its mounting by one measurement of it.
+VioFilter taught(const FilterOptions& options, const SE3& given, const Eigen::Vector3d& turn) {
+  VioFilter filter(options, ImuNoise(), given, 0.0, 500, 9.81);
+  filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
+  const WindowState& window = filter.window();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, window.dimension());
+  H.block<3, 3>(0, window.rotationColumn()).setIdentity();
+  H *= 1e6;
+  Eigen::VectorXd r = 1e6 * turn;
+  const_cast<SquareRootFilter&>(filter.algebra()).update(H, r);
+  return filter;
+}
+
+TEST(Calibration, OutlivesARestart) {
+  const FilterOptions options = singlePixels();
+  const SE3 given(expSO3(Eigen::Vector3d(0.3, 0.2, 0.1)), Eigen::Vector3d(0.05, 0, 0));
+  const Eigen::Vector3d turn(0.006, -0.004, 0.003);
+  VioFilter filter = taught(options, given, turn);
+  EXPECT_LT((filter.mounting().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
+  EXPECT_GT(filter.mounting().sigma_rotation.minCoeff(), 0);
+  filter.stop();
+  EXPECT_LT((filter.mounting().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
+  filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
+  EXPECT_LT((filter.window().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
+  // But with the doubt of the first start: it may have been what went wrong.
+  EXPECT_NEAR(filter.mounting().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
+}
+
+TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
+  for (const double off : {-0.02, -0.08}) {
+    VioFilter filter(singlePixels(), ImuNoise(), SE3(), 0.0, 500, 9.81);
+    filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, filter.window().dimension());
+    H(0, filter.window().gyroColumn() + 1) = 1e6;
+    Eigen::VectorXd r = Eigen::VectorXd::Constant(1, 1e6 * off);
+    const_cast<SquareRootFilter&>(filter.algebra()).update(H, r);
+    filter.stop();
+    filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
+    Eigen::Matrix3d expected = Eigen::Matrix3d::Zero();
+    if (off > -0.05) expected(1, 1) = off;
+    EXPECT_LT((filter.window().gyro_correction - expected).norm(), 1e-5);
+  }
+}
+
+TEST(Calibration, IsForgottenWhenItWentAstray) {
+  const FilterOptions options = singlePixels();
+  VioFilter filter = taught(options, SE3(), 6 * options.calibration.sigma_rotation * Eigen::Vector3d::UnitY());
+  filter.stop();
+  EXPECT_EQ(filter.mounting().T_I_C.matrix(), SE3().matrix());
+}
+
+TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
+  MountingEstimate given, found;
+  found.T_I_C = SE3(expSO3(Eigen::Vector3d(0, 0.01, 0)), Eigen::Vector3d(0.02, 0, 0));
+  found.time_offset = 0.004;
+  EXPECT_TRUE(mountingDifferences(given, found).empty()) << "nothing was estimated";
+  found.sigma_rotation.setConstant(0.0005);
+  found.sigma_translation.setConstant(0.001);
+  found.sigma_time_offset = 0.0002;
+  found.depth_offset = -0.0098;
+  found.sigma_depth_offset = 0.0003;
+  const std::vector<std::string> all = mountingDifferences(given, found);
+  ASSERT_EQ(all.size(), 4u);
+  EXPECT_NE(all[0].find("0.57 degrees"), std::string::npos) << all[0];
+  EXPECT_NE(all[1].find("20.0 mm"), std::string::npos) << all[1];
+  EXPECT_NE(all[2].find("4.0 ms"), std::string::npos) << all[2];
+  EXPECT_NE(all[3].find("9.8 mm too long"), std::string::npos) << all[3];
+  EXPECT_NE(all[3].find("depth/offset in the sensor's configuration should be -0.0098"), std::string::npos) << all[3];
+  given.depth_offset = -0.005;  // and is too long by what is left
+  found.depth_offset = -0.012;
+  const std::string more = mountingDifferences(given, found).back();
+  EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
+  EXPECT_NE(more.find("-0.0120"), std::string::npos) << more;
+  found.gyro_correction(1, 1) = -0.0123;
+  found.sigma_gyro_correction(1, 1) = 0.0003;
+  const std::string gyro = mountingDifferences(given, found).back();
+  EXPECT_NE(gyro.find("up to 1.2 %"), std::string::npos) << gyro;
+  EXPECT_NE(gyro.find("[0.0000, -0.0123, 0.0000]"), std::string::npos) << gyro;
+  found.sigma_gyro_correction(1, 1) = 0.003;
+  found.sigma_rotation.setConstant(0.01);  // not sure
+  found.sigma_translation.setConstant(0.01);
+  found.sigma_time_offset = 0.002;
+  found.sigma_depth_offset = 0.002;
+  EXPECT_TRUE(mountingDifferences(given, found).empty());
+}
+
+}  // namespace
+}  // namespace vip_slam::testing
