@@ -125,17 +125,22 @@ TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
   EXPECT_LT((point.p_W - scene.f_W).norm(), 0.05);
 }
 
+/// A window with this pose alone.
+WindowState windowOfOne(const NavState& state) {
+  WindowState window;
+  Clone clone;
+  clone.t = state.t;
+  clone.T_W_I = clone.T_W_I_fej = state.T_W_I;
+  window.clones.push_back(clone);
+  window.v_W = window.v_W_fej = state.v_W;
+  return window;
+}
+
 TEST(Propagation, TransitionMatchesCentralDifferences) {
   testing::SimulationOptions options;
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
-  WindowState window;
-  const NavState state = simulation.stateAt(0.5);
-  Clone clone;
-  clone.t = 0.5;
-  clone.T_W_I = clone.T_W_I_fej = state.T_W_I;
-  window.clones.push_back(clone);
-  window.v_W = window.v_W_fej = state.v_W;
+  const WindowState window = windowOfOne(simulation.stateAt(0.5));
   const auto samples = simulation.imuBetween(0.5, 0.56);
   const auto predicted = [&](const Eigen::Matrix<double, 15, 1>& d) {
     WindowState moved = window;
@@ -160,12 +165,7 @@ TEST(Propagation, GyroCorrectionMatchesCentralDifferences) {
   testing::SimulationOptions options;
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
-  WindowState window;
-  const NavState state = simulation.stateAt(0.5);
-  Clone clone;
-  clone.T_W_I = clone.T_W_I_fej = state.T_W_I;
-  window.clones.push_back(clone);
-  window.v_W = window.v_W_fej = state.v_W;
+  WindowState window = windowOfOne(simulation.stateAt(0.5));
   window.gyro_correction << 0.01, -0.02, 0.005, 0.003, -0.015, 0.01, -0.01, 0.02, 0.008;
   const auto samples = simulation.imuBetween(0.5, 0.56);
   for (const bool misalignment : {true, false}) {
