@@ -301,6 +301,7 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("[0.01, 0.002, 0]", "[0.01, 0.002]", "imu/gyro_correction: row 1: expected 3 numbers");
   changed("[0.01, 0.002, 0]", "[0.01, 0.9, 0]", "imu/gyro_correction: expected numbers from -0.2 to 0.2");
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0", "imu/gyro_correction_sigma");
+  changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0.3", "imu/gyro_correction_sigma");
   changed("scale: 0.0002", "scale: 0", "depth/scale");
   changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth");
   changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam");

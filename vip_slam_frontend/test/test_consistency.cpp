@@ -21,10 +21,8 @@ FilterOptions filterOptions() {
 
 /// For a simulation whose tracks are points with errors independent from image to image.
 FilterOptions independentNoise() {
-  FilterOptions options = filterOptions();
-  options.pixel_inflation = 1.0;
-  options.own_noise = false;
-  options.pull_huber = 1000.0;
+  FilterOptions options = singlePixels();
+  options.calibration.time_offset = false;
   return options;
 }
 

@@ -205,7 +205,7 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   imu.matrix("gyro_correction", config.gyro_correction, false);
   if (!(config.gyro_correction.cwiseAbs().maxCoeff() <= 0.2))
     throw std::runtime_error("imu/gyro_correction: expected numbers from -0.2 to 0.2");
-  imu.number("gyro_correction_sigma", config.imu_noise.gyro_correction_sigma, 1e-6, 0.1, false);
+  imu.number("gyro_correction_sigma", config.imu_noise.gyro_correction_sigma, 1e-6, 0.2, false);
   imu.number("gravity", config.gravity, 9.0, 10.5, false);
   imu.finish();
 
