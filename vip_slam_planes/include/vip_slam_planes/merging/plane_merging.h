@@ -9,9 +9,10 @@
 namespace vip_slam {
 
 /// Same kind and side, within the angle, boundary points near each other's plane where the areas meet, and then either
-/// a shared area, or a gap that suits their size and a joint fit that serves both. Pieces beside each other may differ by
-/// more where the noise of their depth explains it. The plane offsets d are not compared: their difference grows with the
-/// distance from the origin. `known` are all planes of the map, which tell whether a ceiling has anything above it.
+/// a shared area, or a gap that suits their size and a joint fit that serves both. Pieces beside each other may differ
+/// by more where the noise of their depth explains it. The plane offsets d are not compared: their difference grows
+/// with the distance from the origin. `known` are all planes of the map, which tell whether a ceiling has anything
+/// above it.
 bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known,
                  const CameraPoses& poses, const PlaneMergingOptions& options);
 
