@@ -7,6 +7,7 @@
 #include <vip_slam_msgs/MapUpdate.h>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_ros/calibration.h"
 #include "vip_slam_ros/frame_conversions.h"
@@ -163,7 +164,8 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
-    scale_difference_ = scaleDifference(back_end_->scale(), sensor_.depth_scale);
+    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale),
+                                depthCurveDifference(back_end_->depthCurve())};
   }
   distribute(update);
   startGlobalBa();
@@ -259,7 +261,9 @@ void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status)
     status.summary(DiagnosticStatus::OK,
                    std::to_string(shown_.keyframes) + " keyframes, " + std::to_string(shown_.landmarks) + " landmarks");
   }
-  if (!scale_difference_.empty()) status.add("calibration", scale_difference_);
+  for (const std::string& difference : calibration_differences_) {
+    if (!difference.empty()) status.add("calibration", difference);
+  }
   status.add("keyframes", shown_.keyframes);
   status.add("landmarks", shown_.landmarks);
   status.add("landmarks on planes", shown_.plane_landmarks);

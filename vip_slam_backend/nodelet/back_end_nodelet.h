@@ -89,7 +89,8 @@ class BackEndNodelet : public nodelet::Nodelet {
   DropWatch drops_;  ///< used by diagnostics only
   mutable std::mutex shown_mutex_;
   vip_slam_msgs::BackEndStatistics shown_;
-  std::string problem_, scale_difference_;
+  std::string problem_;
+  std::vector<std::string> calibration_differences_;  ///< empty ones: nothing to tell
   std::string load_problem_;                ///< why the map to start with could not be loaded
   vip_slam_backend::BackEndConfig config_;  ///< as dynamic_reconfigure has it
 

@@ -1,6 +1,8 @@
 // Depth that turns out to have been read too long.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
@@ -9,15 +11,15 @@ namespace {
 TEST(DepthCorrection, MovesReadingsAndLeavesTheRest) {
   auto keyframe = std::make_shared<Keyframe>();
   keyframe->id = 7;
-  keyframe->frame.depth_correction = 0.002;
+  keyframe->frame.depth_correction.offset = 0.002;
   Feature with, without;
   with.depth = 2.0f;
   with.depth_sigma = 0.01f;
   keyframe->frame.features = {with, without};
   keyframe->frame.depth_grid.z = {1.5f, 0.0f, 0.003f};
-  const KeyframePtr corrected = withDepthCorrection(keyframe, -0.01);
+  const KeyframePtr corrected = withDepthCorrection(keyframe, {-0.01, {}});
   EXPECT_EQ(corrected->id, 7u);
-  EXPECT_EQ(corrected->frame.depth_correction, -0.01);
+  EXPECT_EQ(corrected->frame.depth_correction.offset, -0.01);
   EXPECT_FLOAT_EQ(corrected->frame.features[0].depth, 2.0f - 0.012f);
   EXPECT_EQ(corrected->frame.features[0].depth_sigma, 0.01f);
   EXPECT_EQ(corrected->frame.features[1].depth, 0.0f);
@@ -25,7 +27,7 @@ TEST(DepthCorrection, MovesReadingsAndLeavesTheRest) {
   EXPECT_EQ(corrected->frame.depth_grid.z[1], 0.0f);
   EXPECT_GT(corrected->frame.depth_grid.z[2], 0.0f);
   EXPECT_EQ(keyframe->frame.features[0].depth, 2.0f);
-  EXPECT_EQ(withDepthCorrection(keyframe, 0.002), keyframe);
+  EXPECT_EQ(withDepthCorrection(keyframe, {0.002, {}}), keyframe);
 }
 
 TEST(DepthCorrection, MovesPointsOnPlanesAlongTheirRays) {
@@ -42,15 +44,47 @@ TEST(DepthCorrection, MovesPointsOnPlanesAlongTheirRays) {
     return observation;
   };
   PlaneObservation read = observe(0.01);
-  setDepthCorrection(-0.01, &read);
+  setDepthCorrection({-0.01, {}}, &read);
   const PlaneObservation truth = observe(0);
-  EXPECT_EQ(read.depth_correction, -0.01);
+  EXPECT_EQ(read.depth_correction.offset, -0.01);
   for (int k = 0; k < 3; ++k) EXPECT_LT((read.points[k].p_C - truth.points[k].p_C).norm(), 1e-6f);
   EXPECT_LT((read.G - truth.G).norm(), 1e-5 * truth.G.norm());
   // What has it already stays as it is.
   const Eigen::Matrix4d before = read.G;
-  setDepthCorrection(-0.01, &read);
+  setDepthCorrection({-0.01, {}}, &read);
   EXPECT_EQ(read.G, before);
+}
+
+TEST(DepthCorrection, AnotherCurveTakesTheOldOnesPlace) {
+  DepthCorrection before{0.004, {}}, after{-0.003, {}};
+  for (int k = 0; k < 40; ++k) {
+    before.curve.added.push_back(0.004f * std::sin(0.5f * float(k)));
+    after.curve.added.push_back(0.006f * std::cos(0.3f * float(k)));
+  }
+  const auto corrected = [](float reading, const DepthCorrection& c) {
+    return reading + c.curve.at(reading) + float(c.offset);
+  };
+  auto keyframe = std::make_shared<Keyframe>();
+  keyframe->frame.depth_correction = before;
+  PlaneObservation observation;
+  observation.depth_correction = before;
+  std::vector<float> readings;
+  for (float z = 0.3f; z < 7; z += 0.07f) readings.push_back(z);
+  for (const float z : readings) {
+    keyframe->frame.depth_grid.z.push_back(corrected(z, before));
+    observation.points.push_back({Eigen::Vector3f(0.2f, -0.3f, 1) * corrected(z, before), 0.01f});
+  }
+  keyframe->frame.depth_grid.z.push_back(0);
+  const KeyframePtr other = withDepthCorrection(keyframe, after);
+  setDepthCorrection(after, &observation);
+  EXPECT_EQ(other->frame.depth_correction, after);
+  EXPECT_EQ(observation.depth_correction, after);
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    EXPECT_NEAR(other->frame.depth_grid.z[k], corrected(readings[k], after), 2e-6f);
+    EXPECT_LT((observation.points[k].p_C - Eigen::Vector3f(0.2f, -0.3f, 1) * corrected(readings[k], after)).norm(), 4e-6f);
+  }
+  EXPECT_EQ(other->frame.depth_grid.z.back(), 0.0f);
+  EXPECT_EQ(withDepthCorrection(other, after), other);
 }
 
 }  // namespace

@@ -146,6 +146,7 @@ class FrontEnd::Impl {
   bool still_ = false;
   SE3 T_map_odom_;
   bool have_map_ = false;
+  DepthCurve depth_curve_;  ///< that the map has found out, after the sensor's own
   using PixelList = std::vector<std::pair<LandmarkId, Eigen::Vector2f>>;
   std::deque<std::pair<double, PixelList>> recent_pixels_;  ///< over the stillness window
   PixelList still_anchor_;

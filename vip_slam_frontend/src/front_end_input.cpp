@@ -119,16 +119,17 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* de
   } else {
     depth->image = input.depth;
     depth->lag = std::abs(input.depth_lag) >= kSameInstant ? input.depth_lag : 0.0;
-    if (!masked_.empty()) {
-      depth->image = input.depth.clone();  // the caller's own stays as it is
-      depth->image.setTo(0, masked_);
-    }
+    const DepthCurve curve = chained(sensor_.depth_curve, depth_curve_);
+    if (!masked_.empty() || !curve.empty()) depth->image = input.depth.clone();  // the caller's own stays as it is
+    if (!masked_.empty()) depth->image.setTo(0, masked_);
+    applyDepthCurve(curve, &depth->image);
   }
   return "";
 }
 
 void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
   landmarks_.apply(update);
+  if (validateDepthCurve(update.depth_curve).empty()) depth_curve_ = update.depth_curve;
   // A loaded map brings keyframes of its own: new ones come after them.
   next_keyframe_ = std::max(next_keyframe_, update.newest_keyframe + 1);
   // In a map that was loaded or begun anew nobody knows yet where this odometry lies.

@@ -91,13 +91,35 @@ TEST_F(FrontEndTest, DepthIsHandedOnAsWhatItMeans) {
   ASSERT_TRUE(output.keyframe);
   const double offset = front_end_.mounting().depth_offset;
   EXPECT_LT(offset, -0.001);
-  EXPECT_EQ(output.frame->depth_correction, offset);
-  EXPECT_EQ(keyframe->frame.depth_correction, offset);
+  EXPECT_EQ(output.frame->depth_correction.offset, offset);
+  EXPECT_EQ(keyframe->frame.depth_correction.offset, offset);
   const double z = kWall - World::position(t).x() + 0.015 + offset;
   for (const Feature& f : keyframe->frame.features) EXPECT_NEAR(f.depth, z, 5e-4);
   for (const Feature& f : output.frame->features) EXPECT_NEAR(f.depth, z, 5e-4);
   EXPECT_NEAR(keyframe->frame.depth_grid.at(20, 20), z, 5e-4);
   EXPECT_NEAR(output.frame->depth_grid.at(10, 10), z, 5e-4);
+}
+
+TEST_F(FrontEndTest, DepthHasWhatTheMapFoundOutAboutItsCamera) {
+  run(0.0, 2.0);
+  MapUpdate update;
+  update.depth_curve.added.assign(60, 0.02f);
+  update.depth_curve.added[0] = 0.01f;
+  front_end_.applyMapUpdate(update);
+  feedImu(2.05);
+  const cv::Mat read = World::depth(2.05);
+  const cv::Mat before = read.clone();
+  FrameOutput output = front_end_.process({2.05, world_.image(2.05), read});
+  EXPECT_EQ(output.frame->depth_correction.curve, update.depth_curve);
+  const double z = kWall - World::position(2.05).x() + 0.02 + output.frame->depth_correction.offset;
+  EXPECT_NEAR(output.frame->depth_grid.at(10, 10), z, 5e-4);
+  EXPECT_EQ(cv::norm(read, before, cv::NORM_INF), 0.0);  // the caller's own stays as it is
+  // One that no camera has is not believed.
+  update.depth_curve.added[3] = std::nanf("");
+  front_end_.applyMapUpdate(update);
+  feedImu(2.10);
+  output = front_end_.process({2.10, world_.image(2.10), World::depth(2.10)});
+  EXPECT_FLOAT_EQ(output.frame->depth_correction.curve.at(3.0f), 0.02f);
 }
 
 // Readings have what the sensor's configuration adds by the time they get here; what is found comes on top.

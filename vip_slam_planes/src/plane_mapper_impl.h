@@ -44,7 +44,7 @@ class PlaneMapper::Impl {
   bool tieEpochs(const std::vector<LoopEvent>& loops);
   void takeCorrections(const MapUpdate& update);
   /// False when the keyframe's depth is corrected by just that already.
-  bool adoptDepthCorrection(double correction, KeyframePtr* keyframe);
+  bool adoptDepthCorrection(const DepthCorrection& correction, KeyframePtr* keyframe);
   void removeKeyframe(KeyframeId id);
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();

@@ -109,7 +109,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
 }
 
 // Covered cells and what detection has left over stay where they are: they are coarser than any such correction.
-bool PlaneMapper::Impl::adoptDepthCorrection(double correction, KeyframePtr* keyframe) {
+bool PlaneMapper::Impl::adoptDepthCorrection(const DepthCorrection& correction, KeyframePtr* keyframe) {
   const KeyframePtr corrected = withDepthCorrection(*keyframe, correction);
   if (corrected == *keyframe) return false;
   *keyframe = corrected;

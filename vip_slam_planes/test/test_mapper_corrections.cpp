@@ -49,7 +49,7 @@ TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
     for (Feature& f : keyframe->frame.features) f.depth += f.depth > 0 ? 0.02f : 0.0f;
     rig.place(keyframe, T_W_C);
     all.keyframes.push_back(updateFor(*keyframe, T_W_C).keyframes[0]);
-    all.keyframes.back().depth_correction = -0.02;
+    all.keyframes.back().depth_correction.offset = -0.02;
   }
   const PlaneEstimate* wall = rig.find(truth, 0.05);
   ASSERT_TRUE(wall);
@@ -62,12 +62,12 @@ TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
   for (float& z : keyframe->frame.depth_grid.z) z += z > 0 ? 0.02f : 0.0f;
   rig.mapper.addKeyframe(keyframe);
   MapUpdate update = updateFor(*keyframe, T_W_C);
-  update.keyframes[0].depth_correction = -0.02;
+  update.keyframes[0].depth_correction.offset = -0.02;
   const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
   EXPECT_TRUE(rig.find(truth, 0.002));
   ASSERT_FALSE(result.observations.empty());
   for (const PlaneObservation& o : result.observations) {
-    EXPECT_EQ(o.depth_correction, -0.02);
+    EXPECT_EQ(o.depth_correction.offset, -0.02);
     const PlaneEstimate* plane = nullptr;
     for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
     ASSERT_TRUE(plane);

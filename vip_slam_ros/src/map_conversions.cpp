@@ -75,6 +75,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
   msg.epoch = update.epoch;
   msg.map_odom = toPoseMsg(update.T_map_odom);
   msg.newest_keyframe = update.newest_keyframe;
+  msg.depth_curve = update.depth_curve.added;
   msg.global_update = update.global;
   msg.keyframes.reserve(update.keyframes.size());
   for (const auto& keyframe : update.keyframes) {
@@ -82,7 +83,8 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
     k.id = keyframe.id;
     k.state = toMsg(keyframe.state);
     k.imu_camera = toPoseMsg(keyframe.T_I_C);
-    k.depth_correction = keyframe.depth_correction;
+    k.depth_correction = keyframe.depth_correction.offset;
+    k.depth_curve = keyframe.depth_correction.curve.added;
     msg.keyframes.push_back(k);
   }
   msg.landmarks.reserve(update.landmarks.size());
@@ -113,11 +115,12 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.epoch = msg.epoch;
   update.T_map_odom = fromMsg(msg.map_odom);
   update.newest_keyframe = msg.newest_keyframe;
+  update.depth_curve.added = msg.depth_curve;
   update.global = msg.global_update;
   update.keyframes.reserve(msg.keyframes.size());
   for (const auto& keyframe : msg.keyframes) {
-    update.keyframes.push_back(
-        {keyframe.id, fromMsg(keyframe.state), fromMsg(keyframe.imu_camera), keyframe.depth_correction});
+    update.keyframes.push_back({keyframe.id, fromMsg(keyframe.state), fromMsg(keyframe.imu_camera),
+                                {keyframe.depth_correction, {keyframe.depth_curve}}});
   }
   update.landmarks.reserve(msg.landmarks.size());
   for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));

@@ -60,7 +60,7 @@ class Conversions : public ::testing::Test {
     f.state = state();
     f.covariance.setRandom();
     f.T_I_C = pose();
-    f.depth_correction = number();
+    f.depth_correction = {number(), {{0.001f, -0.002f}}};
     f.time_offset = number();
     for (int i = 0; i < 5; ++i) f.features.push_back(feature());
     f.depth_grid.stride = 16;
@@ -184,7 +184,7 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   observation.plane = 2;
   observation.G.setRandom();
   observation.weight_scale = 0.25;
-  observation.depth_correction = -0.01;
+  observation.depth_correction = {-0.01, {{0.003f}}};
   observation.points = {{{1, 2, 3}, 0.01f}, {{4, 5, 6}, 0.02f}};
   update.observations = {observation};
   update.associated = {{11, 2}, {12, 1}};
@@ -203,7 +203,7 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   EXPECT_EQ(back.observations[0].plane, 2u);
   EXPECT_EQ(back.observations[0].G, observation.G);
   EXPECT_EQ(back.observations[0].weight_scale, 0.25);
-  EXPECT_EQ(back.observations[0].depth_correction, -0.01);
+  EXPECT_EQ(back.observations[0].depth_correction, observation.depth_correction);
   ASSERT_EQ(back.observations[0].points.size(), 2u);
   EXPECT_EQ(back.observations[0].points[1].p_C, observation.points[1].p_C);
   EXPECT_EQ(back.observations[0].points[1].sigma, observation.points[1].sigma);
@@ -218,8 +218,9 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   update.epoch = 2;
   update.T_map_odom = pose();
   update.newest_keyframe = 30;
+  update.depth_curve.added = {0.f, -0.001f, 0.004f};
   update.global = true;
-  update.keyframes = {{29, state(), pose()}, {30, state(), pose(), -0.004}};
+  update.keyframes = {{29, state(), pose(), {}}, {30, state(), pose(), {-0.004, {{0.f, 0.002f}}}}};
   LandmarkEstimate landmark;
   landmark.id = 77;
   landmark.p_W = vector();
@@ -251,7 +252,8 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   EXPECT_EQ(back.keyframes[1].id, 30u);
   expectSame(back.keyframes[1].state, update.keyframes[1].state);
   expectSame(back.keyframes[1].T_I_C, update.keyframes[1].T_I_C);
-  EXPECT_EQ(back.keyframes[1].depth_correction, -0.004);
+  EXPECT_EQ(back.keyframes[1].depth_correction, update.keyframes[1].depth_correction);
+  EXPECT_EQ(back.depth_curve, update.depth_curve);
   ASSERT_EQ(back.landmarks.size(), 1u);
   EXPECT_EQ(back.landmarks[0].id, 77);
   EXPECT_EQ(back.landmarks[0].p_W, landmark.p_W);

@@ -58,6 +58,8 @@ class BackEnd {
   MapSnapshot snapshot() const;
   /// How large the map is by the accelerometer; asked after each global adjustment and now and then in between.
   InertialScale scale() const;
+  /// What the map has found out about the depth camera, after what the sensor's configuration adds.
+  const DepthCurve& depthCurve() const;
   const Map& map() const;
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);

@@ -128,6 +128,7 @@ struct BackEndOptions {
   std::string variant = "vip";
   std::string solver = "structured";
   bool loop_closing = true;
+  bool depth_curve = true;
   bool lockstep = false;
   MeasurementOptions measurement;
   LocalBaOptions local_ba;
@@ -141,6 +142,8 @@ struct BackEndOptions {
     v.field("solver", solver, {"structured", "ceres"},
             "the structure-aware Levenberg-Marquardt or the Ceres reference");
     v.field("loop_closing", loop_closing, "recognise places and close loops");
+    v.field("depth_curve", depth_curve,
+            "find out from planes seen from near and far what the depth camera reads wrong at which distance");
     v.field("lockstep", lockstep, "ignore time limits so that two runs give the same bits");
     v.group("measurement", measurement);
     v.group("local_ba", local_ba);

@@ -3,14 +3,16 @@
 #include <cmath>
 
 #include "back_end_impl.h"
+#include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr std::uint64_t kScaleInterval = 30;  // keyframes
+constexpr std::uint64_t kScaleInterval = 30, kCurveInterval = 20;  // keyframes
+constexpr int kAdjustmentsAtEnd = 3;  // at most, while the map still finds out about the depth camera
 // Smaller changes of the depth's correction wait for the next global adjustment, m.
-constexpr double kNewDepthCorrection = 0.001;
+constexpr double kNewDepthOffset = 0.001;
 constexpr double kNewGyroCorrection = 5e-4;  // likewise
 
 }  // namespace
@@ -46,7 +48,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // Beyond the local window bodies turn a little as well; others hear of it with the next global update, until when
   // the cameras they know stay right.
   map.adoptMounting(keyframe->frame.T_I_C);
-  followDepthCorrection(keyframe->frame.depth_correction);
+  followDepthOffset(keyframe->frame.depth_correction.offset);
   followGyroCorrection(keyframe->gyro_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   maker.process(keyframe->id, &map);
@@ -59,13 +61,26 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   statistics.merged += found.merged;
 }
 
-void BackEnd::Impl::followDepthCorrection(double newest) {
-  newest_depth_correction = newest;
-  if (std::abs(newest - depth_correction) < kNewDepthCorrection) return;
-  depth_correction = newest;
-  map.adoptDepthCorrection(newest);
+void BackEnd::Impl::followDepthOffset(double newest) {
+  newest_depth_offset = newest;
+  if (std::abs(newest - depth_correction.offset) < kNewDepthOffset) return;
+  depth_correction.offset = newest;
+  map.adoptDepthCorrection(depth_correction);
   global_wanted = true;
   ++correction;  // an adjustment under way has the readings as they were
+}
+
+bool BackEnd::Impl::learnDepthCurve() {
+  if (!options.depth_curve || frozen()) return false;
+  const ScopedTimer timer(log, "backend.depth_curve", map.empty() ? 0 : map.keyframes().rbegin()->second.data->frame.t);
+  const std::optional<DepthCurve> found = fitDepthCurve(map, sensor.depth_noise);
+  if (!found) return false;
+  DepthCurve curve = chained(depth_correction.curve, *found);
+  if (!validateDepthCurve(curve).empty()) return false;
+  depth_correction.curve = std::move(curve);
+  map.adoptDepthCorrection(depth_correction);
+  ++correction;
+  return true;
 }
 
 void BackEnd::Impl::followGyroCorrection(const Eigen::Matrix3d& newest) {
@@ -83,7 +98,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   const double t = keyframe ? keyframe->frame.t : 0.0;
   const ScopedTimer timer(log, "backend.keyframe", t);
   MapUpdate update = beginUpdate(t);
-  const double depth_correction_before = depth_correction;
+  const DepthCorrection depth_correction_before = depth_correction;
   bool entering = false;
   try {
     if (!keyframe) throw MapError("no keyframe given");
@@ -116,6 +131,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   cull(&update);
   closeLoop(&update);
   if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
+  if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global_wanted = true;
   // Nobody knows yet where the keyframes lie that waited for this one, or what their depth means now.
   if (entering || depth_correction != depth_correction_before) fillGlobal(&update);
   finishUpdate(&update);
@@ -191,7 +207,8 @@ void BackEnd::Impl::reset() {
   ++correction;
   global_wanted = false;
   last_global = -1e300;
-  depth_correction = newest_depth_correction = 0;
+  depth_correction = {};
+  newest_depth_offset = 0;
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   loops.clear();
@@ -211,7 +228,7 @@ void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }
 
 GbaJob BackEnd::startGlobalBa() {
   impl_->global_wanted = false;
-  impl_->depth_correction = impl_->newest_depth_correction;
+  impl_->depth_correction.offset = impl_->newest_depth_offset;
   impl_->map.adoptDepthCorrection(impl_->depth_correction);
   impl_->gyro_correction = impl_->newest_gyro_correction;
   impl_->map.adoptGyroCorrection(impl_->gyro_correction, impl_->sensor.imu_noise);
@@ -235,10 +252,13 @@ MapUpdate BackEnd::finish() {
     impl_->finishUpdate(&update);
     return update;
   }
-  return merge(run(startGlobalBa()));
+  MapUpdate update = merge(run(startGlobalBa()));
+  for (int k = 1; k < kAdjustmentsAtEnd && impl_->learnDepthCurve(); ++k) update = merge(run(startGlobalBa()));
+  return update;
 }
 
 InertialScale BackEnd::scale() const { return impl_->statistics.scale; }
+const DepthCurve& BackEnd::depthCurve() const { return impl_->depth_correction.curve; }
 MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }
 void BackEnd::reset() { impl_->reset(); }

@@ -30,7 +30,10 @@ struct BackEnd::Impl {
   void insert(const KeyframePtr& keyframe);
   /// All keyframes of this session get the same correction of their depth: the newest one's, once it is another one by
   /// enough to redo the map for.
-  void followDepthCorrection(double newest);
+  void followDepthOffset(double newest);
+  /// Asks the map what the depth camera reads wrong at which distance; when that is something new all keyframes have
+  /// it. False when nothing is new.
+  bool learnDepthCurve();
   void followGyroCorrection(const Eigen::Matrix3d& newest);
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
   /// Localisation only: what there is of a map stays as it is.
@@ -94,8 +97,8 @@ struct BackEnd::Impl {
   std::uint64_t correction = 0;
   bool global_wanted = false;
   double last_global = -1e300;                                ///< stamp of the last one that a loop asked for
-  double depth_correction = 0;                                ///< m, of all keyframes of this session
-  double newest_depth_correction = 0;                         ///< m, as the newest keyframe came
+  DepthCorrection depth_correction;                           ///< of all keyframes of this session
+  double newest_depth_offset = 0;                             ///< m, as the newest keyframe came
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< of all keyframes of this session but for little
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< as the newest keyframe came
   std::string refusal;

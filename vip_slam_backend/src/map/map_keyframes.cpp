@@ -122,7 +122,7 @@ void Map::adoptMounting(const SE3& T_I_C) {
   }
 }
 
-void Map::adoptDepthCorrection(double correction) {
+void Map::adoptDepthCorrection(const DepthCorrection& correction) {
   for (auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.data->frame.depth_correction == correction) continue;
     const KeyframePtr corrected = withDepthCorrection(kf.data, correction);

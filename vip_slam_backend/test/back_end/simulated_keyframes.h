@@ -2,8 +2,10 @@
 // with walls, floor and free points; and the plane module's answers.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "solver/synthetic_problem.h"
@@ -101,7 +103,7 @@ class SimulatedKeyframes {
       f.xy = Eigen::Vector2f((uv.x() - 320) / 460, (uv.y() - 240) / 460);
       if (random_() % 5 != 0) {
         f.depth_sigma = static_cast<float>(0.001 + 0.003 * c.z());
-        f.depth = static_cast<float>(c.z() + gauss(f.depth_sigma));
+        f.depth = static_cast<float>(c.z() + read_too_long_(c.z()) + gauss(f.depth_sigma));
       }
       f.descriptor = p.descriptor;
       f.descriptor[random_() % 32] ^= static_cast<std::uint8_t>(1u << (random_() % 8));
@@ -127,13 +129,13 @@ class SimulatedKeyframes {
       PlaneObservation o;
       o.keyframe = last_->id;
       o.plane = e.id;
-      for (int k = 0; k < 30; ++k) {
+      for (int k = 0; k < points_on_planes_; ++k) {
         const Eigen::Vector3d ray(0.6 * u(random_), 0.45 * u(random_), 1);
         const double z = -walls_[w].first.signedDistance(T_W_C.t()) / walls_[w].first.n.dot(T_W_C.rotation() * ray);
         if (!(z > 0.4 && z < 6)) continue;
         PlanePoint p;
-        p.sigma = 0.015f;
-        p.p_C = ((z + gauss(0.012)) * ray).cast<float>();
+        p.sigma = static_cast<float>(1.25 * sigma_on_planes_);
+        p.p_C = ((z + read_too_long_(z) + gauss(sigma_on_planes_)) * ray).cast<float>();
         o.points.push_back(p);
         const Eigen::Vector4d x = p.p_C.cast<double>().homogeneous();
         o.G += x * x.transpose() / (p.sigma * p.sigma);
@@ -143,6 +145,13 @@ class SimulatedKeyframes {
     for (const Point& p : points_)
       if (p.track != kNoLandmark && p.wall >= 0) update.associated.emplace_back(p.track, p.wall + 1);
     return update;
+  }
+
+  /// A depth camera that reads so much too long at each distance, m, with this noise at so many points of each plane.
+  void setDepthCamera(std::function<double(double)> read_too_long, double sigma_on_planes, int points_on_planes) {
+    read_too_long_ = std::move(read_too_long);
+    sigma_on_planes_ = sigma_on_planes;
+    points_on_planes_ = points_on_planes;
   }
 
   double gauss(double sigma) { return sigma * normal_(random_); }
@@ -166,6 +175,9 @@ class SimulatedKeyframes {
   LandmarkId next_track_ = 0;
   SE3 drift_;
   KeyframePtr last_;
+  std::function<double(double)> read_too_long_ = [](double) { return 0.0; };
+  double sigma_on_planes_ = 0.012;
+  int points_on_planes_ = 30;
 };
 
 }  // namespace vip_slam

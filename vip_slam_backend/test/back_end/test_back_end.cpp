@@ -74,14 +74,14 @@ KeyframePtr mountedWrongly(const KeyframePtr& keyframe, const SE3& error) {
 /// `correction`.
 KeyframePtr readTooLong(const KeyframePtr& keyframe, double too_long, double correction) {
   auto exact = std::make_shared<Keyframe>(*keyframe);
-  exact->frame.depth_correction = -too_long;
-  return withDepthCorrection(exact, correction);
+  exact->frame.depth_correction.offset = -too_long;
+  return withDepthCorrection(exact, {correction, {}});
 }
 
 PlaneUpdate readTooLong(PlaneUpdate update, double too_long, double correction) {
   for (PlaneObservation& o : update.observations) {
-    o.depth_correction = -too_long;
-    setDepthCorrection(correction, &o);
+    o.depth_correction.offset = -too_long;
+    setDepthCorrection({correction, {}}, &o);
   }
   return update;
 }
@@ -173,7 +173,7 @@ TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
     if (knows_now) {
       EXPECT_TRUE(update.global);
       EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
-      for (const KeyframeEstimate& estimate : update.keyframes) EXPECT_EQ(estimate.depth_correction, correction);
+      for (const KeyframeEstimate& estimate : update.keyframes) EXPECT_EQ(estimate.depth_correction.offset, correction);
       EXPECT_LT(worst(), 0.0006);
       EXPECT_TRUE(back_end.globalBaWanted());
       back_end.merge(back_end.run(back_end.startGlobalBa()));

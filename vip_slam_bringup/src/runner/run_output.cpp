@@ -9,6 +9,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_bringup/runner/plane_files.h"
 #include "vip_slam_core/types/planes_yaml.h"
@@ -135,6 +136,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     const InertialScale scale = pipeline.mapping()->backEnd().scale();
     const std::string difference = scaleDifference(scale, reader.sensor().depth_scale);
     if (!difference.empty()) all.push_back(difference);
+    const std::string bent = depthCurveDifference(pipeline.mapping()->backEnd().depthCurve());
+    if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
     const auto& refusals = pipeline.mapping()->refusals();
     all.insert(all.end(), refusals.begin(), refusals.end());
   }
@@ -144,8 +147,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
 namespace {
 
 /// In the words and units of a sensor file, so that it can be copied there.
-void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const InertialScale& scale,
-                  double depth_scale) {
+void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const DepthCurve& depth_curve,
+                  const InertialScale& scale, double depth_scale) {
   const auto list = [&yaml](const char* key, const Eigen::VectorXd& values) {
     yaml << YAML::Key << key << YAML::Value << YAML::Flow
          << std::vector<double>(values.data(), values.data() + values.size());
@@ -163,6 +166,11 @@ void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const I
   yaml << YAML::Key << "sigma_time_offset" << YAML::Value << mounting.sigma_time_offset;
   yaml << YAML::Key << "depth_offset" << YAML::Value << mounting.depth_offset;
   yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << mounting.sigma_depth_offset;
+  Eigen::VectorXd added(static_cast<Eigen::Index>(depth_curve.added.size()));
+  for (Eigen::Index k = 0; k < added.size(); ++k) {
+    added(k) = 1e-5 * std::round(1e5 * double(depth_curve.added[static_cast<std::size_t>(k)]));
+  }
+  list("depth_curve", added);
   rows("gyro_correction", mounting.gyro_correction);
   rows("sigma_gyro_correction", mounting.sigma_gyro_correction);
   if (scale.sigma > 0) {
@@ -197,8 +205,10 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   emitMap(yaml, map, planes,
           pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());
+  const BackEnd* back_end = pipeline.mapping() ? &pipeline.mapping()->backEnd() : nullptr;
   emitMounting(yaml, pipeline.frontEnd().mounting(),
-               pipeline.mapping() ? pipeline.mapping()->backEnd().scale() : InertialScale(),
+               chained(reader.sensor().depth_curve, back_end ? back_end->depthCurve() : DepthCurve()),
+               back_end ? back_end->scale() : InertialScale(),
                reader.sensor().depth_scale);
   emitStates(yaml, pipeline.states());
   put("warnings", runWarnings(pipeline, reader));

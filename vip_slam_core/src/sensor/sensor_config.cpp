@@ -1,5 +1,6 @@
 #include "vip_slam_core/sensor/sensor_config.h"
 
+#include <charconv>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -119,6 +120,16 @@ CameraIntrinsics cameraFrom(Section section) {
   return camera;
 }
 
+std::string list(const std::vector<float>& numbers) {
+  std::string out = "[";
+  for (const float number : numbers) {
+    char digits[32];  // as few as give the same float again
+    out += out.size() > 1 ? ", " : "";
+    out.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
+  }
+  return out + "]";
+}
+
 std::string text(const Eigen::MatrixXd& M, const char* indent) {
   std::string out;
   for (int r = 0; r < M.rows(); ++r) {
@@ -178,6 +189,11 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   depth.choice("encoding", config.depth_encoding, {"16UC1", "32FC1", "compressed"});
   depth.number("scale", config.depth_scale, 1e-6, 1.0);
   depth.number("offset", config.depth_offset, -0.5, 0.5, false);
+  std::vector<double> added;
+  depth.get("curve", added, false);
+  config.depth_curve.added.assign(added.begin(), added.end());
+  const std::string bent = validateDepthCurve(config.depth_curve);
+  if (!bent.empty()) throw std::runtime_error("depth/curve: " + bent);
   depth.number("rate", config.depth_rate, 0.1, 1000);
   depth.get("registered", config.depth_registered);
   depth.number("rolling_shutter", config.depth_rolling_shutter, 0, 0.1, false);
@@ -271,7 +287,8 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
       << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter)
       << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
-      << "\n  offset: " << formatDouble(config.depth_offset) << "\n  rate: " << formatDouble(config.depth_rate)
+      << "\n  offset: " << formatDouble(config.depth_offset)
+      << "\n  curve: " << list(config.depth_curve.added) << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
       << "\n  rolling_shutter: " << formatDouble(config.depth_rolling_shutter)
       << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";

@@ -32,7 +32,7 @@ class Map {
   void adoptMounting(const SE3& T_I_C);
   /// The front end knows better what its depth camera reads too long: holds for the readings and the depth points on
   /// planes of all keyframes but those of a stored map. Landmarks, planes and poses are left to the next optimisation.
-  void adoptDepthCorrection(double correction);
+  void adoptDepthCorrection(const DepthCorrection& correction);
   /// The front end knows better what its gyro gets wrong: the IMU factors of all keyframes but those of a stored map
   /// are integrated anew.
   void adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise& noise);

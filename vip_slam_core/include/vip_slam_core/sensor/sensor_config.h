@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_curve.h"
 #include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/imu/imu_types.h"
 
@@ -25,6 +26,7 @@ struct SensorConfig {
   std::string depth_encoding = "16UC1";  ///< 16UC1, 32FC1 or "compressed" (16-bit PNG, also compressedDepth)
   double depth_scale = 0.001;            ///< metres per unit of 16UC1
   double depth_offset = 0;               ///< metres to be added to every reading
+  DepthCurve depth_curve;                ///< and then what it takes at that distance
   bool depth_registered = true;          ///< depth pixels belong to the colour camera
   double color_rate = 30, depth_rate = 30, imu_rate = 200;  ///< Hz, nominal; for checks and messages
 

@@ -7,16 +7,11 @@
 
 namespace vip_slam {
 
-/// A depth whose correction grows by `change` m; 0 is no depth and stays so, anything else stays before the camera.
-float shiftedDepth(float z, double change);
-/// A point in the camera frame, moved along its ray likewise.
-Eigen::Vector3f shiftedPoint(const Eigen::Vector3f& p_C, double change);
-
-/// The keyframe with `correction` m added to the camera's readings instead of what they have now; the same one when
+/// The keyframe with `correction` added to the camera's readings instead of what they have now; the same one when
 /// that is what it has. Sigmas stay, and so does all that is no depth.
-KeyframePtr withDepthCorrection(const KeyframePtr& keyframe, double correction);
+KeyframePtr withDepthCorrection(const KeyframePtr& keyframe, const DepthCorrection& correction);
 
 /// The same for depth points on a plane; G is summed anew from the points.
-void setDepthCorrection(double correction, PlaneObservation* observation);
+void setDepthCorrection(const DepthCorrection& correction, PlaneObservation* observation);
 
 }  // namespace vip_slam

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "vip_slam_core/depth/depth_curve.h"
 #include "vip_slam_core/geometry/plane.h"
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/types/feature.h"
@@ -16,7 +17,7 @@ struct KeyframeEstimate {
   KeyframeId id = 0;
   NavState state;  ///< T_map_I, v_map, biases
   SE3 T_I_C;       ///< the camera's mounting as known now; the keyframe itself has what was known when it was made
-  double depth_correction = 0;  ///< m, what its depth readings are added as known now, likewise
+  DepthCorrection depth_correction;  ///< what its depth readings are added as known now, likewise
 };
 
 struct LandmarkEstimate {
@@ -42,6 +43,7 @@ struct MapUpdate {
   std::uint32_t epoch = 0;     ///< epoch that T_map_odom belongs to
   SE3 T_map_odom;
   KeyframeId newest_keyframe = 0;
+  DepthCurve depth_curve;                         ///< what the map has found out about the depth camera
   bool global = false;                            ///< everything moved (GBA, loop); else a local window
   std::vector<KeyframeEstimate> keyframes;        ///< changed ones (all when global)
   std::vector<LandmarkEstimate> landmarks;        ///< changed ones (all when global)

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "vip_slam_core/depth/depth_curve.h"
 #include "vip_slam_core/geometry/plane.h"
 #include "vip_slam_core/types/feature.h"
 
@@ -43,7 +44,7 @@ struct PlaneObservation {
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
   double weight_scale = 1.0;       ///< G = weight_scale * sum 1/sigma^2 p~ p~^T over `points`
   std::vector<PlanePoint> points;  ///< the samples behind G
-  double depth_correction = 0;     ///< m, of the readings behind them, see TrackedFrame
+  DepthCorrection depth_correction;  ///< of the readings behind them, see TrackedFrame
 };
 
 struct PlaneMerge {

@@ -1,0 +1,150 @@
+// What a map says about the depth camera: found when it is there, and nothing else taken for it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "back_end/simulated_keyframes.h"
+#include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/optimisation/depth_curve_fit.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kWave = 4.1, kAmplitude = 0.004;  // a time-of-flight camera's, 1/m and m
+constexpr int kPoints = 200;  // of each plane in each keyframe
+double wiggle(double z) { return kAmplitude * std::sin(kWave * z); }
+double exact(double) { return 0.0; }
+
+/// At true poses.
+Map mapOf(SimulatedKeyframes* world, int keyframes) {
+  Map map;
+  for (int k = 0; k < keyframes; ++k) {
+    const KeyframePtr kf = world->next();
+    map.addKeyframe(kf, world->truth(kf->frame.t), ImuNoise());
+    const PlaneUpdate planes = world->planes();
+    for (const PlaneEstimate& plane : planes.planes) map.setPlane(plane);
+    for (const PlaneObservation& observation : planes.observations) map.setPlaneObservation(observation);
+  }
+  return map;
+}
+
+std::optional<DepthCurve> curveOf(std::function<double(double)> read_too_long, int keyframes = 60,
+                                  double sigma = 0.004) {
+  SimulatedKeyframes world(3);
+  world.setDepthCamera(std::move(read_too_long), sigma, kPoints);
+  return fitDepthCurve(mapOf(&world, keyframes), DepthNoise());
+}
+
+/// Root mean square of curve + what is read too long, between 2 and 6 m, without offset and scale.
+double leftOver(const DepthCurve& curve) {
+  Eigen::MatrixX2d lines(32, 2);
+  Eigen::VectorXd left(32);
+  for (int k = 0; k < 32; ++k) {
+    const double z = 2 + 0.125 * k;
+    lines.row(k) << 1, z;
+    left(k) = curve.at(static_cast<float>(z)) + wiggle(z);
+  }
+  left -= lines * (lines.transpose() * lines).ldlt().solve(lines.transpose() * left);
+  return left.norm() / std::sqrt(32.0);
+}
+
+TEST(DepthCurveFit, FindsTheWiggleOfATimeOfFlightCamera) {
+  const auto curve = curveOf(wiggle);
+  ASSERT_TRUE(curve);
+  EXPECT_GT(leftOver(DepthCurve()), 0.0025);
+  EXPECT_LT(leftOver(*curve), 0.0006);
+  // Nothing was read there.
+  EXPECT_EQ(curve->at(0.0f), 0.0f);
+  EXPECT_LT(std::abs(curve->at(8.0f)), 0.001f);
+}
+
+TEST(DepthCurveFit, FindsNothingInWhatIsExact) {
+  EXPECT_FALSE(curveOf(exact));
+  EXPECT_FALSE(curveOf(exact, 60, 0.0005));
+  EXPECT_FALSE(curveOf(exact, 60, 0.03));
+}
+
+// Both are the business of others, see the header.
+TEST(DepthCurveFit, LeavesOffsetAndScaleAlone) {
+  EXPECT_FALSE(curveOf([](double) { return 0.02; }));
+  EXPECT_FALSE(curveOf([](double z) { return 0.01 * z; }));
+}
+
+TEST(DepthCurveFit, WaitsForEnoughKeyframes) { EXPECT_FALSE(curveOf(wiggle, 14)); }
+
+TEST(DepthCurveFit, SaysNothingOfAStoredMapsCamera) {
+  SimulatedKeyframes world(3);
+  world.setDepthCamera(wiggle, 0.004, kPoints);
+  Map map = mapOf(&world, 60);
+  for (KeyframeId id = 1; id <= 60; ++id) map.keyframe(id).stored = true;
+  EXPECT_FALSE(fitDepthCurve(map, DepthNoise()));
+}
+
+TEST(DepthCurveFit, TellsTheUserOfWhatMatters) {
+  EXPECT_EQ(depthCurveDifference(DepthCurve()), "");
+  EXPECT_EQ(depthCurveDifference({{0.f, 0.0019f, -0.001f}}), "");
+  EXPECT_NE(depthCurveDifference({{0.f, 0.001f, -0.0042f}}).find("up to 4.2 mm"), std::string::npos);
+}
+
+// A wall whose far part stands back by 4 cm passes for one plane: that is no error of the camera's.
+TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
+  SimulatedKeyframes world(3);
+  world.setDepthCamera(exact, 0.004, kPoints);
+  Map map = mapOf(&world, 60);
+  int moved = 0;
+  for (KeyframeId id = 1; id <= 60; ++id) {
+    const auto seen = map.keyframe(id).planes.find(1);
+    if (seen == map.keyframe(id).planes.end()) continue;
+    for (PlanePoint& point : seen->second.points) {
+      if (point.p_C.z() < 3) continue;
+      point.p_C *= 1 + 0.04f / point.p_C.z();
+      ++moved;
+    }
+  }
+  ASSERT_GT(moved, 50);
+  EXPECT_FALSE(fitDepthCurve(map, DepthNoise()));
+}
+
+// The whole way: the map finds it, tells the others, and all keyframes have it.
+TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
+  SimulatedKeyframes world(6);
+  world.setDepthCamera(wiggle, 0.004, kPoints);
+  BackEndOptions options;
+  options.lockstep = true;
+  options.loop_closing = false;
+  BackEnd back_end(options, world.sensor());
+  MapUpdate update;
+  int told_all = 0;
+  for (int k = 0; k < 60; ++k) {
+    update = back_end.addKeyframe(world.next());
+    ASSERT_EQ(back_end.lastRefusal(), "");
+    back_end.applyPlaneUpdate(world.planes());
+    told_all += update.global && !update.depth_curve.empty();
+    if (back_end.globalBaWanted()) update = back_end.merge(back_end.run(back_end.startGlobalBa()));
+  }
+  update = back_end.finish();
+  EXPECT_GT(told_all, 0);
+  EXPECT_LT(leftOver(update.depth_curve), 0.001);
+  for (const auto& [id, kf] : back_end.map().keyframes()) {
+    EXPECT_EQ(kf.data->frame.depth_correction.curve, update.depth_curve);
+    for (const auto& [plane, o] : kf.planes) EXPECT_EQ(o.depth_correction.curve, update.depth_curve);
+  }
+  for (const KeyframeEstimate& estimate : update.keyframes) {
+    EXPECT_EQ(estimate.depth_correction.curve, update.depth_curve);
+  }
+  back_end.reset();
+  EXPECT_TRUE(back_end.addKeyframe(world.next()).depth_curve.empty());
+
+  options.depth_curve = false;
+  SimulatedKeyframes again(6);
+  again.setDepthCamera(wiggle, 0.004, kPoints);
+  BackEnd believing(options, again.sensor());
+  for (int k = 0; k < 60; ++k) {
+    believing.addKeyframe(again.next());
+    believing.applyPlaneUpdate(again.planes());
+  }
+  EXPECT_TRUE(believing.finish().depth_curve.empty());
+}
+
+}  // namespace
+}  // namespace vip_slam
