@@ -91,8 +91,8 @@ class BackEndNodelet : public nodelet::Nodelet {
   vip_slam_msgs::BackEndStatistics shown_;
   std::string problem_;
   std::vector<std::string> calibration_differences_;  ///< empty ones: nothing to tell
-  std::string load_problem_;                ///< why the map to start with could not be loaded
-  vip_slam_backend::BackEndConfig config_;  ///< as dynamic_reconfigure has it
+  std::string load_problem_;                          ///< why the map to start with could not be loaded
+  vip_slam_backend::BackEndConfig config_;            ///< as dynamic_reconfigure has it
 
   std::atomic<double> display_rate_{2.0};
   std::atomic<bool> publish_tf_{true};

@@ -81,7 +81,8 @@ TEST(DepthCorrection, AnotherCurveTakesTheOldOnesPlace) {
   EXPECT_EQ(observation.depth_correction, after);
   for (std::size_t k = 0; k < readings.size(); ++k) {
     EXPECT_NEAR(other->frame.depth_grid.z[k], corrected(readings[k], after), 2e-6f);
-    EXPECT_LT((observation.points[k].p_C - Eigen::Vector3f(0.2f, -0.3f, 1) * corrected(readings[k], after)).norm(), 4e-6f);
+    EXPECT_LT((observation.points[k].p_C - Eigen::Vector3f(0.2f, -0.3f, 1) * corrected(readings[k], after)).norm(),
+              4e-6f);
   }
   EXPECT_EQ(other->frame.depth_grid.z.back(), 0.0f);
   EXPECT_EQ(withDepthCorrection(other, after), other);

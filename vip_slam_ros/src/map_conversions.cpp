@@ -119,7 +119,9 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.global = msg.global_update;
   update.keyframes.reserve(msg.keyframes.size());
   for (const auto& keyframe : msg.keyframes) {
-    update.keyframes.push_back({keyframe.id, fromMsg(keyframe.state), fromMsg(keyframe.imu_camera),
+    update.keyframes.push_back({keyframe.id,
+                                fromMsg(keyframe.state),
+                                fromMsg(keyframe.imu_camera),
                                 {keyframe.depth_correction, {keyframe.depth_curve}}});
   }
   update.landmarks.reserve(msg.landmarks.size());

@@ -108,19 +108,24 @@ struct ReobservationOptions {
 
 /// A map is kept whole as long as it is small: a keyframe whose landmarks others see as well still holds pixels of a
 /// tenth of a pixel and depth on planes, and a landmark of two views still ties two keyframes. Beyond, a robot that
-/// stays in one room for hours must not fill its memory with it.
+/// stays in one room for hours must not fill its memory with it. Nor its time, long before: where keyframes all see the
+/// same, a global adjustment takes the cube of their number.
 struct CullingOptions {
   bool enabled = true;
   int above_keyframes = 1000;
+  int above_covisible = 120;
   double redundancy = 0.9;
   double max_imu_seconds = 3.0;
 
   void visit(OptionVisitor& v) {
     v.field("enabled", enabled, "remove redundant keyframes and poor landmarks from large maps");
     v.field("above_keyframes", above_keyframes, 0, 1000000, "maps of up to this many keyframes are kept whole");
+    v.field("above_covisible", above_covisible, 10, 1000000,
+            "... but for those that share landmarks with more than so many others, in maps of three times as many");
     v.field("redundancy", redundancy, 0.5, 1.0,
             "fraction of landmarks seen by three other keyframes that makes one redundant");
-    v.field("max_imu_seconds", max_imu_seconds, 0.5, 10.0, "longest IMU factor that culling may leave");
+    v.field("max_imu_seconds", max_imu_seconds, 0.5, 10.0,
+            "longest IMU factor that culling may leave, in a crowd up to ten times as long");
   }
 };
 

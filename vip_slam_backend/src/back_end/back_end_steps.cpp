@@ -62,11 +62,12 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
 }
 
 void BackEnd::Impl::cull(MapUpdate* update) {
-  const std::size_t kept_whole = std::max(3, options.culling.above_keyframes);
-  if (!options.culling.enabled || map.keyframes().size() <= kept_whole) return;
-  auto it = map.keyframes().rbegin();
-  std::advance(it, 2);
-  cullLandmarks(it->first, &map);
+  if (!options.culling.enabled) return;
+  if (map.keyframes().size() > static_cast<std::size_t>(std::max(3, options.culling.above_keyframes))) {
+    auto it = map.keyframes().rbegin();
+    std::advance(it, 2);
+    cullLandmarks(it->first, &map);
+  }
   const auto removed = cullKeyframes(options.culling, options.local_ba.window, sensor.imu_noise, &map);
   statistics.keyframes_culled += removed.size();
   for (const KeyframeId id : removed) loop_closer.remove(id);

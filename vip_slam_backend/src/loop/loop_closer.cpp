@@ -52,6 +52,13 @@ void LoopCloser::rebuild(const Map& map, const std::vector<std::pair<KeyframeId,
   loops_ = loops;
 }
 
+void LoopCloser::remove(KeyframeId id) {
+  database_.remove(id);
+  loops_.erase(std::remove_if(loops_.begin(), loops_.end(),
+                              [id](const auto& loop) { return loop.first == id || loop.second == id; }),
+               loops_.end());
+}
+
 void LoopCloser::tie(Map& map, KeyframeId query, KeyframeId match) {
   map.keyframe(query).loop_keyframe = map.keyframe(match).loop_keyframe = true;
   loops_.emplace_back(query, match);

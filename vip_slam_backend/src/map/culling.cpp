@@ -1,5 +1,7 @@
 #include "vip_slam_backend/map/culling.h"
 
+#include <algorithm>
+
 namespace vip_slam {
 
 int cullLandmarks(KeyframeId recent, Map* map) {
@@ -15,35 +17,81 @@ int cullLandmarks(KeyframeId recent, Map* map) {
   return removed;
 }
 
+namespace {
+
+constexpr int kJudged = 10;                // keyframes that just left the window, and as many older ones in turn
+constexpr std::size_t kSmallMap = 3;       // times the keyframes that are a crowd: all together they cost little
+constexpr std::size_t kAtOnce = 2;         // out of a crowd, which is another one without them
+constexpr double kLongest = 10.0;          // times the longest IMU factor, in a crowd
+constexpr std::size_t kSeenElsewhere = 4;  // views of a landmark that can do without one
+
+/// Those whose time has come, oldest first: what just left the window, and each older one again and again.
+std::vector<KeyframeId> candidates(const Map& map, int window) {
+  std::vector<KeyframeId> ids;
+  for (const auto& entry : map.keyframes()) ids.push_back(entry.first);
+  const int older = static_cast<int>(ids.size()) - window - kJudged;
+  std::vector<KeyframeId> list;
+  if (older > 0) {
+    const int parts = (older + kJudged - 1) / kJudged, part = static_cast<int>(ids.back() % KeyframeId(parts));
+    for (int k = part; k < older; k += parts) list.push_back(ids[static_cast<std::size_t>(k)]);
+  }
+  list.insert(list.end(), ids.begin() + std::max(0, older), ids.end() - window);
+  return list;
+}
+
+bool ofOneOdometry(const Map& map) {
+  const auto& keyframes = map.keyframes();
+  const std::uint32_t epoch = keyframes.begin()->second.data->frame.epoch;
+  return std::all_of(keyframes.begin(), keyframes.end(),
+                     [epoch](const auto& entry) { return entry.second.data->frame.epoch == epoch; });
+}
+
+/// Landmarks with fewer than `proven` views do not count.
+bool isRedundant(const MapKeyframe& kf, const Map& map, double redundancy, std::size_t proven) {
+  int total = 0, redundant = 0;
+  for (const LandmarkId landmark : kf.landmarks) {
+    if (landmark == kNoLandmark) continue;
+    const std::size_t views = map.landmark(landmark).observations.size();
+    total += views >= proven;
+    redundant += views >= kSeenElsewhere;
+  }
+  if (total < 20 || redundant < redundancy * total) return false;
+  // A keyframe that alone holds a plane stays.
+  for (const auto& plane : kf.planes) {
+    int others = 0;
+    for (const auto& entry : map.keyframes())
+      others += entry.first != kf.id() && entry.second.planes.count(plane.first);
+    if (others < 3) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise, Map* map) {
   std::vector<KeyframeId> removed;
   if (!options.enabled || map->keyframes().size() <= static_cast<std::size_t>(window)) return removed;
-  // Only keyframes that just left the window: older ones were judged when they did.
-  std::vector<KeyframeId> candidates;
-  int newest = 0;
-  for (auto it = map->keyframes().rbegin(); it != map->keyframes().rend() && newest < window + 10; ++it, ++newest)
-    if (newest >= window) candidates.push_back(it->first);
-  for (const KeyframeId id : candidates) {
+  const bool too_large = map->keyframes().size() > static_cast<std::size_t>(std::max(3, options.above_keyframes));
+  const bool crowds = map->keyframes().size() > kSmallMap * static_cast<std::size_t>(options.above_covisible);
+  if (!too_large && !crowds) return removed;
+  const bool one_odometry = ofOneOdometry(*map);
+  std::size_t out_of_crowds = 0;
+  for (const KeyframeId id : candidates(*map, window)) {
     const MapKeyframe& kf = map->keyframe(id);
-    if (kf.loop_keyframe || kf.previous == 0 || kf.next == 0 || !kf.imu || !map->keyframe(kf.next).imu) continue;
-    if (map->keyframe(kf.next).imu->back().t - kf.imu->front().t > options.max_imu_seconds) continue;
-    int total = 0, redundant = 0;
-    for (const LandmarkId landmark : kf.landmarks) {
-      if (landmark == kNoLandmark) continue;
-      ++total;
-      redundant += map->landmark(landmark).observations.size() >= 4;
-    }
-    if (total < 20 || redundant < options.redundancy * total) continue;
-    // A keyframe that alone holds a plane stays.
-    bool needed = false;
-    for (const auto& plane : kf.planes) {
-      int others = 0;
-      for (const auto& entry : map->keyframes()) others += entry.first != id && entry.second.planes.count(plane.first);
-      needed |= others < 3;
-    }
-    if (needed) continue;
-    map->removeKeyframe(id, noise, options.max_imu_seconds);
+    if (kf.previous == 0 || kf.next == 0 || !kf.imu || !map->keyframe(kf.next).imu) continue;
+    // How far the keyframes around it are more than enough.
+    const double crowd =
+        crowds ? static_cast<double>(map->covisible(id).size()) / static_cast<double>(options.above_covisible) : 0.0;
+    if (!too_large && (crowd <= 1 || out_of_crowds >= kAtOnce)) continue;
+    // Where a room is seen again and again every keyframe is the end of some loop, and landmarks say the same.
+    if (kf.loop_keyframe && (crowd <= 1 || !one_odometry)) continue;
+    const double longest = options.max_imu_seconds * std::clamp(crowd * crowd * crowd, 1.0, kLongest);
+    if (map->keyframe(kf.next).imu->back().t - kf.imu->front().t > longest) continue;
+    // In a crowd a landmark that few of so many saw is a mistake or has moved.
+    if (!isRedundant(kf, *map, options.redundancy, crowd > 1 ? kSeenElsewhere : 1)) continue;
+    map->removeKeyframe(id, noise, longest);
     removed.push_back(id);
+    out_of_crowds += crowd > 1;
   }
   return removed;
 }

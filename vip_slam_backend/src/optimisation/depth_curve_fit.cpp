@@ -13,17 +13,17 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kKeyframes = 200;      // the newest ones
+constexpr int kKeyframes = 200;  // the newest ones
 constexpr int kLeastKeyframes = 15;
-constexpr double kFarthest = 12.0;     // m
-constexpr double kEntrySigma = 0.01;   // m, of an entry before anything is known
-constexpr double kBendSigma = 0.002;   // m, of an entry against the line between its neighbours
+constexpr double kFarthest = 12.0;         // m
+constexpr double kEntrySigma = 0.01;       // m, of an entry before anything is known
+constexpr double kBendSigma = 0.002;       // m, of an entry against the line between its neighbours
 constexpr double kPlaneInformation = 1e2;  // 1/m^2, so that a plane of one point has a place
-constexpr double kOutlier = 3.0;       // sigmas, of a loss that forgets what is far off
-constexpr double kUneven = 4.0;        // times the usual squared residual: what passes for one plane may be several
-constexpr int kRounds = 3;             // of the weights
-constexpr double kKnownSigma = 0.001;  // m: entries below it decide
-constexpr int kLeastKnown = 6;         // entries
+constexpr double kOutlier = 3.0;           // sigmas, of a loss that forgets what is far off
+constexpr double kUneven = 4.0;            // times the usual squared residual: what passes for one plane may be several
+constexpr int kRounds = 3;                 // of the weights
+constexpr double kKnownSigma = 0.001;      // m: entries below it decide
+constexpr int kLeastKnown = 6;             // entries
 // Of the root mean square of the entries, what is worth the trouble, m, and how many sigmas; and how far the two
 // halves of the planes have to agree.
 constexpr double kWorthwhile = 5e-4, kSure = 4.0, kLeastCorrelation = 0.5;

@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "back_end/simulated_keyframes.h"
 #include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/map/culling.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_core/types/depth_correction.h"
@@ -102,6 +104,47 @@ double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& wor
 }
 
 }  // namespace
+
+// Round and round in one room, where all keyframes see the same: so many of them stay as are enough.
+TEST(BackEnd, KeyframesDoNotCrowd) {
+  BackEndOptions crowded = options("vip"), thinned = crowded;
+  crowded.culling.enabled = false;
+  thinned.culling.above_covisible = 20;
+  const RunResult all = run(crowded, 160, 2, 300), few = run(thinned, 160, 2, 300);
+  EXPECT_EQ(all.snapshot.keyframes.size(), 160u);
+  EXPECT_GT(few.snapshot.keyframes.size(), 40u);
+  EXPECT_LT(few.snapshot.keyframes.size(), 100u);
+  EXPECT_LT(few.rmse, 1.5 * all.rmse + 0.002);
+  // What is kept is spread over the whole time.
+  double last = few.snapshot.keyframes.front().t, widest = last;
+  for (const SnapshotKeyframe& kf : few.snapshot.keyframes) widest = std::max(widest, kf.t - std::exchange(last, kf.t));
+  EXPECT_LT(widest, 30.0);
+}
+
+// In a room that is seen again and again all keyframes are ends of loops. Those that tie two odometries stay.
+TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
+  BackEndOptions o = options("vip");
+  o.culling.enabled = false;
+  SimulatedKeyframes world(2, 300);
+  BackEnd back_end(o, world.sensor());
+  for (int k = 0; k < 90; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  CullingOptions culling;
+  culling.above_covisible = 20;
+  for (const bool two_odometries : {false, true}) {
+    Map map = back_end.map();
+    for (KeyframeId id = 1; id <= 90; ++id) map.keyframe(id).loop_keyframe = true;
+    if (two_odometries) {
+      auto other = std::make_shared<Keyframe>(*map.keyframe(90).data);
+      other->frame.epoch = 7;
+      map.keyframe(90).data = other;
+    }
+    EXPECT_EQ(cullKeyframes(culling, 20, ImuNoise(), &map).empty(), two_odometries);
+    EXPECT_EQ(checkMap(map), "");
+  }
+}
 
 // The front end learns the mounting in the first keyframes, by halves. What the last one knows holds for all: those at
 // the beginning, long fixed, would stay turned by two degrees.

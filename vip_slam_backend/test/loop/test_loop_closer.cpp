@@ -40,6 +40,11 @@ TEST(LoopCloser, ClosesTheRingAndRemovesTheDrift) {
     const SE3 found = loop.T_match_query, right = truth[loop.match - 1].inverse() * truth[loop.query - 1];
     EXPECT_LT((found.t() - right.t()).norm(), 0.03) << loop.query << " -> " << loop.match;
   }
+  // A keyframe that leaves the map takes its loops along.
+  const std::size_t all = closer.loops().size();
+  closer.remove(loops[0].query);
+  EXPECT_LT(closer.loops().size(), all);
+  for (const auto& [query, match] : closer.loops()) EXPECT_TRUE(query != loops[0].query && match != loops[0].query);
 }
 
 TEST(LoopCloser, ALittleTiltMattersNoMoreFarFromTheOrigin) {

@@ -11,7 +11,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kWave = 4.1, kAmplitude = 0.004;  // a time-of-flight camera's, 1/m and m
-constexpr int kPoints = 200;  // of each plane in each keyframe
+constexpr int kPoints = 200;                       // of each plane in each keyframe
 double wiggle(double z) { return kAmplitude * std::sin(kWave * z); }
 double exact(double) { return 0.0; }
 

@@ -208,8 +208,7 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   const BackEnd* back_end = pipeline.mapping() ? &pipeline.mapping()->backEnd() : nullptr;
   emitMounting(yaml, pipeline.frontEnd().mounting(),
                chained(reader.sensor().depth_curve, back_end ? back_end->depthCurve() : DepthCurve()),
-               back_end ? back_end->scale() : InertialScale(),
-               reader.sensor().depth_scale);
+               back_end ? back_end->scale() : InertialScale(), reader.sensor().depth_scale);
   emitStates(yaml, pipeline.states());
   put("warnings", runWarnings(pipeline, reader));
   yaml << YAML::EndMap;

@@ -287,8 +287,8 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
       << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter)
       << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
-      << "\n  offset: " << formatDouble(config.depth_offset)
-      << "\n  curve: " << list(config.depth_curve.added) << "\n  rate: " << formatDouble(config.depth_rate)
+      << "\n  offset: " << formatDouble(config.depth_offset) << "\n  curve: " << list(config.depth_curve.added)
+      << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
       << "\n  rolling_shutter: " << formatDouble(config.depth_rolling_shutter)
       << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";

@@ -30,7 +30,8 @@ class LoopCloser {
   /// Looks for a loop at a keyframe that add() knows. On success the map is corrected and fused: all keyframes,
   /// landmarks and planes may have moved. One event per verified candidate; the accepted one is the last.
   std::vector<LoopEvent> close(Map& map, KeyframeId query);
-  void remove(KeyframeId id) { database_.remove(id); }
+  /// A keyframe that left the map, with its loops.
+  void remove(KeyframeId id);
   void clear();
   /// A relocalised keyframe: from now on its epoch and that of `match` are one part of the map.
   void tie(Map& map, KeyframeId query, KeyframeId match);

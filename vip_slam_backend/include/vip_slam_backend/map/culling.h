@@ -12,8 +12,11 @@ namespace vip_slam {
 /// far more often than found. Landmarks that a keyframe at or above `recent` sees are spared. Returns their number.
 int cullLandmarks(KeyframeId recent, Map* map);
 
-/// Removes keyframes outside the newest `window` whose landmarks are seen elsewhere: at least `redundancy` of them by
-/// three other keyframes. Never the first of a chain, the end of a loop, or one whose removal would tear the IMU chain.
+/// Removes keyframes outside the newest `window` whose landmarks are seen elsewhere, at least `redundancy` of them by
+/// three other keyframes: of a map that is too large those that just left the window; and a few, just left or older,
+/// of those that share landmarks with too many others. Never the first of a chain, one that alone holds a plane, one
+/// whose removal would tear the IMU chain, or the end of a loop (but in a crowd of one odometry, whose parts no loop
+/// has to tie).
 std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise, Map* map);
 
 }  // namespace vip_slam

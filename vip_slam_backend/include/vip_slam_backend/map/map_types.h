@@ -43,7 +43,7 @@ struct MapKeyframe {
   RelativeMotion motion;
   /// Depth points of this keyframe on planes.
   std::map<PlaneId, PlaneObservation> planes;
-  bool loop_keyframe = false;  ///< end of an accepted loop: never culled
+  bool loop_keyframe = false;  ///< end of an accepted loop: hardly ever culled
 
   KeyframeId id() const { return data->id; }
   const std::vector<Feature>& features() const { return data->frame.features; }
