@@ -129,7 +129,10 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* de
 
 void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
   landmarks_.apply(update);
-  if (validateDepthCurve(update.depth_curve).empty()) depth_curve_ = update.depth_curve;
+  if (update.depth_curve != depth_curve_ && validateDepthCurve(update.depth_curve).empty()) {
+    depth_curve_ = update.depth_curve;
+    surfaces_.clear();  // they have the readings as they were; the difference is no motion
+  }
   // A loaded map brings keyframes of its own: new ones come after them.
   next_keyframe_ = std::max(next_keyframe_, update.newest_keyframe + 1);
   // In a map that was loaded or begun anew nobody knows yet where this odometry lies.

@@ -122,6 +122,22 @@ TEST_F(FrontEndTest, DepthHasWhatTheMapFoundOutAboutItsCamera) {
   EXPECT_FLOAT_EQ(output.frame->depth_correction.curve.at(3.0f), 0.02f);
 }
 
+// What is known better about the depth camera is no motion.
+TEST_F(FrontEndTest, ADepthCurveDoesNotMoveThePose) {
+  FrameOutput output = run(0.0, 4.0);
+  const auto off = [&] { return output.frame->state.T_W_I.t().x() - World::position(output.frame->t).x(); };
+  const double before = off();
+  MapUpdate update;
+  update.depth_curve.added.assign(60, -0.006f);
+  front_end_.applyMapUpdate(update);
+  double worst = 0;
+  for (int k = 80; k < 84; ++k) {
+    output = step(0.05 * k);
+    worst = std::max(worst, std::abs(off() - before));
+  }
+  EXPECT_LT(worst, 0.002);
+}
+
 // Readings have what the sensor's configuration adds by the time they get here; what is found comes on top.
 TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
   SensorConfig known = sensor();
