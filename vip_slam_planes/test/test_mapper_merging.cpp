@@ -266,21 +266,23 @@ TEST(Mapper, PiecesOfTheLowestFloorAreOneButTablesAreTwo) {
   }
 }
 
-// A duct 7 m long, and two boards that end where it would go on.
+// A duct 7 m long, a bracket at its edge, and two boards that end where it would go on.
 TEST(Mapper, TheUndersideOfADuctIsOneWithItsMiddleUnseen) {
   struct Case {
-    double length, across, step;
+    double length, across, step, bracket;
     std::size_t planes;
   };
-  for (const Case& c : {Case{4, 0, 0, 1}, Case{4, 0, 0.03, 2}, Case{4, 0.5, 0, 2}, Case{1.2, 0, 0, 2}}) {
+  for (const Case& c : {Case{4, 0, 0, 0, 1}, Case{4, 0, 0, 0.9, 1}, Case{4, 0, 0.03, 0, 2}, Case{4, 0.5, 0, 0, 2},
+                        Case{4, 0.5, 0, 0.9, 2}, Case{1.2, 0, 0, 0, 2}}) {
     Rig rig(0.3);
     Scene scene;
     scene.add({0, -0.2, 2.3}, {c.length, 0, 0}, {0, 0.4, 0});
+    if (c.bracket > 0) scene.add({c.length - 0.5, 0.2, 2.3}, {0.1, 0, 0}, {0, c.bracket, 0});
     scene.add({-3, c.across - 0.2, 2.3 - c.step}, {0.7, 0, 0}, {0, 0.4, 0});  // 2.3 m further on
     for (double x = 0; x < c.length - 0.2; x += 0.4) rig.look(scene, {x - 1.2, 0.1, 1.2}, {x + 0.3, 0, 2.3});
     for (int i = 0; i < 4; ++i) rig.look(scene, {-4.2, c.across + 0.1 * i - 0.2, 1.2}, {-2.7, c.across, 2.3});
     EXPECT_EQ(c.planes, rig.mapper.planes().size())
-        << c.length << " m, " << c.across << " m beside, " << c.step << " m below";
+        << c.length << " m, " << c.across << " m beside, " << c.step << " m below, bracket of " << c.bracket << " m";
   }
 }
 

@@ -60,7 +60,6 @@ class CurveFit {
     }
     const double usual = usualMisfit(systems);
     double squares = 0, points = 0;
-    information_ = VectorXd::Zero(entries_);
     for (auto& [id, system] : systems) {
       const double trust = std::pow(std::min(1.0, kUneven * usual / std::max(1e-12, system.misfit())), 2);
       squares += trust * system.squares;

@@ -88,11 +88,21 @@ Eigen::Matrix2d mainAxes(const PlaneTrack& track) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(squares / n - sum * sum.transpose() / (n * n)).eigenvectors();
 }
 
-/// Bounds of the centres of a plane's cells along axes of another one's frame.
+/// Bounds of the centres of a plane's cells along axes of another one's frame, without the twentieth part of them that
+/// is farthest out on each side: a few cells of something else at its rim do not make a strip wide.
 Eigen::AlignedBox2d boundsAlong(const PlaneTrack& track, const PlaneTrack& frame, const Eigen::Matrix2d& axes) {
+  std::vector<double> along[2];
+  track.cells().forEach([&](CellIndex c, int) {
+    const Eigen::Vector2d q = axes.transpose() * frame.toPlane(track.cellCentre(c));
+    for (int k = 0; k < 2; ++k) along[k].push_back(q(k));
+  });
   Eigen::AlignedBox2d bounds;
-  track.cells().forEach(
-      [&](CellIndex c, int) { bounds.extend(axes.transpose() * frame.toPlane(track.cellCentre(c))); });
+  for (int k = 0; k < 2; ++k) {
+    std::sort(along[k].begin(), along[k].end());
+    const std::size_t out = along[k].size() / 20;
+    bounds.min()(k) = along[k][out];
+    bounds.max()(k) = along[k][along[k].size() - 1 - out];
+  }
   return bounds;
 }
 
