@@ -83,7 +83,7 @@ const ImagePair* ImagePairer::front() {
   // A newer depth image may belong to a colour image that is still to come.
   constexpr double kSurelyNearer = 0.45;  // of the interval: stamps jitter
   const bool next_matters = best != depth_.end() && color_.size() < 2 && best->t - t > kSurelyNearer * colorInterval();
-  const bool decided = (after != depth_.end() && !next_matters) || newest() - t > options_.patience;
+  const bool decided = (after != depth_.end() && !next_matters) || newest() - t > options_.patience || ended_;
   if (!decided) return nullptr;
 
   front_ = ImagePair{t, std::move(color_.front().image), {}, 0, color_.front().stamp};
@@ -110,6 +110,7 @@ void ImagePairer::clear() {
   newest_color_.reset();
   newest_depth_.reset();
   front_.reset();
+  ended_ = false;
 }
 
 }  // namespace vip_slam

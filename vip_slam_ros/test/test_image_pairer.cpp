@@ -180,6 +180,32 @@ TEST(ImagePairer, ANearerDepthDoesNotWaitForTheNextColour) {
   }
 }
 
+// The last image of a recording, whose depth may belong to one that never comes, and one that never had any.
+TEST(ImagePairer, WhatWaitsAtTheEndIsHandedOut) {
+  ImagePairer pairer;
+  pairer.addColor(0.0, image(0));
+  pairer.addDepth(0.012, image(0));
+  pairer.addColor(0.1, image(1));
+  while (pairer.front() && valueOf(pairer.front()->gray) == 0) pairer.pop();
+  EXPECT_EQ(pairer.front(), nullptr);
+  pairer.addDepth(0.09, image(1));
+  pairer.addColor(0.2, image(2));
+  EXPECT_EQ(pairer.front(), nullptr);
+  pairer.end();
+  ASSERT_NE(pairer.front(), nullptr);
+  EXPECT_EQ(valueOf(pairer.front()->gray), 1);
+  EXPECT_EQ(valueOf(pairer.front()->depth), 1);
+  pairer.pop();
+  ASSERT_NE(pairer.front(), nullptr);
+  EXPECT_EQ(valueOf(pairer.front()->gray), 2);
+  EXPECT_TRUE(pairer.front()->depth.empty());
+  pairer.pop();
+  EXPECT_EQ(pairer.front(), nullptr);
+  pairer.clear();
+  pairer.addColor(0.3, image(3));
+  EXPECT_EQ(pairer.front(), nullptr);
+}
+
 TEST(ImagePairer, StreamsThatPartLateAreNoticed) {
   PairerCounters hour_ago, then, now;
   then.pairs = 100000;

@@ -184,14 +184,19 @@ void BagReader::read() {
   ImagePairer pairer(options_.pairing);
   StreamClock clock(kStreams, options_.time_jump);
   bool open = true;
+  const auto handOut = [&] {
+    for (; open && pairer.front(); pairer.pop()) open = channel_.push(*pairer.front());
+  };
   // As in the live system: what belongs together is told from what comes before and after a jump of the clock.
   const auto inTime = [&](Stream stream, double t) {
     const StreamClock::Verdict verdict = clock.notice(stream, t);
     if (verdict == StreamClock::Verdict::kStray) ++counters_["stray_messages"];
     if (verdict == StreamClock::Verdict::kJumpedBack) {
       ++counters_["time_jumps"];
+      pairer.end();
+      handOut();
       pairer.clear();
-      open = channel_.push(TimeJump{clock.lastJump()});
+      if (open) open = channel_.push(TimeJump{clock.lastJump()});
     }
     return open && verdict != StreamClock::Verdict::kStray;
   };
@@ -271,12 +276,11 @@ void BagReader::read() {
       if (++counters_["unreadable_messages"] == 1)
         warnings_.push_back(std::string("the bag is damaged, what cannot be read is left out: ") + error.what());
     }
-    while (open && pairer.front()) {
-      open = channel_.push(*pairer.front());
-      pairer.pop();
-    }
+    handOut();
     if (!open) return;
   }
+  pairer.end();
+  handOut();
   const std::size_t paired = pairer.counters().pairs, alone = pairer.counters().without_depth;
   if (alone > 5 && 20 * alone > paired + alone)
     warnings_.push_back("topic " + topics.depth + ": " + std::to_string(alone) + " of " +

@@ -56,6 +56,8 @@ class ImagePairer {
   /// of them, unless their interval tells already that it is nearer to the earlier.
   const ImagePair* front();
   void pop();
+  /// Nothing comes any more: what waits is handed out by front(), with what depth there is.
+  void end() { ended_ = true; }
   void clear();
 
   /// Stamp of the newest image of either stream.
@@ -74,6 +76,7 @@ class ImagePairer {
   std::optional<double> previous_color_;  ///< stamp of the one before the oldest that waits
   std::optional<double> newest_color_, newest_depth_;
   std::optional<ImagePair> front_;
+  bool ended_ = false;
   PairerCounters counters_;
 };
 
