@@ -244,17 +244,15 @@ GbaResult BackEnd::run(const GbaJob& job) const {
   return result;
 }
 
-MapUpdate BackEnd::merge(const GbaResult& result) { return impl_->mergeGlobal(result); }
+MapUpdate BackEnd::merge(const GbaResult& result) { return impl_->globalUpdate(impl_->takeGlobal(result)); }
 
 MapUpdate BackEnd::finish() {
-  if (!impl_->options.global_ba.at_end || impl_->frozen()) {
-    MapUpdate update = impl_->beginUpdate(0);
-    impl_->finishUpdate(&update);
-    return update;
+  if (!impl_->options.global_ba.at_end || impl_->frozen()) return impl_->globalUpdate(false);
+  bool moved = impl_->takeGlobal(run(startGlobalBa()));
+  for (int k = 1; k < kAdjustmentsAtEnd && impl_->learnDepthCurve(); ++k) {
+    moved = impl_->takeGlobal(run(startGlobalBa())) || moved;
   }
-  MapUpdate update = merge(run(startGlobalBa()));
-  for (int k = 1; k < kAdjustmentsAtEnd && impl_->learnDepthCurve(); ++k) update = merge(run(startGlobalBa()));
-  return update;
+  return impl_->globalUpdate(moved);
 }
 
 InertialScale BackEnd::scale() const { return impl_->statistics.scale; }

@@ -58,7 +58,10 @@ struct BackEnd::Impl {
   LandmarkEstimate estimateOf(const MapLandmark& landmark) const;
   void askForScale();
   GbaJob makeGlobalJob() const;
-  MapUpdate mergeGlobal(const GbaResult& result);
+  /// False when the map stays as it was: the solution is of no use, or of a map that is no more.
+  bool takeGlobal(const GbaResult& result);
+  /// With everything in it when the map `moved`.
+  MapUpdate globalUpdate(bool moved);
 
   // back_end_maps.cpp
   void saveMap(const std::string& path) const;

@@ -146,8 +146,7 @@ GbaJob BackEnd::Impl::makeGlobalJob() const {
   return job;
 }
 
-MapUpdate BackEnd::Impl::mergeGlobal(const GbaResult& result) {
-  MapUpdate update = beginUpdate(0);
+bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
   if (result.correction != correction) {
     global_wanted = result.solution != nullptr && !map.empty();  // the map it came from is no more: once again
   } else if (frozen()) {
@@ -157,8 +156,14 @@ MapUpdate BackEnd::Impl::mergeGlobal(const GbaResult& result) {
     ++statistics.global_ba;
     followNewest();
     askForScale();
-    fillGlobal(&update);
+    return true;
   }
+  return false;
+}
+
+MapUpdate BackEnd::Impl::globalUpdate(bool moved) {
+  MapUpdate update = beginUpdate(0);
+  if (moved) fillGlobal(&update);
   finishUpdate(&update);
   return update;
 }
