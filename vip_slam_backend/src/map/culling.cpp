@@ -85,6 +85,8 @@ std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window,
     if (!too_large && (crowd <= 1 || out_of_crowds >= kAtOnce)) continue;
     // Where a room is seen again and again every keyframe is the end of some loop, and landmarks say the same.
     if (kf.loop_keyframe && (crowd <= 1 || !one_odometry)) continue;
+    // A limit on time alone lets a room grow for as long as one stays in it; steep, so that what is no crowd keeps its
+    // IMU.
     const double longest = options.max_imu_seconds * std::clamp(crowd * crowd * crowd, 1.0, kLongest);
     if (map->keyframe(kf.next).imu->back().t - kf.imu->front().t > longest) continue;
     // In a crowd a landmark that few of so many saw is a mistake or has moved.

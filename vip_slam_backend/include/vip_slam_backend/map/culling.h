@@ -14,9 +14,9 @@ int cullLandmarks(KeyframeId recent, Map* map);
 
 /// Removes keyframes outside the newest `window` whose landmarks are seen elsewhere, at least `redundancy` of them by
 /// three other keyframes: of a map that is too large those that just left the window; and a few, just left or older,
-/// of those that share landmarks with too many others. Never the first of a chain, one that alone holds a plane, one
-/// whose removal would tear the IMU chain, or the end of a loop (but in a crowd of one odometry, whose parts no loop
-/// has to tie).
+/// of those that share landmarks with too many others, where landmarks that fewer see do not count. Never the first of
+/// a chain, one that alone holds a plane, one whose removal would tear the IMU chain, or the end of a loop (but in a
+/// crowd of one odometry, whose parts no loop has to tie).
 std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise, Map* map);
 
 }  // namespace vip_slam
