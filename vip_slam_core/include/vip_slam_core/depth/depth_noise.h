@@ -24,6 +24,9 @@ struct DepthNoise {
 
   double sigma(double z) const { return a + (b + c * z) * z; }
   bool inRange(double z) const { return z >= min_range && z <= max_range; }
+  /// Up to here hardly a reading is lost beyond the range. Farther off those are left that noise makes too short, and
+  /// the mean of many is too short as well.
+  double unbiasedRange() const { return max_range - 3.0 * sigma(max_range); }
   /// Defaults of a type: structured light after Khoshelham & Elberink 2012; stereo and ToF from data sheets.
   static DepthNoise preset(DepthSensorType type);
   std::string validate() const;
