@@ -7,7 +7,6 @@
 #include <vip_slam_msgs/MapUpdate.h>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_ros/calibration.h"
 #include "vip_slam_ros/frame_conversions.h"
@@ -165,7 +164,7 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
     calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale),
-                                depthCurveDifference(back_end_->depthCurve())};
+                                back_end_->depthDifference()};
   }
   distribute(update);
   startGlobalBa();

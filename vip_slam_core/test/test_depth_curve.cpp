@@ -56,8 +56,8 @@ TEST(DepthCurve, MovesAnImagesReadingsAndNothingElse) {
 TEST(DepthCurve, WhatNoCameraReadsIsRefused) {
   EXPECT_EQ(validateDepthCurve(wave(0.01f, 4.1f)), "");
   EXPECT_EQ(validateDepthCurve(DepthCurve()), "");
-  EXPECT_EQ(validateDepthCurve({{0.f, std::nanf(""), 0.f}}), "nan m are added at 0.125 m, expected at most 0.3");
-  EXPECT_EQ(validateDepthCurve({{0.f, 0.f, 0.4f}}), "0.4 m are added at 0.25 m, expected at most 0.3");
+  EXPECT_EQ(validateDepthCurve({{0.f, std::nanf(""), 0.f}}), "nan m are added at 0.125 m, expected at most 1");
+  EXPECT_EQ(validateDepthCurve({{0.f, 0.f, 1.5f}}), "1.5 m are added at 0.25 m, expected at most 1");
   EXPECT_EQ(validateDepthCurve({{0.f, 0.f, -0.1f}}),
             "falls by 0.1 m up to 0.25 m, expected at most 0.0625 from entry to entry");
 }

@@ -146,7 +146,8 @@ class FrontEnd::Impl {
   bool still_ = false;
   SE3 T_map_odom_;
   bool have_map_ = false;
-  DepthCurve depth_curve_;  ///< that the map has found out, after the sensor's own
+  DepthCurve depth_curve_;      ///< that the map has found out, after the sensor's own
+  double disparity_error_ = 0;  ///< 1/m, that was part of the curve when what is known of depth's offset began
   using PixelList = std::vector<std::pair<LandmarkId, Eigen::Vector2f>>;
   std::deque<std::pair<double, PixelList>> recent_pixels_;  ///< over the stillness window
   PixelList still_anchor_;

@@ -4,6 +4,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/depth/disparity_curve.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
 
@@ -132,6 +133,11 @@ void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
   if (update.depth_curve != depth_curve_ && validateDepthCurve(update.depth_curve).empty()) {
     depth_curve_ = update.depth_curve;
     surfaces_.clear();  // they have the readings as they were; the difference is no motion
+    if (voidsDepthOffset(update.disparity_error - disparity_error_)) {
+      disparity_error_ = update.disparity_error;
+      // A camera that measures disparities has no offset; one that was found stood for this.
+      filter_.restartDepthOffset(disparity_error_ != 0);
+    }
   }
   // A loaded map brings keyframes of its own: new ones come after them.
   next_keyframe_ = std::max(next_keyframe_, update.newest_keyframe + 1);

@@ -97,6 +97,24 @@ TEST(Marginalisation, QrEqualsSchur) {
   EXPECT_LT(relative(R.transpose() * R, schur), 1e-12);
 }
 
+TEST(Marginalisation, ARenewedStateIsKnownByItsNewSigmaAlone) {
+  std::mt19937 random(6);
+  WindowState window;
+  window.clones.resize(3);
+  window.calibration.depth_offset = window.calibration.time_offset = true;
+  const int n = window.dimension(), column = window.depthOffsetColumn();
+  SquareRootFilter filter;
+  filter.initialise(window, randomMatrix(n + 20, n, random));
+  const Eigen::MatrixXd before = filter.covariance();
+  filter.renew(column, 0.005);
+  Eigen::MatrixXd expected = before;
+  expected.row(column).setZero();
+  expected.col(column).setZero();
+  expected(column, column) = 0.005 * 0.005;
+  EXPECT_LT(relative(filter.covariance(), expected), 1e-10);
+  EXPECT_TRUE(filter.healthy());
+}
+
 /// Covariance-form twin: the same state, propagated, cloned, marginalised and updated by the textbook EKF.
 struct ReferenceEkf {
   Eigen::MatrixXd P;  // order as in the window

@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_core/depth/disparity_curve.h"
 #include "wall_world.h"
 
 namespace vip_slam {
@@ -120,6 +121,39 @@ TEST_F(FrontEndTest, DepthHasWhatTheMapFoundOutAboutItsCamera) {
   feedImu(2.10);
   output = front_end_.process({2.10, world_.image(2.10), World::depth(2.10)});
   EXPECT_FLOAT_EQ(output.frame->depth_correction.curve.at(3.0f), 0.02f);
+}
+
+// Disparities that are all off by the same pass for an offset of depth until the map tells them apart.
+TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
+  double t = 0;
+  const auto go = [&](int images, double too_long) {
+    FrameOutput output;
+    for (int k = 0; k < images; ++k, t += 0.05) {
+      feedImu(t + 0.05);
+      output = front_end_.process({t, world_.image(t), World::depth(t) + too_long});
+    }
+    return output;
+  };
+  go(90, 0.015);
+  ASSERT_LT(front_end_.mounting().depth_offset, -0.001);
+  MapUpdate update;
+  update.depth_curve = disparityCurve(-0.002, 8);
+  update.disparity_error = -0.002;
+  front_end_.applyMapUpdate(update);
+  EXPECT_EQ(front_end_.mounting().depth_offset, 0.0);
+  FrameOutput output = go(20, 0.015);
+  EXPECT_LT(std::abs(front_end_.mounting().depth_offset), 1e-6);
+  EXPECT_EQ(output.frame->depth_correction, (DepthCorrection{0.0, update.depth_curve}));
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  // A further hundredth changes nothing; a map that was begun anew knows nothing.
+  update.depth_curve = disparityCurve(-0.00202, 8);
+  update.disparity_error = -0.00202;
+  front_end_.applyMapUpdate(update);
+  EXPECT_LT(front_end_.mounting().sigma_depth_offset, 1e-5);
+  front_end_.applyMapUpdate(MapUpdate());
+  EXPECT_NEAR(front_end_.mounting().sigma_depth_offset, FilterOptions().calibration.sigma_depth_offset, 1e-9);
+  go(60, 0.015);
+  EXPECT_LT(front_end_.mounting().depth_offset, -0.001);
 }
 
 // What is known better about the depth camera is no motion.

@@ -76,6 +76,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
   msg.map_odom = toPoseMsg(update.T_map_odom);
   msg.newest_keyframe = update.newest_keyframe;
   msg.depth_curve = update.depth_curve.added;
+  msg.disparity_error = update.disparity_error;
   msg.global_update = update.global;
   msg.keyframes.reserve(update.keyframes.size());
   for (const auto& keyframe : update.keyframes) {
@@ -116,6 +117,7 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.T_map_odom = fromMsg(msg.map_odom);
   update.newest_keyframe = msg.newest_keyframe;
   update.depth_curve.added = msg.depth_curve;
+  update.disparity_error = msg.disparity_error;
   update.global = msg.global_update;
   update.keyframes.reserve(msg.keyframes.size());
   for (const auto& keyframe : msg.keyframes) {

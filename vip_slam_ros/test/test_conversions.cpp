@@ -219,6 +219,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   update.T_map_odom = pose();
   update.newest_keyframe = 30;
   update.depth_curve.added = {0.f, -0.001f, 0.004f};
+  update.disparity_error = -0.0021;
   update.global = true;
   update.keyframes = {{29, state(), pose(), {}}, {30, state(), pose(), {-0.004, {{0.f, 0.002f}}}}};
   LandmarkEstimate landmark;
@@ -254,6 +255,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   expectSame(back.keyframes[1].T_I_C, update.keyframes[1].T_I_C);
   EXPECT_EQ(back.keyframes[1].depth_correction, update.keyframes[1].depth_correction);
   EXPECT_EQ(back.depth_curve, update.depth_curve);
+  EXPECT_EQ(back.disparity_error, update.disparity_error);
   ASSERT_EQ(back.landmarks.size(), 1u);
   EXPECT_EQ(back.landmarks[0].id, 77);
   EXPECT_EQ(back.landmarks[0].p_W, landmark.p_W);

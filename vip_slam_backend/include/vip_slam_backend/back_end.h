@@ -60,6 +60,10 @@ class BackEnd {
   InertialScale scale() const;
   /// What the map has found out about the depth camera, after what the sensor's configuration adds.
   const DepthCurve& depthCurve() const;
+  /// What to tell the user of them, when they are large enough to matter; empty else.
+  std::string depthDifference() const;
+  /// 1/m: the part of the curve that is for disparities which are all off, see disparity_curve.h.
+  double disparityError() const;
   const Map& map() const;
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);

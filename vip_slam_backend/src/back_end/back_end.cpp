@@ -4,6 +4,8 @@
 
 #include "back_end_impl.h"
 #include "vip_slam_backend/optimisation/depth_curve_fit.h"
+#include "vip_slam_backend/optimisation/disparity_fit.h"
+#include "vip_slam_core/depth/disparity_curve.h"
 #include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
@@ -48,7 +50,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // Beyond the local window bodies turn a little as well; others hear of it with the next global update, until when
   // the cameras they know stay right.
   map.adoptMounting(keyframe->frame.T_I_C);
-  followDepthOffset(keyframe->frame.depth_correction.offset);
+  followDepthOffset(keyframe->frame.depth_correction);
   followGyroCorrection(keyframe->gyro_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   maker.process(keyframe->id, &map);
@@ -61,10 +63,11 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   statistics.merged += found.merged;
 }
 
-void BackEnd::Impl::followDepthOffset(double newest) {
-  newest_depth_offset = newest;
-  if (std::abs(newest - depth_correction.offset) < kNewDepthOffset) return;
-  depth_correction.offset = newest;
+void BackEnd::Impl::followDepthOffset(const DepthCorrection& newest) {
+  if (newest.curve != depth_correction.curve) return;  // it goes with readings as they were
+  newest_depth_offset = newest.offset;
+  if (std::abs(newest.offset - depth_correction.offset) < kNewDepthOffset) return;
+  depth_correction.offset = newest.offset;
   map.adoptDepthCorrection(depth_correction);
   global_wanted = true;
   ++correction;  // an adjustment under way has the readings as they were
@@ -73,11 +76,22 @@ void BackEnd::Impl::followDepthOffset(double newest) {
 bool BackEnd::Impl::learnDepthCurve() {
   if (!options.depth_curve || frozen()) return false;
   const ScopedTimer timer(log, "backend.depth_curve", map.empty() ? 0 : map.keyframes().rbegin()->second.data->frame.t);
-  const std::optional<DepthCurve> found = fitDepthCurve(map, sensor.depth_noise);
+  std::optional<double> disparity;
+  std::optional<DepthCurve> found;
+  if (measuresDisparity(sensor.depth_noise.type)) {
+    disparity = fitDisparityError(map, sensor.depth_noise, disparity_error != 0);
+    if (disparity) found = disparityCurve(*disparity, sensor.depth_noise.max_range);
+  } else {
+    found = fitDepthCurve(map, sensor.depth_noise);
+  }
   if (!found) return false;
   DepthCurve curve = chained(depth_correction.curve, *found);
   if (!validateDepthCurve(curve).empty()) return false;
   depth_correction.curve = std::move(curve);
+  if (disparity) {
+    disparity_error += *disparity;
+    if (voidsDepthOffset(*disparity)) depth_correction.offset = newest_depth_offset = 0;
+  }
   map.adoptDepthCorrection(depth_correction);
   ++correction;
   return true;
@@ -208,7 +222,7 @@ void BackEnd::Impl::reset() {
   global_wanted = false;
   last_global = -1e300;
   depth_correction = {};
-  newest_depth_offset = 0;
+  newest_depth_offset = disparity_error = 0;
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   loops.clear();
@@ -257,6 +271,11 @@ MapUpdate BackEnd::finish() {
 
 InertialScale BackEnd::scale() const { return impl_->statistics.scale; }
 const DepthCurve& BackEnd::depthCurve() const { return impl_->depth_correction.curve; }
+double BackEnd::disparityError() const { return impl_->disparity_error; }
+std::string BackEnd::depthDifference() const {
+  if (impl_->disparity_error != 0) return disparityDifference(impl_->disparity_error);
+  return depthCurveDifference(depthCurve());
+}
 MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }
 void BackEnd::reset() { impl_->reset(); }

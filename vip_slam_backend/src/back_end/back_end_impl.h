@@ -30,7 +30,7 @@ struct BackEnd::Impl {
   void insert(const KeyframePtr& keyframe);
   /// All keyframes of this session get the same correction of their depth: the newest one's, once it is another one by
   /// enough to redo the map for.
-  void followDepthOffset(double newest);
+  void followDepthOffset(const DepthCorrection& newest);
   /// Asks the map what the depth camera reads wrong at which distance; when that is something new all keyframes have
   /// it. False when nothing is new.
   bool learnDepthCurve();
@@ -102,6 +102,7 @@ struct BackEnd::Impl {
   double last_global = -1e300;                                ///< stamp of the last one that a loop asked for
   DepthCorrection depth_correction;                           ///< of all keyframes of this session
   double newest_depth_offset = 0;                             ///< m, as the newest keyframe came
+  double disparity_error = 0;                                 ///< 1/m, which the curve takes care of
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< of all keyframes of this session but for little
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< as the newest keyframe came
   std::string refusal;

@@ -116,6 +116,7 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->epoch = epoch;
   update->T_map_odom = T_map_odom;
   update->depth_curve = depth_correction.curve;
+  update->disparity_error = disparity_error;
   update->newest_keyframe = map.newestKeyframe();
   if (update->newest_keyframe != 0) update->t = map.keyframe(update->newest_keyframe).data->frame.t;
   MapChanges changes = map.takeChanges();

@@ -9,7 +9,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_bringup/runner/plane_files.h"
 #include "vip_slam_core/types/planes_yaml.h"
@@ -136,7 +135,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     const InertialScale scale = pipeline.mapping()->backEnd().scale();
     const std::string difference = scaleDifference(scale, reader.sensor().depth_scale);
     if (!difference.empty()) all.push_back(difference);
-    const std::string bent = depthCurveDifference(pipeline.mapping()->backEnd().depthCurve());
+    const std::string bent = pipeline.mapping()->backEnd().depthDifference();
     if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
     const auto& refusals = pipeline.mapping()->refusals();
     all.insert(all.end(), refusals.begin(), refusals.end());

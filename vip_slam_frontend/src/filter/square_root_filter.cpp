@@ -86,6 +86,21 @@ void SquareRootFilter::marginalise(const std::vector<int>& clone_indices) {
   }
 }
 
+void SquareRootFilter::renew(int column, double sigma) {
+  const int n = window_.dimension();
+  std::vector<int> order = {column};
+  for (int c = 0; c < n; ++c) {
+    if (c != column) order.push_back(c);
+  }
+  const Eigen::MatrixXd others = marginaliseColumns(R_, order, 1);
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
+  A.topLeftCorner(n - 1, column) = others.leftCols(column);
+  A.topRightCorner(n - 1, n - 1 - column) = others.rightCols(n - 1 - column);
+  A(n - 1, column) = 1.0 / sigma;
+  triangularise(A, n);
+  R_ = A.triangularView<Eigen::Upper>();
+}
+
 UpdateResult SquareRootFilter::update(Eigen::MatrixXd& H, Eigen::VectorXd& h) {
   UpdateResult result;
   result.rows = static_cast<int>(H.rows());

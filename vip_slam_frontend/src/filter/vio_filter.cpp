@@ -34,6 +34,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       imu_noise_(imu_noise),
       given_{T_I_C, time_offset},
       learnt_(given_),
+      sigma_depth_offset_(options.calibration.sigma_depth_offset),
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(options.gate_probability),
@@ -88,7 +89,7 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
     } else if (calibration.translation && c < window.translationColumn() + 3) {
       sigma = calibration.sigma_translation;
     } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
-      sigma = calibration.sigma_depth_offset;
+      sigma = sigma_depth_offset_;
     } else if (c >= window.gyroColumn()) {
       sigma = imu_noise_.gyro_correction_sigma;
     }

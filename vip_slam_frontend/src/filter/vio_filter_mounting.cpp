@@ -13,7 +13,7 @@ namespace {
 constexpr double kBelievableChange = 4.0, kMostGyroError = 0.05;
 // An offset of depth is beyond doubt from so many of its sigmas and metres on, until it is half as large.
 constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
-// One sigma of what is taken back, m.
+// One sigma of an offset that is taken back or known to be none, m.
 constexpr double kHeldOffset = 1e-6;
 // An entry of the gyro's correction likewise: half a thousandth of a turn by 60 degrees is 0.03 degrees.
 constexpr double kSureGyroError = 4.0, kLeastGyroError = 5e-4;
@@ -85,6 +85,18 @@ void VioFilter::judgeDepthOffset() {
   filter_.update(H, r);
   depth_contradicts_ = true;
   depth_is_off_ = false;
+}
+
+void VioFilter::restartDepthOffset(bool none) {
+  sigma_depth_offset_ = none ? kHeldOffset : options_.calibration.sigma_depth_offset;
+  learnt_.depth_offset = given_.depth_offset;
+  depth_is_off_ = depth_contradicts_ = false;
+  for (auto& [id, track] : tracks_) {
+    for (Observation& observation : track.observations) observation.depth = 0;
+  }
+  if (!started_ || !filter_.window().calibration.depth_offset) return;
+  filter_.renew(filter_.window().depthOffsetColumn(), sigma_depth_offset_);
+  filter_.window().depth_offset = given_.depth_offset;
 }
 
 void VioFilter::judgeGyroCorrection() {

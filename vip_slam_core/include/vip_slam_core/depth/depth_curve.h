@@ -11,7 +11,7 @@ namespace vip_slam {
 
 struct DepthCurve {
   static constexpr double kStep = 0.125;  ///< m
-  static constexpr double kMost = 0.3;    ///< m of any entry; so much more is no error but another sensor
+  static constexpr double kMost = 1.0;    ///< m of any entry; so much more is no error but another sensor
 
   std::vector<float> added;  ///< m, for readings of 0, kStep, 2 kStep, ...; beyond the last as there; empty: nothing
 

@@ -44,6 +44,7 @@ struct MapUpdate {
   SE3 T_map_odom;
   KeyframeId newest_keyframe = 0;
   DepthCurve depth_curve;                         ///< what the map has found out about the depth camera
+  double disparity_error = 0;                     ///< 1/m, what part of depth_curve is there for; see disparity_curve.h
   bool global = false;                            ///< everything moved (GBA, loop); else a local window
   std::vector<KeyframeEstimate> keyframes;        ///< changed ones (all when global)
   std::vector<LandmarkEstimate> landmarks;        ///< changed ones (all when global)

@@ -34,6 +34,9 @@ class SquareRootFilter {
   /// Marginalises clones (indices ascending). Removing the oldest ones only deletes rows; others cost a QR.
   void marginalise(const std::vector<int>& clone_indices);
 
+  /// Forgets all that is known of one column's state, which has `sigma` from then on; of the others nothing is lost.
+  void renew(int column, double sigma);
+
   /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.
   UpdateResult update(Eigen::MatrixXd& H, Eigen::VectorXd& h);
 

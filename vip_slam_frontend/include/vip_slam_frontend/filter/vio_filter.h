@@ -58,6 +58,9 @@ class VioFilter {
   void start(const FilterPrior& prior, CloneId id, const Eigen::Vector3d& omega_I);
   bool started() const { return started_; }
   void stop();
+  /// Readings mean something else from now on: what was known of their offset is void, and so is depth in the tracks.
+  /// `none`: they have no offset any more; else it is estimated anew. Holds for later starts as well.
+  void restartDepthOffset(bool none);
 
   /// Prediction from the newest clone over `samples` (first at its time); does not change the filter.
   Propagation predict(const std::vector<ImuSample>& samples, double noise_scale = 1.0) const;
@@ -117,6 +120,7 @@ class VioFilter {
   ImuNoise imu_noise_;
   const MountingEstimate given_;  ///< by the sensor's configuration
   MountingEstimate learnt_;       ///< what a start begins with: given_, or what earlier runs found
+  double sigma_depth_offset_;     ///< m, at a start
   double focal_;
   Eigen::Vector3d G_;
   Gate gate_, explained_;

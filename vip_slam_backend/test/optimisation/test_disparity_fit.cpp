@@ -1,0 +1,167 @@
+// Disparities that are all off by the same: found when they are, with the offset and scale that come with them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "back_end/simulated_keyframes.h"
+#include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/optimisation/disparity_fit.h"
+#include "vip_slam_core/depth/disparity_curve.h"
+#include "vip_slam_core/types/depth_correction.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr double kError = 0.002;  // 1/m
+constexpr int kPoints = 200;      // of each plane in each keyframe
+double tooLong(double z) { return z / (1 + kError * z) - z; }
+double exact(double) { return 0.0; }
+
+DepthNoise stereo() {
+  DepthNoise noise;
+  noise.type = DepthSensorType::kStereo;
+  return noise;
+}
+
+/// At true poses.
+Map mapOf(SimulatedKeyframes* world, int keyframes) {
+  Map map;
+  for (int k = 0; k < keyframes; ++k) {
+    const KeyframePtr kf = world->next();
+    map.addKeyframe(kf, world->truth(kf->frame.t), ImuNoise());
+    const PlaneUpdate planes = world->planes();
+    for (const PlaneEstimate& plane : planes.planes) map.setPlane(plane);
+    for (const PlaneObservation& observation : planes.observations) map.setPlaneObservation(observation);
+  }
+  return map;
+}
+
+std::optional<double> errorOf(std::function<double(double)> read_too_long, const DepthNoise& noise = stereo(),
+                              int keyframes = 60, double sigma = 0.004, bool again = false) {
+  SimulatedKeyframes world(3);
+  world.setDepthCamera(std::move(read_too_long), sigma, kPoints);
+  return fitDisparityError(mapOf(&world, keyframes), noise, again);
+}
+
+TEST(DisparityFit, FindsTheErrorAndWhatComesWithIt) {
+  const auto found = errorOf(tooLong);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(*found, kError, 1e-4);
+  const auto other = errorOf([](double z) { return z / (1 - 0.001 * z) - z; });
+  ASSERT_TRUE(other);
+  EXPECT_NEAR(*other, -0.001, 1e-4);
+}
+
+// Noise that grows with the square of the distance, twice as large at four metres as the error: what is too short by
+// chance must not count for more.
+TEST(DisparityFit, IsNotMisledByNoise) {
+  DepthNoise noise = stereo();
+  noise.a = 0.001, noise.b = 0, noise.c = 0.0035;
+  for (const unsigned seed : {3u, 4u, 5u}) {
+    SimulatedKeyframes world(seed);
+    world.setDepthCamera(exact, 0.03, kPoints);
+    EXPECT_FALSE(fitDisparityError(mapOf(&world, 60), noise, false)) << seed;
+  }
+}
+
+TEST(DisparityFit, FindsNothingInWhatIsExact) {
+  EXPECT_FALSE(errorOf(exact));
+  EXPECT_FALSE(errorOf(exact, stereo(), 60, 0.0005));
+}
+
+TEST(DisparityFit, LeavesOffsetAndScaleAlone) {
+  EXPECT_FALSE(errorOf([](double) { return 0.02; }));
+  EXPECT_FALSE(errorOf([](double z) { return 0.01 * z; }));
+}
+
+TEST(DisparityFit, ASmallErrorIsBelievedOnlyAfterALargeOne) {
+  const auto small = [](double z) { return z / (1 + 1e-4 * z) - z; };
+  EXPECT_FALSE(errorOf(small));
+  const auto found = errorOf(small, stereo(), 60, 0.004, true);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(*found, 1e-4, 5e-5);
+}
+
+TEST(DisparityFit, IsNotAskedOfOtherCamerasOrOfTooLittle) {
+  DepthNoise tof = stereo();
+  tof.type = DepthSensorType::kTof;
+  EXPECT_FALSE(errorOf(tooLong, tof));
+  EXPECT_FALSE(errorOf(tooLong, stereo(), 14));
+  SimulatedKeyframes world(3);
+  world.setDepthCamera(tooLong, 0.004, kPoints);
+  Map map = mapOf(&world, 60);
+  for (KeyframeId id = 1; id <= 60; ++id) map.keyframe(id).stored = true;
+  EXPECT_FALSE(fitDisparityError(map, stereo(), false));
+}
+
+// A wall whose far part stands back by 4 cm passes for one plane.
+TEST(DisparityFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
+  SimulatedKeyframes world(3);
+  world.setDepthCamera(exact, 0.004, kPoints);
+  Map map = mapOf(&world, 60);
+  for (KeyframeId id = 1; id <= 60; ++id) {
+    const auto seen = map.keyframe(id).planes.find(1);
+    if (seen == map.keyframe(id).planes.end()) continue;
+    for (PlanePoint& point : seen->second.points) {
+      if (point.p_C.z() > 3) point.p_C *= 1 + 0.04f / point.p_C.z();
+    }
+  }
+  EXPECT_FALSE(fitDisparityError(map, stereo(), false));
+}
+
+TEST(DisparityFit, TellsTheUser) {
+  EXPECT_EQ(disparityDifference(0), "");
+  EXPECT_NE(disparityDifference(-0.002).find("too long by more the farther, 2.0 mm at 1 m and 17.9 mm at 3 m"),
+            std::string::npos);
+}
+
+// The whole way: what the front end took for an offset until then goes.
+TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
+  SimulatedKeyframes world(6);
+  world.setDepthCamera(tooLong, 0.004, kPoints);
+  BackEndOptions options;
+  options.lockstep = true;
+  options.loop_closing = false;
+  SensorConfig sensor = world.sensor();
+  sensor.depth_noise.type = DepthSensorType::kStereo;
+  BackEnd back_end(options, sensor);
+  MapUpdate update;
+  int with_offset = 0;
+  for (int k = 0; k < 60; ++k) {
+    auto read = std::make_shared<Keyframe>(*world.next());
+    for (Feature& f : read->frame.features) f.depth += static_cast<float>(tooLong(f.depth));
+    // An odometry by which poses cannot give way to what depth says.
+    if (k > 0) {
+      read->motion.T_a_b =
+          world.truth(read->frame.t - world.interval()).T_W_I.inverse() * world.truth(read->frame.t).T_W_I;
+      read->motion.covariance = 1e-10 * Matrix6d::Identity();
+    }
+    // Until then the front end took it for an offset; what was on its way when it heard of it has that still.
+    const bool known = back_end.disparityError() != 0 && k % 2 == 1;
+    with_offset += back_end.disparityError() == 0;
+    const KeyframePtr keyframe =
+        withDepthCorrection(read, known ? DepthCorrection{0.0, update.depth_curve} : DepthCorrection{0.008, {}});
+    update = back_end.addKeyframe(keyframe);
+    ASSERT_EQ(back_end.lastRefusal(), "");
+    back_end.applyPlaneUpdate(world.planes());
+    if (back_end.globalBaWanted()) update = back_end.merge(back_end.run(back_end.startGlobalBa()));
+  }
+  update = back_end.finish();
+  EXPECT_GE(with_offset, 20);
+  EXPECT_LT(with_offset, 60);
+  EXPECT_NEAR(back_end.disparityError(), kError, 2e-4);
+  EXPECT_EQ(update.disparity_error, back_end.disparityError());
+  EXPECT_NEAR(update.depth_curve.at(3.f), addedForDisparity(kError, 3), 2e-3);
+  EXPECT_FALSE(back_end.depthDifference().empty());
+  for (const auto& [id, kf] : back_end.map().keyframes()) {
+    EXPECT_EQ(kf.data->frame.depth_correction, (DepthCorrection{0.0, update.depth_curve}));
+  }
+  back_end.reset();
+  EXPECT_EQ(back_end.disparityError(), 0.0);
+  EXPECT_EQ(back_end.addKeyframe(world.next()).disparity_error, 0.0);
+}
+
+}  // namespace
+}  // namespace vip_slam
