@@ -26,6 +26,9 @@ struct CurveEquations {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;   ///< gradient at the value they were built at
   double scatter = 1;  ///< squared residual per point: sigmas allow for errors that all points of a keyframe share
+  /// What each keyframe has of g, in columns. All its points share the error of its pose, so that these scatter as
+  /// errors do, however many points there are.
+  Eigen::MatrixXd shares;
 };
 
 /// About `value`, m, what readings are added there. Points far off their plane count for nothing, planes that fit much

@@ -16,9 +16,10 @@ constexpr int kLeastKeyframes = 15;
 constexpr double kFarthest = 12.0;                         // m
 constexpr double kOffsetSigma = 0.02, kScaleSigma = 0.02;  // m and share, of what comes with it and is not asked for
 constexpr int kRounds = 4;                                 // of the weights, and of what is not linear
-// What is beyond doubt: sigmas of the points' scatter, and of what all planes say the share that each half says. In
-// maps of exact depth up to 0.26 mm at one metre are found.
-constexpr double kSure = 4.0, kLeastShare = 0.5, kFirst = 3e-4;
+// What is beyond doubt: sigmas, and of what all planes say the share that each half says. In maps of exact depth up to
+// 0.26 mm at one metre are found.
+constexpr double kSure = 3.0, kLeastShare = 0.5, kFirst = 3e-4;
+constexpr double kMost = 0.01;     // 1/m; a centimetre at one metre is no matter of calibration
 constexpr double kFurther = 4e-5;  // once there is an error its best estimate is the best guess
 
 struct DisparityError {
@@ -45,7 +46,10 @@ DisparityError fit(const std::vector<const MapKeyframe*>& keyframes, const Plane
     const Eigen::LDLT<Eigen::Matrix3d> ldlt(H);
     x -= ldlt.solve(g);
     if (!x.allFinite()) return {};
-    found = {x(2), std::sqrt(std::max(0.0, ldlt.solve(Eigen::Vector3d::Unit(2))(2)))};
+    // By the scatter of points, and by that of whole keyframes, whose poses may be off.
+    const Eigen::Vector3d row = ldlt.solve(Eigen::Vector3d::Unit(2));
+    const Eigen::VectorXd moved = equations.shares.transpose() * (J * row) / equations.scatter;
+    found = {x(2), std::sqrt(std::max({0.0, row(2), moved.squaredNorm()}))};
   }
   return found;
 }
@@ -58,6 +62,7 @@ std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise,
   if (int(keyframes.size()) < kLeastKeyframes) return std::nullopt;
   const PlaneSet planes = allPlanes(map);
   const DisparityError found = fit(keyframes, planes, noise);
+  if (std::abs(found.value) > kMost) return std::nullopt;
   if (again) {
     if (std::abs(found.value) > std::max(found.sigma, kFurther)) return found.value;
     return std::nullopt;

@@ -111,6 +111,30 @@ TEST(DisparityFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   EXPECT_FALSE(fitDisparityError(map, stereo(), false));
 }
 
+TEST(DisparityFit, WhatNoCalibrationExplainsIsNotBelieved) {
+  EXPECT_FALSE(errorOf([](double z) { return z / (1 + 0.02 * z) - z; }));
+  EXPECT_TRUE(errorOf([](double z) { return z / (1 + 0.004 * z) - z; }));
+}
+
+// Where poses are off the points of a keyframe are off all together: they are one error, not hundreds.
+TEST(DisparityFit, PosesThatAreOffAreNotMistakenForManyErrors) {
+  int found = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    SimulatedKeyframes world(seed);
+    world.setDepthCamera(exact, 0.004, kPoints);
+    Map map = mapOf(&world, 60);
+    for (KeyframeId id = 1; id <= 60; ++id) {
+      NavState& state = map.keyframe(id).state;
+      Vector6d off;
+      off << Eigen::Vector3d::Zero(), world.gauss(0.02), world.gauss(0.02), world.gauss(0.02);
+      state.T_W_I = state.T_W_I.boxplus(off);
+    }
+    found += fitDisparityError(map, stereo(), false).has_value();
+  }
+  std::printf("found in %d of 40 maps of exact depth with poses that are off by 2 cm\n", found);
+  EXPECT_LE(found, 2);
+}
+
 TEST(DisparityFit, TellsTheUser) {
   EXPECT_EQ(disparityDifference(0), "");
   EXPECT_NE(disparityDifference(-0.002).find("too long by more the farther, 2.0 mm at 1 m and 17.9 mm at 3 m"),
@@ -124,6 +148,7 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   BackEndOptions options;
   options.lockstep = true;
   options.loop_closing = false;
+  options.variant = "vi";  // so that poses do not give way to what planes say
   SensorConfig sensor = world.sensor();
   sensor.depth_noise.type = DepthSensorType::kStereo;
   BackEnd back_end(options, sensor);
@@ -131,13 +156,7 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   int with_offset = 0;
   for (int k = 0; k < 60; ++k) {
     auto read = std::make_shared<Keyframe>(*world.next());
-    for (Feature& f : read->frame.features) f.depth += static_cast<float>(tooLong(f.depth));
-    // An odometry by which poses cannot give way to what depth says.
-    if (k > 0) {
-      read->motion.T_a_b =
-          world.truth(read->frame.t - world.interval()).T_W_I.inverse() * world.truth(read->frame.t).T_W_I;
-      read->motion.covariance = 1e-10 * Matrix6d::Identity();
-    }
+    for (Feature& f : read->frame.features) f.depth = 0;
     // Until then the front end took it for an offset; what was on its way when it heard of it has that still.
     const bool known = back_end.disparityError() != 0 && k % 2 == 1;
     with_offset += back_end.disparityError() == 0;
@@ -151,9 +170,9 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   update = back_end.finish();
   EXPECT_GE(with_offset, 20);
   EXPECT_LT(with_offset, 60);
-  EXPECT_NEAR(back_end.disparityError(), kError, 2e-4);
+  EXPECT_NEAR(back_end.disparityError(), kError, 4e-4);
   EXPECT_EQ(update.disparity_error, back_end.disparityError());
-  EXPECT_NEAR(update.depth_curve.at(3.f), addedForDisparity(kError, 3), 2e-3);
+  EXPECT_NEAR(update.depth_curve.at(3.f), addedForDisparity(kError, 3), 4e-3);
   EXPECT_FALSE(back_end.depthDifference().empty());
   for (const auto& [id, kf] : back_end.map().keyframes()) {
     EXPECT_EQ(kf.data->frame.depth_correction, (DepthCorrection{0.0, update.depth_curve}));
