@@ -305,7 +305,7 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0", "imu/gyro_correction_sigma");
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0.3", "imu/gyro_correction_sigma");
   changed("scale: 0.0002", "scale: 0", "depth/scale");
-  changed("curve: [0, 0.0031", "curve: [0, 0.31", "depth/curve: 0.31 m are added at 0.125 m, expected at most 0.3");
+  changed("curve: [0, 0.0031", "curve: [0, 1.31", "depth/curve: 1.31 m are added at 0.125 m, expected at most 1");
   changed("curve: [0, 0.0031", "curve: [0, here", "depth/curve: is 'a list', expected a list of numbers");
   changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth");
   changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam");
