@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "solver/synthetic_problem.h"
+#include "vip_slam_backend/map/map.h"
 #include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/types/keyframe.h"
@@ -179,5 +180,18 @@ class SimulatedKeyframes {
   double sigma_on_planes_ = 0.012;
   int points_on_planes_ = 30;
 };
+
+/// The next keyframes at true poses, with what planes() says after each.
+inline Map mapAtTruePoses(SimulatedKeyframes* world, int keyframes) {
+  Map map;
+  for (int k = 0; k < keyframes; ++k) {
+    const KeyframePtr kf = world->next();
+    map.addKeyframe(kf, world->truth(kf->frame.t), ImuNoise());
+    const PlaneUpdate planes = world->planes();
+    for (const PlaneEstimate& plane : planes.planes) map.setPlane(plane);
+    for (const PlaneObservation& observation : planes.observations) map.setPlaneObservation(observation);
+  }
+  return map;
+}
 
 }  // namespace vip_slam

@@ -17,24 +17,11 @@ constexpr int kPoints = 200;                       // of each plane in each keyf
 double wiggle(double z) { return kAmplitude * std::sin(kWave * z); }
 double exact(double) { return 0.0; }
 
-/// At true poses.
-Map mapOf(SimulatedKeyframes* world, int keyframes) {
-  Map map;
-  for (int k = 0; k < keyframes; ++k) {
-    const KeyframePtr kf = world->next();
-    map.addKeyframe(kf, world->truth(kf->frame.t), ImuNoise());
-    const PlaneUpdate planes = world->planes();
-    for (const PlaneEstimate& plane : planes.planes) map.setPlane(plane);
-    for (const PlaneObservation& observation : planes.observations) map.setPlaneObservation(observation);
-  }
-  return map;
-}
-
 std::optional<DepthCurve> curveOf(std::function<double(double)> read_too_long, int keyframes = 60,
                                   double sigma = 0.004) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(std::move(read_too_long), sigma, kPoints);
-  return fitDepthCurve(mapOf(&world, keyframes), DepthNoise());
+  return fitDepthCurve(mapAtTruePoses(&world, keyframes), DepthNoise());
 }
 
 /// Root mean square of curve + what is read too long, between 2 and 6 m, without offset and scale.
@@ -77,7 +64,7 @@ TEST(DepthCurveFit, WaitsForEnoughKeyframes) { EXPECT_FALSE(curveOf(wiggle, 14))
 TEST(DepthCurveFit, SaysNothingOfAStoredMapsCamera) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(wiggle, 0.004, kPoints);
-  Map map = mapOf(&world, 60);
+  Map map = mapAtTruePoses(&world, 60);
   for (KeyframeId id = 1; id <= 60; ++id) map.keyframe(id).stored = true;
   EXPECT_FALSE(fitDepthCurve(map, DepthNoise()));
 }
@@ -92,7 +79,7 @@ TEST(DepthCurveFit, TellsTheUserOfWhatMatters) {
 TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(exact, 0.004, kPoints);
-  Map map = mapOf(&world, 60);
+  Map map = mapAtTruePoses(&world, 60);
   int moved = 0;
   for (KeyframeId id = 1; id <= 60; ++id) {
     const auto seen = map.keyframe(id).planes.find(1);

@@ -25,24 +25,11 @@ DepthNoise stereo() {
   return noise;
 }
 
-/// At true poses.
-Map mapOf(SimulatedKeyframes* world, int keyframes) {
-  Map map;
-  for (int k = 0; k < keyframes; ++k) {
-    const KeyframePtr kf = world->next();
-    map.addKeyframe(kf, world->truth(kf->frame.t), ImuNoise());
-    const PlaneUpdate planes = world->planes();
-    for (const PlaneEstimate& plane : planes.planes) map.setPlane(plane);
-    for (const PlaneObservation& observation : planes.observations) map.setPlaneObservation(observation);
-  }
-  return map;
-}
-
 std::optional<double> errorOf(std::function<double(double)> read_too_long, const DepthNoise& noise = stereo(),
                               int keyframes = 60, double sigma = 0.004, bool again = false) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(std::move(read_too_long), sigma, kPoints);
-  return fitDisparityError(mapOf(&world, keyframes), noise, again);
+  return fitDisparityError(mapAtTruePoses(&world, keyframes), noise, again);
 }
 
 TEST(DisparityFit, FindsTheErrorAndWhatComesWithIt) {
@@ -62,7 +49,7 @@ TEST(DisparityFit, IsNotMisledByNoise) {
   for (const unsigned seed : {3u, 4u, 5u}) {
     SimulatedKeyframes world(seed);
     world.setDepthCamera(exact, 0.03, kPoints);
-    EXPECT_FALSE(fitDisparityError(mapOf(&world, 60), noise, false)) << seed;
+    EXPECT_FALSE(fitDisparityError(mapAtTruePoses(&world, 60), noise, false)) << seed;
   }
 }
 
@@ -91,7 +78,7 @@ TEST(DisparityFit, IsNotAskedOfOtherCamerasOrOfTooLittle) {
   EXPECT_FALSE(errorOf(tooLong, stereo(), 14));
   SimulatedKeyframes world(3);
   world.setDepthCamera(tooLong, 0.004, kPoints);
-  Map map = mapOf(&world, 60);
+  Map map = mapAtTruePoses(&world, 60);
   for (KeyframeId id = 1; id <= 60; ++id) map.keyframe(id).stored = true;
   EXPECT_FALSE(fitDisparityError(map, stereo(), false));
 }
@@ -100,7 +87,7 @@ TEST(DisparityFit, IsNotAskedOfOtherCamerasOrOfTooLittle) {
 TEST(DisparityFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(exact, 0.004, kPoints);
-  Map map = mapOf(&world, 60);
+  Map map = mapAtTruePoses(&world, 60);
   for (KeyframeId id = 1; id <= 60; ++id) {
     const auto seen = map.keyframe(id).planes.find(1);
     if (seen == map.keyframe(id).planes.end()) continue;
@@ -122,7 +109,7 @@ TEST(DisparityFit, PosesThatAreOffAreNotMistakenForManyErrors) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     SimulatedKeyframes world(seed);
     world.setDepthCamera(exact, 0.004, kPoints);
-    Map map = mapOf(&world, 60);
+    Map map = mapAtTruePoses(&world, 60);
     for (KeyframeId id = 1; id <= 60; ++id) {
       NavState& state = map.keyframe(id).state;
       Vector6d off;
