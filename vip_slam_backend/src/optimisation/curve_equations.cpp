@@ -12,6 +12,7 @@ namespace vip_slam {
 namespace {
 
 constexpr int kKeyframes = 200;
+constexpr double kFarthest = 12.0;         // m
 constexpr double kPlaneInformation = 1e2;  // 1/m^2, so that a plane of one point has a place
 constexpr double kOutlier = 3.0;           // sigmas, of a loss that forgets what is far off
 constexpr double kMostOff = 0.1;           // of its depth; a point farther off its plane has none but its own
@@ -131,6 +132,10 @@ std::pair<PlaneSet, PlaneSet> halves(const std::vector<const MapKeyframe*>& keyf
     (first <= second ? first : second) += n;
   }
   return both;
+}
+
+int curveEntries(const DepthNoise& noise) {
+  return 2 + static_cast<int>(std::ceil(std::min(noise.max_range, kFarthest) / DepthCurve::kStep));
 }
 
 CurveEquations curveEquations(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes,

@@ -21,6 +21,9 @@ PlaneSet allPlanes(const Map& map);
 /// Two sets with about as many points each.
 std::pair<PlaneSet, PlaneSet> halves(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes);
 
+/// Entries of a curve that reaches over the camera's range, 12 m at most.
+int curveEntries(const DepthNoise& noise);
+
 /// Normal equations of a curve's entries (DepthCurve::kStep apart) after the planes' elimination.
 struct CurveEquations {
   Eigen::MatrixXd H;

@@ -14,7 +14,6 @@ namespace vip_slam {
 namespace {
 
 constexpr int kLeastKeyframes = 15;
-constexpr double kFarthest = 12.0;     // m
 constexpr double kEntrySigma = 0.01;   // m, of an entry before anything is known
 constexpr double kBendSigma = 0.002;   // m, of an entry against the line between its neighbours
 constexpr int kRounds = 3;             // of the weights
@@ -73,7 +72,7 @@ struct CurveEstimate {
 
 CurveEstimate estimateCurve(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes,
                             const DepthNoise& noise) {
-  const int entries = 2 + static_cast<int>(std::ceil(std::min(noise.max_range, kFarthest) / DepthCurve::kStep));
+  const int entries = curveEntries(noise);
   CurveFit fit(entries, noise);
   for (int round = 0; round < kRounds; ++round) fit.round(keyframes, planes);
   CurveEstimate estimate{fit.value(), fit.sigma(), fit.information(), {}};

@@ -13,7 +13,6 @@ namespace vip_slam {
 namespace {
 
 constexpr int kLeastKeyframes = 15;
-constexpr double kFarthest = 12.0;                         // m
 constexpr double kOffsetSigma = 0.02, kScaleSigma = 0.02;  // m and share, of what comes with it and is not asked for
 constexpr int kRounds = 4;                                 // of the weights, and of what is not linear
 // What is beyond doubt: sigmas, and of what all planes say the share that each half says. In maps of exact depth up to
@@ -27,7 +26,7 @@ struct DisparityError {
 };
 
 DisparityError fit(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes, const DepthNoise& noise) {
-  const int entries = 2 + static_cast<int>(std::ceil(std::min(noise.max_range, kFarthest) / DepthCurve::kStep));
+  const int entries = curveEntries(noise);
   const Eigen::Vector3d prior(1 / (kOffsetSigma * kOffsetSigma), 1 / (kScaleSigma * kScaleSigma), 0);
   Eigen::Vector3d x = Eigen::Vector3d::Zero();  // offset, scale, error
   DisparityError found;
