@@ -145,6 +145,13 @@ bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), since), t_imu), &sensor_.imu_noise);
   cues.tracks = image_counts ? static_cast<int>(now.size()) : 0;
   cues.speed = filter_.nav().v_W.norm();
+  std::vector<Eigen::Vector3d> points;  // those without depth lie beyond its reach, or might as well
+  for (const Track& track : tracker_.tracks()) {
+    const Feature& f = track.feature;
+    const double z = f.depth > 0 ? f.depth : sensor_.depth_noise.max_range;
+    points.emplace_back(z * f.xy.x(), z * f.xy.y(), z);
+  }
+  cues.px_per_metre = leastImageMotion(points, camera_->focal());
   while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options.window - 1e-6) {
     recent_pixels_.pop_front();
   }

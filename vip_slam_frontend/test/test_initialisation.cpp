@@ -214,6 +214,34 @@ TEST(Stillness, IsAsExactAsTheImagesAreQuiet) {
   EXPECT_EQ(detector.unrest(), 1.0);
 }
 
+// Eight metres before a wall the first three centimetres of a motion towards it pass for the noise of pixels nearby.
+TEST(Stillness, WhereAllIsFarASmallerImageMotionEndsIt) {
+  StillnessDetector detector((ZuptOptions()));
+  std::vector<Eigen::Vector3d> near, far;
+  for (double x : {-0.5, 0.0, 0.5}) {
+    for (double y : {-0.3, 0.3}) {
+      near.emplace_back(2 * x, 2 * y, 2);
+      far.emplace_back(8 * x, 8 * y, 8);
+    }
+  }
+  StillnessCues begins = quiet(), stands = quiet();
+  begins.disparity_px = begins.anchor_disparity_px = 0.3;
+  begins.px_per_metre = leastImageMotion(near, 480);
+  EXPECT_GT(begins.px_per_metre, 80.0);
+  detector.begin(quiet().imu);
+  EXPECT_TRUE(detector.update(begins));
+  begins.px_per_metre = stands.px_per_metre = leastImageMotion(far, 480);
+  EXPECT_TRUE(detector.update(stands));
+  EXPECT_GT(detector.unrest(), 1.0);  // and what stands is known less well
+  EXPECT_FALSE(detector.update(begins));
+}
+
+// Along the view a translation shows as far from the middle as the points lie, across it everywhere.
+TEST(Stillness, ImageMotionOfATranslationIsLeastAlongTheView) {
+  EXPECT_NEAR(leastImageMotion({{1, 0, 4}, {-1, 0, 4}, {0, 1, 4}, {0, -1, 4}}, 480), 480 / 4.0 * 0.25, 1e-9);
+  EXPECT_EQ(leastImageMotion({}, 480), 0);
+}
+
 TEST(Stillness, AStartAtRestBeforeABareWallLastsUntilTheImuShowsAMotion) {
   const ZuptOptions options;
   StillnessDetector detector(options);

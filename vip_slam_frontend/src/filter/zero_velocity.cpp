@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
 namespace vip_slam {
 
 namespace {
@@ -16,9 +18,12 @@ constexpr double kMostAccelShift = 0.05;  // m/s^2
 constexpr double kRestFollows = 0.01;
 // So many images after standing still, slow motion may have begun without the IMU's noticing.
 constexpr int kForgotten = 40;
-// The sigmas fit image motion at the limit and surfaces two metres away; farther ones tell so much less. However quiet
-// the image, they do not fall below a share.
+// The sigmas fit image motion at the limit and surfaces two metres away. However quiet the image, they do not fall
+// below a share.
 constexpr double kFar = 3.0, kLeastUnrest = 0.2;
+// So far along the view a step of a centimetre moves a wall's image by a pixel: there the limits on image motion hold.
+// Where a step shows less the limits are lower, as far down as the noise of pixels.
+constexpr double kPxPerMetre = 80.0, kLeastLimit = 0.2;
 
 bool restsAs(const ImuSpread& now, const ImuSpread& rest) {
   const double root = std::sqrt(static_cast<double>(std::max<std::size_t>(1, now.count)));
@@ -61,15 +66,17 @@ ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise
 bool StillnessDetector::update(const StillnessCues& cues) {
   const bool quiet = cues.imu.count >= 5 && cues.imu.quiet(options_.max_gyro_std, options_.max_accel_std);
   const bool image_known = cues.disparity_px >= 0 && cues.tracks > options_.min_tracks;
+  const double shows = cues.px_per_metre > 0 ? cues.px_per_metre / kPxPerMetre : 1.0;
+  const double limit = options_.max_disparity_px * std::clamp(shows, kLeastLimit, 1.0);
   bool wants = options_.enabled && quiet && cues.speed < options_.max_speed;
   if (still_) {
     // Inside, an image without features (lights off) does not end the standing; one that moves does.
-    wants = wants && (image_known ? cues.disparity_px < 1.5 * options_.max_disparity_px : restsAs(cues.imu, rest_)) &&
-            cues.anchor_disparity_px < 3.0 * options_.max_disparity_px;
+    wants = wants && (image_known ? cues.disparity_px < 1.5 * limit : restsAs(cues.imu, rest_)) &&
+            cues.anchor_disparity_px < 3.0 * limit;
   } else {
-    wants = wants && image_known && cues.disparity_px < options_.max_disparity_px;
+    wants = wants && image_known && cues.disparity_px < limit;
   }
-  const double moved = std::max(cues.disparity_px, cues.anchor_disparity_px) / options_.max_disparity_px;
+  const double moved = std::max(cues.disparity_px, cues.anchor_disparity_px) / limit;
   unrest_ = image_known ? std::max(kLeastUnrest, kFar * moved) : 1.0;
   if (wants) {
     const double share = image_known ? 1.0 : kRestFollows;
@@ -98,6 +105,23 @@ void StillnessDetector::reset() {
   still_ = imu_rests_ = false;
   in_a_row_ = 0;
   since_still_ = kForgotten;
+}
+
+double leastImageMotion(const std::vector<Eigen::Vector3d>& points, double focal) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  int count = 0;
+  for (const Eigen::Vector3d& p : points) {
+    if (!(p.z() > 0)) continue;
+    Eigen::Matrix<double, 2, 3> J;
+    J << 1.0, 0.0, -p.x() / p.z(), 0.0, 1.0, -p.y() / p.z();
+    J *= focal / p.z();
+    sum += J.transpose() * J;
+    ++count;
+  }
+  if (count == 0) return 0;
+  const double least =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum / count, Eigen::EigenvaluesOnly).eigenvalues()(0);
+  return std::sqrt(std::max(0.0, least));
 }
 
 void zeroVelocityRows(const WindowState& window, int anchor, int repeats, double unrest, const ZuptOptions& options,

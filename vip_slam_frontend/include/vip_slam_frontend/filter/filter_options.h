@@ -52,7 +52,8 @@ struct ZuptOptions {
     v.field("window", window, 0.1, 5.0, "IMU time looked at, s");
     v.field("max_gyro_std", max_gyro_std, 0.0, 1.0, "largest gyro deviation while still, rad/s");
     v.field("max_accel_std", max_accel_std, 0.0, 10.0, "largest accelerometer deviation while still, m/s^2");
-    v.field("max_disparity_px", max_disparity_px, 0.0, 10.0, "largest mean image motion over the window, px");
+    v.field("max_disparity_px", max_disparity_px, 0.0, 10.0,
+            "largest mean image motion over the window, px; less where all is far");
     v.field("min_tracks", min_tracks, 0, 1000, "tracks needed to trust the image motion");
     v.field("max_speed", max_speed, 0.0, 10.0, "largest estimated speed to enter, m/s");
     v.field("frames_in", frames_in, 1, 100, "still images in a row to enter");

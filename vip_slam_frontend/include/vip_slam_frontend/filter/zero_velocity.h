@@ -29,7 +29,8 @@ struct StillnessCues {
   double disparity_px = -1;         ///< mean image motion over the same time; < 0: unknown
   double anchor_disparity_px = -1;  ///< since standing still began; < 0: unknown
   int tracks = 0;
-  double speed = 0;  ///< estimated, m/s
+  double speed = 0;         ///< estimated, m/s
+  double px_per_metre = 0;  ///< image motion of a translation in the direction that shows least; 0: unknown
 };
 
 /// Still only when the IMU is quiet and the image stands and the estimate is slow; with hysteresis both ways. The image
@@ -57,6 +58,10 @@ class StillnessDetector {
   double unrest_ = 1.0;
   ImuSpread rest_;  ///< the IMU's means at rest
 };
+
+/// Image motion, px per metre in the mean square, of a translation in the direction that shows least (along the view,
+/// mostly). `points`: in the camera, metres. 0 without points.
+double leastImageMotion(const std::vector<Eigen::Vector3d>& points, double focal);
 
 /// Whitened rows on the newest clone and the nav state: v = 0, and no rotation or translation against the clone at
 /// `anchor` (index in the window; -1: velocity only). `repeats` counts the images since stopping: they repeat the same
