@@ -12,9 +12,6 @@
 namespace vip_slam {
 namespace {
 
-// Keyframes that the back end has not placed by then never will be.
-constexpr std::size_t kMostWaiting = 50;
-
 const CameraModel& checked(const std::shared_ptr<const CameraModel>& camera, const DepthNoise& noise) {
   if (!camera) throw std::invalid_argument("plane mapper: the camera model is missing");
   const std::string fault = noise.validate();
@@ -163,7 +160,8 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
   if (!keyframe || keyframe->id == 0 || placed_.count(keyframe->id) || !isSound(keyframe->frame.depth_grid)) return;
   waiting_.emplace(keyframe->id, keyframe);
-  while (waiting_.size() > kMostWaiting) {
+  // Beside those that the back end holds there is the newest one, which it may place yet.
+  while (waiting_.size() > kMostWaitingKeyframes + 1) {
     waiting_.erase(waiting_.begin());
     ++counters.keyframes_forgotten;
   }

@@ -278,6 +278,29 @@ TEST(Mapper, AKeyframeSentAgainCountsOnce) {
   EXPECT_EQ(0u, rig.mapper.counters().keyframes_waiting);
 }
 
+TEST(Mapper, KeyframesWaitAsLongAsTheBackEndHoldsThem) {
+  Rig rig;
+  const auto taken = rig.camera.keyframe(room(), lookAt({0, 0, 1.4}, {3, 0, 1.0}));
+  taken->frame.depth_grid = {};
+  MapUpdate update;
+  for (KeyframeId id = 1; id <= kMostWaitingKeyframes + 1; ++id) {
+    const auto keyframe = std::make_shared<Keyframe>(*taken);
+    keyframe->id = id;
+    rig.mapper.addKeyframe(keyframe);
+    update.keyframes.push_back(updateFor(*keyframe, SE3()).keyframes.front());
+  }
+  EXPECT_EQ(0u, rig.mapper.counters().keyframes_forgotten);
+  rig.mapper.applyMapUpdate(update);
+  EXPECT_EQ(kMostWaitingKeyframes + 1, rig.mapper.counters().keyframes);
+  // One that finds as many waiting already, which the back end has given up, makes room for itself.
+  for (KeyframeId id = 1; id <= kMostWaitingKeyframes + 2; ++id) {
+    const auto keyframe = std::make_shared<Keyframe>(*taken);
+    keyframe->id = 10000 + id;
+    rig.mapper.addKeyframe(keyframe);
+  }
+  EXPECT_EQ(1u, rig.mapper.counters().keyframes_forgotten);
+}
+
 TEST(Mapper, PosesThatAreNoNumbersChangeNothing) {
   Rig rig;
   const Scene scene = room();

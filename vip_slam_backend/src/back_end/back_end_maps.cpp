@@ -3,12 +3,6 @@
 #include "vip_slam_backend/map_io/map_file.h"
 
 namespace vip_slam {
-namespace {
-
-// Keyframes kept while a loaded map is not recognised yet: about ten minutes.
-constexpr std::size_t kMostHeld = 1500;
-
-}  // namespace
 
 void BackEnd::Impl::saveMap(const std::string& path) const {
   saveMapFile(path, map, loop_closer.loops(), loop_closer.vocabulary().id(), sensor.camera);
@@ -53,7 +47,7 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
   if (!findInMap(keyframe, &found)) {
     held.push_back(keyframe);
-    if (held.size() > kMostHeld) held.pop_front();
+    if (held.size() > kMostWaitingKeyframes) held.pop_front();
     return false;
   }
   searching = false;

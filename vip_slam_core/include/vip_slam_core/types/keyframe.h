@@ -1,6 +1,7 @@
 // What the front end hands on: a tracked frame per image and a keyframe now and then. Immutable once published.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -42,6 +43,10 @@ struct Keyframe {
   /// difference of the two published states: those were corrected in between.
   RelativeMotion motion;
 };
+
+/// Keyframes that wait while a loaded map is not recognised yet, about ten minutes of them: the back end and the plane
+/// module keep the same ones, so that all that enter the map late have their planes.
+constexpr std::size_t kMostWaitingKeyframes = 1500;
 
 using KeyframePtr = std::shared_ptr<const Keyframe>;
 using TrackedFramePtr = std::shared_ptr<const TrackedFrame>;
