@@ -1,14 +1,22 @@
-// Images wait for the IMU by the IMU's own clock, which may be far from the camera's.
+// What the runner hands on: images wait for the IMU by the IMU's own clock, which may be far from the camera's; the
+// plane module's answers reach the back end.
+#include <unistd.h>
+
+#include <cstdio>
+#include <string>
+
 #include <gtest/gtest.h>
 
+#include "vip_slam_backend/map_io/map_file.h"
+#include "vip_slam_bringup/runner/mapping_thread.h"
 #include "vip_slam_bringup/runner/pipeline.h"
 
 namespace vip_slam {
 namespace {
 
-class ImuPatience : public testing::Test {
+class RunnerTest : public testing::Test {
  protected:
-  ImuPatience() {
+  RunnerTest() {
     sensor_.camera.width = 64;
     sensor_.camera.height = 48;
     sensor_.camera.fx = sensor_.camera.fy = 60;
@@ -24,7 +32,7 @@ class ImuPatience : public testing::Test {
   SensorConfig sensor_;
 };
 
-TEST_F(ImuPatience, AnImuClockThatIsAheadIsNoReasonToGiveUp) {
+TEST_F(RunnerTest, AnImuClockThatIsAheadIsNoReasonToGiveUp) {
   sensor_.time_offset = 0.8;
   Pipeline pipeline(options_, sensor_, nullptr);
   addImu(&pipeline, 0, 1.7);
@@ -34,7 +42,7 @@ TEST_F(ImuPatience, AnImuClockThatIsAheadIsNoReasonToGiveUp) {
   EXPECT_EQ(pipeline.images(), 1u);
 }
 
-TEST_F(ImuPatience, NorIsOneThatIsBehind) {
+TEST_F(RunnerTest, NorIsOneThatIsBehind) {
   sensor_.time_offset = -0.8;
   Pipeline pipeline(options_, sensor_, nullptr);
   addImu(&pipeline, 0, 0.1);
@@ -44,13 +52,30 @@ TEST_F(ImuPatience, NorIsOneThatIsBehind) {
   EXPECT_EQ(pipeline.images(), 1u);
 }
 
-TEST_F(ImuPatience, WithoutTheImuImagesGoOn) {
+TEST_F(RunnerTest, WithoutTheImuImagesGoOn) {
   Pipeline pipeline(options_, sensor_, nullptr);
   addImu(&pipeline, 0, 0.5);
   pipeline.add(image(1.0));
   EXPECT_EQ(pipeline.images(), 0u);
   pipeline.add(image(1.6));
   EXPECT_EQ(pipeline.images(), 1u);
+}
+
+// Without area it is none for the plane module.
+TEST_F(RunnerTest, WhatThePlaneModuleMakesOfALoadedMapReachesTheBackEnd) {
+  const std::string path = "/tmp/test_pipeline." + std::to_string(getpid()) + ".vsm";
+  Map map;
+  PlaneEstimate empty;
+  empty.id = 4;
+  empty.plane = Plane({0, 0, 1}, 0);
+  map.setPlane(empty);
+  saveMapFile(path, map, {}, 0);
+  options_.mapping = true;
+  MappingThread mapping(options_, sensor_, nullptr);
+  mapping.loadMap(path);
+  std::remove(path.c_str());
+  EXPECT_TRUE(mapping.planes().empty());
+  EXPECT_TRUE(mapping.backEnd().snapshot().planes.empty());
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ MapUpdate MappingThread::loadMap(const std::string& path) {
   const MapUpdate update = back_end_->loadMap(path);
   if (planes_) {
     planes_->restore(back_end_->snapshot().planes);
-    planes_->applyMapUpdate(update);
+    back_end_->applyPlaneUpdate(planes_->applyMapUpdate(update));
   }
   return update;
 }
