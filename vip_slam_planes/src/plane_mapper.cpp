@@ -71,7 +71,7 @@ const CameraPoses& PlaneMapper::Impl::posesTiedTo(EpochKey epoch) {
 
 void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   const bool usable = frame.status.state == TrackingState::kTracking && !frame.depth_grid.empty() && newest_ != 0 &&
-                      frame.epoch == epoch_ && !tracks_.empty() && isSound(frame.depth_grid);
+                      frame.epoch == epoch_ && !localising_ && !tracks_.empty() && isSound(frame.depth_grid);
   const SE3 T_map_C = T_map_odom * frame.state.T_W_I * frame.T_I_C;
   const SE3 moved = grown_at_.inverse() * T_map_C;
   const bool still = has_grown_ && moved.t().norm() < options.growth.min_move &&
@@ -125,7 +125,7 @@ void PlaneMapper::Impl::clear() {
   withdrawn_.clear();
   next_plane_ = 1;
   newest_ = 0;
-  has_grown_ = false;
+  has_grown_ = came_together_ = localising_ = false;
 }
 
 void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {

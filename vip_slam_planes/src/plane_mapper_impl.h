@@ -42,6 +42,7 @@ class PlaneMapper::Impl {
   // plane_mapper_update.cpp: corrections from the back end.
   /// Returns true when epochs have come together that were apart.
   bool tieEpochs(const std::vector<LoopEvent>& loops);
+  void followMode(const MapUpdate& update);
   void takeCorrections(const MapUpdate& update);
   /// False when the keyframe's depth is corrected by just that already.
   bool adoptDepthCorrection(const DepthCorrection& correction, KeyframePtr* keyframe);
@@ -90,7 +91,9 @@ class PlaneMapper::Impl {
   KeyframeId newest_ = 0;
   SE3 grown_at_;  ///< camera pose of the last frame that grew planes
   bool has_grown_ = false;
-  bool map_moved_ = false;  ///< by this update, everywhere
+  bool map_moved_ = false;      ///< by this update, everywhere
+  bool came_together_ = false;  ///< epochs have, and the planes have not been compared since
+  bool localising_ = false;     ///< the back end takes no keyframes into its map, and no planes
 
   // Collected for the next PlaneUpdate.
   std::vector<PlaneMerge> merges_;

@@ -21,7 +21,16 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   PlaneUpdate result;
   result.revision = update.revision;
   result.t = update.t;
-  const bool came_together = tieEpochs(update.loops);
+  came_together_ = tieEpochs(update.loops) || came_together_;
+  followMode(update);
+  if (localising_) {
+    // Planes stay as the back end has them; what has changed before is reported once mapping goes on.
+    for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
+    points_.applyMapUpdate(update);
+    counters.keyframes_waiting = waiting_.size();
+    result.planes = published;
+    return result;
+  }
   takeCorrections(update);
 
   for (const KeyframeEstimate& estimate : update.keyframes) {
@@ -40,8 +49,9 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
 
   std::vector<PlaneId> changed;
   for (auto& [id, track] : tracks_) {
-    if (track.changed(true) || came_together) changed.push_back(id);
+    if (track.changed(true) || came_together_) changed.push_back(id);
   }
+  came_together_ = false;
   mergePlanes(changed);
   dropUnsupported(&result);
   decideOnPoints();
@@ -59,6 +69,17 @@ bool PlaneMapper::Impl::tieEpochs(const std::vector<LoopEvent>& loops) {
     if (loop.accepted && epochs_.tie(epoch_of(loop.query), epoch_of(loop.match))) came_together = true;
   }
   return came_together;
+}
+
+// While the back end only localises it gives back each keyframe at once; one that it takes, or a map that moves, tells
+// that it maps.
+void PlaneMapper::Impl::followMode(const MapUpdate& update) {
+  const bool maps =
+      update.global || std::any_of(update.keyframes.begin(), update.keyframes.end(),
+                                   [this](const KeyframeEstimate& k) { return waiting_.count(k.id) > 0; });
+  const bool gives_back = std::any_of(update.removed_keyframes.begin(), update.removed_keyframes.end(),
+                                      [this](KeyframeId id) { return waiting_.count(id) > 0; });
+  localising_ = !maps && (localising_ || gives_back);
 }
 
 // Points wait for their plane to be known for one; most of them are out of view by then.

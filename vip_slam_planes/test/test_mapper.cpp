@@ -301,6 +301,35 @@ TEST(Mapper, KeyframesWaitAsLongAsTheBackEndHoldsThem) {
   EXPECT_EQ(1u, rig.mapper.counters().keyframes_forgotten);
 }
 
+TEST(Mapper, PlanesStayAsTheyAreWhileTheBackEndOnlyLocalises) {
+  Rig rig;
+  const Scene scene = room();
+  for (int i = 0; i < 3; ++i) rig.look(scene, {0.1 * i, 0, 1.4}, {3, 0, 1.3});
+  const Plane wall({-1, 0, 0}, 3);
+  ASSERT_TRUE(rig.find(wall));
+  const double area = rig.find(wall)->area;
+  const std::uint64_t grown = rig.mapper.counters().frames_grown;
+  for (int i = 1; i <= 4; ++i) {
+    const SE3 T_W_C = lookAt({0.2, 0, 1.4}, {3, 0.5 * i, 1.3});
+    const auto keyframe = rig.camera.keyframe(scene, T_W_C);
+    rig.mapper.addKeyframe(keyframe);
+    MapUpdate localised;
+    localised.removed_keyframes.push_back(keyframe->id);
+    const PlaneUpdate result = rig.mapper.applyMapUpdate(localised);
+    EXPECT_EQ(rig.mapper.planes().size(), result.planes.size());
+    EXPECT_TRUE(result.observations.empty() && result.merges.empty() && result.removed.empty());
+    TrackedFrame frame = rig.camera.frame(scene, T_W_C, 10 + i, 16);
+    frame.keyframe = keyframe->id;
+    rig.mapper.grow(frame, SE3());
+    EXPECT_EQ(area, rig.find(wall)->area);
+  }
+  EXPECT_EQ(grown, rig.mapper.counters().frames_grown);
+  EXPECT_EQ(0u, rig.mapper.counters().keyframes_waiting);
+  // Mapping goes on.
+  rig.look(scene, {0.2, 0, 1.4}, {3, 2, 1.3});
+  EXPECT_GT(rig.find(wall)->area, area + 0.5);
+}
+
 TEST(Mapper, PosesThatAreNoNumbersChangeNothing) {
   Rig rig;
   const Scene scene = room();

@@ -48,7 +48,8 @@ class PlaneMapper {
   void grow(const TrackedFrame& frame, const SE3& T_map_odom);
   /// Takes the corrections, then detects, associates and merges with the keyframes that are now placed. Poses, planes
   /// and landmarks that are not finite are passed over. A wall whose observations have come to disagree is reported as
-  /// removed, and may come back by its id.
+  /// removed, and may come back by its id. From an update that gives back a waiting keyframe, as one of a back end that
+  /// only localises does, until one that places a keyframe or moves everything, planes stay as they are.
   PlaneUpdate applyMapUpdate(const MapUpdate& update);
   /// Confirmed planes, by id; polygons are as of the last applyMapUpdate().
   const std::vector<PlaneEstimate>& planes() const;
