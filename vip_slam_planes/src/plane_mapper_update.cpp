@@ -108,6 +108,8 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   for (const auto& [id, plane] : update.planes) {
     const auto it = tracks_.find(id);
     if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
+    // The back end has nothing of one whose observations it did not get: it sends back what it was told.
+    if (!it->second.determined) continue;
     it->second.setPlane(plane);
     it->second.setOptimised(true);
   }

@@ -127,6 +127,28 @@ TEST(Mapper, APlaneThatNoObservationHoldsMovesWithTheKeyframeThatShowsIt) {
   EXPECT_NEAR(before.planes[0].area, after.planes[0].area, 0.05 * before.planes[0].area);
 }
 
+// These few samples of a strip do not tell its direction, so that the back end does not get them: what it says about the plane
+// is what it was told before.
+TEST(Mapper, APlaneWhoseObservationsAreWithheldIsNotTheBackEnds) {
+  PlaneMapperOptions options;
+  options.observation.effective_points = 1;
+  Rig rig(0, options);
+  Scene scene;
+  scene.add({3, -0.25, 0}, {0, 0.5, 0}, {0, 0, 2.6});
+  const auto keyframe = rig.camera.keyframe(scene, lookAt({0, 0, 1.3}, {3, 0, 1.3}));
+  rig.place(keyframe, lookAt({0, 0, 1.3}, {3, 0, 1.3}));
+  const PlaneUpdate before = rig.look(scene, {0.05, 0, 1.3}, {3, 0, 1.3});
+  ASSERT_EQ(1u, before.planes.size());
+  ASSERT_TRUE(before.observations.empty());
+  Plane stale = before.planes[0].plane;
+  stale.d += 0.1;
+  MapUpdate update;
+  update.planes.emplace_back(before.planes[0].id, stale);
+  const PlaneUpdate after = rig.mapper.applyMapUpdate(update);
+  ASSERT_EQ(1u, after.planes.size());
+  EXPECT_NEAR(before.planes[0].plane.d, after.planes[0].plane.d, 1e-6);
+}
+
 TEST(Mapper, APlaneThatIsGoneDisappears) {
   Rig rig;
   Scene with = room(), without = room();

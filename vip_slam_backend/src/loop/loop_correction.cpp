@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
+#include <set>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -103,7 +105,13 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     return event;
   }
   map.moveKeyframes(solution.T_W_I);
-  for (const auto& plane : solution.planes) map.setPlaneParameters(plane.first, plane.second);
+  // A plane that no keyframe observes had no say in the graph: as it is it stays the plane module's.
+  std::set<PlaneId> observed;
+  for (const auto& entry : map.keyframes())
+    for (const auto& seen : entry.second.planes) observed.insert(seen.first);
+  for (const auto& same : planes.same) observed.insert(same.second);
+  for (const auto& plane : solution.planes)
+    if (observed.count(plane.first)) map.setPlaneParameters(plane.first, plane.second);
   for (const auto& same : planes.same)
     if (tied) map.setPlaneParameters(same.first, solution.planes.at(same.second));
   map.keyframe(query).loop_keyframe = map.keyframe(place.match).loop_keyframe = true;

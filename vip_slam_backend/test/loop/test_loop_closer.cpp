@@ -47,6 +47,23 @@ TEST(LoopCloser, ClosesTheRingAndRemovesTheDrift) {
   for (const auto& [query, match] : closer.loops()) EXPECT_TRUE(query != loops[0].query && match != loops[0].query);
 }
 
+TEST(LoopCloser, APlaneThatNoKeyframeObservesStaysThePlaneModules) {
+  RingWorld world;
+  Map map;
+  std::vector<SE3> truth;
+  world.walk(map, 1.15, 0.4, &truth);
+  PlaneEstimate plane;
+  plane.id = 1000;
+  plane.plane = Plane({0, 0, 1}, -0.7);
+  map.setPlane(plane);
+  LoopCloser closer(LoopOptions(), world.camera());
+  ASSERT_FALSE(closeAll(closer, map).empty());
+  EXPECT_FALSE(map.planes().at(1000).optimised);
+  plane.plane.d = -0.8;
+  map.setPlane(plane);
+  EXPECT_EQ(-0.8, map.planes().at(1000).estimate.plane.d);
+}
+
 TEST(LoopCloser, ALittleTiltMattersNoMoreFarFromTheOrigin) {
   std::vector<std::size_t> closed;
   for (const double away : {0.0, 100.0}) {
