@@ -190,6 +190,10 @@ void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
     }
     fresh_.erase({from_id, keyframe});
   }
+  // The back end moves the broken ones along with the rest.
+  for (PlaneObservation& none : withdrawn_) {
+    if (none.plane == from_id) none.plane = into_id;
+  }
   into.absorb(from, poses_);
   refit(&into);
   points_.renamePlane(from_id, into_id);

@@ -280,7 +280,11 @@ void PlaneMapper::Impl::publish(PlaneUpdate* result) {
 
   for (PlaneObservation& none : withdrawn_) {
     const auto it = tracks_.find(none.plane);
-    if (it != tracks_.end() && !it->second.observations().count(none.keyframe)) result->observations.push_back(none);
+    if (it == tracks_.end()) continue;
+    // Where a plane has another observation by now, that replaces the broken one, unless it is withheld yet.
+    const bool observed = it->second.observations().count(none.keyframe) > 0;
+    if (observed) fresh_.emplace(none.plane, none.keyframe);
+    if (!observed || !it->second.determined) result->observations.push_back(none);
   }
   withdrawn_.clear();
   for (auto it = fresh_.begin(); it != fresh_.end();) {

@@ -1,5 +1,6 @@
 // Which pieces the plane module takes for one surface, on exact scenes.
 #include <cmath>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -325,34 +326,66 @@ TEST(Mapper, BothFacesOfAThinWallAreTwo) {
   EXPECT_TRUE(rig.find(Plane({1, 0, 0}, -0.08), 0.004));
 }
 
-TEST(Mapper, OneWallMappedTwiceBecomesOneWhenTheLoopCloses) {
-  Rig rig;
-  Scene scene;
-  scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
-  // The second visit has drifted by 40 cm: two planes until the correction.
+/// The second visit has drifted by 40 cm: two planes until the correction.
+void visitTwice(const Scene& scene, Rig* rig) {
   for (int visit = 0; visit < 2; ++visit) {
     for (int i = 0; i < 3; ++i) {
       const SE3 truth = lookAt({0, -0.5 + 0.4 * i, 1.4}, {3, -0.5 + 0.4 * i, 1.3});
       const SE3 drifted(truth.rotation(), truth.t() - Eigen::Vector3d(0.4 * visit, 0, 0));
-      rig.place(rig.camera.keyframe(scene, truth), drifted);
+      rig->place(rig->camera.keyframe(scene, truth), drifted);
     }
   }
-  ASSERT_EQ(2u, rig.mapper.planes().size());
-  const PlaneId oldest = rig.mapper.planes()[0].id, newest = rig.mapper.planes()[1].id;
+}
+
+/// Takes the drift out, but puts some keyframes half a metre off.
+MapUpdate closing(const Rig& rig, const std::set<KeyframeId>& astray) {
   MapUpdate update;
   update.global = true;
   for (const auto& [id, T] : rig.poses) {
     KeyframeEstimate k;
     k.id = id;
-    k.state.T_W_I = SE3(T.rotation(), T.t() + Eigen::Vector3d(id > 3 ? 0.4 : 0.0, 0, 0));
+    k.state.T_W_I = SE3(T.rotation(), T.t() + Eigen::Vector3d((id > 3 ? 0.4 : 0.0) - 0.5 * astray.count(id), 0, 0));
     update.keyframes.push_back(k);
   }
-  const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+  return update;
+}
+
+TEST(Mapper, OneWallMappedTwiceBecomesOneWhenTheLoopCloses) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+  visitTwice(scene, &rig);
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  const PlaneId oldest = rig.mapper.planes()[0].id, newest = rig.mapper.planes()[1].id;
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(closing(rig, {}));
   ASSERT_EQ(1u, result.planes.size());
   ASSERT_EQ(1u, result.merges.size());
   EXPECT_EQ(newest, result.merges[0].from);
   EXPECT_EQ(oldest, result.merges[0].into);
   EXPECT_NEAR(3.0, result.planes[0].plane.d, 0.004);
+}
+
+// One keyframe of either visit is not corrected like the others, so that what it saw no longer lies on the wall. The
+// back end moves that along when the planes merge, and must hear that it does not hold.
+TEST(Mapper, WhatNoLongerHoldsIsWithdrawnFromThePlaneThatItsPlaneBecame) {
+  for (const KeyframeId astray : {KeyframeId(2), KeyframeId(5)}) {
+    Rig rig;
+    Scene scene;
+    scene.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
+    visitTwice(scene, &rig);
+    ASSERT_EQ(2u, rig.mapper.planes().size());
+    const PlaneId oldest = rig.mapper.planes()[0].id;
+    MapUpdate update = closing(rig, {astray});
+    for (const PlaneEstimate& plane : rig.mapper.planes()) update.planes.emplace_back(plane.id, Plane({-1, 0, 0}, 3));
+    const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+    ASSERT_EQ(1u, result.merges.size()) << astray;
+    EXPECT_EQ(oldest, result.merges[0].into);
+    bool withdrawn = false;
+    for (const PlaneObservation& o : result.observations) {
+      withdrawn = withdrawn || (o.keyframe == astray && o.plane == oldest && o.points.empty());
+    }
+    EXPECT_TRUE(withdrawn) << astray;
+  }
 }
 
 }  // namespace
