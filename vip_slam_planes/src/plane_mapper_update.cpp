@@ -93,6 +93,16 @@ void PlaneMapper::Impl::decideOnPoints() {
 
 void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   map_moved_ = update.global;
+  for (const auto& [id, plane] : update.planes) {
+    const auto it = tracks_.find(id);
+    if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
+    // The back end has nothing of one whose observations it did not get: it sends back what it was told.
+    if (!it->second.determined) continue;
+    it->second.setPlane(plane);
+    it->second.setOptimised(true);
+  }
+  // Before any pose changes: the area of those that go is handed over where it lay, and moves with its heir.
+  for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
   std::vector<KeyframeId> moved;
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto it = placed_.find(estimate.id);
@@ -105,15 +115,6 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     if (other_depth || T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);
     T_map_C = corrected;
   }
-  for (const auto& [id, plane] : update.planes) {
-    const auto it = tracks_.find(id);
-    if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
-    // The back end has nothing of one whose observations it did not get: it sends back what it was told.
-    if (!it->second.determined) continue;
-    it->second.setPlane(plane);
-    it->second.setOptimised(true);
-  }
-  for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
   points_.applyMapUpdate(update);
   const bool removed = !update.removed_keyframes.empty();
   for (auto& [id, track] : tracks_) {

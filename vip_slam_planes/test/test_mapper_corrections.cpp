@@ -107,6 +107,40 @@ TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
   EXPECT_LT((high - high2).norm(), 0.15);
 }
 
+// The keyframe before it saw nothing of the wall yet.
+TEST(Mapper, AreaOfAKeyframeThatGoesMovesWithTheUpdateThatItGoesWith) {
+  Rig rig;
+  Scene scene;
+  scene.add({3, -2.5, 0}, {0, 5, 0}, {0, 0, 2.6});
+  scene.add({-3, -2.5, 0}, {0, 5, 0}, {0, 0, 2.6});
+  rig.look(scene, {0, 0, 1.4}, {-3, 0, 1.3});
+  rig.look(scene, {0.2, -0.5, 1.4}, {3, -0.5, 1.3});
+  rig.look(scene, {0.2, 0.5, 1.4}, {3, 0.8, 1.3});
+  const PlaneEstimate* wall = rig.find(Plane({-1, 0, 0}, 3));
+  ASSERT_TRUE(wall);
+  const double area = wall->area;
+  double low = 1e9;
+  for (const auto& p : wall->polygons)
+    for (const auto& q : p.outer) low = std::min(low, q.y());
+  const SE3 move(Eigen::Quaterniond::Identity(), {0, 2, 0});
+  MapUpdate update;
+  update.global = true;
+  update.removed_keyframes.push_back(2);
+  for (const KeyframeId id : {KeyframeId(1), KeyframeId(3)}) {
+    update.keyframes.emplace_back();
+    update.keyframes.back().id = id;
+    update.keyframes.back().state.T_W_I = move * rig.poses.at(id);
+  }
+  rig.mapper.applyMapUpdate(update);
+  wall = rig.find(Plane({-1, 0, 0}, 3));
+  ASSERT_TRUE(wall);
+  EXPECT_NEAR(area, wall->area, 0.1 * area);
+  double moved_low = 1e9;
+  for (const auto& p : wall->polygons)
+    for (const auto& q : p.outer) moved_low = std::min(moved_low, q.y());
+  EXPECT_NEAR(low + 2, moved_low, 0.1);
+}
+
 // The first keyframe leans by more than gravity will say; the floor far ahead shows too flat for samples.
 TEST(Mapper, APlaneThatNoObservationHoldsMovesWithTheKeyframeThatShowsIt) {
   PlaneMapperOptions options;
