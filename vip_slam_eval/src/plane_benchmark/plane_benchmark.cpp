@@ -41,7 +41,7 @@ class Bench {
     } else {
       waiting_.clear();  // time ran back; the front end notices that, too
     }
-    while (!waiting_.empty() && front_end_.ready(waiting_.front().t)) {
+    while (!waiting_.empty() && front_end_.ready(waiting_.front().t, waiting_.front().depth_lag)) {
       process(waiting_.front());
       waiting_.pop_front();
     }
@@ -60,7 +60,7 @@ class Bench {
 
  private:
   void process(const ImagePair& pair) {
-    const FrameOutput output = front_end_.process({pair.t, pair.gray, pair.depth});
+    const FrameOutput output = front_end_.process({pair.t, pair.gray, pair.depth, pair.depth_lag});
     ++result_.images;
     if (output.keyframe) {
       auto keyframe = std::make_shared<Keyframe>(*output.keyframe);
