@@ -16,6 +16,8 @@ std::string bagStem(const std::string& bag) {
 void finishConversion(const ConversionOptions& options, const SensorConfig& sensor, const Trajectory& truth,
                       BagOutput* bag, ConversionReport* report) {
   const std::string stem = bagStem(options.bag);
+  // Before anything else is written: when the bag fails, what lies beside an older one of that name stays whole.
+  bag->finish(options.progress);
   try {
     report->files.push_back(stem + "_sensor.yaml");
     saveSensorConfig(report->files.back(), sensor);
@@ -23,7 +25,6 @@ void finishConversion(const ConversionOptions& options, const SensorConfig& sens
       report->files.push_back(stem + "_truth.tum");
       writeTum(report->files.back(), truth);
     }
-    bag->finish(options.progress);
   } catch (...) {
     for (const std::string& file : report->files) {
       std::error_code ignored;
