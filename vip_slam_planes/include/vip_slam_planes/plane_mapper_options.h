@@ -129,7 +129,7 @@ struct PointAssociationOptions {
 
   void visit(OptionVisitor& v) {
     v.field("candidate_distance", candidate_distance, 0.01, 1.0, "largest distance of a candidate to the plane, m");
-    v.field("min_keyframes", min_keyframes, 2, 50, "keyframes that must see a candidate before it is decided on");
+    v.field("min_keyframes", min_keyframes, 2, 12, "keyframes that must see a candidate before it is decided on");
     v.field("pixel_sigma", pixel_sigma, 0.1, 10.0,
             "one sigma of a feature's position, px; at least, the front end tells it");
     v.field("similar_px", similar_px, 0.05, 10.0,
