@@ -179,7 +179,8 @@ TEST_F(EurocConverter, ABagThatFailsLeavesWhatLiesBesideTheOldOne) {
   write("set/mav0/cam0/data/" + std::to_string(kStart + 100000000LL) + ".png", "not a png");
   EXPECT_THROW(convertEuroc(options_), std::runtime_error);
   const std::string stem = bag_.substr(0, bag_.size() - 4);
-  for (const std::string& file : {bag_, stem + "_sensor.yaml", stem + "_truth.tum"}) EXPECT_TRUE(fs::exists(file)) << file;
+  for (const std::string& file : {bag_, stem + "_sensor.yaml", stem + "_truth.tum"})
+    EXPECT_TRUE(fs::exists(file)) << file;
 }
 
 class TumConverter : public Converters {

@@ -161,8 +161,8 @@ TEST(Mapper, APlaneThatNoObservationHoldsMovesWithTheKeyframeThatShowsIt) {
   EXPECT_NEAR(before.planes[0].area, after.planes[0].area, 0.05 * before.planes[0].area);
 }
 
-// These few samples of a strip do not tell its direction, so that the back end does not get them: what it says about the plane
-// is what it was told before.
+// These few samples of a strip do not tell its direction, so that the back end does not get them: what it says about
+// the plane is what it was told before.
 TEST(Mapper, APlaneWhoseObservationsAreWithheldIsNotTheBackEnds) {
   PlaneMapperOptions options;
   options.observation.effective_points = 1;
