@@ -56,7 +56,7 @@ visualization_msgs::MarkerArray PlaneDisplay::markers(const std::vector<PlaneEst
 }
 
 void PlaneDisplay::apply(const MapUpdate& update) {
-  for (const auto& keyframe : update.keyframes) keyframes_[keyframe.id] = keyframe.state.T_W_I;
+  for (const auto& keyframe : update.keyframes) keyframes_[keyframe.id] = keyframe.state.T_W_I * keyframe.T_I_C;
   for (const KeyframeId id : update.removed_keyframes) {
     keyframes_.erase(id);
     for (auto& [plane, observations] : points_) observations.erase(id);
@@ -88,9 +88,8 @@ sensor_msgs::PointCloud2 PlaneDisplay::cloud(const std_msgs::Header& header) con
     for (const auto& [keyframe, points] : observations) {
       const auto pose = keyframes_.find(keyframe);
       if (pose == keyframes_.end()) continue;
-      const SE3 T_map_cam = pose->second * T_imu_cam_;
-      const Eigen::Matrix3f R = T_map_cam.R().cast<float>();
-      const Eigen::Vector3f t = T_map_cam.t().cast<float>();
+      const Eigen::Matrix3f R = pose->second.R().cast<float>();
+      const Eigen::Vector3f t = pose->second.t().cast<float>();
       for (const auto& p : points) all.push_back({R * p + t, color});
     }
   }

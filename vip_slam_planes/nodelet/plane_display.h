@@ -26,16 +26,14 @@ class PlaneDisplay {
   /// Remembers what the depth points on planes need to be drawn.
   void apply(const MapUpdate& update);
   void apply(const PlaneUpdate& update);
-  void setCamera(const SE3& T_imu_cam) { T_imu_cam_ = T_imu_cam; }
   /// The depth points on planes, coloured by plane.
   sensor_msgs::PointCloud2 cloud(const std_msgs::Header& header) const;
   std::size_t points() const;
   void clear();
 
  private:
-  SE3 T_imu_cam_;
   std::set<PlaneId> shown_;
-  std::map<KeyframeId, SE3> keyframes_;  ///< T_map_I
+  std::map<KeyframeId, SE3> keyframes_;  ///< T_map_C, with the mounting as known now
   std::map<PlaneId, std::map<KeyframeId, std::vector<Eigen::Vector3f>>> points_;
 };
 

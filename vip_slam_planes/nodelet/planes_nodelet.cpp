@@ -89,7 +89,6 @@ void PlanesNodelet::start(const vip_slam_msgs::Calibration& calibration) {
   if (mapper_) return;  // the front end restarted; the calibration is the same sensor's
   applyCalibration(calibration, &sensor_);
   mapper_ = std::make_unique<PlaneMapper>(options_.mapper, makeCamera(sensor_.camera), sensor_.depth_noise);
-  display_.setCamera(sensor_.T_imu_cam);
   if (early_map_) obey(*early_map_);
   early_map_.reset();
 }
