@@ -201,8 +201,11 @@ std::vector<PlanePolygon> PlaneTrack::polygons(int min_hits) {
     return out;
   };
   std::vector<PlanePolygon> result;
-  if (area_changed_) outlines_ = traceOutlines(cells_, cell_, min_hits, 0.5 * speck, speck, 0.8 * cell_);
-  area_changed_ = false;
+  // One more hit shows only where more than one is asked for.
+  if (area_changed_ || (hits_changed_ && min_hits > 1)) {
+    outlines_ = traceOutlines(cells_, cell_, min_hits, 0.5 * speck, speck, 0.8 * cell_);
+  }
+  area_changed_ = hits_changed_ = false;
   for (const Outline& outline : outlines_) {
     PlanePolygon polygon;
     polygon.outer = lift(outline.outer);

@@ -51,7 +51,10 @@ class PlaneTrack {
 
   /// Covers the cells under a triangle, seen from keyframe `host` with camera pose T_map_C; `counted` cells gain a hit.
   void cover(const MapTriangle& triangle, KeyframeId host, const SE3& T_map_C, std::vector<CellIndex>* touched);
-  void hit(CellIndex c) { cells_.set(c, std::min(kMostHits, cells_.at(c) + 1)); }
+  void hit(CellIndex c) {
+    cells_.set(c, std::min(kMostHits, cells_.at(c) + 1));
+    hits_changed_ = true;
+  }
   void coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C);
   /// Covers a polygon of a loaded map; it has no host and moves with the plane alone.
   void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes);
@@ -121,7 +124,7 @@ class PlaneTrack {
   double cell_;
   Eigen::Vector3d origin_, ex_, ey_;
   CellGrid cells_;
-  bool area_changed_ = true, grown_ = true;
+  bool area_changed_ = true, grown_ = true, hits_changed_ = false;
   int lost_ = 0;
   std::vector<Outline> outlines_;
   Plane last_checked_;
