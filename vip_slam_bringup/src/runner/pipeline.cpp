@@ -71,6 +71,8 @@ void Pipeline::processRest() {
 
 void Pipeline::restart(double seconds) {
   processRest();
+  duration_ = duration();
+  oldest_taken_ = newest_taken_ = std::numeric_limits<double>::infinity();
   newest_image_ = newest_imu_ = -1e300;
   char words[80];
   std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", seconds);
@@ -103,6 +105,8 @@ void Pipeline::process(const ImagePair& pair) {
   applyAnswers(images_);
   const FrameOutput output = front_end_->process({pair.t, pair.gray, pair.depth, pair.depth_lag});
   ++images_;
+  newest_taken_ = pair.t;
+  if (!(oldest_taken_ <= pair.t)) oldest_taken_ = pair.t;
   const TrackedFrame& frame = *output.frame;
   status_ = frame.status;
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});

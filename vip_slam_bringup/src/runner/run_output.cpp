@@ -181,7 +181,7 @@ void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const D
 
 std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader, const MapSnapshot& map,
                     std::size_t planes) {
-  const double duration = reader.endTime() - reader.beginTime();
+  const double duration = pipeline.duration();
   YAML::Emitter yaml;
   yaml.SetDoublePrecision(15);
   yaml << YAML::BeginMap;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <future>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -48,6 +49,10 @@ class Pipeline {
   void finish();
 
   std::size_t images() const { return images_; }
+  /// From the first to the last image, stamps, seconds; of a clock that ran back the stretches together.
+  double duration() const {
+    return newest_taken_ > oldest_taken_ ? duration_ + newest_taken_ - oldest_taken_ : duration_;
+  }
   /// Images with a pose; in order of their stamps after finish(). Where stamps ran back and come a second time, the
   /// first pass counts.
   const std::vector<OdometryPose>& odometry() const { return odometry_; }
@@ -82,6 +87,9 @@ class Pipeline {
   bool placed_ = false;                                 ///< T_map_odom_ is known for epoch_
   double newest_image_ = -1e300, newest_imu_ = -1e300;  ///< stamps, each by its own clock
   std::size_t images_ = 0;
+  double duration_ = 0;  ///< of the images before the clock last ran back
+  double oldest_taken_ = std::numeric_limits<double>::infinity();  ///< stamps of the images since then
+  double newest_taken_ = oldest_taken_;
   TimePasses passes_;
   std::vector<OdometryPose> odometry_;
   std::vector<OdometryCovariance> covariances_;
