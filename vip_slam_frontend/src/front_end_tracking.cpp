@@ -245,7 +245,9 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const bool surfaces_hold = report.surfaces_used > 0;
   const bool metric = surfaces_hold || with_depth >= options_.recovery.min_tracks;
   judge(tracked, metric, surfaces_hold, t);
-  if (phase_ == Phase::kLost && tracked.tracked >= 2 * options_.recovery.min_tracks && tracked.pose_ok) {
+  // The step from image to image is known with its length only where there is depth; who has none goes on without.
+  const bool agrees = tracked.pose_ok || t - last_metric_t_ > kBetweenDepths;
+  if (phase_ == Phase::kLost && tracked.tracked >= 2 * options_.recovery.min_tracks && agrees) {
     // The IMU went on all the time. As long as it still tells where we are, the odometry goes on, too.
     if (coastedSigma() > options_.recovery.max_position_sigma) {
       reset("features are back after LOST");
