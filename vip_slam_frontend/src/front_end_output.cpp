@@ -63,6 +63,7 @@ FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
   const bool imu_ended = imu_.empty() || t_imu - imu_.newest() > longestImuGap();
   if (phase_ != Phase::kLost && (imu_ended || t_imu - filter_.nav().t > options_.recovery.coast_seconds)) {
     phase_ = Phase::kLost;
+    status_ = {TrackingState::kLost, why};  // what is said of the images to come, until they show otherwise
     ++counters_.lost;
   }
   return statusOnly(t, phase_ == Phase::kLost ? TrackingState::kLost : TrackingState::kDegraded, why);

@@ -161,6 +161,37 @@ TEST_F(FrontEndTest, AfterLostTheOdometryGoesOnWhileTheImuStillTellsWhere) {
   EXPECT_FALSE(keyframes_[before]->imu.empty());
 }
 
+TEST_F(FrontEndTest, WithoutDepthLostIsLeftAsWell) {
+  run(0.0, 3.0);
+  run(3.0, 5.0, false, false);
+  FrameOutput output = run(5.0, 10.0, true, false);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
+  const std::size_t before = keyframes_.size();
+  output = run(10.0, 12.0, false, false);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded) << output.frame->status.reason;
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_GT(keyframes_.size(), before);
+}
+
+TEST_F(FrontEndTest, WhatIsSaidIsLostAsLongAsNoKeyframesCome) {
+  FrontEndOptions few = options();
+  few.tracking.max_features = 15;  // enough to go on with, too few to trust after LOST
+  FrontEnd front_end(few, sensor());
+  for (int k = 0; k < 180; ++k) {
+    const double t = 0.05 * k;
+    for (; imu_t_ < t + 0.02; imu_t_ += 0.005) {
+      ImuSample standing = World::imu(0);
+      standing.t = imu_t_;
+      front_end.addImu(standing);
+    }
+    const bool unusable = k >= 60 && k < 150;
+    const FrameOutput output =
+        front_end.process({t, unusable ? cv::Mat(120, 160, CV_8U) : world_.image(0), World::depth(0)});
+    if (k == 59) ASSERT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
+    if (k >= 145) EXPECT_EQ(output.frame->status.state, TrackingState::kLost) << k;
+  }
+}
+
 TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
   FrontEndOptions strict = options();
   strict.recovery.max_position_sigma = 0.05;
