@@ -4,8 +4,37 @@
 
 #include "front_end_impl.h"
 #include "vip_slam_core/depth/grid_spacing.h"
+#include "vip_slam_core/geometry/so3.h"
 
 namespace vip_slam {
+
+namespace {
+
+// What a camera in the hand may do without an IMU that tells of it, one sigma: m/s^2 and rad/s^2.
+constexpr double kUntoldAcceleration = 3.0;
+constexpr double kUntoldTurn = 5.0;
+
+/// Steady motion for `dt` seconds, where the IMU has ended; `omega`: rad/s in the body, bias taken off. The covariance
+/// grows by what may have happened meanwhile.
+void carryOn(const Eigen::Vector3d& omega, double dt, NavState* state, Matrix15d* covariance) {
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), turn = expSO3(Eigen::Vector3d(omega * dt));
+  Matrix15d F = Matrix15d::Identity();
+  F.block<3, 3>(0, 0) = turn.transpose();
+  F.block<3, 3>(0, 9) = -dt * I;
+  F.block<3, 3>(3, 6) = dt * I;
+  *covariance = (F * *covariance * F.transpose()).eval();
+  const double way = 0.5 * dt * dt * kUntoldAcceleration, speed = dt * kUntoldAcceleration;
+  const double angle = 0.5 * dt * dt * kUntoldTurn;
+  covariance->block<3, 3>(0, 0) += angle * angle * I;
+  covariance->block<3, 3>(3, 3) += way * way * I;
+  covariance->block<3, 3>(6, 6) += speed * speed * I;
+  covariance->block<3, 3>(3, 6) += way * speed * I;
+  covariance->block<3, 3>(6, 3) += way * speed * I;
+  state->T_W_I = SE3(Eigen::Matrix3d(state->T_W_I.R() * turn), state->T_W_I.t() + dt * state->v_W);
+  state->t += dt;
+}
+
+}  // namespace
 
 MountingEstimate FrontEnd::Impl::mounting() const {
   MountingEstimate mounting = filter_.mounting();
@@ -46,12 +75,16 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
   std::shared_ptr<TrackedFrame> frame = makeFrame(t, false);
   frame->status = {state, reason};
   if (filter_.started() && !imu_.empty() && std::isfinite(t)) {
-    const std::vector<ImuSample> samples = imu_.between(filter_.nav().t, std::min(t + timeOffset(), imu_.newest()));
+    const double t_imu = t + timeOffset();
+    const std::vector<ImuSample> samples = imu_.between(filter_.nav().t, std::min(t_imu, imu_.newest()));
     if (samples.size() > 1) {
       const Propagation to = filter_.predict(samples);
       frame->state = to.predicted;
       frame->covariance = to.Phi * frame->covariance * to.Phi.transpose() + to.Q;
     }
+    // The pose goes out under the image's stamp, so it has to be the one at that time. Longer than this it is LOST.
+    const double untold = std::min(t_imu - frame->state.t, longestImuGap());
+    if (untold > 0) carryOn(gyro(frame->state.t) - frame->state.bias_gyro, untold, &frame->state, &frame->covariance);
   }
   return {frame, nullptr};
 }

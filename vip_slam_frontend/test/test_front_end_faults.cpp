@@ -192,6 +192,23 @@ TEST_F(FrontEndTest, WhatIsSaidIsLostAsLongAsNoKeyframesCome) {
   }
 }
 
+TEST_F(FrontEndTest, WhereTheImuEndsThePoseGoesOnSteadilyAndIsTrustedLess) {
+  // At 3.5 s it moves at more than 0.5 m/s.
+  const FrameOutput before = run(0.0, 3.5);
+  const double last = before.frame->t, newest = imu_t_ - 0.005, t = last + 0.4;
+  const FrameOutput output = front_end_.process({t, world_.image(t), World::depth(t)});
+  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
+  EXPECT_NEAR(output.frame->state.t, t, 1e-2);
+  const Eigen::Vector3d way = output.frame->state.T_W_I.t() - before.frame->state.T_W_I.t();
+  const Eigen::Vector3d steady = 0.4 * before.frame->state.v_W;
+  ASSERT_GT(steady.norm(), 0.1);
+  EXPECT_LT((way - steady).norm(), 0.1 * steady.norm());
+  const double blind = t - newest, sigma = std::sqrt(output.frame->covariance(4, 4));
+  EXPECT_GT(sigma, blind * blind);  // of 2 m/s^2 that nobody told of
+  EXPECT_LT(error(output), 3 * sigma);
+  EXPECT_GT(std::sqrt(output.frame->covariance(0, 0)), 2 * blind * blind);
+}
+
 TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
   FrontEndOptions strict = options();
   strict.recovery.max_position_sigma = 0.05;
