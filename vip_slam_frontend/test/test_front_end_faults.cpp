@@ -209,6 +209,15 @@ TEST_F(FrontEndTest, WhereTheImuEndsThePoseGoesOnSteadilyAndIsTrustedLess) {
   EXPECT_GT(std::sqrt(output.frame->covariance(0, 0)), 2 * blind * blind);
 }
 
+TEST_F(FrontEndTest, AnIntervalOfOneUlpIsNone) {
+  const FrameOutput output = run(0.0, 3.0);
+  const double t = output.frame->state.t;
+  std::optional<NavState> state;
+  ASSERT_NO_THROW(state = front_end_.predict(std::nextafter(t, 1e9)));
+  ASSERT_TRUE(state);
+  EXPECT_EQ(state->T_W_I.t(), output.frame->state.T_W_I.t());
+}
+
 TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
   FrontEndOptions strict = options();
   strict.recovery.max_position_sigma = 0.05;

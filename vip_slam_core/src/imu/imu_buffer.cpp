@@ -6,6 +6,9 @@
 namespace vip_slam {
 namespace {
 
+// Shorter than this is no interval: within the rounding of stamps there is nothing to integrate, s.
+constexpr double kShortest = 1e-6;
+
 bool earlier(const ImuSample& sample, double t) { return sample.t < t; }
 
 }  // namespace
@@ -120,7 +123,7 @@ std::optional<ImuSample> ImuBuffer::at(double t) const {
 
 std::vector<ImuSample> ImuBuffer::between(double t0, double t1, double* max_gap) const {
   if (max_gap) *max_gap = 0;
-  if (!(t1 > t0) || !covers(t0) || !covers(t1)) return {};
+  if (!(t1 - t0 > kShortest) || !covers(t0) || !covers(t1)) return {};
   const auto begin = std::lower_bound(samples_.begin(), samples_.end(), t0, earlier);
   const auto end = std::lower_bound(begin, samples_.end(), t1, earlier);
   std::vector<ImuSample> result;
