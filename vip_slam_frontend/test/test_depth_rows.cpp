@@ -83,6 +83,20 @@ TEST(DepthRows, HolesStayHolesAndNothingIsMadeUp) {
   EXPECT_EQ(cv::countNonZero(DepthRows(camera()).atStamp(nothing, rows)), 0);
 }
 
+TEST(DepthRows, ANearSpeckCostsItselfAndNotTheColumnBelowIt) {
+  const RowPoses rows = motion();
+  const cv::Mat whole = image(&rows);
+  const int before = cv::countNonZero(DepthRows(camera()).atStamp(whole, rows));
+  for (const float z : {0.002f, 0.005f, 0.01f, 0.02f}) {
+    for (const int row : {10, 60, 115, 180}) {
+      cv::Mat read = whole.clone();
+      read.rowRange(row, row + 3) = z;
+      const cv::Mat result = DepthRows(camera()).atStamp(read, rows);
+      EXPECT_GT(cv::countNonZero(result), before - 6 * 320) << z << " m in row " << row;
+    }
+  }
+}
+
 TEST(DepthRows, AtRestNothingChanges) {
   NavState still;
   ImuSample s;

@@ -13,6 +13,8 @@ namespace {
 constexpr float kOneSurface = 0.05f;
 // A surface that is farther than this from where it was expected moved otherwise: look again.
 constexpr float kElsewhere = 0.02f;
+// Where nothing is expected yet, m.
+constexpr float kUnknownDepth = 2.f;
 
 /// Looks up 1/z, which is affine over a plane, in an image of inverse depths; 0 where nothing was read.
 inline float inverseAt(const cv::Mat& inverse, float u, float v) {
@@ -49,7 +51,7 @@ struct RowRays {
 
 /// A row of the result: what is expected there, where its pixels were read, and z at the stamp over z there.
 struct RowBuffers {
-  explicit RowBuffers(int n) : z(n, 2.f), offset(n, 0.f), u(n), v(n), gain(n), shift(n) {}
+  explicit RowBuffers(int n) : z(n, kUnknownDepth), offset(n, 0.f), u(n), v(n), gain(n), shift(n) {}
   std::vector<float> z, offset;          ///< expected depth, m, and rows from here to where it was read
   std::vector<float> u, v, gain, shift;  ///< pixel; z_stamp = gain z_read + shift
 };
@@ -123,6 +125,7 @@ cv::Mat DepthRows::atStamp(const cv::Mat& depth, const RowPoses& rows) const {
   const std::vector<RowMotion> motions = motionOfRows(rows, depth.rows);
   // Neighbours move alike: each pixel begins where the one above was found.
   RowBuffers b(n);
+  const float cols = static_cast<float>(depth.cols), height = static_cast<float>(depth.rows);
   for (int v = 0; v < depth.rows; ++v) {
     const std::size_t at = static_cast<std::size_t>(v) * n;
     const RowRays rays{&rays_.x[at], &rays_.y[at], &rays_.ux[at], &rays_.uy[at], &rays_.vx[at], &rays_.vy[at]};
@@ -136,12 +139,19 @@ cv::Mat DepthRows::atStamp(const cv::Mat& depth, const RowPoses& rows) const {
         return found > 0 ? b.gain[u] / found + b.shift[u] : 0.f;
       };
       float z = read();
+      bool misled = !(z > 0) && !(b.u[u] >= 0 && b.v[u] >= 0 && b.u[u] < cols && b.v[u] < height);
       if (z > 0 && std::abs(z - b.z[u]) > kElsewhere * z) {
         b.z[u] = z;
         findSources(rays, motion, v, u, u + 1, &b);
         z = read();
+        misled = !(z > 0);
       }
       if (z > 0) b.z[u] = z;
+      if (misled) {
+        // By a speck close to the camera, which looks far aside: the pixels below are not it and begin afresh.
+        b.z[u] = kUnknownDepth;
+        b.offset[u] = 0;
+      }
       out[u] = std::max(z, 0.f);
     }
   }
