@@ -310,6 +310,7 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth");
   changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam");
   changed("gyro: \"/g\"", "gyro: \"\"", "topics/imu");
+  changed("imu: \"\"", "imu: \"/i\"", "topics/gyro");  // both would be read, and mixed
   changed("encoding: bgr8", "encoding: rgb9", "color/encoding");
   changed("encoding: 32FC1", "encoding: 8UC1", "depth/encoding");
   changed("time_offset: -0.0123", "time_offset: .inf", "time_offset");

@@ -179,6 +179,10 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   const bool split = !config.topics.gyro.empty() && !config.topics.accel.empty();
   if (config.topics.imu.empty() && !split)
     throw std::runtime_error("topics/imu: expected one united topic, or both gyro and accel");
+  if (!config.topics.imu.empty() && (!config.topics.gyro.empty() || !config.topics.accel.empty()))
+    throw std::runtime_error(
+        "topics/imu: there are topics/gyro or topics/accel beside it, expected one united topic or the two, not all: "
+        "leave out (\"\") those that are not to be read");
 
   Section color = root.section("color");
   color.choice("encoding", config.color_encoding, {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
