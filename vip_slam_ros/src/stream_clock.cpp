@@ -6,12 +6,19 @@ namespace vip_slam {
 namespace {
 // More than any subscriber queues between two streams; if a stream still goes on by then, its time is right after all.
 constexpr int kMaxStragglers = 200;
+// Two stamps that lie so close together, seconds, both far ahead, mean the same time: it has gone on meanwhile.
+constexpr double kSameTime = 5.0;
 }  // namespace
 
 StreamClock::StreamClock(std::size_t streams, double jump) : streams_(streams), jump_(jump) {}
 
 StreamClock::Verdict StreamClock::notice(std::size_t stream, double t) {
   Stream& own = streams_.at(stream);
+  // Believed, a single stamp far ahead would make all that follow look like a jump back.
+  const bool ahead = own.newest > kNever && own.stragglers_left == 0 && t > newest_ + jump_;
+  const bool goes_on = t >= own.ahead - jump_ && t <= own.ahead + kSameTime;
+  own.ahead = ahead && !goes_on ? t : kNever;
+  if (own.ahead > kNever) return Verdict::kStray;
   const bool back = t < own.newest - jump_, confirmed = own.suspect;
   own.suspect = back && !confirmed;
   if (own.suspect) return Verdict::kStray;

@@ -53,6 +53,31 @@ TEST(StreamClock, AWrongStampNowAndThenIsNoJump) {
   EXPECT_EQ(clock.newest(0), 50.99);
 }
 
+TEST(StreamClock, AWrongStampFarAheadIsLeftOutAndWhatFollowsIsNoJump) {
+  for (const double wrong : {2.0, 30.0, 1e6}) {
+    StreamClock clock(2, 1.0);
+    for (int i = 0; i < 300; ++i) {
+      EXPECT_EQ(clock.notice(1, 50 + 0.01 * i), Verdict::kInOrder) << wrong;
+      EXPECT_EQ(clock.notice(0, 50 + 0.01 * i), Verdict::kInOrder) << wrong;
+      if (i % 10 == 5) EXPECT_EQ(clock.notice(i % 20 == 5, 50 + 0.01 * i + wrong), Verdict::kStray) << wrong;
+    }
+    EXPECT_EQ(clock.newest(), 52.99);
+  }
+}
+
+TEST(StreamClock, APauseOfAllStreamsCostsOneMessage) {
+  StreamClock clock(3, 1.0);
+  for (std::size_t stream = 0; stream < 3; ++stream) clock.notice(stream, 10.0);
+  EXPECT_EQ(clock.notice(1, 60.0), Verdict::kStray);
+  EXPECT_EQ(clock.notice(1, 60.01), Verdict::kInOrder);
+  EXPECT_EQ(clock.notice(0, 60.02), Verdict::kInOrder);  // the other stream has shown that time went on
+  EXPECT_EQ(clock.notice(1, 60.02), Verdict::kInOrder);
+  EXPECT_EQ(clock.notice(2, 60.0), Verdict::kInOrder);
+  // A stream that comes once in three seconds, alone.
+  EXPECT_EQ(clock.notice(0, 63.0), Verdict::kStray);
+  EXPECT_EQ(clock.notice(0, 66.0), Verdict::kInOrder);
+}
+
 TEST(StreamClock, AStreamThatNeverJumpsIsBelievedInTheEnd) {
   StreamClock clock(2, 1.0);
   clock.notice(0, 50);

@@ -15,6 +15,8 @@ class StreamClock {
   };
 
   /// `jump`: seconds by which stamps have to be older than the newest of their stream, two in a row: one may be wrong.
+  /// One that is newer by so much than all streams has to be followed by another of its stream as well: a pause of all
+  /// streams costs the first message after it.
   /// An image that comes late, from a slow matcher or a busy machine, is older than other streams' newest; that is not
   /// a jump.
   StreamClock(std::size_t streams, double jump);
@@ -30,15 +32,17 @@ class StreamClock {
   double lastJump() const { return last_jump_; }
 
  private:
+  static constexpr double kNever = -1e300;
   struct Stream {
-    double newest = -1e300;
-    double before_jump = -1e300;  ///< newest of all streams when time jumped
+    double newest = kNever;
+    double ahead = kNever;        ///< the last stamp, when it was far ahead and nothing has followed it yet
+    double before_jump = kNever;  ///< newest of all streams when time jumped
     bool suspect = false;         ///< the last stamp was far back
     int stragglers_left = 0;      ///< until the stream has jumped too, or this many were left out
   };
 
   std::vector<Stream> streams_;
-  double jump_, newest_ = -1e300, last_jump_ = 0;
+  double jump_, newest_ = kNever, last_jump_ = 0;
 };
 
 }  // namespace vip_slam
