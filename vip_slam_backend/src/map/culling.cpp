@@ -3,13 +3,21 @@
 #include <algorithm>
 
 namespace vip_slam {
+namespace {
+
+// Views that prove a landmark, however often it was looked for in vain: predictions know of nothing that hides it, and
+// the views of its own track count neither as predicted nor as found.
+constexpr std::size_t kProven = 4;
+
+}  // namespace
 
 int cullLandmarks(KeyframeId recent, Map* map) {
   int removed = 0;
   for (const LandmarkId id : map->landmarkIds()) {
     const MapLandmark& landmark = map->landmark(id);
     if (landmark.observations.back().keyframe >= recent) continue;
-    const bool poor = landmark.observations.size() < 3 || 5 * landmark.found < landmark.visible;
+    const std::size_t views = landmark.observations.size();
+    const bool poor = views < 3 || (views < kProven && 5 * landmark.found < landmark.visible);
     if (!poor) continue;
     map->removeLandmark(id);
     ++removed;

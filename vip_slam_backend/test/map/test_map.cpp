@@ -275,6 +275,27 @@ TEST(Map, CullingKeepsTheMapValid) {
     if (entry.second.preintegration) EXPECT_LE(entry.second.preintegration->dt(), options.max_imu_seconds + 1e-9);
 }
 
+// What stands before a landmark hides it from keyframes that it is predicted into: many views of a track outweigh that.
+TEST(Map, LandmarksOfManyViewsAreKeptHoweverOftenTheyAreHidden) {
+  Fixture f;
+  f.add(30);
+  LandmarkId proven = kNoLandmark, doubtful = kNoLandmark, of_three = kNoLandmark;
+  for (const LandmarkId id : f.map.landmarkIds()) {
+    const MapLandmark& l = f.map.landmark(id);
+    if (l.observations.back().keyframe >= 29) continue;
+    if (l.observations.size() > 3) proven = id;
+    if (l.observations.size() == 3) (doubtful == kNoLandmark ? doubtful : of_three) = id;
+  }
+  ASSERT_NE(proven, kNoLandmark);
+  ASSERT_NE(of_three, kNoLandmark);
+  f.map.landmark(proven).visible = f.map.landmark(doubtful).visible = 40;
+  cullLandmarks(29, &f.map);
+  EXPECT_TRUE(f.map.hasLandmark(proven));
+  EXPECT_TRUE(f.map.hasLandmark(of_three));
+  EXPECT_FALSE(f.map.hasLandmark(doubtful));
+  EXPECT_EQ(checkMap(f.map), "");
+}
+
 TEST(Map, CheckerSeesDamage) {
   Fixture f;
   f.add(3);

@@ -8,8 +8,9 @@
 
 namespace vip_slam {
 
-/// Removes landmarks with fewer than three views once their track ended, and those that are predicted into keyframes
-/// far more often than found. Landmarks that a keyframe at or above `recent` sees are spared. Returns their number.
+/// Removes landmarks with fewer than three views once their track ended, and those with hardly more that are predicted
+/// into keyframes far more often than found. Landmarks that a keyframe at or above `recent` sees are spared. Returns
+/// their number.
 int cullLandmarks(KeyframeId recent, Map* map);
 
 /// Removes keyframes outside the newest `window` whose landmarks are seen elsewhere, at least `redundancy` of them by
