@@ -75,6 +75,11 @@ bool Map::setPlaneObservation(const PlaneObservation& observation) {
   for (const PlanePoint& p : observation.points)
     if (!p.p_C.allFinite() || !(p.sigma > 0)) return false;
   MapKeyframe& kf = keyframe(observation.keyframe);
+  // Kept without points it would count as one that fits perfectly.
+  if (observation.points.empty()) {
+    kf.planes.erase(observation.plane);
+    return true;
+  }
   PlaneObservation& stored = kf.planes[observation.plane] = observation;
   // The plane module may not have heard yet of what its keyframe's depth is corrected by now.
   setDepthCorrection(kf.data->frame.depth_correction, &stored);

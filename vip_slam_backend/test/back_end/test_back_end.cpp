@@ -428,6 +428,7 @@ TEST(BackEnd, SurvivesPoorKeyframes) {
       once.keyframe = kf.id;
       once.plane = 50;
       once.G = 100 * Eigen::Matrix4d::Identity();
+      once.points.push_back({Eigen::Vector3f(0, 0, 1), 0.1f});
       planes.observations.push_back(once);
       PlaneEstimate broken;
       broken.id = 51;

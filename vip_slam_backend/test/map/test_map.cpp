@@ -244,6 +244,22 @@ TEST(Map, PlanesMergeAndGo) {
   EXPECT_THROW(f.map.setPlane(nan_plane), MapError);
 }
 
+// Samples that turn out to lie on something else are withdrawn by an observation without points.
+TEST(Map, AnEmptyObservationWithdrawsTheOneBefore) {
+  Fixture f;
+  f.add(3);
+  const PlaneUpdate update = f.world.planes();
+  for (const PlaneEstimate& plane : update.planes) f.map.setPlane(plane);
+  const PlaneObservation& seen = update.observations.at(0);
+  ASSERT_TRUE(f.map.setPlaneObservation(seen));
+  PlaneObservation none;
+  none.keyframe = seen.keyframe;
+  none.plane = seen.plane;
+  EXPECT_TRUE(f.map.setPlaneObservation(none));
+  EXPECT_TRUE(f.map.keyframe(seen.keyframe).planes.empty());
+  EXPECT_EQ(checkMap(f.map), "");
+}
+
 TEST(Map, CorrectionMovesLandmarksWithTheirHost) {
   Fixture f;
   f.add(4);

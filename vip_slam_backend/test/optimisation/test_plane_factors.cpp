@@ -50,6 +50,7 @@ struct Wall {
     seen.plane = 1;
     seen.keyframe = 1;
     seen.G = Eigen::Matrix4d::Identity();
+    seen.points.push_back({Eigen::Vector3f(0, 0, 3), 1.0f});
     map.setPlaneObservation(seen);
     for (int l = 0; l < kLandmarks; ++l) {
       map.addLandmark(l + 1, point(l), {1, static_cast<std::uint32_t>(l)});

@@ -83,7 +83,8 @@ class Map {
   void removePlane(PlaneId id);
   bool hasPlane(PlaneId id) const { return planes_.count(id) != 0; }
   const std::map<PlaneId, MapPlane>& planes() const { return planes_; }
-  /// Ignored (false) when keyframe or plane are gone, or the numbers are not finite.
+  /// One without points withdraws that of the same keyframe and plane. Ignored (false) when keyframe or plane are gone,
+  /// or the numbers are not finite.
   bool setPlaneObservation(const PlaneObservation& observation);
   /// 0 removes the association.
   void associate(LandmarkId landmark, PlaneId plane);
