@@ -58,7 +58,8 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
       if (id != kNoLandmark) landmarks.insert(id);
   }
   for (const LandmarkId id : landmarks) update->landmarks.push_back(estimateOf(map.landmark(id)));
-  for (const PlaneId id : built.planes) update->planes.emplace_back(id, map.planes().at(id).estimate.plane);
+  for (const PlaneId id : built.planes)
+    if (map.planes().at(id).optimised) update->planes.emplace_back(id, map.planes().at(id).estimate.plane);
 }
 
 void BackEnd::Impl::cull(MapUpdate* update) {

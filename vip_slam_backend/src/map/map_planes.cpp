@@ -31,6 +31,12 @@ void Map::setPlaneParameters(PlaneId id, const Plane& parameters) {
   it->second.optimised = true;
 }
 
+void Map::movePlane(PlaneId id, const SE3& motion) {
+  const auto it = planes_.find(id);
+  if (it == planes_.end()) throw MapError("no plane " + std::to_string(id) + " in the map");
+  it->second.estimate.plane = transformPlane(motion, it->second.estimate.plane);
+}
+
 void Map::mergePlanes(PlaneId from, PlaneId into) {
   if (from == into || !hasPlane(from)) return;
   if (!hasPlane(into)) {

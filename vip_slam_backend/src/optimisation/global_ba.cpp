@@ -38,6 +38,12 @@ void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map*
   for (const auto& entry : map->keyframes())
     if (!solved.count(entry.first)) moved[entry.first] = motion * entry.second.state.T_W_I;
   map->moveKeyframes(moved);
+  std::set<PlaneId> seen, seen_by_solved;
+  for (const auto& entry : map->keyframes())
+    for (const auto& plane : entry.second.planes)
+      (moved.count(entry.first) ? seen : seen_by_solved).insert(plane.first);
+  for (const PlaneId id : seen)
+    if (!seen_by_solved.count(id)) map->movePlane(id, motion);
   storeProblem(solution.built, noise, map);
 }
 

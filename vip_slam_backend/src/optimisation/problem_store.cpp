@@ -49,6 +49,17 @@ void storePlanePoints(const BuiltProblem& built, Map* map, LandmarkSet* done) {
   }
 }
 
+// Planes that some factor holds. Others have only the prior of their kind, or nothing: where a window saw them but none
+// of its depth was believed.
+std::vector<char> heldPlanes(const BaProblem& problem) {
+  std::vector<char> held(problem.planes.size(), 0);
+  for (const BaPointToPlane& f : problem.point_to_plane) held[f.plane] = 1;
+  for (const BaPlanePoint& f : problem.plane_points) held[f.plane] = 1;
+  for (const BaHomography& f : problem.homographies) held[f.plane] = 1;
+  for (const BaHomographyPair& f : problem.homography_pairs) held[f.plane] = 1;
+  return held;
+}
+
 }  // namespace
 
 void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
@@ -65,8 +76,9 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
     motion.emplace_back(built.frames[f], state.T_W_I * map->keyframe(built.frames[f]).state.T_W_I.inverse());
     map->setState(built.frames[f], state, noise);
   }
+  const std::vector<char> held = heldPlanes(problem);
   for (std::size_t p = 0; p < built.planes.size(); ++p)
-    if (map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
+    if (held[p] && map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
   LandmarkSet done(built.points.size() + built.plane_points.size());
   for (std::size_t p = 0; p < built.points.size(); ++p) {
     if (done.contains(built.points[p])) continue;  // another track of it

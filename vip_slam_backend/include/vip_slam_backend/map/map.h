@@ -79,6 +79,8 @@ class Map {
   /// Adds or updates; keeps our parameters when the plane was optimised already.
   void setPlane(const PlaneEstimate& estimate);
   void setPlaneParameters(PlaneId id, const Plane& plane);
+  /// Takes it to where `motion`, new from old world, has brought the keyframes that see it.
+  void movePlane(PlaneId id, const SE3& motion);
   void mergePlanes(PlaneId from, PlaneId into);
   void removePlane(PlaneId id);
   bool hasPlane(PlaneId id) const { return planes_.count(id) != 0; }

@@ -29,8 +29,8 @@ struct GlobalBaSolution {
 /// weights).
 GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job);
 
-/// Writes the solution into `map`. Keyframes and landmarks that came meanwhile move rigidly with the newest keyframe of
-/// the solution; what was removed meanwhile stays removed.
+/// Writes the solution into `map`. Keyframes and landmarks that came meanwhile, and planes that only such keyframes
+/// see, move rigidly with the newest keyframe of the solution; what was removed meanwhile stays removed.
 void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map* map);
 
 }  // namespace vip_slam
