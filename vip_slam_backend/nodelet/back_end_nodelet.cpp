@@ -152,7 +152,7 @@ void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {
 
 void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
   const double t = msg.frame.header.stamp.toSec();
-  barrier_.see(t, msg.frame.epoch);
+  barrier_.seeKeyframe(t, msg.frame.epoch);
   if (!back_end_ || !barrier_.passes(t, msg.frame.epoch)) return;
   const auto keyframe = std::make_shared<const Keyframe>(fromMsg(msg));
   display_.addKeyframe(*keyframe);

@@ -11,12 +11,15 @@ namespace vip_slam {
 /// Thread-safe: frames come in at image rate beside the owner of the map.
 class ResetBarrier {
  public:
-  /// A frame or keyframe came in.
+  /// A frame came in.
   void see(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
-    t_ = std::max(t_, t);
-    epoch_ = std::max(epoch_, epoch);
-    seen_ = true;
+    take(t, epoch);
+  }
+  void seeKeyframe(double t, std::uint32_t epoch) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    take(t, epoch);
+    if (epoch == epoch_) has_keyframe_ = true;
   }
 
   /// Puts the barrier after all that was seen so far.
@@ -25,13 +28,16 @@ class ResetBarrier {
     raised_ = seen_;
     barrier_t_ = t_;
     barrier_epoch_ = epoch_;
+    epoch_ends_ = has_keyframe_;
   }
 
   /// True for what is later than the barrier. A later epoch of the odometry is, whatever its stamps, and lifts it:
-  /// device time may begin anew.
+  /// device time may begin anew. Nothing more of an epoch that had keyframes is: the front end leaves it when it obeys,
+  /// and the images that it finished before are of the old odometry. One that still waits for a start keeps its epoch.
   bool passes(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
     if (raised_ && epoch > barrier_epoch_) raised_ = false;
+    if (raised_ && epoch == barrier_epoch_ && epoch_ends_) return false;
     return !raised_ || t > barrier_t_;
   }
 
@@ -41,8 +47,17 @@ class ResetBarrier {
   }
 
  private:
+  void take(double t, std::uint32_t epoch) {
+    t_ = std::max(t_, t);
+    if (epoch > epoch_) has_keyframe_ = false;
+    epoch_ = std::max(epoch_, epoch);
+    seen_ = true;
+  }
+
   mutable std::mutex mutex_;
   bool seen_ = false, raised_ = false;
+  bool has_keyframe_ = false;  ///< of epoch_
+  bool epoch_ends_ = false;    ///< barrier_epoch_ had keyframes
   double t_ = -1e300, barrier_t_ = 0;
   std::uint32_t epoch_ = 0, barrier_epoch_ = 0;
 };

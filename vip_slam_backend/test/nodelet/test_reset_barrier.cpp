@@ -17,6 +17,22 @@ TEST(ResetBarrier, HoldsBackWhatWasOnItsWay) {
   EXPECT_TRUE(barrier.passes(12.1, 0));
 }
 
+// Images that the front end finished before it obeyed have later stamps, but are of the odometry that is forgotten.
+TEST(ResetBarrier, AnEpochThatHadKeyframesIsOver) {
+  ResetBarrier barrier;
+  barrier.seeKeyframe(11.5, 2);
+  barrier.see(12.0, 2);
+  barrier.raise();
+  barrier.seeKeyframe(12.1, 2);
+  EXPECT_FALSE(barrier.passes(12.1, 2));
+  EXPECT_TRUE(barrier.passes(12.2, 3));
+  // Of epoch 3 nothing but frames of a front end that has not begun: it keeps that epoch.
+  barrier.see(12.3, 4);
+  barrier.raise();
+  EXPECT_FALSE(barrier.passes(12.3, 4));
+  EXPECT_TRUE(barrier.passes(12.4, 4));
+}
+
 TEST(ResetBarrier, ALaterEpochLiftsIt) {
   ResetBarrier barrier;
   barrier.see(12.0, 3);
