@@ -4,6 +4,9 @@
 #include <cmath>
 #include <map>
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
 #include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
@@ -44,6 +47,26 @@ Matrix6d diagonalSqrtInformation(double sigma_angle, double sigma_position) {
   L.diagonal().head<3>().setConstant(1.0 / sigma_angle);
   L.diagonal().tail<3>().setConstant(1.0 / sigma_position);
   return L;
+}
+
+Matrix6d loopSqrtInformation(const Matrix6d& camera_information, const SE3& T_W_match, const SE3& T_W_query,
+                             const SE3& T_I_C, const PoseGraphOptions& options) {
+  Matrix6d covariance = Matrix6d::Zero();
+  const Eigen::FullPivLU<Matrix6d> lu(camera_information);
+  if (lu.isInvertible()) {
+    // From the query camera's perturbation to the residual: theta_I = R_I_C theta_C turns the arm from camera to body,
+    // and positions are compared in the match's frame.
+    const Eigen::Matrix3d R_match_W = T_W_match.R().transpose();
+    Matrix6d J = Matrix6d::Zero();
+    J.topLeftCorner<3, 3>() = T_I_C.R();
+    J.bottomLeftCorner<3, 3>() = R_match_W * T_W_query.R() * hat(T_I_C.t()) * T_I_C.R();
+    J.bottomRightCorner<3, 3>() = R_match_W;
+    covariance = J * lu.inverse() * J.transpose();
+  }
+  const double angle = options.loop_sigma_angle_deg * kDegree;
+  covariance.diagonal().head<3>().array() += angle * angle;
+  covariance.diagonal().tail<3>().array() += options.loop_sigma_position * options.loop_sigma_position;
+  return covariance.inverse().llt().matrixU();
 }
 
 std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,

@@ -5,9 +5,6 @@
 #include <map>
 #include <set>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
 #include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/loop/loop_closer.h"
 #include "vip_slam_backend/loop/loop_fusion.h"
@@ -17,24 +14,6 @@ namespace vip_slam {
 namespace {
 
 constexpr int kFusedNeighbours = 8;
-
-// Information of the relative pose, never better than the floor.
-Matrix6d loopSqrtInformation(const PlaceVerification& place, const SE3& T_I_C, const PoseGraphOptions& options) {
-  Matrix6d covariance = Matrix6d::Zero();
-  const Eigen::FullPivLU<Matrix6d> lu(place.information);
-  if (lu.isInvertible()) {
-    // From the camera's perturbation to the body's: theta_C = R_I_C^T theta_I; position error grows with the arm.
-    const Matrix6d camera = lu.inverse();
-    Matrix6d J = Matrix6d::Zero();
-    J.topLeftCorner<3, 3>() = T_I_C.R();
-    J.bottomRightCorner<3, 3>() = place.T_W_I.R().transpose();
-    covariance = J * camera * J.transpose();
-  }
-  const double angle = options.loop_sigma_angle_deg * M_PI / 180.0;
-  covariance.diagonal().head<3>().array() += angle * angle;
-  covariance.diagonal().tail<3>().array() += options.loop_sigma_position * options.loop_sigma_position;
-  return covariance.inverse().llt().matrixU();
-}
 
 std::set<KeyframeId> withNeighbours(const Map& map, KeyframeId id, std::size_t most) {
   std::set<KeyframeId> result{id};
@@ -95,8 +74,10 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
       if (ours) graph.addPlane(plane.first, transformPlane(correction, plane.second.estimate.plane));
     }
   }
+  const SE3& T_W_match = map.keyframe(place.match).state.T_W_I;
   graph.addEdge(
-      RelativePoseEdge{place.match, query, T_match_query, loopSqrtInformation(place, kf.T_I_C, options_.graph)});
+      RelativePoseEdge{place.match, query, T_match_query,
+                       loopSqrtInformation(place.information, T_W_match, place.T_W_I, kf.T_I_C, options_.graph)});
   const PosePlaneSolution solution = graph.solve(options_.graph.max_iterations);
   if (!solution.usable || solution.chi2 > options_.graph.max_chi2) {
     std::snprintf(text, sizeof text, "closing it costs the graph chi2 %.1f, at most %.1f (moves %.3f m)", solution.chi2,

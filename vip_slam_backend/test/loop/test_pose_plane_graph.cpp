@@ -2,6 +2,7 @@
 
 #include <random>
 
+#include "vip_slam_backend/factors/relative_pose.h"
 #include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/loop/pose_plane_graph.h"
 
@@ -110,6 +111,29 @@ TEST_F(GraphTest, SeparatePartsAreHeldSeparately) {
   EXPECT_LT(s.T_W_I.at(1000).t().norm(), 1e-12);
   EXPECT_NEAR(s.T_W_I.at(1001).t().x(), 2.0, 1e-6);
   EXPECT_LT(s.chi2, 1e-9);
+}
+
+// What the camera's pose is not sure of becomes the residual's, which has the match's axes.
+TEST(Graph, ALoopIsAsSureAsItsCamera) {
+  const SE3 T_W_match(expQuaternion({0.3, -0.2, 1.5}), {1, 2, 3}),
+      T_W_query(expQuaternion({-0.1, 0.4, -0.9}), {2, 0, 1});
+  const SE3 T_I_C(expQuaternion({0.5, 1.2, -0.4}), {0.3, -0.2, 0.1});
+  Vector6d sigma;
+  sigma << 0.01, 0.02, 0.03, 0.002, 0.05, 0.2;
+  const Matrix6d camera = sigma.cwiseAbs2().asDiagonal();
+  PoseGraphOptions options;
+  options.loop_sigma_angle_deg = options.loop_sigma_position = 1e-6;
+  const Matrix6d L = loopSqrtInformation(camera.inverse(), T_W_match, T_W_query, T_I_C, options);
+
+  const SE3 T_W_C = T_W_query * T_I_C, T_match_query = T_W_match.inverse() * T_W_query;
+  Matrix6d J;
+  for (int k = 0; k < 6; ++k) {
+    constexpr double kStep = 1e-6;
+    const SE3 moved = T_W_C.boxplus(kStep * Vector6d::Unit(k)) * T_I_C.inverse();
+    J.col(k) = relativePoseResidual(T_W_match, moved, T_match_query) / kStep;
+  }
+  const Matrix6d expected = J * camera * J.transpose();
+  EXPECT_LT(((L.transpose() * L).inverse() - expected).norm(), 1e-4 * expected.norm());
 }
 
 TEST(Graph, RefusesUnknownNodes) {

@@ -15,6 +15,12 @@ namespace vip_slam {
 /// Diagonal square-root information of a relative pose: angles in radians, position in metres, one sigma each.
 Matrix6d diagonalSqrtInformation(double sigma_angle, double sigma_position);
 
+/// Square-root information of the edge from `match` to `query` (frames as in factors/relative_pose.h), never better
+/// than the options' floor. `camera_information`: of the perturbation (theta, t) of the query's camera pose in the
+/// world; singular: the floor alone.
+Matrix6d loopSqrtInformation(const Matrix6d& camera_information, const SE3& T_W_match, const SE3& T_W_query,
+                             const SE3& T_I_C, const PoseGraphOptions& options);
+
 /// All measurements at their present values (the graph is at its minimum), except for what the caller adds. `loops`:
 /// accepted ones (query, match); `same_planes`: (from, into) are one surface; `min_seconds`: keyframes nearer in time
 /// are joined by odometry alone.
