@@ -57,8 +57,9 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
   // chance.
   const std::set<KeyframeId> part = connectedKeyframes(map, keyframe->id, loop_closer.loops());
-  const ReobservationResult found =
-      reobservation.process(keyframe->id, &map, [&part](KeyframeId id) { return part.count(id) != 0; });
+  const auto in_part = [&part](KeyframeId id) { return part.count(id) != 0; };
+  maker.process(keyframe->id, &map, in_part);
+  const ReobservationResult found = reobservation.process(keyframe->id, &map, in_part);
   statistics.reobserved += found.found;
   statistics.merged += found.merged;
 }

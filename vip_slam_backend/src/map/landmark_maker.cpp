@@ -6,7 +6,7 @@
 
 namespace vip_slam {
 
-int LandmarkMaker::process(KeyframeId id, Map* map) {
+int LandmarkMaker::process(KeyframeId id, Map* map, const std::function<bool(KeyframeId)>& allowed) {
   const KeyframePtr data = map->keyframe(id).data;
   const SE3 T_W_C = map->keyframe(id).T_W_C(), T_C_W = T_W_C.inverse();
   std::unordered_map<LandmarkId, std::vector<MapObservation>> still_waiting;
@@ -17,6 +17,8 @@ int LandmarkMaker::process(KeyframeId id, Map* map) {
     const MapObservation here{id, k};
     const LandmarkId known = map->resolve(f.id);
     if (const MapLandmark* landmark = map->findLandmark(known)) {
+      // The front end looks for the map's landmarks also where only a guess says that they should be.
+      if (allowed && !allowed(landmark->host())) continue;
       const Eigen::Vector3d p = T_C_W * landmark->p_W;
       const bool near =
           p.z() > 0.05 && (p.head<2>() / p.z() - f.xy.cast<double>()).norm() * options_.focal < options_.gate_px;
@@ -31,7 +33,7 @@ int LandmarkMaker::process(KeyframeId id, Map* map) {
     const auto waited = waiting_.find(f.id);
     if (waited != waiting_.end())
       for (const MapObservation& o : waited->second) {
-        if (!map->hasKeyframe(o.keyframe)) continue;
+        if (!map->hasKeyframe(o.keyframe) || (allowed && !allowed(o.keyframe))) continue;
         const LandmarkId taken = map->keyframe(o.keyframe).landmarks[o.feature];
         if (taken != kNoLandmark)
           recognised = taken;

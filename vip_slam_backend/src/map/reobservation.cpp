@@ -53,6 +53,7 @@ std::vector<KeyframeId> Reobservation::neighbours(const Map& map, KeyframeId id,
   const std::size_t limit = static_cast<std::size_t>(options_.keyframes);
   for (const auto& c : map.covisible(id, 3)) {
     if (chosen.size() >= limit / 2) break;
+    if (allowed && !allowed(c.first)) continue;
     chosen.push_back(c.first);
     taken.insert(c.first);
   }

@@ -5,6 +5,7 @@
 #include "vip_slam_backend/map/culling.h"
 #include "vip_slam_backend/map/landmark_maker.h"
 #include "vip_slam_backend/map/map_checker.h"
+#include "vip_slam_backend/map/reobservation.h"
 
 using namespace vip_slam;
 
@@ -160,6 +161,26 @@ TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {
   }
   EXPECT_FALSE(map.hasLandmark(900));
   EXPECT_GE(map.landmark(800).observations.size(), 3u);
+}
+
+// Texture repeats itself: what a new odometry finds where it guesses to be need not be what the map has there.
+TEST(Map, LandmarksOfAPartThatNothingTiesAreNotMet) {
+  for (const bool tied : {true, false}) {
+    Fixture f;
+    f.add(4);
+    const auto allowed = [tied](KeyframeId id) { return tied || id > 4; };
+    const KeyframePtr kf = f.world.next();  // tracks go on under their names
+    f.map.addKeyframe(kf, f.world.truth(kf->frame.t), ImuNoise());
+    f.maker.process(kf->id, &f.map, allowed);
+    const bool meets = !f.map.covisible(kf->id).empty();
+    EXPECT_EQ(meets, tied);
+    // Some share landmarks already: by the name of a track, or through a third keyframe.
+    Fixture shared;
+    shared.add(5);
+    const Reobservation reobservation({}, makeCamera(shared.world.sensor().camera));
+    EXPECT_EQ(reobservation.neighbours(shared.map, 5, allowed).empty(), !tied);
+    EXPECT_EQ(checkMap(f.map), "");
+  }
 }
 
 TEST(Map, RemovingAKeyframeJoinsTheImuChain) {

@@ -2,6 +2,7 @@
 // depth wait until two keyframes see them under enough parallax.
 #pragma once
 
+#include <functional>
 #include <unordered_map>
 #include <vector>
 
@@ -18,8 +19,10 @@ struct LandmarkMakerOptions {
 class LandmarkMaker {
  public:
   explicit LandmarkMaker(const LandmarkMakerOptions& options) : options_(options) {}
-  /// Handles all tracked features of a keyframe that is in the map. Returns the number of new landmarks.
-  int process(KeyframeId id, Map* map);
+  /// Handles all tracked features of a keyframe that is in the map. Returns the number of new landmarks. `allowed`
+  /// names the keyframes whose landmarks may be met (empty: all); a track that bears the name of another one has no
+  /// landmark.
+  int process(KeyframeId id, Map* map, const std::function<bool(KeyframeId)>& allowed = {});
   void clear() { waiting_.clear(); }
 
  private:
