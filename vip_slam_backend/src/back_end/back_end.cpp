@@ -135,7 +135,10 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
       finishUpdate(&update);
       return update;
     }
-    if (!map.hasKeyframe(keyframe->id)) insert(keyframe);
+    if (!map.hasKeyframe(keyframe->id)) {
+      insert(keyframe);
+      tieToLastFound(keyframe);
+    }
   } catch (const MapError& e) {
     refusal = e.what();
     ++statistics.keyframes_refused;
@@ -215,6 +218,7 @@ void BackEnd::Impl::reset() {
   relocaliser.clear();
   held.clear();
   localised.clear();
+  last_found.reset();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;

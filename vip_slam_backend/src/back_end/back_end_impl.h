@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -71,6 +72,8 @@ struct BackEnd::Impl {
   bool enterLoadedMap(const KeyframePtr& keyframe);
   /// Localisation only: T_map_odom follows, the map stays.
   void localise(const KeyframePtr& keyframe);
+  /// The first keyframe that is mapped after localisation only: its odometry's place in the map is known.
+  void tieToLastFound(const KeyframePtr& keyframe);
 
   // back_end_loops.cpp
   /// Enters the newest keyframe into the place database and closes a loop there when there is one.
@@ -91,6 +94,14 @@ struct BackEnd::Impl {
   bool localisation_only = false;
   std::deque<KeyframePtr> held;   ///< keyframes that wait for that
   std::vector<Anchor> localised;  ///< keyframes found in the map without entering it
+
+  /// Localisation only: the last keyframe found in the map, to which the odometry is tied when mapping goes on.
+  struct LastFound {
+    std::uint32_t epoch = 0;
+    KeyframeId match = 0;
+    double t = 0;
+  };
+  std::optional<LastFound> last_found;
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;

@@ -3,6 +3,11 @@
 #include "vip_slam_backend/map_io/map_file.h"
 
 namespace vip_slam {
+namespace {
+
+constexpr double kRecent = 5.0;  // seconds for which the odometry carries what localisation found
+
+}  // namespace
 
 void BackEnd::Impl::saveMap(const std::string& path) const {
   saveMapFile(path, map, loop_closer.loops(), loop_closer.vocabulary().id(), sensor.camera);
@@ -81,6 +86,15 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   const SE3& T_odom_I = keyframe->frame.state.T_W_I;
   T_map_odom = alignLevelled(found->T_W_I, T_odom_I);
   localised.push_back({keyframe->frame.t, epoch, T_odom_I, T_map_odom * T_odom_I, SE3()});
+  last_found = LastFound{epoch, found->match, keyframe->frame.t};
+}
+
+void BackEnd::Impl::tieToLastFound(const KeyframePtr& keyframe) {
+  if (!last_found) return;
+  const double since = keyframe->frame.t - last_found->t;
+  if (keyframe->frame.epoch == last_found->epoch && since >= 0 && since < kRecent && map.hasKeyframe(last_found->match))
+    loop_closer.tie(map, keyframe->id, last_found->match);
+  last_found.reset();
 }
 
 }  // namespace vip_slam

@@ -172,3 +172,39 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   back_end.reset();
   EXPECT_TRUE(back_end.snapshot().localised.empty());
 }
+
+TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
+  const std::string path = ::testing::TempDir() + "mapped_on.vsm";
+  SimulatedKeyframes world(4);
+  BackEnd mapper(options(), world.sensor());
+  for (int k = 0; k < 25; ++k) {
+    mapper.addKeyframe(world.next());
+    mapper.applyPlaneUpdate(world.planes());
+  }
+  mapper.saveMap(path);
+  for (const double pause : {0.0, 60.0}) {  // seconds in which nothing was found
+    SimulatedKeyframes session(4);
+    BackEnd back_end(options(), world.sensor());
+    back_end.loadMap(path);
+    back_end.setLocalisationMode(true);
+    for (int k = 0; k < 20; ++k) {
+      auto kf = std::make_shared<Keyframe>(*session.next());
+      kf->id += 1000;
+      kf->previous = 0;
+      kf->frame.epoch = 7;
+      if (k == 18) {
+        ASSERT_GT(back_end.snapshot().localised.size(), 10u);
+        back_end.setLocalisationMode(false);
+      }
+      if (k >= 18) kf->frame.t += pause;
+      back_end.addKeyframe(kf);
+      EXPECT_EQ(back_end.lastRefusal(), "");
+    }
+    EXPECT_EQ(back_end.map().keyframe(1019).loop_keyframe, pause == 0);
+    EXPECT_FALSE(back_end.map().keyframe(1020).loop_keyframe);
+    bool meets = false;
+    for (const auto& [id, shared] : back_end.map().covisible(1020)) meets = meets || id <= 25;
+    EXPECT_EQ(meets, pause == 0);
+    EXPECT_EQ(checkMap(back_end.map()), "");
+  }
+}
