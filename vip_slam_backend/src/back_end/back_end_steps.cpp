@@ -69,7 +69,8 @@ void BackEnd::Impl::cull(MapUpdate* update) {
     std::advance(it, 2);
     cullLandmarks(it->first, &map);
   }
-  const auto removed = cullKeyframes(options.culling, options.local_ba.window, sensor.imu_noise, &map);
+  const auto removed =
+      cullKeyframes(options.culling, options.local_ba.window, sensor.imu_noise, loop_closer.loops(), &map);
   statistics.keyframes_culled += removed.size();
   for (const KeyframeId id : removed) loop_closer.remove(id);
   update->landmarks.erase(std::remove_if(update->landmarks.begin(), update->landmarks.end(),

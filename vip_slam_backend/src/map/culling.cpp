@@ -1,6 +1,8 @@
 #include "vip_slam_backend/map/culling.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 namespace vip_slam {
 namespace {
@@ -31,6 +33,7 @@ constexpr int kJudged = 10;                // keyframes that just left the windo
 constexpr std::size_t kSmallMap = 3;       // times the keyframes that are a crowd: all together they cost little
 constexpr std::size_t kAtOnce = 2;         // out of a crowd, which is another one without them
 constexpr double kLongest = 10.0;          // times the longest IMU factor, in a crowd
+constexpr int kTies = 5;                   // loops between two odometries that are kept
 constexpr std::size_t kSeenElsewhere = 4;  // views of a landmark that can do without one
 
 /// Those whose time has come, oldest first: what just left the window, and each older one again and again.
@@ -47,11 +50,18 @@ std::vector<KeyframeId> candidates(const Map& map, int window) {
   return list;
 }
 
-bool ofOneOdometry(const Map& map) {
-  const auto& keyframes = map.keyframes();
-  const std::uint32_t epoch = keyframes.begin()->second.data->frame.epoch;
-  return std::all_of(keyframes.begin(), keyframes.end(),
-                     [epoch](const auto& entry) { return entry.second.data->frame.epoch == epoch; });
+/// Ends of the oldest few loops between each two odometries: without any these would be parts that nothing ties.
+std::set<KeyframeId> endsOfTies(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> count;
+  std::set<KeyframeId> ends;
+  for (const auto& [query, match] : loops) {
+    if (!map.hasKeyframe(query) || !map.hasKeyframe(match)) continue;
+    const std::uint32_t a = map.keyframe(query).data->frame.epoch, b = map.keyframe(match).data->frame.epoch;
+    if (a == b || ++count[std::minmax(a, b)] > kTies) continue;
+    ends.insert(query);
+    ends.insert(match);
+  }
+  return ends;
 }
 
 /// Landmarks with fewer than `proven` views do not count.
@@ -76,13 +86,14 @@ bool isRedundant(const MapKeyframe& kf, const Map& map, double redundancy, std::
 
 }  // namespace
 
-std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise, Map* map) {
+std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise,
+                                      const std::vector<std::pair<KeyframeId, KeyframeId>>& loops, Map* map) {
   std::vector<KeyframeId> removed;
   if (!options.enabled || map->keyframes().size() <= static_cast<std::size_t>(window)) return removed;
   const bool too_large = map->keyframes().size() > static_cast<std::size_t>(std::max(3, options.above_keyframes));
   const bool crowds = map->keyframes().size() > kSmallMap * static_cast<std::size_t>(options.above_covisible);
   if (!too_large && !crowds) return removed;
-  const bool one_odometry = ofOneOdometry(*map);
+  const std::set<KeyframeId> ties = endsOfTies(*map, loops);
   std::size_t out_of_crowds = 0;
   for (const KeyframeId id : candidates(*map, window)) {
     const MapKeyframe& kf = map->keyframe(id);
@@ -92,7 +103,7 @@ std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window,
         crowds ? static_cast<double>(map->covisible(id).size()) / static_cast<double>(options.above_covisible) : 0.0;
     if (!too_large && (crowd <= 1 || out_of_crowds >= kAtOnce)) continue;
     // Where a room is seen again and again every keyframe is the end of some loop, and landmarks say the same.
-    if (kf.loop_keyframe && (crowd <= 1 || !one_odometry)) continue;
+    if (kf.loop_keyframe && (crowd <= 1 || ties.count(id) != 0)) continue;
     // A limit on time alone lets a room grow for as long as one stays in it; steep, so that what is no crowd keeps its
     // IMU.
     const double longest = options.max_imu_seconds * std::clamp(crowd * crowd * crowd, 1.0, kLongest);

@@ -305,7 +305,7 @@ TEST(Map, CullingKeepsTheMapValid) {
   CullingOptions options;
   options.redundancy = 0.5;
   options.above_keyframes = 20;
-  const auto removed = cullKeyframes(options, 20, ImuNoise(), &f.map);
+  const auto removed = cullKeyframes(options, 20, ImuNoise(), {}, &f.map);
   EXPECT_FALSE(removed.empty());
   EXPECT_EQ(checkMap(f.map), "");
   for (const auto& entry : f.map.keyframes())
