@@ -90,7 +90,9 @@ void BackEndNodelet::subscribe() {
       }));
   subscribers_.push_back(
       nh.subscribe<vip_slam_msgs::PlaneUpdate>("plane_update", 50, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
-        owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); });
+        if (!owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); })) {
+          NODELET_WARN_THROTTLE(5, "the back end is too slow: an update of the planes was dropped");
+        }
       }));
   subscribers_.push_back(getMTNodeHandle().subscribe<vip_slam_msgs::TrackedFrame>(
       "tracked_frame", 50, [this](const vip_slam_msgs::TrackedFrameConstPtr& m) { onFrame(*m); }));
@@ -163,8 +165,7 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
-    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale),
-                                back_end_->depthDifference()};
+    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale), back_end_->depthDifference()};
   }
   distribute(update);
   startGlobalBa();
@@ -191,7 +192,10 @@ void BackEndNodelet::startGlobalBa() {
     const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
     owner_->post(control_lane_, [this, result, failure, milliseconds] {
       adjusting_ = false;
-      if (!failure.empty()) throw std::runtime_error("global adjustment: " + failure);
+      if (!failure.empty()) {
+        back_end_->requestGlobalBa();  // what asked for it still waits
+        throw std::runtime_error("global adjustment: " + failure);
+      }
       {
         std::lock_guard<std::mutex> lock(shown_mutex_);
         shown_.global_ms = milliseconds;

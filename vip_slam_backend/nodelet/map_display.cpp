@@ -27,7 +27,8 @@ void MapDisplay::apply(const MapUpdate& update) {
   }
   for (const LandmarkId id : update.removed_landmarks) landmarks_.erase(id);
   for (const auto& [from, into] : update.merged_landmarks) landmarks_.erase(from);
-  if (!update.planes.empty()) planes_ = update.planes.size();
+  if (update.global) planes_.clear();
+  for (const auto& plane : update.planes) planes_.insert(plane.first);
   for (const LoopEvent& loop : update.loops)
     if (loop.accepted) loops_.emplace_back(loop.query, loop.match);
 }
@@ -37,7 +38,7 @@ void MapDisplay::clear() {
   keyframes_.clear();
   landmarks_.clear();
   loops_.clear();
-  planes_ = 0;
+  planes_.clear();
 }
 
 std::size_t MapDisplay::planeLandmarkCount() const {

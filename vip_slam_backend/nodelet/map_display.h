@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,7 +36,7 @@ class MapDisplay {
   std::size_t keyframeCount() const { return keyframes_.size(); }
   std::size_t landmarkCount() const { return landmarks_.size(); }
   std::size_t planeLandmarkCount() const;
-  std::size_t planeCount() const { return planes_; }
+  std::size_t planeCount() const { return planes_.size(); }
 
  private:
   struct Shown {
@@ -50,7 +51,7 @@ class MapDisplay {
   std::map<KeyframeId, Shown> keyframes_;
   std::map<LandmarkId, Point> landmarks_;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops_;  ///< accepted ones: query, match
-  std::size_t planes_ = 0;
+  std::set<PlaneId> planes_;  ///< as of the last global update, and those that came into a local window since
   SE3 T_imu_base_, T_imu_cam_;
 };
 

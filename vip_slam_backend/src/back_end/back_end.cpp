@@ -53,7 +53,6 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   followDepthOffset(keyframe->frame.depth_correction);
   followGyroCorrection(keyframe->gyro_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
-  maker.process(keyframe->id, &map);
   // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
   // chance.
   const std::set<KeyframeId> part = connectedKeyframes(map, keyframe->id, loop_closer.loops());

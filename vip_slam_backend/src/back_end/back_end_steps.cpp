@@ -17,7 +17,9 @@ NavState BackEnd::Impl::predict(const Keyframe& keyframe) {
   NavState state = odom;
   state.T_W_I = T_map_odom * odom.T_W_I;
   state.v_W = T_map_odom.rotation() * odom.v_W;
-  if (keyframe.previous != 0 && map.hasKeyframe(keyframe.previous)) {
+  // A stored map may have another keyframe by that number, of another IMU's biases.
+  if (keyframe.previous != 0 && map.hasKeyframe(keyframe.previous) &&
+      map.keyframe(keyframe.previous).data->frame.epoch == epoch) {
     const NavState& previous = map.keyframe(keyframe.previous).state;
     state.bias_gyro = previous.bias_gyro;
     state.bias_accel = previous.bias_accel;
@@ -151,7 +153,8 @@ GbaJob BackEnd::Impl::makeGlobalJob() const {
 
 bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
   if (result.correction != correction) {
-    global_wanted = result.solution != nullptr && !map.empty();  // the map it came from is no more: once again
+    // The map it came from is no more: once again.
+    global_wanted = global_wanted || (result.solution != nullptr && !map.empty());
   } else if (frozen()) {
     global_wanted = global_wanted || result.solution != nullptr;  // once mapping goes on
   } else if (result.solution && result.solution->summary.usable) {

@@ -307,6 +307,31 @@ TEST(BackEnd, AGlobalAdjustmentOfDepthAsItWasReadIsDoneAgain) {
   EXPECT_TRUE(back_end.globalBaWanted());
 }
 
+TEST(BackEnd, ARequestOutlivesAResultThatComesTooLate) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 4; ++k) back_end.addKeyframe(world.next());
+  back_end.requestGlobalBa();
+  GbaResult of_nothing;
+  of_nothing.correction = 1000;
+  back_end.merge(of_nothing);
+  EXPECT_TRUE(back_end.globalBaWanted());
+}
+
+// Also where a stored map has a keyframe by the number of its predecessor.
+TEST(BackEnd, ANewOdometryBringsItsOwnBiases) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
+  auto anew = std::make_shared<Keyframe>(*world.next());
+  anew->frame.epoch = 1;
+  anew->frame.features.clear();
+  anew->frame.state.bias_gyro = Eigen::Vector3d(0.05, -0.02, 0.01);
+  back_end.addKeyframe(anew);
+  ASSERT_EQ(back_end.lastRefusal(), "");
+  EXPECT_LT((back_end.map().keyframe(7).state.bias_gyro - anew->frame.state.bias_gyro).norm(), 1e-6);
+}
+
 TEST(BackEnd, AllVariantsBeatTheOdometry) {
   for (const char* variant : {"vi", "vi_p", "vi_cp", "vip"}) {
     const RunResult result = run(variant, variant == std::string("vi_p") ? 20 : 45);
