@@ -87,7 +87,7 @@ class Pipeline {
   bool placed_ = false;                                 ///< T_map_odom_ is known for epoch_
   double newest_image_ = -1e300, newest_imu_ = -1e300;  ///< stamps, each by its own clock
   std::size_t images_ = 0;
-  double duration_ = 0;  ///< of the images before the clock last ran back
+  double duration_ = 0;                                            ///< of the images before the clock last ran back
   double oldest_taken_ = std::numeric_limits<double>::infinity();  ///< stamps of the images since then
   double newest_taken_ = oldest_taken_;
   TimePasses passes_;
