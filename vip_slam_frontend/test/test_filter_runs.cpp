@@ -98,6 +98,36 @@ TEST(FilterRuns, WhatAsksForTooMuchPullsLess) {
   EXPECT_LT(much, 0.8 * much_freely);
 }
 
+// Two keyframes with a minute of standing between them lie where they lie, to what standing still says of each image.
+TEST(FilterRuns, StandingDoesNotWearOutTheMotionBetweenKeyframes) {
+  SimulationOptions still;
+  still.speed = 0;
+  LandmarkSimulation simulation(still);
+  simulation.generateImu(32.0);
+  const FilterOptions options = singlePixels();
+  for (const int marked : {0, 1, 2, 5}) {  // still images before the first keyframe
+    VioFilter filter(options, still.noise, simulation.T_I_C(), 0.0, still.focal, 9.81);
+    FilterPrior prior;
+    prior.state = simulation.stateAt(0.2);
+    CloneId id = 1;
+    filter.start(prior, id++, Eigen::Vector3d::Zero());
+    double after_a_second = 0;
+    for (int k = 0; k <= 600; ++k) {
+      if (k == marked) filter.markNewest();
+      const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, 0.25 + 0.05 * k));
+      filter.step(propagation, id++, {}, 1.0);
+      if (k == marked + 20) after_a_second = std::sqrt(filter.motionSinceMark().covariance.diagonal().tail<3>().sum());
+    }
+    const RelativeMotion motion = filter.motionSinceMark();
+    ASSERT_TRUE(motion.isUsable());
+    const double sigma = std::sqrt(motion.covariance.diagonal().tail<3>().sum());
+    std::printf("marked after %d still images: %.2f mm +- %.2f (after a second %.2f)\n", marked,
+                1e3 * motion.T_a_b.t().norm(), 1e3 * sigma, 1e3 * after_a_second);
+    EXPECT_LT(sigma, 1.5 * after_a_second);
+    EXPECT_LT(motion.T_a_b.t().norm(), 3.0 * sigma);
+  }
+}
+
 TEST(FilterRuns, PixelNoiseIsLearnt) {
   SimulationOptions simulation;
   simulation.seed = 3;

@@ -129,17 +129,21 @@ void VioFilter::markNewest() {
   to_mark_.reset();
 }
 
-RelativeMotion VioFilter::motionSinceMark() const {
-  const int mark = filter_.window().indexOf(mark_), newest = static_cast<int>(filter_.window().clones.size()) - 1;
-  if (mark < 0 || (mark == newest && !to_mark_)) return {};
-  if (mark == newest) return *to_mark_;
-  const RelativeMotion motion = filter_.relativeMotion(mark, newest);
+RelativeMotion VioFilter::motionFromMark(int clone) const {
+  const int mark = filter_.window().indexOf(mark_);
+  if (mark < 0 || clone < 0 || (mark == clone && !to_mark_)) return {};
+  if (mark == clone) return *to_mark_;
+  const RelativeMotion motion = filter_.relativeMotion(mark, clone);
   return to_mark_ ? compose(*to_mark_, motion) : motion;
 }
 
-void VioFilter::moveMark() {
-  to_mark_ = motionSinceMark();
-  mark_ = filter_.window().clones.back().id;
+RelativeMotion VioFilter::motionSinceMark() const {
+  return motionFromMark(static_cast<int>(filter_.window().clones.size()) - 1);
+}
+
+void VioFilter::moveMark(CloneId to) {
+  to_mark_ = motionFromMark(filter_.window().indexOf(to));
+  mark_ = to;
 }
 
 void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements) {
@@ -172,7 +176,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   // motion and does not fill with copies of one pose.
   const bool replace = still && still_images_ > 0;
   if (replace && previous != still_anchor_) {
-    if (previous == mark_) moveMark();
+    // To the anchor, which stays: image by image each would be a piece, known no better than the IMU predicts it.
+    if (previous == mark_) moveMark(still_anchor_);
     filter_.marginalise({static_cast<int>(filter_.window().clones.size()) - 2});
     forgetClone(previous);
   }
@@ -229,7 +234,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   }
   if (window_full) {
     const CloneId oldest = filter_.window().clones.front().id;
-    if (oldest == mark_) moveMark();
+    if (oldest == mark_) moveMark(still && oldest != still_anchor_ ? still_anchor_ : id);
     filter_.marginalise({0});
     forgetClone(oldest);
   }

@@ -113,8 +113,10 @@ class VioFilter {
   /// allows: then whatever broke the estimate broke this as well.
   void learnMounting();
   void forgetClone(CloneId id);
-  /// The newest clone stands for the marked one, which is about to go.
-  void moveMark();
+  /// From the marked clone to another one; unknown when nothing is marked.
+  RelativeMotion motionFromMark(int clone) const;
+  /// Clone `to` stands for the marked one, which is about to go.
+  void moveMark(CloneId to);
 
   FilterOptions options_;
   ImuNoise imu_noise_;
