@@ -263,6 +263,35 @@ double informationAlong(const SurfaceMatches& matches, const Eigen::Vector3d& al
   return (rows.rows.H.middleCols<3>(window.cloneColumn(3) + 3) * along).squaredNorm();
 }
 
+// A floor and a ceiling through a fisheye: fitted in its pixels their patches lay beside them by up to centimetres at
+// the rim, nearer and farther ones differently, which passed for an offset of the depth camera.
+TEST(SurfaceTracker, PatchesOfAFisheyeLieOnTheirPlanes) {
+  CameraIntrinsics k;
+  k.width = 640, k.height = 480;
+  k.fx = k.fy = 290;
+  k.cx = 319.5, k.cy = 239.5;
+  k.model = DistortionModel::kEquidistant;
+  k.distortion = {0.01, -0.004, 0, 0};
+  const std::shared_ptr<const CameraModel> fisheye = makeCamera(k);
+  DepthNoise noise;
+  cv::Mat depth(k.height, k.width, CV_32FC1, cv::Scalar(0));
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      Eigen::Vector2d xy;
+      if (fisheye->undistort(Eigen::Vector2d(u, v), &xy) && std::abs(xy.y()) > 0.2) {
+        depth.at<float>(v, u) = static_cast<float>(1.4 / std::abs(xy.y()));
+      }
+    }
+  }
+  int rim = 0;
+  for (const SurfacePatch& patch : SurfaceTracker(fisheye, noise).patches(depth)) {
+    EXPECT_NEAR(std::abs(patch.p_C.y()), 1.4, 1e-4) << patch.p_C.transpose();
+    EXPECT_GT(std::abs(patch.n_C.y()), std::cos(1e-3)) << patch.p_C.transpose();
+    rim += patch.p_C.head<2>().norm() > patch.p_C.z();
+  }
+  EXPECT_GT(rim, 30);
+}
+
 TEST(SurfaceTracker, ABareWallSaysNothingOfMotionAlongIt) {
   const DepthNoise noise;
   SurfaceTracker tracker(camera(), noise);

@@ -25,12 +25,38 @@ constexpr double kFloor = 0.002;
 }  // namespace
 
 SurfaceTracker::SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise)
-    : camera_(std::move(camera)), noise_(noise) {}
+    : camera_(std::move(camera)), noise_(noise) {
+  const CameraIntrinsics& k = camera_->intrinsics();
+  if (k.model == DistortionModel::kNone) return;
+  undistorted_.reserve(static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      Eigen::Vector2d xy;
+      if (!camera_->undistort(Eigen::Vector2d(u, v), &xy)) xy.setConstant(std::nan(""));
+      undistorted_.push_back(xy.cast<float>());
+    }
+  }
+}
 
 bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch) const {
   if (u < kReach || v < kReach || u + kReach >= depth.cols || v + kReach >= depth.rows) return false;
+  Eigen::Vector2d xy;
+  Eigen::Matrix2d d_uv_xy;
+  if (!camera_->undistort(Eigen::Vector2d(u, v), &xy)) return false;
+  camera_->distort(xy, &d_uv_xy);
+  // A plane N^T p = 1 is affine in inverse depth, 1/z = N^T (x, y, 1), and for a pinhole also in pixels. Where the lens
+  // bends straight lines it is so in the pixels of a pinhole that touches it in the middle of the patch: in a fisheye's
+  // own the bend of a floor passes for an offset of all depth.
+  const Eigen::Matrix2d to_samples = d_uv_xy / kSampleStep;
+  const auto place = [&](int x, int y) -> Eigen::Vector2d {
+    if (undistorted_.empty()) return {x, y};
+    const std::size_t row = static_cast<std::size_t>(v + y * kSampleStep);
+    const std::size_t pixel =
+        row * static_cast<std::size_t>(depth.cols) + static_cast<std::size_t>(u + x * kSampleStep);
+    return to_samples * (undistorted_[pixel].cast<double>() - xy);
+  };
   double z[kSamples];
-  // A plane N^T p = 1 is affine in inverse depth, 1/z = N^T (x, y, 1), and over a small window also in pixels.
+  Eigen::Vector2d at[kSamples];
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   int valid = 0;
@@ -40,8 +66,13 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
       const float reading = row[x * kSampleStep];
       z[i] = noise_.inRange(reading) ? reading : 0.0;
       if (z[i] == 0) continue;
+      at[i] = place(x, y);
+      if (!at[i].allFinite()) {
+        z[i] = 0;
+        continue;
+      }
       const double w = z[i] * z[i] / noise_.sigma(z[i]);
-      const Eigen::Vector3d J(w, w * x, w * y);
+      const Eigen::Vector3d J(w, w * at[i].x(), w * at[i].y());
       A += J * J.transpose();
       b += J * (w / z[i]);
       ++valid;
@@ -52,18 +83,13 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   const Eigen::Vector3d c = covariance * b;
   if (!c.allFinite() || !(c.x() > 1.0 / noise_.max_range)) return false;
   int explained = 0;
-  for (int y = -kHalf, i = 0; y <= kHalf; ++y) {
-    for (int x = -kHalf; x <= kHalf; ++x, ++i) {
-      const double inverse = c.x() + c.y() * x + c.z() * y;
-      explained += z[i] > 0 && inverse > 0 && std::abs(1.0 / inverse - z[i]) < kInlierSigmas * noise_.sigma(z[i]);
-    }
+  for (int i = 0; i < kSamples; ++i) {
+    if (!(z[i] > 0)) continue;
+    const double inverse = c.x() + c.y() * at[i].x() + c.z() * at[i].y();
+    explained += inverse > 0 && std::abs(1.0 / inverse - z[i]) < kInlierSigmas * noise_.sigma(z[i]);
   }
   if (explained < 0.95 * valid) return false;
 
-  Eigen::Vector2d xy;
-  Eigen::Matrix2d d_uv_xy;
-  if (!camera_->undistort(Eigen::Vector2d(u, v), &xy)) return false;
-  camera_->distort(xy, &d_uv_xy);
   const Eigen::Vector2d gradient = d_uv_xy.transpose() * c.tail<2>() / kSampleStep;
   const Eigen::Vector3d ray = xy.homogeneous();
   const Eigen::Vector3d N(gradient.x(), gradient.y(), c.x() - gradient.dot(xy));

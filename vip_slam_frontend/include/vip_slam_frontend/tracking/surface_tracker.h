@@ -37,6 +37,7 @@ class SurfaceTracker {
 
   std::shared_ptr<const CameraModel> camera_;
   DepthNoise noise_;
+  std::vector<Eigen::Vector2f> undistorted_;  ///< of every pixel, row by row, z = 1; empty for a pinhole
   std::vector<SurfacePatch> patches_;
   CloneId reference_ = 0;
 };
