@@ -27,8 +27,9 @@ Pipeline::~Pipeline() = default;
 
 void Pipeline::loadMap(const std::string& path, bool localise) {
   if (!mapping_) throw std::invalid_argument("a map was given, but mapping is switched off");
-  front_end_->applyMapUpdate(mapping_->loadMap(path));
+  // First: what the planes make of the loaded map would change it.
   if (localise) mapping_->localiseOnly();
+  front_end_->applyMapUpdate(mapping_->loadMap(path));
 }
 
 void Pipeline::add(const SensorEvent& event) {
