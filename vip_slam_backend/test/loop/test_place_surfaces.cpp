@@ -32,6 +32,7 @@ class PlaceSurfacesTest : public ::testing::Test {
       PlaneObservation observation;
       observation.keyframe = 1;
       observation.plane = id;
+      observation.points.push_back({Eigen::Vector3f(0, 0, 1), 0.01f});
       map_.setPlaneObservation(observation);
     }
   }
