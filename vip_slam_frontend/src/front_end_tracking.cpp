@@ -215,7 +215,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     ScopedTimer timer(timing_, "frontend.update", t);
     still_ = decideStillness(from, t_imu);
     report = filter_.step(propagation, next_clone_++, measurements(),
-                          still_ ? std::optional<double>(stillness_.unrest()) : std::nullopt, &surfaces);
+                          still_ ? std::optional<Unrest>(stillness_.unrest()) : std::nullopt, &surfaces);
   }
   renewSurfaces(depth, surfaces.pairs.size(), t);
   counters_.moving += tracked.moves_by_itself;

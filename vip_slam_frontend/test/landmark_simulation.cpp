@@ -190,7 +190,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     const double t_imu = t_imu_true - options.time_offset + filter.window().time_offset;
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
     const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200),
-                                          standing ? std::optional<double>(1.0) : std::nullopt);
+                                          standing ? std::optional<Unrest>(Unrest()) : std::nullopt);
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
     result.gyro_correction = filter.gyroCorrection();

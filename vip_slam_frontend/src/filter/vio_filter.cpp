@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vip_slam_frontend/filter/zero_velocity.h"
-
 namespace vip_slam {
 
 namespace {
@@ -165,7 +163,7 @@ void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* r
 }
 
 StepReport VioFilter::step(const Propagation& propagation, CloneId id,
-                           const std::vector<FilterMeasurement>& measurements, std::optional<double> unrest,
+                           const std::vector<FilterMeasurement>& measurements, std::optional<Unrest> unrest,
                            const SurfaceMatches* surfaces) {
   StepReport report;
   const bool still = unrest.has_value();

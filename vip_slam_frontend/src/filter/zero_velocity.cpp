@@ -76,8 +76,12 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   } else {
     wants = wants && image_known && cues.disparity_px < limit;
   }
-  const double moved = std::max(cues.disparity_px, cues.anchor_disparity_px) / limit;
-  unrest_ = image_known ? std::max(kLeastUnrest, kFar * moved) : 1.0;
+  unrest_ = {};
+  if (image_known) {
+    const double moved = kFar * std::max(cues.disparity_px, cues.anchor_disparity_px);
+    unrest_.rotation = std::max(kLeastUnrest, moved / options_.max_disparity_px);
+    unrest_.translation = std::max(kLeastUnrest, moved / limit);
+  }
   if (wants) {
     const double share = image_known ? 1.0 : kRestFollows;
     rest_.mean_gyro += share * (cues.imu.mean_gyro - rest_.mean_gyro);
@@ -124,21 +128,22 @@ double leastImageMotion(const std::vector<Eigen::Vector3d>& points, double focal
   return std::sqrt(std::max(0.0, least));
 }
 
-void zeroVelocityRows(const WindowState& window, int anchor, int repeats, double unrest, const ZuptOptions& options,
-                      Eigen::MatrixXd* H, Eigen::VectorXd* h) {
+void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const Unrest& unrest,
+                      const ZuptOptions& options, Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   const int newest = static_cast<int>(window.clones.size()) - 1;
   const bool relative = anchor >= 0 && anchor != newest;
-  const double inflation = unrest * std::sqrt(1.0 + std::min(repeats, kMostRepeats));
+  const double root = std::sqrt(1.0 + std::min(repeats, kMostRepeats));
+  const double step = unrest.translation * root, turn = unrest.rotation * root;
   *H = Eigen::MatrixXd::Zero(relative ? 9 : 3, window.dimension());
   *h = Eigen::VectorXd::Zero(relative ? 9 : 3);
-  const double wv = 1.0 / (options.sigma_velocity * inflation);
+  const double wv = 1.0 / (options.sigma_velocity * step);
   H->block<3, 3>(0, window.navColumn()) = wv * Eigen::Matrix3d::Identity();
   h->head<3>() = -wv * window.v_W;
   if (!relative) return;
 
   const Clone& a = window.clones[anchor];
   const Clone& b = window.clones[newest];
-  const double wr = 1.0 / (options.sigma_rotation * inflation), wp = 1.0 / (options.sigma_position * inflation);
+  const double wr = 1.0 / (options.sigma_rotation * turn), wp = 1.0 / (options.sigma_position * step);
   // Log(R_a^T R_b) = 0 with theta right-perturbed on both: d = dtheta_b - R_b^T R_a dtheta_a for a small angle. The
   // translation is compared in the frame of a, which keeps yaw and position unobservable.
   const Eigen::Matrix3d Ra = a.T_W_I_fej.R(), Rb = b.T_W_I_fej.R();

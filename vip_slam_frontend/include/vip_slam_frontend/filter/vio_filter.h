@@ -15,6 +15,7 @@
 #include "vip_slam_frontend/filter/square_root_filter.h"
 #include "vip_slam_frontend/filter/surface_rows.h"
 #include "vip_slam_frontend/filter/triangulation.h"
+#include "vip_slam_frontend/filter/zero_velocity.h"
 
 namespace vip_slam {
 
@@ -67,7 +68,7 @@ class VioFilter {
   /// One image: `propagation` from predict(). Without measurements this coasts. `surfaces` (may be null) ties the new
   /// image's depth to that of an earlier clone. `unrest`: see StillnessDetector; nothing when the body moves.
   StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,
-                  std::optional<double> unrest, const SurfaceMatches* surfaces = nullptr);
+                  std::optional<Unrest> unrest, const SurfaceMatches* surfaces = nullptr);
 
   const WindowState& window() const { return filter_.window(); }
   /// How the camera is mounted, as known now; also between two starts.

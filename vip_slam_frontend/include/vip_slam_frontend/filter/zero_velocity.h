@@ -33,6 +33,12 @@ struct StillnessCues {
   double px_per_metre = 0;  ///< image motion of a translation in the direction that shows least; 0: unknown
 };
 
+/// How much the images moved while still, as a share of what standing still allows: factors on the sigmas of what it
+/// says. A turn shows alike near and far, a step the less the farther all is.
+struct Unrest {
+  double rotation = 1.0, translation = 1.0;
+};
+
 /// Still only when the IMU is quiet and the image stands and the estimate is slow; with hysteresis both ways. The image
 /// alone is never enough: a wall that moves along would fool it. Who stands and sees nothing (darkness, a bare wall)
 /// goes on standing as long as the IMU's means stay where they were: no motion begins without an acceleration or a
@@ -44,8 +50,8 @@ class StillnessDetector {
   /// A start at rest: still from here on. `rest`: the IMU while it stood.
   void begin(const ImuSpread& rest);
   bool still() const { return still_; }
-  /// How much the images moved while still, as a share of what standing still allows; 1 when they do not tell.
-  double unrest() const { return unrest_; }
+  /// Ones when the images do not tell.
+  const Unrest& unrest() const { return unrest_; }
   /// The IMU alone says that nothing has happened since it last stood still, not long ago.
   bool imuRests() const { return imu_rests_; }
   void reset();
@@ -55,7 +61,7 @@ class StillnessDetector {
   bool still_ = false, imu_rests_ = false;
   int in_a_row_ = 0;
   int since_still_ = 1 << 20;  ///< images
-  double unrest_ = 1.0;
+  Unrest unrest_;
   ImuSpread rest_;  ///< the IMU's means at rest
 };
 
@@ -65,9 +71,9 @@ double leastImageMotion(const std::vector<Eigen::Vector3d>& points, double focal
 
 /// Whitened rows on the newest clone and the nav state: v = 0, and no rotation or translation against the clone at
 /// `anchor` (index in the window; -1: velocity only). `repeats` counts the images since stopping: they repeat the same
-/// statement, so the sigmas grow with its root, up to threefold. `unrest` is a factor on them: who sways a little is
-/// still, but not as still as a tripod.
-void zeroVelocityRows(const WindowState& window, int anchor, int repeats, double unrest, const ZuptOptions& options,
-                      Eigen::MatrixXd* H, Eigen::VectorXd* h);
+/// statement, so the sigmas grow with its root, up to threefold. `unrest`: who sways a little is still, but not as
+/// still as a tripod.
+void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const Unrest& unrest,
+                      const ZuptOptions& options, Eigen::MatrixXd* H, Eigen::VectorXd* h);
 
 }  // namespace vip_slam
