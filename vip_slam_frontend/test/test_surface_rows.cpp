@@ -263,7 +263,7 @@ double informationAlong(const SurfaceMatches& matches, const Eigen::Vector3d& al
   return (rows.rows.H.middleCols<3>(window.cloneColumn(3) + 3) * along).squaredNorm();
 }
 
-// A floor and a ceiling through a fisheye: fitted in its pixels their patches lay beside them by up to centimetres at
+// A floor and a ceiling through a fisheye: fitted in its pixels their patches lay beside them by up to 6 mm at
 // the rim, nearer and farther ones differently, which passed for an offset of the depth camera.
 TEST(SurfaceTracker, PatchesOfAFisheyeLieOnTheirPlanes) {
   CameraIntrinsics k;
