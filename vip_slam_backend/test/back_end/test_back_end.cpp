@@ -121,8 +121,8 @@ TEST(BackEnd, KeyframesDoNotCrowd) {
   EXPECT_LT(widest, 30.0);
 }
 
-// In a room that is seen again and again all keyframes are ends of loops. Those
-// that tie two odometries stay, as far as these need them.
+// In a room that is seen again and again all keyframes are ends of loops. Those that tie two odometries stay, as far as
+// these need them.
 TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
   BackEndOptions o = options("vip");
   o.culling.enabled = false;
