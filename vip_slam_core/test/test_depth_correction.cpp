@@ -55,6 +55,50 @@ TEST(DepthCorrection, MovesPointsOnPlanesAlongTheirRays) {
   EXPECT_EQ(read.G, before);
 }
 
+// A keyframe of a camera whose intrinsics are wrong, and what it would have been had they been right.
+TEST(DepthCorrection, MovesBearingsAndWhatLiesOnThem) {
+  const BearingCorrection bearing{{0.004, -0.003, 0.002, 0.001}}, earlier{{0.001, 0.002, -0.001, 0.003}};
+  auto keyframe = std::make_shared<Keyframe>();
+  Feature feature;
+  feature.xy = {0.4f, -0.3f};
+  feature.depth = 2.0f;
+  keyframe->frame.features = {feature};
+  const auto observe = [](const Eigen::Matrix3d& bearings) {
+    PlaneObservation observation;
+    observation.weight_scale = 0.4;
+    for (const Eigen::Vector3d& given : {Eigen::Vector3d(0.3, -0.2, 1), Eigen::Vector3d(-1, 0.2, 2)}) {
+      const Eigen::Vector3d p_C = bearings * given;
+      observation.G += 0.4 * p_C.homogeneous() * p_C.homogeneous().transpose() / (0.005 * 0.005);
+      observation.points.push_back({p_C.cast<float>(), 0.005f});
+    }
+    return observation;
+  };
+  PlaneObservation observation = observe(Eigen::Matrix3d::Identity());
+  // By way of what was believed for a while.
+  KeyframePtr corrected = keyframe;
+  for (const BearingCorrection& known : {earlier, bearing}) {
+    corrected = withDepthCorrection(corrected, {0, {}, known});
+    setDepthCorrection({0, {}, known}, &observation);
+  }
+  EXPECT_LT((corrected->frame.features[0].xy - bearing(feature.xy)).norm(), 1e-6f);
+  EXPECT_NEAR(corrected->frame.features[0].xy.x(), 0.4 + 0.004 * 0.4 + 0.002, 1e-6);
+  EXPECT_NEAR(corrected->frame.features[0].xy.y(), -0.3 + 0.003 * 0.3 + 0.001, 1e-6);
+  EXPECT_EQ(corrected->frame.features[0].depth, 2.0f);
+  const PlaneObservation truth = observe(bearing.matrix());
+  for (int k = 0; k < 2; ++k) EXPECT_LT((observation.points[k].p_C - truth.points[k].p_C).norm(), 1e-6f);
+  EXPECT_LT((observation.G - truth.G).norm(), 1e-5 * truth.G.norm());
+}
+
+TEST(BearingCorrection, TheIntrinsicsItNamesNeedNone) {
+  const Eigen::Vector4d given(481.4, 478.9, 320.9, 238.8);
+  const BearingCorrection bearing{{0.004, -0.003, 0.002, 0.001}};
+  const Eigen::Vector4d right = correctedIntrinsics(given, bearing);
+  const Eigen::Vector2d pixel(17, 433);
+  const Eigen::Vector2d before = (pixel - given.tail<2>()).cwiseQuotient(given.head<2>());
+  const Eigen::Vector2d after = (pixel - right.tail<2>()).cwiseQuotient(right.head<2>());
+  EXPECT_LT((bearing(before) - after).norm(), 1e-12);
+}
+
 TEST(DepthCorrection, AnotherCurveTakesTheOldOnesPlace) {
   DepthCorrection before{0.004, {}}, after{-0.003, {}};
   for (int k = 0; k < 40; ++k) {

@@ -27,6 +27,13 @@ SensorConfig checked(const SensorConfig& sensor) {
   return sensor;
 }
 
+/// Depth of a camera of its own has bearings of its own.
+FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& sensor) {
+  FilterOptions filter = options.filter;
+  filter.calibration.intrinsics = filter.calibration.intrinsics && sensor.depth_registered;
+  return filter;
+}
+
 /// A feature's patch must not reach over what is masked: its outline is a strong edge that goes along with the camera.
 /// So features keep away from it as from the image's own border.
 cv::Mat featureMask(const cv::Mat& mask, int border) {
@@ -50,7 +57,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       surfaces_(camera_, sensor_.depth_noise),
       landmarks_(options.tracking, camera_),
       orb_(options.tracking.keyframe_corners),
-      filter_(options.filter, sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset, camera_->focal(),
+      filter_(filterOptions(options, sensor_), sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset, camera_->focal(),
               sensor_.gravity),
       initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, camera_->focal(),
                    sensor_.gravity, sensor_.depth_noise),

@@ -40,6 +40,8 @@ MountingEstimate FrontEnd::Impl::mounting() const {
   MountingEstimate mounting = filter_.mounting();
   // Readings and rates have what was given by the time they get here.
   mounting.depth_offset += sensor_.depth_offset;
+  const CameraIntrinsics& camera = sensor_.camera;
+  mounting.intrinsics = correctedIntrinsics({camera.fx, camera.fy, camera.cx, camera.cy}, mounting.bearing);
   mounting.gyro_correction += sensor_.gyro_correction + mounting.gyro_correction * sensor_.gyro_correction;
   return mounting;
 }
@@ -58,7 +60,7 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   frame->status = status_;
   frame->T_I_C = extrinsics();
   frame->time_offset = timeOffset();
-  frame->depth_correction = {filter_.depthCorrection(), depth_curve_};
+  frame->depth_correction = {filter_.depthCorrection(), depth_curve_, filter_.bearingCorrection()};
   frame->zero_velocity = still_;
   frame->keyframe = newest_keyframe_;
   if (filter_.started()) {
@@ -115,7 +117,11 @@ float FrontEnd::Impl::trueDepth(float reading) const {
 }
 
 void FrontEnd::Impl::correctDepth(std::vector<Feature>* features) const {
-  for (Feature& f : *features) f.depth = trueDepth(f.depth);
+  const BearingCorrection bearing = filter_.bearingCorrection();
+  for (Feature& f : *features) {
+    f.depth = trueDepth(f.depth);
+    f.xy = bearing(f.xy);
+  }
 }
 
 DepthGrid FrontEnd::Impl::depthGrid(int stride) const {

@@ -103,6 +103,7 @@ std::vector<ImuSample> LandmarkSimulation::imuBetween(double t0, double t1) cons
 }
 
 std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t most) {
+  const Eigen::Matrix3d given = options_.bearing.matrix().inverse();
   std::vector<FilterMeasurement> seen;
   const SE3 T_C_W = (poseAt(t) * T_I_C_).inverse();
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -130,7 +131,7 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
       FilterMeasurement m;
       m.id = track_[i];
       const Eigen::Vector3d noise = gaussian(random_, 1.0);
-      m.xy = p.head<2>() / p.z() + (noise.head<2>() * options_.sigma_px + crept_[i]) / options_.focal;
+      m.xy = (given * p).head<2>() / p.z() + (noise.head<2>() * options_.sigma_px + crept_[i]) / options_.focal;
       if (unit(random_) < options_.outlier_ratio) m.xy += Eigen::Vector2d(0.05, -0.04);
       if (options_.depth) {
         m.depth_sigma = options_.depth_a + options_.depth_c * p.z() * p.z();
@@ -193,6 +194,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
                                           standing ? std::optional<Unrest>(Unrest()) : std::nullopt);
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
+    result.most_bearing_correction =
+        std::max(result.most_bearing_correction, filter.bearingCorrection().value.cwiseAbs().maxCoeff());
     result.gyro_correction = filter.gyroCorrection();
     result.most_gyro_correction = std::max(result.most_gyro_correction, result.gyro_correction.cwiseAbs().maxCoeff());
     nis += report.nis;

@@ -18,6 +18,7 @@ struct SimulationOptions {
   double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
   double depth_told = 1.0;                  ///< share of that sigma which the filter is told
   double depth_offset = 0;                  ///< m, added to all readings
+  BearingCorrection bearing;                ///< what the intrinsics get wrong: sightings are those that need it
   bool depth = true;
   bool imu_noise = true;
   int points = 1200;
@@ -74,6 +75,7 @@ struct RunResult {
   WindowState window;  ///< at the end
   MountingEstimate mounting;
   double most_depth_correction = 0;                           ///< m, of all images, with its sign
+  double most_bearing_correction = 0;                         ///< handed on, largest entry of all images
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< handed on, at the end
   double most_gyro_correction = 0;                            ///< its largest entry of all images
   Matrix15d covariance = Matrix15d::Zero();

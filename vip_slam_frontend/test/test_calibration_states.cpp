@@ -89,6 +89,43 @@ TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
   }
 }
 
+// Focal lengths 0.4 % too long and too short, a principal point that is a pixel off.
+TEST(Calibration, FindsTheIntrinsics) {
+  double nees = 0, believed = 0, own_nees = 0;
+  constexpr int kRuns = 6;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    simulation.sigma_px = 0.2;
+    simulation.bearing.value << 0.004, -0.004, 0.002, -0.0015;
+    FilterOptions options = singlePixels();
+    options.calibration.time_offset = false;  // which so noisy a gyro misleads
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    const Eigen::Vector4d off = run.mounting.bearing.value - simulation.bearing.value;
+    EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.0015);
+    EXPECT_GT(run.most_bearing_correction, 0.003);
+    own_nees += off.cwiseQuotient(run.mounting.sigma_bearing).squaredNorm() / kRuns;
+    nees += run.nees / kRuns;
+    options.calibration.intrinsics = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with wrong intrinsics: %.2f, of the intrinsics %.2f; intrinsics believed: %.2f\n", nees, own_nees,
+              believed);
+  EXPECT_LT(nees, 9.0);
+  EXPECT_LT(own_nees, 8.0);
+  EXPECT_GT(believed, 1.5 * nees);
+}
+
+TEST(Calibration, ExactIntrinsicsAreHandedOnAsTheyAre) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
+    EXPECT_NE(run.mounting.bearing.value, Eigen::Vector4d::Zero());
+    EXPECT_EQ(run.most_bearing_correction, 0.0);
+  }
+}
+
 /// A gyro as cameras have them.
 SimulationOptions goodGyro(std::uint32_t seed) {
   SimulationOptions simulation;
@@ -250,6 +287,11 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   const std::string more = mountingDifferences(given, found).back();
   EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
   EXPECT_NE(more.find("-0.0120"), std::string::npos) << more;
+  found.bearing.value << 0, 0.003, 0, 0;
+  found.sigma_bearing.setConstant(0.0003);
+  found.intrinsics << 480.04, 481.46, 320.2, 240.1;
+  const std::string intrinsics = mountingDifferences(given, found).back();
+  EXPECT_NE(intrinsics.find("480.0, 481.5, 320.2, 240.1"), std::string::npos) << intrinsics;
   found.gyro_correction(1, 1) = -0.0123;
   found.sigma_gyro_correction(1, 1) = 0.0003;
   const std::string gyro = mountingDifferences(given, found).back();
@@ -260,6 +302,7 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   found.sigma_translation.setConstant(0.01);
   found.sigma_time_offset = 0.002;
   found.sigma_depth_offset = 0.002;
+  found.sigma_bearing.setConstant(0.001);
   EXPECT_TRUE(mountingDifferences(given, found).empty());
 }
 

@@ -27,7 +27,8 @@ Scene makeScene() {
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
   scene.window.T_I_C = simulation.T_I_C();
-  scene.window.calibration = {true, true, true, true};
+  scene.window.calibration = {true, true, true, true, true};
+  scene.window.bearing.value << 0.003, -0.002, 0.001, -0.0015;
   scene.window.time_offset = 0.003;
   scene.f_W = simulation.stateAt(0.5).T_W_I * (simulation.T_I_C() * Eigen::Vector3d(0.3, -0.2, 2.5));
   for (int i = 0; i < 4; ++i) {
@@ -105,7 +106,8 @@ TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
   for (Observation& o : scene.observations) {
     const Eigen::Vector3d p_C =
         cameraPose(scene.window, scene.window.clones[scene.window.indexOf(o.clone)]).inverse() * scene.f_W;
-    o.xy = p_C.head<2>() / p_C.z();
+    const Eigen::Vector3d given = scene.window.bearing.matrix().inverse() * p_C;
+    o.xy = given.head<2>() / given.z();
     o.depth = p_C.z();
   }
   MeasurementNoise noise;

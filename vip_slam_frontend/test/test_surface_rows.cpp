@@ -69,9 +69,13 @@ double cost(const WindowState& window, const SurfaceMatches& matches) {
                         cameraPose(window, window.clones.back());
   double sum = 0;
   for (const SurfacePair& pair : matches.pairs) {
-    const Eigen::Vector3d q = window.trueDepth(pair.q_cur.z()) / pair.q_cur.z() * pair.q_cur;
-    const Eigen::Vector3d p = window.trueDepth(pair.p_ref.z()) / pair.p_ref.z() * pair.p_ref;
-    const double r = pair.n_ref.dot(T_ref_cur * q - p) / pair.sigma;
+    const Eigen::Matrix3d bearing = window.bearing.matrix();
+    const Eigen::Vector3d q = bearing * (window.trueDepth(pair.q_cur.z()) / pair.q_cur.z() * pair.q_cur);
+    const Eigen::Vector3d p = bearing * (window.trueDepth(pair.p_ref.z()) / pair.p_ref.z() * pair.p_ref);
+    // Two directions in the patch, wherever the bearings put them, span the plane that its points lie on.
+    const Eigen::Vector3d along = bearing * pair.n_ref.unitOrthogonal();
+    const Eigen::Vector3d across = bearing * pair.n_ref.cross(pair.n_ref.unitOrthogonal());
+    const double r = along.cross(across).normalized().dot(T_ref_cur * q - p) / pair.sigma;
     sum += 0.5 * r * r;
   }
   return sum;
@@ -84,7 +88,8 @@ const std::vector<Eigen::Vector3d> kCorridor{Eigen::Vector3d::UnitY(), -Eigen::V
 
 TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
   for (const bool calibrated : {false, true}) {
-    WindowState window = makeWindow(3, {calibrated, calibrated, calibrated, calibrated});
+    WindowState window = makeWindow(3, {calibrated, calibrated, calibrated, calibrated, calibrated});
+    if (calibrated) window.bearing.value << 0.003, -0.002, 0.001, -0.0015;
     window.depth_offset = calibrated ? 0.002 : 0;
     const SurfaceMatches matches = makeMatches(window, 4, kRoom, 0.01);
     const int n = window.dimension();

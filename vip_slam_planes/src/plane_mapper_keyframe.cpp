@@ -16,7 +16,8 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const ScopedTimer timer(timing, "planes.keyframe", keyframe.frame.t);
   const SE3& T_map_C = poses_.at(keyframe.id);
   const DepthGrid& grid = keyframe.frame.depth_grid;
-  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2));
+  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2),
+                                        keyframe.frame.depth_correction.bearing);
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   if (first_time) removeContradicted(triangles, T_map_C, keyframe.frame.epoch);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, keyframe.frame.epoch);
@@ -125,7 +126,9 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
   for (std::size_t i = 0; i < label.size(); ++i) {
     if (label[i] >= 0) area[label[i]] += mesh.triangles[i].area;
   }
-  const auto shown = pointsByLabel(keyframe, labels, rays_(keyframe.frame.depth_grid), tracks.size());
+  const std::vector<Eigen::Vector2f>& rays =
+      rays_(keyframe.frame.depth_grid, keyframe.frame.depth_correction.bearing);
+  const auto shown = pointsByLabel(keyframe, labels, rays, tracks.size());
   std::vector<PlaneId> ids;
   std::vector<char> trusted;
   for (std::size_t k = 0; k < tracks.size(); ++k) {

@@ -63,6 +63,16 @@ SE3 fromMsg(const geometry_msgs::Transform& transform) {
   return makeTransform(q.w, q.x, q.y, q.z, fromMsg(transform.translation));
 }
 
+boost::array<double, 4> toArray(const BearingCorrection& bearing) {
+  boost::array<double, 4> values;
+  Eigen::Map<Eigen::Vector4d>(values.data()) = bearing.value;
+  return values;
+}
+
+BearingCorrection fromArray(const boost::array<double, 4>& bearing) {
+  return {Eigen::Map<const Eigen::Vector4d>(bearing.data())};
+}
+
 ros::Time toStamp(double t) { return std::isfinite(t) && t > 0 ? ros::Time(t) : ros::Time(); }
 
 }  // namespace vip_slam

@@ -86,6 +86,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
     k.imu_camera = toPoseMsg(keyframe.T_I_C);
     k.depth_correction = keyframe.depth_correction.offset;
     k.depth_curve = keyframe.depth_correction.curve.added;
+    k.bearing_correction = toArray(keyframe.depth_correction.bearing);
     msg.keyframes.push_back(k);
   }
   msg.landmarks.reserve(update.landmarks.size());
@@ -124,7 +125,7 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
     update.keyframes.push_back({keyframe.id,
                                 fromMsg(keyframe.state),
                                 fromMsg(keyframe.imu_camera),
-                                {keyframe.depth_correction, {keyframe.depth_curve}}});
+                                {keyframe.depth_correction, {keyframe.depth_curve}, fromArray(keyframe.bearing_correction)}});
   }
   update.landmarks.reserve(msg.landmarks.size());
   for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));

@@ -15,6 +15,7 @@ constexpr std::uint64_t kScaleInterval = 30, kCurveInterval = 20;  // keyframes
 constexpr int kAdjustmentsAtEnd = 3;  // at most, while the map still finds out about the depth camera
 // Smaller changes of the depth's correction wait for the next global adjustment, m.
 constexpr double kNewDepthOffset = 0.001;
+constexpr double kNewBearing = 1e-4;
 constexpr double kNewGyroCorrection = 5e-4;  // likewise
 
 }  // namespace
@@ -66,8 +67,12 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
 void BackEnd::Impl::followDepthOffset(const DepthCorrection& newest) {
   if (newest.curve != depth_correction.curve) return;  // it goes with readings as they were
   newest_depth_offset = newest.offset;
-  if (std::abs(newest.offset - depth_correction.offset) < kNewDepthOffset) return;
+  newest_bearing = newest.bearing;
+  if (std::abs(newest.offset - depth_correction.offset) < kNewDepthOffset &&
+      (newest.bearing.value - depth_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing)
+    return;
   depth_correction.offset = newest.offset;
+  depth_correction.bearing = newest.bearing;
   map.adoptDepthCorrection(depth_correction);
   global_wanted = true;
   ++correction;  // an adjustment under way has the readings as they were
@@ -227,6 +232,7 @@ void BackEnd::Impl::reset() {
   last_global = -1e300;
   depth_correction = {};
   newest_depth_offset = disparity_error = 0;
+  newest_bearing = {};
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   loops.clear();
@@ -247,6 +253,7 @@ void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }
 GbaJob BackEnd::startGlobalBa() {
   impl_->global_wanted = false;
   impl_->depth_correction.offset = impl_->newest_depth_offset;
+  impl_->depth_correction.bearing = impl_->newest_bearing;
   impl_->map.adoptDepthCorrection(impl_->depth_correction);
   impl_->gyro_correction = impl_->newest_gyro_correction;
   impl_->map.adoptGyroCorrection(impl_->gyro_correction, impl_->sensor.imu_noise);

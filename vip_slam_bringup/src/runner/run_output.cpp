@@ -163,6 +163,8 @@ void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const D
   list("sigma_rotation_deg", mounting.sigma_rotation * 180 / M_PI);
   list("sigma_translation", mounting.sigma_translation);
   yaml << YAML::Key << "sigma_time_offset" << YAML::Value << mounting.sigma_time_offset;
+  list("intrinsics", mounting.intrinsics);
+  list("sigma_bearing", mounting.sigma_bearing);
   yaml << YAML::Key << "depth_offset" << YAML::Value << mounting.depth_offset;
   yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << mounting.sigma_depth_offset;
   Eigen::VectorXd added(static_cast<Eigen::Index>(depth_curve.added.size()));

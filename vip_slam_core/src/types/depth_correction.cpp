@@ -1,13 +1,25 @@
 #include "vip_slam_core/types/depth_correction.h"
 
 namespace vip_slam {
+namespace {
+
+/// Of (x, y, 1) that have the bearing correction `from` to those that have `to`.
+Eigen::Matrix3f bearingChange(const BearingCorrection& from, const BearingCorrection& to) {
+  return (to.matrix() * from.matrix().inverse()).cast<float>();
+}
+
+}  // namespace
 
 KeyframePtr withDepthCorrection(const KeyframePtr& keyframe, const DepthCorrection& correction) {
   if (keyframe->frame.depth_correction == correction) return keyframe;
   const DepthChange change(keyframe->frame.depth_correction, correction);
   auto corrected = std::make_shared<Keyframe>(*keyframe);
   corrected->frame.depth_correction = correction;
-  for (Feature& f : corrected->frame.features) f.depth = change(f.depth);
+  const Eigen::Matrix3f turn = bearingChange(keyframe->frame.depth_correction.bearing, correction.bearing);
+  for (Feature& f : corrected->frame.features) {
+    f.depth = change(f.depth);
+    f.xy = (turn * f.xy.homogeneous()).head<2>();
+  }
   for (float& z : corrected->frame.depth_grid.z) z = change(z);
   return corrected;
 }
@@ -15,11 +27,13 @@ KeyframePtr withDepthCorrection(const KeyframePtr& keyframe, const DepthCorrecti
 void setDepthCorrection(const DepthCorrection& correction, PlaneObservation* observation) {
   if (observation->depth_correction == correction) return;
   const DepthChange change(observation->depth_correction, correction);
+  const Eigen::Matrix3f turn = bearingChange(observation->depth_correction.bearing, correction.bearing);
   observation->depth_correction = correction;
   if (observation->points.empty()) return;
   observation->G.setZero();
   for (PlanePoint& point : observation->points) {
     if (point.p_C.z() > 0) point.p_C *= change(point.p_C.z()) / point.p_C.z();
+    point.p_C = turn * point.p_C;
     const Eigen::Vector4d p = point.p_C.cast<double>().homogeneous();
     observation->G += observation->weight_scale / (double(point.sigma) * double(point.sigma)) * p * p.transpose();
   }

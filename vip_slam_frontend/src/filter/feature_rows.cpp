@@ -80,7 +80,8 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     weight(2, 2) = 1.0 / sigma_z;
     J_measure = weight * J_measure;
 
-    Eigen::Vector3d residual(o.xy.x() - p_C.x() / p_C.z(), o.xy.y() - p_C.y() / p_C.z(),
+    const Eigen::Vector2d xy = window.bearing(o.xy);
+    Eigen::Vector3d residual(xy.x() - p_C.x() / p_C.z(), xy.y() - p_C.y() / p_C.z(),
                              window.trueDepth(o.depth) - p_C.z());
     residual = weight * residual;
 
@@ -101,6 +102,11 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     }
     // The residual grows with the offset, where the rows are those of the prediction.
     if (window.calibration.depth_offset && with_depth) (*H_x)(row + 2, window.depthOffsetColumn()) = -1.0 / sigma_z;
+    if (window.calibration.intrinsics) {
+      const Eigen::Matrix2d by_scale = o.xy.asDiagonal();
+      H_x->block<2, 2>(row, window.intrinsicsColumn()) = -weight.topLeftCorner<2, 2>() * by_scale;
+      H_x->block<2, 2>(row, window.intrinsicsColumn() + 2) = -weight.topLeftCorner<2, 2>();
+    }
     r->segment(row, rows) = residual.head(rows);
     row += rows;
   }

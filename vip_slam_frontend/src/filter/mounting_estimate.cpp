@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kSure = 5.0;  // sigmas
 constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002, kLeastDepth = 0.005,
-                 kLeastGyroError = 0.002;
+                 kLeastBearing = 0.001, kLeastGyroError = 0.002;
 
 template <typename... Numbers>
 std::string sentence(const char* format, Numbers... numbers) {
@@ -61,6 +61,15 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
                  "configuration should be %.4f",
                  1e3 * std::abs(depth), depth < 0 ? "long" : "short",
                  1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
+  }
+  const Eigen::Array4d bearing = (found.bearing.value - given.bearing.value).cwiseAbs();
+  const Eigen::Array4d& bearing_sigma = found.sigma_bearing.array();
+  if ((bearing_sigma > 0 && bearing > (kSure * bearing_sigma).cwiseMax(kLeastBearing)).any()) {
+    const Eigen::Vector4d& k = found.intrinsics;
+    all.push_back(
+        sentence("focal length or principal point are off, which is corrected for; fx, fy, cx, cy in the sensor's "
+                 "configuration or camera_info should be %.1f, %.1f, %.1f, %.1f",
+                 k(0), k(1), k(2), k(3)));
   }
   const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
   const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();

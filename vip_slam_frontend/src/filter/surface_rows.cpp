@@ -49,19 +49,23 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const Eigen::Vector3d t_I_C = window.T_I_C.t();
   const int rotation = 6, translation = 6 + (window.calibration.rotation ? 3 : 0);
   const int reference = layout.reference(), offset = translation + (window.calibration.translation ? 3 : 0);
-  const int depth = reference - 1;
+  const int depth = offset + (window.calibration.time_offset ? 1 : 0);
+  const int intrinsics = depth + (window.calibration.depth_offset ? 1 : 0);
+  const Eigen::Matrix3d bearing = window.bearing.matrix(), normal = bearing.inverse().transpose();
 
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<int>(pairs.size()), layout.size() + 1);
   for (int i = 0; i < A.rows(); ++i) {
     const SurfacePair& pair = pairs[i];
     const double w = 1.0 / pair.sigma;
     // What the offset adds lies along the rays.
-    const Eigen::Vector3d q_ray = pair.q_cur / pair.q_cur.z(), p_ray = pair.p_ref / pair.p_ref.z();
-    const Eigen::Vector3d q_cur = window.trueDepth(pair.q_cur.z()) * q_ray;
-    const Eigen::Vector3d p_ref = window.trueDepth(pair.p_ref.z()) * p_ray;
+    const Eigen::Vector3d q_given = window.trueDepth(pair.q_cur.z()) / pair.q_cur.z() * pair.q_cur;
+    const Eigen::Vector3d p_given = window.trueDepth(pair.p_ref.z()) / pair.p_ref.z() * pair.p_ref;
+    const Eigen::Vector3d q_cur = bearing * q_given, p_ref = bearing * p_given;
+    const Eigen::Vector3d q_ray = q_cur / q_cur.z(), p_ray = p_ref / p_ref.z();
+    const Eigen::Vector3d n_ref = (normal * pair.n_ref).normalized();
     const Eigen::Vector3d q_I = R_I_C * q_cur + t_I_C;  // in the newest IMU frame
     const Eigen::Vector3d s_I = R_ab * q_I + t_ab;      // in the reference's
-    const Eigen::RowVector3d n_I = w * (R_I_C * pair.n_ref).transpose();
+    const Eigen::RowVector3d n_I = w * (R_I_C * n_ref).transpose();
     const Eigen::RowVector3d n_W = n_I * R_a.transpose();
     A.block<1, 3>(i, 0) = -n_I * R_ab * hat(q_I);
     A.block<1, 3>(i, 3) = n_W;
@@ -71,7 +75,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
       // s_C = R_I_C^T (R_ab (R_I_C q + t) + t_ab - t)
       const Eigen::Vector3d s_C = R_I_C.transpose() * (s_I - t_I_C);
       const Eigen::Matrix3d R_ref_cur = R_I_C.transpose() * R_ab * R_I_C;
-      A.block<1, 3>(i, rotation) = w * pair.n_ref.transpose() * (hat(s_C) - R_ref_cur * hat(q_cur));
+      A.block<1, 3>(i, rotation) = w * n_ref.transpose() * (hat(s_C) - R_ref_cur * hat(q_cur));
     }
     if (window.calibration.translation) {
       A.block<1, 3>(i, translation) = n_I * (R_ab - Eigen::Matrix3d::Identity());
@@ -81,8 +85,20 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
                      A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
     }
     if (window.calibration.depth_offset)
-      A(i, depth) = w * pair.n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
-    A(i, layout.size()) = -w * pair.n_ref.dot(T_ref_cur * q_cur - p_ref);
+      A(i, depth) = w * n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
+    if (window.calibration.intrinsics) {
+      // Of a point (x, y, z) by (sx, sy, cx, cy): (x, 0), (0, y), (z, 0), (0, z). The normal turns against it, which
+      // shows in how far beside each other the two points lie.
+      const Eigen::Matrix3d R_ref_cur = R_I_C.transpose() * R_ab * R_I_C;
+      const Eigen::RowVector3d n_cur = n_ref.transpose() * R_ref_cur;
+      const Eigen::Vector3d apart = R_I_C.transpose() * (s_I - t_I_C) - p_ref;
+      const Eigen::Vector3d beside = apart - n_ref.dot(apart) * n_ref;
+      for (int k = 0; k < 2; ++k) {
+        A(i, intrinsics + k) = w * (n_cur(k) * q_given(k) - n_ref(k) * p_given(k) - n_ref(k) * beside(k));
+        A(i, intrinsics + 2 + k) = w * (n_cur(k) * q_cur.z() - n_ref(k) * p_ref.z() - n_ref(k) * beside.z());
+      }
+    }
+    A(i, layout.size()) = -w * n_ref.dot(T_ref_cur * q_cur - p_ref);
   }
   return A;
 }

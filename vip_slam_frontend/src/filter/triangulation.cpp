@@ -13,6 +13,7 @@ struct View {
   Eigen::Matrix3d R;  // R_C_A: anchor into this camera
   Eigen::Vector3d t;
   const Observation* observation;
+  Eigen::Vector2d xy;  // what the observation's bearing means
 };
 
 double medianOf(std::vector<double>& values) {
@@ -27,7 +28,7 @@ double depthInAnchor(const WindowState& window, const std::vector<View>& views) 
   for (const View& view : views) {
     const Observation& o = *view.observation;
     if (o.depth <= 0) continue;
-    const Eigen::Vector3d p_C = window.trueDepth(o.depth) * Eigen::Vector3d(o.xy.x(), o.xy.y(), 1.0);
+    const Eigen::Vector3d p_C = window.trueDepth(o.depth) * view.xy.homogeneous();
     z.push_back((view.R.transpose() * (p_C - view.t)).z());
   }
   return z.empty() ? 0.0 : medianOf(z);
@@ -35,12 +36,10 @@ double depthInAnchor(const WindowState& window, const std::vector<View>& views) 
 
 /// z in the anchor along the anchor's ray by least squares over all views (point on the ray nearest to all rays).
 double depthFromRays(const std::vector<View>& views) {
-  const Observation& first = *views.front().observation;
-  const Eigen::Vector3d ray(first.xy.x(), first.xy.y(), 1.0);
+  const Eigen::Vector3d ray = views.front().xy.homogeneous();
   double a = 0, b = 0;
   for (std::size_t i = 1; i < views.size(); ++i) {
-    const Observation& o = *views[i].observation;
-    const Eigen::Vector3d m(o.xy.x(), o.xy.y(), 1.0);
+    const Eigen::Vector3d m = views[i].xy.homogeneous();
     // m x (R ray z + t) = 0
     const Eigen::Vector3d u = m.cross(views[i].R * ray), w = m.cross(views[i].t);
     a += u.squaredNorm();
@@ -71,7 +70,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
     const SE3 T_W_C = cameraPose(window, window.clones[index]);
     if (views.empty()) T_W_A = T_W_C;
     const SE3 T_C_A = T_W_C.inverse() * T_W_A;
-    views.push_back({T_C_A.R(), T_C_A.t(), &o});
+    views.push_back({T_C_A.R(), T_C_A.t(), &o, window.bearing(o.xy)});
   }
   if (views.size() < 2) return result;
 
@@ -79,7 +78,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
   if (z <= 0) z = depthFromRays(views);
   if (!(z > 0.05) || !(z < 200.0)) return result;
 
-  Eigen::Vector3d x(views.front().observation->xy.x(), views.front().observation->xy.y(), 1.0 / z);
+  Eigen::Vector3d x(views.front().xy.x(), views.front().xy.y(), 1.0 / z);
   Eigen::Matrix3d A;
   double last_cost = 1e300;
   double lambda = 1e-6;
@@ -102,7 +101,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
       ds << view.R.col(0), view.R.col(1), view.t;
       const Eigen::Vector2d predicted(s.x() / s.z(), s.y() / s.z());
       const Eigen::Matrix2d L = view.observation->whitening / noise.sigma_xy;
-      const Eigen::Vector2d r = L * (view.observation->xy - predicted);
+      const Eigen::Vector2d r = L * (view.xy - predicted);
       Eigen::Matrix<double, 2, 3> J;
       J.row(0) = (ds.row(0) - predicted.x() * ds.row(2)) / s.z();
       J.row(1) = (ds.row(1) - predicted.y() * ds.row(2)) / s.z();

@@ -69,11 +69,13 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.T_I_C = learnt_.T_I_C;
   window.time_offset = learnt_.time_offset;
   window.depth_offset = learnt_.depth_offset;
+  window.bearing = learnt_.bearing;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
   window.calibration = {calibration.rotation,    calibration.translation,
                         calibration.time_offset, calibration.depth_offset && !depth_contradicts_,
-                        calibration.gyro_scale,  calibration.gyro_misalignment};
+                        calibration.intrinsics,  calibration.gyro_scale,
+                        calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
@@ -88,10 +90,18 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
       sigma = calibration.sigma_translation;
     } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
       sigma = sigma_depth_offset_;
+    } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.gyroColumn()) {
+      sigma = calibration.sigma_centre;
     } else if (c >= window.gyroColumn()) {
       sigma = imu_noise_.gyro_correction_sigma;
     }
     rows(c, c) = 1.0 / sigma;
+  }
+  if (window.calibration.intrinsics) {
+    // Pixels are square to a few parts in ten thousand, however long the focal length.
+    const int c = window.intrinsicsColumn();
+    rows.block<1, 2>(c, c).setConstant(0.5 / calibration.sigma_focal);
+    rows.block<1, 2>(c + 1, c) << 1.0 / calibration.sigma_aspect, -1.0 / calibration.sigma_aspect;
   }
   rows.block<3, 3>(nav, nav).diagonal().setConstant(1.0 / prior.sigma_velocity);
   rows.block<3, 3>(nav + 3, nav + 3).diagonal().setConstant(1.0 / prior.sigma_bias_gyro);
@@ -202,6 +212,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (!candidates.empty()) updateWithFeatures(candidates, &report);
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
   judgeDepthOffset();
+  judgeIntrinsics();
   judgeGyroCorrection();
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
   if (!still) {

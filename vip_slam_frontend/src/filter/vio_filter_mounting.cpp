@@ -17,6 +17,10 @@ constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
 constexpr double kHeldOffset = 1e-6;
 // An entry of the gyro's correction likewise: half a thousandth of a turn by 60 degrees is 0.03 degrees.
 constexpr double kSureGyroError = 4.0, kLeastGyroError = 5e-4;
+// An entry of the bearings' correction likewise: focal lengths, principal point. Exact focal lengths come out up to 0.06 %
+// too long, by many of their sigmas.
+constexpr double kSureBearing = 4.0;
+const Eigen::Array4d kLeastBearing(1e-3, 1e-3, 5e-4, 5e-4);
 
 }  // namespace
 
@@ -31,6 +35,7 @@ MountingEstimate VioFilter::mounting() const {
   mounting.T_I_C = window.T_I_C;
   mounting.time_offset = window.time_offset;
   mounting.depth_offset = window.depth_offset;
+  mounting.bearing = window.bearing;
   mounting.gyro_correction = window.gyro_correction;
   mounting.depth_contradicts = depth_contradicts_;
   if (window.calibration.size() == 0) return mounting;
@@ -42,6 +47,7 @@ MountingEstimate VioFilter::mounting() const {
   }
   if (window.calibration.time_offset) mounting.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
   if (window.calibration.depth_offset) mounting.sigma_depth_offset = sigmas(window.depthOffsetColumn() - first);
+  if (window.calibration.intrinsics) mounting.sigma_bearing = sigmas.segment<4>(window.intrinsicsColumn() - first);
   for (int k = 0; k < window.calibration.gyro(); ++k) {
     const auto [row, column] = gyroEntry(window.calibration, k);
     mounting.sigma_gyro_correction(row, column) = sigmas(window.gyroColumn() - first + k);
@@ -59,12 +65,15 @@ void VioFilter::learnMounting() {
       change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
       std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset ||
       std::abs(window.depth_offset - given_.depth_offset) > kBelievableChange * options.sigma_depth_offset ||
+      (window.bearing.value.head<2>().array().abs() > kBelievableChange * options.sigma_focal).any() ||
+      (window.bearing.value.tail<2>().array().abs() > kBelievableChange * options.sigma_centre).any() ||
       window.gyro_correction.cwiseAbs().maxCoeff() > kMostGyroError) {
     return;
   }
   learnt_.T_I_C = window.T_I_C;
   learnt_.time_offset = window.time_offset;
   learnt_.depth_offset = window.depth_offset;
+  learnt_.bearing = window.bearing;
   learnt_.gyro_correction = window.gyro_correction;
 }
 
@@ -97,6 +106,20 @@ void VioFilter::restartDepthOffset(bool none) {
   if (!started_ || !filter_.window().calibration.depth_offset) return;
   filter_.renew(filter_.window().depthOffsetColumn(), sigma_depth_offset_);
   filter_.window().depth_offset = given_.depth_offset;
+}
+
+void VioFilter::judgeIntrinsics() {
+  if (!filter_.window().calibration.intrinsics) return;
+  const Eigen::Array4d change = filter_.window().bearing.value.array().abs();
+  bearing_is_off_ = bearing_is_off_ && change > kLeastBearing / 2;
+  if ((change > kLeastBearing && !bearing_is_off_).any()) {
+    bearing_is_off_ =
+        bearing_is_off_ || (change > kLeastBearing && change > kSureBearing * mounting().sigma_bearing.array());
+  }
+}
+
+BearingCorrection VioFilter::bearingCorrection() const {
+  return {bearing_is_off_.select(filter_.window().bearing.value, Eigen::Vector4d::Zero())};
 }
 
 void VioFilter::judgeGyroCorrection() {

@@ -18,11 +18,11 @@ constexpr float kSameSurface = 0.9f;  // cosine between neighbouring normals tha
 
 }  // namespace
 
-const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid) {
+const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid, const BearingCorrection& bearing) {
   for (std::size_t i : {last_, 1 - last_}) {
     const Layout& known = layouts_[i];
     if (grid.stride != known.stride || grid.offset != known.offset || grid.cols != known.cols ||
-        grid.rows != known.rows) {
+        grid.rows != known.rows || bearing != known.bearing) {
       continue;
     }
     last_ = i;
@@ -31,13 +31,14 @@ const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid) 
   last_ = 1 - last_;
   Layout& layout = layouts_[last_];
   layout.stride = grid.stride, layout.offset = grid.offset, layout.cols = grid.cols, layout.rows = grid.rows;
+  layout.bearing = bearing;
   layout.rays.clear();
   layout.rays.reserve(static_cast<std::size_t>(grid.cols) * grid.rows);
   for (int r = 0; r < grid.rows; ++r) {
     for (int c = 0; c < grid.cols; ++c) {
       Eigen::Vector2d xy;
       if (!camera_->undistort(grid.pixel(c, r), &xy)) xy.setConstant(std::numeric_limits<double>::quiet_NaN());
-      layout.rays.push_back(xy.cast<float>());
+      layout.rays.push_back(bearing(xy).cast<float>());
     }
   }
   return layout.rays;
@@ -215,9 +216,9 @@ void DepthMeshBuilder::smoothNormals() {
 }
 
 const DepthMesh& DepthMeshBuilder::build(const std::vector<Feature>& features, const DepthGrid& grid,
-                                         const Eigen::Vector3d& up_C) {
+                                         const Eigen::Vector3d& up_C, const BearingCorrection& bearing) {
   up_C_ = up_C.cast<float>();
-  if (!grid.empty()) grid_rays_ = &rays_(grid);
+  if (!grid.empty()) grid_rays_ = &rays_(grid, bearing);
   collectVertices(features, grid);
   pixels_.clear();
   for (const MeshVertex& v : mesh_.vertices) pixels_.push_back(v.pixel);

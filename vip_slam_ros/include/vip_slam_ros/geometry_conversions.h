@@ -6,8 +6,10 @@
 #include <geometry_msgs/Transform.h>
 #include <geometry_msgs/Vector3.h>
 #include <ros/time.h>
+#include <boost/array.hpp>
 #include <Eigen/Core>
 
+#include "vip_slam_core/camera/bearing_correction.h"
 #include "vip_slam_core/geometry/se3.h"
 
 namespace vip_slam {
@@ -22,6 +24,9 @@ Eigen::Vector3d fromMsg(const geometry_msgs::Vector3& v);
 /// A quaternion of zero length, as an unset message has, becomes the identity.
 SE3 fromMsg(const geometry_msgs::Pose& pose);
 SE3 fromMsg(const geometry_msgs::Transform& transform);
+
+boost::array<double, 4> toArray(const BearingCorrection& bearing);
+BearingCorrection fromArray(const boost::array<double, 4>& bearing);
 
 /// Seconds to stamp; stamps that came from toSec() return exactly. Negative and non-finite times become 0.
 ros::Time toStamp(double t);

@@ -7,6 +7,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "vip_slam_core/camera/bearing_correction.h"
+
 namespace vip_slam {
 
 struct DepthCurve {
@@ -40,12 +42,15 @@ std::string validateDepthCurve(const DepthCurve& curve);
 /// In place; 32FC1, 0 and NaN stay.
 void applyDepthCurve(const DepthCurve& curve, cv::Mat* depth);
 
-/// All that a camera's readings are added.
+/// All that a camera's readings are added, and what its bearings mean.
 struct DepthCorrection {
   double offset = 0;  ///< m, after the curve
   DepthCurve curve;
+  BearingCorrection bearing;
 
-  bool operator==(const DepthCorrection& other) const { return offset == other.offset && curve == other.curve; }
+  bool operator==(const DepthCorrection& other) const {
+    return offset == other.offset && curve == other.curve && bearing == other.bearing;
+  }
   bool operator!=(const DepthCorrection& other) const { return !(*this == other); }
 };
 

@@ -12,24 +12,34 @@ struct CalibrationOptions {
   bool translation = false;
   bool time_offset = true;
   bool depth_offset = true;
+  bool intrinsics = true;
   bool gyro_scale = true;
   bool gyro_misalignment = false;
   double sigma_rotation = 0.01;
   double sigma_translation = 0.01;
   double sigma_time_offset = 0.005;
   double sigma_depth_offset = 0.005;
+  double sigma_focal = 0.002;
+  double sigma_aspect = 0.0005;
+  double sigma_centre = 0.002;
 
   void visit(OptionVisitor& v) {
     v.field("rotation", rotation, "estimate the camera-IMU rotation online");
     v.field("translation", translation, "estimate the camera-IMU translation online");
     v.field("time_offset", time_offset, "estimate the camera-IMU delay online");
     v.field("depth_offset", depth_offset, "estimate online what all depth readings are too long or too short by");
+    v.field("intrinsics", intrinsics,
+            "estimate online what focal lengths and principal point are off by, where depth is registered");
     v.field("gyro_scale", gyro_scale, "estimate online the scale of the gyro's axes");
     v.field("gyro_misalignment", gyro_misalignment, "estimate online the misalignment of the gyro's axes");
     v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "initial one-sigma of the rotation, rad");
     v.field("sigma_translation", sigma_translation, 1e-5, 1.0, "initial one-sigma of the translation, m");
     v.field("sigma_time_offset", sigma_time_offset, 1e-6, 1.0, "initial one-sigma of the delay, s");
     v.field("sigma_depth_offset", sigma_depth_offset, 1e-6, 1.0, "initial one-sigma of the depth's offset, m");
+    v.field("sigma_focal", sigma_focal, 1e-6, 1.0, "initial one-sigma of the focal lengths, as a share of them");
+    v.field("sigma_aspect", sigma_aspect, 1e-6, 1.0, "initial one-sigma of fx / fy");
+    v.field("sigma_centre", sigma_centre, 1e-6, 1.0,
+            "initial one-sigma of the principal point, as a share of the focal length");
   }
 };
 

@@ -90,6 +90,9 @@ class VioFilter {
   /// The gyro's correction for others: of each entry the estimate once it is beyond doubt and large enough to matter,
   /// else zero.
   Eigen::Matrix3d gyroCorrection() const;
+  /// What bearings mean, for others: of each entry the estimate once it is beyond doubt and large enough to matter, else
+  /// zero.
+  BearingCorrection bearingCorrection() const;
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
@@ -109,6 +112,7 @@ class VioFilter {
   /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
   /// estimated no more.
   void judgeDepthOffset();
+  void judgeIntrinsics();
   void judgeGyroCorrection();
   /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
   /// allows: then whatever broke the estimate broke this as well.
@@ -135,6 +139,7 @@ class VioFilter {
   bool started_ = false;
   bool depth_is_off_ = false;                                                         ///< beyond doubt
   Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);  ///< likewise, by entries
+  Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
   bool depth_contradicts_ = false;                                                    ///< its offset went beyond belief
   int still_images_ = 0;  ///< images since the standing began; 0 when moving
   CloneId still_anchor_ = 0;

@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "vip_slam_core/camera/bearing_correction.h"
 #include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/types/feature.h"
@@ -43,13 +44,14 @@ struct DepthMesh {
 class GridRays {
  public:
   explicit GridRays(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {}
-  /// Computed once for the grids of keyframes and once for the coarser ones of frames, which take turns; the result is
-  /// valid until the next but one call.
-  const std::vector<Eigen::Vector2f>& operator()(const DepthGrid& grid);
+  /// Computed once for the grids of keyframes and once for the coarser ones of frames, which take turns, and anew when
+  /// their bearings are corrected by something else; the result is valid until the next but one call.
+  const std::vector<Eigen::Vector2f>& operator()(const DepthGrid& grid, const BearingCorrection& bearing = {});
 
  private:
   struct Layout {
     int stride = 0, offset = 0, cols = 0, rows = 0;
+    BearingCorrection bearing;
     std::vector<Eigen::Vector2f> rays;
   };
   std::shared_ptr<const CameraModel> camera_;
@@ -61,8 +63,10 @@ class DepthMeshBuilder {
  public:
   DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
   /// The result is valid until the next call. The grid may be empty. `up_C` is the world's z axis in the camera frame:
-  /// what is level may be seen at a flatter angle, where upright strips may be nothing but a step in depth.
-  const DepthMesh& build(const std::vector<Feature>& features, const DepthGrid& grid, const Eigen::Vector3d& up_C);
+  /// what is level may be seen at a flatter angle, where upright strips may be nothing but a step in depth. `bearing`:
+  /// what the camera's bearings mean; the features have it already.
+  const DepthMesh& build(const std::vector<Feature>& features, const DepthGrid& grid, const Eigen::Vector3d& up_C,
+                         const BearingCorrection& bearing = {});
 
  private:
   void collectVertices(const std::vector<Feature>& features, const DepthGrid& grid);
