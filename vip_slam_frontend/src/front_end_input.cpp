@@ -27,10 +27,12 @@ SensorConfig checked(const SensorConfig& sensor) {
   return sensor;
 }
 
-/// Depth of a camera of its own has bearings of its own.
+/// Depth of a camera of its own has bearings of its own, and what the focal length of a fisheye gets wrong does not grow
+/// evenly with the bearing.
 FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& sensor) {
   FilterOptions filter = options.filter;
-  filter.calibration.intrinsics = filter.calibration.intrinsics && sensor.depth_registered;
+  filter.calibration.intrinsics = filter.calibration.intrinsics && sensor.depth_registered &&
+                                  sensor.camera.model != DistortionModel::kEquidistant;
   return filter;
 }
 

@@ -66,7 +66,10 @@ TEST(FeatureRows, JacobiansMatchCentralDifferences) {
     stackFeature(b, scene.observations, fb, noise, &unused_x, &unused_f, &minus);
     return Eigen::VectorXd(-(plus - minus) / (2 * h));
   };
+  // The columns of the focal lengths are taken where the bearing is expected, not where it was measured.
+  const int focal = scene.window.intrinsicsColumn();
   for (int c = 0; c < scene.window.dimension(); ++c) {
+    if (c == focal || c == focal + 1) continue;
     Eigen::VectorXd delta = Eigen::VectorXd::Zero(scene.window.dimension());
     delta(c) = h;
     WindowState a = scene.window, b = scene.window;
@@ -79,6 +82,33 @@ TEST(FeatureRows, JacobiansMatchCentralDifferences) {
     const Eigen::Vector3d step = h * Eigen::Vector3d::Unit(c);
     EXPECT_LT((difference(scene.window, scene.f_W + step, scene.window, scene.f_W - step) - H_f.col(c)).norm(),
               1e-6 * H_f.col(c).norm());
+  }
+}
+
+TEST(FeatureRows, FocalLengthsAreAskedWhereTheBearingIsExpected) {
+  Scene scene = makeScene();
+  const MeasurementNoise noise;
+  Eigen::MatrixXd measured, H_x, H_f, unused_x, unused_f;
+  Eigen::VectorXd r, plus, minus;
+  stackFeature(scene.window, scene.observations, scene.f_W, noise, &measured, &H_f, &r);
+  for (Observation& o : scene.observations) {
+    const Eigen::Vector3d p_C =
+        cameraPose(scene.window, scene.window.clones[scene.window.indexOf(o.clone)]).inverse() * scene.f_W;
+    const Eigen::Vector3d given = scene.window.bearing.matrix().inverse() * p_C;
+    o.xy = given.head<2>() / given.z();
+  }
+  stackFeature(scene.window, scene.observations, scene.f_W, noise, &H_x, &H_f, &r);
+  const double h = 1e-6;
+  for (int c = scene.window.intrinsicsColumn(); c < scene.window.intrinsicsColumn() + 2; ++c) {
+    EXPECT_EQ(measured.col(c), H_x.col(c)) << "the noise of the measurement is in it";
+    Eigen::VectorXd delta = Eigen::VectorXd::Zero(scene.window.dimension());
+    delta(c) = h;
+    WindowState a = scene.window, b = scene.window;
+    a.boxplus(delta);
+    b.boxplus(-delta);
+    stackFeature(a, scene.observations, scene.f_W, noise, &unused_x, &unused_f, &plus);
+    stackFeature(b, scene.observations, scene.f_W, noise, &unused_x, &unused_f, &minus);
+    EXPECT_LT((-(plus - minus) / (2 * h) - H_x.col(c)).norm(), 1e-6 * (1.0 + H_x.col(c).norm())) << "column " << c;
   }
 }
 
