@@ -11,19 +11,19 @@ CalibrationSource::CalibrationSource(const SensorConfig& sensor, const FrontEndN
 
 void CalibrationSource::addColorInfo(const sensor_msgs::CameraInfo& info) {
   std::lock_guard<std::mutex> lock(mutex_);
-  take(info, sensor_.topics.color_info, &sensor_.camera, &color_info_);
+  take(info, sensor_.topics.color_info, sensor_.topics.color, &sensor_.camera, &color_info_);
 }
 
 void CalibrationSource::addDepthInfo(const sensor_msgs::CameraInfo& info) {
   std::lock_guard<std::mutex> lock(mutex_);
-  take(info, sensor_.topics.depth_info, &sensor_.depth_camera, &depth_info_);
+  take(info, sensor_.topics.depth_info, sensor_.topics.depth, &sensor_.depth_camera, &depth_info_);
 }
 
-void CalibrationSource::take(const sensor_msgs::CameraInfo& info, const std::string& topic, CameraIntrinsics* camera,
-                             bool* known) {
+void CalibrationSource::take(const sensor_msgs::CameraInfo& info, const std::string& topic,
+                             const std::string& image_topic, CameraIntrinsics* camera, bool* known) {
   if (*known) return;
   try {
-    *camera = intrinsicsFromCameraInfo(info);
+    *camera = intrinsicsFromCameraInfo(info, image_topic);
     *known = true;
     problem_.clear();
   } catch (const std::exception& error) {

@@ -31,7 +31,8 @@ class CalibrationSource {
   std::string colorFrame() const;
 
  private:
-  void take(const sensor_msgs::CameraInfo& info, const std::string& topic, CameraIntrinsics* camera, bool* known);
+  void take(const sensor_msgs::CameraInfo& info, const std::string& topic, const std::string& image_topic,
+            CameraIntrinsics* camera, bool* known);
   bool intrinsicsKnown() const;
 
   mutable std::mutex mutex_;

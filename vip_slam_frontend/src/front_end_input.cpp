@@ -27,12 +27,12 @@ SensorConfig checked(const SensorConfig& sensor) {
   return sensor;
 }
 
-/// Depth of a camera of its own has bearings of its own, and what the focal length of a fisheye gets wrong does not grow
-/// evenly with the bearing.
+/// Depth of a camera of its own has bearings of its own, and what the focal length of a fisheye gets wrong does not
+/// grow evenly with the bearing.
 FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& sensor) {
   FilterOptions filter = options.filter;
-  filter.calibration.intrinsics = filter.calibration.intrinsics && sensor.depth_registered &&
-                                  sensor.camera.model != DistortionModel::kEquidistant;
+  filter.calibration.intrinsics =
+      filter.calibration.intrinsics && sensor.depth_registered && sensor.camera.model != DistortionModel::kEquidistant;
   return filter;
 }
 
@@ -59,8 +59,8 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       surfaces_(camera_, sensor_.depth_noise),
       landmarks_(options.tracking, camera_),
       orb_(options.tracking.keyframe_corners),
-      filter_(filterOptions(options, sensor_), sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset, camera_->focal(),
-              sensor_.gravity),
+      filter_(filterOptions(options, sensor_), sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset,
+              camera_->focal(), sensor_.gravity),
       initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, camera_->focal(),
                    sensor_.gravity, sensor_.depth_noise),
       stillness_(options.filter.zupt),

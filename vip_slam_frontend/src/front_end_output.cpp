@@ -60,7 +60,7 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   frame->status = status_;
   frame->T_I_C = extrinsics();
   frame->time_offset = timeOffset();
-  frame->depth_correction = {filter_.depthCorrection(), depth_curve_, filter_.bearingCorrection()};
+  frame->camera_correction = {filter_.depthCorrection(), depth_curve_, filter_.bearingCorrection()};
   frame->zero_velocity = still_;
   frame->keyframe = newest_keyframe_;
   if (filter_.started()) {

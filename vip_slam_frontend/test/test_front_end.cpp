@@ -92,8 +92,8 @@ TEST_F(FrontEndTest, DepthIsHandedOnAsWhatItMeans) {
   ASSERT_TRUE(output.keyframe);
   const double offset = front_end_.mounting().depth_offset;
   EXPECT_LT(offset, -0.001);
-  EXPECT_EQ(output.frame->depth_correction.offset, offset);
-  EXPECT_EQ(keyframe->frame.depth_correction.offset, offset);
+  EXPECT_EQ(output.frame->camera_correction.offset, offset);
+  EXPECT_EQ(keyframe->frame.camera_correction.offset, offset);
   const double z = kWall - World::position(t).x() + 0.015 + offset;
   for (const Feature& f : keyframe->frame.features) EXPECT_NEAR(f.depth, z, 5e-4);
   for (const Feature& f : output.frame->features) EXPECT_NEAR(f.depth, z, 5e-4);
@@ -111,8 +111,8 @@ TEST_F(FrontEndTest, DepthHasWhatTheMapFoundOutAboutItsCamera) {
   const cv::Mat read = World::depth(2.05);
   const cv::Mat before = read.clone();
   FrameOutput output = front_end_.process({2.05, world_.image(2.05), read});
-  EXPECT_EQ(output.frame->depth_correction.curve, update.depth_curve);
-  const double z = kWall - World::position(2.05).x() + 0.02 + output.frame->depth_correction.offset;
+  EXPECT_EQ(output.frame->camera_correction.curve, update.depth_curve);
+  const double z = kWall - World::position(2.05).x() + 0.02 + output.frame->camera_correction.offset;
   EXPECT_NEAR(output.frame->depth_grid.at(10, 10), z, 5e-4);
   EXPECT_EQ(cv::norm(read, before, cv::NORM_INF), 0.0);  // the caller's own stays as it is
   // One that no camera has is not believed.
@@ -120,7 +120,7 @@ TEST_F(FrontEndTest, DepthHasWhatTheMapFoundOutAboutItsCamera) {
   front_end_.applyMapUpdate(update);
   feedImu(2.10);
   output = front_end_.process({2.10, world_.image(2.10), World::depth(2.10)});
-  EXPECT_FLOAT_EQ(output.frame->depth_correction.curve.at(3.0f), 0.02f);
+  EXPECT_FLOAT_EQ(output.frame->camera_correction.curve.at(3.0f), 0.02f);
 }
 
 // Disparities that are all off by the same pass for an offset of depth until the map tells them apart.
@@ -143,7 +143,7 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
   EXPECT_EQ(front_end_.mounting().depth_offset, 0.0);
   FrameOutput output = go(20, 0.015);
   EXPECT_LT(std::abs(front_end_.mounting().depth_offset), 1e-6);
-  EXPECT_EQ(output.frame->depth_correction, (DepthCorrection{0.0, update.depth_curve}));
+  EXPECT_EQ(output.frame->camera_correction, (CameraCorrection{0.0, update.depth_curve}));
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
   // A further hundredth changes nothing; a map that was begun anew knows nothing.
   update.depth_curve = disparityCurve(-0.00202, 8);

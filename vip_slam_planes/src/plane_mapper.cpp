@@ -86,8 +86,8 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   has_grown_ = true;
   const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, frame.epoch);
   if (tracks.empty()) return;
-  const DepthMesh& mesh = mesher_.build(frame.features, frame.depth_grid, T_map_C.R().row(2),
-                                        frame.depth_correction.bearing);
+  const DepthMesh& mesh =
+      mesher_.build(frame.features, frame.depth_grid, T_map_C.R().row(2), frame.camera_correction.bearing);
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
   releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);

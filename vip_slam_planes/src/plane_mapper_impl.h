@@ -45,7 +45,7 @@ class PlaneMapper::Impl {
   void followMode(const MapUpdate& update);
   void takeCorrections(const MapUpdate& update);
   /// False when the keyframe's depth is corrected by just that already.
-  bool adoptDepthCorrection(const DepthCorrection& correction, KeyframePtr* keyframe);
+  bool adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe);
   void removeKeyframe(KeyframeId id);
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();

@@ -16,8 +16,8 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const ScopedTimer timer(timing, "planes.keyframe", keyframe.frame.t);
   const SE3& T_map_C = poses_.at(keyframe.id);
   const DepthGrid& grid = keyframe.frame.depth_grid;
-  const DepthMesh& mesh = mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2),
-                                        keyframe.frame.depth_correction.bearing);
+  const DepthMesh& mesh =
+      mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2), keyframe.frame.camera_correction.bearing);
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   if (first_time) removeContradicted(triangles, T_map_C, keyframe.frame.epoch);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, keyframe.frame.epoch);
@@ -126,8 +126,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
   for (std::size_t i = 0; i < label.size(); ++i) {
     if (label[i] >= 0) area[label[i]] += mesh.triangles[i].area;
   }
-  const std::vector<Eigen::Vector2f>& rays =
-      rays_(keyframe.frame.depth_grid, keyframe.frame.depth_correction.bearing);
+  const std::vector<Eigen::Vector2f>& rays = rays_(keyframe.frame.depth_grid, keyframe.frame.camera_correction.bearing);
   const auto shown = pointsByLabel(keyframe, labels, rays, tracks.size());
   std::vector<PlaneId> ids;
   std::vector<char> trusted;
@@ -137,7 +136,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
     if (area[k] > 0) {
       auto observation = sampler_.sample(keyframe.id, shown[k], T_map_C, track.id(), track.plane());
       if (observation) {
-        observation->depth_correction = keyframe.frame.depth_correction;
+        observation->camera_correction = keyframe.frame.camera_correction;
         track.observations().insert_or_assign(keyframe.id, std::move(*observation));
         fresh_.emplace(track.id(), keyframe.id);
         refit(&track);

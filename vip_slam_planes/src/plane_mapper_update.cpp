@@ -4,7 +4,7 @@
 
 #include "plane_mapper_impl.h"
 #include "vip_slam_core/geometry/plane_noise.h"
-#include "vip_slam_core/types/depth_correction.h"
+#include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -36,7 +36,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto it = waiting_.find(estimate.id);
     if (it == waiting_.end() || !estimate.state.T_W_I.isFinite()) continue;
-    const KeyframePtr keyframe = withDepthCorrection(it->second, estimate.depth_correction);
+    const KeyframePtr keyframe = withCameraCorrection(it->second, estimate.camera_correction);
     waiting_.erase(it);
     placed_[keyframe->id] = keyframe;
     poses_[keyframe->id] = estimate.state.T_W_I * estimate.T_I_C;
@@ -111,7 +111,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     const SE3 corrected = estimate.state.T_W_I * estimate.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
     map_moved_ = map_moved_ || move.t().norm() > kMovedShift || logSO3(move.rotation()).norm() > kMovedTurn;
-    const bool other_depth = adoptDepthCorrection(estimate.depth_correction, &it->second);
+    const bool other_depth = adoptCameraCorrection(estimate.camera_correction, &it->second);
     if (other_depth || T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);
     T_map_C = corrected;
   }
@@ -133,14 +133,14 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
 }
 
 // Covered cells and what detection has left over stay where they are: they are coarser than any such correction.
-bool PlaneMapper::Impl::adoptDepthCorrection(const DepthCorrection& correction, KeyframePtr* keyframe) {
-  const KeyframePtr corrected = withDepthCorrection(*keyframe, correction);
+bool PlaneMapper::Impl::adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe) {
+  const KeyframePtr corrected = withCameraCorrection(*keyframe, correction);
   if (corrected == *keyframe) return false;
   *keyframe = corrected;
   points_.renewSightings(*corrected);
   for (auto& [id, track] : tracks_) {
     const auto observation = track.observations().find(corrected->id);
-    if (observation != track.observations().end()) setDepthCorrection(correction, &observation->second);
+    if (observation != track.observations().end()) setCameraCorrection(correction, &observation->second);
   }
   return true;
 }

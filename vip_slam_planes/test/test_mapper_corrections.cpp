@@ -1,4 +1,4 @@
-// What the back end corrects, on exact scenes: poses, the camera's mounting, the depth's offset.
+// What the back end corrects, on exact scenes: poses, the camera's mounting and intrinsics, the depth's offset.
 #include <cmath>
 #include <set>
 
@@ -49,7 +49,7 @@ TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
     for (Feature& f : keyframe->frame.features) f.depth += f.depth > 0 ? 0.02f : 0.0f;
     rig.place(keyframe, T_W_C);
     all.keyframes.push_back(updateFor(*keyframe, T_W_C).keyframes[0]);
-    all.keyframes.back().depth_correction.offset = -0.02;
+    all.keyframes.back().camera_correction.offset = -0.02;
   }
   const PlaneEstimate* wall = rig.find(truth, 0.05);
   ASSERT_TRUE(wall);
@@ -62,12 +62,55 @@ TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
   for (float& z : keyframe->frame.depth_grid.z) z += z > 0 ? 0.02f : 0.0f;
   rig.mapper.addKeyframe(keyframe);
   MapUpdate update = updateFor(*keyframe, T_W_C);
-  update.keyframes[0].depth_correction.offset = -0.02;
+  update.keyframes[0].camera_correction.offset = -0.02;
   const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
   EXPECT_TRUE(rig.find(truth, 0.002));
   ASSERT_FALSE(result.observations.empty());
   for (const PlaneObservation& o : result.observations) {
-    EXPECT_EQ(o.depth_correction.offset, -0.02);
+    EXPECT_EQ(o.camera_correction.offset, -0.02);
+    const PlaneEstimate* plane = nullptr;
+    for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
+    ASSERT_TRUE(plane);
+    const Eigen::Vector4d p_C = transformPlane(T_W_C.inverse(), plane->plane).coefficients();
+    EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.004);
+  }
+}
+
+TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
+  // Focal lengths 2 % too long, the principal point 8 px off; the back end tells of it with the sixth keyframe.
+  Rig rig;
+  const BearingCorrection bearing{{0.02, 0.02, 0.015, -0.01}};
+  const CameraIntrinsics& given = rig.camera.camera->intrinsics();
+  const Eigen::Vector4d right = correctedIntrinsics({given.fx, given.fy, given.cx, given.cy}, bearing);
+  CameraIntrinsics truth_of_camera = given;
+  truth_of_camera.fx = right(0), truth_of_camera.fy = right(1), truth_of_camera.cx = right(2);
+  truth_of_camera.cy = right(3);
+  rig.camera.camera = makeCamera(truth_of_camera);
+  const Scene scene = room();
+  const Plane truth({-1, 0, 0}, 3);
+  MapUpdate all;
+  all.global = true;
+  for (int i = 0; i < 6; ++i) {
+    const SE3 T_W_C = lookAt({-1 + 0.2 * i, 0, 1.4}, {3, -1.5 + 0.1 * i, 1.0});
+    const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+    rig.place(keyframe, T_W_C);
+    all.keyframes.push_back(updateFor(*keyframe, T_W_C).keyframes[0]);
+    all.keyframes.back().camera_correction.bearing = bearing;
+  }
+  EXPECT_FALSE(rig.find(truth, 0.005));
+  rig.mapper.applyMapUpdate(all);
+  EXPECT_TRUE(rig.find(truth, 0.003));
+  // One that comes with the correction is seen with it at once.
+  const SE3 T_W_C = lookAt({0.3, 0.1, 1.4}, {3, -1.2, 1.1});
+  const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
+  keyframe->frame.camera_correction.bearing = bearing;
+  rig.mapper.addKeyframe(keyframe);
+  MapUpdate update = updateFor(*keyframe, T_W_C);
+  update.keyframes[0].camera_correction.bearing = bearing;
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
+  ASSERT_FALSE(result.observations.empty());
+  for (const PlaneObservation& o : result.observations) {
+    EXPECT_EQ(o.camera_correction.bearing, bearing);
     const PlaneEstimate* plane = nullptr;
     for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
     ASSERT_TRUE(plane);

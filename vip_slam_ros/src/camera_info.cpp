@@ -5,7 +5,7 @@
 
 namespace vip_slam {
 
-CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info) {
+CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info, const std::string& image_topic) {
   CameraIntrinsics intrinsics;
   intrinsics.width = int(info.width);
   intrinsics.height = int(info.height);
@@ -13,6 +13,17 @@ CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info) {
   intrinsics.cx = info.K[2];
   intrinsics.fy = info.K[4];
   intrinsics.cy = info.K[5];
+  if (image_topic.find("image_rect") != std::string::npos) {
+    if (info.P[0] > 0) {  // some drivers leave it empty
+      intrinsics.fx = info.P[0];
+      intrinsics.cx = info.P[2];
+      intrinsics.fy = info.P[5];
+      intrinsics.cy = info.P[6];
+    }
+    const std::string wrong = intrinsics.validate();
+    if (!wrong.empty()) throw std::invalid_argument("camera_info: " + wrong);
+    return intrinsics;
+  }
   const bool zero = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
   // An equidistant lens without corrections is still no pinhole.
   const bool equidistant = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";

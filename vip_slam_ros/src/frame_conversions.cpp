@@ -122,9 +122,9 @@ vip_slam_msgs::TrackedFrame toMsg(const TrackedFrame& frame, const std::string& 
   Eigen::Map<Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(msg.covariance.data()) = frame.covariance;
   msg.imu_camera = toPoseMsg(frame.T_I_C);
   msg.time_offset = frame.time_offset;
-  msg.depth_correction = frame.depth_correction.offset;
-  msg.depth_curve = frame.depth_correction.curve.added;
-  msg.bearing_correction = toArray(frame.depth_correction.bearing);
+  msg.depth_correction = frame.camera_correction.offset;
+  msg.depth_curve = frame.camera_correction.curve.added;
+  msg.bearing_correction = toArray(frame.camera_correction.bearing);
   msg.features.reserve(frame.features.size());
   for (const Feature& feature : frame.features) msg.features.push_back(toMsg(feature));
   msg.depth_grid = toMsg(frame.depth_grid);
@@ -142,7 +142,7 @@ TrackedFrame fromMsg(const vip_slam_msgs::TrackedFrame& msg) {
   frame.covariance = Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(msg.covariance.data());
   frame.T_I_C = fromMsg(msg.imu_camera);
   frame.time_offset = msg.time_offset;
-  frame.depth_correction = {msg.depth_correction, {msg.depth_curve}, fromArray(msg.bearing_correction)};
+  frame.camera_correction = {msg.depth_correction, {msg.depth_curve}, fromArray(msg.bearing_correction)};
   frame.features.reserve(msg.features.size());
   for (const auto& feature : msg.features) frame.features.push_back(fromMsg(feature));
   frame.depth_grid = fromMsg(msg.depth_grid);

@@ -84,9 +84,9 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
     k.id = keyframe.id;
     k.state = toMsg(keyframe.state);
     k.imu_camera = toPoseMsg(keyframe.T_I_C);
-    k.depth_correction = keyframe.depth_correction.offset;
-    k.depth_curve = keyframe.depth_correction.curve.added;
-    k.bearing_correction = toArray(keyframe.depth_correction.bearing);
+    k.depth_correction = keyframe.camera_correction.offset;
+    k.depth_curve = keyframe.camera_correction.curve.added;
+    k.bearing_correction = toArray(keyframe.camera_correction.bearing);
     msg.keyframes.push_back(k);
   }
   msg.landmarks.reserve(update.landmarks.size());
@@ -122,10 +122,11 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.global = msg.global_update;
   update.keyframes.reserve(msg.keyframes.size());
   for (const auto& keyframe : msg.keyframes) {
-    update.keyframes.push_back({keyframe.id,
-                                fromMsg(keyframe.state),
-                                fromMsg(keyframe.imu_camera),
-                                {keyframe.depth_correction, {keyframe.depth_curve}, fromArray(keyframe.bearing_correction)}});
+    update.keyframes.push_back(
+        {keyframe.id,
+         fromMsg(keyframe.state),
+         fromMsg(keyframe.imu_camera),
+         {keyframe.depth_correction, {keyframe.depth_curve}, fromArray(keyframe.bearing_correction)}});
   }
   update.landmarks.reserve(msg.landmarks.size());
   for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));

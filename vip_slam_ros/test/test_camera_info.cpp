@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <Eigen/Core>
 
 #include "vip_slam_ros/camera_info.h"
 
@@ -60,6 +61,33 @@ TEST(CameraInfo, ZeroCoefficientsLeaveAFisheyeAFisheye) {
     fisheye.distortion.assign(distortion.begin(), distortion.end());
     EXPECT_EQ(intrinsicsFromCameraInfo(toCameraInfo(fisheye)).model, DistortionModel::kEquidistant);
   }
+}
+
+// image_proc publishes beside image_raw, image_rect and image_rect_color one camera_info, that of the lens.
+TEST(CameraInfo, OfRectifiedImagesIsTheProjection) {
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  info.distortion_model = "plumb_bob";
+  info.D = {0.1, -0.2, 0.001, 0.002, 0};
+  info.K = {600, 0, 321, 0, 601, 241, 0, 0, 1};
+  info.P = {580, 0, 322, 0, 0, 581, 242, 0, 0, 0, 1, 0};
+  for (const char* topic : {"/camera/rgb/image_rect_color", "/camera/rgb/image_rect/compressed"}) {
+    const CameraIntrinsics rectified = intrinsicsFromCameraInfo(info, topic);
+    EXPECT_EQ(rectified.model, DistortionModel::kNone);
+    EXPECT_TRUE(rectified.distortion.empty());
+    EXPECT_EQ(Eigen::Vector4d(rectified.fx, rectified.fy, rectified.cx, rectified.cy),
+              Eigen::Vector4d(580, 581, 322, 242));
+  }
+  const CameraIntrinsics raw = intrinsicsFromCameraInfo(info, "/camera/rgb/image_raw");
+  EXPECT_EQ(raw.model, DistortionModel::kRadTan);
+  EXPECT_EQ(raw.fx, 600);
+  info.P = {};
+  const CameraIntrinsics without = intrinsicsFromCameraInfo(info, "/camera/rgb/image_rect");
+  EXPECT_EQ(without.model, DistortionModel::kNone);
+  EXPECT_EQ(without.fx, 600);
+  info.K = {};
+  EXPECT_THROW(intrinsicsFromCameraInfo(info, "/camera/rgb/image_rect"), std::invalid_argument);
 }
 
 TEST(CameraInfo, UnusableIsNamed) {

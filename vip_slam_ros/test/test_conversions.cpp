@@ -60,7 +60,7 @@ class Conversions : public ::testing::Test {
     f.state = state();
     f.covariance.setRandom();
     f.T_I_C = pose();
-    f.depth_correction = {number(), {{0.001f, -0.002f}}, {{number(), number(), number(), number()}}};
+    f.camera_correction = {number(), {{0.001f, -0.002f}}, {{number(), number(), number(), number()}}};
     f.time_offset = number();
     for (int i = 0; i < 5; ++i) f.features.push_back(feature());
     f.depth_grid.stride = 16;
@@ -110,7 +110,7 @@ void expectSame(const TrackedFrame& a, const TrackedFrame& b) {
   expectSame(a.state, b.state);
   EXPECT_EQ(a.covariance, b.covariance);
   expectSame(a.T_I_C, b.T_I_C);
-  EXPECT_EQ(a.depth_correction, b.depth_correction);
+  EXPECT_EQ(a.camera_correction, b.camera_correction);
   EXPECT_EQ(a.time_offset, b.time_offset);
   ASSERT_EQ(a.features.size(), b.features.size());
   for (std::size_t i = 0; i < a.features.size(); ++i) {
@@ -184,7 +184,7 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   observation.plane = 2;
   observation.G.setRandom();
   observation.weight_scale = 0.25;
-  observation.depth_correction = {-0.01, {{0.003f}}, {{0.001, -0.002, 0.003, 0.004}}};
+  observation.camera_correction = {-0.01, {{0.003f}}, {{0.001, -0.002, 0.003, 0.004}}};
   observation.points = {{{1, 2, 3}, 0.01f}, {{4, 5, 6}, 0.02f}};
   update.observations = {observation};
   update.associated = {{11, 2}, {12, 1}};
@@ -203,7 +203,7 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   EXPECT_EQ(back.observations[0].plane, 2u);
   EXPECT_EQ(back.observations[0].G, observation.G);
   EXPECT_EQ(back.observations[0].weight_scale, 0.25);
-  EXPECT_EQ(back.observations[0].depth_correction, observation.depth_correction);
+  EXPECT_EQ(back.observations[0].camera_correction, observation.camera_correction);
   ASSERT_EQ(back.observations[0].points.size(), 2u);
   EXPECT_EQ(back.observations[0].points[1].p_C, observation.points[1].p_C);
   EXPECT_EQ(back.observations[0].points[1].sigma, observation.points[1].sigma);
@@ -253,7 +253,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   EXPECT_EQ(back.keyframes[1].id, 30u);
   expectSame(back.keyframes[1].state, update.keyframes[1].state);
   expectSame(back.keyframes[1].T_I_C, update.keyframes[1].T_I_C);
-  EXPECT_EQ(back.keyframes[1].depth_correction, update.keyframes[1].depth_correction);
+  EXPECT_EQ(back.keyframes[1].camera_correction, update.keyframes[1].camera_correction);
   EXPECT_EQ(back.depth_curve, update.depth_curve);
   EXPECT_EQ(back.disparity_error, update.disparity_error);
   ASSERT_EQ(back.landmarks.size(), 1u);

@@ -6,14 +6,14 @@
 #include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/disparity_fit.h"
 #include "vip_slam_core/depth/disparity_curve.h"
-#include "vip_slam_core/types/depth_correction.h"
+#include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr std::uint64_t kScaleInterval = 30, kCurveInterval = 20;  // keyframes
 constexpr int kAdjustmentsAtEnd = 3;  // at most, while the map still finds out about the depth camera
-// Smaller changes of the depth's correction wait for the next global adjustment, m.
+// Smaller changes of the camera's correction wait for the next global adjustment: m, normalised.
 constexpr double kNewDepthOffset = 0.001;
 constexpr double kNewBearing = 1e-4;
 constexpr double kNewGyroCorrection = 5e-4;  // likewise
@@ -42,7 +42,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   const std::uint32_t epoch_before = epoch;
   const NavState state = predict(*keyframe);
   try {
-    map.addKeyframe(withDepthCorrection(keyframe, depth_correction), state, sensor.imu_noise);
+    map.addKeyframe(withCameraCorrection(keyframe, camera_correction), state, sensor.imu_noise);
   } catch (...) {
     T_map_odom = T_map_odom_before;
     epoch = epoch_before;
@@ -51,7 +51,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // Beyond the local window bodies turn a little as well; others hear of it with the next global update, until when
   // the cameras they know stay right.
   map.adoptMounting(keyframe->frame.T_I_C);
-  followDepthOffset(keyframe->frame.depth_correction);
+  followCameraCorrection(keyframe->frame.camera_correction);
   followGyroCorrection(keyframe->gyro_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
@@ -64,16 +64,16 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   statistics.merged += found.merged;
 }
 
-void BackEnd::Impl::followDepthOffset(const DepthCorrection& newest) {
-  if (newest.curve != depth_correction.curve) return;  // it goes with readings as they were
+void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
+  if (newest.curve != camera_correction.curve) return;  // it goes with readings as they were
   newest_depth_offset = newest.offset;
   newest_bearing = newest.bearing;
-  if (std::abs(newest.offset - depth_correction.offset) < kNewDepthOffset &&
-      (newest.bearing.value - depth_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing)
+  if (std::abs(newest.offset - camera_correction.offset) < kNewDepthOffset &&
+      (newest.bearing.value - camera_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing)
     return;
-  depth_correction.offset = newest.offset;
-  depth_correction.bearing = newest.bearing;
-  map.adoptDepthCorrection(depth_correction);
+  camera_correction.offset = newest.offset;
+  camera_correction.bearing = newest.bearing;
+  map.adoptCameraCorrection(camera_correction);
   global_wanted = true;
   ++correction;  // an adjustment under way has the readings as they were
 }
@@ -90,14 +90,14 @@ bool BackEnd::Impl::learnDepthCurve() {
     found = fitDepthCurve(map, sensor.depth_noise);
   }
   if (!found) return false;
-  DepthCurve curve = chained(depth_correction.curve, *found);
+  DepthCurve curve = chained(camera_correction.curve, *found);
   if (!validateDepthCurve(curve).empty()) return false;
-  depth_correction.curve = std::move(curve);
+  camera_correction.curve = std::move(curve);
   if (disparity) {
     disparity_error += *disparity;
-    if (voidsDepthOffset(*disparity)) depth_correction.offset = newest_depth_offset = 0;
+    if (voidsDepthOffset(*disparity)) camera_correction.offset = newest_depth_offset = 0;
   }
-  map.adoptDepthCorrection(depth_correction);
+  map.adoptCameraCorrection(camera_correction);
   ++correction;
   return true;
 }
@@ -117,7 +117,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   const double t = keyframe ? keyframe->frame.t : 0.0;
   const ScopedTimer timer(log, "backend.keyframe", t);
   MapUpdate update = beginUpdate(t);
-  const DepthCorrection depth_correction_before = depth_correction;
+  const CameraCorrection camera_correction_before = camera_correction;
   bool entering = false;
   try {
     if (!keyframe) throw MapError("no keyframe given");
@@ -155,7 +155,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
   if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global_wanted = true;
   // Nobody knows yet where the keyframes lie that waited for this one, or what their depth means now.
-  if (entering || depth_correction != depth_correction_before) fillGlobal(&update);
+  if (entering || camera_correction != camera_correction_before) fillGlobal(&update);
   finishUpdate(&update);
   return update;
 }
@@ -230,7 +230,7 @@ void BackEnd::Impl::reset() {
   ++correction;
   global_wanted = false;
   last_global = -1e300;
-  depth_correction = {};
+  camera_correction = {};
   newest_depth_offset = disparity_error = 0;
   newest_bearing = {};
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
@@ -252,9 +252,9 @@ void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }
 
 GbaJob BackEnd::startGlobalBa() {
   impl_->global_wanted = false;
-  impl_->depth_correction.offset = impl_->newest_depth_offset;
-  impl_->depth_correction.bearing = impl_->newest_bearing;
-  impl_->map.adoptDepthCorrection(impl_->depth_correction);
+  impl_->camera_correction.offset = impl_->newest_depth_offset;
+  impl_->camera_correction.bearing = impl_->newest_bearing;
+  impl_->map.adoptCameraCorrection(impl_->camera_correction);
   impl_->gyro_correction = impl_->newest_gyro_correction;
   impl_->map.adoptGyroCorrection(impl_->gyro_correction, impl_->sensor.imu_noise);
   return impl_->makeGlobalJob();
@@ -281,7 +281,7 @@ MapUpdate BackEnd::finish() {
 }
 
 InertialScale BackEnd::scale() const { return impl_->statistics.scale; }
-const DepthCurve& BackEnd::depthCurve() const { return impl_->depth_correction.curve; }
+const DepthCurve& BackEnd::depthCurve() const { return impl_->camera_correction.curve; }
 double BackEnd::disparityError() const { return impl_->disparity_error; }
 std::string BackEnd::depthDifference() const {
   if (impl_->disparity_error != 0) return disparityDifference(impl_->disparity_error);

@@ -31,7 +31,7 @@ struct BackEnd::Impl {
   void insert(const KeyframePtr& keyframe);
   /// All keyframes of this session get the same correction of their depth: the newest one's, once it is another one by
   /// enough to redo the map for.
-  void followDepthOffset(const DepthCorrection& newest);
+  void followCameraCorrection(const CameraCorrection& newest);
   /// Asks the map what the depth camera reads wrong at which distance; when that is something new all keyframes have
   /// it. False when nothing is new.
   bool learnDepthCurve();
@@ -111,7 +111,7 @@ struct BackEnd::Impl {
   std::uint64_t correction = 0;
   bool global_wanted = false;
   double last_global = -1e300;                                ///< stamp of the last one that a loop asked for
-  DepthCorrection depth_correction;                           ///< of all keyframes of this session
+  CameraCorrection camera_correction;                         ///< of all keyframes of this session
   double newest_depth_offset = 0;                             ///< m, as the newest keyframe came
   BearingCorrection newest_bearing;                           ///< likewise
   double disparity_error = 0;                                 ///< 1/m, which the curve takes care of

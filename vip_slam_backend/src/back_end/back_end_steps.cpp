@@ -92,7 +92,7 @@ MapUpdate BackEnd::Impl::beginUpdate(double t) const {
 }
 
 KeyframeEstimate BackEnd::Impl::estimateOf(const MapKeyframe& kf) const {
-  return {kf.id(), kf.state, kf.T_I_C, kf.data->frame.depth_correction};
+  return {kf.id(), kf.state, kf.T_I_C, kf.data->frame.camera_correction};
 }
 
 LandmarkEstimate BackEnd::Impl::estimateOf(const MapLandmark& landmark) const {
@@ -119,7 +119,7 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->revision = ++revision;
   update->epoch = epoch;
   update->T_map_odom = T_map_odom;
-  update->depth_curve = depth_correction.curve;
+  update->depth_curve = camera_correction.curve;
   update->disparity_error = disparity_error;
   update->newest_keyframe = map.newestKeyframe();
   if (update->newest_keyframe != 0) update->t = map.keyframe(update->newest_keyframe).data->frame.t;

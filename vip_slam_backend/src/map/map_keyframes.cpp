@@ -4,7 +4,7 @@
 
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_core/imu/gyro_correction.h"
-#include "vip_slam_core/types/depth_correction.h"
+#include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -122,14 +122,14 @@ void Map::adoptMounting(const SE3& T_I_C) {
   }
 }
 
-void Map::adoptDepthCorrection(const DepthCorrection& correction) {
+void Map::adoptCameraCorrection(const CameraCorrection& correction) {
   for (auto& [id, kf] : keyframes_) {
-    if (kf.stored || kf.data->frame.depth_correction == correction) continue;
-    const KeyframePtr corrected = withDepthCorrection(kf.data, correction);
+    if (kf.stored || kf.data->frame.camera_correction == correction) continue;
+    const KeyframePtr corrected = withCameraCorrection(kf.data, correction);
     // Samples that lie in the keyframe's data must not hold on to what that was.
     if (kf.imu && kf.imu.get() == &kf.data->imu) kf.imu = {corrected, &corrected->imu};
     kf.data = corrected;
-    for (auto& entry : kf.planes) setDepthCorrection(correction, &entry.second);
+    for (auto& entry : kf.planes) setCameraCorrection(correction, &entry.second);
   }
 }
 

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "vip_slam_backend/map/map.h"
-#include "vip_slam_core/types/depth_correction.h"
+#include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -88,7 +88,7 @@ bool Map::setPlaneObservation(const PlaneObservation& observation) {
   }
   PlaneObservation& stored = kf.planes[observation.plane] = observation;
   // The plane module may not have heard yet of what its keyframe's depth is corrected by now.
-  setDepthCorrection(kf.data->frame.depth_correction, &stored);
+  setCameraCorrection(kf.data->frame.camera_correction, &stored);
   return true;
 }
 

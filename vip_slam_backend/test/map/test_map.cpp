@@ -111,7 +111,7 @@ TEST(Map, DepthThatIsKnownBetterHoldsForAllKeyframesButStoredOnes) {
   }
   const std::map<KeyframeId, MapKeyframe> before = f.map.keyframes();
 
-  f.map.adoptDepthCorrection({-0.01, {}});
+  f.map.adoptCameraCorrection({-0.01, {}});
   EXPECT_EQ(checkMap(f.map), "");
   for (const auto& [id, kf] : f.map.keyframes()) {
     const float change = id == stored->id ? 0.0f : -0.01f;
@@ -131,7 +131,7 @@ TEST(Map, DepthThatIsKnownBetterHoldsForAllKeyframesButStoredOnes) {
   ASSERT_TRUE(f.map.setPlaneObservation(observation));
   const PlaneObservation& late = f.map.keyframe(3).planes.at(observation.plane);
   EXPECT_FLOAT_EQ(late.points[0].p_C.z(), observation.points[0].p_C.z() - 0.01f);
-  EXPECT_EQ(late.depth_correction.offset, -0.01);
+  EXPECT_EQ(late.camera_correction.offset, -0.01);
 }
 
 TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {

@@ -127,11 +127,11 @@ TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
   EXPECT_GT(told_all, 0);
   EXPECT_LT(leftOver(update.depth_curve), 0.001);
   for (const auto& [id, kf] : back_end.map().keyframes()) {
-    EXPECT_EQ(kf.data->frame.depth_correction.curve, update.depth_curve);
-    for (const auto& [plane, o] : kf.planes) EXPECT_EQ(o.depth_correction.curve, update.depth_curve);
+    EXPECT_EQ(kf.data->frame.camera_correction.curve, update.depth_curve);
+    for (const auto& [plane, o] : kf.planes) EXPECT_EQ(o.camera_correction.curve, update.depth_curve);
   }
   for (const KeyframeEstimate& estimate : update.keyframes) {
-    EXPECT_EQ(estimate.depth_correction.curve, update.depth_curve);
+    EXPECT_EQ(estimate.camera_correction.curve, update.depth_curve);
   }
   back_end.reset();
   EXPECT_TRUE(back_end.addKeyframe(world.next()).depth_curve.empty());

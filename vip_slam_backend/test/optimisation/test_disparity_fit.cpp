@@ -9,7 +9,7 @@
 #include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/optimisation/disparity_fit.h"
 #include "vip_slam_core/depth/disparity_curve.h"
-#include "vip_slam_core/types/depth_correction.h"
+#include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -148,7 +148,7 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
     const bool known = back_end.disparityError() != 0 && k % 2 == 1;
     with_offset += back_end.disparityError() == 0;
     const KeyframePtr keyframe =
-        withDepthCorrection(read, known ? DepthCorrection{0.0, update.depth_curve} : DepthCorrection{0.008, {}});
+        withCameraCorrection(read, known ? CameraCorrection{0.0, update.depth_curve} : CameraCorrection{0.008, {}});
     update = back_end.addKeyframe(keyframe);
     ASSERT_EQ(back_end.lastRefusal(), "");
     back_end.applyPlaneUpdate(world.planes());
@@ -162,7 +162,7 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   EXPECT_NEAR(update.depth_curve.at(3.f), addedForDisparity(kError, 3), 4e-3);
   EXPECT_FALSE(back_end.depthDifference().empty());
   for (const auto& [id, kf] : back_end.map().keyframes()) {
-    EXPECT_EQ(kf.data->frame.depth_correction, (DepthCorrection{0.0, update.depth_curve}));
+    EXPECT_EQ(kf.data->frame.camera_correction, (CameraCorrection{0.0, update.depth_curve}));
   }
   back_end.reset();
   EXPECT_EQ(back_end.disparityError(), 0.0);

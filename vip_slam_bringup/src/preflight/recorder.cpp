@@ -69,11 +69,12 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message) {
-  const auto take = [&](StreamRecord* stream, CameraIntrinsics* camera, std::string* error) {
+  const auto take = [&](StreamRecord* stream, const std::string& image_topic, CameraIntrinsics* camera,
+                        std::string* error) {
     note(stream, arrival, message);
     if (stream->stamps.size() > 1) return;
     try {
-      *camera = intrinsicsFromCameraInfo(message);
+      *camera = intrinsicsFromCameraInfo(message, image_topic);
       const std::string wrong = camera->validate();
       if (!wrong.empty()) *error = wrong;
     } catch (const std::exception& e) {
@@ -83,11 +84,11 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   };
   const SensorTopics& topics = recording_.sensor.topics;
   if (topic == topics.color_info) {
-    take(&recording_.color_info, &recording_.color_camera, &recording_.color_camera_error);
+    take(&recording_.color_info, topics.color, &recording_.color_camera, &recording_.color_camera_error);
     if (!rotation_ && recording_.color_camera.width > 0) startRotation(recording_.color_camera);
   }
   if (topic == topics.depth_info)
-    take(&recording_.depth_info, &recording_.depth_camera, &recording_.depth_camera_error);
+    take(&recording_.depth_info, topics.depth, &recording_.depth_camera, &recording_.depth_camera_error);
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Imu& message) {

@@ -88,7 +88,7 @@ struct BagReader::Source {
     }
   }
 
-  CameraIntrinsics cameraInfo(const std::string& topic) {
+  CameraIntrinsics cameraInfo(const std::string& topic, const std::string& image_topic) {
     rosbag::View view(bag, rosbag::TopicQuery(topic));
     for (const auto& message : view) {
       const auto info = message.instantiate<sensor_msgs::CameraInfo>();
@@ -97,7 +97,7 @@ struct BagReader::Source {
                                  ", expected sensor_msgs/CameraInfo");
       }
       try {
-        return intrinsicsFromCameraInfo(*info);
+        return intrinsicsFromCameraInfo(*info, image_topic);
       } catch (const std::exception& error) {
         throw std::runtime_error(bag.getFileName() + ": topic " + topic + ": " + error.what());
       }
@@ -113,8 +113,10 @@ BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagRea
   source_->open(path);
   source_->checkTopics(sensor);
   if (sensor.intrinsics_from_camera_info) {
-    sensor.camera = source_->cameraInfo(sensor.topics.color_info);
-    if (!sensor.depth_registered) sensor.depth_camera = source_->cameraInfo(sensor.topics.depth_info);
+    sensor.camera = source_->cameraInfo(sensor.topics.color_info, sensor.topics.color);
+    if (!sensor.depth_registered) {
+      sensor.depth_camera = source_->cameraInfo(sensor.topics.depth_info, sensor.topics.depth);
+    }
   }
   if (!sensor.depth_registered) {
     source_->registration = std::make_unique<DepthRegistration>(

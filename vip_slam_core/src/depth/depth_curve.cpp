@@ -52,7 +52,7 @@ void applyDepthCurve(const DepthCurve& curve, cv::Mat* depth) {
   }
 }
 
-DepthChange::DepthChange(const DepthCorrection& from, const DepthCorrection& to)
+DepthChange::DepthChange(const CameraCorrection& from, const CameraCorrection& to)
     : from_(from), to_(to), same_curve_(from.curve == to.curve) {}
 
 float DepthChange::operator()(float z) const {

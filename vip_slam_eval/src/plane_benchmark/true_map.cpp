@@ -19,7 +19,7 @@ MapUpdate TrueMap::addKeyframe(const Keyframe& keyframe) {
   update.t = keyframe.frame.t;
   update.newest_keyframe = keyframe.id;
   update.keyframes.push_back(
-      {keyframe.id, keyframe.frame.state, keyframe.frame.T_I_C, keyframe.frame.depth_correction});
+      {keyframe.id, keyframe.frame.state, keyframe.frame.T_I_C, keyframe.frame.camera_correction});
   const SE3 T_W_C = keyframe.frame.state.T_W_I * keyframe.frame.T_I_C;
   for (const Feature& f : keyframe.frame.features) {
     if (f.id == kNoLandmark) continue;

@@ -104,8 +104,8 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     // The residual grows with the offset, where the rows are those of the prediction.
     if (window.calibration.depth_offset && with_depth) (*H_x)(row + 2, window.depthOffsetColumn()) = -1.0 / sigma_z;
     if (window.calibration.intrinsics) {
-      // At the bearing that is expected: the measured one has the residual's noise, whose square would pass for an error
-      // of the focal length (a quarter of a per cent with 0.2 px).
+      // At the bearing that is expected: the measured one has the residual's noise, whose square would pass for an
+      // error of the focal length (a quarter of a per cent with 0.2 px).
       const Eigen::Vector3d given = to_given * q_C;
       const Eigen::Matrix2d by_scale = (given.head<2>() / given.z()).asDiagonal();
       H_x->block<2, 2>(row, window.intrinsicsColumn()) = -weight.topLeftCorner<2, 2>() * by_scale;

@@ -84,8 +84,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
       A(i, offset) = A.block<1, 3>(i, 0).dot(to.omega_I) + A.block<1, 3>(i, 3).dot(to.v_W) +
                      A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
     }
-    if (window.calibration.depth_offset)
-      A(i, depth) = w * n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
+    if (window.calibration.depth_offset) A(i, depth) = w * n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
     if (window.calibration.intrinsics) {
       // Of a point (x, y, z) by (sx, sy, cx, cy): (x, 0), (0, y), (z, 0), (0, z). The normal turns against it, which
       // shows in how far beside each other the two points lie.

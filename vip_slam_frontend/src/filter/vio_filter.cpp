@@ -72,9 +72,9 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.bearing = learnt_.bearing;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = {calibration.rotation,    calibration.translation,
-                        calibration.time_offset, calibration.depth_offset && !depth_contradicts_,
-                        calibration.intrinsics,  calibration.gyro_scale,
+  window.calibration = {calibration.rotation,         calibration.translation,
+                        calibration.time_offset,      calibration.depth_offset && !depth_contradicts_,
+                        calibration.intrinsics,       calibration.gyro_scale,
                         calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();

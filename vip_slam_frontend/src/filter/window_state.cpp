@@ -50,7 +50,8 @@ bool WindowState::isFinite() const {
     if (!clone.T_W_I.isFinite()) return false;
   }
   return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
-         std::isfinite(time_offset) && std::isfinite(depth_offset) && bearing.value.allFinite() && gyro_correction.allFinite();
+         std::isfinite(time_offset) && std::isfinite(depth_offset) && bearing.value.allFinite() &&
+         gyro_correction.allFinite();
 }
 
 }  // namespace vip_slam

@@ -6,8 +6,8 @@
 #include <geometry_msgs/Transform.h>
 #include <geometry_msgs/Vector3.h>
 #include <ros/time.h>
-#include <boost/array.hpp>
 #include <Eigen/Core>
+#include <boost/array.hpp>
 
 #include "vip_slam_core/camera/bearing_correction.h"
 #include "vip_slam_core/geometry/se3.h"

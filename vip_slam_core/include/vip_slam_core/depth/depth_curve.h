@@ -43,26 +43,26 @@ std::string validateDepthCurve(const DepthCurve& curve);
 void applyDepthCurve(const DepthCurve& curve, cv::Mat* depth);
 
 /// All that a camera's readings are added, and what its bearings mean.
-struct DepthCorrection {
+struct CameraCorrection {
   double offset = 0;  ///< m, after the curve
   DepthCurve curve;
   BearingCorrection bearing;
 
-  bool operator==(const DepthCorrection& other) const {
+  bool operator==(const CameraCorrection& other) const {
     return offset == other.offset && curve == other.curve && bearing == other.bearing;
   }
-  bool operator!=(const DepthCorrection& other) const { return !(*this == other); }
+  bool operator!=(const CameraCorrection& other) const { return !(*this == other); }
 };
 
 /// From a depth that has one correction to the depth that has another.
 class DepthChange {
  public:
-  DepthChange(const DepthCorrection& from, const DepthCorrection& to);
+  DepthChange(const CameraCorrection& from, const CameraCorrection& to);
   /// 0 is no depth and stays so, anything else stays before the camera.
   float operator()(float z) const;
 
  private:
-  DepthCorrection from_, to_;
+  CameraCorrection from_, to_;
   bool same_curve_;
 };
 

@@ -23,7 +23,7 @@ struct TrackedFrame {
   Matrix15d covariance = Matrix15d::Zero();  ///< of state, order (theta, p, v, b_g, b_a)
   SE3 T_I_C;                                 ///< extrinsics in use (online-calibrated)
   double time_offset = 0;                    ///< t_imu = t_image + time_offset
-  DepthCorrection depth_correction;          ///< what features and grid have been added to the camera's readings
+  CameraCorrection camera_correction;        ///< what features and grid have been added to the camera's readings
   std::vector<Feature> features;             ///< tracked features only
   DepthGrid depth_grid;                      ///< coarse, for plane growth; empty without depth
   bool zero_velocity = false;                ///< standing still

@@ -17,7 +17,7 @@ struct KeyframeEstimate {
   KeyframeId id = 0;
   NavState state;  ///< T_map_I, v_map, biases
   SE3 T_I_C;       ///< the camera's mounting as known now; the keyframe itself has what was known when it was made
-  DepthCorrection depth_correction;  ///< what its depth readings are added as known now, likewise
+  CameraCorrection camera_correction;  ///< of its depth readings and bearings as known now, likewise
 };
 
 struct LandmarkEstimate {

@@ -42,9 +42,9 @@ struct PlaneObservation {
   PlaneId plane = 0;
   /// G_p = sum w [p_C;1][p_C;1]^T, w = 1/sigma^2 scaled so that the sum of effective points is capped.
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
-  double weight_scale = 1.0;         ///< G = weight_scale * sum 1/sigma^2 p~ p~^T over `points`
-  std::vector<PlanePoint> points;    ///< the samples behind G
-  DepthCorrection depth_correction;  ///< of the readings behind them, see TrackedFrame
+  double weight_scale = 1.0;           ///< G = weight_scale * sum 1/sigma^2 p~ p~^T over `points`
+  std::vector<PlanePoint> points;      ///< the samples behind G
+  CameraCorrection camera_correction;  ///< of the readings behind them, see TrackedFrame
 };
 
 struct PlaneMerge {

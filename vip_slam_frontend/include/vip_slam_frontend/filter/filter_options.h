@@ -28,9 +28,10 @@ struct CalibrationOptions {
     v.field("translation", translation, "estimate the camera-IMU translation online");
     v.field("time_offset", time_offset, "estimate the camera-IMU delay online");
     v.field("depth_offset", depth_offset, "estimate online what all depth readings are too long or too short by");
-    v.field("intrinsics", intrinsics,
-            "estimate online what focal lengths and principal point are off by; not of a fisheye, nor where depth is not "
-            "registered");
+    v.field(
+        "intrinsics", intrinsics,
+        "estimate online what focal lengths and principal point are off by; not of a fisheye, nor where depth is not "
+        "registered");
     v.field("gyro_scale", gyro_scale, "estimate online the scale of the gyro's axes");
     v.field("gyro_misalignment", gyro_misalignment, "estimate online the misalignment of the gyro's axes");
     v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "initial one-sigma of the rotation, rad");

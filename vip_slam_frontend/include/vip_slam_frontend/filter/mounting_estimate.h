@@ -22,14 +22,15 @@ struct MountingEstimate {
   double sigma_depth_offset = 0;  ///< m
   BearingCorrection bearing;      ///< what the intrinsics in use get wrong
   Eigen::Vector4d sigma_bearing = Eigen::Vector4d::Zero();
-  Eigen::Vector4d intrinsics = Eigen::Vector4d::Zero();  ///< fx, fy, cx, cy in px that make `bearing` zero
+  Eigen::Vector4d intrinsics = Eigen::Vector4d::Zero();       ///< fx, fy, cx, cy in px that make `bearing` zero
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   Eigen::Matrix3d sigma_gyro_correction = Eigen::Matrix3d::Zero();
   bool depth_contradicts = false;  ///< depth and images disagree by more than any offset; none is used
 };
 
 /// What the sensor's configuration should be corrected by, in sentences: differences that are both sure (five sigmas)
-/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth; 0.1 % of the focal length; 0.2 % of the gyro). Empty when it is right.
+/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth; 0.1 % of the focal length; 0.2 % of the gyro).
+/// Empty when it is right.
 std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found);
 
 }  // namespace vip_slam

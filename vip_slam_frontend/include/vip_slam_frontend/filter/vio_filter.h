@@ -90,8 +90,8 @@ class VioFilter {
   /// The gyro's correction for others: of each entry the estimate once it is beyond doubt and large enough to matter,
   /// else zero.
   Eigen::Matrix3d gyroCorrection() const;
-  /// What bearings mean, for others: of each entry the estimate once it is beyond doubt and large enough to matter, else
-  /// zero.
+  /// What bearings mean, for others: of each entry the estimate once it is beyond doubt and large enough to matter,
+  /// else zero.
   BearingCorrection bearingCorrection() const;
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
@@ -137,11 +137,11 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
-  bool depth_is_off_ = false;                                                         ///< beyond doubt
-  Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);  ///< likewise, by entries
+  bool depth_is_off_ = false;                                                            ///< beyond doubt
+  Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
-  bool depth_contradicts_ = false;                                                    ///< its offset went beyond belief
-  int still_images_ = 0;  ///< images since the standing began; 0 when moving
+  bool depth_contradicts_ = false;  ///< its offset went beyond belief
+  int still_images_ = 0;            ///< images since the standing began; 0 when moving
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none
   std::optional<RelativeMotion> to_mark_;  ///< from the clone that was marked, when mark_ is another by now

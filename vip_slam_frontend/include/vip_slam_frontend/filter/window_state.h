@@ -50,7 +50,7 @@ struct WindowState {
   Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
   SE3 T_I_C;
   double time_offset = 0;
-  double depth_offset = 0;  ///< m: what every reading of the depth camera has to be added
+  double depth_offset = 0;    ///< m: what every reading of the depth camera has to be added
   BearingCorrection bearing;  ///< what the camera's intrinsics get wrong
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   CalibrationFlags calibration;

@@ -1,4 +1,4 @@
-#include "vip_slam_core/types/depth_correction.h"
+#include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
@@ -10,12 +10,12 @@ Eigen::Matrix3f bearingChange(const BearingCorrection& from, const BearingCorrec
 
 }  // namespace
 
-KeyframePtr withDepthCorrection(const KeyframePtr& keyframe, const DepthCorrection& correction) {
-  if (keyframe->frame.depth_correction == correction) return keyframe;
-  const DepthChange change(keyframe->frame.depth_correction, correction);
+KeyframePtr withCameraCorrection(const KeyframePtr& keyframe, const CameraCorrection& correction) {
+  if (keyframe->frame.camera_correction == correction) return keyframe;
+  const DepthChange change(keyframe->frame.camera_correction, correction);
   auto corrected = std::make_shared<Keyframe>(*keyframe);
-  corrected->frame.depth_correction = correction;
-  const Eigen::Matrix3f turn = bearingChange(keyframe->frame.depth_correction.bearing, correction.bearing);
+  corrected->frame.camera_correction = correction;
+  const Eigen::Matrix3f turn = bearingChange(keyframe->frame.camera_correction.bearing, correction.bearing);
   for (Feature& f : corrected->frame.features) {
     f.depth = change(f.depth);
     f.xy = (turn * f.xy.homogeneous()).head<2>();
@@ -24,11 +24,11 @@ KeyframePtr withDepthCorrection(const KeyframePtr& keyframe, const DepthCorrecti
   return corrected;
 }
 
-void setDepthCorrection(const DepthCorrection& correction, PlaneObservation* observation) {
-  if (observation->depth_correction == correction) return;
-  const DepthChange change(observation->depth_correction, correction);
-  const Eigen::Matrix3f turn = bearingChange(observation->depth_correction.bearing, correction.bearing);
-  observation->depth_correction = correction;
+void setCameraCorrection(const CameraCorrection& correction, PlaneObservation* observation) {
+  if (observation->camera_correction == correction) return;
+  const DepthChange change(observation->camera_correction, correction);
+  const Eigen::Matrix3f turn = bearingChange(observation->camera_correction.bearing, correction.bearing);
+  observation->camera_correction = correction;
   if (observation->points.empty()) return;
   observation->G.setZero();
   for (PlanePoint& point : observation->points) {

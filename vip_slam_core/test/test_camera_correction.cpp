@@ -3,23 +3,23 @@
 
 #include <cmath>
 
-#include "vip_slam_core/types/depth_correction.h"
+#include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
 
-TEST(DepthCorrection, MovesReadingsAndLeavesTheRest) {
+TEST(CameraCorrection, MovesReadingsAndLeavesTheRest) {
   auto keyframe = std::make_shared<Keyframe>();
   keyframe->id = 7;
-  keyframe->frame.depth_correction.offset = 0.002;
+  keyframe->frame.camera_correction.offset = 0.002;
   Feature with, without;
   with.depth = 2.0f;
   with.depth_sigma = 0.01f;
   keyframe->frame.features = {with, without};
   keyframe->frame.depth_grid.z = {1.5f, 0.0f, 0.003f};
-  const KeyframePtr corrected = withDepthCorrection(keyframe, {-0.01, {}});
+  const KeyframePtr corrected = withCameraCorrection(keyframe, {-0.01, {}});
   EXPECT_EQ(corrected->id, 7u);
-  EXPECT_EQ(corrected->frame.depth_correction.offset, -0.01);
+  EXPECT_EQ(corrected->frame.camera_correction.offset, -0.01);
   EXPECT_FLOAT_EQ(corrected->frame.features[0].depth, 2.0f - 0.012f);
   EXPECT_EQ(corrected->frame.features[0].depth_sigma, 0.01f);
   EXPECT_EQ(corrected->frame.features[1].depth, 0.0f);
@@ -27,10 +27,10 @@ TEST(DepthCorrection, MovesReadingsAndLeavesTheRest) {
   EXPECT_EQ(corrected->frame.depth_grid.z[1], 0.0f);
   EXPECT_GT(corrected->frame.depth_grid.z[2], 0.0f);
   EXPECT_EQ(keyframe->frame.features[0].depth, 2.0f);
-  EXPECT_EQ(withDepthCorrection(keyframe, {0.002, {}}), keyframe);
+  EXPECT_EQ(withCameraCorrection(keyframe, {0.002, {}}), keyframe);
 }
 
-TEST(DepthCorrection, MovesPointsOnPlanesAlongTheirRays) {
+TEST(CameraCorrection, MovesPointsOnPlanesAlongTheirRays) {
   const Eigen::Vector3f rays[] = {{0.3f, -0.2f, 1}, {-0.5f, 0.1f, 1}, {0, 0.4f, 1}};
   const auto observe = [&](double too_long) {
     PlaneObservation observation;
@@ -44,19 +44,19 @@ TEST(DepthCorrection, MovesPointsOnPlanesAlongTheirRays) {
     return observation;
   };
   PlaneObservation read = observe(0.01);
-  setDepthCorrection({-0.01, {}}, &read);
+  setCameraCorrection({-0.01, {}}, &read);
   const PlaneObservation truth = observe(0);
-  EXPECT_EQ(read.depth_correction.offset, -0.01);
+  EXPECT_EQ(read.camera_correction.offset, -0.01);
   for (int k = 0; k < 3; ++k) EXPECT_LT((read.points[k].p_C - truth.points[k].p_C).norm(), 1e-6f);
   EXPECT_LT((read.G - truth.G).norm(), 1e-5 * truth.G.norm());
   // What has it already stays as it is.
   const Eigen::Matrix4d before = read.G;
-  setDepthCorrection({-0.01, {}}, &read);
+  setCameraCorrection({-0.01, {}}, &read);
   EXPECT_EQ(read.G, before);
 }
 
 // A keyframe of a camera whose intrinsics are wrong, and what it would have been had they been right.
-TEST(DepthCorrection, MovesBearingsAndWhatLiesOnThem) {
+TEST(CameraCorrection, MovesBearingsAndWhatLiesOnThem) {
   const BearingCorrection bearing{{0.004, -0.003, 0.002, 0.001}}, earlier{{0.001, 0.002, -0.001, 0.003}};
   auto keyframe = std::make_shared<Keyframe>();
   Feature feature;
@@ -77,8 +77,8 @@ TEST(DepthCorrection, MovesBearingsAndWhatLiesOnThem) {
   // By way of what was believed for a while.
   KeyframePtr corrected = keyframe;
   for (const BearingCorrection& known : {earlier, bearing}) {
-    corrected = withDepthCorrection(corrected, {0, {}, known});
-    setDepthCorrection({0, {}, known}, &observation);
+    corrected = withCameraCorrection(corrected, {0, {}, known});
+    setCameraCorrection({0, {}, known}, &observation);
   }
   EXPECT_LT((corrected->frame.features[0].xy - bearing(feature.xy)).norm(), 1e-6f);
   EXPECT_NEAR(corrected->frame.features[0].xy.x(), 0.4 + 0.004 * 0.4 + 0.002, 1e-6);
@@ -99,19 +99,19 @@ TEST(BearingCorrection, TheIntrinsicsItNamesNeedNone) {
   EXPECT_LT((bearing(before) - after).norm(), 1e-12);
 }
 
-TEST(DepthCorrection, AnotherCurveTakesTheOldOnesPlace) {
-  DepthCorrection before{0.004, {}}, after{-0.003, {}};
+TEST(CameraCorrection, AnotherCurveTakesTheOldOnesPlace) {
+  CameraCorrection before{0.004, {}}, after{-0.003, {}};
   for (int k = 0; k < 40; ++k) {
     before.curve.added.push_back(0.004f * std::sin(0.5f * float(k)));
     after.curve.added.push_back(0.006f * std::cos(0.3f * float(k)));
   }
-  const auto corrected = [](float reading, const DepthCorrection& c) {
+  const auto corrected = [](float reading, const CameraCorrection& c) {
     return reading + c.curve.at(reading) + float(c.offset);
   };
   auto keyframe = std::make_shared<Keyframe>();
-  keyframe->frame.depth_correction = before;
+  keyframe->frame.camera_correction = before;
   PlaneObservation observation;
-  observation.depth_correction = before;
+  observation.camera_correction = before;
   std::vector<float> readings;
   for (float z = 0.3f; z < 7; z += 0.07f) readings.push_back(z);
   for (const float z : readings) {
@@ -119,17 +119,17 @@ TEST(DepthCorrection, AnotherCurveTakesTheOldOnesPlace) {
     observation.points.push_back({Eigen::Vector3f(0.2f, -0.3f, 1) * corrected(z, before), 0.01f});
   }
   keyframe->frame.depth_grid.z.push_back(0);
-  const KeyframePtr other = withDepthCorrection(keyframe, after);
-  setDepthCorrection(after, &observation);
-  EXPECT_EQ(other->frame.depth_correction, after);
-  EXPECT_EQ(observation.depth_correction, after);
+  const KeyframePtr other = withCameraCorrection(keyframe, after);
+  setCameraCorrection(after, &observation);
+  EXPECT_EQ(other->frame.camera_correction, after);
+  EXPECT_EQ(observation.camera_correction, after);
   for (std::size_t k = 0; k < readings.size(); ++k) {
     EXPECT_NEAR(other->frame.depth_grid.z[k], corrected(readings[k], after), 2e-6f);
     EXPECT_LT((observation.points[k].p_C - Eigen::Vector3f(0.2f, -0.3f, 1) * corrected(readings[k], after)).norm(),
               4e-6f);
   }
   EXPECT_EQ(other->frame.depth_grid.z.back(), 0.0f);
-  EXPECT_EQ(withDepthCorrection(other, after), other);
+  EXPECT_EQ(withCameraCorrection(other, after), other);
 }
 
 }  // namespace
