@@ -20,28 +20,37 @@ constexpr float kSameSurface = 0.9f;  // cosine between neighbouring normals tha
 
 const std::vector<Eigen::Vector2f>& GridRays::operator()(const DepthGrid& grid, const BearingCorrection& bearing) {
   for (std::size_t i : {last_, 1 - last_}) {
-    const Layout& known = layouts_[i];
+    Layout& known = layouts_[i];
     if (grid.stride != known.stride || grid.offset != known.offset || grid.cols != known.cols ||
-        grid.rows != known.rows || bearing != known.bearing) {
+        grid.rows != known.rows) {
       continue;
     }
     last_ = i;
-    return known.rays;
+    return corrected(&known, bearing);
   }
   last_ = 1 - last_;
   Layout& layout = layouts_[last_];
   layout.stride = grid.stride, layout.offset = grid.offset, layout.cols = grid.cols, layout.rows = grid.rows;
-  layout.bearing = bearing;
+  layout.given.clear();
   layout.rays.clear();
-  layout.rays.reserve(static_cast<std::size_t>(grid.cols) * grid.rows);
+  layout.given.reserve(static_cast<std::size_t>(grid.cols) * grid.rows);
   for (int r = 0; r < grid.rows; ++r) {
     for (int c = 0; c < grid.cols; ++c) {
       Eigen::Vector2d xy;
       if (!camera_->undistort(grid.pixel(c, r), &xy)) xy.setConstant(std::numeric_limits<double>::quiet_NaN());
-      layout.rays.push_back(bearing(xy).cast<float>());
+      layout.given.push_back(xy.cast<float>());
     }
   }
-  return layout.rays;
+  return corrected(&layout, bearing);
+}
+
+const std::vector<Eigen::Vector2f>& GridRays::corrected(Layout* layout, const BearingCorrection& bearing) {
+  if (!layout->rays.empty() && layout->bearing == bearing) return layout->rays;
+  layout->bearing = bearing;
+  layout->rays.clear();
+  layout->rays.reserve(layout->given.size());
+  for (const Eigen::Vector2f& xy : layout->given) layout->rays.push_back(bearing(xy));
+  return layout->rays;
 }
 
 DepthMeshBuilder::DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera,

@@ -19,8 +19,8 @@ struct MountingEstimate {
   double sigma_time_offset = 0;                                 ///< s
   double depth_offset =
       0;  ///< m: what every reading of the depth camera has to be added, in the words of a sensor file
-  double sigma_depth_offset = 0;  ///< m
-  BearingCorrection bearing;      ///< what the intrinsics in use get wrong
+  double sigma_depth_offset = 0;   ///< m
+  BearingCorrection bearing = {};  ///< what the intrinsics in use get wrong
   Eigen::Vector4d sigma_bearing = Eigen::Vector4d::Zero();
   Eigen::Vector4d intrinsics = Eigen::Vector4d::Zero();       ///< fx, fy, cx, cy in px that make `bearing` zero
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h

@@ -44,16 +44,19 @@ struct DepthMesh {
 class GridRays {
  public:
   explicit GridRays(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {}
-  /// Computed once for the grids of keyframes and once for the coarser ones of frames, which take turns, and anew when
-  /// their bearings are corrected by something else; the result is valid until the next but one call.
+  /// Undistorted once for the grids of keyframes and once for the coarser ones of frames, which take turns; the result
+  /// is valid until the next but one call.
   const std::vector<Eigen::Vector2f>& operator()(const DepthGrid& grid, const BearingCorrection& bearing = {});
 
  private:
   struct Layout {
     int stride = 0, offset = 0, cols = 0, rows = 0;
+    std::vector<Eigen::Vector2f> given;  // by the intrinsics as they are
     BearingCorrection bearing;
-    std::vector<Eigen::Vector2f> rays;
+    std::vector<Eigen::Vector2f> rays;  // `given` with `bearing`
   };
+  const std::vector<Eigen::Vector2f>& corrected(Layout* layout, const BearingCorrection& bearing);
+
   std::shared_ptr<const CameraModel> camera_;
   std::array<Layout, 2> layouts_;
   std::size_t last_ = 0;
