@@ -74,7 +74,8 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
   list.reserve(tracker_.tracks().size());
   for (const Track& track : tracker_.tracks()) {
     const Feature& f = track.feature;
-    list.push_back({f.id, f.xy.cast<double>(), f.depth, f.depth_sigma, track.whitening});
+    const Eigen::Vector2d xy = f.xy.cast<double>();
+    list.push_back({f.id, xy, f.depth, f.depth_sigma, track.whitening, bearingJacobian(*camera_, xy)});
   }
   return list;
 }

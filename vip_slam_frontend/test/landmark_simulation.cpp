@@ -133,6 +133,7 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
       const Eigen::Vector3d noise = gaussian(random_, 1.0);
       m.xy = (given * p).head<2>() / p.z() + (noise.head<2>() * options_.sigma_px + crept_[i]) / options_.focal;
       if (unit(random_) < options_.outlier_ratio) m.xy += Eigen::Vector2d(0.05, -0.04);
+      m.by_intrinsics = bearingJacobian(m.xy);
       if (options_.depth) {
         m.depth_sigma = options_.depth_a + options_.depth_c * p.z() * p.z();
         m.depth = p.z() + options_.depth_offset + noise.z() * m.depth_sigma;

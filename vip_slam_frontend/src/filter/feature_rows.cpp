@@ -53,7 +53,6 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
   *H_f = Eigen::MatrixXd::Zero(most, 3);
   *r = Eigen::VectorXd::Zero(most);
   const Eigen::Matrix3d R_C_I = window.T_I_C.R().transpose();
-  const Eigen::Matrix3d to_given = window.bearing.matrix().inverse();
   std::vector<ViewRows> views;
   int row = 0;
   for (const Observation& o : observations) {
@@ -81,7 +80,7 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     weight(2, 2) = 1.0 / sigma_z;
     J_measure = weight * J_measure;
 
-    const Eigen::Vector2d xy = window.bearing(o.xy);
+    const Eigen::Vector2d xy = o.xy + o.by_intrinsics * window.bearing.value;
     Eigen::Vector3d residual(xy.x() - p_C.x() / p_C.z(), xy.y() - p_C.y() / p_C.z(),
                              window.trueDepth(o.depth) - p_C.z());
     residual = weight * residual;
@@ -106,10 +105,9 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     if (window.calibration.intrinsics) {
       // At the bearing that is expected: the measured one has the residual's noise, whose square would pass for an
       // error of the focal length (a quarter of a per cent with 0.2 px).
-      const Eigen::Vector3d given = to_given * q_C;
-      const Eigen::Matrix2d by_scale = (given.head<2>() / given.z()).asDiagonal();
-      H_x->block<2, 2>(row, window.intrinsicsColumn()) = -weight.topLeftCorner<2, 2>() * by_scale;
-      H_x->block<2, 2>(row, window.intrinsicsColumn() + 2) = -weight.topLeftCorner<2, 2>();
+      BearingJacobian by_intrinsics = o.by_intrinsics;
+      by_intrinsics.leftCols<2>() += (q_C.head<2>() / q_C.z() - xy).asDiagonal();
+      H_x->block<2, 4>(row, window.intrinsicsColumn()) = -weight.topLeftCorner<2, 2>() * by_intrinsics;
     }
     r->segment(row, rows) = residual.head(rows);
     row += rows;

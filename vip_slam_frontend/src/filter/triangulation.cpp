@@ -50,6 +50,20 @@ double depthFromRays(const std::vector<View>& views) {
 
 }  // namespace
 
+BearingJacobian bearingJacobian(const Eigen::Vector2d& xy) {
+  BearingJacobian J;
+  J << xy.x(), 0, 1, 0, 0, xy.y(), 0, 1;
+  return J;
+}
+
+BearingJacobian bearingJacobian(const CameraModel& camera, const Eigen::Vector2d& xy) {
+  const CameraIntrinsics& k = camera.intrinsics();
+  const Eigen::Vector2d focal(k.fx, k.fy);
+  Eigen::Matrix2d bend;
+  const Eigen::Vector2d distorted = (camera.distort(xy, &bend) - Eigen::Vector2d(k.cx, k.cy)).cwiseQuotient(focal);
+  return bend.inverse() * focal.asDiagonal() * bearingJacobian(distorted);
+}
+
 SE3 cameraPose(const WindowState& window, const Clone& clone) {
   const double shift = window.time_offset - clone.time_offset;
   if (shift == 0.0) return clone.T_W_I * window.T_I_C;
@@ -70,7 +84,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
     const SE3 T_W_C = cameraPose(window, window.clones[index]);
     if (views.empty()) T_W_A = T_W_C;
     const SE3 T_C_A = T_W_C.inverse() * T_W_A;
-    views.push_back({T_C_A.R(), T_C_A.t(), &o, window.bearing(o.xy)});
+    views.push_back({T_C_A.R(), T_C_A.t(), &o, o.xy + o.by_intrinsics * window.bearing.value});
   }
   if (views.size() < 2) return result;
 

@@ -158,7 +158,7 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
   for (const FilterMeasurement& m : measurements) {
     FilterTrack& track = tracks_[m.id];
     track.id = m.id;
-    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma, m.whitening});
+    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma, m.by_intrinsics, m.whitening});
   }
 }
 

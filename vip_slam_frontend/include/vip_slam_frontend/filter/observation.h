@@ -5,16 +5,27 @@
 
 #include <Eigen/Core>
 
+#include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/types/feature.h"
 #include "vip_slam_frontend/filter/window_state.h"
 
 namespace vip_slam {
+
+using BearingJacobian = Eigen::Matrix<double, 2, 4>;
+
+/// Of a bearing of this camera. The correction holds before the lens bends the bearing; undistorted, it is another one
+/// at each radius.
+BearingJacobian bearingJacobian(const CameraModel& camera, const Eigen::Vector2d& xy);
+/// Of a lens that bends nothing.
+BearingJacobian bearingJacobian(const Eigen::Vector2d& xy);
 
 struct Observation {
   CloneId clone = 0;
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< undistorted normalised coordinates
   double depth = 0;                              ///< z, metres; 0: none
   double depth_sigma = 0;                        ///< metres
+  /// What WindowState::bearing does to xy: d xy / d (sx, sy, cx, cy). Zero where the intrinsics are none of the states.
+  BearingJacobian by_intrinsics = BearingJacobian::Zero();
   /// L with L^T L the inverse of the pixel's covariance in units of MeasurementNoise::sigma_xy^2.
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
 };

@@ -25,6 +25,7 @@ struct FilterMeasurement {
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();
   double depth = 0, depth_sigma = 0;
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< see Observation
+  BearingJacobian by_intrinsics = BearingJacobian::Zero();  ///< likewise
 };
 
 /// Where the estimate starts and how well that is known.
