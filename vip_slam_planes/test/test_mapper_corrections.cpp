@@ -15,6 +15,19 @@ using testing::room;
 using testing::Scene;
 using testing::updateFor;
 
+/// All of `result` are of one keyframe at T_W_C, say that they have `correction`, and lie on their planes.
+void expectCorrectedObservations(const PlaneUpdate& result, const SE3& T_W_C, const CameraCorrection& correction) {
+  ASSERT_FALSE(result.observations.empty());
+  for (const PlaneObservation& o : result.observations) {
+    EXPECT_EQ(o.camera_correction, correction);
+    const PlaneEstimate* plane = nullptr;
+    for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
+    ASSERT_TRUE(plane);
+    const Eigen::Vector4d p_C = transformPlane(T_W_C.inverse(), plane->plane).coefficients();
+    EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.004);
+  }
+}
+
 TEST(Mapper, KeyframesLookFromTheMountingThatIsKnownNow) {
   // The front end held the mounting to be 3 degrees off when it made the keyframes; the back end knows better.
   Rig rig;
@@ -65,15 +78,7 @@ TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
   update.keyframes[0].camera_correction.offset = -0.02;
   const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
   EXPECT_TRUE(rig.find(truth, 0.002));
-  ASSERT_FALSE(result.observations.empty());
-  for (const PlaneObservation& o : result.observations) {
-    EXPECT_EQ(o.camera_correction.offset, -0.02);
-    const PlaneEstimate* plane = nullptr;
-    for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
-    ASSERT_TRUE(plane);
-    const Eigen::Vector4d p_C = transformPlane(T_W_C.inverse(), plane->plane).coefficients();
-    EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.004);
-  }
+  expectCorrectedObservations(result, T_W_C, update.keyframes[0].camera_correction);
 }
 
 TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
@@ -108,15 +113,7 @@ TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
   MapUpdate update = updateFor(*keyframe, T_W_C);
   update.keyframes[0].camera_correction.bearing = bearing;
   const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
-  ASSERT_FALSE(result.observations.empty());
-  for (const PlaneObservation& o : result.observations) {
-    EXPECT_EQ(o.camera_correction.bearing, bearing);
-    const PlaneEstimate* plane = nullptr;
-    for (const PlaneEstimate& p : result.planes) plane = p.id == o.plane ? &p : plane;
-    ASSERT_TRUE(plane);
-    const Eigen::Vector4d p_C = transformPlane(T_W_C.inverse(), plane->plane).coefficients();
-    EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.004);
-  }
+  expectCorrectedObservations(result, T_W_C, update.keyframes[0].camera_correction);
 }
 
 TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {

@@ -9,6 +9,8 @@
 namespace vip_slam {
 namespace {
 
+constexpr double kMostBearing = 0.2;  // share of the focal length
+
 bool finite(const NavState& s) {
   return std::isfinite(s.t) && s.T_W_I.isFinite() && s.v_W.allFinite() && s.bias_gyro.allFinite() &&
          s.bias_accel.allFinite();
@@ -47,6 +49,11 @@ std::string validateKeyframe(const Keyframe& keyframe) {
     if (k > 0 && !(s.t > keyframe.imu[k - 1].t))
       return name + "IMU sample " + std::to_string(k) + " is not after the one before";
   }
+  // All keyframes take over what the newest one says of the camera.
+  const CameraCorrection& camera = keyframe.frame.camera_correction;
+  if (!std::isfinite(camera.offset) || !(camera.bearing.value.cwiseAbs().maxCoeff() < kMostBearing) ||
+      !camera.bearing.value.allFinite())
+    return name + "the camera's correction is not finite, or beyond what a camera can be off by";
   if (!keyframe.gyro_correction.allFinite()) return name + "the gyro's correction is not finite";
   if (keyframe.motion.known() && !keyframe.motion.isUsable())
     return name + "the odometry's motion is not finite, or its covariance is none";

@@ -467,6 +467,14 @@ TEST(BackEnd, BadInputIsRefusedByName) {
   bad = *good;
   bad.motion.covariance(2, 2) = -1e-6;
   EXPECT_NE(refusalOf(bad).find("odometry's motion"), std::string::npos);
+  for (const double wrong : {std::nan(""), 0.5}) {
+    bad = *good;
+    bad.frame.camera_correction.bearing.value(2) = wrong;
+    EXPECT_NE(refusalOf(bad).find("camera's correction"), std::string::npos) << wrong;
+  }
+  bad = *good;
+  bad.frame.camera_correction.offset = std::nan("");
+  EXPECT_NE(refusalOf(bad).find("camera's correction"), std::string::npos);
   bad = *good;
   bad.frame.t = 0.1;
   EXPECT_NE(refusalOf(bad).find("not after"), std::string::npos);
