@@ -74,7 +74,7 @@ std::vector<Row> readOdometry(const std::string& folder) {
 
 /// CoreMotion reports minus the specific force, older versions of the app in m/s^2, newer ones in g: told apart by the
 /// median length. IMU axes: x right, y up, z out of the screen, phone upright.
-std::vector<sensor_msgs::Imu> readImu(const std::string& path) {
+std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path) {
   const TextTable table(path, ",", 7);
   std::vector<double> length;
   std::vector<sensor_msgs::Imu> samples;
@@ -167,7 +167,7 @@ ConversionReport convertStray(const StrayOptions& options) {
     if (!fs::exists(options.folder + "/" + needed))
       throw std::runtime_error(options.folder + "/" + needed + ": is not there; expected a Stray Scanner recording");
   std::vector<Row> rows = readOdometry(options.folder);
-  const auto imu = readImu(options.folder + "/imu.csv");
+  const auto imu = readStrayImu(options.folder + "/imu.csv");
   cv::Size video_size;
   const int frames = countFrames(options.folder + "/rgb.mp4", &video_size);
   ConversionReport report;

@@ -23,16 +23,16 @@ const char* const kImu = "/camera/imu";
 const char* const kAccel = "/camera/accel/sample";
 const char* const kFrame = "camera_rgb_optical_frame";
 
-struct StampedFile {
+struct ListedFile {
   double t;
   std::string path;
 };
 
-std::vector<StampedFile> readList(const std::string& folder, const std::string& name) {
+std::vector<ListedFile> readList(const std::string& folder, const std::string& name) {
   const TextTable table(folder + "/" + name, " \t", 2);
-  std::vector<StampedFile> files;
+  std::vector<ListedFile> files;
   for (const TextRow& row : table.rows()) {
-    StampedFile file{table.number(row, 0, "the stamp"), folder + "/" + row.cells[1]};
+    ListedFile file{table.number(row, 0, "the stamp"), folder + "/" + row.cells[1]};
     if (!files.empty() && file.t <= files.back().t) table.fail(row, "the stamp does not follow the one before");
     if (!fs::exists(file.path)) table.fail(row, "image " + file.path + " is not there");
     files.push_back(std::move(file));
@@ -108,7 +108,7 @@ std::vector<sensor_msgs::Imu> readInertial(const std::string& path, bool gyro) {
   return samples;
 }
 
-Trajectory readTruth(const std::string& path, const SE3& T_cam_imu) {
+Trajectory readGroundTruth(const std::string& path, const SE3& T_cam_imu) {
   const TextTable table(path, " \t", 8);
   Trajectory truth;
   for (const TextRow& row : table.rows()) {
@@ -122,7 +122,7 @@ Trajectory readTruth(const std::string& path, const SE3& T_cam_imu) {
   return truth;
 }
 
-double rateOf(const std::vector<StampedFile>& files) {
+double rateOf(const std::vector<ListedFile>& files) {
   const double seconds = files.back().t - files.front().t;
   return seconds > 0 ? (files.size() - 1) / seconds : 30.0;
 }
@@ -140,7 +140,7 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   if (fs::exists(inertial)) imu = readInertial(inertial, gyro);
   Trajectory truth;
   if (fs::exists(options.folder + "/groundtruth.txt"))
-    truth = readTruth(options.folder + "/groundtruth.txt", options.T_imu_cam.inverse());
+    truth = readGroundTruth(options.folder + "/groundtruth.txt", options.T_imu_cam.inverse());
 
   ConversionReport report;
   if (imu.empty())
@@ -149,9 +149,9 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
     report.warnings.push_back(
         "accelerometer.txt has no gyroscope: the odometry needs one (imu.txt: stamp gx gy gz ax ay az)");
   BagOutput bag(options.bag, options.overwrite);
-  const auto addImages = [&](const std::vector<StampedFile>& files, const std::string& topic, const std::string& info,
+  const auto addImages = [&](const std::vector<ListedFile>& files, const std::string& topic, const std::string& info,
                              bool is_color) {
-    for (const StampedFile& file : files) {
+    for (const ListedFile& file : files) {
       const ros::Time stamp(file.t);
       bag.add(stamp, [=](rosbag::Bag& out) {
         const cv::Mat image =

@@ -25,13 +25,6 @@ constexpr int kMostTests = 4;  // peaks tested per keyframe, the largest ones
 // shows of a dark table top comes and goes.
 constexpr double kFreshShare = 0.25;
 
-MapTriangle moved(const SE3& T, MapTriangle t) {
-  for (Eigen::Vector3d& p : t.corner) p = T * p;
-  t.centre = T * t.centre;
-  t.n = T.rotation() * t.n;
-  return t;
-}
-
 // Enough keyframes show a part of the plane, and two of them more than a strip: what spans a step is a strip in every
 // image, however many there are.
 bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::vector<MapTriangle>& triangles,

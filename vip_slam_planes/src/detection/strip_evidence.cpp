@@ -18,18 +18,11 @@ constexpr double kShows = 6.0;                // sigmas by which what turns with
 constexpr double kOff = 0.02;                 // m, of each one's middle to the other one's plane
 constexpr double kUpright = 0.5;              // sine of the angle to the vertical; normals of narrow things are noisy
 constexpr double kLeastRemains = 0.03;        // m^2
-constexpr std::size_t kLeastTriangles = 6;
+constexpr std::size_t kLeastInStrip = 6;
 constexpr double kBeside = 0.15;  // m
 // A body bends; beyond a corner lies another face.
 constexpr double kBends = 10.0 * kDegree, kTurnsOff = 60.0 * kDegree;
 constexpr double kBendingShare = 0.25;  // of the strip's area
-
-MapTriangle moved(const SE3& T, MapTriangle t) {
-  for (Eigen::Vector3d& p : t.corner) p = T * p;
-  t.centre = T * t.centre;
-  t.n = T.rotation() * t.n;
-  return t;
-}
 
 Eigen::Vector3d level(const Eigen::Vector3d& v) { return Eigen::Vector3d(v.x(), v.y(), 0).normalized(); }
 
@@ -138,7 +131,7 @@ bool StripEvidence::remainsOf(const Placed& strip, const Frame& frame, const Cam
     remains->index.push_back(frame.index[i]);
   }
   Plane fitted;
-  if (remains->triangles.size() < kLeastTriangles || area < kLeastRemains) return false;
+  if (remains->triangles.size() < kLeastInStrip || area < kLeastRemains) return false;
   if (!fitPlane(moments, PlaneKind::kVertical, strip.plane.n, &fitted)) return false;
   remains->sigma /= double(remains->triangles.size());
   const Eigen::Vector3d centroid = moments.centroid() + strip.centroid;

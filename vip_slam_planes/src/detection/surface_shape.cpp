@@ -12,8 +12,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kUpright = 0.5;  // sine of the angle between a normal and the vertical
-constexpr double kCore = 0.12;    // share of the width that vertices inside must span; one column of a mesh zigzags
+constexpr double kLeastUpright = 0.5;  // sine of the angle between a normal and the vertical
+constexpr double kCore = 0.12;  // share of the width that vertices inside must span; one column of a mesh zigzags
 
 struct Extent {
   double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
@@ -45,7 +45,7 @@ bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& 
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   for (int i : surface) normal += triangles[i].area * triangles[i].n;
   const Eigen::Vector3d along = Eigen::Vector3d::UnitZ().cross(normal.normalized());
-  if (along.norm() < kUpright) return true;
+  if (along.norm() < kLeastUpright) return true;
   Extent all, core;
   for (int i : surface) {
     for (int k = 0; k < 3; ++k) {

@@ -8,8 +8,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kLeastTriangles = 30;  // fewer do not show two layers
-constexpr double kLeastStep = 0.02;          // m, between the layers
+constexpr std::size_t kLeastInLayers = 30;  // fewer do not show two layers
+constexpr double kLeastStep = 0.02;         // m, between the layers
 constexpr double kStepSigmas = 3.0;
 
 double medianOf(std::vector<double> values) {
@@ -28,7 +28,7 @@ void releaseOtherLayers(const std::vector<MapTriangle>& triangles, const std::ve
   }
   std::vector<double> offset, area, sigma;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (members[k].size() < kLeastTriangles) continue;
+    if (members[k].size() < kLeastInLayers) continue;
     offset.clear(), area.clear(), sigma.clear();
     for (int i : members[k]) {
       offset.push_back(tracks[k]->plane().signedDistance(triangles[i].centre));

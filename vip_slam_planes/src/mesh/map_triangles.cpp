@@ -22,4 +22,11 @@ std::vector<MapTriangle> placeMesh(const DepthMesh& mesh, const SE3& T_map_C) {
   return placed;
 }
 
+MapTriangle moved(const SE3& T, MapTriangle t) {
+  for (Eigen::Vector3d& p : t.corner) p = T * p;
+  t.centre = T * t.centre;
+  t.n = T.rotation() * t.n;
+  return t;
+}
+
 }  // namespace vip_slam

@@ -8,7 +8,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kReach = 8;                ///< px between the points of a normal: bridges the sensor's quantisation
+constexpr int kNeighbour = 8;            ///< px between the points of a normal: bridges the sensor's quantisation
 constexpr double kLeastAgreement = 0.8;  ///< length of the mean of the images' up directions
 
 /// Normals of locally flat patches, in the folder's world.
@@ -21,10 +21,10 @@ void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3&
     const double z = 0.001 * depth.at<std::uint16_t>(v, u);
     return Eigen::Vector3d((u - c.cx) / c.fx * z, (v - c.cy) / c.fy * z, z);
   };
-  for (int v = kReach; v < depth.rows - kReach; v += 6)
-    for (int u = kReach; u < depth.cols - kReach; u += 6) {
-      const Eigen::Vector3d m = point(u, v), l = point(u - kReach, v), r = point(u + kReach, v),
-                            t = point(u, v - kReach), b = point(u, v + kReach);
+  for (int v = kNeighbour; v < depth.rows - kNeighbour; v += 6)
+    for (int u = kNeighbour; u < depth.cols - kNeighbour; u += 6) {
+      const Eigen::Vector3d m = point(u, v), l = point(u - kNeighbour, v), r = point(u + kNeighbour, v),
+                            t = point(u, v - kNeighbour), b = point(u, v + kNeighbour);
       if (m.z() < 0.4 || m.z() > 4 || l.z() == 0 || r.z() == 0 || t.z() == 0 || b.z() == 0) continue;
       const double bend = 0.004 * m.z() * m.z() + 0.002;
       if ((0.5 * (l + r) - m).norm() > bend || (0.5 * (t + b) - m).norm() > bend) continue;

@@ -21,5 +21,7 @@ struct MapTriangle {
 };
 
 std::vector<MapTriangle> placeMesh(const DepthMesh& mesh, const SE3& T_map_C);
+/// A triangle in the frame that T maps into.
+MapTriangle moved(const SE3& T, MapTriangle triangle);
 
 }  // namespace vip_slam
