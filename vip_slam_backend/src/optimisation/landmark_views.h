@@ -31,6 +31,11 @@ class LandmarkViews {
   LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes,
                 const PixelNoise& noise);
 
+  /// All sigmas grow by a factor.
+  void inflate(double factor) {
+    for (LandmarkView& v : views_) v.sigma *= factor;
+  }
+
   int size() const { return static_cast<int>(points_.size()); }
   const MapLandmark& landmark(int l) const { return *points_[l]; }
   /// Of the points of one landmark the first, which holds its longest track, stands for it.

@@ -9,6 +9,7 @@
 #include "odometry_factors.h"
 #include "pixel_noise.h"
 #include "plane_factors.h"
+#include "track_noise.h"
 
 namespace vip_slam {
 namespace {
@@ -115,7 +116,11 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
 
   const PixelNoise noise(settings.measurement, settings.focal);
   built.gate_weight = 1.0 / noise.gateSigma();
-  const LandmarkViews views(map, scope, built.frames, noise);
+  LandmarkViews views(map, scope, built.frames, noise);
+  std::vector<FrameGeometry> geometry;
+  for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
+  built.track_noise_factor = trackNoiseFactor(views, geometry);
+  if (built.track_noise_factor > 1) views.inflate(built.track_noise_factor);
   PlaneFactorBuilder planes(map, scope, settings, &built);
   const std::vector<char> on_plane = planes.addHomographies(views);
   for (int l = 0; l < views.size(); ++l) {

@@ -31,7 +31,8 @@ struct BuiltProblem {
   std::vector<LandmarkId> plane_points;  ///< landmarks that stand for homographies only (vip)
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
-  double gate_weight = 0;  ///< largest weight by which an observation is judged
+  double track_noise_factor = 1;  ///< on the sigmas of all pixels, as the map tells (src/optimisation/track_noise.h)
+  double gate_weight = 0;         ///< largest weight by which an observation is judged
 };
 
 struct BuilderSettings {

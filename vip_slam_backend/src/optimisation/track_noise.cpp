@@ -1,0 +1,41 @@
+#include "track_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_backend/factors/reprojection.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr int kLeastViews = 5;            // of a track: so many keyframes ago its landmark was made, and adjusted since
+constexpr std::size_t kLeastTracks = 30;  // below it the median is one of a few
+constexpr double kClearly = 2.0, kLargest = 8.0;  // a factor below the one is none
+
+}  // namespace
+
+double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeometry>& frames) {
+  std::vector<double> ratios;
+  ratios.reserve(views.size());
+  for (int l = 0; l < views.size(); ++l) {
+    if (!views.standsForLandmark(l)) continue;
+    int seen = 0;
+    double squared = 0;
+    for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
+      Eigen::Vector2d r;
+      if (!v->own_track || v->slides ||
+          !reprojectionResidual(frames[v->frame], views.landmark(l).p_W, v->xy.cast<double>(), 1.0 / v->sigma, &r))
+        continue;
+      ++seen;
+      squared += r.squaredNorm();
+    }
+    if (seen >= kLeastViews) ratios.push_back(squared / (2 * seen - 3));  // the point takes three
+  }
+  if (ratios.size() < kLeastTracks) return 1;
+  const auto middle = ratios.begin() + ratios.size() / 2;
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  const double factor = std::sqrt(*middle);
+  return factor > kClearly ? std::min(factor, kLargest) : 1;
+}
+
+}  // namespace vip_slam

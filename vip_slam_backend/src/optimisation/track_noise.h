@@ -1,0 +1,18 @@
+// How much more than they are told to the pixels of tracks are off, as the map tells: by how much they miss the
+// landmarks that it has by now. Told are the noise of the image and of the matching alone. A camera whose lens or
+// readout is not quite as configured, or whose depth is of another moment, makes errors of a few tenths of a pixel that
+// the views of a track share, and a map that takes them for noise of a tenth believes its pixels far above its depth.
+#pragma once
+
+#include <vector>
+
+#include "landmark_views.h"
+#include "vip_slam_backend/factors/frame_geometry.h"
+
+namespace vip_slam {
+
+/// Factor on the sigmas of all views, 1 to 5; 1 unless they are off by clearly more than told, or when too few tracks
+/// say anything. `frames`: the problem's, at the map's present estimate.
+double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeometry>& frames);
+
+}  // namespace vip_slam
