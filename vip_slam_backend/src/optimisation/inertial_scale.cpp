@@ -20,7 +20,7 @@ constexpr double kGravitySigma = 0.002;  // relative, over the earth's places
 constexpr double kBiasSigma = 0.5;       // at the beginning of each chain, m/s^2
 // Above it the motion shows no more of the scale than the noise of the poses does.
 constexpr double kLargestSigma = 0.01;
-constexpr double kSureScale = 5.0, kLeastDifference = 0.005;
+constexpr double kSure = 5.0, kLeastDifference = 0.005;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -214,7 +214,7 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
 
 std::string scaleDifference(const InertialScale& scale, double depth_scale) {
   const double difference = scale.factor - 1;
-  if (!(scale.sigma > 0) || std::abs(difference) < std::max(kLeastDifference, kSureScale * scale.sigma)) return "";
+  if (!(scale.sigma > 0) || std::abs(difference) < std::max(kLeastDifference, kSure * scale.sigma)) return "";
   char text[320];
   std::snprintf(text, sizeof text,
                 "distances are %.1f %% %s than the accelerometer says (one sigma %.2f %%): depth reads too %s, and "

@@ -17,7 +17,7 @@ constexpr double kContradiction = 1.3;
 constexpr double kManyGated = 0.3;
 constexpr double kWidest = 30.0;
 // Slower turns do not tell the stamps from the gyro's noise, rad/s.
-constexpr double kSlowTurn = 0.1;
+constexpr double kLeastTurn = 0.1;
 // s: below it does no harm; more is no jitter but a wrong IMU.
 constexpr double kLeastJitter = 1e-4, kMostJitter = 5e-3;
 
@@ -37,7 +37,7 @@ void NoiseMonitor::add(double chi2_per_dof, int dof) {
 
 void StampMonitor::add(const Eigen::Vector3d& omega, const Eigen::Vector3d& turned, const Eigen::Matrix3d& lost) {
   const double expected = omega.dot(lost * omega);
-  if (!adapt_ || omega.norm() < kSlowTurn || !(expected > 0) || !turned.allFinite()) return;
+  if (!adapt_ || omega.norm() < kLeastTurn || !(expected > 0) || !turned.allFinite()) return;
   const double along = turned.dot(omega);
   ratio_ += kGain * (std::min(along * along / expected, kMostCorrection) - ratio_);
   if (ratio_ > kContradiction) {

@@ -11,7 +11,7 @@ constexpr int kOld = 8;
 constexpr int kLeast = 5;
 constexpr double kSigmas = 4.0;
 // Shares of the inliers.
-constexpr double kSame = 0.95, kEnough = 0.67;
+constexpr double kSame = 0.95, kMost = 0.67;
 // What else a translation may be off by: blur, rolling rows, a clock. m/s
 constexpr double kLeastSpeed = 0.1;
 
@@ -40,7 +40,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldM
   RansacResult bounded = rejectOutliers(pairs, foretold.T_current_previous, options);
   // Points far away or few leave the translation open: then both motions explain them.
   if (!foretold.wary && bounded.inliers > kSame * found.inliers) return found;
-  if (bounded.inliers > kEnough * found.inliers) return bounded;
+  if (bounded.inliers > kMost * found.inliers) return bounded;
   *moves = foretold.at_rest || movesByItself(pairs, found, bounded);
   return *moves ? bounded : found;
 }

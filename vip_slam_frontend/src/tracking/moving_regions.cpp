@@ -7,7 +7,7 @@ namespace vip_slam {
 namespace {
 
 // Fewer, or a smaller share of all, are mismatches.
-constexpr std::size_t kLeastMarks = 5;
+constexpr std::size_t kLeast = 5;
 constexpr double kLeastShare = 0.08;
 // A body has corners at least this close, px, unless it hides nearly all else.
 constexpr float kReach = 120.0f;
@@ -22,7 +22,7 @@ void MovingRegions::add(const Eigen::Vector2f& pixel, double z, bool still) {
 }
 
 bool MovingRegions::any() const {
-  return moving_.size() >= kLeastMarks &&
+  return moving_.size() >= kLeast &&
          static_cast<double>(moving_.size()) > kLeastShare * static_cast<double>(moving_.size() + still_.size());
 }
 

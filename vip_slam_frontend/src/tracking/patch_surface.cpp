@@ -16,7 +16,7 @@ constexpr int kFewest = 20;
 constexpr double kPriorSlope = 0.03;
 constexpr double kSteepest = 0.06;
 
-constexpr int kGridSide = 2 * kRadius / kStride + 1;
+constexpr int kSide = 2 * kRadius / kStride + 1;
 // Squared deviations of the means of the window's rows and columns from the plane, in their sigmas: ten degrees of
 // freedom. Room for noise that neighbouring readings share, and for a part of the depth that is nobody's noise.
 constexpr double kMostOfLines = 35.0, kLineFloor = 0.0003;
@@ -54,7 +54,7 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double square = 0;
   int count = 0;
-  Line rows[kGridSide], columns[kGridSide];
+  Line rows[kSide], columns[kSide];
   for (int y = -kRadius; y <= kRadius; y += kStride) {
     const float* row = depth_image.ptr<float>(v + y) + u;
     for (int x = -kRadius; x <= kRadius; x += kStride) {
@@ -77,7 +77,7 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   if (residual > 2.0 * sigma + 0.002 || !(fit.tail<2>().norm() < kSteepest)) return surface;
   // Noise hides a step or a bend from single readings, not from the means of lines across it.
   double chi2 = 0;
-  for (int i = 0; i < kGridSide; ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
+  for (int i = 0; i < kSide; ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
   if (chi2 > kMostOfLines) return surface;
   surface.slope = fit.tail<2>();
   surface.known = true;

@@ -8,11 +8,11 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kPatchStride = 32;  // px between patches
-constexpr int kSampleStep = 3;    // px between samples of a patch
-constexpr int kHalfPatch = 3;     // samples to each side of the centre
-constexpr int kReach = kHalfPatch * kSampleStep;
-constexpr int kSamples = (2 * kHalfPatch + 1) * (2 * kHalfPatch + 1);
+constexpr int kStride = 32;     // px between patches
+constexpr int kSampleStep = 3;  // px between samples of a patch
+constexpr int kHalf = 3;        // samples to each side of the centre
+constexpr int kReach = kHalf * kSampleStep;
+constexpr int kSamples = (2 * kHalf + 1) * (2 * kHalf + 1);
 constexpr int kLeastSamples = 42;
 constexpr double kInlierSigmas = 3.5;
 constexpr double kLeastCosine = 0.12;
@@ -20,7 +20,7 @@ constexpr double kMostTurned = 0.985;  // cosine between the normals of a pair
 // Neighbouring readings share part of their error: a patch counts as this share of one reading's sigma at least.
 constexpr double kLeastShare = 0.35;
 // Errors that no average removes: warped depth, skirtings, doors a little open. Metres.
-constexpr double kSigmaFloor = 0.002;
+constexpr double kFloor = 0.002;
 
 }  // namespace
 
@@ -60,9 +60,9 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   int valid = 0;
-  for (int y = -kHalfPatch, i = 0; y <= kHalfPatch; ++y) {
+  for (int y = -kHalf, i = 0; y <= kHalf; ++y) {
     const float* row = depth.ptr<float>(v + y * kSampleStep) + u;
-    for (int x = -kHalfPatch; x <= kHalfPatch; ++x, ++i) {
+    for (int x = -kHalf; x <= kHalf; ++x, ++i) {
       const float reading = row[x * kSampleStep];
       z[i] = noise_.inRange(reading) ? reading : 0.0;
       if (z[i] == 0) continue;
@@ -107,8 +107,8 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
 
 std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth, const MovingRegions& moving) const {
   std::vector<SurfacePatch> result;
-  for (int v = kReach; v + kReach < depth.rows; v += kPatchStride) {
-    for (int u = kReach; u + kReach < depth.cols; u += kPatchStride) {
+  for (int v = kReach; v + kReach < depth.rows; v += kStride) {
+    for (int u = kReach; u + kReach < depth.cols; u += kStride) {
       SurfacePatch patch;
       if (fit(depth, u, v, &patch) && !moving.moves({u, v}, patch.p_C.z())) result.push_back(patch);
     }
@@ -137,8 +137,7 @@ SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref,
     if (!fit(depth, static_cast<int>(std::lround(uv.x())), static_cast<int>(std::lround(uv.y())), &seen)) continue;
     if (moving.moves(uv, seen.p_C.z())) continue;
     if (seen.n_C.dot(R_cur_ref * patch.n_C) < kMostTurned) continue;
-    result.pairs.push_back(
-        {patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kSigmaFloor)});
+    result.pairs.push_back({patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kFloor)});
   }
   return result;
 }
