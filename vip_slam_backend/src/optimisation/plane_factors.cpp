@@ -23,9 +23,8 @@ constexpr double kTrackFreedom = 4.0;
 
 PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings,
                                        BuiltProblem* built)
-    : map_(map), scope_(scope), settings_(settings), built_(built) {
+    : map_(map), scope_(scope), settings_(settings), built_(built), geometry_(frameGeometry(built->problem)) {
   BaProblem& problem = built->problem;
-  for (const BaFrame& f : problem.frames) geometry_.emplace_back(f.state.T_W_I, f.T_I_C);
   if (settings.variant == Variant::kVi) return;
   // Planes that a free frame sees by depth; a plane without depth has nothing that fixes its distance but homographies.
   for (const KeyframeId id : scope.free)

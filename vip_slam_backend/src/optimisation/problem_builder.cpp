@@ -117,9 +117,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
   const PixelNoise noise(settings.measurement, settings.focal);
   built.gate_weight = 1.0 / noise.gateSigma();
   LandmarkViews views(map, scope, built.frames, noise);
-  std::vector<FrameGeometry> geometry;
-  for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
-  built.track_noise_factor = trackNoiseFactor(views, geometry);
+  built.track_noise_factor = trackNoiseFactor(views, frameGeometry(problem));
   if (built.track_noise_factor > 1) views.inflate(built.track_noise_factor);
   PlaneFactorBuilder planes(map, scope, settings, &built);
   const std::vector<char> on_plane = planes.addHomographies(views);

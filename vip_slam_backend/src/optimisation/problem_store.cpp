@@ -97,8 +97,7 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
 
 int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
   const BaProblem& problem = built.problem;
-  std::vector<FrameGeometry> geometry;
-  for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
+  const std::vector<FrameGeometry> geometry = frameGeometry(problem);
   int removed = 0;
   for (std::size_t p = 0; p < problem.points.size(); ++p) {
     if (!map->hasLandmark(built.points[p])) continue;

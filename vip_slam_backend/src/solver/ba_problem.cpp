@@ -75,10 +75,15 @@ std::string validateProblem(const BaProblem& problem) {
   return "";
 }
 
-double evaluateCost(const BaProblem& problem) {
+std::vector<FrameGeometry> frameGeometry(const BaProblem& problem) {
   std::vector<FrameGeometry> geometry;
   geometry.reserve(problem.frames.size());
   for (const BaFrame& f : problem.frames) geometry.emplace_back(f.state.T_W_I, f.T_I_C);
+  return geometry;
+}
+
+double evaluateCost(const BaProblem& problem) {
+  const std::vector<FrameGeometry> geometry = frameGeometry(problem);
   double cost = 0;
   for (const BaPoint& p : problem.points)
     for (int o = p.first; o < p.first + p.count; ++o) {

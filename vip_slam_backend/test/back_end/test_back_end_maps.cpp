@@ -1,28 +1,14 @@
 // The back end when its map is reset, loaded or only localised in.
 #include <gtest/gtest.h>
 
-#include "back_end/simulated_keyframes.h"
-#include "vip_slam_backend/back_end.h"
+#include "back_end/back_end_runs.h"
 #include "vip_slam_backend/map/map.h"
-#include "vip_slam_backend/map/map_checker.h"
 
 using namespace vip_slam;
 
-namespace {
-
-BackEndOptions options() {
-  BackEndOptions o;
-  o.variant = "vip";
-  o.loop_closing = false;
-  o.lockstep = true;
-  return o;
-}
-
-}  // namespace
-
 TEST(BackEndMaps, GlobalAdjustmentOfAMapThatIsNoMoreIsDropped) {
   SimulatedKeyframes world(3), other(9);
-  BackEnd back_end(options(), world.sensor());
+  BackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
   const GbaResult late = back_end.run(back_end.startGlobalBa());
   back_end.reset();
@@ -37,7 +23,7 @@ TEST(BackEndMaps, GlobalAdjustmentOfAMapThatIsNoMoreIsDropped) {
 
 TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   SimulatedKeyframes world(3), other(9);
-  BackEnd back_end(options(), world.sensor());
+  BackEnd back_end(options("vip"), world.sensor());
   back_end.applyPlaneUpdate(PlaneUpdate());  // before any map update came
   PlaneUpdate late;
   for (int k = 0; k < 6; ++k) {
@@ -57,7 +43,7 @@ TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   EXPECT_EQ(back_end.map().planes().size(), world.walls().size());
 
   const std::string path = ::testing::TempDir() + "no_planes.vsm";
-  BackEnd other_end(options(), world.sensor());
+  BackEnd other_end(options("vip"), world.sensor());
   other_end.addKeyframe(SimulatedKeyframes(3).next());
   other_end.saveMap(path);
   const MapUpdate loaded = back_end.loadMap(path);
@@ -71,7 +57,7 @@ TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
 TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
   const std::string path = ::testing::TempDir() + "waited_for.vsm";
   SimulatedKeyframes world(4), session(4);
-  BackEnd mapper(options(), world.sensor()), back_end(options(), world.sensor());
+  BackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
   for (int k = 0; k < 25; ++k) {
     mapper.addKeyframe(world.next());
     mapper.applyPlaneUpdate(world.planes());
@@ -101,7 +87,7 @@ TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
 
 TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {
   SimulatedKeyframes world(4);
-  BackEnd back_end(options(), world.sensor());
+  BackEnd back_end(options("vip"), world.sensor());
   back_end.setLocalisationMode(true);
   for (int k = 0; k < 3; ++k) {
     const MapUpdate update = back_end.addKeyframe(world.next());
@@ -117,7 +103,7 @@ TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {
 
 TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options(), world.sensor());
+  BackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 8; ++k) back_end.addKeyframe(world.next());
   const GbaResult late = back_end.run(back_end.startGlobalBa());
   ASSERT_TRUE(late.solution);
@@ -139,7 +125,7 @@ TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
 TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   const std::string path = ::testing::TempDir() + "localisation_only.vsm";
   SimulatedKeyframes world(4), session(4);
-  BackEnd mapper(options(), world.sensor()), back_end(options(), world.sensor());
+  BackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
   for (int k = 0; k < 25; ++k) {
     mapper.addKeyframe(world.next());
     mapper.applyPlaneUpdate(world.planes());
@@ -176,7 +162,7 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
 TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
   const std::string path = ::testing::TempDir() + "mapped_on.vsm";
   SimulatedKeyframes world(4);
-  BackEnd mapper(options(), world.sensor());
+  BackEnd mapper(options("vip"), world.sensor());
   for (int k = 0; k < 25; ++k) {
     mapper.addKeyframe(world.next());
     mapper.applyPlaneUpdate(world.planes());
@@ -184,7 +170,7 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
   mapper.saveMap(path);
   for (const double pause : {0.0, 60.0}) {  // seconds in which nothing was found
     SimulatedKeyframes session(4);
-    BackEnd back_end(options(), world.sensor());
+    BackEnd back_end(options("vip"), world.sensor());
     back_end.loadMap(path);
     back_end.setLocalisationMode(true);
     for (int k = 0; k < 20; ++k) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "vip_slam_backend/factors/frame_geometry.h"
 #include "vip_slam_backend/factors/gauge_prior.h"
 #include "vip_slam_backend/factors/homography.h"
 #include "vip_slam_backend/factors/motion_prior.h"
@@ -110,6 +111,9 @@ struct BaProblem {
   std::size_t parameters() const;  ///< tangent dimension of all variables
   std::size_t pixelObservations() const { return observations.size(); }
 };
+
+/// Of each frame, at its present estimate.
+std::vector<FrameGeometry> frameGeometry(const BaProblem& problem);
 
 /// Empty when the arrays are consistent, else the first error in words.
 std::string validateProblem(const BaProblem& problem);

@@ -1,0 +1,63 @@
+// A back end that is fed simulated keyframes, its map checked after every operation, and how far off it ends.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "back_end/simulated_keyframes.h"
+#include "vip_slam_backend/back_end.h"
+#include "vip_slam_backend/map/map_checker.h"
+
+namespace vip_slam {
+
+inline BackEndOptions options(const std::string& variant) {
+  BackEndOptions o;
+  o.variant = variant;
+  o.loop_closing = false;
+  o.lockstep = true;
+  return o;
+}
+
+struct RunResult {
+  double rmse = 0, odometry_rmse = 0;
+  MapSnapshot snapshot;
+};
+
+inline RunResult run(const BackEndOptions& o, int keyframes, unsigned seed, int points) {
+  SimulatedKeyframes world(seed, points);
+  BackEnd back_end(o, world.sensor());
+  std::map<KeyframeId, double> odometry_error;
+  for (int k = 0; k < keyframes; ++k) {
+    const KeyframePtr kf = world.next();
+    odometry_error[kf->id] = (kf->frame.state.T_W_I.t() - world.truth(kf->frame.t).T_W_I.t()).squaredNorm();
+    const MapUpdate update = back_end.addKeyframe(kf);
+    EXPECT_EQ(back_end.lastRefusal(), "");
+    EXPECT_EQ(update.newest_keyframe, kf->id);
+    EXPECT_EQ(checkMap(back_end.map()), "") << "after keyframe " << kf->id;
+    back_end.applyPlaneUpdate(world.planes());
+    EXPECT_EQ(checkMap(back_end.map()), "") << "after the planes of keyframe " << kf->id;
+  }
+  back_end.finish();
+  EXPECT_EQ(checkMap(back_end.map()), "");
+  RunResult result;
+  result.snapshot = back_end.snapshot();
+  for (const SnapshotKeyframe& kf : result.snapshot.keyframes) {
+    result.rmse += (kf.state.T_W_I.t() - world.truth(kf.t).T_W_I.t()).squaredNorm();
+    result.odometry_rmse += odometry_error[kf.id];
+  }
+  result.rmse = std::sqrt(result.rmse / result.snapshot.keyframes.size());
+  result.odometry_rmse = std::sqrt(result.odometry_rmse / result.snapshot.keyframes.size());
+  return result;
+}
+
+inline RunResult run(const std::string& variant, int keyframes, unsigned seed = 1,
+                     const std::string& solver = "structured") {
+  BackEndOptions o = options(variant);
+  o.solver = solver;
+  return run(o, keyframes, seed, 500);
+}
+
+}  // namespace vip_slam

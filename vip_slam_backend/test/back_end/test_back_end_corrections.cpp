@@ -1,0 +1,239 @@
+// What the front end finds out late about mounting, depth, gyro and intrinsics holds for all keyframes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <utility>
+
+#include "back_end/back_end_runs.h"
+#include "vip_slam_core/types/camera_correction.h"
+
+using namespace vip_slam;
+
+namespace {
+
+/// The keyframe as a front end publishes it that holds the camera's mounting to be off by `error`.
+KeyframePtr mountedWrongly(const KeyframePtr& keyframe, const SE3& error) {
+  auto wrong = std::make_shared<Keyframe>(*keyframe);
+  wrong->frame.T_I_C = keyframe->frame.T_I_C * error;
+  const SE3 body = keyframe->frame.T_I_C * wrong->frame.T_I_C.inverse();  // maps the wrong body into the true one
+  wrong->frame.state.T_W_I = keyframe->frame.state.T_W_I * body;
+  wrong->motion.T_a_b = body.inverse() * keyframe->motion.T_a_b * body;
+  return wrong;
+}
+
+/// The keyframe of a camera that reads `too_long` m too long, as a front end publishes it that corrects for
+/// `correction`.
+KeyframePtr readTooLong(const KeyframePtr& keyframe, double too_long, double correction) {
+  auto exact = std::make_shared<Keyframe>(*keyframe);
+  exact->frame.camera_correction.offset = -too_long;
+  return withCameraCorrection(exact, {correction, {}});
+}
+
+PlaneUpdate readTooLong(PlaneUpdate update, double too_long, double correction) {
+  for (PlaneObservation& o : update.observations) {
+    o.camera_correction.offset = -too_long;
+    setCameraCorrection({correction, {}}, &o);
+  }
+  return update;
+}
+
+/// Largest error of a keyframe's direction, degrees, after the best common turn about the vertical is taken out.
+double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& world) {
+  double yaw = 0, worst = 0;
+  for (const SnapshotKeyframe& kf : snapshot.keyframes) {
+    yaw +=
+        yawOf(world.truth(kf.t).T_W_I.rotation() * kf.state.T_W_I.rotation().conjugate()) / snapshot.keyframes.size();
+  }
+  const Eigen::Quaterniond turn = expQuaternion({0, 0, yaw});
+  for (const SnapshotKeyframe& kf : snapshot.keyframes) {
+    const Eigen::Quaterniond left = world.truth(kf.t).T_W_I.rotation().conjugate() * (turn * kf.state.T_W_I.rotation());
+    worst = std::max(worst, logSO3(left).norm() * 180 / M_PI);
+  }
+  return worst;
+}
+
+}  // namespace
+
+// The front end learns the mounting in the first keyframes, by halves. What the last one knows holds for all: those at
+// the beginning, long fixed, would stay turned by two degrees.
+TEST(BackEnd, AMountingLearntOnTheWayHoldsForAllKeyframes) {
+  SimulatedKeyframes world(5);
+  BackEnd back_end(options("vip"), world.sensor());
+  Eigen::Vector3d turn(0.03, -0.02, 0.02);
+  for (int k = 0; k < 40; ++k, turn *= 0.5) {
+    back_end.addKeyframe(mountedWrongly(world.next(), SE3(expQuaternion(turn), Eigen::Vector3d::Zero())));
+    EXPECT_EQ(back_end.lastRefusal(), "");
+    EXPECT_EQ(checkMap(back_end.map()), "");
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  back_end.finish();
+  EXPECT_LT(worstDirection(back_end.snapshot(), world), 0.3);
+}
+
+TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackAnOldMounting) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  const SE3 error(expQuaternion({0.02, 0.02, -0.02}), Eigen::Vector3d::Zero());
+  for (int k = 0; k < 15; ++k) {
+    back_end.addKeyframe(mountedWrongly(world.next(), error));
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  back_end.requestGlobalBa();
+  const GbaResult solution = back_end.run(back_end.startGlobalBa());
+  for (int k = 0; k < 3; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  const SE3 T_W_C = back_end.map().keyframe(5).T_W_C();
+  const SE3 between = T_W_C.inverse() * back_end.map().keyframe(17).T_W_C();
+  back_end.merge(solution);
+  EXPECT_EQ(checkMap(back_end.map()), "");
+  // Cameras stay where the adjustment has them, to what little it changes.
+  const SE3 after = back_end.map().keyframe(5).T_W_C().inverse() * back_end.map().keyframe(17).T_W_C();
+  EXPECT_LT(after.boxminus(between).norm(), 0.01);
+}
+
+// Depth reads 2 cm too long; the front end knows with the 16th keyframe, and a little better with each further one.
+TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
+  SimulatedKeyframes world(4);
+  BackEnd back_end(options("vip"), world.sensor());
+  std::map<KeyframeId, KeyframePtr> exact;
+  double correction = 0;
+  const auto worst = [&] {
+    double error = 0;
+    for (const auto& [id, kf] : back_end.map().keyframes()) {
+      for (std::size_t k = 0; k < kf.features().size(); ++k)
+        error = std::max(error, std::abs(double(kf.features()[k].depth) - exact[id]->frame.features[k].depth));
+      for (const auto& [plane, o] : kf.planes) {
+        EXPECT_EQ(o.camera_correction, kf.data->frame.camera_correction);
+        const Eigen::Vector4d p_C =
+            transformPlane(kf.T_W_C().inverse(), back_end.map().planes().at(plane).estimate.plane).coefficients();
+        EXPECT_LT(std::sqrt(p_C.dot(o.G * p_C) / o.G(3, 3)), 0.03);
+      }
+    }
+    return error;
+  };
+  for (int k = 0; k < 30; ++k) {
+    const KeyframePtr kf = exact[k + 1] = world.next();
+    const bool knows_now = k == 15;
+    if (k >= 15) correction = -0.0205 + 0.0001 * (k - 15) / 3;
+    const MapUpdate update = back_end.addKeyframe(readTooLong(kf, 0.02, correction));
+    ASSERT_EQ(back_end.lastRefusal(), "");
+    EXPECT_EQ(checkMap(back_end.map()), "");
+    if (k == 14) EXPECT_NEAR(worst(), 0.02, 1e-4);
+    if (knows_now) {
+      EXPECT_TRUE(update.global);
+      EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
+      for (const KeyframeEstimate& estimate : update.keyframes)
+        EXPECT_EQ(estimate.camera_correction.offset, correction);
+      EXPECT_LT(worst(), 0.0006);
+      EXPECT_TRUE(back_end.globalBaWanted());
+      back_end.merge(back_end.run(back_end.startGlobalBa()));
+    } else {
+      EXPECT_FALSE(back_end.globalBaWanted());
+    }
+    // Planes may lag behind by what the map knows.
+    back_end.applyPlaneUpdate(readTooLong(world.planes(), 0.02, k % 2 ? correction : 0.0));
+  }
+  back_end.finish();  // with what the newest keyframe knows
+  EXPECT_LT(worst(), std::abs(correction + 0.02) + 1e-6);
+  double rmse = 0;
+  for (const SnapshotKeyframe& kf : back_end.snapshot().keyframes)
+    rmse += (kf.state.T_W_I.t() - world.truth(kf.t).T_W_I.t()).squaredNorm() / 30;
+  const double known = std::sqrt(rmse);
+  const double never_wrong = run("vip", 30, 4).rmse;
+  std::printf("rmse %.2f mm, with exact depth %.2f mm\n", 1e3 * known, 1e3 * never_wrong);
+  EXPECT_LT(known, never_wrong + 0.001);
+}
+
+/// As from a gyro that measures 5 % too much, and what its front end knows of that.
+KeyframePtr turningTooFast(const KeyframePtr& keyframe, double correction) {
+  auto kf = std::make_shared<Keyframe>(*keyframe);
+  for (ImuSample& sample : kf->imu) sample.gyro *= 1.05;
+  kf->gyro_correction = correction * Eigen::Matrix3d::Identity();
+  return kf;
+}
+
+TEST(BackEnd, AGyroCorrectionHoldsForAllKeyframes) {
+  const auto rmse = [](bool tells) {
+    SimulatedKeyframes world(4);
+    BackEnd back_end(options("vip"), world.sensor());
+    double correction = 0;
+    for (int k = 0; k < 30; ++k) {
+      if (tells && k >= 15) correction = 1 / 1.05 - 1 + 1e-5 * (k - 15);
+      back_end.addKeyframe(turningTooFast(world.next(), correction));
+      EXPECT_EQ(back_end.lastRefusal(), "");
+      EXPECT_EQ(checkMap(back_end.map()), "");
+      EXPECT_EQ(back_end.globalBaWanted(), tells && k == 15) << k;
+      if (back_end.globalBaWanted()) back_end.merge(back_end.run(back_end.startGlobalBa()));
+      back_end.applyPlaneUpdate(world.planes());
+    }
+    back_end.finish();  // with what the newest keyframe knows
+    double sum = 0;
+    for (const auto& [id, kf] : back_end.map().keyframes()) {
+      EXPECT_EQ(kf.gyro_correction(1, 1), correction);
+      sum += (kf.state.T_W_I.t() - world.truth(kf.data->frame.t).T_W_I.t()).squaredNorm() / 30;
+    }
+    return std::sqrt(sum);
+  };
+  const double known = rmse(true), believed = rmse(false), exact = run("vip", 30, 4).rmse;
+  std::printf("rmse %.2f mm, with an exact gyro %.2f, the gyro believed %.2f mm\n", 1e3 * known, 1e3 * exact,
+              1e3 * believed);
+  EXPECT_LT(known, exact + 0.001);
+  EXPECT_GT(believed, exact + 0.001);
+}
+
+TEST(BackEnd, AGlobalAdjustmentOfAGyroAsItMeasuredIsDoneAgain) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 12; ++k) back_end.addKeyframe(turningTooFast(world.next(), 0));
+  const GbaResult before = back_end.run(back_end.startGlobalBa());
+  back_end.addKeyframe(turningTooFast(world.next(), -0.048));
+  back_end.startGlobalBa();
+  EXPECT_FALSE(back_end.merge(before).global);
+  EXPECT_TRUE(back_end.globalBaWanted());
+}
+
+// Focal lengths 0.4 % too long, a principal point that is a pixel off; the front end knows from the 15th keyframe on.
+TEST(BackEnd, IntrinsicsThatAreKnownBetterHoldForAllKeyframes) {
+  SimulatedKeyframes world(4);
+  BackEnd back_end(options("vip"), world.sensor());
+  const BearingCorrection bearing{{0.004, 0.004, 0.002, -0.001}};
+  std::map<KeyframeId, KeyframePtr> exact;
+  const auto worst = [&] {
+    double error = 0;
+    for (const auto& [id, kf] : back_end.map().keyframes()) {
+      for (std::size_t k = 0; k < kf.features().size(); ++k)
+        error = std::max(error, double((kf.features()[k].xy - exact[id]->frame.features[k].xy).cwiseAbs().maxCoeff()));
+    }
+    return error;
+  };
+  for (int k = 0; k < 30; ++k) {
+    const KeyframePtr kf = exact[k + 1] = world.next();
+    // What this camera sees, and what of it is corrected for by now.
+    auto seen = std::make_shared<Keyframe>(*kf);
+    seen->frame.camera_correction.bearing = bearing;
+    const MapUpdate update =
+        back_end.addKeyframe(withCameraCorrection(seen, {0, {}, k >= 15 ? bearing : BearingCorrection()}));
+    ASSERT_EQ(back_end.lastRefusal(), "");
+    EXPECT_EQ(checkMap(back_end.map()), "");
+    if (k == 14) EXPECT_GT(worst(), 0.002);
+    if (k != 15) continue;
+    EXPECT_TRUE(update.global);
+    EXPECT_TRUE(back_end.globalBaWanted());
+    for (const KeyframeEstimate& estimate : update.keyframes) EXPECT_EQ(estimate.camera_correction.bearing, bearing);
+    EXPECT_LT(worst(), 1e-6);
+  }
+  EXPECT_LT(worst(), 1e-6);
+}
+
+TEST(BackEnd, AGlobalAdjustmentOfDepthAsItWasReadIsDoneAgain) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 12; ++k) back_end.addKeyframe(readTooLong(world.next(), 0.02, 0));
+  const GbaResult before = back_end.run(back_end.startGlobalBa());
+  back_end.addKeyframe(readTooLong(world.next(), 0.02, -0.02));
+  back_end.startGlobalBa();
+  EXPECT_FALSE(back_end.merge(before).global);
+  EXPECT_TRUE(back_end.globalBaWanted());
+}
