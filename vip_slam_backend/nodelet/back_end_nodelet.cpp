@@ -165,7 +165,8 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
-    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale), back_end_->depthDifference()};
+    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale), back_end_->depthDifference(),
+                                back_end_->trackNoiseDifference()};
   }
   distribute(update);
   startGlobalBa();

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "../optimisation/track_noise.h"
 #include "back_end_impl.h"
 #include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/disparity_fit.h"
@@ -286,6 +287,10 @@ double BackEnd::disparityError() const { return impl_->disparity_error; }
 std::string BackEnd::depthDifference() const {
   if (impl_->disparity_error != 0) return disparityDifference(impl_->disparity_error);
   return depthCurveDifference(depthCurve());
+}
+double BackEnd::trackNoiseFactor() const { return impl_->statistics.track_noise_factor; }
+std::string BackEnd::trackNoiseDifference() const {
+  return vip_slam::trackNoiseDifference(impl_->statistics.track_noise_factor);
 }
 MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }

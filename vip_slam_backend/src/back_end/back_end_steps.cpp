@@ -47,6 +47,7 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
     if (!summary.usable) return;
   }
   ++statistics.local_ba;
+  statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
   statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map);
   followNewest();
@@ -160,6 +161,7 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
   } else if (result.solution && result.solution->summary.usable) {
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     ++statistics.global_ba;
+    statistics.track_noise_factor = result.solution->built.track_noise_factor;
     followNewest();
     askForScale();
     return true;

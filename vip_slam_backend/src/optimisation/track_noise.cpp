@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "vip_slam_backend/factors/reprojection.h"
 
@@ -36,6 +37,18 @@ double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeome
   std::nth_element(ratios.begin(), middle, ratios.end());
   const double factor = std::sqrt(*middle);
   return factor > kClearly ? std::min(factor, kLargest) : 1;
+}
+
+std::string trackNoiseDifference(double factor) {
+  if (factor <= 1) return "";
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "pixels of tracks miss the map by %.1f times what their noise explains, and count for as much less: is the "
+      "lens calibrated (camera/distortion), the readout known (color/rolling_shutter), colour registered with "
+      "depth, and depth of the same moment? check_bag tells some of it",
+      factor);
+  return text;
 }
 
 }  // namespace vip_slam

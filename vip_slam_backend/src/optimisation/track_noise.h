@@ -4,6 +4,7 @@
 // the views of a track share, and a map that takes them for noise of a tenth believes its pixels far above its depth.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "landmark_views.h"
@@ -11,8 +12,11 @@
 
 namespace vip_slam {
 
-/// Factor on the sigmas of all views, 1 to 5; 1 unless they are off by clearly more than told, or when too few tracks
+/// Factor on the sigmas of all views, 1 to 8; 1 unless they are off by clearly more than told, or when too few tracks
 /// say anything. `frames`: the problem's, at the map's present estimate.
 double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeometry>& frames);
+
+/// What to tell the user of such a factor; empty at 1.
+std::string trackNoiseDifference(double factor);
 
 }  // namespace vip_slam

@@ -65,3 +65,8 @@ TEST(TrackNoise, WhatTheMapContradictsWeighsLess) {
 }
 
 TEST(TrackNoise, TooFewViewsSayNothing) { EXPECT_EQ(adjustedMap(0.5, 4).built.track_noise_factor, 1); }
+
+TEST(TrackNoise, TheUserIsTold) {
+  EXPECT_EQ(trackNoiseDifference(1), "");
+  EXPECT_NE(trackNoiseDifference(3.26).find("by 3.3 times what their noise explains"), std::string::npos);
+}

@@ -77,7 +77,11 @@ void MappingThread::distribute(const MapUpdate& update) {
   T_map_odom_ = update.T_map_odom;
   epoch_ = update.epoch;
   placed_ = update.newest_keyframe != 0;
-  if (planes_) back_end_->applyPlaneUpdate(planes_->applyMapUpdate(update));
+  if (!planes_) return;
+  back_end_->applyPlaneUpdate(planes_->applyMapUpdate(update));
+  for (const PlaneEstimate& estimate : planes_->planes()) {
+    plane_history_.push_back({update.t, estimate.id, estimate.plane});
+  }
 }
 
 void MappingThread::finish() {

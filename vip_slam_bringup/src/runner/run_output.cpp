@@ -72,6 +72,7 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   put("landmarks", map.landmarks.size());
   put("planes", planes);
   put("plane_landmarks", map.statistics.plane_landmarks);
+  put("track_noise_factor", map.statistics.track_noise_factor);
   yaml << YAML::Key << "loops" << YAML::Value << YAML::BeginSeq;
   for (const LoopEvent& loop : map.loops) {
     yaml << YAML::Flow << YAML::BeginMap;
@@ -137,6 +138,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     if (!difference.empty()) all.push_back(difference);
     const std::string bent = pipeline.mapping()->backEnd().depthDifference();
     if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
+    const std::string missed = pipeline.mapping()->backEnd().trackNoiseDifference();
+    if (!missed.empty()) all.push_back(missed);
     const auto& refusals = pipeline.mapping()->refusals();
     all.insert(all.end(), refusals.begin(), refusals.end());
   }
@@ -246,6 +249,18 @@ void writePoints(const std::string& path, const std::vector<LandmarkEstimate>& l
   file.commit();
 }
 
+/// Where each plane lay after each map update: how steady it is.
+void writePlaneHistory(const std::string& path, const std::vector<PlaneRecord>& history) {
+  AtomicFile file(path);
+  file.stream() << "t,id,nx,ny,nz,d\n" << std::fixed;
+  for (const PlaneRecord& record : history) {
+    const Eigen::Vector3d& n = record.plane.n;
+    file.stream() << std::setprecision(9) << record.t << ',' << record.id << std::setprecision(6) << ',' << n.x() << ','
+                  << n.y() << ',' << n.z() << ',' << record.plane.d << '\n';
+  }
+  file.commit();
+}
+
 }  // namespace
 
 void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader,
@@ -265,6 +280,7 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
     writePlanesYaml(folder + "/planes.yaml", planes);
     writePlanesPly(folder + "/planes.ply", planes);
     writeFloorPlan(folder + "/floorplan.svg", planes, trajectory);
+    writePlaneHistory(folder + "/plane_history.csv", mapping->planeHistory());
     writePoints(folder + "/points.csv", map.landmarks);
     mapping->backEnd().saveMap(folder + "/map.vsm");
   }

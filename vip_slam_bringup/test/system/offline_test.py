@@ -13,7 +13,7 @@ import rospy
 import yaml
 
 FILES = ('trajectory.tum', 'realtime.tum', 'odometry.tum', 'planes.yaml', 'planes.ply', 'map.vsm', 'floorplan.svg',
-         'timing.csv', 'summary.yaml', 'report.html')
+         'plane_history.csv', 'timing.csv', 'summary.yaml', 'report.html')
 
 
 class OfflineTest(unittest.TestCase):

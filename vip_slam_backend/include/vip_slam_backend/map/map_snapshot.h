@@ -34,7 +34,8 @@ struct BackEndStatistics {
   std::uint64_t outliers = 0;    ///< observations removed by residual
   std::uint64_t local_ba = 0, global_ba = 0;
   std::uint64_t loops_accepted = 0, loops_rejected = 0;
-  InertialScale scale;  ///< as of the last global adjustment, or some keyframes ago
+  double track_noise_factor = 1;  ///< see optimisation/problem_builder.h; as of the last adjustment
+  InertialScale scale;            ///< as of the last global adjustment, or some keyframes ago
 };
 
 struct MapSnapshot {

@@ -24,6 +24,13 @@ struct GlobalBaRecord {
   double milliseconds = 0;
 };
 
+/// A plane as it stood after a map update.
+struct PlaneRecord {
+  double t = 0;  ///< stamp of the newest keyframe
+  PlaneId id = 0;
+  Plane plane;  ///< in `map`
+};
+
 class MappingThread {
  public:
   /// `timing` may be null.
@@ -46,6 +53,8 @@ class MappingThread {
   const BackEnd& backEnd() const { return *back_end_; }
   std::vector<PlaneEstimate> planes() const;  ///< empty without planes
   const std::vector<GlobalBaRecord>& globalAdjustments() const { return adjustments_; }
+  /// All planes after each map update, in order.
+  const std::vector<PlaneRecord>& planeHistory() const { return plane_history_; }
   const std::vector<std::string>& refusals() const { return refusals_; }
 
  private:
@@ -59,6 +68,7 @@ class MappingThread {
   std::uint32_t epoch_ = 0;
   bool placed_ = false;
   std::vector<GlobalBaRecord> adjustments_;
+  std::vector<PlaneRecord> plane_history_;
   std::vector<std::string> refusals_;
   Channel<std::function<void()>> work_;
   std::thread thread_;
