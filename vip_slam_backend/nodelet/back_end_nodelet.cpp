@@ -116,7 +116,7 @@ void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
   if (state != TrackingState::kTracking && state != TrackingState::kDegraded) return;
   const double t = frame.header.stamp.toSec();
   const SE3 T_odom_I = fromMsg(frame.state.pose);
-  const std::optional<SE3> T_map_odom = pose_.add(t, frame.epoch, T_odom_I);
+  const std::optional<SE3> T_map_odom = pose_.add(t, frame.epoch, T_odom_I, fromMsg(frame.chain_camera));
   if (!T_map_odom) return;
   if (publish_tf_) {
     geometry_msgs::TransformStamped transform;

@@ -25,9 +25,9 @@ void PoseInMap::clear() {
   passes_ = {};
 }
 
-std::optional<SE3> PoseInMap::add(double t, std::uint32_t epoch, const SE3& T_odom_I) {
+std::optional<SE3> PoseInMap::add(double t, std::uint32_t epoch, const SE3& T_odom_I, const SE3& T_chain_C) {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (passes_.take(t)) odometry_.push_back({t, epoch, T_odom_I});
+  if (passes_.take(t)) odometry_.push_back({t, epoch, T_odom_I, T_chain_C});
   if (!placed_ || epoch != epoch_) return std::nullopt;
   return T_map_odom_;
 }

@@ -24,7 +24,7 @@ class PoseInMap {
 
   /// Remembers the image's odometry for trajectory(). Empty while the back end has not placed this epoch of the
   /// odometry.
-  std::optional<SE3> add(double t, std::uint32_t epoch, const SE3& T_odom_I);
+  std::optional<SE3> add(double t, std::uint32_t epoch, const SE3& T_odom_I, const SE3& T_chain_C);
   /// T_map_base with covariance (x, y, z, rotation about the fixed axes of map) of the odometry seen from map.
   geometry_msgs::PoseWithCovarianceStamped message(double t, const SE3& T_map_odom, const SE3& T_odom_I,
                                                    const Matrix15d& covariance, const std::string& map_frame) const;

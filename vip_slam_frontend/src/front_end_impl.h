@@ -51,6 +51,8 @@ class FrontEnd::Impl {
 
   enum class Phase { kWaiting, kInitialising, kTracking, kLost };
 
+  /// TrackedFrame::T_chain_C of a body at T_odom_I, which is the newest image's or a little later.
+  SE3 chainedCamera(const SE3& T_odom_I) const;
   SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.mounting().T_I_C; }
   /// A depth image as it came; empty when there is none.
   struct DepthReading {
@@ -134,6 +136,7 @@ class FrontEnd::Impl {
   double last_imu_t_ = -1e300;    ///< IMU time of the newest image
   CloneId next_clone_ = 1;
   KeyframeId next_keyframe_ = 1, last_keyframe_ = 0, newest_keyframe_ = 0;
+  SE3 T_odom_keyframe_, T_chain_keyframe_;  ///< of the last keyframe, body and camera
   double last_keyframe_imu_t_ = 0;
   bool keyframe_imu_broken_ = false;  ///< a gap since the last keyframe
   double started_imu_t_ = 0;          ///< of this epoch's first state

@@ -66,11 +66,22 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   if (filter_.started()) {
     frame->state = filter_.nav();
     frame->covariance = filter_.covariance();
+    frame->T_chain_C = chainedCamera(frame->state.T_W_I);
   }
   if (with_features) {
     for (const Track& track : tracker_.tracks()) frame->features.push_back(track.feature);
   }
   return frame;
+}
+
+SE3 FrontEnd::Impl::chainedCamera(const SE3& T_odom_I) const {
+  const SE3 T_I_C = extrinsics();
+  if (last_keyframe_ == 0) return T_odom_I * T_I_C;
+  SE3 moved = T_odom_keyframe_.inverse() * T_odom_I;
+  if (const auto T_keyframe_I = filter_.poseSinceMark()) {
+    moved = *T_keyframe_I * (filter_.nav().T_W_I.inverse() * T_odom_I);
+  }
+  return T_chain_keyframe_ * (T_I_C.inverse() * moved * T_I_C);
 }
 
 FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std::string& reason) const {
@@ -87,6 +98,7 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
     // The pose goes out under the image's stamp, so it has to be the one at that time. Longer than this it is LOST.
     const double untold = std::min(t_imu - frame->state.t, longestImuGap());
     if (untold > 0) carryOn(gyro(frame->state.t) - frame->state.bias_gyro, untold, &frame->state, &frame->covariance);
+    frame->T_chain_C = chainedCamera(frame->state.T_W_I);
   }
   return {frame, nullptr};
 }
@@ -204,6 +216,8 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   if (const RelativeMotion motion = filter_.motionSinceMark(); last_keyframe_ != 0 && motion.isUsable())
     keyframe->motion = motion;
   filter_.markNewest();
+  T_odom_keyframe_ = frame.state.T_W_I;
+  T_chain_keyframe_ = frame.T_chain_C;
 
   selector_.accept(frame.t, frame.state.T_W_I * frame.T_I_C, frame.features);
   last_keyframe_ = newest_keyframe_ = keyframe->id;

@@ -93,14 +93,6 @@ void PlaneMapper::Impl::decideOnPoints() {
 
 void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   map_moved_ = update.global;
-  for (const auto& [id, plane] : update.planes) {
-    const auto it = tracks_.find(id);
-    if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
-    // The back end has nothing of one whose observations it did not get: it sends back what it was told.
-    if (!it->second.determined) continue;
-    it->second.setPlane(plane);
-    it->second.setOptimised(true);
-  }
   // Before any pose changes: the area of those that go is handed over where it lay, and moves with its heir.
   for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
   std::vector<KeyframeId> moved;
@@ -114,6 +106,17 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     const bool other_depth = adoptCameraCorrection(estimate.camera_correction, &it->second);
     if (other_depth || T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);
     T_map_C = corrected;
+  }
+  if (map_moved_) {
+    for (auto& [id, track] : tracks_) track.turnWithKeyframes(poses_);
+  }
+  for (const auto& [id, plane] : update.planes) {
+    const auto it = tracks_.find(id);
+    if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
+    // The back end has nothing of one whose observations it did not get: it sends back what it was told.
+    if (!it->second.determined) continue;
+    it->second.setPlane(plane);
+    it->second.setOptimised(true);
   }
   points_.applyMapUpdate(update);
   const bool removed = !update.removed_keyframes.empty();

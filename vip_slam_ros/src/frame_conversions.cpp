@@ -121,6 +121,7 @@ vip_slam_msgs::TrackedFrame toMsg(const TrackedFrame& frame, const std::string& 
   msg.state = toMsg(frame.state);
   Eigen::Map<Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(msg.covariance.data()) = frame.covariance;
   msg.imu_camera = toPoseMsg(frame.T_I_C);
+  msg.chain_camera = toPoseMsg(frame.T_chain_C);
   msg.time_offset = frame.time_offset;
   msg.depth_correction = frame.camera_correction.offset;
   msg.depth_curve = frame.camera_correction.curve.added;
@@ -141,6 +142,7 @@ TrackedFrame fromMsg(const vip_slam_msgs::TrackedFrame& msg) {
   frame.state = fromMsg(msg.state);
   frame.covariance = Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(msg.covariance.data());
   frame.T_I_C = fromMsg(msg.imu_camera);
+  frame.T_chain_C = fromMsg(msg.chain_camera);
   frame.time_offset = msg.time_offset;
   frame.camera_correction = {msg.depth_correction, {msg.depth_curve}, fromArray(msg.bearing_correction)};
   frame.features.reserve(msg.features.size());

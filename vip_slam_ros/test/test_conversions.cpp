@@ -60,6 +60,7 @@ class Conversions : public ::testing::Test {
     f.state = state();
     f.covariance.setRandom();
     f.T_I_C = pose();
+    f.T_chain_C = pose();
     f.camera_correction = {number(), {{0.001f, -0.002f}}, {{number(), number(), number(), number()}}};
     f.time_offset = number();
     for (int i = 0; i < 5; ++i) f.features.push_back(feature());
@@ -110,6 +111,7 @@ void expectSame(const TrackedFrame& a, const TrackedFrame& b) {
   expectSame(a.state, b.state);
   EXPECT_EQ(a.covariance, b.covariance);
   expectSame(a.T_I_C, b.T_I_C);
+  expectSame(a.T_chain_C, b.T_chain_C);
   EXPECT_EQ(a.camera_correction, b.camera_correction);
   EXPECT_EQ(a.time_offset, b.time_offset);
   ASSERT_EQ(a.features.size(), b.features.size());

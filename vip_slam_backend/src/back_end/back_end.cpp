@@ -197,8 +197,8 @@ MapSnapshot BackEnd::Impl::snapshot() const {
     out.t = kf.data->frame.t;
     out.epoch = kf.data->frame.epoch;
     out.state = kf.state;
-    out.T_odom_I = kf.data->frame.state.T_W_I;
-    out.T_now_then = kf.T_I_C * kf.data->frame.T_I_C.inverse();
+    out.T_chain_C = kf.data->frame.T_chain_C;
+    out.T_I_C = kf.T_I_C;
     for (const LandmarkId landmark : kf.landmarks) out.landmarks += landmark != kNoLandmark;
     snapshot.keyframes.push_back(out);
   }

@@ -85,7 +85,8 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   epoch = keyframe->frame.epoch;
   const SE3& T_odom_I = keyframe->frame.state.T_W_I;
   T_map_odom = alignLevelled(found->T_W_I, T_odom_I);
-  localised.push_back({keyframe->frame.t, epoch, T_odom_I, T_map_odom * T_odom_I, SE3()});
+  localised.push_back(
+      {keyframe->frame.t, epoch, keyframe->frame.T_chain_C, T_map_odom * T_odom_I, keyframe->frame.T_I_C});
   last_found = LastFound{epoch, found->match, keyframe->frame.t};
 }
 

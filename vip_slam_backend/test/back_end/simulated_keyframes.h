@@ -77,6 +77,7 @@ class SimulatedKeyframes {
     kf->frame.state = state;
     kf->frame.state.T_W_I = drift_ * state.T_W_I;
     kf->frame.state.v_W = drift_.rotation() * state.v_W;
+    kf->frame.T_chain_C = kf->frame.state.T_W_I * sensor_.T_imu_cam;
     const SE3 T_C_W = (state.T_W_I * sensor_.T_imu_cam).inverse();
     for (std::size_t k = 0; k < points_.size(); ++k) {
       Point& p = points_[k];

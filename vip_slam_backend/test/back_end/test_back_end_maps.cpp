@@ -144,7 +144,8 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
     kf->id += 1000;
     kf->previous = kf->id - 1;
     kf->frame.state.T_W_I = T_other_odom * kf->frame.state.T_W_I;
-    odometry.push_back({kf->frame.t, kf->frame.epoch, kf->frame.state.T_W_I});
+    kf->frame.T_chain_C = T_other_odom * kf->frame.T_chain_C;
+    odometry.push_back({kf->frame.t, kf->frame.epoch, kf->frame.state.T_W_I, kf->frame.T_chain_C});
     back_end.addKeyframe(kf);
   }
   back_end.finish();

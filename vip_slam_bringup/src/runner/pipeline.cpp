@@ -113,7 +113,7 @@ void Pipeline::process(const ImagePair& pair) {
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
   const bool posed = frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
   if (posed && passes_.take(frame.t)) {
-    odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
+    odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I, frame.T_chain_C});
     covariances_.push_back({frame.t, poseCovariance(frame)});
     if (placed_ && epoch_ == frame.epoch) realtime_.push_back({frame.t, T_map_odom_ * frame.state.T_W_I});
   }

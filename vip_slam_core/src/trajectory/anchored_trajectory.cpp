@@ -7,8 +7,7 @@ namespace vip_slam {
 namespace {
 
 SE3 carry(const Anchor& anchor, const OdometryPose& pose) {
-  const SE3 moved = anchor.T_odom_I.inverse() * pose.T_odom_I;
-  return anchor.T_map_I * (anchor.T_now_then * moved * anchor.T_now_then.inverse());
+  return anchor.T_map_I * (anchor.T_I_C * (anchor.T_chain_C.inverse() * pose.T_chain_C) * anchor.T_I_C.inverse());
 }
 
 }  // namespace

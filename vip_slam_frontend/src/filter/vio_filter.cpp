@@ -149,6 +149,14 @@ RelativeMotion VioFilter::motionSinceMark() const {
   return motionFromMark(static_cast<int>(filter_.window().clones.size()) - 1);
 }
 
+std::optional<SE3> VioFilter::poseSinceMark() const {
+  const int mark = filter_.window().indexOf(mark_);
+  if (mark < 0) return std::nullopt;
+  const auto& clones = filter_.window().clones;
+  const SE3 T_mark_I = clones[mark].T_W_I.inverse() * clones.back().T_W_I;
+  return to_mark_ ? to_mark_->T_a_b * T_mark_I : T_mark_I;
+}
+
 void VioFilter::moveMark(CloneId to) {
   to_mark_ = motionFromMark(filter_.window().indexOf(to));
   mark_ = to;

@@ -90,18 +90,22 @@ void PointAssociation::applyMapUpdate(const MapUpdate& update) {
 }
 
 void PointAssociation::addSightings(const Keyframe& keyframe) {
-  for (const Feature& f : keyframe.frame.features) {
+  const std::vector<Feature>& features = keyframe.frame.features;
+  for (std::uint32_t i = 0; i < features.size(); ++i) {
+    const Feature& f = features[i];
     if (f.id == kNoLandmark) continue;
-    landmarks_[resolve(f.id)].sightings.push_back({keyframe.id, f.xy, f.depth, f.depth_sigma, f.pixel_sigma});
+    landmarks_[resolve(f.id)].sightings.push_back({keyframe.id, i, f.xy, f.depth, f.depth_sigma, f.pixel_sigma});
   }
 }
 
 void PointAssociation::renewSightings(const Keyframe& keyframe) {
-  for (const Feature& f : keyframe.frame.features) {
+  const std::vector<Feature>& features = keyframe.frame.features;
+  for (std::uint32_t i = 0; i < features.size(); ++i) {
+    const Feature& f = features[i];
     const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(resolve(f.id));
     if (it == landmarks_.end()) continue;
     for (Sighting& s : it->second.sightings) {
-      if (s.keyframe == keyframe.id && s.xy == f.xy) s.depth = f.depth;
+      if (s.keyframe == keyframe.id && s.feature == i) s.xy = f.xy, s.depth = f.depth;
     }
   }
 }

@@ -7,6 +7,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kLeastTurn = 1e-3, kLeastShift = 1e-3;  // radians, metres; less is no change
+constexpr double kLargeTurn = 0.3;  // radians; an adjustment turns by less, a loop that ties parts by anything
 
 }  // namespace
 
@@ -30,7 +31,7 @@ void PlaneTrack::setPlane(const Plane& plane) {
 
 void PlaneTrack::coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C) {
   const int before = cells_.at(c);
-  cells_.set(c, before + hits);
+  cells_.set(c, std::min(kMostHits, before + hits));
   if (before > 0) return;
   area_changed_ = grown_ = true;
   lost_ = std::max(0, lost_ - 1);
@@ -74,9 +75,27 @@ Plane PlaneTrack::carriedAlong(const SE3& move, const SE3& T_map_C, const std::v
   return Plane::fromPointNormal(move * plane_.project(T_map_C * middle), n.normalized());
 }
 
+std::pair<const PlaneTrack::Patch*, SE3> PlaneTrack::mainMove(const CameraPoses& poses) const {
+  std::pair<const Patch*, SE3> main = {nullptr, SE3()};
+  for (const auto& [host, patch] : patches_) {
+    const auto it = poses.find(host);
+    if (it == poses.end() || (main.first && patch.cells_C.size() <= main.first->cells_C.size())) continue;
+    main = {&patch, it->second * patch.T_map_C.inverse()};
+  }
+  return main;
+}
+
+void PlaneTrack::turnWithKeyframes(const CameraPoses& poses) {
+  const auto [main, move] = mainMove(poses);
+  if (!main || main->cells_C.empty() || logSO3(move.rotation()).norm() < kLargeTurn) return;
+  plane_ = carriedAlong(move, main->T_map_C, main->cells_C);
+  alignFrame(move.rotation() * ex_, move * origin_);
+  for (auto& [host, patch] : patches_) patch.T_map_C = move * patch.T_map_C;
+  area_changed_ = grown_ = true;
+}
+
 void PlaneTrack::followKeyframes(const CameraPoses& poses) {
-  const Patch* main = nullptr;
-  SE3 main_move;
+  const auto [main, main_move] = mainMove(poses);
   bool moved = false;
   for (const auto& [host, patch] : patches_) {
     const auto it = poses.find(host);
@@ -87,7 +106,6 @@ void PlaneTrack::followKeyframes(const CameraPoses& poses) {
       const Eigen::Vector3d shift = move * p - p;
       moved = moved || (shift - plane_.n * plane_.n.dot(shift)).norm() > 0.5 * cell_;
     }
-    if (!main || patch.cells_C.size() > main->cells_C.size()) main = &patch, main_move = move;
   }
   Plane carried = plane_;
   if (main && !main->cells_C.empty() && followsHosts()) {

@@ -181,6 +181,14 @@ bool DepthMeshBuilder::brokenBetween(const MeshVertex& a, const MeshVertex& b, c
   return straight(node(a.pixel - 2.0f * step), before, za) || straight(node(b.pixel + 2.0f * step), after, zb);
 }
 
+bool DepthMeshBuilder::skipsNodes(const DelaunayTriangle& flat, const DepthGrid& grid) const {
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector2f side = pixels_[flat.vertex[k]] - pixels_[flat.vertex[(k + 1) % 3]];
+    if (side.cwiseAbs().maxCoeff() > 1.5f * float(grid.stride)) return true;
+  }
+  return false;
+}
+
 bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step,
                             MeshTriangle* triangle) const {
   const Eigen::Vector3f& a = mesh_.vertices[flat.vertex[0]].p_C;
@@ -205,7 +213,9 @@ bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid,
   if (facing < (level ? least_level_facing_ : least_facing_) * triangle->centre_C.norm()) return false;
   triangle->sigma = float(noise_.sigma(z)) * kMedianGain * facing / z;
   triangle->sigma_angle = triangle->sigma / altitude;
-  return step < 2 || grid.empty() || !crossesDepthEdge(*triangle, grid);
+  if (grid.empty()) return true;
+  // Between the nodes of a grid as coarse as the mesh there is nothing to ask, but across a hole in the depth there is.
+  return (step < 2 && !skipsNodes(flat, grid)) || !crossesDepthEdge(*triangle, grid);
 }
 
 void DepthMeshBuilder::smoothNormals() {

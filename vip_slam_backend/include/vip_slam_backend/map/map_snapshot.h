@@ -15,8 +15,8 @@ struct SnapshotKeyframe {
   double t = 0;  ///< image stamp
   std::uint32_t epoch = 0;
   NavState state;  ///< T_map_I, v, biases
-  SE3 T_odom_I;    ///< the front end's pose when the keyframe was made
-  SE3 T_now_then;  ///< see Anchor
+  SE3 T_chain_C;   ///< as the front end had it, see TrackedFrame
+  SE3 T_I_C;       ///< the camera's mounting as known now
   std::uint32_t landmarks = 0;
 };
 

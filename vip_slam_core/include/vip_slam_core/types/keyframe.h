@@ -22,12 +22,17 @@ struct TrackedFrame {
   NavState state;                            ///< T_odom_I, v, biases
   Matrix15d covariance = Matrix15d::Zero();  ///< of state, order (theta, p, v, b_g, b_a)
   SE3 T_I_C;                                 ///< extrinsics in use (online-calibrated)
-  double time_offset = 0;                    ///< t_imu = t_image + time_offset
-  CameraCorrection camera_correction;        ///< what features and grid have been added to the camera's readings
-  std::vector<Feature> features;             ///< tracked features only
-  DepthGrid depth_grid;                      ///< coarse, for plane growth; empty without depth
-  bool zero_velocity = false;                ///< standing still
-  KeyframeId keyframe = 0;                   ///< newest keyframe at or before this image
+  /// The camera, put together of its motions since one keyframe after the other, each as the filter knew it at the
+  /// later image. The way from one image to the next in `state` has in it what the filter has corrected of both
+  /// meanwhile (the direction of gravity, by tenths of a degree when the body begins to move); this has not. Its origin
+  /// is the odometry's, but it drifts freely: only ways between neighbours mean something.
+  SE3 T_chain_C;
+  double time_offset = 0;              ///< t_imu = t_image + time_offset
+  CameraCorrection camera_correction;  ///< what features and grid have been added to the camera's readings
+  std::vector<Feature> features;       ///< tracked features only
+  DepthGrid depth_grid;                ///< coarse, for plane growth; empty without depth
+  bool zero_velocity = false;          ///< standing still
+  KeyframeId keyframe = 0;             ///< newest keyframe at or before this image
 };
 
 struct Keyframe {

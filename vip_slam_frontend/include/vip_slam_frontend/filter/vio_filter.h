@@ -81,6 +81,8 @@ class VioFilter {
   /// The motion from the marked clone to the newest. When the marked one has left the window meanwhile it is put
   /// together from pieces as long as the window, whose errors count as independent. Unknown when nothing was marked.
   RelativeMotion motionSinceMark() const;
+  /// Its pose alone, at next to no cost; empty when nothing was marked.
+  std::optional<SE3> poseSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }
   double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s

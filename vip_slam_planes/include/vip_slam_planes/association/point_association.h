@@ -57,6 +57,7 @@ class PointAssociation {
  private:
   struct Sighting {
     KeyframeId keyframe;
+    std::uint32_t feature;  ///< its place among the keyframe's
     Eigen::Vector2f xy;
     float depth, depth_sigma, pixel_sigma;
   };

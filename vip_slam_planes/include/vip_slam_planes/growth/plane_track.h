@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -64,6 +65,9 @@ class PlaneTrack {
     lost_ += cells_.at(c) == 0;
   }
 
+  /// A correction that turns the hosts by much, as when a loop ties a part to the rest, turns the plane as it is with
+  /// the host with most cells, so that what comes next finds its normal on the side it was seen from.
+  void turnWithKeyframes(const CameraPoses& poses);
   /// Rasterises the cells anew when hosts have moved (against where they were when last rasterised) by more than half a
   /// cell; the 2D frame follows the host with most cells, so that a rigid correction moves all without resampling. So
   /// does the plane itself while nothing else holds it.
@@ -113,6 +117,8 @@ class PlaneTrack {
     SE3 T_map_C;                           ///< of the host, when last rasterised
     std::vector<Eigen::Vector3f> cells_C;  ///< cell centres in the host's camera frame
   };
+  /// The host with most cells and how it has moved since they were last rasterised; null without any.
+  std::pair<const Patch*, SE3> mainMove(const CameraPoses& poses) const;
   /// The plane moved with the keyframe that shows these cells; it stays level or upright.
   Plane carriedAlong(const SE3& move, const SE3& T_map_C, const std::vector<Eigen::Vector3f>& cells_C) const;
   void alignFrame(const Eigen::Vector3d& ex_hint, const Eigen::Vector3d& origin_hint);

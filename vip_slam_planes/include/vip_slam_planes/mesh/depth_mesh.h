@@ -73,6 +73,8 @@ class DepthMeshBuilder {
 
  private:
   void collectVertices(const std::vector<Feature>& features, const DepthGrid& grid);
+  /// Whether a side is longer than from a node of the grid to the next.
+  bool skipsNodes(const DelaunayTriangle& flat, const DepthGrid& grid) const;
   bool lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step, MeshTriangle* triangle) const;
   bool flatBlock(const DepthGrid& grid, int c, int r, int step) const;
   bool crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const;
