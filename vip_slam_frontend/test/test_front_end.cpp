@@ -39,6 +39,9 @@ TEST_F(FrontEndTest, WholeRunFollowsAndHandsOnKeyframes) {
       ASSERT_TRUE(keyframe.motion.isUsable());
       const double way = (World::position(keyframe.frame.t) - World::position(keyframes_[i - 1]->frame.t)).norm();
       EXPECT_NEAR(keyframe.motion.T_a_b.t().norm(), way, 4e-3);
+      const SE3& T_I_C = keyframe.frame.T_I_C;
+      const SE3 chained = keyframes_[i - 1]->frame.T_chain_C.inverse() * keyframe.frame.T_chain_C;
+      EXPECT_LT(chained.boxminus(T_I_C.inverse() * keyframe.motion.T_a_b * T_I_C).norm(), 1e-9);
       EXPECT_LT(std::sqrt(keyframe.motion.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff()), 0.02);
     } else {
       EXPECT_FALSE(keyframe.motion.known());

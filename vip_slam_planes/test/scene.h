@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
+#include "vip_slam_core/camera/bearing_correction.h"
 #include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/types/keyframe.h"
@@ -55,6 +56,14 @@ struct Scene {
     return best;
   }
 };
+
+/// The camera whose intrinsics are right when those of `given` have to be corrected by `bearing`.
+inline std::shared_ptr<const CameraModel> cameraThatMeans(const CameraModel& given, const BearingCorrection& bearing) {
+  CameraIntrinsics k = given.intrinsics();
+  const Eigen::Vector4d right = correctedIntrinsics({k.fx, k.fy, k.cx, k.cy}, bearing);
+  k.fx = right(0), k.fy = right(1), k.cx = right(2), k.cy = right(3);
+  return makeCamera(k);
+}
 
 inline std::shared_ptr<const CameraModel> testCamera() {
   CameraIntrinsics k;

@@ -85,12 +85,7 @@ TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
   // Focal lengths 2 % too long, the principal point 8 px off; the back end tells of it with the sixth keyframe.
   Rig rig;
   const BearingCorrection bearing{{0.02, 0.02, 0.015, -0.01}};
-  const CameraIntrinsics& given = rig.camera.camera->intrinsics();
-  const Eigen::Vector4d right = correctedIntrinsics({given.fx, given.fy, given.cx, given.cy}, bearing);
-  CameraIntrinsics truth_of_camera = given;
-  truth_of_camera.fx = right(0), truth_of_camera.fy = right(1), truth_of_camera.cx = right(2);
-  truth_of_camera.cy = right(3);
-  rig.camera.camera = makeCamera(truth_of_camera);
+  rig.camera.camera = testing::cameraThatMeans(*rig.camera.camera, bearing);
   const Scene scene = room();
   const Plane truth({-1, 0, 0}, 3);
   MapUpdate all;
@@ -116,13 +111,14 @@ TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
   expectCorrectedObservations(result, T_W_C, update.keyframes[0].camera_correction);
 }
 
-TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
+void expectCarriedAlong(double yaw, bool optimised) {
+  SCOPED_TRACE(::testing::Message() << "turned by " << yaw << (optimised ? ", optimised" : ""));
   Rig rig;
   const Scene scene = room();
   for (int i = 0; i < 6; ++i) rig.look(scene, {-1 + 0.4 * i, 0, 1.4}, {3, -1 + 0.4 * i, 1.0});
   const std::size_t count = rig.mapper.planes().size();
   const PlaneEstimate wall = *rig.find(Plane({-1, 0, 0}, 3));
-  const SE3 move(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())), {2, -1, 0.2});
+  const SE3 move(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), {2, -1, 0.2});
   MapUpdate update;
   update.global = true;
   for (const auto& [id, T] : rig.poses) {
@@ -131,10 +127,10 @@ TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
     k.state.T_W_I = move * T;
     update.keyframes.push_back(k);
   }
+  if (optimised) update.planes.emplace_back(wall.id, transformPlane(move, wall.plane));
   rig.mapper.applyMapUpdate(update);
   EXPECT_EQ(count, rig.mapper.planes().size());
-  const Plane expected = transformPlane(move, wall.plane);
-  const PlaneEstimate* moved = rig.find(expected, 0.001);
+  const PlaneEstimate* moved = rig.find(transformPlane(move, wall.plane), 0.001);
   ASSERT_TRUE(moved);
   EXPECT_EQ(wall.id, moved->id);
   EXPECT_NEAR(wall.area, moved->area, 0.1 * wall.area);
@@ -145,6 +141,12 @@ TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
     for (const auto& q : p.outer) low2 = low2.cwiseMin(move.inverse() * q), high2 = high2.cwiseMax(move.inverse() * q);
   EXPECT_LT((low - low2).norm(), 0.15);
   EXPECT_LT((high - high2).norm(), 0.15);
+}
+
+// Those beyond a right angle leave the normal on the side that was seen.
+TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
+  for (const bool optimised : {false, true})
+    for (const double yaw : {0.1, 0.5, M_PI / 2, 2.0, M_PI}) expectCarriedAlong(yaw, optimised);
 }
 
 // The keyframe before it saw nothing of the wall yet.

@@ -1,5 +1,6 @@
 // Which map points lie on which plane.
 #include <random>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -172,6 +173,52 @@ TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
   away.global = true;
   away.planes.emplace_back(wall, Plane({-1, 0, 0}, 3.3));
   EXPECT_GT(mapper.applyMapUpdate(away).dissociated.size(), 20u);
+}
+
+// Three keyframes, one less than are asked, see the points by focal lengths 2 % too long; then this is known.
+TEST(Points, WhatWasSeenByWrongIntrinsicsCountsAsItIsMeant) {
+  const World w = world();
+  SceneCamera camera(testing::quietNoise(), 1.0);
+  PlaneMapper mapper({}, camera.camera, camera.noise);
+  const BearingCorrection bearing{{0.02, 0.02, 0.015, -0.01}};
+  camera.camera = testing::cameraThatMeans(*camera.camera, bearing);
+  std::map<LandmarkId, int> seen;
+  std::set<LandmarkId> associated;
+  MapUpdate placed;
+  for (int i = 0; i < 7; ++i) {
+    const SE3 T_W_C = lookAt({-0.8, -1.2 + 0.35 * i, 1.4}, {3, -0.5 + 0.1 * i, 0.9});
+    const auto keyframe = camera.keyframe(w.scene, T_W_C, w.points, 0.5);
+    for (Feature& f : keyframe->frame.features) {
+      ++seen[f.id];
+      if (i < 3) f.xy = (bearing.matrix().inverse().cast<float>() * f.xy.homogeneous()).head<2>();
+    }
+    if (i >= 3) keyframe->frame.camera_correction.bearing = bearing;
+    mapper.addKeyframe(keyframe);
+    placed.keyframes.push_back(testing::updateFor(*keyframe, T_W_C).keyframes[0]);
+    MapUpdate update;
+    update.global = i == 3;
+    update.keyframes = placed.keyframes;
+    if (!update.global) update.keyframes = {placed.keyframes.back()};
+    for (KeyframeEstimate& k : update.keyframes)
+      if (i >= 3) k.camera_correction.bearing = bearing;
+    for (std::size_t k = 0; k < w.points.size(); ++k) {
+      LandmarkEstimate estimate;
+      estimate.id = LandmarkId(k);
+      estimate.p_W = w.points[k];
+      update.landmarks.push_back(estimate);
+    }
+    const PlaneUpdate answer = mapper.applyMapUpdate(update);
+    for (const auto& [id, plane] : answer.associated) associated.insert(id);
+    for (LandmarkId id : answer.dissociated) associated.erase(id);
+  }
+  int expected = 0, found = 0;
+  for (const auto& [id, count] : seen) {
+    if (count < 5 || w.truth[id] < 1) continue;
+    ++expected;
+    found += associated.count(id) ? 1 : 0;
+  }
+  EXPECT_GT(expected, 150);
+  EXPECT_GE(found, expected * 8 / 10);
 }
 
 // What the back end makes of a plane may fit none of the keyframes that saw it: then it is several surfaces, and the
