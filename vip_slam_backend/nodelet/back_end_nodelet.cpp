@@ -179,7 +179,6 @@ void BackEndNodelet::applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg) {
 void BackEndNodelet::startGlobalBa() {
   if (adjusting_ || !back_end_ || !back_end_->globalBaWanted()) return;
   if (adjustment_.joinable()) adjustment_.join();
-  adjusting_ = true;
   adjustment_ = std::thread([this, job = back_end_->startGlobalBa()] {
     lowerThreadPriority(kAdjustmentNiceness);
     const ros::WallTime begin = ros::WallTime::now();
@@ -206,6 +205,7 @@ void BackEndNodelet::startGlobalBa() {
       startGlobalBa();  // one that was asked for meanwhile: the next keyframe may never come
     });
   });
+  adjusting_ = true;  // only now: memory or threads may have been short. Its end is posted to this same thread.
 }
 
 void BackEndNodelet::distribute(const MapUpdate& update) {

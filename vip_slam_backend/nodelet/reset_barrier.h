@@ -37,28 +37,32 @@ class ResetBarrier {
   bool passes(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
     if (raised_ && epoch > barrier_epoch_) raised_ = false;
-    if (raised_ && epoch == barrier_epoch_ && epoch_ends_) return false;
-    return !raised_ || t > barrier_t_;
+    if (!raised_) return true;
+    return epoch == barrier_epoch_ && !epoch_ends_ && t > barrier_t_;
   }
 
-  double newest() const {  ///< stamp; 0 before the first
+  double newest() const {  ///< stamp in the newest epoch; 0 before the first
     std::lock_guard<std::mutex> lock(mutex_);
     return seen_ ? t_ : 0.0;
   }
 
  private:
   void take(double t, std::uint32_t epoch) {
-    t_ = std::max(t_, t);
-    if (epoch > epoch_) has_keyframe_ = false;
-    epoch_ = std::max(epoch_, epoch);
+    if (!seen_ || epoch > epoch_) {
+      t_ = t;  // stamps of the epoch before say nothing here: the clock may have run back
+      epoch_ = epoch;
+      has_keyframe_ = false;
+    } else if (epoch == epoch_) {
+      t_ = std::max(t_, t);
+    }
     seen_ = true;
   }
 
   mutable std::mutex mutex_;
   bool seen_ = false, raised_ = false;
-  bool has_keyframe_ = false;  ///< of epoch_
-  bool epoch_ends_ = false;    ///< barrier_epoch_ had keyframes
-  double t_ = -1e300, barrier_t_ = 0;
+  bool has_keyframe_ = false;     ///< of epoch_
+  bool epoch_ends_ = false;       ///< barrier_epoch_ had keyframes
+  double t_ = 0, barrier_t_ = 0;  ///< t_ of epoch_
   std::uint32_t epoch_ = 0, barrier_epoch_ = 0;
 };
 

@@ -113,7 +113,7 @@ bool FrontEndNodelet::noticeTime(double t, Stream stream) {
     for (auto* monitor : {color_monitor_.get(), depth_monitor_.get(), imu_monitor_.get(), accel_monitor_.get()}) {
       monitor->restart();
     }
-    if (front_end_) front_end_->reset(words);
+    if (front_end_) front_end_->clockRanBack(words);
     last_feature_image_ = posed_imu_t_ = predicted_imu_t_ = -1e300;
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++shown_.time_jumps;

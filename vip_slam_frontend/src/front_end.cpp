@@ -19,6 +19,7 @@ void FrontEnd::applyMapUpdate(const MapUpdate& update) { impl_->applyMapUpdate(u
 std::optional<NavState> FrontEnd::predict(double t) const { return impl_->predict(t); }
 Eigen::Vector3d FrontEnd::gyro(double t) const { return impl_->gyro(t); }
 void FrontEnd::reset(const std::string& reason) { impl_->reset(reason); }
+void FrontEnd::clockRanBack(const std::string& reason) { impl_->clockRanBack(reason); }
 void FrontEnd::forgetMap() { impl_->forgetMap(); }
 MountingEstimate FrontEnd::mounting() const { return impl_->mounting(); }
 double FrontEnd::timeOffset() const { return impl_->timeOffset(); }

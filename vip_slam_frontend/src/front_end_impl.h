@@ -40,6 +40,7 @@ class FrontEnd::Impl {
     return filter_.started() ? filter_.window().time_offset : filter_.mounting().time_offset;
   }
   void reset(const std::string& reason);
+  void clockRanBack(const std::string& reason);
   void forgetMap() { landmarks_.clear(); }
 
   FrontEndCounters counters_;

@@ -70,10 +70,14 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
 
 bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
   if (!(t < newest - kClockJump)) return false;
+  clockRanBack(std::string(what) + " clock ran back by " + std::to_string(newest - t) + " s");
+  return true;
+}
+
+void FrontEnd::Impl::clockRanBack(const std::string& reason) {
   imu_.clear();
   last_image_t_ = last_imu_t_ = -1e300;
-  reset(std::string(what) + " clock ran back by " + std::to_string(newest - t) + " s");
-  return true;
+  reset(reason);
 }
 
 void FrontEnd::Impl::countImu() {

@@ -346,6 +346,18 @@ TEST_F(FrontEndTest, ClockRunningBackStartsAnew) {
   EXPECT_LT(error(output), 0.02);
 }
 
+// The first accelerometer sample of a device that tells its streams apart has the time of another clock.
+TEST_F(FrontEndTest, AFirstSampleFarAheadDoesNotEndASplitImu) {
+  const Eigen::Vector3d gyro(0.01, 0, 0), accel(0, 0, 9.81);
+  EXPECT_TRUE(front_end_.addAccel(1e6, accel));
+  front_end_.clockRanBack("time ran backwards");
+  for (int k = 0; k <= 200; ++k) {
+    EXPECT_TRUE(front_end_.addGyro(0.005 * k, gyro)) << k;
+    EXPECT_TRUE(front_end_.addAccel(0.005 * k, accel)) << k;
+  }
+  EXPECT_TRUE(front_end_.ready(0.9));
+}
+
 TEST_F(FrontEndTest, LongImuGapRestartsWithItsReason) {
   run(0.0, 3.0);
   imu_t_ = 3.8;

@@ -162,8 +162,14 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
 }
 
 void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
-  if (frozen()) return;
   if (update.revision < first_revision) return;  // of a map that was forgotten or replaced meanwhile
+  if (frozen()) {
+    // The plane module says it once; what it said of the map before it heard that this stays as it is comes in later.
+    const bool says = !update.merges.empty() || !update.removed.empty() || !update.observations.empty() ||
+                      !update.associated.empty() || !update.dissociated.empty();
+    if (says) held_updates.push_back(update);
+    return;
+  }
   const ScopedTimer timer(log, "backend.planes", update.t);
   for (const PlaneMerge& merge : update.merges) map.mergePlanes(merge.from, merge.into);
   for (const PlaneId id : update.removed) map.removePlane(id);
@@ -183,6 +189,12 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     const LandmarkId id = map.resolve(landmark);
     if (map.hasLandmark(id)) map.associate(id, 0);
   }
+}
+
+void BackEnd::Impl::applyHeldUpdates() {
+  std::vector<PlaneUpdate> held;
+  held.swap(held_updates);
+  for (const PlaneUpdate& update : held) applyPlaneUpdate(update);
 }
 
 MapSnapshot BackEnd::Impl::snapshot() const {
@@ -223,6 +235,7 @@ void BackEnd::Impl::reset() {
   relocaliser.clear();
   held.clear();
   localised.clear();
+  held_updates.clear();
   last_found.reset();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
@@ -297,6 +310,9 @@ const Map& BackEnd::map() const { return impl_->map; }
 void BackEnd::reset() { impl_->reset(); }
 void BackEnd::saveMap(const std::string& path) const { impl_->saveMap(path); }
 MapUpdate BackEnd::loadMap(const std::string& path) { return impl_->loadMap(path); }
-void BackEnd::setLocalisationMode(bool on) { impl_->localisation_only = on; }
+void BackEnd::setLocalisationMode(bool on) {
+  impl_->localisation_only = on;
+  if (!on) impl_->applyHeldUpdates();
+}
 
 }  // namespace vip_slam

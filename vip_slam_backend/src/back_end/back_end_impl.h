@@ -40,6 +40,7 @@ struct BackEnd::Impl {
   /// Localisation only: what there is of a map stays as it is.
   bool frozen() const { return localisation_only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
+  void applyHeldUpdates();
   MapSnapshot snapshot() const;
   void reset();
 
@@ -92,8 +93,9 @@ struct BackEnd::Impl {
   Relocaliser relocaliser;
   bool searching = false;  ///< a loaded map is not recognised yet
   bool localisation_only = false;
-  std::deque<KeyframePtr> held;   ///< keyframes that wait for that
-  std::vector<Anchor> localised;  ///< keyframes found in the map without entering it
+  std::vector<PlaneUpdate> held_updates;  ///< that came since
+  std::deque<KeyframePtr> held;           ///< keyframes that wait for that
+  std::vector<Anchor> localised;          ///< keyframes found in the map without entering it
 
   /// Localisation only: the last keyframe found in the map, to which the odometry is tied when mapping goes on.
   struct LastFound {

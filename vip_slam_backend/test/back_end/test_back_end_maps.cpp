@@ -160,6 +160,27 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   EXPECT_TRUE(back_end.snapshot().localised.empty());
 }
 
+// What the plane module had to say when localisation was switched on it says only once.
+TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
+  SimulatedKeyframes world(4);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 10; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  const MapSnapshot before = back_end.snapshot();
+  ASSERT_GT(before.planes.size(), 1u);
+  back_end.setLocalisationMode(true);
+  PlaneUpdate late;
+  late.revision = before.revision;
+  late.removed = {before.planes.front().id};
+  back_end.applyPlaneUpdate(late);
+  EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size());
+  back_end.setLocalisationMode(false);
+  EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size() - 1);
+  EXPECT_FALSE(back_end.map().hasPlane(before.planes.front().id));
+}
+
 TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
   const std::string path = ::testing::TempDir() + "mapped_on.vsm";
   SimulatedKeyframes world(4);

@@ -42,6 +42,19 @@ TEST(ResetBarrier, ALaterEpochLiftsIt) {
   EXPECT_TRUE(barrier.passes(0.2, 4));
 }
 
+// The device was plugged in anew before the reset: the epoch that waits for a start has small stamps.
+TEST(ResetBarrier, StampsOfEarlierEpochsDoNotCount) {
+  ResetBarrier barrier;
+  barrier.seeKeyframe(5000.0, 0);
+  barrier.see(1.0, 1);
+  barrier.see(5000.1, 0);  // on its way since before
+  EXPECT_EQ(barrier.newest(), 1.0);
+  barrier.raise();
+  EXPECT_FALSE(barrier.passes(5000.1, 0));
+  EXPECT_FALSE(barrier.passes(1.0, 1));
+  EXPECT_TRUE(barrier.passes(1.1, 1));
+}
+
 TEST(ResetBarrier, AResetBeforeAnythingCameHoldsNothingBack) {
   ResetBarrier barrier;
   barrier.raise();

@@ -107,6 +107,7 @@ int run(const Arguments& arguments) {
                       pipeline.states().empty() ? "" : trackingStateName(pipeline.states().back().status.state));
     }
   }
+  reader.stop();
   pipeline.finish();
   const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 

@@ -51,7 +51,7 @@ Recording recordBag(const std::string& path, const SensorConfig& sensor, double 
       dispatch(&recorder, message.getTopic(), message.getTime().toSec(), message);
     recorder.finish();
     return recorder.recording();
-  } catch (const rosbag::BagException& e) {
+  } catch (const ros::Exception& e) {
     throw std::runtime_error(path + ": the bag breaks off: " + e.what() + "; rosbag reindex may mend it");
   }
 }

@@ -154,7 +154,9 @@ void BagReader::takeExtrinsics(SensorConfig* sensor) {
   sensor->T_imu_cam = *found.T_imu_cam;
 }
 
-BagReader::~BagReader() {
+BagReader::~BagReader() { stop(); }
+
+void BagReader::stop() {
   stop_ = true;
   channel_.close();
   if (thread_.joinable()) thread_.join();
@@ -270,16 +272,16 @@ void BagReader::read() {
 
   rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
   for (const auto& message : view) {
-    if (stop_) return;
+    if (stop_) break;
     try {
       take(message);
-    } catch (const rosbag::BagException& error) {  // a chunk that is damaged; those after it may be whole
+    } catch (const ros::Exception& error) {  // a chunk or a message that is damaged; those after it may be whole
       damaged_ = true;
       if (++counters_["unreadable_messages"] == 1)
         warnings_.push_back(std::string("the bag is damaged, what cannot be read is left out: ") + error.what());
     }
     handOut();
-    if (!open) return;
+    if (!open) break;
   }
   pairer.end();
   handOut();

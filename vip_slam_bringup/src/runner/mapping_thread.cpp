@@ -22,7 +22,13 @@ MappingThread::MappingThread(const PipelineOptions& options, const SensorConfig&
     planes_ = std::make_unique<PlaneMapper>(options.planes, makeCamera(sensor.camera), sensor.depth_noise, timing);
   }
   thread_ = std::thread([this] {
-    while (const auto work = work_.pop()) (*work)();
+    while (const auto work = work_.pop()) {
+      try {
+        (*work)();
+      } catch (...) {
+        if (!failure_) failure_ = std::current_exception();
+      }
+    }
   });
 }
 
@@ -94,6 +100,7 @@ void MappingThread::finish() {
   });
   work_.close();
   if (thread_.joinable()) thread_.join();
+  if (failure_) std::rethrow_exception(failure_);
 }
 
 std::vector<PlaneEstimate> MappingThread::planes() const {

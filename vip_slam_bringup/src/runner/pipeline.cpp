@@ -77,7 +77,7 @@ void Pipeline::restart(double seconds) {
   newest_image_ = newest_imu_ = -1e300;
   char words[80];
   std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", seconds);
-  front_end_->reset(words);
+  front_end_->clockRanBack(words);
 }
 
 void Pipeline::finish() {

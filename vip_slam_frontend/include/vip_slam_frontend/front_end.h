@@ -94,6 +94,8 @@ class FrontEnd {
   Eigen::Vector3d gyro(double t) const;
   /// Starts anew: a new epoch; keyframe and landmark ids go on.
   void reset(const std::string& reason);
+  /// Likewise, and what comes has stamps that precede those so far.
+  void clockRanBack(const std::string& reason);
   /// The back end has forgotten its map: its landmarks are not looked for any more.
   void forgetMap();
 

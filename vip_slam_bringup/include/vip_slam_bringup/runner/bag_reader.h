@@ -56,6 +56,8 @@ class BagReader {
 
   /// Starts to read ahead.
   void start();
+  /// Reads no further: the end, before the end.
+  void stop();
   /// The next event; empty at the end. What cannot be read of a damaged bag is left out, with a warning.
   std::optional<SensorEvent> next();
 

@@ -2,6 +2,7 @@
 // depend on how fast either thread runs.
 #pragma once
 
+#include <exception>
 #include <functional>
 #include <future>
 #include <memory>
@@ -47,7 +48,8 @@ class MappingThread {
   void grow(TrackedFramePtr frame);
   /// The map updates that follow from the keyframe, in order. An exception of the estimators comes out of get().
   std::future<std::vector<MapUpdate>> addKeyframe(KeyframePtr keyframe);
-  /// Does what waits, then the last global adjustment. Afterwards the estimators may be read.
+  /// Does what waits, then the last global adjustment. Afterwards the estimators may be read. Throws what that, or
+  /// grow(), has met with.
   void finish();
 
   const BackEnd& backEnd() const { return *back_end_; }
@@ -70,6 +72,7 @@ class MappingThread {
   std::vector<GlobalBaRecord> adjustments_;
   std::vector<PlaneRecord> plane_history_;
   std::vector<std::string> refusals_;
+  std::exception_ptr failure_;  ///< of the thread, to be read after its end
   Channel<std::function<void()>> work_;
   std::thread thread_;
 };
