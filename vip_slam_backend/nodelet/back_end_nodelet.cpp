@@ -2,6 +2,7 @@
 
 #include <fstream>
 #include <stdexcept>
+#include <system_error>
 
 #include <vip_slam_msgs/LoopEvent.h>
 #include <vip_slam_msgs/MapUpdate.h>
@@ -116,7 +117,7 @@ void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
   if (state != TrackingState::kTracking && state != TrackingState::kDegraded) return;
   const double t = frame.header.stamp.toSec();
   const SE3 T_odom_I = fromMsg(frame.state.pose);
-  const std::optional<SE3> T_map_odom = pose_.add(t, frame.epoch, T_odom_I, fromMsg(frame.chain_camera));
+  const std::optional<SE3> T_map_odom = pose_.add({t, frame.epoch, fromMsg(frame.chain_camera)});
   if (!T_map_odom) return;
   if (publish_tf_) {
     geometry_msgs::TransformStamped transform;
@@ -179,7 +180,7 @@ void BackEndNodelet::applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg) {
 void BackEndNodelet::startGlobalBa() {
   if (adjusting_ || !back_end_ || !back_end_->globalBaWanted()) return;
   if (adjustment_.joinable()) adjustment_.join();
-  adjustment_ = std::thread([this, job = back_end_->startGlobalBa()] {
+  const auto adjust = [this, job = back_end_->startGlobalBa()] {
     lowerThreadPriority(kAdjustmentNiceness);
     const ros::WallTime begin = ros::WallTime::now();
     GbaResult result;
@@ -204,8 +205,14 @@ void BackEndNodelet::startGlobalBa() {
       distribute(back_end_->merge(result));
       startGlobalBa();  // one that was asked for meanwhile: the next keyframe may never come
     });
-  });
-  adjusting_ = true;  // only now: memory or threads may have been short. Its end is posted to this same thread.
+  };
+  try {
+    adjustment_ = std::thread(adjust);
+  } catch (const std::system_error&) {  // no thread to be had: the next keyframe tries again
+    back_end_->requestGlobalBa();
+    throw;
+  }
+  adjusting_ = true;  // its end is posted to this same thread
 }
 
 void BackEndNodelet::distribute(const MapUpdate& update) {

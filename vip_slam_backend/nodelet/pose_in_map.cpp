@@ -21,14 +21,14 @@ void PoseInMap::apply(const MapUpdate& update) {
 void PoseInMap::clear() {
   std::lock_guard<std::mutex> lock(mutex_);
   placed_ = false;
-  odometry_.clear();
+  chain_.clear();
   passes_ = {};
 }
 
-std::optional<SE3> PoseInMap::add(double t, std::uint32_t epoch, const SE3& T_odom_I, const SE3& T_chain_C) {
+std::optional<SE3> PoseInMap::add(const ChainedPose& pose) {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (passes_.take(t)) odometry_.push_back({t, epoch, T_odom_I, T_chain_C});
-  if (!placed_ || epoch != epoch_) return std::nullopt;
+  if (passes_.take(pose.t)) chain_.push_back(pose);
+  if (!placed_ || pose.epoch != epoch_) return std::nullopt;
   return T_map_odom_;
 }
 
@@ -54,12 +54,12 @@ geometry_msgs::PoseWithCovarianceStamped PoseInMap::message(double t, const SE3&
 }
 
 Trajectory PoseInMap::trajectory(const std::vector<Anchor>& anchors) const {
-  std::vector<OdometryPose> odometry;
+  std::vector<ChainedPose> chain;
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    odometry = odometry_;
+    chain = chain_;
   }
-  Trajectory trajectory = anchorTrajectory(odometry, anchors);
+  Trajectory trajectory = anchorTrajectory(chain, anchors);
   std::stable_sort(trajectory.begin(), trajectory.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.t < b.t; });
   return trajectory;

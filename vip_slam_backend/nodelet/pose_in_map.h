@@ -22,9 +22,9 @@ class PoseInMap {
   void apply(const MapUpdate& update);
   void clear();
 
-  /// Remembers the image's odometry for trajectory(). Empty while the back end has not placed this epoch of the
+  /// Remembers the image for trajectory(). T_map_odom; empty while the back end has not placed this epoch of the
   /// odometry.
-  std::optional<SE3> add(double t, std::uint32_t epoch, const SE3& T_odom_I, const SE3& T_chain_C);
+  std::optional<SE3> add(const ChainedPose& pose);
   /// T_map_base with covariance (x, y, z, rotation about the fixed axes of map) of the odometry seen from map.
   geometry_msgs::PoseWithCovarianceStamped message(double t, const SE3& T_map_odom, const SE3& T_odom_I,
                                                    const Matrix15d& covariance, const std::string& map_frame) const;
@@ -36,7 +36,7 @@ class PoseInMap {
   SE3 T_base_imu_, T_map_odom_;
   std::uint32_t epoch_ = 0;
   bool placed_ = false;
-  std::vector<OdometryPose> odometry_;
+  std::vector<ChainedPose> chain_;
   TimePasses passes_;
 };
 

@@ -62,9 +62,8 @@ class BackEnd {
   const DepthCurve& depthCurve() const;
   /// What to tell the user of them, when they are large enough to matter; empty else.
   std::string depthDifference() const;
-  /// By how much pixels are off more than they are told to be, as the last adjustment found; 1: as told.
-  double trackNoiseFactor() const;
-  /// What to tell the user of it; empty at 1.
+  /// What to tell the user when the last adjustment found pixels to be off by more than they are told to be; empty
+  /// else.
   std::string trackNoiseDifference() const;
   /// 1/m: the part of the curve that is for disparities which are all off, see disparity_curve.h.
   double disparityError() const;

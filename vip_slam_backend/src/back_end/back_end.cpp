@@ -301,7 +301,6 @@ std::string BackEnd::depthDifference() const {
   if (impl_->disparity_error != 0) return disparityDifference(impl_->disparity_error);
   return depthCurveDifference(depthCurve());
 }
-double BackEnd::trackNoiseFactor() const { return impl_->statistics.track_noise_factor; }
 std::string BackEnd::trackNoiseDifference() const {
   return vip_slam::trackNoiseDifference(impl_->statistics.track_noise_factor);
 }

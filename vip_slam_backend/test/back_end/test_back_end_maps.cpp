@@ -138,22 +138,22 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   EXPECT_TRUE(back_end.snapshot().localised.empty());
   // The same walk in an odometry that began elsewhere and looks elsewhere.
   const SE3 T_other_odom(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {7, -3, 1});
-  std::vector<OdometryPose> odometry;
+  std::vector<ChainedPose> chain;
   for (int k = 0; k < 25; ++k) {
     auto kf = std::make_shared<Keyframe>(*session.next());
     kf->id += 1000;
     kf->previous = kf->id - 1;
     kf->frame.state.T_W_I = T_other_odom * kf->frame.state.T_W_I;
     kf->frame.T_chain_C = T_other_odom * kf->frame.T_chain_C;
-    odometry.push_back({kf->frame.t, kf->frame.epoch, kf->frame.state.T_W_I, kf->frame.T_chain_C});
+    chain.push_back({kf->frame.t, kf->frame.epoch, kf->frame.T_chain_C});
     back_end.addKeyframe(kf);
   }
   back_end.finish();
   const MapSnapshot snapshot = back_end.snapshot();
   EXPECT_EQ(snapshot.keyframes.size(), mapper.snapshot().keyframes.size());
   ASSERT_GT(snapshot.localised.size(), 15u);
-  const Trajectory trajectory = anchorTrajectory(odometry, anchorsOf(snapshot));
-  ASSERT_EQ(trajectory.size(), odometry.size());
+  const Trajectory trajectory = anchorTrajectory(chain, anchorsOf(snapshot));
+  ASSERT_EQ(trajectory.size(), chain.size());
   for (const auto& pose : trajectory)
     EXPECT_LT((pose.T_W_B.t() - world.truth(pose.t).T_W_I.t()).norm(), 0.03) << "at " << pose.t;
   back_end.reset();

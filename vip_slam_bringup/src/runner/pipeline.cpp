@@ -84,6 +84,7 @@ void Pipeline::finish() {
   processRest();
   const auto earlier = [](const auto& a, const auto& b) { return a.t < b.t; };
   std::stable_sort(odometry_.begin(), odometry_.end(), earlier);
+  std::stable_sort(chain_.begin(), chain_.end(), earlier);
   std::stable_sort(covariances_.begin(), covariances_.end(), earlier);
   std::stable_sort(realtime_.begin(), realtime_.end(), earlier);
   applyAnswers(std::numeric_limits<std::size_t>::max());
@@ -113,7 +114,8 @@ void Pipeline::process(const ImagePair& pair) {
   if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
   const bool posed = frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
   if (posed && passes_.take(frame.t)) {
-    odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I, frame.T_chain_C});
+    odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
+    chain_.push_back({frame.t, frame.epoch, frame.T_chain_C});
     covariances_.push_back({frame.t, poseCovariance(frame)});
     if (placed_ && epoch_ == frame.epoch) realtime_.push_back({frame.t, T_map_odom_ * frame.state.T_W_I});
   }

@@ -274,7 +274,7 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
   if (const MappingThread* mapping = pipeline.mapping()) {
     map = mapping->backEnd().snapshot();
     planes = mapping->planes();
-    const Trajectory trajectory = anchorTrajectory(pipeline.odometry(), anchorsOf(map));
+    const Trajectory trajectory = anchorTrajectory(pipeline.chain(), anchorsOf(map));
     writeTum(folder + "/trajectory.tum", trajectory);
     writeTum(folder + "/realtime.tum", pipeline.realtime());
     writePlanesYaml(folder + "/planes.yaml", planes);

@@ -6,19 +6,19 @@
 namespace vip_slam {
 namespace {
 
-SE3 carry(const Anchor& anchor, const OdometryPose& pose) {
+SE3 carry(const Anchor& anchor, const ChainedPose& pose) {
   return anchor.T_map_I * (anchor.T_I_C * (anchor.T_chain_C.inverse() * pose.T_chain_C) * anchor.T_I_C.inverse());
 }
 
 }  // namespace
 
-Trajectory anchorTrajectory(const std::vector<OdometryPose>& odometry, const std::vector<Anchor>& anchors) {
+Trajectory anchorTrajectory(const std::vector<ChainedPose>& chain, const std::vector<Anchor>& anchors) {
   std::map<std::uint32_t, std::vector<const Anchor*>> by_epoch;
   for (const Anchor& anchor : anchors) by_epoch[anchor.epoch].push_back(&anchor);
 
   Trajectory trajectory;
-  trajectory.reserve(odometry.size());
-  for (const OdometryPose& pose : odometry) {
+  trajectory.reserve(chain.size());
+  for (const ChainedPose& pose : chain) {
     const auto epoch = by_epoch.find(pose.epoch);
     if (epoch == by_epoch.end()) continue;
     const auto& list = epoch->second;

@@ -30,6 +30,13 @@ struct StateChange {
   TrackingStatus status;
 };
 
+/// An image's pose as the front end gave it.
+struct OdometryPose {
+  double t = 0;  ///< image stamp, seconds
+  std::uint32_t epoch = 0;
+  SE3 T_odom_I;
+};
+
 /// What the front end says of its own error, ordered as in nav_msgs/Odometry: x y z in odom, then rotation about the
 /// axes of odom.
 struct OdometryCovariance {
@@ -56,6 +63,7 @@ class Pipeline {
   /// Images with a pose; in order of their stamps after finish(). Where stamps ran back and come a second time, the
   /// first pass counts.
   const std::vector<OdometryPose>& odometry() const { return odometry_; }
+  const std::vector<ChainedPose>& chain() const { return chain_; }                     ///< one for each of odometry()
   const std::vector<OdometryCovariance>& covariances() const { return covariances_; }  ///< one for each of odometry()
   const std::vector<StateChange>& states() const { return states_; }
   const TrackingStatus& status() const { return status_; }  ///< of the last image
@@ -92,6 +100,7 @@ class Pipeline {
   double newest_taken_ = oldest_taken_;
   TimePasses passes_;
   std::vector<OdometryPose> odometry_;
+  std::vector<ChainedPose> chain_;
   std::vector<OdometryCovariance> covariances_;
   Trajectory realtime_;
   std::vector<StateChange> states_;

@@ -8,11 +8,10 @@
 
 namespace vip_slam {
 
-/// An image's pose as the front end gave it.
-struct OdometryPose {
+/// Where the camera was at an image, as the front end gave it.
+struct ChainedPose {
   double t = 0;  ///< image stamp, seconds
   std::uint32_t epoch = 0;
-  SE3 T_odom_I;
   SE3 T_chain_C;  ///< see TrackedFrame
 };
 
@@ -29,6 +28,6 @@ struct Anchor {
 /// last keyframe it follows that one, in between the two predictions are blended by time. Blending poses (not the
 /// corrections map->odom) keeps the lever arm to the origin of odom out of it. Images of an epoch without keyframes
 /// have no pose in map and are left out. Both lists ascend in t.
-Trajectory anchorTrajectory(const std::vector<OdometryPose>& odometry, const std::vector<Anchor>& anchors);
+Trajectory anchorTrajectory(const std::vector<ChainedPose>& chain, const std::vector<Anchor>& anchors);
 
 }  // namespace vip_slam
