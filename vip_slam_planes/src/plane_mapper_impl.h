@@ -47,6 +47,8 @@ class PlaneMapper::Impl {
   /// False when the keyframe's depth is corrected by just that already.
   bool adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe);
   void removeKeyframe(KeyframeId id);
+  /// One sigma of the vertical in the newest placed keyframe, radians, as the front end tells it.
+  double gravitySigma() const;
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();
   void judgeAgreement();

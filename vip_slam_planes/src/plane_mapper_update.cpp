@@ -209,6 +209,17 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   if (newest_ != 0) epoch_ = placed_.rbegin()->second->frame.epoch;
 }
 
+// Before a body has moved gravity may be a degree off, and all that is level or upright leans in the map.
+double PlaneMapper::Impl::gravitySigma() const {
+  const auto newest = placed_.find(newest_);
+  if (newest == placed_.end()) return 0;
+  const TrackedFrame& frame = newest->second->frame;
+  const Eigen::Matrix3d R = frame.state.T_W_I.R();
+  const Eigen::Matrix3d covariance = R * frame.covariance.topLeftCorner<3, 3>() * R.transpose();
+  const double variance = covariance.diagonal().head<2>().maxCoeff();
+  return std::isfinite(variance) ? std::sqrt(std::max(0.0, variance)) : 0.0;
+}
+
 void PlaneMapper::Impl::refit(PlaneTrack* track) {
   track->refit_due = false;
   if (track->optimised() && track->determined) return;
@@ -218,7 +229,7 @@ void PlaneMapper::Impl::refit(PlaneTrack* track) {
   if (track->optimised()) return;
   // Until the samples tell the direction, detection knows it better: it had the surface up to its border.
   Plane plane = Plane::fromPointNormal(moments.centroid(), track->plane().n);
-  if (track->determined && !fitPlane(moments, track->kind(), track->plane().n, &plane)) return;
+  if (track->determined && !fitLeaningPlane(moments, track->kind(), gravitySigma(), track->plane().n, &plane)) return;
   track->setPlane(plane);
 }
 

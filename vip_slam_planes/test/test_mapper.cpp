@@ -39,6 +39,22 @@ TEST(Mapper, TurningInARoomFindsSixPlanesOnce) {
   EXPECT_LT(wall->area, 1.02 * 5 * 2.6);
 }
 
+TEST(Mapper, AFloorIsAsFarBelowTheOriginBeforeGravityIsKnown) {
+  // Half a degree by which a map leans at first would be 3 cm of height, three metres from the origin.
+  Scene scene;
+  scene.add({-2, -3, -1.4}, {8, 0, 0}, {0, 6, 0});
+  const SE3 T_W_C = lookAt({0, 0, 0}, {3.5, 0, -1.4});
+  for (const double lean_deg : {0.0, 0.5, -0.5}) {
+    const Eigen::AngleAxisd lean(lean_deg * M_PI / 180, Eigen::Vector3d::UnitY());
+    Rig rig;
+    const auto keyframe = rig.camera.keyframe(scene, T_W_C);
+    keyframe->frame.covariance.topLeftCorner<3, 3>() = 1e-4 * Eigen::Matrix3d::Identity();
+    rig.place(keyframe, SE3(lean.toRotationMatrix(), Eigen::Vector3d::Zero()) * T_W_C);
+    ASSERT_EQ(1u, rig.mapper.planes().size()) << lean_deg;
+    EXPECT_NEAR(1.4, rig.mapper.planes().front().plane.d, 0.003) << lean_deg;
+  }
+}
+
 TEST(Mapper, ADoorWhoseRecessDidNotShowFromAfarIsStillFound) {
   // From afar and at a flat angle the wall goes on across the recess, so all of the leaf lies where the wall is known.
   Rig rig;

@@ -54,6 +54,33 @@ TEST(PlaneFit, KindsKeepTheirNormalsAndSide) {
   }
 }
 
+TEST(PlaneFit, ALeanIsWhatPointsAndPriorSayTogether) {
+  const double lean = 0.004;
+  const auto sum = [](const Plane& plane, double weight) {
+    PlaneMoments moments;
+    for (const auto& p : samples(plane, 0, 7)) moments.add(p, weight);
+    return moments;
+  };
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  for (const PlaneKind kind : {PlaneKind::kHorizontal, PlaneKind::kVertical}) {
+    const bool level = kind == PlaneKind::kHorizontal;
+    const Eigen::Vector3d n = level ? Eigen::Vector3d(lean, 0, 1) : Eigen::Vector3d(1, 0, lean);
+    const Plane truth(n, -1.3);
+    Plane plane;
+    ASSERT_TRUE(fitLeaningPlane(sum(truth, 1e10), kind, 0.01, n, &plane));
+    EXPECT_LT(angleBetween(truth, plane), 1e-6);
+    ASSERT_TRUE(fitLeaningPlane(sum(truth, 1.0), kind, 1e-6, n, &plane));
+    EXPECT_LT(level ? plane.n.head<2>().norm() : std::abs(plane.n.z()), 1e-6);
+    // Points and prior that know equally much meet halfway. The points' axes: those of their scatter.
+    const PlaneMoments unit = sum(truth, 1.0);
+    const Eigen::Vector3d mean = unit.centroid(), along = level ? Eigen::Vector3d::UnitX() : z;
+    const double spread = along.dot((unit.M.topLeftCorner<3, 3>() - unit.weight() * mean * mean.transpose()) * along);
+    ASSERT_TRUE(fitLeaningPlane(sum(truth, 1.0 / (spread * 0.01 * 0.01)), kind, 0.01, -n, &plane));
+    EXPECT_LT(plane.n.dot(n), 0) << "the side asked for";
+    EXPECT_NEAR(0.5 * lean, std::abs(level ? plane.n.x() : plane.n.z()), 0.05 * lean);
+  }
+}
+
 TEST(PlaneFit, ThirtyPercentOutliersOnOneSide) {
   const Plane truth(Eigen::Vector3d(0, 1, 0), -3.0);
   auto points = samples(truth, 0.005, 5);

@@ -63,6 +63,21 @@ bool fitPlane(const PlaneMoments& moments, PlaneKind kind, const Eigen::Vector3d
   return true;
 }
 
+bool fitLeaningPlane(const PlaneMoments& moments, PlaneKind kind, double lean_sigma, const Eigen::Vector3d& towards,
+                     Plane* plane) {
+  if (!fitPlane(moments, kind, towards, plane)) return false;
+  if (kind == PlaneKind::kGeneral || !(lean_sigma > 0)) return true;
+  // The square of a small lean is n_z^2 or n_x^2 + n_y^2, so that the prior is a quadratic form like the scatter.
+  const Eigen::Vector3d mean = moments.centroid(), z = Eigen::Vector3d::UnitZ();
+  const Eigen::Matrix3d across = kind == PlaneKind::kVertical ? Eigen::Matrix3d(z * z.transpose())
+                                                              : Eigen::Matrix3d::Identity() - z * z.transpose();
+  const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() - moments.weight() * mean * mean.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter + across / (lean_sigma * lean_sigma));
+  const Eigen::Vector3d n = solver.eigenvectors().col(0);
+  *plane = Plane::fromPointNormal(mean, n.dot(plane->n) < 0 ? Eigen::Vector3d(-n) : n);
+  return true;
+}
+
 double normalSigma(const PlaneMoments& moments, PlaneKind kind) {
   if (!(moments.weight() > 0)) return std::numeric_limits<double>::infinity();
   if (kind == PlaneKind::kHorizontal) return 0;

@@ -34,6 +34,12 @@ struct PlaneMoments {
 /// `towards` (n . towards >= 0). False when the points do not determine it (no weight, or no extent).
 bool fitPlane(const PlaneMoments& moments, PlaneKind kind, const Eigen::Vector3d& towards, Plane* plane);
 
+/// The same with a lean off the kind's normal that has a prior of `lean_sigma` radians; the weights are inverse
+/// variances. What is level leans in a map whose gravity is not known yet, and its distance from the origin would be
+/// off by that lean times how far away its points are.
+bool fitLeaningPlane(const PlaneMoments& moments, PlaneKind kind, double lean_sigma, const Eigen::Vector3d& towards,
+                     Plane* plane);
+
 /// One sigma of the least certain direction of that plane's normal, radians, when the weights are inverse variances: a
 /// column of samples tells nothing about which way its wall runs. 0 for horizontal planes, infinite without points.
 double normalSigma(const PlaneMoments& moments, PlaneKind kind);
