@@ -158,6 +158,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
 void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
   // Each merge may bring further planes together; every one removes a plane, so this ends.
   std::set<PlaneId> open(changed.begin(), changed.end());
+  const SceneView view{placed_, poses_, *camera, noise, options.support.see_through};
   while (!open.empty()) {
     const PlaneId id = *open.begin();
     open.erase(open.begin());
@@ -169,7 +170,7 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
     }
     for (auto& [other_id, other] : tracks_) {
       if (other_id == id || !epochs_.tied(mine->second.epoch, other.epoch)) continue;
-      if (!sameSurface(mine->second, other, known, poses_, options.merging)) continue;
+      if (!sameSurface(mine->second, other, known, view, options.merging)) continue;
       // The older id stays, but one that the back end knows goes before one that it does not.
       PlaneId into = std::min(id, other_id), from = std::max(id, other_id);
       if (tracks_.at(from).known() && !tracks_.at(into).known()) std::swap(into, from);

@@ -314,6 +314,31 @@ TEST(Mapper, TablesOfOneHeightStayTwo) {
   for (const PlaneEstimate& table : rig.mapper.planes()) EXPECT_NEAR(-0.75, table.plane.d, 0.004);
 }
 
+// A counter of which a cupboard hides the middle, the same with a step behind it, and two counters with an aisle.
+TEST(Mapper, ACounterGoesOnBehindACupboardButNotAcrossAnAisle) {
+  struct Case {
+    bool cupboard, floor;
+    double step;
+    int counters;
+  };
+  for (const Case& c :
+       {Case{true, true, 0, 1}, Case{true, true, 0.02, 2}, Case{false, true, 0, 2}, Case{false, false, 0, 2}}) {
+    Rig rig(0.3);
+    Scene scene;
+    const double length = c.cupboard ? 2.0 : 1.4;
+    scene.add({1, -2, 0.9}, {0.6, 0, 0}, {0, length, 0});
+    scene.add({1, 2 - length, 0.9 + c.step}, {0.6, 0, 0}, {0, length, 0});
+    if (c.cupboard) scene.add({0.8, -0.7, 0}, {0, 1.4, 0}, {0, 0, 2.2});
+    if (c.floor) scene.add({-3, -4, 0}, {6, 0, 0}, {0, 8, 0});
+    for (const double side : {-1.0, 1.0}) {
+      for (int i = 0; i < 4; ++i) rig.look(scene, {-0.6, side * (1.2 + 0.1 * i), 1.6}, {1.3, side * 1.3, 0.9});
+    }
+    int counters = 0;
+    for (const PlaneEstimate& p : rig.mapper.planes()) counters += p.plane.n.z() > 0.9 && p.plane.d < -0.5;
+    EXPECT_EQ(c.counters, counters) << (c.cupboard ? "cupboard" : "aisle") << ", step " << c.step;
+  }
+}
+
 TEST(Mapper, BothFacesOfAThinWallAreTwo) {
   Rig rig;
   Scene scene;

@@ -21,14 +21,10 @@ constexpr double kTopmostCeiling = 1.0, kLowestFloor = 0.5;  // m^2
 constexpr double kCeilingSlack = 1.5;              // of max_rms
 constexpr double kStrip = 4.0, kLeastStrip = 1.0;  // length over width, m^2; boards of shelves are smaller
 constexpr double kSmallGap = 4.0;                  // a smaller piece of a wall may be as many of its own widths away
+constexpr double kHiddenGap = 4.0;      // m; as far as indoor depth reaches, a surface may go on where nobody looked
 constexpr double kNoise = 11.3;         // of what noise does to two planes that are one (three degrees of freedom) 99 %
 constexpr double kNoisyDistance = 2.0;  // as many times the distance when noise explains it
 constexpr double kCloser = 4.0;         // as many times as far apart when they agree as many times better
-
-bool isBorder(const CellGrid& cells, CellIndex c) {
-  return !cells.at({c.x - 1, c.y}) || !cells.at({c.x + 1, c.y}) || !cells.at({c.x, c.y - 1}) ||
-         !cells.at({c.x, c.y + 1});
-}
 
 // What the smaller plane's area looks like from the larger one.
 struct Contact {
@@ -44,7 +40,7 @@ Contact contact(const PlaneTrack& small, const PlaneTrack& large, double gap) {
   small.cells().forEach([&](CellIndex c, int) {
     ++result.cells;
     const Eigen::Vector3d p = small.cellCentre(c);
-    const bool border = isBorder(small.cells(), c);
+    const bool border = small.cells().isBorder(c);
     if (border) result.worst_border = std::max(result.worst_border, std::abs(large.plane().signedDistance(p)));
     const CellIndex there = large.cellAt(large.toPlane(p));
     if (large.cells().at(there)) {
@@ -209,7 +205,8 @@ bool shownApart(const PlaneTrack& small, const PlaneTrack& large, const CameraPo
 }  // namespace
 
 bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known,
-                 const CameraPoses& poses, const PlaneMergingOptions& options) {
+                 const SceneView& view, const PlaneMergingOptions& options) {
+  const CameraPoses& poses = view.poses;
   if (a.kind() != b.kind() || a.cells().empty() || b.cells().empty()) return false;
   if (a.plane().n.dot(b.plane().n) < std::cos(options.angle_deg * M_PI / 180.0)) return false;
   const double area_a = a.area(), area_b = b.area();
@@ -255,13 +252,21 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
   // That two surfaces lie in one plane by accident is the likelier the further one looks and the less is asked of them:
   // the same chance, with a gap as much wider as they agree better.
   const double between = boundsGap(small, large), widest = smaller >= large_from ? kCloser * gap : gap;
-  if (between > widest) return false;
+  const bool may_be_hidden = a.kind() != PlaneKind::kGeneral && gap < kHiddenGap && between <= kHiddenGap;
+  if (between > widest && !may_be_hidden) return false;
   const Contact meeting = contact(small, large, options.gap);
   // The tenth of a degree by which a level surface may be tilted in the map is centimetres some metres further on; its
   // height is not.
   double off = meeting.worst_border;
   if (a.kind() == PlaneKind::kHorizontal && meeting.near == 0) {
     off = std::min(off, heightDifference(a, b));
+  }
+  // Whatever their sizes, pieces between which nothing is known to end may be one counter.
+  const bool out_of_reach = between > widest || (meeting.near == 0 && gap <= options.gap);
+  if (out_of_reach) {
+    apart = 0.5 * options.distance_apart;
+    if (!may_be_hidden || meeting.near > 0 || off > apart || gapIsOpen(small, large, view)) return false;
+    gap = kHiddenGap;
   }
   const double worst = std::max(meeting.worst_border, meeting.worst_meeting);
   if (worst > kNoisyDistance * options.distance) return false;
@@ -271,7 +276,6 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
       (beside || worst > options.distance) && between <= std::sqrt(smaller) && noiseAllowsOne(a, b, poses);
   if (between > gap && off * between > apart * gap) return false;
   if ((beside || worst > options.distance) && !noise) return false;
-  if (meeting.near == 0 && gap <= options.gap) return false;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
   if (shownApart(small, large, poses, options.max_rms)) return false;
   // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift

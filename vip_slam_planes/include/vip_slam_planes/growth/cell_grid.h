@@ -28,6 +28,10 @@ class CellGrid {
   int count(int min_hits) const;
   /// True when a cell within `reach` (Chebyshev) has at least one hit.
   bool near(CellIndex c, int reach) const;
+  /// Whether one of its four neighbours has none.
+  bool isBorder(CellIndex c) const {
+    return !at({c.x - 1, c.y}) || !at({c.x + 1, c.y}) || !at({c.x, c.y - 1}) || !at({c.x, c.y + 1});
+  }
   bool empty() const { return hits_.empty(); }
   void clear();
 
