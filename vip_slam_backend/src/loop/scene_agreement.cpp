@@ -17,9 +17,8 @@ void warp(const DepthGrid& from, const DepthGrid& into, const SE3& T_into_from, 
       Eigen::Vector2d uv;
       if (p.z() < 0.2 || !camera.project(p, &uv) || !camera.inImage(uv)) continue;
       // The four nodes around the pixel: a surface agrees when it passes between them.
-      const int c0 = static_cast<int>(std::floor((uv.x() - into.offset) / into.stride));
-      const int r0 = static_cast<int>(std::floor((uv.y() - into.offset) / into.stride));
-      if (c0 < 0 || r0 < 0 || c0 + 1 >= into.cols || r0 + 1 >= into.rows) continue;
+      int c0 = 0, r0 = 0;
+      if (!into.nodesAround(uv, &c0, &r0)) continue;
       double nearest = std::numeric_limits<double>::max(), farthest = 0;
       for (int k = 0; k < 4; ++k) {
         const double node = into.at(c0 + (k & 1), r0 + (k >> 1));

@@ -81,9 +81,8 @@ int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, co
     if (p.z() < noise.min_range || p.z() > range || -n_C.dot(p) < kGrazing * p.norm()) return;
     Eigen::Vector2d uv;
     if (!camera.project(p, &uv) || !camera.inImage(uv)) return;
-    const int c = static_cast<int>(std::floor((uv.x() - grid.offset) / grid.stride));
-    const int r = static_cast<int>(std::floor((uv.y() - grid.offset) / grid.stride));
-    if (c < 0 || r < 0 || c + 1 >= grid.cols || r + 1 >= grid.rows) return;
+    int c = 0, r = 0;
+    if (!grid.nodesAround(uv, &c, &r)) return;
     const double facing = -n_C.dot(p) / p.z();  // |n . ray|
     const double slack = (margin + 3 * noise.sigma(p.z()) * facing) / facing;
     for (int k = 0; k < 4; ++k) {

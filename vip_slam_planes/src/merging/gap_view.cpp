@@ -57,9 +57,8 @@ bool seesThrough(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::V
   Eigen::Vector2d uv;
   if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kGrazing * p.norm()) return false;
   if (!view.camera.project(p, &uv) || !view.camera.inImage(uv)) return false;
-  const int c = static_cast<int>(std::floor((uv.x() - grid.offset) / grid.stride));
-  const int r = static_cast<int>(std::floor((uv.y() - grid.offset) / grid.stride));
-  if (c < 0 || r < 0 || c + 1 >= grid.cols || r + 1 >= grid.rows) return false;
+  int c = 0, r = 0;
+  if (!grid.nodesAround(uv, &c, &r)) return false;
   const double facing = -n_C.dot(p) / p.z();  // |n . ray|
   const double slack = (view.see_through + 3 * view.noise.sigma(p.z()) * facing) / facing;
   for (int k = 0; k < 4; ++k) {

@@ -1,6 +1,7 @@
 // Reading depth safely: a look-up that refuses values beside depth edges, and a coarse grid of safe depths.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -34,6 +35,12 @@ struct DepthGrid {
   bool empty() const { return z.empty(); }
   float at(int c, int r) const { return z[static_cast<std::size_t>(r) * cols + c]; }
   Eigen::Vector2d pixel(int c, int r) const { return {double(offset + c * stride), double(offset + r * stride)}; }
+  /// The first of the four nodes (c, r) to (c + 1, r + 1) around a pixel; false outside the grid.
+  bool nodesAround(const Eigen::Vector2d& uv, int* c, int* r) const {
+    *c = static_cast<int>(std::floor((uv.x() - offset) / stride));
+    *r = static_cast<int>(std::floor((uv.y() - offset) / stride));
+    return *c >= 0 && *r >= 0 && *c + 1 < cols && *r + 1 < rows;
+  }
 };
 DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise,
                         const DepthLookupOptions& options = {});
