@@ -33,7 +33,7 @@ BackEndNodelet::~BackEndNodelet() {
 
 void BackEndNodelet::onInit() {
   try {
-    loadOptionsFromParameters(options_, getPrivateNodeHandle());
+    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"display_rate", "diagnostic_period"});
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
     if (!options_.load_map.empty() && !std::ifstream(options_.load_map))
       throw std::invalid_argument("load_map: " + options_.load_map + ": no such file, or not readable");
@@ -65,8 +65,14 @@ void BackEndNodelet::advertise() {
   control_pub_ = nh.advertise<vip_slam_msgs::Control>("control", 10, true);  // nodelets come up one after the other
   pose_pub_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", 50);
   path_pub_ = nh.advertise<nav_msgs::Path>("path", 1, true);
-  markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("map_markers", 1, true);
-  landmarks_pub_ = nh.advertise<sensor_msgs::PointCloud2>("landmarks", 1, true);
+  // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
+  const auto show = [this](const ros::SingleSubscriberPublisher&) {
+    owner_->post(control_lane_, [this] {
+      if (shown_once_) publishDisplay(last_display_, true);
+    });
+  };
+  markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("map_markers", 1, show, {}, nullptr, true);
+  landmarks_pub_ = nh.advertise<sensor_msgs::PointCloud2>("landmarks", 1, show, {}, nullptr, true);
   loop_pub_ = nh.advertise<vip_slam_msgs::LoopEvent>("loop_event", 20);
   statistics_pub_ = nh.advertise<vip_slam_msgs::BackEndStatistics>("back_end_statistics", 5, true);
 
@@ -242,6 +248,7 @@ void BackEndNodelet::distribute(const MapUpdate& update) {
 void BackEndNodelet::publishDisplay(double t, bool now) {
   if (!now && t > last_display_ && t - last_display_ < 1.0 / display_rate_) return;
   last_display_ = t;
+  shown_once_ = true;
   std_msgs::Header header;
   header.stamp = toStamp(t);
   header.frame_id = options_.map_frame;

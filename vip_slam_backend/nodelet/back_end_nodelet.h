@@ -82,6 +82,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<BackEnd> back_end_;
   MapDisplay display_;
   double last_display_ = -1e300;
+  bool shown_once_ = false;
   bool localise_ = false;   ///< as asked for, also before there is a back end
   bool adjusting_ = false;  ///< a global adjustment is under way
   std::thread adjustment_;

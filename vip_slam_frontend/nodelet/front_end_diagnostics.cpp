@@ -6,6 +6,7 @@
 #include "front_end_nodelet.h"
 #include "vip_slam_ros/frame_conversions.h"
 #include "vip_slam_ros/process_memory.h"
+#include "vip_slam_ros/topic_lookup.h"
 
 namespace vip_slam {
 
@@ -22,7 +23,31 @@ double quantile(std::deque<double> values, double q) {
 
 }  // namespace
 
+std::vector<FrontEndNodelet::Input> FrontEndNodelet::inputs() const {
+  const auto image = [](const std::string& encoding) {
+    return encoding == "compressed" ? "sensor_msgs/CompressedImage" : "sensor_msgs/Image";
+  };
+  std::vector<Input> all = {{color_monitor_.get(), image(sensor_.color_encoding)}};
+  if (!sensor_.topics.depth.empty()) all.push_back({depth_monitor_.get(), image(sensor_.depth_encoding)});
+  all.push_back({imu_monitor_.get(), "sensor_msgs/Imu"});
+  if (!sensor_.topics.accel.empty()) all.push_back({accel_monitor_.get(), "sensor_msgs/Imu"});
+  return all;
+}
+
+// The master is asked only while something is lacking.
+void FrontEndNodelet::explainAbsences() {
+  ros::master::V_TopicInfo published;
+  for (const Input& input : inputs()) {
+    const StreamMonitor::Report r = input.monitor->report();
+    if (r.messages > 0 || r.rejected > 0) continue;
+    if (published.empty() && !ros::master::getTopics(published)) return;
+    input.monitor->explainAbsence(whyNoMessage(getNodeHandle().resolveName(r.topic), input.type, published));
+  }
+}
+
 void FrontEndNodelet::tick() {
+  constexpr int kLookup = 5;  // ticks
+  if (ticks_++ % kLookup == kLookup - 1) explainAbsences();
   // Only images bring a status: before the first one, and when they no longer come, nothing else says why there is no
   // pose.
   bool started;
@@ -39,6 +64,7 @@ void FrontEndNodelet::tick() {
   } else {
     waiting.reason = color_monitor_->complaint(now);
     if (waiting.reason.empty()) waiting.reason = imu_monitor_->complaint(now);
+    if (waiting.reason.empty() && !sensor_.topics.accel.empty()) waiting.reason = accel_monitor_->absence(now);
     if (waiting.reason.empty()) waiting.reason = calibration_->waitingFor();
     if (waiting.reason.empty()) waiting.reason = "the first image waits for its depth and the IMU";
   }
@@ -47,8 +73,14 @@ void FrontEndNodelet::tick() {
     NODELET_WARN_THROTTLE(10, "WAITING: %s", waiting.reason.c_str());
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.status = waiting;
+  } else if (const std::string depth = depthAbsence(now); !depth.empty()) {
+    NODELET_WARN_THROTTLE(10, "no depth, no planes: %s", depth.c_str());
   }
   diagnostics_->force_update();
+}
+
+std::string FrontEndNodelet::depthAbsence(double now) const {
+  return sensor_.topics.depth.empty() ? "" : depth_monitor_->absence(now);
 }
 
 void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -95,16 +127,11 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
     shown = shown_;
   }
   const double now = ros::Time::now().toSec();
-  std::vector<const StreamMonitor*> monitors = {color_monitor_.get()};
-  if (!sensor_.topics.depth.empty()) monitors.push_back(depth_monitor_.get());
-  monitors.push_back(imu_monitor_.get());
-  if (!sensor_.topics.accel.empty()) monitors.push_back(accel_monitor_.get());
-
   std::string complaints;
-  for (const StreamMonitor* monitor : monitors) {
-    const std::string complaint = monitor->complaint(now);
+  for (const Input& input : inputs()) {
+    const std::string complaint = input.monitor->complaint(now);
     if (!complaint.empty()) complaints += (complaints.empty() ? "" : "; ") + complaint;
-    const StreamMonitor::Report r = monitor->report();
+    const StreamMonitor::Report r = input.monitor->report();
     const std::string name = r.topic + " ";
     status.add(name + "rate (Hz)", r.rate);
     status.add(name + "delay on arrival (ms)", 1e3 * r.delay);

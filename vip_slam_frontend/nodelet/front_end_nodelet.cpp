@@ -21,7 +21,7 @@ FrontEndNodelet::~FrontEndNodelet() {
 
 void FrontEndNodelet::onInit() {
   try {
-    loadOptionsFromParameters(options_, getPrivateNodeHandle());
+    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"feature_image_rate", "diagnostic_period"});
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
   } catch (const std::exception& error) {
     NODELET_FATAL("%s", error.what());

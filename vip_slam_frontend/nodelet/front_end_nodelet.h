@@ -27,7 +27,6 @@
 #include "calibration_source.h"
 #include "depth_alignment.h"
 #include "odometry_messages.h"
-#include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/FrontEndConfig.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_node_options.h"
@@ -81,6 +80,14 @@ class FrontEndNodelet : public nodelet::Nodelet {
 
   // Diagnostics, once a second by the wall clock.
   void tick();
+  /// The topics that are read, and the type each is expected to have.
+  struct Input {
+    StreamMonitor* monitor;
+    std::string type;
+  };
+  std::vector<Input> inputs() const;
+  void explainAbsences();
+  std::string depthAbsence(double now) const;  ///< empty while depth comes, and for sensors without
   void reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status);
   void reportInput(diagnostic_updater::DiagnosticStatusWrapper& status);
   void reportQueues(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -88,7 +95,6 @@ class FrontEndNodelet : public nodelet::Nodelet {
   FrontEndNodeOptions options_;
   SensorConfig sensor_;
   OdometryFrames frames_;
-  TimingLog timing_;
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
@@ -123,6 +129,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
     std::string size_problem;  ///< depth that does not fit the colour image, in words
   };
   DropWatch drops_;  ///< used by diagnostics only
+  int ticks_ = 0;    ///< likewise
   mutable std::mutex shown_mutex_;
   Shown shown_;
   std::deque<PairerCounters> lately_paired_;  ///< as it was reported in the last seconds; of the diagnostics' thread

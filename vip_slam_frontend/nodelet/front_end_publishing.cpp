@@ -48,7 +48,12 @@ void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, 
   tracked->header.stamp = stamp;
   tracked->processing_ms = milliseconds;
   frame_pub_.publish(tracked);
-  status_pub_.publish(boost::make_shared<vip_slam_msgs::TrackingStatus>(toMsg(frame.status)));
+  TrackingStatus status = frame.status;
+  if (status.state == TrackingState::kDegraded) {
+    const std::string depth = depthAbsence(ros::Time::now().toSec());
+    if (!depth.empty()) status.reason += " (" + depth + ")";
+  }
+  status_pub_.publish(boost::make_shared<vip_slam_msgs::TrackingStatus>(toMsg(status)));
   publishFeatureImage(pair, frame);
 }
 

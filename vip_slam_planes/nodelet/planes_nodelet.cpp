@@ -25,7 +25,7 @@ PlanesNodelet::~PlanesNodelet() {
 
 void PlanesNodelet::onInit() {
   try {
-    loadOptionsFromParameters(options_, getPrivateNodeHandle());
+    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"opacity", "display_rate", "diagnostic_period"});
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
   } catch (const std::exception& error) {
     NODELET_FATAL("%s", error.what());
@@ -41,7 +41,13 @@ void PlanesNodelet::onInit() {
   update_pub_ = nh.advertise<vip_slam_msgs::PlaneUpdate>("plane_update", 20);
   map_pub_ = nh.advertise<vip_slam_msgs::PlaneMap>("plane_map", 1, true);
   markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("plane_markers", 1, true);
-  cloud_pub_ = nh.advertise<sensor_msgs::PointCloud2>("plane_cloud", 1, true);
+  // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
+  const auto show = [this](const ros::SingleSubscriberPublisher&) {
+    owner_->post(control_lane_, [this] {
+      if (shown_once_) publishMap(last_display_, true);
+    });
+  };
+  cloud_pub_ = nh.advertise<sensor_msgs::PointCloud2>("plane_cloud", 1, show, {}, nullptr, true);
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
   diagnostics_->setHardwareID(sensor_.name);
   diagnostics_->add("planes", this, &PlanesNodelet::report);
@@ -138,6 +144,7 @@ void PlanesNodelet::publishMap(double t, bool now) {
       boost::make_shared<vip_slam_msgs::PlaneMap>(toPlaneMapMsg(mapper_->planes(), t, revision_, options_.map_frame)));
   if (!now && t > last_display_ && t - last_display_ < 1.0 / display_rate_) return;
   last_display_ = t;
+  shown_once_ = true;
   std_msgs::Header header;
   header.stamp = toStamp(t);
   header.frame_id = options_.map_frame;

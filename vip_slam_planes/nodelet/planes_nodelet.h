@@ -57,6 +57,7 @@ class PlanesNodelet : public nodelet::Nodelet {
   bool placed_ = false;  ///< T_map_odom_ is known for epoch_
   std::uint64_t revision_ = 0;
   double last_display_ = -1e300;
+  bool shown_once_ = false;
 
   struct Shown {
     PlaneMapperCounters counters;

@@ -1,7 +1,6 @@
 #include "vip_slam_ros/parameters.h"
 
 #include <algorithm>
-#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -30,13 +29,7 @@ std::string toText(const std::string& name, XmlRpc::XmlRpcValue& value) {
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> readParameters(const ros::NodeHandle& nh,
-                                                                const std::vector<OptionRow>& known) {
-  std::set<std::string> names, groups;
-  for (const auto& row : known) {
-    names.insert(row.name);
-    const auto slash = row.name.find('/');
-    if (slash != std::string::npos) groups.insert(row.name.substr(0, slash + 1));
-  }
+                                                                const std::set<std::string>& others) {
   std::vector<std::string> all;
   nh.getParamNames(all);
   const std::string prefix = nh.getNamespace() == "/" ? "/" : nh.getNamespace() + "/";
@@ -44,11 +37,8 @@ std::vector<std::pair<std::string, std::string>> readParameters(const ros::NodeH
   for (const std::string& path : all) {
     if (path.compare(0, prefix.size(), prefix) != 0) continue;
     const std::string name = path.substr(prefix.size());
-    const bool ours = names.count(name) > 0 || std::any_of(groups.begin(), groups.end(), [&](const std::string& g) {
-                        return name.compare(0, g.size(), g) == 0;
-                      });
     XmlRpc::XmlRpcValue value;
-    if (ours && nh.getParam(path, value)) values.emplace_back(name, toText(path, value));
+    if (!others.count(name) && nh.getParam(path, value)) values.emplace_back(name, toText(path, value));
   }
   std::sort(values.begin(), values.end());
   return values;

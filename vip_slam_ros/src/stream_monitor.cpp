@@ -62,6 +62,11 @@ void StreamMonitor::reject(const std::string& why) {
   report_.last_rejection = why;
 }
 
+void StreamMonitor::explainAbsence(const std::string& why) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  absence_ = why;
+}
+
 StreamMonitor::Report StreamMonitor::report() const {
   std::lock_guard<std::mutex> lock(mutex_);
   Report report = report_;
@@ -78,13 +83,18 @@ std::string StreamMonitor::silence(double now) const {
   return r.messages > 0 && seconds > kSilent ? "topic " + r.topic + ": " + format("silent for %.1f s", seconds, 0) : "";
 }
 
+std::string StreamMonitor::absence(double now) const {
+  const Report r = report();
+  if (r.messages > 0 || r.rejected > 0) return silence(now);
+  std::lock_guard<std::mutex> lock(mutex_);
+  return "topic " + r.topic + ": no message so far; " + absence_;
+}
+
 std::string StreamMonitor::complaint(double now) const {
   const Report r = report();
   const std::string topic = "topic " + r.topic + ": ";
-  if (r.messages == 0 && r.rejected == 0)
-    return topic + "no message so far; is the name right, and the driver running?";
   if (r.rejected > 0 && r.messages <= r.rejected) return topic + r.last_rejection;
-  if (const std::string silent = silence(now); !silent.empty()) return silent;
+  if (const std::string absent = absence(now); !absent.empty()) return absent;
   if (r.messages >= kWindow && r.repeated + 1 == r.messages)
     return topic + "all stamps are the same: the driver does not stamp its messages";
   if (r.nominal_rate > 0 && r.rate > 0 && r.rate < 0.7 * r.nominal_rate) {

@@ -13,7 +13,6 @@ struct BackEndNodeOptions {
   std::string sensor;
   std::string map_frame = "map";
   std::string odom_frame = "odom";
-  std::string base_frame = "base_link";
   std::string load_map;
   bool localisation_mode = false;
   std::string rtabmap_services = "rtabmap";
@@ -25,7 +24,6 @@ struct BackEndNodeOptions {
     v.field("sensor", sensor, {}, "a shipped sensor or the path of a sensor YAML file");
     v.field("map_frame", map_frame, {}, "tf frame of the map");
     v.field("odom_frame", odom_frame, {}, "tf frame of the odometry");
-    v.field("base_frame", base_frame, {}, "tf frame of the robot");
     v.field("load_map", load_map, {}, "map file to start with; empty: a new map");
     v.field("localisation_mode", localisation_mode, "use the map without changing it");
     v.field("rtabmap_services", rtabmap_services, {}, "namespace of services named as RTAB-Map's; empty: none");

@@ -29,11 +29,11 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     try {
       if (calibration.empty()) throw std::runtime_error(parameters.resolveName("calibration") + ": not set");
       StereoDepthOptions options;
-      loadOptionsFromParameters(options, parameters);
+      loadOptionsFromParameters(options, parameters, {"calibration", "max_skew"});
       stereo_ = std::make_unique<StereoDepth>(loadStereoCalibration(calibration), options);
     } catch (const std::exception& e) {
       NODELET_FATAL("Stereo depth does not start: %s", e.what());
-      return;
+      throw;
     }
     image_publisher_ = nh.advertise<sensor_msgs::Image>("rectified/image", 5);
     image_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("rectified/camera_info", 5);

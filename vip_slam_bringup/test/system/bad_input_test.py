@@ -94,16 +94,33 @@ class BadInputTest(unittest.TestCase):
             launch.terminate()
             launch.wait(30)
 
+    def test_02b_missing_depth_is_named(self):
+        sensor = self.sensor_with(r'(depth: )\S+image_raw\S*', r'\1"/nowhere/depth"')
+        status = Listener('/vip_slam/tracking_status', TrackingStatus)
+        launch = subprocess.Popen(['roslaunch', 'vip_slam_bringup', 'bag.launch', 'sensor:=' + sensor, 'rviz:=false',
+                                   'bag:=' + os.path.join(self.data, 'smoke.bag')], stdout=subprocess.PIPE,
+                                  stderr=subprocess.STDOUT, text=True)
+        try:
+            wait_for(lambda: any('/nowhere/depth: no message so far; nobody publishes it' in s.reason
+                                 for s in status.all()), 40, 'a tracking status that names the topic of depth')
+        finally:
+            launch.terminate()
+            words, _ = launch.communicate(timeout=30)
+        self.assertIn('no depth, no planes: topic /nowhere/depth', words)
+
     def test_03_wrong_parameter_ends_the_launch(self):
-        parameters = os.path.join(self.folder, 'parameters.yaml')
-        with open(parameters, 'w') as file:
-            file.write('frontend: {tracking: {max_featurez: 100}}\n')
+        # What one of these launches leaves on the server is not the next one's.
         sensor = os.path.join(self.data, 'smoke_sensor.yaml')
-        done = subprocess.run(['roslaunch', 'vip_slam_bringup', 'vip_slam.launch', 'sensor:=' + sensor,
-                               'params:=' + parameters], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                              timeout=60)
-        self.assertIn('max_featurez', done.stdout)
-        rospy.delete_param('/vip_slam')  # the server would hand it to the next launch as well
+        for wrong, name in (('tracking: {max_featurez: 100}', 'tracking/max_featurez'),
+                            ('trackink: {max_features: 100}', 'trackink/max_features'),
+                            ('tf_patiens: 3', 'tf_patiens')):
+            parameters = os.path.join(self.folder, 'parameters.yaml')
+            with open(parameters, 'w') as file:
+                file.write('frontend: {%s}\n' % wrong)
+            done = subprocess.run(['roslaunch', 'vip_slam_bringup', 'vip_slam.launch', 'sensor:=' + sensor,
+                                   'params:=' + parameters], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                  timeout=60)
+            self.assertIn("unknown option '" + name + "'", done.stdout)
 
     def test_04_a_map_that_is_not_there_ends_the_launch(self):
         sensor = os.path.join(self.data, 'smoke_sensor.yaml')
@@ -111,7 +128,6 @@ class BadInputTest(unittest.TestCase):
                                'map:=/nowhere/map.vsm'], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               timeout=60)
         self.assertIn('/nowhere/map.vsm', done.stdout)
-        rospy.delete_param('/vip_slam')
 
     def test_05_run_bag_names_what_is_missing(self):
         bag, sensor = os.path.join(self.data, 'smoke.bag'), os.path.join(self.data, 'smoke_sensor.yaml')

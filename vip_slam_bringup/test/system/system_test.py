@@ -14,9 +14,10 @@ import rospy
 import rostest
 import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import CameraInfo
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_srvs.srv import Empty
+from visualization_msgs.msg import MarkerArray
 from vip_slam_msgs.msg import MapUpdate, TrackedFrame, TrackingStatus
 from vip_slam_msgs.srv import (LoadMap, Pause, Reset, SaveMap, SaveTrajectory, SetLocalisationMode, TriggerGlobalBa)
 
@@ -128,6 +129,11 @@ class SystemTest(unittest.TestCase):
         self.frames.wait_for_silence(1.0, 10, 'silence after pausing')
         wait_for(lambda: self.status.last().reason.startswith('paused'), 10, 'a status that says so')
         self.assertEqual(self.status.last().state, TrackingStatus.WAITING)
+        # An rviz that is opened now gets the map although it stands still.
+        for topic, kind in (('map_markers', MarkerArray), ('landmarks', PointCloud2), ('plane_markers', MarkerArray),
+                            ('plane_cloud', PointCloud2), ('path', Path)):
+            late = Listener(NS + topic, kind)
+            wait_for(late.last, 10, topic + ' for somebody who comes late')
         self.assertTrue(self.call('pause', Pause, False)[0])
         self.frames.wait(10, 10, 'images after resuming')
 

@@ -27,7 +27,7 @@ struct ImagePair {
 
 struct PairerOptions {
   double tolerance = 0.035;  ///< largest difference between the stamps of a pair, seconds: an image at 30 Hz
-  double patience = 0.15;   ///< colour waits for its depth until any image is this much newer, seconds
+  double patience = 0.15;    ///< colour waits for its depth until any image is this much newer, seconds
   std::size_t capacity = 20;
 };
 

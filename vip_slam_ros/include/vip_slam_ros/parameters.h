@@ -1,6 +1,7 @@
 // Option structs from ROS parameters: "group/name" is looked up below the given namespace.
 #pragma once
 
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,16 +12,17 @@
 
 namespace vip_slam {
 
-/// The parameters below `nh`'s namespace that name a known option or lie in a group of one, as
-/// "group/name" -> text. Throws std::invalid_argument naming a parameter that is a list.
+/// The parameters below `nh`'s namespace but for `others`, as "group/name" -> text. Throws std::invalid_argument naming
+/// a parameter that is a list.
 std::vector<std::pair<std::string, std::string>> readParameters(const ros::NodeHandle& nh,
-                                                                const std::vector<OptionRow>& known);
+                                                                const std::set<std::string>& others);
 
 /// Sets the options that have a parameter. Throws std::invalid_argument naming the parameter, its value and what was
-/// expected; a parameter inside one of the options' groups that no option has is an error, with the nearest known name.
+/// expected; a parameter that no option has is an error, with the nearest known name. `others`: names that somebody
+/// else reads, such as dynamic_reconfigure.
 template <class Options>
-void loadOptionsFromParameters(Options& options, const ros::NodeHandle& nh) {
-  setOptions(options, readParameters(nh, listOptions(options)));
+void loadOptionsFromParameters(Options& options, const ros::NodeHandle& nh, const std::set<std::string>& others) {
+  setOptions(options, readParameters(nh, others));
 }
 
 }  // namespace vip_slam

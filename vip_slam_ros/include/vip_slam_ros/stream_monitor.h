@@ -17,6 +17,8 @@ class StreamMonitor {
   /// `t`: header stamp, `arrival`: when it came (same clock), seconds. Thread-safe, as all of this class.
   Step add(double t, double arrival);
   void reject(const std::string& why);  ///< a message that could not be used
+  /// What is known of a topic that has brought nothing yet, for the words of complaint().
+  void explainAbsence(const std::string& why);
 
   struct Report {
     std::string topic;
@@ -36,6 +38,8 @@ class StreamMonitor {
   /// The same only of a stream that has come and stopped, or brings nothing usable any more: empty while good messages
   /// come, and before the first one.
   std::string silence(double now) const;
+  /// Why there is nothing of a stream: no message so far, or silence().
+  std::string absence(double now) const;
   /// After time ran backwards: the next stamp may be anything.
   void restart();
 
@@ -44,6 +48,7 @@ class StreamMonitor {
   mutable std::mutex mutex_;
   Report report_;
   std::deque<double> stamps_;
+  std::string absence_ = "is the name right, and the driver running?";
   bool newest_rejected_ = false;
 };
 
