@@ -51,6 +51,7 @@ void BackEndNodelet::onInit() {
   keyframe_lane_ = owner_->addLane("keyframes", std::size_t(options_.keyframe_queue));
   update_lane_ = owner_->addLane("plane updates", std::size_t(options_.keyframe_queue));
   control_lane_ = owner_->addLane("control", 100);
+  adjustment_lane_ = owner_->addLane("adjustments", 2);  // the end of one must not be lost: none would begin again
   advertise();
   owner_->start(kMappingNiceness);
   advertiseServices();
@@ -172,6 +173,8 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
+    if (problem_.empty() && !update.placed && update.newest_keyframe != 0)
+      problem_ = "the odometry began anew, and its place in the map is not found yet";
     calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale), back_end_->depthDifference(),
                                 back_end_->trackNoiseDifference()};
   }
@@ -197,7 +200,7 @@ void BackEndNodelet::startGlobalBa() {
       failure = error.what();
     }
     const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
-    owner_->post(control_lane_, [this, result, failure, milliseconds] {
+    owner_->post(adjustment_lane_, [this, result, failure, milliseconds] {
       adjusting_ = false;
       if (!failure.empty()) {
         back_end_->requestGlobalBa();  // what asked for it still waits

@@ -97,7 +97,7 @@ class BackEndNodelet : public nodelet::Nodelet {
 
   std::atomic<double> display_rate_{2.0};
   std::atomic<bool> publish_tf_{true};
-  OwnerThread::Lane keyframe_lane_ = 0, update_lane_ = 0, control_lane_ = 0;
+  OwnerThread::Lane keyframe_lane_ = 0, update_lane_ = 0, control_lane_ = 0, adjustment_lane_ = 0;
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   ros::Publisher map_update_pub_, control_pub_, pose_pub_, path_pub_, markers_pub_, landmarks_pub_, loop_pub_,
       statistics_pub_;

@@ -15,7 +15,7 @@ void PoseInMap::apply(const MapUpdate& update) {
   std::lock_guard<std::mutex> lock(mutex_);
   T_map_odom_ = update.T_map_odom;
   epoch_ = update.epoch;
-  placed_ = update.newest_keyframe != 0;
+  placed_ = update.newest_keyframe != 0 && update.placed;
 }
 
 void PoseInMap::clear() {

@@ -47,6 +47,8 @@ class ResetBarrier {
   }
 
  private:
+  static constexpr int kBehind = 5;
+
   void take(double t, std::uint32_t epoch) {
     if (!seen_ || epoch > epoch_) {
       t_ = t;  // stamps of the epoch before say nothing here: the clock may have run back
@@ -54,6 +56,13 @@ class ResetBarrier {
       has_keyframe_ = false;
     } else if (epoch == epoch_) {
       t_ = std::max(t_, t);
+      behind_ = 0;
+    } else if (++behind_ >= kBehind) {
+      // Not a late message: a front end that was loaded anew counts its epochs from the beginning.
+      t_ = t;
+      epoch_ = epoch;
+      has_keyframe_ = raised_ = false;
+      behind_ = 0;
     }
     seen_ = true;
   }
@@ -62,6 +71,7 @@ class ResetBarrier {
   bool seen_ = false, raised_ = false;
   bool has_keyframe_ = false;     ///< of epoch_
   bool epoch_ends_ = false;       ///< barrier_epoch_ had keyframes
+  int behind_ = 0;                ///< messages of an earlier epoch than epoch_, one after the other
   double t_ = 0, barrier_t_ = 0;  ///< t_ of epoch_
   std::uint32_t epoch_ = 0, barrier_epoch_ = 0;
 };

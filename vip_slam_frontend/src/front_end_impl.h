@@ -146,6 +146,7 @@ class FrontEnd::Impl {
   double last_held_t_ = 0;            ///< image with enough features or matched depth surfaces
   double last_depth_t_ = -1e300;      ///< image with a depth image
   double last_metric_t_ = 0;          ///< image in which depth took part
+  double last_points_t_ = 0;          ///< image with points that have depth
   int gated_in_a_row_ = 0;
   bool still_ = false;
   SE3 T_map_odom_;

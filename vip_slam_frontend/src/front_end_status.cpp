@@ -55,7 +55,8 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
     last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
     if (imuIsContradicted()) {
       status_ = {TrackingState::kDegraded,
-                 "the images contradict the IMU: are its axes, signs and units, T_imu_cam and the stamps right? check_bag tells"};
+                 "the images contradict the IMU: are its axes, signs and units, T_imu_cam and the stamps right? "
+                 "check_bag tells"};
     } else if (t - last_metric_t_ > kBetweenDepths && !still_) {
       status_ = {TrackingState::kDegraded, "no depth: visual-inertial only"};
     } else {

@@ -95,6 +95,8 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   tracker_.track(gray, depth, {rotation, 0, 0}, false, SE3(), colourRows(turning), t);
   tracker_.replenish(SE3(), true, t);
   const int stride = strideOn(camera_->width(), camera_->height(), options_.frame_grid_stride);
+  // After a restart more is known of them than the configuration says.
+  initialiser_.setMounting(extrinsics(), filter_.mounting().gyro_correction);
   std::optional<FilterPrior> prior =
       initialiser_.add({t_imu, measurements(), makeDepthGrid(depth, stride, sensor_.depth_noise)}, imu_);
   if (!prior) {
@@ -115,7 +117,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   phase_ = Phase::kTracking;
   started_imu_t_ = t_imu;
   status_ = {TrackingState::kTracking, ""};
-  last_good_t_ = last_held_t_ = last_metric_t_ = t;
+  last_good_t_ = last_held_t_ = last_metric_t_ = last_points_t_ = t;
   last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   // The tracks' references were taken under unknown poses: begin them here.
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
@@ -160,7 +162,9 @@ bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   if (still_ && image_counts) cues.anchor_disparity_px = disparity(still_anchor_);
   recent_pixels_.emplace_back(t_imu, now);
   const bool still = stillness_.update(cues);
-  if (still && !still_) still_anchor_ = std::move(now);
+  // Of an anchor whose features are gone (the lights went out) nothing tells any more what adds up since.
+  const bool anchor_gone = still_ && cues.anchor_disparity_px < 0 && cues.tracks > options.min_tracks;
+  if (still && (!still_ || anchor_gone)) still_anchor_ = std::move(now);
   return still;
 }
 
@@ -246,8 +250,10 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const bool surfaces_hold = report.surfaces_used > 0;
   const bool metric = surfaces_hold || with_depth >= options_.recovery.min_tracks;
   judge(tracked, metric, surfaces_hold, t);
-  // The step from image to image is known with its length only where there is depth; who has none goes on without.
-  const bool agrees = tracked.pose_ok || t - last_metric_t_ > kBetweenDepths;
+  // The step from image to image is known with its length only where points have depth; who has none, or has it on
+  // surfaces alone, goes on without.
+  if (with_depth >= options_.recovery.min_tracks) last_points_t_ = t;
+  const bool agrees = tracked.pose_ok || t - last_points_t_ > kBetweenDepths;
   if (phase_ == Phase::kLost && tracked.tracked >= 2 * options_.recovery.min_tracks && agrees) {
     // The IMU went on all the time. As long as it still tells where we are, the odometry goes on, too.
     if (coastedSigma() > options_.recovery.max_position_sigma) {

@@ -125,6 +125,30 @@ TEST(Initialiser, MovingWithoutDepthSaysWhyItWaits) {
   EXPECT_NE(s.reason.find("features with depth"), std::string::npos) << s.reason;
 }
 
+// A steady motion that turns the view over within the second is quiet, and shares nothing with the oldest image.
+TEST(Initialiser, ASteadyMotionIsNoRestHoweverSoonTheViewHasTurnedOver) {
+  ImuNoise noise;
+  for (const double speed : {0.0, 0.04}) {  // of the view from image to image, normalised
+    ImuBuffer imu;
+    Initialiser initialiser(InitialisationOptions(), FilterOptions(), noise, SE3(), 480, 9.81, DepthNoise());
+    std::optional<FilterPrior> prior;
+    double t = 0;
+    for (int k = 0; k < 40 && !prior; ++k) {
+      for (; t <= 0.05 * k + 0.01; t += 0.005) imu.add({t, {0, 0, 0}, {0, -9.81, 0}});
+      InitialisationInput image{0.05 * k, {}};
+      for (int i = 0; i < 100; ++i) {
+        FilterMeasurement m;
+        m.id = 1000 * (k / 8) + i + 1;  // all of them are new every 0.4 s
+        m.xy = Eigen::Vector2d(0.01 * (i % 10) + speed * (k % 8), 0.01 * (i / 10));
+        image.features.push_back(m);
+      }
+      prior = initialiser.add(image, imu);
+    }
+    EXPECT_EQ(prior.has_value(), speed == 0.0);
+    if (prior) EXPECT_TRUE(prior->standing);
+  }
+}
+
 // A slow steady turn is quiet to the IMU, and a bare wall has no features that could tell.
 TEST(Initialiser, BeforeABareWallTheDepthTellsWhetherItStands) {
   ImuNoise noise;

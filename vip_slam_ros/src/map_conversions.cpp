@@ -74,6 +74,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
   msg.revision = update.revision;
   msg.epoch = update.epoch;
   msg.map_odom = toPoseMsg(update.T_map_odom);
+  msg.placed = update.placed;
   msg.newest_keyframe = update.newest_keyframe;
   msg.depth_curve = update.depth_curve.added;
   msg.disparity_error = update.disparity_error;
@@ -116,6 +117,7 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.revision = msg.revision;
   update.epoch = msg.epoch;
   update.T_map_odom = fromMsg(msg.map_odom);
+  update.placed = msg.placed;
   update.newest_keyframe = msg.newest_keyframe;
   update.depth_curve.added = msg.depth_curve;
   update.disparity_error = msg.disparity_error;

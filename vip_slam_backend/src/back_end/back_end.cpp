@@ -132,6 +132,10 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (frozen()) {
       localise(keyframe);
       finishUpdate(&update);
+      if (!searching) {  // those that waited for the map to be recognised would wait for ever
+        for (const KeyframePtr& waiting : held) update.removed_keyframes.push_back(waiting->id);
+        held.clear();
+      }
       update.removed_keyframes.push_back(keyframe->id);  // it will never be in the map
       return update;
     }

@@ -52,6 +52,8 @@ struct BackEnd::Impl {
   void cull(MapUpdate* update);
   /// T_map_odom from the newest keyframe.
   void followNewest();
+  /// Whether the map tells where the present epoch of the odometry lies in it; else T_map_odom is a guess.
+  bool placed() const;
   MapUpdate beginUpdate(double t) const;
   /// Fills estimates of everything (global) and what was removed and merged since the last update.
   void fillGlobal(MapUpdate* update) const;
@@ -68,7 +70,8 @@ struct BackEnd::Impl {
   // back_end_maps.cpp
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);
-  bool findInMap(const KeyframePtr& keyframe, Relocalisation* found);
+  /// `allowed`: keyframes that it may be found at; empty: all.
+  bool findInMap(const KeyframePtr& keyframe, const std::function<bool(KeyframeId)>& allowed, Relocalisation* found);
   /// Recognises the loaded map; on success the keyframe and those held before it enter it.
   bool enterLoadedMap(const KeyframePtr& keyframe);
   /// Localisation only: T_map_odom follows, the map stays.

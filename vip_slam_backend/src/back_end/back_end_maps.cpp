@@ -1,5 +1,6 @@
 // Stored maps within the back end: saving, loading, finding the way in a loaded map, localisation without mapping.
 #include "back_end_impl.h"
+#include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/map_io/map_file.h"
 
 namespace vip_slam {
@@ -27,10 +28,11 @@ MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
   return update;
 }
 
-bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found) {
+bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, const std::function<bool(KeyframeId)>& allowed,
+                              Relocalisation* found) {
   const ScopedTimer timer(log, "backend.relocalise", keyframe->frame.t);
   std::string reason;
-  const auto result = relocaliser.relocalise(map, loop_closer, keyframe, {}, &reason);
+  const auto result = relocaliser.relocalise(map, loop_closer, keyframe, allowed, &reason);
   LoopEvent event;
   event.query = keyframe->id;
   event.t = keyframe->frame.t;
@@ -50,7 +52,7 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found
 
 bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
-  if (!findInMap(keyframe, &found)) {
+  if (!findInMap(keyframe, {}, &found)) {
     held.push_back(keyframe);
     if (held.size() > kMostWaitingKeyframes) held.pop_front();
     return false;
@@ -75,11 +77,14 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
 }
 
 void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
+  // A part of the map that nothing ties to it lies there by a guess.
+  const std::set<KeyframeId> part = referencePart(map, loop_closer.loops());
+  const auto allowed = [&part](KeyframeId id) { return part.count(id) != 0; };
   const bool known = !searching && keyframe->frame.epoch == epoch;
   std::optional<Relocalisation> found;
-  if (known) found = relocaliser.track(map, loop_closer, *keyframe, T_map_odom * keyframe->frame.state.T_W_I);
+  if (known) found = relocaliser.track(map, loop_closer, *keyframe, T_map_odom * keyframe->frame.state.T_W_I, allowed);
   Relocalisation place;
-  if (!found && findInMap(keyframe, &place)) found = place;
+  if (!found && findInMap(keyframe, allowed, &place)) found = place;
   if (!found) return;
   searching = false;
   epoch = keyframe->frame.epoch;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "back_end_impl.h"
+#include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/optimisation/inertial_scale.h"
 
 namespace vip_slam {
@@ -86,6 +87,12 @@ void BackEnd::Impl::followNewest() {
   if (newest.data->frame.epoch == epoch) T_map_odom = newest.state.T_W_I * newest.data->frame.state.T_W_I.inverse();
 }
 
+bool BackEnd::Impl::placed() const {
+  if (map.empty() || searching) return false;
+  if (last_found && last_found->epoch == epoch) return true;
+  return referencePart(map, loop_closer.loops()).count(map.newestKeyframe()) != 0;
+}
+
 MapUpdate BackEnd::Impl::beginUpdate(double t) const {
   MapUpdate update;
   update.t = t;
@@ -120,6 +127,7 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->revision = ++revision;
   update->epoch = epoch;
   update->T_map_odom = T_map_odom;
+  update->placed = placed();
   update->depth_curve = camera_correction.curve;
   update->disparity_error = disparity_error;
   update->newest_keyframe = map.newestKeyframe();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <tuple>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -16,7 +17,10 @@ namespace {
 Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, const PoseGraphOptions& options) {
   const double turned = a.state.T_W_I.rotation().angularDistance(b.state.T_W_I.rotation());
   // Turning on the spot drifts too: a full turn counts as two metres of way.
-  const double way = (a.state.T_W_I.t() - b.state.T_W_I.t()).norm() + turned / M_PI;
+  double way = (a.state.T_W_I.t() - b.state.T_W_I.t()).norm() + turned / M_PI;
+  // Where keyframes are missing between them, as after a while of localisation only, it went who knows where.
+  constexpr double kWayPerSecond = 0.5;  // m
+  if (b.previous != a.id()) way = std::max(way, kWayPerSecond * std::abs(b.data->frame.t - a.data->frame.t));
   const bool weak =
       a.data->frame.status.state != TrackingState::kTracking || b.data->frame.status.state != TrackingState::kTracking;
   const double factor = std::sqrt(std::max(0.02, way)) * (weak ? 10.0 : 1.0);
@@ -77,6 +81,27 @@ std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,
   for (const auto& entry : map.keyframes())
     if (group.at(entry.second.data->frame.epoch) == ours) result.insert(entry.first);
   return result;
+}
+
+std::set<KeyframeId> referencePart(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
+  struct Part {
+    std::size_t keyframes = 0;
+    bool stored = false;
+    KeyframeId oldest = 0;
+  };
+  std::map<std::uint32_t, Part> parts;
+  const auto group = epochGroups(map, loops);
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    Part& part = parts[group.at(keyframe.data->frame.epoch)];
+    if (part.keyframes++ == 0) part.oldest = id;  // in ascending order
+    part.stored = part.stored || keyframe.stored;
+  }
+  if (parts.empty()) return {};
+  const auto lesser = [](const auto& a, const auto& b) {
+    const Part &p = a.second, &q = b.second;
+    return std::make_tuple(p.stored, p.keyframes, q.oldest) < std::make_tuple(q.stored, q.keyframes, p.oldest);
+  };
+  return connectedKeyframes(map, std::max_element(parts.begin(), parts.end(), lesser)->second.oldest, loops);
 }
 
 PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,

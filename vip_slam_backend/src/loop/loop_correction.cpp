@@ -57,21 +57,28 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     return event;
   }
 
-  // A part of the map that nothing tied to the match yet is brought there as a whole; odometry has no say then.
-  const std::set<KeyframeId> part = connectedKeyframes(map, query, loops_);
+  // Of two parts of the map that nothing tied yet one is brought to the other as a whole; odometry has no say then.
+  // What others know the map by stays: a fragment that was put somewhere by a guess comes to it, whichever is the
+  // query's.
+  std::set<KeyframeId> part = connectedKeyframes(map, query, loops_);
   const bool tied = part.count(place.match) != 0;
+  SE3 move = correction;
+  if (!tied && referencePart(map, loops_).count(query)) {
+    part = connectedKeyframes(map, place.match, loops_);
+    move = correction.inverse();
+  }
   std::map<KeyframeId, SE3> start;
   for (const KeyframeId id : part)
-    start[id] = tied ? map.keyframe(id).state.T_W_I : correction * map.keyframe(id).state.T_W_I;
+    start[id] = tied ? map.keyframe(id).state.T_W_I : move * map.keyframe(id).state.T_W_I;
 
   PosePlaneGraph graph = buildPosePlaneGraph(map, loops_, tied ? planes.same : decltype(planes.same)(),
                                              options_.min_seconds, options_.graph);
   if (!tied) {
     for (const auto& pose : start) graph.addPose(pose.first, pose.second);
     for (const auto& plane : map.planes()) {
-      const bool ours = std::any_of(part.begin(), part.end(),
-                                    [&](KeyframeId id) { return map.keyframe(id).planes.count(plane.first) != 0; });
-      if (ours) graph.addPlane(plane.first, transformPlane(correction, plane.second.estimate.plane));
+      const bool moves = std::any_of(part.begin(), part.end(),
+                                     [&](KeyframeId id) { return map.keyframe(id).planes.count(plane.first) != 0; });
+      if (moves) graph.addPlane(plane.first, transformPlane(move, plane.second.estimate.plane));
     }
   }
   const SE3& T_W_match = map.keyframe(place.match).state.T_W_I;

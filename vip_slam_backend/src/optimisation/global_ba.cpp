@@ -30,20 +30,25 @@ void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map*
   for (const KeyframeId id : solved)
     if (map->hasKeyframe(id)) newest = std::max(newest, id);
   if (newest == 0) return;
-  SE3 motion;  // of the newest solved keyframe, new from old world
-  for (std::size_t f = 0; f < solution.built.frames.size(); ++f)
-    if (solution.built.frames[f] == newest)
-      motion = solution.built.problem.frames[f].T_W_C() * map->keyframe(newest).T_W_C().inverse();
+  std::map<KeyframeId, SE3> motion;  // new from old world
+  for (std::size_t f = 0; f < solution.built.frames.size(); ++f) {
+    const KeyframeId id = solution.built.frames[f];
+    if (map->hasKeyframe(id))
+      motion[id] = solution.built.problem.frames[f].T_W_C() * map->keyframe(id).T_W_C().inverse();
+  }
+  const SE3 last = motion.at(newest);
   std::map<KeyframeId, SE3> moved;
-  for (const auto& entry : map->keyframes())
-    if (!solved.count(entry.first)) moved[entry.first] = motion * entry.second.state.T_W_I;
+  std::map<PlaneId, KeyframeId> seen_by;  // the newest keyframe
+  for (const auto& entry : map->keyframes()) {
+    if (motion.emplace(entry.first, last).second) moved[entry.first] = last * entry.second.state.T_W_I;
+    for (const auto& plane : entry.second.planes) seen_by[plane.first] = entry.first;
+  }
   map->moveKeyframes(moved);
-  std::set<PlaneId> seen, seen_by_solved;
-  for (const auto& entry : map->keyframes())
-    for (const auto& plane : entry.second.planes)
-      (moved.count(entry.first) ? seen : seen_by_solved).insert(plane.first);
-  for (const PlaneId id : seen)
-    if (!seen_by_solved.count(id)) map->movePlane(id, motion);
+  // Planes that the solution says nothing about, such as those that became known meanwhile, go with who saw them last.
+  const std::vector<char> held = heldPlanes(solution.built.problem);
+  for (std::size_t p = 0; p < solution.built.planes.size(); ++p)
+    if (held[p]) seen_by.erase(solution.built.planes[p]);
+  for (const auto& plane : seen_by) map->movePlane(plane.first, motion.at(plane.second));
   storeProblem(solution.built, noise, map);
 }
 

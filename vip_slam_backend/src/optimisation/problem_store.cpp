@@ -49,8 +49,8 @@ void storePlanePoints(const BuiltProblem& built, Map* map, LandmarkSet* done) {
   }
 }
 
-// Planes that some factor holds. Others have only the prior of their kind, or nothing: where a window saw them but none
-// of its depth was believed.
+}  // namespace
+
 std::vector<char> heldPlanes(const BaProblem& problem) {
   std::vector<char> held(problem.planes.size(), 0);
   for (const BaPointToPlane& f : problem.point_to_plane) held[f.plane] = 1;
@@ -59,8 +59,6 @@ std::vector<char> heldPlanes(const BaProblem& problem) {
   for (const BaHomographyPair& f : problem.homography_pairs) held[f.plane] = 1;
   return held;
 }
-
-}  // namespace
 
 void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   const BaProblem& problem = built.problem;

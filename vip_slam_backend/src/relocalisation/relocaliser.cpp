@@ -28,13 +28,15 @@ std::optional<Relocalisation> Relocaliser::relocalise(const Map& map, const Loop
 }
 
 std::optional<Relocalisation> Relocaliser::track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
-                                                 const SE3& T_W_I) const {
+                                                 const SE3& T_W_I,
+                                                 const std::function<bool(KeyframeId)>& allowed) const {
   // The nearest keyframe that looks the same way.
   const SE3 T_W_C = T_W_I * keyframe.frame.T_I_C;
   const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
   KeyframeId nearest = 0;
   double best = 6.0;
   for (const auto& entry : map.keyframes()) {
+    if (allowed && !allowed(entry.first)) continue;
     const SE3 other = entry.second.T_W_C();
     const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
     const double cost = (other.t() - T_W_C.t()).norm() + 4.0 * (1.0 - cosine);
@@ -44,7 +46,7 @@ std::optional<Relocalisation> Relocaliser::track(const Map& map, const LoopClose
     }
   }
   if (nearest == 0) return std::nullopt;
-  const PlaceVerification place = places.verifier().track(map, keyframe, T_W_I, nearest, {});
+  const PlaceVerification place = places.verifier().track(map, keyframe, T_W_I, nearest, allowed);
   if (!place.accepted) return std::nullopt;
   return fromPlace(place);
 }

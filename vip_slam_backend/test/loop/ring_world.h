@@ -92,17 +92,22 @@ class RingWorld {
       linked->previous = k;
       NavState state = linked->frame.state;
       map.addKeyframe(linked, state, ImuNoise());
-      for (std::uint32_t f = 0; f < linked->frame.features.size(); ++f) {
-        const Feature& feature = linked->frame.features[f];
-        const MapObservation o{linked->id, f};
-        if (map.hasLandmark(feature.id))
-          map.addObservation(feature.id, o);
-        else
-          map.addLandmark(feature.id,
-                          estimate * (T_I_C() * (feature.depth * Eigen::Vector3d(feature.xy.x(), feature.xy.y(), 1))),
-                          o);
-      }
+      addLandmarks(map, *linked);
       truths->push_back(T);
+    }
+  }
+
+  /// Each track of a keyframe is a landmark, which lies where the first keyframe has it.
+  void addLandmarks(Map& map, const Keyframe& keyframe) const {
+    const SE3 estimate = map.keyframe(keyframe.id).state.T_W_I;
+    for (std::uint32_t f = 0; f < keyframe.frame.features.size(); ++f) {
+      const Feature& feature = keyframe.frame.features[f];
+      const MapObservation o{keyframe.id, f};
+      if (const LandmarkId id = map.resolve(feature.id); map.hasLandmark(id))  // a loop may have joined it to another
+        map.addObservation(id, o);
+      else
+        map.addLandmark(feature.id,
+                        estimate * (T_I_C() * (feature.depth * Eigen::Vector3d(feature.xy.x(), feature.xy.y(), 1))), o);
     }
   }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "loop/ring_world.h"
+#include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/loop/loop_closer.h"
 #include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_backend/relocalisation/relocaliser.h"
@@ -139,6 +140,48 @@ TEST(LoopCloser, OdometryThatBeganAnewJoinsWhereOnlyOnePlaceFits) {
       EXPECT_LT((map.keyframe(previous).state.T_W_I.t() - (guess * world.truth(1.55)).t()).norm(), 1e-9);
     }
   }
+}
+
+// A fragment that was mapped after a loss and never tied comes to the map, not the map to it.
+TEST(LoopCloser, TheMapStaysWhenAFragmentIsFoundAgain) {
+  RingWorld world(1);
+  Map map;
+  std::vector<SE3> truth;
+  world.walk(map, 0.35, 0.0, &truth);
+  LoopCloser closer(LoopOptions(), world.camera());
+  closeAll(closer, map);
+  const SE3 first = map.keyframe(1).state.T_W_I;
+  const auto walk = [&](KeyframeId id, std::uint32_t epoch, double from, int count, const SE3& guess) {
+    KeyframeId previous = 0;
+    SE3 T_map_odom;
+    for (int k = 0; k < count; ++k, ++id) {
+      const SE3 T = world.truth(from + 0.07 * k);
+      const LandmarkId tracks = 1000000 * LandmarkId(epoch);
+      auto kf = std::make_shared<Keyframe>(*world.see(id, 0.5 * static_cast<double>(id), T, guess * T, tracks));
+      kf->frame.epoch = epoch;
+      kf->previous = previous;
+      previous = kf->id;
+      NavState state = kf->frame.state;
+      state.T_W_I = T_map_odom * guess * T;
+      map.addKeyframe(kf, state, ImuNoise());
+      world.addLandmarks(map, *kf);
+      closer.add(map, kf->id);
+      closer.close(map, kf->id);
+      T_map_odom = map.keyframe(kf->id).state.T_W_I * (guess * T).inverse();
+    }
+  };
+  const auto guess = [](double yaw) {
+    return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(3, -4, 0.5));
+  };
+  walk(1000, 1, 2.9, 8, guess(2.0));  // a place that the map does not have
+  EXPECT_GT((map.keyframe(1000).state.T_W_I.t() - world.truth(2.9).t()).norm(), 1.0);
+  EXPECT_EQ(0u, referencePart(map, closer.loops()).count(1000));
+  walk(2000, 2, 1.2, 32, guess(-1.0));  // back in the map, then on to that place
+  EXPECT_LT((map.keyframe(1).state.T_W_I.t() - first.t()).norm(), 0.05);
+  EXPECT_LT((map.keyframe(2000).state.T_W_I.t() - world.truth(1.2).t()).norm(), 0.1);
+  EXPECT_TRUE(closer.tied(map, 1000));
+  EXPECT_LT((map.keyframe(1000).state.T_W_I.t() - world.truth(2.9).t()).norm(), 0.1);
+  EXPECT_EQ(checkMap(map), "");
 }
 
 TEST(LoopCloser, TwoRunsGiveTheSameBits) {

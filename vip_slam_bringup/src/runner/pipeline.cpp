@@ -97,7 +97,7 @@ void Pipeline::applyAnswers(std::size_t image) {
       front_end_->applyMapUpdate(update);
       T_map_odom_ = update.T_map_odom;
       epoch_ = update.epoch;
-      placed_ = update.newest_keyframe != 0;
+      placed_ = update.newest_keyframe != 0 && update.placed;
     }
     answers_.pop_front();
   }

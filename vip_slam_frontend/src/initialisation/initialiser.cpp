@@ -86,6 +86,11 @@ Initialiser::Initialiser(const InitialisationOptions& options, const FilterOptio
       gravity_(gravity),
       depth_noise_(depth_noise) {}
 
+void Initialiser::setMounting(const SE3& T_I_C, const Eigen::Matrix3d& gyro_correction) {
+  T_I_C_ = T_I_C;
+  gyro_correction_ = gyro_correction;
+}
+
 void Initialiser::reset() {
   images_.clear();
   reason_ = "waiting for images and IMU";
@@ -129,23 +134,25 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
   }
   // The oldest image inside the second shows whether the scene stood, too: a steady motion is quiet as well. After a
   // restart the IMU reaches back further than the images.
-  const InitialisationInput* oldest = nullptr;
-  for (const InitialisationInput& image : images_) {
-    if (image.t_imu >= from - 1e-9) {
-      oldest = &image;
-      break;
-    }
-  }
-  if (!oldest || now - oldest->t_imu < kWatched * options_.standing_seconds) {
+  std::size_t oldest = 0;
+  while (oldest < images_.size() && images_[oldest].t_imu < from - 1e-9) ++oldest;
+  if (oldest == images_.size() || now - images_[oldest].t_imu < kWatched * options_.standing_seconds) {
     reason_ = "IMU is quiet: watching whether the image moves";
     return std::nullopt;
   }
-  const double disparity = meanDisparity(oldest->features, images_.back().features, focal_);
+  // When the view has turned over within the second, the oldest one that still shares something with the newest tells.
+  double disparity = -1;
+  for (std::size_t k = oldest; disparity < 0 && k + 1 < images_.size(); ++k)
+    disparity = meanDisparity(images_[k].features, images_.back().features, focal_);
+  if (disparity < 0 && static_cast<int>(images_.back().features.size()) >= options_.min_tracks) {
+    reason_ = "IMU is quiet, all that is seen is new: watching whether the image moves";
+    return std::nullopt;
+  }
   if (disparity > options_.max_disparity_px) {
     reason_ = "IMU is quiet but the image moves: gathering images for a start in motion";
     return std::nullopt;
   }
-  if (disparity < 0 && depthMoved(*oldest)) {
+  if (disparity < 0 && depthMoved(images_[oldest])) {
     reason_ = "IMU is quiet but the depth moves: gathering images for a start in motion";
     return std::nullopt;
   }
@@ -201,7 +208,7 @@ std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {
     T_base_last = T_k_base.inverse();
     poses.push_back({images_[k].t_imu, T_first_base * T_base_last});
   }
-  MovingStart start = solveMovingStart(poses, imu, T_I_C_, noise_, filter_, gravity_);
+  MovingStart start = solveMovingStart(poses, imu, T_I_C_, noise_, filter_, gravity_, gyro_correction_);
   if (!start.ok || start.gravity_error > options_.max_gravity_error) {
     reason_ = start.ok ? "start in motion: gravity off by " + std::to_string(start.gravity_error) + " m/s^2"
                        : "start in motion: " + start.reason;

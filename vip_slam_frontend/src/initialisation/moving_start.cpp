@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
 
 namespace vip_slam {
@@ -22,7 +23,8 @@ constexpr double kWorstPosition = 0.008, kWorstRotation = 0.004;
 }  // namespace
 
 MovingStart solveMovingStart(const std::vector<TimedCameraPose>& poses, const ImuBuffer& imu, const SE3& T_I_C,
-                             const ImuNoise& noise, const FilterOptions& options, double gravity) {
+                             const ImuNoise& noise, const FilterOptions& options, double gravity,
+                             const Eigen::Matrix3d& gyro_correction) {
   MovingStart result;
   if (poses.size() < 5) {
     result.reason = "fewer than five camera poses";
@@ -40,7 +42,7 @@ MovingStart solveMovingStart(const std::vector<TimedCameraPose>& poses, const Im
     Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     for (std::size_t k = 1; k < poses.size(); ++k) {
-      const std::vector<ImuSample> samples = imu.between(t0, poses[k].t_imu);
+      const std::vector<ImuSample> samples = withGyroCorrection(imu.between(t0, poses[k].t_imu), gyro_correction);
       if (samples.size() < 2) {
         result.reason = "the IMU does not cover the images";
         return result;

@@ -31,8 +31,8 @@ class Map {
   /// cameras stay where they are, so that landmarks and planes fit as before; the body turns about them.
   void adoptMounting(const SE3& T_I_C);
   /// The front end knows better what its depth camera reads too long or its intrinsics get wrong: holds for features,
-  /// readings and depth points on planes of all keyframes but those of a stored map. Landmarks, planes and poses are left
-  /// to the next optimisation.
+  /// readings and depth points on planes of all keyframes but those of a stored map. Landmarks, planes and poses are
+  /// left to the next optimisation.
   void adoptCameraCorrection(const CameraCorrection& correction);
   /// The front end knows better what its gyro gets wrong: the IMU factors of all keyframes but those of a stored map
   /// are integrated anew.

@@ -46,6 +46,10 @@ struct BuilderSettings {
 
 BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings);
 
+/// Per plane of a problem, whether some factor holds it. Others have only the prior of their kind, or nothing: where a
+/// window saw them but none of its depth was believed.
+std::vector<char> heldPlanes(const BaProblem& problem);
+
 /// Writes the optimised variables back. Landmarks that are no variables follow: plane points are intersected with their
 /// plane, single views move with their keyframe. Keyframes that are gone meanwhile are skipped.
 void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);

@@ -26,9 +26,9 @@ class Relocaliser {
   std::optional<Relocalisation> relocalise(const Map& map, const LoopCloser& places, const KeyframePtr& keyframe,
                                            const std::function<bool(KeyframeId)>& allowed = {},
                                            std::string* reason = nullptr);
-  /// From a predicted pose: the landmarks around it are looked for at once.
+  /// From a predicted pose: the landmarks around it are looked for at once, at the nearest of the keyframes allowed.
   std::optional<Relocalisation> track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
-                                      const SE3& T_W_I) const;
+                                      const SE3& T_W_I, const std::function<bool(KeyframeId)>& allowed = {}) const;
   /// Forgets the keyframes before (another map, another odometry).
   void clear() { search_.clear(); }
 

@@ -42,6 +42,7 @@ struct MapUpdate {
   double t = 0;                ///< stamp of the newest keyframe in it
   std::uint32_t epoch = 0;     ///< epoch that T_map_odom belongs to
   SE3 T_map_odom;
+  bool placed = true;  ///< false: where that epoch lies in the map is a guess, until a loop or relocalisation tells
   KeyframeId newest_keyframe = 0;
   DepthCurve depth_curve;                         ///< what the map has found out about the depth camera
   double disparity_error = 0;                     ///< 1/m, what part of depth_curve is there for; see disparity_curve.h

@@ -29,6 +29,9 @@ class Initialiser {
   std::optional<FilterPrior> add(const InitialisationInput& image, const ImuBuffer& imu);
   /// Why it is still waiting.
   const std::string& reason() const { return reason_; }
+  /// What is known of them by now, instead of the configuration: T_I_C, and of the gyro as in
+  /// core/imu/gyro_correction.h.
+  void setMounting(const SE3& T_I_C, const Eigen::Matrix3d& gyro_correction);
   void reset();
 
  private:
@@ -41,6 +44,7 @@ class Initialiser {
   FilterOptions filter_;
   ImuNoise noise_;
   SE3 T_I_C_;
+  Eigen::Matrix3d gyro_correction_ = Eigen::Matrix3d::Zero();
   double focal_, gravity_;
   DepthNoise depth_noise_;
   bool weighs_wrong_ = false;  ///< at rest, and not with a body's weight: no start is possible

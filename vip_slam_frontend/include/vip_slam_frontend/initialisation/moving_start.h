@@ -25,6 +25,7 @@ struct MovingStart {
 };
 
 MovingStart solveMovingStart(const std::vector<TimedCameraPose>& poses, const ImuBuffer& imu, const SE3& T_I_C,
-                             const ImuNoise& noise, const FilterOptions& options, double gravity);
+                             const ImuNoise& noise, const FilterOptions& options, double gravity,
+                             const Eigen::Matrix3d& gyro_correction = Eigen::Matrix3d::Zero());
 
 }  // namespace vip_slam
