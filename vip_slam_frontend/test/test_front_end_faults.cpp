@@ -173,6 +173,23 @@ TEST_F(FrontEndTest, WithoutDepthLostIsLeftAsWell) {
   EXPECT_GT(keyframes_.size(), before);
 }
 
+// A hall: depth reaches the floor, which shows nothing, and what shows something lies beyond its reach.
+TEST_F(FrontEndTest, WhereDepthLiesOnSurfacesAloneLostIsLeft) {
+  run(0.0, 3.0);
+  FrameOutput output = run(3.0, 9.0, true, false);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
+  for (int k = 180; k < 195; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t);
+    cv::Mat image = world_.image(t), depth = World::cornerDepth(t);
+    image.rowRange(120, 240).setTo(90);
+    depth.rowRange(0, 125).setTo(0);
+    output = front_end_.process({t, image, depth});
+  }
+  EXPECT_NE(output.frame->status.state, TrackingState::kLost) << output.frame->status.reason;
+  EXPECT_EQ(output.frame->epoch, 0u);
+}
+
 TEST_F(FrontEndTest, WhatIsSaidIsLostAsLongAsNoKeyframesCome) {
   FrontEndOptions few = options();
   few.tracking.max_features = 15;  // enough to go on with, too few to trust after LOST

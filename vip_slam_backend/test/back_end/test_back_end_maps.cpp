@@ -160,6 +160,33 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   EXPECT_TRUE(back_end.snapshot().localised.empty());
 }
 
+TEST(BackEndMaps, APartThatNothingTiesToTheMapIsNeitherPlacedNorLocalisedIn) {
+  SimulatedKeyframes world(4), again(4), other(9), other_again(9);
+  BackEnd back_end(options("vip"), world.sensor());
+  const auto anew = [&back_end](SimulatedKeyframes* place, std::uint32_t epoch, int count) {
+    MapUpdate update;
+    for (int k = 0; k < count; ++k) {
+      auto kf = std::make_shared<Keyframe>(*place->next());
+      kf->id += 1000 * epoch;
+      kf->previous = k == 0 ? 0 : kf->id - 1;
+      kf->frame.epoch = epoch;
+      for (Feature& f : kf->frame.features) f.id += 1000000 * LandmarkId(epoch);
+      update = back_end.addKeyframe(kf);
+      EXPECT_EQ(back_end.lastRefusal(), "");
+    }
+    return update;
+  };
+  EXPECT_TRUE(anew(&world, 0, 25).placed);
+  const MapUpdate lost = anew(&other, 1, 15);
+  EXPECT_EQ(lost.epoch, 1u);
+  EXPECT_FALSE(lost.placed);
+  back_end.setLocalisationMode(true);
+  EXPECT_FALSE(anew(&other_again, 2, 15).placed);
+  EXPECT_TRUE(back_end.snapshot().localised.empty());
+  EXPECT_TRUE(anew(&again, 3, 25).placed);
+  EXPECT_FALSE(back_end.snapshot().localised.empty());
+}
+
 // What the plane module had to say when localisation was switched on it says only once.
 TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   SimulatedKeyframes world(4);
