@@ -184,6 +184,21 @@ TEST(LoopCloser, TheMapStaysWhenAFragmentIsFoundAgain) {
   EXPECT_EQ(checkMap(map), "");
 }
 
+// As after a while of localisation that found nothing: the odometry drifted, and nothing of the way is in the map.
+TEST(LoopCloser, AHoleInTheOdometryIsNoStiffEdge) {
+  RingWorld world;
+  Map map;
+  std::vector<SE3> truth;
+  world.walk(map, 1.15, 0.32, &truth);
+  for (KeyframeId id = 12; id < 88; ++id) map.removeKeyframe(id, ImuNoise(), 30.0);
+  ASSERT_EQ(0u, map.keyframe(88).previous);
+  LoopCloser closer(LoopOptions(), world.camera());
+  EXPECT_FALSE(closeAll(closer, map).empty());
+  const SE3 T_first_last = truth.front().inverse() * truth.back();
+  const SE3 estimate = map.keyframe(1).state.T_W_I.inverse() * map.keyframe(map.newestKeyframe()).state.T_W_I;
+  EXPECT_LT((estimate.t() - T_first_last.t()).norm(), 0.1);
+}
+
 TEST(LoopCloser, TwoRunsGiveTheSameBits) {
   const auto run = [] {
     RingWorld world;

@@ -148,7 +148,7 @@ int main(int argc, char** argv) {
                              "Runs VIP-SLAM over a bag, as fast as the machine allows; two runs give the same bits.");
   Arguments arguments;
   addArguments(line, arguments);
-  if (const auto status = line.parse(argc, argv)) return *status;
+  if (const auto status = line.parse(argc, argv)) return *status == 0 ? 0 : 1;  // 2 tells of the bag
   std::signal(SIGINT, [](int) { g_interrupted = 1; });
   std::signal(SIGTERM, [](int) { g_interrupted = 1; });
   // The pipeline has its own threads, one for each core; OpenCV's would only stand in their way.
