@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include <opencv2/features2d.hpp>
@@ -15,26 +16,48 @@ constexpr std::size_t kMostPatches = 8000;
 constexpr int kMostPerImage = 60;
 // A corner detected anew may lie this far from where the old track saw it, px.
 constexpr double kCornerOffset = 3.0;
+constexpr double kNearest = 0.2, kFarthest = 15.0;  // m along the optical axis
+
+// Length of the longest ray of the image with unit depth; infinite for a lens that has none at its corners.
+double longestRay(const CameraModel& camera) {
+  double longest = 1;
+  for (int corner = 0; corner < 4; ++corner) {
+    const Eigen::Vector2d uv((corner & 1) * (camera.width() - 1), (corner >> 1) * (camera.height() - 1));
+    Eigen::Vector2d xy;
+    if (!camera.undistort(uv, &xy)) return std::numeric_limits<double>::infinity();
+    longest = std::max(longest, std::sqrt(1 + xy.squaredNorm()));
+  }
+  return longest;
+}
 
 }  // namespace
 
 LandmarkMatcher::LandmarkMatcher(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera)
-    : options_(options), camera_(std::move(camera)) {}
+    : options_(options), camera_(std::move(camera)), reach_(std::min(1e4, kFarthest * longestRay(*camera_))) {}
 
 void LandmarkMatcher::clear() {
   landmarks_.clear();
+  index_.clear();
   patches_.clear();
 }
 
 void LandmarkMatcher::apply(const MapUpdate& update) {
-  if (update.global) landmarks_.clear();  // it tells of all; what it does not tell of is of another map
-  for (const LandmarkEstimate& l : update.landmarks) landmarks_[l.id] = {l.p_W, l.observations, l.descriptor};
+  if (update.global) {  // it tells of all; what it does not tell of is of another map
+    landmarks_.clear();
+    index_.clear();
+  }
+  for (const LandmarkEstimate& l : update.landmarks) {
+    landmarks_[l.id] = {l.p_W, l.observations, l.descriptor};
+    index_.put(l.id, l.p_W);
+  }
   for (LandmarkId id : update.removed_landmarks) {
     landmarks_.erase(id);
+    index_.remove(id);
     patches_.erase(id);
   }
   for (const auto& merge : update.merged_landmarks) {
     landmarks_.erase(merge.first);
+    index_.remove(merge.first);
     patches_.erase(merge.first);
   }
 }
@@ -78,13 +101,14 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   };
   std::vector<Visible> visible;
   const SE3 T_C_map = T_map_C.inverse();
-  for (const auto& item : landmarks_) {
-    if (item.second.observations < 3 || tracked.count(item.first)) continue;
-    const Eigen::Vector3d p_C = T_C_map * item.second.p_map;
+  for (const LandmarkId id : index_.around(T_map_C.t(), reach_)) {
+    const Entry& entry = landmarks_.at(id);
+    if (entry.observations < 3 || tracked.count(id)) continue;
+    const Eigen::Vector3d p_C = T_C_map * entry.p_map;
     Eigen::Vector2d uv;
-    if (p_C.z() < 0.2 || p_C.z() > 15.0 || !tracker->camera().project(p_C, &uv)) continue;
+    if (p_C.z() < kNearest || p_C.z() > kFarthest || !tracker->camera().project(p_C, &uv)) continue;
     if (!camera_->inImage(uv, options_.border + options_.landmark_radius_px) || !tracker->allowed(uv)) continue;
-    if (free(uv, options_.min_distance)) visible.push_back({item.first, &item.second, uv, p_C.z()});
+    if (free(uv, options_.min_distance)) visible.push_back({id, &entry, uv, p_C.z()});
   }
   std::stable_sort(visible.begin(), visible.end(),
                    [](const Visible& a, const Visible& b) { return a.entry->observations > b.entry->observations; });

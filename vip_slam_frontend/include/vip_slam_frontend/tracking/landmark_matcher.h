@@ -5,10 +5,12 @@
 
 #include <map>
 #include <memory>
+#include <unordered_map>
 #include <vector>
 
 #include "vip_slam_core/types/map_update.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
+#include "vip_slam_frontend/tracking/landmark_index.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
 
 namespace vip_slam {
@@ -41,7 +43,9 @@ class LandmarkMatcher {
   };
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;
-  std::map<LandmarkId, Entry> landmarks_;
+  double reach_;  ///< m from the camera to the corners of its view, as far as landmarks are looked for
+  std::unordered_map<LandmarkId, Entry> landmarks_;
+  LandmarkIndex index_;  ///< of landmarks_
   std::map<LandmarkId, Patch> patches_;
 };
 
