@@ -15,6 +15,16 @@ class ResetBarrier {
   void see(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
     take(t, epoch);
+    if (epoch >= epoch_) {
+      behind_ = 0;
+    } else if (++behind_ >= kBehind) {
+      // Not a late message: a front end that was loaded anew counts its epochs from the beginning. Keyframes tell
+      // nothing of it, they may wait in a queue.
+      t_ = t;
+      epoch_ = epoch;
+      has_keyframe_ = raised_ = false;
+      behind_ = 0;
+    }
   }
   void seeKeyframe(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -56,13 +66,6 @@ class ResetBarrier {
       has_keyframe_ = false;
     } else if (epoch == epoch_) {
       t_ = std::max(t_, t);
-      behind_ = 0;
-    } else if (++behind_ >= kBehind) {
-      // Not a late message: a front end that was loaded anew counts its epochs from the beginning.
-      t_ = t;
-      epoch_ = epoch;
-      has_keyframe_ = raised_ = false;
-      behind_ = 0;
     }
     seen_ = true;
   }
@@ -71,7 +74,7 @@ class ResetBarrier {
   bool seen_ = false, raised_ = false;
   bool has_keyframe_ = false;     ///< of epoch_
   bool epoch_ends_ = false;       ///< barrier_epoch_ had keyframes
-  int behind_ = 0;                ///< messages of an earlier epoch than epoch_, one after the other
+  int behind_ = 0;                ///< frames of an earlier epoch than epoch_, one after the other
   double t_ = 0, barrier_t_ = 0;  ///< t_ of epoch_
   std::uint32_t epoch_ = 0, barrier_epoch_ = 0;
 };

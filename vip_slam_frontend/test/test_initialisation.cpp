@@ -164,6 +164,33 @@ TEST(Initialiser, ASteadyMotionIsNoRestHoweverSoonTheViewHasTurnedOver) {
   }
 }
 
+// In the dark the corners are noise: none lasts from one image to the next, or they jump this way and that.
+TEST(Initialiser, NoiseIsNoMotion) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> u(-0.3, 0.3), jump(-0.01, 0.01);
+  ImuNoise noise;
+  for (const int lasts : {1, 4}) {
+    ImuBuffer imu;
+    Initialiser initialiser(InitialisationOptions(), FilterOptions(), noise, SE3(), 480, 9.81, DepthNoise());
+    std::optional<FilterPrior> prior;
+    std::vector<FilterMeasurement> corners(80);
+    double t = 0;
+    for (int k = 0; k < 80 && !prior; ++k) {
+      for (; t <= 0.05 * k + 0.01; t += 0.005) imu.add({t, {0, 0, 0}, {0, -9.81, 0}});
+      InitialisationInput image{0.05 * k, {}};
+      for (int i = 0; i < 80; ++i) {
+        const bool fresh = k % lasts == 0;
+        corners[i].id = 1 + i + 100 * (k / lasts);
+        corners[i].xy = fresh ? Eigen::Vector2d(u(random), u(random))
+                              : Eigen::Vector2d(corners[i].xy + Eigen::Vector2d(jump(random), jump(random)));
+      }
+      image.features = corners;
+      prior = initialiser.add(image, imu);
+    }
+    EXPECT_TRUE(prior && prior->standing) << lasts << ": " << initialiser.reason();
+  }
+}
+
 // A slow steady turn is quiet to the IMU, and a bare wall has no features that could tell.
 TEST(Initialiser, BeforeABareWallTheDepthTellsWhetherItStands) {
   ImuNoise noise;

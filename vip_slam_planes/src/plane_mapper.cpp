@@ -119,6 +119,7 @@ void PlaneMapper::Impl::clear() {
   points_.clear();
   evidence_.clear();
   strips_.clear();
+  open_gaps_.clear();
   published.clear();
   merges_.clear();
   removed_.clear();

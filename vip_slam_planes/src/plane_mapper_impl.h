@@ -9,6 +9,7 @@
 #include "vip_slam_planes/detection/strip_evidence.h"
 #include "vip_slam_planes/epochs/epoch_groups.h"
 #include "vip_slam_planes/growth/plane_track.h"
+#include "vip_slam_planes/merging/gap_view.h"
 #include "vip_slam_planes/mesh/depth_mesh.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
 #include "vip_slam_planes/plane_mapper.h"
@@ -81,6 +82,7 @@ class PlaneMapper::Impl {
   PointAssociation points_;
   PlaneEvidence evidence_;
   StripEvidence strips_;
+  OpenGaps open_gaps_;
 
   std::map<KeyframeId, KeyframePtr> waiting_;  ///< not placed yet
   std::map<KeyframeId, KeyframePtr> placed_;   ///< processed keyframes that the map still has

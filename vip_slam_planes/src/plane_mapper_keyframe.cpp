@@ -158,7 +158,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
 void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
   // Each merge may bring further planes together; every one removes a plane, so this ends.
   std::set<PlaneId> open(changed.begin(), changed.end());
-  const SceneView view{placed_, poses_, *camera, noise, options.support.see_through};
+  const SceneView view{placed_, poses_, *camera, noise, options.support.see_through, open_gaps_};
   while (!open.empty()) {
     const PlaneId id = *open.begin();
     open.erase(open.begin());
@@ -200,6 +200,7 @@ void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
   into.absorb(from, poses_);
   refit(&into);
   points_.renamePlane(from_id, into_id);
+  open_gaps_.rename(from_id, into_id);
   into.takes_points = false;  // those that waited for the other one
   tracks_.erase(from_id);
   ++counters.planes_merged;
@@ -215,6 +216,7 @@ void PlaneMapper::Impl::removePlane(PlaneId id) {
     ++counters.planes_removed;
   }
   points_.removePlane(id);
+  open_gaps_.remove(id);
   tracks_.erase(it);
 }
 

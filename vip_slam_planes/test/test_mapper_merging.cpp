@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "rig.h"
+#include "vip_slam_planes/merging/gap_view.h"
 
 namespace vip_slam {
 namespace {
@@ -337,6 +338,38 @@ TEST(Mapper, ACounterGoesOnBehindACupboardButNotAcrossAnAisle) {
     for (const PlaneEstimate& p : rig.mapper.planes()) counters += p.plane.n.z() > 0.9 && p.plane.d < -0.5;
     EXPECT_EQ(c.counters, counters) << (c.cupboard ? "cupboard" : "aisle") << ", step " << c.step;
   }
+}
+
+// Two desks of one height, seen so flat that one hardly looks between them; then, from above, between them.
+TEST(Mapper, DesksSeenFromAfarStayTwo) {
+  for (const double x : {0.0, -1.5}) {  // at 82 and 85 degrees from upright
+    Rig rig(0.3);
+    Scene scene;
+    scene.add({3, -1.8, 0.75}, {0.8, 0, 0}, {0, 1.4, 0});
+    scene.add({3, 0.4, 0.75}, {0.8, 0, 0}, {0, 1.4, 0});
+    scene.add({-3, -4, 0}, {9, 0, 0}, {0, 8, 0});
+    scene.add({6, -4, 0}, {0, 8, 0}, {0, 0, 2.6});
+    for (int i = 0; i < 6; ++i) rig.look(scene, {x + 0.1 * i, 0.05 * i, 1.2}, {3.4, 0, 0.75});
+    for (int i = 0; i < 3; ++i) rig.look(scene, {2.2, 0.1 * i - 0.1, 1.7}, {3.4, 0, 0.75});
+    int desks = 0;
+    for (const PlaneEstimate& p : rig.mapper.planes()) desks += p.plane.n.z() > 0.9 && p.plane.d < -0.5;
+    EXPECT_EQ(2, desks) << x;
+  }
+}
+
+TEST(OpenGaps, GoWithTheirPlanes) {
+  OpenGaps gaps;
+  gaps.add(5, 2);
+  gaps.add(7, 5);
+  EXPECT_TRUE(gaps.has(2, 5));
+  gaps.rename(5, 3);
+  EXPECT_FALSE(gaps.has(2, 5));
+  EXPECT_TRUE(gaps.has(3, 2));
+  EXPECT_TRUE(gaps.has(3, 7));
+  gaps.rename(3, 2);  // what had been seen apart was one all the same
+  EXPECT_TRUE(gaps.has(2, 7));
+  gaps.remove(7);
+  EXPECT_FALSE(gaps.has(2, 7));
 }
 
 TEST(Mapper, BothFacesOfAThinWallAreTwo) {

@@ -1,5 +1,6 @@
 // Loop closing within the back end.
 #include <cmath>
+#include <map>
 
 #include "back_end_impl.h"
 
@@ -14,7 +15,8 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
   const KeyframeId id = map.newestKeyframe();
   loop_closer.add(map, id);
   if (!options.loop_closing) return;
-  const SE3 before = map.keyframe(id).state.T_W_I;
+  std::map<KeyframeId, SE3> before;  // which part moves where two come together is for the loop closer to say
+  for (const auto& entry : map.keyframes()) before.emplace(entry.first, entry.second.state.T_W_I);
   for (const LoopEvent& event : loop_closer.close(map, id)) {
     (event.accepted ? statistics.loops_accepted : statistics.loops_rejected) += 1;
     loops.push_back(event);
@@ -24,10 +26,12 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
     fillGlobal(update);
     // A loop that moves next to nothing can wait: the room that is seen again and again must not cost an adjustment of
     // everything each time.
-    const SE3 moved = before.inverse() * map.keyframe(id).state.T_W_I;
+    const auto moved_far = [&](KeyframeId end) {
+      const SE3 &then = before.at(end), &now = map.keyframe(end).state.T_W_I;
+      return (then.inverse() * now).t().norm() > 0.02 || then.rotation().angularDistance(now.rotation()) > 0.005;
+    };
     const double t = map.keyframe(id).data->frame.t;
-    const bool far =
-        moved.t().norm() > 0.02 || before.rotation().angularDistance(map.keyframe(id).state.T_W_I.rotation()) > 0.005;
+    const bool far = moved_far(id) || moved_far(event.match);
     if (far) ++correction;  // small ones may follow each other faster than an adjustment takes: they leave it valid
     if (far || std::abs(t - last_global) > kRestSeconds) {  // stamps run back where a bag starts over
       global_wanted = true;

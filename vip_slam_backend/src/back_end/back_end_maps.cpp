@@ -52,7 +52,10 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, const std::function<b
 
 bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
-  if (!findInMap(keyframe, {}, &found)) {
+  // A part of the map that nothing ties to it lies there by a guess.
+  const std::set<KeyframeId> part = referencePart(map, loop_closer.loops());
+  if (!findInMap(
+          keyframe, [&part](KeyframeId id) { return part.count(id) != 0; }, &found)) {
     held.push_back(keyframe);
     if (held.size() > kMostWaitingKeyframes) held.pop_front();
     return false;

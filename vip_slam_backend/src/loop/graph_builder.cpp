@@ -97,9 +97,16 @@ std::set<KeyframeId> referencePart(const Map& map, const std::vector<std::pair<K
     part.stored = part.stored || keyframe.stored;
   }
   if (parts.empty()) return {};
-  const auto lesser = [](const auto& a, const auto& b) {
-    const Part &p = a.second, &q = b.second;
-    return std::make_tuple(p.stored, p.keyframes, q.oldest) < std::make_tuple(q.stored, q.keyframes, p.oldest);
+  constexpr std::size_t kFragment = 10;  // times as large as what is a mere fragment beside it
+  std::size_t largest = 0;
+  for (const auto& entry : parts) largest = std::max(largest, entry.second.keyframes);
+  const auto lesser = [largest](const auto& a, const auto& b) {
+    const auto rank = [largest](const Part& part) {
+      return std::make_tuple(part.stored,
+                             part.stored ? part.keyframes : std::size_t(kFragment * part.keyframes >= largest));
+    };
+    const auto p = rank(a.second), q = rank(b.second);
+    return p != q ? p < q : a.second.oldest > b.second.oldest;
   };
   return connectedKeyframes(map, std::max_element(parts.begin(), parts.end(), lesser)->second.oldest, loops);
 }

@@ -14,23 +14,39 @@ namespace {
 constexpr double kWatched = 0.5;         // share of the standing time that images have to cover
 constexpr double kMostTurn = 0.3;        // rad/s, of a gyro that stands: its bias
 constexpr double kMostOffGravity = 1.5;  // m/s^2, of an accelerometer that stands
+constexpr int kFewestCommon = 5;         // features
 constexpr double kDepthMoved = 2.0;      // sigmas, and times what changes from one image to the next
+
+// f(xy in a, xy in b) of features common to both; their number.
+template <class F>
+int forCommon(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b, F f) {
+  // Both lists are small; ids ascend within neither, so look each one up.
+  std::map<LandmarkId, Eigen::Vector2d> first;
+  for (const FilterMeasurement& m : a) first[m.id] = m.xy;
+  int count = 0;
+  for (const FilterMeasurement& m : b) {
+    const auto it = first.find(m.id);
+    if (it == first.end()) continue;
+    f(it->second, m.xy);
+    ++count;
+  }
+  return count;
+}
+
 }  // namespace
 
 double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b,
                      double focal_px) {
   double sum = 0;
-  int count = 0;
-  // Both lists are small; ids ascend within neither, so look each one up.
-  std::map<LandmarkId, Eigen::Vector2d> first;
-  for (const FilterMeasurement& m : a) first[m.id] = m.xy;
-  for (const FilterMeasurement& m : b) {
-    const auto it = first.find(m.id);
-    if (it == first.end()) continue;
-    sum += (it->second - m.xy).norm() * focal_px;
-    ++count;
-  }
-  return count < 5 ? -1.0 : sum / count;
+  const int count =
+      forCommon(a, b, [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) { sum += (p - q).norm() * focal_px; });
+  return count < kFewestCommon ? -1.0 : sum / count;
+}
+
+double meanShift(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b, double focal_px) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  const int count = forCommon(a, b, [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) { sum += q - p; });
+  return count < kFewestCommon ? -1.0 : sum.norm() * focal_px / count;
 }
 
 double depthChange(const DepthGrid& a, const DepthGrid& b, const DepthNoise& noise) {
@@ -93,6 +109,7 @@ void Initialiser::setMounting(const SE3& T_I_C, const Eigen::Matrix3d& gyro_corr
 
 void Initialiser::reset() {
   images_.clear();
+  replaced_in_a_row_ = 0;
   reason_ = "waiting for images and IMU";
 }
 
@@ -140,15 +157,13 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     reason_ = "IMU is quiet: watching whether the image moves";
     return std::nullopt;
   }
-  // When the view has turned over within the second, the oldest one that still shares something with the newest tells.
-  double disparity = -1;
-  for (std::size_t k = oldest; disparity < 0 && k + 1 < images_.size(); ++k)
-    disparity = meanDisparity(images_[k].features, images_.back().features, focal_);
-  if (disparity < 0 && static_cast<int>(images_.back().features.size()) >= options_.min_tracks) {
+  const double disparity = meanDisparity(images_[oldest].features, images_.back().features, focal_);
+  const bool turns_over = disparity < 0 && turnsOver(oldest);
+  if (turns_over && replaced_in_a_row_ > 0) {
     reason_ = "IMU is quiet, all that is seen is new: watching whether the image moves";
     return std::nullopt;
   }
-  if (disparity > options_.max_disparity_px) {
+  if (turns_over || disparity > options_.max_disparity_px) {
     reason_ = "IMU is quiet but the image moves: gathering images for a start in motion";
     return std::nullopt;
   }
@@ -157,6 +172,23 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     return std::nullopt;
   }
   return standingPrior(samples, filter_, noise_, gravity_);
+}
+
+// Of a view of which nothing is left after a second: whether it has moved on. What is left of a shorter while tells, by
+// the mean of how all of it moved; the tracks of noise in the dark go this way and that, and end as soon.
+bool Initialiser::turnsOver(std::size_t oldest) {
+  constexpr int kMostReplaced = 5;  // images; where no track lasts from one to the next nothing can be told by them
+  const std::vector<FilterMeasurement>& now = images_.back().features;
+  if (static_cast<int>(now.size()) < options_.min_tracks) return false;
+  for (std::size_t k = oldest + 1; k + 1 < images_.size(); ++k) {
+    const double shift = meanShift(images_[k].features, now, focal_);
+    if (shift < 0) continue;
+    replaced_in_a_row_ = 0;
+    return shift > options_.max_disparity_px;
+  }
+  if (replaced_in_a_row_ >= kMostReplaced) return false;
+  ++replaced_in_a_row_;
+  return true;
 }
 
 bool Initialiser::depthMoved(const InitialisationInput& since) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <vector>
 
@@ -11,7 +12,7 @@ namespace {
 constexpr std::size_t kWays = 8, kPlaces = 12;  // from as many border cells of the smaller piece, on each
 constexpr double kRim = 0.15;                   // m; the rim of a piece is not known better
 constexpr double kOpen = 0.05;                  // share of the places; poses and depth are not exact
-constexpr double kGrazing = 0.25;               // cosine of 75 degrees
+constexpr double kGrazing = 0.1;                // cosine of 84 degrees, as far as level surfaces are looked for
 
 std::vector<Eigen::Vector3d> borderOf(const PlaneTrack& track) {
   std::vector<Eigen::Vector3d> border;
@@ -51,26 +52,46 @@ std::vector<Eigen::Vector3d> placesBetween(const PlaneTrack& small, const PlaneT
   return places;
 }
 
-/// Whether the four nodes around a place's image show nothing in front of it or on the plane: depth behind it, or none.
-/// Not every floor beside a table gives depth.
-bool seesThrough(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3d& n_C, const SceneView& view) {
+enum class Sight { kOutside, kUnsure, kBlocked, kOpen };
+
+// Of the four nodes around a place's image: when none shows anything in front of it or on the plane it is open. Not
+// every floor beside a table gives depth.
+Sight look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3d& n_C, const SceneView& view) {
   Eigen::Vector2d uv;
-  if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kGrazing * p.norm()) return false;
-  if (!view.camera.project(p, &uv) || !view.camera.inImage(uv)) return false;
   int c = 0, r = 0;
-  if (!grid.nodesAround(uv, &c, &r)) return false;
+  if (p.z() <= 0 || !view.camera.project(p, &uv) || !view.camera.inImage(uv) || !grid.nodesAround(uv, &c, &r))
+    return Sight::kOutside;
   const double facing = -n_C.dot(p) / p.z();  // |n . ray|
+  if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kGrazing * p.norm()) return Sight::kUnsure;
   const double slack = (view.see_through + 3 * view.noise.sigma(p.z()) * facing) / facing;
   for (int k = 0; k < 4; ++k) {
     const double z = grid.at(c + (k & 1), r + (k >> 1));
-    if (z > 0 && z <= p.z() + slack) return false;
+    if (z > 0 && z <= p.z() + slack) return Sight::kBlocked;
   }
-  return true;
+  return Sight::kOpen;
 }
 
 }  // namespace
 
-bool gapIsOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneView& view) {
+void OpenGaps::rename(PlaneId from, PlaneId into) {
+  std::vector<PlaneId> beside;
+  for (const auto& pair : pairs_) {
+    if (pair.first == from || pair.second == from) beside.push_back(pair.first == from ? pair.second : pair.first);
+  }
+  remove(from);
+  for (const PlaneId id : beside) {
+    if (id != into) add(id, into);
+  }
+}
+
+void OpenGaps::remove(PlaneId id) {
+  for (auto it = pairs_.begin(); it != pairs_.end();) {
+    it = it->first == id || it->second == id ? pairs_.erase(it) : std::next(it);
+  }
+}
+
+bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneView& view) {
+  if (view.open_gaps.has(small.id(), large.id())) return true;
   std::vector<const Keyframe*> witnesses;
   bool witnessed[2] = {false, false};
   for (const auto& [id, keyframe] : view.keyframes) {
@@ -81,18 +102,22 @@ bool gapIsOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneView
   }
   if (!witnessed[0] || !witnessed[1]) return true;
   const std::vector<Eigen::Vector3d> places = placesBetween(small, large);
-  std::vector<char> open(places.size(), 0);
-  std::size_t count = 0;
+  const double few = kOpen * static_cast<double>(places.size());
+  std::vector<Sight> seen(places.size(), Sight::kOutside);
+  std::size_t open = 0;
   for (const Keyframe* keyframe : witnesses) {
     const SE3 T_C_map = view.poses.at(keyframe->id).inverse();
     const Eigen::Vector3d n_C = T_C_map.rotation() * large.plane().n;
     for (std::size_t k = 0; k < places.size(); ++k) {
-      if (open[k] || !seesThrough(keyframe->frame.depth_grid, T_C_map * places[k], n_C, view)) continue;
-      open[k] = 1;
-      if (++count > kOpen * static_cast<double>(places.size())) return true;
+      if (seen[k] == Sight::kOpen) continue;
+      seen[k] = std::max(seen[k], look(keyframe->frame.depth_grid, T_C_map * places[k], n_C, view));
+      if (seen[k] == Sight::kOpen && ++open > few) {
+        view.open_gaps.add(small.id(), large.id());
+        return true;
+      }
     }
   }
-  return false;
+  return static_cast<double>(open + std::count(seen.begin(), seen.end(), Sight::kUnsure)) > few;
 }
 
 }  // namespace vip_slam

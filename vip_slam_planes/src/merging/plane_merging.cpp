@@ -265,7 +265,7 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
   const bool out_of_reach = between > widest || (meeting.near == 0 && gap <= options.gap);
   if (out_of_reach) {
     apart = 0.5 * options.distance_apart;
-    if (!may_be_hidden || meeting.near > 0 || off > apart || gapIsOpen(small, large, view)) return false;
+    if (!may_be_hidden || meeting.near > 0 || off > apart) return false;
     gap = kHiddenGap;
   }
   const double worst = std::max(meeting.worst_border, meeting.worst_meeting);
@@ -282,9 +282,10 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
   // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
   if (shared > options.overlap && meeting.separation < 0.5 * options.distance) return true;
   if (shared > 2 * options.overlap) return true;
-  if (noise) return true;
+  if (noise && !out_of_reach) return true;
   const double slack = options.max_rms * (ceiling ? kCeilingSlack : 1.0);
-  return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, slack);
+  return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, slack) &&
+         !(out_of_reach && gapMayBeOpen(small, large, view));
 }
 
 }  // namespace vip_slam

@@ -32,8 +32,8 @@ PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<K
 std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,
                                         const std::vector<std::pair<KeyframeId, KeyframeId>>& loops);
 
-/// The part of the map that the others are brought to: the largest of those with stored keyframes, else the largest
-/// one; of two alike the older. Empty for an empty map.
+/// The part of the map that the others are brought to: the largest of those with stored keyframes; else the oldest one
+/// that is no tenth of the largest, so that what others know the map by stays. Empty for an empty map.
 std::set<KeyframeId> referencePart(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops);
 
 }  // namespace vip_slam

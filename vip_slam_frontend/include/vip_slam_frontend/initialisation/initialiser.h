@@ -39,6 +39,7 @@ class Initialiser {
   std::optional<FilterPrior> moving(const ImuBuffer& imu);
   /// From that image to the newest one.
   bool depthMoved(const InitialisationInput& since) const;
+  bool turnsOver(std::size_t oldest);
 
   InitialisationOptions options_;
   FilterOptions filter_;
@@ -48,12 +49,16 @@ class Initialiser {
   double focal_, gravity_;
   DepthNoise depth_noise_;
   bool weighs_wrong_ = false;  ///< at rest, and not with a body's weight: no start is possible
+  int replaced_in_a_row_ = 0;  ///< images that shared nothing with any before them
   std::deque<InitialisationInput> images_;
   std::string reason_ = "waiting for images and IMU";
 };
 
 /// Mean image motion in pixels of features common to both; -1 when fewer than five are.
 double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b, double focal_px);
+
+/// Length of the mean of their motions, likewise: next to nothing when they go this way and that.
+double meanShift(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b, double focal_px);
 
 /// Median change of depth at the grid's pixels, in sigmas of a single reading; -1 when fewer than thirty of them have
 /// depth in both.

@@ -2,7 +2,10 @@
 // behind what stands before it, or beyond the edge of the images, nobody saw.
 #pragma once
 
+#include <algorithm>
 #include <map>
+#include <set>
+#include <utility>
 
 #include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/depth/depth_noise.h"
@@ -11,6 +14,20 @@
 
 namespace vip_slam {
 
+/// Pairs of planes that somebody has looked through between: they stay two when the keyframe that saw it has gone.
+class OpenGaps {
+ public:
+  void add(PlaneId a, PlaneId b) { pairs_.insert(std::minmax(a, b)); }
+  bool has(PlaneId a, PlaneId b) const { return pairs_.count(std::minmax(a, b)) > 0; }
+  /// What was seen beside `from` was seen beside `into`.
+  void rename(PlaneId from, PlaneId into);
+  void remove(PlaneId id);
+  void clear() { pairs_.clear(); }
+
+ private:
+  std::set<std::pair<PlaneId, PlaneId>> pairs_;
+};
+
 /// What it takes to look at a map's planes once more.
 struct SceneView {
   const std::map<KeyframeId, KeyframePtr>& keyframes;
@@ -18,12 +35,14 @@ struct SceneView {
   const CameraModel& camera;
   const DepthNoise& noise;
   double see_through;  ///< metres behind a plane, beyond noise, from which depth counts as behind it
+  OpenGaps& open_gaps;
 };
 
-/// Whether keyframes that show the pieces look through their plane, at more than a few places along the shortest ways
-/// from one piece to the other: within range, from the plane's own side and not at a grazing angle, and depth shows
-/// something behind it or nothing at all. Taken for open when no keyframe shows one of them, as when its map was
-/// loaded.
-bool gapIsOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneView& view);
+/// Whether there may be an opening between two pieces, at more than a few places along the shortest ways from one to
+/// the other. A place is open when a keyframe that shows one of the pieces looks through it: in the image, within
+/// range, not at a grazing angle, and depth shows something behind the plane or nothing at all. One that is in an image
+/// too far away or too flat to tell may be open. Something before it, or the edge of every image, hides it. Taken for
+/// open when no keyframe shows one of the pieces, as when its map was loaded.
+bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneView& view);
 
 }  // namespace vip_slam
