@@ -12,6 +12,8 @@ namespace {
 constexpr std::size_t kWays = 8, kPlaces = 12;  // from as many border cells of the smaller piece, on each
 constexpr double kRim = 0.15;                   // m; the rim of a piece is not known better
 constexpr double kOpen = 0.05;                  // share of the places; poses and depth are not exact
+constexpr double kFlat = 0.25;                  // cosine of 75 degrees
+constexpr double kUnsure = 0.5;                 // share of the places that nothing needs to tell of
 constexpr double kGrazing = 0.1;                // cosine of 84 degrees, as far as level surfaces are looked for
 
 std::vector<Eigen::Vector3d> borderOf(const PlaneTrack& track) {
@@ -64,11 +66,14 @@ Sight look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3
   const double facing = -n_C.dot(p) / p.z();  // |n . ray|
   if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kGrazing * p.norm()) return Sight::kUnsure;
   const double slack = (view.see_through + 3 * view.noise.sigma(p.z()) * facing) / facing;
+  int behind = 0;
   for (int k = 0; k < 4; ++k) {
     const double z = grid.at(c + (k & 1), r + (k >> 1));
     if (z > 0 && z <= p.z() + slack) return Sight::kBlocked;
+    behind += z > 0;
   }
-  return Sight::kOpen;
+  // A surface that is seen flat may give no depth itself.
+  return behind < 4 && -n_C.dot(p) < kFlat * p.norm() ? Sight::kUnsure : Sight::kOpen;
 }
 
 }  // namespace
@@ -117,7 +122,8 @@ bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneV
       }
     }
   }
-  return static_cast<double>(open + std::count(seen.begin(), seen.end(), Sight::kUnsure)) > few;
+  const auto unsure = std::count(seen.begin(), seen.end(), Sight::kUnsure);
+  return static_cast<double>(unsure) > kUnsure * static_cast<double>(places.size());
 }
 
 }  // namespace vip_slam

@@ -38,11 +38,12 @@ struct SceneView {
   OpenGaps& open_gaps;
 };
 
-/// Whether there may be an opening between two pieces, at more than a few places along the shortest ways from one to
-/// the other. A place is open when a keyframe that shows one of the pieces looks through it: in the image, within
-/// range, not at a grazing angle, and depth shows something behind the plane or nothing at all. One that is in an image
-/// too far away or too flat to tell may be open. Something before it, or the edge of every image, hides it. Taken for
-/// open when no keyframe shows one of the pieces, as when its map was loaded.
+/// Whether there may be an opening between two pieces, along the shortest ways from one to the other: more than a few
+/// places are open, or nothing tells of more than half of them. A place is open when a keyframe that shows one of the
+/// pieces looks through it: in the image, within range, and depth shows something behind the plane or, unless it is
+/// seen flat, nothing at all. One that is in an image too far away or too flat tells nothing. Something before it, or
+/// the edge of every image, hides it. Taken for open when no keyframe shows one of the pieces, as when its map was
+/// loaded.
 bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneView& view);
 
 }  // namespace vip_slam
