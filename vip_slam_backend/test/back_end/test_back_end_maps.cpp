@@ -187,6 +187,38 @@ TEST(BackEndMaps, APartThatNothingTiesToTheMapIsNeitherPlacedNorLocalisedIn) {
   EXPECT_FALSE(back_end.snapshot().localised.empty());
 }
 
+// The camera is in the map and comes to a fragment, which is brought there; an adjustment that knew the fragment where
+// it was would put it back.
+TEST(BackEndMaps, AnAdjustmentFromBeforeAFragmentCameToTheMapIsDropped) {
+  SimulatedKeyframes world(4), again(4), other(9), other_again(9);
+  BackEndOptions closing = options("vip");
+  closing.loop_closing = true;
+  BackEnd back_end(closing, world.sensor());
+  const auto add = [&back_end](const KeyframePtr& given, std::uint32_t epoch, bool first) {
+    auto kf = std::make_shared<Keyframe>(*given);
+    kf->id += 1000 * epoch;
+    kf->previous = first ? 0 : kf->id - 1;
+    kf->frame.epoch = epoch;
+    for (Feature& f : kf->frame.features) f.id += 1000000 * LandmarkId(epoch);
+    return back_end.addKeyframe(kf);
+  };
+  for (int k = 0; k < 25; ++k) add(world.next(), 0, k == 0);
+  for (int k = 0; k < 25; ++k) add(other.next(), 1, k == 0);
+  const SE3 guess = back_end.map().keyframe(1010).state.T_W_I;
+  // Back in the map; then what is seen is the fragment's room.
+  bool placed = false;
+  for (int k = 0; k < 14; ++k, other_again.next()) placed = add(again.next(), 2, k == 0).placed;
+  ASSERT_TRUE(placed);
+  const GbaResult late = back_end.run(back_end.startGlobalBa());
+  for (int k = 14; k < 25; ++k) add(other_again.next(), 2, false);
+  const SE3 found = back_end.map().keyframe(1010).state.T_W_I;
+  ASSERT_GT((found.t() - guess.t()).norm(), 0.1);
+  EXPECT_LT((found.t() - world.truth(9 * world.interval()).T_W_I.t()).norm(), 0.1);
+  EXPECT_FALSE(back_end.merge(late).global);
+  EXPECT_EQ(back_end.map().keyframe(1010).state.T_W_I.boxminus(found).norm(), 0.0);
+  EXPECT_TRUE(back_end.globalBaWanted());
+}
+
 // What the plane module had to say when localisation was switched on it says only once.
 TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   SimulatedKeyframes world(4);
