@@ -69,7 +69,7 @@ void BackEndNodelet::advertise() {
   // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
   const auto show = [this](const ros::SingleSubscriberPublisher&) {
     owner_->post(control_lane_, [this] {
-      if (shown_once_) publishDisplay(last_display_, true);
+      if (last_display_ >= 0) publishDisplay(last_display_, true);
     });
   };
   markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("map_markers", 1, show, {}, nullptr, true);
@@ -251,7 +251,6 @@ void BackEndNodelet::distribute(const MapUpdate& update) {
 void BackEndNodelet::publishDisplay(double t, bool now) {
   if (!now && t > last_display_ && t - last_display_ < 1.0 / display_rate_) return;
   last_display_ = t;
-  shown_once_ = true;
   std_msgs::Header header;
   header.stamp = toStamp(t);
   header.frame_id = options_.map_frame;

@@ -81,10 +81,9 @@ class BackEndNodelet : public nodelet::Nodelet {
   // Owned by the thread.
   std::unique_ptr<BackEnd> back_end_;
   MapDisplay display_;
-  double last_display_ = -1e300;
-  bool shown_once_ = false;
-  bool localise_ = false;   ///< as asked for, also before there is a back end
-  bool adjusting_ = false;  ///< a global adjustment is under way
+  double last_display_ = -1e300;  ///< stamp; negative before the first
+  bool localise_ = false;         ///< as asked for, also before there is a back end
+  bool adjusting_ = false;        ///< a global adjustment is under way
   std::thread adjustment_;
 
   DropWatch drops_;  ///< used by diagnostics only

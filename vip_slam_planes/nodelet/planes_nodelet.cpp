@@ -44,7 +44,7 @@ void PlanesNodelet::onInit() {
   // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
   const auto show = [this](const ros::SingleSubscriberPublisher&) {
     owner_->post(control_lane_, [this] {
-      if (shown_once_) publishMap(last_display_, true);
+      if (last_display_ >= 0) publishMap(last_display_, true);
     });
   };
   cloud_pub_ = nh.advertise<sensor_msgs::PointCloud2>("plane_cloud", 1, show, {}, nullptr, true);
@@ -144,7 +144,6 @@ void PlanesNodelet::publishMap(double t, bool now) {
       boost::make_shared<vip_slam_msgs::PlaneMap>(toPlaneMapMsg(mapper_->planes(), t, revision_, options_.map_frame)));
   if (!now && t > last_display_ && t - last_display_ < 1.0 / display_rate_) return;
   last_display_ = t;
-  shown_once_ = true;
   std_msgs::Header header;
   header.stamp = toStamp(t);
   header.frame_id = options_.map_frame;

@@ -70,8 +70,9 @@ struct BackEnd::Impl {
   // back_end_maps.cpp
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);
-  /// `allowed`: keyframes that it may be found at; empty: all.
-  bool findInMap(const KeyframePtr& keyframe, const std::function<bool(KeyframeId)>& allowed, Relocalisation* found);
+  /// The keyframes that another one may be found at.
+  std::function<bool(KeyframeId)> inReferencePart() const;
+  bool findInMap(const KeyframePtr& keyframe, Relocalisation* found);
   /// Recognises the loaded map; on success the keyframe and those held before it enter it.
   bool enterLoadedMap(const KeyframePtr& keyframe);
   /// Localisation only: T_map_odom follows, the map stays.

@@ -28,11 +28,15 @@ MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
   return update;
 }
 
-bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, const std::function<bool(KeyframeId)>& allowed,
-                              Relocalisation* found) {
+// A part of the map that nothing ties to it lies there by a guess.
+std::function<bool(KeyframeId)> BackEnd::Impl::inReferencePart() const {
+  return [part = referencePart(map, loop_closer.loops())](KeyframeId id) { return part.count(id) != 0; };
+}
+
+bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found) {
   const ScopedTimer timer(log, "backend.relocalise", keyframe->frame.t);
   std::string reason;
-  const auto result = relocaliser.relocalise(map, loop_closer, keyframe, allowed, &reason);
+  const auto result = relocaliser.relocalise(map, loop_closer, keyframe, inReferencePart(), &reason);
   LoopEvent event;
   event.query = keyframe->id;
   event.t = keyframe->frame.t;
@@ -52,10 +56,7 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, const std::function<b
 
 bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
-  // A part of the map that nothing ties to it lies there by a guess.
-  const std::set<KeyframeId> part = referencePart(map, loop_closer.loops());
-  if (!findInMap(
-          keyframe, [&part](KeyframeId id) { return part.count(id) != 0; }, &found)) {
+  if (!findInMap(keyframe, &found)) {
     held.push_back(keyframe);
     if (held.size() > kMostWaitingKeyframes) held.pop_front();
     return false;
@@ -80,14 +81,12 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
 }
 
 void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
-  // A part of the map that nothing ties to it lies there by a guess.
-  const std::set<KeyframeId> part = referencePart(map, loop_closer.loops());
-  const auto allowed = [&part](KeyframeId id) { return part.count(id) != 0; };
   const bool known = !searching && keyframe->frame.epoch == epoch;
   std::optional<Relocalisation> found;
-  if (known) found = relocaliser.track(map, loop_closer, *keyframe, T_map_odom * keyframe->frame.state.T_W_I, allowed);
+  const SE3 predicted = T_map_odom * keyframe->frame.state.T_W_I;
+  if (known) found = relocaliser.track(map, loop_closer, *keyframe, predicted, inReferencePart());
   Relocalisation place;
-  if (!found && findInMap(keyframe, allowed, &place)) found = place;
+  if (!found && findInMap(keyframe, &place)) found = place;
   if (!found) return;
   searching = false;
   epoch = keyframe->frame.epoch;

@@ -106,6 +106,36 @@ TEST(LoopCloser, IdenticalBaysMakeNoLoop) {
                              << loops.front().match << ": " << loops.front().reason;
 }
 
+/// A walk of `count` keyframes round the ring, `step` radians each, in an odometry of its own whose place in the map is
+/// `guess` until a loop tells. The id of the last keyframe.
+KeyframeId walkAnew(RingWorld& world, LoopCloser& closer, Map& map, KeyframeId first, std::uint32_t epoch, double from,
+                    double step, int count, const SE3& guess) {
+  KeyframeId previous = 0;
+  SE3 T_map_odom;
+  for (int k = 0; k < count; ++k) {
+    const KeyframeId id = first + static_cast<KeyframeId>(k);
+    const SE3 T = world.truth(from + step * k);
+    const LandmarkId tracks = 1000000 * LandmarkId(epoch);
+    auto kf = std::make_shared<Keyframe>(*world.see(id, 0.5 * static_cast<double>(id), T, guess * T, tracks));
+    kf->frame.epoch = epoch;
+    kf->previous = previous;
+    previous = kf->id;
+    NavState state = kf->frame.state;
+    state.T_W_I = T_map_odom * guess * T;
+    map.addKeyframe(kf, state, ImuNoise());
+    world.addLandmarks(map, *kf);
+    closer.add(map, kf->id);
+    closer.close(map, kf->id);
+    T_map_odom = map.keyframe(kf->id).state.T_W_I * (guess * T).inverse();
+  }
+  return previous;
+}
+
+/// Where somebody is put who was carried blindfolded.
+SE3 guessOf(double yaw) {
+  return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(3, -4, 0.5));
+}
+
 TEST(LoopCloser, OdometryThatBeganAnewJoinsWhereOnlyOnePlaceFits) {
   for (const int bays : {1, 6}) {
     RingWorld world(bays);
@@ -114,23 +144,8 @@ TEST(LoopCloser, OdometryThatBeganAnewJoinsWhereOnlyOnePlaceFits) {
     world.walk(map, 0.9, 0.0, &truth);
     LoopCloser closer(LoopOptions(), world.camera());
     closeAll(closer, map);
-    // Carried elsewhere blindfolded: the new part of the map begins at a place and heading that are a guess.
-    const SE3 guess(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(3, -4, 0.5));
-    KeyframeId previous = 0;
-    SE3 T_map_odom;
-    for (int k = 0; k < 12; ++k) {
-      const SE3 T = world.truth(1.0 + 0.05 * k);
-      auto kf = std::make_shared<Keyframe>(*world.see(1000 + k, 900 + 0.5 * k, T, guess * T, 500000));
-      kf->frame.epoch = 1;
-      kf->previous = previous;
-      previous = kf->id;
-      NavState state = kf->frame.state;
-      state.T_W_I = T_map_odom * guess * T;
-      map.addKeyframe(kf, state, ImuNoise());
-      closer.add(map, kf->id);
-      closer.close(map, kf->id);
-      T_map_odom = map.keyframe(kf->id).state.T_W_I * (guess * T).inverse();
-    }
+    const SE3 guess = guessOf(2.0);
+    const KeyframeId previous = walkAnew(world, closer, map, 1000, 1, 1.0, 0.05, 12, guess);
     EXPECT_EQ(checkMap(map), "");
     EXPECT_EQ(closer.tied(map, previous), bays == 1);
     if (bays == 1) {
@@ -151,32 +166,10 @@ TEST(LoopCloser, TheMapStaysWhenAFragmentIsFoundAgain) {
   LoopCloser closer(LoopOptions(), world.camera());
   closeAll(closer, map);
   const SE3 first = map.keyframe(1).state.T_W_I;
-  const auto walk = [&](KeyframeId id, std::uint32_t epoch, double from, int count, const SE3& guess) {
-    KeyframeId previous = 0;
-    SE3 T_map_odom;
-    for (int k = 0; k < count; ++k, ++id) {
-      const SE3 T = world.truth(from + 0.07 * k);
-      const LandmarkId tracks = 1000000 * LandmarkId(epoch);
-      auto kf = std::make_shared<Keyframe>(*world.see(id, 0.5 * static_cast<double>(id), T, guess * T, tracks));
-      kf->frame.epoch = epoch;
-      kf->previous = previous;
-      previous = kf->id;
-      NavState state = kf->frame.state;
-      state.T_W_I = T_map_odom * guess * T;
-      map.addKeyframe(kf, state, ImuNoise());
-      world.addLandmarks(map, *kf);
-      closer.add(map, kf->id);
-      closer.close(map, kf->id);
-      T_map_odom = map.keyframe(kf->id).state.T_W_I * (guess * T).inverse();
-    }
-  };
-  const auto guess = [](double yaw) {
-    return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(3, -4, 0.5));
-  };
-  walk(1000, 1, 2.9, 8, guess(2.0));  // a place that the map does not have
+  walkAnew(world, closer, map, 1000, 1, 2.9, 0.07, 8, guessOf(2.0));  // a place that the map does not have
   EXPECT_GT((map.keyframe(1000).state.T_W_I.t() - world.truth(2.9).t()).norm(), 1.0);
   EXPECT_EQ(0u, referencePart(map, closer.loops()).count(1000));
-  walk(2000, 2, 1.2, 32, guess(-1.0));  // back in the map, then on to that place
+  walkAnew(world, closer, map, 2000, 2, 1.2, 0.07, 32, guessOf(-1.0));  // back in the map, then on to that place
   EXPECT_LT((map.keyframe(1).state.T_W_I.t() - first.t()).norm(), 0.05);
   EXPECT_LT((map.keyframe(2000).state.T_W_I.t() - world.truth(1.2).t()).norm(), 0.1);
   EXPECT_TRUE(closer.tied(map, 1000));

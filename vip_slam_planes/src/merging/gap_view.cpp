@@ -14,7 +14,7 @@ constexpr double kRim = 0.15;                   // m; the rim of a piece is not 
 constexpr double kOpen = 0.05;                  // share of the places; poses and depth are not exact
 constexpr double kFlat = 0.25;                  // cosine of 75 degrees
 constexpr double kUnsure = 0.5;                 // share of the places that nothing needs to tell of
-constexpr double kGrazing = 0.1;                // cosine of 84 degrees, as far as level surfaces are looked for
+constexpr double kFlattest = 0.1;               // cosine of 84 degrees, as far as level surfaces are looked for
 
 std::vector<Eigen::Vector3d> borderOf(const PlaneTrack& track) {
   std::vector<Eigen::Vector3d> border;
@@ -64,7 +64,7 @@ Sight look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3
   if (p.z() <= 0 || !view.camera.project(p, &uv) || !view.camera.inImage(uv) || !grid.nodesAround(uv, &c, &r))
     return Sight::kOutside;
   const double facing = -n_C.dot(p) / p.z();  // |n . ray|
-  if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kGrazing * p.norm()) return Sight::kUnsure;
+  if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kFlattest * p.norm()) return Sight::kUnsure;
   const double slack = (view.see_through + 3 * view.noise.sigma(p.z()) * facing) / facing;
   int behind = 0;
   for (int k = 0; k < 4; ++k) {
