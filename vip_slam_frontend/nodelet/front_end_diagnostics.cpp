@@ -164,10 +164,12 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("images of wrong size or type", c.bad_image);
   status.add("depth of wrong size or type", c.bad_depth);
   status.add("images out of order", shown.pairs.backward + c.bad_stamp);
+  status.add("images that repeat the one before", c.repeated_image);
   status.add("images without IMU", c.imu_missing);
   status.add("IMU samples refused", c.imu_rejected);
   status.add("IMU gaps", c.imu_gaps);
   status.add("IMU samples far off their neighbours, replaced", c.imu_spikes);
+  status.add("shocks that the IMU has missed", c.imu_shocks);
   status.add("times that time ran backwards", shown.time_jumps);
 }
 

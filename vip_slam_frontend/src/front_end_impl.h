@@ -92,6 +92,14 @@ class FrontEnd::Impl {
   bool movedLately(double t_imu) const;
   /// So long that it is time to begin anew.
   bool contradictedForLong(const TrackingResult& tracking, double t) const;
+  /// Remembers when points that stand still last agreed with the IMU.
+  void noteAgreement(const TrackingResult& tracking, double t);
+  /// The pixels of the image before, where something ought to have moved.
+  bool repeatsLastImage(const cv::Mat& gray, double t_imu) const;
+  FrameOutput repeatedImage(double t, double t_imu);
+  /// A blow that clips the accelerometer or falls between its samples changes the velocity unseen, for good. All points
+  /// together show it at once, each alone would be an outlier: then the velocity is what they say, not the IMU's.
+  void admitShock(const TrackingResult& tracking, const ForetoldMotion& foretold, double dt, Propagation* propagation);
   /// `metric`: depth took part, by features or surfaces.
   void judge(const TrackingResult& tracking, bool metric, bool surfaces_hold, double t);
   /// What the position's one sigma has grown by since the last image with enough features, m.
@@ -147,6 +155,9 @@ class FrontEnd::Impl {
   double last_depth_t_ = -1e300;      ///< image with a depth image
   double last_metric_t_ = 0;          ///< image in which depth took part
   double last_points_t_ = 0;          ///< image with points that have depth
+  double last_agreed_t_ = 0;          ///< image whose points agreed with the IMU
+  double doubt_imu_t_ = 0;            ///< image whose points were somewhat off the IMU, or could not tell
+  double shock_imu_t_ = -1e300;       ///< first such after a while without
   int gated_in_a_row_ = 0;
   bool still_ = false;
   SE3 T_map_odom_;

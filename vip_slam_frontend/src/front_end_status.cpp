@@ -6,45 +6,9 @@
 
 namespace vip_slam {
 
-namespace {
-
-// A filter that has just started has not yet shown that its velocity is right, s.
-constexpr double kSettled = 2.0;
-// What walks about pauses, and then follows the camera, for so long, s.
-constexpr double kPauses = 1.0;
-// LOST with everything in view moving against the IMU for so many times the coasting time: the IMU is wrong after all.
-constexpr double kPatience = 2.0;
-// No IMU is worse than its data sheet by this; with axes, signs or units mixed up the factor goes to its limit of 30,
-// while a camera turned by a degree or a delay of 10 ms leave it at 1.
-constexpr double kImplausibleNoise = 10.0;
-
-}  // namespace
-
 double FrontEnd::Impl::coastedSigma() const {
   const double variance = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   return std::sqrt(std::max(0.0, variance - last_good_variance_));
-}
-
-bool FrontEnd::Impl::imuIsContradicted() const { return filter_.imuNoiseScale() > kImplausibleNoise; }
-
-bool FrontEnd::Impl::movedLately(double t_imu) const { return t_imu - moving_imu_t_ < kPauses; }
-
-ForetoldMotion FrontEnd::Impl::foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const {
-  const NavState& from = filter_.nav();
-  ForetoldMotion motion;
-  motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * extrinsics());
-  motion.sigma = propagation.displacementSigma(filter_.covariance());
-  motion.wary = movedLately(propagation.predicted.t);
-  motion.at_rest = stillness_.imuRests();
-  const bool settled = options_.tracking.leave_out_moving && propagation.predicted.t - started_imu_t_ > kSettled;
-  motion.interval = settled && !imu_gap ? propagation.predicted.t - from.t : 0.0;
-  return motion;
-}
-
-bool FrontEnd::Impl::contradictedForLong(const TrackingResult& tracking, double t) const {
-  return tracking.moves_by_itself && phase_ == Phase::kLost &&
-         (t - last_held_t_ > kPatience * options_.recovery.coast_seconds ||
-          coastedSigma() > options_.recovery.max_position_sigma);
 }
 
 void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool surfaces_hold, double t) {

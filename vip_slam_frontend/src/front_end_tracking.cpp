@@ -33,6 +33,7 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
     return unusable(input.t, imu_.empty() ? "no IMU yet" : "the IMU does not cover the image");
   }
   last_image_t_ = input.t;
+  if (filter_.started() && repeatsLastImage(input.gray, t_imu)) return repeatedImage(input.t, t_imu);
   // The tracker keeps images for later comparison; the caller may reuse his.
   const cv::Mat gray = input.gray.clone();
   if (filter_.started()) {
@@ -117,7 +118,9 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   phase_ = Phase::kTracking;
   started_imu_t_ = t_imu;
   status_ = {TrackingState::kTracking, ""};
-  last_good_t_ = last_held_t_ = last_metric_t_ = last_points_t_ = t;
+  last_good_t_ = last_held_t_ = last_metric_t_ = last_points_t_ = last_agreed_t_ = t;
+  doubt_imu_t_ = t_imu;  // the velocity itself has to prove right first
+  shock_imu_t_ = -1e300;
   last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   // The tracks' references were taken under unknown poses: begin them here.
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
@@ -197,7 +200,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     return initialise(t, t_imu, gray, depth_read);
   }
   keyframe_imu_broken_ = keyframe_imu_broken_ || gap;
-  const Propagation propagation = filter_.predict(samples, gap ? kLongGapNoise : 1.0);
+  Propagation propagation = filter_.predict(samples, gap ? kLongGapNoise : 1.0);
   // Without images the IMU carries the pose as it does in the dark, for as long as it tells where.
   if (propagation.displacementSigma(filter_.covariance()) > options_.recovery.max_position_sigma) {
     reset("no image for " + std::to_string(t_imu - from).substr(0, 4) + " s");
@@ -209,9 +212,11 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const SE3 T_odom_C = propagation.predicted.T_W_I * T_I_C;
   const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
-  const TrackingResult tracked = tracker_.track(gray, depth, foretell(propagation, T_odom_C, gap), !coasting, T_odom_C,
-                                                colourRows(propagation.predicted), t);
+  const ForetoldMotion foretold = foretell(propagation, T_odom_C, gap);
+  const TrackingResult tracked =
+      tracker_.track(gray, depth, foretold, !coasting, T_odom_C, colourRows(propagation.predicted), t);
   moving_ = tracked.regions;
+  admitShock(tracked, foretold, t_imu - from, &propagation);
   for (const Track& track : tracker_.ended()) landmarks_.retire(track);
 
   const SurfaceMatches surfaces = matchSurfaces(depth, T_odom_C, t);
@@ -236,6 +241,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const bool all_gated = report.features_gated >= 5 && report.features_used * 5 < report.features_gated;
   gated_in_a_row_ = all_gated ? gated_in_a_row_ + 1 : (report.features_used > 0 ? 0 : gated_in_a_row_);
 
+  noteAgreement(tracked, t);
   const std::string failure = !report.healthy                                          ? "the filter became singular"
                               : filter_.nav().v_W.norm() > options_.recovery.max_speed ? "estimated speed is impossible"
                               : gated_in_a_row_ >= kGatedImages ? "measurements contradict the estimate"

@@ -37,9 +37,11 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
                                                              {"bad_depth", c.bad_depth},
                                                              {"no_depth", c.no_depth},
                                                              {"bad_stamp", c.bad_stamp},
+                                                             {"repeated_image", c.repeated_image},
                                                              {"imu_rejected", c.imu_rejected},
                                                              {"imu_gaps", c.imu_gaps},
                                                              {"imu_spikes", c.imu_spikes},
+                                                             {"imu_shocks", c.imu_shocks},
                                                              {"imu_missing", c.imu_missing},
                                                              {"zero_velocity", c.zero_velocity},
                                                              {"coasting", c.coasting},
@@ -108,6 +110,13 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(
         std::to_string(c.imu_spikes) +
         " single samples of the IMU were far off their neighbours and were replaced by them: errors on its bus?");
+  if (c.imu_shocks > 0)
+    all.push_back(std::to_string(c.imu_shocks) +
+                  " images show a step of the velocity that the IMU has not: shocks beyond its range or rate?");
+  if (c.repeated_image > 0)
+    all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
+                  " images repeat the pixels of the one before under a new stamp and are left out: a camera slower "
+                  "than its topic, or frozen?");
   if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
   if (c.imu_rejected > 0)
     all.push_back(std::to_string(c.imu_rejected) +

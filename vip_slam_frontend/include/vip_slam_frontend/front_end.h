@@ -40,13 +40,15 @@ struct FrameOutput {
 /// Everything that was counted since construction; for diagnostics.
 struct FrontEndCounters {
   std::uint64_t images = 0, keyframes = 0, restarts = 0;
-  std::uint64_t bad_image = 0;     ///< wrong size or type, or empty
-  std::uint64_t bad_depth = 0;     ///< depth of wrong size or type: treated as none
-  std::uint64_t no_depth = 0;      ///< images without depth
-  std::uint64_t bad_stamp = 0;     ///< repeated, backward or non-finite image stamps
-  std::uint64_t imu_rejected = 0;  ///< non-finite, repeated or backward samples
+  std::uint64_t bad_image = 0;       ///< wrong size or type, or empty
+  std::uint64_t bad_depth = 0;       ///< depth of wrong size or type: treated as none
+  std::uint64_t no_depth = 0;        ///< images without depth
+  std::uint64_t bad_stamp = 0;       ///< repeated, backward or non-finite image stamps
+  std::uint64_t repeated_image = 0;  ///< new stamps on the pixels of the image before: not used
+  std::uint64_t imu_rejected = 0;    ///< non-finite, repeated or backward samples
   std::uint64_t imu_gaps = 0;
   std::uint64_t imu_spikes = 0;        ///< single wrong samples, replaced
+  std::uint64_t imu_shocks = 0;        ///< images that showed a step of the velocity which the IMU has not
   std::uint64_t imu_missing = 0;       ///< images not covered by the IMU
   std::uint64_t zero_velocity = 0;     ///< images taken standing still
   std::uint64_t coasting = 0;          ///< images passed on the IMU alone

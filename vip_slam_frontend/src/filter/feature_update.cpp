@@ -53,14 +53,14 @@ double huberWeight(double squared, double threshold) {
 
 }  // namespace
 
-std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool window_full) {
+std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool window_full, bool all) {
   std::vector<Candidate> candidates;
   const CloneId oldest = filter_.window().clones.front().id;
   for (auto& entry : tracks_) {
     const auto& observations = entry.second.observations;
     const bool lost = observations.back().clone != id;
     const bool leaving = window_full && observations.front().clone == oldest;
-    if ((lost || leaving) && observations.size() >= 2) candidates.push_back({&entry.second, lost});
+    if ((lost || leaving || all) && observations.size() >= 2) candidates.push_back({&entry.second, lost});
   }
   // Long tracks say most. Ties go by id, so that two runs agree.
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
@@ -80,7 +80,7 @@ double VioFilter::depthScale() const {
   return depth_noise_.sigma() > kWorseThanModel ? depth_noise_.sigma() : 1.0;
 }
 
-void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, StepReport* report) {
+void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report) {
   const WindowState& window = filter_.window();
   MeasurementNoise noise;
   noise.sigma_xy = noise_.sigma() / focal_;
@@ -97,7 +97,8 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, Ste
     const Triangulation point = triangulate(window, observations, noise);
     if (!point.ok) continue;
     MeasurementNoise row_noise = noise;
-    row_noise.sigma_xy *= options_.pixel_inflation * ownNoise(point);
+    // Points seen from poses that are wrong together leave residuals that are none of their own.
+    row_noise.sigma_xy *= options_.pixel_inflation * (after_step ? 1.0 : ownNoise(point));
     FeatureRows feature = featureRows(window, observations, point.p_W, row_noise);
     const int dof = static_cast<int>(feature.r.size());
     if (dof == 0) continue;

@@ -21,7 +21,25 @@ Eigen::Matrix<double, 15, 1> noiseFloor() {
   return floor;
 }
 
+Matrix15d whitening(const Matrix15d& Q) {
+  const Eigen::LLT<Matrix15d> llt(Q);
+  return llt.matrixL().solve(Matrix15d::Identity());
+}
+
 }  // namespace
+
+void Propagation::admitStep(double dv, double dt) {
+  // At s after the first image, s uniform: dp = dv (dt - s), so E[dp^2] = dv^2 dt^2 / 3 and E[dp dv] = dv^2 dt / 2.
+  const double variance = dv * dv;
+  for (int axis = 0; axis < 3; ++axis) {
+    Q(3 + axis, 3 + axis) += variance * dt * dt / 3.0;
+    Q(6 + axis, 6 + axis) += variance;
+    Q(3 + axis, 6 + axis) += 0.5 * variance * dt;
+    Q(6 + axis, 3 + axis) += 0.5 * variance * dt;
+  }
+  W = whitening(Q);
+  step_admitted = true;
+}
 
 double Propagation::displacementSigma(const Matrix15d& P) const {
   Eigen::Matrix<double, 3, 15> J = Phi.middleRows<3>(3);
@@ -82,8 +100,7 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
     result.Q.topLeftCorner<9, 9>() += 2.0 * stamp_sigma * stamp_sigma * rate * rate.transpose();
   }
   result.Q.diagonal() += noiseFloor().cwiseAbs2();
-  const Eigen::LLT<Matrix15d> llt(result.Q);
-  result.W = llt.matrixL().solve(Matrix15d::Identity());
+  result.W = whitening(result.Q);
   return result;
 }
 

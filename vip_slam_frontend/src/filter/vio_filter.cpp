@@ -49,6 +49,7 @@ void VioFilter::stop() {
   stamp_monitor_.reset();
   imu_monitor_.reset();
   still_images_ = 0;
+  after_step_ = false;
   mark_ = 0;
 }
 
@@ -216,8 +217,11 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const NavState predicted = nav();
   const Matrix15d P_predicted = covariance();
   const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
-  const std::vector<Candidate> candidates = chooseCandidates(id, window_full);
-  if (!candidates.empty()) updateWithFeatures(candidates, &report);
+  // After a step of the velocity only images know it: with the first one that is whole again all tracks are asked.
+  const bool all = after_step_ && !propagation.step_admitted;
+  after_step_ = propagation.step_admitted;
+  const std::vector<Candidate> candidates = chooseCandidates(id, window_full, all);
+  if (!candidates.empty()) updateWithFeatures(candidates, all, &report);
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
   judgeDepthOffset();
   judgeIntrinsics();

@@ -22,6 +22,9 @@ struct Propagation {
   /// there.
   double displacementSigma(const Matrix15d& P) const;
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
+  /// Adds to Q a step of the velocity by `dv` (one sigma of each axis, m/s) at an unknown moment of the `dt` seconds.
+  void admitStep(double dv, double dt);
+  bool step_admitted = false;
 };
 
 /// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.

@@ -105,12 +105,13 @@ class VioFilter {
     bool lost;
   };
   void addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements);
-  std::vector<Candidate> chooseCandidates(CloneId id, bool window_full);
+  /// Tracks that have ended and those that are about to leave the window; `all`: the others as well.
+  std::vector<Candidate> chooseCandidates(CloneId id, bool window_full, bool all);
   /// Factor on the common pixel noise for a feature whose residuals that does not explain: its patch shows something
   /// that is no point (an occluding edge, a reflection). Such patches also wander along with the motion, by much more
   /// than their residuals say: measured against true poses about as the square of them.
   double ownNoise(const Triangulation& point) const;
-  void updateWithFeatures(const std::vector<Candidate>& candidates, StepReport* report);
+  void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
   /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
   /// estimated no more.
@@ -145,6 +146,7 @@ class VioFilter {
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
   bool depth_contradicts_ = false;  ///< its offset went beyond belief
   int still_images_ = 0;            ///< images since the standing began; 0 when moving
+  bool after_step_ = false;         ///< the propagation before admitted a step of the velocity
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none
   std::optional<RelativeMotion> to_mark_;  ///< from the clone that was marked, when mark_ is another by now

@@ -26,6 +26,9 @@ double mostApart(const ForetoldMotion& foretold);
 /// further than mostApart() from the foretold one that explains most.
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded);
 
+/// Whether nearly all points agree with `found`, many of them old: a scene does not begin to move as one.
+bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found);
+
 /// Outliers rejected with both in mind. `options.most_apart` is set here. `moves`: whether what is seen moves by
 /// itself; then only points that agree with the IMU are inliers.
 RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldMotion& foretold, RansacOptions options,

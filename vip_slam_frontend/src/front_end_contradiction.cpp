@@ -1,0 +1,138 @@
+// Images and IMU that contradict each other: images that come again, shocks that the IMU missed, what moves by itself,
+// an IMU that is wrong.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "front_end_impl.h"
+
+namespace vip_slam {
+
+namespace {
+
+// A filter that has just started has not yet shown that its velocity is right, s.
+constexpr double kSettled = 2.0;
+// What walks about pauses, and then follows the camera, for so long, s.
+constexpr double kPauses = 1.0;
+// Everything in view moving against the IMU for so many times the coasting time: the IMU, or the velocity that was made
+// of it, is wrong after all.
+constexpr double kPatience = 2.0;
+// No IMU is worse than its data sheet by this; with axes, signs or units mixed up the factor goes to its limit of 30,
+// while a camera turned by a degree or a delay of 10 ms leave it at 1.
+constexpr double kImplausibleNoise = 10.0;
+// Features that were followed for so many images and have depth show how the camera moves.
+constexpr int kOld = 8;
+// The same pixels may come again while the IMU rests and foretells less image motion than this: what is rendered
+// without noise looks like that when it stands.
+constexpr double kStandsPx = 0.5;
+// The translation between two images may be off the foretold one by four sigmas and this speed and length, or the IMU
+// has missed something. Ordinary images have a tenth of that, and a third at the 98th percentile.
+constexpr double kShockSigmas = 4.0, kShockSpeed = 0.05, kShockLength = 1e-3;
+// A repeated image is no fault for so long, s.
+constexpr double kFrozen = 0.3;
+// A shock shows when so many points tell the same motion, but for one in twenty.
+constexpr int kShockTracks = 30, kShockOutliers = 20;
+// It comes out of the blue: for so long before, images have agreed with a share of that. An IMU or a velocity that is
+// wrong departs little by little. It is over in so much time, s.
+constexpr double kCalm = 0.5, kDoubt = 0.5, kShockLasts = 0.1;
+
+bool sameBytes(const cv::Mat& a, const cv::Mat& b) {
+  if (a.size() != b.size() || a.type() != b.type()) return false;
+  const std::size_t bytes = a.cols * a.elemSize();
+  for (int v = 0; v < a.rows; ++v) {
+    if (std::memcmp(a.ptr(v), b.ptr(v), bytes) != 0) return false;  // ends with the first row, mostly
+  }
+  return true;
+}
+
+}  // namespace
+
+bool FrontEnd::Impl::imuIsContradicted() const { return filter_.imuNoiseScale() > kImplausibleNoise; }
+
+bool FrontEnd::Impl::movedLately(double t_imu) const { return t_imu - moving_imu_t_ < kPauses; }
+
+ForetoldMotion FrontEnd::Impl::foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const {
+  const NavState& from = filter_.nav();
+  ForetoldMotion motion;
+  motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * extrinsics());
+  motion.sigma = propagation.displacementSigma(filter_.covariance());
+  motion.wary = movedLately(propagation.predicted.t);
+  motion.at_rest = stillness_.imuRests();
+  const bool settled = options_.tracking.leave_out_moving && propagation.predicted.t - started_imu_t_ > kSettled;
+  motion.interval = settled && !imu_gap ? propagation.predicted.t - from.t : 0.0;
+  return motion;
+}
+
+bool FrontEnd::Impl::contradictedForLong(const TrackingResult& tracking, double t) const {
+  if (!tracking.moves_by_itself) return false;
+  const double patience = kPatience * options_.recovery.coast_seconds;
+  if (t - last_agreed_t_ > patience) return true;
+  return phase_ == Phase::kLost &&
+         (t - last_held_t_ > patience || coastedSigma() > options_.recovery.max_position_sigma);
+}
+
+void FrontEnd::Impl::noteAgreement(const TrackingResult& tracking, double t) {
+  const std::size_t needed = 2 * static_cast<std::size_t>(options_.recovery.min_tracks);
+  const auto held = [](const Track& track) { return track.feature.depth > 0 && track.feature.age >= kOld; };
+  const auto& tracks = tracker_.tracks();
+  if (still_ || (tracking.moves_by_itself
+                     ? 2 * static_cast<std::size_t>(std::count_if(tracks.begin(), tracks.end(), held)) >= needed
+                     : tracking.pose_ok && tracks.size() >= needed)) {
+    last_agreed_t_ = t;
+  }
+}
+
+bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
+  if (still_ || tracker_.tracks().empty() || !sameBytes(gray, tracker_.gray())) return false;
+  const ZuptOptions& rest = options_.filter.zupt;
+  const double since = std::max(imu_.oldest(), std::min(t_imu - rest.window, filter_.nav().t));
+  if (!imuSpread(imu_.between(since, t_imu), &sensor_.imu_noise).quiet(rest.max_gyro_std, rest.max_accel_std)) {
+    return true;
+  }
+  const std::vector<ImuSample> samples = imu_.between(filter_.nav().t, t_imu);
+  if (samples.size() < 2) return true;
+  const SE3 T_now_then =
+      (filter_.predict(samples).predicted.T_W_I * extrinsics()).inverse() * filter_.nav().T_W_I * extrinsics();
+  std::vector<double> moved;
+  for (const Track& track : tracker_.tracks()) {
+    const Feature& f = track.feature;
+    const Eigen::Vector2d xy = f.xy.cast<double>();
+    const double z = f.depth > 0 ? f.depth : sensor_.depth_noise.max_range;
+    const Eigen::Vector3d p = T_now_then * Eigen::Vector3d(z * xy.x(), z * xy.y(), z);
+    if (p.z() > 0) moved.push_back((p.head<2>() / p.z() - xy).norm() * camera_->focal());
+  }
+  if (moved.empty()) return true;
+  std::nth_element(moved.begin(), moved.begin() + moved.size() / 2, moved.end());
+  return moved[moved.size() / 2] > kStandsPx;
+}
+
+FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {
+  ++counters_.repeated_image;
+  // A camera that is slower than its topic says nothing in between, which is no fault.
+  if (phase_ == Phase::kTracking && t_imu - filter_.nav().t < kFrozen)
+    return statusOnly(t, status_.state, status_.reason);
+  return unusable(t, "the image repeats the one before: has the camera frozen?");
+}
+
+void FrontEnd::Impl::admitShock(const TrackingResult& tracking, const ForetoldMotion& foretold, double dt,
+                                Propagation* propagation) {
+  const double t = propagation->predicted.t;
+  const bool told = foretold.interval > 0 && !foretold.wary && !tracking.moves_by_itself && tracking.pose_ok &&
+                    tracking.tracked >= kShockTracks && kShockOutliers * tracking.lost_outlier <= tracking.tracked;
+  const double apart = (tracking.T_current_previous.t() - foretold.T_current_previous.t()).norm();
+  const double limit = kShockSigmas * foretold.sigma + kShockSpeed * dt + kShockLength;
+  const bool doubtful = apart > kDoubt * limit;
+  if (!told || doubtful) {
+    if (t - doubt_imu_t_ > kCalm) shock_imu_t_ = t;
+    doubt_imu_t_ = t;
+  }
+  // A shock may begin at the end of one interval and show in the next one.
+  const bool begins = doubtful && shock_imu_t_ == t;
+  const bool goes_on = apart > limit && t - shock_imu_t_ <= std::max(kShockLasts, 1.5 * dt);
+  if (!told || !(begins || goes_on)) return;
+  counters_.imu_shocks += apart > limit;
+  propagation->admitStep(apart / dt, dt);
+}
+
+}  // namespace vip_slam
