@@ -234,12 +234,13 @@ Trajectory writeDriverBag(const std::string& path, const DriverBagOptions& o) {
   const CameraIntrinsics rendered = half ? camera.scaled(camera.width / 2, camera.height / 2) : camera;
   Trajectory truth;
   const double rate = o.sensor.color_rate * o.image_rate_factor;
+  cv::Mat grey, depth;
   for (int k = 0; k < end * rate; ++k) {
     const double t = 0.02 + k / rate, t_imu = t + o.sensor.time_offset;
     if (t > end) break;
-    cv::Mat grey, depth;
-    render(room, motion.cameraAt(t_imu), rendered, &grey, &depth);
-    if (half) {
+    const bool again = o.repeat_every > 0 && k % o.repeat_every == o.repeat_every - 1;
+    if (!again) render(room, motion.cameraAt(t_imu), rendered, &grey, &depth);
+    if (half && !again) {
       cv::resize(grey, grey, {camera.width, camera.height}, 0, 0, cv::INTER_LINEAR);
       cv::resize(depth, depth, {camera.width, camera.height}, 0, 0, cv::INTER_LINEAR);
     }

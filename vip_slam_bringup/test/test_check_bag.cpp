@@ -223,6 +223,11 @@ TEST_F(CheckBag, ImagesThatShowNothing) {
   expectFound(checkImages(recording), Severity::kError, "depth image", "every pixel says 1.5 m");
 }
 
+TEST_F(CheckBag, ImagesThatComeAgain) {
+  options_.repeat_every = 5;
+  expectFound(check(), Severity::kWarning, "colour image", "repeat the pixels of the one before");
+}
+
 TEST_F(CheckBag, CalibrationOfTheSensorFile) {
   expected_.intrinsics_from_camera_info = false;
   expectFound(check(), Severity::kError, "camera", "the images are 320x240");

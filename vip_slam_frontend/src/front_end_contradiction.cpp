@@ -2,8 +2,9 @@
 // an IMU that is wrong.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <vector>
+
+#include "vip_slam_core/util/same_pixels.h"
 
 #include "front_end_impl.h"
 
@@ -36,15 +37,6 @@ constexpr int kShockTracks = 30, kShockOutliers = 20;
 // It comes out of the blue: for so long before, images have agreed with a share of that. An IMU or a velocity that is
 // wrong departs little by little. It is over in so much time, s.
 constexpr double kCalm = 0.5, kDoubt = 0.5, kShockLasts = 0.1;
-
-bool sameBytes(const cv::Mat& a, const cv::Mat& b) {
-  if (a.size() != b.size() || a.type() != b.type()) return false;
-  const std::size_t bytes = a.cols * a.elemSize();
-  for (int v = 0; v < a.rows; ++v) {
-    if (std::memcmp(a.ptr(v), b.ptr(v), bytes) != 0) return false;  // ends with the first row, mostly
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -84,7 +76,7 @@ void FrontEnd::Impl::noteAgreement(const TrackingResult& tracking, double t) {
 }
 
 bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
-  if (still_ || tracker_.tracks().empty() || !sameBytes(gray, tracker_.gray())) return false;
+  if (still_ || tracker_.tracks().empty() || !samePixels(gray, tracker_.gray())) return false;
   const ZuptOptions& rest = options_.filter.zupt;
   const double since = std::max(imu_.oldest(), std::min(t_imu - rest.window, filter_.nav().t));
   if (!imuSpread(imu_.between(since, t_imu), &sensor_.imu_noise).quiet(rest.max_gyro_std, rest.max_accel_std)) {

@@ -1,4 +1,5 @@
 // Encodings, sizes, calibration, depth values, colour against depth.
+#include <algorithm>
 #include <cmath>
 
 #include "vip_slam_bringup/preflight/checks.h"
@@ -102,6 +103,23 @@ void checkBrightness(const std::vector<BrightnessSample>& samples, Findings* out
                     "more light or exposure"});
 }
 
+/// Images that come again while the gyro turns; what is rendered without noise may repeat while it stands.
+void checkRepeats(const Recording& r, Findings* out) {
+  constexpr double kTurns = 0.05;  // rad/s
+  constexpr double kShare = 0.01;  // of the images
+  std::size_t turning = 0;
+  for (const double t : r.color.repeated) {
+    const auto later = [](const StampedVector& sample, double at) { return sample.t < at; };
+    const auto near = std::lower_bound(r.gyro_samples.begin(), r.gyro_samples.end(), t, later);
+    turning += near != r.gyro_samples.end() && near->value.norm() > kTurns;
+  }
+  if (turning > kShare * double(r.color.decoded))
+    out->push_back({Severity::kWarning, "colour image",
+                    words("%zu of %zu images repeat the pixels of the one before while the camera moves", turning,
+                          r.color.decoded),
+                    "the camera is slower than its topic, or froze: the repeats are left out"});
+}
+
 void checkDepth(const Recording& r, Findings* out) {
   std::vector<double> valid, usable, middle, spread;
   for (const DepthSample& d : r.depths) {
@@ -148,6 +166,7 @@ Findings checkImages(const Recording& r) {
     checkSensorFileCamera(r, &out);
   checkMask(r, &out);
   checkBrightness(r.brightness, &out);
+  checkRepeats(r, &out);
   if (r.sensor.depth_registered && r.color.sizes.size() == 1 && r.depth.sizes.size() == 1) {
     const auto color = *r.color.sizes.begin(), depth = *r.depth.sizes.begin();
     if (color != depth)

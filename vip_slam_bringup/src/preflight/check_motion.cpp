@@ -81,7 +81,7 @@ Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro
 }
 
 constexpr double kUsefulReadout = 0.003;  // one sigma beyond which rows are left out of account, seconds
-constexpr double kStep = 0.002;  // of the grid of delays, seconds
+constexpr double kStep = 0.002;           // of the grid of delays, seconds
 
 struct Search {
   Fit fit;

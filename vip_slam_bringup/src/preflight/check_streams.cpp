@@ -62,8 +62,8 @@ std::string adviceOnType(const Recording& r, const Wanted& w, const std::string&
   return candidates(r, w);
 }
 
-/// One sigma by which stamps scatter about the instants they stand for, s. A stamp that is late makes the step before it
-/// longer and the one after it shorter by as much; a rate that varies does not.
+/// One sigma by which stamps scatter about the instants they stand for, s. A stamp that is late makes the step before
+/// it longer and the one after it shorter by as much; a rate that varies does not.
 double stampJitter(const std::vector<double>& stamps, double period) {
   constexpr std::size_t kEnough = 50;
   double sum = 0;

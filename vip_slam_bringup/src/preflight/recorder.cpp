@@ -8,6 +8,7 @@
 #include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/imu/gyro_correction.h"
+#include "vip_slam_core/util/same_pixels.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/image_decoding.h"
 
@@ -146,6 +147,12 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
 }
 
 void Recorder::addGray(double t, const cv::Mat& gray) {
+  ++recording_.color.decoded;
+  if (samePixels(gray, newest_gray_)) {
+    recording_.color.repeated.push_back(t);
+    return;  // says nothing of the motion at this time
+  }
+  newest_gray_ = gray;
   if (recording_.color.stamps.size() % 5 == 1) {
     cv::Scalar mean, sigma;
     cv::meanStdDev(gray, mean, sigma);

@@ -49,6 +49,7 @@ class Recorder {
     double t;
     cv::Mat image;
   };
+  cv::Mat newest_gray_;
   std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour waits a moment for its depth
 };
 
