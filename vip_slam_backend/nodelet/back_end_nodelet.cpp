@@ -173,9 +173,11 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
-    if (problem_.empty() && !update.placed && update.newest_keyframe != 0)
+    // Localisation that has not found the new odometry yet goes on answering for the one before.
+    const bool known = update.placed && update.epoch == keyframe->frame.epoch;
+    if (problem_.empty() && !known && update.newest_keyframe != 0)
       problem_ = "the odometry began anew, and its place in the map is not found yet";
-    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_.depth_scale), back_end_->depthDifference(),
+    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_), back_end_->depthDifference(),
                                 back_end_->trackNoiseDifference()};
   }
   distribute(update);

@@ -315,6 +315,15 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("encoding: 32FC1", "encoding: 8UC1", "depth/encoding");
   changed("time_offset: -0.0123", "time_offset: .inf", "time_offset");
   changed("  rate: 25\n", "  rate: 0\n", "color/rate");
+  SensorConfig uncalibrated = sensor();
+  uncalibrated.intrinsics_from_camera_info = true;
+  const auto without = [&](std::string* topic) {
+    topic->clear();
+    saveSensorConfig(path("bad.yaml"), uncalibrated);
+    return [&] { loadSensorConfig(path("bad.yaml")); };
+  };
+  expectRefused(without(&uncalibrated.topics.depth_info), "bad.yaml", "topics/depth_info: missing");
+  expectRefused(without(&uncalibrated.topics.color_info), "bad.yaml", "topics/color_info: missing");
 }
 
 }  // namespace

@@ -77,9 +77,27 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     }
     if (T_imu_cam) sensor_.T_imu_cam = *T_imu_cam;
     if (T_base_imu) sensor_.T_base_imu = *T_base_imu;
+    const auto origin = [](bool from_tf, const std::string& target, const std::string& source) {
+      return from_tf ? "from tf" : "the sensor file's, tf does not connect '" + source + "' to '" + target + "'";
+    };
+    origin_ = "T_imu_cam: " + origin(T_imu_cam.has_value(), imu_frame_, color_frame_) +
+              "; T_base_imu: " + origin(T_base_imu.has_value(), options_.base_frame, imu_frame_);
+    tf_incomplete_ = !(T_imu_cam && T_base_imu);
+  } else {
+    origin_ = "T_imu_cam and T_base_imu: the sensor file's";
   }
   waiting_for_.clear();
   return sensor_;
+}
+
+std::string CalibrationSource::extrinsicsOrigin() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return origin_;
+}
+
+bool CalibrationSource::tfIsIncomplete() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return tf_incomplete_;
 }
 
 std::string CalibrationSource::waitingFor() const {

@@ -26,6 +26,9 @@ class CalibrationSource {
 
   /// The completed configuration, once everything is known at time `t` (stamps, seconds).
   std::optional<SensorConfig> resolve(double t);
+  /// After that: where the extrinsics come from, as a sentence, and whether tf was asked and did not have both.
+  std::string extrinsicsOrigin() const;
+  bool tfIsIncomplete() const;
   /// What is missing, as a sentence; what is wrong with a camera_info that came.
   std::string waitingFor() const;
   std::string colorFrame() const;
@@ -40,7 +43,8 @@ class CalibrationSource {
   const FrontEndNodeOptions options_;
   const tf2::BufferCore& tf_;
   bool color_info_ = false, depth_info_ = false, color_seen_ = false, imu_seen_ = false;
-  std::string color_frame_, imu_frame_, problem_, waiting_for_;
+  std::string color_frame_, imu_frame_, problem_, waiting_for_, origin_;
+  bool tf_incomplete_ = false;
   std::optional<double> asked_since_;  ///< when both frames were known first, s
 };
 

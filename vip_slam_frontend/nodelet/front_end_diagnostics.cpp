@@ -51,9 +51,11 @@ void FrontEndNodelet::tick() {
   // Only images bring a status: before the first one, and when they no longer come, nothing else says why there is no
   // pose.
   bool started;
+  std::string start_problem;
   {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     started = shown_.counters.images > 0;
+    start_problem = shown_.start_problem;
   }
   const double now = ros::Time::now().toSec();
   TrackingStatus waiting{TrackingState::kWaiting, ""};
@@ -66,6 +68,7 @@ void FrontEndNodelet::tick() {
     if (waiting.reason.empty()) waiting.reason = imu_monitor_->complaint(now);
     if (waiting.reason.empty() && !sensor_.topics.accel.empty()) waiting.reason = accel_monitor_->absence(now);
     if (waiting.reason.empty()) waiting.reason = calibration_->waitingFor();
+    if (waiting.reason.empty()) waiting.reason = start_problem;
     if (waiting.reason.empty()) waiting.reason = "the first image waits for its depth and the IMU";
   }
   if (!waiting.reason.empty()) {
@@ -108,6 +111,7 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("jitter of image stamps in use (ms)", 1e3 * c.stamp_sigma);
   status.add("images that contradict the IMU", c.imu_contradicted);
   status.add("camera's delay in use (ms)", 1e3 * shown.mounting.time_offset);
+  status.add("extrinsics", shown.extrinsics);
   for (const std::string& difference : shown.mounting_differences) status.add("calibration", difference);
   status.add("images", c.images);
   status.add("keyframes", c.keyframes);

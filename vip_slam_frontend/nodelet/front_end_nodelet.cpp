@@ -159,11 +159,26 @@ void FrontEndNodelet::startWhenCalibrated() {
   const std::optional<SensorConfig> resolved = calibration_->resolve(clock_->newest());
   if (!resolved) return;
   try {
+    // clock_ has judged the stamps; what it lets pass is no jump.
+    auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.time_jump);
     alignment_ = std::make_unique<DepthAlignment>(*resolved);
-    front_end_ = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr);
+    front_end_ = std::move(front_end);
   } catch (const std::exception& error) {
-    NODELET_ERROR_THROTTLE(5, "sensor '%s': %s", sensor_.name.c_str(), error.what());
+    const std::string problem = "sensor '" + sensor_.name + "': " + error.what();
+    NODELET_ERROR_THROTTLE(5, "%s", problem.c_str());
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown_.start_problem = problem;
     return;
+  }
+  const std::string origin = calibration_->extrinsicsOrigin();
+  if (calibration_->tfIsIncomplete())
+    NODELET_WARN("%s", origin.c_str());
+  else
+    NODELET_INFO("%s", origin.c_str());
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    shown_.start_problem.clear();
+    shown_.extrinsics = origin;
   }
   // Only these are found out; the rest of sensor_ is read by other threads.
   sensor_.camera = resolved->camera;

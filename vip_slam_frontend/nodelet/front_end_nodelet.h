@@ -126,7 +126,9 @@ class FrontEndNodelet : public nodelet::Nodelet {
     double processing = 0;      ///< last image, ms
     std::deque<double> recent;  ///< processing of the last images (a minute of them at 20 Hz), ms
     std::size_t time_jumps = 0;
-    std::string size_problem;  ///< depth that does not fit the colour image, in words
+    std::string start_problem;  ///< why the front end cannot begin with what it was told of the sensor
+    std::string extrinsics;     ///< where they come from
+    std::string size_problem;   ///< depth that does not fit the colour image, in words
   };
   DropWatch drops_;  ///< used by diagnostics only
   int ticks_ = 0;    ///< likewise

@@ -42,6 +42,8 @@ TEST_F(CalibrationSourceTest, ACameraThatStartsLateStillGetsItsExtrinsicsFromTf)
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->T_imu_cam.t().x(), 0.2, 1e-12);
   EXPECT_NEAR(found->T_base_imu.t().x(), 0.1, 1e-12);
+  EXPECT_FALSE(source.tfIsIncomplete());
+  EXPECT_EQ(source.extrinsicsOrigin(), "T_imu_cam: from tf; T_base_imu: from tf");
 }
 
 TEST_F(CalibrationSourceTest, TfMayComeALittleAfterTheFrames) {
@@ -71,6 +73,13 @@ TEST_F(CalibrationSourceTest, WithoutTfTheConfigurationIsTakenInTheEndUnlessTfIs
     const auto late = source.resolve(1 + options_.tf_patience + 0.1);
     EXPECT_EQ(bool(late), from != "tf") << from;
     if (late) EXPECT_EQ(late->T_imu_cam.t().z(), 0.05);
+    EXPECT_EQ(source.tfIsIncomplete(), from == "auto") << from;
+    if (from == "auto") {
+      const std::string origin = source.extrinsicsOrigin();
+      EXPECT_NE(origin.find("T_base_imu: the sensor file's, tf does not connect 'imu' to 'base_link'"),
+                std::string::npos)
+          << origin;
+    }
   }
 }
 

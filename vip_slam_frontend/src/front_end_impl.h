@@ -21,7 +21,7 @@ namespace vip_slam {
 
 class FrontEnd::Impl {
  public:
-  Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing);
+  Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump);
 
   bool addImu(const ImuSample& sample);
   bool addGyro(double t, const Eigen::Vector3d& gyro);
@@ -123,6 +123,7 @@ class FrontEnd::Impl {
 
   SensorConfig sensor_;
   TimingLog* timing_;
+  const double clock_jump_;
   std::shared_ptr<const CameraModel> camera_;
   ImuBuffer imu_;
   cv::Mat masked_;                         ///< not zero where depth is to be left out; empty: nowhere

@@ -14,8 +14,6 @@ namespace vip_slam {
 
 namespace {
 
-// A step back by more than this is a looped bag or a restarted clock, less is a sample out of order.
-constexpr double kClockJump = 1.0;
 // Half a millimetre at a fast walk: depth closer than that to the colour image counts as taken with it, seconds.
 constexpr double kSameInstant = 5e-4;
 
@@ -47,10 +45,11 @@ cv::Mat featureMask(const cv::Mat& mask, int border) {
 
 }  // namespace
 
-FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing)
+FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump)
     : options_(options),
       sensor_(checked(sensor)),
       timing_(timing),
+      clock_jump_(clock_jump),
       camera_(makeCamera(sensor_.camera)),
       imu_(options.recovery.max_imu_gap, 30.0),
       masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
@@ -69,7 +68,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
 }
 
 bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
-  if (!(t < newest - kClockJump)) return false;
+  if (!(t < newest - clock_jump_)) return false;
   clockRanBack(std::string(what) + " clock ran back by " + std::to_string(newest - t) + " s");
   return true;
 }

@@ -157,6 +157,7 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
     tracks_.emplace(estimate.id, std::move(track));
     published.push_back(estimate);
   }
+  epochs_.addLoaded();
 }
 
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {

@@ -42,7 +42,7 @@ class PlaneMapper::Impl {
 
   // plane_mapper_update.cpp: corrections from the back end.
   /// Returns true when epochs have come together that were apart.
-  bool tieEpochs(const std::vector<LoopEvent>& loops);
+  bool tieEpochs(const MapUpdate& update);
   void followMode(const MapUpdate& update);
   void takeCorrections(const MapUpdate& update);
   /// False when the keyframe's depth is corrected by just that already.

@@ -21,7 +21,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   PlaneUpdate result;
   result.revision = update.revision;
   result.t = update.t;
-  came_together_ = tieEpochs(update.loops) || came_together_;
+  came_together_ = tieEpochs(update) || came_together_;
   followMode(update);
   if (localising_) {
     // Planes stay as the back end has them; what has changed before is reported once mapping goes on.
@@ -59,13 +59,16 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   return result;
 }
 
-bool PlaneMapper::Impl::tieEpochs(const std::vector<LoopEvent>& loops) {
+bool PlaneMapper::Impl::tieEpochs(const MapUpdate& update) {
   const auto epoch_of = [this](KeyframeId id) {
     const auto it = waiting_.find(id);  // the newest one is placed by the same update
     return it == waiting_.end() ? epochs_.epochOf(id) : EpochKey(it->second->frame.epoch);
   };
   bool came_together = false;
-  for (const LoopEvent& loop : loops) {
+  for (const LoopEvent& loop : update.loops) {
+    // What localisation finds the place of does not enter the map, and its odometry drifts on.
+    const auto& gone = update.removed_keyframes;
+    if (std::find(gone.begin(), gone.end(), loop.query) != gone.end()) continue;
     if (loop.accepted && epochs_.tie(epoch_of(loop.query), epoch_of(loop.match))) came_together = true;
   }
   return came_together;

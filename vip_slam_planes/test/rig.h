@@ -26,6 +26,7 @@ class Rig {
     MapUpdate update = updateFor(*keyframe, T_W_C);
     update.landmarks = base.landmarks;
     update.planes = base.planes;
+    update.loops = base.loops;
     poses[keyframe->id] = T_W_C;
     return mapper.applyMapUpdate(update);
   }

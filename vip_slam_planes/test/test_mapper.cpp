@@ -285,7 +285,14 @@ TEST(Mapper, RestoredPlanesAreRecognised) {
   Rig second;
   second.mapper.restore(first.mapper.planes());
   EXPECT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
-  for (int i = 0; i < 4; ++i) second.look(scene, {0.2, 0.2 * i, 1.4}, {3, 0.5, 1.1});
+  MapUpdate recognition;
+  recognition.loops.emplace_back();
+  recognition.loops.back().query = 1;
+  recognition.loops.back().accepted = true;
+  for (int i = 0; i < 4; ++i) {
+    const SE3 T = lookAt({0.2, 0.2 * i, 1.4}, {3, 0.5, 1.1});
+    second.place(second.camera.keyframe(scene, T), T, i == 0 ? recognition : MapUpdate());
+  }
   ASSERT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
   for (std::size_t i = 0; i < first.mapper.planes().size(); ++i) {
     EXPECT_EQ(first.mapper.planes()[i].id, second.mapper.planes()[i].id);

@@ -40,7 +40,12 @@ StreamMonitor::Step StreamMonitor::add(double t, double arrival) {
     }
     if (dt < 0) {
       ++report_.backward;
-      return Step::kBackward;
+      // Two in a row that follow each other: the wrong one was the stamp ahead of them.
+      const bool again = backward_ && t > *backward_;
+      backward_ = t;
+      if (!again) return Step::kBackward;
+      stamps_.clear();
+      step = Step::kBackward;
     }
     if (gap_seconds_ > 0 && dt > gap_seconds_) {
       ++report_.gaps;
@@ -48,6 +53,7 @@ StreamMonitor::Step StreamMonitor::add(double t, double arrival) {
       step = Step::kGap;
     }
   }
+  backward_.reset();
   report_.newest = t;
   stamps_.push_back(t);
   if (stamps_.size() > kWindow) stamps_.pop_front();
@@ -106,6 +112,7 @@ std::string StreamMonitor::complaint(double now) const {
 void StreamMonitor::restart() {
   std::lock_guard<std::mutex> lock(mutex_);
   stamps_.clear();
+  backward_.reset();
 }
 
 }  // namespace vip_slam

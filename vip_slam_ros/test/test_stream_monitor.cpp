@@ -29,6 +29,16 @@ TEST(StreamMonitor, CountsWhatIsWrong) {
   EXPECT_NEAR(report.largest_gap, 0.5, 1e-9);
 }
 
+TEST(StreamMonitor, OneStampFarAheadSilencesNothing) {
+  StreamMonitor monitor("/imu", 200);
+  for (int i = 0; i < 200; ++i) monitor.add(10 + i / 200.0, 10 + i / 200.0);
+  monitor.add(3611, 11);
+  for (int i = 1; i < 200; ++i) monitor.add(11 + i / 200.0, 11 + i / 200.0);
+  EXPECT_EQ(monitor.report().backward, 2u);
+  EXPECT_NEAR(monitor.report().rate, 200, 1e-6);
+  EXPECT_EQ(monitor.complaint(12), "");
+}
+
 TEST(StreamMonitor, ComplaintsNameTheTopic) {
   StreamMonitor monitor("/camera/imu", 200);
   EXPECT_NE(monitor.complaint(1).find("/camera/imu"), std::string::npos);

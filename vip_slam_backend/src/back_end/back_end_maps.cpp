@@ -99,9 +99,22 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
 
 void BackEnd::Impl::tieToLastFound(const KeyframePtr& keyframe) {
   if (!last_found) return;
+  if (keyframe->frame.epoch != last_found->epoch) {
+    last_found.reset();
+    return;
+  }
+  // Later it still says where the odometry lies, but for its drift: enough for a pose, too little to join two parts.
   const double since = keyframe->frame.t - last_found->t;
-  if (keyframe->frame.epoch == last_found->epoch && since >= 0 && since < kRecent && map.hasKeyframe(last_found->match))
-    loop_closer.tie(map, keyframe->id, last_found->match);
+  if (since < 0 || since >= kRecent || !map.hasKeyframe(last_found->match)) return;
+  loop_closer.tie(map, keyframe->id, last_found->match);
+  LoopEvent event;  // for the planes: from here on the map has this odometry
+  event.query = keyframe->id;
+  event.match = last_found->match;
+  event.t = keyframe->frame.t;
+  event.accepted = true;
+  event.reason = "relocalisation: mapping goes on where it was found";
+  event.T_match_query = map.keyframe(event.match).state.T_W_I.inverse() * map.keyframe(keyframe->id).state.T_W_I;
+  new_loops.push_back(event);
   last_found.reset();
 }
 

@@ -212,15 +212,20 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
   return fitWith(low).scale();
 }
 
-std::string scaleDifference(const InertialScale& scale, double depth_scale) {
+std::string scaleDifference(const InertialScale& scale, const SensorConfig& sensor) {
   const double difference = scale.factor - 1;
   if (!(scale.sigma > 0) || std::abs(difference) < std::max(kLeastDifference, kSure * scale.sigma)) return "";
+  char remedy[120] = "";
+  if (sensor.depth_encoding != "32FC1") {
+    std::snprintf(remedy, sizeof remedy, ", and depth/scale in the sensor's configuration should be %.6g",
+                  sensor.depth_scale * scale.factor);
+  }
   char text[320];
   std::snprintf(text, sizeof text,
-                "distances are %.1f %% %s than the accelerometer says (one sigma %.2f %%): depth reads too %s, and "
-                "depth/scale in the sensor's configuration should be %.6g, unless the accelerometer is off by as much",
+                "distances are %.1f %% %s than the accelerometer says (one sigma %.2f %%): depth reads too %s%s, "
+                "unless the accelerometer is off by as much",
                 100 * std::abs(difference), difference < 0 ? "longer" : "shorter", 100 * scale.sigma,
-                difference < 0 ? "long" : "short", depth_scale * scale.factor);
+                difference < 0 ? "long" : "short", remedy);
   return text;
 }
 

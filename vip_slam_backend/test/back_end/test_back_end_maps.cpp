@@ -264,7 +264,14 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
         back_end.setLocalisationMode(false);
       }
       if (k >= 18) kf->frame.t += pause;
-      back_end.addKeyframe(kf);
+      const MapUpdate update = back_end.addKeyframe(kf);
+      if (k >= 18) {
+        EXPECT_TRUE(update.placed);  // the odometry has gone on all the time
+        EXPECT_EQ(update.epoch, 7u);
+        const bool told =
+            !update.loops.empty() && update.loops.front().accepted && update.loops.front().query == kf->id;
+        EXPECT_EQ(told, k == 18 && pause == 0) << k;
+      }
       EXPECT_EQ(back_end.lastRefusal(), "");
     }
     EXPECT_EQ(back_end.map().keyframe(1019).loop_keyframe, pause == 0);

@@ -112,9 +112,12 @@ TEST(InertialScale, FindsAMapThatIsTooLargeOrTooSmall) {
     EXPECT_LT(scale.sigma, 0.0025);
     EXPECT_NEAR(scale.factor, 1 / map_scale, 4 * scale.sigma) << map_scale;
     // 1.012: depth of a camera that reads 0.001 m per unit too long.
-    const std::string words = scaleDifference({1 / map_scale, 0.001}, 0.001);
+    const std::string words = scaleDifference({1 / map_scale, 0.001}, SensorConfig());
     EXPECT_NE(words.find(map_scale > 1 ? "too long" : "too short"), std::string::npos) << words;
     EXPECT_NE(words.find(map_scale > 1 ? "0.000988142" : "0.00101215"), std::string::npos) << words;
+    SensorConfig metres;
+    metres.depth_encoding = "32FC1";  // no key changes what it says
+    EXPECT_EQ(scaleDifference({1 / map_scale, 0.001}, metres).find("depth/scale"), std::string::npos);
   }
 }
 
@@ -126,7 +129,7 @@ TEST(InertialScale, ItsSigmaIsHonest) {
     w.seed = static_cast<unsigned>(seed);
     const InertialScale scale = scaleOf(w);
     squares += std::pow((scale.factor - 1) / scale.sigma, 2);
-    EXPECT_EQ(scaleDifference(scale, 0.001), "");
+    EXPECT_EQ(scaleDifference(scale, SensorConfig()), "");
   }
   EXPECT_LT(squares / runs, 1.8);
   EXPECT_GT(squares / runs, 0.2);
@@ -161,8 +164,8 @@ TEST(InertialScale, NothingIsKnownWithoutMotionOrTime) {
 }
 
 TEST(InertialScale, SaysNothingUnlessSureAndLargeEnough) {
-  EXPECT_EQ(scaleDifference({0.99, 0.0025}, 0.001), "");   // four sigmas
-  EXPECT_EQ(scaleDifference({0.996, 0.0002}, 0.001), "");  // twenty, but of what no camera promises
-  EXPECT_EQ(scaleDifference({0.98, 0}, 0.001), "");        // not known
-  EXPECT_NE(scaleDifference({0.99, 0.0015}, 0.001), "");
+  EXPECT_EQ(scaleDifference({0.99, 0.0025}, SensorConfig()), "");   // four sigmas
+  EXPECT_EQ(scaleDifference({0.996, 0.0002}, SensorConfig()), "");  // twenty, but of what no camera promises
+  EXPECT_EQ(scaleDifference({0.98, 0}, SensorConfig()), "");        // not known
+  EXPECT_NE(scaleDifference({0.99, 0.0015}, SensorConfig()), "");
 }

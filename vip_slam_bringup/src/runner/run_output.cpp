@@ -143,7 +143,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   }
   if (pipeline.mapping()) {
     const InertialScale scale = pipeline.mapping()->backEnd().scale();
-    const std::string difference = scaleDifference(scale, reader.sensor().depth_scale);
+    const std::string difference = scaleDifference(scale, reader.sensor());
     if (!difference.empty()) all.push_back(difference);
     const std::string bent = pipeline.mapping()->backEnd().depthDifference();
     if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");

@@ -207,6 +207,12 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   if (root.has("camera")) config.camera = cameraFrom(root.section("camera"));
   if (root.has("depth_camera")) config.depth_camera = cameraFrom(root.section("depth_camera"));
   root.pose("T_color_depth", config.T_color_depth, !config.depth_registered);
+  const bool own_depth = !config.depth_registered && !config.topics.depth.empty();
+  if (config.intrinsics_from_camera_info && config.topics.color_info.empty())
+    throw std::runtime_error("topics/color_info: missing, though intrinsics_from_camera_info is true");
+  if (config.intrinsics_from_camera_info && own_depth && config.topics.depth_info.empty())
+    throw std::runtime_error(
+        "topics/depth_info: missing, though depth/registered is false and intrinsics_from_camera_info is true");
   if (!config.intrinsics_from_camera_info) {
     const std::string wrong = config.camera.validate();
     if (!wrong.empty()) throw std::runtime_error("camera: " + wrong);

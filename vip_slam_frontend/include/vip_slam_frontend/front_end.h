@@ -66,8 +66,10 @@ struct FrontEndCounters {
 
 class FrontEnd {
  public:
-  /// Throws std::invalid_argument when sensor.camera is unusable. `timing` may be null and must outlive this.
-  FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing = nullptr);
+  /// Throws std::invalid_argument when sensor.camera is unusable. `timing` may be null and must outlive this. A stamp
+  /// further back than `clock_jump` seconds is a looped bag or a restarted clock, less is a message out of order.
+  FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing = nullptr,
+           double clock_jump = 1.0);
   ~FrontEnd();
   FrontEnd(const FrontEnd&) = delete;
   FrontEnd& operator=(const FrontEnd&) = delete;

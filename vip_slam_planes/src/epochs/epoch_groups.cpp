@@ -11,6 +11,8 @@ void EpochGroups::place(KeyframeId id, EpochKey epoch) {
   if (epochOf(id) != epoch) first_[id] = epoch;
 }
 
+void EpochGroups::addLoaded() { group_.emplace(kLoadedEpoch, kLoadedEpoch); }
+
 EpochKey EpochGroups::epochOf(KeyframeId id) const {
   const auto next = first_.upper_bound(id);
   return next == first_.begin() ? kLoadedEpoch : std::prev(next)->second;

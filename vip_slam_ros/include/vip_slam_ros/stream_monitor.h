@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <string>
 
 namespace vip_slam {
@@ -48,6 +49,7 @@ class StreamMonitor {
   mutable std::mutex mutex_;
   Report report_;
   std::deque<double> stamps_;
+  std::optional<double> backward_;  ///< the newest stamp, when it lies before those in stamps_
   std::string absence_ = "is the name right, and the driver running?";
   bool newest_rejected_ = false;
 };

@@ -8,6 +8,7 @@
 
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map/map_snapshot.h"
+#include "vip_slam_core/sensor/sensor_config.h"
 
 namespace vip_slam {
 
@@ -17,7 +18,7 @@ namespace vip_slam {
 InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& noise);
 
 /// What to tell the user when depth and accelerometer contradict each other beyond doubt (five sigmas) and by enough to
-/// matter (half a percent); empty else. `depth_scale` is the configured one.
-std::string scaleDifference(const InertialScale& scale, double depth_scale);
+/// matter (half a percent); empty else. `sensor` has the scale that is in use; depth in 32FC1 has none.
+std::string scaleDifference(const InertialScale& scale, const SensorConfig& sensor);
 
 }  // namespace vip_slam

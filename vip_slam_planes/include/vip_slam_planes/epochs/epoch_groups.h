@@ -15,8 +15,9 @@ constexpr EpochKey kLoadedEpoch = -1;
 
 class EpochGroups {
  public:
-  /// The back end has placed a keyframe. Beside a loaded map it does so only once it has recognised the map: unless
-  /// told otherwise, the first epoch belongs to that.
+  /// There is a loaded map: no epoch belongs to it before a loop or relocalisation says so.
+  void addLoaded();
+  /// The back end has placed a keyframe. Without a loaded map the first epoch is the map's own.
   void place(KeyframeId id, EpochKey epoch);
   /// Of a keyframe, also of one that is gone; ids before the first placed one are those of a loaded map.
   EpochKey epochOf(KeyframeId id) const;
