@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/LU>
+
 #include "vip_slam_core/util/same_pixels.h"
 
 #include "front_end_impl.h"
@@ -27,16 +29,16 @@ constexpr int kOld = 8;
 // The same pixels may come again while the IMU rests and foretells less image motion than this: what is rendered
 // without noise looks like that when it stands.
 constexpr double kStandsPx = 0.5;
-// The translation between two images may be off the foretold one by four sigmas and this speed and length, or the IMU
-// has missed something. Ordinary images have a tenth of that, and a third at the 98th percentile.
-constexpr double kShockSigmas = 4.0, kShockSpeed = 0.05, kShockLength = 1e-3;
+// The translation between two images may be off the foretold one by so many sigmas, or the IMU has missed something;
+// this speed and length, m/s and m, are a sigma of what neither knows of (rows, a delay).
+constexpr double kShockSigmas = 4.0, kLeastSpeed = 0.0125, kLeastLength = 2.5e-4;
 // A repeated image is no fault for so long, s.
 constexpr double kFrozen = 0.3;
 // A shock shows when so many points tell the same motion, but for one in twenty.
 constexpr int kShockTracks = 30, kShockOutliers = 20;
 // It comes out of the blue: for so long before, images have agreed with a share of that. An IMU or a velocity that is
 // wrong departs little by little. It is over in so much time, s.
-constexpr double kCalm = 0.5, kDoubt = 0.5, kShockLasts = 0.1;
+constexpr double kCalm = 0.5, kDoubt = 0.7, kShockLasts = 0.1;
 
 }  // namespace
 
@@ -110,21 +112,24 @@ FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {
 void FrontEnd::Impl::admitShock(const TrackingResult& tracking, const ForetoldMotion& foretold, double dt,
                                 Propagation* propagation) {
   const double t = propagation->predicted.t;
-  const bool told = foretold.interval > 0 && !foretold.wary && !tracking.moves_by_itself && tracking.pose_ok &&
+  const bool told = foretold.interval > 0 && !foretold.wary && !tracking.moves_by_itself && tracking.step.ok &&
                     tracking.tracked >= kShockTracks && kShockOutliers * tracking.lost_outlier <= tracking.tracked;
-  const double apart = (tracking.T_current_previous.t() - foretold.T_current_previous.t()).norm();
-  const double limit = kShockSigmas * foretold.sigma + kShockSpeed * dt + kShockLength;
-  const bool doubtful = apart > kDoubt * limit;
+  const Eigen::Vector3d apart = tracking.step.t - foretold.T_current_previous.t();
+  const double length = kLeastSpeed * dt + kLeastLength;
+  const Eigen::Matrix3d C =
+      tracking.step.covariance + (std::pow(foretold.sigma, 2) + std::pow(length, 2)) * Eigen::Matrix3d::Identity();
+  const double sigmas = told ? std::sqrt(apart.dot(C.inverse() * apart)) : 0.0;
+  const bool doubtful = sigmas > kDoubt * kShockSigmas;
   if (!told || doubtful) {
     if (t - doubt_imu_t_ > kCalm) shock_imu_t_ = t;
     doubt_imu_t_ = t;
   }
   // A shock may begin at the end of one interval and show in the next one.
   const bool begins = doubtful && shock_imu_t_ == t;
-  const bool goes_on = apart > limit && t - shock_imu_t_ <= std::max(kShockLasts, 1.5 * dt);
+  const bool goes_on = sigmas > kShockSigmas && t - shock_imu_t_ <= std::max(kShockLasts, 1.5 * dt);
   if (!told || !(begins || goes_on)) return;
-  counters_.imu_shocks += apart > limit;
-  propagation->admitStep(apart / dt, dt);
+  counters_.imu_shocks += sigmas > kShockSigmas;
+  propagation->admitStep(apart.norm() / dt, dt);
 }
 
 }  // namespace vip_slam

@@ -248,6 +248,10 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   result.lost_outlier = static_cast<int>(pairs.size()) - model.inliers;
   result.pose_ok = model.ok && model.with_depth;
   result.T_current_previous = model.T_current_previous;
+  if (result.pose_ok && !model.free_rotation) {
+    result.step = fitTranslation(pairs, model.inlier, predicted.T_current_previous.R(), model.t_given_rotation,
+                                 0.5 * ransac.threshold);
+  }
 
   for (std::size_t k = 0; k < index.size() && predicted.interval > 0; ++k) {
     result.regions.add({next[index[k]].x, next[index[k]].y}, pairs[k].depth_previous, model.inlier[k]);

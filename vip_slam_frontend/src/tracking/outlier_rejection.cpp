@@ -5,6 +5,7 @@
 #include <random>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include "pair_errors.h"
 #include "vip_slam_frontend/tracking/general_motion.h"
@@ -77,6 +78,42 @@ bool refinePose(const std::vector<PointPair>& pairs, const std::vector<char>& us
   }
   *T_current_previous = T;
   return true;
+}
+
+TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::vector<char>& use,
+                              const Eigen::Matrix3d& R_current_previous, const Eigen::Vector3d& start, double huber) {
+  constexpr int kRounds = 4, kLeast = 8;
+  TranslationFit fit;
+  fit.t = start;
+  Eigen::Matrix3d A;
+  double squares = 0;
+  int n = 0;
+  for (int round = 0; round <= kRounds; ++round) {  // the last one only measures what is left
+    A.setZero();
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+    squares = 0, n = 0;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (!use[i] || pairs[i].depth_previous <= 0) continue;
+      const Eigen::Vector3d p = R_current_previous * (bearing(pairs[i].xy_previous) * pairs[i].depth_previous) + fit.t;
+      if (p.z() < 0.01) continue;
+      const double iz = 1.0 / p.z();
+      const Eigen::Vector2d r = pairs[i].xy_current - p.head<2>() * iz;
+      Eigen::Matrix<double, 2, 3> J;
+      J << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz;
+      const double e = r.norm(), w = e > huber ? huber / e : 1.0;
+      A += w * J.transpose() * J;
+      b += w * J.transpose() * r;
+      squares += w * r.squaredNorm();
+      ++n;
+    }
+    if (n < kLeast) return fit;
+    const Eigen::LDLT<Eigen::Matrix3d> ldlt(A);
+    if (ldlt.vectorD().minCoeff() < 1e-9) return fit;
+    if (round < kRounds) fit.t += ldlt.solve(b);
+  }
+  fit.covariance = squares / (2.0 * n - 3.0) * A.inverse();
+  fit.ok = fit.t.allFinite() && fit.covariance.allFinite();
+  return fit;
 }
 
 RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& predicted, const RansacOptions& options) {

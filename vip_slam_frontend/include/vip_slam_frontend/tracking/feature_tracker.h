@@ -48,6 +48,7 @@ struct TrackingResult {
   int lost_klt = 0, lost_outlier = 0;
   bool pose_ok = false;  ///< RANSAC gave a metric pose
   SE3 T_current_previous;
+  TranslationFit step;  ///< with the rotation that was foretold
   /// Most of what is seen moves by itself: only what agrees with the IMU was kept.
   bool moves_by_itself = false;
   MovingRegions regions;

@@ -44,4 +44,14 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
 bool refinePose(const std::vector<PointPair>& pairs, const std::vector<char>& use, double huber,
                 SE3* T_current_previous);
 
+/// The translation, metres, that goes best with a given rotation, and how sure the pairs are of it.
+struct TranslationFit {
+  bool ok = false;
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+/// Huber-weighted at `huber` over the pairs with depth that are in `use`; noise as their residuals scatter.
+TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::vector<char>& use,
+                              const Eigen::Matrix3d& R_current_previous, const Eigen::Vector3d& start, double huber);
+
 }  // namespace vip_slam
