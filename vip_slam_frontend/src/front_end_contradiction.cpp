@@ -31,7 +31,7 @@ constexpr int kOld = 8;
 constexpr double kStandsPx = 0.5;
 // The translation between two images may be off the foretold one by so many sigmas, or the IMU has missed something;
 // this speed and length, m/s and m, are a sigma of what neither knows of (rows, a delay).
-constexpr double kShockSigmas = 4.0, kLeastSpeed = 0.0125, kLeastLength = 2.5e-4;
+constexpr double kShockSigmas = 6.0, kLeastSpeed = 0.0125, kLeastLength = 2.5e-4;
 // A repeated image is no fault for so long, s.
 constexpr double kFrozen = 0.3;
 // A shock shows when so many points tell the same motion, but for one in twenty.
