@@ -113,6 +113,7 @@ void BackEndNodelet::command(std::uint8_t command) {
   msg->command = command;
   if (command == vip_slam_msgs::Control::MAP_LOADED) {
     for (const auto& plane : backEnd().snapshot().planes) msg->planes.push_back(toMsg(plane));
+    msg->newest_keyframe = backEnd().map().newestKeyframe();
   }
   control_pub_.publish(msg);
 }

@@ -40,13 +40,13 @@ void PlanesNodelet::onInit() {
   ros::NodeHandle& nh = getNodeHandle();
   update_pub_ = nh.advertise<vip_slam_msgs::PlaneUpdate>("plane_update", 20);
   map_pub_ = nh.advertise<vip_slam_msgs::PlaneMap>("plane_map", 1, true);
-  markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("plane_markers", 1, true);
   // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
   const auto show = [this](const ros::SingleSubscriberPublisher&) {
     owner_->post(control_lane_, [this] {
       if (last_display_ >= 0) publishMap(last_display_, true);
     });
   };
+  markers_pub_ = nh.advertise<visualization_msgs::MarkerArray>("plane_markers", 1, show, {}, nullptr, true);
   cloud_pub_ = nh.advertise<sensor_msgs::PointCloud2>("plane_cloud", 1, show, {}, nullptr, true);
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
   diagnostics_->setHardwareID(sensor_.name);
@@ -133,7 +133,7 @@ void PlanesNodelet::obey(const vip_slam_msgs::Control& control) {
     placed_ = false;
     publishMap(control.header.stamp.toSec(), true);
   } else if (control.command == Control::MAP_LOADED) {
-    mapper_->restore(fromMsg(control.planes));
+    mapper_->restore(fromMsg(control.planes), control.newest_keyframe);
     display_.clear();
     publishMap(control.header.stamp.toSec(), true);
   }
@@ -147,8 +147,10 @@ void PlanesNodelet::publishMap(double t, bool now) {
   std_msgs::Header header;
   header.stamp = toStamp(t);
   header.frame_id = options_.map_frame;
-  markers_pub_.publish(
-      boost::make_shared<visualization_msgs::MarkerArray>(display_.markers(mapper_->planes(), header, opacity_)));
+  if (markers_pub_.getNumSubscribers() > 0) {  // the outline of a hall takes a tenth of a second to fill
+    markers_pub_.publish(
+        boost::make_shared<visualization_msgs::MarkerArray>(display_.markers(mapper_->planes(), header, opacity_)));
+  }
   if (cloud_pub_.getNumSubscribers() > 0) {
     cloud_pub_.publish(boost::make_shared<sensor_msgs::PointCloud2>(display_.cloud(header)));
   }

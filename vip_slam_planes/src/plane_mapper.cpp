@@ -126,12 +126,13 @@ void PlaneMapper::Impl::clear() {
   fresh_.clear();
   withdrawn_.clear();
   next_plane_ = 1;
-  newest_ = 0;
+  newest_ = stored_until_ = 0;
   has_grown_ = came_together_ = localising_ = false;
 }
 
-void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
+void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe) {
   clear();
+  stored_until_ = newest_keyframe;
   for (const PlaneEstimate& estimate : planes) {
     next_plane_ = std::max(next_plane_, estimate.id + 1);
     const bool sound = !estimate.polygons.empty() && !estimate.polygons.front().outer.empty() &&
@@ -150,7 +151,7 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
       for (std::size_t i = 0; i < holes.size(); ++i) {
         for (const Eigen::Vector3d& p : polygon.holes[i]) holes[i].push_back(track.toPlane(p));
       }
-      track.coverPolygon(outer, holes);
+      track.coverPolygon(outer, holes, options.growth.min_hits);
     }
     track.confirmed = track.determined = true;
     track.keyframes_seen = static_cast<int>(estimate.keyframes);
@@ -161,6 +162,8 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes) {
 }
 
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
+  // One that was on its way when the map was loaded bears the number of another one, whose place it would take.
+  if (keyframe && keyframe->id <= stored_until_) return;
   if (!keyframe || keyframe->id == 0 || placed_.count(keyframe->id) || !isSound(keyframe->frame.depth_grid)) return;
   waiting_.emplace(keyframe->id, keyframe);
   // Beside those that the back end holds there is the newest one, which it may place yet.
@@ -180,7 +183,9 @@ void PlaneMapper::addKeyframe(KeyframePtr keyframe) { impl_->addKeyframe(keyfram
 void PlaneMapper::grow(const TrackedFrame& frame, const SE3& T_map_odom) { impl_->grow(frame, T_map_odom); }
 PlaneUpdate PlaneMapper::applyMapUpdate(const MapUpdate& update) { return impl_->applyMapUpdate(update); }
 const std::vector<PlaneEstimate>& PlaneMapper::planes() const { return impl_->published; }
-void PlaneMapper::restore(const std::vector<PlaneEstimate>& planes) { impl_->restore(planes); }
+void PlaneMapper::restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe) {
+  impl_->restore(planes, newest_keyframe);
+}
 void PlaneMapper::clear() { impl_->clear(); }
 const PlaneMapperCounters& PlaneMapper::counters() const { return impl_->counters; }
 const PlaneMapperOptions& PlaneMapper::options() const { return impl_->options; }

@@ -27,7 +27,7 @@ class PlaneMapper::Impl {
   void addKeyframe(const KeyframePtr& keyframe);
   void grow(const TrackedFrame& frame, const SE3& T_map_odom);
   PlaneUpdate applyMapUpdate(const MapUpdate& update);
-  void restore(const std::vector<PlaneEstimate>& planes);
+  void restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe);
   void clear();
 
   PlaneMapperOptions options;
@@ -44,6 +44,7 @@ class PlaneMapper::Impl {
   /// Returns true when epochs have come together that were apart.
   bool tieEpochs(const MapUpdate& update);
   void followMode(const MapUpdate& update);
+  void removeUnnamed(const MapUpdate& update);
   void takeCorrections(const MapUpdate& update);
   /// False when the keyframe's depth is corrected by just that already.
   bool adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe);
@@ -93,6 +94,7 @@ class PlaneMapper::Impl {
   PlaneId next_plane_ = 1;
   std::uint32_t epoch_ = 0;  ///< of the newest placed keyframe
   KeyframeId newest_ = 0;
+  KeyframeId stored_until_ = 0;  ///< keyframes up to here are those of a loaded map
   SE3 grown_at_;  ///< camera pose of the last frame that grew planes
   bool has_grown_ = false;
   bool map_moved_ = false;      ///< by this update, everywhere

@@ -1,6 +1,7 @@
 // Corrections from the back end, and what goes back to it.
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "plane_mapper_impl.h"
 #include "vip_slam_core/geometry/plane_noise.h"
@@ -94,10 +95,26 @@ void PlaneMapper::Impl::decideOnPoints() {
   }
 }
 
+// A global update names all keyframes of the map. What it does not name is gone, in an update that was lost, or was
+// never taken.
+void PlaneMapper::Impl::removeUnnamed(const MapUpdate& update) {
+  std::set<KeyframeId> named;
+  for (const KeyframeEstimate& estimate : update.keyframes) named.insert(estimate.id);
+  std::vector<KeyframeId> gone;
+  for (const auto& [id, keyframe] : placed_) {
+    if (!named.count(id)) gone.push_back(id);
+  }
+  for (KeyframeId id : gone) removeKeyframe(id);
+  for (auto it = waiting_.begin(); it != waiting_.end() && it->first <= update.newest_keyframe;) {
+    it = named.count(it->first) ? std::next(it) : waiting_.erase(it);
+  }
+}
+
 void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   map_moved_ = update.global;
   // Before any pose changes: the area of those that go is handed over where it lay, and moves with its heir.
   for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
+  if (update.global) removeUnnamed(update);
   std::vector<KeyframeId> moved;
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto it = placed_.find(estimate.id);

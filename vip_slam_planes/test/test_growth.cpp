@@ -1,7 +1,10 @@
 // Which triangles join a plane: the gates of 10 degrees and 5 cm, the side, and the reach of the covered area.
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_planes/growth/outline.h"
 #include "vip_slam_planes/growth/triangle_association.h"
 
 namespace vip_slam {
@@ -95,6 +98,29 @@ TEST_F(Growth, WhenTheNearerPlaneIsOutOfReachTheNextOneIsAsked) {
   EXPECT_EQ(1, label(triangle({3.01, 0.3, 0}, 0), {&far, &at_three})) << "also when nothing else joined it yet";
   EXPECT_EQ((std::vector<int>{1, 1}), associateTriangles({triangle({3, 0, 0}, 0), triangle({3.01, 0.3, 0}, 0)},
                                                          {&far, &at_three}, PlaneGrowthOptions()));
+}
+
+TEST(PlaneTrack, AStoredPolygonCoversTheCellsWhoseCentresLieInItAndInNoHole) {
+  PlaneTrack track(1, PlaneKind::kHorizontal, Plane({0, 0, 1}, 0), Eigen::Vector3d::Zero(), 0.1);
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> radius(2.0, 6.0);
+  Ring2d outer, hole;
+  for (int i = 0; i < 40; ++i) {  // a star
+    const Eigen::Vector2d out(std::cos(0.05 * M_PI * i), std::sin(0.05 * M_PI * i));
+    outer.push_back(radius(random) * out);
+    if (i % 4 == 0) hole.push_back(0.25 * radius(random) * out);
+  }
+  track.coverPolygon(outer, {hole}, 3);
+  int covered = 0;
+  for (int y = -70; y < 70; ++y) {
+    for (int x = -70; x < 70; ++x) {
+      const Eigen::Vector2d q((x + 0.5) * 0.1, (y + 0.5) * 0.1);
+      const bool inside = ringContains(outer, q) && !ringContains(hole, q);
+      EXPECT_EQ(track.cells().at({x, y}), inside ? 3 : 0) << x << ' ' << y;
+      covered += inside;
+    }
+  }
+  EXPECT_GT(covered, 1000);
 }
 
 }  // namespace

@@ -283,7 +283,7 @@ TEST(Mapper, RestoredPlanesAreRecognised) {
   const Scene scene = room();
   for (int i = 0; i < 4; ++i) first.look(scene, {0, 0.2 * i, 1.4}, {3, 0.2, 1.0});
   Rig second;
-  second.mapper.restore(first.mapper.planes());
+  second.mapper.restore(first.mapper.planes(), 0);
   EXPECT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
   MapUpdate recognition;
   recognition.loops.emplace_back();
@@ -297,6 +297,21 @@ TEST(Mapper, RestoredPlanesAreRecognised) {
   for (std::size_t i = 0; i < first.mapper.planes().size(); ++i) {
     EXPECT_EQ(first.mapper.planes()[i].id, second.mapper.planes()[i].id);
     EXPECT_NEAR(first.mapper.planes()[i].area, second.mapper.planes()[i].area, 0.35 * second.mapper.planes()[i].area);
+  }
+}
+
+TEST(Mapper, RestoredPlanesKeepTheirAreaHoweverManySightingsACellNeeds) {
+  PlaneMapperOptions options;
+  options.growth.min_hits = 3;
+  Rig first(1.0, options), second(1.0, options);
+  for (int i = 0; i < 5; ++i) first.look(room(), {0, 0.05 * i, 1.4}, {3, 0.2, 1.0});
+  ASSERT_FALSE(first.mapper.planes().empty());
+  second.mapper.restore(first.mapper.planes(), 5);
+  second.mapper.applyMapUpdate({});
+  ASSERT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
+  for (std::size_t i = 0; i < first.mapper.planes().size(); ++i) {
+    const double area = first.mapper.planes()[i].area;
+    EXPECT_NEAR(area, second.mapper.planes()[i].area, 0.1 * area + 0.1);
   }
 }
 
@@ -445,7 +460,7 @@ TEST(Mapper, LoadedPlanesWithoutAreaGoAndTheBackEndHearsOfIt) {
   planes[sound].polygons.clear();
   planes[sound + 1].polygons.front().outer[1].y() = kNan;
   planes[sound + 2].plane.d = kNan;
-  second.mapper.restore(planes);
+  second.mapper.restore(planes, 0);
   EXPECT_EQ(sound, second.mapper.planes().size());
   const PlaneUpdate update = second.mapper.applyMapUpdate({});
   EXPECT_EQ((std::vector<PlaneId>{100, 101, 102}), update.removed);

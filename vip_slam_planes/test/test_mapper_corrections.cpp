@@ -243,5 +243,66 @@ TEST(Mapper, APlaneThatIsGoneDisappears) {
   EXPECT_TRUE(rig.find(Plane({-1, 0, 0}, 3)));
 }
 
+/// Global updates name all keyframes of the map.
+MapUpdate everything(const std::map<KeyframeId, SE3>& poses) {
+  MapUpdate update;
+  update.global = true;
+  for (const auto& [id, T] : poses) {
+    update.keyframes.emplace_back();
+    update.keyframes.back().id = id;
+    update.keyframes.back().state.T_W_I = T;
+    update.newest_keyframe = id;
+  }
+  return update;
+}
+
+TEST(MapperCorrections, AGlobalUpdateHealsWhatALostOneHadRemoved) {
+  const Scene scene = room();
+  Rig told, missed;
+  for (Rig* rig : {&told, &missed}) {
+    for (int i = 0; i < 6; ++i) rig->look(scene, {-1 + 0.3 * i, 0, 1.4}, {3, -1.2 + 0.4 * i, 1.0});
+  }
+  MapUpdate removal;
+  removal.removed_keyframes = {6};
+  told.mapper.applyMapUpdate(removal);  // the other one loses this
+  for (Rig* rig : {&told, &missed}) {
+    rig->poses.erase(6);
+    rig->mapper.applyMapUpdate(everything(rig->poses));
+  }
+  ASSERT_EQ(told.mapper.planes().size(), missed.mapper.planes().size());
+  for (std::size_t i = 0; i < told.mapper.planes().size(); ++i) {
+    EXPECT_EQ(told.mapper.planes()[i].id, missed.mapper.planes()[i].id);
+    EXPECT_NEAR(told.mapper.planes()[i].area, missed.mapper.planes()[i].area, 1e-9);
+  }
+}
+
+TEST(MapperCorrections, KeyframesThatTheBackEndNeverTookAreNotKept) {
+  const Scene scene = room();
+  Rig rig;
+  for (int i = 0; i < 6; ++i) {
+    const SE3 T = lookAt({0, 0.2 * i, 1.4}, {3, 0.2, 1.0});
+    const auto keyframe = rig.camera.keyframe(scene, T);
+    if (i % 2 == 0) {
+      rig.place(keyframe, T);
+    } else {
+      rig.mapper.addKeyframe(keyframe);
+    }
+  }
+  EXPECT_EQ(3u, rig.mapper.counters().keyframes_waiting);
+  rig.mapper.applyMapUpdate(everything(rig.poses));
+  EXPECT_EQ(1u, rig.mapper.counters().keyframes_waiting);  // the newest one may be placed yet
+}
+
+TEST(MapperCorrections, AKeyframeOnItsWayIsNoneOfAMapThatIsLoadedMeanwhile) {
+  const Scene scene = room();
+  Rig stored, rig;
+  for (int i = 0; i < 6; ++i) stored.look(scene, {-1 + 0.3 * i, 0, 1.4}, {3, -1.2 + 0.4 * i, 1.0});
+  rig.mapper.restore(stored.mapper.planes(), 6);
+  rig.mapper.addKeyframe(rig.camera.keyframe(scene, lookAt({0, 0, 1.4}, {-3, 1, 1.0})));  // number 1 of its session
+  const PlaneUpdate update = rig.mapper.applyMapUpdate(everything(stored.poses));
+  EXPECT_TRUE(update.observations.empty());
+  EXPECT_EQ(stored.mapper.planes().size(), rig.mapper.planes().size());
+}
+
 }  // namespace
 }  // namespace vip_slam

@@ -128,7 +128,7 @@ TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   constexpr KeyframeId kFirst = 100;  // the loaded map has the ids before
   Rig first, rig;
   for (int i = 0; i < 6; ++i) first.place(taken(&first, view(i), 0), view(i));
-  rig.mapper.restore(first.mapper.planes());
+  rig.mapper.restore(first.mapper.planes(), kFirst - 1);
   const std::set<PlaneId> loaded = idsOf(rig);
   // Localisation found the place of one that does not enter the map; mapping goes on later, where odometry has drifted.
   const auto passing = taken(&rig, view(0), 4, kFirst);
@@ -143,7 +143,7 @@ TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   }
   EXPECT_EQ(2 * loaded.size(), rig.mapper.planes().size());
 
-  rig.mapper.restore(first.mapper.planes());
+  rig.mapper.restore(first.mapper.planes(), kFirst - 1);
   const auto found = taken(&rig, view(0), 5, kFirst);
   update = updateFor(*found, view(0));
   update.loops = {loopBetween(found->id, 7, true)};

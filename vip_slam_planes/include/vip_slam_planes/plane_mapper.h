@@ -54,8 +54,9 @@ class PlaneMapper {
   /// Confirmed planes, by id; polygons are as of the last applyMapUpdate().
   const std::vector<PlaneEstimate>& planes() const;
   /// Starts from the planes of a loaded map; everything known before is forgotten. Planes without area, or not finite,
-  /// are reported as removed by the next applyMapUpdate().
-  void restore(const std::vector<PlaneEstimate>& planes);
+  /// are reported as removed by the next applyMapUpdate(). Keyframes up to `newest_keyframe` are the map's own: what
+  /// comes under such a number was on its way when it was loaded, and is left out.
+  void restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe);
   void clear();
 
   const PlaneMapperCounters& counters() const;

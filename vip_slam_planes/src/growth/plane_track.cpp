@@ -32,7 +32,7 @@ void PlaneTrack::setPlane(const Plane& plane) {
 void PlaneTrack::coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C) {
   const int before = cells_.at(c);
   cells_.set(c, std::min(kMostHits, before + hits));
-  if (before > 0) return;
+  if (before > 0 || cells_.at(c) == 0) return;  // beyond what a grid takes
   area_changed_ = grown_ = true;
   lost_ = std::max(0, lost_ - 1);
   auto [it, fresh] = patches_.try_emplace(host);
@@ -52,17 +52,30 @@ void PlaneTrack::cover(const MapTriangle& triangle, KeyframeId host, const SE3& 
                      });
 }
 
-void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes) {
+void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits) {
   if (outer.size() < 3) return;
   Eigen::Vector2d low = outer.front(), high = low;
   for (const Eigen::Vector2d& q : outer) low = low.cwiseMin(q), high = high.cwiseMax(q);
-  const CellIndex first = cellAt(low), last = cellAt(high);
-  for (int y = first.y; y <= last.y; ++y) {
-    for (int x = first.x; x <= last.x; ++x) {
-      const Eigen::Vector2d q((x + 0.5) * cell_, (y + 0.5) * cell_);
-      if (!ringContains(outer, q)) continue;
-      const bool open = std::any_of(holes.begin(), holes.end(), [&](const Ring2d& h) { return ringContains(h, q); });
-      if (!open) coverCell({x, y}, 1, 0, SE3());
+  std::vector<const Ring2d*> rings = {&outer};
+  for (const Ring2d& hole : holes) rings.push_back(&hole);
+  std::vector<double> edges;  // where the outline and the holes cross a row: inside between the first two, the next two
+  for (int y = cellAt(low).y; y <= cellAt(high).y; ++y) {
+    const double v = (y + 0.5) * cell_;
+    edges.clear();
+    for (const Ring2d* ring : rings) {
+      for (std::size_t i = 0, j = ring->size() - 1; i < ring->size(); j = i++) {
+        const Eigen::Vector2d &a = (*ring)[i], &b = (*ring)[j];
+        if ((a.y() > v) == (b.y() > v)) continue;
+        edges.push_back((b.x() - a.x()) * (v - a.y()) / (b.y() - a.y()) + a.x());
+      }
+    }
+    std::sort(edges.begin(), edges.end());
+    for (std::size_t k = 0; k + 1 < edges.size(); k += 2) {
+      const int last = cellAt({edges[k + 1], v}).x;
+      for (int x = cellAt({edges[k], v}).x; x <= last; ++x) {
+        const double u = (x + 0.5) * cell_;
+        if (u >= edges[k] && u < edges[k + 1]) coverCell({x, y}, hits, 0, SE3());
+      }
     }
   }
 }

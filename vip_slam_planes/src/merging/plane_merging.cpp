@@ -121,6 +121,19 @@ double meanHeight(const PlaneTrack& track) {
 
 double heightDifference(const PlaneTrack& a, const PlaneTrack& b) { return std::abs(meanHeight(a) - meanHeight(b)); }
 
+/// How far out from a level all of a surface lies: heights of a plane are extreme at the corners of its grid.
+std::pair<double, double> heightRange(const PlaneTrack& track, double out, double level) {
+  const CellGrid& grid = track.cells();
+  std::pair<double, double> range = {1e300, -1e300};
+  for (const int x : {grid.x0(), grid.x0() + grid.width() - 1}) {
+    for (const int y : {grid.y0(), grid.y0() + grid.height() - 1}) {
+      const double height = out * (track.cellCentre({x, y}).z() - level);
+      range = {std::min(range.first, height), std::max(range.second, height)};
+    }
+  }
+  return range;
+}
+
 /// Whether walls end at both pieces, and of all that is known beside them and between them nothing lies beyond. Over a
 /// duct or a beam the walls go on, under a table as well; and nothing at all that is known may lie below a floor.
 bool outermost(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known) {
@@ -137,6 +150,10 @@ bool outermost(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const
   }
   bool meets[2] = {false, false}, beyond = false;
   for (const PlaneTrack* track : known) {
+    // Many tables of one height are asked for in pairs: a floor below them is not walked cell by cell.
+    const auto [lowest, highest] = heightRange(*track, out, level);
+    if (highest < -kBeyond) continue;
+    if (lowest > kBeyond && !ceiling && !track->cells().empty() && track->cells().count(1) > 0) return false;
     const bool wall = track->kind() == PlaneKind::kVertical && track->area() >= kLargeWall;
     track->cells().forEach([&](CellIndex c, int) {
       const Eigen::Vector3d p = track->cellCentre(c);

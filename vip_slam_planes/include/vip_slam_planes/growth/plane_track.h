@@ -58,7 +58,7 @@ class PlaneTrack {
   }
   void coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C);
   /// Covers a polygon of a loaded map; it has no host and moves with the plane alone.
-  void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes);
+  void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits);
   void miss(CellIndex c) {
     cells_.set(c, cells_.at(c) - 1);
     area_changed_ = true;
