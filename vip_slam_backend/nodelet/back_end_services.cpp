@@ -151,10 +151,14 @@ std::string BackEndNodelet::loadMap(const std::string& path) {
 }
 
 std::string BackEndNodelet::saveTrajectory(const std::string& path) {
-  const Trajectory trajectory = pose_.trajectory(anchorsOf(backEnd().snapshot()));
+  const MapSnapshot map = backEnd().snapshot();
+  const Trajectory trajectory = pose_.trajectory(anchorsOf(map));
   if (trajectory.empty()) throw std::runtime_error("no image has a pose in map yet");
   writeTum(requirePath(path), trajectory);
-  return std::to_string(trajectory.size()) + " poses written to " + path;
+  const std::size_t guessed = guessedTimes(map).size();
+  const std::string parts = std::to_string(guessed) + (guessed == 1 ? " part" : " parts");
+  return std::to_string(trajectory.size()) + " poses written to " + path +
+         (guessed > 0 ? "; the place of " + parts + " of the map is a guess, nothing ties it to the rest" : "");
 }
 
 std::string BackEndNodelet::setLocalisation(bool on) {

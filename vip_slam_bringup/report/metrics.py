@@ -78,11 +78,11 @@ def contains(plane, point):
 
 
 def worth_finding(plane):
-    """Only planes of 1 m2 and more, in view for 2 s and more, count as missed."""
+    """Only planes of 1 m2 and more, in view for 2 s and more, count as missed; slanted ones are left alone by design."""
     def at_least(value, limit):
         return value is None or value >= limit
     area = plane['seen_area'] if plane.get('seen_area') is not None else plane['area']
-    return at_least(area, 1.0) and at_least(plane.get('seen_seconds'), 2.0)
+    return plane.get('kind') != 'general' and at_least(area, 1.0) and at_least(plane.get('seen_seconds'), 2.0)
 
 
 def plane_errors(found, true, T_truth_map):

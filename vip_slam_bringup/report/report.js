@@ -38,7 +38,7 @@ function notes(data) {
   if (data.summary.finished === false) list.unshift('The run was interrupted: this is what there was until then.');
   if (data.missing.length) list.push('Not in the folder: ' + data.missing.join(', '));
   if (data.truth_note) list.push(data.truth_note);
-  if (!data.trajectory) list.push('No image got a pose.');
+  if (!data.trajectory) list.push('No image got a pose in the map.');
   if (!list.length) return;
   el('notes').hidden = false;
   el('notes').className = 'notes';

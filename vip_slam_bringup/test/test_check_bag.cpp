@@ -223,6 +223,27 @@ TEST_F(CheckBag, ImagesThatShowNothing) {
   expectFound(checkImages(recording), Severity::kError, "depth image", "every pixel says 1.5 m");
 }
 
+TEST_F(CheckBag, StreamsThatLieElsewhereInTheBag) {
+  test_support::writeDriverBag(path_, options_);
+  const Recording whole = recordBag(path_, expected_, 60);
+  const auto late = [&](StreamRecord Recording::*stream, double seconds) {
+    Recording moved = whole;
+    for (double& t : (moved.*stream).arrivals) t += seconds;
+    return checkRates(moved);
+  };
+  expectFound(late(&Recording::imu, 0.8), Severity::kError, "IMU", "0.8 s later in the bag");
+  expectFound(late(&Recording::imu, 0.8), Severity::kError, "IMU", "imu_patience=2");
+  expectFound(late(&Recording::depth, -1), Severity::kError, "depth image", "1.0 s earlier in the bag");
+  for (const Finding& f : late(&Recording::imu, -0.5)) EXPECT_NE(f.severity, Severity::kError) << f.text;
+}
+
+TEST_F(CheckBag, WithoutDepthItIsSaidAndNoError) {
+  expected_.topics.depth.clear();
+  const Findings findings = check();
+  expectFound(findings, Severity::kNote, "depth image", "visual-inertial only");
+  expectNoErrorBut(findings, "");
+}
+
 TEST_F(CheckBag, ImagesThatComeAgain) {
   options_.repeat_every = 5;
   expectFound(check(), Severity::kWarning, "colour image", "repeat the pixels of the one before");

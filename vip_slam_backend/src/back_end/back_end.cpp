@@ -206,9 +206,12 @@ MapSnapshot BackEnd::Impl::snapshot() const {
   snapshot.revision = revision;
   snapshot.epoch = epoch;
   snapshot.T_map_odom = T_map_odom;
+  const auto placed = inReferencePart();
   for (const auto& entry : map.keyframes()) {
     const MapKeyframe& kf = entry.second;
     SnapshotKeyframe out;
+    out.stored = kf.stored;
+    out.placed = placed(entry.first);
     out.id = entry.first;
     out.t = kf.data->frame.t;
     out.epoch = kf.data->frame.epoch;

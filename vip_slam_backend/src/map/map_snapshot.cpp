@@ -13,4 +13,16 @@ std::vector<Anchor> anchorsOf(const MapSnapshot& snapshot) {
   return anchors;
 }
 
+std::vector<std::pair<double, double>> guessedTimes(const MapSnapshot& snapshot) {
+  std::vector<std::pair<double, double>> times;
+  bool goes_on = false;
+  for (const SnapshotKeyframe& kf : snapshot.keyframes) {
+    const bool guessed = !kf.placed && !kf.stored;
+    if (guessed && !goes_on) times.emplace_back(kf.t, kf.t);
+    if (guessed) times.back().second = kf.t;
+    goes_on = guessed;
+  }
+  return times;
+}
+
 }  // namespace vip_slam

@@ -180,6 +180,10 @@ TEST(BackEndMaps, APartThatNothingTiesToTheMapIsNeitherPlacedNorLocalisedIn) {
   const MapUpdate lost = anew(&other, 1, 15);
   EXPECT_EQ(lost.epoch, 1u);
   EXPECT_FALSE(lost.placed);
+  const auto guessed = guessedTimes(back_end.snapshot());
+  ASSERT_EQ(guessed.size(), 1u);
+  EXPECT_EQ(guessed.front().first, back_end.map().keyframe(1001).data->frame.t);
+  EXPECT_EQ(guessed.front().second, lost.t);
   back_end.setLocalisationMode(true);
   EXPECT_FALSE(anew(&other_again, 2, 15).placed);
   EXPECT_TRUE(back_end.snapshot().localised.empty());

@@ -25,7 +25,7 @@ std::vector<Wanted> wanted(const Recording& r) {
   const std::vector<std::string> imu{"sensor_msgs/Imu"}, info{"sensor_msgs/CameraInfo"};
   std::vector<Wanted> out{
       {"colour image", t.color, image(r.sensor.color_encoding), &r.color, r.sensor.color_rate, true},
-      {"depth image", t.depth, image(r.sensor.depth_encoding), &r.depth, r.sensor.depth_rate, true},
+      {"depth image", t.depth, image(r.sensor.depth_encoding), &r.depth, r.sensor.depth_rate, !t.depth.empty()},
       {"colour camera_info", t.color_info, info, &r.color_info, r.sensor.color_rate,
        r.sensor.intrinsics_from_camera_info},
       {"depth camera_info", t.depth_info, info, &r.depth_info, r.sensor.depth_rate, false}};
@@ -119,6 +119,9 @@ void checkCoverage(const Recording& r, Findings* out) {
 
 Findings checkTopics(const Recording& r) {
   Findings out;
+  if (r.sensor.topics.depth.empty())
+    out.push_back({Severity::kNote, "depth image", "the sensor file names no topic",
+                   "visual-inertial only, without planes; distances come from the IMU alone"});
   for (const Wanted& w : wanted(r)) {
     if (w.topic.empty()) {
       out.push_back({Severity::kError, w.role, "the sensor file names no topic", "fill it in; " + candidates(r, w)});
@@ -141,6 +144,37 @@ Findings checkTopics(const Recording& r) {
   }
   return out;
 }
+
+namespace {
+
+double medianDelay(const StreamRecord& stream) {
+  std::vector<double> delays;
+  for (std::size_t i = 0; i < stream.stamps.size() && i < stream.arrivals.size(); ++i)
+    delays.push_back(stream.arrivals[i] - stream.stamps[i]);
+  return delays.empty() ? 0 : median(delays);
+}
+
+/// A bag is read in the order of its record times: what lies far from the images of the same time comes too late for
+/// them, whatever its stamps say.
+void checkOrder(const Recording& r, Findings* out) {
+  constexpr double kDepthWaits = 0.3, kImuWaits = 0.5, kImuKept = 25;  // s
+  if (r.live || r.color.stamps.empty()) return;
+  const double color = medianDelay(r.color);
+  for (const Wanted& w : wanted(r)) {
+    if (w.stream == &r.color || w.stream->stamps.empty() || w.role.find("camera_info") != std::string::npos) continue;
+    const double late = medianDelay(*w.stream) - color;
+    const bool depth = w.stream == &r.depth;
+    if (depth ? std::abs(late) < kDepthWaits : late < kImuWaits && late > -kImuKept) continue;
+    const std::string remedy = "sort the bag by header stamps";
+    out->push_back(
+        {Severity::kError, w.role,
+         words("lies %.1f s %s in the bag than the images of the same time", std::abs(late),
+               late > 0 ? "later" : "earlier"),
+         depth || late < 0 || late > 9 ? remedy : remedy + words(", or run_bag --set imu_patience=%.0f", late + 1)});
+  }
+}
+
+}  // namespace
 
 Findings checkRates(const Recording& r) {
   Findings out;
@@ -202,16 +236,14 @@ Findings checkRates(const Recording& r) {
                      words("%.1f %% of the messages are missing, the largest hole is %.2f s at %.1f s", 100 * share,
                            largest, largest_at),
                      "USB bandwidth, disk or CPU too slow? lower the resolution or record compressed"});
-    std::vector<double> delays;
-    for (std::size_t i = 0; i < stamps.size() && i < w.stream->arrivals.size(); ++i)
-      delays.push_back(w.stream->arrivals[i] - stamps[i]);
-    const double delay = delays.empty() ? 0 : median(delays);
+    const double delay = medianDelay(*w.stream);
     if (r.live && std::abs(delay) > 1.0)
       out.push_back(
           {Severity::kError, w.role,
            words("stamps lie %.1f s %s the clock of this machine", std::abs(delay), delay > 0 ? "behind" : "ahead of"),
            "the driver stamps with the device's clock: set it to system or global time"});
   }
+  checkOrder(r, &out);
   checkCoverage(r, &out);
   return out;
 }

@@ -286,11 +286,12 @@ void BagReader::read() {
   pairer.end();
   handOut();
   const std::size_t paired = pairer.counters().pairs, alone = pairer.counters().without_depth;
-  if (alone > 5 && 20 * alone > paired + alone)
+  if (!topics.depth.empty() && alone > 5 && 20 * alone > paired + alone)
     warnings_.push_back("topic " + topics.depth + ": " + std::to_string(alone) + " of " +
                         std::to_string(paired + alone) + " colour images have no depth within " +
                         std::to_string(std::lround(1e3 * options_.pairing.tolerance)) +
-                        " ms: switch on the driver's synchronisation, or equal rates");
+                        " ms: switch on the driver's synchronisation, or equal rates; when check_bag finds "
+                        "the depth elsewhere in the bag, sort that");
   if (2 * without_any > depth_images) {
     char range[60];
     std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 
 #include <yaml-cpp/yaml.h>
 
@@ -149,6 +150,17 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
     const std::string missed = pipeline.mapping()->backEnd().trackNoiseDifference();
     if (!missed.empty()) all.push_back(missed);
+    const MapSnapshot map = pipeline.mapping()->backEnd().snapshot();
+    for (const auto& [from, to] : guessedTimes(map)) {
+      char words[240];
+      std::snprintf(words, sizeof words,
+                    "keyframes from %.1f to %.1f s after the first image were never tied to the rest of the map: their "
+                    "place in trajectory.tum, planes and map is a guess, realtime.tum leaves them out",
+                    from - pipeline.chain().front().t, to - pipeline.chain().front().t);
+      all.push_back(words);
+    }
+    if (!pipeline.chain().empty() && anchorTrajectory(pipeline.chain(), anchorsOf(map)).empty())
+      all.push_back("the stored map was not recognised: no image has a pose in it, trajectory.tum is empty");
     const auto& refusals = pipeline.mapping()->refusals();
     all.insert(all.end(), refusals.begin(), refusals.end());
   }
@@ -258,6 +270,12 @@ void writePoints(const std::string& path, const std::vector<LandmarkEstimate>& l
   file.commit();
 }
 
+/// All that docs/outputs.md names, whichever of it a run writes.
+constexpr const char* kFiles[] = {"trajectory.tum", "realtime.tum", "odometry.tum", "odometry_covariance.csv",
+                                  "planes.yaml",    "planes.ply",   "points.csv",   "plane_history.csv",
+                                  "floorplan.svg",  "map.vsm",      "timing.csv",   "summary.yaml",
+                                  "report.html"};
+
 /// Where each plane lay after each map update: how steady it is.
 void writePlaneHistory(const std::string& path, const std::vector<PlaneRecord>& history) {
   AtomicFile file(path);
@@ -274,6 +292,8 @@ void writePlaneHistory(const std::string& path, const std::vector<PlaneRecord>& 
 
 void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader,
               const TimingLog& timing) {
+  // Of an earlier run into the same folder nothing may pass for this one's.
+  for (const char* name : kFiles) std::filesystem::remove(std::filesystem::path(folder) / name);
   Trajectory odometry;
   for (const OdometryPose& pose : pipeline.odometry()) odometry.push_back({pose.t, pose.T_odom_I});
   writeTum(folder + "/odometry.tum", odometry);

@@ -18,6 +18,8 @@ struct SnapshotKeyframe {
   SE3 T_chain_C;   ///< as the front end had it, see TrackedFrame
   SE3 T_I_C;       ///< the camera's mounting as known now
   std::uint32_t landmarks = 0;
+  bool stored = false;  ///< of a loaded map
+  bool placed = true;   ///< false: in a part of the map that nothing ties to the rest; where that lies is a guess
 };
 
 /// How large the map is by the accelerometer, see optimisation/inertial_scale.h.
@@ -53,5 +55,8 @@ struct MapSnapshot {
 
 /// Where the odometry lies in the map, by the map's keyframes and those that were only found in it; ascending times.
 std::vector<Anchor> anchorsOf(const MapSnapshot& snapshot);
+
+/// First and last stamps of keyframes in a row, of this session, whose place is a guess.
+std::vector<std::pair<double, double>> guessedTimes(const MapSnapshot& snapshot);
 
 }  // namespace vip_slam
