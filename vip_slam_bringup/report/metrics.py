@@ -37,10 +37,11 @@ def rigid_alignment(source, target):
     return T
 
 
-def trajectory_error(estimate, truth):
+def trajectory_error(estimate, truth, time_offset=0.0):
+    """`time_offset`: what the stamps of images lack of the truth's clock, s (time_offset of the sensor file)."""
     if len(estimate) < 3 or len(truth) < 2:
         return None
-    ok, p_true, q_true = interpolate_poses(truth, estimate[:, 0])
+    ok, p_true, q_true = interpolate_poses(truth, estimate[:, 0] + time_offset)
     if ok.sum() < 3:
         return None
     estimate, p_true, q_true = estimate[ok], p_true[ok], q_true[ok]

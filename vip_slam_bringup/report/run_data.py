@@ -17,7 +17,7 @@ class Unreadable(Exception):
 
 
 def read_tum(path):
-    """Array of rows t, x, y, z, qx, qy, qz, qw; strictly increasing in t."""
+    """Array of rows t, x, y, z, qx, qy, qz, qw; strictly increasing in t: of a time that comes twice, the first."""
     rows = []
     try:
         with open(path, encoding='utf-8') as file:
@@ -31,7 +31,9 @@ def read_tum(path):
                     raise Unreadable('%s:%d: expected eight numbers' % (path, number))
                 if len(values) != 8 or not all(math.isfinite(v) for v in values):
                     raise Unreadable('%s:%d: expected eight numbers' % (path, number))
-                if rows and values[0] <= rows[-1][0]:
+                if rows and values[0] == rows[-1][0]:
+                    continue
+                if rows and values[0] < rows[-1][0]:
                     raise Unreadable('%s:%d: the stamp does not follow the one before' % (path, number))
                 rows.append(values)
     except UnicodeDecodeError:
@@ -110,7 +112,7 @@ def stage_summary(name, rows, t0):
             't': rounded(rows[peaks, 0] - t0, 3), 'ms': rounded(ms[peaks], 3)}
 
 
-def load(folder, truth_path=None, planes_truth_path=None):
+def load(folder, truth_path=None, planes_truth_path=None, time_offset=0.0):
     if not os.path.isdir(folder):
         raise Unreadable('%s: is not a folder' % folder)
     for given in (truth_path, planes_truth_path):
@@ -145,7 +147,7 @@ def load(folder, truth_path=None, planes_truth_path=None):
     T_truth_map = None
     if truth_path:
         truth = read_tum(truth_path)
-        result = metrics.trajectory_error(trajectory, truth)
+        result = metrics.trajectory_error(trajectory, truth, time_offset)
         if result is None:
             data['truth_note'] = 'The truth has no pose at the times of this run.'
         else:

@@ -207,7 +207,7 @@ TEST_F(Report, NamesWhatItCannotRead) {
   expect(folder, "timing.csv:3: expected stage,t,ms");
   std::ofstream(dir_ / "planes.yaml") << "planes: [{id: 1}]\n";
   expect(folder, "planes.yaml: plane 1");
-  std::ofstream(dir_ / "trajectory.tum") << "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n";
+  std::ofstream(dir_ / "trajectory.tum") << "1 0 0 0 0 0 0 1\n0.9 0 0 0 0 0 0 1\n";
   expect(folder, "trajectory.tum:2: the stamp does not follow");
   fs::remove(dir_ / "trajectory.tum");
   fs::remove(dir_ / "odometry.tum");

@@ -75,7 +75,11 @@ TEST_F(FileFormats, TumErrorsNameTheLine) {
   refused("1 0 zero 0 0 0 0 1\n", ":1: 'zero' is not a number");
   refused("1 0 nan 0 0 0 0 1\n", "expected a finite number");
   refused("1 0 0 0 0 0 0 0\n", "unit quaternion");
-  refused("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", ":2: timestamp 1 does not follow 1");
+  refused("1 0 0 0 0 0 0 1\n0.9 0 0 0 0 0 0 1\n", ":2: timestamp 0.9 does not follow 1");
+  write("twice.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n2 5 0 0 0 0 0 1\n3 2 0 0 0 0 0 1\n");
+  const Trajectory twice = readTum(path("twice.tum"));
+  ASSERT_EQ(twice.size(), 3u);
+  EXPECT_EQ(twice[1].T_W_B.t().x(), 1);
   refused("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "ascending");
 }
 

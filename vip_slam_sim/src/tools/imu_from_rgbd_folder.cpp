@@ -110,7 +110,7 @@ int run(int argc, char** argv) {
   line.option("name", s.name, "default: the folder's name");
   line.option("up", s.up, "up vector in the world of the poses; default: from floors and walls in the depth",
               count<double>(3, 3));
-  line.option("intrinsics", s.intrinsics, "fx fy cx cy of the colour camera", count<double>(4, 4));
+  line.option("intrinsics", s.intrinsics, "fx fy cx cy [k1 k2 p1 p2 [k3]] of the colour camera", count<double>(4, 9));
   line.flag("registered", s.registered,
             "7-Scenes layout: depth, intrinsics and poses belong to the colour camera, not to one of its own");
   line.option("rate", s.rate, "images per second, where the folder has no stamps", between(1.0, 120.0));
@@ -130,11 +130,16 @@ int run(int argc, char** argv) {
     s.name = fs::path(s.folder).filename().empty() ? fs::path(s.folder).parent_path().filename().string()
                                                    : fs::path(s.folder).filename().string();
   RgbdFolder folder = openRgbdFolder(s.folder, s.rate, s.registered);
-  if (s.intrinsics.size() == 4) {
+  if (!s.intrinsics.empty()) {
+    if (s.intrinsics.size() != 4 && s.intrinsics.size() != 8 && s.intrinsics.size() != 9)
+      throw std::runtime_error("--intrinsics: " + std::to_string(s.intrinsics.size()) +
+                               " numbers, expected fx fy cx cy, with k1 k2 p1 p2, or k1 k2 p1 p2 k3");
     folder.camera.fx = s.intrinsics[0];
     folder.camera.fy = s.intrinsics[1];
     folder.camera.cx = s.intrinsics[2];
     folder.camera.cy = s.intrinsics[3];
+    folder.camera.distortion.assign(s.intrinsics.begin() + 4, s.intrinsics.end());
+    folder.camera.model = s.intrinsics.size() > 4 ? DistortionModel::kRadTan : DistortionModel::kNone;
   }
   if (!folder.camera.validate().empty())
     throw std::runtime_error(s.folder + ": " + folder.camera.validate() + "; give --intrinsics FX FY CX CY");
