@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include <Eigen/Cholesky>
+
 #include "vip_slam_backend/factors/reprojection.h"
 
 namespace vip_slam {
@@ -20,17 +22,30 @@ double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeome
   ratios.reserve(views.size());
   for (int l = 0; l < views.size(); ++l) {
     if (!views.standsForLandmark(l)) continue;
+    // Landmarks that were found again are where several tracks have them together, a corner of half a pixel off each;
+    // what a track's noise explains is how its views agree, so the point first goes where this one has it.
     int seen = 0;
     double squared = 0;
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
     for (const LandmarkView* v = views.begin(l); v != views.end(l); ++v) {
       Eigen::Vector2d r;
+      Eigen::Matrix<double, 2, 6> J_pose;
+      Eigen::Matrix<double, 2, 3> J;
       if (!v->own_track || v->slides ||
-          !reprojectionResidual(frames[v->frame], views.landmark(l).p_W, v->xy.cast<double>(), 1.0 / v->sigma, &r))
+          !reprojectionResidual(frames[v->frame], views.landmark(l).p_W, v->xy.cast<double>(), 1.0 / v->sigma, &r,
+                                &J_pose, &J))
         continue;
       ++seen;
       squared += r.squaredNorm();
+      H.noalias() += J.transpose() * J;
+      g.noalias() += J.transpose() * r;
     }
-    if (seen >= kLeastViews) ratios.push_back(squared / (2 * seen - 3));  // the point takes three
+    if (seen < kLeastViews) continue;
+    H.diagonal() *= 1.0 + 1e-9;  // all views from one place leave the depth open
+    const double explained = g.dot(H.ldlt().solve(g));
+    if (!std::isfinite(explained)) continue;
+    ratios.push_back(std::max(0.0, squared - explained) / (2 * seen - 3));  // the point takes three
   }
   if (ratios.size() < kLeastTracks) return 1;
   const auto middle = ratios.begin() + ratios.size() / 2;

@@ -55,6 +55,18 @@ TEST(TrackNoise, NoiseAsToldIsBelieved) {
   EXPECT_NEAR(largestWeight(exact.built), 460 / 0.1, 1);
 }
 
+TEST(TrackNoise, ALandmarkThatOtherTracksPullAsideIsNoNoiseOfThisOne) {
+  Adjusted pulled = adjustedMap(0, 12);
+  SimulatedKeyframes world(3);
+  for (const LandmarkId id : pulled.map.landmarkIds()) {
+    const Eigen::Vector3d aside(world.gauss(0.004), world.gauss(0.004), world.gauss(0.004));  // most of a pixel
+    pulled.map.setPosition(id, pulled.map.landmark(id).p_W + aside);
+  }
+  BuilderSettings settings;
+  settings.focal = world.sensor().camera.fx;
+  EXPECT_EQ(buildProblem(pulled.map, globalScope(pulled.map), settings).track_noise_factor, 1);
+}
+
 TEST(TrackNoise, WhatTheMapContradictsWeighsLess) {
   // Half a pixel in one of two directions, beside a tenth in both: sqrt((0.1^2 + 0.1^2 + 0.5^2) / (0.1^2 + 0.1^2))
   // = 3.7, less what the adjustment bends away.

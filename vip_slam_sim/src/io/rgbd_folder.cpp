@@ -95,8 +95,9 @@ std::vector<std::pair<double, std::string>> readList(const fs::path& path) {
     std::string file;
     if (!(s >> t >> file))
       throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": expected 'stamp file'");
-    if (!out.empty() && t <= out.back().first)
-      throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": stamp repeats or runs backwards");
+    if (!out.empty() && t == out.back().first) continue;  // public recordings repeat a few
+    if (!out.empty() && t < out.back().first)
+      throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": stamp runs backwards");
     out.emplace_back(t, file);
   }
   return out;
