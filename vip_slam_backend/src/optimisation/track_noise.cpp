@@ -15,15 +15,21 @@ constexpr int kLeastViews = 5;            // of a track: so many keyframes ago i
 constexpr std::size_t kLeastTracks = 30;  // below it the median is one of a few
 constexpr double kClearly = 2.0, kLargest = 8.0;  // a factor below the one is none
 
+/// Root of the median; reorders.
+double rootOfMedian(std::vector<double>* ratios) {
+  const auto middle = ratios->begin() + static_cast<std::ptrdiff_t>(ratios->size() / 2);
+  std::nth_element(ratios->begin(), middle, ratios->end());
+  return std::sqrt(*middle);
+}
+
 }  // namespace
 
 double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeometry>& frames) {
-  std::vector<double> ratios;
-  ratios.reserve(views.size());
+  std::vector<double> ratios, of_the_map;  // of how the views of a track agree, and of how they agree with the map
   for (int l = 0; l < views.size(); ++l) {
     if (!views.standsForLandmark(l)) continue;
     // Landmarks that were found again are where several tracks have them together, a corner of half a pixel off each;
-    // what a track's noise explains is how its views agree, so the point first goes where this one has it.
+    // what a track's noise explains is how its views agree, with the point where this one has it.
     int seen = 0;
     double squared = 0;
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -46,12 +52,12 @@ double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeome
     const double explained = g.dot(H.ldlt().solve(g));
     if (!std::isfinite(explained)) continue;
     ratios.push_back(std::max(0.0, squared - explained) / (2 * seen - 3));  // the point takes three
+    of_the_map.push_back(squared / (2 * seen - 3));
   }
   if (ratios.size() < kLeastTracks) return 1;
-  const auto middle = ratios.begin() + ratios.size() / 2;
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  const double factor = std::sqrt(*middle);
-  return factor > kClearly ? std::min(factor, kLargest) : 1;
+  if (!(rootOfMedian(&ratios) > kClearly)) return 1;
+  // An error that the views of a track share moves their point along, so that they agree better than they are right.
+  return std::clamp(rootOfMedian(&of_the_map), kClearly, kLargest);
 }
 
 std::string trackNoiseDifference(double factor) {
