@@ -166,7 +166,7 @@ TEST_F(EvaluateCommand, RefusesBadInputInOneLine) {
   expectRefused(truth + " --estimate " + path("missing.tum"), "missing.tum");
   std::ofstream(path("bad.tum")) << "# t\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0\n";
   expectRefused(truth + " --estimate " + path("bad.tum"), "bad.tum:3:");
-  std::ofstream(path("twice.tum")) << "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n";
+  std::ofstream(path("twice.tum")) << "2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n";
   expectRefused(truth + " --estimate " + path("twice.tum"), "twice.tum:2:");
   std::ofstream(path("empty.tum")) << "# nothing\n";
   expectRefused(truth + " --estimate " + path("empty.tum"), "empty.tum");

@@ -192,7 +192,7 @@ TEST(Folder, ErrorsNameTheFile) {
   EXPECT_NE(messageOf("/nowhere").find("/nowhere"), std::string::npos);
   const std::string path = scratch("tum");
   fs::create_directories(path);
-  std::ofstream(path + "/rgb.txt") << "1.0 a.png\n1.0 b.png\n";
+  std::ofstream(path + "/rgb.txt") << "1.0 a.png\n0.9 b.png\n";
   std::ofstream(path + "/depth.txt") << "1.0 a.png\n";
   std::ofstream(path + "/groundtruth.txt") << "1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n";
   EXPECT_NE(messageOf(path).find("rgb.txt:2"), std::string::npos) << messageOf(path);

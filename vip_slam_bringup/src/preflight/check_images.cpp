@@ -103,20 +103,12 @@ void checkBrightness(const std::vector<BrightnessSample>& samples, Findings* out
                     "more light or exposure"});
 }
 
-/// Images that come again while the gyro turns; what is rendered without noise may repeat while it stands.
 void checkRepeats(const Recording& r, Findings* out) {
-  constexpr double kTurns = 0.05;  // rad/s
   constexpr double kShare = 0.01;  // of the images
-  std::size_t turning = 0;
-  for (const double t : r.color.repeated) {
-    const auto later = [](const StampedVector& sample, double at) { return sample.t < at; };
-    const auto near = std::lower_bound(r.gyro_samples.begin(), r.gyro_samples.end(), t, later);
-    turning += near != r.gyro_samples.end() && near->value.norm() > kTurns;
-  }
-  if (turning > kShare * double(r.color.decoded))
+  if (r.color.repeated > kShare * double(r.color.decoded))
     out->push_back({Severity::kWarning, "colour image",
-                    words("%zu of %zu images repeat the pixels of the one before while the camera moves", turning,
-                          r.color.decoded),
+                    words("%zu of %zu images repeat the pixels of the one before while the camera moves",
+                          r.color.repeated, r.color.decoded),
                     "the camera is slower than its topic, or froze: the repeats are left out"});
 }
 

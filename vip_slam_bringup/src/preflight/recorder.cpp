@@ -148,8 +148,11 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
 
 void Recorder::addGray(double t, const cv::Mat& gray) {
   ++recording_.color.decoded;
-  if (samePixels(gray, newest_gray_)) {
-    recording_.color.repeated.push_back(t);
+  // What is rendered without noise repeats by itself while it stands.
+  constexpr double kTurns = 0.05;  // rad/s
+  const bool turns = !recording_.gyro_samples.empty() && recording_.gyro_samples.back().value.norm() > kTurns;
+  if (turns && samePixels(gray, newest_gray_)) {
+    ++recording_.color.repeated;
     return;  // says nothing of the motion at this time
   }
   newest_gray_ = gray;

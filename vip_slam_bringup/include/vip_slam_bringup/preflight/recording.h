@@ -24,8 +24,8 @@ struct StreamRecord {
   std::string frame_id;                 ///< of the last message
   std::size_t unusable = 0;             ///< messages that could not be decoded
   std::string unusable_reason;
-  std::size_t decoded = 0;       ///< messages whose pixels were looked at
-  std::vector<double> repeated;  ///< stamps of those with the pixels of the one before
+  std::size_t decoded = 0;   ///< messages whose pixels were looked at
+  std::size_t repeated = 0;  ///< of these, with the pixels of the one before while the sensor turns
 };
 
 struct StampedVector {
