@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "vip_slam_core/util/same_pixels.h"
@@ -24,17 +25,15 @@ constexpr double kPatience = 2.0;
 // No IMU is worse than its data sheet by this; with axes, signs or units mixed up the factor goes to its limit of 30,
 // while a camera turned by a degree or a delay of 10 ms leave it at 1.
 constexpr double kImplausibleNoise = 10.0;
-// Features that were followed for so many images and have depth show how the camera moves.
-constexpr int kOld = 8;
 // The same pixels may come again while the IMU rests and foretells less image motion than this: what is rendered
 // without noise looks like that when it stands.
 constexpr double kStandsPx = 0.5;
 // The translation between two images may be off the foretold one by so many sigmas, or the IMU has missed something;
-// this speed and length, m/s and m, are a sigma of what neither knows of (rows, a delay).
-constexpr double kShockSigmas = 6.0, kLeastSpeed = 0.0125, kLeastLength = 2.5e-4;
+// this speed and length, m/s and m, are a sigma of what neither knows of (rows, a delay). At four ordinary images did.
+constexpr double kShockSigmas = 6.0, kUntoldSpeed = 0.0125, kUntoldLength = 2.5e-4;
 // A repeated image is no fault for so long, s.
 constexpr double kFrozen = 0.3;
-// A shock shows when so many points tell the same motion, but for one in twenty.
+// A shock shows when so many points tell one motion, with no more than one in so many against it.
 constexpr int kShockTracks = 30, kShockOutliers = 20;
 // It comes out of the blue: for so long before, images have agreed with a share of that. An IMU or a velocity that is
 // wrong departs little by little. It is over in so much time, s.
@@ -67,14 +66,13 @@ bool FrontEnd::Impl::contradictedForLong(const TrackingResult& tracking, double 
 }
 
 void FrontEnd::Impl::noteAgreement(const TrackingResult& tracking, double t) {
-  const std::size_t needed = 2 * static_cast<std::size_t>(options_.recovery.min_tracks);
-  const auto held = [](const Track& track) { return track.feature.depth > 0 && track.feature.age >= kOld; };
+  const int needed = options_.recovery.min_tracks;
   const auto& tracks = tracker_.tracks();
-  if (still_ || (tracking.moves_by_itself
-                     ? 2 * static_cast<std::size_t>(std::count_if(tracks.begin(), tracks.end(), held)) >= needed
-                     : tracking.pose_ok && tracks.size() >= needed)) {
-    last_agreed_t_ = t;
-  }
+  const auto held = std::count_if(tracks.begin(), tracks.end(), [](const Track& track) {
+    return track.feature.depth > 0 && track.feature.age >= kOldPoint;
+  });
+  const bool agrees = tracking.moves_by_itself ? held >= needed : tracking.pose_ok && tracking.tracked >= 2 * needed;
+  if (still_ || agrees) last_agreed_t_ = t;
 }
 
 bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
@@ -89,12 +87,9 @@ bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
   const SE3 T_now_then =
       (filter_.predict(samples).predicted.T_W_I * extrinsics()).inverse() * filter_.nav().T_W_I * extrinsics();
   std::vector<double> moved;
-  for (const Track& track : tracker_.tracks()) {
-    const Feature& f = track.feature;
-    const Eigen::Vector2d xy = f.xy.cast<double>();
-    const double z = f.depth > 0 ? f.depth : sensor_.depth_noise.max_range;
-    const Eigen::Vector3d p = T_now_then * Eigen::Vector3d(z * xy.x(), z * xy.y(), z);
-    if (p.z() > 0) moved.push_back((p.head<2>() / p.z() - xy).norm() * camera_->focal());
+  for (const Eigen::Vector3d& then : trackedPoints()) {
+    const Eigen::Vector3d now = T_now_then * then;
+    if (now.z() > 0) moved.push_back((now.hnormalized() - then.hnormalized()).norm() * camera_->focal());
   }
   if (moved.empty()) return true;
   std::nth_element(moved.begin(), moved.begin() + moved.size() / 2, moved.end());
@@ -115,7 +110,7 @@ void FrontEnd::Impl::admitShock(const TrackingResult& tracking, const ForetoldMo
   const bool told = foretold.interval > 0 && !foretold.wary && !tracking.moves_by_itself && tracking.step.ok &&
                     tracking.tracked >= kShockTracks && kShockOutliers * tracking.lost_outlier <= tracking.tracked;
   const Eigen::Vector3d apart = tracking.step.t - foretold.T_current_previous.t();
-  const double length = kLeastSpeed * dt + kLeastLength;
+  const double length = kUntoldSpeed * dt + kUntoldLength;
   const Eigen::Matrix3d C =
       tracking.step.covariance + (std::pow(foretold.sigma, 2) + std::pow(length, 2)) * Eigen::Matrix3d::Identity();
   const double sigmas = told ? std::sqrt(apart.dot(C.inverse() * apart)) : 0.0;

@@ -70,6 +70,8 @@ class FrontEnd::Impl {
   FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth,
                          const FrontEnd::PoseReady& on_pose);
   SE3 gyroRotation(double t0, double t1) const;
+  /// In the camera, m; those without depth lie beyond its reach, or might as well.
+  std::vector<Eigen::Vector3d> trackedPoints() const;
   /// Both in IMU time: of the last image and of this one.
   bool decideStillness(double previous_t_imu, double t_imu);
   /// How the colour camera moves during a readout, given the state at the stamp; null: everything at the stamp.

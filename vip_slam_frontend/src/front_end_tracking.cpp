@@ -128,6 +128,16 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   return makeOutput(t, t_imu, "first");
 }
 
+std::vector<Eigen::Vector3d> FrontEnd::Impl::trackedPoints() const {
+  std::vector<Eigen::Vector3d> points;
+  for (const Track& track : tracker_.tracks()) {
+    const Feature& f = track.feature;
+    const double z = f.depth > 0 ? f.depth : sensor_.depth_noise.max_range;
+    points.emplace_back(z * f.xy.x(), z * f.xy.y(), z);
+  }
+  return points;
+}
+
 bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   if (moving_.any()) moving_imu_t_ = t_imu;
   const bool image_counts = !movedLately(t_imu);  // what pauses says nothing about standing still
@@ -151,13 +161,7 @@ bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), since), t_imu), &sensor_.imu_noise);
   cues.tracks = image_counts ? static_cast<int>(now.size()) : 0;
   cues.speed = filter_.nav().v_W.norm();
-  std::vector<Eigen::Vector3d> points;  // those without depth lie beyond its reach, or might as well
-  for (const Track& track : tracker_.tracks()) {
-    const Feature& f = track.feature;
-    const double z = f.depth > 0 ? f.depth : sensor_.depth_noise.max_range;
-    points.emplace_back(z * f.xy.x(), z * f.xy.y(), z);
-  }
-  cues.px_per_metre = leastImageMotion(points, camera_->focal());
+  cues.px_per_metre = leastImageMotion(trackedPoints(), camera_->focal());
   while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options.window - 1e-6) {
     recent_pixels_.pop_front();
   }

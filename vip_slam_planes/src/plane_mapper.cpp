@@ -163,8 +163,8 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes, Keyfra
 
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
   // One that was on its way when the map was loaded bears the number of another one, whose place it would take.
-  if (keyframe && keyframe->id <= stored_until_) return;
-  if (!keyframe || keyframe->id == 0 || placed_.count(keyframe->id) || !isSound(keyframe->frame.depth_grid)) return;
+  if (!keyframe || keyframe->id <= stored_until_ || placed_.count(keyframe->id)) return;
+  if (!isSound(keyframe->frame.depth_grid)) return;
   waiting_.emplace(keyframe->id, keyframe);
   // Beside those that the back end holds there is the newest one, which it may place yet.
   while (waiting_.size() > kMostWaitingKeyframes + 1) {

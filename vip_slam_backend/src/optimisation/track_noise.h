@@ -12,8 +12,9 @@
 
 namespace vip_slam {
 
-/// Factor on the sigmas of all views, 1 to 8; 1 unless they are off by clearly more than told, or when too few tracks
-/// say anything. `frames`: the problem's, at the map's present estimate.
+/// Factor on the sigmas of all views, 1 to 8; 1 unless the views of a track miss each other by clearly more than told,
+/// or when too few tracks say anything. Then it is by how much they miss the map. `frames`: the problem's, at the map's
+/// present estimate.
 double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeometry>& frames);
 
 /// What to tell the user of such a factor; empty at 1.

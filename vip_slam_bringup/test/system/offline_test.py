@@ -81,6 +81,14 @@ class OfflineTest(unittest.TestCase):
         self.assertTrue(filecmp.cmp(os.path.join(self.folder, 'a', 'odometry.tum'), os.path.join(out, 'odometry.tum'),
                                     shallow=False))
 
+    def test_06_nothing_of_an_earlier_run_stays(self):
+        for name in FILES:
+            open(os.path.join(self.folder, 'd', name), 'a').close()
+        subprocess.run(self.command('d', '--duration', '3', '--set', 'mapping=false', '--no-report'), check=True,
+                       timeout=120)
+        self.assertEqual(sorted(os.listdir(os.path.join(self.folder, 'd'))),
+                         ['odometry.tum', 'odometry_covariance.csv', 'summary.yaml', 'timing.csv'])
+
 
 if __name__ == '__main__':
     rostest.rosrun('vip_slam_bringup', 'offline_test', OfflineTest)

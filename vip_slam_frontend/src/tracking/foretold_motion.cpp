@@ -6,8 +6,6 @@ namespace vip_slam {
 
 namespace {
 
-// Images after which a point has shown that it stands still.
-constexpr int kOld = 8;
 constexpr int kLeast = 5;
 constexpr double kSigmas = 4.0;
 // Shares of the inliers.
@@ -25,7 +23,7 @@ double mostApart(const ForetoldMotion& foretold) { return kSigmas * foretold.sig
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded) {
   int old_found = 0, old_bounded = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (pairs[i].age < kOld) continue;
+    if (pairs[i].age < int(kOldPoint)) continue;
     old_found += found.inlier[i] != 0;
     old_bounded += bounded.inlier[i] != 0;
   }
@@ -35,7 +33,7 @@ bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& foun
 bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found) {
   int old = 0, old_found = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (pairs[i].age < kOld) continue;
+    if (pairs[i].age < int(kOldPoint)) continue;
     ++old;
     old_found += found.inlier[i] != 0;
   }

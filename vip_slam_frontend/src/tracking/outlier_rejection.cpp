@@ -20,6 +20,19 @@ constexpr int kLeastToDoubt = 15;
 
 Eigen::Vector3d bearing(const Eigen::Vector2d& xy) { return {xy.x(), xy.y(), 1.0}; }
 
+/// What the second view of a pair with depth is off the point moved by R, t, and how that changes with the moved point.
+bool reprojectionOf(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, Eigen::Vector2d* r,
+                    Eigen::Matrix<double, 2, 3>* J_p) {
+  const Eigen::Vector3d p = R * (bearing(pair.xy_previous) * pair.depth_previous) + t;
+  if (p.z() < 0.01) return false;
+  const double iz = 1.0 / p.z();
+  *r = pair.xy_current - p.head<2>() * iz;
+  *J_p << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz;
+  return true;
+}
+
+double huberWeight(double e, double huber) { return e > huber ? huber / e : 1.0; }
+
 /// Normal equations of m x (R p + t) = 0 in t over the given pairs.
 bool solveTranslation(const std::vector<PointPair>& pairs, const int* sample, int n, const Eigen::Matrix3d& R,
                       Eigen::Vector3d* t) {
@@ -52,18 +65,14 @@ bool refinePose(const std::vector<PointPair>& pairs, const std::vector<char>& us
     const Eigen::Matrix3d R = T.R();
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       if (!use[i] || pairs[i].depth_previous <= 0) continue;
-      const Eigen::Vector3d q = bearing(pairs[i].xy_previous) * pairs[i].depth_previous;
-      const Eigen::Vector3d p = R * q + T.t();
-      if (p.z() < 0.01) continue;
-      const double iz = 1.0 / p.z();
-      const Eigen::Vector2d r = pairs[i].xy_current - p.head<2>() * iz;
+      Eigen::Vector2d r;
       Eigen::Matrix<double, 2, 3> J_p;
-      J_p << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz;
+      if (!reprojectionOf(pairs[i], R, T.t(), &r, &J_p)) continue;
+      const Eigen::Vector3d q = bearing(pairs[i].xy_previous) * pairs[i].depth_previous;
       Eigen::Matrix<double, 2, 6> J;
       J.leftCols<3>() = -J_p * R * hat(q);
       J.rightCols<3>() = J_p;
-      const double e = r.norm();
-      const double w = e > huber ? huber / e : 1.0;
+      const double w = huberWeight(r.norm(), huber);
       A += w * J.transpose() * J;
       b += w * J.transpose() * r;
       ++n;
@@ -94,13 +103,10 @@ TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::ve
     squares = 0, n = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       if (!use[i] || pairs[i].depth_previous <= 0) continue;
-      const Eigen::Vector3d p = R_current_previous * (bearing(pairs[i].xy_previous) * pairs[i].depth_previous) + fit.t;
-      if (p.z() < 0.01) continue;
-      const double iz = 1.0 / p.z();
-      const Eigen::Vector2d r = pairs[i].xy_current - p.head<2>() * iz;
+      Eigen::Vector2d r;
       Eigen::Matrix<double, 2, 3> J;
-      J << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz;
-      const double e = r.norm(), w = e > huber ? huber / e : 1.0;
+      if (!reprojectionOf(pairs[i], R_current_previous, fit.t, &r, &J)) continue;
+      const double w = huberWeight(r.norm(), huber);
       A += w * J.transpose() * J;
       b += w * J.transpose() * r;
       squares += w * r.squaredNorm();

@@ -153,7 +153,7 @@ bool outermost(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const
     // Many tables of one height are asked for in pairs: a floor below them is not walked cell by cell.
     const auto [lowest, highest] = heightRange(*track, out, level);
     if (highest < -kBeyond) continue;
-    if (lowest > kBeyond && !ceiling && !track->cells().empty() && track->cells().count(1) > 0) return false;
+    if (lowest > kBeyond && !ceiling && track->cells().count(1) > 0) return false;
     const bool wall = track->kind() == PlaneKind::kVertical && track->area() >= kLargeWall;
     track->cells().forEach([&](CellIndex c, int) {
       const Eigen::Vector3d p = track->cellCentre(c);

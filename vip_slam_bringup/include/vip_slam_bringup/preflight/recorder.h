@@ -49,7 +49,7 @@ class Recorder {
     double t;
     cv::Mat image;
   };
-  cv::Mat newest_gray_;
+  cv::Mat newest_gray_;                               ///< that was no repeat
   std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour waits a moment for its depth
 };
 

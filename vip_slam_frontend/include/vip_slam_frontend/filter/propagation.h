@@ -24,7 +24,7 @@ struct Propagation {
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
   /// Adds to Q a step of the velocity by `dv` (one sigma of each axis, m/s) at an unknown moment of the `dt` seconds.
   void admitStep(double dv, double dt);
-  bool step_admitted = false;
+  bool step_admitted = false;  ///< by that
 };
 
 /// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.

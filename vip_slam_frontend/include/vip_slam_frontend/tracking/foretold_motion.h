@@ -2,12 +2,16 @@
 // view, the motion that explains most points is his, not the camera's; the IMU knows better for some seconds.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_frontend/tracking/outlier_rejection.h"
 
 namespace vip_slam {
+
+/// Images after which a point has shown that it stands still.
+constexpr std::uint32_t kOldPoint = 8;
 
 struct ForetoldMotion {
   SE3 T_current_previous;

@@ -16,6 +16,10 @@ struct CellIndex {
   bool operator==(const CellIndex& o) const { return x == o.x && y == o.y; }
 };
 
+/// Sightings of a cell beyond these are not counted: few enough that a surface which has gone is forgotten after as
+/// many sightings of what is behind it.
+constexpr int kMostHits = 8;
+
 class CellGrid {
  public:
   int at(CellIndex c) const {

@@ -111,8 +111,6 @@ class PlaneTrack {
   int keyframes_waited = 0;                               ///< that looked its way before it was confirmed
 
  private:
-  /// Few enough that a surface which has gone is forgotten after as many sightings of what is behind it.
-  static constexpr int kMostHits = 8;
   struct Patch {
     SE3 T_map_C;                           ///< of the host, when last rasterised
     std::vector<Eigen::Vector3f> cells_C;  ///< cell centres in the host's camera frame
