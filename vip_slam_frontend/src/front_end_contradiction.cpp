@@ -1,5 +1,5 @@
 // Images and IMU that contradict each other: images that come again, shocks that the IMU missed, what moves by itself,
-// an IMU that is wrong.
+// an IMU that is wrong, or missing.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/util/same_pixels.h"
 
 #include "front_end_impl.h"
@@ -38,6 +39,9 @@ constexpr int kShockTracks = 30, kShockOutliers = 20;
 // It comes out of the blue: for so long before, images have agreed with a share of that. An IMU or a velocity that is
 // wrong departs little by little. It is over in so much time, s.
 constexpr double kCalm = 0.5, kDoubt = 0.7, kShockLasts = 0.1;
+// So long after the last image a hand may have turned the camera elsewhere, s; twice as long and by more than this
+// angle from what the IMU foretold, rad, the filter's step is too far from where it is linearised.
+constexpr double kLongUnseen = 0.2, kFarTurn = 0.05;
 
 }  // namespace
 
@@ -50,11 +54,20 @@ ForetoldMotion FrontEnd::Impl::foretell(const Propagation& propagation, const SE
   ForetoldMotion motion;
   motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * extrinsics());
   motion.sigma = propagation.displacementSigma(filter_.covariance());
+  motion.turn_unknown = imu_gap;
   motion.wary = movedLately(propagation.predicted.t);
   motion.at_rest = stillness_.imuRests();
   const bool settled = options_.tracking.leave_out_moving && propagation.predicted.t - started_imu_t_ > kSettled;
   motion.interval = settled && !imu_gap ? propagation.predicted.t - from.t : 0.0;
   return motion;
+}
+
+bool FrontEnd::Impl::bridgesGap(const TrackingResult& tracking, std::size_t tracks_before,
+                                const ForetoldMotion& foretold, double unseen) {
+  if (unseen < kLongUnseen) return true;
+  if (!tracking.pose_ok || 2 * static_cast<std::size_t>(tracking.tracked) < tracks_before) return false;
+  const SE3 apart = foretold.T_current_previous.inverse() * tracking.T_current_previous;
+  return unseen < 2 * kLongUnseen || logSO3(apart.R()).norm() < kFarTurn;
 }
 
 bool FrontEnd::Impl::contradictedForLong(const TrackingResult& tracking, double t) const {

@@ -90,6 +90,11 @@ class FrontEnd::Impl {
   ForetoldMotion foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const;
   /// A longer one starts tracking anew, s.
   double longestImuGap() const { return 5.0 * options_.recovery.max_imu_gap; }
+  /// Whether the image after a gap of the IMU tells what went on in it. Where images were taken within the gap, each
+  /// follows the last one closely; where they are missing as well, it takes one that is known again. `unseen`: since
+  /// the last image, s.
+  static bool bridgesGap(const TrackingResult& tracking, std::size_t tracks_before, const ForetoldMotion& foretold,
+                         double unseen);
   bool imuIsContradicted() const;
   bool movedLately(double t_imu) const;
   /// So long that it is time to begin anew.

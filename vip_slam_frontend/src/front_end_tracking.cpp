@@ -17,8 +17,6 @@ namespace {
 
 // Features gated away in this many images in a row: the estimate has left the measurements.
 constexpr int kGatedImages = 30;
-constexpr double kLongGapNoise = 5.0;
-
 }  // namespace
 
 FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::PoseReady& on_pose) {
@@ -204,7 +202,8 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     return initialise(t, t_imu, gray, depth_read);
   }
   keyframe_imu_broken_ = keyframe_imu_broken_ || gap;
-  Propagation propagation = filter_.predict(samples, gap ? kLongGapNoise : 1.0);
+  Propagation propagation = filter_.predict(samples);
+  if (gap) propagation.admitGap(max_gap, t_imu - from);
   // Without images the IMU carries the pose as it does in the dark, for as long as it tells where.
   if (propagation.displacementSigma(filter_.covariance()) > options_.recovery.max_position_sigma) {
     reset("no image for " + std::to_string(t_imu - from).substr(0, 4) + " s");
@@ -217,8 +216,13 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
   const ForetoldMotion foretold = foretell(propagation, T_odom_C, gap);
+  const std::size_t tracks_before = tracker_.tracks().size();
   const TrackingResult tracked =
       tracker_.track(gray, depth, foretold, !coasting, T_odom_C, colourRows(propagation.predicted), t);
+  if (gap && !bridgesGap(tracked, tracks_before, foretold, t_imu - from)) {
+    reset("IMU and images are missing for " + std::to_string(t_imu - from).substr(0, 4) + " s");
+    return initialise(t, t_imu, gray, depth_read);
+  }
   moving_ = tracked.regions;
   admitShock(tracked, foretold, t_imu - from, &propagation);
   for (const Track& track : tracker_.ended()) landmarks_.retire(track);

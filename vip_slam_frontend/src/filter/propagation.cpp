@@ -21,12 +21,31 @@ Eigen::Matrix<double, 15, 1> noiseFloor() {
   return floor;
 }
 
+// A hand turns and shakes a camera by so much, rad/s and m/s^2, once or twice a second: a line across a gap is off by
+// its square, until it tells nothing of what went on between. (1/s^3, m/s^4)
+constexpr double kRate = 2.0, kRateCurvature = 8.0, kAcceleration = 6.0, kAccelerationCurvature = 24.0;
+
 Matrix15d whitening(const Matrix15d& Q) {
   const Eigen::LLT<Matrix15d> llt(Q);
   return llt.matrixL().solve(Matrix15d::Identity());
 }
 
 }  // namespace
+
+void Propagation::admitGap(double gap, double dt) {
+  const double rate = std::min(kRate, kRateCurvature * gap * gap);
+  const double acceleration = std::min(kAcceleration, kAccelerationCurvature * gap * gap);
+  // The same for all of the interval.
+  const double theta = rate * dt, v = acceleration * dt, p = 0.5 * v * dt;
+  for (int axis = 0; axis < 3; ++axis) {
+    Q(axis, axis) += theta * theta;
+    Q(3 + axis, 3 + axis) += p * p;
+    Q(6 + axis, 6 + axis) += v * v;
+    Q(3 + axis, 6 + axis) += p * v;
+    Q(6 + axis, 3 + axis) += p * v;
+  }
+  W = whitening(Q);
+}
 
 void Propagation::admitStep(double dv, double dt) {
   // At s after the first image, s uniform: dp = dv (dt - s), so E[dp^2] = dv^2 dt^2 / 3 and E[dp dv] = dv^2 dt / 2.

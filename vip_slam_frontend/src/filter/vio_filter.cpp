@@ -118,8 +118,8 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   started_ = true;
 }
 
-Propagation VioFilter::predict(const std::vector<ImuSample>& samples, double noise_scale) const {
-  const double scale = noise_scale * options_.imu_noise_inflation * imu_monitor_.scale();
+Propagation VioFilter::predict(const std::vector<ImuSample>& samples) const {
+  const double scale = options_.imu_noise_inflation * imu_monitor_.scale();
   return propagate(filter_.window(), samples, imu_noise_, G_, scale, stamp_monitor_.sigma());
 }
 

@@ -44,6 +44,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldM
                             bool* moves) {
   *moves = false;
   options.most_apart = 0;
+  options.turn_unknown = foretold.turn_unknown;
   RansacResult found = rejectOutliers(pairs, foretold.T_current_previous, options);
   if (!(foretold.interval > 0) || !found.ok || !found.with_depth) return found;
   options.most_apart = mostApart(foretold);

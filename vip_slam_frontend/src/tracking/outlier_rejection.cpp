@@ -197,18 +197,18 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
   result.T_current_previous = T;
   result.ok = result.inliers >= 5;
   const int n = static_cast<int>(pairs.size());
-  if (n >= kLeastToDoubt && 3 * result.inliers < n && !bounded) {
-    GeneralMotion general = poseFromDepth(pairs, predicted, options);
-    if (general.model == GeneralModel::kNone) general = fundamentalOrHomography(pairs, options);
-    if (3 * general.inliers > 2 * n) {
-      const bool metric = general.model == GeneralModel::kPose;
-      result.ok = true;
-      result.free_rotation = true;
-      result.with_depth = metric;
-      result.T_current_previous = metric ? general.T_current_previous : predicted;
-      result.inlier = std::move(general.inlier);
-      result.inliers = general.inliers;
-    }
+  const bool doubtful = n >= kLeastToDoubt && 3 * result.inliers < n && !bounded;
+  if (!doubtful && !options.turn_unknown) return result;
+  GeneralMotion general = poseFromDepth(pairs, predicted, options);
+  if (doubtful && general.model == GeneralModel::kNone) general = fundamentalOrHomography(pairs, options);
+  if (doubtful ? 3 * general.inliers > 2 * n : general.inliers > result.inliers) {
+    const bool metric = general.model == GeneralModel::kPose;
+    result.ok = true;
+    result.free_rotation = true;
+    result.with_depth = metric;
+    result.T_current_previous = metric ? general.T_current_previous : predicted;
+    result.inlier = std::move(general.inlier);
+    result.inliers = general.inliers;
   }
   return result;
 }

@@ -22,13 +22,16 @@ struct Propagation {
   /// there.
   double displacementSigma(const Matrix15d& P) const;
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
+  /// Adds to Q what a straight line between two samples `gap` seconds apart may be off the motion between them, for the
+  /// `dt` seconds of this interval, all of which may lie in the gap.
+  void admitGap(double gap, double dt);
   /// Adds to Q a step of the velocity by `dv` (one sigma of each axis, m/s) at an unknown moment of the `dt` seconds.
   void admitStep(double dv, double dt);
   bool step_admitted = false;  ///< by that
 };
 
 /// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.
-/// `noise_scale` multiplies all noise densities (IMU gaps); `stamp_sigma`: the image may have been taken so much
+/// `noise_scale` multiplies all noise densities; `stamp_sigma`: the image may have been taken so much
 /// earlier or later than its stamp says, s. The window is not changed.
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
                       const Eigen::Vector3d& G, double noise_scale = 1.0, double stamp_sigma = 0.0);

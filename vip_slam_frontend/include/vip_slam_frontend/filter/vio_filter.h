@@ -65,7 +65,7 @@ class VioFilter {
   void restartDepthOffset(bool none);
 
   /// Prediction from the newest clone over `samples` (first at its time); does not change the filter.
-  Propagation predict(const std::vector<ImuSample>& samples, double noise_scale = 1.0) const;
+  Propagation predict(const std::vector<ImuSample>& samples) const;
   /// One image: `propagation` from predict(). Without measurements this coasts. `surfaces` (may be null) ties the new
   /// image's depth to that of an earlier clone. `unrest`: see StillnessDetector; nothing when the body moves.
   StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,

@@ -15,9 +15,10 @@ constexpr std::uint32_t kOldPoint = 8;
 
 struct ForetoldMotion {
   SE3 T_current_previous;
-  double sigma = 0;      ///< of the translation along its least certain axis, m
-  double interval = 0;   ///< between the two images, s; 0: nothing is foretold
-  bool wary = false;     ///< something moved a moment ago: when in doubt the IMU is right
+  double sigma = 0;           ///< of the translation along its least certain axis, m
+  double interval = 0;        ///< between the two images, s; 0: nothing is foretold
+  bool turn_unknown = false;  ///< the IMU had a gap
+  bool wary = false;          ///< something moved a moment ago: when in doubt the IMU is right
   bool at_rest = false;  ///< the IMU has not stirred since the camera stood still: points that move do so themselves
 };
 

@@ -21,8 +21,9 @@ struct RansacOptions {
   double threshold = 0.004;  ///< normalised image units
   int iterations = 60;
   std::uint32_t seed = 1;
-  double most_apart =
-      0;  ///< of the translation from the predicted one, m; the rotation is kept. 0: whatever explains most
+  /// Of the translation from the predicted one, m; the rotation is kept. 0: whatever explains most.
+  double most_apart = 0;
+  bool turn_unknown = false;  ///< a pose from depth with a free rotation is taken when it explains more
 };
 
 struct RansacResult {
