@@ -115,6 +115,28 @@ TEST(Marginalisation, ARenewedStateIsKnownByItsNewSigmaAlone) {
   EXPECT_TRUE(filter.healthy());
 }
 
+TEST(Marginalisation, AConsideredStateIsKnownAsBeforeAndTheOthersGivenItAsNow) {
+  std::mt19937 random(7);
+  WindowState window;
+  window.clones.resize(3);
+  window.calibration.depth_offset = window.calibration.time_offset = window.calibration.gyro_scale = true;
+  const int n = window.dimension(), column = window.timeOffsetColumn();
+  SquareRootFilter filter;
+  filter.initialise(window, randomMatrix(n + 20, n, random));
+  const Eigen::MatrixXd before = filter.covariance();
+  const double sigma = 3.0 * std::sqrt(before(column, column)), change = 1e-3;
+  filter.consider(column, change, sigma);
+  // P(others given it) stays: P - p p^T / s, with p its column; then p follows from its own variance.
+  const Eigen::VectorXd gain = before.col(column) / before(column, column);
+  const Eigen::MatrixXd expected = before + (sigma * sigma - before(column, column)) * gain * gain.transpose();
+  EXPECT_LT(relative(filter.covariance(), expected), 1e-10);
+  EXPECT_TRUE(filter.R().isUpperTriangular(1e-12));
+  EXPECT_TRUE(filter.healthy());
+  EXPECT_NEAR(filter.window().time_offset, change, 1e-12);
+  EXPECT_NEAR(filter.window().depth_offset, change * gain(window.depthOffsetColumn()), 1e-12);
+  EXPECT_NEAR(filter.window().v_W.y(), change * gain(window.navColumn() + 1), 1e-12);
+}
+
 /// Covariance-form twin: the same state, propagated, cloned, marginalised and updated by the textbook EKF.
 struct ReferenceEkf {
   Eigen::MatrixXd P;  // order as in the window

@@ -80,7 +80,7 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   const NavState from = window.nav();
   result.predicted = pre.predict(from, G);
   result.predicted.t = samples.back().t;
-  result.omega_I = correctedRate(samples.back().gyro, window.gyro_correction) - window.bias_gyro;
+  result.omega_I = correctedRate(RateHistory::last(samples), window.gyro_correction) - window.bias_gyro;
 
   const Clone& last = window.clones.back();
   const Eigen::Matrix3d R_fej = last.T_W_I_fej.R();
@@ -102,9 +102,10 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   Phi.block<3, 3>(6, 12) = R_now * pre.J_beta_ba();
 
   // A bias that grows with the rate, which hardly changes between two images.
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const ImuSample& sample : samples) mean += sample.gyro / static_cast<double>(samples.size());
-  for (int axis = 0; axis < 3; ++axis) result.Phi_gyro.block<9, 3>(0, 3 * axis) = -mean(axis) * Phi.block<9, 3>(0, 9);
+  const Eigen::Vector3d rate = window.rates.expected(samples);
+  for (int axis = 0; axis < 3; ++axis) result.Phi_gyro.block<9, 3>(0, 3 * axis) = -rate(axis) * Phi.block<9, 3>(0, 9);
+  result.rates = window.rates;
+  result.rates.add(samples);
 
   // The preintegrated position and velocity noise lives in the frame of the first pose.
   Matrix15d T = Matrix15d::Identity();

@@ -1,5 +1,9 @@
 #include "vip_slam_frontend/filter/square_root_filter.h"
 
+#include <algorithm>
+
+#include <Eigen/Jacobi>
+
 #include "vip_slam_frontend/filter/qr.h"
 #include "vip_slam_frontend/filter/triangular_solve.h"
 
@@ -57,6 +61,7 @@ void SquareRootFilter::augment(const Propagation& propagation, CloneId id) {
   clone.time_offset = window_.time_offset;
   window_.clones.push_back(clone);
   window_.v_W = window_.v_W_fej = propagation.predicted.v_W;
+  window_.rates = propagation.rates;
 }
 
 void SquareRootFilter::marginalise(const std::vector<int>& clone_indices) {
@@ -99,6 +104,36 @@ void SquareRootFilter::renew(int column, double sigma) {
   A(n - 1, column) = 1.0 / sigma;
   triangularise(A, n);
   R_ = A.triangularView<Eigen::Upper>();
+}
+
+void SquareRootFilter::consider(int column, double change, double sigma) {
+  // With the column last, the rows above tell of the others given it, the last one of it alone.
+  const int n = window_.dimension();
+  const auto rotate = [this, n](int pivot, int from) {  // makes (pivot + 1, from) zero
+    Eigen::JacobiRotation<double> rotation;
+    rotation.makeGivens(R_(pivot, from), R_(pivot + 1, from));
+    R_.rightCols(n - std::min(from, pivot)).applyOnTheLeft(pivot, pivot + 1, rotation.adjoint());
+    R_(pivot + 1, from) = 0;
+  };
+  const Eigen::VectorXd moved = R_.col(column);
+  for (int c = column; c + 1 < n; ++c) R_.col(c) = R_.col(c + 1).eval();
+  R_.col(n - 1) = moved;
+  for (int c = column; c + 1 < n; ++c) rotate(c, c);
+  R_(n - 1, n - 1) = 1.0 / sigma;
+
+  Eigen::VectorXd others = -change * R_.col(n - 1).head(n - 1);
+  R_.topLeftCorner(n - 1, n - 1).triangularView<Eigen::Upper>().solveInPlace(others);
+  Eigen::VectorXd delta(n);
+  delta << others.head(column), change, others.tail(n - 1 - column);
+
+  const Eigen::VectorXd last = R_.col(n - 1);
+  for (int c = n - 1; c > column; --c) R_.col(c) = R_.col(c - 1).eval();
+  R_.col(column) = last;
+  for (int r = n - 2; r >= column; --r) rotate(r, column);
+  for (int r = column; r < n; ++r) {
+    if (R_(r, r) < 0) R_.row(r) = -R_.row(r);
+  }
+  window_.boxplus(delta);
 }
 
 UpdateResult SquareRootFilter::update(Eigen::MatrixXd& H, Eigen::VectorXd& h) {

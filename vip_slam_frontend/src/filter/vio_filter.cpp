@@ -50,6 +50,7 @@ void VioFilter::stop() {
   imu_monitor_.reset();
   still_images_ = 0;
   after_step_ = false;
+  delay_before_.reset();
   mark_ = 0;
 }
 
@@ -187,6 +188,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   StepReport report;
   const bool still = unrest.has_value();
   const CloneId previous = filter_.window().clones.back().id;
+  const bool holds_delay = filter_.window().calibration.time_offset && !propagation.rates.changes();
+  if (holds_delay != delay_before_.has_value()) delay_before_ = holds_delay ? delay() : std::nullopt;
   filter_.augment(propagation, id);
 
   // From the second still image on, the newest clone replaces the one before: the window keeps what it knew of the
@@ -223,6 +226,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full, all);
   if (!candidates.empty()) updateWithFeatures(candidates, all, &report);
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
+  if (delay_before_) holdDelay();
   judgeDepthOffset();
   judgeIntrinsics();
   judgeGyroCorrection();

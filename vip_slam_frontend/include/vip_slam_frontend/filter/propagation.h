@@ -22,6 +22,7 @@ struct Propagation {
   /// there.
   double displacementSigma(const Matrix15d& P) const;
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
+  RateHistory rates;                                  ///< the window's, up to the end
   /// Adds to Q what a straight line between two samples `gap` seconds apart may be off the motion between them, for the
   /// `dt` seconds of this interval, all of which may lie in the gap.
   void admitGap(double gap, double dt);

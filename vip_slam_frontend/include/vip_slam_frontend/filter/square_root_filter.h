@@ -36,6 +36,9 @@ class SquareRootFilter {
 
   /// Forgets all that is known of one column's state, which has `sigma` from then on; of the others nothing is lost.
   void renew(int column, double sigma);
+  /// What is known of the state in this column alone becomes the given sigma again, at `change` from its present value;
+  /// what is known of the others when it is given stays (a consider update, as Schmidt's filter does).
+  void consider(int column, double change, double sigma);
 
   /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.
   UpdateResult update(Eigen::MatrixXd& H, Eigen::VectorXd& h);

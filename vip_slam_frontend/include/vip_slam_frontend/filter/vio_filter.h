@@ -116,6 +116,12 @@ class VioFilter {
   /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
   /// estimated no more.
   void judgeDepthOffset();
+  /// While the rate hardly changes, noise alone would tell of the camera-IMU delay: it stays what it was, and as sure.
+  struct Delay {
+    double value, sigma;  ///< s
+  };
+  std::optional<Delay> delay() const;
+  void holdDelay();
   void judgeIntrinsics();
   void judgeGyroCorrection();
   /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
@@ -144,9 +150,10 @@ class VioFilter {
   bool depth_is_off_ = false;                                                            ///< beyond doubt
   Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
-  bool depth_contradicts_ = false;  ///< its offset went beyond belief
-  int still_images_ = 0;            ///< images since the standing began; 0 when moving
-  bool after_step_ = false;         ///< the propagation before admitted a step of the velocity
+  bool depth_contradicts_ = false;     ///< its offset went beyond belief
+  int still_images_ = 0;               ///< images since the standing began; 0 when moving
+  bool after_step_ = false;            ///< the propagation before admitted a step of the velocity
+  std::optional<Delay> delay_before_;  ///< while it is held
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none
   std::optional<RelativeMotion> to_mark_;  ///< from the clone that was marked, when mark_ is another by now

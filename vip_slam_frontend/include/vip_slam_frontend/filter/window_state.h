@@ -10,6 +10,7 @@
 
 #include "vip_slam_core/camera/bearing_correction.h"
 #include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/rate_history.h"
 
 namespace vip_slam {
 
@@ -54,6 +55,7 @@ struct WindowState {
   BearingCorrection bearing;  ///< what the camera's intrinsics get wrong
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   CalibrationFlags calibration;
+  RateHistory rates;  ///< of the gyro, up to the newest clone
 
   int cloneColumn(int index) const { return 6 * index; }
   int calibrationColumn() const { return 6 * static_cast<int>(clones.size()); }
