@@ -25,19 +25,6 @@ double depthIn(const Map& map, KeyframeId keyframe, const Eigen::Vector3d& p_W) 
   return std::max(kLeastDepth, T_W_C.R().col(2).dot(p_W - T_W_C.t()));
 }
 
-// Depth of a landmark where one of its tracks began, as far as the map knows.
-double firstDepth(const Map& map, const MapLandmark& landmark, LandmarkId track) {
-  for (const MapObservation& o : landmark.observations)
-    if (map.feature(o).id == track) return depthIn(map, o.keyframe, landmark.p_W);
-  return kLeastDepth;
-}
-
-// See PixelNoise::sigma().
-double cornersApart(const Map& map, const MapLandmark& landmark, LandmarkId a, LandmarkId b, KeyframeId here) {
-  const double depth = depthIn(map, here, landmark.p_W);
-  return std::min(kMostApart, std::hypot(firstDepth(map, landmark, a), firstDepth(map, landmark, b)) / depth);
-}
-
 }  // namespace
 
 LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes,
@@ -86,6 +73,10 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
   first_.push_back(viewCount());
 }
 
+double LandmarkViews::cornersApart(const Track& a, const Track& b, double depth) {
+  return std::min(kMostApart, std::hypot(a.first_depth, b.first_depth) / depth);
+}
+
 void LandmarkViews::collect(const MapLandmark& landmark) {
   seen_.clear();
   for (const MapObservation& o : landmark.observations) {
@@ -101,6 +92,19 @@ void LandmarkViews::addView(const Seen& seen, bool own_track, double apart, cons
                     own_track, own_track && f.pixel_sigma > kSlidingPixelSigma});
 }
 
+void LandmarkViews::findFirstDepths(const Map& map, const MapLandmark& landmark) {
+  std::size_t missing = tracks_.size();
+  for (const MapObservation& o : landmark.observations) {
+    const LandmarkId id = map.feature(o).id;
+    for (Track& track : tracks_) {
+      if (track.id != id || track.first_depth > 0) continue;
+      track.first_depth = depthIn(map, o.keyframe, landmark.p_W);
+      --missing;
+    }
+    if (missing == 0) return;
+  }
+}
+
 void LandmarkViews::addPoints(const Map& map, const MapLandmark& landmark, const std::vector<KeyframeId>& keyframes,
                               const PixelNoise& noise) {
   const auto trackOf = [this](LandmarkId id) {
@@ -111,7 +115,7 @@ void LandmarkViews::addPoints(const Map& map, const MapLandmark& landmark, const
     if (s.feature->id == kNoLandmark) continue;
     const auto known = trackOf(s.feature->id);
     if (known == tracks_.end())
-      tracks_.push_back({s.feature->id, 1, 0});
+      tracks_.push_back({s.feature->id, 1, 0, 0});
     else
       ++known->views;
   }
@@ -121,12 +125,13 @@ void LandmarkViews::addPoints(const Map& map, const MapLandmark& landmark, const
   first_.push_back(viewCount());
   // Of each other track the view in its middle.
   for (Track& track : tracks_) track.until_tie = track.views / 2;
+  if (tracks_.size() > 1) findFirstDepths(map, landmark);
   for (const Seen& s : seen_) {
     const auto track = trackOf(s.feature->id);
     if (track == tracks_.end() || track == longest)
       addView(s, track != tracks_.end(), 1, noise);
     else if (track->until_tie-- == 0)
-      addView(s, false, cornersApart(map, landmark, longest->id, track->id, keyframes[s.frame]), noise);
+      addView(s, false, cornersApart(*longest, *track, depthIn(map, keyframes[s.frame], landmark.p_W)), noise);
   }
   for (auto track = tracks_.begin(); track != tracks_.end(); ++track) {
     if (track == longest || track->views < 2) continue;

@@ -56,12 +56,16 @@ class LandmarkViews {
   struct Track {
     LandmarkId id;
     int views;
-    int until_tie;  ///< views left before the one in its middle
+    int until_tie;       ///< views left before the one in its middle
+    double first_depth;  ///< m: of the landmark where the track began, as far as the map knows
   };
   /// Views of one landmark whose keyframes are frames of the problem.
   void collect(const MapLandmark& landmark);
   void addPoints(const Map& map, const MapLandmark& landmark, const std::vector<KeyframeId>& keyframes,
                  const PixelNoise& noise);
+  void findFirstDepths(const Map& map, const MapLandmark& landmark);
+  /// See PixelNoise::sigma(). `depth`: of the landmark where it is seen, m.
+  static double cornersApart(const Track& a, const Track& b, double depth);
   void addView(const Seen& seen, bool own_track, double apart, const PixelNoise& noise);
 
   std::vector<const MapLandmark*> points_;

@@ -115,7 +115,8 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
   const double host_judged = std::max(host_variance, gate);
   const Eigen::Vector2d xy_i = host.xy.cast<double>();
   pairs_.clear();
-  int tried = 0, refused = 0;
+  refused_.clear();
+  int tried = 0;
   if (host.slides) return true;
   for (const LandmarkView* v = views.begin(landmark); v != views.end(landmark); ++v) {
     if (v->frame == host.frame || (host_fixed && built_->problem.frames[v->frame].fixed)) continue;
@@ -126,7 +127,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     const Eigen::Vector3d p = transfer(observer.h, xy_i);
     const double rho = p.z();
     if (!observer.usable || rho < kMinDepthRatio || rho > kMaxDepthRatio) {
-      ++refused;
+      refused_.push_back(v);
       continue;
     }
     // The pair's noise is that of the observer and that of the host, seen from the observer.
@@ -137,7 +138,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     const Eigen::Vector2d xy_j = v->xy.cast<double>();
     const double error = (p.head<2>() - rho * xy_j).squaredNorm() / (rho * rho);
     if (error > options.outlier_chi2 * judged) {
-      ++refused;
+      refused_.push_back(v);
       continue;
     }
     const double scale = options.huber > 0 && v->own_track ? kCore : 1.0;
@@ -145,7 +146,8 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     const double weight = redescendingScale(squared, kTail * options.huber) / (scale * std::sqrt(variance) * rho);
     pairs_.push_back({place, {xy_i, xy_j, weight}, v->own_track, squared});
   }
-  if (tried == 0 || 2 * refused > tried) return false;
+  if (tried == 0 || 2 * static_cast<int>(refused_.size()) > tried) return false;
+  if (settings_.variant == Variant::kVip) keepRefused(views.landmark(landmark).id);
   if (options.huber > 0) weighTrack();
   for (const PairOfObserver& p : pairs_) {
     Observer& observer = (*observers)[p.observer];
@@ -156,6 +158,19 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
       addHomographyPair(p.pair, &observer.sums);
   }
   return true;
+}
+
+void PlaneFactorBuilder::keepRefused(LandmarkId landmark) {
+  for (const LandmarkView* v : refused_) {
+    RefusedView view;
+    view.landmark = landmark;
+    view.keyframe = built_->frames[v->frame];
+    view.observation.frame = v->frame;
+    view.observation.x = v->xy.x();
+    view.observation.y = v->xy.y();
+    view.observation.weight = 1.0 / v->sigma;
+    built_->refused.push_back(view);
+  }
 }
 
 // What is wrong with a track is wrong with most of its pairs: the patch slides, shows a rim, or lies beside the plane.

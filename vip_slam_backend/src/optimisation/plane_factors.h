@@ -47,9 +47,12 @@ class PlaneFactorBuilder {
     bool own_track;  // of the host's
     double error;    // squared, in sigmas
   };
+  /// Whether they are wrong shows once the problem is solved.
+  void keepRefused(LandmarkId landmark);
   /// A track whose pairs disagree more than they should counts for less altogether.
   void weighTrack();
-  std::vector<PairOfObserver> pairs_;  // of the landmark at hand
+  std::vector<PairOfObserver> pairs_;         // of the landmark at hand
+  std::vector<const LandmarkView*> refused_;  // likewise
   BuiltProblem* built_;
   std::vector<FrameGeometry> geometry_;
   std::map<PlaneId, int> planes_;

@@ -4,6 +4,15 @@
 
 namespace vip_slam {
 
+namespace {
+
+// Rays that miss the others by more than this, in normalised coordinates (a pixel or so), count as those of Huber's
+// estimator do: a wrong view must not pull the landmark away from the right ones.
+constexpr double kAgree = 2e-3;
+constexpr int kRounds = 5;
+
+}  // namespace
+
 PlaneIntersection::PlaneIntersection(const Map& map)
     : map_(map), lowest_(map.empty() ? 0 : map.keyframes().begin()->first) {
   camera_of_.assign(map.empty() ? 0 : map.newestKeyframe() - lowest_ + 1, -1);
@@ -21,6 +30,7 @@ const PlaneIntersection::Camera& PlaneIntersection::camera(KeyframeId id) {
 }
 
 Eigen::Vector3d PlaneIntersection::operator()(const MapLandmark& landmark, const Plane& plane) {
+  hits_.clear();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double weights = 0;
   for (const MapObservation& o : landmark.observations) {
@@ -33,10 +43,27 @@ Eigen::Vector3d PlaneIntersection::operator()(const MapLandmark& landmark, const
     if (!(z > 0.05) || cosine < 0.1) continue;
     // A ray's error on the plane grows with distance and with the slant.
     const double weight = cosine * cosine / (z * z);
-    sum += weight * (c.t_W_C + z * ray);
+    hits_.push_back({c.t_W_C + z * ray, weight});
+    sum += weight * hits_.back().p_W;
     weights += weight;
   }
-  return weights > 0 ? Eigen::Vector3d(sum / weights) : plane.project(landmark.p_W);
+  if (weights == 0) return plane.project(landmark.p_W);
+  Eigen::Vector3d mean = sum / weights;
+  for (int round = 0; round < kRounds; ++round) {
+    sum.setZero();
+    weights = 0;
+    bool all_agree = true;
+    for (const Hit& hit : hits_) {
+      const double apart = std::sqrt(hit.weight) * (hit.p_W - mean).norm();
+      all_agree = all_agree && apart <= kAgree;
+      const double weight = hit.weight * (apart > kAgree ? kAgree / apart : 1.0);
+      sum += weight * hit.p_W;
+      weights += weight;
+    }
+    if (all_agree) break;
+    mean = sum / weights;
+  }
+  return mean;
 }
 
 void PlaneIntersection::prefetch(const MapLandmark& landmark) {

@@ -11,8 +11,8 @@ namespace vip_slam {
 class PlaneIntersection {
  public:
   explicit PlaneIntersection(const Map& map);
-  /// Weighted mean of where the rays of a landmark's observations meet the plane; the projection of its position when
-  /// none does.
+  /// Robust weighted mean of where the rays of a landmark's observations meet the plane; the projection of its position
+  /// when none does.
   Eigen::Vector3d operator()(const MapLandmark& landmark, const Plane& plane);
   /// Asks for the memory that a later call with this landmark will read.
   void prefetch(const MapLandmark& landmark);
@@ -25,6 +25,11 @@ class PlaneIntersection {
   };
   const Camera& camera(KeyframeId id);  // until the next call
 
+  struct Hit {
+    Eigen::Vector3d p_W;
+    double weight;
+  };
+  std::vector<Hit> hits_;  // of the landmark at hand
   const Map& map_;
   KeyframeId lowest_;
   std::vector<int> camera_of_;  // by keyframe - lowest_: keyframes lie close together in their ids

@@ -96,20 +96,26 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
 int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
   const BaProblem& problem = built.problem;
   const std::vector<FrameGeometry> geometry = frameGeometry(problem);
+  const auto fits = [&](const BaObservation& b, const Eigen::Vector3d& p_W) {
+    Eigen::Vector2d r;
+    const double weight = std::min(b.weight, built.gate_weight);
+    return reprojectionResidual(geometry[b.frame], p_W, Eigen::Vector2d(b.x, b.y), weight, &r) &&
+           r.squaredNorm() <= chi2;
+  };
   int removed = 0;
   for (std::size_t p = 0; p < problem.points.size(); ++p) {
-    if (!map->hasLandmark(built.points[p])) continue;
     const BaPoint& point = problem.points[p];
-    for (int o = point.first; o < point.first + point.count; ++o) {
-      const BaObservation& b = problem.observations[o];
-      Eigen::Vector2d r;
-      const bool front = reprojectionResidual(geometry[b.frame], point.p_W, Eigen::Vector2d(b.x, b.y),
-                                              std::min(b.weight, built.gate_weight), &r);
-      if (front && r.squaredNorm() <= chi2) continue;
-      if (!map->hasLandmark(built.points[p])) break;
+    for (int o = point.first; o < point.first + point.count && map->hasLandmark(built.points[p]); ++o) {
+      if (fits(problem.observations[o], point.p_W)) continue;
       map->removeObservation(built.points[p], built.observations[o].keyframe);
       ++removed;
     }
+  }
+  for (const RefusedView& view : built.refused) {
+    const MapLandmark* landmark = map->findLandmark(view.landmark);
+    if (!landmark || fits(view.observation, landmark->p_W)) continue;
+    map->removeObservation(view.landmark, view.keyframe);
+    ++removed;
   }
   return removed;
 }

@@ -105,6 +105,19 @@ TEST(PlaneFactors, AWrongViewIsLeftOut) {
   }
 }
 
+TEST(PlaneFactors, AWrongViewNeitherPullsItsLandmarkNorStays) {
+  Wall wall(5, [](int k) { return k == 6 ? 10.0 : 0.0; });  // its poses are true, there is nothing to solve
+  BuiltProblem built = buildProblem(wall.map, globalScope(wall.map), wall.settings);
+  storeProblem(built, ImuNoise(), &wall.map);
+  EXPECT_LT((wall.map.landmark(5).p_W - Wall::point(4)).norm(), 0.003);  // the mean of all is 8 mm off
+  EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map), 1);
+  for (const MapObservation& o : wall.map.landmark(5).observations) EXPECT_NE(o.keyframe, 7u);
+  // What the poses explain after all is no outlier.
+  built.refused.front().observation.x -= 10.0 / kFocal;
+  built.refused.front().keyframe = 6;
+  EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map), 0);
+}
+
 TEST(PlaneFactors, AWrongHostMakesItAPointOfItsOwn) {
   Wall wall(5, [](int k) { return k == 0 ? 8.0 : 0.0; });
   EXPECT_TRUE(wall.isPoint(5, false));

@@ -23,12 +23,20 @@ ProblemScope localScope(const Map& map, const LocalBaOptions& options);
 /// All keyframes.
 ProblemScope globalScope(const Map& map);
 
+/// View of a landmark on a plane that the plane contradicted when the problem was built.
+struct RefusedView {
+  LandmarkId landmark = kNoLandmark;
+  KeyframeId keyframe = 0;
+  BaObservation observation;
+};
+
 struct BuiltProblem {
   BaProblem problem;
   std::vector<KeyframeId> frames;  ///< per problem frame; 0: the world frame of outside planes
   std::vector<LandmarkId> points;  ///< one per track: a landmark's first is its longest
   std::vector<PlaneId> planes;
   std::vector<LandmarkId> plane_points;  ///< landmarks that stand for homographies only (vip)
+  std::vector<RefusedView> refused;      ///< of those
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
   double track_noise_factor = 1;  ///< on the sigmas of all pixels, as the map tells (src/optimisation/track_noise.h)
@@ -55,7 +63,8 @@ std::vector<char> heldPlanes(const BaProblem& problem);
 void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);
 
 /// Observations whose residual is above `chi2` (squared sigmas, at least `gate_sigma` each) or behind the camera are
-/// removed from the map; their number.
+/// removed from the map; their number. To be called after storeProblem(): of landmarks on planes those that were
+/// refused are judged by the position stored.
 int removeOutliers(const BuiltProblem& built, double chi2, Map* map);
 
 }  // namespace vip_slam
