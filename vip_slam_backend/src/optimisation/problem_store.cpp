@@ -31,6 +31,10 @@ class LandmarkSet {
   std::vector<LandmarkId> slots_;
 };
 
+// Views that a plane contradicts are left out anew at each build, whatever the estimate is by then: what is removed for
+// good has to be far off.
+constexpr double kGross = 10.0;
+
 void storePlanePoints(const BuiltProblem& built, Map* map, LandmarkSet* done) {
   // A few landmarks ahead their features are asked for, which lie scattered over the keyframes.
   constexpr std::size_t kAhead = 4;
@@ -96,24 +100,24 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
 int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
   const BaProblem& problem = built.problem;
   const std::vector<FrameGeometry> geometry = frameGeometry(problem);
-  const auto fits = [&](const BaObservation& b, const Eigen::Vector3d& p_W) {
+  const auto fits = [&](const BaObservation& b, const Eigen::Vector3d& p_W, double most) {
     Eigen::Vector2d r;
     const double weight = std::min(b.weight, built.gate_weight);
     return reprojectionResidual(geometry[b.frame], p_W, Eigen::Vector2d(b.x, b.y), weight, &r) &&
-           r.squaredNorm() <= chi2;
+           r.squaredNorm() <= most;
   };
   int removed = 0;
   for (std::size_t p = 0; p < problem.points.size(); ++p) {
     const BaPoint& point = problem.points[p];
     for (int o = point.first; o < point.first + point.count && map->hasLandmark(built.points[p]); ++o) {
-      if (fits(problem.observations[o], point.p_W)) continue;
+      if (fits(problem.observations[o], point.p_W, chi2)) continue;
       map->removeObservation(built.points[p], built.observations[o].keyframe);
       ++removed;
     }
   }
   for (const RefusedView& view : built.refused) {
     const MapLandmark* landmark = map->findLandmark(view.landmark);
-    if (!landmark || fits(view.observation, landmark->p_W)) continue;
+    if (!landmark || fits(view.observation, landmark->p_W, kGross * chi2)) continue;
     map->removeObservation(view.landmark, view.keyframe);
     ++removed;
   }
