@@ -21,7 +21,7 @@ struct Start {
 /// `scene`: the images show something that moves with the camera by this share. `gyro`: it measures as many times a
 /// turn. `turned`: the camera, against what is configured. `learnt`: both are known by now.
 Start start(double speed, bool depth, double accel_unit = 1, double scene = 0, double gyro = 1, double turned = 0,
-            bool learnt = false) {
+            bool learnt = false, double standing_seconds = 1.0) {
   SimulationOptions options;
   options.speed = speed;
   options.depth = depth;
@@ -33,7 +33,9 @@ Start start(double speed, bool depth, double accel_unit = 1, double scene = 0, d
   seen.generateImu(6.0);
   ImuBuffer imu;
   const SE3 T_I_C = simulation.T_I_C(), given(T_I_C.rotation() * expQuaternion({turned, 0, turned}), T_I_C.t());
-  Initialiser initialiser(InitialisationOptions(), FilterOptions(), options.noise, given, options.focal, 9.81);
+  InitialisationOptions initialisation;
+  initialisation.standing_seconds = standing_seconds;
+  Initialiser initialiser(initialisation, FilterOptions(), options.noise, given, options.focal, 9.81);
   if (learnt) initialiser.setMounting(T_I_C, (1 / gyro - 1) * Eigen::Matrix3d::Identity());
   std::size_t next = 0;
   Start result;
@@ -75,6 +77,18 @@ TEST(Initialiser, StandingLevelsAndFindsTheGyroBias) {
   EXPECT_LT(tiltError(*s.prior, truth), 0.02);  // an accelerometer bias of 0.04 m/s^2 tilts by 4 mrad per axis
   EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.005);
   EXPECT_LT(s.prior->state.v_W.norm(), 1e-9);
+}
+
+TEST(Initialiser, ALongerRestIsWaitedFor) {
+  for (const bool depth : {true, false}) {
+    const Start s = start(0.0, depth, 1, 0, 1, 0, false, 3.0);
+    ASSERT_TRUE(s.prior) << depth << ' ' << s.reason;
+    EXPECT_TRUE(s.prior->standing) << depth;
+    EXPECT_GE(s.t, 2.9) << depth;
+  }
+  const Start moving = start(1.0, true, 1, 0, 1, 0, false, 3.0);  // nothing rests there: it does not wait
+  ASSERT_TRUE(moving.prior) << moving.reason;
+  EXPECT_LT(moving.t, 2.5);
 }
 
 TEST(Initialiser, TheRobotBeginsAtTheOriginHeadingAlongX) {

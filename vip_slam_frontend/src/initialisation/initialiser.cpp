@@ -16,6 +16,8 @@ constexpr double kMostTurn = 0.3;        // rad/s, of a gyro that stands: its bi
 constexpr double kMostOffGravity = 1.5;  // m/s^2, of an accelerometer that stands
 constexpr int kFewestCommon = 5;         // features
 constexpr double kDepthMoved = 2.0;      // sigmas, and times what changes from one image to the next
+constexpr double kBetweenTries = 0.2;    // s, of a start in motion
+constexpr double kBetweenPoses = 0.03;   // s, of those that a start in motion takes
 
 // f(xy in a, xy in b) of features common to both; their number.
 template <class F>
@@ -110,6 +112,7 @@ void Initialiser::setMounting(const SE3& T_I_C, const Eigen::Matrix3d& gyro_corr
 void Initialiser::reset() {
   images_.clear();
   replaced_in_a_row_ = 0;
+  next_try_t_ = -1e300;
   reason_ = "waiting for images and IMU";
 }
 
@@ -118,14 +121,28 @@ std::optional<FilterPrior> Initialiser::add(const InitialisationInput& image, co
   const double keep = std::max(options_.standing_seconds, options_.moving_seconds) + 0.5;
   while (images_.size() > 2 && images_.back().t_imu - images_.front().t_imu > keep) images_.pop_front();
   if (auto prior = standing(imu)) return prior;
-  return weighs_wrong_ ? std::nullopt : moving(imu);
+  if (weighs_wrong_ || watches_rest_) return std::nullopt;
+  if (image.t_imu < next_try_t_) {
+    reason_ = refusal_;
+    return std::nullopt;
+  }
+  auto prior = moving(imu);
+  // One that is refused is hardly better with the next image, and takes tens of milliseconds.
+  if (!prior) {
+    next_try_t_ = image.t_imu + kBetweenTries;
+    refusal_ = reason_;
+  }
+  return prior;
 }
 
 std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
   const double now = images_.back().t_imu;
   const double from = now - options_.standing_seconds;
-  weighs_wrong_ = false;
+  weighs_wrong_ = watches_rest_ = false;
   if (imu.empty() || imu.oldest() > from) {
+    watches_rest_ =
+        !imu.empty() &&
+        imuSpread(imu.between(imu.oldest(), now), &noise_).quiet(options_.max_gyro_std, options_.max_accel_std);
     reason_ = "gathering " + std::to_string(options_.standing_seconds).substr(0, 3) + " s of IMU";
     return std::nullopt;
   }
@@ -154,6 +171,7 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
   std::size_t oldest = 0;
   while (oldest < images_.size() && images_[oldest].t_imu < from - 1e-9) ++oldest;
   if (oldest == images_.size() || now - images_[oldest].t_imu < kWatched * options_.standing_seconds) {
+    watches_rest_ = true;
     reason_ = "IMU is quiet: watching whether the image moves";
     return std::nullopt;
   }
@@ -238,7 +256,9 @@ std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {
       return std::nullopt;
     }
     T_base_last = T_k_base.inverse();
-    poses.push_back({images_[k].t_imu, T_first_base * T_base_last});
+    if (k + 1 == images_.size() || images_[k].t_imu - poses.back().t_imu > kBetweenPoses) {
+      poses.push_back({images_[k].t_imu, T_first_base * T_base_last});
+    }
   }
   MovingStart start = solveMovingStart(poses, imu, T_I_C_, noise_, filter_, gravity_, gyro_correction_);
   if (!start.ok || start.gravity_error > options_.max_gravity_error) {

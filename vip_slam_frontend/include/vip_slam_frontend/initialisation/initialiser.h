@@ -48,10 +48,12 @@ class Initialiser {
   Eigen::Matrix3d gyro_correction_ = Eigen::Matrix3d::Zero();
   double focal_, gravity_;
   DepthNoise depth_noise_;
-  bool weighs_wrong_ = false;  ///< at rest, and not with a body's weight: no start is possible
-  int replaced_in_a_row_ = 0;  ///< images that shared nothing with any before them
+  bool weighs_wrong_ = false;   ///< at rest, and not with a body's weight: no start is possible
+  bool watches_rest_ = false;   ///< the IMU is quiet, whether the camera stands will show
+  double next_try_t_ = -1e300;  ///< of a start in motion, IMU time
+  int replaced_in_a_row_ = 0;   ///< images that shared nothing with any before them
   std::deque<InitialisationInput> images_;
-  std::string reason_ = "waiting for images and IMU";
+  std::string reason_ = "waiting for images and IMU", refusal_;
 };
 
 /// Mean image motion in pixels of features common to both; -1 when fewer than five are.
