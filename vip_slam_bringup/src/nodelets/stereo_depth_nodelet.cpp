@@ -1,7 +1,9 @@
 // Stereo pair in, rectified left image and depth out, for sensors without a depth camera (EuRoC).
 //   subscribes  left/image_raw, right/image_raw  (mono8 or colour)
 //   publishes   rectified/image, depth/image (32FC1 metres), rectified/camera_info, depth/camera_info
+//   tf          <frame of the left image> -> <...>_rectified, which the images are stamped with (static)
 //   parameters  ~calibration (file, required), ~max_skew (s), the fields of StereoDepthOptions
+#include <geometry_msgs/TransformStamped.h>
 #include <message_filters/subscriber.h>
 #include <message_filters/sync_policies/approximate_time.h>
 #include <message_filters/synchronizer.h>
@@ -10,6 +12,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
+#include <tf2_ros/static_transform_broadcaster.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "vip_slam_bringup/convert/image_messages.h"
@@ -61,15 +64,35 @@ class StereoDepthNodelet : public nodelet::Nodelet {
         NODELET_WARN_THROTTLE(10.0, "Stereo depth takes %.0f ms, pairs come every %.0f ms: some are left out",
                               1e3 * taken, 1e3 * gap);
       last_ = left->header.stamp;
-      const sensor_msgs::CameraInfo info = cameraInfo(stereo_->rectified(), left->header);
-      image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", left->header)));
+      const std_msgs::Header header = rectifiedHeader(left->header);
+      const sensor_msgs::CameraInfo info = cameraInfo(stereo_->rectified(), header);
+      image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", header)));
       image_info_publisher_.publish(info);
-      depth_publisher_.publish(
-          boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", left->header)));
+      depth_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", header)));
       depth_info_publisher_.publish(info);
     } catch (const std::exception& e) {
       NODELET_ERROR_THROTTLE(5.0, "Stereo depth: %s", e.what());
     }
+  }
+
+  // Rectifying turns the camera by up to a degree: whoever asks tf for its mounting must not get the raw one's.
+  std_msgs::Header rectifiedHeader(std_msgs::Header header) {
+    if (header.frame_id.empty()) return header;
+    const std::string raw = header.frame_id;
+    header.frame_id += "_rectified";
+    if (raw == raw_frame_) return header;
+    raw_frame_ = raw;
+    geometry_msgs::TransformStamped transform;
+    transform.header.stamp = header.stamp;
+    transform.header.frame_id = raw;
+    transform.child_frame_id = header.frame_id;
+    const Eigen::Quaterniond q = stereo_->T_left_rectified().rotation();
+    transform.transform.rotation.x = q.x();
+    transform.transform.rotation.y = q.y();
+    transform.transform.rotation.z = q.z();
+    transform.transform.rotation.w = q.w();
+    tf_.sendTransform(transform);
+    return header;
   }
 
   void onWatch(const ros::TimerEvent&) {
@@ -81,6 +104,8 @@ class StereoDepthNodelet : public nodelet::Nodelet {
 
   std::unique_ptr<StereoDepth> stereo_;
   ros::Time last_;  ///< stamp of the last pair
+  tf2_ros::StaticTransformBroadcaster tf_;
+  std::string raw_frame_;  ///< whose rectified one tf knows
   ros::Publisher image_publisher_, image_info_publisher_, depth_publisher_, depth_info_publisher_;
   message_filters::Subscriber<sensor_msgs::Image> left_, right_;
   std::unique_ptr<message_filters::Synchronizer<Policy>> sync_;
