@@ -54,9 +54,10 @@ Eigen::Vector3d PlaneIntersection::operator()(const MapLandmark& landmark, const
     weights = 0;
     bool all_agree = true;
     for (const Hit& hit : hits_) {
-      const double apart = std::sqrt(hit.weight) * (hit.p_W - mean).norm();
-      all_agree = all_agree && apart <= kAgree;
-      const double weight = hit.weight * (apart > kAgree ? kAgree / apart : 1.0);
+      const double apart2 = hit.weight * (hit.p_W - mean).squaredNorm();
+      const bool agrees = apart2 <= kAgree * kAgree;
+      all_agree = all_agree && agrees;
+      const double weight = agrees ? hit.weight : hit.weight * kAgree / std::sqrt(apart2);
       sum += weight * hit.p_W;
       weights += weight;
     }
