@@ -9,8 +9,8 @@ namespace {
 
 // Time constants of the rate and of its changes, and what is taken for a moment, s.
 constexpr double kLately = 0.05, kChanges = 0.5, kMoment = 0.01;
-// A delay that is learnt from changes of this many times the noise's variance comes out wrong by a tenth of its sigma;
-// from the noise alone it came out 10 ms off at a sigma of 1 ms.
+// Of so many times the noise's variance. A delay that is learnt from noise alone came out 10 ms off at a sigma of 1 ms;
+// at this limit it is off by two sigmas (docs/accuracy.md), well above it by less than one.
 constexpr double kClearly = 40.0;
 
 Eigen::Vector3d mean(const std::vector<ImuSample>& samples) {
