@@ -17,6 +17,7 @@ namespace {
 
 // Features gated away in this many images in a row: the estimate has left the measurements.
 constexpr int kGatedImages = 30;
+
 }  // namespace
 
 FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::PoseReady& on_pose) {

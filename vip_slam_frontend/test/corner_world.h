@@ -64,9 +64,11 @@ class CornerWorld {
         ramp * Eigen::Vector3d(0.2 * std::sin(1.1 * s), 0.4 * std::sin(1.3 * s), 0.2 * std::sin(1.6 * s));
     return SE3(Eigen::Matrix3d(expSO3(angles)), p);
   }
-  static ImuSample imu(double t) {
+  /// When it is where the motion at `speed` times its own is at `t`.
+  static double atSpeed(double speed, double t) { return kStill + speed * (t - kStill); }
+  static ImuSample imu(double t, double speed = 1.0) {
     const double h = 1e-3;
-    const SE3 before = pose(t - h), now = pose(t), after = pose(t + h);
+    const SE3 before = pose(atSpeed(speed, t - h)), now = pose(atSpeed(speed, t)), after = pose(atSpeed(speed, t + h));
     ImuSample sample;
     sample.t = t;
     sample.gyro = logSO3(Eigen::Quaterniond(Eigen::Matrix3d(before.R().transpose() * after.R()))) / (2 * h);

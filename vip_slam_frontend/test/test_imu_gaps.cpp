@@ -24,7 +24,6 @@ struct Flight {
 Flight fly(double gap, bool images_too, double speed = 1.0) {
   const CornerWorld world;
   FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));
-  const auto pose = [speed](double t) { return CornerWorld::pose(t < kStill ? t : kStill + speed * (t - kStill)); };
   const auto missing = [gap](double t) { return t > 3.9 && std::fmod(t, 2.0) > 1e-6 && std::fmod(t, 2.0) < gap; };
   Flight flight;
   double imu_t = 0;
@@ -32,23 +31,17 @@ Flight fly(double gap, bool images_too, double speed = 1.0) {
   for (int k = 0; k < 255; ++k) {
     const double t = k / 30.0;
     for (; !front_end.ready(t); imu_t += 0.005) {
-      const double h = 1e-3;
-      const SE3 before = pose(imu_t - h), now = pose(imu_t), after = pose(imu_t + h);
-      ImuSample sample;
-      sample.t = imu_t;
-      sample.gyro = logSO3(Eigen::Quaterniond(Eigen::Matrix3d(before.R().transpose() * after.R()))) / (2 * h);
-      sample.accel = now.R().transpose() * ((before.t() - 2 * now.t() + after.t()) / (h * h) + gravityVector());
-      if (!missing(imu_t)) front_end.addImu(sample);
+      if (!missing(imu_t)) front_end.addImu(CornerWorld::imu(imu_t, speed));
     }
     if (images_too && missing(t)) continue;
     FrameInput input;
     input.t = t;
-    world.look(t < kStill ? t : kStill + speed * (t - kStill), 0, &input.gray, &input.depth);
+    world.look(CornerWorld::atSpeed(speed, t), 0, &input.gray, &input.depth);
     const FrameOutput output = front_end.process(input);
     if (t > 4.0 && flight.reason.empty() && !missing(t)) flight.reason = output.frame->status.reason;
     flight.restarts = front_end.counters().restarts;
     if (flight.restarts > 0) break;
-    const SE3 truth = pose(output.frame->state.t);
+    const SE3 truth = CornerWorld::pose(CornerWorld::atSpeed(speed, output.frame->state.t));
     const Vector6d e = truth.boxminus(output.frame->state.T_W_I);
     if (t > 4.0) {
       const Matrix6d C = output.frame->covariance.topLeftCorner<6, 6>();

@@ -188,8 +188,11 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   StepReport report;
   const bool still = unrest.has_value();
   const CloneId previous = filter_.window().clones.back().id;
-  const bool holds_delay = filter_.window().calibration.time_offset && !propagation.rates.changes();
-  if (holds_delay != delay_before_.has_value()) delay_before_ = holds_delay ? delay() : std::nullopt;
+  if (!filter_.window().calibration.time_offset || propagation.rates.changes()) {
+    delay_before_.reset();
+  } else if (!delay_before_) {
+    delay_before_ = Delay{filter_.window().time_offset, mounting().sigma_time_offset};
+  }
   filter_.augment(propagation, id);
 
   // From the second still image on, the newest clone replaces the one before: the window keeps what it knew of the

@@ -108,10 +108,6 @@ void VioFilter::restartDepthOffset(bool none) {
   filter_.window().depth_offset = given_.depth_offset;
 }
 
-std::optional<VioFilter::Delay> VioFilter::delay() const {
-  return Delay{filter_.window().time_offset, mounting().sigma_time_offset};
-}
-
 void VioFilter::holdDelay() {
   const WindowState& window = filter_.window();
   filter_.consider(window.timeOffsetColumn(), delay_before_->value - window.time_offset, delay_before_->sigma);

@@ -120,7 +120,6 @@ class VioFilter {
   struct Delay {
     double value, sigma;  ///< s
   };
-  std::optional<Delay> delay() const;
   void holdDelay();
   void judgeIntrinsics();
   void judgeGyroCorrection();
