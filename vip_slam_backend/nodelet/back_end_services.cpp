@@ -112,7 +112,10 @@ void BackEndNodelet::command(std::uint8_t command) {
   msg->header.frame_id = options_.map_frame;
   msg->command = command;
   if (command == vip_slam_msgs::Control::MAP_LOADED) {
-    for (const auto& plane : backEnd().snapshot().planes) msg->planes.push_back(toMsg(plane));
+    for (const StoredPlane& plane : backEnd().storedPlanes()) {
+      msg->planes.push_back(toMsg(plane.estimate));
+      msg->hosts.push_back(toMsg(plane.host));
+    }
     msg->newest_keyframe = backEnd().map().newestKeyframe();
   }
   control_pub_.publish(msg);

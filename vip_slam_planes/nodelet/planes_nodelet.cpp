@@ -133,7 +133,7 @@ void PlanesNodelet::obey(const vip_slam_msgs::Control& control) {
     placed_ = false;
     publishMap(control.header.stamp.toSec(), true);
   } else if (control.command == Control::MAP_LOADED) {
-    mapper_->restore(fromMsg(control.planes), control.newest_keyframe);
+    mapper_->restore(fromMsg(control.planes, control.hosts), control.newest_keyframe);
     display_.clear();
     publishMap(control.header.stamp.toSec(), true);
   }

@@ -50,7 +50,7 @@ PlaneMapper::Impl::Impl(const PlaneMapperOptions& o, std::shared_ptr<const Camer
       evidence_(o.detection, o.growth),
       strips_(o.detection, o.growth) {}
 
-std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, EpochKey epoch) {
+std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, std::uint32_t epoch) {
   std::vector<PlaneTrack*> tracks;
   // Planes grow into view as well: the reach goes beyond what is covered.
   for (auto& [id, track] : tracks_) {
@@ -60,7 +60,7 @@ std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, Epo
   return tracks;
 }
 
-const CameraPoses& PlaneMapper::Impl::posesTiedTo(EpochKey epoch) {
+const CameraPoses& PlaneMapper::Impl::posesTiedTo(std::uint32_t epoch) {
   if (epochs_.allTied()) return poses_;
   tied_poses_.clear();
   for (const auto& [id, keyframe] : placed_) {
@@ -113,6 +113,7 @@ void PlaneMapper::Impl::clear() {
   waiting_.clear();
   placed_.clear();
   poses_.clear();
+  epoch_of_.clear();
   tied_poses_.clear();
   epochs_.clear();
   tracks_.clear();
@@ -130,14 +131,14 @@ void PlaneMapper::Impl::clear() {
   has_grown_ = came_together_ = localising_ = false;
 }
 
-void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe) {
+void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe) {
   clear();
   stored_until_ = newest_keyframe;
-  for (const PlaneEstimate& estimate : planes) {
+  for (const auto& [estimate, host] : planes) {
     next_plane_ = std::max(next_plane_, estimate.id + 1);
     const bool sound = !estimate.polygons.empty() && !estimate.polygons.front().outer.empty() &&
                        std::all_of(estimate.polygons.begin(), estimate.polygons.end(), isFinite) &&
-                       isSound(estimate.plane) && !tracks_.count(estimate.id);
+                       isSound(estimate.plane) && host.T_map_C.isFinite() && !tracks_.count(estimate.id);
     if (!sound) {
       if (!tracks_.count(estimate.id)) removed_.push_back(estimate.id);
       continue;
@@ -151,14 +152,17 @@ void PlaneMapper::Impl::restore(const std::vector<PlaneEstimate>& planes, Keyfra
       for (std::size_t i = 0; i < holes.size(); ++i) {
         for (const Eigen::Vector3d& p : polygon.holes[i]) holes[i].push_back(track.toPlane(p));
       }
-      track.coverPolygon(outer, holes, options.growth.min_hits);
+      track.coverPolygon(outer, holes, options.growth.min_hits, host);
     }
+    track.stored = true;
+    track.epoch = host.epoch;
+    epochs_.add(host.epoch);
+    if (host.keyframe != 0) poses_[host.keyframe] = host.T_map_C, epoch_of_[host.keyframe] = host.epoch;
     track.confirmed = track.determined = true;
     track.keyframes_seen = static_cast<int>(estimate.keyframes);
     tracks_.emplace(estimate.id, std::move(track));
     published.push_back(estimate);
   }
-  epochs_.addLoaded();
 }
 
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
@@ -183,7 +187,7 @@ void PlaneMapper::addKeyframe(KeyframePtr keyframe) { impl_->addKeyframe(keyfram
 void PlaneMapper::grow(const TrackedFrame& frame, const SE3& T_map_odom) { impl_->grow(frame, T_map_odom); }
 PlaneUpdate PlaneMapper::applyMapUpdate(const MapUpdate& update) { return impl_->applyMapUpdate(update); }
 const std::vector<PlaneEstimate>& PlaneMapper::planes() const { return impl_->published; }
-void PlaneMapper::restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe) {
+void PlaneMapper::restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe) {
   impl_->restore(planes, newest_keyframe);
 }
 void PlaneMapper::clear() { impl_->clear(); }

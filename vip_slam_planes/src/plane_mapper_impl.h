@@ -27,7 +27,7 @@ class PlaneMapper::Impl {
   void addKeyframe(const KeyframePtr& keyframe);
   void grow(const TrackedFrame& frame, const SE3& T_map_odom);
   PlaneUpdate applyMapUpdate(const MapUpdate& update);
-  void restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe);
+  void restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe);
   void clear();
 
   PlaneMapperOptions options;
@@ -41,8 +41,6 @@ class PlaneMapper::Impl {
   using Tracks = std::map<PlaneId, PlaneTrack>;
 
   // plane_mapper_update.cpp: corrections from the back end.
-  /// Returns true when epochs have come together that were apart.
-  bool tieEpochs(const MapUpdate& update);
   void followMode(const MapUpdate& update);
   void removeUnnamed(const MapUpdate& update);
   void takeCorrections(const MapUpdate& update);
@@ -61,9 +59,9 @@ class PlaneMapper::Impl {
   // plane_mapper_keyframe.cpp: one placed keyframe.
   void processKeyframe(const Keyframe& keyframe, bool first_time);
   /// Those that keyframes and frames of an epoch may meet.
-  std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C, EpochKey epoch);
-  const CameraPoses& posesTiedTo(EpochKey epoch);
-  void removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C, EpochKey epoch);
+  std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C, std::uint32_t epoch);
+  const CameraPoses& posesTiedTo(std::uint32_t epoch);
+  void removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C, std::uint32_t epoch);
   /// Returns the strips that detection left.
   std::vector<DetectedPlane> startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
                                          const std::vector<MapTriangle>& triangles, std::vector<int>* label,
@@ -85,17 +83,18 @@ class PlaneMapper::Impl {
   StripEvidence strips_;
   OpenGaps open_gaps_;
 
-  std::map<KeyframeId, KeyframePtr> waiting_;  ///< not placed yet
-  std::map<KeyframeId, KeyframePtr> placed_;   ///< processed keyframes that the map still has
-  CameraPoses poses_;                          ///< T_map_C of all of those
-  CameraPoses tied_poses_;                     ///< of some, while not all epochs are tied
+  std::map<KeyframeId, KeyframePtr> waiting_;     ///< not placed yet
+  std::map<KeyframeId, KeyframePtr> placed_;      ///< processed keyframes that the map still has
+  CameraPoses poses_;                             ///< T_map_C of all of those, and of the hosts of loaded planes
+  std::map<KeyframeId, std::uint32_t> epoch_of_;  ///< of the same
+  CameraPoses tied_poses_;                        ///< of some, while not all epochs are tied
   EpochGroups epochs_;
   Tracks tracks_;
   PlaneId next_plane_ = 1;
   std::uint32_t epoch_ = 0;  ///< of the newest placed keyframe
   KeyframeId newest_ = 0;
   KeyframeId stored_until_ = 0;  ///< keyframes up to here are those of a loaded map
-  SE3 grown_at_;  ///< camera pose of the last frame that grew planes
+  SE3 grown_at_;                 ///< camera pose of the last frame that grew planes
   bool has_grown_ = false;
   bool map_moved_ = false;      ///< by this update, everywhere
   bool came_together_ = false;  ///< epochs have, and the planes have not been compared since

@@ -64,7 +64,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
 
 // Before its triangles are asked for: they go to the planes that are there, or start what is there.
 void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C,
-                                           EpochKey epoch) {
+                                           std::uint32_t epoch) {
   std::vector<PlaneId> contradicted;
   for (const PlaneTrack* track : tracksInView(T_map_C, epoch)) {
     if (isContradicted(triangles, *track, options.detection, options.growth)) contradicted.push_back(track->id());

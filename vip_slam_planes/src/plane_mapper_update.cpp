@@ -22,7 +22,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   PlaneUpdate result;
   result.revision = update.revision;
   result.t = update.t;
-  came_together_ = tieEpochs(update) || came_together_;
+  came_together_ = epochs_.tie(update.parts) || came_together_;
   followMode(update);
   if (localising_) {
     // Planes stay as the back end has them; what has changed before is reported once mapping goes on.
@@ -42,7 +42,8 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
     placed_[keyframe->id] = keyframe;
     poses_[keyframe->id] = estimate.state.T_W_I * estimate.T_I_C;
     if (keyframe->id > newest_) newest_ = keyframe->id, epoch_ = keyframe->frame.epoch;
-    epochs_.place(keyframe->id, keyframe->frame.epoch);
+    epoch_of_[keyframe->id] = keyframe->frame.epoch;
+    epochs_.add(keyframe->frame.epoch);
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);
   }
@@ -58,21 +59,6 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   decideOnPoints();
   publish(&result);
   return result;
-}
-
-bool PlaneMapper::Impl::tieEpochs(const MapUpdate& update) {
-  const auto epoch_of = [this](KeyframeId id) {
-    const auto it = waiting_.find(id);  // the newest one is placed by the same update
-    return it == waiting_.end() ? epochs_.epochOf(id) : EpochKey(it->second->frame.epoch);
-  };
-  bool came_together = false;
-  for (const LoopEvent& loop : update.loops) {
-    // What localisation finds the place of does not enter the map, and its odometry drifts on.
-    const auto& gone = update.removed_keyframes;
-    if (std::find(gone.begin(), gone.end(), loop.query) != gone.end()) continue;
-    if (loop.accepted && epochs_.tie(epoch_of(loop.query), epoch_of(loop.match))) came_together = true;
-  }
-  return came_together;
 }
 
 // While the back end only localises it gives back each keyframe at once; one that it takes, or a map that moves, tells
@@ -101,7 +87,7 @@ void PlaneMapper::Impl::removeUnnamed(const MapUpdate& update) {
   std::set<KeyframeId> named;
   for (const KeyframeEstimate& estimate : update.keyframes) named.insert(estimate.id);
   std::vector<KeyframeId> gone;
-  for (const auto& [id, keyframe] : placed_) {
+  for (const auto& [id, epoch] : epoch_of_) {
     if (!named.count(id)) gone.push_back(id);
   }
   for (KeyframeId id : gone) removeKeyframe(id);
@@ -117,13 +103,14 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   if (update.global) removeUnnamed(update);
   std::vector<KeyframeId> moved;
   for (const KeyframeEstimate& estimate : update.keyframes) {
-    const auto it = placed_.find(estimate.id);
-    if (it == placed_.end() || !estimate.state.T_W_I.isFinite()) continue;
-    SE3& T_map_C = poses_[estimate.id];
+    const auto pose = poses_.find(estimate.id);
+    if (pose == poses_.end() || !estimate.state.T_W_I.isFinite()) continue;
+    SE3& T_map_C = pose->second;
     const SE3 corrected = estimate.state.T_W_I * estimate.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
     map_moved_ = map_moved_ || move.t().norm() > kMovedShift || logSO3(move.rotation()).norm() > kMovedTurn;
-    const bool other_depth = adoptCameraCorrection(estimate.camera_correction, &it->second);
+    const auto it = placed_.find(estimate.id);
+    const bool other_depth = it != placed_.end() && adoptCameraCorrection(estimate.camera_correction, &it->second);
     if (other_depth || T_map_C.matrix() != corrected.matrix()) moved.push_back(estimate.id);
     T_map_C = corrected;
   }
@@ -203,27 +190,28 @@ void PlaneMapper::Impl::judgeAgreement() {
 
 void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   waiting_.erase(id);
-  if (!placed_.count(id)) return;
+  const auto it = epoch_of_.find(id);
+  if (it == epoch_of_.end()) return;
   // Its share of the area goes to the neighbour in time, which moves nearly alike, unless its epoch is elsewhere.
-  const auto it = placed_.find(id);
-  const auto moves_alike = [&](const auto& other) {
-    return epochs_.tied(other.second->frame.epoch, it->second->frame.epoch);
-  };
+  const auto moves_alike = [&](const auto& other) { return epochs_.tied(other.second, it->second); };
   KeyframeId heir = 0;
-  if (it != placed_.begin() && moves_alike(*std::prev(it))) {
+  if (it != epoch_of_.begin() && moves_alike(*std::prev(it))) {
     heir = std::prev(it)->first;
-  } else if (std::next(it) != placed_.end() && moves_alike(*std::next(it))) {
+  } else if (std::next(it) != epoch_of_.end() && moves_alike(*std::next(it))) {
     heir = std::next(it)->first;
   }
   for (auto& [plane, track] : tracks_) {
     track.rehost(id, heir, poses_);
     fresh_.erase({plane, id});
   }
-  points_.removeKeyframe(*it->second);
+  epoch_of_.erase(it);
+  poses_.erase(id);
+  const auto placed = placed_.find(id);
+  if (placed == placed_.end()) return;
+  points_.removeKeyframe(*placed->second);
   evidence_.remove(id);
   strips_.remove(id);
-  placed_.erase(it);
-  poses_.erase(id);
+  placed_.erase(placed);
   if (newest_ != id) return;
   newest_ = placed_.empty() ? 0 : placed_.rbegin()->first;
   if (newest_ != 0) epoch_ = placed_.rbegin()->second->frame.epoch;

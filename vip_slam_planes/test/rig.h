@@ -26,7 +26,7 @@ class Rig {
     MapUpdate update = updateFor(*keyframe, T_W_C);
     update.landmarks = base.landmarks;
     update.planes = base.planes;
-    update.loops = base.loops;
+    update.parts = base.parts;
     poses[keyframe->id] = T_W_C;
     return mapper.applyMapUpdate(update);
   }
@@ -41,6 +41,14 @@ class Rig {
   PlaneMapper mapper;
   std::map<KeyframeId, SE3> poses;
 };
+
+/// As a back end gives them of a loaded map; `first` hosts them all.
+inline std::vector<StoredPlane> storedPlanes(const std::vector<PlaneEstimate>& planes, std::uint32_t epoch = 0,
+                                             KeyframeId first = 0, const SE3& T_map_C = {}) {
+  std::vector<StoredPlane> stored;
+  for (const PlaneEstimate& plane : planes) stored.push_back({plane, {first, epoch, T_map_C}});
+  return stored;
+}
 
 inline Scene room() {
   Scene scene;

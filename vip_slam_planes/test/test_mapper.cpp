@@ -283,15 +283,11 @@ TEST(Mapper, RestoredPlanesAreRecognised) {
   const Scene scene = room();
   for (int i = 0; i < 4; ++i) first.look(scene, {0, 0.2 * i, 1.4}, {3, 0.2, 1.0});
   Rig second;
-  second.mapper.restore(first.mapper.planes(), 0);
+  second.mapper.restore(testing::storedPlanes(first.mapper.planes()), 0);
   EXPECT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
-  MapUpdate recognition;
-  recognition.loops.emplace_back();
-  recognition.loops.back().query = 1;
-  recognition.loops.back().accepted = true;
   for (int i = 0; i < 4; ++i) {
     const SE3 T = lookAt({0.2, 0.2 * i, 1.4}, {3, 0.5, 1.1});
-    second.place(second.camera.keyframe(scene, T), T, i == 0 ? recognition : MapUpdate());
+    second.place(second.camera.keyframe(scene, T), T);
   }
   ASSERT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
   for (std::size_t i = 0; i < first.mapper.planes().size(); ++i) {
@@ -306,7 +302,7 @@ TEST(Mapper, RestoredPlanesKeepTheirAreaHoweverManySightingsACellNeeds) {
   Rig first(1.0, options), second(1.0, options);
   for (int i = 0; i < 5; ++i) first.look(room(), {0, 0.05 * i, 1.4}, {3, 0.2, 1.0});
   ASSERT_FALSE(first.mapper.planes().empty());
-  second.mapper.restore(first.mapper.planes(), 5);
+  second.mapper.restore(testing::storedPlanes(first.mapper.planes()), 5);
   second.mapper.applyMapUpdate({});
   ASSERT_EQ(first.mapper.planes().size(), second.mapper.planes().size());
   for (std::size_t i = 0; i < first.mapper.planes().size(); ++i) {
@@ -460,7 +456,7 @@ TEST(Mapper, LoadedPlanesWithoutAreaGoAndTheBackEndHearsOfIt) {
   planes[sound].polygons.clear();
   planes[sound + 1].polygons.front().outer[1].y() = kNan;
   planes[sound + 2].plane.d = kNan;
-  second.mapper.restore(planes, 0);
+  second.mapper.restore(testing::storedPlanes(planes), 0);
   EXPECT_EQ(sound, second.mapper.planes().size());
   const PlaneUpdate update = second.mapper.applyMapUpdate({});
   EXPECT_EQ((std::vector<PlaneId>{100, 101, 102}), update.removed);

@@ -297,7 +297,7 @@ TEST(MapperCorrections, AKeyframeOnItsWayIsNoneOfAMapThatIsLoadedMeanwhile) {
   const Scene scene = room();
   Rig stored, rig;
   for (int i = 0; i < 6; ++i) stored.look(scene, {-1 + 0.3 * i, 0, 1.4}, {3, -1.2 + 0.4 * i, 1.0});
-  rig.mapper.restore(stored.mapper.planes(), 6);
+  rig.mapper.restore(testing::storedPlanes(stored.mapper.planes()), 6);
   rig.mapper.addKeyframe(rig.camera.keyframe(scene, lookAt({0, 0, 1.4}, {-3, 1, 1.0})));  // number 1 of its session
   const PlaneUpdate update = rig.mapper.applyMapUpdate(everything(stored.poses));
   EXPECT_TRUE(update.observations.empty());

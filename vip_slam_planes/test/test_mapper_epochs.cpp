@@ -29,14 +29,12 @@ SE3 view(int i) { return lookAt({-1 + 0.3 * i, 0.1 * i, 1.4}, {3, -0.8 + 0.4 * i
 /// away.
 SE3 guess(const SE3& truth) { return SE3(truth.rotation(), truth.t() + Eigen::Vector3d(1.5, 0, 0)); }
 
-LoopEvent loopBetween(KeyframeId query, KeyframeId match, bool accepted) {
-  LoopEvent loop;
-  loop.query = query, loop.match = match, loop.accepted = accepted;
-  return loop;
-}
+std::vector<EpochPart> together(std::uint32_t a, std::uint32_t b) { return {{a, a}, {b, a}}; }
+std::vector<EpochPart> apart(std::uint32_t a, std::uint32_t b) { return {{a, a}, {b, b}}; }
 
-/// The update in which the back end places a keyframe and closes a loop with it: it brings all to where they are.
-MapUpdate closing(const Keyframe& query, KeyframeId match, const std::map<KeyframeId, SE3>& truth) {
+/// The update in which the back end places a keyframe and closes a loop with it: it brings all to where they are, and
+/// the keyframe's epoch to `epoch`.
+MapUpdate closing(const Keyframe& query, std::uint32_t epoch, const std::map<KeyframeId, SE3>& truth) {
   MapUpdate update = updateFor(query, truth.at(query.id));
   update.global = true;
   update.keyframes.clear();
@@ -45,7 +43,7 @@ MapUpdate closing(const Keyframe& query, KeyframeId match, const std::map<Keyfra
     update.keyframes.back().id = id;
     update.keyframes.back().state.T_W_I = T;
   }
-  update.loops.push_back(loopBetween(query.id, match, true));
+  update.parts = together(epoch, query.frame.epoch);
   return update;
 }
 
@@ -79,7 +77,7 @@ TEST(MapperEpochs, AGuessedPlaceSaysNothingAboutPlanesOfAnotherEpoch) {
     const auto keyframe = taken(&rig, view(i), 1);
     rig.mapper.addKeyframe(keyframe);
     MapUpdate update = updateFor(*keyframe, guess(view(i)));
-    update.loops.push_back(loopBetween(keyframe->id, 3, false));  // a candidate that was no loop
+    update.parts = apart(0, 1);
     const PlaneUpdate result = rig.mapper.applyMapUpdate(update);
     EXPECT_TRUE(result.removed.empty());
     EXPECT_TRUE(result.merges.empty());
@@ -108,7 +106,7 @@ TEST(MapperEpochs, ALoopBetweenEpochsMakesOnePlaneOfTwo) {
   const auto query = taken(&rig, view(3), 1);
   truth[query->id] = view(3);
   rig.mapper.addKeyframe(query);
-  const PlaneUpdate result = rig.mapper.applyMapUpdate(closing(*query, 4, truth));
+  const PlaneUpdate result = rig.mapper.applyMapUpdate(closing(*query, 0, truth));
   EXPECT_EQ(old, idsOf(rig));
   EXPECT_TRUE(result.removed.empty());
   std::set<PlaneId> from, into;
@@ -126,16 +124,16 @@ TEST(MapperEpochs, ALoopBetweenEpochsMakesOnePlaneOfTwo) {
 
 TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   constexpr KeyframeId kFirst = 100;  // the loaded map has the ids before
+  constexpr std::uint32_t kLoaded = 0x80000000u;
   Rig first, rig;
   for (int i = 0; i < 6; ++i) first.place(taken(&first, view(i), 0), view(i));
-  rig.mapper.restore(first.mapper.planes(), kFirst - 1);
+  rig.mapper.restore(testing::storedPlanes(first.mapper.planes(), kLoaded), kFirst - 1);
   const std::set<PlaneId> loaded = idsOf(rig);
   // Localisation found the place of one that does not enter the map; mapping goes on later, where odometry has drifted.
   const auto passing = taken(&rig, view(0), 4, kFirst);
   MapUpdate update = updateFor(*passing, view(0));
   update.keyframes.clear();
   update.removed_keyframes = {passing->id};
-  update.loops = {loopBetween(passing->id, 7, true)};
   rig.mapper.addKeyframe(passing);
   rig.mapper.applyMapUpdate(update);
   for (int i = 0; i < 6; ++i) {
@@ -143,10 +141,10 @@ TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   }
   EXPECT_EQ(2 * loaded.size(), rig.mapper.planes().size());
 
-  rig.mapper.restore(first.mapper.planes(), kFirst - 1);
+  rig.mapper.restore(testing::storedPlanes(first.mapper.planes(), kLoaded), kFirst - 1);
   const auto found = taken(&rig, view(0), 5, kFirst);
   update = updateFor(*found, view(0));
-  update.loops = {loopBetween(found->id, 7, true)};
+  update.parts = together(5, kLoaded);
   rig.mapper.addKeyframe(found);
   rig.mapper.applyMapUpdate(update);
   for (int i = 1; i < 3; ++i) rig.place(taken(&rig, view(i), 5, kFirst), view(i));
@@ -163,7 +161,7 @@ TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   const auto query = taken(&rig, view(3), 6, kFirst);
   truth[query->id] = view(3);
   rig.mapper.addKeyframe(query);
-  rig.mapper.applyMapUpdate(closing(*query, 7, truth));  // a keyframe of the loaded map
+  rig.mapper.applyMapUpdate(closing(*query, kLoaded, truth));
   EXPECT_EQ(loaded, idsOf(rig));
 }
 
@@ -195,14 +193,98 @@ TEST(MapperEpochs, AreaOfARemovedKeyframeStaysWithItsEpoch) {
     for (const Eigen::Vector3d& q : p.outer) EXPECT_LT(q.z(), 2.75);
 }
 
-TEST(MapperEpochs, OneEpochIsAsItWasWhateverItsNumberAndLoops) {
+// The update with the loop is lost; the one that places the next keyframe tells as well.
+TEST(MapperEpochs, ATieInALostUpdateComesWithTheNext) {
+  Rig rig;
+  std::map<KeyframeId, SE3> truth;
+  for (int i = 0; i < 12; ++i) {
+    const SE3 T = view(i % 6);
+    const auto keyframe = taken(&rig, T, i / 6);
+    truth[keyframe->id] = T;
+    rig.place(keyframe, i < 6 ? T : guess(T));
+  }
+  const std::size_t twice = rig.mapper.planes().size();
+  const auto query = taken(&rig, view(3), 1), next = taken(&rig, view(4), 1);
+  rig.mapper.addKeyframe(query);
+  rig.mapper.addKeyframe(next);
+  truth[query->id] = view(3);
+  truth[next->id] = view(4);
+  MapUpdate update = updateFor(*next, view(4));
+  update.keyframes = closing(*query, 0, truth).keyframes;
+  update.global = true;
+  update.parts = together(0, 1);
+  rig.mapper.applyMapUpdate(update);
+  EXPECT_EQ(twice, 2 * rig.mapper.planes().size());
+}
+
+// A stored map of two parts, the second of which lies 1.5 m off, as the back end guessed.
+TEST(MapperEpochs, AStoredFragmentSaysNothingUntilItIsTiedAndThenComesAlong) {
+  constexpr KeyframeId kFirst = 100, kHost = 1, kOther = 50;
+  constexpr std::uint32_t kMap = 0x80000000u, kFragment = 0x80000001u;
+  Rig map, fragment, rig;
+  for (int i = 0; i < 6; ++i) {
+    map.place(taken(&map, view(i), 0), view(i));
+    fragment.place(taken(&fragment, view(i), 0), guess(view(i)));
+  }
+  std::vector<StoredPlane> planes = testing::storedPlanes(map.mapper.planes(), kMap, kHost, view(0));
+  const std::size_t once = planes.size();
+  for (StoredPlane plane : testing::storedPlanes(fragment.mapper.planes(), kFragment, kOther, guess(view(0)))) {
+    plane.estimate.id += 1000;
+    planes.push_back(plane);
+  }
+  rig.mapper.restore(planes, kFirst - 1);
+  rig.mapper.applyMapUpdate({});  // polygons are drawn anew
+  const Plane far_wall({-1, 0, 0}, 4.5);
+  ASSERT_TRUE(rig.find(far_wall));
+  const double area = rig.find(far_wall)->area;
+
+  // Views of the map, through where the fragment's walls would be.
+  std::map<KeyframeId, SE3> truth = {{kHost, view(0)}, {kOther, view(0)}};
+  const auto place = [&](int i, const std::vector<EpochPart>& parts) {
+    const auto keyframe = taken(&rig, view(i % 6), 0, kFirst);
+    truth[keyframe->id] = view(i % 6);
+    MapUpdate base;
+    base.parts = parts;
+    return rig.place(keyframe, view(i % 6), base);
+  };
+  for (int i = 0; i < 12; ++i) {
+    const PlaneUpdate update = place(i, {{0, kMap}, {kMap, kMap}, {kFragment, kFragment}});
+    EXPECT_TRUE(update.removed.empty());
+    EXPECT_TRUE(update.merges.empty());
+    for (const PlaneObservation& o : update.observations) EXPECT_LT(o.plane, 1000u);
+  }
+  EXPECT_EQ(2 * once, rig.mapper.planes().size());
+  ASSERT_TRUE(rig.find(far_wall));
+  EXPECT_EQ(area, rig.find(far_wall)->area);
+
+  // A loop ties the fragment; the back end says where its wall is now, its host where it was seen from.
+  const auto query = taken(&rig, view(2), 0, kFirst);
+  truth[query->id] = view(2);
+  rig.mapper.addKeyframe(query);
+  MapUpdate loop = closing(*query, kMap, truth);
+  loop.parts.push_back({kFragment, kMap});
+  for (const StoredPlane& plane : planes) {
+    if (plane.host.epoch != kFragment) continue;
+    const Plane& lying = plane.estimate.plane;
+    loop.planes.emplace_back(plane.estimate.id, Plane(lying.n, lying.d + lying.n.x() * 1.5));
+  }
+  const PlaneUpdate update = rig.mapper.applyMapUpdate(loop);
+  EXPECT_EQ(once, update.merges.size());
+  EXPECT_EQ(once, rig.mapper.planes().size());
+  // What was drawn 1.5 m beside came along: no floor beyond the wall.
+  for (const PlaneEstimate& plane : rig.mapper.planes())
+    for (const PlanePolygon& p : plane.polygons)
+      for (const Eigen::Vector3d& q : p.outer) EXPECT_LT(q.x(), 3.25) << plane.id;
+}
+
+TEST(MapperEpochs, OneEpochIsAsItWasWhateverItsNumber) {
   Rig zero, seven;
   for (int i = 0; i < 8; ++i) {
     for (Rig* rig : {&zero, &seven}) {
       const auto keyframe = taken(rig, view(i), rig == &zero ? 0 : 7);
       rig->mapper.addKeyframe(keyframe);
       MapUpdate update = updateFor(*keyframe, view(i));
-      if (rig == &seven && i > 3) update.loops.push_back(loopBetween(keyframe->id, 2, true));
+      if (rig == &seven) update.parts = {{7, 7}};
       rig->mapper.applyMapUpdate(update);
     }
     ASSERT_EQ(zero.mapper.planes().size(), seven.mapper.planes().size());

@@ -75,6 +75,12 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
   msg.epoch = update.epoch;
   msg.map_odom = toPoseMsg(update.T_map_odom);
   msg.placed = update.placed;
+  for (const auto& told : update.parts) {
+    vip_slam_msgs::EpochPart p;
+    p.epoch = told.epoch;
+    p.part = told.part;
+    msg.parts.push_back(p);
+  }
   msg.newest_keyframe = update.newest_keyframe;
   msg.depth_curve = update.depth_curve.added;
   msg.disparity_error = update.disparity_error;
@@ -118,6 +124,7 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.epoch = msg.epoch;
   update.T_map_odom = fromMsg(msg.map_odom);
   update.placed = msg.placed;
+  for (const auto& told : msg.parts) update.parts.push_back({told.epoch, told.part});
   update.newest_keyframe = msg.newest_keyframe;
   update.depth_curve.added = msg.depth_curve;
   update.disparity_error = msg.disparity_error;

@@ -65,10 +65,25 @@ PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg) {
   return plane;
 }
 
-std::vector<PlaneEstimate> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes) {
-  std::vector<PlaneEstimate> result;
+vip_slam_msgs::PlaneHost toMsg(const PlaneHost& host) {
+  vip_slam_msgs::PlaneHost msg;
+  msg.keyframe = host.keyframe;
+  msg.epoch = host.epoch;
+  msg.map_camera = toPoseMsg(host.T_map_C);
+  return msg;
+}
+
+std::vector<StoredPlane> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes,
+                                 const std::vector<vip_slam_msgs::PlaneHost>& hosts) {
+  if (hosts.size() != planes.size()) {
+    throw std::invalid_argument(std::to_string(hosts.size()) + " hosts for " + std::to_string(planes.size()) +
+                                " planes, expected one each");
+  }
+  std::vector<StoredPlane> result;
   result.reserve(planes.size());
-  for (const auto& plane : planes) result.push_back(fromMsg(plane));
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    result.push_back({fromMsg(planes[i]), {hosts[i].keyframe, hosts[i].epoch, fromMsg(hosts[i].map_camera)}});
+  }
   return result;
 }
 
@@ -136,7 +151,8 @@ PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg) {
   update.revision = msg.revision;
   for (const auto& merge : msg.merges) update.merges.push_back({merge.from, merge.into});
   update.removed = msg.removed;
-  update.planes = fromMsg(msg.planes);
+  update.planes.reserve(msg.planes.size());
+  for (const auto& plane : msg.planes) update.planes.push_back(fromMsg(plane));
   update.observations.reserve(msg.observations.size());
   for (const auto& observation : msg.observations) update.observations.push_back(fromMsg(observation));
   for (const auto& pair : msg.associated) update.associated.emplace_back(pair.landmark, pair.plane);

@@ -213,12 +213,28 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   EXPECT_EQ(back.dissociated, update.dissociated);
 }
 
+TEST_F(Conversions, PlanesOfALoadedMapComeWithTheirHosts) {
+  PlaneEstimate plane;
+  plane.id = 4;
+  plane.plane = Plane(vector(), 1.5);
+  const std::vector<vip_slam_msgs::Plane> planes = {toMsg(plane)};
+  const PlaneHost host{17, 0x80000001u, pose()};
+  const std::vector<StoredPlane> back = fromMsg(planes, {throughBytes(toMsg(host))});
+  ASSERT_EQ(back.size(), 1u);
+  EXPECT_EQ(back[0].estimate.id, 4u);
+  EXPECT_EQ(back[0].host.keyframe, 17u);
+  EXPECT_EQ(back[0].host.epoch, 0x80000001u);
+  expectSame(back[0].host.T_map_C, host.T_map_C);
+  EXPECT_THROW(fromMsg(planes, {}), std::invalid_argument);
+}
+
 TEST_F(Conversions, MapUpdateIsUnchanged) {
   MapUpdate update;
   update.revision = 6;
   update.t = ros::Time(1600000001, 1).toSec();
   update.epoch = 2;
   update.T_map_odom = pose();
+  update.parts = {{0, 0}, {2, 0}, {3, 3}};
   update.newest_keyframe = 30;
   update.depth_curve.added = {0.f, -0.001f, 0.004f};
   update.disparity_error = -0.0021;
@@ -250,6 +266,9 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   EXPECT_EQ(back.epoch, update.epoch);
   expectSame(back.T_map_odom, update.T_map_odom);
   EXPECT_EQ(back.newest_keyframe, update.newest_keyframe);
+  ASSERT_EQ(back.parts.size(), 3u);
+  EXPECT_EQ(back.parts[1].epoch, 2u);
+  EXPECT_EQ(back.parts[1].part, 0u);
   EXPECT_TRUE(back.global);
   ASSERT_EQ(back.keyframes.size(), 2u);
   EXPECT_EQ(back.keyframes[1].id, 30u);

@@ -70,6 +70,8 @@ class BackEnd {
   const Map& map() const;
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);
+  /// All planes as a plane module takes them that starts from this map.
+  std::vector<StoredPlane> storedPlanes() const;
   void reset();
   /// On: keyframes are found in the map and leave it as it is; without a map they are refused. Off: mapping goes on.
   void setLocalisationMode(bool on);

@@ -315,6 +315,7 @@ MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }
 void BackEnd::reset() { impl_->reset(); }
 void BackEnd::saveMap(const std::string& path) const { impl_->saveMap(path); }
+std::vector<StoredPlane> BackEnd::storedPlanes() const { return impl_->storedPlanes(); }
 MapUpdate BackEnd::loadMap(const std::string& path) { return impl_->loadMap(path); }
 void BackEnd::setLocalisationMode(bool on) {
   impl_->localisation_only = on;

@@ -70,6 +70,7 @@ struct BackEnd::Impl {
   // back_end_maps.cpp
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);
+  std::vector<StoredPlane> storedPlanes() const;
   /// The keyframes that another one may be found at.
   std::function<bool(KeyframeId)> inReferencePart() const;
   bool findInMap(const KeyframePtr& keyframe, Relocalisation* found);

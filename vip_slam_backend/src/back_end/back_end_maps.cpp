@@ -1,4 +1,7 @@
 // Stored maps within the back end: saving, loading, finding the way in a loaded map, localisation without mapping.
+#include <map>
+#include <set>
+
 #include "back_end_impl.h"
 #include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/map_io/map_file.h"
@@ -7,6 +10,8 @@ namespace vip_slam {
 namespace {
 
 constexpr double kRecent = 5.0;  // seconds for which the odometry carries what localisation found
+
+PlaneHost hostAt(const MapKeyframe& kf) { return {kf.id(), kf.data->frame.epoch, kf.state.T_W_I * kf.T_I_C}; }
 
 }  // namespace
 
@@ -26,6 +31,22 @@ MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
   fillGlobal(&update);
   finishUpdate(&update);
   return update;
+}
+
+std::vector<StoredPlane> BackEnd::Impl::storedPlanes() const {
+  std::map<PlaneId, PlaneHost> hosts;
+  for (const auto& [id, kf] : map.keyframes()) {  // in ascending order: the oldest first
+    for (const auto& seen : kf.planes) hosts.try_emplace(seen.first, hostAt(kf));
+  }
+  // One that no keyframe is left of belongs where most does.
+  const std::set<KeyframeId> most = referencePart(map, loop_closer.loops());
+  std::vector<StoredPlane> planes;
+  for (const auto& [id, plane] : map.planes()) {
+    const auto host = hosts.find(id);
+    planes.push_back({plane.estimate, host == hosts.end() ? PlaneHost() : host->second});
+    if (host == hosts.end() && !most.empty()) planes.back().host.epoch = map.keyframe(*most.begin()).data->frame.epoch;
+  }
+  return planes;
 }
 
 // A part of the map that nothing ties to it lies there by a guess.
@@ -107,14 +128,6 @@ void BackEnd::Impl::tieToLastFound(const KeyframePtr& keyframe) {
   const double since = keyframe->frame.t - last_found->t;
   if (since < 0 || since >= kRecent || !map.hasKeyframe(last_found->match)) return;
   loop_closer.tie(map, keyframe->id, last_found->match);
-  LoopEvent event;  // for the planes: from here on the map has this odometry
-  event.query = keyframe->id;
-  event.match = last_found->match;
-  event.t = keyframe->frame.t;
-  event.accepted = true;
-  event.reason = "relocalisation: mapping goes on where it was found";
-  event.T_match_query = map.keyframe(event.match).state.T_W_I.inverse() * map.keyframe(keyframe->id).state.T_W_I;
-  new_loops.push_back(event);
   last_found.reset();
 }
 

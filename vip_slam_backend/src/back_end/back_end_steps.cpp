@@ -128,6 +128,7 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->epoch = epoch;
   update->T_map_odom = T_map_odom;
   update->placed = placed();
+  update->parts = epochParts(map, loop_closer.loops());
   update->depth_curve = camera_correction.curve;
   update->disparity_error = disparity_error;
   update->newest_keyframe = map.newestKeyframe();

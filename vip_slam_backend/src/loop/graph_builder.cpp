@@ -73,6 +73,12 @@ Matrix6d loopSqrtInformation(const Matrix6d& camera_information, const SE3& T_W_
   return covariance.inverse().llt().matrixU();
 }
 
+std::vector<EpochPart> epochParts(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
+  std::vector<EpochPart> parts;
+  for (const auto& [epoch, part] : epochGroups(map, loops)) parts.push_back({epoch, part});
+  return parts;
+}
+
 std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,
                                         const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
   const auto group = epochGroups(map, loops);

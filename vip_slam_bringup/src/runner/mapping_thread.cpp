@@ -40,7 +40,7 @@ MappingThread::~MappingThread() {
 MapUpdate MappingThread::loadMap(const std::string& path) {
   const MapUpdate update = back_end_->loadMap(path);
   if (planes_) {
-    planes_->restore(back_end_->snapshot().planes, update.newest_keyframe);
+    planes_->restore(back_end_->storedPlanes(), update.newest_keyframe);
     back_end_->applyPlaneUpdate(planes_->applyMapUpdate(update));
   }
   return update;

@@ -56,7 +56,7 @@ class PlaneMapper {
   /// Starts from the planes of a loaded map; everything known before is forgotten. Planes without area, or not finite,
   /// are reported as removed by the next applyMapUpdate(). Keyframes up to `newest_keyframe` are the map's own: what
   /// comes under such a number was on its way when it was loaded, and is left out.
-  void restore(const std::vector<PlaneEstimate>& planes, KeyframeId newest_keyframe);
+  void restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe);
   void clear();
 
   const PlaneMapperCounters& counters() const;

@@ -52,7 +52,7 @@ void PlaneTrack::cover(const MapTriangle& triangle, KeyframeId host, const SE3& 
                      });
 }
 
-void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits) {
+void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits, const PlaneHost& host) {
   if (outer.size() < 3) return;
   Eigen::Vector2d low = outer.front(), high = low;
   for (const Eigen::Vector2d& q : outer) low = low.cwiseMin(q), high = high.cwiseMax(q);
@@ -74,7 +74,7 @@ void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& ho
       const int last = cellAt({edges[k + 1], v}).x;
       for (int x = cellAt({edges[k], v}).x; x <= last; ++x) {
         const double u = (x + 0.5) * cell_;
-        if (u >= edges[k] && u < edges[k + 1]) coverCell({x, y}, hits, 0, SE3());
+        if (u >= edges[k] && u < edges[k + 1]) coverCell({x, y}, hits, host.keyframe, host.T_map_C);
       }
     }
   }
@@ -203,6 +203,7 @@ void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
     mine.G = mine.weight_scale * sum;
   }
   keyframes_seen = std::max<int>(keyframes_seen, static_cast<int>(observations_.size()));
+  stored = stored || other.stored;
   confirmed = confirmed || other.confirmed;
   determined = determined || other.determined;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <vip_slam_msgs/Plane.h>
+#include <vip_slam_msgs/PlaneHost.h>
 #include <vip_slam_msgs/PlaneMap.h>
 #include <vip_slam_msgs/PlaneObservation.h>
 #include <vip_slam_msgs/PlaneUpdate.h>
@@ -14,6 +15,7 @@
 namespace vip_slam {
 
 vip_slam_msgs::Plane toMsg(const PlaneEstimate& plane);
+vip_slam_msgs::PlaneHost toMsg(const PlaneHost& host);
 vip_slam_msgs::PlaneObservation toMsg(const PlaneObservation& observation);
 vip_slam_msgs::PlaneUpdate toMsg(const PlaneUpdate& update, const std::string& map_frame);
 vip_slam_msgs::PlaneMap toPlaneMapMsg(const std::vector<PlaneEstimate>& planes, double t, std::uint64_t revision,
@@ -24,6 +26,8 @@ vip_slam_msgs::PlaneMap toPlaneMapMsg(const std::vector<PlaneEstimate>& planes, 
 PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg);
 PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg);
 PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg);
-std::vector<PlaneEstimate> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes);
+/// Throws std::invalid_argument when there is not one host for each plane.
+std::vector<StoredPlane> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes,
+                                 const std::vector<vip_slam_msgs::PlaneHost>& hosts);
 
 }  // namespace vip_slam

@@ -9,6 +9,7 @@
 #include "vip_slam_backend/loop/loop_options.h"
 #include "vip_slam_backend/loop/pose_plane_graph.h"
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/types/map_update.h"
 
 namespace vip_slam {
 
@@ -27,6 +28,9 @@ Matrix6d loopSqrtInformation(const Matrix6d& camera_information, const SE3& T_W_
 PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
                                    const std::vector<std::pair<PlaneId, PlaneId>>& same_planes, double min_seconds,
                                    const PoseGraphOptions& options);
+
+/// Which epochs of the map loops tie together, directly or by way of others.
+std::vector<EpochPart> epochParts(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops);
 
 /// Keyframes that odometry (one epoch) and loops tie to `id`, itself included.
 std::set<KeyframeId> connectedKeyframes(const Map& map, KeyframeId id,

@@ -37,12 +37,20 @@ struct LoopEvent {
   double t = 0;
 };
 
+/// Epochs of the odometry with the same `part` lie in one frame. Where parts lie to each other is a guess until a loop
+/// or relocalisation ties them.
+struct EpochPart {
+  std::uint32_t epoch = 0;
+  std::uint32_t part = 0;  ///< named by one of its epochs
+};
+
 struct MapUpdate {
   std::uint64_t revision = 0;  ///< increases by one per update
   double t = 0;                ///< stamp of the newest keyframe in it
   std::uint32_t epoch = 0;     ///< epoch that T_map_odom belongs to
   SE3 T_map_odom;
   bool placed = true;  ///< false: where that epoch lies in the map is a guess, until a loop or relocalisation tells
+  std::vector<EpochPart> parts;  ///< all epochs of the map, in every update
   KeyframeId newest_keyframe = 0;
   DepthCurve depth_curve;                         ///< what the map has found out about the depth camera
   double disparity_error = 0;                     ///< 1/m, what part of depth_curve is there for; see disparity_curve.h

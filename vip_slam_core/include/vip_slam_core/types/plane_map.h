@@ -6,6 +6,7 @@
 
 #include "vip_slam_core/depth/depth_curve.h"
 #include "vip_slam_core/geometry/plane.h"
+#include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/types/feature.h"
 
 namespace vip_slam {
@@ -28,6 +29,18 @@ struct PlaneEstimate {
   std::uint32_t keyframes = 0;         ///< keyframes that saw it
   double seen_seconds = -1;            ///< simulator's truth: time in view; -1: not known
   double seen_area = -1;               ///< simulator's truth: m^2 of it that was ever in view; -1: not known
+};
+
+/// Where a plane of a loaded map belongs: its area moves with the oldest keyframe that saw it.
+struct PlaneHost {
+  KeyframeId keyframe = 0;  ///< 0: none is left, it stays where it is
+  std::uint32_t epoch = 0;  ///< of its odometry, see EpochPart
+  SE3 T_map_C;
+};
+
+struct StoredPlane {
+  PlaneEstimate estimate;
+  PlaneHost host;
 };
 
 /// A depth point on a plane, in the keyframe's camera frame, with the one-sigma distance error used as its weight.

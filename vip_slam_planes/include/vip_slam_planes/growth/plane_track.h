@@ -16,7 +16,6 @@
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/types/plane_map.h"
 #include "vip_slam_planes/detection/plane_fit.h"
-#include "vip_slam_planes/epochs/epoch_groups.h"
 #include "vip_slam_planes/growth/cell_grid.h"
 #include "vip_slam_planes/growth/outline.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
@@ -57,8 +56,8 @@ class PlaneTrack {
     hits_changed_ = true;
   }
   void coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C);
-  /// Covers a polygon of a loaded map; it has no host and moves with the plane alone.
-  void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits);
+  /// Covers a polygon of a loaded map. Without a host it moves with the plane alone.
+  void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits, const PlaneHost& host);
   void miss(CellIndex c) {
     cells_.set(c, cells_.at(c) - 1);
     area_changed_ = true;
@@ -82,7 +81,7 @@ class PlaneTrack {
   /// Whether some of its area or an observation belongs to a keyframe.
   bool restsOn(KeyframeId keyframe) const { return observations_.count(keyframe) > 0 || patches_.count(keyframe) > 0; }
   /// No observation holds it and no loaded map: it moves with the keyframe that shows most of it.
-  bool followsHosts() const { return observations_.empty() && !patches_.count(0); }
+  bool followsHosts() const { return observations_.empty() && !stored; }
   /// Moments of all observations in `map`.
   PlaneMoments moments(const CameraPoses& poses) const;
 
@@ -99,7 +98,8 @@ class PlaneTrack {
   bool known() const { return confirmed && (agrees || kind_ != PlaneKind::kVertical); }
 
   // Book-keeping of the mapper.
-  EpochKey epoch = kLoadedEpoch;  ///< of the keyframe that started it
+  std::uint32_t epoch = 0;  ///< of the keyframe that started it
+  bool stored = false;      ///< all or part of it comes from a loaded map
   bool confirmed = false;
   bool determined = false;    ///< its observations tell its direction; until then the back end does not get them
   bool agrees = true;         ///< its observations agree; otherwise it may be several surfaces: no points
@@ -132,7 +132,7 @@ class PlaneTrack {
   int lost_ = 0;
   std::vector<Outline> outlines_;
   Plane last_checked_;
-  std::map<KeyframeId, Patch> patches_;  ///< host 0: cells of a loaded map, in `map`
+  std::map<KeyframeId, Patch> patches_;  ///< host 0: cells whose keyframe is gone, in `map`
   std::map<KeyframeId, PlaneObservation> observations_;
 };
 
