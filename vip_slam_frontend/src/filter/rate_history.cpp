@@ -12,6 +12,7 @@ constexpr double kLately = 0.05, kChanges = 0.5, kMoment = 0.01;
 // Of so many times the noise's variance. A delay that is learnt from noise alone came out 10 ms off at a sigma of 1 ms;
 // at this limit it is off by two sigmas (docs/accuracy.md), well above it by less than one.
 constexpr double kClearly = 40.0;
+constexpr double kUneven = 0.3;  // steps between samples that differ by more do not compare
 
 Eigen::Vector3d mean(const std::vector<ImuSample>& samples) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -39,17 +40,30 @@ void RateHistory::add(const std::vector<ImuSample>& samples) {
   means_[0] = now;
   if (intervals_++ == 0) smoothed_ = now;
   const double share = std::min(1.0, dt / kChanges);
-  // Second differences of white noise have six times its variance, those of motion hardly any. The ends are
-  // interpolated.
-  double squares = 0;
-  int n = 0;
-  for (std::size_t i = 2; i + 2 < samples.size(); ++i, n += 3) {
-    squares += (samples[i - 1].gyro - 2.0 * samples[i].gyro + samples[i + 1].gyro).squaredNorm();
-  }
-  if (n > 0) noise_ += share * (squares / (6.0 * n) / static_cast<double>(lastOnes(samples)) - noise_);
+  double variance = 0;
+  if (noiseOf(samples, &variance)) noise_ += share * (variance / static_cast<double>(lastOnes(samples)) - noise_);
   const Eigen::Vector3d change = now - smoothed_;
   squared_changes_ += share * (change.squaredNorm() / 3.0 - squared_changes_);
   smoothed_ += (1.0 - std::exp(-dt / kLately)) * change;
+}
+
+// Second differences of white noise have six times its variance, those of motion hardly any. An interval may have one
+// sample or two between its ends, which are interpolated: what the intervals before measured counts on.
+bool RateHistory::noiseOf(const std::vector<ImuSample>& samples, double* variance) {
+  double squares = 0;
+  int n = 0;
+  for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
+    const ImuSample &a = measured_[0], &b = measured_[1], &c = samples[i];
+    const double before = b.t - a.t, after = c.t - b.t;
+    if (measured_count_ >= 2 && before > 0 && std::abs(after - before) < kUneven * before) {
+      squares += (a.gyro - 2.0 * b.gyro + c.gyro).squaredNorm();
+      n += 3;
+    }
+    measured_ = {b, c};
+    ++measured_count_;
+  }
+  if (n > 0) *variance = squares / (6.0 * n);
+  return n > 0;
 }
 
 Eigen::Vector3d RateHistory::expected(const std::vector<ImuSample>& samples) const {

@@ -26,11 +26,16 @@ class RateHistory {
   bool changes() const;
 
  private:
+  /// Mean square of one sample's noise per axis by the samples that are complete now; false without any.
+  bool noiseOf(const std::vector<ImuSample>& samples, double* variance);
+
   std::array<Eigen::Vector3d, 3> means_;  ///< of the last intervals, the newest first, rad/s
   int intervals_ = 0;
   Eigen::Vector3d smoothed_ = Eigen::Vector3d::Zero();
-  double squared_changes_ = 0;  ///< per axis, (rad/s)^2
-  double noise_ = 0;            ///< of last(), per axis, (rad/s)^2
+  double squared_changes_ = 0;         ///< per axis, (rad/s)^2
+  double noise_ = 0;                   ///< of last(), per axis, (rad/s)^2
+  std::array<ImuSample, 2> measured_;  ///< the newest, older first, without those interpolated at images
+  int measured_count_ = 0;
 };
 
 }  // namespace vip_slam
