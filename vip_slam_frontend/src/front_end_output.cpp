@@ -212,6 +212,7 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   }
   if (last_keyframe_ != 0 && !keyframe_imu_broken_) keyframe->imu = imu_.between(last_keyframe_imu_t_, t_imu);
   keyframe->gyro_correction = filter_.gyroCorrection();
+  keyframe->imu_noise_scale = filter_.imuNoiseScale();
 
   if (const RelativeMotion motion = filter_.motionSinceMark(); last_keyframe_ != 0 && motion.isUsable())
     keyframe->motion = motion;

@@ -1,12 +1,14 @@
 #include "vip_slam_backend/back_end.h"
 
-#include <cmath>
+#include <algorithm>
+#include <set>
+#include <vector>
 
+#include "../optimisation/imu_agreement.h"
 #include "../optimisation/track_noise.h"
 #include "back_end_impl.h"
 #include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/disparity_fit.h"
-#include "vip_slam_core/depth/disparity_curve.h"
 #include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
@@ -14,10 +16,6 @@ namespace {
 
 constexpr std::uint64_t kScaleInterval = 30, kCurveInterval = 20;  // keyframes
 constexpr int kAdjustmentsAtEnd = 3;  // at most, while the map still finds out about the depth camera
-// Smaller changes of the camera's correction wait for the next global adjustment: m, normalised.
-constexpr double kNewDepthOffset = 0.001;
-constexpr double kNewBearing = 1e-4;
-constexpr double kNewGyroCorrection = 5e-4;  // likewise
 
 }  // namespace
 
@@ -49,6 +47,11 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
     epoch = epoch_before;
     throw;
   }
+  const MapKeyframe& inserted = map.keyframe(keyframe->id);
+  if (inserted.previous != 0) {
+    const double factor = imuNoiseFactor(map.keyframe(inserted.previous), inserted, settings.gravity);
+    if (factor > 1) map.widenImuNoise(keyframe->id, factor, sensor.imu_noise);
+  }
   // Beyond the local window bodies turn a little as well; others hear of it with the next global update, until when
   // the cameras they know stay right.
   map.adoptMounting(keyframe->frame.T_I_C);
@@ -65,51 +68,20 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   statistics.merged += found.merged;
 }
 
-void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
-  if (newest.curve != camera_correction.curve) return;  // it goes with readings as they were
-  newest_depth_offset = newest.offset;
-  newest_bearing = newest.bearing;
-  if (std::abs(newest.offset - camera_correction.offset) < kNewDepthOffset &&
-      (newest.bearing.value - camera_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing)
-    return;
-  camera_correction.offset = newest.offset;
-  camera_correction.bearing = newest.bearing;
-  map.adoptCameraCorrection(camera_correction);
-  global_wanted = true;
-  ++correction;  // an adjustment under way has the readings as they were
-}
-
-bool BackEnd::Impl::learnDepthCurve() {
-  if (!options.depth_curve || frozen()) return false;
-  const ScopedTimer timer(log, "backend.depth_curve", map.empty() ? 0 : map.keyframes().rbegin()->second.data->frame.t);
-  std::optional<double> disparity;
-  std::optional<DepthCurve> found;
-  if (measuresDisparity(sensor.depth_noise.type)) {
-    disparity = fitDisparityError(map, sensor.depth_noise, disparity_error != 0);
-    if (disparity) found = disparityCurve(*disparity, sensor.depth_noise.max_range);
-  } else {
-    found = fitDepthCurve(map, sensor.depth_noise);
-  }
-  if (!found) return false;
-  DepthCurve curve = chained(camera_correction.curve, *found);
-  if (!validateDepthCurve(curve).empty()) return false;
-  camera_correction.curve = std::move(curve);
-  if (disparity) {
-    disparity_error += *disparity;
-    if (voidsDepthOffset(*disparity)) camera_correction.offset = newest_depth_offset = 0;
-  }
-  map.adoptCameraCorrection(camera_correction);
-  ++correction;
-  return true;
-}
-
-void BackEnd::Impl::followGyroCorrection(const Eigen::Matrix3d& newest) {
-  newest_gyro_correction = newest;
-  if ((newest - gyro_correction).cwiseAbs().maxCoeff() < kNewGyroCorrection) return;
-  gyro_correction = newest;
-  map.adoptGyroCorrection(newest, sensor.imu_noise);
-  global_wanted = true;
-  ++correction;  // an adjustment under way has the factors as they were
+// A front end that is loaded anew counts its epochs from 0. Taken for the old odometry, what it sends would be put
+// where that one ended.
+void BackEnd::Impl::refuseUntoldRestart(const Keyframe& keyframe) {
+  const std::uint32_t theirs = keyframe.frame.epoch;
+  const auto of_theirs = [theirs](const auto& entry) {
+    return !entry.second.stored && entry.second.data->frame.epoch == theirs;
+  };
+  const auto waits = [theirs](const KeyframePtr& waiting) { return waiting->frame.epoch == theirs; };
+  if (keyframe.previous == 0 && (std::any_of(map.keyframes().begin(), map.keyframes().end(), of_theirs) ||
+                                 std::any_of(held.begin(), held.end(), waits)))
+    restarted_epoch = theirs;
+  if (restarted_epoch == theirs)
+    throw MapError("the odometry began anew under the number of an old one (" + std::to_string(theirs) +
+                   "), as after a restart of the front end alone: call reset");
 }
 
 MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
@@ -119,7 +91,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   const ScopedTimer timer(log, "backend.keyframe", t);
   MapUpdate update = beginUpdate(t);
   const CameraCorrection camera_correction_before = camera_correction;
-  bool entering = false;
+  bool entering = false, brought = false;
   try {
     if (!keyframe) throw MapError("no keyframe given");
     const std::string bad = validateKeyframe(*keyframe);
@@ -129,6 +101,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (keyframe->id <= map.newestKeyframe())
       throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
                      std::to_string(map.newestKeyframe()) + " of the map");
+    refuseUntoldRestart(*keyframe);
     if (frozen()) {
       localise(keyframe);
       finishUpdate(&update);
@@ -145,8 +118,10 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
       return update;
     }
     if (!map.hasKeyframe(keyframe->id)) {
+      const bool found = knowsWhereItWasFound(*keyframe);
+      brought = found && bringToWhereItWasFound(keyframe->frame.epoch);
       insert(keyframe);
-      tieToLastFound(keyframe);
+      if (found) tieToLastFound(keyframe);
     }
   } catch (const MapError& e) {
     refusal = e.what();
@@ -160,7 +135,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
   if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global_wanted = true;
   // Nobody knows yet where the keyframes lie that waited for this one, or what their depth means now.
-  if (entering || camera_correction != camera_correction_before) fillGlobal(&update);
+  if (entering || brought || camera_correction != camera_correction_before) fillGlobal(&update);
   finishUpdate(&update);
   return update;
 }
@@ -184,6 +159,7 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
       refusal = e.what();
     }
   }
+  removeUnnamedPlanes(update);
   for (const PlaneObservation& observation : update.observations) map.setPlaneObservation(observation);
   for (const auto& pair : update.associated) {
     const LandmarkId id = map.resolve(pair.first);
@@ -193,6 +169,16 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     const LandmarkId id = map.resolve(landmark);
     if (map.hasLandmark(id)) map.associate(id, 0);
   }
+}
+
+// An update names all planes. One that it does not name was removed or merged in an update that was lost.
+void BackEnd::Impl::removeUnnamedPlanes(const PlaneUpdate& update) {
+  std::set<PlaneId> named;
+  for (const PlaneEstimate& plane : update.planes) named.insert(plane.id);
+  std::vector<PlaneId> gone;
+  for (const auto& entry : map.planes())
+    if (!named.count(entry.first)) gone.push_back(entry.first);
+  for (const PlaneId id : gone) map.removePlane(id);
 }
 
 void BackEnd::Impl::applyHeldUpdates() {
@@ -244,6 +230,7 @@ void BackEnd::Impl::reset() {
   localised.clear();
   held_updates.clear();
   last_found.reset();
+  restarted_epoch.reset();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;

@@ -29,6 +29,17 @@ struct BackEnd::Impl {
   // back_end.cpp
   /// Inserts at the predicted pose and looks for known landmarks; throws MapError when refused.
   void insert(const KeyframePtr& keyframe);
+  MapUpdate addKeyframe(const KeyframePtr& keyframe);
+  void refuseUntoldRestart(const Keyframe& keyframe);
+  /// Localisation only: what there is of a map stays as it is.
+  bool frozen() const { return localisation_only && !map.empty(); }
+  void applyPlaneUpdate(const PlaneUpdate& update);
+  void removeUnnamedPlanes(const PlaneUpdate& update);
+  void applyHeldUpdates();
+  MapSnapshot snapshot() const;
+  void reset();
+
+  // back_end_calibration.cpp
   /// All keyframes of this session get the same correction of their depth: the newest one's, once it is another one by
   /// enough to redo the map for.
   void followCameraCorrection(const CameraCorrection& newest);
@@ -36,13 +47,6 @@ struct BackEnd::Impl {
   /// it. False when nothing is new.
   bool learnDepthCurve();
   void followGyroCorrection(const Eigen::Matrix3d& newest);
-  MapUpdate addKeyframe(const KeyframePtr& keyframe);
-  /// Localisation only: what there is of a map stays as it is.
-  bool frozen() const { return localisation_only && !map.empty(); }
-  void applyPlaneUpdate(const PlaneUpdate& update);
-  void applyHeldUpdates();
-  MapSnapshot snapshot() const;
-  void reset();
 
   // back_end_steps.cpp
   /// Pose of the keyframe in the map as T_map_odom predicts it; starts a new epoch where the odometry did.
@@ -79,6 +83,10 @@ struct BackEnd::Impl {
   /// Localisation only: T_map_odom follows, the map stays.
   void localise(const KeyframePtr& keyframe);
   /// The first keyframe that is mapped after localisation only: its odometry's place in the map is known.
+  /// Localisation has found the odometry of this keyframe in the map, just before.
+  bool knowsWhereItWasFound(const Keyframe& keyframe);
+  /// What an odometry has mapped at a guess, before it was found, comes along; true when there was anything.
+  bool bringToWhereItWasFound(std::uint32_t epoch);
   void tieToLastFound(const KeyframePtr& keyframe);
 
   // back_end_loops.cpp
@@ -96,7 +104,8 @@ struct BackEnd::Impl {
   std::unique_ptr<BaSolver> solver;
   LoopCloser loop_closer;
   Relocaliser relocaliser;
-  bool searching = false;  ///< a loaded map is not recognised yet
+  std::optional<std::uint32_t> restarted_epoch;  ///< of an odometry that bears the number of an old one
+  bool searching = false;                        ///< a loaded map is not recognised yet
   bool localisation_only = false;
   std::vector<PlaneUpdate> held_updates;  ///< that came since
   std::deque<KeyframePtr> held;           ///< keyframes that wait for that

@@ -90,7 +90,12 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   before.swap(held);
   for (const KeyframePtr& kf : before) {
     if (kf->frame.epoch != epoch || kf->id >= keyframe->id) continue;
-    insert(kf);
+    try {
+      insert(kf);
+    } catch (const MapError& e) {  // the others belong to the map all the same
+      refusal = e.what();
+      continue;
+    }
     loop_closer.add(map, kf->id);
     global_wanted = true;  // most of them lie beyond the local window
   }
@@ -118,15 +123,41 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   last_found = LastFound{epoch, found->match, keyframe->frame.t};
 }
 
-void BackEnd::Impl::tieToLastFound(const KeyframePtr& keyframe) {
-  if (!last_found) return;
-  if (keyframe->frame.epoch != last_found->epoch) {
+bool BackEnd::Impl::knowsWhereItWasFound(const Keyframe& keyframe) {
+  if (!last_found) return false;
+  if (keyframe.frame.epoch != last_found->epoch) {
     last_found.reset();
-    return;
+    return false;
   }
   // Later it still says where the odometry lies, but for its drift: enough for a pose, too little to join two parts.
-  const double since = keyframe->frame.t - last_found->t;
-  if (since < 0 || since >= kRecent || !map.hasKeyframe(last_found->match)) return;
+  const double since = keyframe.frame.t - last_found->t;
+  return since >= 0 && since < kRecent && map.hasKeyframe(last_found->match);
+}
+
+bool BackEnd::Impl::bringToWhereItWasFound(std::uint32_t of_epoch) {
+  KeyframeId newest = 0;
+  for (const auto& [id, kf] : map.keyframes())
+    if (kf.data->frame.epoch == of_epoch) newest = id;
+  if (newest == 0) return false;
+  const std::set<KeyframeId> part = connectedKeyframes(map, newest, loop_closer.loops());
+  if (part.count(last_found->match)) return false;
+  const MapKeyframe& last = map.keyframe(newest);
+  const SE3 move = alignLevelled(T_map_odom * last.data->frame.state.T_W_I, last.state.T_W_I);
+  std::map<KeyframeId, SE3> moved;
+  std::set<PlaneId> planes;
+  for (const KeyframeId id : part) {
+    const MapKeyframe& kf = map.keyframe(id);
+    moved[id] = move * kf.state.T_W_I;
+    for (const auto& seen : kf.planes) planes.insert(seen.first);
+  }
+  map.moveKeyframes(moved);
+  for (const PlaneId id : planes) map.movePlane(id, move);
+  ++correction;  // an adjustment under way has it where it was
+  global_wanted = true;
+  return true;
+}
+
+void BackEnd::Impl::tieToLastFound(const KeyframePtr& keyframe) {
   loop_closer.tie(map, keyframe->id, last_found->match);
   last_found.reset();
 }

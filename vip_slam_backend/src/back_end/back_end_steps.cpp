@@ -168,10 +168,17 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
   } else if (frozen()) {
     global_wanted = global_wanted || result.solution != nullptr;  // once mapping goes on
   } else if (result.solution && result.solution->summary.usable) {
+    const bool found = last_found && last_found->epoch == epoch && map.hasKeyframe(last_found->match);
+    const SE3 match_before = found ? map.keyframe(last_found->match).state.T_W_I : SE3();
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     ++statistics.global_ba;
     statistics.track_noise_factor = result.solution->built.track_noise_factor;
-    followNewest();
+    if (found) {
+      // The newest keyframe is from before it was found, and the odometry has drifted since.
+      T_map_odom = alignLevelled(map.keyframe(last_found->match).state.T_W_I, match_before) * T_map_odom;
+    } else {
+      followNewest();
+    }
     askForScale();
     return true;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/place_recognition/vocabulary_io.h"
@@ -136,8 +137,12 @@ std::vector<LoopEvent> LoopCloser::close(Map& map, KeyframeId query) {
 
 LoopEvent LoopCloser::joinParts(Map& map, KeyframeId query, const std::set<KeyframeId>& part) {
   const auto elsewhere = [&part](KeyframeId id) { return part.count(id) == 0; };
-  return correct(map, query,
-                 joins_.add(map, database_, verifier_, map.keyframe(query).data, database_.bow(query), elsewhere));
+  std::map<std::uint32_t, std::uint32_t> part_of_epoch;
+  for (const EpochPart& told : epochParts(map, loops_)) part_of_epoch[told.epoch] = told.part;
+  const auto part_of = [&](KeyframeId id) { return part_of_epoch.at(map.keyframe(id).data->frame.epoch); };
+  return correct(
+      map, query,
+      joins_.add(map, database_, verifier_, map.keyframe(query).data, database_.bow(query), elsewhere, part_of));
 }
 
 }  // namespace vip_slam

@@ -44,22 +44,25 @@ std::vector<KeyframeId> PlaceSearch::viewsLikeNewest(const Scene& scene) const {
   const auto there = [&](KeyframeId id) { return scene.map.hasKeyframe(id) && (!scene.allowed || scene.allowed(id)); };
   const std::size_t most = static_cast<std::size_t>(options_.candidates + options_.rivals);
   std::vector<KeyframeId> views;
-  std::vector<SE3> poses;
+  std::vector<Place> seen;
   for (const DatabaseMatch& candidate : scene.database.query(bows_.back().bow, 20 * most, there)) {
     if (views.size() >= most) break;
     const SE3 view = scene.map.keyframe(candidate.keyframe).T_W_C();
-    if (std::any_of(poses.begin(), poses.end(), [&](const SE3& other) { return sameView(other, view); })) continue;
+    const std::uint32_t part = scene.partOf(candidate.keyframe);
+    const auto same = [&](const Place& other) { return other.part == part && sameView(other.T_W_odom, view); };
+    if (std::any_of(seen.begin(), seen.end(), same)) continue;
     views.push_back(candidate.keyframe);
-    poses.push_back(view);
+    seen.push_back({view, part});
   }
   return views;
 }
 
-std::vector<SE3> PlaceSearch::guesses(const Scene& scene, std::size_t first, std::size_t last, std::size_t most) const {
+std::vector<PlaceSearch::Place> PlaceSearch::guesses(const Scene& scene, std::size_t first, std::size_t last,
+                                                     std::size_t most) const {
   const Keyframe& newest = *keyframes_.back();
   const SE3 T_odom_B = newest.frame.state.T_W_I * newest.frame.T_I_C;
   const CameraRig rig = rigOf(keyframes_);
-  std::vector<std::pair<std::size_t, SE3>> found;
+  std::vector<std::pair<std::size_t, Place>> found;  // here the place of the rig
   for (std::size_t v = first; v < std::min(last, scene.views.size()); ++v) {
     std::vector<PlaceMatch> matches;
     for (std::uint32_t c = 0; c < keyframes_.size(); ++c)
@@ -73,34 +76,41 @@ std::vector<SE3> PlaceSearch::guesses(const Scene& scene, std::size_t first, std
     pose_options.seed = newest.id * 1000003ull + scene.views[v];
     const PlacePose pose = ransacPlacePose(matches, rig, T_odom_B.rotation(), pose_options);
     if (static_cast<int>(pose.inliers.size()) < options_.min_seed_inliers) continue;
-    const auto same =
-        std::find_if(found.begin(), found.end(), [&](const auto& f) { return samePlace(f.second, pose.T_W_B); });
+    const Place place{pose.T_W_B, scene.partOf(scene.views[v])};
+    const auto same = std::find_if(found.begin(), found.end(), [&](const auto& f) {
+      return f.second.part == place.part && samePlace(f.second.T_W_odom, place.T_W_odom);
+    });
     if (same == found.end())
-      found.emplace_back(pose.inliers.size(), pose.T_W_B);
+      found.emplace_back(pose.inliers.size(), place);
     else if (same->first < pose.inliers.size())
-      *same = {pose.inliers.size(), pose.T_W_B};
+      *same = {pose.inliers.size(), place};
   }
   std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   if (found.size() > most) found.resize(most);
-  std::vector<SE3> result;
-  for (const auto& f : found) result.push_back(f.second * T_odom_B.inverse());
+  std::vector<Place> result;
+  for (const auto& f : found) result.push_back({f.second.T_W_odom * T_odom_B.inverse(), f.second.part});
   return result;
 }
 
-void PlaceSearch::weigh(const Scene& scene, const std::vector<SE3>& T_W_odom) {
+void PlaceSearch::weigh(const Scene& scene, const std::vector<Place>& places) {
   const SE3 T_odom_B = keyframes_.back()->frame.state.T_W_I * keyframes_.back()->frame.T_I_C;
-  for (const SE3& guess : T_W_odom) {
-    const auto atGuess = [&](const Guess& g) { return samePlace(g.support.T_W_C, guess * T_odom_B); };
-    if (std::any_of(guesses_.begin(), guesses_.end(), atGuess)) continue;
-    PlaceSupport support = placeSupport(scene.map, keyframes_, guess, scene.verifier, scene.allowed);
+  for (const auto& [T_W_odom, part] : places) {
+    const auto at = [&, part = part](const SE3& T_W_C) {
+      return [&, part](const Guess& g) { return g.place.part == part && samePlace(g.support.T_W_C, T_W_C); };
+    };
+    if (std::any_of(guesses_.begin(), guesses_.end(), at(T_W_odom * T_odom_B))) continue;
+    const auto in_part = [&scene, part = part](KeyframeId id) {
+      return scene.partOf(id) == part && (!scene.allowed || scene.allowed(id));
+    };
+    PlaceSupport support = placeSupport(scene.map, keyframes_, T_W_odom, scene.verifier, in_part);
     if (!support.found || support.points < options_.min_seed_inliers) continue;
     // What the matches moved together is one place.
-    const auto same = std::find_if(guesses_.begin(), guesses_.end(),
-                                   [&](const Guess& g) { return samePlace(g.support.T_W_C, support.T_W_C); });
+    const auto same = std::find_if(guesses_.begin(), guesses_.end(), at(support.T_W_C));
+    const Place place{support.T_W_C * T_odom_B.inverse(), part};
     if (same == guesses_.end())
-      guesses_.push_back({support.T_W_C * T_odom_B.inverse(), std::move(support)});
+      guesses_.push_back({place, std::move(support)});
     else if (same->support.evidence() < support.evidence())
-      *same = {support.T_W_C * T_odom_B.inverse(), std::move(support)};
+      *same = {place, std::move(support)};
   }
   std::stable_sort(guesses_.begin(), guesses_.end(),
                    [](const Guess& a, const Guess& b) { return a.support.evidence() > b.support.evidence(); });
@@ -108,7 +118,8 @@ void PlaceSearch::weigh(const Scene& scene, const std::vector<SE3>& T_W_odom) {
 
 PlaceVerification PlaceSearch::add(const Map& map, const KeyframeDatabase& database, const PlaceVerifier& verifier,
                                    const KeyframePtr& keyframe, const BowResult& bow,
-                                   const std::function<bool(KeyframeId)>& allowed) {
+                                   const std::function<bool(KeyframeId)>& allowed,
+                                   const std::function<std::uint32_t(KeyframeId)>& part_of) {
   if (!keyframes_.empty() && keyframes_.back()->frame.epoch != keyframe->frame.epoch) clear();
   keyframes_.push_back(keyframe);
   bows_.push_back(bow);
@@ -118,15 +129,15 @@ PlaceVerification PlaceSearch::add(const Map& map, const KeyframeDatabase& datab
     bows_.erase(bows_.begin());
   }
 
-  Scene scene{map, database, verifier, allowed, {}};
+  Scene scene{map, database, verifier, allowed, part_of, {}};
   scene.views = viewsLikeNewest(scene);
   const std::size_t candidates = static_cast<std::size_t>(options_.candidates);
-  std::vector<SE3> T_W_odom;
-  for (const Guess& guess : guesses_) T_W_odom.push_back(guess.T_W_odom);
-  const std::vector<SE3> fresh = guesses(scene, 0, candidates, kNewGuesses);
-  T_W_odom.insert(T_W_odom.end(), fresh.begin(), fresh.end());
+  std::vector<Place> places;
+  for (const Guess& guess : guesses_) places.push_back(guess.place);
+  const std::vector<Place> fresh = guesses(scene, 0, candidates, kNewGuesses);
+  places.insert(places.end(), fresh.begin(), fresh.end());
   guesses_.clear();
-  weigh(scene, T_W_odom);
+  weigh(scene, places);
   PlaceVerification result = judge(scene);
   if (result.accepted) {
     // Before it is believed, views that look less alike must not hold it as well: corridors repeat themselves.
@@ -135,10 +146,11 @@ PlaceVerification PlaceSearch::add(const Map& map, const KeyframeDatabase& datab
   }
   if (result.accepted) {
     // Chance resemblance passes with the view; a place stays.
-    const SE3& T_W_odom_now = guesses_.front().T_W_odom;
+    const Place& now = guesses_.front().place;
     const SE3 T_odom_B = keyframe->frame.state.T_W_I * keyframe->frame.T_I_C;
-    const bool again = believed_ && samePlace(*believed_ * T_odom_B, T_W_odom_now * T_odom_B);
-    believed_ = T_W_odom_now;
+    const bool again =
+        believed_ && believed_->part == now.part && samePlace(believed_->T_W_odom * T_odom_B, now.T_W_odom * T_odom_B);
+    believed_ = now;
     // The next keyframe that comes to it lifts one doubt, not two: a wall like the right one stays in view as well.
     const std::vector<std::string> left = doubts();
     if (left.size() > 1) believed_.reset();

@@ -11,24 +11,6 @@ namespace {
 // the views of its own track count neither as predicted nor as found.
 constexpr std::size_t kProven = 4;
 
-}  // namespace
-
-int cullLandmarks(KeyframeId recent, Map* map) {
-  int removed = 0;
-  for (const LandmarkId id : map->landmarkIds()) {
-    const MapLandmark& landmark = map->landmark(id);
-    if (landmark.observations.back().keyframe >= recent) continue;
-    const std::size_t views = landmark.observations.size();
-    const bool poor = views < 3 || (views < kProven && 5 * landmark.found < landmark.visible);
-    if (!poor) continue;
-    map->removeLandmark(id);
-    ++removed;
-  }
-  return removed;
-}
-
-namespace {
-
 constexpr int kJudged = 10;                // keyframes that just left the window, and as many older ones in turn
 constexpr std::size_t kSmallMap = 3;       // times the keyframes that are a crowd: all together they cost little
 constexpr std::size_t kAtOnce = 2;         // out of a crowd, which is another one without them
@@ -64,6 +46,19 @@ std::set<KeyframeId> endsOfTies(const Map& map, const std::vector<std::pair<Keyf
   return ends;
 }
 
+/// Three more at least: neighbours in time mostly see what a keyframe sees.
+bool isHeldByOthers(PlaneId plane, const MapKeyframe& kf, const Map& map) {
+  constexpr int kEnough = 3;
+  int others = 0;
+  const auto here = map.keyframes().find(kf.id());
+  auto before = here, after = std::next(here);
+  while (others < kEnough && (before != map.keyframes().begin() || after != map.keyframes().end())) {
+    if (before != map.keyframes().begin()) others += (--before)->second.planes.count(plane) != 0;
+    if (after != map.keyframes().end()) others += (after++)->second.planes.count(plane) != 0;
+  }
+  return others >= kEnough;
+}
+
 /// Landmarks with fewer than `proven` views do not count.
 bool isRedundant(const MapKeyframe& kf, const Map& map, double redundancy, std::size_t proven) {
   int total = 0, redundant = 0;
@@ -75,16 +70,31 @@ bool isRedundant(const MapKeyframe& kf, const Map& map, double redundancy, std::
   }
   if (total < 20 || redundant < redundancy * total) return false;
   // A keyframe that alone holds a plane stays.
-  for (const auto& plane : kf.planes) {
-    int others = 0;
-    for (const auto& entry : map.keyframes())
-      others += entry.first != kf.id() && entry.second.planes.count(plane.first);
-    if (others < 3) return false;
-  }
-  return true;
+  return std::all_of(kf.planes.begin(), kf.planes.end(),
+                     [&](const auto& plane) { return isHeldByOthers(plane.first, kf, map); });
 }
 
 }  // namespace
+
+int cullLandmarks(KeyframeId recent, Map* map) {
+  const auto& keyframes = map->keyframes();
+  const int window = static_cast<int>(std::distance(keyframes.lower_bound(recent), keyframes.end()));
+  if (window >= static_cast<int>(keyframes.size())) return 0;
+  int removed = 0;
+  for (const KeyframeId keyframe : candidates(*map, window)) {
+    for (const LandmarkId id : std::vector<LandmarkId>(map->keyframe(keyframe).landmarks)) {
+      if (id == kNoLandmark) continue;
+      const MapLandmark& landmark = map->landmark(id);
+      if (landmark.observations.back().keyframe >= recent) continue;
+      const std::size_t views = landmark.observations.size();
+      const bool poor = views < 3 || (views < kProven && 5 * landmark.found < landmark.visible);
+      if (!poor) continue;
+      map->removeLandmark(id);
+      ++removed;
+    }
+  }
+  return removed;
+}
 
 std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise,
                                       const std::vector<std::pair<KeyframeId, KeyframeId>>& loops, Map* map) {

@@ -3,13 +3,16 @@
 #include <cmath>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/map_limits.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kMostBearing = 0.2;  // share of the focal length
+constexpr double kMostBearing = 0.2;         // share of the focal length
+constexpr double kMostGyroCorrection = 0.5;  // each entry
+constexpr double kSameTime = 1e-6;           // s
 
 bool finite(const NavState& s) {
   return std::isfinite(s.t) && s.T_W_I.isFinite() && s.v_W.allFinite() && s.bias_gyro.allFinite() &&
@@ -18,10 +21,14 @@ bool finite(const NavState& s) {
 
 std::shared_ptr<const Preintegration> integrate(const std::shared_ptr<const std::vector<ImuSample>>& imu,
                                                 const Eigen::Matrix3d& gyro_correction, const NavState& from,
-                                                const ImuNoise& noise) {
+                                                const ImuNoise& noise, double noise_scale) {
   if (!imu || imu->size() < 2) return nullptr;
+  ImuNoise scaled = noise;
+  for (double* density :
+       {&scaled.gyro_noise_density, &scaled.gyro_random_walk, &scaled.accel_noise_density, &scaled.accel_random_walk})
+    *density *= noise_scale;
   return std::make_shared<Preintegration>(withGyroCorrection(*imu, gyro_correction), from.bias_gyro, from.bias_accel,
-                                          noise);
+                                          scaled);
 }
 
 }  // namespace
@@ -32,11 +39,14 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   if (!std::isfinite(keyframe.frame.t)) return name + "stamp is not finite";
   if (!finite(keyframe.frame.state)) return name + "state is not finite";
   if (!keyframe.frame.T_I_C.isFinite()) return name + "extrinsics are not finite";
+  if (!std::isfinite(keyframe.frame.time_offset)) return name + "the camera's delay is not finite";
+  const DepthGrid& grid = keyframe.frame.depth_grid;
+  if (!grid.empty() && grid.stride <= 0) return name + "depth grid without a stride";
   const auto& features = keyframe.frame.features;
   for (std::size_t k = 0; k < features.size(); ++k) {
     const Feature& f = features[k];
     if (!f.pixel.allFinite() || !f.xy.allFinite() || !std::isfinite(f.depth) || !std::isfinite(f.depth_sigma) ||
-        !std::isfinite(f.pixel_sigma))
+        !std::isfinite(f.pixel_sigma) || !std::isfinite(f.angle))
       return name + "feature " + std::to_string(k) + " is not finite";
     if (f.depth < 0 || (f.depth > 0 && !(f.depth_sigma > 0)))
       return name + "feature " + std::to_string(k) + " has depth " + std::to_string(f.depth) + " with sigma " +
@@ -48,13 +58,20 @@ std::string validateKeyframe(const Keyframe& keyframe) {
       return name + "IMU sample " + std::to_string(k) + " is not finite";
     if (k > 0 && !(s.t > keyframe.imu[k - 1].t))
       return name + "IMU sample " + std::to_string(k) + " is not after the one before";
+    if (s.gyro.norm() > map_limits::kMostRate || s.accel.norm() > map_limits::kMostAcceleration)
+      return name + "IMU sample " + std::to_string(k) + " is out of any sensor's range";
   }
+  if (!keyframe.imu.empty() && keyframe.imu.back().t - keyframe.imu.front().t > map_limits::kLongestImu)
+    return name + "its IMU samples span hours";
   // All keyframes take over what the newest one says of the camera.
   const CameraCorrection& camera = keyframe.frame.camera_correction;
   if (!std::isfinite(camera.offset) || !(camera.bearing.value.cwiseAbs().maxCoeff() < kMostBearing) ||
       !camera.bearing.value.allFinite())
     return name + "the camera's correction is not finite, or beyond what a camera can be off by";
-  if (!keyframe.gyro_correction.allFinite()) return name + "the gyro's correction is not finite";
+  if (!keyframe.gyro_correction.allFinite() || keyframe.gyro_correction.cwiseAbs().maxCoeff() > kMostGyroCorrection)
+    return name + "the gyro's correction is not finite, or beyond what a gyro can be off by";
+  if (!(keyframe.imu_noise_scale > 0 && keyframe.imu_noise_scale <= map_limits::kMostNoiseScale))
+    return name + "the scale of the IMU's noise is " + std::to_string(keyframe.imu_noise_scale);
   if (keyframe.motion.known() && !keyframe.motion.isUsable())
     return name + "the odometry's motion is not finite, or its covariance is none";
   return "";
@@ -65,6 +82,8 @@ MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, co
   const std::string name = "keyframe " + std::to_string(data->id);
   if (data->id <= newestKeyframe())
     throw MapError(name + " is not newer than keyframe " + std::to_string(newestKeyframe()) + " of the map");
+  if (!keyframes_.empty() && data->id - keyframes_.begin()->first > map_limits::kWidestIds)
+    throw MapError(name + " is too far from the first one, " + std::to_string(keyframes_.begin()->first));
   const std::string bad = validateKeyframe(*data);
   if (!bad.empty()) throw MapError(bad);
   if (!finite(state)) throw MapError(name + ": state in the map is not finite");
@@ -77,10 +96,17 @@ MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, co
       if (!(data->frame.t > it->second.data->frame.t))
         throw MapError(name + ": stamp is not after that of its previous keyframe " + std::to_string(data->previous));
       previous = data->previous;
+      const auto& before = it->second.imu;
+      if (before && !data->imu.empty() && data->imu.front().t < before->back().t - kSameTime)
+        throw MapError(name + ": its IMU samples begin before those of its previous keyframe end");
       if (data->imu.size() >= 2) imu = std::shared_ptr<const std::vector<ImuSample>>(data, &data->imu);
     }
   }
-  return insert(data, state, previous, imu, noise);
+  try {
+    return insert(data, state, previous, imu, noise);
+  } catch (const std::invalid_argument& e) {  // numbers, each in its range, that cannot be integrated together
+    throw MapError(name + ": IMU samples: " + e.what());
+  }
 }
 
 MapKeyframe& Map::restoreKeyframe(const KeyframePtr& data, const NavState& state, KeyframeId previous,
@@ -109,10 +135,11 @@ MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, Keyfram
   kf.landmarks.assign(data->frame.features.size(), kNoLandmark);
   kf.previous = previous;
   kf.gyro_correction = data->gyro_correction;
+  kf.imu_noise_scale = data->imu_noise_scale;
   if (previous != 0) {
     kf.motion = data->motion;
     kf.imu = imu;
-    kf.preintegration = integrate(imu, kf.gyro_correction, keyframe(previous).state, noise);
+    kf.preintegration = integrate(imu, kf.gyro_correction, keyframe(previous).state, noise, kf.imu_noise_scale);
   }
   MapKeyframe& inserted = keyframes_.emplace(data->id, std::move(kf)).first->second;
   if (previous != 0) keyframe(previous).next = data->id;
@@ -152,7 +179,8 @@ void Map::adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise&
   }
   for (const KeyframeId id : others) {
     MapKeyframe& kf = keyframe(id);
-    if (kf.preintegration) kf.preintegration = integrate(kf.imu, correction, keyframe(kf.previous).state, noise);
+    if (kf.preintegration)
+      kf.preintegration = integrate(kf.imu, correction, keyframe(kf.previous).state, noise, kf.imu_noise_scale);
   }
 }
 
@@ -164,17 +192,21 @@ void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_se
   if (next != 0) {
     MapKeyframe& n = keyframe(next);
     std::shared_ptr<const std::vector<ImuSample>> joined;
+    std::shared_ptr<const Preintegration> preintegration;
     KeyframeId chained = 0;
     if (previous != 0 && kf.imu && n.imu && n.imu->back().t - kf.imu->front().t <= max_imu_seconds) {
       auto samples = std::make_shared<std::vector<ImuSample>>(*kf.imu);
       samples->insert(samples->end(), n.imu->begin() + 1, n.imu->end());
       joined = samples;
+      const double scale = std::max(kf.imu_noise_scale, n.imu_noise_scale);
+      preintegration = integrate(joined, n.gyro_correction, keyframe(previous).state, noise, scale);
+      n.imu_noise_scale = scale;
       chained = previous;
     }
     n.motion = chained ? compose(kf.motion, n.motion) : RelativeMotion();
     n.previous = chained;
     n.imu = joined;
-    n.preintegration = chained ? integrate(joined, n.gyro_correction, keyframe(chained).state, noise) : nullptr;
+    n.preintegration = preintegration;
     if (previous != 0) keyframe(previous).next = chained ? next : 0;
   } else if (previous != 0) {
     keyframe(previous).next = 0;
@@ -214,7 +246,14 @@ void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) 
   if (kf.next == 0) return;
   MapKeyframe& next = keyframe(kf.next);
   if (next.preintegration && next.preintegration->needsReintegration(state.bias_gyro, state.bias_accel))
-    next.preintegration = integrate(next.imu, next.gyro_correction, state, noise);
+    next.preintegration = integrate(next.imu, next.gyro_correction, state, noise, next.imu_noise_scale);
+}
+
+void Map::widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise) {
+  MapKeyframe& kf = keyframe(id);
+  kf.imu_noise_scale = std::min(factor * kf.imu_noise_scale, map_limits::kMostNoiseScale);
+  if (kf.preintegration)
+    kf.preintegration = integrate(kf.imu, kf.gyro_correction, keyframe(kf.previous).state, noise, kf.imu_noise_scale);
 }
 
 void Map::moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I) {

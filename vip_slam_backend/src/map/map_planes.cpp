@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/map_limits.h"
 #include "vip_slam_core/types/camera_correction.h"
 
 namespace vip_slam {
@@ -20,6 +21,8 @@ void Map::setPlane(const PlaneEstimate& estimate) {
   MapPlane& plane = planes_[estimate.id];
   const Plane optimised = plane.estimate.plane;
   plane.estimate = estimate;
+  const double length = estimate.plane.n.norm();
+  if (std::abs(length - 1.0) > map_limits::kUnitNormal) plane.estimate.plane.n /= length;
   if (plane.optimised) plane.estimate.plane = optimised;
 }
 

@@ -8,9 +8,9 @@ namespace vip_slam {
 namespace map_file {
 
 constexpr char kMagic[8] = {'V', 'I', 'P', 'M', 'A', 'P', 0, 0};
-constexpr std::uint32_t kVersion = 5;
+constexpr std::uint32_t kVersion = 6;
 /// Without the features' pixel_sigma; until 2 one track a landmark, until 3 no motion of the odometry, until 4 no
-/// camera.
+/// camera, until 5 no scale of the IMU's noise.
 constexpr std::uint32_t kOldestVersion = 1;
 constexpr float kPixelSigmaOfVersion1 = 0.3f;  ///< what tracks were worth on average, px
 constexpr std::size_t kHeader = 8 + 4 + 4 + 8;

@@ -5,15 +5,13 @@
 #include <stdexcept>
 
 #include "map_file_format.h"
+#include "vip_slam_backend/map/map_limits.h"
 #include "vip_slam_backend/map_io/byte_stream.h"
 #include "vip_slam_backend/map_io/map_file.h"
 #include "vip_slam_backend/util/crc32.h"
 
 namespace vip_slam {
 namespace {
-
-// Tables go by keyframe id; a map that is three months of keyframes wide has not been made here.
-constexpr KeyframeId kWidestIds = KeyframeId{1} << 24;
 
 double finite(ByteReader& in, const char* what) {
   const auto v = in.get<double>(what);
@@ -97,7 +95,7 @@ void readPlane(ByteReader& in, Map& map) {
   e.kind = static_cast<PlaneKind>(kind);
   const bool optimised = flag(in, "plane flag");
   e.plane.n = finiteVector<Eigen::Vector3d>(in, "plane normal");
-  if (std::abs(e.plane.n.norm() - 1.0) > 1e-7) in.fail("plane normal is not a unit vector");
+  if (std::abs(e.plane.n.norm() - 1.0) > map_limits::kUnitNormal) in.fail("plane normal is not a unit vector");
   e.plane.d = finite(in, "plane distance");
   e.area = finite(in, "plane area");
   e.keyframes = in.get<std::uint32_t>("plane keyframes");
@@ -161,7 +159,7 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   TrackedFrame& frame = data->frame;
   data->id = in.get<std::uint64_t>("keyframe id");
   if (data->id <= map.newestKeyframe()) in.fail("keyframe " + std::to_string(data->id) + " is out of order");
-  if (!map.empty() && data->id - map.keyframes().begin()->first > kWidestIds)
+  if (!map.empty() && data->id - map.keyframes().begin()->first > map_limits::kWidestIds)
     in.fail("keyframe " + std::to_string(data->id) + " is too far from the first, " +
             std::to_string(map.keyframes().begin()->first));
   frame.t = finite(in, "keyframe stamp");
@@ -191,16 +189,17 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   }
   frame.depth_grid = readGrid(in);
   if (version >= 4 && flag(in, "motion flag")) data->motion = readMotion(in);
+  if (version >= 6) data->imu_noise_scale = finite(in, "scale of the IMU's noise");
   std::vector<ImuSample> imu(in.count(map_file::kImuBytes, "IMU samples"));
   for (std::size_t k = 0; k < imu.size(); ++k) {
     imu[k].t = finite(in, "IMU sample");
     imu[k].gyro = finiteVector<Eigen::Vector3d>(in, "IMU sample");
     imu[k].accel = finiteVector<Eigen::Vector3d>(in, "IMU sample");
-    // Far beyond any sensor; larger numbers would overflow when integrated.
-    if (imu[k].gyro.norm() > 1e3 || imu[k].accel.norm() > 1e4) in.fail("IMU sample is out of any sensor's range");
+    if (imu[k].gyro.norm() > map_limits::kMostRate || imu[k].accel.norm() > map_limits::kMostAcceleration)
+      in.fail("IMU sample is out of any sensor's range");
     if (k > 0 && !(imu[k].t > imu[k - 1].t)) in.fail("IMU samples are not in order");
   }
-  if (!imu.empty() && imu.back().t - imu.front().t > 1e4) in.fail("IMU samples span hours");
+  if (!imu.empty() && imu.back().t - imu.front().t > map_limits::kLongestImu) in.fail("IMU samples span hours");
   try {
     map.restoreKeyframe(data, state, previous, imu, noise).loop_keyframe = loop_keyframe;
   } catch (const std::invalid_argument& e) {  // numbers, each in its range, that cannot be integrated together

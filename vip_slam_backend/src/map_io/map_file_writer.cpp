@@ -144,6 +144,7 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch, Landmark
     for (int r = 0; r < 6; ++r)
       for (int c = r; c < 6; ++c) out.put(kf.motion.covariance(r, c));
   }
+  out.put(kf.imu_noise_scale);
   const std::size_t samples = kf.previous != 0 && kf.imu ? kf.imu->size() : 0;
   out.put(static_cast<std::uint32_t>(samples));
   const std::vector<ImuSample> scaled =

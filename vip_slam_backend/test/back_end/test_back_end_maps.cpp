@@ -249,11 +249,30 @@ TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   PlaneUpdate late;
   late.revision = before.revision;
   late.removed = {before.planes.front().id};
+  late.planes.assign(before.planes.begin() + 1, before.planes.end());
   back_end.applyPlaneUpdate(late);
   EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size());
   back_end.setLocalisationMode(false);
   EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size() - 1);
   EXPECT_FALSE(back_end.map().hasPlane(before.planes.front().id));
+}
+
+TEST(BackEndMaps, PlanesThatALostUpdateRemovedGoWithTheNext) {
+  SimulatedKeyframes world(4);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 10; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  const MapSnapshot before = back_end.snapshot();
+  ASSERT_GT(before.planes.size(), 1u);
+  PlaneUpdate next;
+  next.revision = before.revision;
+  next.planes.assign(before.planes.begin() + 1, before.planes.end());
+  back_end.applyPlaneUpdate(next);
+  EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size() - 1);
+  EXPECT_FALSE(back_end.map().hasPlane(before.planes.front().id));
+  EXPECT_EQ(checkMap(back_end.map()), "");
 }
 
 TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
@@ -273,7 +292,7 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
     for (int k = 0; k < 20; ++k) {
       auto kf = std::make_shared<Keyframe>(*session.next());
       kf->id += 1000;
-      kf->previous = 0;
+      kf->previous = k == 0 ? 0 : kf->id - 1;
       kf->frame.epoch = 7;
       if (k == 18) {
         ASSERT_GT(back_end.snapshot().localised.size(), 10u);
@@ -303,6 +322,7 @@ TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
   const SensorConfig sensor = SimulatedKeyframes(4).sensor();
   BackEnd mapper(options("vip"), sensor), back_end(options("vip"), sensor);
   MapUpdate update;
+  std::vector<PlaneEstimate> of_first_room;
   for (const std::uint32_t epoch : {0u, 1u}) {
     SimulatedKeyframes world(epoch == 0 ? 4 : 9);
     for (int k = 0; k < 8; ++k) {
@@ -319,6 +339,8 @@ TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
       planes.dissociated.clear();
       for (PlaneEstimate& plane : planes.planes) plane.id += 1000 * epoch;
       for (PlaneObservation& o : planes.observations) o.plane += 1000 * epoch, o.keyframe += 1000 * epoch;
+      if (epoch == 0) of_first_room = planes.planes;
+      if (epoch == 1) planes.planes.insert(planes.planes.end(), of_first_room.begin(), of_first_room.end());
       mapper.applyPlaneUpdate(planes);
     }
   }
@@ -348,4 +370,91 @@ TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
   }
   EXPECT_GT(of_first, 0);
   EXPECT_GT(of_second, 0);
+}
+
+// Lost, four keyframes are mapped at a guess; then the place is found, and mapping goes on.
+TEST(BackEndMaps, WhatWasMappedAtAGuessComesAlongWhenItsOdometryIsFound) {
+  SimulatedKeyframes world(4), session(4);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 25; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  const SE3 T_other_odom(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {7, -3, 1});
+  MapUpdate update;
+  for (int k = 0; k < 18; ++k) {
+    auto kf = std::make_shared<Keyframe>(*session.next());
+    kf->id += 1000;
+    kf->previous = k == 0 ? 0 : kf->id - 1;
+    kf->frame.epoch = 7;
+    kf->frame.state.T_W_I = T_other_odom * kf->frame.state.T_W_I;
+    kf->frame.state.v_W = T_other_odom.rotation() * kf->frame.state.v_W;
+    for (Feature& f : kf->frame.features) {
+      f.id += 1000000;
+      if (k < 4) f.descriptor.fill(0x55);  // nothing looks as it did
+    }
+    if (k == 4) back_end.setLocalisationMode(true);
+    if (k == 16) {
+      ASSERT_GT(back_end.snapshot().localised.size(), 3u);
+      back_end.setLocalisationMode(false);
+    }
+    update = back_end.addKeyframe(kf);
+    EXPECT_EQ(back_end.lastRefusal(), "");
+    if (k == 16) EXPECT_TRUE(update.global);
+  }
+  EXPECT_TRUE(update.placed);
+  EXPECT_EQ(partOf(update, 7), partOf(update, 0));
+  const auto error = [&](KeyframeId id) {
+    const MapKeyframe& kf = back_end.map().keyframe(id);
+    return (kf.state.T_W_I.t() - world.truth(kf.data->frame.t).T_W_I.t()).norm();
+  };
+  for (const KeyframeId id : {1001, 1004, 1017, 1018}) EXPECT_LT(error(id), 0.05) << id;
+  EXPECT_EQ(checkMap(back_end.map()), "");
+}
+
+// The odometry has drifted by half a metre since its last keyframe in the map; an adjustment ends before the next one.
+TEST(BackEndMaps, AnAdjustmentLeavesTheOdometryWhereItWasFound) {
+  SimulatedKeyframes world(4), again(4);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 25; ++k) {
+    back_end.addKeyframe(world.next());
+    back_end.applyPlaneUpdate(world.planes());
+  }
+  const SE3 drift(Eigen::Quaterniond::Identity(), {0.5, 0.2, 0});
+  SE3 found;
+  back_end.setLocalisationMode(true);
+  for (int k = 0; k < 12; ++k) {
+    auto kf = std::make_shared<Keyframe>(*again.next());
+    kf->id += 1000;
+    kf->previous = kf->id - 1;
+    kf->frame.t += 100;
+    kf->imu.clear();
+    kf->frame.state.T_W_I = drift * kf->frame.state.T_W_I;
+    for (Feature& f : kf->frame.features) f.id += 1000000;
+    found = back_end.addKeyframe(kf).T_map_odom;
+  }
+  ASSERT_GT(back_end.snapshot().localised.size(), 3u);
+  ASSERT_LT((found * drift).t().norm(), 0.1);
+  back_end.setLocalisationMode(false);
+  back_end.requestGlobalBa();
+  const MapUpdate update = back_end.merge(back_end.run(back_end.startGlobalBa()));
+  EXPECT_TRUE(update.global);
+  EXPECT_LT((update.T_map_odom.t() - found.t()).norm(), 0.05);
+}
+
+TEST(BackEndMaps, AnOdometryUnderTheNumberOfAnOldOneIsRefusedByName) {
+  SimulatedKeyframes world(4), again(9);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 8; ++k) back_end.addKeyframe(world.next());
+  for (int k = 0; k < 4; ++k) {
+    auto kf = std::make_shared<Keyframe>(*again.next());
+    kf->id += 100;
+    kf->previous = k == 0 ? 0 : kf->id - 1;
+    back_end.addKeyframe(kf);
+    EXPECT_NE(back_end.lastRefusal().find("began anew"), std::string::npos) << back_end.lastRefusal();
+  }
+  EXPECT_EQ(back_end.map().keyframes().size(), 8u);
+  back_end.reset();
+  back_end.addKeyframe(SimulatedKeyframes(9).next());
+  EXPECT_EQ(back_end.lastRefusal(), "");
 }

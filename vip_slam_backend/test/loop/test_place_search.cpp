@@ -122,6 +122,23 @@ TEST_F(PlaceSearchTest, PlacesThatRepeatThemselvesAreRefused) {
   }
 }
 
+// Parts that nothing ties lie over each other by a guess. Here every other keyframe of one place belongs to another.
+TEST_F(PlaceSearchTest, WhatSeveralPartsShowSpeaksForNoPlaceTogether) {
+  map(1);
+  PlaceSearch one{RelocalisationOptions()}, several{RelocalisationOptions()};
+  PlaceVerification whole, parted;
+  for (int k = 0; k < 4; ++k) {
+    const KeyframePtr keyframe = query(k);
+    const BowResult bow = places_->describe(*keyframe);
+    whole = one.add(map_, places_->database(), places_->verifier(), keyframe, bow, {});
+    parted = several.add(map_, places_->database(), places_->verifier(), keyframe, bow, {},
+                         [](KeyframeId id) { return static_cast<std::uint32_t>(id % 2); });
+    EXPECT_FALSE(parted.accepted) << k;
+  }
+  EXPECT_TRUE(whole.accepted) << whole.reason;
+  EXPECT_NE(parted.reason.find("for another place"), std::string::npos) << parted.reason;
+}
+
 TEST_F(PlaceSearchTest, APlaceTheMapDoesNotShowToTheNewestKeyframeIsNotForgotten) {
   map(1);
   // The newest keyframe looks at the middle of the ring, where the map has no view; the one before speaks for the

@@ -54,8 +54,15 @@ TEST(MapCamera, ComesBack) {
 }
 
 TEST(MapCamera, AVersion4FileIsReadWithout) {
-  std::string bytes = serialiseMap(syntheticMap(3, 12, 100), {}, 1);
+  Map map = syntheticMap(3, 12, 100);
+  constexpr double kScale = 1.2345678901;
+  for (const KeyframeId id : {1, 2, 3}) map.widenImuNoise(id, kScale, ImuNoise());
+  std::string bytes = serialiseMap(map, {}, 1);
   bytes.erase(24 + 8, 1);  // the flag that no camera follows
+  const std::string scale(reinterpret_cast<const char*>(&kScale), sizeof kScale);
+  int scales = 0;  // that version 6 has of each keyframe
+  for (std::size_t at; (at = bytes.find(scale)) != std::string::npos; ++scales) bytes.erase(at, sizeof kScale);
+  ASSERT_EQ(scales, 3);
   bytes[8] = 4;
   const std::uint64_t length = bytes.size() - 24 - 4;
   std::memcpy(&bytes[16], &length, 8);

@@ -4,6 +4,7 @@
 // it refuse.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -22,15 +23,21 @@ class PlaceSearch {
 
   /// The next keyframe; one of another odometry (epoch) begins anew. `bow`: of the keyframe. Places are taken from
   /// keyframes that `allowed` lets pass (empty: all). Accepted with the pose of this keyframe, or refused with the
-  /// reason.
+  /// reason. `part_of`: which part of the map a keyframe lies in (empty: all in one). Parts that nothing ties lie over
+  /// each other by a guess: what several of them show speaks for no place together.
   PlaceVerification add(const Map& map, const KeyframeDatabase& database, const PlaceVerifier& verifier,
                         const KeyframePtr& keyframe, const BowResult& bow,
-                        const std::function<bool(KeyframeId)>& allowed);
+                        const std::function<bool(KeyframeId)>& allowed,
+                        const std::function<std::uint32_t(KeyframeId)>& part_of = {});
   void clear();
 
  private:
-  struct Guess {
+  struct Place {
     SE3 T_W_odom;
+    std::uint32_t part = 0;
+  };
+  struct Guess {
+    Place place;
     PlaceSupport support;
   };
   /// What the search of one keyframe runs on.
@@ -39,14 +46,17 @@ class PlaceSearch {
     const KeyframeDatabase& database;
     const PlaceVerifier& verifier;
     const std::function<bool(KeyframeId)>& allowed;
+    const std::function<std::uint32_t(KeyframeId)>& part_of;
     std::vector<KeyframeId> views;  ///< keyframes that look like the newest, one a view, best first
+
+    std::uint32_t partOf(KeyframeId id) const { return part_of ? part_of(id) : 0; }
   };
   std::vector<KeyframeId> viewsLikeNewest(const Scene& scene) const;
   /// Where pairs of descriptor matches of all keyframes put the odometry if it were at one of the views [first, last),
   /// one a place, best first, at most `most`.
-  std::vector<SE3> guesses(const Scene& scene, std::size_t first, std::size_t last, std::size_t most) const;
+  std::vector<Place> guesses(const Scene& scene, std::size_t first, std::size_t last, std::size_t most) const;
   /// Adds to guesses_ what speaks for places that are not among them, and sorts them.
-  void weigh(const Scene& scene, const std::vector<SE3>& T_W_odom);
+  void weigh(const Scene& scene, const std::vector<Place>& places);
   PlaceVerification judge(const Scene& scene) const;
   /// Why the strongest place is not believed on the word of one keyframe, in words; empty: it is.
   std::vector<std::string> doubts() const;
@@ -55,7 +65,7 @@ class PlaceSearch {
   std::vector<KeyframePtr> keyframes_;  ///< of the last seconds, oldest first
   std::vector<BowResult> bows_;         ///< of each
   std::vector<Guess> guesses_;          ///< places that some of them spoke for, strongest first
-  std::optional<SE3> believed_;         ///< T_W_odom that the keyframe before came to
+  std::optional<Place> believed_;       ///< what the keyframe before came to
 };
 
 }  // namespace vip_slam

@@ -94,6 +94,8 @@ class Map {
 
   // ---- all ----
   /// Moves keyframes to new poses (loop correction): velocities turn with them, each landmark follows its host.
+  /// Its IMU factor is believed by as much less.
+  void widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise);
   void moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I);
   MapChanges takeChanges();
   void clear();

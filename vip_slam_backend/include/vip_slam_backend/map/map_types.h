@@ -39,6 +39,7 @@ struct MapKeyframe {
   std::shared_ptr<const std::vector<ImuSample>> imu;
   std::shared_ptr<const Preintegration> preintegration;
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< that the factor has, see Keyframe
+  double imu_noise_scale = 1;                                 ///< likewise
   /// The odometry's motion from `previous`; unknown when there is none.
   RelativeMotion motion;
   /// Depth points of this keyframe on planes.

@@ -1,10 +1,10 @@
 // Map files (.vsm): everything a later session needs to relocalise and to go on mapping.
 //
-// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 5 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
+// Layout, little-endian: "VIPMAP" 0 0 | u32 version = 6 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
 // of all before it. Version 1, without the features' pixel_sigma, version 2, which does not tell a landmark's tracks
-// apart, version 3, without the odometry's motion, and version 4, without the camera, are read, too. The payload holds
-// the vocabulary's id, the camera, planes, keyframes (state, features with
-// descriptors, depth grid in mm, IMU samples, plane observations), landmarks and loops.
+// apart, version 3, without the odometry's motion, version 4, without the camera, and version 5, without the scale of
+// the IMU's noise, are read, too. The payload holds the vocabulary's id, the camera, planes, keyframes (state, features
+// with descriptors, depth grid in mm, IMU samples, plane observations), landmarks and loops.
 //
 // A file is the same bytes for the same map: landmarks and epochs are numbered anew in ascending order when written,
 // the tracks of a landmark in the order of their first views. Read back, landmarks get ids from kLoadedLandmarks and

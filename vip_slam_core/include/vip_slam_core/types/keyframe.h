@@ -44,6 +44,7 @@ struct Keyframe {
   std::vector<ImuSample> imu;
   /// What the front end found out by now about the rates in `imu`, which do not have it: see gyro_correction.h.
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();
+  double imu_noise_scale = 1;  ///< how many times as noisy as configured the front end has found the IMU
   /// The odometry's motion since the previous keyframe; unknown when previous == 0 or when it lost the thread. Not the
   /// difference of the two published states: those were corrected in between.
   RelativeMotion motion;

@@ -1,0 +1,17 @@
+// What a map takes in, whether from a front end or from a file: what is accepted can be saved and loaded again.
+#pragma once
+
+#include <cstdint>
+
+namespace vip_slam::map_limits {
+
+// Far beyond any sensor; larger numbers would overflow when integrated.
+constexpr double kMostRate = 1e3;          ///< rad/s
+constexpr double kMostAcceleration = 1e4;  ///< m/s^2
+constexpr double kMostNoiseScale = 1e4;    ///< of the IMU
+constexpr double kLongestImu = 1e4;        ///< s, of one keyframe
+/// Of numbers between the first keyframe and any other: tables go by them; three months of keyframes.
+constexpr std::uint64_t kWidestIds = std::uint64_t{1} << 24;
+constexpr double kUnitNormal = 1e-7;  ///< what the length of a plane's normal may be off by
+
+}  // namespace vip_slam::map_limits

@@ -1,0 +1,67 @@
+// What front end and map find out about camera and gyro, for all keyframes of the session.
+#include <cmath>
+
+#include "back_end_impl.h"
+#include "vip_slam_backend/optimisation/depth_curve_fit.h"
+#include "vip_slam_backend/optimisation/disparity_fit.h"
+#include "vip_slam_core/depth/disparity_curve.h"
+#include "vip_slam_core/types/camera_correction.h"
+
+namespace vip_slam {
+namespace {
+
+// Smaller changes of the camera's correction wait for the next global adjustment: m, normalised.
+constexpr double kNewDepthOffset = 0.001;
+constexpr double kNewBearing = 1e-4;
+constexpr double kNewGyroCorrection = 5e-4;  // likewise
+
+}  // namespace
+
+void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
+  if (newest.curve != camera_correction.curve) return;  // it goes with readings as they were
+  newest_depth_offset = newest.offset;
+  newest_bearing = newest.bearing;
+  if (std::abs(newest.offset - camera_correction.offset) < kNewDepthOffset &&
+      (newest.bearing.value - camera_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing)
+    return;
+  camera_correction.offset = newest.offset;
+  camera_correction.bearing = newest.bearing;
+  map.adoptCameraCorrection(camera_correction);
+  global_wanted = true;
+  ++correction;  // an adjustment under way has the readings as they were
+}
+
+bool BackEnd::Impl::learnDepthCurve() {
+  if (!options.depth_curve || frozen()) return false;
+  const ScopedTimer timer(log, "backend.depth_curve", map.empty() ? 0 : map.keyframes().rbegin()->second.data->frame.t);
+  std::optional<double> disparity;
+  std::optional<DepthCurve> found;
+  if (measuresDisparity(sensor.depth_noise.type)) {
+    disparity = fitDisparityError(map, sensor.depth_noise, disparity_error != 0);
+    if (disparity) found = disparityCurve(*disparity, sensor.depth_noise.max_range);
+  } else {
+    found = fitDepthCurve(map, sensor.depth_noise);
+  }
+  if (!found) return false;
+  DepthCurve curve = chained(camera_correction.curve, *found);
+  if (!validateDepthCurve(curve).empty()) return false;
+  camera_correction.curve = std::move(curve);
+  if (disparity) {
+    disparity_error += *disparity;
+    if (voidsDepthOffset(*disparity)) camera_correction.offset = newest_depth_offset = 0;
+  }
+  map.adoptCameraCorrection(camera_correction);
+  ++correction;
+  return true;
+}
+
+void BackEnd::Impl::followGyroCorrection(const Eigen::Matrix3d& newest) {
+  newest_gyro_correction = newest;
+  if ((newest - gyro_correction).cwiseAbs().maxCoeff() < kNewGyroCorrection) return;
+  gyro_correction = newest;
+  map.adoptGyroCorrection(newest, sensor.imu_noise);
+  global_wanted = true;
+  ++correction;  // an adjustment under way has the factors as they were
+}
+
+}  // namespace vip_slam
