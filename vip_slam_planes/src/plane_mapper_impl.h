@@ -53,6 +53,8 @@ class PlaneMapper::Impl {
   void withdrawBrokenObservations();
   void judgeAgreement();
   void decideOnPoints();
+
+  // plane_mapper_output.cpp: what goes back to it.
   void dropUnsupported(PlaneUpdate* result);
   void publish(PlaneUpdate* result);
 

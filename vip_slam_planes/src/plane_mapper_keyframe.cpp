@@ -11,6 +11,18 @@
 #include "vip_slam_planes/merging/plane_merging.h"
 
 namespace vip_slam {
+namespace {
+
+constexpr double kFlat = 0.34;  // cosine of 70 degrees
+
+/// What spans the recess of a door and the wall beside it passes for a wall when it is seen at a flat angle, and may be
+/// as large as one.
+bool isSeenFlat(const PlaneTrack& track, const Eigen::Vector3d& centroid, const Eigen::Vector3d& camera_centre) {
+  return track.kind() != PlaneKind::kHorizontal &&
+         track.plane().signedDistance(camera_centre) < kFlat * (centroid - camera_centre).norm();
+}
+
+}  // namespace
 
 void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_time) {
   const ScopedTimer timer(timing, "planes.keyframe", keyframe.frame.t);
@@ -133,13 +145,16 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     PlaneTrack& track = *tracks[k];
     ids.push_back(track.id());
+    bool flat = track.kind() != PlaneKind::kHorizontal;  // until an observation tells
     if (area[k] > 0) {
       auto observation = sampler_.sample(keyframe.id, shown[k], T_map_C, track.id(), track.plane());
       if (observation) {
         observation->camera_correction = keyframe.frame.camera_correction;
+        const Eigen::Vector3d shown_at = T_map_C * PlaneMoments{observation->G}.centroid();
         track.observations().insert_or_assign(keyframe.id, std::move(*observation));
         fresh_.emplace(track.id(), keyframe.id);
         refit(&track);
+        flat = isSeenFlat(track, shown_at, T_map_C.t());
       }
     }
     if (first_time && area[k] >= options.support.min_area) {
@@ -147,9 +162,9 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
       track.viewed_from = T_map_C.t();
     }
     const double covered = track.area();
-    track.confirmed = track.confirmed ||
-                      (track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area) ||
-                      (track.keyframes_seen > 0 && covered >= options.support.sure_area);
+    const bool seen = track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area;
+    const bool large = track.keyframes_seen > 0 && covered >= options.support.sure_area && !flat;
+    track.confirmed = track.confirmed || seen || large;
     trusted.push_back(track.known() && track.determined && track.agrees);
   }
   points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });

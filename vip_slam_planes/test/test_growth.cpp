@@ -123,5 +123,20 @@ TEST(PlaneTrack, AStoredPolygonCoversTheCellsWhoseCentresLieInItAndInNoHole) {
   EXPECT_GT(covered, 1000);
 }
 
+// Between the fronts of two cupboards; the other host of the area moves by less than a cell.
+TEST(PlaneTrack, AGapOfOneCellStaysOpenWhenTheMapMoves) {
+  PlaneTrack track(1, PlaneKind::kVertical, Plane({-1, 0, 0}, 3), {3, 0, 0}, 0.1);
+  CameraPoses poses = {{1, SE3()}, {2, SE3()}};
+  for (int y = 0; y < 12; ++y) {
+    for (int x = 0; x < 9; ++x) track.coverCell({x, y}, 2, 1, SE3());
+    for (int x = 10; x < 15; ++x) track.coverCell({x, y}, 2, 2, SE3());
+  }
+  poses[1] = SE3(Eigen::Quaterniond::Identity(), {0, 0, 0.11});
+  poses[2] = SE3(Eigen::Quaterniond::Identity(), {0, 0.02, 0.17});
+  track.followKeyframes(poses);
+  for (int y = 2; y < 10; ++y) EXPECT_EQ(track.cells().at({9, y}), 0) << y;
+  EXPECT_GT(track.cells().count(1), 150);
+}
+
 }  // namespace
 }  // namespace vip_slam

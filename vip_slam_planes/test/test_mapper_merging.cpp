@@ -6,6 +6,7 @@
 
 #include "rig.h"
 #include "vip_slam_planes/merging/gap_view.h"
+#include "vip_slam_planes/merging/plane_merging.h"
 
 namespace vip_slam {
 namespace {
@@ -355,6 +356,37 @@ TEST(Mapper, DesksSeenFromAfarStayTwo) {
     for (const PlaneEstimate& p : rig.mapper.planes()) desks += p.plane.n.z() > 0.9 && p.plane.d < -0.5;
     EXPECT_EQ(2, desks) << x;
   }
+}
+
+// A threshold or the floor of a wet room: one keyframe shows both, so that it is no drift.
+TEST(Mapper, AStepOfThreeCentimetresInAFloorStays) {
+  Scene scene;
+  scene.add({-6, -2, 0}, {6, 0, 0}, {0, 4, 0});
+  scene.add({0, -2, -0.03}, {6, 0, 0}, {0, 4, 0});
+  scene.add({-6, -2, -0.03}, {12, 0, 0}, {0, 0, 2.6});
+  scene.add({-6, 2, -0.03}, {12, 0, 0}, {0, 0, 2.6});
+  Rig rig;
+  for (int i = 0; i < 16; ++i) rig.look(scene, {-5 + 0.5 * i, 0, 1.4}, {-2.5 + 0.5 * i, 0.2, 0});
+  EXPECT_TRUE(rig.find(Plane({0, 0, 1}, 0), 0.003));
+  EXPECT_TRUE(rig.find(Plane({0, 0, 1}, 0.03), 0.003));
+  EXPECT_FALSE(rig.find(Plane({0, 0, 1}, 0.015), 0.008));
+}
+
+// Depth that has frozen looks through a ceiling until nothing is left of it.
+TEST(SameSurface, WhatHasNoAreaLeftIsNoPieceOfAnything) {
+  Rig rig;
+  PlaneTrack strip(1, PlaneKind::kHorizontal, Plane({0, 0, -1}, 2.6), {0, 0, 2.6}, 0.1);
+  PlaneTrack gone(2, PlaneKind::kHorizontal, Plane({0, 0, -1}, 2.6), {0, 0, 2.6}, 0.1);
+  for (int x = 0; x < 100; ++x)
+    for (int y = 0; y < 3; ++y) strip.coverCell({x, y}, 1, 1, SE3());
+  gone.coverCell({120, 1}, 1, 1, SE3());
+  gone.miss({120, 1});
+  OpenGaps gaps;
+  const std::map<KeyframeId, KeyframePtr> keyframes;
+  const CameraPoses poses;
+  const SceneView view{keyframes, poses, *rig.camera.camera, rig.camera.noise, 0.1, gaps};
+  EXPECT_TRUE(gone.cells().empty());
+  EXPECT_FALSE(sameSurface(strip, gone, {&strip, &gone}, view, PlaneMergingOptions()));
 }
 
 TEST(OpenGaps, GoWithTheirPlanes) {

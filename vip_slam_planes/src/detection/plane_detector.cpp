@@ -252,9 +252,10 @@ class Detector {
 
     // Surfaces that lean are left alone: what a free fit says, less what noise explains.
     Plane free;
-    if (!fit(surface, PlaneKind::kGeneral, &free, nullptr)) return false;
+    double free_rms = 0;
+    if (!fit(surface, PlaneKind::kGeneral, &free, &free_rms)) return false;
     const double z = std::min(1.0, std::abs(free.n.z()));
-    const double uncertainty = std::max(sigma, rms) / (spread * std::sqrt(double(surface.size()) / 4.0));
+    const double uncertainty = std::max(sigma, free_rms) / (spread * std::sqrt(double(surface.size()) / 4.0));
     const double lean = std::min(std::acos(z), std::asin(z));
     const double limit = options_.max_tilt_deg * kDegree;
     if (kind == PlaneKind::kGeneral) {

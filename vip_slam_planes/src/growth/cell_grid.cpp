@@ -62,13 +62,13 @@ void CellGrid::clear() {
   x0_ = y0_ = width_ = height_ = covered_ = 0;
 }
 
-void CellGrid::closePinholes() {
+void CellGrid::closePinholes(const std::function<bool(CellIndex)>& was_covered) {
   std::vector<std::pair<CellIndex, int>> holes;
   for (int y = y0_; y < y0_ + height_; ++y) {
     for (int x = x0_; x < x0_ + width_; ++x) {
       if (at({x, y})) continue;
       const int across = std::min(at({x - 1, y}), at({x + 1, y})), along = std::min(at({x, y - 1}), at({x, y + 1}));
-      if (across || along) holes.push_back({{x, y}, std::max(across, along)});
+      if ((across || along) && was_covered({x, y})) holes.push_back({{x, y}, std::max(across, along)});
     }
   }
   for (const auto& [c, h] : holes) set(c, h);

@@ -160,7 +160,8 @@ void PlaneTrack::followKeyframes(const CameraPoses& poses) {
       cells_.set(c, std::max(cells_.at(c), source.hits[i]));
     }
   }
-  cells_.closePinholes();
+  // The frame went with most of them: in it they are about where they were.
+  cells_.closePinholes([&old](CellIndex c) { return old.at(c) > 0; });
 }
 
 void PlaneTrack::rehost(KeyframeId from, KeyframeId to, const CameraPoses& poses) {
@@ -188,7 +189,7 @@ void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
       if (hits > 0) coverCell(cellAt(toPlane(p)), hits, host, T_map_C);
     }
   }
-  cells_.closePinholes();
+  cells_.closePinholes([&](CellIndex c) { return other.cells_.at(other.cellAt(other.toPlane(cellCentre(c)))) > 0; });
   for (const auto& [keyframe, theirs] : other.observations_) {
     auto [it, fresh] = observations_.emplace(keyframe, theirs);
     PlaneObservation& mine = it->second;

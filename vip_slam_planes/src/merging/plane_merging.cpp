@@ -12,6 +12,7 @@ namespace {
 // Smaller walls and ceilings are furniture. What one can put things on stays apart until it is a floor: two tables are
 // two.
 constexpr double kLargeWall = 1.0, kLargeFloor = 4.0;  // m^2
+constexpr double kFloor = 1.0;                         // m^2; of a level surface that is no thing on it
 constexpr double kPartition = 0.5;     // m^2; free-standing walls and doors, of which something hides the middle
 constexpr double kNoTable = 20.0;      // m^2; what lies level with so large a surface is more of it, not a second table
 constexpr double kLeastCeiling = 4.0;  // m^2; no underside of furniture is as large, and none is level with a ceiling
@@ -293,8 +294,10 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
       (beside || worst > options.distance) && between <= std::sqrt(smaller) && noiseAllowsOne(a, b, poses);
   if (between > gap && off * between > apart * gap) return false;
   if ((beside || worst > options.distance) && !noise) return false;
+  // A threshold, or the floor of a wet room.
+  const bool floors = a.plane().n.z() > 0.5 && smaller >= kFloor;
   const double shared = double(meeting.shared) / std::max(1, meeting.cells);
-  if (shownApart(small, large, poses, options.max_rms)) return false;
+  if (shownApart(small, large, poses, (floors ? 0.5 : 1.0) * options.max_rms)) return false;
   // A surface hides what is behind it, so two surfaces that face the same way do not show in the same place; with drift
   // one surface does. A rim of shared cells proves nothing, and a step may show both levels there.
   if (shared > options.overlap && meeting.separation < 0.5 * options.distance) return true;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -36,7 +37,7 @@ class CellGrid {
   bool isBorder(CellIndex c) const {
     return !at({c.x - 1, c.y}) || !at({c.x + 1, c.y}) || !at({c.x, c.y - 1}) || !at({c.x, c.y + 1});
   }
-  bool empty() const { return hits_.empty(); }
+  bool empty() const { return covered_ == 0; }
   void clear();
 
   // Bounds of the stored rectangle: [x0, x0 + width) x [y0, y0 + height).
@@ -66,8 +67,9 @@ class CellGrid {
     }
   }
 
-  /// Covers single empty cells between covered opposite neighbours (re-sampling leaves such pinholes).
-  void closePinholes();
+  /// Covers single empty cells between covered opposite neighbours (re-sampling leaves such pinholes), where
+  /// `was_covered` says that before the re-sampling there was something.
+  void closePinholes(const std::function<bool(CellIndex)>& was_covered);
 
  private:
   bool cover(CellIndex c);

@@ -57,7 +57,7 @@ class PlaneTrack {
   }
   void coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C);
   /// Covers a polygon of a loaded map. Without a host it moves with the plane alone.
-  void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits, const PlaneHost& host);
+  void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits, const PlaneHost& host = {});
   void miss(CellIndex c) {
     cells_.set(c, cells_.at(c) - 1);
     area_changed_ = true;
@@ -80,8 +80,8 @@ class PlaneTrack {
   const std::map<KeyframeId, PlaneObservation>& observations() const { return observations_; }
   /// Whether some of its area or an observation belongs to a keyframe.
   bool restsOn(KeyframeId keyframe) const { return observations_.count(keyframe) > 0 || patches_.count(keyframe) > 0; }
-  /// No observation holds it and no loaded map: it moves with the keyframe that shows most of it.
-  bool followsHosts() const { return observations_.empty() && !stored; }
+  /// No observation holds it and no loaded map, and all its keyframes are there: it moves with the one that shows most.
+  bool followsHosts() const { return observations_.empty() && !stored && !patches_.count(0); }
   /// Moments of all observations in `map`.
   PlaneMoments moments(const CameraPoses& poses) const;
 
