@@ -7,6 +7,7 @@ add_library(vip_slam_runner
   src/runner/pipeline.cpp
   src/runner/plane_files.cpp
   src/runner/run_output.cpp
+  src/runner/run_warnings.cpp
 )
 target_link_libraries(vip_slam_runner ${catkin_LIBRARIES} ${OpenCV_LIBRARIES} yaml-cpp)
 

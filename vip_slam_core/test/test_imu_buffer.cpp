@@ -167,5 +167,14 @@ TEST(ImuBufferTest, SplitStreamsRefuseDisorderToo) {
   EXPECT_EQ(buffer.counters().not_finite, 1u);
 }
 
+TEST(ImuBuffer, SamplesOfABusThatFailsAreRefused) {
+  ImuBuffer buffer;
+  const Eigen::Vector3d up(0, 0, 9.8), none = Eigen::Vector3d::Zero();
+  EXPECT_TRUE(buffer.add({0.000, none, up}));  // a body at rest, its gyro rounded to zero
+  EXPECT_FALSE(buffer.add({0.005, none, none}));
+  EXPECT_TRUE(buffer.add({0.010, none, up}));
+  EXPECT_EQ(buffer.counters().not_finite, 1u);
+}
+
 }  // namespace
 }  // namespace vip_slam

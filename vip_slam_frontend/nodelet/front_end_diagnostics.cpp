@@ -169,6 +169,8 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("depth of wrong size or type", c.bad_depth);
   status.add("images out of order", shown.pairs.backward + c.bad_stamp);
   status.add("images that repeat the one before", c.repeated_image);
+  status.add("depth images that repeat the one before", c.repeated_depth);
+  status.add("gyro samples at the end of its range", c.gyro_cut_off);
   status.add("images without IMU", c.imu_missing);
   status.add("IMU samples refused", c.imu_rejected);
   status.add("IMU gaps", c.imu_gaps);

@@ -88,8 +88,7 @@ void FrontEnd::Impl::noteAgreement(const TrackingResult& tracking, double t) {
   if (still_ || agrees) last_agreed_t_ = t;
 }
 
-bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
-  if (still_ || tracker_.tracks().empty() || !samePixels(gray, tracker_.gray())) return false;
+bool FrontEnd::Impl::movesByImu(double t_imu, const SE3& T_odom_C_then) const {
   const ZuptOptions& rest = options_.filter.zupt;
   const double since = std::max(imu_.oldest(), std::min(t_imu - rest.window, filter_.nav().t));
   if (!imuSpread(imu_.between(since, t_imu), &sensor_.imu_noise).quiet(rest.max_gyro_std, rest.max_accel_std)) {
@@ -97,8 +96,7 @@ bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
   }
   const std::vector<ImuSample> samples = imu_.between(filter_.nav().t, t_imu);
   if (samples.size() < 2) return true;
-  const SE3 T_now_then =
-      (filter_.predict(samples).predicted.T_W_I * extrinsics()).inverse() * filter_.nav().T_W_I * extrinsics();
+  const SE3 T_now_then = (filter_.predict(samples).predicted.T_W_I * extrinsics()).inverse() * T_odom_C_then;
   std::vector<double> moved;
   for (const Eigen::Vector3d& then : trackedPoints()) {
     const Eigen::Vector3d now = T_now_then * then;
@@ -107,6 +105,11 @@ bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
   if (moved.empty()) return true;
   std::nth_element(moved.begin(), moved.begin() + moved.size() / 2, moved.end());
   return moved[moved.size() / 2] > kStandsPx;
+}
+
+bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
+  return !still_ && !tracker_.tracks().empty() && samePixels(gray, tracker_.gray()) &&
+         movesByImu(t_imu, filter_.nav().T_W_I * extrinsics());
 }
 
 FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {

@@ -4,6 +4,7 @@
 #include <deque>
 #include <utility>
 
+#include "vip_slam_core/imu/gyro_range.h"
 #include "vip_slam_core/imu/imu_buffer.h"
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
@@ -12,6 +13,7 @@
 #include "vip_slam_frontend/keyframes/keyframe_selector.h"
 #include "vip_slam_frontend/tracking/depth_rows.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
+#include "vip_slam_frontend/tracking/frozen_depth.h"
 #include "vip_slam_frontend/tracking/landmark_matcher.h"
 #include "vip_slam_frontend/tracking/orb_extractor.h"
 #include "vip_slam_frontend/tracking/row_camera.h"
@@ -103,6 +105,8 @@ class FrontEnd::Impl {
   void noteAgreement(const TrackingResult& tracking, double t);
   /// The pixels of the image before, where something ought to have moved.
   bool repeatsLastImage(const cv::Mat& gray, double t_imu) const;
+  /// Whether the IMU foretells that an image shows more than standing still since the camera was there.
+  bool movesByImu(double t_imu, const SE3& T_odom_C_then) const;
   FrameOutput repeatedImage(double t, double t_imu);
   /// A blow that clips the accelerometer or falls between its samples changes the velocity unseen, for good. All points
   /// together show it at once, each alone would be an outlier: then the velocity is what they say, not the IMU's.
@@ -133,6 +137,10 @@ class FrontEnd::Impl {
   const double clock_jump_;
   std::shared_ptr<const CameraModel> camera_;
   ImuBuffer imu_;
+  GyroRange gyro_range_;
+  FrozenDepth frozen_depth_;
+  bool same_depth_ = false;                ///< the newest depth image is the one before
+  SE3 T_odom_depth_;                       ///< camera of the last image whose depth was its own
   cv::Mat masked_;                         ///< not zero where depth is to be left out; empty: nowhere
   std::unique_ptr<DepthRows> depth_rows_;  ///< null until a depth image of other times than the stamp came
   FeatureTracker tracker_;
@@ -164,6 +172,7 @@ class FrontEnd::Impl {
   double last_metric_t_ = 0;          ///< image in which depth took part
   double last_points_t_ = 0;          ///< image with points that have depth
   double last_agreed_t_ = 0;          ///< image whose points agreed with the IMU
+  double cut_off_imu_t_ = -1e300;     ///< image since the one before which the gyro was at the end of its range
   double doubt_imu_t_ = 0;            ///< image whose points were somewhat off the IMU, or could not tell
   double shock_imu_t_ = -1e300;       ///< first such after a while without
   int gated_in_a_row_ = 0;

@@ -84,10 +84,13 @@ void FrontEnd::Impl::countImu() {
   counters_.imu_rejected = c.out_of_order + c.duplicate + c.not_finite;
   counters_.imu_gaps = c.gaps;
   counters_.imu_spikes = c.spikes;
+  counters_.gyro_cut_off = gyro_range_.samples();
+  counters_.gyro_range = gyro_range_.end();
 }
 
 bool FrontEnd::Impl::addImu(const ImuSample& sample) {
   if (!imu_.empty() && std::isfinite(sample.t)) noticeTimeJump(sample.t, imu_.newest(), "IMU");
+  gyro_range_.add(sample.t, sample.gyro);
   const bool accepted = imu_.add({sample.t, correctedRate(sample.gyro, sensor_.gyro_correction), sample.accel});
   countImu();
   return accepted;
@@ -95,6 +98,7 @@ bool FrontEnd::Impl::addImu(const ImuSample& sample) {
 
 bool FrontEnd::Impl::addGyro(double t, const Eigen::Vector3d& gyro) {
   if (!imu_.empty() && std::isfinite(t)) noticeTimeJump(t, imu_.newest(), "gyro");
+  gyro_range_.add(t, gyro);
   const bool accepted = imu_.addGyro(t, correctedRate(gyro, sensor_.gyro_correction));
   countImu();
   return accepted;

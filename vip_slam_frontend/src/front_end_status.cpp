@@ -5,6 +5,11 @@
 #include "front_end_impl.h"
 
 namespace vip_slam {
+namespace {
+
+constexpr double kRangeShown = 0.5;  // s
+
+}  // namespace
 
 double FrontEnd::Impl::coastedSigma() const {
   const double variance = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
@@ -19,8 +24,11 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
     last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
     if (imuIsContradicted()) {
       status_ = {TrackingState::kDegraded,
-                 "the images contradict the IMU: are its axes, signs and units, T_imu_cam and the stamps right? "
+                 "the images contradict the IMU: are its axes, signs and units, T_imu_cam, the stamps and the scale of "
+                 "depth right? "
                  "check_bag tells"};
+    } else if (t + timeOffset() - cut_off_imu_t_ < kRangeShown) {
+      status_ = {TrackingState::kDegraded, "the gyroscope is at the end of its range"};
     } else if (t - last_metric_t_ > kBetweenDepths && !still_) {
       status_ = {TrackingState::kDegraded, "no depth: visual-inertial only"};
     } else {

@@ -17,6 +17,8 @@ namespace {
 
 // Features gated away in this many images in a row: the estimate has left the measurements.
 constexpr int kGatedImages = 30;
+// What a gyro at the end of its range leaves out, one sigma, as a share of that.
+constexpr double kBeyondRange = 0.3;
 
 }  // namespace
 
@@ -33,6 +35,13 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   }
   last_image_t_ = input.t;
   if (filter_.started() && repeatsLastImage(input.gray, t_imu)) return repeatedImage(input.t, t_imu);
+  // What is rendered without noise repeats by itself while it stands.
+  if (filter_.started() && !same_depth_) T_odom_depth_ = filter_.nav().T_W_I * extrinsics();
+  same_depth_ = !depth.image.empty() && frozen_depth_.repeats(input.depth);
+  if (same_depth_ && filter_.started() && !still_ && movesByImu(t_imu, T_odom_depth_)) {
+    ++counters_.repeated_depth;
+    depth.image.release();
+  }
   // The tracker keeps images for later comparison; the caller may reuse his.
   const cv::Mat gray = input.gray.clone();
   if (filter_.started()) {
@@ -205,6 +214,12 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   keyframe_imu_broken_ = keyframe_imu_broken_ || gap;
   Propagation propagation = filter_.predict(samples);
   if (gap) propagation.admitGap(max_gap, t_imu - from);
+  const double cut_off = gyro_range_.cutOff(from, t_imu);
+  if (cut_off > 0) {
+    propagation.admitRate(kBeyondRange * cut_off, t_imu - from);
+    keyframe_imu_broken_ = true;
+    cut_off_imu_t_ = t_imu;
+  }
   // Without images the IMU carries the pose as it does in the dark, for as long as it tells where.
   if (propagation.displacementSigma(filter_.covariance()) > options_.recovery.max_position_sigma) {
     reset("no image for " + std::to_string(t_imu - from).substr(0, 4) + " s");
@@ -216,7 +231,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const SE3 T_odom_C = propagation.predicted.T_W_I * T_I_C;
   const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
-  const ForetoldMotion foretold = foretell(propagation, T_odom_C, gap);
+  const ForetoldMotion foretold = foretell(propagation, T_odom_C, gap || cut_off > 0);
   const std::size_t tracks_before = tracker_.tracks().size();
   const TrackingResult tracked =
       tracker_.track(gray, depth, foretold, !coasting, T_odom_C, colourRows(propagation.predicted), t);

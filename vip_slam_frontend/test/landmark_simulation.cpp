@@ -189,7 +189,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   NavState marked_truth, marked_estimate;
   for (int k = 1; 0.2 + k * step < seconds; ++k) {
     const double t_imu_true = 0.2 + k * step;  // the image stamp is this minus the true delay
-    const double t_imu = t_imu_true - options.time_offset + filter.window().time_offset;
+    const double delay = t_imu_true < options.later ? options.time_offset : options.later_time_offset;
+    const double t_imu = t_imu_true - delay + filter.window().time_offset;
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
     const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200),
                                           standing ? std::optional<Unrest>(Unrest()) : std::nullopt);

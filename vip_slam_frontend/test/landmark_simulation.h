@@ -31,6 +31,8 @@ struct SimulationOptions {
   Eigen::Matrix3d gyro_error = Eigen::Matrix3d::Zero();  ///< it measures (I + this) * omega
   double noise_told = 1.0;                               ///< share of the IMU's noise that the filter is told
   double time_offset = 0;                                ///< t_imu = t_image + time_offset
+  double later_time_offset = 0;                          ///< instead, from `later` on
+  double later = 1e9;                                    ///< s
 };
 
 class LandmarkSimulation {

@@ -32,6 +32,23 @@ TEST(Calibration, FindsExtrinsicsAndDelay) {
   EXPECT_NEAR(run.window.time_offset, 0.008, 0.001);
 }
 
+// As by another exposure time. A delay that is taken for the same for ever is followed by a twentieth in that time.
+TEST(Calibration, FollowsADelayThatChanges) {
+  SimulationOptions simulation;
+  simulation.seed = 6;
+  simulation.image_rate = 30;
+  simulation.sigma_px = 0.1;
+  simulation.noise.gyro_noise_density = 2e-4;
+  simulation.later = 40;
+  simulation.later_time_offset = 0.004;
+  FilterOptions options = singlePixels();
+  options.calibration.time_offset_walk = 5e-5;
+  const MountingEstimate mounting = runFilter(simulation, options, 80.0, false).mounting;
+  std::printf("delay %.2f ms, sigma %.2f\n", 1e3 * mounting.time_offset, 1e3 * mounting.sigma_time_offset);
+  EXPECT_NEAR(mounting.time_offset, 0.004, 0.0005);
+  EXPECT_LT(mounting.sigma_time_offset, 0.0003);
+}
+
 // In slow motion the gyro's noise would tell both: the delay came out at -6 ms with a sigma of 0.6, the scale at -4 %
 // with one of 2.5.
 TEST(Calibration, LearnsNeitherDelayNorGyroScaleFromNoise) {

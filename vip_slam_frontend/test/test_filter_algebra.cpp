@@ -142,7 +142,7 @@ struct ReferenceEkf {
   Eigen::MatrixXd P;  // order as in the window
   WindowState window;
 
-  void augment(const Propagation& u, CloneId id) {
+  void augment(const Propagation& u, CloneId id, double delay_change) {
     const int n = window.dimension(), clone = window.cloneColumn(static_cast<int>(window.clones.size()) - 1);
     const int calibration = window.calibrationColumn(), nav = window.navColumn();
     Eigen::MatrixXd S = Eigen::MatrixXd::Zero(15, n);  // picks (theta, p, v, bg, ba)
@@ -158,6 +158,8 @@ struct ReferenceEkf {
     G.block<6, 6>(calibration, 0).setIdentity();
     G.bottomRightCorner(9, 9).setIdentity();
     P = J * P * J.transpose() + G * u.Q * G.transpose();
+    const int delay = window.timeOffsetColumn() + 6;
+    P(delay, delay) += delay_change * delay_change;
     Clone c;
     c.id = id;
     c.t = u.predicted.t;
@@ -220,8 +222,8 @@ class AlgebraOnSimulation : public ::testing::Test {
   void advance(CloneId id, double t) {
     const auto samples = simulation_->imuBetween(filter_.window().clones.back().t, t);
     const Propagation a = propagate(filter_.window(), samples, options_.noise, gravityVector());
-    filter_.augment(a, id);
-    ekf_.augment(propagate(ekf_.window, samples, options_.noise, gravityVector()), id);
+    filter_.augment(a, id, 1e-3);
+    ekf_.augment(propagate(ekf_.window, samples, options_.noise, gravityVector()), id, 1e-3);
     for (const FilterMeasurement& m : simulation_->sight(t, 60)) {
       tracks_[m.id].push_back({id, m.xy, m.depth, m.depth_sigma});
     }

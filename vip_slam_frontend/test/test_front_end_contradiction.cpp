@@ -45,6 +45,24 @@ TEST_F(ContradictionTest, ACameraThatFreezesIsNamedAndWaitedFor) {
   EXPECT_LT(error(output), 0.03);
 }
 
+// What is seen moves on before depth that has stopped: taken for the world, it would be.
+TEST_F(ContradictionTest, DepthThatFreezesIsLeftOut) {
+  run(0.0, 3.0);
+  FrameOutput output;
+  for (int k = 60; k < 100; ++k) {
+    feedImu(0.05 * k);
+    output = front_end_.process({0.05 * k, world_.image(0.05 * k), World::depth(2.95)});
+    EXPECT_LT(error(output), 3.0 * std::sqrt(output.frame->covariance.block<3, 3>(3, 3).trace())) << k;
+    EXPECT_LT(error(output), 0.15) << k;  // the drift without depth
+  }
+  const std::uint64_t repeated = front_end_.counters().repeated_depth;
+  EXPECT_NEAR(repeated, 40, 1);
+  EXPECT_EQ(output.frame->status.reason, "no depth: visual-inertial only");
+  output = run(5.0, 6.0);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
+  EXPECT_EQ(front_end_.counters().repeated_depth, repeated);
+}
+
 TEST_F(ContradictionTest, WhatIsRenderedWithoutNoiseMayStand) {
   run(0.0, 3.0);
   // From 3 s on time slows down and stops within a second, and goes on at 7 s.

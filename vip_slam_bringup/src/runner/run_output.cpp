@@ -10,7 +10,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_bringup/runner/plane_files.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
@@ -39,7 +38,9 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
                                                              {"no_depth", c.no_depth},
                                                              {"bad_stamp", c.bad_stamp},
                                                              {"repeated_image", c.repeated_image},
+                                                             {"repeated_depth", c.repeated_depth},
                                                              {"imu_rejected", c.imu_rejected},
+                                                             {"gyro_cut_off", c.gyro_cut_off},
                                                              {"imu_gaps", c.imu_gaps},
                                                              {"imu_spikes", c.imu_spikes},
                                                              {"imu_shocks", c.imu_shocks},
@@ -100,74 +101,6 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   }
   yaml << YAML::EndSeq;
 }
-
-}  // namespace
-
-std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader) {
-  std::vector<std::string> all = reader.warnings();
-  const FrontEndCounters& c = pipeline.frontEnd().counters();
-  if (c.imu_gaps > 0) all.push_back(std::to_string(c.imu_gaps) + " gaps in the IMU; a long one restarts the odometry");
-  if (c.imu_spikes > 0)
-    all.push_back(
-        std::to_string(c.imu_spikes) +
-        " single samples of the IMU were far off their neighbours and were replaced by them: errors on its bus?");
-  if (c.imu_shocks > 0)
-    all.push_back(std::to_string(c.imu_shocks) +
-                  " images show a step of the velocity that the IMU has not: shocks beyond its range or rate?");
-  if (c.repeated_image > 0)
-    all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
-                  " images repeat the pixels of the one before under a new stamp and are left out: a camera slower "
-                  "than its topic, or frozen?");
-  if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
-  if (c.imu_rejected > 0)
-    all.push_back(std::to_string(c.imu_rejected) +
-                  " IMU messages are left out: not finite, or not newer than the one before");
-  if (pipeline.images() == 0) all.push_back("no image could be used");
-  if (c.imu_contradicted > 0)
-    all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
-                  " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
-                  "signs and units, T_imu_cam and the stamps right? check_bag tells");
-  constexpr double kLargeJitter = 0.001;
-  if (c.stamp_sigma > kLargeJitter) {
-    char words[120];
-    std::snprintf(words, sizeof words,
-                  "stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
-                  1e3 * c.stamp_sigma);
-    all.push_back(words);
-  }
-  // A mounting that was learnt against a wrong IMU means nothing.
-  if (10 * c.imu_contradicted < c.images) {
-    for (const std::string& difference :
-         mountingDifferences(pipeline.frontEnd().givenMounting(), pipeline.frontEnd().mounting())) {
-      all.push_back(difference + " (summary.yaml: calibration)");
-    }
-  }
-  if (pipeline.mapping()) {
-    const InertialScale scale = pipeline.mapping()->backEnd().scale();
-    const std::string difference = scaleDifference(scale, reader.sensor());
-    if (!difference.empty()) all.push_back(difference);
-    const std::string bent = pipeline.mapping()->backEnd().depthDifference();
-    if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
-    const std::string missed = pipeline.mapping()->backEnd().trackNoiseDifference();
-    if (!missed.empty()) all.push_back(missed);
-    const MapSnapshot map = pipeline.mapping()->backEnd().snapshot();
-    for (const auto& [from, to] : guessedTimes(map)) {
-      char words[240];
-      std::snprintf(words, sizeof words,
-                    "keyframes from %.1f to %.1f s after the first image were never tied to the rest of the map: their "
-                    "place in trajectory.tum, planes and map is a guess, realtime.tum leaves them out",
-                    from - pipeline.chain().front().t, to - pipeline.chain().front().t);
-      all.push_back(words);
-    }
-    if (!pipeline.chain().empty() && anchorTrajectory(pipeline.chain(), anchorsOf(map)).empty())
-      all.push_back("the stored map was not recognised: no image has a pose in it, trajectory.tum is empty");
-    const auto& refusals = pipeline.mapping()->refusals();
-    all.insert(all.end(), refusals.begin(), refusals.end());
-  }
-  return all;
-}
-
-namespace {
 
 /// In the words and units of a sensor file, so that it can be copied there.
 void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const DepthCurve& depth_curve,

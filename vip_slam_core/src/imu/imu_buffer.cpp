@@ -47,7 +47,9 @@ void ImuBuffer::countSpikes() {
 }
 
 bool ImuBuffer::add(const ImuSample& sample) {
-  const bool finite = sample.gyro.allFinite() && sample.accel.allFinite();
+  // A bus that fails says zero; nothing measures that exactly.
+  const bool silent = sample.gyro.isZero(0) && sample.accel.isZero(0);
+  const bool finite = sample.gyro.allFinite() && sample.accel.allFinite() && !silent;
   if (!acceptable(sample.t, finite, united_spikes_.newest())) return false;
   ++counters_.accepted;
   for (const ImuSample& settled : united_spikes_.add(sample)) append(settled);
@@ -76,7 +78,7 @@ bool ImuBuffer::addGyro(double t, const Eigen::Vector3d& gyro) {
 }
 
 bool ImuBuffer::addAccel(double t, const Eigen::Vector3d& accel) {
-  if (!acceptable(t, accel.allFinite(), accel_spikes_.newest())) return false;
+  if (!acceptable(t, accel.allFinite() && !accel.isZero(0), accel_spikes_.newest())) return false;
   for (const ImuSample& settled : accel_spikes_.add({t, Eigen::Vector3d::Zero(), accel})) {
     accel_.push_back({settled.t, settled.accel});
   }

@@ -45,10 +45,12 @@ struct FrontEndCounters {
   std::uint64_t no_depth = 0;        ///< images without depth
   std::uint64_t bad_stamp = 0;       ///< repeated, backward or non-finite image stamps
   std::uint64_t repeated_image = 0;  ///< new stamps on the pixels of the image before: not used
-  std::uint64_t imu_rejected = 0;    ///< non-finite, repeated or backward samples
+  std::uint64_t repeated_depth = 0;  ///< depth images with the pixels of the one before: left out
+  std::uint64_t imu_rejected = 0;    ///< non-finite, all zero, repeated or backward samples
   std::uint64_t imu_gaps = 0;
   std::uint64_t imu_spikes = 0;        ///< single wrong samples, replaced
   std::uint64_t imu_shocks = 0;        ///< images that showed a step of the velocity which the IMU has not
+  std::uint64_t gyro_cut_off = 0;      ///< samples at the end of the gyro's range
   std::uint64_t imu_missing = 0;       ///< images not covered by the IMU
   std::uint64_t zero_velocity = 0;     ///< images taken standing still
   std::uint64_t coasting = 0;          ///< images passed on the IMU alone
@@ -59,6 +61,7 @@ struct FrontEndCounters {
   std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
   double sigma_px = 0;         ///< adapted pixel noise
+  double gyro_range = 0;       ///< its end, rad/s; 0: never reached
   double imu_noise_scale = 1;  ///< factor on the IMU's noise, see ImuNoiseMonitor
   double stamp_sigma = 0;      ///< by which images are taken earlier or later than their stamps say, as learnt, s
   double nis_per_dof = 0;      ///< of the last update; about 1 when consistent

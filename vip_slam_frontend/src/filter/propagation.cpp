@@ -47,6 +47,11 @@ void Propagation::admitGap(double gap, double dt) {
   W = whitening(Q);
 }
 
+void Propagation::admitRate(double rate, double dt) {
+  Q.diagonal().head<3>().array() += std::pow(rate * dt, 2);
+  W = whitening(Q);
+}
+
 void Propagation::admitStep(double dv, double dt) {
   // At s after the first image, s uniform: dp = dv (dt - s), so E[dp^2] = dv^2 dt^2 / 3 and E[dp dv] = dv^2 dt / 2.
   const double variance = dv * dv;

@@ -25,13 +25,16 @@ void SquareRootFilter::initialise(const WindowState& window, const Eigen::Matrix
   R_ = A.topLeftCorner(n, n).triangularView<Eigen::Upper>();
 }
 
-void SquareRootFilter::augment(const Propagation& propagation, CloneId id) {
+void SquareRootFilter::augment(const Propagation& propagation, CloneId id, double delay_change) {
   const int n = window_.dimension();
   const int last_clone = window_.cloneColumn(static_cast<int>(window_.clones.size()) - 1);
   const int nav = window_.navColumn();
 
-  // Rows of the old factor, then W [-Phi I] on (C_k, E_k ; C_k+1, E_k+1), appended behind the old columns.
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n + 15, n + 15);
+  // Rows of the old factor, then W [-Phi I] on (C_k, E_k ; C_k+1, E_k+1), appended behind the old columns, and the
+  // delay's change behind these.
+  const int changed = delay_change > 0 && window_.calibration.time_offset ? 1 : 0;
+  const int delay = window_.timeOffsetColumn();
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n + 15 + changed, n + 15 + changed);
   A.topLeftCorner(n, n) = R_;
   const Matrix15d WPhi = propagation.W * propagation.Phi;
   A.block<15, 6>(n, last_clone) = -WPhi.leftCols<6>();
@@ -43,14 +46,20 @@ void SquareRootFilter::augment(const Propagation& propagation, CloneId id) {
     A.block<15, 1>(n, window_.gyroColumn() + k) = -W_gyro.col(3 * column + row);
   }
 
+  if (changed) {
+    A(n + 15, n + 15) = 1.0 / delay_change;
+    A(n + 15, delay) = -1.0 / delay_change;
+  }
+
   std::vector<int> order;
-  order.reserve(n + 15);
-  for (int c = nav; c < n; ++c) order.push_back(c);                            // E_k goes
-  for (int c = 0; c < window_.calibrationColumn(); ++c) order.push_back(c);    // clones
-  for (int c = n; c < n + 6; ++c) order.push_back(c);                          // C_k+1
-  for (int c = window_.calibrationColumn(); c < nav; ++c) order.push_back(c);  // calibration
-  for (int c = n + 6; c < n + 15; ++c) order.push_back(c);                     // E_k+1
-  R_ = marginaliseColumns(A, order, 9);
+  order.reserve(n + 16);
+  for (int c = nav; c < n; ++c) order.push_back(c);                          // E_k goes
+  if (changed) order.push_back(delay);                                       // and the delay until then
+  for (int c = 0; c < window_.calibrationColumn(); ++c) order.push_back(c);  // clones
+  for (int c = n; c < n + 6; ++c) order.push_back(c);                        // C_k+1
+  for (int c = window_.calibrationColumn(); c < nav; ++c) order.push_back(changed && c == delay ? n + 15 : c);
+  for (int c = n + 6; c < n + 15; ++c) order.push_back(c);  // E_k+1
+  R_ = marginaliseColumns(A, order, 9 + changed);
 
   Clone clone;
   clone.id = id;

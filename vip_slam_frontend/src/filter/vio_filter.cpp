@@ -193,7 +193,10 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   } else if (!delay_before_) {
     delay_before_ = Delay{filter_.window().time_offset, mounting().sigma_time_offset};
   }
-  filter_.augment(propagation, id);
+  // What is held neither changes nor is learnt.
+  const double since = propagation.predicted.t - filter_.window().clones.back().t;
+  const double delay_change = delay_before_ ? 0.0 : options_.calibration.time_offset_walk * std::sqrt(since);
+  filter_.augment(propagation, id, delay_change);
 
   // From the second still image on, the newest clone replaces the one before: the window keeps what it knew of the
   // motion and does not fill with copies of one pose.

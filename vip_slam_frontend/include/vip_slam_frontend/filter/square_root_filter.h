@@ -30,7 +30,8 @@ class SquareRootFilter {
   const Eigen::MatrixXd& R() const { return R_; }
 
   /// Adds the new clone and nav state behind the IMU rows W [-Phi I] and marginalises the old nav state.
-  void augment(const Propagation& propagation, CloneId id);
+  /// `delay_change`: one sigma by which the delay may have changed since the newest clone, s; 0: it is the same.
+  void augment(const Propagation& propagation, CloneId id, double delay_change = 0);
   /// Marginalises clones (indices ascending). Removing the oldest ones only deletes rows; others cost a QR.
   void marginalise(const std::vector<int>& clone_indices);
 

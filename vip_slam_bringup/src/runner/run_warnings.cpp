@@ -1,0 +1,122 @@
+// What a user should know of a run that ended well.
+#include <algorithm>
+#include <cstdio>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "vip_slam_backend/optimisation/inertial_scale.h"
+#include "vip_slam_bringup/runner/run_output.h"
+
+namespace vip_slam {
+namespace {
+
+bool hasPose(const StateChange& change) {
+  return change.status.state == TrackingState::kTracking || change.status.state == TrackingState::kDegraded;
+}
+
+/// Where poses are missing after the first one, when that is more than a moment; in words.
+std::string missingPoses(const Pipeline& pipeline) {
+  constexpr double kMoment = 1.0;  // s
+  const std::vector<StateChange>& states = pipeline.states();
+  const auto first = std::find_if(states.begin(), states.end(), hasPose);
+  if (first == states.end()) return "";
+  const double begin = states.front().t, end = begin + pipeline.duration();
+  double longest = 0, missing = 0;
+  const StateChange* worst = nullptr;
+  for (auto it = first; it != states.end(); ++it) {
+    if (hasPose(*it)) continue;
+    const double seconds = (std::next(it) == states.end() ? end : std::next(it)->t) - it->t;
+    missing += seconds;
+    if (seconds > longest) longest = seconds, worst = &*it;
+  }
+  if (!worst || missing < kMoment) return "";
+  char words[300];
+  std::snprintf(
+      words, sizeof words,
+      "%.1f of %.1f s have no pose, the longest stretch begins %.1f s after the first image and lasts %.1f s: %s",
+      missing, pipeline.duration(), worst->t - begin, longest, worst->status.reason.c_str());
+  return words;
+}
+
+}  // namespace
+
+std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader) {
+  std::vector<std::string> all = reader.warnings();
+  const FrontEndCounters& c = pipeline.frontEnd().counters();
+  if (c.imu_gaps > 0) all.push_back(std::to_string(c.imu_gaps) + " gaps in the IMU; a long one restarts the odometry");
+  if (c.imu_spikes > 0)
+    all.push_back(
+        std::to_string(c.imu_spikes) +
+        " single samples of the IMU were far off their neighbours and were replaced by them: errors on its bus?");
+  if (c.imu_shocks > 0)
+    all.push_back(std::to_string(c.imu_shocks) +
+                  " images show a step of the velocity that the IMU has not: shocks beyond its range or rate?");
+  if (c.repeated_image > 0)
+    all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
+                  " images repeat the pixels of the one before under a new stamp and are left out: a camera slower "
+                  "than its topic, or frozen?");
+  if (c.repeated_depth > 0)
+    all.push_back(std::to_string(c.repeated_depth) + " of " + std::to_string(c.images) +
+                  " depth images repeat the one before and are left out: has the depth camera frozen?");
+  if (c.gyro_cut_off > 0) {
+    char words[160];
+    std::snprintf(
+        words, sizeof words,
+        "%zu samples of the gyroscope are at the end of its range, %.2f rad/s: the body turned faster, by how "
+        "much only images tell",
+        static_cast<std::size_t>(c.gyro_cut_off), c.gyro_range);
+    all.push_back(words);
+  }
+  if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
+  if (c.imu_rejected > 0)
+    all.push_back(std::to_string(c.imu_rejected) +
+                  " IMU messages are left out: not finite, all zero, or not newer than the one before");
+  if (pipeline.images() == 0) all.push_back("no image could be used");
+  const std::string missing = missingPoses(pipeline);
+  if (!missing.empty()) all.push_back(missing);
+  if (c.imu_contradicted > 0)
+    all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
+                  " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
+                  "signs and units, T_imu_cam, the stamps and the scale of depth right? check_bag tells");
+  constexpr double kLargeJitter = 0.001;
+  if (c.stamp_sigma > kLargeJitter) {
+    char words[120];
+    std::snprintf(words, sizeof words,
+                  "stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
+                  1e3 * c.stamp_sigma);
+    all.push_back(words);
+  }
+  // A mounting that was learnt against a wrong IMU means nothing.
+  if (10 * c.imu_contradicted < c.images) {
+    for (const std::string& difference :
+         mountingDifferences(pipeline.frontEnd().givenMounting(), pipeline.frontEnd().mounting())) {
+      all.push_back(difference + " (summary.yaml: calibration)");
+    }
+  }
+  if (pipeline.mapping()) {
+    const InertialScale scale = pipeline.mapping()->backEnd().scale();
+    const std::string difference = scaleDifference(scale, reader.sensor());
+    if (!difference.empty()) all.push_back(difference);
+    const std::string bent = pipeline.mapping()->backEnd().depthDifference();
+    if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
+    const std::string missed = pipeline.mapping()->backEnd().trackNoiseDifference();
+    if (!missed.empty()) all.push_back(missed);
+    const MapSnapshot map = pipeline.mapping()->backEnd().snapshot();
+    for (const auto& [from, to] : guessedTimes(map)) {
+      char words[240];
+      std::snprintf(words, sizeof words,
+                    "keyframes from %.1f to %.1f s after the first image were never tied to the rest of the map: their "
+                    "place in trajectory.tum, planes and map is a guess, realtime.tum leaves them out",
+                    from - pipeline.chain().front().t, to - pipeline.chain().front().t);
+      all.push_back(words);
+    }
+    if (!pipeline.chain().empty() && anchorTrajectory(pipeline.chain(), anchorsOf(map)).empty())
+      all.push_back("the stored map was not recognised: no image has a pose in it, trajectory.tum is empty");
+    const auto& refusals = pipeline.mapping()->refusals();
+    all.insert(all.end(), refusals.begin(), refusals.end());
+  }
+  return all;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,26 @@
+#include "vip_slam_frontend/tracking/frozen_depth.h"
+
+namespace vip_slam {
+namespace {
+
+constexpr int kStep = 12;        // pixels
+constexpr int kLeastDepth = 50;  // samples; noise makes no so many alike
+
+}  // namespace
+
+bool FrozenDepth::repeats(const cv::Mat& depth) {
+  std::vector<float> now;
+  int with_depth = 0;
+  for (int y = kStep / 2; y < depth.rows; y += kStep) {
+    const float* row = depth.ptr<float>(y);
+    for (int x = kStep / 2; x < depth.cols; x += kStep) {
+      now.push_back(row[x] > 0 ? row[x] : 0.f);
+      with_depth += row[x] > 0;
+    }
+  }
+  const bool same = with_depth >= kLeastDepth && now == last_;
+  last_ = std::move(now);
+  return same;
+}
+
+}  // namespace vip_slam
