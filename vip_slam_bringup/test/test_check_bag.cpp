@@ -265,6 +265,18 @@ TEST_F(CheckBag, ValuesThatAreNoNumbersAreNotTakenForADelay) {
   EXPECT_NEAR(estimateMotion(recording).time_offset, expected_.time_offset, 0.002);
 }
 
+TEST_F(CheckBag, TheEndOfTheGyrosRangeAndDepthThatRepeatsAreNamed) {
+  test_support::writeDriverBag(path_, options_);
+  Recording recording = recordBag(path_, expected_, 60);
+  EXPECT_EQ(recording.gyro_range.samples(), 0u);
+  EXPECT_GT(recording.depth.decoded, 10u);
+  EXPECT_EQ(recording.depth.repeated, 0u);
+  for (int k = 0; k < 20; ++k) recording.gyro_range.add(1e3 + 0.005 * k, {0, -34.9, 0});
+  expectFound(checkImu(recording), Severity::kWarning, "gyroscope", "at the end of its range, 34.90 rad/s");
+  recording.depth.repeated = recording.depth.decoded / 2;
+  expectFound(checkImages(recording), Severity::kWarning, "depth image", "repeat the one before");
+}
+
 TEST_F(CheckBag, UnreadableBag) {
   std::ofstream(path_) << "not a bag";
   try {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <utility>
 
 #include "vip_slam_core/imu/gyro_range.h"
@@ -139,10 +140,11 @@ class FrontEnd::Impl {
   ImuBuffer imu_;
   GyroRange gyro_range_;
   FrozenDepth frozen_depth_;
-  bool same_depth_ = false;                ///< the newest depth image is the one before
-  SE3 T_odom_depth_;                       ///< camera of the last image whose depth was its own
-  cv::Mat masked_;                         ///< not zero where depth is to be left out; empty: nowhere
-  std::unique_ptr<DepthRows> depth_rows_;  ///< null until a depth image of other times than the stamp came
+  bool same_depth_ = false;                   ///< the newest depth image is the one before
+  SE3 T_odom_depth_;                          ///< camera of the last image whose depth was its own ...
+  std::optional<std::uint32_t> depth_epoch_;  ///< ... in this epoch
+  cv::Mat masked_;                            ///< not zero where depth is to be left out; empty: nowhere
+  std::unique_ptr<DepthRows> depth_rows_;     ///< null until a depth image of other times than the stamp came
   FeatureTracker tracker_;
   MovingRegions moving_;          ///< of the newest image
   double moving_imu_t_ = -1e300;  ///< of the last image with such

@@ -36,7 +36,10 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   last_image_t_ = input.t;
   if (filter_.started() && repeatsLastImage(input.gray, t_imu)) return repeatedImage(input.t, t_imu);
   // What is rendered without noise repeats by itself while it stands.
-  if (filter_.started() && !same_depth_) T_odom_depth_ = filter_.nav().T_W_I * extrinsics();
+  if (filter_.started() && (!same_depth_ || depth_epoch_ != epoch_)) {
+    T_odom_depth_ = filter_.nav().T_W_I * extrinsics();
+    depth_epoch_ = epoch_;
+  }
   same_depth_ = !depth.image.empty() && frozen_depth_.repeats(input.depth);
   if (same_depth_ && filter_.started() && !still_ && movesByImu(t_imu, T_odom_depth_)) {
     ++counters_.repeated_depth;

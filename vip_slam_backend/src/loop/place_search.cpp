@@ -44,15 +44,15 @@ std::vector<KeyframeId> PlaceSearch::viewsLikeNewest(const Scene& scene) const {
   const auto there = [&](KeyframeId id) { return scene.map.hasKeyframe(id) && (!scene.allowed || scene.allowed(id)); };
   const std::size_t most = static_cast<std::size_t>(options_.candidates + options_.rivals);
   std::vector<KeyframeId> views;
-  std::vector<Place> seen;
+  std::vector<std::pair<SE3, std::uint32_t>> seen;  // T_W_C, part
   for (const DatabaseMatch& candidate : scene.database.query(bows_.back().bow, 20 * most, there)) {
     if (views.size() >= most) break;
     const SE3 view = scene.map.keyframe(candidate.keyframe).T_W_C();
     const std::uint32_t part = scene.partOf(candidate.keyframe);
-    const auto same = [&](const Place& other) { return other.part == part && sameView(other.T_W_odom, view); };
+    const auto same = [&](const auto& other) { return other.second == part && sameView(other.first, view); };
     if (std::any_of(seen.begin(), seen.end(), same)) continue;
     views.push_back(candidate.keyframe);
-    seen.push_back({view, part});
+    seen.emplace_back(view, part);
   }
   return views;
 }
@@ -62,7 +62,7 @@ std::vector<PlaceSearch::Place> PlaceSearch::guesses(const Scene& scene, std::si
   const Keyframe& newest = *keyframes_.back();
   const SE3 T_odom_B = newest.frame.state.T_W_I * newest.frame.T_I_C;
   const CameraRig rig = rigOf(keyframes_);
-  std::vector<std::pair<std::size_t, Place>> found;  // here the place of the rig
+  std::vector<std::pair<std::size_t, Place>> found;
   for (std::size_t v = first; v < std::min(last, scene.views.size()); ++v) {
     std::vector<PlaceMatch> matches;
     for (std::uint32_t c = 0; c < keyframes_.size(); ++c)
@@ -76,9 +76,9 @@ std::vector<PlaceSearch::Place> PlaceSearch::guesses(const Scene& scene, std::si
     pose_options.seed = newest.id * 1000003ull + scene.views[v];
     const PlacePose pose = ransacPlacePose(matches, rig, T_odom_B.rotation(), pose_options);
     if (static_cast<int>(pose.inliers.size()) < options_.min_seed_inliers) continue;
-    const Place place{pose.T_W_B, scene.partOf(scene.views[v])};
+    const Place place{pose.T_W_B * T_odom_B.inverse(), scene.partOf(scene.views[v])};
     const auto same = std::find_if(found.begin(), found.end(), [&](const auto& f) {
-      return f.second.part == place.part && samePlace(f.second.T_W_odom, place.T_W_odom);
+      return f.second.part == place.part && samePlace(f.second.T_W_odom * T_odom_B, pose.T_W_B);
     });
     if (same == found.end())
       found.emplace_back(pose.inliers.size(), place);
@@ -88,15 +88,15 @@ std::vector<PlaceSearch::Place> PlaceSearch::guesses(const Scene& scene, std::si
   std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   if (found.size() > most) found.resize(most);
   std::vector<Place> result;
-  for (const auto& f : found) result.push_back({f.second.T_W_odom * T_odom_B.inverse(), f.second.part});
+  for (const auto& f : found) result.push_back(f.second);
   return result;
 }
 
 void PlaceSearch::weigh(const Scene& scene, const std::vector<Place>& places) {
   const SE3 T_odom_B = keyframes_.back()->frame.state.T_W_I * keyframes_.back()->frame.T_I_C;
   for (const auto& [T_W_odom, part] : places) {
-    const auto at = [&, part = part](const SE3& T_W_C) {
-      return [&, part](const Guess& g) { return g.place.part == part && samePlace(g.support.T_W_C, T_W_C); };
+    const auto at = [part = part](const SE3& T_W_C) {
+      return [part, T_W_C](const Guess& g) { return g.place.part == part && samePlace(g.support.T_W_C, T_W_C); };
     };
     if (std::any_of(guesses_.begin(), guesses_.end(), at(T_W_odom * T_odom_B))) continue;
     const auto in_part = [&scene, part = part](KeyframeId id) {

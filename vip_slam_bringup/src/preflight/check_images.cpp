@@ -110,6 +110,11 @@ void checkRepeats(const Recording& r, Findings* out) {
                     words("%zu of %zu images repeat the pixels of the one before while the camera moves",
                           r.color.repeated, r.color.decoded),
                     "the camera is slower than its topic, or froze: the repeats are left out"});
+  if (r.depth.repeated > kShare * double(r.depth.decoded))
+    out->push_back(
+        {Severity::kWarning, "depth image",
+         words("%zu of %zu images repeat the one before while the camera moves", r.depth.repeated, r.depth.decoded),
+         "the depth camera is slower than its topic, or froze: the repeats are left out"});
 }
 
 void checkDepth(const Recording& r, Findings* out) {

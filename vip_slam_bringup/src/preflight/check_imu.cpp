@@ -111,6 +111,11 @@ Findings checkImu(const Recording& r) {
       out.push_back({Severity::kError, "gyroscope", words("rates up to %.4g", largest),
                      "degrees a second? radians a second are expected"});
   }
+  if (r.gyro_range.samples() > 0)
+    out.push_back({Severity::kWarning, "gyroscope",
+                   words("%zu samples at the end of its range, %.2f rad/s", std::size_t(r.gyro_range.samples()),
+                         r.gyro_range.end()),
+                   "a larger range in the driver; how much faster it turned only images tell"});
   double least_spread = 0;
   const std::vector<Eigen::Vector3d> forces = quietForces(r.accel_samples, &least_spread);
   if (forces.empty()) return out;

@@ -102,6 +102,7 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   if (topic == topics.accel) note(&recording_.accel, arrival, message);
   if (topic == topics.imu || topic == topics.gyro) {
     const Eigen::Matrix3d& correction = recording_.sensor.gyro_correction;
+    recording_.gyro_range.add(t, {w.x, w.y, w.z});
     recording_.gyro_samples.push_back({t, correctedRate({w.x, w.y, w.z}, correction)});
   }
   if (topic == topics.imu || topic == topics.accel) recording_.accel_samples.push_back({t, {a.x, a.y, a.z}});
@@ -121,6 +122,8 @@ void Recorder::add(const tf2_msgs::TFMessage& message) {
 }
 
 void Recorder::addDepth(double t, const cv::Mat& depth) {
+  ++recording_.depth.decoded;
+  recording_.depth.repeated += frozen_depth_.repeats(depth) && turns();
   if (recording_.depth.stamps.size() % 5 == 1) {
     std::vector<double> values;
     std::size_t all = 0, usable = 0;
@@ -146,12 +149,15 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
   flushGray(false);
 }
 
+// What is rendered without noise repeats by itself while it stands.
+bool Recorder::turns() const {
+  constexpr double kTurns = 0.05;  // rad/s
+  return !recording_.gyro_samples.empty() && recording_.gyro_samples.back().value.norm() > kTurns;
+}
+
 void Recorder::addGray(double t, const cv::Mat& gray) {
   ++recording_.color.decoded;
-  // What is rendered without noise repeats by itself while it stands.
-  constexpr double kTurns = 0.05;  // rad/s
-  const bool turns = !recording_.gyro_samples.empty() && recording_.gyro_samples.back().value.norm() > kTurns;
-  if (turns && samePixels(gray, newest_gray_)) {
+  if (turns() && samePixels(gray, newest_gray_)) {
     ++recording_.color.repeated;
     return;  // says nothing of the motion at this time
   }

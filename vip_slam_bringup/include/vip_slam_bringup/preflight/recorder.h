@@ -12,6 +12,7 @@
 
 #include "vip_slam_bringup/preflight/image_rotation.h"
 #include "vip_slam_bringup/preflight/recording.h"
+#include "vip_slam_frontend/tracking/frozen_depth.h"
 
 namespace vip_slam {
 
@@ -37,6 +38,7 @@ class Recorder {
   void addImage(const std::string& topic, double arrival, const ImageMessage& message, const std::string& encoding);
   void addDepth(double t, const cv::Mat& depth);
   void addGray(double t, const cv::Mat& gray);
+  bool turns() const;
   void flushGray(bool all);
   void startRotation(const CameraIntrinsics& camera);
 
@@ -49,6 +51,7 @@ class Recorder {
     double t;
     cv::Mat image;
   };
+  FrozenDepth frozen_depth_;
   cv::Mat newest_gray_;                               ///< that was no repeat
   std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour waits a moment for its depth
 };

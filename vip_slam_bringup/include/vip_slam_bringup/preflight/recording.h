@@ -11,6 +11,7 @@
 #include <geometry_msgs/TransformStamped.h>
 
 #include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_core/imu/gyro_range.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 
 namespace vip_slam {
@@ -67,6 +68,7 @@ struct Recording {
   CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
   std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable
   std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
+  GyroRange gyro_range;
   std::vector<RotationStep> rotations;
   std::vector<DepthSample> depths;
   std::vector<BrightnessSample> brightness;         ///< of some colour images

@@ -25,9 +25,9 @@ struct Propagation {
   RateHistory rates;                                  ///< the window's, up to the end
   /// Adds to Q what a straight line between two samples `gap` seconds apart may be off the motion between them, for the
   /// `dt` seconds of this interval, all of which may lie in the gap.
-  /// The body has turned by a rate that the IMU has not, of one sigma `rate`, rad/s.
-  void admitRate(double rate, double dt);
   void admitGap(double gap, double dt);
+  /// Adds to Q a turn by a rate that the IMU has not, of one sigma `rate`, rad/s, for `dt` seconds.
+  void admitRate(double rate, double dt);
   /// Adds to Q a step of the velocity by `dv` (one sigma of each axis, m/s) at an unknown moment of the `dt` seconds.
   void admitStep(double dv, double dt);
   bool step_admitted = false;  ///< by that
