@@ -94,9 +94,9 @@ class Map {
 
   // ---- all ----
   /// Moves keyframes to new poses (loop correction): velocities turn with them, each landmark follows its host.
-  /// Its IMU factor is believed by as much less.
-  void widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise);
   void moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I);
+  /// The IMU factor into a keyframe is believed by as much less.
+  void widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise);
   MapChanges takeChanges();
   void clear();
   bool empty() const { return keyframes_.empty(); }
