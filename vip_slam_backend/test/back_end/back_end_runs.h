@@ -21,6 +21,14 @@ inline BackEndOptions options(const std::string& variant) {
   return o;
 }
 
+/// Keyframes and what the planes say of each.
+inline void feed(SimulatedKeyframes* world, BackEnd* back_end, int keyframes) {
+  for (int k = 0; k < keyframes; ++k) {
+    back_end->addKeyframe(world->next());
+    back_end->applyPlaneUpdate(world->planes());
+  }
+}
+
 struct RunResult {
   double rmse = 0, odometry_rmse = 0;
   MapSnapshot snapshot;

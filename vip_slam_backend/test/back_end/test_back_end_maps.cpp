@@ -70,10 +70,7 @@ TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
   const std::string path = ::testing::TempDir() + "waited_for.vsm";
   SimulatedKeyframes world(4), session(4);
   BackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 25; ++k) {
-    mapper.addKeyframe(world.next());
-    mapper.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &mapper, 25);
   mapper.saveMap(path);
   back_end.loadMap(path);
   const std::size_t loaded = back_end.map().keyframes().size();
@@ -138,10 +135,7 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   const std::string path = ::testing::TempDir() + "localisation_only.vsm";
   SimulatedKeyframes world(4), session(4);
   BackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 25; ++k) {
-    mapper.addKeyframe(world.next());
-    mapper.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &mapper, 25);
   mapper.finish();
   mapper.saveMap(path);
 
@@ -239,10 +233,7 @@ TEST(BackEndMaps, AnAdjustmentFromBeforeAFragmentCameToTheMapIsDropped) {
 TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   SimulatedKeyframes world(4);
   BackEnd back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 10; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &back_end, 10);
   const MapSnapshot before = back_end.snapshot();
   ASSERT_GT(before.planes.size(), 1u);
   back_end.setLocalisationMode(true);
@@ -260,10 +251,7 @@ TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
 TEST(BackEndMaps, PlanesThatALostUpdateRemovedGoWithTheNext) {
   SimulatedKeyframes world(4);
   BackEnd back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 10; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &back_end, 10);
   const MapSnapshot before = back_end.snapshot();
   ASSERT_GT(before.planes.size(), 1u);
   PlaneUpdate next;
@@ -279,10 +267,7 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
   const std::string path = ::testing::TempDir() + "mapped_on.vsm";
   SimulatedKeyframes world(4);
   BackEnd mapper(options("vip"), world.sensor());
-  for (int k = 0; k < 25; ++k) {
-    mapper.addKeyframe(world.next());
-    mapper.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &mapper, 25);
   mapper.saveMap(path);
   for (const double pause : {0.0, 60.0}) {  // seconds in which nothing was found
     SimulatedKeyframes session(4);
@@ -376,10 +361,7 @@ TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
 TEST(BackEndMaps, WhatWasMappedAtAGuessComesAlongWhenItsOdometryIsFound) {
   SimulatedKeyframes world(4), session(4);
   BackEnd back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 25; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &back_end, 25);
   const SE3 T_other_odom(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {7, -3, 1});
   MapUpdate update;
   for (int k = 0; k < 18; ++k) {
@@ -416,10 +398,7 @@ TEST(BackEndMaps, WhatWasMappedAtAGuessComesAlongWhenItsOdometryIsFound) {
 TEST(BackEndMaps, AnAdjustmentLeavesTheOdometryWhereItWasFound) {
   SimulatedKeyframes world(4), again(4);
   BackEnd back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 25; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &back_end, 25);
   const SE3 drift(Eigen::Quaterniond::Identity(), {0.5, 0.2, 0});
   SE3 found;
   back_end.setLocalisationMode(true);
