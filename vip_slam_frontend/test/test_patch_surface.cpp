@@ -76,6 +76,21 @@ TEST(PatchSurface, FacesTheCameraWhereTheReadingsAreNoPlane) {
   EXPECT_EQ(patchSurface(wallDepthImage(0), kPixel, 0.0, noise()).depth, 0);
 }
 
+TEST(PatchSurface, WideWhereOnePlaneIsAllOverTheWidePatch) {
+  EXPECT_TRUE(patchSurface(wallDepthImage(0.0017), kPixel, wallDepth(kPixel), noise()).wide);
+  cv::Mat step = wallDepthImage(0.0017);
+  step.colRange(static_cast<int>(kPixel.x()) + 9, 640) *= 1.01;
+  const PatchSurface narrow = patchSurface(step, kPixel, wallDepth(kPixel), noise());
+  EXPECT_TRUE(narrow.known);
+  EXPECT_FALSE(narrow.wide);
+  cv::Mat bar = wallDepthImage(0.0017);  // not near the wall: no step within it, but not the wall either
+  bar.colRange(static_cast<int>(kPixel.x()) + 9, 640) *= 0.4;
+  EXPECT_FALSE(patchSurface(bar, kPixel, wallDepth(kPixel), noise()).wide);
+  DepthNoise loud = noise();
+  loud.b = 0.007;  // would hide what moves the wide patch
+  EXPECT_FALSE(patchSurface(wallDepthImage(0.0017), kPixel, wallDepth(kPixel), loud).wide);
+}
+
 // A step of four sigmas is hidden in every single reading, yet a patch across it creeps by pixels.
 TEST(PatchSurface, AStepHiddenInTheNoiseIsNoPlane) {
   DepthNoise loud = noise();

@@ -97,6 +97,40 @@ TEST(PatchAlignment, RecoversSubPixelShiftUnderExposureChange) {
   EXPECT_LT(worst, 0.2);
 }
 
+/// Root mean square error of alignments by 0.37 and -0.21 px.
+double alignmentError(bool wide, int* count) {
+  const cv::Mat texture = makeTexture();
+  const cv::Mat reference = render(texture, Eigen::Vector3d::Zero(), 3.0, 1);
+  const cv::Mat current = render(texture, Eigen::Vector3d(-0.37 * 2.0 / kFocal, 0.21 * 2.0 / kFocal, 0), 3.0, 2);
+  double sum = 0;
+  *count = 0;
+  for (const Corner& corner : detectCorners(reference, {}, 100, TrackingOptions())) {
+    const Eigen::Vector2d p(corner.pixel.x, corner.pixel.y);
+    const PatchAlignment aligned = alignPatch(reference, p, PatchWarp(), current, p, wide);
+    if (!aligned.ok) continue;
+    sum += (aligned.pixel - p - Eigen::Vector2d(0.37, -0.21)).squaredNorm();
+    ++*count;
+  }
+  return std::sqrt(sum / *count);
+}
+
+TEST(PatchAlignment, WidePatchIsMoreExact) {
+  int narrow_count = 0, wide_count = 0;
+  const double narrow = alignmentError(false, &narrow_count), wide = alignmentError(true, &wide_count);
+  std::printf("narrow %.3f px of %d, wide %.3f px of %d\n", narrow, narrow_count, wide, wide_count);
+  EXPECT_GE(wide_count, narrow_count);
+  EXPECT_LT(wide, 0.75 * narrow);
+}
+
+TEST(PatchAlignment, TheNarrowPatchServesWhereTheWideOneLeavesTheImage) {
+  const cv::Mat image = render(makeTexture(), Eigen::Vector3d::Zero(), 0.5, 1);
+  const Eigen::Vector2d rim(9, 200);
+  const PatchAlignment aligned = alignPatch(image, rim, PatchWarp(), image, rim + Eigen::Vector2d(0.3, 0.2), true);
+  ASSERT_TRUE(aligned.ok);
+  EXPECT_LT((aligned.pixel - rim).norm(), 0.01);
+  EXPECT_GT(patchTexture(image, rim, true).norm(), 0);
+}
+
 TEST(PatchAlignment, RefusesADifferentPatch) {
   const cv::Mat image = render(makeTexture(), Eigen::Vector3d::Zero(), 0.5, 1);
   int accepted = 0;
@@ -173,6 +207,16 @@ TEST(PixelNoise, GrowsWithFaintnessResidualAndEdges) {
   EXPECT_TRUE(pixelWhitening(Eigen::Matrix2d::Zero(), 0, 1).allFinite());
 }
 
+TEST(PixelNoise, WidePatchesAreMoreExactAndLargerOnesLess) {
+  PatchSurface wide, narrow, rim;
+  wide.depth = narrow.depth = rim.depth = 2.0;
+  wide.known = narrow.known = wide.wide = true;
+  EXPECT_LT(matchSigma(wide, 1), matchSigma(narrow, 1));
+  EXPECT_LT(matchSigma(narrow, 1), matchSigma(rim, 1));
+  EXPECT_EQ(matchSigma(wide, 0.5), matchSigma(wide, 1));  // smaller than the reference is no more exact
+  EXPECT_NEAR(matchSigma(wide, 2), std::pow(2, 1.5) * matchSigma(wide, 1), 1e-12);
+}
+
 TEST(OutlierRejection, FindsTheMotionOnAPlaneWithManyOutliers) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -242,6 +286,41 @@ TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
   }
   ASSERT_GT(old, 60);
   EXPECT_LT(std::sqrt(sum / old), 0.12);  // px, after 25 images and more
+}
+
+// Bars one metre before the wall cover the outskirts of wide patches: those match their narrow patch.
+TEST(FeatureTracker, WhatCoversPartOfAWidePatchDoesNotMoveIt) {
+  const cv::Mat texture = makeTexture();
+  FeatureTracker tracker(TrackingOptions(), camera(), DepthNoise(), nullptr);
+  const auto poseAt = [](int k) { return SE3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.004 * k, 0, 0)); };
+  std::map<LandmarkId, Eigen::Vector2d> first;
+  constexpr int kBarEvery = 64, kBar = 24;
+  for (int k = 0; k < 4; ++k) {
+    cv::Mat image = render(texture, poseAt(k).t(), 1.0, k + 1), depth(480, 640, CV_32F, cv::Scalar(2.0));
+    const cv::Mat other = render(texture, Eigen::Vector3d(1.3, 0.7, 0), 1.0, 20);
+    for (int u = 0; k == 3 && u + kBar < 640; u += kBarEvery) {
+      other.colRange(u, u + kBar).copyTo(image.colRange(u, u + kBar));
+      depth.colRange(u, u + kBar).setTo(1.0);
+    }
+    const SE3 motion = k == 0 ? SE3() : poseAt(k).inverse() * poseAt(k - 1);
+    tracker.track(image, depth, {motion, 0, 0}, true, poseAt(k), nullptr, k);
+    if (k > 0) continue;
+    tracker.replenish(poseAt(k), true, k);
+    for (const Track& track : tracker.tracks()) first[track.feature.id] = track.feature.pixel.cast<double>();
+  }
+  double sum = 0;
+  int covered = 0;
+  for (const Track& track : tracker.tracks()) {
+    const double u = track.feature.pixel.x(), from_bar = std::fmod(u, kBarEvery) - kBar;
+    const double gap = std::min(from_bar, kBarEvery - kBar - from_bar);  // to the nearest bar
+    if (gap < 7.5 || gap > 11) continue;
+    EXPECT_FALSE(track.surface.wide) << u;
+    const Eigen::Vector2d expected = first.at(track.feature.id) - Eigen::Vector2d(kFocal / 2.0 * 0.012, 0);
+    sum += (track.feature.pixel.cast<double>() - expected).squaredNorm();
+    ++covered;
+  }
+  ASSERT_GT(covered, 10);
+  EXPECT_LT(std::sqrt(sum / covered), 0.08);  // px
 }
 
 TEST(FeatureTracker, ATrackBeginsAnewWhenDepthFirstShowsItsSurface) {

@@ -15,7 +15,7 @@ Variant variantFromName(const std::string& name);
 const char* variantName(Variant variant);
 
 struct MeasurementOptions {
-  double pixel_sigma = 0.08;
+  double pixel_sigma = 0.05;
   double max_pixel_sigma = 1.5;
   double gate_sigma = 0.4;
   double matched_pixel_sigma = 1.0;

@@ -28,8 +28,8 @@ Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
 /// Of the newest pixel as a view of what the track began with, px^2. What is wrong in the reference grows with the
 /// patch.
 double pixelVariance(const Track& track) {
-  const double sigma = matchSigma(track.surface), m2 = track.magnification * track.magnification;
-  return sigma * sigma * std::max(1.0, m2) + track.reference_variance * m2;
+  const double sigma = matchSigma(track.surface, track.magnification);
+  return sigma * sigma + track.reference_variance * track.magnification * track.magnification;
 }
 
 }  // namespace
@@ -134,14 +134,21 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
   const double shear = (warp.A / scale - (warp.A / scale).inverse().transpose()).norm();
   if (!(scale > 0.45) || !(scale < 2.2) || !(shear < 1.5)) return false;
   const Eigen::Vector2d start = track->feature.pixel.cast<double>();
-  const PatchAlignment aligned =
-      alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin, warp, gray_, start);
+  // For good: matches with either patch err otherwise, and a track that goes to and fro between them moves.
+  if (track->surface.wide) track->surface.wide = isWideHere(track->feature);
+  const PatchAlignment aligned = alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin,
+                                            warp, gray_, start, track->surface.wide);
   if (!aligned.ok || (aligned.pixel - start).norm() > most_px) return false;
   track->feature.pixel = aligned.pixel.cast<float>();
-  track->magnification = 1.0 / scale;
+  track->magnification = 1.0 / warp.A.jacobiSvd().singularValues()(1);
   track->texture = aligned.texture;
   track->residual = aligned.residual;
   return true;
+}
+
+bool FeatureTracker::isWideHere(Feature feature) const {
+  measure(&feature);
+  return patchSurface(depth_, pixelAtStamp(feature), feature.depth, noise_).wide;
 }
 
 void FeatureTracker::setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const {
@@ -149,7 +156,7 @@ void FeatureTracker::setReference(Track* track, const std::shared_ptr<const Refe
   track->reference_pixel = track->feature.pixel.cast<double>();
   track->magnification = 1.0;
   track->surface = patchSurface(depth_, pixelAtStamp(track->feature), track->feature.depth, noise_);
-  track->texture = patchTexture(gray_, track->reference_pixel);
+  track->texture = patchTexture(gray_, track->reference_pixel, track->surface.wide);
   track->residual = 0;
 }
 

@@ -11,7 +11,7 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kPatchRadius = 20;
+constexpr int kPatchRadius = 28;  // a wide patch at half its size
 constexpr std::size_t kMostPatches = 8000;
 constexpr int kMostPerImage = 60;
 // A corner detected anew may lie this far from where the old track saw it, px.

@@ -8,10 +8,12 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kHalf = 6;
-constexpr int kSide = 2 * kHalf + 1;
-constexpr int kWide = kSide + 2;  // one more on each side for the gradients
-constexpr int kCount = kSide * kSide;
+template <int kRadius>
+struct Size {
+  static constexpr int kSide = 2 * kRadius + 1;
+  static constexpr int kRow = kSide + 2;  // one more on each side for the gradients
+  static constexpr int kCount = kSide * kSide;
+};
 
 inline float bilinear(const cv::Mat& image, float x, float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
@@ -22,15 +24,17 @@ inline float bilinear(const cv::Mat& image, float x, float y) {
 }
 
 /// Gradients of the inner (kSide x kSide) part; returns the sums of products of (g_x, g_y, 1).
-Eigen::Matrix3d gradients(const float* wide, float* patch, float* gx, float* gy) {
+template <int kRadius>
+Eigen::Matrix3d gradients(const float* framed, float* patch, float* gx, float* gy) {
+  constexpr int kSide = Size<kRadius>::kSide, kRow = Size<kRadius>::kRow;
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
-      const float* p = wide + (y + 1) * kWide + x + 1;
+      const float* p = framed + (y + 1) * kRow + x + 1;
       const int i = y * kSide + x;
       patch[i] = *p;
       gx[i] = 0.5f * (p[1] - p[-1]);
-      gy[i] = 0.5f * (p[kWide] - p[-kWide]);
+      gy[i] = 0.5f * (p[kRow] - p[-kRow]);
       const Eigen::Vector3d g(gx[i], gy[i], 1.0);
       A += g * g.transpose();
     }
@@ -44,35 +48,39 @@ Eigen::Matrix2d textureOf(const Eigen::Matrix3d& A) {
 }
 
 /// Samples the patch with its margin; false outside the image.
-bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp, float* wide) {
-  for (int y = 0; y < kWide; ++y) {
-    const double dy = y - kHalf - 1;
+template <int kRadius>
+bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp, float* framed) {
+  constexpr int kRow = Size<kRadius>::kRow;
+  for (int y = 0; y < kRow; ++y) {
+    const double dy = y - kRadius - 1;
     const Eigen::Vector2d begin = pixel + warp(0, dy), slope = warp.A.col(0) + warp.xy * dy, bend = 0.5 * warp.xx;
-    for (int x = 0; x < kWide; ++x) {
-      const double dx = x - kHalf - 1;
+    for (int x = 0; x < kRow; ++x) {
+      const double dx = x - kRadius - 1;
       const Eigen::Vector2d p = begin + (slope + bend * dx) * dx;
       if (!(p.x() >= 0) || !(p.y() >= 0) || p.x() >= image.cols - 1 || p.y() >= image.rows - 1) return false;
-      wide[y * kWide + x] = bilinear(image, static_cast<float>(p.x()), static_cast<float>(p.y()));
+      framed[y * kRow + x] = bilinear(image, static_cast<float>(p.x()), static_cast<float>(p.y()));
     }
   }
   return true;
 }
 
-}  // namespace
-
-Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  float wide[kWide * kWide], patch[kCount], gx[kCount], gy[kCount];
-  if (!sample(image, pixel, PatchWarp(), wide)) return Eigen::Matrix2d::Zero();
-  return textureOf(gradients(wide, patch, gx, gy));
+template <int kRadius>
+Eigen::Matrix2d texture(const cv::Mat& image, const Eigen::Vector2d& pixel) {
+  constexpr int kRow = Size<kRadius>::kRow, kCount = Size<kRadius>::kCount;
+  float framed[kRow * kRow], patch[kCount], gx[kCount], gy[kCount];
+  if (!sample<kRadius>(image, pixel, PatchWarp(), framed)) return Eigen::Matrix2d::Zero();
+  return textureOf(gradients<kRadius>(framed, patch, gx, gy));
 }
 
-PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
-                          const cv::Mat& current, const Eigen::Vector2d& start) {
+template <int kRadius>
+PatchAlignment align(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
+                     const cv::Mat& current, const Eigen::Vector2d& start) {
+  constexpr int kSide = Size<kRadius>::kSide, kRow = Size<kRadius>::kRow, kCount = Size<kRadius>::kCount;
   PatchAlignment result;
-  float wide[kWide * kWide];
-  if (!sample(reference, reference_pixel, warp, wide)) return result;
+  float framed[kRow * kRow];
+  if (!sample<kRadius>(reference, reference_pixel, warp, framed)) return result;
   float patch[kCount], gx[kCount], gy[kCount];
-  const Eigen::Matrix3d A = gradients(wide, patch, gx, gy);
+  const Eigen::Matrix3d A = gradients<kRadius>(framed, patch, gx, gy);
   result.texture = textureOf(A);
   double mean = 0, square = 0;
   for (float value : patch) {
@@ -87,7 +95,7 @@ PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& refer
   Eigen::Vector2d pixel = start;
   float sampled[kCount];
   for (int iteration = 0; iteration < 12; ++iteration) {
-    const double x0 = pixel.x() - kHalf, y0 = pixel.y() - kHalf;
+    const double x0 = pixel.x() - kRadius, y0 = pixel.y() - kRadius;
     if (!(x0 >= 0) || !(y0 >= 0) || x0 + kSide >= current.cols || y0 + kSide >= current.rows) return result;
     const int ix = static_cast<int>(x0), iy = static_cast<int>(y0);
     const float fx = static_cast<float>(x0 - ix), fy = static_cast<float>(y0 - iy);
@@ -128,6 +136,25 @@ PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& refer
   }
   result.pixel = pixel;
   return result;
+}
+
+}  // namespace
+
+Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel, bool wide) {
+  if (wide) {
+    const Eigen::Matrix2d whole = texture<kWidePatch>(image, pixel);
+    if (!whole.isZero()) return whole;
+  }
+  return texture<kNarrowPatch>(image, pixel);
+}
+
+PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
+                          const cv::Mat& current, const Eigen::Vector2d& start, bool wide) {
+  if (wide) {
+    const PatchAlignment aligned = align<kWidePatch>(reference, reference_pixel, warp, current, start);
+    if (aligned.ok) return aligned;
+  }
+  return align<kNarrowPatch>(reference, reference_pixel, warp, current, start);
 }
 
 }  // namespace vip_slam

@@ -8,19 +8,21 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kRadius = 6;  // of the patch
 constexpr int kStride = 2;
-constexpr int kFewest = 20;
+constexpr double kFewest = 0.4;        // of the readings
+constexpr double kMostForeign = 0.05;  // far before or behind: something else covers part of the patch
 // Slopes are a few per cent a pixel at the flattest angles that can be tracked; the prior decides where readings are
 // few.
 constexpr double kPriorSlope = 0.03;
 constexpr double kSteepest = 0.06;
 
-constexpr int kSide = 2 * kRadius / kStride + 1;
-// Squared deviations of the means of the window's rows and columns from the plane, in their sigmas: ten degrees of
+// Squared deviations of the means of the window's rows and columns from the plane, in their sigmas, a degree of
 // freedom. Room for noise that neighbouring readings share, and for a part of the depth that is nobody's noise.
-constexpr double kMostOfLines = 35.0, kLineFloor = 0.0003;
+constexpr double kMostOfLines = 3.5, kLineFloor = 0.0003;
 constexpr int kFewestOfLine = 3;
+// One sigma of a reading over its depth, up to which a wide patch's lines show steps of 0.3 %, which would move half of
+// it by a pixel within three hundred.
+constexpr double kQuiet = 0.005;
 
 /// Readings in one row or column of the window.
 struct Line {
@@ -37,13 +39,13 @@ struct Line {
   }
 };
 
-}  // namespace
-
-PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
-                          const DepthNoise& noise) {
+/// The plane over the (2 kRadius + 1)^2 window about the pixel.
+template <int kRadius>
+PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
+                         const DepthNoise& noise) {
+  constexpr int kSide = 2 * kRadius / kStride + 1;
   PatchSurface surface;
   surface.depth = depth;
-  if (!(depth > 0) || depth_image.empty()) return surface;
   const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
   if (u < kRadius || v < kRadius || u + kRadius >= depth_image.cols || v + kRadius >= depth_image.rows) return surface;
 
@@ -53,13 +55,17 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   A *= sigma * sigma / (kPriorSlope * kPriorSlope);
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double square = 0;
-  int count = 0;
+  int count = 0, foreign = 0;
   Line rows[kSide], columns[kSide];
   for (int y = -kRadius; y <= kRadius; y += kStride) {
     const float* row = depth_image.ptr<float>(v + y) + u;
     for (int x = -kRadius; x <= kRadius; x += kStride) {
       const double z = row[x];
-      if (!(z > 0.5 * depth && z < 2.0 * depth)) continue;  // also refuses 0 and NaN
+      if (!(z > 0)) continue;  // also NaN
+      if (z < 0.5 * depth || z > 2.0 * depth) {
+        ++foreign;
+        continue;
+      }
       const Eigen::Vector3d row_of_A(1.0, x, y);
       const double value = depth / z - 1.0;
       A += row_of_A * row_of_A.transpose();
@@ -70,7 +76,7 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
       columns[(x + kRadius) / kStride].add(row_of_A, value);
     }
   }
-  if (count < kFewest) return surface;
+  if (count < kFewest * kSide * kSide || foreign > kMostForeign * count) return surface;
   const Eigen::Vector3d fit = A.ldlt().solve(b);
   const double residual = std::sqrt(std::max(0.0, square - b.dot(fit)) / count);
   // A step or a rim inside the window is no plane, and its slope would be worse than none.
@@ -78,10 +84,24 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   // Noise hides a step or a bend from single readings, not from the means of lines across it.
   double chi2 = 0;
   for (int i = 0; i < kSide; ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
-  if (chi2 > kMostOfLines) return surface;
+  if (chi2 > kMostOfLines * (2 * kSide - 4)) return surface;
   surface.slope = fit.tail<2>();
   surface.known = true;
   return surface;
+}
+
+}  // namespace
+
+PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
+                          const DepthNoise& noise) {
+  PatchSurface surface;
+  surface.depth = depth;
+  if (!(depth > 0) || depth_image.empty()) return surface;
+  if (noise.sigma(depth) < kQuiet * depth) {
+    surface = surfaceOver<kWidePatch>(depth_image, pixel, depth, noise);
+    surface.wide = surface.known;
+  }
+  return surface.wide ? surface : surfaceOver<kNarrowPatch>(depth_image, pixel, depth, noise);
 }
 
 bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen::Vector2d& reference_pixel,

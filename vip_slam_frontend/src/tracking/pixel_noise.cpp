@@ -19,8 +19,8 @@ constexpr double kResidual = 2.0;
 // What is left over for a patch of infinite contrast, px: the unit.
 constexpr double kFloor = 0.05;
 constexpr double kAtEdge = 2.5;
-// Matches with a patch whose surface the depth shows, shows in parts, does not show; px.
-constexpr double kKnownSurface = 0.08, kUnclearSurface = 0.25, kNoSurface = 0.6;
+// Matches with a patch whose surface the depth shows (wide, narrow), shows in parts, does not show; px.
+constexpr double kWideSurface = 0.06, kKnownSurface = 0.08, kUnclearSurface = 0.25, kNoSurface = 0.6;
 // What reads the sigma tells by it which tracks slide.
 static_assert(kUnclearSurface < kSlidingPixelSigma && kNoSurface > kSlidingPixelSigma,
               "the kinds of tracks cannot be told");
@@ -43,13 +43,14 @@ Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, 
   return L;
 }
 
-double matchSigma(const PatchSurface& surface) {
-  if (surface.known) return kKnownSurface;
-  return surface.depth > 0 ? kUnclearSurface : kNoSurface;
+double matchSigma(const PatchSurface& surface, double magnification) {
+  const double m = std::max(1.0, magnification), growth = m * std::sqrt(m);
+  if (surface.known) return growth * (surface.wide ? kWideSurface : kKnownSurface);
+  return growth * (surface.depth > 0 ? kUnclearSurface : kNoSurface);
 }
 
 double patchWander(const PatchSurface& surface, bool at_edge) {
-  return std::max(at_edge ? kAtEdge : 1.0, matchSigma(surface) / kKnownSurface);
+  return std::max(at_edge ? kAtEdge : 1.0, surface.known ? 1.0 : matchSigma(surface, 1.0) / kKnownSurface);
 }
 
 }  // namespace vip_slam

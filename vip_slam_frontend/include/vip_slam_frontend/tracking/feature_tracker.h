@@ -37,7 +37,7 @@ struct Track {
   Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
   PatchSurface surface;           ///< what the reference patch shows
   double reference_variance = 0;  ///< of the reference pixel as a view of what the track began with, px^2
-  double magnification = 1;       ///< of the newest image over the reference image, at the patch
+  double magnification = 1;       ///< of the newest over the reference image, at the patch, the larger one
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();        ///< of the patch in the newest image (patch_alignment.h)
   double residual = 0;                                      ///< of its match with the reference, grey levels
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< of the newest pixel (pixel_noise.h)
@@ -109,6 +109,9 @@ class FeatureTracker {
   void setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const;
   std::shared_ptr<ReferenceImage> referenceHere(const SE3& T_odom_C) const;
   /// Whether the track's patch in the newest image lies on one plane of the depth image; measures the feature.
+  /// Whether the newest image shows one plane all over the wide patch: something that covers two columns of it would
+  /// move the match by a sixth of a pixel.
+  bool isWideHere(Feature feature) const;
   bool surfaceIsKnown(Track* track) const;
 
   TrackingOptions options_;

@@ -16,14 +16,15 @@ struct PatchAlignment {
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< see patchTexture, of the warped patch in `current`'s pixels
 };
 
-/// Sum of the gradient products over the patch around `pixel`, the mean gradient taken out since brightness is
-/// estimated along: (grey levels / px)^2, times the variance of a grey level's inverse the information of its position.
-/// Zero outside the image.
-Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel);
+/// Sum of the gradient products over the narrow or wide patch around `pixel`, the mean gradient taken out since
+/// brightness is estimated along: (grey levels / px)^2, times the variance of a grey level's inverse the information of
+/// its position. Zero outside the image.
+Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel, bool wide = false);
 
 /// Finds in `current` the patch that `reference` shows at `reference_pixel`. `warp` maps pixel offsets of the
-/// current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge.
+/// current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge. `wide`:
+/// with the wide patch where that succeeds.
 PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
-                          const cv::Mat& current, const Eigen::Vector2d& start);
+                          const cv::Mat& current, const Eigen::Vector2d& start, bool wide = false);
 
 }  // namespace vip_slam

@@ -11,11 +11,16 @@
 
 namespace vip_slam {
 
+/// Half the side of a patch, px. The wide one halves the variance of where the patch is; it takes one plane all over
+/// it.
+constexpr int kNarrowPatch = 6, kWidePatch = 12;
+
 /// A plane is affine in inverse depth over the image: 1/z(p + d) = (1 + slope . d) / depth.
 struct PatchSurface {
   double depth = 0;                                 ///< z at the patch's middle, metres; 0: unknown, far away
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< 1/pixel; zero: facing the camera
   bool known = false;                               ///< one plane explains the depth readings of the whole patch
+  bool wide = false;                                ///< ... of the wide one as well
 
   double depthAt(const Eigen::Vector2d& offset_px) const { return depth / (1.0 + slope.dot(offset_px)); }
 };

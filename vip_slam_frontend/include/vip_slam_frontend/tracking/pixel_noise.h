@@ -15,9 +15,11 @@ namespace vip_slam {
 Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, double wander);
 
 /// One sigma, px, of a match with a reference patch, as measured against true poses. With the surface known the warp
-/// is right, and the error stays below a tenth of a pixel for as long as the track lives. At the rims of things, and
-/// far more beyond the reach of the depth camera, the patch slides over what it shows.
-double matchSigma(const PatchSurface& surface);
+/// is right, and the error stays below a tenth of a pixel for as long as the track lives, but it grows with the patch:
+/// what is wrong in the reference by as much, and its blur, in which more of the motion hides, by the rest. At the rims
+/// of things, and far more beyond the reach of the depth camera, the patch slides over what it shows. `magnification`:
+/// the larger one of the newest image over the reference; ceilings and floors grow along the motion most.
+double matchSigma(const PatchSurface& surface, double magnification);
 
 /// How many times farther than the best patches this one may be off. What slides does so as smoothly as the camera
 /// moves: residuals over a few images do not show it, but points that are taken to be fixed pull at the motion.
