@@ -1,18 +1,38 @@
 #include "vip_slam_frontend/tracking/patch_alignment.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <opencv2/imgproc.hpp>
 
 namespace vip_slam {
 
 namespace {
 
+constexpr int kIterations = 12;
+constexpr double kFarthestStep = 3.0, kConverged = 0.01;  // px
+// The camera's own blur, one sigma in px. An enlarged patch shows the reference's, enlarged as well; the newest image
+// is blurred to match where it would be by at least the second of these.
+constexpr double kBlurOfCamera = 0.55, kLeastBlur = 0.3;
+constexpr int kBlurReach = 5;  // px around the patch that it may move by
+
 template <int kRadius>
-struct Size {
+struct Patch {
   static constexpr int kSide = 2 * kRadius + 1;
   static constexpr int kRow = kSide + 2;  // one more on each side for the gradients
   static constexpr int kCount = kSide * kSide;
+  using Values = Eigen::Matrix<float, kCount, 1>;
+
+  float framed[kRow * kRow];
+  Values grey, gx, gy;
+
+  /// Samples the patch with its margin; false outside the image.
+  bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp);
+  /// Gradients; returns the sums of products of (g_x, g_y, 1).
+  Eigen::Matrix3d gradients();
 };
 
 inline float bilinear(const cv::Mat& image, float x, float y) {
@@ -23,34 +43,8 @@ inline float bilinear(const cv::Mat& image, float x, float y) {
   return (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) + fy * ((1 - fx) * q[0] + fx * q[1]);
 }
 
-/// Gradients of the inner (kSide x kSide) part; returns the sums of products of (g_x, g_y, 1).
 template <int kRadius>
-Eigen::Matrix3d gradients(const float* framed, float* patch, float* gx, float* gy) {
-  constexpr int kSide = Size<kRadius>::kSide, kRow = Size<kRadius>::kRow;
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      const float* p = framed + (y + 1) * kRow + x + 1;
-      const int i = y * kSide + x;
-      patch[i] = *p;
-      gx[i] = 0.5f * (p[1] - p[-1]);
-      gy[i] = 0.5f * (p[kRow] - p[-kRow]);
-      const Eigen::Vector3d g(gx[i], gy[i], 1.0);
-      A += g * g.transpose();
-    }
-  }
-  return A;
-}
-
-/// What the position keeps when the brightness is estimated along.
-Eigen::Matrix2d textureOf(const Eigen::Matrix3d& A) {
-  return A.topLeftCorner<2, 2>() - A.topRightCorner<2, 1>() * A.topRightCorner<2, 1>().transpose() / A(2, 2);
-}
-
-/// Samples the patch with its margin; false outside the image.
-template <int kRadius>
-bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp, float* framed) {
-  constexpr int kRow = Size<kRadius>::kRow;
+bool Patch<kRadius>::sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp) {
   for (int y = 0; y < kRow; ++y) {
     const double dy = y - kRadius - 1;
     const Eigen::Vector2d begin = pixel + warp(0, dy), slope = warp.A.col(0) + warp.xy * dy, bend = 0.5 * warp.xx;
@@ -65,70 +59,108 @@ bool sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp&
 }
 
 template <int kRadius>
+Eigen::Matrix3d Patch<kRadius>::gradients() {
+  for (int y = 0; y < kSide; ++y) {
+    const float* p = framed + (y + 1) * kRow + 1;
+    for (int x = 0; x < kSide; ++x) {
+      const int i = y * kSide + x;
+      grey[i] = p[x];
+      gx[i] = 0.5f * (p[x + 1] - p[x - 1]);
+      gy[i] = 0.5f * (p[x + kRow] - p[x - kRow]);
+    }
+  }
+  Eigen::Matrix3d A;
+  A << gx.squaredNorm(), gx.dot(gy), gx.sum(), 0, gy.squaredNorm(), gy.sum(), 0, 0, kCount;
+  return A.selfadjointView<Eigen::Upper>();
+}
+
+/// What the position keeps when the brightness is estimated along.
+Eigen::Matrix2d textureOf(const Eigen::Matrix3d& A) {
+  return A.topLeftCorner<2, 2>() - A.topRightCorner<2, 1>() * A.topRightCorner<2, 1>().transpose() / A(2, 2);
+}
+
+template <int kRadius>
 Eigen::Matrix2d texture(const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  constexpr int kRow = Size<kRadius>::kRow, kCount = Size<kRadius>::kCount;
-  float framed[kRow * kRow], patch[kCount], gx[kCount], gy[kCount];
-  if (!sample<kRadius>(image, pixel, PatchWarp(), framed)) return Eigen::Matrix2d::Zero();
-  return textureOf(gradients<kRadius>(framed, patch, gx, gy));
+  Patch<kRadius> patch;
+  return patch.sample(image, pixel, PatchWarp()) ? textureOf(patch.gradients()) : Eigen::Matrix2d::Zero();
+}
+
+/// Part of the newest image, its first element at `origin`.
+struct Window {
+  cv::Mat grey;  ///< 8U or 32F
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+};
+
+/// The image around the patch with the blur that the reference's has been enlarged to, or the image as it is.
+Window matchBlur(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp, int radius) {
+  const Eigen::Matrix2d A = warp.A.inverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(A * A.transpose());
+  const Eigen::Vector2d added = (solver.eigenvalues().array() - 1.0).max(0.0);
+  const Eigen::Matrix2d covariance = solver.eigenvectors() * added.asDiagonal() * solver.eigenvectors().transpose();
+  const double sx = kBlurOfCamera * std::sqrt(covariance(0, 0)), sy = kBlurOfCamera * std::sqrt(covariance(1, 1));
+  if (!(std::max(sx, sy) > kLeastBlur)) return {image, Eigen::Vector2d::Zero()};
+  const int reach = radius + kBlurReach, side = 2 * reach + 1;
+  const cv::Rect rect = cv::Rect(static_cast<int>(pixel.x()) - reach, static_cast<int>(pixel.y()) - reach, side, side) &
+                        cv::Rect(0, 0, image.cols, image.rows);
+  if (rect.empty()) return {image, Eigen::Vector2d::Zero()};
+  Window window{cv::Mat(), Eigen::Vector2d(rect.x, rect.y)};
+  cv::Mat cut;
+  image(rect).convertTo(cut, CV_32F);
+  const auto size = [](double sigma) { return 2 * static_cast<int>(std::ceil(2.5 * sigma)) + 1; };
+  cv::sepFilter2D(cut, window.grey, CV_32F, cv::getGaussianKernel(size(sx), std::max(sx, 0.01), CV_32F),
+                  cv::getGaussianKernel(size(sy), std::max(sy, 0.01), CV_32F), cv::Point(-1, -1), 0,
+                  cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  return window;
+}
+
+/// The square of `side` pixels whose first lies at (x, y); false outside.
+template <typename Grey, int side>
+bool shifted(const cv::Mat& image, double x, double y, float* out) {
+  if (!(x >= 0) || !(y >= 0) || x + side >= image.cols || y + side >= image.rows) return false;
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const float fx = static_cast<float>(x - ix), fy = static_cast<float>(y - iy);
+  const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
+  for (int v = 0; v < side; ++v) {
+    const Grey* p = image.ptr<Grey>(iy + v) + ix;
+    const Grey* q = image.ptr<Grey>(iy + v + 1) + ix;
+    for (int u = 0; u < side; ++u) out[v * side + u] = w00 * p[u] + w01 * p[u + 1] + w10 * q[u] + w11 * q[u + 1];
+  }
+  return true;
 }
 
 template <int kRadius>
 PatchAlignment align(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
                      const cv::Mat& current, const Eigen::Vector2d& start) {
-  constexpr int kSide = Size<kRadius>::kSide, kRow = Size<kRadius>::kRow, kCount = Size<kRadius>::kCount;
+  constexpr int kSide = Patch<kRadius>::kSide, kCount = Patch<kRadius>::kCount;
   PatchAlignment result;
-  float framed[kRow * kRow];
-  if (!sample<kRadius>(reference, reference_pixel, warp, framed)) return result;
-  float patch[kCount], gx[kCount], gy[kCount];
-  const Eigen::Matrix3d A = gradients<kRadius>(framed, patch, gx, gy);
+  Patch<kRadius> patch;
+  if (!patch.sample(reference, reference_pixel, warp)) return result;
+  const Eigen::Matrix3d A = patch.gradients();
   result.texture = textureOf(A);
-  double mean = 0, square = 0;
-  for (float value : patch) {
-    mean += value;
-    square += value * value;
-  }
-  mean /= kCount;
-  const double deviation = std::sqrt(std::max(1e-6, square / kCount - mean * mean));
+  const float mean = patch.grey.mean();
+  const float deviation = std::sqrt(std::max(1e-6f, (patch.grey.array() - mean).matrix().squaredNorm() / kCount));
   const Eigen::LDLT<Eigen::Matrix3d> solver(A);
-  if (deviation < 1.0 || solver.vectorD().minCoeff() < 1.0) return result;
+  if (deviation < 1.0f || solver.vectorD().minCoeff() < 1.0) return result;
 
+  const Window window = matchBlur(current, start, warp, kRadius);
+  const bool bytes = window.grey.depth() == CV_8U;
   Eigen::Vector2d pixel = start;
-  float sampled[kCount];
-  for (int iteration = 0; iteration < 12; ++iteration) {
-    const double x0 = pixel.x() - kRadius, y0 = pixel.y() - kRadius;
-    if (!(x0 >= 0) || !(y0 >= 0) || x0 + kSide >= current.cols || y0 + kSide >= current.rows) return result;
-    const int ix = static_cast<int>(x0), iy = static_cast<int>(y0);
-    const float fx = static_cast<float>(x0 - ix), fy = static_cast<float>(y0 - iy);
-    const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
-    double sum = 0, sum2 = 0;
-    for (int y = 0; y < kSide; ++y) {
-      const std::uint8_t* p = current.ptr<std::uint8_t>(iy + y) + ix;
-      const std::uint8_t* q = current.ptr<std::uint8_t>(iy + y + 1) + ix;
-      for (int x = 0; x < kSide; ++x) {
-        const float value = w00 * p[x] + w01 * p[x + 1] + w10 * q[x] + w11 * q[x + 1];
-        sampled[y * kSide + x] = value;
-        sum += value;
-        sum2 += value * value;
-      }
-    }
-    const double sampled_mean = sum / kCount;
-    const double sampled_deviation = std::sqrt(std::max(1e-6, sum2 / kCount - sampled_mean * sampled_mean));
+  typename Patch<kRadius>::Values seen;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    const Eigen::Vector2d first = pixel - window.origin - Eigen::Vector2d::Constant(kRadius);
+    if (!(bytes ? shifted<std::uint8_t, kSide>(window.grey, first.x(), first.y(), seen.data())
+                : shifted<float, kSide>(window.grey, first.x(), first.y(), seen.data())))
+      return result;
+    const float seen_mean = seen.mean();
+    seen.array() -= seen_mean;
     // Exposure may change the contrast; noise must not blow it up.
-    const float gain = static_cast<float>(std::min(2.0, std::max(0.5, deviation / sampled_deviation)));
-    const float offset = static_cast<float>(mean - gain * sampled_mean);
-    double bx = 0, by = 0, bo = 0, cost = 0;
-    for (int i = 0; i < kCount; ++i) {
-      const float e = gain * sampled[i] + offset - patch[i];
-      bx += gx[i] * e;
-      by += gy[i] * e;
-      bo += e;
-      cost += e * e;
-    }
-    result.residual = std::sqrt(cost / kCount);
-    const Eigen::Vector3d step = solver.solve(Eigen::Vector3d(bx, by, bo));
-    if (!step.allFinite() || step.head<2>().norm() > 3.0) return result;
+    const float gain = std::clamp(deviation / std::sqrt(std::max(1e-6f, seen.squaredNorm() / kCount)), 0.5f, 2.0f);
+    seen = gain * seen - (patch.grey.array() - mean).matrix();
+    result.residual = std::sqrt(seen.squaredNorm() / kCount);
+    const Eigen::Vector3d step = solver.solve(Eigen::Vector3d(patch.gx.dot(seen), patch.gy.dot(seen), seen.sum()));
+    if (!step.allFinite() || step.head<2>().norm() > kFarthestStep) return result;
     pixel -= step.head<2>();
-    if (step.head<2>().squaredNorm() < 1e-4) {
+    if (step.head<2>().squaredNorm() < kConverged * kConverged) {
       // What is left over must be small beside the patch's own contrast, else it shows something else.
       result.ok = result.residual < 0.6 * deviation + 2.0;
       break;
