@@ -222,7 +222,7 @@ TEST(PlaneFactors, PairsFarOffWeighLittle) {
 // A track that is off in some views is believed less in the others, too: the less the more of them are off.
 TEST(PlaneFactors, ATrackCountsAsItsPairsAgree) {
   const auto information = [](int wrong) {  // of the pairs with view 1, which is right as the host is, view 0
-    Wall wall(5, [wrong](int k) { return k > 7 - wrong ? 0.3 : 0.0; });
+    Wall wall(5, [wrong](int k) { return k > 7 - wrong ? 0.19 : 0.0; });
     wall.settings.shared_hosts = false;
     double sum = 0;
     for (const BaHomography& h : buildProblem(wall.map, globalScope(wall.map), wall.settings).problem.homographies)
