@@ -362,6 +362,22 @@ TEST(FeatureTracker, WhatCoversPartOfAWidePatchDoesNotMoveIt) {
   EXPECT_LT(std::sqrt(sum / covered), 0.08);  // px
 }
 
+TEST(FeatureTracker, PatchesStayWideThroughAnImageWithoutDepth) {
+  const cv::Mat texture = makeTexture(), wall(480, 640, CV_32F, cv::Scalar(2.0));
+  FeatureTracker tracker(TrackingOptions(), camera(), DepthNoise(), nullptr);
+  for (int k = 0; k < 3; ++k) {
+    const SE3 pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.004 * k, 0, 0));
+    const SE3 motion(Eigen::Matrix3d::Identity(), Eigen::Vector3d(k == 0 ? 0 : -0.004, 0, 0));
+    tracker.track(render(texture, pose.t(), 1.0, k + 1), k == 1 ? cv::Mat() : wall, {motion, 0, 0}, true, pose, nullptr,
+                  k);
+    if (k == 0) tracker.replenish(pose, true, k);
+    if (k == 0) continue;
+    int wide = 0;
+    for (const Track& track : tracker.tracks()) wide += track.surface.wide;
+    EXPECT_GT(wide, 100) << k;
+  }
+}
+
 TEST(FeatureTracker, ATrackBeginsAnewWhenDepthFirstShowsItsSurface) {
   const cv::Mat texture = makeTexture();
   DepthNoise noise;

@@ -229,6 +229,14 @@ TEST(BackEndMaps, AnAdjustmentFromBeforeAFragmentCameToTheMapIsDropped) {
   EXPECT_TRUE(back_end.globalBaWanted());
 }
 
+/// All planes but the first, as the plane module would list them.
+PlaneUpdate withoutTheFirst(const MapSnapshot& before) {
+  PlaneUpdate update;
+  update.revision = before.revision;
+  update.planes.assign(before.planes.begin() + 1, before.planes.end());
+  return update;
+}
+
 // What the plane module had to say when localisation was switched on it says only once.
 TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   SimulatedKeyframes world(4);
@@ -237,10 +245,8 @@ TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   const MapSnapshot before = back_end.snapshot();
   ASSERT_GT(before.planes.size(), 1u);
   back_end.setLocalisationMode(true);
-  PlaneUpdate late;
-  late.revision = before.revision;
+  PlaneUpdate late = withoutTheFirst(before);
   late.removed = {before.planes.front().id};
-  late.planes.assign(before.planes.begin() + 1, before.planes.end());
   back_end.applyPlaneUpdate(late);
   EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size());
   back_end.setLocalisationMode(false);
@@ -254,10 +260,7 @@ TEST(BackEndMaps, PlanesThatALostUpdateRemovedGoWithTheNext) {
   feed(&world, &back_end, 10);
   const MapSnapshot before = back_end.snapshot();
   ASSERT_GT(before.planes.size(), 1u);
-  PlaneUpdate next;
-  next.revision = before.revision;
-  next.planes.assign(before.planes.begin() + 1, before.planes.end());
-  back_end.applyPlaneUpdate(next);
+  back_end.applyPlaneUpdate(withoutTheFirst(before));
   EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size() - 1);
   EXPECT_FALSE(back_end.map().hasPlane(before.planes.front().id));
   EXPECT_EQ(checkMap(back_end.map()), "");

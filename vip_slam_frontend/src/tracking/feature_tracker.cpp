@@ -147,6 +147,7 @@ bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_p
 }
 
 bool FeatureTracker::isWideHere(Feature feature) const {
+  if (depth_.empty()) return true;
   measure(&feature);
   return patchSurface(depth_, pixelAtStamp(feature), feature.depth, noise_).wide;
 }

@@ -108,10 +108,10 @@ class FeatureTracker {
   void alignWithReferences(const SE3& T_odom_C);
   void setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const;
   std::shared_ptr<ReferenceImage> referenceHere(const SE3& T_odom_C) const;
-  /// Whether the track's patch in the newest image lies on one plane of the depth image; measures the feature.
   /// Whether the newest image shows one plane all over the wide patch: something that covers two columns of it would
-  /// move the match by a sixth of a pixel.
+  /// move the match by a sixth of a pixel. An image without depth tells nothing against it.
   bool isWideHere(Feature feature) const;
+  /// Whether the track's patch in the newest image lies on one plane of the depth image; measures the feature.
   bool surfaceIsKnown(Track* track) const;
 
   TrackingOptions options_;
