@@ -65,6 +65,8 @@ class FrontEnd::Impl {
   };
 
   /// Empty when the input is usable; else what is wrong. Fixes up the depth.
+  /// From now on depth is read with what the filter has found out of its shift.
+  void followDepthShift();
   std::string checkInput(const FrameInput& input, DepthReading* depth);
   bool noticeTimeJump(double t, double newest, const char* what);
   void countImu();
@@ -181,6 +183,7 @@ class FrontEnd::Impl {
   bool still_ = false;
   SE3 T_map_odom_;
   bool have_map_ = false;
+  DepthShift depth_shift_;      ///< that the filter has found out, beside the sensor's own
   DepthCurve depth_curve_;      ///< that the map has found out, after the sensor's own
   double disparity_error_ = 0;  ///< 1/m, that was part of the curve when what is known of depth's offset began
   using PixelList = std::vector<std::pair<LandmarkId, Eigen::Vector2f>>;

@@ -31,6 +31,8 @@ FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& 
   FilterOptions filter = options.filter;
   filter.calibration.intrinsics =
       filter.calibration.intrinsics && sensor.depth_registered && sensor.camera.model != DistortionModel::kEquidistant;
+  filter.calibration.depth_shift =
+      filter.calibration.depth_shift && sensor.camera.model != DistortionModel::kEquidistant;
   return filter;
 }
 
@@ -137,11 +139,22 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* de
     depth->image = input.depth;
     depth->lag = std::abs(input.depth_lag) >= kSameInstant ? input.depth_lag : 0.0;
     const DepthCurve curve = chained(sensor_.depth_curve, depth_curve_);
-    if (!masked_.empty() || !curve.empty()) depth->image = input.depth.clone();  // the caller's own stays as it is
+    const Eigen::Vector2d shift = sensor_.depth_shift + depth_shift_.px;
+    const bool shifted = !shift.isZero();
+    if (shifted) depth->image = shiftedDepth(input.depth, shift);
+    // The caller's own stays as it is.
+    if (!shifted && (!masked_.empty() || !curve.empty())) depth->image = input.depth.clone();
     if (!masked_.empty()) depth->image.setTo(0, masked_);
     applyDepthCurve(curve, &depth->image);
   }
   return "";
+}
+
+void FrontEnd::Impl::followDepthShift() {
+  const Eigen::Vector2d& found = filter_.takeDepthShift();
+  if (found == depth_shift_.bearing) return;
+  depth_shift_ = {found.cwiseProduct(Eigen::Vector2d(sensor_.camera.fx, sensor_.camera.fy)), found};
+  surfaces_.clear();  // they have the readings as they were
 }
 
 void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {

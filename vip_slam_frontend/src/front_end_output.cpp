@@ -41,6 +41,8 @@ MountingEstimate FrontEnd::Impl::mounting() const {
   // Readings and rates have what was given by the time they get here.
   mounting.depth_offset += sensor_.depth_offset;
   const CameraIntrinsics& camera = sensor_.camera;
+  mounting.depth_shift_px =
+      sensor_.depth_shift + mounting.depth_shift.cwiseProduct(Eigen::Vector2d(camera.fx, camera.fy));
   mounting.intrinsics = correctedIntrinsics({camera.fx, camera.fy, camera.cx, camera.cy}, mounting.bearing);
   mounting.gyro_correction += sensor_.gyro_correction + mounting.gyro_correction * sensor_.gyro_correction;
   return mounting;
@@ -60,7 +62,7 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   frame->status = status_;
   frame->T_I_C = extrinsics();
   frame->time_offset = timeOffset();
-  frame->camera_correction = {filter_.depthCorrection(), depth_curve_, filter_.bearingCorrection()};
+  frame->camera_correction = {filter_.depthCorrection(), depth_curve_, filter_.bearingCorrection(), depth_shift_};
   frame->zero_velocity = still_;
   frame->keyframe = newest_keyframe_;
   if (filter_.started()) {

@@ -25,6 +25,7 @@ constexpr double kBeyondRange = 0.3;
 FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::PoseReady& on_pose) {
   ScopedTimer timer(timing_, "frontend.total", input.t);
   ++counters_.images;
+  followDepthShift();
   DepthReading depth;
   const std::string problem = checkInput(input, &depth);
   if (!problem.empty()) return unusable(input.t, problem);
@@ -87,7 +88,8 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
   for (const Track& track : tracker_.tracks()) {
     const Feature& f = track.feature;
     const Eigen::Vector2d xy = f.xy.cast<double>();
-    list.push_back({f.id, xy, f.depth, f.depth_sigma, track.whitening, bearingJacobian(*camera_, xy)});
+    const Eigen::Vector2d depth_slope = camera_->focal() * track.depth_slope;
+    list.push_back({f.id, xy, f.depth, f.depth_sigma, depth_slope, track.whitening, bearingJacobian(*camera_, xy)});
   }
   return list;
 }

@@ -126,6 +126,7 @@ vip_slam_msgs::TrackedFrame toMsg(const TrackedFrame& frame, const std::string& 
   msg.depth_correction = frame.camera_correction.offset;
   msg.depth_curve = frame.camera_correction.curve.added;
   msg.bearing_correction = toArray(frame.camera_correction.bearing);
+  msg.depth_shift = toArray(frame.camera_correction.shift);
   msg.features.reserve(frame.features.size());
   for (const Feature& feature : frame.features) msg.features.push_back(toMsg(feature));
   msg.depth_grid = toMsg(frame.depth_grid);
@@ -144,7 +145,10 @@ TrackedFrame fromMsg(const vip_slam_msgs::TrackedFrame& msg) {
   frame.T_I_C = fromMsg(msg.imu_camera);
   frame.T_chain_C = fromMsg(msg.chain_camera);
   frame.time_offset = msg.time_offset;
-  frame.camera_correction = {msg.depth_correction, {msg.depth_curve}, fromArray(msg.bearing_correction)};
+  frame.camera_correction = {msg.depth_correction,
+                             {msg.depth_curve},
+                             bearingFromArray(msg.bearing_correction),
+                             shiftFromArray(msg.depth_shift)};
   frame.features.reserve(msg.features.size());
   for (const auto& feature : msg.features) frame.features.push_back(fromMsg(feature));
   frame.depth_grid = fromMsg(msg.depth_grid);

@@ -69,7 +69,13 @@ boost::array<double, 4> toArray(const BearingCorrection& bearing) {
   return values;
 }
 
-BearingCorrection fromArray(const boost::array<double, 4>& bearing) {
+boost::array<double, 4> toArray(const DepthShift& shift) {
+  return {{shift.px.x(), shift.px.y(), shift.bearing.x(), shift.bearing.y()}};
+}
+
+DepthShift shiftFromArray(const boost::array<double, 4>& shift) { return {{shift[0], shift[1]}, {shift[2], shift[3]}}; }
+
+BearingCorrection bearingFromArray(const boost::array<double, 4>& bearing) {
   return {Eigen::Map<const Eigen::Vector4d>(bearing.data())};
 }
 

@@ -94,6 +94,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
     k.depth_correction = keyframe.camera_correction.offset;
     k.depth_curve = keyframe.camera_correction.curve.added;
     k.bearing_correction = toArray(keyframe.camera_correction.bearing);
+    k.depth_shift = toArray(keyframe.camera_correction.shift);
     msg.keyframes.push_back(k);
   }
   msg.landmarks.reserve(update.landmarks.size());
@@ -131,11 +132,13 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.global = msg.global_update;
   update.keyframes.reserve(msg.keyframes.size());
   for (const auto& keyframe : msg.keyframes) {
-    update.keyframes.push_back(
-        {keyframe.id,
-         fromMsg(keyframe.state),
-         fromMsg(keyframe.imu_camera),
-         {keyframe.depth_correction, {keyframe.depth_curve}, fromArray(keyframe.bearing_correction)}});
+    update.keyframes.push_back({keyframe.id,
+                                fromMsg(keyframe.state),
+                                fromMsg(keyframe.imu_camera),
+                                {keyframe.depth_correction,
+                                 {keyframe.depth_curve},
+                                 bearingFromArray(keyframe.bearing_correction),
+                                 shiftFromArray(keyframe.depth_shift)}});
   }
   update.landmarks.reserve(msg.landmarks.size());
   for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));

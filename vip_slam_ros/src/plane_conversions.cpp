@@ -96,6 +96,7 @@ vip_slam_msgs::PlaneObservation toMsg(const PlaneObservation& observation) {
   msg.depth_correction = observation.camera_correction.offset;
   msg.depth_curve = observation.camera_correction.curve.added;
   msg.bearing_correction = toArray(observation.camera_correction.bearing);
+  msg.depth_shift = toArray(observation.camera_correction.shift);
   msg.points.reserve(4 * observation.points.size());
   for (const auto& point : observation.points) {
     msg.points.insert(msg.points.end(), {point.p_C.x(), point.p_C.y(), point.p_C.z(), point.sigma});
@@ -113,7 +114,10 @@ PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg) {
   observation.plane = msg.plane;
   observation.G = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(msg.g.data());
   observation.weight_scale = msg.weight_scale;
-  observation.camera_correction = {msg.depth_correction, {msg.depth_curve}, fromArray(msg.bearing_correction)};
+  observation.camera_correction = {msg.depth_correction,
+                                   {msg.depth_curve},
+                                   bearingFromArray(msg.bearing_correction),
+                                   shiftFromArray(msg.depth_shift)};
   observation.points.reserve(msg.points.size() / 4);
   for (std::size_t i = 0; i < msg.points.size(); i += 4) {
     observation.points.push_back({{msg.points[i], msg.points[i + 1], msg.points[i + 2]}, msg.points[i + 3]});

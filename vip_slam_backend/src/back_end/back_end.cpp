@@ -241,6 +241,7 @@ void BackEnd::Impl::reset() {
   camera_correction = {};
   newest_depth_offset = disparity_error = 0;
   newest_bearing = {};
+  newest_depth_shift = {};
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   loops.clear();
@@ -262,6 +263,7 @@ GbaJob BackEnd::startGlobalBa() {
   impl_->global_wanted = false;
   impl_->camera_correction.offset = impl_->newest_depth_offset;
   impl_->camera_correction.bearing = impl_->newest_bearing;
+  impl_->camera_correction.shift = impl_->newest_depth_shift;
   impl_->map.adoptCameraCorrection(impl_->camera_correction);
   impl_->gyro_correction = impl_->newest_gyro_correction;
   impl_->map.adoptGyroCorrection(impl_->gyro_correction, impl_->sensor.imu_noise);

@@ -13,6 +13,7 @@ namespace {
 // Smaller changes of the camera's correction wait for the next global adjustment: m, normalised.
 constexpr double kNewDepthOffset = 0.001;
 constexpr double kNewBearing = 1e-4;
+constexpr double kNewDepthShift = 0.02;      // px
 constexpr double kNewGyroCorrection = 5e-4;  // likewise
 
 }  // namespace
@@ -21,11 +22,14 @@ void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
   if (newest.curve != camera_correction.curve) return;  // it goes with readings as they were
   newest_depth_offset = newest.offset;
   newest_bearing = newest.bearing;
+  newest_depth_shift = newest.shift;
   if (std::abs(newest.offset - camera_correction.offset) < kNewDepthOffset &&
-      (newest.bearing.value - camera_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing)
+      (newest.bearing.value - camera_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing &&
+      (newest.shift.px - camera_correction.shift.px).cwiseAbs().maxCoeff() < kNewDepthShift)
     return;
   camera_correction.offset = newest.offset;
   camera_correction.bearing = newest.bearing;
+  camera_correction.shift = newest.shift;
   map.adoptCameraCorrection(camera_correction);
   global_wanted = true;
   ++correction;  // an adjustment under way has the readings as they were

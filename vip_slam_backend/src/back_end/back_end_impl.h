@@ -130,6 +130,7 @@ struct BackEnd::Impl {
   CameraCorrection camera_correction;                         ///< of all keyframes of this session
   double newest_depth_offset = 0;                             ///< m, as the newest keyframe came
   BearingCorrection newest_bearing;                           ///< likewise
+  DepthShift newest_depth_shift;                              ///< likewise
   double disparity_error = 0;                                 ///< 1/m, which the curve takes care of
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< of all keyframes of this session but for little
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< as the newest keyframe came

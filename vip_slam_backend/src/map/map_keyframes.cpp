@@ -11,6 +11,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kMostBearing = 0.2;         // share of the focal length
+constexpr double kMostDepthShift = 100;      // px
 constexpr double kMostGyroCorrection = 0.5;  // each entry
 constexpr double kSameTime = 1e-6;           // s
 
@@ -66,7 +67,9 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   // All keyframes take over what the newest one says of the camera.
   const CameraCorrection& camera = keyframe.frame.camera_correction;
   if (!std::isfinite(camera.offset) || !(camera.bearing.value.cwiseAbs().maxCoeff() < kMostBearing) ||
-      !camera.bearing.value.allFinite())
+      !camera.bearing.value.allFinite() || !camera.shift.px.allFinite() || !camera.shift.bearing.allFinite() ||
+      camera.shift.px.cwiseAbs().maxCoeff() > kMostDepthShift ||
+      camera.shift.bearing.cwiseAbs().maxCoeff() > kMostBearing)
     return name + "the camera's correction is not finite, or beyond what a camera can be off by";
   if (!keyframe.gyro_correction.allFinite() || keyframe.gyro_correction.cwiseAbs().maxCoeff() > kMostGyroCorrection)
     return name + "the gyro's correction is not finite, or beyond what a gyro can be off by";

@@ -124,6 +124,8 @@ void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const D
   list("sigma_bearing", mounting.sigma_bearing);
   yaml << YAML::Key << "depth_offset" << YAML::Value << mounting.depth_offset;
   yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << mounting.sigma_depth_offset;
+  list("depth_shift", mounting.depth_shift_px);
+  list("sigma_depth_shift", mounting.sigma_depth_shift);
   Eigen::VectorXd added(static_cast<Eigen::Index>(depth_curve.added.size()));
   for (Eigen::Index k = 0; k < added.size(); ++k) {
     added(k) = 1e-5 * std::round(1e5 * double(depth_curve.added[static_cast<std::size_t>(k)]));

@@ -15,6 +15,8 @@
 namespace vip_slam {
 namespace {
 
+constexpr double kMostDepthShift = 50;  // px; so much more is no error but another camera
+
 /// A map whose every key must be asked for: what is left over is an unknown key.
 class Section {
  public:
@@ -193,6 +195,13 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   depth.choice("encoding", config.depth_encoding, {"16UC1", "32FC1", "compressed"});
   depth.number("scale", config.depth_scale, 1e-6, 1.0);
   depth.number("offset", config.depth_offset, -0.5, 0.5, false);
+  std::vector<double> shift;
+  depth.get("shift", shift, false);
+  if (!shift.empty() && shift.size() != 2)
+    throw std::runtime_error("depth/shift: " + std::to_string(shift.size()) + " numbers, expected two: right and down");
+  if (!shift.empty()) config.depth_shift = {shift[0], shift[1]};
+  if (!(config.depth_shift.cwiseAbs().maxCoeff() <= kMostDepthShift))
+    throw std::runtime_error("depth/shift: expected at most " + formatDouble(kMostDepthShift) + " pixels");
   std::vector<double> added;
   depth.get("curve", added, false);
   config.depth_curve.added.assign(added.begin(), added.end());
@@ -297,7 +306,8 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
       << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter)
       << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
-      << "\n  offset: " << formatDouble(config.depth_offset) << "\n  curve: " << list(config.depth_curve.added)
+      << "\n  offset: " << formatDouble(config.depth_offset) << "\n  shift: [" << formatDouble(config.depth_shift.x())
+      << ", " << formatDouble(config.depth_shift.y()) << "]\n  curve: " << list(config.depth_curve.added)
       << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
       << "\n  rolling_shutter: " << formatDouble(config.depth_rolling_shutter)

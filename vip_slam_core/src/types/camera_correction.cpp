@@ -8,6 +8,14 @@ Eigen::Matrix3f bearingChange(const BearingCorrection& from, const BearingCorrec
   return (to.matrix() * from.matrix().inverse()).cast<float>();
 }
 
+/// The same of depth points, which lie where their reading was: the farther right the depth image is found to lie, the
+/// farther left.
+Eigen::Matrix3f pointChange(const CameraCorrection& from, const CameraCorrection& to) {
+  Eigen::Matrix3d back = Eigen::Matrix3d::Identity();
+  back.col(2).head<2>() = from.shift.bearing - to.shift.bearing;
+  return (to.bearing.matrix() * back * from.bearing.matrix().inverse()).cast<float>();
+}
+
 }  // namespace
 
 KeyframePtr withCameraCorrection(const KeyframePtr& keyframe, const CameraCorrection& correction) {
@@ -16,18 +24,24 @@ KeyframePtr withCameraCorrection(const KeyframePtr& keyframe, const CameraCorrec
   auto corrected = std::make_shared<Keyframe>(*keyframe);
   corrected->frame.camera_correction = correction;
   const Eigen::Matrix3f turn = bearingChange(keyframe->frame.camera_correction.bearing, correction.bearing);
+  const Eigen::Vector2d shift = correction.shift.px - keyframe->frame.camera_correction.shift.px;
+  DepthGrid& grid = corrected->frame.depth_grid;
+  if (!shift.isZero()) {
+    for (Feature& f : corrected->frame.features) f.depth = shiftedDepthAt(grid, f.pixel.cast<double>(), f.depth, shift);
+    grid = shiftedDepthGrid(grid, shift);
+  }
   for (Feature& f : corrected->frame.features) {
     f.depth = change(f.depth);
     f.xy = (turn * f.xy.homogeneous()).head<2>();
   }
-  for (float& z : corrected->frame.depth_grid.z) z = change(z);
+  for (float& z : grid.z) z = change(z);
   return corrected;
 }
 
 void setCameraCorrection(const CameraCorrection& correction, PlaneObservation* observation) {
   if (observation->camera_correction == correction) return;
   const DepthChange change(observation->camera_correction, correction);
-  const Eigen::Matrix3f turn = bearingChange(observation->camera_correction.bearing, correction.bearing);
+  const Eigen::Matrix3f turn = pointChange(observation->camera_correction, correction);
   observation->camera_correction = correction;
   if (observation->points.empty()) return;
   observation->G.setZero();

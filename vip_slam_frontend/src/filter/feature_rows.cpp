@@ -81,8 +81,7 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     J_measure = weight * J_measure;
 
     const Eigen::Vector2d xy = o.xy + o.by_intrinsics * window.bearing.value;
-    Eigen::Vector3d residual(xy.x() - p_C.x() / p_C.z(), xy.y() - p_C.y() / p_C.z(),
-                             window.trueDepth(o.depth) - p_C.z());
+    Eigen::Vector3d residual(xy.x() - p_C.x() / p_C.z(), xy.y() - p_C.y() / p_C.z(), trueDepth(window, o) - p_C.z());
     residual = weight * residual;
 
     const Eigen::Matrix3d M_theta = J_measure * J_theta, M_f = J_measure * J_f;
@@ -109,6 +108,8 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
       by_intrinsics.leftCols<2>() += (q_C.head<2>() / q_C.z() - xy).asDiagonal();
       H_x->block<2, 4>(row, window.intrinsicsColumn()) = -weight.topLeftCorner<2, 2>() * by_intrinsics;
     }
+    if (window.calibration.depth_shift && with_depth)
+      H_x->block<1, 2>(row + 2, window.depthShiftColumn()) = -o.depth_slope.transpose() / sigma_z;
     r->segment(row, rows) = residual.head(rows);
     row += rows;
   }

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kSure = 5.0;  // sigmas
 constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002, kLeastDepth = 0.005,
-                 kLeastBearing = 0.001, kLeastGyroError = 0.002;
+                 kLeastBearing = 0.001, kLeastGyroError = 0.002, kLeastDepthShift = 0.001;
 
 template <typename... Numbers>
 std::string sentence(const char* format, Numbers... numbers) {
@@ -61,6 +61,14 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
                  "configuration should be %.4f",
                  1e3 * std::abs(depth), depth < 0 ? "long" : "short",
                  1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
+  }
+  const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
+  const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();
+  if ((beside_sigma > 0 && beside > (kSure * beside_sigma).cwiseMax(kLeastDepthShift)).any()) {
+    all.push_back(
+        sentence("the depth image lies beside the colour image, which is corrected for; depth/shift in the sensor's "
+                 "configuration should be [%.2f, %.2f] pixels",
+                 found.depth_shift_px.x(), found.depth_shift_px.y()));
   }
   const Eigen::Array4d bearing = (found.bearing.value - given.bearing.value).cwiseAbs();
   const Eigen::Array4d& bearing_sigma = found.sigma_bearing.array();

@@ -51,7 +51,11 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const int reference = layout.reference(), offset = translation + (window.calibration.translation ? 3 : 0);
   const int depth = offset + (window.calibration.time_offset ? 1 : 0);
   const int intrinsics = depth + (window.calibration.depth_offset ? 1 : 0);
-  const Eigen::Matrix3d bearing = window.bearing.matrix(), normal = bearing.inverse().transpose();
+  const int shift = intrinsics + (window.calibration.intrinsics ? 4 : 0);
+  // Of depth points alone a shift of their image and one of the principal point are the same.
+  Eigen::Matrix3d bearing = window.bearing.matrix();
+  bearing.col(2).head<2>() -= window.depth_shift;
+  const Eigen::Matrix3d normal = bearing.inverse().transpose();
 
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<int>(pairs.size()), layout.size() + 1);
   for (int i = 0; i < A.rows(); ++i) {
@@ -85,7 +89,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
                      A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
     }
     if (window.calibration.depth_offset) A(i, depth) = w * n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
-    if (window.calibration.intrinsics) {
+    if (window.calibration.intrinsics || window.calibration.depth_shift) {
       // Of a point (x, y, z) by (sx, sy, cx, cy): (x, 0), (0, y), (z, 0), (0, z). The normal turns against it, which
       // shows in how far beside each other the two points lie.
       const Eigen::Matrix3d R_ref_cur = R_I_C.transpose() * R_ab * R_I_C;
@@ -93,8 +97,11 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
       const Eigen::Vector3d apart = R_I_C.transpose() * (s_I - t_I_C) - p_ref;
       const Eigen::Vector3d beside = apart - n_ref.dot(apart) * n_ref;
       for (int k = 0; k < 2; ++k) {
-        A(i, intrinsics + k) = w * (n_cur(k) * q_given(k) - n_ref(k) * p_given(k) - n_ref(k) * beside(k));
-        A(i, intrinsics + 2 + k) = w * (n_cur(k) * q_cur.z() - n_ref(k) * p_ref.z() - n_ref(k) * beside.z());
+        const double by_scale = n_cur(k) * q_given(k) - n_ref(k) * p_given(k) - n_ref(k) * beside(k);
+        const double by_centre = n_cur(k) * q_cur.z() - n_ref(k) * p_ref.z() - n_ref(k) * beside.z();
+        if (window.calibration.intrinsics) A(i, intrinsics + k) = w * by_scale;
+        if (window.calibration.intrinsics) A(i, intrinsics + 2 + k) = w * by_centre;
+        if (window.calibration.depth_shift) A(i, shift + k) = -w * by_centre;
       }
     }
     A(i, layout.size()) = -w * n_ref.dot(T_ref_cur * q_cur - p_ref);

@@ -28,7 +28,7 @@ double depthInAnchor(const WindowState& window, const std::vector<View>& views) 
   for (const View& view : views) {
     const Observation& o = *view.observation;
     if (o.depth <= 0) continue;
-    const Eigen::Vector3d p_C = window.trueDepth(o.depth) * view.xy.homogeneous();
+    const Eigen::Vector3d p_C = trueDepth(window, o) * view.xy.homogeneous();
     z.push_back((view.R.transpose() * (p_C - view.t)).z());
   }
   return z.empty() ? 0.0 : medianOf(z);
@@ -130,7 +130,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
       if (noise.use_depth && view.observation->depth > 0) {
         const double sigma = view.observation->depth_sigma * noise.depth_inflation;
         const double z_C = s.z() / x.z();
-        const double rz = (window.trueDepth(view.observation->depth) - z_C) / sigma;
+        const double rz = (trueDepth(window, *view.observation) - z_C) / sigma;
         Eigen::RowVector3d Jz = ds.row(2) / x.z();
         Jz.z() -= s.z() / (x.z() * x.z());
         Jz /= sigma;

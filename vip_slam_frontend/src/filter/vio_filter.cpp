@@ -72,12 +72,13 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.time_offset = learnt_.time_offset;
   window.depth_offset = learnt_.depth_offset;
   window.bearing = learnt_.bearing;
+  window.depth_shift = learnt_.depth_shift;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = {calibration.rotation,         calibration.translation,
-                        calibration.time_offset,      calibration.depth_offset && !depth_contradicts_,
-                        calibration.intrinsics,       calibration.gyro_scale,
-                        calibration.gyro_misalignment};
+  window.calibration = {calibration.rotation,    calibration.translation,
+                        calibration.time_offset, calibration.depth_offset && !depth_contradicts_,
+                        calibration.intrinsics,  calibration.depth_shift && !shift_contradicts_,
+                        calibration.gyro_scale,  calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
@@ -92,8 +93,10 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
       sigma = calibration.sigma_translation;
     } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
       sigma = sigma_depth_offset_;
-    } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.gyroColumn()) {
+    } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.depthShiftColumn()) {
       sigma = calibration.sigma_centre;
+    } else if (c >= window.depthShiftColumn() && c < window.gyroColumn()) {
+      sigma = calibration.sigma_depth_shift;
     } else if (c >= window.gyroColumn()) {
       sigma = imu_noise_.gyro_correction_sigma;
     }
@@ -168,7 +171,7 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
   for (const FilterMeasurement& m : measurements) {
     FilterTrack& track = tracks_[m.id];
     track.id = m.id;
-    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma, m.by_intrinsics, m.whitening});
+    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma, m.depth_slope, m.by_intrinsics, m.whitening});
   }
 }
 
@@ -234,6 +237,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
   if (delay_before_) holdDelay();
   judgeDepthOffset();
+  judgeDepthShift();
   judgeIntrinsics();
   judgeGyroCorrection();
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());

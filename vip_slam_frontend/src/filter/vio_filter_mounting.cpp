@@ -15,6 +15,11 @@ constexpr double kBelievableChange = 4.0, kMostGyroError = 0.05;
 constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
 // One sigma of an offset that is taken back or known to be none, m.
 constexpr double kHeldOffset = 1e-6;
+// How far the depth image lies beside: of the focal length, what is beyond doubt, worth the trouble and well enough
+// known to be taken. A tenth of a pixel costs a wide office two millimetres.
+constexpr double kSureShift = 4.0, kLeastShift = 1e-4, kKnownShift = 2e-4;
+// One sigma of one that is taken back.
+constexpr double kHeldShift = 1e-7;
 // An entry of the gyro's correction likewise: half a thousandth of a turn by 60 degrees is 0.03 degrees.
 constexpr double kSureGyroError = 4.0, kLeastGyroError = 5e-4;
 // An entry of the bearings' correction likewise: focal lengths, principal point. Exact focal lengths come out within
@@ -27,7 +32,8 @@ const Eigen::Array4d kLeastBearing(1e-3, 1e-3, 5e-4, 5e-4);
 MountingEstimate VioFilter::mounting() const {
   if (!started_) {
     MountingEstimate mounting = learnt_;
-    mounting.depth_contradicts = depth_contradicts_;
+    mounting.depth_shift += depth_shift_;
+    mounting.depth_contradicts = depth_contradicts_ || shift_contradicts_;
     return mounting;
   }
   const WindowState& window = filter_.window();
@@ -36,8 +42,9 @@ MountingEstimate VioFilter::mounting() const {
   mounting.time_offset = window.time_offset;
   mounting.depth_offset = window.depth_offset;
   mounting.bearing = window.bearing;
+  mounting.depth_shift = depth_shift_ + window.depth_shift;
   mounting.gyro_correction = window.gyro_correction;
-  mounting.depth_contradicts = depth_contradicts_;
+  mounting.depth_contradicts = depth_contradicts_ || shift_contradicts_;
   if (window.calibration.size() == 0) return mounting;
   const Eigen::VectorXd sigmas = filter_.calibrationSigmas();
   const int first = window.calibrationColumn();
@@ -48,6 +55,9 @@ MountingEstimate VioFilter::mounting() const {
   if (window.calibration.time_offset) mounting.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
   if (window.calibration.depth_offset) mounting.sigma_depth_offset = sigmas(window.depthOffsetColumn() - first);
   if (window.calibration.intrinsics) mounting.sigma_bearing = sigmas.segment<4>(window.intrinsicsColumn() - first);
+  if (window.calibration.depth_shift) {
+    mounting.sigma_depth_shift = sigmas.segment<2>(window.depthShiftColumn() - first);
+  }
   for (int k = 0; k < window.calibration.gyro(); ++k) {
     const auto [row, column] = gyroEntry(window.calibration, k);
     mounting.sigma_gyro_correction(row, column) = sigmas(window.gyroColumn() - first + k);
@@ -58,6 +68,8 @@ MountingEstimate VioFilter::mounting() const {
 void VioFilter::learnMounting() {
   const WindowState& window = filter_.window();
   learnt_ = given_;
+  const Eigen::Vector2d depth_shift = depth_shift_;
+  depth_shift_.setZero();
   if (!window.isFinite()) return;
   const CalibrationOptions& options = options_.calibration;
   const Vector6d change = window.T_I_C.boxminus(given_.T_I_C);
@@ -67,6 +79,7 @@ void VioFilter::learnMounting() {
       std::abs(window.depth_offset - given_.depth_offset) > kBelievableChange * options.sigma_depth_offset ||
       (window.bearing.value.head<2>().array().abs() > kBelievableChange * options.sigma_focal).any() ||
       (window.bearing.value.tail<2>().array().abs() > kBelievableChange * options.sigma_centre).any() ||
+      ((depth_shift + window.depth_shift).array().abs() > kBelievableChange * options.sigma_depth_shift).any() ||
       window.gyro_correction.cwiseAbs().maxCoeff() > kMostGyroError) {
     return;
   }
@@ -74,6 +87,8 @@ void VioFilter::learnMounting() {
   learnt_.time_offset = window.time_offset;
   learnt_.depth_offset = window.depth_offset;
   learnt_.bearing = window.bearing;
+  learnt_.depth_shift = window.depth_shift;
+  depth_shift_ = depth_shift;
   learnt_.gyro_correction = window.gyro_correction;
 }
 
@@ -94,6 +109,44 @@ void VioFilter::judgeDepthOffset() {
   filter_.update(H, r);
   depth_contradicts_ = true;
   depth_is_off_ = false;
+}
+
+void VioFilter::moveDepth(const Eigen::Vector2d& shift) {
+  for (auto& [id, track] : tracks_) {
+    for (Observation& o : track.observations) {
+      if (o.depth > 0) o.depth = std::max(1e-3, o.depth + o.depth_slope.dot(shift));
+    }
+  }
+}
+
+void VioFilter::judgeDepthShift() {
+  const WindowState& window = filter_.window();
+  if (!window.calibration.depth_shift || shift_contradicts_) return;
+  const Eigen::Vector2d change = depth_shift_ + window.depth_shift;
+  if (change.cwiseAbs().maxCoeff() <= kBelievableChange * options_.calibration.sigma_depth_shift) return;
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, window.dimension());
+  H.middleCols<2>(window.depthShiftColumn()).diagonal().setConstant(1.0 / kHeldShift);
+  Eigen::VectorXd r = -change / kHeldShift;
+  filter_.update(H, r);
+  moveDepth(-depth_shift_);
+  depth_shift_.setZero();
+  filter_.window().depth_shift.setZero();
+  shift_contradicts_ = true;
+}
+
+const Eigen::Vector2d& VioFilter::takeDepthShift() {
+  if (!started_ || !filter_.window().calibration.depth_shift || shift_contradicts_) return depth_shift_;
+  const Eigen::Vector2d rest = filter_.window().depth_shift;
+  if (rest.cwiseAbs().maxCoeff() < kLeastShift) return depth_shift_;
+  const Eigen::Vector2d sigma = mounting().sigma_depth_shift;
+  const auto off = rest.array().abs();
+  if (sigma.maxCoeff() > kKnownShift || !(off > kLeastShift && off > kSureShift * sigma.array()).any()) {
+    return depth_shift_;
+  }
+  moveDepth(rest);
+  depth_shift_ += rest;
+  filter_.window().depth_shift.setZero();
+  return depth_shift_;
 }
 
 void VioFilter::restartDepthOffset(bool none) {

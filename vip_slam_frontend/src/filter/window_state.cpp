@@ -36,6 +36,7 @@ void WindowState::boxplus(const Eigen::VectorXd& delta) {
   if (calibration.time_offset) time_offset += delta(timeOffsetColumn());
   if (calibration.depth_offset) depth_offset += delta(depthOffsetColumn());
   if (calibration.intrinsics) bearing.value += delta.segment<4>(intrinsicsColumn());
+  if (calibration.depth_shift) depth_shift += delta.segment<2>(depthShiftColumn());
   for (int k = 0; k < calibration.gyro(); ++k) {
     const auto [row, column] = gyroEntry(calibration, k);
     gyro_correction(row, column) += delta(gyroColumn() + k);
@@ -51,7 +52,7 @@ bool WindowState::isFinite() const {
   }
   return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
          std::isfinite(time_offset) && std::isfinite(depth_offset) && bearing.value.allFinite() &&
-         gyro_correction.allFinite();
+         depth_shift.allFinite() && gyro_correction.allFinite();
 }
 
 }  // namespace vip_slam

@@ -72,6 +72,10 @@ void FeatureTracker::measure(Track* track) const {
   const bool at_edge = source != FeatureDepth::Source::kSmooth && source != FeatureDepth::Source::kNone;
   track->whitening = pixelWhitening(track->texture, track->residual, patchWander(track->surface, at_edge));
   track->feature.pixel_sigma = static_cast<float>(std::sqrt(pixelVariance(*track)));
+  const double z = track->feature.depth;
+  const PatchSurface here = narrowPatchSurface(depth_, pixelAtStamp(track->feature), z, noise_);
+  // 1 / z(p + d) = (1 + slope . d) / z
+  track->depth_slope = -z * here.slope;
 }
 
 void FeatureTracker::matchExposure(const cv::Mat& gray) {

@@ -104,6 +104,12 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   return surface.wide ? surface : surfaceOver<kNarrowPatch>(depth_image, pixel, depth, noise);
 }
 
+PatchSurface narrowPatchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
+                                const DepthNoise& noise) {
+  if (!(depth > 0) || depth_image.empty()) return {depth};
+  return surfaceOver<kNarrowPatch>(depth_image, pixel, depth, noise);
+}
+
 bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen::Vector2d& reference_pixel,
                const PatchSurface& surface, const SE3& T_cur_ref, PatchWarp* warp_ref_cur) {
   PatchSurface plane = surface;

@@ -10,6 +10,7 @@
 #include <boost/array.hpp>
 
 #include "vip_slam_core/camera/bearing_correction.h"
+#include "vip_slam_core/depth/depth_shift.h"
 #include "vip_slam_core/geometry/se3.h"
 
 namespace vip_slam {
@@ -26,7 +27,9 @@ SE3 fromMsg(const geometry_msgs::Pose& pose);
 SE3 fromMsg(const geometry_msgs::Transform& transform);
 
 boost::array<double, 4> toArray(const BearingCorrection& bearing);
-BearingCorrection fromArray(const boost::array<double, 4>& bearing);
+boost::array<double, 4> toArray(const DepthShift& shift);
+DepthShift shiftFromArray(const boost::array<double, 4>& shift);
+BearingCorrection bearingFromArray(const boost::array<double, 4>& bearing);
 
 /// Seconds to stamp; stamps that came from toSec() return exactly. Negative and non-finite times become 0.
 ros::Time toStamp(double t);

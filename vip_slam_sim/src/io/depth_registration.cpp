@@ -88,7 +88,7 @@ bool registerSurfaces(const DepthSurface& a, const DepthSurface& b, const Camera
 
 }  // namespace
 
-const DepthSurface& DepthRegistration::surface(std::size_t i) {
+const DepthSurface& PoseRegistration::surface(std::size_t i) {
   const auto known = surfaces_.find(i);
   if (known != surfaces_.end()) return known->second;
   while (surfaces_.size() > 64) surfaces_.erase(surfaces_.begin());  // pairs come in the order of time
@@ -97,7 +97,7 @@ const DepthSurface& DepthRegistration::surface(std::size_t i) {
   return surfaces_[i] = surfaceOf(depth, folder_.depth_registered ? folder_.camera : folder_.depth_camera);
 }
 
-bool DepthRegistration::align(std::size_t i, std::size_t j, SE3* T_j_i, PoseError* error) {
+bool PoseRegistration::align(std::size_t i, std::size_t j, SE3* T_j_i, PoseError* error) {
   const DepthSurface from = surface(i);  // a copy: making room for the other may drop it
   return registerSurfaces(from, surface(j), folder_.depth_registered ? folder_.camera : folder_.depth_camera, T_j_i,
                           error);

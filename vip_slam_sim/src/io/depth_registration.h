@@ -15,9 +15,9 @@ struct DepthSurface {
 };
 
 /// Keeps the surfaces of the last images it was asked for.
-class DepthRegistration {
+class PoseRegistration {
  public:
-  explicit DepthRegistration(const RgbdFolder& folder) : folder_(folder) {}
+  explicit PoseRegistration(const RgbdFolder& folder) : folder_(folder) {}
 
   /// Depth camera of image i into that of image j, m; in: where to begin. False when too little is common to both or
   /// the surfaces leave a direction nearly open. `error`: one sigma of the worst direction.

@@ -52,7 +52,7 @@ std::vector<DepthDisagreement> posesAgainstDepth(const RgbdFolder& folder, const
                                                  const std::vector<double>& lags) {
   std::vector<SE3> T_W_D;
   const std::vector<bool> known = depthCameras(folder, T_W_C, &T_W_D);
-  DepthRegistration registration(folder);
+  PoseRegistration registration(folder);
   std::vector<DepthDisagreement> out;
   const std::size_t stride = std::max<std::size_t>(1, folder.frames.size() / kPairs);
   for (const double lag : lags) {
@@ -82,7 +82,7 @@ Trajectory refinePoses(const RgbdFolder& folder, const PoseError& jitter, const 
   std::vector<SE3> T_W_D;
   const std::vector<bool> known = depthCameras(folder, folder.T_W_C, &T_W_D);
   const std::vector<SE3> given = T_W_D;
-  DepthRegistration registration(folder);
+  PoseRegistration registration(folder);
   std::vector<Edge> edges;
   const PoseError near{1.5 * std::max(jitter.rotation, 1e-4), 1.5 * std::max(jitter.position, 1e-4)};
   for (std::size_t i = 0; i < given.size(); ++i) {

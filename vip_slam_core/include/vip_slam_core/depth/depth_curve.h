@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "vip_slam_core/camera/bearing_correction.h"
+#include "vip_slam_core/depth/depth_shift.h"
 
 namespace vip_slam {
 
@@ -47,9 +48,10 @@ struct CameraCorrection {
   double offset = 0;  ///< m, after the curve
   DepthCurve curve;
   BearingCorrection bearing;
+  DepthShift shift;  ///< that depth was read with
 
   bool operator==(const CameraCorrection& other) const {
-    return offset == other.offset && curve == other.curve && bearing == other.bearing;
+    return offset == other.offset && curve == other.curve && bearing == other.bearing && shift == other.shift;
   }
   bool operator!=(const CameraCorrection& other) const { return !(*this == other); }
 };

@@ -1,6 +1,7 @@
 // What a depth camera reads too long or too short, and what the intrinsics get wrong, when it becomes known only after
 // readings and bearings were handed on: all that holds them takes over the better correction. A reading moves its point
-// along the point's ray; a bearing turns the ray.
+// along the point's ray; a bearing turns the ray. Where the depth image lies beside the colour image, points on planes
+// move beside with their readings, while pixels of features and of the grid stay and have other readings.
 #pragma once
 
 #include "vip_slam_core/types/keyframe.h"

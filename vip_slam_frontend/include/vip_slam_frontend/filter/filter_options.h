@@ -13,6 +13,7 @@ struct CalibrationOptions {
   bool time_offset = true;
   bool depth_offset = true;
   bool intrinsics = true;
+  bool depth_shift = true;
   bool gyro_scale = true;
   bool gyro_misalignment = false;
   double sigma_rotation = 0.01;
@@ -23,6 +24,7 @@ struct CalibrationOptions {
   double sigma_focal = 0.002;
   double sigma_aspect = 0.0005;
   double sigma_centre = 0.002;
+  double sigma_depth_shift = 0.003;
 
   void visit(OptionVisitor& v) {
     v.field("rotation", rotation, "estimate the camera-IMU rotation online");
@@ -33,6 +35,8 @@ struct CalibrationOptions {
         "intrinsics", intrinsics,
         "estimate online what focal lengths and principal point are off by; not of a fisheye, nor where depth is not "
         "registered");
+    v.field("depth_shift", depth_shift,
+            "estimate online how far the depth image lies beside the colour image; not of a fisheye");
     v.field("gyro_scale", gyro_scale, "estimate online the scale of the gyro's axes");
     v.field("gyro_misalignment", gyro_misalignment, "estimate online the misalignment of the gyro's axes");
     v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "initial one-sigma of the rotation, rad");
@@ -45,6 +49,9 @@ struct CalibrationOptions {
     v.field("sigma_aspect", sigma_aspect, 1e-6, 1.0, "initial one-sigma of fx / fy");
     v.field("sigma_centre", sigma_centre, 1e-6, 1.0,
             "initial one-sigma of the principal point, as a share of the focal length");
+    v.field(
+        "sigma_depth_shift", sigma_depth_shift, 1e-6, 1.0,
+        "initial one-sigma of how far the depth image lies beside the colour image, as a share of the focal length");
   }
 };
 

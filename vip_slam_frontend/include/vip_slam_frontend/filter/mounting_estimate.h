@@ -19,8 +19,11 @@ struct MountingEstimate {
   double sigma_time_offset = 0;                                 ///< s
   double depth_offset =
       0;  ///< m: what every reading of the depth camera has to be added, in the words of a sensor file
-  double sigma_depth_offset = 0;   ///< m
-  BearingCorrection bearing = {};  ///< what the intrinsics in use get wrong
+  double sigma_depth_offset = 0;  ///< m
+  /// How far right and down of the colour image the depth image lies, in bearings, and one sigma.
+  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero(), sigma_depth_shift = Eigen::Vector2d::Zero();
+  Eigen::Vector2d depth_shift_px = Eigen::Vector2d::Zero();  ///< the same in the words of a sensor file
+  BearingCorrection bearing = {};                            ///< what the intrinsics in use get wrong
   Eigen::Vector4d sigma_bearing = Eigen::Vector4d::Zero();
   Eigen::Vector4d intrinsics = Eigen::Vector4d::Zero();       ///< fx, fy, cx, cy in px that make `bearing` zero
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
@@ -29,8 +32,8 @@ struct MountingEstimate {
 };
 
 /// What the sensor's configuration should be corrected by, in sentences: differences that are both sure (five sigmas)
-/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth; 0.1 % of the focal length; 0.2 % of the gyro).
-/// Empty when it is right.
+/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth, half a pixel of where it lies; 0.1 % of the
+/// focal length; 0.2 % of the gyro). Empty when it is right.
 std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found);
 
 }  // namespace vip_slam

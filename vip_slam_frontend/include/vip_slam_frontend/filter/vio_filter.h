@@ -24,7 +24,8 @@ struct FilterMeasurement {
   LandmarkId id = kNoLandmark;
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();
   double depth = 0, depth_sigma = 0;
-  Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< see Observation
+  Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();    ///< see Observation
+  Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< likewise
   BearingJacobian by_intrinsics = BearingJacobian::Zero();  ///< likewise
 };
 
@@ -96,6 +97,10 @@ class VioFilter {
   /// What bearings mean, for others: of each entry the estimate once it is beyond doubt and large enough to matter,
   /// else zero.
   BearingCorrection bearingCorrection() const;
+  /// How far the depth image lies beside the colour image (WindowState::depth_shift), for readings to come: nothing
+  /// until it is known to a tenth of a pixel and beyond doubt, then what is still found of it. From then on the filter
+  /// estimates the rest.
+  const Eigen::Vector2d& takeDepthShift();
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
@@ -121,6 +126,10 @@ class VioFilter {
     double value, sigma;  ///< s
   };
   void holdDelay();
+  /// The same of the depth image's shift.
+  void judgeDepthShift();
+  /// Depth in the tracks becomes what is read with so much more of the shift.
+  void moveDepth(const Eigen::Vector2d& shift);
   void judgeIntrinsics();
   void judgeGyroCorrection();
   /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
@@ -146,6 +155,8 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
+  Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();                                ///< that readings have by now
+  bool shift_contradicts_ = false;                                                       ///< it went beyond belief
   bool depth_is_off_ = false;                                                            ///< beyond doubt
   Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise

@@ -1,6 +1,6 @@
 // The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
-// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td, depth offset, bearing correction, gyro
-// correction) that are estimated.
+// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td, depth offset, bearing correction, depth
+// shift, gyro correction) that are estimated.
 // Rotations are perturbed on the right, positions in the world.
 #pragma once
 
@@ -29,12 +29,12 @@ struct Clone {
 
 struct CalibrationFlags {
   bool rotation = false, translation = false, time_offset = false, depth_offset = false;
-  bool intrinsics = false;
+  bool intrinsics = false, depth_shift = false;
   bool gyro_scale = false, gyro_misalignment = false;
   /// States of the camera, which its measurements depend on.
   int camera() const {
     return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0) + (depth_offset ? 1 : 0) +
-           (intrinsics ? 4 : 0);
+           (intrinsics ? 4 : 0) + (depth_shift ? 2 : 0);
   }
   int gyro() const { return (gyro_scale ? 3 : 0) + (gyro_misalignment ? 6 : 0); }
   int size() const { return camera() + gyro(); }
@@ -53,6 +53,8 @@ struct WindowState {
   double time_offset = 0;
   double depth_offset = 0;    ///< m: what every reading of the depth camera has to be added
   BearingCorrection bearing;  ///< what the camera's intrinsics get wrong
+  /// How far right and down of the colour image the depth image lies, in bearings: what is read at b is of b - shift.
+  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   CalibrationFlags calibration;
   RateHistory rates;  ///< of the gyro, up to the newest clone
@@ -67,6 +69,7 @@ struct WindowState {
   int timeOffsetColumn() const { return translationColumn() + (calibration.translation ? 3 : 0); }
   int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
   int intrinsicsColumn() const { return depthOffsetColumn() + (calibration.depth_offset ? 1 : 0); }
+  int depthShiftColumn() const { return intrinsicsColumn() + (calibration.intrinsics ? 4 : 0); }
   /// The correction's diagonal, then what lies beside it, as far as they are estimated: see gyroEntry().
   int gyroColumn() const { return calibrationColumn() + calibration.camera(); }
 

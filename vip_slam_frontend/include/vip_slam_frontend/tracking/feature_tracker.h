@@ -35,7 +35,9 @@ struct Track {
   Feature feature;  ///< of the newest image; descriptor and angle only on keyframes
   std::shared_ptr<const ReferenceImage> reference;
   Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
-  PatchSurface surface;           ///< what the reference patch shows
+  PatchSurface surface;  ///< what the reference patch shows
+  /// Of the depth at the newest pixel, m/px; zero where no plane explains the readings around it.
+  Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();
   double reference_variance = 0;  ///< of the reference pixel as a view of what the track began with, px^2
   double magnification = 1;       ///< of the newest over the reference image, at the patch, the larger one
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();        ///< of the patch in the newest image (patch_alignment.h)

@@ -30,6 +30,10 @@ struct PatchSurface {
 PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
                           const DepthNoise& noise);
 
+/// The same over the narrow patch alone.
+PatchSurface narrowPatchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
+                                const DepthNoise& noise);
+
 /// Offsets from the patch's middle in the current image, px, into those in the reference. The second order counts: over
 /// a patch its mean is a shift in the direction of the motion, the same for all patches of a wall or of a turn.
 struct PatchWarp {
