@@ -136,7 +136,13 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
       m.by_intrinsics = bearingJacobian(m.xy);
       if (options_.depth) {
         m.depth_sigma = options_.depth_a + options_.depth_c * p.z() * p.z();
-        m.depth = p.z() + options_.depth_offset + noise.z() * m.depth_sigma;
+        // All points lie on surfaces along the room's axes.
+        const Eigen::Vector3d n = T_C_W.R().col(static_cast<int>(i % 3));
+        const Eigen::Vector3d ray = p / p.z();
+        const Eigen::Vector2d beside = options_.depth_shift - read_with_;
+        const double read = p.z() * n.dot(ray) / (n.dot(ray) - n.head<2>().dot(beside));
+        m.depth_slope = -p.z() / n.dot(ray) * n.head<2>();
+        m.depth = read + options_.depth_offset + noise.z() * m.depth_sigma;
         m.depth_sigma *= options_.depth_told;
       }
       seen.push_back(m);
@@ -196,6 +202,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
                                           standing ? std::optional<Unrest>(Unrest()) : std::nullopt);
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
+    result.depth_shift = filter.takeDepthShift();
+    simulation.readDepthWith(result.depth_shift);
     result.most_bearing_correction =
         std::max(result.most_bearing_correction, filter.bearingCorrection().value.cwiseAbs().maxCoeff());
     result.gyro_correction = filter.gyroCorrection();

@@ -18,7 +18,9 @@ struct SimulationOptions {
   double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
   double depth_told = 1.0;                  ///< share of that sigma which the filter is told
   double depth_offset = 0;                  ///< m, added to all readings
-  BearingCorrection bearing;                ///< what the intrinsics get wrong: sightings are those that need it
+  /// In bearings: how far right and down of the colour image the depth image lies.
+  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();
+  BearingCorrection bearing;  ///< what the intrinsics get wrong: sightings are those that need it
   bool depth = true;
   bool imu_noise = true;
   int points = 1200;
@@ -46,6 +48,8 @@ class LandmarkSimulation {
   std::vector<ImuSample> imuBetween(double t0, double t1) const;
   /// Noisy sightings at IMU time t of at most `most` points; a point keeps its track id while it stays in view.
   std::vector<FilterMeasurement> sight(double t, std::size_t most);
+  /// From now on depth is read with so much of its shift.
+  void readDepthWith(const Eigen::Vector2d& shift) { read_with_ = shift; }
   const SE3& T_I_C() const { return T_I_C_; }
   void generateImu(double until);
 
@@ -55,6 +59,7 @@ class LandmarkSimulation {
   std::mt19937 random_;
   SE3 T_I_C_;
   std::vector<Eigen::Vector3d> points_;
+  Eigen::Vector2d read_with_ = Eigen::Vector2d::Zero();
   std::vector<LandmarkId> track_;
   std::vector<Eigen::Vector2d> creep_, crept_;  ///< px per image, px; per point
   LandmarkId next_ = 1;
@@ -77,6 +82,7 @@ struct RunResult {
   WindowState window;  ///< at the end
   MountingEstimate mounting;
   double most_depth_correction = 0;                           ///< m, of all images, with its sign
+  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();      ///< taken, at the end
   double most_bearing_correction = 0;                         ///< handed on, largest entry of all images
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< handed on, at the end
   double most_gyro_correction = 0;                            ///< its largest entry of all images

@@ -145,6 +145,61 @@ TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
   }
 }
 
+// A depth image that lies 1.5 pixels left and 0.8 pixels below.
+TEST(Calibration, FindsWhereTheDepthImageLies) {
+  double nees = 0, believed = 0, own_nees = 0;
+  constexpr int kRuns = 6;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    simulation.depth_shift << -0.003, 0.0016;
+    simulation.depth_a = 0.001;
+    simulation.depth_c = 0.0005;
+    simulation.sigma_px = 0.2;
+    FilterOptions options = singlePixels();
+    options.calibration.time_offset = false;  // which so noisy a gyro misleads
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    EXPECT_LT((run.mounting.depth_shift - simulation.depth_shift).cwiseAbs().maxCoeff(), 3e-4);
+    EXPECT_LT((run.depth_shift - simulation.depth_shift).cwiseAbs().maxCoeff(), 4e-4) << "taken";
+    own_nees += (run.mounting.depth_shift - simulation.depth_shift)
+                    .cwiseQuotient(run.mounting.sigma_depth_shift)
+                    .squaredNorm() /
+                (2 * kRuns);
+    nees += run.nees / kRuns;
+    options.calibration.depth_shift = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with depth beside: %.2f, of the shift %.2f; believed: %.2f\n", nees, own_nees, believed);
+  EXPECT_LT(nees, 9.0);
+  EXPECT_LT(own_nees, 2.5);
+  EXPECT_GT(believed, 2.0 * nees);
+}
+
+TEST(Calibration, AnExactDepthImageStaysWhereItIs) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    SimulationOptions simulation;
+    simulation.seed = seed;
+    simulation.depth_a = 0.001;
+    simulation.depth_c = 0.0005;
+    const RunResult run = runFilter(simulation, singlePixels(), 20.0, false);
+    EXPECT_GT(run.mounting.sigma_depth_shift.minCoeff(), 0.0);
+    EXPECT_LT(run.mounting.sigma_depth_shift.maxCoeff(), 4e-4);
+    EXPECT_TRUE(run.depth_shift.isZero()) << run.depth_shift.transpose();
+  }
+}
+
+// Beyond belief it stands for something else: depth of another camera, say.
+TEST(Calibration, AShiftBeyondBeliefIsTakenBack) {
+  SimulationOptions simulation;
+  simulation.depth_shift << 0.03, 0.0;
+  simulation.depth_a = 0.001;
+  simulation.depth_c = 0.0005;
+  const RunResult run = runFilter(simulation, singlePixels(), 20.0, false);
+  EXPECT_TRUE(run.depth_shift.isZero());
+  EXPECT_LT(run.mounting.depth_shift.norm(), 1e-5);
+  EXPECT_TRUE(run.mounting.depth_contradicts);
+}
+
 // Focal lengths 0.4 % too long, a principal point that is a pixel off.
 TEST(Calibration, FindsTheIntrinsics) {
   double nees = 0, believed = 0, own_nees = 0;

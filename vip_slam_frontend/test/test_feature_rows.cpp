@@ -27,7 +27,8 @@ Scene makeScene() {
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
   scene.window.T_I_C = simulation.T_I_C();
-  scene.window.calibration = {true, true, true, true, true};
+  scene.window.calibration = {true, true, true, true, true, true};
+  scene.window.depth_shift << 0.004, -0.003;
   scene.window.bearing.value << 0.003, -0.002, 0.001, -0.0015;
   scene.window.time_offset = 0.003;
   scene.f_W = simulation.stateAt(0.5).T_W_I * (simulation.T_I_C() * Eigen::Vector3d(0.3, -0.2, 2.5));
@@ -45,7 +46,8 @@ Scene makeScene() {
     const Eigen::Vector2d xy = p_C.head<2>() / p_C.z() + Eigen::Vector2d(1e-3, -2e-3);
     Eigen::Matrix2d whitening;
     whitening << 0.9, 0.0, -0.2 * i, 0.4;
-    scene.observations.push_back({clone.id, xy, p_C.z() + 0.01, 0.01, bearingJacobian(xy), whitening});
+    scene.observations.push_back(
+        {clone.id, xy, p_C.z() + 0.01, 0.01, {1.5 - i, 0.4 * i}, bearingJacobian(xy), whitening});
   }
   scene.window.v_W = scene.window.v_W_fej = scene.window.clones.back().v_W;
   return scene;
@@ -160,7 +162,7 @@ TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
     const Eigen::Vector3d given = scene.window.bearing.matrix().inverse() * p_C;
     o.xy = given.head<2>() / given.z();
     o.by_intrinsics = bearingJacobian(o.xy);
-    o.depth = p_C.z();
+    o.depth = p_C.z() - o.depth_slope.dot(scene.window.depth_shift);
   }
   MeasurementNoise noise;
   Triangulation point = triangulate(scene.window, scene.observations, noise);

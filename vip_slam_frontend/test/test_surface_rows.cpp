@@ -69,7 +69,8 @@ double cost(const WindowState& window, const SurfaceMatches& matches) {
                         cameraPose(window, window.clones.back());
   double sum = 0;
   for (const SurfacePair& pair : matches.pairs) {
-    const Eigen::Matrix3d bearing = window.bearing.matrix();
+    Eigen::Matrix3d bearing = window.bearing.matrix();
+    bearing.col(2).head<2>() -= window.depth_shift;
     const Eigen::Vector3d q = bearing * (window.trueDepth(pair.q_cur.z()) / pair.q_cur.z() * pair.q_cur);
     const Eigen::Vector3d p = bearing * (window.trueDepth(pair.p_ref.z()) / pair.p_ref.z() * pair.p_ref);
     // Two directions in the patch, wherever the bearings put them, span the plane that its points lie on.
@@ -87,9 +88,12 @@ const std::vector<Eigen::Vector3d> kCorridor{Eigen::Vector3d::UnitY(), -Eigen::V
                                              -Eigen::Vector3d::UnitZ()};
 
 TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
-  for (const bool calibrated : {false, true}) {
-    WindowState window = makeWindow(3, {calibrated, calibrated, calibrated, calibrated, calibrated});
+  const CalibrationFlags all{true, true, true, true, true, true}, shift{false, false, false, false, false, true};
+  for (const CalibrationFlags& calibration : {CalibrationFlags(), all, shift}) {
+    WindowState window = makeWindow(3, calibration);
+    const bool calibrated = calibration.rotation;
     if (calibrated) window.bearing.value << 0.003, -0.002, 0.001, -0.0015;
+    if (calibration.depth_shift) window.depth_shift << 0.004, -0.003;
     window.depth_offset = calibrated ? 0.002 : 0;
     const SurfaceMatches matches = makeMatches(window, 4, kRoom, 0.01);
     const int n = window.dimension();

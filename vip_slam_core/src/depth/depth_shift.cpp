@@ -46,8 +46,7 @@ cv::Mat shiftedDepth(const cv::Mat& depth, const Eigen::Vector2d& px) {
       const float z00 = upper[u], z01 = upper[u + 1], z10 = lower[u], z11 = lower[u + 1];
       const float least = std::min(std::min(z00, z01), std::min(z10, z11));
       const float most = std::max(std::max(z00, z01), std::max(z10, z11));
-      // Also false for NaN.
-      const bool whole = least > 0 && most - least < kOneSurface * least;
+      const bool whole = z00 > 0 && z01 > 0 && z10 > 0 && z11 > 0 && most - least < kOneSurface * least;  // no NaN
       out[u] = whole ? w00 * z00 + w01 * z01 + w10 * z10 + w11 * z11 : nearest[u];
     }
   }

@@ -55,7 +55,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   // Of depth points alone a shift of their image and one of the principal point are the same.
   Eigen::Matrix3d bearing = window.bearing.matrix();
   bearing.col(2).head<2>() -= window.depth_shift;
-  const Eigen::Matrix3d normal = bearing.inverse().transpose();
+  const Eigen::Matrix3d given = bearing.inverse(), normal = given.transpose();
 
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<int>(pairs.size()), layout.size() + 1);
   for (int i = 0; i < A.rows(); ++i) {
@@ -95,9 +95,9 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
       const Eigen::Matrix3d R_ref_cur = R_I_C.transpose() * R_ab * R_I_C;
       const Eigen::RowVector3d n_cur = n_ref.transpose() * R_ref_cur;
       const Eigen::Vector3d apart = R_I_C.transpose() * (s_I - t_I_C) - p_ref;
-      const Eigen::Vector3d beside = apart - n_ref.dot(apart) * n_ref;
+      const Eigen::Vector3d beside = apart - n_ref.dot(apart) * n_ref, beside_given = given * beside;
       for (int k = 0; k < 2; ++k) {
-        const double by_scale = n_cur(k) * q_given(k) - n_ref(k) * p_given(k) - n_ref(k) * beside(k);
+        const double by_scale = n_cur(k) * q_given(k) - n_ref(k) * p_given(k) - n_ref(k) * beside_given(k);
         const double by_centre = n_cur(k) * q_cur.z() - n_ref(k) * p_ref.z() - n_ref(k) * beside.z();
         if (window.calibration.intrinsics) A(i, intrinsics + k) = w * by_scale;
         if (window.calibration.intrinsics) A(i, intrinsics + 2 + k) = w * by_centre;
