@@ -192,7 +192,13 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
 void FrontEnd::Impl::placeAtStamp(std::vector<Feature>* features) const {
   if (!tracker_.camera().rolls()) return;
   const Eigen::Vector2d last(camera_->width() - 1, camera_->height() - 1);
-  for (Feature& f : *features) f.pixel = tracker_.pixelAtStamp(f).cwiseMax(0.0).cwiseMin(last).cast<float>();
+  // Pixels are the image's own, whatever is known of the intrinsics by now.
+  const Eigen::Matrix3f given = filter_.bearingCorrection().matrix().inverse().cast<float>();
+  for (Feature& f : *features) {
+    Feature read = f;
+    read.xy = (given * f.xy.homogeneous()).head<2>();
+    f.pixel = tracker_.pixelAtStamp(read).cwiseMax(0.0).cwiseMin(last).cast<float>();
+  }
 }
 
 KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu) {

@@ -239,10 +239,10 @@ TEST(PixelNoise, GrowsWithFaintnessResidualAndEdges) {
   PatchSurface known, rim, unknown;
   known.depth = rim.depth = 2.0;
   known.known = true;
-  EXPECT_EQ(patchWander(known, false), 1.0);
-  EXPECT_GT(patchWander(known, true), 2.0);
-  EXPECT_GT(patchWander(rim, false), 2.0);
-  EXPECT_GT(patchWander(unknown, false), patchWander(rim, true));
+  EXPECT_EQ(patchWander(known, false, false), 1.0);
+  EXPECT_GT(patchWander(known, true, false), 2.0);
+  EXPECT_GT(patchWander(rim, false, false), 2.0);
+  EXPECT_GT(patchWander(unknown, false, false), patchWander(rim, true, false));
   EXPECT_TRUE(pixelWhitening(Eigen::Matrix2d::Zero(), 0, 1).allFinite());
 }
 

@@ -17,6 +17,11 @@ namespace {
 // Changes of contrast and mean grey level between two images beyond which KLT's constant brightness no longer holds.
 constexpr double kExposureGain = 0.1;
 constexpr double kExposureShift = 6.0;
+constexpr int kExposureReach = 12;             // px around a track
+constexpr std::size_t kLeastForExposure = 10;  // tracks
+
+constexpr int kMostMissed = 5;               // images in a row in which a patch is not found
+constexpr double kMostBesideForetold = 3.0;  // px
 
 constexpr double kFarAway = 1e4;  // m
 
@@ -29,7 +34,8 @@ Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
 /// patch.
 double pixelVariance(const Track& track) {
   const double sigma = matchSigma(track.surface, track.magnification);
-  return sigma * sigma + track.reference_variance * track.magnification * track.magnification;
+  const double flow = track.missed > 0 ? kFlowSigma : 0.0;
+  return sigma * sigma + flow * flow + track.reference_variance * track.magnification * track.magnification;
 }
 
 }  // namespace
@@ -70,7 +76,8 @@ Eigen::Vector2d FeatureTracker::pixelAtStamp(const Feature& feature) const {
 void FeatureTracker::measure(Track* track) const {
   const FeatureDepth::Source source = measure(&track->feature);
   const bool at_edge = source != FeatureDepth::Source::kSmooth && source != FeatureDepth::Source::kNone;
-  track->whitening = pixelWhitening(track->texture, track->residual, patchWander(track->surface, at_edge));
+  track->whitening =
+      pixelWhitening(track->texture, track->residual, patchWander(track->surface, at_edge, track->missed > 0));
   track->feature.pixel_sigma = static_cast<float>(std::sqrt(pixelVariance(*track)));
   const double z = track->feature.depth;
   const PatchSurface here = narrowPatchSurface(depth_, pixelAtStamp(track->feature), z, noise_);
@@ -78,13 +85,45 @@ void FeatureTracker::measure(Track* track) const {
   track->depth_slope = -z * here.slope;
 }
 
-void FeatureTracker::matchExposure(const cv::Mat& gray) {
-  cv::Scalar mean_last, deviation_last, mean, deviation;
-  cv::meanStdDev(gray_, mean_last, deviation_last, mask_);
-  cv::meanStdDev(gray, mean, deviation, mask_);
-  if (deviation_last[0] < 1.0 || deviation[0] < 1.0) return;
-  const double gain = deviation[0] / deviation_last[0], offset = mean[0] - gain * mean_last[0];
-  if (std::abs(gain - 1.0) < kExposureGain && std::abs(mean[0] - mean_last[0]) < kExposureShift) return;
+bool FeatureTracker::foretell(const Feature& f, const SE3& predicted, bool has_translation, Eigen::Vector2d* uv) const {
+  const double z = has_translation && f.depth > 0 ? f.depth : kFarAway;
+  const Eigen::Vector3d p = predicted.R() * (f.xy.homogeneous().cast<double>() * z) +
+                            (has_translation ? predicted.t() : Eigen::Vector3d(Eigen::Vector3d::Zero()));
+  return view_.project(p, uv) && camera_->inImage(*uv);
+}
+
+void FeatureTracker::matchExposure(const cv::Mat& gray, const SE3& predicted, bool has_translation) {
+  std::vector<double> gains, last, now;
+  for (const Track& track : tracks_) {
+    const Eigen::Vector2d here = track.feature.pixel.cast<double>();
+    Eigen::Vector2d there;
+    if (!foretell(track.feature, predicted, has_translation, &there)) continue;
+    if (!camera_->inImage(here, kExposureReach + 1) || !camera_->inImage(there, kExposureReach + 1)) continue;
+    const auto around = [](const Eigen::Vector2d& uv) {
+      return cv::Rect(cvRound(uv.x()) - kExposureReach, cvRound(uv.y()) - kExposureReach, 2 * kExposureReach + 1,
+                      2 * kExposureReach + 1);
+    };
+    cv::Scalar mean_last, deviation_last, mean, deviation;
+    cv::meanStdDev(gray_(around(here)), mean_last, deviation_last);
+    cv::meanStdDev(gray(around(there)), mean, deviation);
+    if (deviation_last[0] < 2.0 || deviation[0] < 1.0) continue;
+    gains.push_back(deviation[0] / deviation_last[0]);
+    last.push_back(mean_last[0]);
+    now.push_back(mean[0]);
+  }
+  if (gains.size() < kLeastForExposure) return;
+  const auto median = [](std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+  };
+  const double gain = median(gains);
+  std::vector<double> offsets, changes;
+  for (std::size_t i = 0; i < gains.size(); ++i) {
+    offsets.push_back(now[i] - gain * last[i]);
+    changes.push_back(now[i] - last[i]);
+  }
+  if (std::abs(gain - 1.0) < kExposureGain && std::abs(median(changes)) < kExposureShift) return;
+  const double offset = median(offsets);
   cv::Mat adapted;
   gray_.convertTo(adapted, CV_8U, gain, offset);
   last_pyramid_.clear();
@@ -101,11 +140,8 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
   for (const Track& track : tracks_) {
     const Feature& f = track.feature;
     previous.emplace_back(f.pixel.x(), f.pixel.y());
-    const double z = has_translation && f.depth > 0 ? f.depth : kFarAway;
-    const Eigen::Vector3d p = predicted.R() * (f.xy.homogeneous().cast<double>() * z) +
-                              (has_translation ? predicted.t() : Eigen::Vector3d(Eigen::Vector3d::Zero()));
     Eigen::Vector2d uv;
-    const bool usable = view_.project(p, &uv) && camera_->inImage(uv);
+    const bool usable = foretell(f, predicted, has_translation, &uv);
     next->push_back(usable ? cv::Point2f(static_cast<float>(uv.x()), static_cast<float>(uv.y())) : previous.back());
   }
   found->assign(tracks_.size(), 0);
@@ -128,38 +164,60 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
   }
 }
 
-bool FeatureTracker::alignTrack(Track* track, const SE3& T_odom_C, double most_px) const {
-  if (!track->reference) return false;
+FeatureTracker::Match FeatureTracker::match(Track* track, const SE3& T_odom_C, double most_px) const {
+  if (!track->reference) return Match::kOtherView;
   PatchWarp warp;
   const SE3 T_cur_ref = T_odom_C.inverse() * track->reference->T_odom_C;
   if (!patchWarp(track->reference->camera, view_, track->reference_pixel, track->surface, T_cur_ref, &warp))
-    return false;
+    return Match::kOtherView;
   const double scale = std::sqrt(warp.A.determinant());
   const double shear = (warp.A / scale - (warp.A / scale).inverse().transpose()).norm();
-  if (!(scale > 0.45) || !(scale < 2.2) || !(shear < 1.5)) return false;
+  if (!(scale > 0.45) || !(scale < 2.2) || !(shear < 1.5)) return Match::kOtherView;
   const Eigen::Vector2d start = track->feature.pixel.cast<double>();
   // For good: matches with either patch err otherwise, and a track that goes to and fro between them moves.
-  if (track->surface.wide) track->surface.wide = isWideHere(track->feature);
+  if (track->surface.wide) {
+    const Eigen::Vector3d foretold =
+        T_cur_ref * track->reference->camera.unproject(track->reference_pixel, track->surface.depth);
+    track->surface.wide = isWideHere(track->feature, foretold.z());
+  }
   const PatchAlignment aligned = alignPatch(track->reference->gray, track->reference_pixel - track->reference->origin,
                                             warp, gray_, start, track->surface.wide);
-  if (!aligned.ok || (aligned.pixel - start).norm() > most_px) return false;
+  if (!aligned.ok || (aligned.pixel - start).norm() > most_px) return Match::kNotFound;
+  track->surface.wide = aligned.wide;
   track->feature.pixel = aligned.pixel.cast<float>();
   track->magnification = 1.0 / warp.A.jacobiSvd().singularValues()(1);
   track->texture = aligned.texture;
   track->residual = aligned.residual;
-  return true;
+  return Match::kFound;
 }
 
-bool FeatureTracker::isWideHere(Feature feature) const {
+bool FeatureTracker::isWideHere(Feature feature, double foretold) const {
   if (depth_.empty()) return true;
   measure(&feature);
-  return patchSurface(depth_, pixelAtStamp(feature), feature.depth, noise_).wide;
+  const double z = feature.depth > 0 ? feature.depth : foretold;
+  return patchSurface(depth_, pixelAtStamp(feature), z, noise_).wide;
+}
+
+void FeatureTracker::findLost(const SE3& predicted, const SE3& T_odom_C, std::vector<cv::Point2f>* next,
+                              std::vector<char>* found) const {
+  for (std::size_t i = 0; i < found->size(); ++i) {
+    if ((*found)[i] || !tracks_[i].surface.known || !(tracks_[i].feature.depth > 0)) continue;
+    Eigen::Vector2d uv;
+    if (!foretell(tracks_[i].feature, predicted, true, &uv)) continue;
+    if (!camera_->inImage(uv, options_.border) || !allowed(uv)) continue;
+    Track there = tracks_[i];
+    there.feature.pixel = uv.cast<float>();
+    if (!alignTrack(&there, T_odom_C, kMostBesideForetold)) continue;
+    (*next)[i] = cv::Point2f(there.feature.pixel.x(), there.feature.pixel.y());
+    (*found)[i] = 1;
+  }
 }
 
 void FeatureTracker::setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const {
   track->reference = reference;
   track->reference_pixel = track->feature.pixel.cast<double>();
   track->magnification = 1.0;
+  track->missed = 0;
   track->surface = patchSurface(depth_, pixelAtStamp(track->feature), track->feature.depth, noise_);
   track->texture = patchTexture(gray_, track->reference_pixel, track->surface.wide);
   track->residual = 0;
@@ -194,9 +252,12 @@ void FeatureTracker::restartReferences(const SE3& T_odom_C, const std::shared_pt
 void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
   std::shared_ptr<ReferenceImage> here;
   for (Track& track : tracks_) {
-    const bool aligned = alignTrack(&track, T_odom_C, options_.reference_max_correction_px);
+    const Match match = this->match(&track, T_odom_C, options_.reference_max_correction_px);
     const bool known = track.surface.known;
-    if (aligned && (known || !surfaceIsKnown(&track))) continue;
+    track.missed = match == Match::kFound ? 0 : track.missed + 1;
+    if (match == Match::kFound && (known || !surfaceIsKnown(&track))) continue;
+    // Blur, a jump of the exposure: with another reference it would never come back to what it began with.
+    if (match == Match::kNotFound && known && track.missed <= kMostMissed) continue;
     if (!here) here = referenceHere(T_odom_C);
     measure(&track.feature);
     if (!known && surfaceIsKnown(&track)) {
@@ -233,10 +294,11 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     pyramid_.clear();
     cv::buildOpticalFlowPyramid(gray, pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
                                 options_.klt_levels);
-    if (!last_pyramid_.empty()) matchExposure(gray);
+    if (!last_pyramid_.empty()) matchExposure(gray, predicted.T_current_previous, has_translation);
     if (!last_pyramid_.empty()) runKlt(gray, predicted.T_current_previous, has_translation, &next, &found);
     gray_ = gray;
     depth_ = depth;
+    if (has_translation) findLost(predicted.T_current_previous, T_odom_C, &next, &found);
   }
   ended_.clear();
   if (tracks_.empty() || found.empty()) return result;

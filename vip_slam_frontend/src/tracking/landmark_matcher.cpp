@@ -11,7 +11,7 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kPatchRadius = 28;  // a wide patch at half its size
+constexpr int kPatchRadius = 41;  // a wide patch at half its size, however it is rolled
 constexpr std::size_t kMostPatches = 8000;
 constexpr int kMostPerImage = 60;
 // A corner detected anew may lie this far from where the old track saw it, px.
@@ -73,7 +73,7 @@ void LandmarkMatcher::retire(const Track& track) {
   auto reference = std::make_shared<ReferenceImage>(*track.reference);
   reference->gray = image(window).clone();
   reference->origin = track.reference->origin + Eigen::Vector2d(window.x, window.y);
-  patches_[track.feature.id] = {reference, track.reference_pixel, track.surface};
+  patches_[track.feature.id] = {reference, track.reference_pixel, track.surface, track.reference_variance};
   if (patches_.size() > kMostPatches) patches_.erase(patches_.begin());
 }
 
@@ -117,24 +117,27 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   // Where each may be: its patch aligned from the projection, and the corners around; described in one go.
   std::vector<Feature> corners;
   std::vector<std::size_t> owner;
-  std::vector<char> aligned;
+  std::vector<Track> direct;  // those whose patch was found there, with what the alignment says
+  std::vector<int> aligned;   // index of direct, -1: a corner
   const auto withPatch = [&](std::size_t i, Track* track) {
     const auto patch = patches_.find(visible[i].id);
     if (patch == patches_.end()) return false;
     track->reference = patch->second.reference;
     track->reference_pixel = patch->second.pixel;
     track->surface = patch->second.surface;
+    track->reference_variance = patch->second.reference_variance;
     return true;
   };
   const int radius = static_cast<int>(options_.landmark_radius_px);
   std::vector<cv::KeyPoint> keypoints;
   for (std::size_t i = 0; i < visible.size(); ++i) {
-    Track direct;
-    direct.feature.pixel = visible[i].uv.cast<float>();
-    if (withPatch(i, &direct) && tracker->alignTrack(&direct, T_odom_C, 0.5 * options_.landmark_radius_px)) {
-      corners.push_back(direct.feature);
+    Track there;
+    there.feature.pixel = visible[i].uv.cast<float>();
+    if (withPatch(i, &there) && tracker->alignTrack(&there, T_odom_C, 0.5 * options_.landmark_radius_px)) {
+      corners.push_back(there.feature);
       owner.push_back(i);
-      aligned.push_back(1);
+      aligned.push_back(static_cast<int>(direct.size()));
+      direct.push_back(std::move(there));
     }
     const int x = static_cast<int>(visible[i].uv.x()), y = static_cast<int>(visible[i].uv.y());
     const cv::Rect roi(x - radius - 3, y - radius - 3, 2 * radius + 7, 2 * radius + 7);
@@ -145,7 +148,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
       if (!tracker->allowed(f.pixel.cast<double>())) continue;
       corners.push_back(f);
       owner.push_back(i);
-      aligned.push_back(0);
+      aligned.push_back(-1);
     }
   }
   orb.describe(gray, &corners);
@@ -161,10 +164,11 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   int count = 0;
   for (std::size_t i = 0; i < visible.size() && count < kMostPerImage; ++i) {
     if (best[i] < 0) continue;
-    Track track;
+    const int known = aligned[best[i]];
+    Track track = known < 0 ? Track() : direct[known];
     track.feature = corners[best[i]];
     track.feature.id = visible[i].id;
-    if (withPatch(i, &track) && !aligned[best[i]] && !tracker->alignTrack(&track, T_odom_C, kCornerOffset)) continue;
+    if (known < 0 && withPatch(i, &track) && !tracker->alignTrack(&track, T_odom_C, kCornerOffset)) continue;
     if (!free(track.feature.pixel.cast<double>(), options_.min_distance)) continue;
     tracker->measure(&track.feature);
     // Another surface in front of it is not the landmark.

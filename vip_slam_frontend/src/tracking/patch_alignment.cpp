@@ -50,8 +50,11 @@ bool Patch<kRadius>::sample(const cv::Mat& image, const Eigen::Vector2d& pixel, 
     for (int x = 0; x < kRow; ++x) {
       const double dx = x - kRadius - 1;
       const Eigen::Vector2d p = begin + (slope + bend * dx) * dx;
-      if (!(p.x() >= 0) || !(p.y() >= 0) || p.x() >= image.cols - 1 || p.y() >= image.rows - 1) return false;
-      framed[y * kRow + x] = bilinear(image, static_cast<float>(p.x()), static_cast<float>(p.y()));
+      const auto u = static_cast<float>(p.x()), v = static_cast<float>(p.y());
+      // What is just inside may round to the last column or row, which has none beyond.
+      if (!(u >= 0) || !(v >= 0) || u >= static_cast<float>(image.cols - 1) || v >= static_cast<float>(image.rows - 1))
+        return false;
+      framed[y * kRow + x] = bilinear(image, u, v);
     }
   }
   return true;
@@ -182,7 +185,8 @@ Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel,
 PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
                           const cv::Mat& current, const Eigen::Vector2d& start, bool wide) {
   if (wide) {
-    const PatchAlignment aligned = align<kWidePatch>(reference, reference_pixel, warp, current, start);
+    PatchAlignment aligned = align<kWidePatch>(reference, reference_pixel, warp, current, start);
+    aligned.wide = true;
     if (aligned.ok) return aligned;
   }
   return align<kNarrowPatch>(reference, reference_pixel, warp, current, start);

@@ -49,8 +49,9 @@ double matchSigma(const PatchSurface& surface, double magnification) {
   return growth * (surface.depth > 0 ? kUnclearSurface : kNoSurface);
 }
 
-double patchWander(const PatchSurface& surface, bool at_edge) {
-  return std::max(at_edge ? kAtEdge : 1.0, surface.known ? 1.0 : matchSigma(surface, 1.0) / kKnownSurface);
+double patchWander(const PatchSurface& surface, bool at_edge, bool missed) {
+  const double sigma = std::max(surface.known ? kKnownSurface : matchSigma(surface, 1.0), missed ? kFlowSigma : 0.0);
+  return std::max(at_edge ? kAtEdge : 1.0, sigma / kKnownSurface);
 }
 
 }  // namespace vip_slam

@@ -41,6 +41,7 @@ struct Track {
   double reference_variance = 0;  ///< of the reference pixel as a view of what the track began with, px^2
   double magnification = 1;       ///< of the newest over the reference image, at the patch, the larger one
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();        ///< of the patch in the newest image (patch_alignment.h)
+  int missed = 0;                                           ///< images in a row in which the patch was not found
   double residual = 0;                                      ///< of its match with the reference, grey levels
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< of the newest pixel (pixel_noise.h)
 };
@@ -73,7 +74,9 @@ class FeatureTracker {
   std::vector<std::size_t> replenish(const SE3& T_odom_C, bool force, double t);
   /// Moves the track's pixel by at most `most_px` to where its reference patch lies in the newest image; false when it
   /// does not fit there.
-  bool alignTrack(Track* track, const SE3& T_odom_C, double most_px) const;
+  bool alignTrack(Track* track, const SE3& T_odom_C, double most_px) const {
+    return match(track, T_odom_C, most_px) == Match::kFound;
+  }
   /// Adds a track found by others in the newest image (which becomes its reference when it has none).
   void addTrack(Track track, const SE3& T_odom_C);
   /// The newest image becomes the reference of all tracks, with what is now known of its rows.
@@ -104,15 +107,24 @@ class FeatureTracker {
 
  private:
   /// After a jump of the exposure: gives the last image's pyramid the contrast and brightness of the new image.
-  void matchExposure(const cv::Mat& gray);
+  /// Medians over the tracks' surroundings, here and where they are foretold: what else comes into view is no exposure.
+  void matchExposure(const cv::Mat& gray, const SE3& predicted, bool has_translation);
+  /// Where optical flow begins; false outside the image.
+  bool foretell(const Feature& feature, const SE3& predicted, bool has_translation, Eigen::Vector2d* uv) const;
   void runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation, std::vector<cv::Point2f>* next,
               std::vector<char>* found);
+  /// What optical flow lost may lie where it is foretold: the reference patch tells.
+  void findLost(const SE3& predicted, const SE3& T_odom_C, std::vector<cv::Point2f>* next,
+                std::vector<char>* found) const;
+  enum class Match { kFound, kNotFound, kOtherView };
+  Match match(Track* track, const SE3& T_odom_C, double most_px) const;
   void alignWithReferences(const SE3& T_odom_C);
   void setReference(Track* track, const std::shared_ptr<const ReferenceImage>& reference) const;
   std::shared_ptr<ReferenceImage> referenceHere(const SE3& T_odom_C) const;
   /// Whether the newest image shows one plane all over the wide patch: something that covers two columns of it would
   /// move the match by a sixth of a pixel. An image without depth tells nothing against it.
-  bool isWideHere(Feature feature) const;
+  /// `foretold`: the depth there as far as the reference tells, where the image has a hole.
+  bool isWideHere(Feature feature, double foretold) const;
   /// Whether the track's patch in the newest image lies on one plane of the depth image; measures the feature.
   bool surfaceIsKnown(Track* track) const;
 

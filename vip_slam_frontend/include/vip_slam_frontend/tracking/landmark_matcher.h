@@ -40,6 +40,7 @@ class LandmarkMatcher {
     std::shared_ptr<const ReferenceImage> reference;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
     PatchSurface surface;
+    double reference_variance = 0;
   };
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;

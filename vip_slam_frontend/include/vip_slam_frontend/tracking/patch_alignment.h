@@ -11,6 +11,7 @@ namespace vip_slam {
 
 struct PatchAlignment {
   bool ok = false;
+  bool wide = false;  ///< found with the wide patch
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double residual = 0;                                ///< root mean square after gain and offset, grey levels
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< see patchTexture, of the warped patch in `current`'s pixels

@@ -24,7 +24,10 @@ double matchSigma(const PatchSurface& surface, double magnification);
 /// How many times farther than the best patches this one may be off. What slides does so as smoothly as the camera
 /// moves: residuals over a few images do not show it, but points that are taken to be fixed pull at the motion.
 /// `at_edge`: the newest view shows two surfaces there, or one that the depth does not explain, so that what the patch
-/// shows changes.
-double patchWander(const PatchSurface& surface, bool at_edge);
+/// shows changes. `missed`: the patch was not found in the newest image, whose pixel is optical flow's alone.
+double patchWander(const PatchSurface& surface, bool at_edge, bool missed);
+
+/// One sigma of optical flow from image to image alone, px.
+constexpr double kFlowSigma = 0.5;
 
 }  // namespace vip_slam
