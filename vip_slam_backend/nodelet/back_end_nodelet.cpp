@@ -27,6 +27,10 @@ BackEndNodelet::~BackEndNodelet() {
   timer_.stop();
   for (auto& service : services_) service.shutdown();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
+  // Their callbacks ask the owner too.
+  reconfigure_.reset();
+  markers_pub_.shutdown();
+  landmarks_pub_.shutdown();
   if (owner_) owner_->stop();
   if (adjustment_.joinable()) adjustment_.join();
 }

@@ -20,6 +20,10 @@ using diagnostic_msgs::DiagnosticStatus;
 PlanesNodelet::~PlanesNodelet() {
   timer_.stop();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
+  // Their callbacks ask the owner too.
+  reconfigure_.reset();
+  markers_pub_.shutdown();
+  cloud_pub_.shutdown();
   if (owner_) owner_->stop();
 }
 
@@ -79,6 +83,8 @@ void PlanesNodelet::onInit() {
             obey(*m);
           } else if (m->command == vip_slam_msgs::Control::MAP_LOADED) {
             early_map_ = m;
+          } else if (m->command == vip_slam_msgs::Control::RESET) {
+            early_map_.reset();
           }
         });
       }));

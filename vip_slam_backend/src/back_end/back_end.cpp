@@ -127,6 +127,10 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     refusal = e.what();
     ++statistics.keyframes_refused;
     finishUpdate(&update);
+    // Others wait for it, unless the map has one of that number.
+    const auto waits = [&keyframe](const KeyframePtr& other) { return other->id == keyframe->id; };
+    if (keyframe && !map.hasKeyframe(keyframe->id) && std::none_of(held.begin(), held.end(), waits))
+      update.removed_keyframes.push_back(keyframe->id);
     return update;
   }
   localBundleAdjustment(t, &update);

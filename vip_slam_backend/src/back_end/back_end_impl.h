@@ -118,6 +118,7 @@ struct BackEnd::Impl {
     double t = 0;
   };
   std::optional<LastFound> last_found;
+  std::uint64_t loads = 0;  ///< of maps, since the start
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;

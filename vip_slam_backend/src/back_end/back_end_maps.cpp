@@ -9,7 +9,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kRecent = 5.0;  // seconds for which the odometry carries what localisation found
+constexpr std::uint64_t kMostLoads = 4096;  // whose landmarks have ids of their own
+constexpr double kRecent = 5.0;             // seconds for which the odometry carries what localisation found
 
 PlaneHost hostAt(const MapKeyframe& kf) { return {kf.id(), kf.data->frame.epoch, kf.state.T_W_I * kf.T_I_C}; }
 
@@ -20,8 +21,10 @@ void BackEnd::Impl::saveMap(const std::string& path) const {
 }
 
 MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
-  StoredMap stored = loadMapFile(path, sensor.imu_noise);  // both throw before anything is changed
+  // Both throw before anything is changed.
+  StoredMap stored = loadMapFile(path, sensor.imu_noise, kLoadedLandmarks + (loads % kMostLoads) * kLoadedApart);
   requireCamera(stored, sensor.camera, path);
+  ++loads;
   reset();
   map = std::move(stored.map);
   loop_closer.rebuild(map, stored.loops);

@@ -168,7 +168,10 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
   } else if (frozen()) {
     global_wanted = global_wanted || result.solution != nullptr;  // once mapping goes on
   } else if (result.solution && result.solution->summary.usable) {
-    const bool found = last_found && last_found->epoch == epoch && map.hasKeyframe(last_found->match);
+    // Where it was found counts until mapping goes on from there.
+    const TrackedFrame& newest = map.keyframe(map.newestKeyframe()).data->frame;
+    const bool found = last_found && last_found->epoch == epoch && map.hasKeyframe(last_found->match) &&
+                       !(newest.epoch == epoch && newest.t > last_found->t);
     const SE3 match_before = found ? map.keyframe(last_found->match).state.T_W_I : SE3();
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     ++statistics.global_ba;

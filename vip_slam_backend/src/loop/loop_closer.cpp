@@ -10,6 +10,12 @@
 namespace vip_slam {
 namespace {
 
+// A place farther from where the map has the query, m and rad, than two matches of one place differ by: others are
+// asked whether they hold it as well, with at least this share of its points.
+constexpr double kElsewhere = 0.3, kElsewhereAngle = 0.2, kRivalShare = 0.7;
+// A view of what the query sees from where the map has it.
+constexpr double kFarthestView = 3.0, kMetresPerRadian = 2.0, kWidestView = 0.7;
+
 // A keyframe with those around it that show the same place.
 std::set<KeyframeId> placeOf(const Map& map, KeyframeId id) {
   std::set<KeyframeId> place{id};
@@ -18,6 +24,21 @@ std::set<KeyframeId> placeOf(const Map& map, KeyframeId id) {
     if (neighbour != 0) place.insert(neighbour);
   for (const auto& neighbour : map.covisible(id, 15)) place.insert(neighbour.first);
   return place;
+}
+
+// Of old keyframes that look at the same scene as the camera at T_W_C the nearest; 0: none.
+KeyframeId nearestView(const Map& map, const SE3& T_W_C, const std::function<bool(KeyframeId)>& old) {
+  KeyframeId nearest = 0;
+  double least = kFarthestView;
+  for (const auto& [id, kf] : map.keyframes()) {
+    const SE3 view = kf.T_W_C();
+    const double angle = view.rotation().angularDistance(T_W_C.rotation());
+    const double distance = (view.t() - T_W_C.t()).norm() + angle * kMetresPerRadian;
+    if (angle > kWidestView || distance >= least || !old(id)) continue;
+    nearest = id;
+    least = distance;
+  }
+  return nearest;
 }
 
 bool touch(const std::set<KeyframeId>& a, const std::set<KeyframeId>& b) {
@@ -124,15 +145,49 @@ std::vector<LoopEvent> LoopCloser::close(Map& map, KeyframeId query) {
     events.push_back(joinParts(map, query, part));
     if (events.back().accepted) return events;
   }
-  for (const KeyframeId match : candidates(map, query, part)) {
+  const std::vector<KeyframeId> matches = candidates(map, query, part);
+  for (const KeyframeId match : matches) {
     // The pose must rest on the old part of the map alone, else it confirms the drift.
     const auto old = [&](KeyframeId id) { return part.count(id) != 0 && isOld(map, id, *kf.data); };
-    const PlaceVerification place =
+    PlaceVerification place =
         verifier_.verify(map, *kf.data, kf.state.T_W_I, database_.bow(query), match, database_, old);
+    const std::string as_well = place.accepted ? rival(map, query, place, matches, old) : "";
+    if (!as_well.empty()) {
+      place.accepted = false;
+      place.reason += "; " + as_well;
+    }
     events.push_back(correct(map, query, place));
     if (events.back().accepted) break;
   }
   return events;
+}
+
+std::string LoopCloser::rival(const Map& map, KeyframeId query, const PlaceVerification& place,
+                              const std::vector<KeyframeId>& candidates,
+                              const std::function<bool(KeyframeId)>& old) const {
+  const MapKeyframe& kf = map.keyframe(query);
+  const auto elsewhere = [&place](const SE3& T_W_I) {
+    return (T_W_I.t() - place.T_W_I.t()).norm() > kElsewhere ||
+           T_W_I.rotation().angularDistance(place.T_W_I.rotation()) > kElsewhereAngle;
+  };
+  if (!elsewhere(kf.state.T_W_I)) return "";
+  const auto rivals = [&](const PlaceVerification& other) {
+    return other.accepted && elsewhere(other.T_W_I) && other.inliers > kRivalShare * place.inliers;
+  };
+  if (const KeyframeId nearest = nearestView(map, kf.T_W_C(), old); nearest != 0) {
+    const PlaceVerification other = verifier_.track(map, *kf.data, kf.state.T_W_I, nearest, old);
+    if (rivals(other)) return "where the map has it fits as well, " + std::to_string(other.inliers) + " points";
+  }
+  for (const KeyframeId match : candidates) {
+    if (match == place.match) continue;
+    const PlaceVerification other =
+        verifier_.verify(map, *kf.data, kf.state.T_W_I, database_.bow(query), match, database_, old);
+    if (rivals(other)) {
+      return "keyframe " + std::to_string(match) + " shows it elsewhere as well, " + std::to_string(other.inliers) +
+             " points";
+    }
+  }
+  return "";
 }
 
 LoopEvent LoopCloser::joinParts(Map& map, KeyframeId query, const std::set<KeyframeId>& part) {

@@ -9,14 +9,17 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kMostFocal = 0.01;  // share by which focal lengths may differ: calibrations of one camera do
+constexpr double kMostFocal = 0.01;   // share by which focal lengths may differ: calibrations of one camera do
+constexpr double kMostCentre = 0.05;  // share of the width by which principal points may
 
 bool differ(double a, double b) { return std::abs(a - b) > kMostFocal * std::max(a, b); }
 
+bool isFisheye(const CameraIntrinsics& camera) { return camera.model == DistortionModel::kEquidistant; }
+
 std::string describe(const CameraIntrinsics& camera) {
-  char text[96];
-  std::snprintf(text, sizeof text, "%d x %d pixels, fx %.1f, fy %.1f", camera.width, camera.height, camera.fx,
-                camera.fy);
+  char text[160];
+  std::snprintf(text, sizeof text, "%d x %d pixels, fx %.1f, fy %.1f, cx %.1f, cy %.1f%s", camera.width, camera.height,
+                camera.fx, camera.fy, camera.cx, camera.cy, isFisheye(camera) ? ", fisheye" : "");
   return text;
 }
 
@@ -25,8 +28,10 @@ std::string describe(const CameraIntrinsics& camera) {
 void requireCamera(const StoredMap& stored, const CameraIntrinsics& camera, const std::string& path) {
   if (!stored.camera) return;
   const CameraIntrinsics& made = *stored.camera;
+  // Depth of stored keyframes is read with the present camera.
+  const double centre = std::hypot(made.cx - camera.cx, made.cy - camera.cy);
   if (made.width == camera.width && made.height == camera.height && !differ(made.fx, camera.fx) &&
-      !differ(made.fy, camera.fy))
+      !differ(made.fy, camera.fy) && centre <= kMostCentre * camera.width && isFisheye(made) == isFisheye(camera))
     return;
   throw std::runtime_error(path + ": made with images of " + describe(made) + ", but the camera now has " +
                            describe(camera) + "; expected the same");

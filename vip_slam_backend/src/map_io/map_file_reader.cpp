@@ -124,7 +124,8 @@ PlaneObservation readObservation(ByteReader& in, KeyframeId keyframe) {
   return o;
 }
 
-Feature readFeature(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, std::uint32_t* landmark) {
+Feature readFeature(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, LandmarkId first_landmark,
+                    std::uint32_t* landmark) {
   Feature f;
   f.pixel = in.vector<Eigen::Vector2f>("feature");
   f.xy = in.vector<Eigen::Vector2f>("feature");
@@ -139,7 +140,7 @@ Feature readFeature(ByteReader& in, std::uint32_t version, std::size_t landmark_
   *landmark = in.get<std::uint32_t>("feature");
   if (*landmark != map_file::kNoIndex && *landmark >= landmark_limit)
     in.fail("landmark " + std::to_string(*landmark) + " cannot exist in a file of this size");
-  if (track > 0 && *landmark != map_file::kNoIndex) f.id = kLoadedLandmarks + *landmark + track * kLoadedTracks;
+  if (track > 0 && *landmark != map_file::kNoIndex) f.id = first_landmark + *landmark + track * kLoadedTracks;
   return f;
 }
 
@@ -153,8 +154,8 @@ RelativeMotion readMotion(ByteReader& in) {
 }
 
 // One keyframe into the map; its observations by landmark into `seen`.
-void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, const ImuNoise& noise, Map& map,
-                  std::vector<std::vector<MapObservation>>& seen) {
+void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, LandmarkId first_landmark,
+                  const ImuNoise& noise, Map& map, std::vector<std::vector<MapObservation>>& seen) {
   auto data = std::make_shared<Keyframe>();
   TrackedFrame& frame = data->frame;
   data->id = in.get<std::uint64_t>("keyframe id");
@@ -182,7 +183,7 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   frame.features.reserve(features);
   for (std::uint32_t k = 0; k < features; ++k) {
     std::uint32_t landmark;
-    frame.features.push_back(readFeature(in, version, landmark_limit, &landmark));
+    frame.features.push_back(readFeature(in, version, landmark_limit, first_landmark, &landmark));
     if (landmark == map_file::kNoIndex) continue;
     if (landmark >= seen.size()) seen.resize(landmark + 1);
     seen[landmark].push_back({data->id, k});
@@ -213,9 +214,9 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   }
 }
 
-void readLandmark(ByteReader& in, std::uint32_t index, std::vector<MapObservation>&& seen, Map& map) {
+void readLandmark(ByteReader& in, LandmarkId id, std::vector<MapObservation>&& seen, Map& map) {
   MapLandmark landmark;
-  landmark.id = kLoadedLandmarks + index;
+  landmark.id = id;
   landmark.p_W = finiteVector<Eigen::Vector3d>(in, "landmark position");
   landmark.plane = in.get<std::uint64_t>("landmark plane");
   landmark.visible = in.get<std::uint32_t>("landmark");
@@ -225,7 +226,8 @@ void readLandmark(ByteReader& in, std::uint32_t index, std::vector<MapObservatio
   map.restoreLandmark(landmark);
 }
 
-void readPayload(ByteReader& in, std::uint32_t version, const ImuNoise& noise, StoredMap* stored) {
+void readPayload(ByteReader& in, std::uint32_t version, LandmarkId first_landmark, const ImuNoise& noise,
+                 StoredMap* stored) {
   Map& map = stored->map;
   stored->vocabulary_id = in.get<std::uint64_t>("vocabulary id");
   if (version >= 5 && flag(in, "camera flag")) stored->camera = readCamera(in);
@@ -234,12 +236,13 @@ void readPayload(ByteReader& in, std::uint32_t version, const ImuNoise& noise, S
   const std::size_t keyframes = in.count(map_file::kKeyframeBytes, "keyframes");
   const std::size_t landmark_limit = in.left() / map_file::kLandmarkBytes;
   std::vector<std::vector<MapObservation>> seen;
-  for (std::size_t k = 0; k < keyframes; ++k) readKeyframe(in, version, landmark_limit, noise, map, seen);
+  for (std::size_t k = 0; k < keyframes; ++k)
+    readKeyframe(in, version, landmark_limit, first_landmark, noise, map, seen);
   const std::size_t landmarks = in.count(map_file::kLandmarkBytes, "landmarks");
   if (seen.size() > landmarks)
     in.fail("keyframes see more landmarks than the " + std::to_string(landmarks) + " stored");
   seen.resize(landmarks);
-  for (std::uint32_t k = 0; k < landmarks; ++k) readLandmark(in, k, std::move(seen[k]), map);
+  for (std::uint32_t k = 0; k < landmarks; ++k) readLandmark(in, first_landmark + k, std::move(seen[k]), map);
   const std::size_t loops = in.count(16, "loops");
   for (std::size_t k = 0; k < loops; ++k) {
     const auto query = in.get<std::uint64_t>("loop"), match = in.get<std::uint64_t>("loop");
@@ -252,7 +255,8 @@ void readPayload(ByteReader& in, std::uint32_t version, const ImuNoise& noise, S
 
 }  // namespace
 
-StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise) {
+StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise,
+                   LandmarkId first_landmark) {
   ByteReader in(data, size, source);
   char magic[8];
   if (size < map_file::kHeader + 4) in.fail("too short for a map file (" + std::to_string(size) + " bytes)");
@@ -274,14 +278,14 @@ StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string
   ByteReader payload(data + map_file::kHeader, static_cast<std::size_t>(length), source);
   StoredMap stored;
   try {
-    readPayload(payload, version, noise, &stored);
+    readPayload(payload, version, first_landmark, noise, &stored);
   } catch (const MapError& e) {
     payload.fail(e.what());
   }
   return stored;
 }
 
-StoredMap loadMapFile(const std::string& path, const ImuNoise& noise) {
+StoredMap loadMapFile(const std::string& path, const ImuNoise& noise, LandmarkId first_landmark) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   if (!in) throw std::runtime_error(path + ": cannot be opened, expected a map file");
   // A folder opens, and claims to be as long as can be.
@@ -290,7 +294,7 @@ StoredMap loadMapFile(const std::string& path, const ImuNoise& noise) {
   in.seekg(0);
   in.read(&bytes[0], static_cast<std::streamsize>(bytes.size()));
   if (!in) throw std::runtime_error(path + ": cannot be read");
-  return parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), path, noise);
+  return parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), path, noise, first_landmark);
 }
 
 }  // namespace vip_slam

@@ -66,6 +66,22 @@ TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   EXPECT_EQ(back_end.map().planes().size(), world.walls().size());
 }
 
+// The front end's tracks go on under the ids they have.
+TEST(BackEndMaps, NoLandmarkOfAMapHasTheIdOfOneLoadedBefore) {
+  SimulatedKeyframes world(3);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
+  const std::string path = ::testing::TempDir() + "loaded_again.vsm";
+  back_end.saveMap(path);
+  std::set<LandmarkId> before;
+  for (int load = 0; load < 3; ++load) {
+    back_end.loadMap(path);
+    ASSERT_GT(back_end.map().landmarks().size(), 20u);
+    for (const auto& entry : back_end.map().landmarks()) EXPECT_TRUE(before.insert(entry.first).second) << entry.first;
+    EXPECT_EQ(checkMap(back_end.map()), "");
+  }
+}
+
 TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
   const std::string path = ::testing::TempDir() + "waited_for.vsm";
   SimulatedKeyframes world(4), session(4);
@@ -99,8 +115,10 @@ TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {
   BackEnd back_end(options("vip"), world.sensor());
   back_end.setLocalisationMode(true);
   for (int k = 0; k < 3; ++k) {
-    const MapUpdate update = back_end.addKeyframe(world.next());
+    const KeyframePtr keyframe = world.next();
+    const MapUpdate update = back_end.addKeyframe(keyframe);
     EXPECT_EQ(update.newest_keyframe, 0u);
+    EXPECT_EQ(update.removed_keyframes, std::vector<KeyframeId>{keyframe->id});  // or the planes would wait for it
     EXPECT_NE(back_end.lastRefusal().find("localisation without a map"), std::string::npos) << back_end.lastRefusal();
   }
   EXPECT_TRUE(back_end.map().empty());

@@ -82,9 +82,18 @@ TEST(MapCamera, AnotherOneIsRefusedByName) {
   now.distortion.clear();
   EXPECT_EQ(refusal(stored, now), "");
   now.fy *= 1.02;
-  EXPECT_EQ(refusal(stored, now),
-            "test.vsm: made with images of 640 x 480 pixels, fx 615.2, fy 614.5, but the camera now has 640 x 480 "
-            "pixels, fx 620.8, fy 626.8; expected the same");
+  EXPECT_EQ(
+      refusal(stored, now),
+      "test.vsm: made with images of 640 x 480 pixels, fx 615.2, fy 614.5, cx 321.1, cy 238.8, but the camera now "
+      "has 640 x 480 pixels, fx 620.8, fy 626.8, cx 321.1, cy 238.8; expected the same");
+  now = camera();
+  now.cx += 25;  // a recalibration finds some pixels
+  EXPECT_EQ(refusal(stored, now), "");
+  now.cx += 15;
+  EXPECT_NE(refusal(stored, now).find("cx 361.1"), std::string::npos) << refusal(stored, now);
+  now = camera();
+  now.model = DistortionModel::kEquidistant;
+  EXPECT_NE(refusal(stored, now).find("cy 238.8, fisheye; expected"), std::string::npos) << refusal(stored, now);
   now = camera().scaled(848, 480);
   EXPECT_NE(refusal(stored, now).find("but the camera now has 848 x 480"), std::string::npos) << refusal(stored, now);
 }

@@ -6,9 +6,21 @@
 #include <locale>
 #include <stdexcept>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 namespace vip_slam {
+namespace {
+
+bool synced(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY);
+  if (file < 0) return false;
+  const bool done = ::fsync(file) == 0;
+  ::close(file);
+  return done;
+}
+
+}  // namespace
 
 AtomicFile::AtomicFile(std::string path, bool binary)
     : path_(std::move(path)), temporary_(path_ + ".partial-" + std::to_string(::getpid())) {
@@ -27,11 +39,15 @@ void AtomicFile::commit() {
   stream_.flush();
   const bool written = stream_.good();
   stream_.close();
-  if (!written || stream_.fail()) throw std::runtime_error(path_ + ": writing failed, is the disk full?");
+  // On the disk before the name changes: a power cut must not leave an empty file in place of the one before.
+  if (!written || stream_.fail() || !synced(temporary_))
+    throw std::runtime_error(path_ + ": writing failed, is the disk full?");
   if (std::rename(temporary_.c_str(), path_.c_str()) != 0) {
     throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
   }
   committed_ = true;
+  const auto slash = path_.find_last_of('/');
+  synced(slash == std::string::npos ? "." : path_.substr(0, slash + 1));  // the new name; not all file systems can
 }
 
 }  // namespace vip_slam

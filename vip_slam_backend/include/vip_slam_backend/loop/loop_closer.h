@@ -3,8 +3,10 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -52,6 +54,10 @@ class LoopCloser {
   bool isOld(const Map& map, KeyframeId id, const Keyframe& query) const;
   /// Looks for the query in those parts of the map that nothing ties to its own yet.
   LoopEvent joinParts(Map& map, KeyframeId query, const std::set<KeyframeId>& part);
+  /// Where the query would be as well, in words, when `place` lies elsewhere than the map has it: what looks alike is no
+  /// place. Empty: nowhere.
+  std::string rival(const Map& map, KeyframeId query, const PlaceVerification& place,
+                    const std::vector<KeyframeId>& candidates, const std::function<bool(KeyframeId)>& old) const;
   /// The map's veto on a place that was verified, or the correction.
   LoopEvent correct(Map& map, KeyframeId query, const PlaceVerification& place);
   void fuse(Map& map, KeyframeId query, const PlaceVerification& place);

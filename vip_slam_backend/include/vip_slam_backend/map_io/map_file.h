@@ -25,6 +25,8 @@ namespace vip_slam {
 
 constexpr LandmarkId kLoadedLandmarks = LandmarkId(1) << 40;
 constexpr LandmarkId kLoadedTracks = LandmarkId(1) << 42;  ///< times a track's number, added to the landmark's id
+/// Between the landmarks of maps that are loaded one after the other: tracks of the front end outlive a map.
+constexpr LandmarkId kLoadedApart = LandmarkId(1) << 51;
 constexpr std::uint32_t kLoadedEpochs = 0x80000000u;
 
 struct StoredMap {
@@ -37,13 +39,14 @@ struct StoredMap {
 std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
                          std::uint64_t vocabulary_id, const std::optional<CameraIntrinsics>& camera = {});
 /// Throws std::runtime_error "source: what, expected what" on anything that is not a whole, undamaged, consistent map
-/// of this version. Allocates no more than a small multiple of `size`.
-StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise);
+/// of this version. Allocates no more than a small multiple of `size`. Landmarks get ids from `first_landmark` on.
+StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string& source, const ImuNoise& noise,
+                   LandmarkId first_landmark = kLoadedLandmarks);
 
 /// Whole or not at all. Throws std::runtime_error naming the path.
 void saveMapFile(const std::string& path, const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
                  std::uint64_t vocabulary_id, const std::optional<CameraIntrinsics>& camera = {});
-StoredMap loadMapFile(const std::string& path, const ImuNoise& noise);
+StoredMap loadMapFile(const std::string& path, const ImuNoise& noise, LandmarkId first_landmark = kLoadedLandmarks);
 
 /// Throws std::runtime_error "path: made with ..., but the camera is ..." when places of the map would not be
 /// recognised by `camera`: another image size, or a focal length that differs by more than a per cent. A map that does
