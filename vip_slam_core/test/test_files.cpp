@@ -175,6 +175,7 @@ SensorConfig sensor() {
   c.depth_encoding = "32FC1";
   c.depth_scale = 0.0002;
   c.depth_offset = -0.012;
+  c.depth_shift << 1.75, -0.5;
   c.depth_curve.added = {0.0f, 0.0031f, -0.002f};
   c.depth_registered = false;
   c.color_rate = 25, c.depth_rate = 15, c.imu_rate = 250;
@@ -210,6 +211,7 @@ TEST_F(FileFormats, SensorRoundTrip) {
   EXPECT_EQ(b.depth_encoding, a.depth_encoding);
   EXPECT_EQ(b.depth_scale, a.depth_scale);
   EXPECT_EQ(b.depth_offset, a.depth_offset);
+  EXPECT_EQ(b.depth_shift, a.depth_shift);
   EXPECT_EQ(b.depth_curve, a.depth_curve);
   EXPECT_FALSE(b.depth_registered);
   EXPECT_EQ(b.color_rate, 25);
@@ -309,6 +311,9 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0", "imu/gyro_correction_sigma");
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0.3", "imu/gyro_correction_sigma");
   changed("scale: 0.0002", "scale: 0", "depth/scale");
+  changed("shift: [1.75, -0.5]", "shift: [1.75]", "depth/shift: 1 numbers, expected two: right and down");
+  changed("shift: [1.75, -0.5]", "shift: [1.75, 90]", "depth/shift: expected at most 50 pixels");
+  changed("shift: [1.75, -0.5]", "shift: [.nan, 0]", "depth/shift");
   changed("curve: [0, 0.0031", "curve: [0, 1.31", "depth/curve: 1.31 m are added at 0.125 m, expected at most 1");
   changed("curve: [0, 0.0031", "curve: [0, here", "depth/curve: is 'a list', expected a list of numbers");
   changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth");

@@ -61,7 +61,10 @@ class Conversions : public ::testing::Test {
     f.covariance.setRandom();
     f.T_I_C = pose();
     f.T_chain_C = pose();
-    f.camera_correction = {number(), {{0.001f, -0.002f}}, {{number(), number(), number(), number()}}};
+    f.camera_correction = {number(),
+                           {{0.001f, -0.002f}},
+                           {{number(), number(), number(), number()}},
+                           {{number(), number()}, {number(), number()}}};
     f.time_offset = number();
     for (int i = 0; i < 5; ++i) f.features.push_back(feature());
     f.depth_grid.stride = 16;
@@ -188,7 +191,7 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   observation.plane = 2;
   observation.G.setRandom();
   observation.weight_scale = 0.25;
-  observation.camera_correction = {-0.01, {{0.003f}}, {{0.001, -0.002, 0.003, 0.004}}};
+  observation.camera_correction = {-0.01, {{0.003f}}, {{0.001, -0.002, 0.003, 0.004}}, {{1.5, -0.5}, {0.003, -0.001}}};
   observation.points = {{{1, 2, 3}, 0.01f}, {{4, 5, 6}, 0.02f}};
   update.observations = {observation};
   update.associated = {{11, 2}, {12, 1}};
