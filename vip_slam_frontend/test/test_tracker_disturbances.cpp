@@ -124,6 +124,20 @@ TEST_F(DisturbanceTest, AHoleInTheDepthLeavesAPatchWide) {
   EXPECT_GT(wide, inside * 95 / 100);
 }
 
+TEST_F(DisturbanceTest, DepthCarriesOverImagesWithoutIt) {
+  for (int k = 0; k < 12; ++k) {
+    const SE3 motion = k == 0 ? SE3() : pose(k).inverse() * pose(k - 1);
+    const cv::Mat depth = k % 3 == 0 ? cv::Mat(480, 640, CV_32F, cv::Scalar(kWall)) : cv::Mat();
+    const TrackingResult result = tracker_.track(image(k), depth, {motion, 0.002, 0.033}, true, pose(k), nullptr, k);
+    if (k == 0) tracker_.replenish(pose(0), true, 0);
+    if (k > 0) EXPECT_TRUE(result.pose_ok) << k;
+    for (const Track& track : tracker_.tracks()) {
+      EXPECT_EQ(track.feature.depth > 0, k % 3 == 0);  // what the filter is told
+      EXPECT_NEAR(track.carried_depth, kWall, 1e-3);
+    }
+  }
+}
+
 // A landmark that was found by its descriptor is a pixel unsure, and stays so when its patch is found again later.
 TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
   show(0, image(0));

@@ -80,14 +80,16 @@ void FeatureTracker::measure(Track* track) const {
       pixelWhitening(track->texture, track->residual, patchWander(track->surface, at_edge, track->missed > 0));
   track->feature.pixel_sigma = static_cast<float>(std::sqrt(pixelVariance(*track)));
   const double z = track->feature.depth;
+  if (z > 0 || !depth_.empty()) track->carried_depth = z;
   const PatchSurface here = narrowPatchSurface(depth_, pixelAtStamp(track->feature), z, noise_);
   // 1 / z(p + d) = (1 + slope . d) / z
   track->depth_slope = -z * here.slope;
 }
 
-bool FeatureTracker::foretell(const Feature& f, const SE3& predicted, bool has_translation, Eigen::Vector2d* uv) const {
-  const double z = has_translation && f.depth > 0 ? f.depth : kFarAway;
-  const Eigen::Vector3d p = predicted.R() * (f.xy.homogeneous().cast<double>() * z) +
+bool FeatureTracker::foretell(const Track& track, const SE3& predicted, bool has_translation,
+                              Eigen::Vector2d* uv) const {
+  const double z = has_translation && track.carried_depth > 0 ? track.carried_depth : kFarAway;
+  const Eigen::Vector3d p = predicted.R() * (track.feature.xy.homogeneous().cast<double>() * z) +
                             (has_translation ? predicted.t() : Eigen::Vector3d(Eigen::Vector3d::Zero()));
   return view_.project(p, uv) && camera_->inImage(*uv);
 }
@@ -97,7 +99,7 @@ void FeatureTracker::matchExposure(const cv::Mat& gray, const SE3& predicted, bo
   for (const Track& track : tracks_) {
     const Eigen::Vector2d here = track.feature.pixel.cast<double>();
     Eigen::Vector2d there;
-    if (!foretell(track.feature, predicted, has_translation, &there)) continue;
+    if (!foretell(track, predicted, has_translation, &there)) continue;
     if (!camera_->inImage(here, kExposureReach + 1) || !camera_->inImage(there, kExposureReach + 1)) continue;
     const auto around = [](const Eigen::Vector2d& uv) {
       return cv::Rect(cvRound(uv.x()) - kExposureReach, cvRound(uv.y()) - kExposureReach, 2 * kExposureReach + 1,
@@ -141,7 +143,7 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
     const Feature& f = track.feature;
     previous.emplace_back(f.pixel.x(), f.pixel.y());
     Eigen::Vector2d uv;
-    const bool usable = foretell(f, predicted, has_translation, &uv);
+    const bool usable = foretell(track, predicted, has_translation, &uv);
     next->push_back(usable ? cv::Point2f(static_cast<float>(uv.x()), static_cast<float>(uv.y())) : previous.back());
   }
   found->assign(tracks_.size(), 0);
@@ -201,9 +203,9 @@ bool FeatureTracker::isWideHere(Feature feature, double foretold) const {
 void FeatureTracker::findLost(const SE3& predicted, const SE3& T_odom_C, std::vector<cv::Point2f>* next,
                               std::vector<char>* found) const {
   for (std::size_t i = 0; i < found->size(); ++i) {
-    if ((*found)[i] || !tracks_[i].surface.known || !(tracks_[i].feature.depth > 0)) continue;
+    if ((*found)[i] || !tracks_[i].surface.known || !(tracks_[i].carried_depth > 0)) continue;
     Eigen::Vector2d uv;
-    if (!foretell(tracks_[i].feature, predicted, true, &uv)) continue;
+    if (!foretell(tracks_[i], predicted, true, &uv)) continue;
     if (!camera_->inImage(uv, options_.border) || !allowed(uv)) continue;
     Track there = tracks_[i];
     there.feature.pixel = uv.cast<float>();
@@ -309,8 +311,9 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     if (!found[i]) continue;
     const Feature& last = tracks_[i].feature;
-    const Eigen::Vector3d p = view_.unproject(asVector(next[i]), last.depth > 0 ? last.depth : kFarAway);
-    pairs.push_back({last.xy.cast<double>(), p.head<2>() / p.z(), last.depth, static_cast<int>(last.age)});
+    const double z = tracks_[i].carried_depth;
+    const Eigen::Vector3d p = view_.unproject(asVector(next[i]), z > 0 ? z : kFarAway);
+    pairs.push_back({last.xy.cast<double>(), p.head<2>() / p.z(), z, static_cast<int>(last.age)});
     index.push_back(i);
   }
   RansacOptions ransac;
@@ -337,6 +340,8 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     Track track = std::move(tracks_[index[k]]);
     track.feature.pixel = Eigen::Vector2f(next[index[k]].x, next[index[k]].y);
     ++track.feature.age;
+    const Eigen::Vector3d last = track.carried_depth * track.feature.xy.homogeneous().cast<double>();
+    if (track.carried_depth > 0) track.carried_depth = (predicted.T_current_previous * last).z();
     kept.push_back(std::move(track));
   }
   for (Track& track : tracks_) {

@@ -36,6 +36,9 @@ struct Track {
   std::shared_ptr<const ReferenceImage> reference;
   Eigen::Vector2d reference_pixel = Eigen::Vector2d::Zero();
   PatchSurface surface;  ///< what the reference patch shows
+  /// Depth at the newest pixel, m, carried on from the last image that had any where this one has none; for prediction
+  /// and the rejection of outliers. 0: unknown.
+  double carried_depth = 0;
   /// Of the depth at the newest pixel, m/px; zero where no plane explains the readings around it.
   Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();
   double reference_variance = 0;  ///< of the reference pixel as a view of what the track began with, px^2
@@ -110,7 +113,7 @@ class FeatureTracker {
   /// Medians over the tracks' surroundings, here and where they are foretold: what else comes into view is no exposure.
   void matchExposure(const cv::Mat& gray, const SE3& predicted, bool has_translation);
   /// Where optical flow begins; false outside the image.
-  bool foretell(const Feature& feature, const SE3& predicted, bool has_translation, Eigen::Vector2d* uv) const;
+  bool foretell(const Track& track, const SE3& predicted, bool has_translation, Eigen::Vector2d* uv) const;
   void runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation, std::vector<cv::Point2f>* next,
               std::vector<char>* found);
   /// What optical flow lost may lie where it is foretold: the reference patch tells.
