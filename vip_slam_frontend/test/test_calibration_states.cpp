@@ -200,6 +200,24 @@ TEST(Calibration, AShiftBeyondBeliefIsTakenBack) {
   EXPECT_TRUE(run.mounting.depth_contradicts);
 }
 
+// On its way there nobody is told of it: the map would go to and fro.
+TEST(Calibration, AnOffsetBeyondBeliefIsNotHandedOn) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    for (const double speed : {0.3, 1.0}) {
+      SimulationOptions simulation;
+      simulation.seed = seed;
+      simulation.speed = speed;
+      simulation.depth_offset = speed < 1 ? 0.04 : 0.03;
+      simulation.depth_a = 0.001;
+      simulation.depth_c = 0.0005;
+      simulation.sigma_px = 0.2;
+      const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
+      EXPECT_TRUE(run.mounting.depth_contradicts);
+      EXPECT_EQ(run.most_depth_correction, 0.0);
+    }
+  }
+}
+
 // Focal lengths 0.4 % too long, a principal point that is a pixel off.
 TEST(Calibration, FindsTheIntrinsics) {
   double nees = 0, believed = 0, own_nees = 0;

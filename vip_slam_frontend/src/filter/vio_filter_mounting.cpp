@@ -13,6 +13,8 @@ namespace {
 constexpr double kBelievableChange = 4.0, kMostGyroError = 0.05;
 // An offset of depth is beyond doubt from so many of its sigmas and metres on, until it is half as large.
 constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
+// ... and it has not changed by more than a share of it for a while: on its way beyond belief it is nobody's business.
+constexpr double kSteadySeconds = 1.0, kSteadyShare = 0.25;
 // One sigma of an offset that is taken back or known to be none, m.
 constexpr double kHeldOffset = 1e-6;
 // How far the depth image lies beside: of the focal length, what is beyond doubt, worth the trouble and well enough
@@ -92,12 +94,23 @@ void VioFilter::learnMounting() {
   learnt_.gyro_correction = window.gyro_correction;
 }
 
+bool VioFilter::isSteady(double depth_offset) {
+  const double t = nav().t, since = t - offset_before_.t;
+  if (!(since >= 0) || since >= kSteadySeconds) {
+    const double moved = std::abs(depth_offset - offset_before_.value);
+    offset_is_steady_ = since < 2 * kSteadySeconds && moved < kSteadyShare * std::abs(depth_offset);
+    offset_before_ = {t, depth_offset};
+  }
+  return offset_is_steady_;
+}
+
 void VioFilter::judgeDepthOffset() {
   const WindowState& window = filter_.window();
   const double change = window.depth_offset - given_.depth_offset;
   if (!window.calibration.depth_offset || depth_contradicts_) return;
+  const bool steady = isSteady(change);
   if (!depth_is_off_ && std::abs(change) > kLeastOffset) {
-    depth_is_off_ = std::abs(change) > kSureOffset * mounting().sigma_depth_offset;
+    depth_is_off_ = steady && std::abs(change) > kSureOffset * mounting().sigma_depth_offset;
   } else if (std::abs(change) < kLeastOffset / 2) {
     depth_is_off_ = false;
   }

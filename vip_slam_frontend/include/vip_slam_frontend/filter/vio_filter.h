@@ -121,6 +121,7 @@ class VioFilter {
   /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
   /// estimated no more.
   void judgeDepthOffset();
+  bool isSteady(double depth_offset);
   /// While the rate hardly changes, noise alone would tell of the camera-IMU delay: it stays what it was, and as sure.
   struct Delay {
     double value, sigma;  ///< s
@@ -155,8 +156,13 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
-  Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();                                ///< that readings have by now
-  bool shift_contradicts_ = false;                                                       ///< it went beyond belief
+  Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();  ///< that readings have by now
+  bool shift_contradicts_ = false;                         ///< it went beyond belief
+  struct Offset {
+    double t = -1e300, value = 0;  ///< s, m
+  };
+  Offset offset_before_;  ///< when it was looked at last
+  bool offset_is_steady_ = false;
   bool depth_is_off_ = false;                                                            ///< beyond doubt
   Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
