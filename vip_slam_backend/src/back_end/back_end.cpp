@@ -249,6 +249,7 @@ void BackEnd::Impl::reset() {
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   loops.clear();
+  rejected_kept = 0;
   new_loops.clear();
   statistics = BackEndStatistics();
 }

@@ -90,6 +90,7 @@ struct BackEnd::Impl {
   void tieToLastFound(const KeyframePtr& keyframe);
 
   // back_end_loops.cpp
+  void remember(const LoopEvent& event);
   /// Enters the newest keyframe into the place database and closes a loop there when there is one.
   void closeLoop(MapUpdate* update);
 
@@ -136,7 +137,8 @@ struct BackEnd::Impl {
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< of all keyframes of this session but for little
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< as the newest keyframe came
   std::string refusal;
-  std::vector<LoopEvent> loops;      ///< all so far
+  std::vector<LoopEvent> loops;      ///< all accepted so far, and the newest that were refused
+  std::size_t rejected_kept = 0;     ///< of these
   std::vector<LoopEvent> new_loops;  ///< since the last update
   BackEndStatistics statistics;
 };

@@ -1,4 +1,5 @@
 // Loop closing within the back end.
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -8,8 +9,20 @@ namespace vip_slam {
 namespace {
 
 constexpr double kRestSeconds = 15;
+// Of the loops that were looked at and refused; a day of them would be a hundred thousand.
+constexpr std::size_t kMostRejected = 1000;
 
 }  // namespace
+
+void BackEnd::Impl::remember(const LoopEvent& event) {
+  (event.accepted ? statistics.loops_accepted : statistics.loops_rejected) += 1;
+  new_loops.push_back(event);
+  loops.push_back(event);
+  rejected_kept += !event.accepted;
+  if (rejected_kept <= kMostRejected) return;
+  loops.erase(std::find_if(loops.begin(), loops.end(), [](const LoopEvent& e) { return !e.accepted; }));
+  --rejected_kept;
+}
 
 void BackEnd::Impl::closeLoop(MapUpdate* update) {
   const KeyframeId id = map.newestKeyframe();
@@ -18,9 +31,7 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
   std::map<KeyframeId, SE3> before;  // which part moves where two come together is for the loop closer to say
   for (const auto& entry : map.keyframes()) before.emplace(entry.first, entry.second.state.T_W_I);
   for (const LoopEvent& event : loop_closer.close(map, id)) {
-    (event.accepted ? statistics.loops_accepted : statistics.loops_rejected) += 1;
-    loops.push_back(event);
-    new_loops.push_back(event);
+    remember(event);
     if (!event.accepted) continue;
     followNewest();
     fillGlobal(update);

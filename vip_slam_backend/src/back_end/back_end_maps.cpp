@@ -72,9 +72,7 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found
     event.inliers = result->inliers;
     event.T_match_query = map.keyframe(result->match).state.T_W_I.inverse() * result->T_W_I;
   }
-  loops.push_back(event);
-  new_loops.push_back(event);
-  (result ? statistics.loops_accepted : statistics.loops_rejected) += 1;
+  remember(event);
   return result.has_value();
 }
 

@@ -149,6 +149,27 @@ TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
   EXPECT_TRUE(back_end.globalBaWanted());
 }
 
+// Hours in a place that the map does not know: what was refused is not kept for ever.
+TEST(BackEndMaps, LookingInVainForLongKeepsTheNewestRefusalsOnly) {
+  SimulatedKeyframes world(3), other(9);
+  BackEnd back_end(options("vip"), world.sensor());
+  feed(&world, &back_end, 8);
+  back_end.setLocalisationMode(true);
+  for (int k = 0; k < 8; ++k) other.next();  // bear numbers of the map
+  std::size_t refused = 0;
+  KeyframeId last = 0;
+  for (int k = 0; k < 1200; ++k) {
+    const KeyframePtr keyframe = other.next();
+    last = keyframe->id;
+    for (const LoopEvent& event : back_end.addKeyframe(keyframe).loops) refused += !event.accepted;
+  }
+  ASSERT_GT(refused, 1050u);
+  const std::vector<LoopEvent> kept = back_end.snapshot().loops;
+  EXPECT_LE(kept.size(), 1000 + (1200 - refused));
+  ASSERT_FALSE(kept.empty());
+  EXPECT_EQ(kept.back().query, last);
+}
+
 TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   const std::string path = ::testing::TempDir() + "localisation_only.vsm";
   SimulatedKeyframes world(4), session(4);
