@@ -11,6 +11,7 @@ namespace vip_slam {
 
 namespace {
 
+constexpr int kLeastRadius = 14;  // the narrow one likewise
 constexpr int kPatchRadius = 41;  // a wide patch at half its size, however it is rolled
 constexpr std::size_t kMostPatches = 8000;
 constexpr int kMostPerImage = 60;
@@ -68,8 +69,9 @@ void LandmarkMatcher::retire(const Track& track) {
   const cv::Mat& image = track.reference->gray;
   const int x = static_cast<int>(std::lround(track.reference_pixel.x()));
   const int y = static_cast<int>(std::lround(track.reference_pixel.y()));
-  if (x < kPatchRadius || y < kPatchRadius || x + kPatchRadius >= image.cols || y + kPatchRadius >= image.rows) return;
-  const cv::Rect window(x - kPatchRadius, y - kPatchRadius, 2 * kPatchRadius + 1, 2 * kPatchRadius + 1);
+  if (x < kLeastRadius || y < kLeastRadius || x + kLeastRadius >= image.cols || y + kLeastRadius >= image.rows) return;
+  const cv::Rect whole(x - kPatchRadius, y - kPatchRadius, 2 * kPatchRadius + 1, 2 * kPatchRadius + 1);
+  const cv::Rect window = whole & cv::Rect(0, 0, image.cols, image.rows);
   auto reference = std::make_shared<ReferenceImage>(*track.reference);
   reference->gray = image(window).clone();
   reference->origin = track.reference->origin + Eigen::Vector2d(window.x, window.y);
