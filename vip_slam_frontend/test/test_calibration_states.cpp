@@ -10,6 +10,16 @@
 namespace vip_slam::testing {
 namespace {
 
+/// Depth and pixels that tell of a camera's small errors.
+SimulationOptions exactReadings(int seed) {
+  SimulationOptions simulation;
+  simulation.seed = static_cast<std::uint32_t>(seed);
+  simulation.depth_a = 0.001;
+  simulation.depth_c = 0.0005;
+  simulation.sigma_px = 0.2;
+  return simulation;
+}
+
 TEST(Calibration, FindsExtrinsicsAndDelay) {
   SimulationOptions simulation;
   simulation.seed = 4;
@@ -111,12 +121,8 @@ TEST(Calibration, FindsWhatDepthIsTooLongBy) {
   double nees = 0, believed = 0, offset_nees = 0;
   constexpr int kRuns = 6;
   for (int seed = 1; seed <= kRuns; ++seed) {
-    SimulationOptions simulation;
-    simulation.seed = seed;
+    SimulationOptions simulation = exactReadings(seed);
     simulation.depth_offset = 0.01;
-    simulation.depth_a = 0.001;
-    simulation.depth_c = 0.0005;
-    simulation.sigma_px = 0.2;
     FilterOptions options = singlePixels();
     options.calibration.time_offset = false;  // which so noisy a gyro misleads
     const RunResult run = runFilter(simulation, options, 20.0, false);
@@ -150,12 +156,8 @@ TEST(Calibration, FindsWhereTheDepthImageLies) {
   double nees = 0, believed = 0, own_nees = 0;
   constexpr int kRuns = 6;
   for (int seed = 1; seed <= kRuns; ++seed) {
-    SimulationOptions simulation;
-    simulation.seed = seed;
+    SimulationOptions simulation = exactReadings(seed);
     simulation.depth_shift << -0.003, 0.0016;
-    simulation.depth_a = 0.001;
-    simulation.depth_c = 0.0005;
-    simulation.sigma_px = 0.2;
     FilterOptions options = singlePixels();
     options.calibration.time_offset = false;  // which so noisy a gyro misleads
     const RunResult run = runFilter(simulation, options, 20.0, false);
@@ -204,13 +206,9 @@ TEST(Calibration, AShiftBeyondBeliefIsTakenBack) {
 TEST(Calibration, AnOffsetBeyondBeliefIsNotHandedOn) {
   for (int seed = 1; seed <= 3; ++seed) {
     for (const double speed : {0.3, 1.0}) {
-      SimulationOptions simulation;
-      simulation.seed = seed;
+      SimulationOptions simulation = exactReadings(seed);
       simulation.speed = speed;
       simulation.depth_offset = speed < 1 ? 0.04 : 0.03;
-      simulation.depth_a = 0.001;
-      simulation.depth_c = 0.0005;
-      simulation.sigma_px = 0.2;
       const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
       EXPECT_TRUE(run.mounting.depth_contradicts);
       EXPECT_EQ(run.most_depth_correction, 0.0);
