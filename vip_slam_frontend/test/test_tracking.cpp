@@ -291,6 +291,53 @@ TEST(OutlierRejection, FindsTheMotionOnAPlaneWithManyOutliers) {
   }
 }
 
+// At 60 to 70 degrees a pixel of a fisheye covers up to eight times as much of the normalised radius as in its centre.
+TEST(OutlierRejection, AFisheyesPairsAreJudgedByPixels) {
+  CameraIntrinsics intrinsics;
+  intrinsics.model = DistortionModel::kEquidistant;
+  intrinsics.width = 640, intrinsics.height = 480;
+  intrinsics.fx = intrinsics.fy = 250;
+  intrinsics.cx = 320, intrinsics.cy = 240;
+  intrinsics.distortion = {0, 0, 0, 0};
+  const std::shared_ptr<const CameraModel> fisheye = makeCamera(intrinsics);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::normal_distribution<double> noise(0, 0.3);
+  const SE3 truth(expSO3(Eigen::Vector3d(0.01, -0.02, 0.015)), Eigen::Vector3d(0.04, -0.02, 0.03));
+  for (const bool depth : {true, false}) {
+    std::vector<PointPair> pairs;
+    std::vector<char> good;
+    while (pairs.size() < 150) {
+      const Eigen::Vector2d uv(320 + 310 * unit(random), 240 + 230 * unit(random));
+      PointPair pair;
+      if (!fisheye->undistort(uv, &pair.xy_previous)) continue;
+      const double z = 1.2 + 0.4 * unit(random);
+      Eigen::Vector2d seen;
+      if (!fisheye->project(truth * Eigen::Vector3d(z * pair.xy_previous.homogeneous()), &seen)) continue;
+      good.push_back(pairs.size() % 5 != 0);
+      seen += good.back() ? Eigen::Vector2d(noise(random), noise(random)) : Eigen::Vector2d(8, -9);
+      if (!fisheye->undistort(seen, &pair.xy_current)) continue;
+      fisheye->distort(pair.xy_current, &pair.pixels);
+      pair.pixels /= fisheye->focal();
+      pair.depth_previous = depth ? z : 0.0;
+      pairs.push_back(pair);
+    }
+    good.resize(pairs.size());
+    const SE3 guess(truth.rotation(), Eigen::Vector3d::Zero());
+    RansacOptions options;
+    options.threshold = 2.0 / fisheye->focal();
+    const RansacResult result = rejectOutliers(pairs, guess, options);
+    ASSERT_TRUE(result.ok);
+    int right = 0, wrong = 0;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      right += good[i] && result.inlier[i];
+      wrong += !good[i] && result.inlier[i];
+    }
+    EXPECT_GE(right, 118) << depth;  // of 120
+    EXPECT_LE(wrong, depth ? 0 : 8) << depth;
+  }
+}
+
 TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
   const cv::Mat texture = makeTexture();
   DepthNoise noise;

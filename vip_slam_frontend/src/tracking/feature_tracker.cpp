@@ -313,7 +313,11 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     const Feature& last = tracks_[i].feature;
     const double z = tracks_[i].carried_depth;
     const Eigen::Vector3d p = view_.unproject(asVector(next[i]), z > 0 ? z : kFarAway);
-    pairs.push_back({last.xy.cast<double>(), p.head<2>() / p.z(), z, static_cast<int>(last.age)});
+    PointPair pair{last.xy.cast<double>(), p.head<2>() / p.z(), z, static_cast<int>(last.age)};
+    camera_->distort(pair.xy_current, &pair.pixels);
+    pair.pixels /= camera_->focal();
+    if (!(pair.pixels.determinant() > 1e-4)) pair.pixels.setIdentity();  // where the distortion folds over
+    pairs.push_back(pair);
     index.push_back(i);
   }
   RansacOptions ransac;

@@ -20,14 +20,16 @@ constexpr int kLeastToDoubt = 15;
 
 Eigen::Vector3d bearing(const Eigen::Vector2d& xy) { return {xy.x(), xy.y(), 1.0}; }
 
-/// What the second view of a pair with depth is off the point moved by R, t, and how that changes with the moved point.
+/// What the second view of a pair with depth is off the point moved by R, t (pixels over the focal length), and how
+/// that changes with the moved point.
 bool reprojectionOf(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, Eigen::Vector2d* r,
                     Eigen::Matrix<double, 2, 3>* J_p) {
   const Eigen::Vector3d p = R * (bearing(pair.xy_previous) * pair.depth_previous) + t;
   if (p.z() < 0.01) return false;
   const double iz = 1.0 / p.z();
-  *r = pair.xy_current - p.head<2>() * iz;
+  *r = pair.pixels * (pair.xy_current - p.head<2>() * iz);
   *J_p << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz;
+  *J_p = pair.pixels * *J_p;
   return true;
 }
 

@@ -1,4 +1,4 @@
-// Errors of a point pair under a camera motion, normalised image units. Internal to outlier rejection.
+// Errors of a point pair under a camera motion, pixels over the focal length. Internal to outlier rejection.
 #pragma once
 
 #include <cmath>
@@ -10,15 +10,15 @@ namespace vip_slam {
 inline double reprojectionError(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
   const Eigen::Vector3d p = pair.depth_previous * (R * pair.xy_previous.homogeneous()) + t;
   if (p.z() < 0.01) return 1e9;
-  return (p.head<2>() / p.z() - pair.xy_current).norm();
+  return (pair.pixels * (p.head<2>() / p.z() - pair.xy_current)).norm();
 }
 
 /// Distance of the current point from its epipolar line, t up to scale. Without translation: from the rotated point.
 inline double epipolarError(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
   const Eigen::Vector3d rotated = R * pair.xy_previous.homogeneous();
   const Eigen::Vector3d line = t.cross(rotated);
-  const double norm = line.head<2>().norm();
-  if (norm < 1e-6) return (rotated.head<2>() / rotated.z() - pair.xy_current).norm();
+  const double norm = (pair.pixels.inverse().transpose() * line.head<2>()).norm();
+  if (norm < 1e-6) return (pair.pixels * (rotated.head<2>() / rotated.z() - pair.xy_current)).norm();
   return std::abs(line.dot(pair.xy_current.homogeneous())) / norm;
 }
 
