@@ -2,7 +2,7 @@
 # file reads and of which many instantiate the same, so libraries are compiled six files at a time (planes: 62 s instead
 # of 113). The workspace's catkin profile includes this file at each project(). A package that is built elsewhere does
 # without, so every file has to include what it uses; here two neighbours may not give the same name to something of
-# their own. Precompiled headers save nothing: of a hundred megabytes too many have to be read again.
+# their own. Precompiled headers save little: of a hundred megabytes too many have to be read again.
 if(CMAKE_VERSION VERSION_LESS 3.19)
   return()  # no cmake_language(DEFER)
 endif()
@@ -11,9 +11,15 @@ function(vip_slam_faster_build)
   get_property(targets DIRECTORY PROPERTY BUILDSYSTEM_TARGETS)
   foreach(target ${targets})
     get_target_property(type ${target} TYPE)
-    # Not those whose speed is measured: the solver seemed to take longer, on a machine too busy to be sure.
-    if(type MATCHES "^(STATIC|SHARED)_LIBRARY$" AND NOT target MATCHES "^vip_slam_(backend|frontend)$")
+    if(type MATCHES "^(STATIC|SHARED)_LIBRARY$")
       set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+      # Not what the speed hangs on: the solver seemed to take longer, on a machine too busy to be sure.
+      get_target_property(sources ${target} SOURCES)
+      foreach(source ${sources})
+        if(source MATCHES "src/(solver|filter|tracking)/")
+          set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+        endif()
+      endforeach()
     endif()
   endforeach()
 endfunction()

@@ -15,6 +15,9 @@ namespace vip_slam {
 
 using PlaneSet = std::map<PlaneId, const Plane*>;
 
+/// Fewer keyframes say nothing.
+constexpr int kLeastCurveKeyframes = 15;
+
 /// This session's newest keyframes (200 at most) with depth points on planes.
 std::vector<const MapKeyframe*> newestKeyframesOnPlanes(const Map& map);
 PlaneSet allPlanes(const Map& map);

@@ -13,7 +13,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kLeastKeyframes = 15;
 constexpr double kEntrySigma = 0.01;   // m, of an entry before anything is known
 constexpr double kBendSigma = 0.002;   // m, of an entry against the line between its neighbours
 constexpr int kRounds = 3;             // of the weights
@@ -114,7 +113,7 @@ double correlation(const CurveEstimate& a, const CurveEstimate& b) {
 
 std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise) {
   const std::vector<const MapKeyframe*> keyframes = newestKeyframesOnPlanes(map);
-  if (int(keyframes.size()) < kLeastKeyframes) return std::nullopt;
+  if (int(keyframes.size()) < kLeastCurveKeyframes) return std::nullopt;
   const PlaneSet planes = allPlanes(map);
   const CurveEstimate found = estimateCurve(keyframes, planes, noise);
   if (found.known.empty()) return std::nullopt;

@@ -12,12 +12,11 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kLeastKeyframes = 15;
 constexpr double kOffsetSigma = 0.02, kScaleSigma = 0.02;  // m and share, of what comes with it and is not asked for
-constexpr int kRounds = 4;                                 // of the weights, and of what is not linear
+constexpr int kFitRounds = 4;                              // of the weights, and of what is not linear
 // What is beyond doubt: sigmas, and of what all planes say the share that each half says. In maps of exact depth up to
 // 0.26 mm at one metre are found.
-constexpr double kSure = 3.0, kLeastShare = 0.5, kFirst = 3e-4;
+constexpr double kCertain = 3.0, kLeastShare = 0.5, kFirst = 3e-4;
 constexpr double kMost = 0.01;     // 1/m; a centimetre at one metre is no matter of calibration
 constexpr double kFurther = 4e-5;  // once there is an error its best estimate is the best guess
 
@@ -30,7 +29,7 @@ DisparityError fit(const std::vector<const MapKeyframe*>& keyframes, const Plane
   const Eigen::Vector3d prior(1 / (kOffsetSigma * kOffsetSigma), 1 / (kScaleSigma * kScaleSigma), 0);
   Eigen::Vector3d x = Eigen::Vector3d::Zero();  // offset, scale, error
   DisparityError found;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFitRounds; ++round) {
     Eigen::MatrixX3d J(entries, 3);
     Eigen::VectorXd value(entries);
     for (int i = 0; i < entries; ++i) {
@@ -58,7 +57,7 @@ DisparityError fit(const std::vector<const MapKeyframe*>& keyframes, const Plane
 std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise, bool again) {
   if (!measuresDisparity(noise.type)) return std::nullopt;
   const std::vector<const MapKeyframe*> keyframes = newestKeyframesOnPlanes(map);
-  if (int(keyframes.size()) < kLeastKeyframes) return std::nullopt;
+  if (int(keyframes.size()) < kLeastCurveKeyframes) return std::nullopt;
   const PlaneSet planes = allPlanes(map);
   const DisparityError found = fit(keyframes, planes, noise);
   if (std::abs(found.value) > kMost) return std::nullopt;
@@ -66,7 +65,7 @@ std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise,
     if (std::abs(found.value) > std::max(found.sigma, kFurther)) return found.value;
     return std::nullopt;
   }
-  if (!(std::abs(found.value) > std::max(kSure * found.sigma, kFirst))) return std::nullopt;
+  if (!(std::abs(found.value) > std::max(kCertain * found.sigma, kFirst))) return std::nullopt;
   // Surfaces that pass for one plane bend as well, but each plane its own way.
   const auto [first, second] = halves(keyframes, planes);
   for (const PlaneSet& half : {first, second}) {
