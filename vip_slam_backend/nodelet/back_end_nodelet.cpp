@@ -23,6 +23,8 @@ namespace vip_slam {
 
 using diagnostic_msgs::DiagnosticStatus;
 
+constexpr int kMostPlaneUpdates = 1000;
+
 BackEndNodelet::~BackEndNodelet() {
   timer_.stop();
   for (auto& service : services_) service.shutdown();
@@ -53,7 +55,8 @@ void BackEndNodelet::onInit() {
     problem_ = what;
   });
   keyframe_lane_ = owner_->addLane("keyframes", std::size_t(options_.keyframe_queue));
-  update_lane_ = owner_->addLane("plane updates", std::size_t(options_.keyframe_queue));
+  // Observations and associations come once: minutes of them may wait before one is lost.
+  update_lane_ = owner_->addLane("plane updates", kMostPlaneUpdates);
   control_lane_ = owner_->addLane("control", 100);
   adjustment_lane_ = owner_->addLane("adjustments", 2);  // the end of one must not be lost: none would begin again
   advertise();
@@ -101,7 +104,7 @@ void BackEndNodelet::subscribe() {
         }
       }));
   subscribers_.push_back(
-      nh.subscribe<vip_slam_msgs::PlaneUpdate>("plane_update", 50, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
+      nh.subscribe<vip_slam_msgs::PlaneUpdate>("plane_update", kMostPlaneUpdates, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
         if (!owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); })) {
           NODELET_WARN_THROTTLE(5, "the back end is too slow: an update of the planes was dropped");
         }

@@ -1,4 +1,7 @@
 // The services of the system, offered by the back end.
+#include <cstdlib>
+#include <filesystem>
+
 #include <std_srvs/Empty.h>
 #include <vip_slam_msgs/LoadMap.h>
 #include <vip_slam_msgs/Pause.h>
@@ -16,9 +19,12 @@ namespace {
 
 constexpr double kPatience = 30.0;  // seconds that a service waits for the owner thread
 
-std::string requirePath(const std::string& path) {
+/// Absolute: a node's own folder is not the caller's. `~/` is the home of who runs the node.
+std::string absolutePath(const std::string& path) {
   if (path.empty()) throw std::invalid_argument("path: empty, expected a file name");
-  return path;
+  const char* home = std::getenv("HOME");
+  if (path.compare(0, 2, "~/") == 0 && home) return home + path.substr(1);
+  return std::filesystem::absolute(path).lexically_normal().string();
 }
 
 }  // namespace
@@ -137,12 +143,14 @@ std::string BackEndNodelet::reset(bool keep_map) {
 }
 
 std::string BackEndNodelet::saveMap(const std::string& path) {
-  backEnd().saveMap(requirePath(path));
-  return "map of " + std::to_string(display_.keyframeCount()) + " keyframes written to " + path;
+  const std::string file = absolutePath(path);
+  backEnd().saveMap(file);
+  return "map of " + std::to_string(display_.keyframeCount()) + " keyframes written to " + file;
 }
 
 std::string BackEndNodelet::loadMap(const std::string& path) {
-  const MapUpdate update = backEnd().loadMap(requirePath(path));
+  const std::string file = absolutePath(path);
+  const MapUpdate update = backEnd().loadMap(file);
   display_.clear();
   {
     std::lock_guard<std::mutex> lock(shown_mutex_);
@@ -150,17 +158,18 @@ std::string BackEndNodelet::loadMap(const std::string& path) {
   }
   command(vip_slam_msgs::Control::MAP_LOADED);
   distribute(update);
-  return "map of " + std::to_string(update.keyframes.size()) + " keyframes loaded from " + path;
+  return "map of " + std::to_string(update.keyframes.size()) + " keyframes loaded from " + file;
 }
 
 std::string BackEndNodelet::saveTrajectory(const std::string& path) {
   const MapSnapshot map = backEnd().snapshot();
   const Trajectory trajectory = pose_.trajectory(anchorsOf(map));
   if (trajectory.empty()) throw std::runtime_error("no image has a pose in map yet");
-  writeTum(requirePath(path), trajectory);
+  const std::string file = absolutePath(path);
+  writeTum(file, trajectory);
   const std::size_t guessed = guessedTimes(map).size();
   const std::string parts = std::to_string(guessed) + (guessed == 1 ? " part" : " parts");
-  return std::to_string(trajectory.size()) + " poses written to " + path +
+  return std::to_string(trajectory.size()) + " poses written to " + file +
          (guessed > 0 ? "; the place of " + parts + " of the map is a guess, nothing ties it to the rest" : "");
 }
 

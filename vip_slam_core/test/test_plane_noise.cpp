@@ -73,11 +73,20 @@ TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {
 // With poses as good as the points, everything else agrees far better than the noise model expects.
 TEST(PlaneNoise, WhatNoiseExplainsMayBeAPlane) {
   for (const double misfit : {1.5, 6.0}) {
-    std::vector<PlaneMisfit> misfits(100, PlaneMisfit{0, 0.01});
-    misfits.insert(misfits.end(), 10, PlaneMisfit{1, misfit});
+    std::vector<PlaneMisfit> misfits(100, PlaneMisfit{0, 0.01, 1e-8});
+    misfits.insert(misfits.end(), 10, PlaneMisfit{1, misfit, 4e-4});
     const std::vector<char> agree = planesAgree(misfits, 2);
     EXPECT_TRUE(agree[0]);
     EXPECT_EQ(agree[1] != 0, misfit < 2.0);
+  }
+}
+
+// A wall that bows by some millimetres disagrees with an exact map, and is one wall.
+TEST(PlaneNoise, AnUnevenWallIsAPlane) {
+  for (const double off : {0.004, 0.02}) {
+    std::vector<PlaneMisfit> misfits(100, PlaneMisfit{0, 0.01, 1e-8});
+    misfits.insert(misfits.end(), 10, PlaneMisfit{1, 30, off * off});
+    EXPECT_EQ(planesAgree(misfits, 2)[1] != 0, off < 0.01);
   }
 }
 
@@ -90,7 +99,7 @@ TEST(PlaneNoise, WhatIsNoPlaneCountsForLess) {
       const int plane = k % 10;
       // Plane 9 is a row of boxes whose fronts lie a centimetre apart (in units), plane 8 had one bad keyframe.
       const double offset = plane == 9 ? normal(random) : plane == 8 && k < 10 ? 0.01 * unit : 0.0;
-      misfits.push_back({plane, planeMisfit(observation(offset, 0, unit * kSigma, &random), kPlane)});
+      misfits.push_back({plane, planeMisfit(observation(offset, 0, unit * kSigma, &random), kPlane), 4e-4});
     }
     const std::vector<double> weights = planeWeights(misfits, 12);
     for (int plane = 0; plane < 8; ++plane) EXPECT_GT(weights[plane], 0.7) << unit << " " << plane;

@@ -1,5 +1,6 @@
 // What the front-end nodelet says about itself in /diagnostics.
 #include <algorithm>
+#include <cstdio>
 
 #include <vip_slam_msgs/TrackingStatus.h>
 
@@ -64,11 +65,14 @@ void FrontEndNodelet::tick() {
   } else if (started) {
     waiting.reason = color_monitor_->silence(now);
   } else {
-    waiting.reason = color_monitor_->complaint(now);
-    if (waiting.reason.empty()) waiting.reason = imu_monitor_->complaint(now);
+    // What comes at another rate than told does no harm by itself: it is the last thing to name.
+    waiting.reason = color_monitor_->fault(now);
+    if (waiting.reason.empty()) waiting.reason = imu_monitor_->fault(now);
     if (waiting.reason.empty() && !sensor_.topics.accel.empty()) waiting.reason = accel_monitor_->absence(now);
     if (waiting.reason.empty()) waiting.reason = calibration_->waitingFor();
     if (waiting.reason.empty()) waiting.reason = start_problem;
+    if (waiting.reason.empty()) waiting.reason = color_monitor_->complaint(now);
+    if (waiting.reason.empty()) waiting.reason = imu_monitor_->complaint(now);
     if (waiting.reason.empty()) waiting.reason = "the first image waits for its depth and the IMU";
   }
   if (!waiting.reason.empty()) {
@@ -83,7 +87,14 @@ void FrontEndNodelet::tick() {
 }
 
 std::string FrontEndNodelet::depthAbsence(double now) const {
-  return sensor_.topics.depth.empty() ? "" : depth_monitor_->absence(now);
+  if (sensor_.topics.depth.empty()) return "";
+  const std::string absence = depth_monitor_->absence(now);
+  constexpr int kLasting = 20;  // images; a hand before the camera is short
+  if (!absence.empty() || empty_depth_ < kLasting) return absence;
+  char range[60];
+  std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);
+  return "topic " + sensor_.topics.depth + ": images hold nothing within " + range +
+         ", the sensor file's range: wrong depth/scale, emitter off, wrong topic?";
 }
 
 void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -158,6 +169,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
                   depth_monitor_->report().rate, 1e3 * skew, 1e3 * options_.pair_tolerance);
     complaints += (complaints.empty() ? "" : "; ") + std::string(words);
   }
+  if (empty_depth_ > 0 && complaints.empty()) complaints = depthAbsence(now);
   if (!shown.size_problem.empty()) complaints += (complaints.empty() ? "" : "; ") + shown.size_problem;
   status.summary(complaints.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
                  complaints.empty() ? "all topics arrive" : complaints);

@@ -88,6 +88,7 @@ void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) 
   watch(*depth_monitor_, t);
   try {
     cv::Mat depth = decode();
+    empty_depth_ = holdsNoDepth(depth, sensor_.depth_noise) ? empty_depth_ + 1 : 0;
     owner_->post(depth_lane_, [this, t, depth] {
       if (noticeTime(t, kDepth)) pairer_->addDepth(t, depth);
       processReady();

@@ -87,7 +87,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   };
   std::vector<Input> inputs() const;
   void explainAbsences();
-  std::string depthAbsence(double now) const;  ///< empty while depth comes, and for sensors without
+  std::string depthAbsence(double now) const;  ///< empty while usable depth comes, and for sensors without
   void reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status);
   void reportInput(diagnostic_updater::DiagnosticStatusWrapper& status);
   void reportQueues(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -136,6 +136,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   Shown shown_;
   std::deque<PairerCounters> lately_paired_;  ///< as it was reported in the last seconds; of the diagnostics' thread
 
+  std::atomic<int> empty_depth_{0};  ///< depth images in a row that hold nothing within the sensor's range
   std::atomic<bool> paused_{false};
   std::atomic<bool> publish_tf_{true}, imu_rate_odometry_{false};
   std::atomic<double> feature_image_rate_{15.0};

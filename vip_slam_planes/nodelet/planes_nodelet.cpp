@@ -42,7 +42,7 @@ void PlanesNodelet::onInit() {
   control_lane_ = owner_->addLane("control", 100);
 
   ros::NodeHandle& nh = getNodeHandle();
-  update_pub_ = nh.advertise<vip_slam_msgs::PlaneUpdate>("plane_update", 20);
+  update_pub_ = nh.advertise<vip_slam_msgs::PlaneUpdate>("plane_update", 1000);  // each tells what no other does
   map_pub_ = nh.advertise<vip_slam_msgs::PlaneMap>("plane_map", 1, true);
   // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
   const auto show = [this](const ros::SingleSubscriberPublisher&) {

@@ -13,7 +13,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFlat = 0.34;  // cosine of 70 degrees
+constexpr double kFlat = 0.34;     // cosine of 70 degrees
+constexpr int kEstablished = 3;  // keyframes that saw a plane, after which it takes two to contradict it
 
 /// What spans the recess of a door and the wall beside it passes for a wall when it is seen at a flat angle, and may be
 /// as large as one.
@@ -74,12 +75,19 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   }
 }
 
-// Before its triangles are asked for: they go to the planes that are there, or start what is there.
+// Before its triangles are asked for: they go to the planes that are there, or start what is there. What several
+// keyframes have shown does not go for a single one.
 void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C,
                                            std::uint32_t epoch) {
+  const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, epoch);
+  const std::vector<const PlaneTrack*> all(tracks.begin(), tracks.end());
   std::vector<PlaneId> contradicted;
-  for (const PlaneTrack* track : tracksInView(T_map_C, epoch)) {
-    if (isContradicted(triangles, *track, options.detection, options.growth)) contradicted.push_back(track->id());
+  for (PlaneTrack* track : tracks) {
+    const PlaneVerdict verdict = planeVerdict(triangles, *track, all, options.detection, options.growth);
+    if (verdict == PlaneVerdict::kFor) track->contradictions = 0;
+    if (verdict != PlaneVerdict::kAgainst) continue;
+    ++track->contradictions;
+    if (track->keyframes_seen < kEstablished || track->contradictions > 1) contradicted.push_back(track->id());
   }
   for (PlaneId id : contradicted) removePlane(id);
 }

@@ -40,7 +40,8 @@ class Contradiction : public ::testing::Test {
     return triangles;
   }
   bool contradicted(const std::vector<MapTriangle>& triangles) {
-    return isContradicted(triangles, track_, PlaneDetectionOptions(), PlaneGrowthOptions());
+    return planeVerdict(triangles, track_, {&track_}, PlaneDetectionOptions(), PlaneGrowthOptions()) ==
+           PlaneVerdict::kAgainst;
   }
   const PlaneTrack track_ = level();
   std::mt19937 random_{5};
@@ -71,6 +72,48 @@ TEST_F(Contradiction, WhatStandsOnItDoesNotRefuteIt) {
   triangles = surface(13 * kDegree, 0.003);
   for (MapTriangle& t : triangles) t.n = {1, 0, 0};  // sides of boxes
   EXPECT_FALSE(contradicted(triangles));
+}
+
+// A shelf 0.4 m deep before a wall, seen so flat that one row of points lies on it: triangles from its front edge over
+// that row to the wall behind make a smooth ramp of four degrees.
+TEST_F(Contradiction, TrianglesFromPlaneToPlaneTellNothing) {
+  PlaneTrack shelf(1, PlaneKind::kHorizontal, Plane({0, 0, 1}, -0.9), {0, 0, 0.9}, 0.1);
+  PlaneTrack wall(2, PlaneKind::kVertical, Plane({-1, 0, 0}, 0.4), {0.4, 0, 1.2}, 0.1);
+  PlaneTrack front(3, PlaneKind::kVertical, Plane({-1, 0, 0}, 0), {0, 0, 0.6}, 0.1);
+  const auto cover = [](PlaneTrack* track, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    for (double x = low.x(); x <= high.x(); x += 0.05)
+      for (double y = low.y(); y <= high.y(); y += 0.05)
+        for (double z = low.z(); z <= high.z(); z += 0.05)
+          track->coverCell(track->cellAt(track->toPlane({x, y, z})), 1, 1, SE3());
+  };
+  cover(&shelf, {0, -0.8, 0.9}, {0.4, 0.8, 0.9});
+  cover(&wall, {0.4, -0.8, 0.92}, {0.4, 0.8, 2});
+  cover(&front, {0, -0.8, 0}, {0, 0.8, 0.88});
+  std::vector<MapTriangle> triangles;
+  const auto add = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+    MapTriangle t;
+    t.corner = {a, b, c};
+    t.vertex = {0, 1, 2};
+    t.neighbour = {-1, -1, -1};
+    t.centre = (a + b + c) / 3;
+    t.n = Eigen::Vector3d(-0.075, 0, 1).normalized();
+    t.area = 0.005;
+    t.sigma = 0.001;
+    t.sigma_angle = 0.01;
+    triangles.push_back(t);
+  };
+  for (double y = -0.75; y < 0.7; y += 0.05) {
+    const Eigen::Vector3d step(0, 0.05, 0), low(0, y, 0.873), top(0.2, y, 0.9), high(0.4, y, 0.925);
+    add(low, low + step, top);
+    add(low + step, top, top + step);
+    add(top, top + step, high);
+    add(top + step, high, high + step);
+  }
+  const auto verdict = [&](const std::vector<const PlaneTrack*>& all) {
+    return planeVerdict(triangles, shelf, all, PlaneDetectionOptions(), PlaneGrowthOptions());
+  };
+  EXPECT_EQ(verdict({&shelf}), PlaneVerdict::kAgainst);
+  EXPECT_EQ(verdict({&shelf, &wall, &front}), PlaneVerdict::kNone);
 }
 
 }  // namespace

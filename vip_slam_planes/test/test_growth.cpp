@@ -100,6 +100,20 @@ TEST_F(Growth, WhenTheNearerPlaneIsOutOfReachTheNextOneIsAsked) {
                                                          {&far, &at_three}, PlaneGrowthOptions()));
 }
 
+// At the rim of what noise lets in cells are cleared and covered again by one keyframe after the other.
+TEST(PlaneTrack, ACellThatComesAndGoesCountsOnceInAMerge) {
+  const auto level = [](PlaneId id) {
+    return PlaneTrack(id, PlaneKind::kHorizontal, Plane({0, 0, 1}, 0), Eigen::Vector3d::Zero(), 0.1);
+  };
+  PlaneTrack flickers = level(2), other = level(1);
+  for (KeyframeId host = 1; host < 10; ++host) {
+    flickers.coverCell({3, 4}, 1, host, SE3());
+    if (host < 9) flickers.miss({3, 4});
+  }
+  other.absorb(flickers, {});
+  EXPECT_EQ(other.cells().at({3, 4}), 1);
+}
+
 TEST(PlaneTrack, AStoredPolygonCoversTheCellsWhoseCentresLieInItAndInNoHole) {
   PlaneTrack track(1, PlaneKind::kHorizontal, Plane({0, 0, 1}, 0), Eigen::Vector3d::Zero(), 0.1);
   std::mt19937 random(2);

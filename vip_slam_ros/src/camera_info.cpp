@@ -5,6 +5,28 @@
 
 namespace vip_slam {
 
+namespace {
+
+// width, height, K and P are of the whole sensor; images may be a part of it, and several of its pixels one of theirs.
+CameraIntrinsics ofTheImages(CameraIntrinsics whole, const sensor_msgs::CameraInfo& info) {
+  const sensor_msgs::RegionOfInterest& roi = info.roi;
+  if (roi.width > 0 && roi.height > 0) {
+    whole.cx -= roi.x_offset;
+    whole.cy -= roi.y_offset;
+    whole.width = int(roi.width);
+    whole.height = int(roi.height);
+  }
+  const int columns = std::max(1, int(info.binning_x)), rows = std::max(1, int(info.binning_y));
+  return columns * rows > 1 ? whole.scaled(whole.width / columns, whole.height / rows) : whole;
+}
+
+// Drivers fill up with zeros what a model has no coefficients for.
+void dropTrailingZeros(std::size_t least, std::vector<double>* coefficients) {
+  while (coefficients->size() > least && coefficients->back() == 0) coefficients->pop_back();
+}
+
+}  // namespace
+
 CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info, const std::string& image_topic) {
   CameraIntrinsics intrinsics;
   intrinsics.width = int(info.width);
@@ -22,23 +44,27 @@ CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info, c
     }
     const std::string wrong = intrinsics.validate();
     if (!wrong.empty()) throw std::invalid_argument("camera_info: " + wrong);
-    return intrinsics;
+    return ofTheImages(intrinsics, info);
   }
   const bool zero = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
   // An equidistant lens without corrections is still no pinhole.
   const bool equidistant = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";
   const bool straight = zero && !(equidistant && !info.D.empty());
   try {
-    // Drivers of rectified images leave the model empty, or name one with coefficients that are all zero.
-    intrinsics.model = straight ? DistortionModel::kNone : distortionModelFromName(info.distortion_model);
+    // Drivers of rectified images leave the model empty, or name one with coefficients that are all zero. Coefficients
+    // without a model are OpenCV's.
+    const std::string& name = info.distortion_model;
+    intrinsics.model = straight ? DistortionModel::kNone : distortionModelFromName(name.empty() ? "plumb_bob" : name);
   } catch (const std::exception& error) {
     throw std::invalid_argument(std::string("camera_info.distortion_model: ") + error.what());
   }
   if (!straight) intrinsics.distortion.assign(info.D.begin(), info.D.end());
   if (!straight && zero) intrinsics.distortion.resize(4);  // some drivers give plumb_bob's five
+  const std::size_t most = intrinsics.model == DistortionModel::kEquidistant ? 4 : 8;
+  dropTrailingZeros(most, &intrinsics.distortion);
   const std::string wrong = intrinsics.validate();
   if (!wrong.empty()) throw std::invalid_argument("camera_info: " + wrong);
-  return intrinsics;
+  return ofTheImages(intrinsics, info);
 }
 
 sensor_msgs::CameraInfo toCameraInfo(const CameraIntrinsics& intrinsics) {

@@ -130,4 +130,17 @@ cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, dou
   return inverseDepth(values, parameters[0], parameters[1], offset);
 }
 
+bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise) {
+  constexpr int kStep = 8;
+  constexpr double kNothing = 0.01;
+  std::size_t all = 0, inside = 0;
+  for (int v = 0; v < metres.rows; v += kStep) {
+    for (int u = 0; u < metres.cols; u += kStep) {
+      ++all;
+      inside += noise.inRange(metres.at<float>(v, u));
+    }
+  }
+  return double(inside) < kNothing * double(all);
+}
+
 }  // namespace vip_slam

@@ -96,15 +96,22 @@ std::string StreamMonitor::absence(double now) const {
   return "topic " + r.topic + ": no message so far; " + absence_;
 }
 
-std::string StreamMonitor::complaint(double now) const {
+std::string StreamMonitor::fault(double now) const {
   const Report r = report();
   const std::string topic = "topic " + r.topic + ": ";
   if (r.rejected > 0 && r.messages <= r.rejected) return topic + r.last_rejection;
   if (const std::string absent = absence(now); !absent.empty()) return absent;
   if (r.messages >= kWindow && r.repeated + 1 == r.messages)
     return topic + "all stamps are the same: the driver does not stamp its messages";
+  return "";
+}
+
+std::string StreamMonitor::complaint(double now) const {
+  const std::string fault_now = fault(now);
+  if (!fault_now.empty()) return fault_now;
+  const Report r = report();
   if (r.nominal_rate > 0 && r.rate > 0 && r.rate < 0.7 * r.nominal_rate) {
-    return topic + format("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
+    return "topic " + r.topic + ": " + format("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
   }
   return "";
 }

@@ -90,6 +90,47 @@ TEST(CameraInfo, OfRectifiedImagesIsTheProjection) {
   EXPECT_THROW(intrinsicsFromCameraInfo(info, "/camera/rgb/image_rect"), std::invalid_argument);
 }
 
+TEST(CameraInfo, ZerosBehindTheCoefficientsSayNothing) {
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  info.K = {300, 0, 320, 0, 300, 240, 0, 0, 1};
+  info.distortion_model = "equidistant";
+  info.D = {0.1, 0.2, 0.3, 0.4, 0};
+  EXPECT_EQ(intrinsicsFromCameraInfo(info).distortion, (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
+  info.distortion_model = "rational_polynomial";
+  info.D = {1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(intrinsicsFromCameraInfo(info).distortion, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8}));
+  info.D.back() = 0.1;  // a tilted sensor: not known here
+  EXPECT_THROW(intrinsicsFromCameraInfo(info), std::invalid_argument);
+  info.distortion_model = "";
+  info.D = {0.1, 0.2, 0, 0, 0.3};
+  EXPECT_EQ(intrinsicsFromCameraInfo(info).model, DistortionModel::kRadTan);
+}
+
+TEST(CameraInfo, APartOfTheSensorAndBinnedPixels) {
+  sensor_msgs::CameraInfo info;
+  info.width = 1280;
+  info.height = 960;
+  info.K = {1200, 0, 639.5, 0, 1200, 479.5, 0, 0, 1};
+  info.binning_x = info.binning_y = 2;
+  CameraIntrinsics binned = intrinsicsFromCameraInfo(info);
+  EXPECT_EQ(binned.width, 640);
+  EXPECT_EQ(binned.fx, 600);
+  EXPECT_EQ(binned.cx, 319.5);
+  info.roi.x_offset = 320;
+  info.roi.y_offset = 120;
+  info.roi.width = 640;
+  info.roi.height = 720;
+  info.binning_x = info.binning_y = 0;
+  const CameraIntrinsics part = intrinsicsFromCameraInfo(info);
+  EXPECT_EQ(part.width, 640);
+  EXPECT_EQ(part.height, 720);
+  EXPECT_EQ(part.fx, 1200);
+  EXPECT_EQ(part.cx, 319.5);
+  EXPECT_EQ(part.cy, 359.5);
+}
+
 TEST(CameraInfo, UnusableIsNamed) {
   sensor_msgs::CameraInfo info;
   info.width = 640;

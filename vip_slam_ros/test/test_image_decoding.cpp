@@ -209,5 +209,13 @@ TEST(Decode, UnusableImagesAreNamed) {
   expectNamed([&] { decodeDepth(eight_bit, 1); }, "16-bit");
 }
 
+TEST(Decode, DepthOutsideOfTheSensorsRangeIsNone) {
+  DepthNoise noise;
+  noise.min_range = 0.3, noise.max_range = 6;
+  EXPECT_FALSE(holdsNoDepth(cv::Mat(480, 640, CV_32FC1, cv::Scalar(2.0)), noise));
+  EXPECT_TRUE(holdsNoDepth(cv::Mat(480, 640, CV_32FC1, cv::Scalar(2000.0)), noise)) << "millimetres";
+  EXPECT_TRUE(holdsNoDepth(cv::Mat(480, 640, CV_32FC1, cv::Scalar(0)), noise));
+}
+
 }  // namespace
 }  // namespace vip_slam

@@ -81,5 +81,12 @@ TEST(StreamMonitor, StartsAnewAfterTimeRanBackwards) {
   EXPECT_EQ(monitor.add(5, 5), Step::kGood);
 }
 
+TEST(StreamMonitor, AnotherRateIsOddButNoFault) {
+  StreamMonitor monitor("/camera/color", 30);
+  for (int k = 0; k < 60; ++k) monitor.add(0.05 * k, 0.05 * k);
+  EXPECT_EQ(monitor.fault(3.0), "");
+  EXPECT_NE(monitor.complaint(3.0).find("20.0 Hz"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace vip_slam

@@ -29,7 +29,7 @@ struct BackEndNodeOptions {
     v.field("rtabmap_services", rtabmap_services, {}, "namespace of services named as RTAB-Map's; empty: none");
     v.field("backup_path", backup_path, {}, "file of the backup service; relative: to ~/.ros under roslaunch");
     v.field("publish_tf", publish_tf, "publish map -> odom");
-    v.field("keyframe_queue", keyframe_queue, 2, 1000, "keyframes and plane updates that may wait");
+    v.field("keyframe_queue", keyframe_queue, 2, 1000, "keyframes that may wait");
     back_end.visit(v);
   }
 };

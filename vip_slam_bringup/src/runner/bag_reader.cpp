@@ -33,21 +33,6 @@ std::string join(const std::set<std::string>& names) {
   return text.empty() ? "none" : text;
 }
 
-/// Whether a depth image holds next to nothing that the sensor could have measured, judged on some of its pixels.
-bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise) {
-  constexpr int kStep = 8;
-  constexpr double kNothing = 0.01;
-  std::size_t all = 0, inside = 0;
-  for (int v = 0; v < metres.rows; v += kStep) {
-    for (int u = 0; u < metres.cols; u += kStep) {
-      const float z = metres.at<float>(v, u);
-      ++all;
-      inside += noise.inRange(z);
-    }
-  }
-  return double(inside) < kNothing * double(all);
-}
-
 std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
 
 /// `decode` gets the image, raw or compressed.

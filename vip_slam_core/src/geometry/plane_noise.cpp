@@ -19,6 +19,8 @@ constexpr double kPlaneFreedom = 12.0;
 // Observations that tell of a plane whether it is one, and by how much they must be worse than the map's.
 constexpr std::size_t kLeastOfPlane = 4;
 constexpr double kDisagrees = 10.0;
+// A wall is no ideal plane: one that bows by a centimetre over its length is one, however exact the map.
+constexpr double kSurfaceSigma = 0.006;  // m
 
 /// The median misfit, in units of what the noise model expects; below 1 / kMost points agree with themselves too well.
 double typicalMisfit(std::vector<double> misfits) {
@@ -69,11 +71,18 @@ std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size
   std::vector<char> agree(planes, 1);
   if (misfits.size() < kLeastObservations) return agree;
   const double unit = typicalMisfit(misfits);
-  std::vector<std::vector<double>> own(planes);
-  for (const PlaneMisfit& m : misfits) own[m.plane].push_back(m.misfit);
+  std::vector<std::vector<double>> own(planes), squares(planes);
+  for (const PlaneMisfit& m : misfits) {
+    own[m.plane].push_back(m.misfit);
+    squares[m.plane].push_back(m.square);
+  }
   const double most = std::max(1.0, kDisagrees * unit);
-  for (std::size_t p = 0; p < planes; ++p)
-    agree[p] = own[p].size() < kLeastOfPlane || typicalMisfit(std::move(own[p])) < most;
+  for (std::size_t p = 0; p < planes; ++p) {
+    if (own[p].size() < kLeastOfPlane || typicalMisfit(std::move(own[p])) < most) continue;
+    const auto middle = squares[p].begin() + squares[p].size() / 2;
+    std::nth_element(squares[p].begin(), middle, squares[p].end());
+    agree[p] = *middle < kSurfaceSigma * kSurfaceSigma;
+  }
   return agree;
 }
 

@@ -16,29 +16,60 @@ constexpr std::size_t kLeastTriangles = 10;  // fewer tell no direction
 constexpr double kFacing = 0.7;              // cosine; sides of things that stand on the plane are turned further
 constexpr double kMost = 0.5;                // of the plane's area; a part of a wall may bend, and the wall is one
 constexpr double kSigmas = 3.0;
+constexpr double kOnPlane = 0.01;  // m and three sigmas; further off a corner is no plane's
+
+/// The plane on whose covered area a corner lies, of several the nearest; null: none.
+const PlaneTrack* ownerOf(const Eigen::Vector3d& corner, double sigma, const std::vector<const PlaneTrack*>& tracks) {
+  const PlaneTrack* owner = nullptr;
+  double best = kOnPlane + kSigmas * sigma;
+  for (const PlaneTrack* track : tracks) {
+    const double distance = std::abs(track->plane().signedDistance(corner));
+    if (distance < best && track->cells().near(track->cellAt(track->toPlane(corner)), 1)) {
+      best = distance;
+      owner = track;
+    }
+  }
+  return owner;
+}
+
+/// A triangle that spans from one plane to another lies on none. Over a narrow shelf that is seen flat there may be no
+/// others, and from its front edge over its one row of points to the wall behind they make a smooth ramp.
+bool spansPlanes(const MapTriangle& t, const std::vector<const PlaneTrack*>& tracks) {
+  const PlaneTrack* first = nullptr;
+  for (const Eigen::Vector3d& corner : t.corner) {
+    const PlaneTrack* owner = ownerOf(corner, t.sigma, tracks);
+    if (owner && first && owner != first) return true;
+    if (owner) first = owner;
+  }
+  return false;
+}
 
 }  // namespace
 
-bool isContradicted(const std::vector<MapTriangle>& triangles, const PlaneTrack& track,
-                    const PlaneDetectionOptions& detection, const PlaneGrowthOptions& growth) {
+PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const PlaneTrack& track,
+                            const std::vector<const PlaneTrack*>& all, const PlaneDetectionOptions& detection,
+                            const PlaneGrowthOptions& growth) {
   std::vector<Eigen::Vector3d> points;
   std::vector<double> weights, sigmas;
   double area = 0;
   for (const MapTriangle& t : triangles) {
     if (std::abs(track.plane().signedDistance(t.centre)) > distanceGate(t, growth.distance)) continue;
     if (track.plane().n.dot(t.n) < kFacing || !track.cells().at(track.cellAt(track.toPlane(t.centre)))) continue;
+    if (spansPlanes(t, all)) continue;
     const double sigma = t.sigma + 0.005;
     points.push_back(t.centre - triangles.front().centre);
     weights.push_back(t.area / (sigma * sigma));
     sigmas.push_back(t.sigma);
     area += t.area;
   }
-  if (points.size() < kLeastTriangles || area < kMost * track.area()) return false;
+  if (points.size() < kLeastTriangles || area < kMost * track.area()) return PlaneVerdict::kNone;
   std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
   const double sigma = sigmas[sigmas.size() / 2];
   Plane shown;
   double rms = 0;
-  if (!fitPlaneRobust(points, weights, sigma + 0.002, PlaneKind::kGeneral, track.plane().n, &shown, &rms)) return false;
+  if (!fitPlaneRobust(points, weights, sigma + 0.002, PlaneKind::kGeneral, track.plane().n, &shown, &rms)) {
+    return PlaneVerdict::kNone;
+  }
   PlaneMoments moments;
   for (const Eigen::Vector3d& p : points) moments.add(p, 1.0);
   const Eigen::Vector3d mean = moments.centroid();
@@ -48,7 +79,8 @@ bool isContradicted(const std::vector<MapTriangle>& triangles, const PlaneTrack&
   // Neighbouring triangles share vertices: a quarter of them is independent.
   const double uncertainty = std::max(sigma, rms) / (spread * std::sqrt(double(points.size()) / 4.0));
   const double turned = std::acos(std::min(1.0, shown.n.dot(track.plane().n)));
-  return turned > detection.max_tilt_deg * kDegree + kSigmas * uncertainty;
+  const bool against = turned > detection.max_tilt_deg * kDegree + kSigmas * uncertainty;
+  return against ? PlaneVerdict::kAgainst : PlaneVerdict::kFor;
 }
 
 }  // namespace vip_slam

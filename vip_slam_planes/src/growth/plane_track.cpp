@@ -38,6 +38,22 @@ void PlaneTrack::coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_
   auto [it, fresh] = patches_.try_emplace(host);
   if (fresh) it->second.T_map_C = T_map_C;
   it->second.cells_C.push_back((it->second.T_map_C.inverse() * cellCentre(c)).cast<float>());
+  if (++covered_since_ > cells_.count(1)) dropStaleCells();
+}
+
+// A cell that is cleared and covered again has an entry with each of its hosts.
+void PlaneTrack::dropStaleCells() {
+  covered_since_ = 0;
+  CellGrid taken;
+  for (auto& [host, patch] : patches_) {
+    const auto stale = [&, &patch = patch](const Eigen::Vector3f& p_C) {
+      const CellIndex c = cellAt(toPlane(patch.T_map_C * p_C.cast<double>()));
+      if (cells_.at(c) == 0 || taken.at(c) > 0) return true;
+      taken.set(c, 1);
+      return false;
+    };
+    patch.cells_C.erase(std::remove_if(patch.cells_C.begin(), patch.cells_C.end(), stale), patch.cells_C.end());
+  }
 }
 
 void PlaneTrack::cover(const MapTriangle& triangle, KeyframeId host, const SE3& T_map_C,
@@ -180,13 +196,17 @@ void PlaneTrack::rehost(KeyframeId from, KeyframeId to, const CameraPoses& poses
 }
 
 void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
+  CellGrid taken;  // a cell may have entries with several hosts
   for (const auto& [host, patch] : other.patches_) {
     const auto pose = poses.find(host);
     const SE3 T_map_C = pose == poses.end() ? patch.T_map_C : pose->second;
     for (const Eigen::Vector3f& p_C : patch.cells_C) {
       const Eigen::Vector3d p = patch.T_map_C * p_C.cast<double>();
-      const int hits = other.cells_.at(other.cellAt(other.toPlane(p)));
-      if (hits > 0) coverCell(cellAt(toPlane(p)), hits, host, T_map_C);
+      const CellIndex theirs = other.cellAt(other.toPlane(p));
+      const int hits = other.cells_.at(theirs);
+      if (hits == 0 || taken.at(theirs) > 0) continue;
+      taken.set(theirs, 1);
+      coverCell(cellAt(toPlane(p)), hits, host, T_map_C);
     }
   }
   cells_.closePinholes([&](CellIndex c) { return other.cells_.at(other.cellAt(other.toPlane(cellCentre(c)))) > 0; });

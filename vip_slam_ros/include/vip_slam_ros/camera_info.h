@@ -12,7 +12,7 @@ namespace vip_slam {
 /// Takes plumb_bob, rational_polynomial, equidistant, fisheye and none; an uncalibrated K (fx = 0), a missing size or
 /// an unknown distortion model throws std::invalid_argument naming the field. `image_topic` is that of the images
 /// meant: camera_info describes the lens, so where image_proc has rectified them already (a name with image_rect) P
-/// holds, and no distortion is left.
+/// holds, and no distortion is left. A region of interest and binning are applied: the result is of the images.
 CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info, const std::string& image_topic = "");
 sensor_msgs::CameraInfo toCameraInfo(const CameraIntrinsics& intrinsics);
 

@@ -5,6 +5,8 @@
 #include <sensor_msgs/Image.h>
 #include <opencv2/core.hpp>
 
+#include "vip_slam_core/depth/depth_noise.h"
+
 namespace vip_slam {
 
 /// 8UC1 of its own memory. Takes mono8, 8UC1, mono16, rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, yuv422, yuv422_yuy2 and
@@ -18,5 +20,9 @@ cv::Mat decodeGray(const sensor_msgs::CompressedImage& image);
 cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset = 0);
 /// 16-bit PNG, bare or behind the 12-byte header of compressedDepth (16UC1, or 32FC1 quantised as inverse depth).
 cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, double offset = 0);
+
+/// Whether a depth image (32FC1 metres) holds next to nothing that the sensor could have measured, judged on some of its
+/// pixels: a wrong scale, another topic, an emitter that is off.
+bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise);
 
 }  // namespace vip_slam

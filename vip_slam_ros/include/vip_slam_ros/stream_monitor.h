@@ -34,7 +34,9 @@ class StreamMonitor {
     double last_arrival = 0;
   };
   Report report() const;
-  /// One sentence on what is wrong at time `now` ("topic /x: ..."); empty when nothing is.
+  /// One sentence on why the stream cannot be used at time `now` ("topic /x: ..."); empty when it can.
+  std::string fault(double now) const;
+  /// The same, and what is odd: another rate than told.
   std::string complaint(double now) const;
   /// The same only of a stream that has come and stopped, or brings nothing usable any more: empty while good messages
   /// come, and before the first one.

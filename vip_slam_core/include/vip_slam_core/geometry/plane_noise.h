@@ -15,6 +15,7 @@ double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C);
 struct PlaneMisfit {
   int plane;
   double misfit;
+  double square = 0;  ///< the same per point, m^2: how far the points lie off the plane
 };
 
 /// Factor on the information of all point-to-plane blocks. A depth camera's floor of systematic error is a figure that
@@ -31,7 +32,7 @@ double planeInformationScale(const std::vector<PlaneMisfit>& misfits);
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
 
 /// Whether each plane, by index, is one surface: not when its median misfit is ten times what is typical of the map,
-/// and more than the noise model expects. (Single keyframes that saw something else beside it say nothing about the
+/// more than the noise model expects, and more than real walls are uneven. (Single keyframes that saw something else beside it say nothing about the
 /// plane.) All are with too few observations.
 std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
 

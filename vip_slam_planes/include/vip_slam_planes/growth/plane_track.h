@@ -108,6 +108,7 @@ class PlaneTrack {
   int keyframes_seen = 0;     ///< keyframes that saw a fair part of it, ever
   int views_seen = 0;         ///< growth frames that did so before it was confirmed, each from another place
   Eigen::Vector3d viewed_from = Eigen::Vector3d::Zero();  ///< camera centre of the last keyframe or view that did
+  int contradictions = 0;                                 ///< keyframes in a row that showed something else in its place
   int keyframes_waited = 0;                               ///< that looked its way before it was confirmed
 
  private:
@@ -115,6 +116,8 @@ class PlaneTrack {
     SE3 T_map_C;                           ///< of the host, when last rasterised
     std::vector<Eigen::Vector3f> cells_C;  ///< cell centres in the host's camera frame
   };
+  /// Leaves one entry of each covered cell, with its first host.
+  void dropStaleCells();
   /// The host with most cells and how it has moved since they were last rasterised; null without any.
   std::pair<const Patch*, SE3> mainMove(const CameraPoses& poses) const;
   /// The plane moved with the keyframe that shows these cells; it stays level or upright.
@@ -130,6 +133,7 @@ class PlaneTrack {
   CellGrid cells_;
   bool area_changed_ = true, grown_ = true, hits_changed_ = false;
   int lost_ = 0;
+  int covered_since_ = 0;  ///< cells covered since stale entries were dropped
   std::vector<Outline> outlines_;
   Plane last_checked_;
   std::map<KeyframeId, Patch> patches_;  ///< host 0: cells whose keyframe is gone, in `map`
