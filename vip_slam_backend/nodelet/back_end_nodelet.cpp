@@ -103,8 +103,8 @@ void BackEndNodelet::subscribe() {
           NODELET_WARN_THROTTLE(5, "the back end is too slow: a keyframe was dropped");
         }
       }));
-  subscribers_.push_back(
-      nh.subscribe<vip_slam_msgs::PlaneUpdate>("plane_update", kMostPlaneUpdates, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
+  subscribers_.push_back(nh.subscribe<vip_slam_msgs::PlaneUpdate>(
+      "plane_update", kMostPlaneUpdates, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
         if (!owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); })) {
           NODELET_WARN_THROTTLE(5, "the back end is too slow: an update of the planes was dropped");
         }
@@ -192,7 +192,19 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
 }
 
 void BackEndNodelet::applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg) {
-  if (back_end_) back_end_->applyPlaneUpdate(fromMsg(msg));
+  if (!back_end_) return;
+  if (msg.session != planes_session_) {
+    // Loaded anew it has no planes, and what it does not name would go.
+    if (planes_session_ != 0 && !back_end_->map().planes().empty()) {
+      NODELET_WARN("the plane nodelet began anew: it gets the planes of the map");
+      planes_wanted_ = back_end_->map().newestKeyframe();
+      command(vip_slam_msgs::Control::MAP_LOADED);
+    }
+    planes_session_ = msg.session;
+  }
+  if (planes_wanted_ != 0 && msg.restored != planes_wanted_) return;
+  planes_wanted_ = 0;
+  back_end_->applyPlaneUpdate(fromMsg(msg));
 }
 
 void BackEndNodelet::startGlobalBa() {

@@ -80,6 +80,8 @@ class BackEndNodelet : public nodelet::Nodelet {
 
   // Owned by the thread.
   std::unique_ptr<BackEnd> back_end_;
+  std::uint64_t planes_session_ = 0;  ///< of the plane nodelet, see PlaneUpdate
+  std::uint64_t planes_wanted_ = 0;   ///< what its updates have to begin with before they count; 0: anything
   MapDisplay display_;
   double last_display_ = -1e300;  ///< stamp; negative before the first
   bool localise_ = false;         ///< as asked for, also before there is a back end

@@ -135,6 +135,7 @@ std::string BackEndNodelet::reset(bool keep_map) {
   // Keyframes that are still on their way belong to what is forgotten.
   barrier_.raise();
   if (back_end_) back_end_->reset();
+  planes_wanted_ = 0;
   display_.clear();
   pose_.clear();
   publishDisplay(barrier_.newest(), true);
@@ -151,6 +152,7 @@ std::string BackEndNodelet::saveMap(const std::string& path) {
 std::string BackEndNodelet::loadMap(const std::string& path) {
   const std::string file = absolutePath(path);
   const MapUpdate update = backEnd().loadMap(file);
+  planes_wanted_ = 0;
   display_.clear();
   {
     std::lock_guard<std::mutex> lock(shown_mutex_);

@@ -45,20 +45,31 @@ cv::Mat featureMask(const cv::Mat& mask, int border) {
   return shrunk;
 }
 
+/// Distances between features are told for images 640 px wide. A narrower one shows as much in fewer pixels.
+FrontEndOptions forWidth(FrontEndOptions options, int width) {
+  constexpr double kTold = 640.0, kLeast = 0.5;
+  constexpr int kLeastBorder = 8;  // px, for patches and their gradients
+  const double scale = std::clamp(width / kTold, kLeast, 1.0);
+  options.tracking.min_distance *= scale;
+  const int border = options.tracking.border;
+  options.tracking.border = std::max(std::min(border, kLeastBorder), static_cast<int>(std::ceil(scale * border)));
+  return options;
+}
+
 }  // namespace
 
 FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump)
-    : options_(options),
+    : options_(forWidth(options, sensor.camera.width)),
       sensor_(checked(sensor)),
       timing_(timing),
       clock_jump_(clock_jump),
       camera_(makeCamera(sensor_.camera)),
       imu_(options.recovery.max_imu_gap, 30.0),
       masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
-      tracker_(options.tracking, camera_, sensor_.depth_noise, timing,
-               featureMask(sensor_.mask, options.tracking.border)),
+      tracker_(options_.tracking, camera_, sensor_.depth_noise, timing,
+               featureMask(sensor_.mask, options_.tracking.border)),
       surfaces_(camera_, sensor_.depth_noise),
-      landmarks_(options.tracking, camera_),
+      landmarks_(options_.tracking, camera_),
       orb_(options.tracking.keyframe_corners),
       filter_(filterOptions(options, sensor_), sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset,
               camera_->focal(), sensor_.gravity),

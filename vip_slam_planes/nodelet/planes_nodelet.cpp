@@ -36,6 +36,7 @@ void PlanesNodelet::onInit() {
     throw;
   }
   owner_ = std::make_unique<OwnerThread>([this](const std::string& what) { NODELET_ERROR("%s", what.c_str()); });
+  session_ = ros::WallTime::now().toNSec();
   frame_lane_ = owner_->addLane("tracked frames", 5);  // growth may skip images
   keyframe_lane_ = owner_->addLane("keyframes", std::size_t(options_.keyframe_queue));
   update_lane_ = owner_->addLane("map updates", std::size_t(options_.keyframe_queue));
@@ -119,7 +120,10 @@ void PlanesNodelet::applyMapUpdate(const vip_slam_msgs::MapUpdate& msg) {
   const ros::WallTime begin = ros::WallTime::now();
   const PlaneUpdate update = mapper_->applyMapUpdate(map);
   const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
-  update_pub_.publish(boost::make_shared<vip_slam_msgs::PlaneUpdate>(toMsg(update, options_.map_frame)));
+  auto told = boost::make_shared<vip_slam_msgs::PlaneUpdate>(toMsg(update, options_.map_frame));
+  told->session = session_;
+  told->restored = restored_;
+  update_pub_.publish(told);
   display_.apply(map);
   display_.apply(update);
   publishMap(map.t, map.global);
@@ -140,6 +144,7 @@ void PlanesNodelet::obey(const vip_slam_msgs::Control& control) {
     publishMap(control.header.stamp.toSec(), true);
   } else if (control.command == Control::MAP_LOADED) {
     mapper_->restore(fromMsg(control.planes, control.hosts), control.newest_keyframe);
+    restored_ = control.newest_keyframe;
     display_.clear();
     publishMap(control.header.stamp.toSec(), true);
   }

@@ -56,7 +56,8 @@ class PlanesNodelet : public nodelet::Nodelet {
   std::uint32_t epoch_ = 0;
   bool placed_ = false;  ///< T_map_odom_ is known for epoch_
   std::uint64_t revision_ = 0;
-  double last_display_ = -1e300;  ///< stamp; negative before the first
+  std::uint64_t session_ = 0, restored_ = 0;  ///< see PlaneUpdate
+  double last_display_ = -1e300;              ///< stamp; negative before the first
 
   struct Shown {
     PlaneMapperCounters counters;

@@ -111,7 +111,10 @@ void Pipeline::process(const ImagePair& pair) {
   if (!(oldest_taken_ <= pair.t)) oldest_taken_ = pair.t;
   const TrackedFrame& frame = *output.frame;
   status_ = frame.status;
-  if (states_.empty() || states_.back().status.state != frame.status.state) states_.push_back({frame.t, frame.status});
+  if (states_.empty() || states_.back().status.state != frame.status.state)
+    states_.push_back({frame.t, frame.status});
+  else if (frame.status.state == TrackingState::kInitialising)
+    states_.back().status.reason = frame.status.reason;  // what the start waited for in the end
   const bool posed = frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
   if (posed && passes_.take(frame.t)) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});

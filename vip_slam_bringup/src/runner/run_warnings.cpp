@@ -15,6 +15,24 @@ bool hasPose(const StateChange& change) {
   return change.status.state == TrackingState::kTracking || change.status.state == TrackingState::kDegraded;
 }
 
+/// A first pose that comes late, in words.
+std::string lateStart(const Pipeline& pipeline) {
+  constexpr double kSoon = 3.0;  // s; standing for a second, or two tries in motion
+  const std::vector<StateChange>& states = pipeline.states();
+  const auto first = std::find_if(states.begin(), states.end(), hasPose);
+  if (states.empty() || first == states.begin()) return "";
+  const bool never = first == states.end();
+  const double seconds = never ? pipeline.duration() : first->t - states.front().t;
+  if (seconds < kSoon) return "";
+  char words[300];
+  std::snprintf(words, sizeof words, "%s: %s; standing still for a second, in view of some texture, starts at once",
+                never ? "there is no pose at all" : "the first pose comes late",
+                std::prev(first)->status.reason.c_str());
+  char after[60] = "";
+  if (!never) std::snprintf(after, sizeof after, "%.1f s after the first image ", seconds);
+  return after + std::string(words);
+}
+
 /// Where poses are missing after the first one, when that is more than a moment; in words.
 std::string missingPoses(const Pipeline& pipeline) {
   constexpr double kMoment = 1.0;  // s
@@ -73,8 +91,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(std::to_string(c.imu_rejected) +
                   " IMU messages are left out: not finite, all zero, or not newer than the one before");
   if (pipeline.images() == 0) all.push_back("no image could be used");
-  const std::string missing = missingPoses(pipeline);
-  if (!missing.empty()) all.push_back(missing);
+  for (const std::string& missing : {lateStart(pipeline), missingPoses(pipeline)})
+    if (!missing.empty()) all.push_back(missing);
   if (c.imu_contradicted > 0)
     all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
                   " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "

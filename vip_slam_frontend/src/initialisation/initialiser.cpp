@@ -35,6 +35,20 @@ int forCommon(const std::vector<FilterMeasurement>& a, const std::vector<FilterM
   return count;
 }
 
+/// Points with depth in `a` that `b` shows as well.
+std::vector<PointPair> commonPoints(const InitialisationInput& a, const InitialisationInput& b) {
+  std::map<LandmarkId, const FilterMeasurement*> first;
+  for (const FilterMeasurement& m : a.features) {
+    if (m.depth > 0) first[m.id] = &m;
+  }
+  std::vector<PointPair> pairs;
+  for (const FilterMeasurement& m : b.features) {
+    const auto it = first.find(m.id);
+    if (it != first.end()) pairs.push_back({it->second->xy, m.xy, it->second->depth});
+  }
+  return pairs;
+}
+
 }  // namespace
 
 double meanDisparity(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b,
@@ -216,49 +230,48 @@ bool Initialiser::depthMoved(const InitialisationInput& since) const {
   return all > kDepthMoved && all > kDepthMoved * last;
 }
 
-std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {
-  if (images_.size() < 5 || images_.back().t_imu - images_.front().t_imu < options_.moving_seconds) return std::nullopt;
-  // Poses of all images against the first; when too little of the first is left in view, a later one takes its place.
-  const auto pairsOf = [](const InitialisationInput& a, const InitialisationInput& b) {
-    std::map<LandmarkId, const FilterMeasurement*> first;
-    for (const FilterMeasurement& m : a.features) {
-      if (m.depth > 0) first[m.id] = &m;
-    }
-    std::vector<PointPair> pairs;
-    for (const FilterMeasurement& m : b.features) {
-      const auto it = first.find(m.id);
-      if (it != first.end()) pairs.push_back({it->second->xy, m.xy, it->second->depth});
-    }
-    return pairs;
-  };
-  std::vector<TimedCameraPose> poses{{images_.front().t_imu, SE3()}};
+bool Initialiser::chainPoses(std::vector<TimedCameraPose>* poses, std::size_t* broken) {
+  poses->assign(1, {images_.front().t_imu, SE3()});
   std::size_t base = 0;
   SE3 T_first_base, T_base_last;
   for (std::size_t k = 1; k < images_.size(); ++k) {
-    std::vector<PointPair> pairs = pairsOf(images_[base], images_[k]);
+    *broken = k;
+    std::vector<PointPair> pairs = commonPoints(images_[base], images_[k]);
     if (static_cast<int>(pairs.size()) < options_.min_tracks && base != k - 1) {
       T_first_base = T_first_base * T_base_last;
       T_base_last = SE3();
       base = k - 1;
-      pairs = pairsOf(images_[base], images_[k]);
+      pairs = commonPoints(images_[base], images_[k]);
     }
     if (static_cast<int>(pairs.size()) < options_.min_tracks) {
       reason_ = "start in motion needs " + std::to_string(options_.min_tracks) + " features with depth, has " +
                 std::to_string(pairs.size());
-      images_.erase(images_.begin(), images_.begin() + static_cast<long>(k));
-      return std::nullopt;
+      return false;
     }
     SE3 T_k_base = T_base_last.inverse();
     std::vector<char> use(pairs.size(), 1);
     if (!refinePose(pairs, use, 1.0 / focal_, &T_k_base)) {
       reason_ = "start in motion: camera pose failed";
-      images_.erase(images_.begin(), images_.begin() + static_cast<long>(k));
-      return std::nullopt;
+      return false;
     }
     T_base_last = T_k_base.inverse();
-    if (k + 1 == images_.size() || images_[k].t_imu - poses.back().t_imu > kBetweenPoses) {
-      poses.push_back({images_[k].t_imu, T_first_base * T_base_last});
+    if (k + 1 == images_.size() || images_[k].t_imu - poses->back().t_imu > kBetweenPoses) {
+      poses->push_back({images_[k].t_imu, T_first_base * T_base_last});
     }
+  }
+  return true;
+}
+
+std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {
+  const auto enough = [this] {
+    return images_.size() >= 5 && images_.back().t_imu - images_.front().t_imu >= options_.moving_seconds;
+  };
+  if (!enough()) return std::nullopt;
+  std::vector<TimedCameraPose> poses;
+  for (std::size_t broken = 0; !chainPoses(&poses, &broken);) {
+    // What comes after the break may do by itself.
+    images_.erase(images_.begin(), images_.begin() + static_cast<long>(broken));
+    if (!enough()) return std::nullopt;
   }
   MovingStart start = solveMovingStart(poses, imu, T_I_C_, noise_, filter_, gravity_, gyro_correction_);
   if (!start.ok || start.gravity_error > options_.max_gravity_error) {

@@ -11,7 +11,7 @@ struct InitialisationOptions {
   double max_gyro_std = 0.03;
   double max_accel_std = 0.3;
   double max_disparity_px = 1.0;
-  int min_tracks = 30;
+  int min_tracks = 12;
   double max_gravity_error = 0.5;
 
   void visit(OptionVisitor& v) {

@@ -11,6 +11,7 @@
 #include "vip_slam_core/imu/imu_buffer.h"
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/initialisation/initialisation_options.h"
+#include "vip_slam_frontend/initialisation/moving_start.h"
 
 namespace vip_slam {
 
@@ -37,6 +38,9 @@ class Initialiser {
  private:
   std::optional<FilterPrior> standing(const ImuBuffer& imu);
   std::optional<FilterPrior> moving(const ImuBuffer& imu);
+  /// Poses of all images against the first; when too little of the first is left in view, a later one takes its place.
+  /// False where an image shows too little of the one before, which is then `broken`.
+  bool chainPoses(std::vector<TimedCameraPose>* poses, std::size_t* broken);
   /// From that image to the newest one.
   bool depthMoved(const InitialisationInput& since) const;
   bool turnsOver(std::size_t oldest);
