@@ -253,16 +253,23 @@ void BackEndNodelet::distribute(const MapUpdate& update) {
     loop_pub_.publish(boost::make_shared<vip_slam_msgs::LoopEvent>(toMsg(loop)));
   publishDisplay(update.t, update.global);
 
-  auto statistics = boost::make_shared<vip_slam_msgs::BackEndStatistics>();
   {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.header.stamp = toStamp(update.t);
     shown_.revision = update.revision;
+    for (const LoopEvent& loop : update.loops) ++(loop.accepted ? shown_.loops_accepted : shown_.loops_rejected);
+  }
+  publishStatistics();
+}
+
+void BackEndNodelet::publishStatistics() {
+  auto statistics = boost::make_shared<vip_slam_msgs::BackEndStatistics>();
+  {
+    std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.keyframes = std::uint32_t(display_.keyframeCount());
     shown_.landmarks = std::uint32_t(display_.landmarkCount());
     shown_.plane_landmarks = std::uint32_t(display_.planeLandmarkCount());
     shown_.planes = std::uint32_t(display_.planeCount());
-    for (const LoopEvent& loop : update.loops) ++(loop.accepted ? shown_.loops_accepted : shown_.loops_rejected);
     shown_.keyframes_dropped = owner_->lanes()[keyframe_lane_].dropped;
     *statistics = shown_;
   }

@@ -54,6 +54,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   void applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg);
   void startGlobalBa();
   void distribute(const MapUpdate& update);
+  void publishStatistics();
   void publishDisplay(double t, bool now);
   void command(std::uint8_t command);
 

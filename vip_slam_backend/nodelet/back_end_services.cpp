@@ -139,6 +139,7 @@ std::string BackEndNodelet::reset(bool keep_map) {
   display_.clear();
   pose_.clear();
   publishDisplay(barrier_.newest(), true);
+  publishStatistics();
   command(vip_slam_msgs::Control::RESET);
   return "map and odometry start anew";
 }

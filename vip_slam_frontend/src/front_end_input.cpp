@@ -89,6 +89,8 @@ bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
 void FrontEnd::Impl::clockRanBack(const std::string& reason) {
   imu_.clear();
   last_image_t_ = last_imu_t_ = -1e300;
+  // Stamps tell the order only within an epoch.
+  if (phase_ == Phase::kWaiting) ++epoch_;
   reset(reason);
 }
 
