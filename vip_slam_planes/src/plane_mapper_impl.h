@@ -52,6 +52,8 @@ class PlaneMapper::Impl {
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();
   void judgeAgreement();
+  bool forgetWhereItWas(PlaneTrack* track);
+  void withdraw(const PlaneTrack& track, KeyframeId keyframe);
   void decideOnPoints();
 
   // plane_mapper_output.cpp: what goes back to it.

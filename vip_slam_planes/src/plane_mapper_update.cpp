@@ -6,6 +6,7 @@
 #include "plane_mapper_impl.h"
 #include "vip_slam_core/geometry/plane_noise.h"
 #include "vip_slam_core/types/camera_correction.h"
+#include "vip_slam_planes/growth/moved_surface.h"
 
 namespace vip_slam {
 namespace {
@@ -175,7 +176,7 @@ void PlaneMapper::Impl::judgeAgreement() {
   index = 0;
   for (auto& [id, track] : tracks_) {
     const bool known = track.known(), hidden = track.confirmed && !known;
-    track.agrees = agree[index++] != 0;
+    track.agrees = agree[index++] != 0 || forgetWhereItWas(&track);
     if (!track.agrees) points_.releaseFrom(id);
     if (known && !track.known()) {
       removed_.push_back(id);
@@ -187,6 +188,30 @@ void PlaneMapper::Impl::judgeAgreement() {
       fresh_.emplace(id, it->first);
     }
   }
+}
+
+// Of a surface that was moved only what has been seen of it since still holds. True when there was such.
+bool PlaneMapper::Impl::forgetWhereItWas(PlaneTrack* track) {
+  const KeyframeId since = surfaceMovedAt(*track, poses_);
+  if (since == 0) return false;
+  auto& observations = track->observations();
+  while (!observations.empty() && observations.begin()->first < since) {
+    withdraw(*track, observations.begin()->first);
+    observations.erase(observations.begin());
+  }
+  track->setOptimised(false);
+  refit(track);
+  return true;
+}
+
+// The back end hears of an observation that it has and that no longer holds.
+void PlaneMapper::Impl::withdraw(const PlaneTrack& track, KeyframeId keyframe) {
+  const bool told = fresh_.erase({track.id(), keyframe}) == 0;
+  if (!track.known() || !told) return;
+  PlaneObservation none;
+  none.keyframe = keyframe;
+  none.plane = track.id();
+  withdrawn_.push_back(none);
 }
 
 void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
@@ -256,13 +281,7 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
         ++it;
         continue;
       }
-      if (track.known() && !fresh_.count({id, it->first})) {
-        PlaneObservation none;
-        none.keyframe = it->first;
-        none.plane = id;
-        withdrawn_.push_back(none);
-      }
-      fresh_.erase({id, it->first});
+      withdraw(track, it->first);
       renewed.insert(it->first);
       it = track.observations().erase(it);
       track.refit_due = true;

@@ -304,5 +304,32 @@ TEST(MapperCorrections, AKeyframeOnItsWayIsNoneOfAMapThatIsLoadedMeanwhile) {
   EXPECT_EQ(stored.mapper.planes().size(), rig.mapper.planes().size());
 }
 
+// A cupboard that is put further back or forward: the two places are merged, and disagree.
+TEST(Mapper, AFrontThatWasMovedIsWhereItIsNow) {
+  for (const double way : {0.06, 0.09, -0.06}) {
+    const auto with_front_at = [](double y) {
+      Scene scene = room();
+      scene.add({0.3, y, 0}, {1.3, 0, 0}, {0, 0, 1.8});
+      scene.add({0.3, y - 0.4, 0}, {0, 0.4, 0}, {0, 0, 1.8});
+      scene.add({1.6, y - 0.4, 0}, {0, 0.4, 0}, {0, 0, 1.8});
+      return scene;
+    };
+    const Scene before = with_front_at(-1.8), after = with_front_at(-1.8 - way);
+    Rig rig;
+    const auto look = [&](const Scene& scene, int keyframes) {
+      for (int k = 0; k < keyframes; ++k) {
+        const double q = 0.4 * k;
+        rig.look(scene, {0.5 + 0.8 * std::sin(q), 1.0 + 0.4 * std::cos(0.7 * q), 1.3},
+                 {0.9 + 0.5 * std::sin(1.3 * q), -2, 1});
+      }
+    };
+    look(before, 15);
+    ASSERT_TRUE(rig.find(Plane({0, 1, 0}, 1.8), 0.005)) << way;
+    look(after, 25);
+    EXPECT_TRUE(rig.find(Plane({0, 1, 0}, 1.8 + way), 0.01)) << way;
+    EXPECT_FALSE(rig.find(Plane({0, 1, 0}, 1.8), 0.01)) << way;
+  }
+}
+
 }  // namespace
 }  // namespace vip_slam
