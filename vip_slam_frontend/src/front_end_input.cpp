@@ -45,11 +45,11 @@ cv::Mat featureMask(const cv::Mat& mask, int border) {
   return shrunk;
 }
 
-/// Distances between features are told for images 640 px wide. A narrower one shows as much in fewer pixels.
-FrontEndOptions forWidth(FrontEndOptions options, int width) {
+/// Distances between features are told for images of 640 x 480. A smaller one shows as much in fewer pixels.
+FrontEndOptions forSize(FrontEndOptions options, int width, int height) {
   constexpr double kTold = 640.0, kLeast = 0.5;
   constexpr int kLeastBorder = 8;  // px, for patches and their gradients
-  const double scale = std::clamp(width / kTold, kLeast, 1.0);
+  const double scale = std::clamp(std::max(width, height) / kTold, kLeast, 1.0);
   options.tracking.min_distance *= scale;
   const int border = options.tracking.border;
   options.tracking.border = std::max(std::min(border, kLeastBorder), static_cast<int>(std::ceil(scale * border)));
@@ -59,7 +59,7 @@ FrontEndOptions forWidth(FrontEndOptions options, int width) {
 }  // namespace
 
 FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump)
-    : options_(forWidth(options, sensor.camera.width)),
+    : options_(forSize(options, sensor.camera.width, sensor.camera.height)),
       sensor_(checked(sensor)),
       timing_(timing),
       clock_jump_(clock_jump),

@@ -29,7 +29,7 @@ struct TrackingOptions {
   void visit(OptionVisitor& v) {
     v.field("max_features", max_features, 20, 2000, "features tracked per image");
     v.field("min_distance", min_distance, 3.0, 200.0,
-            "smallest distance between tracked features, px of an image 640 wide");
+            "smallest distance between tracked features, px of an image of 640 x 480");
     v.field("grid_columns", grid_columns, 1, 64, "cells across the image for an even spread of corners");
     v.field("grid_rows", grid_rows, 1, 64, "cells down the image for an even spread of corners");
     v.field("fast_threshold", fast_threshold, 2, 100, "FAST threshold tried first, grey levels");
@@ -46,7 +46,7 @@ struct TrackingOptions {
             "align each tracked patch with the one of its reference image, so that long tracks do not creep");
     v.field("reference_max_correction_px", reference_max_correction_px, 0.1, 10.0,
             "largest shift the alignment with the reference patch may make, px");
-    v.field("border", border, 4, 100, "no features nearer to the image border, px of an image 640 wide");
+    v.field("border", border, 4, 100, "no features nearer to the image border, px of an image of 640 x 480");
     v.field("keyframe_corners", keyframe_corners, 0, 5000, "untracked ORB corners added to a keyframe");
     v.field("landmark_hamming", landmark_hamming, 0, 256, "largest descriptor distance to re-acquire a landmark, bits");
     v.field("landmark_radius_px", landmark_radius_px, 1.0, 100.0, "search radius around a projected landmark, px");
