@@ -1,7 +1,6 @@
 // The filter's update with features: which tracks, their rows, how far each may be believed.
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "vip_slam_frontend/filter/feature_rows.h"
 #include "vip_slam_frontend/filter/triangular_solve.h"
@@ -14,10 +13,6 @@ namespace {
 
 // Up to here a sensor is as good as its model says.
 constexpr double kWorseThanModel = 1.1;
-// px that the velocity's uncertainty moves a point by across the window: beyond, residuals at the present poses are the
-// velocity's, as when points come back after a stretch on the IMU alone.
-constexpr double kOpen = 2.0;
-constexpr double kUsualDistance = 3.0;  // m, of a point without depth
 
 /// Tells a monitor the median of what the features left over per degree of freedom, and the rows behind it.
 void tell(NoiseMonitor* monitor, std::vector<double>& chi2, int rows) {
@@ -80,20 +75,6 @@ double VioFilter::ownNoise(const Triangulation& point) const {
   return point.pixel_chi2 / dof;
 }
 
-double VioFilter::beyondState(const FeatureRows& feature) const {
-  const int n = static_cast<int>(feature.r.size());
-  if (n == 0) return 1.0;
-  const double distance = testInnovation(filter_.R(), feature.H, feature.r).distance;
-  return distance < explained_.threshold(n) ? 1.0 : distance / n;
-}
-
-double VioFilter::openPixels() const {
-  const WindowState& window = filter_.window();
-  const double variance = covariance().block<3, 3>(6, 6).diagonal().maxCoeff();
-  const double seconds = window.clones.back().t - window.clones.front().t;
-  return std::sqrt(std::max(0.0, variance)) * seconds * focal_;
-}
-
 double VioFilter::depthScale() const {
   // Errors of a depth camera last longer than those between images: what scatters less is not more exact.
   return depth_noise_.sigma() > kWorseThanModel ? depth_noise_.sigma() : 1.0;
@@ -109,7 +90,6 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
   std::vector<FeatureRows> accepted;
   std::vector<double> chi2, depth_chi2;
   int rows = 0, chi2_rows = 0, depth_rows = 0;
-  std::optional<double> open_pixels;
   for (const Candidate& candidate : candidates) {
     if (static_cast<int>(accepted.size()) >= options_.max_update_features) break;
     ++report->features_tried;
@@ -117,21 +97,12 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
     const Triangulation point = triangulate(window, observations, noise);
     if (!point.ok) continue;
     MeasurementNoise row_noise = noise;
-    row_noise.sigma_xy *= options_.pixel_inflation;
     // Points seen from poses that are wrong together leave residuals that are none of their own.
-    double own = after_step ? 1.0 : ownNoise(point);
-    bool open = false;
-    if (own > 1) {
-      if (!open_pixels) open_pixels = openPixels();
-      const double z = observations.back().depth > 0 ? observations.back().depth : kUsualDistance;
-      open = *open_pixels > kOpen * z;
-      if (open) own = std::min(own, beyondState(featureRows(window, observations, point.p_W, row_noise)));
-    }
-    row_noise.sigma_xy *= own;
+    row_noise.sigma_xy *= options_.pixel_inflation * (after_step ? 1.0 : ownNoise(point));
     FeatureRows feature = featureRows(window, observations, point.p_W, row_noise);
     const int dof = static_cast<int>(feature.r.size());
     if (dof == 0) continue;
-    if (point.pixel_rows >= 10 && !open) {
+    if (point.pixel_rows >= 10) {
       chi2.push_back(point.pixel_chi2 / (point.pixel_rows - 3));
       chi2_rows += point.pixel_rows - 3;
     }

@@ -19,8 +19,6 @@
 
 namespace vip_slam {
 
-struct FeatureRows;
-
 /// One feature in the present image.
 struct FilterMeasurement {
   LandmarkId id = kNoLandmark;
@@ -118,10 +116,6 @@ class VioFilter {
   /// that is no point (an occluding edge, a reflection). Such patches also wander along with the motion, by much more
   /// than their residuals say: measured against true poses about as the square of them.
   double ownNoise(const Triangulation& point) const;
-  /// What is left of that factor when the state's uncertainty has its share; `feature`: with the common noise.
-  double beyondState(const FeatureRows& feature) const;
-  /// Uncertainty of the velocity over the time of the window, times the focal length: px at one metre.
-  double openPixels() const;
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
   /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
