@@ -13,7 +13,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFlat = 0.34;     // cosine of 70 degrees
+constexpr double kFlat = 0.34;   // cosine of 70 degrees
 constexpr int kEstablished = 3;  // keyframes that saw a plane, after which it takes two to contradict it
 
 /// What spans the recess of a door and the wall beside it passes for a wall when it is seen at a flat angle, and may be

@@ -47,8 +47,8 @@ bool spansPlanes(const MapTriangle& t, const std::vector<const PlaneTrack*>& tra
 }  // namespace
 
 PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const PlaneTrack& track,
-                            const std::vector<const PlaneTrack*>& all, const PlaneDetectionOptions& detection,
-                            const PlaneGrowthOptions& growth) {
+                          const std::vector<const PlaneTrack*>& all, const PlaneDetectionOptions& detection,
+                          const PlaneGrowthOptions& growth) {
   std::vector<Eigen::Vector3d> points;
   std::vector<double> weights, sigmas;
   double area = 0;

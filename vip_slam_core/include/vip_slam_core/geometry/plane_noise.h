@@ -32,8 +32,8 @@ double planeInformationScale(const std::vector<PlaneMisfit>& misfits);
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
 
 /// Whether each plane, by index, is one surface: not when its median misfit is ten times what is typical of the map,
-/// more than the noise model expects, and more than real walls are uneven. (Single keyframes that saw something else beside it say nothing about the
-/// plane.) All are with too few observations.
+/// more than the noise model expects, and more than real walls are uneven. (Single keyframes that saw something else
+/// beside it say nothing about the plane.) All are with too few observations.
 std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size_t planes);
 
 }  // namespace vip_slam

@@ -21,7 +21,7 @@ enum class PlaneVerdict {
 /// detection.max_tilt_deg and noise. Triangles from one plane of `all` (those in view, `track` among them) to another
 /// tell nothing.
 PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const PlaneTrack& track,
-                            const std::vector<const PlaneTrack*>& all, const PlaneDetectionOptions& detection,
-                            const PlaneGrowthOptions& growth);
+                          const std::vector<const PlaneTrack*>& all, const PlaneDetectionOptions& detection,
+                          const PlaneGrowthOptions& growth);
 
 }  // namespace vip_slam

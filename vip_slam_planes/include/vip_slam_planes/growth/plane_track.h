@@ -108,8 +108,8 @@ class PlaneTrack {
   int keyframes_seen = 0;     ///< keyframes that saw a fair part of it, ever
   int views_seen = 0;         ///< growth frames that did so before it was confirmed, each from another place
   Eigen::Vector3d viewed_from = Eigen::Vector3d::Zero();  ///< camera centre of the last keyframe or view that did
-  int contradictions = 0;                                 ///< keyframes in a row that showed something else in its place
-  int keyframes_waited = 0;                               ///< that looked its way before it was confirmed
+  int contradictions = 0;    ///< keyframes in a row that showed something else in its place
+  int keyframes_waited = 0;  ///< that looked its way before it was confirmed
 
  private:
   struct Patch {
