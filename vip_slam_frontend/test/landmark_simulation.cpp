@@ -105,6 +105,10 @@ std::vector<ImuSample> LandmarkSimulation::imuBetween(double t0, double t1) cons
 std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t most) {
   const Eigen::Matrix3d given = options_.bearing.matrix().inverse();
   std::vector<FilterMeasurement> seen;
+  if (t > options_.blind_from && t < options_.blind_until) {
+    std::fill(track_.begin(), track_.end(), kNoLandmark);
+    return seen;
+  }
   const SE3 T_C_W = (poseAt(t) * T_I_C_).inverse();
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   // Tracks already running come first: a tracker holds on to what it has.
@@ -198,7 +202,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     const double delay = t_imu_true < options.later ? options.time_offset : options.later_time_offset;
     const double t_imu = t_imu_true - delay + filter.window().time_offset;
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
-    const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, 200),
+    const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, options.most_points),
                                           standing ? std::optional<Unrest>(Unrest()) : std::nullopt);
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
@@ -239,6 +243,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     }
     result.final_position = error.tail<3>().norm();
     result.final_rotation = error.head<3>().norm();
+    result.final_velocity = (truth.v_W - estimate.v_W).norm();
   }
   result.nees /= std::max(1, count);
   result.motion_nees /= std::max(1, motions);

@@ -35,6 +35,8 @@ struct SimulationOptions {
   double time_offset = 0;                                ///< t_imu = t_image + time_offset
   double later_time_offset = 0;                          ///< instead, from `later` on
   double later = 1e9;                                    ///< s
+  std::size_t most_points = 200;                         ///< in view at a time
+  double blind_from = 1e9, blind_until = 1e9;            ///< s: no point is seen, the tracks end
 };
 
 class LandmarkSimulation {
@@ -71,6 +73,7 @@ struct RunResult {
   double nees = 0;            ///< mean over time of the 6-DoF pose error's normalised square (expectation 6)
   double final_position = 0;  ///< m
   double final_rotation = 0;  ///< rad
+  double final_velocity = 0;  ///< m/s
   double length = 0;          ///< m travelled
   double nis_per_dof = 0;
   double depth_scale = 1;  ///< factor on the depth noise that the filter found, at the end

@@ -13,6 +13,12 @@ namespace {
 
 // Up to here a sensor is as good as its model says.
 constexpr double kWorseThanModel = 1.1;
+// px that the velocity's uncertainty moves a point by across the window: beyond, residuals at the present poses are the
+// velocity's, as when points come back after a stretch on the IMU alone.
+constexpr double kOpen = 2.0;
+// Updates from there, each linearised where the one before led to: the second one's poses are right to a pixel.
+constexpr int kPasses = 3;
+constexpr double kUsualDistance = 3.0;  // m, of a point without depth
 
 /// Tells a monitor the median of what the features left over per degree of freedom, and the rows behind it.
 void tell(NoiseMonitor* monitor, std::vector<double>& chi2, int rows) {
@@ -75,45 +81,66 @@ double VioFilter::ownNoise(const Triangulation& point) const {
   return point.pixel_chi2 / dof;
 }
 
+double VioFilter::beyondState(const FeatureRows& feature) const {
+  const int n = static_cast<int>(feature.r.size());
+  if (n == 0) return 1.0;
+  const double distance = testInnovation(filter_.R(), feature.H, feature.r).distance;
+  return distance < explained_.threshold(n) ? 1.0 : distance / n;
+}
+
+double VioFilter::openPixels() const {
+  const WindowState& window = filter_.window();
+  const double variance = covariance().block<3, 3>(6, 6).diagonal().maxCoeff();
+  const double seconds = window.clones.back().t - window.clones.front().t;
+  return std::sqrt(std::max(0.0, variance)) * seconds * focal_;
+}
+
 double VioFilter::depthScale() const {
   // Errors of a depth camera last longer than those between images: what scatters less is not more exact.
   return depth_noise_.sigma() > kWorseThanModel ? depth_noise_.sigma() : 1.0;
 }
 
-void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report) {
-  const WindowState& window = filter_.window();
+VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& candidates, const WindowState& window,
+                                                 const Eigen::VectorXd& moved, OwnNoise own_noise) const {
   MeasurementNoise noise;
   noise.sigma_xy = noise_.sigma() / focal_;
   noise.depth_inflation = options_.depth_inflation * depthScale();
   noise.use_depth = options_.use_depth;
-
-  std::vector<FeatureRows> accepted;
-  std::vector<double> chi2, depth_chi2;
-  int rows = 0, chi2_rows = 0, depth_rows = 0;
+  FeatureBatch batch;
   for (const Candidate& candidate : candidates) {
-    if (static_cast<int>(accepted.size()) >= options_.max_update_features) break;
-    ++report->features_tried;
+    if (static_cast<int>(batch.accepted.size()) >= options_.max_update_features) break;
+    ++batch.tried;
     const auto& observations = candidate.track->observations;
     const Triangulation point = triangulate(window, observations, noise);
     if (!point.ok) continue;
+    double own = own_noise == OwnNoise::kNone ? 1.0 : ownNoise(point);
+    if (own > 1) {
+      const double z = observations.back().depth > 0 ? observations.back().depth : kUsualDistance;
+      batch.nearest_noisy = std::min(batch.nearest_noisy, z);
+      if (own_noise == OwnNoise::kBeyondState) {
+        MeasurementNoise common = noise;
+        common.sigma_xy *= options_.pixel_inflation;
+        own = std::min(own, beyondState(featureRows(window, observations, point.p_W, common)));
+      }
+    }
     MeasurementNoise row_noise = noise;
-    // Points seen from poses that are wrong together leave residuals that are none of their own.
-    row_noise.sigma_xy *= options_.pixel_inflation * (after_step ? 1.0 : ownNoise(point));
+    row_noise.sigma_xy *= options_.pixel_inflation * own;
     FeatureRows feature = featureRows(window, observations, point.p_W, row_noise);
     const int dof = static_cast<int>(feature.r.size());
     if (dof == 0) continue;
     if (point.pixel_rows >= 10) {
-      chi2.push_back(point.pixel_chi2 / (point.pixel_rows - 3));
-      chi2_rows += point.pixel_rows - 3;
+      batch.chi2.push_back(point.pixel_chi2 / (point.pixel_rows - 3));
+      batch.chi2_rows += point.pixel_rows - 3;
     }
     if (point.depth_rows >= 5) {
       const double scale = depthScale() / depth_noise_.sigma();  // of what they were whitened by
-      depth_chi2.push_back(scale * scale * point.depth_chi2 / (point.depth_rows - 1));
-      depth_rows += point.depth_rows - 1;
+      batch.depth_chi2.push_back(scale * scale * point.depth_chi2 / (point.depth_rows - 1));
+      batch.depth_rows += point.depth_rows - 1;
     }
+    feature.r += feature.H * moved;
     const Innovation innovation = testInnovation(filter_.R(), feature.H, feature.r);
     if (!(innovation.distance < gate_.threshold(dof))) {
-      ++report->features_gated;
+      ++batch.gated;
       continue;
     }
     // A patch that creeps along with the motion (two edges at different depths that meet) explains all its residuals by
@@ -125,18 +152,51 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
       feature.H *= std::sqrt(weight);
       feature.r *= std::sqrt(weight);
     }
-    rows += dof;
-    accepted.push_back(std::move(feature));
+    batch.rows += dof;
+    batch.accepted.push_back(std::move(feature));
   }
-  tell(&noise_, chi2, chi2_rows);
-  tell(&depth_noise_, depth_chi2, depth_rows);
-  if (rows == 0) return;
+  return batch;
+}
+
+UpdateResult VioFilter::apply(FeatureBatch& batch) {
+  if (batch.rows == 0) return {};
   Eigen::MatrixXd H;
   Eigen::VectorXd h;
-  stackStaircase(accepted, rows, &H, &h);
-  const UpdateResult result = filter_.update(H, h);
-  report->features_used = static_cast<int>(accepted.size());
-  report->rows = rows;
+  stackStaircase(batch.accepted, batch.rows, &H, &h);
+  return filter_.update(H, h);
+}
+
+UpdateResult VioFilter::updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch) {
+  const SquareRootFilter prior = filter_;
+  WindowState at = prior.window();
+  UpdateResult result;
+  result.delta = Eigen::VectorXd::Zero(at.dimension());
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const Eigen::VectorXd moved = result.delta;
+    filter_ = prior;
+    *batch = judgeFeatures(candidates, at, moved, pass == 0 ? OwnNoise::kBeyondState : OwnNoise::kResiduals);
+    result = apply(*batch);
+    if (!result.ok) break;
+    filter_.relinearise();
+    at = filter_.window();
+  }
+  return result;
+}
+
+void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report) {
+  const Eigen::VectorXd here = Eigen::VectorXd::Zero(filter_.window().dimension());
+  // Points seen from poses that are wrong together leave residuals that are none of their own.
+  FeatureBatch batch =
+      judgeFeatures(candidates, filter_.window(), here, after_step ? OwnNoise::kNone : OwnNoise::kResiduals);
+  const bool open = openPixels() > kOpen * batch.nearest_noisy;
+  const UpdateResult result = open ? updateRelinearised(candidates, &batch) : apply(batch);
+  tell(&noise_, batch.chi2, batch.chi2_rows);
+  tell(&depth_noise_, batch.depth_chi2, batch.depth_rows);
+  report->features_tried = batch.tried;
+  report->features_gated = batch.gated;
+  if (batch.rows == 0) return;
+  report->features_used = static_cast<int>(batch.accepted.size());
+  report->rows = batch.rows;
   report->nis = result.nis;
   report->healthy = report->healthy && result.ok;
 }

@@ -161,6 +161,11 @@ UpdateResult SquareRootFilter::update(Eigen::MatrixXd& H, Eigen::VectorXd& h) {
   return result;
 }
 
+void SquareRootFilter::relinearise() {
+  for (Clone& clone : window_.clones) clone.T_W_I_fej = clone.T_W_I;
+  window_.v_W_fej = window_.v_W;
+}
+
 Eigen::VectorXd SquareRootFilter::calibrationSigmas() const {
   const int size = window_.calibration.size();
   Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(size, window_.dimension());

@@ -44,6 +44,9 @@ class SquareRootFilter {
   /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.
   UpdateResult update(Eigen::MatrixXd& H, Eigen::VectorXd& h);
 
+  /// The present estimates are the first ones from now on: where Jacobians to come are taken.
+  void relinearise();
+
   /// One sigma of each calibration state.
   Eigen::VectorXd calibrationSigmas() const;
   /// Covariance of (theta, p, v, b_g, b_a) of the newest pose.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/feature_rows.h"
 #include "vip_slam_frontend/filter/filter_options.h"
 #include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/filter/mounting_estimate.h"
@@ -116,6 +117,30 @@ class VioFilter {
   /// that is no point (an occluding edge, a reflection). Such patches also wander along with the motion, by much more
   /// than their residuals say: measured against true poses about as the square of them.
   double ownNoise(const Triangulation& point) const;
+  /// What is left of that factor when the state's uncertainty has its share; `feature`: with the common noise.
+  double beyondState(const FeatureRows& feature) const;
+  /// Uncertainty of the velocity over the time of the window, times the focal length: px at one metre.
+  double openPixels() const;
+  /// Which residuals of a feature are noise of its own: none, all that the common noise does not explain, or of these
+  /// what the state's uncertainty does not explain either.
+  enum class OwnNoise { kNone, kResiduals, kBeyondState };
+  /// An image's features, ready for an update, and what they say about the noise.
+  struct FeatureBatch {
+    std::vector<FeatureRows> accepted;
+    int rows = 0, tried = 0, gated = 0;
+    std::vector<double> chi2, depth_chi2;  ///< per degree of freedom, of single features
+    int chi2_rows = 0, depth_rows = 0;
+    double nearest_noisy = 1e9;  ///< m, z of the nearest feature with a noise of its own
+  };
+  /// Rows that are linearised at `window`, for an update of the filter's own, which is `moved` away from it.
+  FeatureBatch judgeFeatures(const std::vector<Candidate>& candidates, const WindowState& window,
+                             const Eigen::VectorXd& moved, OwnNoise own_noise) const;
+  UpdateResult apply(FeatureBatch& batch);
+  /// Where the velocity is open, poses are wrong together by more than rows linearised there can tell (a stretch on the
+  /// IMU alone): a first update takes all residuals that the state may explain for the state's, the next ones begin
+  /// from the same prior, but linearise and judge the features' own noise where the one before led to (iterated Kalman
+  /// update). First estimates are renewed with it.
+  UpdateResult updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
   /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
