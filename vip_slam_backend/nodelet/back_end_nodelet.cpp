@@ -29,7 +29,7 @@ BackEndNodelet::~BackEndNodelet() {
   timer_.stop();
   for (auto& service : services_) service.shutdown();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
-  // Their callbacks ask the owner too.
+  // Their callbacks use the owner thread too.
   reconfigure_.reset();
   markers_pub_.shutdown();
   landmarks_pub_.shutdown();
@@ -55,10 +55,10 @@ void BackEndNodelet::onInit() {
     problem_ = what;
   });
   keyframe_lane_ = owner_->addLane("keyframes", std::size_t(options_.keyframe_queue));
-  // Observations and associations come once: minutes of them may wait before one is lost.
+  // Observations and associations are sent only once: the queue holds minutes of them.
   update_lane_ = owner_->addLane("plane updates", kMostPlaneUpdates);
   control_lane_ = owner_->addLane("control", 100);
-  adjustment_lane_ = owner_->addLane("adjustments", 2);  // the end of one must not be lost: none would begin again
+  adjustment_lane_ = owner_->addLane("adjustments", 2);  // its own lane: if an end were dropped, no other would start
   advertise();
   owner_->start(kMappingNiceness);
   advertiseServices();
@@ -70,10 +70,10 @@ void BackEndNodelet::onInit() {
 void BackEndNodelet::advertise() {
   ros::NodeHandle& nh = getNodeHandle();
   map_update_pub_ = nh.advertise<vip_slam_msgs::MapUpdate>("map_update", 20);
-  control_pub_ = nh.advertise<vip_slam_msgs::Control>("control", 10, true);  // nodelets come up one after the other
+  control_pub_ = nh.advertise<vip_slam_msgs::Control>("control", 10, true);  // latched: other nodelets may start later
   pose_pub_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", 50);
   path_pub_ = nh.advertise<nav_msgs::Path>("path", 1, true);
-  // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
+  // Computed only while there are subscribers; a new one gets the present map even if it no longer changes.
   const auto show = [this](const ros::SingleSubscriberPublisher&) {
     owner_->post(control_lane_, [this] {
       if (last_display_ >= 0) publishDisplay(last_display_, true);
@@ -88,7 +88,8 @@ void BackEndNodelet::advertise() {
   diagnostics_->setHardwareID(sensor_.name);
   diagnostics_->add("map", this, &BackEndNodelet::report);
   getPrivateNodeHandle().setParam("localisation_mode", options_.localisation_mode);
-  reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>>(getPrivateNodeHandle());
+  reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>>(reconfigure_mutex_,
+                                                                                                getPrivateNodeHandle());
   reconfigure_->setCallback([this](vip_slam_backend::BackEndConfig& config, std::uint32_t) { onReconfigure(config); });
 }
 
@@ -145,12 +146,12 @@ void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
       Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(frame.covariance.data());
   auto pose = boost::make_shared<geometry_msgs::PoseWithCovarianceStamped>(
       pose_.message(t, *T_map_odom, T_odom_I, covariance, options_.map_frame));
-  pose->header.stamp = frame.header.stamp;  // which t cannot hold exactly
+  pose->header.stamp = frame.header.stamp;  // exact, unlike the double t
   pose_pub_.publish(pose);
 }
 
 void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {
-  if (back_end_) return;  // the front end restarted; the calibration is the same sensor's
+  if (back_end_) return;  // the front end restarted with the same sensor
   applyCalibration(calibration, &sensor_);
   back_end_ = std::make_unique<BackEnd>(options_.back_end, sensor_);
   pose_.setBase(sensor_.T_base_imu);
@@ -180,7 +181,7 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.local_ms = milliseconds;
     problem_ = update.keyframes.empty() ? back_end_->lastRefusal() : "";
-    // Localisation that has not found the new odometry yet goes on answering for the one before.
+    // Until the new odometry is localised the updates still refer to the one before.
     const bool known = update.placed && update.epoch == keyframe->frame.epoch;
     if (problem_.empty() && !known && update.newest_keyframe != 0)
       problem_ = "the odometry began anew, and its place in the map is not found yet";
@@ -194,7 +195,7 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
 void BackEndNodelet::applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg) {
   if (!back_end_) return;
   if (msg.session != planes_session_) {
-    // Loaded anew it has no planes, and what it does not name would go.
+    // A reloaded plane nodelet has no planes, and planes that its updates do not name would be removed.
     if (planes_session_ != 0 && !back_end_->map().planes().empty()) {
       NODELET_WARN("the plane nodelet began anew: it gets the planes of the map");
       planes_wanted_ = back_end_->map().newestKeyframe();
@@ -224,7 +225,7 @@ void BackEndNodelet::startGlobalBa() {
     owner_->post(adjustment_lane_, [this, result, failure, milliseconds] {
       adjusting_ = false;
       if (!failure.empty()) {
-        back_end_->requestGlobalBa();  // what asked for it still waits
+        back_end_->requestGlobalBa();  // the request is still open
         throw std::runtime_error("global adjustment: " + failure);
       }
       {
@@ -233,16 +234,16 @@ void BackEndNodelet::startGlobalBa() {
         ++shown_.global_adjustments;
       }
       distribute(back_end_->merge(result));
-      startGlobalBa();  // one that was asked for meanwhile: the next keyframe may never come
+      startGlobalBa();  // if requested meanwhile: there may be no further keyframe to start it
     });
   };
   try {
     adjustment_ = std::thread(adjust);
-  } catch (const std::system_error&) {  // no thread to be had: the next keyframe tries again
+  } catch (const std::system_error&) {  // no thread available: the next keyframe tries again
     back_end_->requestGlobalBa();
     throw;
   }
-  adjusting_ = true;  // its end is posted to this same thread
+  adjusting_ = true;  // safe after the start: the end is posted to this same thread
 }
 
 void BackEndNodelet::distribute(const MapUpdate& update) {

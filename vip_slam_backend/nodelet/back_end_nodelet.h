@@ -43,10 +43,10 @@ class BackEndNodelet : public nodelet::Nodelet {
   void onInit() override;
   void advertise();
   void advertiseServices();
-  void advertiseRtabmapServices(const std::string& prefix);  ///< names and types that users of RTAB-Map know
+  void advertiseRtabmapServices(const std::string& prefix);  ///< services with the names and types of RTAB-Map
   void subscribe();
   void onReconfigure(vip_slam_backend::BackEndConfig& config);
-  void onFrame(const vip_slam_msgs::TrackedFrame& frame);  ///< not in the owner thread: at image rate
+  void onFrame(const vip_slam_msgs::TrackedFrame& frame);  ///< at image rate, in a callback thread
 
   // In the owner thread.
   void start(const vip_slam_msgs::Calibration& calibration);
@@ -58,12 +58,12 @@ class BackEndNodelet : public nodelet::Nodelet {
   void publishDisplay(double t, bool now);
   void command(std::uint8_t command);
 
-  /// Runs work in the owner thread; false, with the reason as message, when it throws or has to wait for too long.
+  /// Runs work in the owner thread; false, with the reason as message, when it throws or has to wait too long.
   bool askOwner(const std::function<std::string()>& work, std::string* message);
-  /// A service whose work runs in the owner thread and answers with its words, or those of its exception.
+  /// Offers a service whose work runs in the owner thread; the answer is its return value or its exception's message.
   template <class Service>
   void offer(const std::string& name, const std::function<std::string(const typename Service::Request&)>& work);
-  /// The same for std_srvs/Empty: the call itself fails when the work does, the words go to the log.
+  /// The same for std_srvs/Empty: the call itself fails when the work does, the message goes to the log.
   void offerEmpty(const std::string& name, const std::function<std::string()>& work);
   std::string reset(bool keep_map);
   std::string loadMap(const std::string& path);
@@ -82,10 +82,10 @@ class BackEndNodelet : public nodelet::Nodelet {
   // Owned by the thread.
   std::unique_ptr<BackEnd> back_end_;
   std::uint64_t planes_session_ = 0;  ///< of the plane nodelet, see PlaneUpdate
-  std::uint64_t planes_wanted_ = 0;   ///< what its updates have to begin with before they count; 0: anything
+  std::uint64_t planes_wanted_ = 0;   ///< value of PlaneUpdate::restored from which on updates are applied; 0: any
   MapDisplay display_;
   double last_display_ = -1e300;  ///< stamp; negative before the first
-  bool localise_ = false;         ///< as asked for, also before there is a back end
+  bool localise_ = false;         ///< requested mode, also before there is a back end
   bool adjusting_ = false;        ///< a global adjustment is under way
   std::thread adjustment_;
 
@@ -93,9 +93,9 @@ class BackEndNodelet : public nodelet::Nodelet {
   mutable std::mutex shown_mutex_;
   vip_slam_msgs::BackEndStatistics shown_;
   std::string problem_;
-  std::vector<std::string> calibration_differences_;  ///< empty ones: nothing to tell
-  std::string load_problem_;                          ///< why the map to start with could not be loaded
-  vip_slam_backend::BackEndConfig config_;            ///< as dynamic_reconfigure has it
+  std::vector<std::string> calibration_differences_;  ///< messages; empty ones are not shown
+  std::string load_problem_;                          ///< why the initial map could not be loaded
+  vip_slam_backend::BackEndConfig config_;            ///< as last set by dynamic_reconfigure
 
   std::atomic<double> display_rate_{2.0};
   std::atomic<bool> publish_tf_{true};
@@ -106,9 +106,10 @@ class BackEndNodelet : public nodelet::Nodelet {
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  boost::recursive_mutex reconfigure_mutex_;  ///< a service changes the configuration as well
   std::unique_ptr<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>> reconfigure_;
   ros::WallTimer timer_;
-  std::unique_ptr<OwnerThread> owner_;  ///< last: stops before anything it uses goes
+  std::unique_ptr<OwnerThread> owner_;  ///< last member: stops before anything it uses is destroyed
 };
 
 }  // namespace vip_slam

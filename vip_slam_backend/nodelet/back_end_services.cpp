@@ -19,7 +19,8 @@ namespace {
 
 constexpr double kPatience = 30.0;  // seconds that a service waits for the owner thread
 
-/// Absolute: a node's own folder is not the caller's. `~/` is the home of who runs the node.
+/// Makes sure that the path is absolute, since the node's working directory is not the caller's. `~/` is the home of
+/// the user that runs the node.
 std::string absolutePath(const std::string& path) {
   if (path.empty()) throw std::invalid_argument("path: empty, expected a file name");
   const char* home = std::getenv("HOME");
@@ -32,7 +33,7 @@ std::string absolutePath(const std::string& path) {
 bool BackEndNodelet::askOwner(const std::function<std::string()>& work, std::string* message) {
   bool success = false;
   try {
-    // Copies: a call that comes too late must not touch what this function has left behind.
+    // Copies: work that runs after the timeout must not touch this function's variables.
     auto words = std::make_shared<std::string>();
     success = owner_->call(
         control_lane_, [words, work] { *words = work(); }, kPatience);
@@ -132,7 +133,7 @@ std::string BackEndNodelet::reset(bool keep_map) {
     command(vip_slam_msgs::Control::RESET_ODOMETRY);
     return "the odometry starts anew, the map stays";
   }
-  // Keyframes that are still on their way belong to what is forgotten.
+  // Keyframes still in transit belong to the discarded map.
   barrier_.raise();
   if (back_end_) back_end_->reset();
   planes_wanted_ = 0;
@@ -185,7 +186,8 @@ std::string BackEndNodelet::setLocalisation(bool on) {
     shown_.localisation_mode = config_.localisation_mode = on;
     config = config_;
   }
-  // Else a change of another parameter would bring the mode back that was set there last.
+  // Otherwise a change of another parameter would restore the mode that dynamic_reconfigure had last.
+  const boost::recursive_mutex::scoped_lock lock(reconfigure_mutex_);
   reconfigure_->updateConfig(config);
   return on ? "localisation: the map no longer changes" : "mapping";
 }

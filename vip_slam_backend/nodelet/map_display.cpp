@@ -92,7 +92,7 @@ visualization_msgs::MarkerArray MapDisplay::markers(const std_msgs::Header& head
   }
   visualization_msgs::MarkerArray array;
   for (const Marker& marker : {line, frusta, edges}) {
-    // rviz refuses lines of fewer than two points; an empty one takes back what was shown.
+    // rviz rejects lines of fewer than two points; delete the old marker instead.
     const bool drawable = marker.points.size() >= 2;
     array.markers.push_back(drawable ? marker : makeDeletion(header, marker.ns, marker.id));
   }

@@ -1,5 +1,5 @@
-// The map as rviz shows it: keyframes, trajectory, loop edges, landmarks. Follows the map by its updates, so that
-// nothing has to be copied from the estimator.
+// The map for rviz: keyframes, trajectory, loop edges, landmarks. It is built from the map updates, so that nothing has
+// to be copied from the estimator.
 #pragma once
 
 #include <cstdint>
@@ -51,7 +51,7 @@ class MapDisplay {
   std::map<KeyframeId, Shown> keyframes_;
   std::map<LandmarkId, Point> landmarks_;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops_;  ///< accepted ones: query, match
-  std::set<PlaneId> planes_;  ///< as of the last global update, and those that came into a local window since
+  std::set<PlaneId> planes_;  ///< planes of the last global update, and those of local updates since
   SE3 T_imu_base_, T_imu_cam_;
 };
 

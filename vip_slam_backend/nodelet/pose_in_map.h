@@ -1,5 +1,5 @@
-// Where the body is in `map` at each image: T_map_odom of the back end times the odometry. Thread-safe: frames come in
-// at image rate while the estimator is busy.
+// Pose of the body in `map` at each image: T_map_odom of the back end times the odometry. Thread-safe: frames arrive at
+// image rate while the estimator is busy.
 #pragma once
 
 #include <mutex>
@@ -22,8 +22,8 @@ class PoseInMap {
   void apply(const MapUpdate& update);
   void clear();
 
-  /// Remembers the image for trajectory(). T_map_odom; empty while the back end has not placed this epoch of the
-  /// odometry.
+  /// Stores the image's pose for trajectory(). Returns T_map_odom; empty while the back end has not placed this epoch
+  /// of the odometry in the map.
   std::optional<SE3> add(const ChainedPose& pose);
   /// T_map_base with covariance (x, y, z, rotation about the fixed axes of map) of the odometry seen from map.
   geometry_msgs::PoseWithCovarianceStamped message(double t, const SE3& T_map_odom, const SE3& T_odom_I,

@@ -1,5 +1,5 @@
-// Keeps what was seen before a reset out of the new map. Sensor stamps are compared with sensor stamps only: their
-// clock may be another than ROS time's.
+// Keeps data from before a reset out of the new map. Sensor stamps are compared with sensor stamps only, since their
+// clock may differ from ROS time.
 #pragma once
 
 #include <algorithm>
@@ -8,18 +8,18 @@
 
 namespace vip_slam {
 
-/// Thread-safe: frames come in at image rate beside the owner of the map.
+/// Thread-safe: frames arrive at image rate in parallel to the owner of the map.
 class ResetBarrier {
  public:
-  /// A frame came in.
+  /// To be called for each frame received.
   void see(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
     take(t, epoch);
     if (epoch >= epoch_) {
       behind_ = 0;
     } else if (++behind_ >= kBehind) {
-      // Not a late message: a front end that was loaded anew counts its epochs from the beginning. Keyframes tell
-      // nothing of it, they may wait in a queue.
+      // Too many for late messages: a front end that was reloaded counts its epochs from the beginning. Only frames are
+      // counted here, since keyframes may wait in a queue.
       t_ = t;
       epoch_ = epoch;
       has_keyframe_ = raised_ = false;
@@ -32,7 +32,7 @@ class ResetBarrier {
     if (epoch == epoch_) has_keyframe_ = true;
   }
 
-  /// Puts the barrier after all that was seen so far.
+  /// Puts the barrier after all data seen so far.
   void raise() {
     std::lock_guard<std::mutex> lock(mutex_);
     raised_ = seen_;
@@ -41,9 +41,10 @@ class ResetBarrier {
     epoch_ends_ = has_keyframe_;
   }
 
-  /// True for what is later than the barrier. A later epoch of the odometry is, whatever its stamps, and lifts it:
-  /// device time may begin anew. Nothing more of an epoch that had keyframes is: the front end leaves it when it obeys,
-  /// and the images that it finished before are of the old odometry. One that still waits for a start keeps its epoch.
+  /// True for data later than the barrier. A later epoch of the odometry passes whatever its stamps, and lifts the
+  /// barrier, since device time may restart. An epoch that had keyframes never passes: the front end leaves it on
+  /// reset, and images that it finished before belong to the old odometry. A front end still initialising keeps its
+  /// epoch, whose later stamps pass.
   bool passes(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
     if (raised_ && epoch > barrier_epoch_) raised_ = false;
@@ -61,7 +62,7 @@ class ResetBarrier {
 
   void take(double t, std::uint32_t epoch) {
     if (!seen_ || epoch > epoch_) {
-      t_ = t;  // stamps of the epoch before say nothing here: the clock may have run back
+      t_ = t;  // stamps of the epoch before are not comparable: the clock may have run back
       epoch_ = epoch;
       has_keyframe_ = false;
     } else if (epoch == epoch_) {
@@ -74,7 +75,7 @@ class ResetBarrier {
   bool seen_ = false, raised_ = false;
   bool has_keyframe_ = false;     ///< of epoch_
   bool epoch_ends_ = false;       ///< barrier_epoch_ had keyframes
-  int behind_ = 0;                ///< frames of an earlier epoch than epoch_, one after the other
+  int behind_ = 0;                ///< consecutive frames of an earlier epoch than epoch_
   double t_ = 0, barrier_t_ = 0;  ///< t_ of epoch_
   std::uint32_t epoch_ = 0, barrier_epoch_ = 0;
 };

@@ -2,6 +2,7 @@
 
 add_library(vip_slam_runner
   src/runner/bag_extrinsics.cpp
+  src/runner/bag_decoding.cpp
   src/runner/bag_reader.cpp
   src/runner/mapping_thread.cpp
   src/runner/pipeline.cpp

@@ -14,7 +14,7 @@ namespace {
 
 using Rows = std::vector<OptionRow>;
 
-/// A nodelet's parameters in two tables: those of its estimator, which run_bag knows as `group/name`, and its own.
+/// A nodelet's parameters in two tables: those of its estimator, which run_bag has as `group/name`, and its own.
 std::string nodeletReference(const std::string& title, const std::string& group, Rows rows) {
   const Rows of_run_bag = listOptions(PipelineOptions());
   const auto shared = [&](const OptionRow& row) {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kStart = 1700000000.0;
 
-/// Pose of the IMU: still, then sines that set in smoothly.
+/// Pose of the IMU: at rest, then sines that start smoothly.
 struct Motion {
   double still;
   SE3 T_imu_cam;

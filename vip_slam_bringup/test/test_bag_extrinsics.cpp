@@ -1,4 +1,4 @@
-// Where run_bag takes the camera's mounting from: tf in the bag, or the sensor file.
+// Where run_bag takes the extrinsics from: tf in the bag, or the sensor file.
 #include <unistd.h>
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 namespace vip_slam {
 namespace {
 
-/// A bag of two images whose tf has `truth`, read with a sensor file that says `T_imu_cam`.
+/// A bag of two images whose tf has `truth`, read with a sensor file that has `T_imu_cam`.
 class BagExtrinsicsTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -26,7 +26,7 @@ class BagExtrinsicsTest : public testing::Test {
   }
   void TearDown() override { fs::remove(path_); }
 
-  /// What the estimators are given.
+  /// The extrinsics passed to the estimators.
   SE3 read(const SE3& T_imu_cam, const std::string& extrinsics) {
     test_support::writeDriverBag(path_, options_);
     SensorConfig sensor = options_.sensor;

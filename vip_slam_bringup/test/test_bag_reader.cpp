@@ -1,4 +1,4 @@
-// Bags whose clock is not sound, and bags that cannot be read to their end.
+// Bags whose clock jumps, and bags that cannot be read to their end.
 #include <unistd.h>
 
 #include <algorithm>
@@ -73,6 +73,19 @@ TEST_F(BagReaderTest, WhereTheClockRanBackTheOdometryStartsAnewAndTheMapGoesOn) 
   for (std::size_t i = 0; i < odometry.size(); ++i) EXPECT_EQ(pipeline.covariances()[i].t, odometry[i].t);
 }
 
+TEST_F(BagReaderTest, ATopicOfAnotherTypeIsNamedAtOnce) {
+  test_support::writeDriverBag(bag_, options_);
+  SensorConfig sensor = options_.sensor;
+  sensor.topics.imu = sensor.topics.color;
+  try {
+    BagReader reader(bag_, sensor);
+    FAIL() << "images were taken for an IMU";
+  } catch (const std::runtime_error& error) {
+    const std::string expected = "topic " + sensor.topics.imu + " is sensor_msgs/Image, expected sensor_msgs/Imu";
+    EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
+  }
+}
+
 TEST_F(BagReaderTest, OfTimesThatComeTwiceTheFirstPassCounts) {
   options_.late_jump = -2.0;  // the second half repeats the times of the first
   test_support::writeDriverBag(bag_, options_);
@@ -95,8 +108,8 @@ TEST_F(BagReaderTest, OfADamagedBagTheRestIsRead) {
     std::ifstream in(bag_, std::ios::binary);
     sound.assign(std::istreambuf_iterator<char>(in), {});
   }
-  // The index is whole, the header of a chunk names a compression that nobody knows: of images, and of the IMU, which
-  // is written last.
+  // The index is intact, but a chunk's header names an unknown compression: for images, and for the IMU, which is
+  // written last.
   const std::string none = "compression=none";
   for (const std::size_t at : {sound.find(none, sound.size() * 6 / 10), sound.rfind(none)}) {
     ASSERT_NE(at, std::string::npos);

@@ -34,7 +34,7 @@ class CheckBag : public testing::Test {
     test_support::writeDriverBag(path_, options_);
     return checkAll(recordBag(path_, expected_, 60));
   }
-  /// A finding of that severity that is about `about` and holds `words`.
+  /// Expects a finding of that severity about `about` whose text contains `words`.
   static void expectFound(const Findings& findings, Severity severity, const std::string& about,
                           const std::string& words) {
     for (const Finding& f : findings)
@@ -151,7 +151,7 @@ TEST_F(CheckBag, DelayBetweenCameraAndImu) {
     EXPECT_LT(motion.time_sigma, 0.001);
     EXPECT_GT(motion.correlation, 0.95);
     expectFound(checkAll(recording), Severity::kWarning, "camera-IMU delay", "set time_offset");
-    // Knowing it, the check is content.
+    // With the right time_offset the check passes.
     Recording informed = recording;
     informed.sensor.time_offset = offset;
     expectFound(checkMotion(informed), Severity::kGood, "camera-IMU delay", "");
@@ -191,7 +191,7 @@ TEST_F(CheckBag, StampsOfImagesThatJitter) {
   std::normal_distribution<double> normal(0, 0.003);
   for (double& t : jittering.color.stamps) t += normal(random);
   expectFound(checkRates(jittering), Severity::kWarning, "colour image", "stamps jitter by");
-  // An exposure that follows the light changes the rate, and stamps that are right.
+  // Auto-exposure varies the rate, with correct stamps.
   double t = varying.color.stamps.front();
   for (std::size_t i = 1; i < varying.color.stamps.size(); ++i)
     varying.color.stamps[i] = t += (1 + 0.15 * std::sin(0.3 * double(i))) / 30;

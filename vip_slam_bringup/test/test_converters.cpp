@@ -1,4 +1,4 @@
-// Converters on tiny generated folders: what lands in the bag, and what an unreadable folder says.
+// Converters on tiny generated folders: the bag's content, and the errors for unreadable folders.
 #include <unistd.h>
 
 #include <cstdio>
@@ -49,7 +49,7 @@ class Converters : public testing::Test {
     } catch (const std::exception& e) {
       const std::string text = e.what();
       EXPECT_EQ(text.find('\n'), std::string::npos) << text;
-      // Nothing half-written stays behind.
+      // No partial file stays behind.
       for (const auto& entry : fs::directory_iterator(root_))
         EXPECT_EQ(entry.path().filename().string().find("out"), std::string::npos) << entry.path();
       return text;
@@ -168,6 +168,10 @@ TEST_F(EurocConverter, DoesNotOverwriteUnasked) {
   makeFolder();
   convertEuroc(options_);
   EXPECT_THROW(convertEuroc(options_), std::runtime_error);
+  // The bag's companion files may have been edited since.
+  fs::remove(bag_);
+  const std::string sensor = bag_.substr(0, bag_.size() - 4) + "_sensor.yaml";
+  EXPECT_EQ(errorOf([&] { convertEuroc(options_); }).find(sensor + ": exists already"), 0u);
   options_.overwrite = true;
   EXPECT_NO_THROW(convertEuroc(options_));
 }
@@ -312,7 +316,7 @@ TEST_F(StrayConverter, ColourDepthAndSpecificForce) {
     ASSERT_EQ(color.size(), 4u);
     const cv::Mat image = cv::imdecode(color[3]->data, cv::IMREAD_COLOR);
     EXPECT_EQ(image.cols, 160);
-    EXPECT_NEAR(image.at<cv::Vec3b>(60, 80)[0], 120, 12);  // the fourth frame, not another one
+    EXPECT_NEAR(image.at<cv::Vec3b>(60, 80)[0], 120, 12);  // must be the fourth frame
     const auto depth = read<sensor_msgs::CompressedImage>(sensor.topics.depth);
     ASSERT_EQ(depth.size(), 4u);
     const cv::Mat z = cv::imdecode(depth[0]->data, cv::IMREAD_UNCHANGED);

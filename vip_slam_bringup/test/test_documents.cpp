@@ -1,4 +1,4 @@
-// Documents that follow from the code are up to date, and their links lead somewhere.
+// Documents generated from the code are up to date, and their links have targets.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>

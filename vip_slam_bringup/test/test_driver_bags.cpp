@@ -1,5 +1,5 @@
-// Every shipped configuration against a bag as its driver writes it: the check finds nothing to complain about, and the
-// offline pipeline tracks it.
+// Every shipped configuration with a bag as its driver writes it: check_bag reports no problem, and the offline
+// pipeline tracks it.
 #include <unistd.h>
 
 #include <filesystem>
@@ -45,8 +45,8 @@ TEST_P(DriverBags, IsReadyAndTracks) {
   EXPECT_TRUE(reader.warnings().empty()) << reader.warnings().front();
   const auto& odometry = pipeline.odometry();
   ASSERT_GT(odometry.size(), 0.4 * truth.size());
-  // The way gone since the first tracked image, against the truth: the system starts level and at zero yaw, so only
-  // lengths compare.
+  // Compares distances from the first tracked image with the truth: the system starts at zero yaw, so only lengths are
+  // comparable.
   const auto at = [&](double t) {
     SE3 T;
     EXPECT_TRUE(poseAt(truth, t, &T)) << t;

@@ -82,7 +82,7 @@ TEST(LiveTools, CheckListensToTopics) {
     EXPECT_TRUE(imu) << toText(findings, false);
   }
   fs::remove(path);
-  // Nobody publishes any more: the check says so instead of waiting.
+  // Nothing is published any more: the check reports that instead of waiting.
   const Findings silent = checkAll(recordLive(options.sensor, 1.0));
   EXPECT_EQ(worst(silent), Severity::kError);
 }

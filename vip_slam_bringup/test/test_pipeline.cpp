@@ -1,5 +1,5 @@
-// What the runner hands on: images wait for the IMU by the IMU's own clock, which may be far from the camera's; the
-// plane module's answers reach the back end.
+// Data flow in the runner: images wait for IMU data on the IMU's clock, whose offset from the camera's may be large;
+// the plane module's answers reach the back end.
 #include <unistd.h>
 
 #include <cstdio>
@@ -36,7 +36,7 @@ TEST_F(RunnerTest, AnImuClockThatIsAheadIsNoReasonToGiveUp) {
   sensor_.time_offset = 0.8;
   Pipeline pipeline(options_, sensor_, nullptr);
   addImu(&pipeline, 0, 1.7);
-  pipeline.add(image(1.0));  // the IMU's 1.8
+  pipeline.add(image(1.0));  // 1.8 on the IMU's clock
   EXPECT_EQ(pipeline.images(), 0u);
   addImu(&pipeline, 1.7, 1.85);
   EXPECT_EQ(pipeline.images(), 1u);
@@ -46,7 +46,7 @@ TEST_F(RunnerTest, NorIsOneThatIsBehind) {
   sensor_.time_offset = -0.8;
   Pipeline pipeline(options_, sensor_, nullptr);
   addImu(&pipeline, 0, 0.1);
-  pipeline.add(image(1.0));  // the IMU's 0.2
+  pipeline.add(image(1.0));  // 0.2 on the IMU's clock
   EXPECT_EQ(pipeline.images(), 0u);
   addImu(&pipeline, 0.1, 0.25);
   EXPECT_EQ(pipeline.images(), 1u);
@@ -61,7 +61,7 @@ TEST_F(RunnerTest, WithoutTheImuImagesGoOn) {
   EXPECT_EQ(pipeline.images(), 1u);
 }
 
-// Without area it is none for the plane module.
+// The plane module drops a plane without area.
 TEST_F(RunnerTest, WhatThePlaneModuleMakesOfALoadedMapReachesTheBackEnd) {
   const std::string path = "/tmp/test_pipeline." + std::to_string(getpid()) + ".vsm";
   Map map;

@@ -1,4 +1,4 @@
-// The readout time of a rolling shutter from corners and gyro of an invented motion.
+// The readout time of a rolling shutter, estimated from corners and gyro of a synthetic motion.
 #include <cmath>
 #include <random>
 
@@ -47,7 +47,7 @@ std::vector<RotationStep> steps(double readout, double delay, double pixel_noise
       const Eigen::Vector3d p(uniform(random) * z, 2 * kHeight * from * z, z);
       const double t_from = t + readout * from;
       const Eigen::Vector3d p_W = Motion::R_W_C(t_from) * p + Motion::p_W_C(t_from);
-      double to = from;  // the row that sees it is the one where it is
+      double to = from;  // iterate: the point is seen by the row onto which it projects at that row's time
       Eigen::Vector2d seen;
       for (int turn = 0; turn < 8; ++turn) {
         const double t_to = t + 0.05 + readout * to;
@@ -56,7 +56,7 @@ std::vector<RotationStep> steps(double readout, double delay, double pixel_noise
       }
       if (std::abs(to) > 0.5) continue;
       seen += pixel_noise / 480 * Eigen::Vector2d(normal(random), normal(random));
-      if (i % 15 == 0) seen.x() += 0.05;  // a corner taken for another
+      if (i % 15 == 0) seen.x() += 0.05;  // a wrong match
       step.tracks.push_back({p.cast<float>(), seen.cast<float>(), float(from), float(to)});
     }
     list.push_back(step);

@@ -1,4 +1,4 @@
-// make_report on a small invented run: the page stands alone, holds the right numbers, and bad input is named.
+// make_report on a small synthetic run: the page is self-contained, has the right numbers, and bad input is named.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -136,7 +136,7 @@ class Report : public testing::Test {
           << ", area: 10, polygons: [{outer: [";
       for (int k = 0; k < 4; ++k) out << (k ? ", " : "") << turned(p.corner[k]);
       out << "], holes: []}]}\n";
-      if (!estimate && p.id == 7) {  // a glimpse of something small: nobody expects it to be found
+      if (!estimate && p.id == 7) {  // too small and too briefly in view to count for recall
         out << "- {id: 8, kind: vertical, normal: [1, 0, 0], distance: 1, area: 4, seen_seconds: 0.4, seen_area: 0.2, "
                "polygons: []}\n";
       }

@@ -1,4 +1,4 @@
-// Every shipped sensor file loads, has all keys, survives saving, and says what can be right.
+// Every shipped sensor file loads, has all keys, survives saving, and has plausible values.
 #include <unistd.h>
 
 #include <algorithm>
@@ -52,7 +52,7 @@ TEST(SensorFiles, EachLoadsAndIsPlausible) {
     EXPECT_FALSE(sensor.topics.color.empty());
     EXPECT_FALSE(sensor.topics.depth.empty());
     EXPECT_FALSE(sensor.topics.color_info.empty());
-    // One kind of IMU stream, not both.
+    // Either a combined IMU stream or separate ones, not both.
     EXPECT_NE(sensor.topics.imu.empty(), sensor.topics.gyro.empty());
     EXPECT_EQ(sensor.topics.gyro.empty(), sensor.topics.accel.empty());
     EXPECT_EQ(sensor.camera.validate(), "");

@@ -49,7 +49,7 @@ TEST(CameraCorrection, MovesPointsOnPlanesAlongTheirRays) {
   EXPECT_EQ(read.camera_correction.offset, -0.01);
   for (int k = 0; k < 3; ++k) EXPECT_LT((read.points[k].p_C - truth.points[k].p_C).norm(), 1e-6f);
   EXPECT_LT((read.G - truth.G).norm(), 1e-5 * truth.G.norm());
-  // What has it already stays as it is.
+  // A keyframe that already has the correction stays unchanged.
   const Eigen::Matrix4d before = read.G;
   setCameraCorrection({-0.01, {}}, &read);
   EXPECT_EQ(read.G, before);
@@ -74,7 +74,7 @@ TEST(CameraCorrection, MovesBearingsAndWhatLiesOnThem) {
     return observation;
   };
   PlaneObservation observation = observe(Eigen::Matrix3d::Identity());
-  // By way of what was believed for a while.
+  // By way of an intermediate correction.
   KeyframePtr corrected = keyframe;
   for (const BearingCorrection& known : {earlier, bearing}) {
     corrected = withCameraCorrection(corrected, {0, {}, known});

@@ -69,7 +69,7 @@ TEST(CommandLine, WhatRoslaunchAddsIsNotTheUsers) {
 TEST(CommandLine, HelpShowsPurposeArgumentsAndDefaults) {
   const Parsed p = parse({"--help"});
   EXPECT_EQ(p.status.value_or(-1), 0);
-  for (const char* piece : {"Does something.", "tool bag [options]", "the recording", "--offset", "0.25", "fast"})
+  for (const char* piece : {"Does something.", "tool bag --out ... [options]", "the recording", "--offset", "0.25", "fast"})
     EXPECT_NE(p.messages.find(piece), std::string::npos) << piece << " in:\n" << p.messages;
 }
 
@@ -77,7 +77,8 @@ TEST(CommandLine, MistakesAreNamedOnOneLineWithStatusTwo) {
   const struct {
     std::vector<const char*> arguments;
     const char* named;
-  } mistakes[] = {{{"--out", "d"}, "bag (the recording) is missing"},
+  } mistakes[] = {{{"--out", "d"}, "bag (the recording) is missing (see"},
+                  {{"--out", "d", "--set", "a=1", "x.bag"}, "bag (the recording) is missing; it has to stand before --set"},
                   {{"x.bag"}, "--out is missing"},
                   {{"x.bag", "--out", "d", "--thread", "3"}, "'--thread'"},
                   {{"x.bag", "--out", "d", "--threads", "9"}, "--threads 9: expected a number from 1 to 8"},

@@ -167,7 +167,7 @@ TEST(DepthToMetres, TypesAndInvalidValues) {
   EXPECT_EQ(metres.at<float>(1), 0);
   EXPECT_EQ(metres.at<float>(2), 0);
   EXPECT_EQ(metres.at<float>(3), 2.5f);
-  // What is known to be added to every reading makes none of what is none.
+  // The offset added to every reading must not turn invalid depth into a reading.
   metres = depthToMetres(floats, 0.001, -0.01);
   EXPECT_EQ(metres.at<float>(1), 0);
   EXPECT_FLOAT_EQ(metres.at<float>(3), 2.49f);
@@ -235,7 +235,7 @@ TEST(DepthGridTest, KeepsSurfacesAtAGrazingAngleButNoEdges) {
       const double v = grid.pixel(0, r).y(), top = 0.55 * f / (v - horizon), z = grid.at(20, r);
       if (z == 0) continue;
       const double surface = top < 6.0 ? top : 0.8 * f / (v - horizon);
-      EXPECT_NEAR(z, surface, 0.02) << "row " << v;  // on one of both, never in between
+      EXPECT_NEAR(z, surface, 0.02) << "row " << v;  // on one of the two surfaces, never in between
       if (top > 4.0 && top < 5.8) {
         ++far_nodes;
         EXPECT_EQ(safeDepth(depth, grid.pixel(20, r).x(), v, noise), 0.0f) << v;  // as cautious as ever for one point

@@ -1,4 +1,4 @@
-// Depth that lies beside its colour image: what is read at a pixel is of another.
+// Depth image shifted against the colour image: the depth at a pixel belongs to a neighbouring one.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -57,7 +57,7 @@ TEST(DepthShift, TakesTheNearestReadingAtEdgesAndNoneBeyondTheBorder) {
   EXPECT_EQ(cv::countNonZero(shiftedDepth(depth, {30, -40})), 0);
 }
 
-// What is found out later: a keyframe that was read with another shift becomes what it would have been.
+// Correcting a keyframe that was read with another shift gives what the right shift would have given.
 TEST(DepthShift, AKeyframeFollowsWhatIsFoundOutLater) {
   const DepthShift before{{0.5, -0.25}, {0.5 / kFocal, -0.25 / kFocal}},
       after{{2.5, -1.0}, {2.5 / kFocal, -1.0 / kFocal}};
@@ -71,7 +71,7 @@ TEST(DepthShift, AKeyframeFollowsWhatIsFoundOutLater) {
     for (int c = 0; c < grid.cols; ++c) grid.z.push_back(planeAt(grid.pixel(c, r).x(), grid.pixel(c, r).y(), rest));
   }
   grid.z[7 * 20 + 10] = 0;      // a hole
-  const int step = 3 * 20 + 4;  // something before the plane
+  const int step = 3 * 20 + 4;  // an object in front of the plane
   grid.z[static_cast<std::size_t>(step)] = 1.0f;
   for (const Eigen::Vector2f& pixel : {Eigen::Vector2f(61.5f, 90.25f), Eigen::Vector2f(120, 40)}) {
     Feature f;
@@ -108,7 +108,7 @@ TEST(DepthShift, AKeyframeFollowsWhatIsFoundOutLater) {
   }
   EXPECT_EQ(moved.at(10, 7), 0.f);
   EXPECT_EQ(moved.at(4, 3), 1.f);
-  EXPECT_EQ(same, 2);  // nodes beside still have one slope
+  EXPECT_EQ(same, 2);  // adjacent nodes still have one valid slope
   setCameraCorrection(correction, &observation);
   for (const PlanePoint& p : observation.points) EXPECT_NEAR(kSlanted.dot(p.p_C.cast<double>()), 2.0, 1e-4);
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();

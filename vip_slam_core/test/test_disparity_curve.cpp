@@ -1,4 +1,4 @@
-// Depth from disparities that are all off by the same.
+// Depth from disparities with a constant error.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,7 +8,7 @@
 namespace vip_slam {
 namespace {
 
-// A stereo camera of 600 px and 5 cm that measures disparities by a tenth of a pixel too large.
+// A stereo camera with 600 px focal length and 5 cm baseline whose disparities are 0.1 px too large.
 constexpr double kFocalBaseline = 30.0, kTooLarge = 0.1;
 
 TEST(DisparityCurve, TakesBackWhatTheDisparityHasTooMuch) {

@@ -258,7 +258,7 @@ TEST_F(FileFormats, SensorMask) {
   picture.rowRange(400, 480) = cv::Scalar::all(9);
   fs::create_directories(folder_ / "rig");
   cv::imwrite(path("rig/bumper.png"), picture);
-  with("rig/bumper.png");  // beside the file, wherever one stands
+  with("rig/bumper.png");  // relative to the file, whatever the working directory
   const SensorConfig config = loadSensorConfig(path("s.yaml"));
   ASSERT_EQ(config.mask.type(), CV_8UC1);
   EXPECT_EQ(cv::countNonZero(config.mask == 255), 640 * 400);
@@ -296,6 +296,8 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   expectRefused([&] { loadSensorConfig(path("missing.yaml")); }, "missing.yaml", "cannot be read");
   changed("name:", "nom:", "name: missing");
   changed("time_offset:", "time_ofset:", "time_ofset: unknown key");
+  changed("time_offset: -0.0123", "time_offset: -0.0123\ntime_offset: 0.03", "time_offset: stands there twice");
+  changed("gyro_noise_density: 0.00017", "gyro_nois_density: 0.00017", "'imu/gyro_nois_density' is no key, is it meant?");
   changed("  rate: 250", "  rate: fast", "imu/rate");
   changed("gyro_noise_density: 0.00017", "gyro_noise_density: -1", "imu");
   changed("accel_random_walk: 0.003", "accel_random_walk: .nan", "imu");

@@ -104,7 +104,7 @@ TEST_F(Geometry, LevelledWorldsAreAlignedHoweverTheBodyIsHeld) {
     const SE3 T_C_B(k % 2 ? pose().rotation() : expQuaternion({0, -0.5 * M_PI, 0}), vector(5));
     const SE3 T_A_B = T_A_C * T_C_B;
     EXPECT_LT(alignLevelled(T_A_B, T_C_B).boxminus(T_A_C).norm(), 1e-9);
-    // An error of the tilt turns the worlds against each other by no more than itself.
+    // A tilt error turns the two worlds against each other by no more than itself.
     const SE3 tilted(expQuaternion({0.004, -0.003, 0}) * T_A_B.rotation(), T_A_B.t());
     EXPECT_LT(alignLevelled(tilted, T_C_B).rotation().angularDistance(T_A_C.rotation()), 0.001);
   }
@@ -211,7 +211,7 @@ TEST_F(Geometry, ClosestPointVectorAndItsSign) {
     const Plane back = Plane::fromCp(p.toCp());
     EXPECT_GE(back.d, 0);
     EXPECT_LT((back.coefficients() - (p.d < 0 ? p.flipped() : p).coefficients()).norm(), 1e-12);
-    EXPECT_LT((p.toCp() - p.flipped().toCp()).norm(), 1e-15);  // blind to the side
+    EXPECT_LT((p.toCp() - p.flipped().toCp()).norm(), 1e-15);  // does not depend on the side
     EXPECT_NEAR(p.signedDistance(-p.toCp()), 0, 1e-12);        // eta is minus the closest point
   }
   EXPECT_THROW(Plane::fromCp({0, 0, 1e-10}), std::invalid_argument);

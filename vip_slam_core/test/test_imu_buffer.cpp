@@ -1,4 +1,4 @@
-// The IMU buffer: interpolated ends, gaps, disorder, split streams, bounded memory.
+// The IMU buffer: interpolated ends, gaps, out-of-order samples, split streams, bounded memory.
 #include <gtest/gtest.h>
 
 #include "vip_slam_core/imu/imu_buffer.h"
@@ -158,7 +158,7 @@ TEST(ImuBufferTest, SplitStreamsRefuseDisorderToo) {
   EXPECT_FALSE(buffer.addAccel(1.0, {0, 0, 9.81}));
   EXPECT_FALSE(buffer.addAccel(1.1, {0, 0, NAN}));
   EXPECT_TRUE(buffer.addAccel(1.1, {0, 0, 9.81}));
-  EXPECT_TRUE(buffer.addGyro(1.05, {0, 0, 0}));  // covered: joined at once
+  EXPECT_TRUE(buffer.addGyro(1.05, {0, 0, 0}));  // accelerometer samples on both sides: combined at once
   EXPECT_EQ(buffer.size(), 1u);
   EXPECT_FALSE(buffer.addGyro(1.05, {0, 0, 0}));
   EXPECT_FALSE(buffer.addGyro(1.01, {0, 0, 0}));

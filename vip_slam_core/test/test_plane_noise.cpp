@@ -1,4 +1,4 @@
-// How the weight of depth points on planes follows from how well they agree with the planes.
+// Weights of depth points on planes, from their agreement with the planes.
 #include <gtest/gtest.h>
 
 #include <random>

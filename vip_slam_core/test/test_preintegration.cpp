@@ -70,7 +70,7 @@ TEST(Preintegration, StepsAreExactForSignalsThatChangeLinearly) {
   EXPECT_LT(logSO3(Eigen::Matrix3d(a.deltaR().transpose() * b.deltaR())).norm(), 1e-7);
   EXPECT_LT((a.alpha() - b.alpha()).norm(), 2e-5);
   EXPECT_LT((a.beta() - b.beta()).norm(), 1e-5);
-  // The same with the covariance: it belongs to the time, not to the number of samples.
+  // The same holds for the covariance: it depends on the duration, not on the number of samples.
   EXPECT_LT((a.covariance() - b.covariance()).norm() / b.covariance().norm(), 0.02);
 }
 
@@ -223,7 +223,7 @@ TEST(Preintegration, ASingleStepHasAnInverse) {
     const Matrix15d& W = pre.sqrtInformation();
     EXPECT_LT((W * pre.covariance() * W.transpose() - Matrix15d::Identity()).cwiseAbs().maxCoeff(), 1e-6) << dt;
     EXPECT_NEAR(pre.dt(), dt, 1e-12);
-    // As sure as the same time in many steps, no surer: in whitened units neither sees the other far from unity.
+    // One long step has the same covariance as many short ones: each, whitened by the other, is close to unity.
     const Matrix15d relative = exact.sqrtInformation() * pre.covariance() * exact.sqrtInformation().transpose();
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix15d>(relative).eigenvalues().minCoeff(), 0.5) << dt;
     EXPECT_LT(Eigen::SelfAdjointEigenSolver<Matrix15d>(relative).eigenvalues().maxCoeff(), 1.5) << dt;

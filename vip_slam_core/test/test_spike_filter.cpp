@@ -102,7 +102,7 @@ TEST(SpikeFilterTest, OnlyASuspectWaitsAndOnlyForTheNextSample) {
   spike.accel.x() += 20;
   EXPECT_TRUE(buffer.add(spike));
   EXPECT_EQ(buffer.newest(), kStep * (k - 1));
-  EXPECT_FALSE(buffer.add(spike));  // it is there all the same
+  EXPECT_FALSE(buffer.add(spike));  // it is in the buffer nevertheless
   EXPECT_EQ(buffer.counters().duplicate, 1u);
   EXPECT_TRUE(buffer.add(Hand::smooth(kStep * ++k)));
   EXPECT_EQ(buffer.newest(), kStep * k);
@@ -158,7 +158,7 @@ TEST(SpikeFilterTest, GapsAndAbruptStepsAreNone) {
             0u);
   EXPECT_EQ(spikesIn([](int, ImuSample*) {}, 0.01), 0u);
   EXPECT_EQ(spikesIn([](int k, ImuSample* s) { s->accel.x() += k % 200 < 100 ? 8 : 0; }), 0u);
-  // A sample alone between two holes: what it should have been nobody knows.
+  // A single sample between two gaps cannot be checked against neighbours.
   EXPECT_EQ(spikesIn([](int k, ImuSample* s) {
               const int at = k % 400;
               if (at > 100 && at < 120 && at != 110) s->t = -1;

@@ -1,4 +1,4 @@
-// Options, text, timing, files that appear whole, and the bounded queue.
+// Options, text, timing, atomic files, and the bounded queue.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,11 +6,9 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <thread>
 
 #include "util/text.h"
 #include "vip_slam_core/util/atomic_file.h"
-#include "vip_slam_core/util/bounded_queue.h"
 #include "vip_slam_core/util/options.h"
 #include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_core/util/timing.h"
@@ -119,7 +117,7 @@ TEST_F(Files, AnOutputFolderIsMadeAndTried) {
   std::ofstream(path("file")) << "x";
   EXPECT_THROW(prepareOutputFolder(path("file")), std::runtime_error);
   EXPECT_THROW(prepareOutputFolder("/proc/vip_slam"), std::runtime_error);
-  EXPECT_THROW(prepareOutputFolder("/proc"), std::runtime_error);  // there, but nobody can write into it
+  EXPECT_THROW(prepareOutputFolder("/proc"), std::runtime_error);  // exists but is not writable
 }
 
 TEST_F(Files, OptionsFromYaml) {
@@ -211,38 +209,6 @@ TEST_F(Files, TimingSummaryAndCsv) {
   { ScopedTimer timer(&log, "scope", 3); }
   { ScopedTimer timer(nullptr, "scope", 3); }
   EXPECT_EQ(log.summary("scope").count, 1u);
-}
-
-TEST(BoundedQueueTest, DropsTheOldestAndCounts) {
-  BoundedQueue<int> queue(3);
-  for (int k = 0; k < 3; ++k) EXPECT_TRUE(queue.push(k));
-  EXPECT_FALSE(queue.push(3));
-  EXPECT_EQ(queue.dropped(), 1u);
-  EXPECT_EQ(queue.size(), 3u);
-  EXPECT_EQ(*queue.tryPop(), 1);
-  queue.close();
-  EXPECT_FALSE(queue.push(9));
-  EXPECT_EQ(*queue.pop(), 2);
-  EXPECT_EQ(*queue.pop(), 3);
-  EXPECT_FALSE(queue.pop());
-  EXPECT_FALSE(queue.tryPop());
-  BoundedQueue<int> never_zero(0);
-  EXPECT_TRUE(never_zero.push(1));
-  never_zero.clear();
-  EXPECT_EQ(never_zero.size(), 0u);
-}
-
-TEST(BoundedQueueTest, ClosingWakesWaitersAndNothingIsLostInBetween) {
-  BoundedQueue<int> queue(100000);
-  long sum = 0;
-  std::thread consumer([&] {
-    while (const auto value = queue.pop()) sum += *value;
-  });
-  for (int k = 1; k <= 10000; ++k) queue.push(k);
-  queue.close();
-  consumer.join();
-  EXPECT_EQ(sum, 10000L * 10001 / 2);
-  EXPECT_EQ(queue.dropped(), 0u);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The command itself: what it prints and leaves, and how it refuses bad input.
+// The command itself: its output, its files, and how it rejects bad input.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -82,7 +82,7 @@ TEST_F(EvaluateCommand, CovarianceFileAddsTheNees) {
     }
   };
   const std::string input = "--truth " + path("truth.tum") + " --estimate " + path("estimate.tum") + " --covariance ";
-  // The first pose is joined with the truth, so the others are off by 0 or 4 cm, in turn.
+  // The first pose is aligned with the truth, so the others are off by 0 and 4 cm alternately.
   write(0, "0.0004");
   ASSERT_EQ(run(input + path("covariance.csv") + " --out " + path("out")), 0) << error_;
   const std::string metrics = text(path("out") + "/metrics.csv");

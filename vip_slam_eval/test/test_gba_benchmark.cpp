@@ -1,4 +1,4 @@
-// The benchmark's simulation and its runs: counts as asked for, the variants build from one map, the adjustment helps.
+// The benchmark's simulation and runs: counts as requested, all variants build from one map, the adjustment helps.
 #include <gtest/gtest.h>
 
 #include <stdexcept>

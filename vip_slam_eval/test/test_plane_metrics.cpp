@@ -141,7 +141,7 @@ TEST(AssociationMetricsTest, PrecisionAndRecall) {
       {3, {0, 1, 1.0}, 11, 5},   // right
       {4, {0, 2, 1.0}, 10, 4},   // a wall point tied to the floor
       {5, {3, 1, 0.0}, 0, 4},    // on the floor, not tied
-      {6, {2, 3, 1.0}, 0, 4},    // on the wall nobody found
+      {6, {2, 3, 1.0}, 0, 4},    // on the wall that was not found
       {7, {8, 1, 0.0}, 10, 4},   // the floor's height outside of it
       {8, {3, 2, 0.0}, 0, 3}};   // on the floor, not tied, not seen often enough to be
   const AssociationMetrics m = associationMetrics(points, truth, planes);

@@ -12,7 +12,7 @@ std::shared_ptr<const CameraModel> camera() {
   return makeCamera(k);
 }
 
-// Upright, two metres before the camera (which looks along z of the map), right of the middle, with a hole.
+// Vertical, two metres in front of the camera (which looks along z of the map), right of the middle, with a hole.
 PlaneEstimate wall() {
   PlaneEstimate plane;
   plane.id = 3;
@@ -44,7 +44,7 @@ TEST(PlanePicture, PaintsTheAreaAndLeavesTheRest) {
 TEST(PlanePicture, DepthDecidesWhereItIsKnown) {
   const cv::Mat gray(120, 160, CV_8UC1, cv::Scalar(100));
   cv::Mat depth(120, 160, CV_32FC1, cv::Scalar(2.0f));
-  depth.rowRange(0, 60).setTo(1.0f);  // something stands before the upper half
+  depth.rowRange(0, 60).setTo(1.0f);  // an object in front of the upper half
   const cv::Vec3b bare(100, 100, 100);
   const cv::Mat picture = drawPlanes(gray, depth, *camera(), SE3(), {wall()});
   EXPECT_EQ(bare, picture.at<cv::Vec3b>(pixel(0.2, -0.6)));

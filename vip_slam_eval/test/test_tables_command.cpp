@@ -1,4 +1,4 @@
-// The tables command among stand-ins of the programs it calls: what becomes of failures, what is run again.
+// The tables command with stubs of the programs it calls: handling of failures, and which runs are repeated.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -176,7 +176,7 @@ class NeesTest : public ::testing::Test {
     for (const StampedPose& pose : truth_) {
       Vector6d e;
       for (int k = 0; k < 6; ++k) e[k] = normal(random);
-      e = L * e * (samples.empty() ? 0.0 : optimism);  // the first pose joins the worlds and must be exact
+      e = L * e * (samples.empty() ? 0.0 : optimism);  // the first pose aligns the worlds and must be exact
       PoseWithCovariance sample;
       sample.t = pose.t;
       const SE3 T = kTurned * pose.T_W_B;
@@ -198,7 +198,7 @@ TEST_F(NeesTest, HonestCovariancesGiveTheirDegreesOfFreedom) {
   EXPECT_EQ(honest.unusable, 0u);
 }
 
-/// EuRoC's IMU has its x axis up, which has no heading to join the worlds by.
+/// EuRoC's IMU has its x axis up, so that axis has no heading for aligning the worlds.
 TEST_F(NeesTest, TheBodyMayStandOnItsEnd) {
   const SE3 on_end(expQuaternion({0, -0.5 * M_PI, 0}), Eigen::Vector3d::Zero());
   const SE3 T_first_B(truth_.front().T_W_B.rotation().conjugate() * on_end.rotation(), Eigen::Vector3d::Zero());

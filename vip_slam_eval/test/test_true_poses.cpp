@@ -18,7 +18,7 @@ TEST(TruePoses, AMapOfABodyThatOnlyTurnedIsAlignedByItsOrientations) {
     kf->frame.t = 0.5 * k;
     NavState state;
     state.t = kf->frame.t;
-    // Millimetres of noise along a line that says nothing of the heading.
+    // Millimetres of noise on a straight line, which leaves rotation about it undetermined.
     state.T_W_I = SE3(expQuaternion({0.02, 0.01, 0.3 * k}), {0.001 * (k % 2), 0, 0});
     kf->frame.state = state;
     map.addKeyframe(kf, state, ImuNoise());

@@ -60,7 +60,7 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     return std::nullopt;
   }
   if (options_.extrinsics != "config") {
-    // Without an image nobody knows which frame to ask tf for: a camera that starts late must not cost its extrinsics.
+    // The frame to look up in tf is known only from an image: wait for a camera that starts late.
     if (!color_seen_) {
       waiting_for_ = "no image on topic " + sensor_.topics.color + " yet";
       return std::nullopt;

@@ -1,5 +1,5 @@
-// Collects what the estimators must know of the sensor before they can start: intrinsics from camera_info or the sensor
-// configuration, extrinsics from tf or the sensor configuration.
+// Collects the calibration that the estimators need to start: intrinsics from camera_info or the sensor configuration,
+// extrinsics from tf or the sensor configuration.
 #pragma once
 
 #include <mutex>
@@ -26,10 +26,11 @@ class CalibrationSource {
 
   /// The completed configuration, once everything is known at time `t` (stamps, seconds).
   std::optional<SensorConfig> resolve(double t);
-  /// After that: where the extrinsics come from, as a sentence, and whether tf was asked and did not have both.
+  /// Valid after resolve(): the source of the extrinsics as a sentence, and whether tf lacked one of the two
+  /// transforms.
   std::string extrinsicsOrigin() const;
   bool tfIsIncomplete() const;
-  /// What is missing, as a sentence; what is wrong with a camera_info that came.
+  /// What is missing, or what is wrong with the camera_info received, as a sentence.
   std::string waitingFor() const;
   std::string colorFrame() const;
 
@@ -45,7 +46,7 @@ class CalibrationSource {
   bool color_info_ = false, depth_info_ = false, color_seen_ = false, imu_seen_ = false;
   std::string color_frame_, imu_frame_, problem_, waiting_for_, origin_;
   bool tf_incomplete_ = false;
-  std::optional<double> asked_since_;  ///< when both frames were known first, s
+  std::optional<double> asked_since_;  ///< time when both frame names were first known, s
 };
 
 }  // namespace vip_slam

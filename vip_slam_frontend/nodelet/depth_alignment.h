@@ -1,5 +1,5 @@
-// Depth as the estimator takes it: in the colour camera. What does not fit is named instead of thrown, so that a camera
-// set up wrongly costs the depth and not the odometry.
+// Registers depth to the colour camera, as the estimator needs it. Mismatches are reported instead of thrown, so that a
+// wrongly configured camera costs the depth and not the odometry.
 #pragma once
 
 #include <optional>
@@ -17,8 +17,8 @@ class DepthAlignment {
   /// Throws std::invalid_argument when depth is to be registered and a camera is unusable.
   explicit DepthAlignment(const SensorConfig& sensor);
 
-  /// `depth`: metres, may be empty. Without registration it comes back as it is, also when it does not fit; else
-  /// registered, or empty. `problem`: what does not fit, in words; empty when all does.
+  /// `depth`: metres, may be empty. Without registration it is returned unchanged, also when it does not fit; else
+  /// registered, or empty. `problem`: what does not fit, in words; empty when all fits.
   cv::Mat align(const cv::Mat& depth, const cv::Size& color, std::string* problem) const;
 
  private:

@@ -9,7 +9,8 @@
 namespace vip_slam {
 namespace {
 
-/// Red at half a metre over yellow and green to blue at eight, each doubling of the distance by the same step.
+/// From red at half a metre via yellow and green to blue at eight metres, with equal steps per doubling of the
+/// distance.
 cv::Scalar depthColour(float z) {
   const float s = std::clamp(std::log2(8.0f / z) / 4.0f, 0.0f, 1.0f);
   const cv::Mat hsv(1, 1, CV_8UC3, cv::Scalar(120 * (1 - s), 220, 255));

@@ -1,4 +1,4 @@
-// The picture users look at first: the image with its tracked features and the tracking state.
+// The image with its tracked features and the tracking state, for display.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -7,8 +7,8 @@
 
 namespace vip_slam {
 
-/// BGR. Features with depth are coloured by it (near red, far blue), those without are white rings; larger dots have
-/// lived longer. The state and its reason stand at the bottom, in green, yellow or red.
+/// BGR. Features with depth are coloured by it (near red, far blue), those without are white rings; larger dots are
+/// older. The state and its reason are written at the bottom, in green, yellow or red.
 cv::Mat drawFeatureImage(const cv::Mat& gray, const TrackedFrame& frame);
 
 }  // namespace vip_slam

@@ -1,10 +1,11 @@
-// What the front-end nodelet says about itself in /diagnostics.
+// The front-end nodelet's /diagnostics.
 #include <algorithm>
 #include <cstdio>
 
 #include <vip_slam_msgs/TrackingStatus.h>
 
 #include "front_end_nodelet.h"
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/frame_conversions.h"
 #include "vip_slam_ros/process_memory.h"
 #include "vip_slam_ros/topic_lookup.h"
@@ -15,11 +16,8 @@ using diagnostic_msgs::DiagnosticStatus;
 
 namespace {
 
-double quantile(std::deque<double> values, double q) {
-  if (values.empty()) return 0;
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
+double quantileOf(const std::deque<double>& values, double q) {
+  return values.empty() ? 0 : quantile(std::vector<double>(values.begin(), values.end()), q);
 }
 
 }  // namespace
@@ -35,7 +33,7 @@ std::vector<FrontEndNodelet::Input> FrontEndNodelet::inputs() const {
   return all;
 }
 
-// The master is asked only while something is lacking.
+// The ROS master is asked only while a topic is missing.
 void FrontEndNodelet::explainAbsences() {
   ros::master::V_TopicInfo published;
   for (const Input& input : inputs()) {
@@ -49,8 +47,8 @@ void FrontEndNodelet::explainAbsences() {
 void FrontEndNodelet::tick() {
   constexpr int kLookup = 5;  // ticks
   if (ticks_++ % kLookup == kLookup - 1) explainAbsences();
-  // Only images bring a status: before the first one, and when they no longer come, nothing else says why there is no
-  // pose.
+  // A status is published only with images: before the first one, and when images stop, this is the only report why
+  // there is no pose.
   bool started;
   std::string start_problem;
   {
@@ -59,13 +57,18 @@ void FrontEndNodelet::tick() {
     start_problem = shown_.start_problem;
   }
   const double now = ros::Time::now().toSec();
+  // A player that has not begun, or is paused at its beginning, is no fault of the topics.
+  const bool clock_stands = !started && ros::Time::isSimTime() && now == last_tick_;
+  last_tick_ = now;
   TrackingStatus waiting{TrackingState::kWaiting, ""};
   if (paused_) {
     waiting.reason = "paused; the service pause (false) goes on";
+  } else if (clock_stands) {
+    waiting.reason = "simulated time (/clock) stands still: nothing is being played";
   } else if (started) {
     waiting.reason = color_monitor_->silence(now);
   } else {
-    // What comes at another rate than told does no harm by itself: it is the last thing to name.
+    // A rate that differs from the configured one does no harm by itself: it is reported last.
     waiting.reason = color_monitor_->fault(now);
     if (waiting.reason.empty()) waiting.reason = imu_monitor_->fault(now);
     if (waiting.reason.empty() && !sensor_.topics.accel.empty()) waiting.reason = accel_monitor_->absence(now);
@@ -77,7 +80,10 @@ void FrontEndNodelet::tick() {
   }
   if (!waiting.reason.empty()) {
     status_pub_.publish(toMsg(waiting));
-    NODELET_WARN_THROTTLE(10, "WAITING: %s", waiting.reason.c_str());
+    if (clock_stands)
+      NODELET_INFO_THROTTLE(10, "WAITING: %s", waiting.reason.c_str());
+    else
+      NODELET_WARN_THROTTLE(10, "WAITING: %s", waiting.reason.c_str());
     std::lock_guard<std::mutex> lock(shown_mutex_);
     shown_.status = waiting;
   } else if (const std::string depth = depthAbsence(now); !depth.empty()) {
@@ -89,7 +95,7 @@ void FrontEndNodelet::tick() {
 std::string FrontEndNodelet::depthAbsence(double now) const {
   if (sensor_.topics.depth.empty()) return "";
   const std::string absence = depth_monitor_->absence(now);
-  constexpr int kLasting = 20;  // images; a hand before the camera is short
+  constexpr int kLasting = 20;  // images; a hand in front of the camera is gone sooner
   if (!absence.empty() || empty_depth_ < kLasting) return absence;
   char range[60];
   std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);
@@ -112,8 +118,8 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   const FrontEndCounters& c = shown.counters;
   status.add("features", shown.features);
   status.add("processing of the last image (ms)", shown.processing);
-  status.add("processing, median of the last minute (ms)", quantile(shown.recent, 0.5));
-  status.add("processing, 99 % of the last minute (ms)", quantile(shown.recent, 0.99));
+  status.add("processing, median of the last minute (ms)", quantileOf(shown.recent, 0.5));
+  status.add("processing, 99 % of the last minute (ms)", quantileOf(shown.recent, 0.99));
   status.add("latency, stamp to odometry (ms)", 1e3 * shown.latency);
   status.add("depth surfaces used", c.surfaces_used);
   status.add("NIS per degree of freedom", c.nis_per_dof);

@@ -1,5 +1,4 @@
-// What the sensors send: images are decoded where they arrive, then all is handed to the thread that owns the
-// estimator.
+// Sensor input: images are decoded in the callback threads, then all is passed to the thread that owns the estimator.
 #include "front_end_nodelet.h"
 
 #include "vip_slam_ros/geometry_conversions.h"
@@ -39,7 +38,7 @@ void FrontEndNodelet::subscribe() {
           onDepth(m->header.stamp.toSec(), [m, scale, offset] { return decodeDepth(*m, scale, offset); });
         });
   }
-  // One queue in order for what is small and frequent; images are decoded beside it.
+  // One ordered queue for small and frequent messages; images are decoded in other threads.
   ros::NodeHandle& ordered = getNodeHandle();
   const auto imu = [&](const std::string& topic, void (FrontEndNodelet::*callback)(const sensor_msgs::ImuConstPtr&)) {
     if (!topic.empty()) subscribers_.push_back(ordered.subscribe(topic, 1000, callback, this, hints));

@@ -127,7 +127,7 @@ void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const E
     constexpr std::size_t kEarly = 4000;
     const Eigen::Vector3d g = gyro ? *gyro : Eigen::Vector3d::Zero(), a = accel ? *accel : Eigen::Vector3d::Zero();
     const bool has_gyro = gyro != nullptr, has_accel = accel != nullptr;
-    // Their time has been noticed: handed over later, they must not look like a jump back.
+    // Their stamps have been checked already: when replayed later they must not count as a jump back.
     early_.push_back(
         [this, t, g, a, has_gyro, has_accel] { feedInertial(t, has_gyro ? &g : nullptr, has_accel ? &a : nullptr); });
     if (early_.size() > kEarly) early_.pop_front();
@@ -159,7 +159,7 @@ void FrontEndNodelet::startWhenCalibrated() {
   const std::optional<SensorConfig> resolved = calibration_->resolve(clock_->newest());
   if (!resolved) return;
   try {
-    // clock_ has judged the stamps; what it lets pass is no jump.
+    // clock_ has already filtered the stamps; those that pass are no jump.
     auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.time_jump);
     alignment_ = std::make_unique<DepthAlignment>(*resolved);
     front_end_ = std::move(front_end);
@@ -180,7 +180,7 @@ void FrontEndNodelet::startWhenCalibrated() {
     shown_.start_problem.clear();
     shown_.extrinsics = origin;
   }
-  // Only these are found out; the rest of sensor_ is read by other threads.
+  // Only these fields are resolved here; the rest of sensor_ is read by other threads.
   sensor_.camera = resolved->camera;
   sensor_.depth_camera = resolved->depth_camera;
   sensor_.T_imu_cam = resolved->T_imu_cam;
@@ -202,7 +202,7 @@ void FrontEndNodelet::processReady() {
   if (!front_end_) return;
   while (const ImagePair* front = pairer_->front()) {
     if (!front_end_->ready(front->t, front->depth_lag) && waitedFor(front->t) <= options_.imu_patience) return;
-    // Taken out first: an image that cannot be processed must not come back for ever.
+    // Removed before processing: an image that throws must not be tried again forever.
     const ImagePair pair = *front;
     pairer_->pop();
     process(pair);

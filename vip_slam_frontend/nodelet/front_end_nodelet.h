@@ -1,4 +1,4 @@
-// The front end as a nodelet: subscribers decode and hand over, one thread owns the estimator, publishers hand on.
+// The front end as a nodelet: subscribers decode and queue messages, one thread owns the estimator and publishes.
 #pragma once
 
 #include <atomic>
@@ -47,7 +47,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void advertise();
   void subscribe();
 
-  // In the callback threads: decoding, watching, handing over.
+  // In the callback threads: decoding, stream monitoring, queuing.
   void onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode);
   void onDepth(double t, const std::function<cv::Mat()>& decode);
   void onImu(const sensor_msgs::ImuConstPtr& msg);
@@ -68,7 +68,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   bool noticeTime(double t, Stream stream);  ///< false: leave the message out
   void startWhenCalibrated();
   void processReady();
-  /// How far the streams have gone on since an image at `t`, each by its own clock; seconds.
+  /// Time by which other streams have advanced past an image at `t`, each by its own stamps; seconds.
   double waitedFor(double t) const;
   void process(const ImagePair& pair);
   /// Odometry and tf of a frame that has a pose.
@@ -80,7 +80,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
 
   // Diagnostics, once a second by the wall clock.
   void tick();
-  /// The topics that are read, and the type each is expected to have.
+  /// A subscribed topic's monitor and its expected message type.
   struct Input {
     StreamMonitor* monitor;
     std::string type;
@@ -106,7 +106,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<FrontEnd> front_end_;
   std::unique_ptr<DepthAlignment> alignment_;
   std::unique_ptr<ImagePairer> pairer_;
-  std::deque<std::function<void()>> early_;  ///< IMU samples before the calibration is complete
+  std::deque<std::function<void()>> early_;  ///< IMU samples received before the calibration is complete
   std::unique_ptr<StreamClock> clock_;
   bool told_of_spikes_ = false;
   double posed_imu_t_ = -1e300;               ///< of the newest image with a pose
@@ -114,7 +114,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   Matrix15d covariance_ = Matrix15d::Zero();  ///< of the newest image; predictions between images carry it
   double last_feature_image_ = -1e300;
 
-  // What the thread tells the diagnostics.
+  // Passed from the owner thread to the diagnostics.
   struct Shown {
     TrackingStatus status;
     FrontEndCounters counters;
@@ -126,15 +126,16 @@ class FrontEndNodelet : public nodelet::Nodelet {
     double processing = 0;      ///< last image, ms
     std::deque<double> recent;  ///< processing of the last images (a minute of them at 20 Hz), ms
     std::size_t time_jumps = 0;
-    std::string start_problem;  ///< why the front end cannot begin with what it was told of the sensor
-    std::string extrinsics;     ///< where they come from
+    std::string start_problem;  ///< why the front end cannot start with the given sensor configuration
+    std::string extrinsics;     ///< source of the extrinsics
     std::string size_problem;   ///< depth that does not fit the colour image, in words
   };
-  DropWatch drops_;  ///< used by diagnostics only
-  int ticks_ = 0;    ///< likewise
+  DropWatch drops_;       ///< used by diagnostics only
+  int ticks_ = 0;         ///< likewise
+  double last_tick_ = 0;  ///< time of the last tick, s; likewise
   mutable std::mutex shown_mutex_;
   Shown shown_;
-  std::deque<PairerCounters> lately_paired_;  ///< as it was reported in the last seconds; of the diagnostics' thread
+  std::deque<PairerCounters> lately_paired_;  ///< counters of the last reports; used by diagnostics only
 
   std::atomic<int> empty_depth_{0};  ///< depth images in a row that hold nothing within the sensor's range
   std::atomic<bool> paused_{false};
@@ -148,7 +149,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
   std::unique_ptr<dynamic_reconfigure::Server<vip_slam_frontend::FrontEndConfig>> reconfigure_;
   ros::WallTimer timer_;
-  std::unique_ptr<OwnerThread> owner_;  ///< last: stops before anything it uses goes
+  std::unique_ptr<OwnerThread> owner_;  ///< last member: stops before anything it uses is destroyed
 };
 
 }  // namespace vip_slam

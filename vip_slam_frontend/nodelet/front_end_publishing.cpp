@@ -74,7 +74,7 @@ void FrontEndNodelet::publishFeatureImage(const ImagePair& pair, const TrackedFr
 }
 
 void FrontEndNodelet::publishImuRate(double t) {
-  // Each prediction integrates from the newest image on: without images it would cost more and more, and mean less.
+  // Each prediction integrates from the newest image on: without images its cost and its error grow.
   constexpr double kLongestPrediction = 1.0;  // seconds
   if (imu_rate_pub_.getNumSubscribers() == 0 || t - posed_imu_t_ > kLongestPrediction) return;
   const auto state = front_end_->predict(t);

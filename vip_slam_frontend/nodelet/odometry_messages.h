@@ -1,5 +1,5 @@
-// The front end's state as ROS knows odometry: the pose of base_link in odom, its twist in base_link, both with
-// covariance (REP-105, nav_msgs/Odometry).
+// The front end's state as nav_msgs/Odometry: the pose of base_link in odom, its twist in base_link, both with
+// covariance (REP-105).
 #pragma once
 
 #include <string>

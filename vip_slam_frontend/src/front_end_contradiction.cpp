@@ -1,5 +1,5 @@
-// Images and IMU that contradict each other: images that come again, shocks that the IMU missed, what moves by itself,
-// an IMU that is wrong, or missing.
+// Contradictions between images and IMU: repeated images, shocks that the IMU missed, bodies that move independently of
+// the camera, an IMU that is wrong or missing.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -9,6 +9,7 @@
 
 #include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/util/same_pixels.h"
+#include "vip_slam_core/util/statistics.h"
 
 #include "front_end_impl.h"
 
@@ -16,31 +17,32 @@ namespace vip_slam {
 
 namespace {
 
-// A filter that has just started has not yet shown that its velocity is right, s.
+// Time after the start during which the filter's velocity is not yet trusted to judge the points, s.
 constexpr double kSettled = 2.0;
-// What walks about pauses, and then follows the camera, for so long, s.
+// A moving body that pauses looks static: for this long after one was last seen moving the images stay in doubt, s.
 constexpr double kPauses = 1.0;
-// Everything in view moving against the IMU for so many times the coasting time: the IMU, or the velocity that was made
-// of it, is wrong after all.
+// Factor on coast_seconds: when everything in view contradicts the IMU for longer, the IMU, or the velocity integrated
+// from it, is taken to be wrong.
 constexpr double kPatience = 2.0;
-// No IMU is worse than its data sheet by this; with axes, signs or units mixed up the factor goes to its limit of 30,
-// while a camera turned by a degree or a delay of 10 ms leave it at 1.
+// Factor on the IMU's noise that no sound IMU reaches: with wrong axes, signs or units the adapted factor goes to its
+// limit of 30, while extrinsics that are wrong by a degree or a delay of 10 ms leave it at 1.
 constexpr double kImplausibleNoise = 10.0;
-// The same pixels may come again while the IMU rests and foretells less image motion than this: what is rendered
-// without noise looks like that when it stands.
+// An image may repeat the one before while the IMU is at rest and predicts less image motion than this, px: a standing
+// camera that is simulated without noise renders equal images.
 constexpr double kStandsPx = 0.5;
-// The translation between two images may be off the foretold one by so many sigmas, or the IMU has missed something;
-// this speed and length, m/s and m, are a sigma of what neither knows of (rows, a delay). At four ordinary images did.
+// Limit on the distance between the measured and the predicted translation, in sigmas; beyond, the IMU has missed a
+// shock. Ordinary images reach four. One sigma of unmodelled errors (rolling shutter, delay) is speed * dt + length,
+// m/s and m.
 constexpr double kShockSigmas = 6.0, kUntoldSpeed = 0.0125, kUntoldLength = 2.5e-4;
-// A repeated image is no fault for so long, s.
+// Repeated images are reported as a fault only after this time, s.
 constexpr double kFrozen = 0.3;
-// A shock shows when so many points tell one motion, with no more than one in so many against it.
+// A shock needs at least this many tracked points, and at most one outlier per kShockOutliers of them.
 constexpr int kShockTracks = 30, kShockOutliers = 20;
-// It comes out of the blue: for so long before, images have agreed with a share of that. An IMU or a velocity that is
-// wrong departs little by little. It is over in so much time, s.
+// A shock is sudden: for kCalm s before it deviations stayed below the share kDoubt of kShockSigmas, whereas a wrong
+// IMU or velocity drifts off gradually. It lasts at most kShockLasts, s.
 constexpr double kCalm = 0.5, kDoubt = 0.7, kShockLasts = 0.1;
-// So long after the last image a hand may have turned the camera elsewhere, s; twice as long and by more than this
-// angle from what the IMU foretold, rad, the filter's step is too far from where it is linearised.
+// Time without images after which the camera may look elsewhere, s. After twice that time a rotation further than
+// kFarTurn, rad, from the predicted one is too far from the filter's linearisation point.
 constexpr double kLongUnseen = 0.2, kFarTurn = 0.05;
 
 }  // namespace
@@ -49,24 +51,25 @@ bool FrontEnd::Impl::imuIsContradicted() const { return filter_.imuNoiseScale() 
 
 bool FrontEnd::Impl::movedLately(double t_imu) const { return t_imu - moving_imu_t_ < kPauses; }
 
-ForetoldMotion FrontEnd::Impl::foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const {
+PredictedMotion FrontEnd::Impl::predictMotion(const Propagation& propagation, const SE3& T_odom_C,
+                                              bool doubtful) const {
   const NavState& from = filter_.nav();
-  ForetoldMotion motion;
+  PredictedMotion motion;
   motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * extrinsics());
   motion.sigma = propagation.displacementSigma(filter_.covariance());
-  motion.turn_unknown = imu_gap;
+  motion.turn_unknown = doubtful;
   motion.wary = movedLately(propagation.predicted.t);
   motion.at_rest = stillness_.imuRests();
   const bool settled = options_.tracking.leave_out_moving && propagation.predicted.t - started_imu_t_ > kSettled;
-  motion.interval = settled && !imu_gap ? propagation.predicted.t - from.t : 0.0;
+  motion.interval = settled && !doubtful ? propagation.predicted.t - from.t : 0.0;
   return motion;
 }
 
 bool FrontEnd::Impl::bridgesGap(const TrackingResult& tracking, std::size_t tracks_before,
-                                const ForetoldMotion& foretold, double unseen) {
+                                const PredictedMotion& prediction, double unseen) {
   if (unseen < kLongUnseen) return true;
   if (!tracking.pose_ok || 2 * static_cast<std::size_t>(tracking.tracked) < tracks_before) return false;
-  const SE3 apart = foretold.T_current_previous.inverse() * tracking.T_current_previous;
+  const SE3 apart = prediction.T_current_previous.inverse() * tracking.T_current_previous;
   return unseen < 2 * kLongUnseen || logSO3(apart.R()).norm() < kFarTurn;
 }
 
@@ -103,8 +106,7 @@ bool FrontEnd::Impl::movesByImu(double t_imu, const SE3& T_odom_C_then) const {
     if (now.z() > 0) moved.push_back((now.hnormalized() - then.hnormalized()).norm() * camera_->focal());
   }
   if (moved.empty()) return true;
-  std::nth_element(moved.begin(), moved.begin() + moved.size() / 2, moved.end());
-  return moved[moved.size() / 2] > kStandsPx;
+  return upperMedian(std::move(moved)) > kStandsPx;
 }
 
 bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
@@ -114,21 +116,21 @@ bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
 
 FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {
   ++counters_.repeated_image;
-  // A camera that is slower than its topic says nothing in between, which is no fault.
+  // A camera slower than its topic repeats images in between, which is no fault.
   if (phase_ == Phase::kTracking && t_imu - filter_.nav().t < kFrozen)
     return statusOnly(t, status_.state, status_.reason);
   return unusable(t, "the image repeats the one before: has the camera frozen?");
 }
 
-void FrontEnd::Impl::admitShock(const TrackingResult& tracking, const ForetoldMotion& foretold, double dt,
+void FrontEnd::Impl::admitShock(const TrackingResult& tracking, const PredictedMotion& prediction, double dt,
                                 Propagation* propagation) {
   const double t = propagation->predicted.t;
-  const bool told = foretold.interval > 0 && !foretold.wary && !tracking.moves_by_itself && tracking.step.ok &&
+  const bool told = prediction.interval > 0 && !prediction.wary && !tracking.moves_by_itself && tracking.step.ok &&
                     tracking.tracked >= kShockTracks && kShockOutliers * tracking.lost_outlier <= tracking.tracked;
-  const Eigen::Vector3d apart = tracking.step.t - foretold.T_current_previous.t();
+  const Eigen::Vector3d apart = tracking.step.t - prediction.T_current_previous.t();
   const double length = kUntoldSpeed * dt + kUntoldLength;
   const Eigen::Matrix3d C =
-      tracking.step.covariance + (std::pow(foretold.sigma, 2) + std::pow(length, 2)) * Eigen::Matrix3d::Identity();
+      tracking.step.covariance + (std::pow(prediction.sigma, 2) + std::pow(length, 2)) * Eigen::Matrix3d::Identity();
   const double sigmas = told ? std::sqrt(apart.dot(C.inverse() * apart)) : 0.0;
   const bool doubtful = sigmas > kDoubt * kShockSigmas;
   if (!told || doubtful) {

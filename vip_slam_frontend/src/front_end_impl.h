@@ -1,4 +1,4 @@
-// The front end's inside: what it owns and the steps of one image.
+// The front end's implementation: what it owns and the steps of one image.
 #pragma once
 
 #include <deque>
@@ -50,23 +50,23 @@ class FrontEnd::Impl {
   FrontEndOptions options_;
 
  private:
-  /// Depth cameras that are slower than the colour camera leave images without depth in between, s.
+  /// Longest time without depth that is normal, s: a depth camera slower than the colour camera leaves images without.
   static constexpr double kBetweenDepths = 0.5;
 
   enum class Phase { kWaiting, kInitialising, kTracking, kLost };
 
-  /// TrackedFrame::T_chain_C of a body at T_odom_I, which is the newest image's or a little later.
+  /// TrackedFrame::T_chain_C for the body pose T_odom_I, at the newest image or a little later.
   SE3 chainedCamera(const SE3& T_odom_I) const;
   SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.mounting().T_I_C; }
-  /// A depth image as it came; empty when there is none.
+  /// A depth image at its own stamp; empty when there is none.
   struct DepthReading {
     cv::Mat image;
-    double lag = 0;  ///< its stamp after that of the colour image, seconds
+    double lag = 0;  ///< its stamp minus that of the colour image, seconds
   };
 
-  /// Empty when the input is usable; else what is wrong. Fixes up the depth.
-  /// From now on depth is read with what the filter has found out of its shift.
+  /// Applies the filter's estimate of the depth image's shift to the depth images to come.
   void followDepthShift();
+  /// Empty when the input is usable, else what is wrong. Fills `depth` with the corrected and masked depth image.
   std::string checkInput(const FrameInput& input, DepthReading* depth);
   bool noticeTimeJump(double t, double newest, const char* what);
   void countImu();
@@ -74,61 +74,77 @@ class FrontEnd::Impl {
   FrameOutput initialise(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth);
   FrameOutput trackImage(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth,
                          const FrontEnd::PoseReady& on_pose);
+  /// Widens the prediction over [from, t_imu] by what an IMU gap or a gyro at the limit of its range leaves unknown.
+  /// True when there was such a thing.
+  bool admitDoubts(double max_gap, double from, double t_imu, Propagation* propagation);
+  /// Decides stillness, updates the filter with features and surfaces, and counts. Times of the last image on the IMU
+  /// clock and of this one on its own, s.
+  StepReport updateFilter(const Propagation& propagation, const cv::Mat& depth, const SurfaceMatches& surfaces,
+                          double previous_t_imu, double t);
+  /// Why the estimate is not to be believed any more; empty when it is.
+  std::string divergence(const StepReport& report, const TrackingResult& tracking, double t) const;
+  /// Judges the tracking state and ends LOST when features are back. False when the position is too uncertain by then.
+  bool resume(const TrackingResult& tracking, bool surfaces_hold, double t);
+  /// Why this image becomes a keyframe; empty when it does not.
+  std::string keyframeReason(const TrackingResult& tracking, bool has_depth, bool surfaces_hold, double t);
+  /// Rotation of the camera between two IMU times by the gyro alone.
   SE3 gyroRotation(double t0, double t1) const;
-  /// In the camera, m; those without depth lie beyond its reach, or might as well.
+  /// Tracked points in the camera frame, m; points without depth are put at the depth camera's maximum range.
   std::vector<Eigen::Vector3d> trackedPoints() const;
-  /// Both in IMU time: of the last image and of this one.
+  /// Whether the body stands still at this image; times of the last image and of this one on the IMU clock, s.
   bool decideStillness(double previous_t_imu, double t_imu);
-  /// How the colour camera moves during a readout, given the state at the stamp; null: everything at the stamp.
+  /// Poses of the colour camera during a rolling-shutter readout, given the state at the stamp; null: global shutter.
   std::shared_ptr<const RowPoses> rows(const Readout& readout, const NavState& nav) const;
   std::shared_ptr<const RowPoses> colourRows(const NavState& nav) const {
     return rows(Readout::around(sensor_.rolling_shutter), nav);
   }
-  /// A depth image that was not read at the stamp of the colour image, or row by row, as at that stamp.
+  /// The depth image as seen at the stamp of the colour image, when it has another stamp or a rolling shutter.
   cv::Mat depthAtStamp(const DepthReading& depth, const NavState& nav);
   std::vector<FilterMeasurement> measurements() const;
   SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
-  /// The camera's motion since the last image as the IMU has it; not to be held against the points (interval 0) while
-  /// that is in doubt.
-  ForetoldMotion foretell(const Propagation& propagation, const SE3& T_odom_C, bool imu_gap) const;
-  /// A longer one starts tracking anew, s.
+  /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt its interval is
+  /// 0: then it must not be used to judge the points.
+  PredictedMotion predictMotion(const Propagation& propagation, const SE3& T_odom_C, bool doubtful) const;
+  /// Longest IMU gap that is bridged, s; a longer one restarts tracking.
   double longestImuGap() const { return 5.0 * options_.recovery.max_imu_gap; }
-  /// Whether the image after a gap of the IMU tells what went on in it. Where images were taken within the gap, each
-  /// follows the last one closely; where they are missing as well, it takes one that is known again. `unseen`: since
-  /// the last image, s.
-  static bool bridgesGap(const TrackingResult& tracking, std::size_t tracks_before, const ForetoldMotion& foretold,
+  /// Whether the image after an IMU gap shows the motion during the gap. Images taken inside the gap follow each other
+  /// closely; when they are missing as well, enough tracks must survive and the rotation must be near the predicted
+  /// one. `unseen`: time since the last image, s.
+  static bool bridgesGap(const TrackingResult& tracking, std::size_t tracks_before, const PredictedMotion& prediction,
                          double unseen);
   bool imuIsContradicted() const;
   bool movedLately(double t_imu) const;
-  /// So long that it is time to begin anew.
+  /// Whether the images have contradicted the IMU for so long that tracking must restart.
   bool contradictedForLong(const TrackingResult& tracking, double t) const;
-  /// Remembers when points that stand still last agreed with the IMU.
+  /// Records the time when static points last agreed with the IMU.
   void noteAgreement(const TrackingResult& tracking, double t);
-  /// The pixels of the image before, where something ought to have moved.
+  /// Whether the pixels equal those of the image before although the IMU says that the camera moved.
   bool repeatsLastImage(const cv::Mat& gray, double t_imu) const;
-  /// Whether the IMU foretells that an image shows more than standing still since the camera was there.
+  /// Whether the IMU predicts visible image motion between the camera pose T_odom_C_then and the image at t_imu.
   bool movesByImu(double t_imu, const SE3& T_odom_C_then) const;
   FrameOutput repeatedImage(double t, double t_imu);
-  /// A blow that clips the accelerometer or falls between its samples changes the velocity unseen, for good. All points
-  /// together show it at once, each alone would be an outlier: then the velocity is what they say, not the IMU's.
-  void admitShock(const TrackingResult& tracking, const ForetoldMotion& foretold, double dt, Propagation* propagation);
+  /// A shock that clips the accelerometer or falls between its samples leaves a lasting velocity error. All points show
+  /// it together at once, while each alone would be gated: then `propagation` admits a velocity step.
+  void admitShock(const TrackingResult& tracking, const PredictedMotion& prediction, double dt,
+                  Propagation* propagation);
   /// `metric`: depth took part, by features or surfaces.
   void judge(const TrackingResult& tracking, bool metric, bool surfaces_hold, double t);
-  /// What the position's one sigma has grown by since the last image with enough features, m.
+  /// Growth of the position's one sigma since the last image with enough features, m.
   double coastedSigma() const;
 
   FrameOutput makeOutput(double t, double t_imu, const std::string& keyframe_reason);
   std::shared_ptr<TrackedFrame> makeFrame(double t, bool with_features) const;
-  /// Those who take features from here know of no rows: pixels become what a global shutter would have seen.
+  /// Planes and back end assume a global shutter: moves rolling-shutter pixels to where the camera at the stamp sees
+  /// them.
   void placeAtStamp(std::vector<Feature>* features) const;
-  /// Without those features that lie where something moves by itself.
+  /// Removes the features that lie in regions which move independently of the camera.
   void dropMoving(std::vector<Feature>* features) const;
-  /// Depth leaves as what it means, where tracker and filter have what the camera read; 0 stays 0.
+  /// Adds the estimated depth offset, m, for output; tracker and filter keep the raw readings. 0 stays 0.
   float trueDepth(float reading) const;
   void correctDepth(std::vector<Feature>* features) const;
-  /// Of the newest depth image; nothing where something moves by itself.
+  /// Depth grid of the newest depth image, without regions which move independently of the camera.
   DepthGrid depthGrid(int stride) const;
   KeyframePtr makeKeyframe(const TrackedFrame& frame, double t_imu);
   FrameOutput statusOnly(double t, TrackingState state, const std::string& reason) const;
@@ -142,14 +158,14 @@ class FrontEnd::Impl {
   ImuBuffer imu_;
   GyroRange gyro_range_;
   FrozenDepth frozen_depth_;
-  bool same_depth_ = false;                   ///< the newest depth image is the one before
-  SE3 T_odom_depth_;                          ///< camera of the last image whose depth was its own ...
-  std::optional<std::uint32_t> depth_epoch_;  ///< ... in this epoch
+  bool same_depth_ = false;                   ///< the newest depth image repeats the one before
+  SE3 T_odom_depth_;                          ///< camera pose at the last image that brought new depth ...
+  std::optional<std::uint32_t> depth_epoch_;  ///< ... and its epoch
   cv::Mat masked_;                            ///< not zero where depth is to be left out; empty: nowhere
-  std::unique_ptr<DepthRows> depth_rows_;     ///< null until a depth image of other times than the stamp came
+  std::unique_ptr<DepthRows> depth_rows_;     ///< null until a depth image has to be warped to the stamp
   FeatureTracker tracker_;
   MovingRegions moving_;          ///< of the newest image
-  double moving_imu_t_ = -1e300;  ///< of the last image with such
+  double moving_imu_t_ = -1e300;  ///< IMU time of the last image with moving regions
   SurfaceTracker surfaces_;
   LandmarkMatcher landmarks_;
   OrbExtractor orb_;
@@ -165,27 +181,27 @@ class FrontEnd::Impl {
   double last_imu_t_ = -1e300;    ///< IMU time of the newest image
   CloneId next_clone_ = 1;
   KeyframeId next_keyframe_ = 1, last_keyframe_ = 0, newest_keyframe_ = 0;
-  SE3 T_odom_keyframe_, T_chain_keyframe_;  ///< of the last keyframe, body and camera
+  SE3 T_odom_keyframe_, T_chain_keyframe_;  ///< body and camera pose of the last keyframe
   double last_keyframe_imu_t_ = 0;
-  bool keyframe_imu_broken_ = false;  ///< a gap since the last keyframe
-  double started_imu_t_ = 0;          ///< of this epoch's first state
-  double last_good_t_ = 0;            ///< image with enough features
-  double last_good_variance_ = 0;     ///< of the position there, m^2
-  double last_held_t_ = 0;            ///< image with enough features or matched depth surfaces
-  double last_depth_t_ = -1e300;      ///< image with a depth image
-  double last_metric_t_ = 0;          ///< image in which depth took part
-  double last_points_t_ = 0;          ///< image with points that have depth
-  double last_agreed_t_ = 0;          ///< image whose points agreed with the IMU
-  double cut_off_imu_t_ = -1e300;     ///< image since the one before which the gyro was at the end of its range
-  double doubt_imu_t_ = 0;            ///< image whose points were somewhat off the IMU, or could not tell
-  double shock_imu_t_ = -1e300;       ///< first such after a while without
+  bool keyframe_imu_broken_ = false;  ///< IMU gap or gyro saturation since the last keyframe
+  double started_imu_t_ = 0;          ///< IMU time of this epoch's first state
+  double last_good_t_ = 0;            ///< last image with enough features
+  double last_good_variance_ = 0;     ///< position variance there, m^2
+  double last_held_t_ = 0;            ///< last image with enough features or matched depth surfaces
+  double last_depth_t_ = -1e300;      ///< last image with a depth image
+  double last_metric_t_ = 0;          ///< last image in which depth took part
+  double last_points_t_ = 0;          ///< last image with enough points that have depth
+  double last_agreed_t_ = 0;          ///< last image whose points agreed with the IMU
+  double cut_off_imu_t_ = -1e300;     ///< last image before which the gyro reached the limit of its range
+  double doubt_imu_t_ = 0;            ///< last image whose points deviated from the IMU somewhat, or could not tell
+  double shock_imu_t_ = -1e300;       ///< first such image after a calm time: a shock may begin there
   int gated_in_a_row_ = 0;
   bool still_ = false;
   SE3 T_map_odom_;
   bool have_map_ = false;
-  DepthShift depth_shift_;      ///< that the filter has found out, beside the sensor's own
-  DepthCurve depth_curve_;      ///< that the map has found out, after the sensor's own
-  double disparity_error_ = 0;  ///< 1/m, that was part of the curve when what is known of depth's offset began
+  DepthShift depth_shift_;      ///< estimated by the filter, in addition to the sensor configuration's
+  DepthCurve depth_curve_;      ///< estimated by the back end, applied after the sensor configuration's
+  double disparity_error_ = 0;  ///< 1/m, part of the curve when the present estimate of the depth offset began
   using PixelList = std::vector<std::pair<LandmarkId, Eigen::Vector2f>>;
   std::deque<std::pair<double, PixelList>> recent_pixels_;  ///< over the stillness window
   PixelList still_anchor_;

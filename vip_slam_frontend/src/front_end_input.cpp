@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vip_slam_core/depth/disparity_curve.h"
+#include "vip_slam_core/depth/grid_spacing.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
 
@@ -14,7 +15,7 @@ namespace vip_slam {
 
 namespace {
 
-// Half a millimetre at a fast walk: depth closer than that to the colour image counts as taken with it, seconds.
+// Depth with a smaller lag than this counts as taken with the colour image, seconds: half a millimetre at 1 m/s.
 constexpr double kSameInstant = 5e-4;
 
 SensorConfig checked(const SensorConfig& sensor) {
@@ -25,8 +26,8 @@ SensorConfig checked(const SensorConfig& sensor) {
   return sensor;
 }
 
-/// Depth of a camera of its own has bearings of its own, and what the focal length of a fisheye gets wrong does not
-/// grow evenly with the bearing.
+/// Intrinsics are estimated only with registered depth and no fisheye: a separate depth camera has intrinsics of its
+/// own, and the error of a fisheye's focal length is not proportional to the bearing.
 FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& sensor) {
   FilterOptions filter = options.filter;
   filter.calibration.intrinsics =
@@ -36,8 +37,8 @@ FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& 
   return filter;
 }
 
-/// A feature's patch must not reach over what is masked: its outline is a strong edge that goes along with the camera.
-/// So features keep away from it as from the image's own border.
+/// A feature's patch must not reach into the masked area, whose outline is a strong edge that moves with the camera. So
+/// features keep the same distance from it as from the image border, `border` px.
 cv::Mat featureMask(const cv::Mat& mask, int border) {
   if (mask.empty()) return mask;
   cv::Mat shrunk;
@@ -45,11 +46,11 @@ cv::Mat featureMask(const cv::Mat& mask, int border) {
   return shrunk;
 }
 
-/// Distances between features are told for images of 640 x 480. A smaller one shows as much in fewer pixels.
+/// Scales pixel distances, which the options give for images of 640 x 480, to smaller images with the same view.
 FrontEndOptions forSize(FrontEndOptions options, int width, int height) {
-  constexpr double kTold = 640.0, kLeast = 0.5;
+  constexpr double kLeast = 0.5;   // patches of neighbouring features must not overlap by more than half
   constexpr int kLeastBorder = 8;  // px, for patches and their gradients
-  const double scale = std::clamp(std::max(width, height) / kTold, kLeast, 1.0);
+  const double scale = std::clamp(std::max(width, height) / kReferenceSide, kLeast, 1.0);
   options.tracking.min_distance *= scale;
   const int border = options.tracking.border;
   options.tracking.border = std::max(std::min(border, kLeastBorder), static_cast<int>(std::ceil(scale * border)));
@@ -89,7 +90,7 @@ bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
 void FrontEnd::Impl::clockRanBack(const std::string& reason) {
   imu_.clear();
   last_image_t_ = last_imu_t_ = -1e300;
-  // Stamps tell the order only within an epoch.
+  // Stamps are ordered only within an epoch, so the clock's jump back needs a new one.
   if (phase_ == Phase::kWaiting) ++epoch_;
   reset(reason);
 }
@@ -155,7 +156,7 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* de
     const Eigen::Vector2d shift = sensor_.depth_shift + depth_shift_.px;
     const bool shifted = !shift.isZero();
     if (shifted) depth->image = shiftedDepth(input.depth, shift);
-    // The caller's own stays as it is.
+    // The caller's image must stay unchanged.
     if (!shifted && (!masked_.empty() || !curve.empty())) depth->image = input.depth.clone();
     if (!masked_.empty()) depth->image.setTo(0, masked_);
     applyDepthCurve(curve, &depth->image);
@@ -167,23 +168,23 @@ void FrontEnd::Impl::followDepthShift() {
   const Eigen::Vector2d& found = filter_.takeDepthShift();
   if (found == depth_shift_.bearing) return;
   depth_shift_ = {found.cwiseProduct(Eigen::Vector2d(sensor_.camera.fx, sensor_.camera.fy)), found};
-  surfaces_.clear();  // they have the readings as they were
+  surfaces_.clear();  // their readings have the old shift
 }
 
 void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
   landmarks_.apply(update);
   if (update.depth_curve != depth_curve_ && validateDepthCurve(update.depth_curve).empty()) {
     depth_curve_ = update.depth_curve;
-    surfaces_.clear();  // they have the readings as they were; the difference is no motion
+    surfaces_.clear();  // their readings have the old curve: the difference would pass for motion
     if (voidsDepthOffset(update.disparity_error - disparity_error_)) {
       disparity_error_ = update.disparity_error;
-      // A camera that measures disparities has no offset; one that was found stood for this.
+      // A disparity error replaces the depth offset: what was estimated as an offset was this error.
       filter_.restartDepthOffset(disparity_error_ != 0);
     }
   }
-  // A loaded map brings keyframes of its own: new ones come after them.
+  // A loaded map has keyframes of its own: new ids continue after them.
   next_keyframe_ = std::max(next_keyframe_, update.newest_keyframe + 1);
-  // In a map that was loaded or begun anew nobody knows yet where this odometry lies.
+  // T_map_odom of another epoch, or of a map without keyframes, is not valid for this odometry.
   have_map_ = update.epoch == epoch_ && update.newest_keyframe != 0;
   if (have_map_) T_map_odom_ = update.T_map_odom;
 }

@@ -10,12 +10,12 @@ namespace vip_slam {
 
 namespace {
 
-// What a camera in the hand may do without an IMU that tells of it, one sigma: m/s^2 and rad/s^2.
+// Acceleration of a hand-held camera while no IMU measures it, one sigma: m/s^2 and rad/s^2.
 constexpr double kUntoldAcceleration = 3.0;
 constexpr double kUntoldTurn = 5.0;
 
-/// Steady motion for `dt` seconds, where the IMU has ended; `omega`: rad/s in the body, bias taken off. The covariance
-/// grows by what may have happened meanwhile.
+/// Extrapolates with constant velocity for `dt` seconds after the last IMU sample; `omega`: rad/s in the body, bias
+/// removed. The covariance grows by the unmeasured accelerations.
 void carryOn(const Eigen::Vector3d& omega, double dt, NavState* state, Matrix15d* covariance) {
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), turn = expSO3(Eigen::Vector3d(omega * dt));
   Matrix15d F = Matrix15d::Identity();
@@ -38,7 +38,7 @@ void carryOn(const Eigen::Vector3d& omega, double dt, NavState* state, Matrix15d
 
 MountingEstimate FrontEnd::Impl::mounting() const {
   MountingEstimate mounting = filter_.mounting();
-  // Readings and rates have what was given by the time they get here.
+  // The filter sees readings and rates to which the configured corrections are already applied: add those back.
   mounting.depth_offset += sensor_.depth_offset;
   const CameraIntrinsics& camera = sensor_.camera;
   mounting.depth_shift_px =
@@ -97,7 +97,7 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
       frame->state = to.predicted;
       frame->covariance = to.Phi * frame->covariance * to.Phi.transpose() + to.Q;
     }
-    // The pose goes out under the image's stamp, so it has to be the one at that time. Longer than this it is LOST.
+    // The pose is published with the image's stamp, so extrapolate it to that time. After a longer IMU gap it is LOST.
     const double untold = std::min(t_imu - frame->state.t, longestImuGap());
     if (untold > 0) carryOn(gyro(frame->state.t) - frame->state.bias_gyro, untold, &frame->state, &frame->covariance);
     frame->T_chain_C = chainedCamera(frame->state.T_W_I);
@@ -107,12 +107,12 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
 
 FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
   if (!filter_.started()) return statusOnly(t, TrackingState::kWaiting, why);
-  // Where the IMU ends nothing carries the pose: after a hole like this one tracking starts anew, whatever comes.
+  // Without IMU nothing propagates the pose: after a gap longer than this tracking restarts in any case.
   const double t_imu = t + timeOffset();
   const bool imu_ended = imu_.empty() || t_imu - imu_.newest() > longestImuGap();
   if (phase_ != Phase::kLost && (imu_ended || t_imu - filter_.nav().t > options_.recovery.coast_seconds)) {
     phase_ = Phase::kLost;
-    status_ = {TrackingState::kLost, why};  // what is said of the images to come, until they show otherwise
+    status_ = {TrackingState::kLost, why};  // also reported for the next images, until one of them is judged anew
     ++counters_.lost;
   }
   return statusOnly(t, phase_ == Phase::kLost ? TrackingState::kLost : TrackingState::kDegraded, why);
@@ -171,7 +171,7 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
     }
   }
   correctDepth(&frame->features);
-  // Others need not know of what passes by; the tracker does, to know it again.
+  // Features on moving bodies are not passed on; the tracker keeps them, to recognise the bodies in the next images.
   dropMoving(&frame->features);
   if (is_keyframe) {
     ScopedTimer timer(timing_, "frontend.keyframe", t);
@@ -192,7 +192,7 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
 void FrontEnd::Impl::placeAtStamp(std::vector<Feature>* features) const {
   if (!tracker_.camera().rolls()) return;
   const Eigen::Vector2d last(camera_->width() - 1, camera_->height() - 1);
-  // Pixels are the image's own, whatever is known of the intrinsics by now.
+  // Pixels belong to the configured intrinsics: undo the bearing correction first.
   const Eigen::Matrix3f given = filter_.bearingCorrection().matrix().inverse().cast<float>();
   for (Feature& f : *features) {
     Feature read = f;

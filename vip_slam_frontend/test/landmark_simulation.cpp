@@ -203,7 +203,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     const double t_imu = t_imu_true - delay + filter.window().time_offset;
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
     const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, options.most_points),
-                                          standing ? std::optional<Unrest>(Unrest()) : std::nullopt);
+                                          standing ? std::optional<ResidualMotion>(ResidualMotion()) : std::nullopt);
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
     result.depth_shift = filter.takeDepthShift();

@@ -115,7 +115,7 @@ TEST(FilterRuns, StandingDoesNotWearOutTheMotionBetweenKeyframes) {
     for (int k = 0; k <= 600; ++k) {
       if (k == marked) filter.markNewest();
       const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, 0.25 + 0.05 * k));
-      filter.step(propagation, id++, {}, Unrest());
+      filter.step(propagation, id++, {}, ResidualMotion());
       if (k == marked + 20) after_a_second = std::sqrt(filter.motionSinceMark().covariance.diagonal().tail<3>().sum());
     }
     const RelativeMotion motion = filter.motionSinceMark();

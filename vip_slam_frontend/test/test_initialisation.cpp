@@ -282,16 +282,16 @@ TEST(Stillness, IsAsExactAsTheImagesAreQuiet) {
   sway.anchor_disparity_px = 0.4;
   leaves.disparity_px = 0.7;
   ASSERT_TRUE(detector.update(tripod));
-  EXPECT_LE(detector.unrest().translation, 0.25);
+  EXPECT_LE(detector.residualMotion().translation, 0.25);
   ASSERT_TRUE(detector.update(sway));
-  EXPECT_GE(detector.unrest().translation, 1.0);
+  EXPECT_GE(detector.residualMotion().translation, 1.0);
   ASSERT_TRUE(detector.update(leaves));
-  EXPECT_GE(detector.unrest().translation, 3.0);
+  EXPECT_GE(detector.residualMotion().translation, 3.0);
   StillnessCues dark = quiet();
   dark.tracks = 0;
   dark.disparity_px = dark.anchor_disparity_px = -1;
   ASSERT_TRUE(detector.update(dark));
-  EXPECT_EQ(detector.unrest().translation, 1.0);
+  EXPECT_EQ(detector.residualMotion().translation, 1.0);
 }
 
 // Eight metres before a wall the first three centimetres of a motion towards it pass for the noise of pixels nearby.
@@ -312,8 +312,8 @@ TEST(Stillness, WhereAllIsFarASmallerImageMotionEndsIt) {
   EXPECT_TRUE(detector.update(begins));
   begins.px_per_metre = stands.px_per_metre = leastImageMotion(far, 480);
   EXPECT_TRUE(detector.update(stands));
-  EXPECT_GT(detector.unrest().translation, 1.0);  // and what stands is known less well, but for its direction
-  EXPECT_LT(detector.unrest().rotation, 1.0);
+  EXPECT_GT(detector.residualMotion().translation, 1.0);  // and what stands is known less well, but for its direction
+  EXPECT_LT(detector.residualMotion().rotation, 1.0);
   EXPECT_FALSE(detector.update(begins));
 }
 

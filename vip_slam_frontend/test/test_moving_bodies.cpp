@@ -4,8 +4,8 @@
 
 #include "corner_world.h"
 #include "vip_slam_frontend/front_end.h"
-#include "vip_slam_frontend/tracking/foretold_motion.h"
 #include "vip_slam_frontend/tracking/moving_regions.h"
+#include "vip_slam_frontend/tracking/predicted_motion.h"
 
 namespace vip_slam {
 namespace {
@@ -34,9 +34,9 @@ const SE3 kCamera(Eigen::Matrix3d(expSO3(Eigen::Vector3d(0.01, -0.02, 0.005))), 
 /// The camera as it would have to move if a body that goes sideways by 5 cm stood still.
 const SE3 kBody(kCamera.rotation(), kCamera.t() + Eigen::Vector3d(0.05, 0, 0));
 
-ForetoldMotion foretold() { return {kCamera, 0.0005, 0.05}; }
+PredictedMotion prediction() { return {kCamera, 0.0005, 0.05}; }
 
-RansacResult reject(const std::vector<PointPair>& pairs, const ForetoldMotion& motion, bool* moves) {
+RansacResult reject(const std::vector<PointPair>& pairs, const PredictedMotion& motion, bool* moves) {
   RansacOptions options;
   options.threshold = kThreshold;
   return rejectOutliers(pairs, motion, options, moves);
@@ -46,7 +46,7 @@ TEST(MovingBodies, NewPointsThatContradictTheImuMoveByThemselves) {
   const std::vector<PointPair> pairs = points(60, kBody, 1, 1) + points(15, kCamera, 30, 2);
   ASSERT_GE(rejectOutliers(pairs, kCamera, RansacOptions()).inliers, 55);  // most agree on the body's motion
   bool moves = false;
-  const RansacResult kept = reject(pairs, foretold(), &moves);
+  const RansacResult kept = reject(pairs, prediction(), &moves);
   EXPECT_TRUE(moves);
   EXPECT_TRUE(kept.ok);
   EXPECT_GE(kept.inliers, 15);
@@ -56,7 +56,7 @@ TEST(MovingBodies, NewPointsThatContradictTheImuMoveByThemselves) {
 
 TEST(MovingBodies, AnImuThatIsOffTakesThePointsNearWhatItForetells) {
   const std::vector<PointPair> pairs = points(60, kBody, 1, 1) + points(15, kCamera, 30, 2);
-  ForetoldMotion off = foretold();
+  PredictedMotion off = prediction();
   off.T_current_previous.t() += Eigen::Vector3d(-0.01, 0.005, 0.005);  // 5 px at the nearest
   off.sigma = 0.005;
   bool moves = false;
@@ -69,29 +69,29 @@ TEST(MovingBodies, AnImuThatIsOffTakesThePointsNearWhatItForetells) {
 
 TEST(MovingBodies, AnOldBodyThatSetsOffIsToldByWhatElseIsOld) {
   bool moves = false;
-  reject(points(60, kBody, 30, 1) + points(25, kCamera, 30, 2), foretold(), &moves);
+  reject(points(60, kBody, 30, 1) + points(25, kCamera, 30, 2), prediction(), &moves);
   EXPECT_TRUE(moves);
 }
 
 TEST(MovingBodies, OldPointsThatAllContradictTheImuAreBelieved) {
   bool moves = true;
-  const RansacResult kept = reject(points(60, kBody, 30, 1) + points(3, kCamera, 30, 2), foretold(), &moves);
+  const RansacResult kept = reject(points(60, kBody, 30, 1) + points(3, kCamera, 30, 2), prediction(), &moves);
   EXPECT_FALSE(moves);
   EXPECT_GE(kept.inliers, 60);
 }
 
 TEST(MovingBodies, WithinWhatTheImuLeavesOpenThePointsDecide) {
   const std::vector<PointPair> pairs = points(60, kBody, 1, 1);
-  ForetoldMotion unsure = foretold();
+  PredictedMotion unsure = prediction();
   unsure.sigma = 0.02;
   bool moves = true;
   reject(pairs, unsure, &moves);
   EXPECT_FALSE(moves);
-  reject(pairs, foretold(), &moves);
+  reject(pairs, prediction(), &moves);
   EXPECT_TRUE(moves);
-  reject(points(60, kCamera, 1, 1), foretold(), &moves);
+  reject(points(60, kCamera, 1, 1), prediction(), &moves);
   EXPECT_FALSE(moves);
-  ForetoldMotion nothing = foretold();
+  PredictedMotion nothing = prediction();
   nothing.interval = 0;
   reject(pairs, nothing, &moves);
   EXPECT_FALSE(moves);

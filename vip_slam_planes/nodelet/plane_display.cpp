@@ -39,7 +39,7 @@ visualization_msgs::MarkerArray PlaneDisplay::markers(const std::vector<PlaneEst
       addRing(polygon.outer, &lines);
       for (const Ring& hole : polygon.holes) addRing(hole, &lines);
     }
-    // With a colour for each corner rviz draws unlit: a plane looks the same from both sides.
+    // With a colour per corner rviz draws without lighting, so that a plane looks the same from both sides.
     fill.colors.assign(fill.points.size(), fill.color);
     if (fill.points.empty()) continue;  // rviz warns about empty lists
     now.insert(plane.id);

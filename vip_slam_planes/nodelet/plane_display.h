@@ -1,4 +1,4 @@
-// Planes as rviz shows them.
+// Planes for rviz.
 #pragma once
 
 #include <cstddef>
@@ -18,12 +18,12 @@ namespace vip_slam {
 
 class PlaneDisplay {
  public:
-  /// Translucent polygons with outlines: grey when horizontal, else one colour a plane. Planes shown before that are
-  /// gone are deleted.
+  /// Translucent polygons with outlines: grey when horizontal, else one colour per plane. Markers of planes that no
+  /// longer exist are deleted.
   visualization_msgs::MarkerArray markers(const std::vector<PlaneEstimate>& planes, const std_msgs::Header& header,
                                           double opacity);
 
-  /// Remembers what the depth points on planes need to be drawn.
+  /// Stores the poses and points needed to draw the depth points on planes.
   void apply(const MapUpdate& update);
   void apply(const PlaneUpdate& update);
   /// The depth points on planes, coloured by plane.
@@ -33,7 +33,7 @@ class PlaneDisplay {
 
  private:
   std::set<PlaneId> shown_;
-  std::map<KeyframeId, SE3> keyframes_;  ///< T_map_C, with the mounting as known now
+  std::map<KeyframeId, SE3> keyframes_;  ///< T_map_C, with the present camera-IMU extrinsics
   std::map<PlaneId, std::map<KeyframeId, std::vector<Eigen::Vector3f>>> points_;
 };
 

@@ -20,7 +20,7 @@ using diagnostic_msgs::DiagnosticStatus;
 PlanesNodelet::~PlanesNodelet() {
   timer_.stop();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
-  // Their callbacks ask the owner too.
+  // Their callbacks use the owner thread too.
   reconfigure_.reset();
   markers_pub_.shutdown();
   cloud_pub_.shutdown();
@@ -43,9 +43,9 @@ void PlanesNodelet::onInit() {
   control_lane_ = owner_->addLane("control", 100);
 
   ros::NodeHandle& nh = getNodeHandle();
-  update_pub_ = nh.advertise<vip_slam_msgs::PlaneUpdate>("plane_update", 1000);  // each tells what no other does
+  update_pub_ = nh.advertise<vip_slam_msgs::PlaneUpdate>("plane_update", 1000);  // incremental: none may be lost
   map_pub_ = nh.advertise<vip_slam_msgs::PlaneMap>("plane_map", 1, true);
-  // Made only while somebody looks; who comes late, or to a map that stands still, gets what there is.
+  // Computed only while there are subscribers; a new one gets the present map even if it no longer changes.
   const auto show = [this](const ros::SingleSubscriberPublisher&) {
     owner_->post(control_lane_, [this] {
       if (last_display_ >= 0) publishMap(last_display_, true);
@@ -60,7 +60,7 @@ void PlanesNodelet::onInit() {
   reconfigure_->setCallback([this](vip_slam_planes::PlanesConfig& config, std::uint32_t) { onReconfigure(config); });
   owner_->start(kMappingNiceness);
 
-  // One callback queue in order: a keyframe is handed over before the update that places it.
+  // One ordered callback queue: a keyframe is delivered before the update that places it.
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::Calibration>(
       "calibration", 1,
       [this](const vip_slam_msgs::CalibrationConstPtr& m) { owner_->post(control_lane_, [this, m] { start(*m); }); }));
@@ -99,7 +99,7 @@ void PlanesNodelet::onReconfigure(vip_slam_planes::PlanesConfig& config) {
 }
 
 void PlanesNodelet::start(const vip_slam_msgs::Calibration& calibration) {
-  if (mapper_) return;  // the front end restarted; the calibration is the same sensor's
+  if (mapper_) return;  // the front end restarted with the same sensor
   applyCalibration(calibration, &sensor_);
   mapper_ = std::make_unique<PlaneMapper>(options_.mapper, makeCamera(sensor_.camera), sensor_.depth_noise);
   if (early_map_) obey(*early_map_);
@@ -172,7 +172,7 @@ void PlanesNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status) 
   for (const auto& lane : owner_->lanes()) {
     status.add(lane.name + " waiting", lane.waiting);
     status.add(lane.name + " dropped", lane.dropped);
-    // Growth is made to skip images when there is no time for it.
+    // Growth skips images by design when there is no time for it.
     if (lane.name != "tracked frames") dropped += lane.dropped;
   }
   std::lock_guard<std::mutex> lock(shown_mutex_);
@@ -192,6 +192,7 @@ void PlanesNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status) 
   status.add("planes started", c.planes_started);
   status.add("planes merged", c.planes_merged);
   status.add("planes removed", c.planes_removed);
+  status.add("points undecided", c.point_candidates);
   status.add("points associated", c.points_associated);
   status.add("points dissociated", c.points_dissociated);
 }

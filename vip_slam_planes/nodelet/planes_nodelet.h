@@ -51,7 +51,7 @@ class PlanesNodelet : public nodelet::Nodelet {
   // Owned by the thread.
   std::unique_ptr<PlaneMapper> mapper_;
   PlaneDisplay display_;
-  vip_slam_msgs::ControlConstPtr early_map_;  ///< a map that was loaded before the calibration came
+  vip_slam_msgs::ControlConstPtr early_map_;  ///< a map that was loaded before the calibration was received
   SE3 T_map_odom_;
   std::uint32_t epoch_ = 0;
   bool placed_ = false;  ///< T_map_odom_ is known for epoch_
@@ -75,7 +75,7 @@ class PlanesNodelet : public nodelet::Nodelet {
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
   std::unique_ptr<dynamic_reconfigure::Server<vip_slam_planes::PlanesConfig>> reconfigure_;
   ros::WallTimer timer_;
-  std::unique_ptr<OwnerThread> owner_;  ///< last: stops before anything it uses goes
+  std::unique_ptr<OwnerThread> owner_;  ///< last member: stops before anything it uses is destroyed
 };
 
 }  // namespace vip_slam

@@ -52,7 +52,7 @@ PlaneMapper::Impl::Impl(const PlaneMapperOptions& o, std::shared_ptr<const Camer
 
 std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, std::uint32_t epoch) {
   std::vector<PlaneTrack*> tracks;
-  // Planes grow into view as well: the reach goes beyond what is covered.
+  // Planes may also grow into view: the range is larger by the growth gap.
   for (auto& [id, track] : tracks_) {
     if (!epochs_.tied(track.epoch, epoch)) continue;
     if (mayBeInView(track, T_map_C, noise.max_range + options.growth.gap)) tracks.push_back(&track);
@@ -99,7 +99,7 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
     tracks[label[i]]->cover(triangles[i], host, poses_.at(host), nullptr);
     area[label[i]] += triangles[i].area;
   }
-  // Frames from further on speak for a plane that one keyframe has started, as a second keyframe would.
+  // Frames from other places confirm a plane that one keyframe has started, as a second keyframe would.
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     PlaneTrack& track = *tracks[k];
     if (track.confirmed || track.keyframes_seen == 0 || area[k] < options.support.min_area) continue;
@@ -166,11 +166,11 @@ void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, Keyframe
 }
 
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
-  // One that was on its way when the map was loaded bears the number of another one, whose place it would take.
+  // A keyframe that was in transit when the map was loaded has the id of a stored one, which it would replace.
   if (!keyframe || keyframe->id <= stored_until_ || placed_.count(keyframe->id)) return;
   if (!isSound(keyframe->frame.depth_grid)) return;
   waiting_.emplace(keyframe->id, keyframe);
-  // Beside those that the back end holds there is the newest one, which it may place yet.
+  // One more than the back end holds: the newest one, which it may still place.
   while (waiting_.size() > kMostWaitingKeyframes + 1) {
     waiting_.erase(waiting_.begin());
     ++counters.keyframes_forgotten;

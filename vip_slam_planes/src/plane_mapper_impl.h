@@ -44,10 +44,10 @@ class PlaneMapper::Impl {
   void followMode(const MapUpdate& update);
   void removeUnnamed(const MapUpdate& update);
   void takeCorrections(const MapUpdate& update);
-  /// False when the keyframe's depth is corrected by just that already.
+  /// False when the keyframe already has this correction.
   bool adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe);
   void removeKeyframe(KeyframeId id);
-  /// One sigma of the vertical in the newest placed keyframe, radians, as the front end tells it.
+  /// One sigma of the gravity direction in the newest placed keyframe, radians, from the front end's covariance.
   double gravitySigma() const;
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();
@@ -56,17 +56,17 @@ class PlaneMapper::Impl {
   void withdraw(const PlaneTrack& track, KeyframeId keyframe);
   void decideOnPoints();
 
-  // plane_mapper_output.cpp: what goes back to it.
+  // plane_mapper_output.cpp: the update to the back end.
   void dropUnsupported(PlaneUpdate* result);
   void publish(PlaneUpdate* result);
 
   // plane_mapper_keyframe.cpp: one placed keyframe.
   void processKeyframe(const Keyframe& keyframe, bool first_time);
-  /// Those that keyframes and frames of an epoch may meet.
+  /// Planes that may be in view of a camera at T_map_C and belong to epochs tied to this one.
   std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C, std::uint32_t epoch);
   const CameraPoses& posesTiedTo(std::uint32_t epoch);
   void removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C, std::uint32_t epoch);
-  /// Returns the strips that detection left.
+  /// Returns the strips found by detection.
   std::vector<DetectedPlane> startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
                                          const std::vector<MapTriangle>& triangles, std::vector<int>* label,
                                          std::vector<PlaneTrack*>* tracks);
@@ -89,9 +89,9 @@ class PlaneMapper::Impl {
 
   std::map<KeyframeId, KeyframePtr> waiting_;     ///< not placed yet
   std::map<KeyframeId, KeyframePtr> placed_;      ///< processed keyframes that the map still has
-  CameraPoses poses_;                             ///< T_map_C of all of those, and of the hosts of loaded planes
-  std::map<KeyframeId, std::uint32_t> epoch_of_;  ///< of the same
-  CameraPoses tied_poses_;                        ///< of some, while not all epochs are tied
+  CameraPoses poses_;                             ///< T_map_C of placed keyframes and of the hosts of loaded planes
+  std::map<KeyframeId, std::uint32_t> epoch_of_;  ///< epoch of each of these
+  CameraPoses tied_poses_;                        ///< result of posesTiedTo() while not all epochs are tied
   EpochGroups epochs_;
   Tracks tracks_;
   PlaneId next_plane_ = 1;
@@ -100,15 +100,15 @@ class PlaneMapper::Impl {
   KeyframeId stored_until_ = 0;  ///< keyframes up to here are those of a loaded map
   SE3 grown_at_;                 ///< camera pose of the last frame that grew planes
   bool has_grown_ = false;
-  bool map_moved_ = false;      ///< by this update, everywhere
-  bool came_together_ = false;  ///< epochs have, and the planes have not been compared since
-  bool localising_ = false;     ///< the back end takes no keyframes into its map, and no planes
+  bool map_moved_ = false;      ///< this update moved the map by a noticeable amount
+  bool came_together_ = false;  ///< epochs were tied, and the planes have not been compared since
+  bool localising_ = false;     ///< the back end is in localisation-only mode: its map and planes do not change
 
   // Collected for the next PlaneUpdate.
   std::vector<PlaneMerge> merges_;
   std::vector<PlaneId> removed_;
   std::set<std::pair<PlaneId, KeyframeId>> fresh_;  ///< observations to report
-  std::vector<PlaneObservation> withdrawn_;         ///< empty ones that replace what no longer holds
+  std::vector<PlaneObservation> withdrawn_;         ///< empty observations that replace invalid ones
 };
 
 }  // namespace vip_slam

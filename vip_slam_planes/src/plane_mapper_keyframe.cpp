@@ -1,4 +1,4 @@
-// What a placed keyframe does to the plane map: grow, start, observe, associate.
+// Updates the plane map with a placed keyframe: grow, start, observe, associate.
 #include <algorithm>
 #include <cmath>
 
@@ -14,10 +14,10 @@ namespace vip_slam {
 namespace {
 
 constexpr double kFlat = 0.34;   // cosine of 70 degrees
-constexpr int kEstablished = 3;  // keyframes that saw a plane, after which it takes two to contradict it
+constexpr int kEstablished = 3;  // a plane seen by this many keyframes is removed only after two contradictions
 
-/// What spans the recess of a door and the wall beside it passes for a wall when it is seen at a flat angle, and may be
-/// as large as one.
+/// Whether a plane is seen at such a flat angle that it may span a recessed door and the wall next to it, which looks
+/// like a wall and may be as large as one.
 bool isSeenFlat(const PlaneTrack& track, const Eigen::Vector3d& centroid, const Eigen::Vector3d& camera_centre) {
   return track.kind() != PlaneKind::kHorizontal &&
          track.plane().signedDistance(camera_centre) < kFlat * (centroid - camera_centre).norm();
@@ -42,7 +42,8 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
     seen_again.clear();
     for (std::size_t i = 0; i < triangles.size(); ++i) {
       if (label[i] != static_cast<int>(k)) continue;
-      // What noise let in covers, but does not vouch for it: a nearer view must be able to take it away at once.
+      // Triangles accepted only because of their noise cover cells without adding hits, so that a nearer view can clear
+      // them at once.
       const bool sure = distanceGate(triangles[i], options.growth.distance) <= options.growth.distance;
       tracks[k]->cover(triangles[i], keyframe.id, T_map_C, sure ? &seen_again : nullptr);
     }
@@ -75,8 +76,8 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   }
 }
 
-// Before its triangles are asked for: they go to the planes that are there, or start what is there. What several
-// keyframes have shown does not go for a single one.
+// Called before the triangles are associated: they then join the remaining planes or start new ones. A plane that
+// several keyframes have seen is not removed because of a single one.
 void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C,
                                            std::uint32_t epoch) {
   const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, epoch);
@@ -153,7 +154,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     PlaneTrack& track = *tracks[k];
     ids.push_back(track.id());
-    bool flat = track.kind() != PlaneKind::kHorizontal;  // until an observation tells
+    bool flat = track.kind() != PlaneKind::kHorizontal;  // until there is an observation
     if (area[k] > 0) {
       auto observation = sampler_.sample(keyframe.id, shown[k], T_map_C, track.id(), track.plane());
       if (observation) {
@@ -179,7 +180,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
 }
 
 void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
-  // Each merge may bring further planes together; every one removes a plane, so this ends.
+  // Each merge may make further merges possible; each removes a plane, so this terminates.
   std::set<PlaneId> open(changed.begin(), changed.end());
   const SceneView view{placed_, poses_, *camera, noise, options.support.see_through, open_gaps_};
   while (!open.empty()) {
@@ -194,7 +195,7 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
     for (auto& [other_id, other] : tracks_) {
       if (other_id == id || !epochs_.tied(mine->second.epoch, other.epoch)) continue;
       if (!sameSurface(mine->second, other, known, view, options.merging)) continue;
-      // The older id stays, but one that the back end knows goes before one that it does not.
+      // The older id is kept, unless only the newer one is known to the back end.
       PlaneId into = std::min(id, other_id), from = std::max(id, other_id);
       if (tracks_.at(from).known() && !tracks_.at(into).known()) std::swap(into, from);
       mergeInto(from, into);
@@ -210,13 +211,14 @@ void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
   const PlaneTrack& from = tracks_.at(from_id);
   const bool known = from.known();
   for (const auto& [keyframe, observation] : from.observations()) {
-    // The back end re-keys what it has; what it lacks, and what two planes of one keyframe make together, is reported.
+    // The back end renames the observations that it has. Those that it lacks, and joint ones of a keyframe that
+    // observed both planes, are reported.
     if (!known || into.observations().count(keyframe) || fresh_.count({from_id, keyframe})) {
       fresh_.emplace(into_id, keyframe);
     }
     fresh_.erase({from_id, keyframe});
   }
-  // The back end moves the broken ones along with the rest.
+  // The back end renames invalid observations with the rest, so their withdrawal must follow.
   for (PlaneObservation& none : withdrawn_) {
     if (none.plane == from_id) none.plane = into_id;
   }
@@ -224,7 +226,7 @@ void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
   refit(&into);
   points_.renamePlane(from_id, into_id);
   open_gaps_.rename(from_id, into_id);
-  into.takes_points = false;  // those that waited for the other one
+  into.takes_points = false;  // so that candidates of the other plane are decided on as well
   tracks_.erase(from_id);
   ++counters.planes_merged;
   if (known) merges_.push_back({from_id, into_id});

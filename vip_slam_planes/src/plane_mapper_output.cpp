@@ -1,4 +1,4 @@
-// What goes back to the back end after an update.
+// Output to the back end after an update.
 #include <utility>
 #include <vector>
 
@@ -9,7 +9,7 @@ namespace vip_slam {
 void PlaneMapper::Impl::dropUnsupported(PlaneUpdate* result) {
   std::vector<PlaneId> gone;
   for (const auto& [id, track] : tracks_) {
-    // One that several keyframes have started small may still grow; until then nobody hears of it.
+    // A small plane that several keyframes started may still grow; it is not published until it is confirmed.
     const bool shrunk = (track.confirmed && track.area() < options.support.min_area) || track.mostlyGone();
     const bool never_confirmed = !track.confirmed && track.keyframes_waited > options.support.patience;
     if (shrunk || never_confirmed) gone.push_back(id);
@@ -39,7 +39,7 @@ void PlaneMapper::Impl::publish(PlaneUpdate* result) {
   for (PlaneObservation& none : withdrawn_) {
     const auto it = tracks_.find(none.plane);
     if (it == tracks_.end()) continue;
-    // Where a plane has another observation by now, that replaces the broken one, unless it is withheld yet.
+    // A new observation of the same keyframe replaces the invalid one, unless it is not published yet.
     const bool observed = it->second.observations().count(none.keyframe) > 0;
     if (observed) fresh_.emplace(none.plane, none.keyframe);
     if (!observed || !it->second.determined) result->observations.push_back(none);

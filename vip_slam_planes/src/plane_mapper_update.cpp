@@ -11,10 +11,11 @@
 namespace vip_slam {
 namespace {
 
-// Keyframes looked at anew per update after the map has moved under their observations.
+// Largest number of keyframes per update that are processed again after the map has moved their observations off
+// planes.
 constexpr std::size_t kMostRenewed = 10;
-constexpr double kSureDirection = 2.0 * M_PI / 180.0;                  // one sigma of a wall's direction
-constexpr double kMovedTurn = 0.5 * M_PI / 180.0, kMovedShift = 0.02;  // of a keyframe by one update
+constexpr double kSureDirection = 2.0 * M_PI / 180.0;                  // largest sigma of a determined direction, rad
+constexpr double kMovedTurn = 0.5 * M_PI / 180.0, kMovedShift = 0.02;  // of a keyframe by one update, rad and m
 
 }  // namespace
 
@@ -26,7 +27,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   came_together_ = epochs_.tie(update.parts) || came_together_;
   followMode(update);
   if (localising_) {
-    // Planes stay as the back end has them; what has changed before is reported once mapping goes on.
+    // Planes must not change now; changes from before are reported once mapping goes on.
     for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
     points_.applyMapUpdate(update);
     counters.keyframes_waiting = waiting_.size();
@@ -62,8 +63,8 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   return result;
 }
 
-// While the back end only localises it gives back each keyframe at once; one that it takes, or a map that moves, tells
-// that it maps.
+// Detects the back end's mode: in localisation-only mode it removes each waiting keyframe at once; a keyframe that it
+// places, or a global update, shows that it maps.
 void PlaneMapper::Impl::followMode(const MapUpdate& update) {
   const bool maps =
       update.global || std::any_of(update.keyframes.begin(), update.keyframes.end(),
@@ -73,7 +74,7 @@ void PlaneMapper::Impl::followMode(const MapUpdate& update) {
   localising_ = !maps && (localising_ || gives_back);
 }
 
-// Points wait for their plane to be known for one; most of them are out of view by then.
+// Candidate points wait until their plane takes points; most of them are out of view by then, so all are decided on.
 void PlaneMapper::Impl::decideOnPoints() {
   for (auto& [id, track] : tracks_) {
     const bool before = track.takes_points;
@@ -82,8 +83,8 @@ void PlaneMapper::Impl::decideOnPoints() {
   }
 }
 
-// A global update names all keyframes of the map. What it does not name is gone, in an update that was lost, or was
-// never taken.
+// A global update lists all keyframes of the map. A keyframe that it does not list was removed in an update that was
+// lost, or was never inserted.
 void PlaneMapper::Impl::removeUnnamed(const MapUpdate& update) {
   std::set<KeyframeId> named;
   for (const KeyframeEstimate& estimate : update.keyframes) named.insert(estimate.id);
@@ -99,7 +100,8 @@ void PlaneMapper::Impl::removeUnnamed(const MapUpdate& update) {
 
 void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   map_moved_ = update.global;
-  // Before any pose changes: the area of those that go is handed over where it lay, and moves with its heir.
+  // Before any pose changes: the cells of removed keyframes are handed over at their present place, and then move with
+  // their new host.
   for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
   if (update.global) removeUnnamed(update);
   std::vector<KeyframeId> moved;
@@ -121,7 +123,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   for (const auto& [id, plane] : update.planes) {
     const auto it = tracks_.find(id);
     if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
-    // The back end has nothing of one whose observations it did not get: it sends back what it was told.
+    // Without observations of a plane the back end only returns the parameters that it received from here.
     if (!it->second.determined) continue;
     it->second.setPlane(plane);
     it->second.setOptimised(true);
@@ -143,7 +145,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   if (update.global) points_.recheck([this](PlaneId id) { return findPlane(id); });
 }
 
-// Covered cells and what detection has left over stay where they are: they are coarser than any such correction.
+// Covered cells and detection's left-over triangles are not corrected: they are coarser than any such correction.
 bool PlaneMapper::Impl::adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe) {
   const KeyframePtr corrected = withCameraCorrection(*keyframe, correction);
   if (corrected == *keyframe) return false;
@@ -156,9 +158,9 @@ bool PlaneMapper::Impl::adoptCameraCorrection(const CameraCorrection& correction
   return true;
 }
 
-// What passes for one plane may be several surfaces, such as the fronts of boxes on a shelf: it takes no points, and
-// the map does without it until its observations agree. It stays here, so that the same triangles do not start it
-// again. What lies on a table disagrees with the table as well, so that level ones stay in the map.
+// A plane whose observations disagree may be several surfaces, such as the fronts of boxes on a shelf: it takes no
+// points and, if vertical, is withdrawn from the map until they agree. It is kept here, so that the same triangles do
+// not start it again. Horizontal planes stay in the map, since objects on a table disagree with the table as well.
 void PlaneMapper::Impl::judgeAgreement() {
   std::vector<PlaneMisfit> misfits;
   std::size_t index = 0;
@@ -190,7 +192,7 @@ void PlaneMapper::Impl::judgeAgreement() {
   }
 }
 
-// Of a surface that was moved only what has been seen of it since still holds. True when there was such.
+// Removes the observations of a moved surface from before the move. True when it was moved.
 bool PlaneMapper::Impl::forgetWhereItWas(PlaneTrack* track) {
   const KeyframeId since = surfaceMovedAt(*track, poses_);
   if (since == 0) return false;
@@ -204,7 +206,7 @@ bool PlaneMapper::Impl::forgetWhereItWas(PlaneTrack* track) {
   return true;
 }
 
-// The back end hears of an observation that it has and that no longer holds.
+// Reports an invalid observation to the back end, if it was published there.
 void PlaneMapper::Impl::withdraw(const PlaneTrack& track, KeyframeId keyframe) {
   const bool told = fresh_.erase({track.id(), keyframe}) == 0;
   if (!track.known() || !told) return;
@@ -218,7 +220,7 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   waiting_.erase(id);
   const auto it = epoch_of_.find(id);
   if (it == epoch_of_.end()) return;
-  // Its share of the area goes to the neighbour in time, which moves nearly alike, unless its epoch is elsewhere.
+  // Its cells go to the neighbour in time, which moves nearly alike, if their epochs are tied.
   const auto moves_alike = [&](const auto& other) { return epochs_.tied(other.second, it->second); };
   KeyframeId heir = 0;
   if (it != epoch_of_.begin() && moves_alike(*std::prev(it))) {
@@ -243,7 +245,8 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   if (newest_ != 0) epoch_ = placed_.rbegin()->second->frame.epoch;
 }
 
-// Before a body has moved gravity may be a degree off, and all that is level or upright leans in the map.
+// Until the body has moved, the gravity direction may be wrong by a degree, so that horizontal and vertical surfaces
+// lean in the map.
 double PlaneMapper::Impl::gravitySigma() const {
   const auto newest = placed_.find(newest_);
   if (newest == placed_.end()) return 0;
@@ -261,14 +264,14 @@ void PlaneMapper::Impl::refit(PlaneTrack* track) {
   if (!(moments.weight() > 0)) return;
   track->determined = normalSigma(moments, track->kind()) < kSureDirection;
   if (track->optimised()) return;
-  // Until the samples tell the direction, detection knows it better: it had the surface up to its border.
+  // Until the samples determine the direction, keep that of detection, which used the surface up to its border.
   Plane plane = Plane::fromPointNormal(moments.centroid(), track->plane().n);
   if (track->determined && !fitLeaningPlane(moments, track->kind(), gravitySigma(), track->plane().n, &plane)) return;
   track->setPlane(plane);
 }
 
 void PlaneMapper::Impl::withdrawBrokenObservations() {
-  // Samples that the corrected poses have put off their plane belong to something else, or to another piece of it.
+  // Samples that are off their plane at the corrected poses belong to another surface, or to another piece of it.
   std::set<KeyframeId> renewed;
   for (auto& [id, track] : tracks_) {
     for (auto it = track.observations().begin(); it != track.observations().end();) {
@@ -287,7 +290,7 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
       track.refit_due = true;
     }
   }
-  while (renewed.size() > kMostRenewed) renewed.erase(renewed.begin());  // the newest matter most
+  while (renewed.size() > kMostRenewed) renewed.erase(renewed.begin());  // keep the newest
   for (KeyframeId id : renewed) processKeyframe(*placed_.at(id), false);
 }
 

@@ -7,7 +7,7 @@ namespace vip_slam {
 
 namespace {
 
-// width, height, K and P are of the whole sensor; images may be a part of it, and several of its pixels one of theirs.
+// width, height, K and P refer to the whole sensor; images may be cropped (region of interest) and binned.
 CameraIntrinsics ofTheImages(CameraIntrinsics whole, const sensor_msgs::CameraInfo& info) {
   const sensor_msgs::RegionOfInterest& roi = info.roi;
   if (roi.width > 0 && roi.height > 0) {
@@ -20,7 +20,7 @@ CameraIntrinsics ofTheImages(CameraIntrinsics whole, const sensor_msgs::CameraIn
   return columns * rows > 1 ? whole.scaled(whole.width / columns, whole.height / rows) : whole;
 }
 
-// Drivers fill up with zeros what a model has no coefficients for.
+// Drivers pad the coefficients of a model with zeros.
 void dropTrailingZeros(std::size_t least, std::vector<double>* coefficients) {
   while (coefficients->size() > least && coefficients->back() == 0) coefficients->pop_back();
 }
@@ -47,19 +47,19 @@ CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info, c
     return ofTheImages(intrinsics, info);
   }
   const bool zero = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
-  // An equidistant lens without corrections is still no pinhole.
+  // An equidistant lens with zero coefficients is still not a pinhole.
   const bool equidistant = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";
   const bool straight = zero && !(equidistant && !info.D.empty());
   try {
-    // Drivers of rectified images leave the model empty, or name one with coefficients that are all zero. Coefficients
-    // without a model are OpenCV's.
+    // Drivers of rectified images leave the model empty, or name one with all-zero coefficients. Coefficients without a
+    // model are taken as OpenCV's.
     const std::string& name = info.distortion_model;
     intrinsics.model = straight ? DistortionModel::kNone : distortionModelFromName(name.empty() ? "plumb_bob" : name);
   } catch (const std::exception& error) {
     throw std::invalid_argument(std::string("camera_info.distortion_model: ") + error.what());
   }
   if (!straight) intrinsics.distortion.assign(info.D.begin(), info.D.end());
-  if (!straight && zero) intrinsics.distortion.resize(4);  // some drivers give plumb_bob's five
+  if (!straight && zero) intrinsics.distortion.resize(4);  // some drivers give five, as for plumb_bob
   const std::size_t most = intrinsics.model == DistortionModel::kEquidistant ? 4 : 8;
   dropTrailingZeros(most, &intrinsics.distortion);
   const std::string wrong = intrinsics.validate();

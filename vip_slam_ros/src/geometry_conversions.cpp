@@ -79,6 +79,18 @@ BearingCorrection bearingFromArray(const boost::array<double, 4>& bearing) {
   return {Eigen::Map<const Eigen::Vector4d>(bearing.data())};
 }
 
-ros::Time toStamp(double t) { return std::isfinite(t) && t > 0 ? ros::Time(t) : ros::Time(); }
+ros::Time toStamp(double t) {
+  if (!std::isfinite(t) || !(t > 0)) return ros::Time();
+  // A double of today's time has steps of 0.24 us. Of the stamps that it may stand for the roundest one is meant:
+  // whole milliseconds or microseconds are what drivers and simulators stamp with.
+  const double seconds = std::floor(t);
+  for (const double unit : {1e3, 1e6}) {
+    const ros::Time round =
+        ros::Time(static_cast<std::uint32_t>(seconds), 0) +
+        ros::Duration(0, static_cast<std::int32_t>(std::lround((t - seconds) * unit) * (1e9 / unit)));
+    if (round.toSec() == t) return round;
+  }
+  return ros::Time(t);
+}
 
 }  // namespace vip_slam

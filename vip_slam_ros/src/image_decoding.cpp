@@ -17,7 +17,7 @@ namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
 
-/// A view on the message's pixels, checked against its size.
+/// A view of the message's pixels without copying, with its size checked.
 cv::Mat view(const sensor_msgs::Image& image, int type) {
   const std::size_t row = std::size_t(image.width) * CV_ELEM_SIZE(type);
   if (image.width == 0 || image.height == 0 || image.step < row ||
@@ -94,7 +94,7 @@ cv::Mat decodeGray(const sensor_msgs::Image& image) {
 
 cv::Mat decodeGray(const sensor_msgs::CompressedImage& image) {
   cv::Mat gray;
-  // An image that its EXIF tag turns would no longer fit the calibration; IMREAD_UNCHANGED never turns.
+  // An image rotated by its EXIF tag would no longer fit the calibration; IMREAD_UNCHANGED never rotates.
   if (!image.data.empty()) gray = cv::imdecode(image.data, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (gray.empty()) throw std::invalid_argument(describe(image) + ": cannot be decoded, expected JPEG or PNG");
   return gray;

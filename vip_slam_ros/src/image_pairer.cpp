@@ -6,7 +6,7 @@
 
 namespace vip_slam {
 namespace {
-constexpr std::size_t kIntervals = 10;      // colour intervals that are remembered: a lost image does not count
+constexpr std::size_t kIntervals = 10;      // colour intervals remembered, of which the shortest ignores lost images
 constexpr double kShortestInterval = 0.01;  // seconds; assumed until one is known
 }  // namespace
 
@@ -72,7 +72,7 @@ const ImagePair* ImagePairer::front() {
     depth_.pop_front();
     ++counters_.unused_depth;
   }
-  // The nearest depth image is known once one at or after t is there; an exact match needs no waiting.
+  // The nearest depth image is known once one at or after t has arrived; an exact match needs no waiting.
   const auto after = std::find_if(depth_.begin(), depth_.end(), [t](const StampedImage& d) { return d.t >= t; });
   auto best = depth_.end();
   if (after != depth_.end() && after->t <= t + options_.tolerance && belongsToFront(after->t)) best = after;
@@ -80,8 +80,8 @@ const ImagePair* ImagePairer::front() {
     const auto before = std::prev(after);
     if (belongsToFront(before->t) && (best == depth_.end() || t - before->t < best->t - t)) best = before;
   }
-  // A newer depth image may belong to a colour image that is still to come.
-  constexpr double kSurelyNearer = 0.45;  // of the interval: stamps jitter
+  // A newer depth image may belong to the next colour image, which has not arrived yet.
+  constexpr double kSurelyNearer = 0.45;  // of the interval: less than half, since stamps jitter
   const bool next_matters = best != depth_.end() && color_.size() < 2 && best->t - t > kSurelyNearer * colorInterval();
   const bool decided = (after != depth_.end() && !next_matters) || newest() - t > options_.patience || ended_;
   if (!decided) return nullptr;

@@ -31,7 +31,7 @@ LandmarkEstimate fromLandmarkMsg(const vip_slam_msgs::LandmarkEstimate& msg) {
 
 std::pair<PlaneId, Plane> fromPlaneMsg(const vip_slam_msgs::PlaneCoefficients& msg) {
   Plane plane;
-  // Assigned rather than normalised anew, so that a round trip changes no bit.
+  // Assigned rather than normalised again, so that a round trip is bit-exact.
   plane.n = fromMsg(msg.normal);
   plane.d = msg.distance;
   if (std::abs(plane.n.norm() - 1.0) > 1e-6) {

@@ -27,22 +27,28 @@ void OwnerThread::start(int niceness) {
 }
 
 void OwnerThread::stop() {
+  std::deque<Task> forgotten;  // destroyed outside the lock, since destructors of captures may call this object
   {
     std::lock_guard<std::mutex> lock(mutex_);
     stopping_ = true;
-    tasks_.clear();
+    tasks_.swap(forgotten);
+    for (LaneState& lane : lanes_) lane.waiting = 0;
     ready_.notify_all();
   }
+  forgotten.clear();
   if (thread_.joinable()) thread_.join();
 }
 
 bool OwnerThread::post(Lane lane, std::function<void()> task) {
+  Task oldest;  // likewise
   std::lock_guard<std::mutex> lock(mutex_);
   if (stopping_) return false;
   LaneState& state = lanes_.at(lane);
   const bool full = state.waiting >= state.capacity;
   if (full) {
-    tasks_.erase(std::find_if(tasks_.begin(), tasks_.end(), [lane](const Task& t) { return t.lane == lane; }));
+    const auto it = std::find_if(tasks_.begin(), tasks_.end(), [lane](const Task& t) { return t.lane == lane; });
+    oldest = std::move(*it);
+    tasks_.erase(it);
     ++state.dropped;
   } else {
     ++state.waiting;
@@ -53,11 +59,12 @@ bool OwnerThread::post(Lane lane, std::function<void()> task) {
 }
 
 bool OwnerThread::call(Lane lane, std::function<void()> task, double seconds) {
-  // 0: waiting, 1: begun, 2: given up; whoever moves it away from 0 decides.
+  // 0: waiting, 1: started, 2: given up; the first thread to change it from 0 decides.
   auto phase = std::make_shared<std::atomic<int>>(0);
+  // Only the task holds its promise: when it is discarded (a full lane, a stopping thread) the wait ends at once.
   auto done = std::make_shared<std::promise<void>>();
   std::future<void> finished = done->get_future();
-  post(lane, [phase, done, task = std::move(task)] {
+  post(lane, [phase, done = std::move(done), task = std::move(task)] {
     int expected = 0;
     if (!phase->compare_exchange_strong(expected, 1)) return;
     try {
@@ -71,7 +78,12 @@ bool OwnerThread::call(Lane lane, std::function<void()> task, double seconds) {
     int expected = 0;
     if (phase->compare_exchange_strong(expected, 2)) return false;
   }
-  finished.get();
+  try {
+    finished.get();
+  } catch (const std::future_error& error) {
+    if (error.code() == std::future_errc::broken_promise) return false;
+    throw;
+  }
   return true;
 }
 

@@ -48,7 +48,7 @@ PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg) {
   PlaneEstimate plane;
   plane.id = msg.id;
   plane.kind = static_cast<PlaneKind>(msg.kind);
-  // Assigned rather than normalised anew, so that a round trip changes no bit.
+  // Assigned rather than normalised again, so that a round trip is bit-exact.
   plane.plane.n = fromMsg(msg.normal);
   plane.plane.d = msg.distance;
   if (std::abs(plane.plane.n.norm() - 1.0) > 1e-6) {

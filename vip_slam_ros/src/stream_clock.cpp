@@ -4,9 +4,10 @@
 
 namespace vip_slam {
 namespace {
-// More than any subscriber queues between two streams; if a stream still goes on by then, its time is right after all.
+// Largest number of late messages per stream, more than any subscriber queue holds; beyond, the stream's time is taken
+// to be right.
 constexpr int kMaxStragglers = 200;
-// Two stamps that lie so close together, seconds, both far ahead, mean the same time: it has gone on meanwhile.
+// Two stamps far ahead that are within this time of each other, seconds, confirm each other: time has really advanced.
 constexpr double kSameTime = 5.0;
 }  // namespace
 
@@ -14,7 +15,7 @@ StreamClock::StreamClock(std::size_t streams, double jump) : streams_(streams), 
 
 StreamClock::Verdict StreamClock::notice(std::size_t stream, double t) {
   Stream& own = streams_.at(stream);
-  // Believed, a single stamp far ahead would make all that follow look like a jump back.
+  // A single wrong stamp far ahead, if accepted, would make all following ones look like a jump back.
   const bool ahead = own.newest > kNever && own.stragglers_left == 0 && t > newest_ + jump_;
   const bool goes_on = t >= own.ahead - jump_ && t <= own.ahead + kSameTime;
   own.ahead = ahead && !goes_on ? t : kNever;
@@ -34,7 +35,7 @@ StreamClock::Verdict StreamClock::notice(std::size_t stream, double t) {
     return Verdict::kJumpedBack;
   }
   if (own.stragglers_left > 0) {
-    // Old time ends within `jump` of where all streams were; new time begins anywhere below it.
+    // Stamps from before the jump are near where all streams were then; those after it are clearly below.
     if (t > newest_ + jump_ && t > own.before_jump - last_jump_ / 2) {
       --own.stragglers_left;
       return Verdict::kStray;

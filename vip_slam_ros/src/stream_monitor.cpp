@@ -40,7 +40,7 @@ StreamMonitor::Step StreamMonitor::add(double t, double arrival) {
     }
     if (dt < 0) {
       ++report_.backward;
-      // Two in a row that follow each other: the wrong one was the stamp ahead of them.
+      // Two successive stamps in order: the wrong one was the stamp before them.
       const bool again = backward_ && t > *backward_;
       backward_ = t;
       if (!again) return Step::kBackward;

@@ -1,4 +1,4 @@
-// Intrinsics to camera_info and back; what drivers leave out is understood, what cannot be used is named.
+// Intrinsics to camera_info and back; fields that drivers leave out are handled, unusable ones are named.
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -101,7 +101,7 @@ TEST(CameraInfo, ZerosBehindTheCoefficientsSayNothing) {
   info.distortion_model = "rational_polynomial";
   info.D = {1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0};
   EXPECT_EQ(intrinsicsFromCameraInfo(info).distortion, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8}));
-  info.D.back() = 0.1;  // a tilted sensor: not known here
+  info.D.back() = 0.1;  // tilted sensor: not supported
   EXPECT_THROW(intrinsicsFromCameraInfo(info), std::invalid_argument);
   info.distortion_model = "";
   info.D = {0.1, 0.2, 0, 0, 0.3};

@@ -1,4 +1,4 @@
-// Core types survive the way through messages and through serialisation unchanged.
+// Core types are unchanged after conversion to messages, serialisation and back.
 #include <random>
 #include <stdexcept>
 
@@ -13,7 +13,7 @@
 namespace vip_slam {
 namespace {
 
-/// Through bytes, as a message takes that leaves the process.
+/// Serialises and deserialises, as for a message to another process.
 template <class Message>
 Message throughBytes(const Message& message) {
   const ros::SerializedMessage bytes = ros::serialization::serializeMessage(message);
@@ -306,6 +306,11 @@ TEST_F(Conversions, StampsSurvive) {
   for (int i = 0; i < 1000; ++i) {
     const double t = ros::Time(seconds(random_), nanoseconds(random_)).toSec();
     EXPECT_EQ(toStamp(t).toSec(), t);
+  }
+  // Drivers stamp with whole milliseconds or microseconds, which are recovered to the nanosecond.
+  for (const std::uint32_t ns : {0u, 900000000u, 45000000u, 123456000u, 999999000u, 1000u}) {
+    const ros::Time stamp(1600000005u, ns);
+    EXPECT_EQ(toStamp(stamp.toSec()), stamp) << ns;
   }
   EXPECT_EQ(toStamp(-1), ros::Time());
   EXPECT_EQ(toStamp(std::nan("")), ros::Time());

@@ -1,4 +1,4 @@
-// Every encoding a driver may send becomes the same gray or depth image; what cannot be read is named.
+// Every encoding that a driver may send gives the same gray or depth image; unreadable ones are named in the error.
 #include <cstring>
 #include <stdexcept>
 

@@ -1,4 +1,4 @@
-// Colour and depth meet by stamp, whatever order they arrive in.
+// Colour and depth are paired by stamp, in whatever order they arrive.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -156,7 +156,7 @@ TEST(ImagePairer, DepthAtHalfTheRateGoesToItsOwnColour) {
 }
 
 TEST(ImagePairer, DepthThatLagsIsNotTakenForTheImageBefore) {
-  // 6 ms late of a 60 Hz colour stream, and 30 Hz depth: the odd images have none.
+  // 30 Hz depth that is 6 ms later than a 60 Hz colour stream: every other colour image has no depth.
   const auto got = pairAll(121, 1 / 60.0, true,
                            [](int i) { return i % 2 ? std::nullopt : std::optional<double>(i / 60.0 + 0.006); });
   for (int i = 0; i < 121; ++i) EXPECT_EQ(got[std::size_t(i)], i % 2 ? -1 : i) << i;

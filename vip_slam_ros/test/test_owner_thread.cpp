@@ -101,5 +101,34 @@ TEST(OwnerThread, StopsWithWorkWaiting) {
   EXPECT_FALSE(owner->post(lane, [] {}));
 }
 
+TEST(OwnerThread, ACallIsNotKeptWaitingForWhatNeverRuns) {
+  OwnerThread owner([](const std::string&) {});
+  const auto lane = owner.addLane("work", 1);
+  const auto nothing = [] {};
+  std::promise<void> release;
+  std::promise<void> begun;
+  owner.start();
+  owner.post(lane, [&] {
+    begun.set_value();
+    release.get_future().wait();
+  });
+  begun.get_future().wait();
+  // A later task replaces it in the lane.
+  auto dropped = std::async(std::launch::async, [&] { return owner.call(lane, nothing, 100); });
+  while (owner.lanes()[lane].waiting == 0) std::this_thread::yield();
+  owner.post(lane, nothing);
+  EXPECT_FALSE(dropped.get());
+  // The thread stops before its turn comes.
+  auto forgotten = std::async(std::launch::async, [&] { return owner.call(lane, nothing, 100); });
+  while (owner.lanes()[lane].dropped < 2) std::this_thread::yield();
+  std::thread stopping([&owner] { owner.stop(); });
+  EXPECT_FALSE(forgotten.get());
+  release.set_value();
+  stopping.join();
+  EXPECT_EQ(owner.lanes()[lane].waiting, 0u);
+  // It has stopped already.
+  EXPECT_FALSE(owner.call(lane, nothing, 100));
+}
+
 }  // namespace
 }  // namespace vip_slam

@@ -28,7 +28,7 @@ TEST(StreamClock, ALoopingBagJumpsOnceWhateverOrderTheStreamsComeIn) {
   };
   for (int round = 0; round < 3; ++round) {
     for (int i = 0; i < 100; ++i) {
-      // The last images of the round before arrive when the IMU has begun anew.
+      // The last images of the previous loop arrive after the IMU has restarted.
       if (round > 0 && i < 5) notice(0, 100 + 0.1 * (95 + i));
       if (round > 0 && i < 3) notice(1, 100 + 0.1 * (97 + i));
       notice(2, 100 + 0.1 * i);
@@ -37,7 +37,7 @@ TEST(StreamClock, ALoopingBagJumpsOnceWhateverOrderTheStreamsComeIn) {
     }
   }
   EXPECT_EQ(jumps, 2);
-  // Two images of each late stream come before the jump is sure, four after it; and one IMU sample tells of it.
+  // Of each late stream two images come before the jump is certain and four after it; one IMU sample shows it.
   EXPECT_EQ(strays, 2 * 5);
   EXPECT_LT(clock.newest(), 110.0);
 }
@@ -70,7 +70,7 @@ TEST(StreamClock, APauseOfAllStreamsCostsOneMessage) {
   for (std::size_t stream = 0; stream < 3; ++stream) clock.notice(stream, 10.0);
   EXPECT_EQ(clock.notice(1, 60.0), Verdict::kStray);
   EXPECT_EQ(clock.notice(1, 60.01), Verdict::kInOrder);
-  EXPECT_EQ(clock.notice(0, 60.02), Verdict::kInOrder);  // the other stream has shown that time went on
+  EXPECT_EQ(clock.notice(0, 60.02), Verdict::kInOrder);  // the other stream has shown that time advanced
   EXPECT_EQ(clock.notice(1, 60.02), Verdict::kInOrder);
   EXPECT_EQ(clock.notice(2, 60.0), Verdict::kInOrder);
   // A stream that comes once in three seconds, alone.

@@ -42,7 +42,7 @@ TEST(StreamMonitor, OneStampFarAheadSilencesNothing) {
 TEST(StreamMonitor, ComplaintsNameTheTopic) {
   StreamMonitor monitor("/camera/imu", 200);
   EXPECT_NE(monitor.complaint(1).find("/camera/imu"), std::string::npos);
-  EXPECT_EQ(monitor.silence(100), "");  // it has not begun
+  EXPECT_EQ(monitor.silence(100), "");  // the stream has not started
   for (int i = 0; i < 50; ++i) monitor.add(i / 20.0, i / 20.0);
   EXPECT_NE(monitor.complaint(2.5).find("20.0 Hz"), std::string::npos) << monitor.complaint(2.5);
   EXPECT_NE(monitor.complaint(10).find("silent"), std::string::npos);

@@ -1,4 +1,4 @@
-// Bags and folders: what goes in comes out, nothing is left half done; folders of real images.
+// Bags and folders: data survive the round trip, no partial output stays; folders of real images.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A path in a directory of this run's own, which goes when the program ends.
+/// A path in a temporary directory, which is removed when the program ends.
 std::string scratch(const std::string& name) {
   struct Directory {
     fs::path path = fs::path(testing::TempDir()) / ("vip_slam_sim_io_" + std::to_string(getpid()));
@@ -115,7 +115,7 @@ TEST(Bag, NothingIsLeftWithoutCommit) {
 TEST(Folder, ReadsBackAsAnRgbdFolderAndKnowsUp) {
   const std::string path = scratch("folder");
   SequenceSpec spec = loadSequence("07", libraryPath());
-  spec.camera.rate = 2;  // sees much in few images
+  spec.camera.rate = 2;  // few images, but much to see
   SequenceRenderer s(spec, quickOptions(5, 33));
   std::vector<SimFrame> frames;
   {
@@ -135,14 +135,14 @@ TEST(Folder, ReadsBackAsAnRgbdFolderAndKnowsUp) {
   loadRgbdFrame(folder, folder.frames[3], &rgb, &depth);
   EXPECT_EQ(cv::norm(rgb, frames[3].rgb, cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(depth, frames[3].depth, cv::NORM_INF), 0);
-  // Up is found whatever way the folder's world lies.
+  // Up is found for any orientation of the folder's world.
   const SE3 turn(expQuaternion(Eigen::Vector3d(1.1, -0.7, 0.4)), Eigen::Vector3d(1, 2, 3));
   for (StampedPose& p : folder.T_W_C) p.T_W_B = turn * p.T_W_B;
   const Eigen::Vector3d up = upFromDepth(folder), want = turn.rotation() * Eigen::Vector3d::UnitZ();
   const double angle = std::acos(std::min(1.0, up.dot(want))) * 180 / M_PI;
   std::printf("  up found to %.3f deg\n", angle);
   EXPECT_LT(angle, 0.3);
-  // A camera that is turned upside down half of the time does not say where up is.
+  // A camera that is upside down half of the time does not determine up.
   for (std::size_t k = 0; k < folder.T_W_C.size(); k += 2) {
     SE3& T = folder.T_W_C[k].T_W_B;
     T = T * SE3(expQuaternion(Eigen::Vector3d(0, 0, M_PI)), Eigen::Vector3d::Zero());

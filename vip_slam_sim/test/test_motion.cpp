@@ -39,8 +39,8 @@ TEST(Spline, AccelerationIsContinuousAcrossKnots) {
   }
 }
 
-/// The IMU alone, from the true start, by an integrator of its own (Simpson on the interpolated samples, no core code
-/// beyond the exponential map).
+/// Integrates the IMU alone, from the true start, with an independent integrator (Simpson on the interpolated samples,
+/// no core code but the exponential map).
 TEST(Imu, NoiseFreeIntegrationStaysWithinMillimetres) {
   for (const std::string name : {"01", "10"}) {
     SequenceSpec spec = cleanSequence(name);
@@ -116,7 +116,7 @@ TEST(Imu, NoiseMatchesTheConfiguredDensities) {
 TEST(Motion, NamedSequencesMoveLikePeopleAndDrones) {
   for (const std::string& name : sequenceNames(libraryPath())) {
     const SequenceSpec spec = loadSequence(name, libraryPath());
-    if (spec.motion.type == "path" && spec.motion.waypoints.empty()) continue;  // a base for others
+    if (spec.motion.type == "path" && spec.motion.waypoints.empty()) continue;  // only a base of other sequences
     const SplineTrajectory s = makeMotion(spec.motion, spec.T_imu_cam(), spec.seed);
     double v = 0, a = 0, w = 0, still = 0;
     for (double t = 0; t < s.end(); t += 0.01) {

@@ -1,4 +1,4 @@
-// Poses of a folder: how far they are off, what that makes of an IMU, and how depth images mend them.
+// Poses of a folder: their accuracy, the noise of an IMU made from them, and their refinement by depth images.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -54,7 +54,7 @@ TEST(SplineSpacing, IsWideForSmoothPosesAndFollowsFastOnes) {
   const PoseError none;
   const double exact = splineSpacing(poses, none, 20), rough = splineSpacing(poses, {0.5 * kDegree, 10e-3}, 20);
   EXPECT_GT(rough, 1.9 * exact);
-  // A hand that trembles at 5 Hz has no knots 200 ms apart.
+  // A hand tremor of 5 Hz needs knots closer than 200 ms.
   for (StampedPose& p : poses) p.T_W_B.t().x() += 0.004 * std::sin(2 * M_PI * 5 * p.t);
   EXPECT_LT(splineSpacing(poses, {0.05 * kDegree, 1e-3}, 20), 0.11);
 }
@@ -70,7 +70,8 @@ TEST(NoiseOfImuFromPoses, CoversJitterAndDrift) {
   const ImuNoise rough = noiseOfImuFromPoses(own, {1e-3, 1e-3}, 1.0 / 30, {});
   EXPECT_NEAR(rough.gyro_noise_density * std::sqrt(1.0 / 30), std::sqrt(2.0) * 1e-3, 5e-5);
   EXPECT_NEAR(rough.accel_noise_density * std::sqrt(std::pow(1.0 / 30, 3) / 3), std::sqrt(2.0) * 1e-3, 5e-5);
-  // What the registration is off by at every lag is its own; what grows is the poses'. Lags without pairs say nothing.
+  // Disagreement that is constant over the lags is registration noise, growth is pose drift. Lags without pairs are
+  // ignored.
   const PoseError own_error{1e-3, 1e-3}, grown{std::hypot(1e-3, 8e-3), 1e-3};
   EXPECT_DOUBLE_EQ(
       noiseOfImuFromPoses(own, {}, 1.0 / 30, {{0.1, 9, own_error}, {1.1, 9, own_error}}).gyro_noise_density, 2e-4);
@@ -119,7 +120,7 @@ TEST_F(RenderedFolder, DepthTellsHowFarPosesAreOffAndMendsThem) {
     EXPECT_LT(d.error.rotation, 0.1 * kDegree);
   }
 
-  // Poses that wander by 1.2 deg and 25 mm within a second and a half, and jump.
+  // Poses that drift by 1.2 deg and 25 mm within 1.5 s, and jump.
   const Trajectory truth = folder_.T_W_C;
   for (StampedPose& p : folder_.T_W_C) {
     const double phase = 2 * M_PI * (p.t - truth.front().t) / 3;

@@ -1,4 +1,4 @@
-// The script that draws definitions: every one of them is accepted, and the same seed gives the same.
+// The script that draws random definitions: all are accepted, and equal seeds give equal definitions.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>

@@ -1,4 +1,4 @@
-// Images against geometry: warping, optical flow, noise, same bytes.
+// Images against geometry: warping, optical flow, noise, determinism.
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
@@ -77,7 +77,7 @@ TEST_P(Rendering, KltFlowAgreesWithTrueFlow) {
   for (std::size_t i = 0; i < from.size(); ++i) {
     Eigen::Vector2d q;
     if (!ok[i] || !carry(s, a, b, {from[i].x, from[i].y}, &q)) continue;
-    // Corners where two depths meet move with neither surface exactly.
+    // Corners at a depth step move exactly with neither surface.
     const cv::Mat near =
         a.exact.depth(cv::Rect(int(from[i].x) - 4, int(from[i].y) - 4, 9, 9) & cv::Rect(0, 0, ga.cols, ga.rows));
     double lo, hi;
@@ -242,7 +242,7 @@ TEST(Sequence, RollingShutterAndTimeOffsetShiftWhatTheyShould) {
   const SimFrame g = r.renderFrame(100);
   const double t = r.toSeconds(g.stamp_ns);
   double worst = 0;
-  for (int v : {40, 240, 440})  // every row lies where the scene is at its own time
+  for (int v : {40, 240, 440})  // every row shows the scene at its own readout time
     for (int u = 20; u < 640; u += 50) {
       const SE3 T =
           r.trajectory().at(t + rolling.effects.rolling_shutter * ((v + 0.5) / 480 - 0.5)).T_W_I * r.sensor().T_imu_cam;
@@ -295,7 +295,7 @@ TEST(Sequence, MotionBlurSmearsAlongTheFlow) {
   cv::Laplacian(ga, la, CV_32F);
   cv::Laplacian(gb, lb, CV_32F);
   EXPECT_LT(cv::norm(lb), 0.8 * cv::norm(la));
-  // Blur moves nothing: still and blurred pictures agree when both are seen from afar.
+  // Blur causes no shift: sharp and blurred pictures agree at low resolution.
   cv::GaussianBlur(ga, ga, {0, 0}, 8);
   cv::GaussianBlur(gb, gb, {0, 0}, 8);
   EXPECT_LT(cv::norm(ga, gb, cv::NORM_L1) / (640 * 480), 1.5);

@@ -1,4 +1,4 @@
-// What the simulator's tests share.
+// Helpers shared by the simulator's tests.
 #pragma once
 
 #include <string>

@@ -20,14 +20,14 @@ class Map;
 struct GlobalBaProblem;  // optimisation/global_ba.h
 struct GlobalBaSolution;
 
-/// A global bundle adjustment to run elsewhere: a copy of all it needs.
+/// A global bundle adjustment to run in any thread: a copy of all it needs.
 struct GbaJob {
   std::shared_ptr<const GlobalBaProblem> problem;  ///< null: nothing to do
-  std::uint64_t correction = 0;                    ///< how often the whole map had been moved when it was copied
+  std::uint64_t correction = 0;                    ///< the map's correction count when it was copied
 };
 struct GbaResult {
   std::shared_ptr<const GlobalBaSolution> solution;  ///< null: none
-  std::uint64_t correction = 0;                      ///< of the job
+  std::uint64_t correction = 0;                      ///< that of the job
 };
 
 class BackEnd {
@@ -42,38 +42,46 @@ class BackEnd {
   /// map as it was: the update then has no keyframes and lastRefusal() says why.
   MapUpdate addKeyframe(KeyframePtr keyframe);
   const std::string& lastRefusal() const;
-  /// The plane module's changes; used from the next optimisation on.
+  /// Applies the plane module's changes; they take effect with the next optimisation.
   void applyPlaneUpdate(const PlaneUpdate& update);
 
-  /// True after an accepted loop or requestGlobalBa(), until startGlobalBa(); not while localising only.
+  /// True after an accepted loop or requestGlobalBa(), until startGlobalBa(); never in localisation-only mode.
   bool globalBaWanted() const;
+  /// Makes globalBaWanted() true.
   void requestGlobalBa();
+  /// Clears the request, adopts the newest camera and gyro corrections for all keyframes of this session, and copies
+  /// the map. The job has no problem with fewer than two keyframes.
   GbaJob startGlobalBa();
+  /// Solves a job; does not change the map.
   GbaResult run(const GbaJob& job) const;
-  /// Brings the result into the map together with what came meanwhile.
+  /// Merges the result with what has changed in the map meanwhile. Discarded, and requested again, when the map was
+  /// corrected, loaded or reset since the job was copied.
   MapUpdate merge(const GbaResult& result);
   /// End of the data: a last global bundle adjustment when options.global_ba.at_end.
   MapUpdate finish();
 
   MapSnapshot snapshot() const;
-  /// How large the map is by the accelerometer; asked after each global adjustment and now and then in between.
+  /// Scale of the map according to the accelerometer; computed after each global adjustment and every 30 keyframes.
   InertialScale scale() const;
-  /// What the map has found out about the depth camera, after what the sensor's configuration adds.
+  /// Correction of the depth camera estimated from the map, applied after that of the sensor's configuration.
   const DepthCurve& depthCurve() const;
-  /// What to tell the user of them, when they are large enough to matter; empty else.
+  /// Message to the user about the depth correction when it is large enough to matter; empty otherwise.
   std::string depthDifference() const;
-  /// What to tell the user when the last adjustment found pixels to be off by more than they are told to be; empty
-  /// else.
+  /// Message to the user when the last adjustment found pixel errors well above the reported sigmas; empty otherwise.
   std::string trackNoiseDifference() const;
-  /// 1/m: the part of the curve that is for disparities which are all off, see disparity_curve.h.
+  /// 1/m: common disparity error that is part of the curve, see disparity_curve.h; 0: none.
   double disparityError() const;
   const Map& map() const;
+  /// Throws std::runtime_error naming the path when the file cannot be written.
   void saveMap(const std::string& path) const;
+  /// Replaces the map; keyframes enter it once it is recognised. Throws std::runtime_error, the map unchanged, on a bad
+  /// file or a map made with another camera.
   MapUpdate loadMap(const std::string& path);
-  /// All planes as a plane module takes them that starts from this map.
+  /// All planes of the map, for a plane module that starts from it.
   std::vector<StoredPlane> storedPlanes() const;
+  /// Discards map, odometry and learnt corrections; revisions go on. Cannot fail.
   void reset();
-  /// On: keyframes are found in the map and leave it as it is; without a map they are refused. Off: mapping goes on.
+  /// On: keyframes are localised in the map without changing it; without a map they are refused. Off: mapping goes on.
   void setLocalisationMode(bool on);
 
  private:

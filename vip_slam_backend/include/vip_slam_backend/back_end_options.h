@@ -106,10 +106,10 @@ struct ReobservationOptions {
   }
 };
 
-/// A map is kept whole as long as it is small: a keyframe whose landmarks others see as well still holds pixels of a
-/// tenth of a pixel and depth on planes, and a landmark of two views still ties two keyframes. Beyond, a robot that
-/// stays in one room for hours must not fill its memory with it. Nor its time, long before: where keyframes all see the
-/// same, a global adjustment takes the cube of their number.
+/// A small map is kept whole: even a redundant keyframe has pixels measured to a tenth of a pixel and depth on planes,
+/// and a landmark with two views still ties two keyframes. Larger maps are culled, so that a robot which stays in one
+/// room for hours does not run out of memory, or of time long before: among keyframes that all see the same landmarks
+/// the cost of a global adjustment grows with the cube of their number.
 struct CullingOptions {
   bool enabled = true;
   int above_keyframes = 1000;

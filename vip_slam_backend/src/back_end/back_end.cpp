@@ -15,7 +15,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::uint64_t kScaleInterval = 30, kCurveInterval = 20;  // keyframes
-constexpr int kAdjustmentsAtEnd = 3;  // at most, while the map still finds out about the depth camera
+constexpr int kAdjustmentsAtEnd = 3;  // at most, while the estimated depth curve still changes
 
 }  // namespace
 
@@ -24,7 +24,7 @@ BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l
       sensor(s),
       log(l),
       camera(makeCamera(s.camera)),
-      maker(LandmarkMakerOptions{12.0, 1.0, camera->focal()}),
+      maker(camera->focal()),
       reobservation(o.reobservation, camera),
       solver(makeSolver(o.solver)),
       loop_closer(o.loop, camera, l),
@@ -52,14 +52,14 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
     const double factor = imuNoiseFactor(map.keyframe(inserted.previous), inserted, settings.gravity);
     if (factor > 1) map.widenImuNoise(keyframe->id, factor, sensor.imu_noise);
   }
-  // Beyond the local window bodies turn a little as well; others hear of it with the next global update, until when
-  // the cameras they know stay right.
+  // New extrinsics change the body poses outside the local window as well. These are published with the next global
+  // update; until then the published camera poses are still right.
   map.adoptMounting(keyframe->frame.T_I_C);
   followCameraCorrection(keyframe->frame.camera_correction);
   followGyroCorrection(keyframe->gyro_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
-  // Where a new odometry lies in the map is a guess until a loop ties it: its landmarks must not meet older ones by
-  // chance.
+  // The place of a new odometry in the map is a guess until a loop ties it: its landmarks must not be matched with
+  // older ones by chance.
   const std::set<KeyframeId> part = connectedKeyframes(map, keyframe->id, loop_closer.loops());
   const auto in_part = [&part](KeyframeId id) { return part.count(id) != 0; };
   maker.process(keyframe->id, &map, in_part);
@@ -68,9 +68,9 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   statistics.merged += found.merged;
 }
 
-// A front end that is loaded anew counts its epochs from 0. Taken for the old odometry, what it sends would be put
-// where that one ended.
-void BackEnd::Impl::refuseUntoldRestart(const Keyframe& keyframe) {
+// A front end that was restarted alone counts its epochs from 0. Its keyframes must not be taken for a continuation of
+// the old odometry with that number, so they are refused.
+void BackEnd::Impl::refuseUnannouncedRestart(const Keyframe& keyframe) {
   const std::uint32_t theirs = keyframe.frame.epoch;
   const auto of_theirs = [theirs](const auto& entry) {
     return !entry.second.stored && entry.second.data->frame.epoch == theirs;
@@ -96,16 +96,16 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (!keyframe) throw MapError("no keyframe given");
     const std::string bad = validateKeyframe(*keyframe);
     if (!bad.empty()) throw MapError(bad);
-    // Mapped, it would be all there is to localise in.
+    // Mapping it would create a map of this single keyframe, to localise in from then on.
     if (localisation_only && map.empty()) throw MapError("localisation without a map: load one, or go on mapping");
     if (keyframe->id <= map.newestKeyframe())
       throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
                      std::to_string(map.newestKeyframe()) + " of the map");
-    refuseUntoldRestart(*keyframe);
+    refuseUnannouncedRestart(*keyframe);
     if (frozen()) {
       localise(keyframe);
       finishUpdate(&update);
-      if (!searching) {  // those that waited for the map to be recognised would wait for ever
+      if (!searching) {  // keyframes that waited for the map to be recognised will not be mapped any more
         for (const KeyframePtr& waiting : held) update.removed_keyframes.push_back(waiting->id);
         held.clear();
       }
@@ -118,16 +118,15 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
       return update;
     }
     if (!map.hasKeyframe(keyframe->id)) {
-      const bool found = knowsWhereItWasFound(*keyframe);
-      brought = found && bringToWhereItWasFound(keyframe->frame.epoch);
+      const bool found = hasRecentLocalisation(*keyframe);
+      brought = found && moveUnplacedPartToMap(keyframe->frame.epoch);
       insert(keyframe);
       if (found) tieToLastFound(keyframe);
     }
   } catch (const MapError& e) {
     refusal = e.what();
-    ++statistics.keyframes_refused;
     finishUpdate(&update);
-    // Others wait for it, unless the map has one of that number.
+    // Report it as removed, since other modules wait for it; not when the map has a keyframe with this id.
     const auto waits = [&keyframe](const KeyframePtr& other) { return other->id == keyframe->id; };
     if (keyframe && !map.hasKeyframe(keyframe->id) && std::none_of(held.begin(), held.end(), waits))
       update.removed_keyframes.push_back(keyframe->id);
@@ -138,16 +137,16 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   closeLoop(&update);
   if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
   if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global_wanted = true;
-  // Nobody knows yet where the keyframes lie that waited for this one, or what their depth means now.
+  // Poses of keyframes that waited or were moved, and corrected depth, are new to all receivers: update everything.
   if (entering || brought || camera_correction != camera_correction_before) fillGlobal(&update);
   finishUpdate(&update);
   return update;
 }
 
 void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
-  if (update.revision < first_revision) return;  // of a map that was forgotten or replaced meanwhile
+  if (update.revision < first_revision) return;  // it refers to a map that was reset or replaced meanwhile
   if (frozen()) {
-    // The plane module says it once; what it said of the map before it heard that this stays as it is comes in later.
+    // The plane module sends each change only once: keep those that it sent before it learnt of localisation-only mode.
     const bool says = !update.merges.empty() || !update.removed.empty() || !update.observations.empty() ||
                       !update.associated.empty() || !update.dissociated.empty();
     if (says) held_updates.push_back(update);
@@ -175,7 +174,7 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
   }
 }
 
-// An update names all planes. One that it does not name was removed or merged in an update that was lost.
+// An update lists all planes. A plane that it does not list was removed or merged in an update that was lost.
 void BackEnd::Impl::removeUnnamedPlanes(const PlaneUpdate& update) {
   std::set<PlaneId> named;
   for (const PlaneEstimate& plane : update.planes) named.insert(plane.id);

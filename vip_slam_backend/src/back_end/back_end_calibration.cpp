@@ -1,4 +1,4 @@
-// What front end and map find out about camera and gyro, for all keyframes of the session.
+// Applies corrections of camera and gyro estimated by the front end and from the map to all keyframes of the session.
 #include <cmath>
 
 #include "back_end_impl.h"
@@ -10,16 +10,16 @@
 namespace vip_slam {
 namespace {
 
-// Smaller changes of the camera's correction wait for the next global adjustment: m, normalised.
+// Smaller changes of the camera's correction are adopted only with the next global adjustment: m, normalised.
 constexpr double kNewDepthOffset = 0.001;
 constexpr double kNewBearing = 1e-4;
 constexpr double kNewDepthShift = 0.02;      // px
-constexpr double kNewGyroCorrection = 5e-4;  // likewise
+constexpr double kNewGyroCorrection = 5e-4;  // likewise, per entry
 
 }  // namespace
 
 void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
-  if (newest.curve != camera_correction.curve) return;  // it goes with readings as they were
+  if (newest.curve != camera_correction.curve) return;  // it refers to readings with another curve
   newest_depth_offset = newest.offset;
   newest_bearing = newest.bearing;
   newest_depth_shift = newest.shift;
@@ -32,7 +32,7 @@ void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
   camera_correction.shift = newest.shift;
   map.adoptCameraCorrection(camera_correction);
   global_wanted = true;
-  ++correction;  // an adjustment under way has the readings as they were
+  ++correction;  // an adjustment under way has the old readings
 }
 
 bool BackEnd::Impl::learnDepthCurve() {
@@ -65,7 +65,7 @@ void BackEnd::Impl::followGyroCorrection(const Eigen::Matrix3d& newest) {
   gyro_correction = newest;
   map.adoptGyroCorrection(newest, sensor.imu_noise);
   global_wanted = true;
-  ++correction;  // an adjustment under way has the factors as they were
+  ++correction;  // an adjustment under way has the old IMU factors
 }
 
 }  // namespace vip_slam

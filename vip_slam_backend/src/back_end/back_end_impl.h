@@ -27,11 +27,11 @@ struct BackEnd::Impl {
   Impl(const BackEndOptions& options, const SensorConfig& sensor, TimingLog* log);
 
   // back_end.cpp
-  /// Inserts at the predicted pose and looks for known landmarks; throws MapError when refused.
+  /// Inserts at the predicted pose and re-observes known landmarks; throws MapError when refused.
   void insert(const KeyframePtr& keyframe);
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
-  void refuseUntoldRestart(const Keyframe& keyframe);
-  /// Localisation only: what there is of a map stays as it is.
+  void refuseUnannouncedRestart(const Keyframe& keyframe);
+  /// Localisation-only mode with a map, which must not change.
   bool frozen() const { return localisation_only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
   void removeUnnamedPlanes(const PlaneUpdate& update);
@@ -40,23 +40,23 @@ struct BackEnd::Impl {
   void reset();
 
   // back_end_calibration.cpp
-  /// All keyframes of this session get the same correction of their depth: the newest one's, once it is another one by
-  /// enough to redo the map for.
+  /// Applies the newest keyframe's correction of the camera to all keyframes of this session once it differs enough to
+  /// justify a new global adjustment.
   void followCameraCorrection(const CameraCorrection& newest);
-  /// Asks the map what the depth camera reads wrong at which distance; when that is something new all keyframes have
-  /// it. False when nothing is new.
+  /// Estimates the depth camera's distance-dependent error from the map and applies a significant change to all
+  /// keyframes of this session. False when nothing changed.
   bool learnDepthCurve();
   void followGyroCorrection(const Eigen::Matrix3d& newest);
 
   // back_end_steps.cpp
   /// Pose of the keyframe in the map as T_map_odom predicts it; starts a new epoch where the odometry did.
   NavState predict(const Keyframe& keyframe);
-  /// Optimises the window; ids of keyframes, landmarks and planes that changed go to `update`.
+  /// Optimises the window; adds the keyframes, landmarks and planes that changed to `update`.
   void localBundleAdjustment(double t, MapUpdate* update);
   void cull(MapUpdate* update);
-  /// T_map_odom from the newest keyframe.
+  /// Sets T_map_odom from the newest keyframe.
   void followNewest();
-  /// Whether the map tells where the present epoch of the odometry lies in it; else T_map_odom is a guess.
+  /// Whether the place of the present odometry epoch in the map is known; else T_map_odom is a guess.
   bool placed() const;
   MapUpdate beginUpdate(double t) const;
   /// Fills estimates of everything (global) and what was removed and merged since the last update.
@@ -66,32 +66,32 @@ struct BackEnd::Impl {
   LandmarkEstimate estimateOf(const MapLandmark& landmark) const;
   void askForScale();
   GbaJob makeGlobalJob() const;
-  /// False when the map stays as it was: the solution is of no use, or of a map that is no more.
+  /// Merges a solution into the map. False, the map unchanged, when the solution is unusable or outdated.
   bool takeGlobal(const GbaResult& result);
-  /// With everything in it when the map `moved`.
+  /// An update with the whole map when it `moved`.
   MapUpdate globalUpdate(bool moved);
 
   // back_end_maps.cpp
   void saveMap(const std::string& path) const;
   MapUpdate loadMap(const std::string& path);
   std::vector<StoredPlane> storedPlanes() const;
-  /// The keyframes that another one may be found at.
+  /// Predicate of the keyframes that others may be localised at.
   std::function<bool(KeyframeId)> inReferencePart() const;
   bool findInMap(const KeyframePtr& keyframe, Relocalisation* found);
-  /// Recognises the loaded map; on success the keyframe and those held before it enter it.
+  /// Relocalises in the loaded map; on success the keyframe and those held before it are inserted.
   bool enterLoadedMap(const KeyframePtr& keyframe);
-  /// Localisation only: T_map_odom follows, the map stays.
+  /// Localisation-only mode: updates T_map_odom, leaves the map unchanged.
   void localise(const KeyframePtr& keyframe);
-  /// The first keyframe that is mapped after localisation only: its odometry's place in the map is known.
-  /// Localisation has found the odometry of this keyframe in the map, just before.
-  bool knowsWhereItWasFound(const Keyframe& keyframe);
-  /// What an odometry has mapped at a guess, before it was found, comes along; true when there was anything.
-  bool bringToWhereItWasFound(std::uint32_t epoch);
+  /// Whether localisation-only mode has found the odometry of this keyframe in the map within the last seconds.
+  bool hasRecentLocalisation(const Keyframe& keyframe);
+  /// Moves what the odometry had mapped at a guessed place to where it was found; false when there was nothing to move.
+  bool moveUnplacedPartToMap(std::uint32_t epoch);
+  /// The first keyframe that is mapped after localisation-only mode: ties its odometry to the last match in the map.
   void tieToLastFound(const KeyframePtr& keyframe);
 
   // back_end_loops.cpp
   void remember(const LoopEvent& event);
-  /// Enters the newest keyframe into the place database and closes a loop there when there is one.
+  /// Adds the newest keyframe to the place database and closes a loop there when there is one.
   void closeLoop(MapUpdate* update);
 
   BackEndOptions options;
@@ -105,40 +105,41 @@ struct BackEnd::Impl {
   std::unique_ptr<BaSolver> solver;
   LoopCloser loop_closer;
   Relocaliser relocaliser;
-  std::optional<std::uint32_t> restarted_epoch;  ///< of an odometry that bears the number of an old one
+  std::optional<std::uint32_t> restarted_epoch;  ///< of a new odometry with the epoch number of an old one
   bool searching = false;                        ///< a loaded map is not recognised yet
   bool localisation_only = false;
-  std::vector<PlaneUpdate> held_updates;  ///< that came since
-  std::deque<KeyframePtr> held;           ///< keyframes that wait for that
-  std::vector<Anchor> localised;          ///< keyframes found in the map without entering it
+  std::vector<PlaneUpdate> held_updates;  ///< received while frozen(), applied when mapping goes on
+  std::deque<KeyframePtr> held;           ///< received while searching, inserted once the map is recognised
+  std::vector<Anchor> localised;          ///< keyframes localised in the map without entering it
 
-  /// Localisation only: the last keyframe found in the map, to which the odometry is tied when mapping goes on.
+  /// Localisation-only mode: the last keyframe found in the map, to which the odometry is tied when mapping goes on.
   struct LastFound {
     std::uint32_t epoch = 0;
     KeyframeId match = 0;
     double t = 0;
   };
   std::optional<LastFound> last_found;
-  std::uint64_t loads = 0;  ///< of maps, since the start
+  std::uint64_t loads = 0;  ///< number of maps loaded since the start
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;
   std::uint64_t revision = 0;
-  std::uint64_t first_revision = 0;  ///< of the map as it is since the last reset; older ones speak of another
-  /// Counts loop corrections, loaded maps and resets: a global adjustment of the map before one must not undo it.
+  std::uint64_t first_revision = 0;  ///< first one since the last reset; older ones refer to another map
+  /// Counts loop corrections, new calibrations, loaded maps and resets: a global adjustment that started before one
+  /// must not undo it.
   std::uint64_t correction = 0;
   bool global_wanted = false;
-  double last_global = -1e300;                                ///< stamp of the last one that a loop asked for
-  CameraCorrection camera_correction;                         ///< of all keyframes of this session
-  double newest_depth_offset = 0;                             ///< m, as the newest keyframe came
-  BearingCorrection newest_bearing;                           ///< likewise
-  DepthShift newest_depth_shift;                              ///< likewise
-  double disparity_error = 0;                                 ///< 1/m, which the curve takes care of
-  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< of all keyframes of this session but for little
-  Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< as the newest keyframe came
+  double last_global = -1e300;                                       ///< stamp of the last one requested by a loop
+  CameraCorrection camera_correction;                                ///< applied to all keyframes of this session
+  double newest_depth_offset = 0;                                    ///< m, reported with the newest keyframe
+  BearingCorrection newest_bearing;                                  ///< likewise
+  DepthShift newest_depth_shift;                                     ///< likewise
+  double disparity_error = 0;                                        ///< 1/m, corrected by the curve
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();         ///< applied to all keyframes of this session
+  Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< reported with the newest keyframe
   std::string refusal;
-  std::vector<LoopEvent> loops;      ///< all accepted so far, and the newest that were refused
-  std::size_t rejected_kept = 0;     ///< of these
+  std::vector<LoopEvent> loops;      ///< all accepted so far, and the newest refused ones
+  std::size_t rejected_kept = 0;     ///< number of refused ones in `loops`
   std::vector<LoopEvent> new_loops;  ///< since the last update
   BackEndStatistics statistics;
 };

@@ -9,7 +9,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kRestSeconds = 15;
-// Of the loops that were looked at and refused; a day of them would be a hundred thousand.
+// Number of refused loops that are kept; a day has about a hundred thousand.
 constexpr std::size_t kMostRejected = 1000;
 
 }  // namespace
@@ -28,22 +28,22 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
   const KeyframeId id = map.newestKeyframe();
   loop_closer.add(map, id);
   if (!options.loop_closing) return;
-  std::map<KeyframeId, SE3> before;  // which part moves where two come together is for the loop closer to say
+  std::map<KeyframeId, SE3> before;  // of all, since the loop closer decides which part moves when two are joined
   for (const auto& entry : map.keyframes()) before.emplace(entry.first, entry.second.state.T_W_I);
   for (const LoopEvent& event : loop_closer.close(map, id)) {
     remember(event);
     if (!event.accepted) continue;
     followNewest();
     fillGlobal(update);
-    // A loop that moves next to nothing can wait: the room that is seen again and again must not cost an adjustment of
-    // everything each time.
+    // A loop that hardly moves anything does not need an adjustment at once: in a room that is seen again and again
+    // each loop would cost a global one.
     const auto moved_far = [&](KeyframeId end) {
       const SE3 &then = before.at(end), &now = map.keyframe(end).state.T_W_I;
       return (then.inverse() * now).t().norm() > 0.02 || then.rotation().angularDistance(now.rotation()) > 0.005;
     };
     const double t = map.keyframe(id).data->frame.t;
     const bool far = moved_far(id) || moved_far(event.match);
-    if (far) ++correction;  // small ones may follow each other faster than an adjustment takes: they leave it valid
+    if (far) ++correction;  // small ones keep an adjustment valid, since they may be more frequent than it takes
     if (far || std::abs(t - last_global) > kRestSeconds) {  // stamps run back where a bag starts over
       global_wanted = true;
       last_global = t;

@@ -1,4 +1,4 @@
-// Stored maps within the back end: saving, loading, finding the way in a loaded map, localisation without mapping.
+// Stored maps within the back end: saving, loading, relocalisation in a loaded map, localisation without mapping.
 #include <map>
 #include <set>
 
@@ -9,8 +9,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::uint64_t kMostLoads = 4096;  // whose landmarks have ids of their own
-constexpr double kRecent = 5.0;             // seconds for which the odometry carries what localisation found
+constexpr std::uint64_t kMostLoads = 4096;  // number of loads until ranges of landmark ids are reused
+constexpr double kRecent = 5.0;             // s after the last localisation while the odometry's drift is negligible
 
 PlaneHost hostAt(const MapKeyframe& kf) { return {kf.id(), kf.data->frame.epoch, kf.state.T_W_I * kf.T_I_C}; }
 
@@ -21,7 +21,7 @@ void BackEnd::Impl::saveMap(const std::string& path) const {
 }
 
 MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
-  // Both throw before anything is changed.
+  // Both throw before the back end is changed.
   StoredMap stored = loadMapFile(path, sensor.imu_noise, kLoadedLandmarks + (loads % kMostLoads) * kLoadedApart);
   requireCamera(stored, sensor.camera, path);
   ++loads;
@@ -41,7 +41,7 @@ std::vector<StoredPlane> BackEnd::Impl::storedPlanes() const {
   for (const auto& [id, kf] : map.keyframes()) {  // in ascending order: the oldest first
     for (const auto& seen : kf.planes) hosts.try_emplace(seen.first, hostAt(kf));
   }
-  // One that no keyframe is left of belongs where most does.
+  // A plane without an observing keyframe is assigned to the reference part of the map.
   const std::set<KeyframeId> most = referencePart(map, loop_closer.loops());
   std::vector<StoredPlane> planes;
   for (const auto& [id, plane] : map.planes()) {
@@ -52,7 +52,7 @@ std::vector<StoredPlane> BackEnd::Impl::storedPlanes() const {
   return planes;
 }
 
-// A part of the map that nothing ties to it lies there by a guess.
+// Other parts of the map are not tied to the reference part: their place is a guess.
 std::function<bool(KeyframeId)> BackEnd::Impl::inReferencePart() const {
   return [part = referencePart(map, loop_closer.loops())](KeyframeId id) { return part.count(id) != 0; };
 }
@@ -86,14 +86,14 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   searching = false;
   epoch = keyframe->frame.epoch;
   T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
-  // What was seen before the map was recognised belongs to it as well, as far as the odometry did not start anew since.
+  // Keyframes from before the recognition are inserted as well, unless the odometry has restarted since.
   std::deque<KeyframePtr> before;
   before.swap(held);
   for (const KeyframePtr& kf : before) {
     if (kf->frame.epoch != epoch || kf->id >= keyframe->id) continue;
     try {
       insert(kf);
-    } catch (const MapError& e) {  // the others belong to the map all the same
+    } catch (const MapError& e) {  // the others are inserted nevertheless
       refusal = e.what();
       continue;
     }
@@ -124,18 +124,18 @@ void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
   last_found = LastFound{epoch, found->match, keyframe->frame.t};
 }
 
-bool BackEnd::Impl::knowsWhereItWasFound(const Keyframe& keyframe) {
+bool BackEnd::Impl::hasRecentLocalisation(const Keyframe& keyframe) {
   if (!last_found) return false;
   if (keyframe.frame.epoch != last_found->epoch) {
     last_found.reset();
     return false;
   }
-  // Later it still says where the odometry lies, but for its drift: enough for a pose, too little to join two parts.
+  // Later the odometry has drifted: its place is still good enough for a pose, but not to join two parts of the map.
   const double since = keyframe.frame.t - last_found->t;
   return since >= 0 && since < kRecent && map.hasKeyframe(last_found->match);
 }
 
-bool BackEnd::Impl::bringToWhereItWasFound(std::uint32_t of_epoch) {
+bool BackEnd::Impl::moveUnplacedPartToMap(std::uint32_t of_epoch) {
   KeyframeId newest = 0;
   for (const auto& [id, kf] : map.keyframes())
     if (kf.data->frame.epoch == of_epoch) newest = id;
@@ -153,7 +153,7 @@ bool BackEnd::Impl::bringToWhereItWasFound(std::uint32_t of_epoch) {
   }
   map.moveKeyframes(moved);
   for (const PlaneId id : planes) map.movePlane(id, move);
-  ++correction;  // an adjustment under way has it where it was
+  ++correction;  // an adjustment under way has it at its old place
   global_wanted = true;
   return true;
 }

@@ -11,14 +11,14 @@ namespace vip_slam {
 NavState BackEnd::Impl::predict(const Keyframe& keyframe) {
   const NavState& odom = keyframe.frame.state;
   if (!map.empty() && keyframe.frame.epoch != epoch) {
-    // The odometry started anew: go on where the map ends until a loop or relocalisation says better.
+    // The odometry restarted: continue at the end of the map until a loop or relocalisation gives its true place.
     T_map_odom = alignLevelled(map.keyframe(map.newestKeyframe()).state.T_W_I, odom.T_W_I);
   }
   epoch = keyframe.frame.epoch;
   NavState state = odom;
   state.T_W_I = T_map_odom * odom.T_W_I;
   state.v_W = T_map_odom.rotation() * odom.v_W;
-  // A stored map may have another keyframe by that number, of another IMU's biases.
+  // A stored map may have another keyframe with that id, with another IMU's biases.
   if (keyframe.previous != 0 && map.hasKeyframe(keyframe.previous) &&
       map.keyframe(keyframe.previous).data->frame.epoch == epoch) {
     const NavState& previous = map.keyframe(keyframe.previous).state;
@@ -75,7 +75,6 @@ void BackEnd::Impl::cull(MapUpdate* update) {
   }
   const auto removed =
       cullKeyframes(options.culling, options.local_ba.window, sensor.imu_noise, loop_closer.loops(), &map);
-  statistics.keyframes_culled += removed.size();
   for (const KeyframeId id : removed) loop_closer.remove(id);
   update->landmarks.erase(std::remove_if(update->landmarks.begin(), update->landmarks.end(),
                                          [&](const LandmarkEstimate& l) { return !map.hasLandmark(l.id); }),
@@ -163,12 +162,12 @@ GbaJob BackEnd::Impl::makeGlobalJob() const {
 
 bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
   if (result.correction != correction) {
-    // The map it came from is no more: once again.
+    // The map has been corrected or replaced since the job was copied: adjust again.
     global_wanted = global_wanted || (result.solution != nullptr && !map.empty());
   } else if (frozen()) {
-    global_wanted = global_wanted || result.solution != nullptr;  // once mapping goes on
+    global_wanted = global_wanted || result.solution != nullptr;  // adjust again when mapping goes on
   } else if (result.solution && result.solution->summary.usable) {
-    // Where it was found counts until mapping goes on from there.
+    // Without newer keyframes T_map_odom comes from the last localisation and follows its matched keyframe.
     const TrackedFrame& newest = map.keyframe(map.newestKeyframe()).data->frame;
     const bool found = last_found && last_found->epoch == epoch && map.hasKeyframe(last_found->match) &&
                        !(newest.epoch == epoch && newest.t > last_found->t);
@@ -177,7 +176,7 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
     ++statistics.global_ba;
     statistics.track_noise_factor = result.solution->built.track_noise_factor;
     if (found) {
-      // The newest keyframe is from before it was found, and the odometry has drifted since.
+      // The newest keyframe is older than the localisation, and the odometry has drifted since.
       T_map_odom = alignLevelled(map.keyframe(last_found->match).state.T_W_I, match_before) * T_map_odom;
     } else {
       followNewest();

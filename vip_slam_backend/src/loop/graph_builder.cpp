@@ -13,12 +13,12 @@
 namespace vip_slam {
 namespace {
 
-// Odometry between neighbours: drift grows with the square root of the way; a coasting front end knows far less.
+// Odometry between neighbours: drift grows with the square root of the distance; ten times as much while coasting.
 Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, const PoseGraphOptions& options) {
   const double turned = a.state.T_W_I.rotation().angularDistance(b.state.T_W_I.rotation());
-  // Turning on the spot drifts too: a full turn counts as two metres of way.
+  // A rotation in place drifts too: a full turn counts as two metres of travel.
   double way = (a.state.T_W_I.t() - b.state.T_W_I.t()).norm() + turned / M_PI;
-  // Where keyframes are missing between them, as after a while of localisation only, it went who knows where.
+  // With keyframes missing in between, as after localisation-only mode, the distance travelled is not known.
   constexpr double kWayPerSecond = 0.5;  // m
   if (b.previous != a.id()) way = std::max(way, kWayPerSecond * std::abs(b.data->frame.t - a.data->frame.t));
   const bool weak =
@@ -58,8 +58,8 @@ Matrix6d loopSqrtInformation(const Matrix6d& camera_information, const SE3& T_W_
   Matrix6d covariance = Matrix6d::Zero();
   const Eigen::FullPivLU<Matrix6d> lu(camera_information);
   if (lu.isInvertible()) {
-    // From the query camera's perturbation to the residual: theta_I = R_I_C theta_C turns the arm from camera to body,
-    // and positions are compared in the match's frame.
+    // From the query camera's perturbation to the residual: theta_I = R_I_C theta_C rotates the lever arm from camera
+    // to body, and positions are compared in the match's frame.
     const Eigen::Matrix3d R_match_W = T_W_match.R().transpose();
     Matrix6d J = Matrix6d::Zero();
     J.topLeftCorner<3, 3>() = T_I_C.R();
@@ -103,7 +103,7 @@ std::set<KeyframeId> referencePart(const Map& map, const std::vector<std::pair<K
     part.stored = part.stored || keyframe.stored;
   }
   if (parts.empty()) return {};
-  constexpr std::size_t kFragment = 10;  // times as large as what is a mere fragment beside it
+  constexpr std::size_t kFragment = 10;  // a part is a fragment when the largest one is this many times as large
   std::size_t largest = 0;
   for (const auto& entry : parts) largest = std::max(largest, entry.second.keyframes);
   const auto lesser = [largest](const auto& a, const auto& b) {

@@ -11,14 +11,14 @@ namespace vip_slam {
 namespace {
 
 constexpr double kFarthestView = 6.0, kCosineOfView = 0.5;
-constexpr double kMetresPerCosine = 4.0;  // how a change of direction compares with a change of place
-constexpr double kRatio = 0.9;            // around a projection there are few rivals
-constexpr float kSameCorner2 = 4.0f;      // px^2: two detections of one corner are no rivals
+constexpr double kMetresPerCosine = 4.0;  // weight of a change of direction against one of position
+constexpr double kRatio = 0.9;            // of best to second distance; weak, since few corners lie around a projection
+constexpr float kSameCorner2 = 4.0f;      // px^2: two detections of one corner do not compete
 
 // ORB pyramids here and in common vocabularies grow by 1.2 to 1.4 per octave.
 double octaveScale(const Feature& f) { return std::pow(1.3, f.octave); }
 
-// A landmark looks different from its sides.
+// With kWide over all descriptors of a landmark, since it looks different from other sides.
 int distanceOf(const Map& map, const MapPoint& point, const Descriptor& descriptor, GuidedLooks looks) {
   if (point.landmark == kNoLandmark)
     return hammingDistance(map.keyframe(point.keyframe).features()[point.feature].descriptor, descriptor);

@@ -10,13 +10,13 @@
 namespace vip_slam {
 namespace {
 
-// A place farther from where the map has the query, m and rad, than two matches of one place differ by: others are
-// asked whether they hold it as well, with at least this share of its points.
+// A place farther than this from the query's pose in the map, m and rad, is not the expected one: it is refused when
+// another candidate or view fits the query as well, with at least this share of its points.
 constexpr double kElsewhere = 0.3, kElsewhereAngle = 0.2, kRivalShare = 0.7;
-// A view of what the query sees from where the map has it.
+// Limits of a view of the same scene, m and rad, and the weight of a rotation against a distance.
 constexpr double kFarthestView = 3.0, kMetresPerRadian = 2.0, kWidestView = 0.7;
 
-// A keyframe with those around it that show the same place.
+// A keyframe with the neighbours that show the same place.
 std::set<KeyframeId> placeOf(const Map& map, KeyframeId id) {
   std::set<KeyframeId> place{id};
   const MapKeyframe& kf = map.keyframe(id);
@@ -26,7 +26,7 @@ std::set<KeyframeId> placeOf(const Map& map, KeyframeId id) {
   return place;
 }
 
-// Of old keyframes that look at the same scene as the camera at T_W_C the nearest; 0: none.
+// The nearest old keyframe that looks at the same scene as a camera at T_W_C; 0: none.
 KeyframeId nearestView(const Map& map, const SE3& T_W_C, const std::function<bool(KeyframeId)>& old) {
   KeyframeId nearest = 0;
   double least = kFarthestView;
@@ -105,7 +105,7 @@ std::vector<KeyframeId> LoopCloser::candidates(const Map& map, KeyframeId query,
   const auto old = [&](KeyframeId id) {
     return id != query && !joined.count(id) && part.count(id) != 0 && isOld(map, id, *kf.data);
   };
-  // Words are shared by accident too: what the keyframe before scores tells how much two views of one place share here.
+  // Words are shared by chance, too: the score of the previous keyframe is the reference for two views of one place.
   double reference = 0;
   if (kf.previous != 0 && database_.has(kf.previous)) reference = bowScore(bow, database_.bow(kf.previous).bow);
   const auto matches = database_.query(bow, 30, old);
@@ -147,7 +147,7 @@ std::vector<LoopEvent> LoopCloser::close(Map& map, KeyframeId query) {
   }
   const std::vector<KeyframeId> matches = candidates(map, query, part);
   for (const KeyframeId match : matches) {
-    // The pose must rest on the old part of the map alone, else it confirms the drift.
+    // The pose must be computed from old landmarks alone, otherwise it would confirm the drift.
     const auto old = [&](KeyframeId id) { return part.count(id) != 0 && isOld(map, id, *kf.data); };
     PlaceVerification place =
         verifier_.verify(map, *kf.data, kf.state.T_W_I, database_.bow(query), match, database_, old);

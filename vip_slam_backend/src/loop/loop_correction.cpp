@@ -1,4 +1,4 @@
-// What an accepted place does to the map: the pose-plane graph and its last veto, then the fusion of landmarks.
+// Correction of the map by an accepted place: plane check, pose-plane graph with its chi-square test, landmark fusion.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -43,12 +43,12 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
   const SE3 T_match_query = map.keyframe(place.match).state.T_W_I.inverse() * place.T_W_I;
   event.T_match_query = T_match_query;
   if (!place.accepted) return event;
-  // Turns about the keyframe, not about the map's origin: far from there the least tilt would shift its planes.
+  // Rotates about the keyframe, not about the map's origin: far from there any tilt would shift the planes.
   const SE3 correction = alignLevelled(place.T_W_I, kf.state.T_W_I);
   char text[160];
 
-  // Planes of the two ends must be the same or different, but not shifted copies. The newest keyframe's planes come
-  // after it, so its forerunners speak for it.
+  // Planes of the two ends must coincide or be distinct, but not be shifted copies. The newest keyframe's planes arrive
+  // later, so use those of the keyframes before it.
   const PlaneAgreement planes =
       comparePlanes(map, withNeighbours(map, query, 5), around(map, place.match, 4), correction);
   if (planes.contradictions > static_cast<int>(planes.same.size())) {
@@ -57,9 +57,8 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     return event;
   }
 
-  // Of two parts of the map that nothing tied yet one is brought to the other as a whole; odometry has no say then.
-  // What others know the map by stays: a fragment that was put somewhere by a guess comes to it, whichever is the
-  // query's.
+  // When the loop joins two parts of the map, one is moved to the other as a whole, without odometry edges between
+  // them. The reference part stays, whichever part the query belongs to, since the other's place was a guess.
   std::set<KeyframeId> part = connectedKeyframes(map, query, loops_);
   const bool tied = part.count(place.match) != 0;
   SE3 move = correction;
@@ -93,7 +92,7 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     return event;
   }
   map.moveKeyframes(solution.T_W_I);
-  // A plane that no keyframe observes had no say in the graph: as it is it stays the plane module's.
+  // Planes that no keyframe observes had no edges in the graph: they keep their parameters.
   std::set<PlaneId> observed;
   for (const auto& entry : map.keyframes())
     for (const auto& seen : entry.second.planes) observed.insert(seen.first);
@@ -117,7 +116,7 @@ void LoopCloser::fuse(Map& map, KeyframeId query, const PlaceVerification& place
   fuseLandmarks(map, query, place.landmarks);
   const KeyframePtr& data = map.keyframe(query).data;
   const auto old = [&](KeyframeId id) { return isOld(map, id, *data); };
-  // The keyframes on the way to the query saw the place as well.
+  // The keyframes just before the query saw the place as well.
   int left = kFusedNeighbours;
   for (KeyframeId id = map.keyframe(query).previous; id != 0 && left > 0; id = map.keyframe(id).previous, --left) {
     if (id == place.match) break;

@@ -6,7 +6,7 @@ int fuseLandmarks(Map& map, KeyframeId query, const std::vector<std::pair<std::u
   const Eigen::Vector3d eye = map.keyframe(query).T_W_C().t();
   int joined = 0;
   for (const auto& pair : pairs) {
-    // An earlier pair may have merged either side away.
+    // An earlier pair may have merged either landmark.
     const LandmarkId into = map.resolve(pair.second);
     const LandmarkId own = map.keyframe(query).landmarks[pair.first];
     if (own == into || !map.hasLandmark(into)) continue;
@@ -14,7 +14,7 @@ int fuseLandmarks(Map& map, KeyframeId query, const std::vector<std::pair<std::u
       joined += map.addObservation(into, {query, pair.first});
       continue;
     }
-    // One point, as far as depth cameras and the correction that just moved the map can tell.
+    // Landmarks within the accuracy of depth and of the loop correction count as one point.
     const Eigen::Vector3d& p_W = map.landmark(into).p_W;
     if ((map.landmark(own).p_W - p_W).norm() > 0.03 + 0.02 * (p_W - eye).norm()) continue;
     joined += map.mergeLandmarks(own, into);

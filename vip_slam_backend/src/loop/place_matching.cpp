@@ -18,7 +18,7 @@ int angleBin(const Feature& a, const Feature& b) {
   return std::min(bin, kAngleBins - 1);
 }
 
-// Keeps matches in the fullest bin and its two neighbours: the camera rolls one way for all of them.
+// Keeps matches in the fullest bin and its two neighbours: the camera's roll is the same for all true matches.
 void keepCommonAngle(const std::vector<Feature>& a, const std::vector<Feature>& b,
                      std::vector<std::pair<std::uint32_t, std::uint32_t>>& matches) {
   std::array<int, kAngleBins> count{};

@@ -18,12 +18,12 @@ struct Lengths {
 std::vector<Lengths> lengthsFromDifference(const Eigen::Vector3d& fa, const Eigen::Vector3d& fb,
                                            const Eigen::Vector3d& D) {
   std::vector<Lengths> result;
-  // Express the length of the steeper ray by the other: solve with fb the steeper one, else swap.
+  // Eliminates the length of the steeper ray: solve with fb the steeper one, else swap.
   const bool swap = std::abs(fa.z()) > std::abs(fb.z());
   const Eigen::Vector3d& f = swap ? fb : fa;  // free length x
   const Eigen::Vector3d& g = swap ? fa : fb;  // length y = (x f.z + h) / g.z
   const double h = swap ? -D.z() : D.z();
-  if (std::abs(g.z()) < 0.02 * g.norm()) return result;  // both rays at the horizon: heights say nothing
+  if (std::abs(g.z()) < 0.02 * g.norm()) return result;  // both rays are horizontal: heights give no constraint
   const Eigen::Vector3d u = g * (f.z() / g.z()) - f, w = g * (h / g.z());  // y g - x f = x u + w
   const double A = u.squaredNorm(), B = u.dot(w), C = w.squaredNorm() - D.squaredNorm();
   const double discriminant = B * B - A * C;
@@ -82,7 +82,7 @@ PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const CameraRi
     const Eigen::Vector3d D = mb.p_W - ma.p_W;
     std::vector<Lengths> lengths;
     if (ma.depth > 0 && mb.depth > 0) {
-      // Distance and height do not depend on the pose: most wrong pairs end here.
+      // Distance and height are independent of the pose: this rejects most wrong pairs.
       const Eigen::Vector3d E = eb + mb.depth * rays[b] - ea - ma.depth * rays[a];
       const double slack = options.depth_sigmas * (ma.depth_sigma + mb.depth_sigma) + 0.05;
       if (std::abs(E.norm() - D.norm()) > slack || std::abs(E.z() - D.z()) > slack) continue;

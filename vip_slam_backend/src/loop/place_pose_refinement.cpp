@@ -70,7 +70,7 @@ class Refinement {
       add(s.plane_W.signedDistance(T_W_B * p_B) / s.sigma, J / s.sigma);
     }
     if (options_.tilt_sigma > 0) {
-      // The direction of up in the body: the third carries no information of its own.
+      // Direction of up in the body; three rows, of rank two.
       const Eigen::Vector3d up = R_B_W * Eigen::Vector3d::UnitZ();
       Eigen::Matrix<double, 3, 6> J = Eigen::Matrix<double, 3, 6>::Zero();
       J.leftCols<3>() = hat(up);
@@ -123,7 +123,7 @@ PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRi
   const Refinement refinement(matches, rig, R_G_B, options, surfaces);
   PlacePose result;
   result.T_W_B = start;
-  // The gate closes in rounds: the start may be a few pixels off, the end is not.
+  // The gate is tightened in rounds, since the start may be wrong by a few pixels.
   for (const double px : {2.5 * options.inlier_px, 1.5 * options.inlier_px, options.inlier_px}) {
     result.inliers = refinement.inliersAt(result.T_W_B, px);
     if (result.inliers.size() < 3 || !refinement.minimise(result.inliers, &result.T_W_B)) return result;

@@ -12,14 +12,14 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kNewGuesses = 4, kKeptGuesses = 4, kRivalGuesses = 8;
-constexpr int kFewLandmarks = 5;  // fewer may be hidden or were seen from elsewhere
+constexpr int kFewLandmarks = 5;  // fewer missing landmarks may be occluded or not visible from here
 
-// Keyframes that look at the same scene: verifying both says nothing about other places.
+// Whether two keyframes look at the same scene, so that one of them is enough as a candidate.
 bool sameView(const SE3& T_W_C_a, const SE3& T_W_C_b) {
   return (T_W_C_a.t() - T_W_C_b.t()).norm() < 1.0 && T_W_C_a.rotation().angularDistance(T_W_C_b.rotation()) < 0.5;
 }
 
-// Poses that are one place, up to what two matches of it differ by.
+// Whether two poses are the same place, within the differences of two matches of it.
 bool samePlace(const SE3& a, const SE3& b) {
   return (a.t() - b.t()).norm() < 0.3 && a.rotation().angularDistance(b.rotation()) < 0.2;
 }
@@ -104,7 +104,7 @@ void PlaceSearch::weigh(const Scene& scene, const std::vector<Place>& places) {
     };
     PlaceSupport support = placeSupport(scene.map, keyframes_, T_W_odom, scene.verifier, in_part);
     if (!support.found || support.points < options_.min_seed_inliers) continue;
-    // What the matches moved together is one place.
+    // Hypotheses that the refinement moved to the same pose are one place.
     const auto same = std::find_if(guesses_.begin(), guesses_.end(), at(support.T_W_C));
     const Place place{support.T_W_C * T_odom_B.inverse(), part};
     if (same == guesses_.end())
@@ -140,18 +140,18 @@ PlaceVerification PlaceSearch::add(const Map& map, const KeyframeDatabase& datab
   weigh(scene, places);
   PlaceVerification result = judge(scene);
   if (result.accepted) {
-    // Before it is believed, views that look less alike must not hold it as well: corridors repeat themselves.
+    // Before it is accepted also check less similar views for a rival place: corridors repeat themselves.
     weigh(scene, guesses(scene, candidates, scene.views.size(), kRivalGuesses));
     result = judge(scene);
   }
   if (result.accepted) {
-    // Chance resemblance passes with the view; a place stays.
+    // A chance resemblance disappears with the view, a true place is found again by the next keyframe.
     const Place& now = guesses_.front().place;
     const SE3 T_odom_B = keyframe->frame.state.T_W_I * keyframe->frame.T_I_C;
     const bool again =
         believed_ && believed_->part == now.part && samePlace(believed_->T_W_odom * T_odom_B, now.T_W_odom * T_odom_B);
     believed_ = now;
-    // The next keyframe that comes to it lifts one doubt, not two: a wall like the right one stays in view as well.
+    // Confirmation by the next keyframe outweighs one doubt, not two: a similar wall stays in view as well.
     const std::vector<std::string> left = doubts();
     if (left.size() > 1) believed_.reset();
     if (left.size() > (again ? 1 : 0)) {
@@ -212,14 +212,14 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
 std::vector<std::string> PlaceSearch::doubts() const {
   const PlaceSupport& best = guesses_.front().support;
   std::vector<std::string> doubts;
-  // Where another place has the same posters on a wall of another shape, this one's shape proves little: the place that
-  // is really seen may have it too and not be in the map.
+  // When another place has the same posters on a wall of another shape, the agreement in shape proves little: the place
+  // that is really seen may have the same shape and not be in the map.
   int alike = 0;
   for (std::size_t g = 1; g < guesses_.size(); ++g) alike = std::max(alike, guesses_[g].support.points);
   if (alike > options_.resemblance * best.points) doubts.push_back(words("another place has %d of such points", alike));
   if (best.points < options_.sure_points || best.evidence() < options_.sure_evidence)
     doubts.push_back(words("evidence %.0f of %d points is not sure", best.evidence(), best.points));
-  // Points fit by chance where a bare wall resembles another; what the map saw from many views is then missing.
+  // On a bare wall that resembles another one points fit by chance, but the established landmarks are missing there.
   if (best.refound == 0 && best.established >= kFewLandmarks)
     doubts.push_back(words("none of %d landmarks that should be in sight is", best.established));
   return doubts;

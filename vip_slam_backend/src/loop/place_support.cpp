@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kViews = 15, kCoveringViews = 5;
 constexpr double kPointSize = 0.05;   // metres
-constexpr double kTiltSigma = 0.003;  // radians: odometry against gravity, and the map against it
+constexpr double kTiltSigma = 0.003;  // radians: tilt of the odometry and of the map against gravity
 constexpr double kLeastContradiction = 0.005, kUnknownContradiction = 0.05;  // of depth
 constexpr double kOccludedWeight = 0.25;
 constexpr std::size_t kEstablishedViews = 4;
@@ -34,7 +34,7 @@ bool shows(const DepthGrid& grid, const Eigen::Vector3d& p_V, const CameraModel&
   return z <= 0 || z > p_V.z() - kDepthSlack - kDepthSlackPerMetre * p_V.z();
 }
 
-// Of the image, an eighth by a sixth.
+// Cell of the image, an eighth of the width by a sixth of the height.
 int cellOf(const Feature& feature, const CameraModel& camera) {
   return static_cast<int>(feature.pixel.x() * 8 / camera.width()) * 6 +
          static_cast<int>(feature.pixel.y() * 6 / camera.height());
@@ -43,11 +43,12 @@ int cellOf(const Feature& feature, const CameraModel& camera) {
 }  // namespace
 
 double PlaceSupport::evidence() const {
-  // What the pose lets one camera see through is not there; what it puts behind another surface is often only hidden.
+  // A surface that the other camera sees through contradicts the pose; one behind another surface is often just
+  // occluded.
   double contradiction = kUnknownContradiction;
   if (depth.compared >= kFewDepths)
     contradiction = kLeastContradiction + depth.seeThrough() + kOccludedWeight * depth.occluded / depth.compared;
-  // Corners of few views come and go even at the right place; with few landmarks the share is a guess.
+  // Even at the right place corners are missed, and with few landmarks the share is uncertain: regularise it.
   const double there = (refound + 2.0) / (established + 10.0);
   return points * explainedCells() * there / contradiction;
 }

@@ -8,9 +8,9 @@ namespace vip_slam {
 namespace {
 
 constexpr int kEvery = 3;                          // nodes of the grid, in both directions
-constexpr std::size_t kFewest = 8;                 // points that make a plane worth it
-constexpr double kOnPlane = 0.03, kNear = 0.10;    // metres: the view's surface, the other's
-constexpr double kSigma = 0.01, kIndependent = 6;  // metres; points of one plane that err on their own
+constexpr std::size_t kFewest = 8;                 // points of a plane that is used
+constexpr double kOnPlane = 0.03, kNear = 0.10;    // metres, distance from the plane of the view's point, of the grid's
+constexpr double kSigma = 0.01, kIndependent = 6;  // metres; effective number of independent points of a plane
 
 }  // namespace
 
@@ -34,7 +34,7 @@ std::vector<PlaceSurface> matchSurfaces(const Map& map, KeyframeId view, const D
       if (tc < 0 || tr < 0 || tc >= theirs.cols || tr >= theirs.rows || theirs.at(tc, tr) <= 0) continue;
       const Eigen::Vector3d q_W = T_W_V * model.unproject(theirs.pixel(tc, tr), theirs.at(tc, tr));
       const Eigen::Vector3d p_W = T_W_C * p_C;
-      // At an edge between two planes the spot says nothing about which of them it is.
+      // At an edge between two planes the point cannot be assigned.
       const MapPlane *shown = nullptr, *nearest = nullptr;
       int on = 0;
       for (const auto& seen : kf.planes) {

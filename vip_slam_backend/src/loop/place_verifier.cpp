@@ -105,7 +105,7 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
   result->reason = words("%.0f inliers, depth agreement %.2f", result->inliers, result->depth_agreement);
 }
 
-// A keyframe in poor texture has few corners that come again; those around it have others.
+// In poor texture few corners are detected again, so use the neighbouring keyframes' corners as well.
 std::vector<PlaceMatch> PlaceVerifier::match(const Map& map, const Keyframe& query, const BowResult& query_bow,
                                              KeyframeId match, const KeyframeDatabase& database,
                                              const std::function<bool(KeyframeId)>& allowed) const {

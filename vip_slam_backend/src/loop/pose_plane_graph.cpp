@@ -5,13 +5,14 @@
 
 #include <ceres/ceres.h>
 
+#include "../util/union_find.h"
 #include "vip_slam_backend/factors/pose_plane.h"
 #include "vip_slam_backend/factors/relative_pose.h"
 
 namespace vip_slam {
 namespace {
 
-using YawPosition = std::array<double, 4>;  // yaw turned since the start, position
+using YawPosition = std::array<double, 4>;  // yaw relative to the start, position
 using PlaneVector = std::array<double, 4>;  // n, d
 
 SE3 poseOf(const Eigen::Quaterniond& R_0, const double* x) {
@@ -65,7 +66,7 @@ class PosePlaneCost : public ceres::SizedCostFunction<3, 4, 4> {
     r = edge_.sqrt_information * posePlaneResidual(T, plane, edge_.measured_I, &J_pose, &J_plane);
     if (jacobians && jacobians[0]) store<3>(edge_.sqrt_information * held<3>(J_pose, T), jacobians[0]);
     if (jacobians && jacobians[1]) {
-      // From the factor's tangent basis to the ambient (n, d) that the manifold projects again.
+      // From the factor's tangent basis to the ambient (n, d), which the manifold projects to its own tangent.
       Eigen::Matrix<double, 3, 4> to_tangent = Eigen::Matrix<double, 3, 4>::Zero();
       to_tangent.topLeftCorner<2, 3>() = tangentBasis(plane.n).transpose();
       to_tangent(2, 3) = 1;
@@ -77,23 +78,6 @@ class PosePlaneCost : public ceres::SizedCostFunction<3, 4, 4> {
  private:
   PosePlaneEdge edge_;
   Eigen::Quaterniond R_;
-};
-
-// Union-find over keyframes and planes.
-class Parts {
- public:
-  std::size_t find(std::size_t k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-  void join(std::size_t a, std::size_t b) { parent_[std::max(find(a), find(b))] = std::min(find(a), find(b)); }
-  std::size_t add() {
-    parent_.push_back(parent_.size());
-    return parent_.size() - 1;
-  }
-
- private:
-  std::vector<std::size_t> parent_;
 };
 
 }  // namespace
@@ -117,23 +101,23 @@ PosePlaneSolution PosePlaneGraph::solve(int max_iterations) const {
   if (poses_.empty()) return solution;
   std::map<KeyframeId, YawPosition> x;
   std::map<PlaneId, PlaneVector> y;
-  std::map<KeyframeId, std::size_t> pose_part;
-  std::map<PlaneId, std::size_t> plane_part;
-  Parts parts;
+  std::map<KeyframeId, int> pose_part;
+  std::map<PlaneId, int> plane_part;
+  UnionFind parts(static_cast<int>(poses_.size() + planes_.size()));
+  int next = 0;
   for (const auto& p : poses_) {
     x[p.first] = {0, p.second.t().x(), p.second.t().y(), p.second.t().z()};
-    pose_part[p.first] = parts.add();
+    pose_part[p.first] = next++;
   }
   for (const auto& p : planes_) {
     y[p.first] = {p.second.n.x(), p.second.n.y(), p.second.n.z(), p.second.d};
-    plane_part[p.first] = parts.add();
+    plane_part[p.first] = next++;
   }
 
   ceres::Problem problem;
-  std::vector<ceres::ResidualBlockId> relative_blocks;
   for (const RelativePoseEdge& e : relative_) {
     auto* cost = new RelativeCost(e, poses_.at(e.i).rotation(), poses_.at(e.j).rotation());
-    relative_blocks.push_back(problem.AddResidualBlock(cost, nullptr, x[e.i].data(), x[e.j].data()));
+    problem.AddResidualBlock(cost, nullptr, x[e.i].data(), x[e.j].data());
     parts.join(pose_part[e.i], pose_part[e.j]);
   }
   for (const PosePlaneEdge& e : pose_plane_) {
@@ -162,11 +146,6 @@ PosePlaneSolution PosePlaneGraph::solve(int max_iterations) const {
     if (!summary.IsSolutionUsable()) return solution;
     solution.iterations = static_cast<int>(summary.iterations.size());
     solution.chi2 = 2.0 * summary.final_cost;
-  }
-  for (const ceres::ResidualBlockId block : relative_blocks) {
-    double cost = 0;
-    problem.EvaluateResidualBlock(block, false, &cost, nullptr, nullptr);
-    solution.relative_chi2.push_back(2.0 * cost);
   }
   for (const auto& p : x) solution.T_W_I[p.first] = poseOf(poses_.at(p.first).rotation(), p.second.data());
   for (const auto& p : y)

@@ -7,18 +7,18 @@
 namespace vip_slam {
 namespace {
 
-// Views that prove a landmark, however often it was looked for in vain: predictions know of nothing that hides it, and
-// the views of its own track count neither as predicted nor as found.
+// With this many views a landmark is kept however often it was not found: predictions do not model occlusion, and the
+// views of its own track count neither as predicted nor as found.
 constexpr std::size_t kProven = 4;
 
-constexpr int kJudged = 10;                // keyframes that just left the window, and as many older ones in turn
-constexpr std::size_t kSmallMap = 3;       // times the keyframes that are a crowd: all together they cost little
-constexpr std::size_t kAtOnce = 2;         // out of a crowd, which is another one without them
-constexpr double kLongest = 10.0;          // times the longest IMU factor, in a crowd
-constexpr int kTies = 5;                   // loops between two odometries that are kept
-constexpr std::size_t kSeenElsewhere = 4;  // views of a landmark that can do without one
+constexpr int kJudged = 10;                // keyframes judged that just left the window, and as many older ones in turn
+constexpr std::size_t kSmallMap = 3;       // times above_covisible: smaller maps have no crowds, since they cost little
+constexpr std::size_t kAtOnce = 2;         // removed from crowds per call, since each removal changes the crowd
+constexpr double kLongest = 10.0;          // largest factor on max_imu_seconds, in a crowd
+constexpr int kTies = 5;                   // loops between two odometries whose ends are kept
+constexpr std::size_t kSeenElsewhere = 4;  // views of a landmark for which one view is redundant
 
-/// Those whose time has come, oldest first: what just left the window, and each older one again and again.
+/// Keyframes to judge now, oldest first: those that just left the window, and a share of the older ones in turn.
 std::vector<KeyframeId> candidates(const Map& map, int window) {
   std::vector<KeyframeId> ids;
   for (const auto& entry : map.keyframes()) ids.push_back(entry.first);
@@ -32,7 +32,7 @@ std::vector<KeyframeId> candidates(const Map& map, int window) {
   return list;
 }
 
-/// Ends of the oldest few loops between each two odometries: without any these would be parts that nothing ties.
+/// Ends of the oldest few loops between each two odometries, which would be separate parts of the map without them.
 std::set<KeyframeId> endsOfTies(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> count;
   std::set<KeyframeId> ends;
@@ -46,7 +46,7 @@ std::set<KeyframeId> endsOfTies(const Map& map, const std::vector<std::pair<Keyf
   return ends;
 }
 
-/// Three more at least: neighbours in time mostly see what a keyframe sees.
+/// Whether at least three other keyframes observe the plane; searched from the neighbours in time, which mostly do.
 bool isHeldByOthers(PlaneId plane, const MapKeyframe& kf, const Map& map) {
   constexpr int kEnough = 3;
   int others = 0;
@@ -59,7 +59,7 @@ bool isHeldByOthers(PlaneId plane, const MapKeyframe& kf, const Map& map) {
   return others >= kEnough;
 }
 
-/// Landmarks with fewer than `proven` views do not count.
+/// Whether enough landmarks and all planes are seen elsewhere; landmarks with fewer than `proven` views do not count.
 bool isRedundant(const MapKeyframe& kf, const Map& map, double redundancy, std::size_t proven) {
   int total = 0, redundant = 0;
   for (const LandmarkId landmark : kf.landmarks) {
@@ -69,7 +69,7 @@ bool isRedundant(const MapKeyframe& kf, const Map& map, double redundancy, std::
     redundant += views >= kSeenElsewhere;
   }
   if (total < 20 || redundant < redundancy * total) return false;
-  // A keyframe that alone holds a plane stays.
+  // A keyframe whose planes too few others observe stays.
   return std::all_of(kf.planes.begin(), kf.planes.end(),
                      [&](const auto& plane) { return isHeldByOthers(plane.first, kf, map); });
 }
@@ -108,17 +108,18 @@ std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window,
   for (const KeyframeId id : candidates(*map, window)) {
     const MapKeyframe& kf = map->keyframe(id);
     if (kf.previous == 0 || kf.next == 0 || !kf.imu || !map->keyframe(kf.next).imu) continue;
-    // How far the keyframes around it are more than enough.
+    // Number of covisible keyframes relative to the limit.
     const double crowd =
         crowds ? static_cast<double>(map->covisible(id).size()) / static_cast<double>(options.above_covisible) : 0.0;
     if (!too_large && (crowd <= 1 || out_of_crowds >= kAtOnce)) continue;
-    // Where a room is seen again and again every keyframe is the end of some loop, and landmarks say the same.
+    // In a room that is seen again and again every keyframe is the end of some loop, whose information the shared
+    // landmarks have as well.
     if (kf.loop_keyframe && (crowd <= 1 || ties.count(id) != 0)) continue;
-    // A limit on time alone lets a room grow for as long as one stays in it; steep, so that what is no crowd keeps its
-    // IMU.
+    // With a fixed limit on the IMU factor a room's keyframes would grow with the time spent there. The limit rises
+    // steeply, so that keyframes outside crowds keep their IMU factors.
     const double longest = options.max_imu_seconds * std::clamp(crowd * crowd * crowd, 1.0, kLongest);
     if (map->keyframe(kf.next).imu->back().t - kf.imu->front().t > longest) continue;
-    // In a crowd a landmark that few of so many saw is a mistake or has moved.
+    // In a crowd a landmark that only few keyframes saw is a mismatch or has moved.
     if (!isRedundant(kf, *map, options.redundancy, crowd > 1 ? kSeenElsewhere : 1)) continue;
     map->removeKeyframe(id, noise, longest);
     removed.push_back(id);

@@ -6,6 +6,14 @@
 
 namespace vip_slam {
 
+namespace {
+
+constexpr double kGate = 12.0;               // px; a known track farther than this from its projection is not added
+constexpr double kLeastParallax = 1.0;       // degrees between the two outermost rays, for triangulation
+constexpr double kTriangulationError = 3.0;  // px; largest reprojection error of a triangulated point
+
+}  // namespace
+
 int LandmarkMaker::process(KeyframeId id, Map* map, const std::function<bool(KeyframeId)>& allowed) {
   const KeyframePtr data = map->keyframe(id).data;
   const SE3 T_W_C = map->keyframe(id).T_W_C(), T_C_W = T_W_C.inverse();
@@ -17,17 +25,18 @@ int LandmarkMaker::process(KeyframeId id, Map* map, const std::function<bool(Key
     const MapObservation here{id, k};
     const LandmarkId known = map->resolve(f.id);
     if (const MapLandmark* landmark = map->findLandmark(known)) {
-      // The front end looks for the map's landmarks also where only a guess says that they should be.
+      // The front end searches the map's landmarks also when T_map_odom is only a guess.
       if (allowed && !allowed(landmark->host())) continue;
       const Eigen::Vector3d p = T_C_W * landmark->p_W;
-      const bool near =
-          p.z() > 0.05 && (p.head<2>() / p.z() - f.xy.cast<double>()).norm() * options_.focal < options_.gate_px;
-      // A landmark with one view is only as good as that view's depth: the track itself is the better witness.
+      const bool near = p.z() > 0.05 && (p.head<2>() / p.z() - f.xy.cast<double>()).norm() * focal_ < kGate;
+      // With one view the landmark's position rests on one depth reading; then the track is more reliable than the
+      // gate.
       if (near || landmark->observations.size() < 2) map->addObservation(known, here);
       continue;
     }
-    if (known != f.id) continue;  // merged into a landmark that is gone
-    // Views that waited; one of them may have been recognised as a known landmark meanwhile: then the track is that.
+    if (known != f.id) continue;  // merged into a landmark that was removed
+    // Waiting views of the track; one of them may have been matched with a known landmark meanwhile, which then owns
+    // it.
     std::vector<MapObservation> views;
     LandmarkId recognised = map->keyframe(id).landmarks[k];
     const auto waited = waiting_.find(f.id);
@@ -82,14 +91,14 @@ bool LandmarkMaker::triangulate(const Map& map, const std::vector<MapObservation
   double smallest = 1;
   for (std::size_t i = 0; i < rays.size(); ++i)
     for (std::size_t j = i + 1; j < rays.size(); ++j) smallest = std::min(smallest, rays[i].dot(rays[j]));
-  if (smallest > std::cos(options_.min_parallax_deg * M_PI / 180.0)) return false;
+  if (smallest > std::cos(kLeastParallax * M_PI / 180.0)) return false;
   *p_W = A.ldlt().solve(b);
   if (!p_W->allFinite()) return false;
   for (const MapObservation& o : views) {
     const Eigen::Vector3d p = map.keyframe(o.keyframe).T_W_C().inverse() * *p_W;
     if (p.z() < 0.1 || p.z() > 50) return false;
     const Eigen::Vector2d error = p.head<2>() / p.z() - map.feature(o).xy.cast<double>();
-    if (error.norm() * options_.focal > 3.0) return false;
+    if (error.norm() * focal_ > kTriangulationError) return false;
   }
   return true;
 }

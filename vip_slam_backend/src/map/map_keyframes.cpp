@@ -64,7 +64,7 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   }
   if (!keyframe.imu.empty() && keyframe.imu.back().t - keyframe.imu.front().t > map_limits::kLongestImu)
     return name + "its IMU samples span hours";
-  // All keyframes take over what the newest one says of the camera.
+  // The newest keyframe's camera correction is applied to all keyframes.
   const CameraCorrection& camera = keyframe.frame.camera_correction;
   if (!std::isfinite(camera.offset) || !(camera.bearing.value.cwiseAbs().maxCoeff() < kMostBearing) ||
       !camera.bearing.value.allFinite() || !camera.shift.px.allFinite() || !camera.shift.bearing.allFinite() ||
@@ -107,7 +107,7 @@ MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, co
   }
   try {
     return insert(data, state, previous, imu, noise);
-  } catch (const std::invalid_argument& e) {  // numbers, each in its range, that cannot be integrated together
+  } catch (const std::invalid_argument& e) {  // numbers in range that cannot be integrated together
     throw MapError(name + ": IMU samples: " + e.what());
   }
 }
@@ -163,7 +163,7 @@ void Map::adoptCameraCorrection(const CameraCorrection& correction) {
   for (auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.data->frame.camera_correction == correction) continue;
     const KeyframePtr corrected = withCameraCorrection(kf.data, correction);
-    // Samples that lie in the keyframe's data must not hold on to what that was.
+    // IMU samples inside the keyframe's data must not keep the old data alive.
     if (kf.imu && kf.imu.get() == &kf.data->imu) kf.imu = {corrected, &corrected->imu};
     kf.data = corrected;
     for (auto& entry : kf.planes) setCameraCorrection(correction, &entry.second);
@@ -175,7 +175,7 @@ void Map::adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise&
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
   for (auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.gyro_correction == correction) continue;
-    // What stands still measures the same as before.
+    // The corrected rate of a body at rest must stay zero.
     kf.state.bias_gyro = (I + correction) * (I + kf.gyro_correction).inverse() * kf.state.bias_gyro;
     kf.gyro_correction = correction;
     others.push_back(id);

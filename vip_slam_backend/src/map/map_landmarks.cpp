@@ -8,7 +8,7 @@
 namespace vip_slam {
 
 int hammingDistance(const Descriptor& a, const Descriptor& b) {
-  // Baseline x86-64 has no popcount instruction: sums of bit fields, pairs of words sharing the later steps.
+  // Baseline x86-64 has no popcount instruction: add bit fields, with the later steps shared by pairs of words.
   constexpr std::uint64_t k1 = 0x5555555555555555u, k2 = 0x3333333333333333u, k4 = 0x0F0F0F0F0F0F0F0Fu;
   std::uint64_t x[4], y[4];
   std::memcpy(x, a.data(), 32);
@@ -150,7 +150,7 @@ void Map::setPosition(LandmarkId id, const Eigen::Vector3d& p_W) {
 }
 
 void Map::updateDescriptor(MapLandmark& landmark) {
-  // The medoid of the newest few: old views of a long track say little about what it looks like from here.
+  // The medoid of the newest few: old views of a long track differ from the present appearance.
   constexpr std::size_t kNewest = 8;
   const std::size_t n = landmark.observations.size(), begin = n > kNewest ? n - kNewest : 0;
   int best_sum = std::numeric_limits<int>::max();

@@ -84,13 +84,13 @@ bool Map::setPlaneObservation(const PlaneObservation& observation) {
   for (const PlanePoint& p : observation.points)
     if (!p.p_C.allFinite() || !(p.sigma > 0)) return false;
   MapKeyframe& kf = keyframe(observation.keyframe);
-  // Kept without points it would count as one that fits perfectly.
+  // An observation without points would count as a perfect fit.
   if (observation.points.empty()) {
     kf.planes.erase(observation.plane);
     return true;
   }
   PlaneObservation& stored = kf.planes[observation.plane] = observation;
-  // The plane module may not have heard yet of what its keyframe's depth is corrected by now.
+  // The plane module may not know the present correction of this keyframe's depth yet.
   setCameraCorrection(kf.data->frame.camera_correction, &stored);
   return true;
 }

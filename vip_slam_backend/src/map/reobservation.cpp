@@ -109,7 +109,7 @@ ReobservationResult Reobservation::process(KeyframeId id, Map* map,
       if (f.depth > 0 && std::abs(f.depth - p_C.z()) > 4 * f.depth_sigma + 0.03 * p_C.z()) return;
       const int distance = hammingDistance(f.descriptor, landmark->descriptor);
       if (distance < best) {
-        // Two detections of one corner are no rivals.
+        // Two detections of one corner (within 2 px) do not compete in the ratio test.
         if (best <= options_.max_hamming && (features[best_feature].pixel - f.pixel).squaredNorm() > 4) second = best;
         best = distance;
         best_feature = k;
@@ -127,7 +127,7 @@ ReobservationResult Reobservation::process(KeyframeId id, Map* map,
       }
       continue;
     }
-    // The same point under two tracks: the older name stays.
+    // The same point with two tracks: the older landmark id stays.
     const MapLandmark& other = map->landmark(own);
     const double pixels = (features[best_feature].pixel.cast<double>() - uv).norm();
     if (pixels * pixels > options_.merge_chi2) continue;

@@ -1,4 +1,4 @@
-// Whether a stored map and the present camera go together.
+// Checks that a stored map fits the present camera.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -9,8 +9,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kMostFocal = 0.01;   // share by which focal lengths may differ: calibrations of one camera do
-constexpr double kMostCentre = 0.05;  // share of the width by which principal points may
+constexpr double kMostFocal = 0.01;   // relative difference of focal lengths, as between calibrations of one camera
+constexpr double kMostCentre = 0.05;  // difference of principal points as a share of the width
 
 bool differ(double a, double b) { return std::abs(a - b) > kMostFocal * std::max(a, b); }
 
@@ -28,7 +28,7 @@ std::string describe(const CameraIntrinsics& camera) {
 void requireCamera(const StoredMap& stored, const CameraIntrinsics& camera, const std::string& path) {
   if (!stored.camera) return;
   const CameraIntrinsics& made = *stored.camera;
-  // Depth of stored keyframes is read with the present camera.
+  // The depth grids of stored keyframes are interpreted with the present camera's intrinsics.
   const double centre = std::hypot(made.cx - camera.cx, made.cy - camera.cy);
   if (made.width == camera.width && made.height == camera.height && !differ(made.fx, camera.fx) &&
       !differ(made.fy, camera.fy) && centre <= kMostCentre * camera.width && isFisheye(made) == isFisheye(camera))

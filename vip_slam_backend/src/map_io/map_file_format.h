@@ -1,4 +1,4 @@
-// What writer and reader of map files share.
+// Constants shared by writer and reader of map files.
 #pragma once
 
 #include <cstddef>
@@ -9,16 +9,16 @@ namespace map_file {
 
 constexpr char kMagic[8] = {'V', 'I', 'P', 'M', 'A', 'P', 0, 0};
 constexpr std::uint32_t kVersion = 6;
-/// Without the features' pixel_sigma; until 2 one track a landmark, until 3 no motion of the odometry, until 4 no
-/// camera, until 5 no scale of the IMU's noise.
+/// Oldest readable version. Version 1 lacks the features' pixel_sigma, up to 2 a landmark has a single track, up to 3
+/// there is no odometry motion, up to 4 no camera, up to 5 no scale of the IMU's noise.
 constexpr std::uint32_t kOldestVersion = 1;
-constexpr float kPixelSigmaOfVersion1 = 0.3f;  ///< what tracks were worth on average, px
+constexpr float kPixelSigmaOfVersion1 = 0.3f;  ///< average sigma of tracks, px
 constexpr std::size_t kHeader = 8 + 4 + 4 + 8;
 constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;
-constexpr std::size_t kMostTracks = 255;  ///< of one landmark that are told apart
+constexpr std::size_t kMostTracks = 255;  ///< largest number of a track within a landmark
 constexpr double kDepthUnit = 0.001;      ///< metres per unit of a stored depth grid
 
-// Smallest sizes of elements, to refuse counts that cannot be true.
+// Smallest sizes of elements in bytes, to reject counts that exceed the file.
 constexpr std::size_t kFeatureBytes = 7 * 4 + 2 + 32 + 4;
 constexpr std::size_t kImuBytes = 7 * 8;
 constexpr std::size_t kPlanePointBytes = 4 * 4;

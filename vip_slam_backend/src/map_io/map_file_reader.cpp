@@ -153,7 +153,7 @@ RelativeMotion readMotion(ByteReader& in) {
   return motion;
 }
 
-// One keyframe into the map; its observations by landmark into `seen`.
+// Reads one keyframe into the map; its observations, by landmark, into `seen`.
 void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_limit, LandmarkId first_landmark,
                   const ImuNoise& noise, Map& map, std::vector<std::vector<MapObservation>>& seen) {
   auto data = std::make_shared<Keyframe>();
@@ -203,7 +203,7 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   if (!imu.empty() && imu.back().t - imu.front().t > map_limits::kLongestImu) in.fail("IMU samples span hours");
   try {
     map.restoreKeyframe(data, state, previous, imu, noise).loop_keyframe = loop_keyframe;
-  } catch (const std::invalid_argument& e) {  // numbers, each in its range, that cannot be integrated together
+  } catch (const std::invalid_argument& e) {  // numbers in range that cannot be integrated together
     in.fail(std::string("IMU samples: ") + e.what());
   }
   const std::size_t planes = in.count(8 + 11 * 8 + 4, "plane observations");
@@ -288,7 +288,7 @@ StoredMap parseMap(const std::uint8_t* data, std::size_t size, const std::string
 StoredMap loadMapFile(const std::string& path, const ImuNoise& noise, LandmarkId first_landmark) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   if (!in) throw std::runtime_error(path + ": cannot be opened, expected a map file");
-  // A folder opens, and claims to be as long as can be.
+  // A folder can be opened, but its reported size is meaningless.
   if (std::filesystem::is_directory(path)) throw std::runtime_error(path + ": is a folder, expected a map file");
   std::string bytes(static_cast<std::size_t>(std::max<std::streamoff>(0, in.tellg())), '\0');
   in.seekg(0);

@@ -12,9 +12,9 @@
 namespace vip_slam {
 namespace {
 
-// Reading normalises, and rounding lets some rotations wander when that is done again and again. So three coefficients
-// are written on a grid coarser than that by some bits, and the fourth, a large one, follows from them: whatever the
-// last bits in memory are, the next save finds the same four.
+// Reading normalises the quaternion, and by rounding some rotations would drift over repeated saving and loading. So
+// three coefficients are rounded to a grid some bits coarser than double precision, and the fourth, a large one, is
+// computed from them: the next save then gives the same four numbers.
 Eigen::Vector4d settled(const Eigen::Quaterniond& rotation) {
   constexpr double kGrid = 0x1p-49, kLarge = 0.4;  // one of four is at least a half
   Eigen::Vector4d q = rotation.coeffs();
@@ -93,12 +93,12 @@ void write(ByteWriter& out, const PlaneObservation& observation) {
   }
 }
 
-// Landmarks by their place in the file, and the tracks of each that were written so far.
+// Index of each landmark in the file, and its tracks that were written so far.
 struct LandmarkNumbers {
   std::unordered_map<LandmarkId, std::uint32_t> index;
   std::vector<std::vector<LandmarkId>> tracks;
 
-  // 1, 2, 3, ...; 0: not tracked, or a track that is no landmark and means nothing to a later session.
+  // Number of the feature's track within the landmark, from 1 on; 0: no track or no landmark, not needed later.
   std::uint8_t track(const Feature& f, LandmarkId landmark) {
     if (f.id == kNoLandmark || landmark == kNoLandmark) return 0;
     std::vector<LandmarkId>& known = tracks[index.at(landmark)];

@@ -13,12 +13,12 @@ namespace {
 
 constexpr int kKeyframes = 200;
 constexpr double kFarthest = 12.0;         // m
-constexpr double kPlaneInformation = 1e2;  // 1/m^2, so that a plane of one point has a place
-constexpr double kOutlier = 3.0;           // sigmas, of a loss that forgets what is far off
-constexpr double kMostOff = 0.1;           // of its depth; a point farther off its plane has none but its own
-constexpr double kUneven = 4.0;            // times the usual squared residual: what passes for one plane may be several
+constexpr double kPlaneInformation = 1e2;  // 1/m^2, prior so that a plane with a single point is determined
+constexpr double kOutlier = 3.0;           // sigmas, scale of a redescending loss
+constexpr double kMostOff = 0.1;           // share of the reading; a point farther off its plane uses its own reading
+constexpr double kUneven = 4.0;            // times the usual squared residual: beyond, "one plane" may be several
 
-/// What a plane's points say of the entries, of the plane's normal (two angles) and distance, and what ties them.
+/// Normal equations of a plane's points: of the entries, of the plane's normal (two angles) and distance, and mixed.
 struct PlaneSystem {
   explicit PlaneSystem(Eigen::Index entries)
       : own(Eigen::MatrixXd::Zero(entries, entries)),
@@ -39,7 +39,7 @@ struct PlaneSystem {
   double squares = 0, points = 0;  ///< of residuals in sigmas
 };
 
-/// The median over all points.
+/// Median of the planes' misfits, weighted by their points.
 double usualMisfit(const std::map<PlaneId, PlaneSystem>& systems) {
   std::vector<std::pair<double, double>> list;
   double all = 0, sum = 0;
@@ -55,7 +55,7 @@ double usualMisfit(const std::map<PlaneId, PlaneSystem>& systems) {
   return 1.0;
 }
 
-/// What a curve's entries are asked with: `value`, m, is added to readings now.
+/// Linearisation point of a curve's entries: `value`, m, is added to the readings at present.
 struct Question {
   const Eigen::VectorXd& value;
   const DepthNoise& noise;
@@ -69,7 +69,7 @@ double between(const Eigen::VectorXd& value, double z) {
   return (1 - share) * value(i) + share * value(i + 1);
 }
 
-/// `u`, `v`: along the plane.
+/// Adds one point to the system of its plane. `u`, `v`: unit vectors along the plane.
 void add(const PlanePoint& point, const SE3& T_W_C, const Plane& plane, const Eigen::Vector3d& u,
          const Eigen::Vector3d& v, const Question& question, PlaneSystem* system) {
   const double reading = point.p_C.z();
@@ -78,8 +78,8 @@ void add(const PlanePoint& point, const SE3& T_W_C, const Plane& plane, const Ei
   const double along = plane.n.dot(ray);
   const Eigen::Vector3d corrected = ray * (reading + between(question.value, reading)) + T_W_C.t();
   const double off = (plane.n.dot(corrected) + plane.d) / along;
-  // By what would be read of the plane rather than by the reading: one that noise makes too short would pass for a
-  // better one, and for one of another entry.
+  // Use the depth expected from the plane instead of the noisy reading: a reading that noise makes too short would get
+  // a smaller sigma and count for another entry.
   const double z = std::abs(off) < kMostOff * reading ? reading - off : reading;
   const Eigen::Index i = entryOf(z);
   if (!(z > 0) || z > question.noise.unbiasedRange() || i + 1 >= question.value.size()) return;

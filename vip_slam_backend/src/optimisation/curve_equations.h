@@ -1,5 +1,5 @@
-// What the depth points on planes say about an error of the camera's that depends on the reading alone: a wall seen
-// from near and from far has one place. Poses are held, planes are free.
+// Normal equations for a depth error that depends on the reading alone, from depth points on planes: a wall seen from
+// near and from far has one place. Poses are fixed, planes are free.
 #pragma once
 
 #include <map>
@@ -15,16 +15,16 @@ namespace vip_slam {
 
 using PlaneSet = std::map<PlaneId, const Plane*>;
 
-/// Fewer keyframes say nothing.
+/// Smallest number of keyframes for a fit.
 constexpr int kLeastCurveKeyframes = 15;
 
 /// This session's newest keyframes (200 at most) with depth points on planes.
 std::vector<const MapKeyframe*> newestKeyframesOnPlanes(const Map& map);
 PlaneSet allPlanes(const Map& map);
-/// Two sets with about as many points each.
+/// Splits the planes into two sets with about equally many points.
 std::pair<PlaneSet, PlaneSet> halves(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes);
 
-/// Entries of a curve that reaches over the camera's range, 12 m at most.
+/// Number of entries of a curve over the camera's range, 12 m at most.
 int curveEntries(const DepthNoise& noise);
 
 /// Normal equations of a curve's entries (DepthCurve::kStep apart) after the planes' elimination.
@@ -32,13 +32,13 @@ struct CurveEquations {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;   ///< gradient at the value they were built at
   double scatter = 1;  ///< squared residual per point: sigmas allow for errors that all points of a keyframe share
-  /// What each keyframe has of g, in columns. All its points share the error of its pose, so that these scatter as
-  /// errors do, however many points there are.
+  /// Contribution of each keyframe to g, in columns. All points of a keyframe share its pose's error, so the scatter of
+  /// these columns gives the true uncertainty, independent of the number of points.
   Eigen::MatrixXd shares;
 };
 
-/// About `value`, m, what readings are added there. Points far off their plane count for nothing, planes that fit much
-/// worse than usual for little; points of planes beyond the range that noise leaves whole for nothing as well.
+/// Linearised at `value`, m, the correction of the readings. Points far off their plane have hardly any weight, planes
+/// that fit much worse than usual little; points beyond DepthNoise::unbiasedRange() are not used.
 CurveEquations curveEquations(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes,
                               const Eigen::VectorXd& value, const DepthNoise& noise);
 

@@ -13,13 +13,13 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kEntrySigma = 0.01;   // m, of an entry before anything is known
-constexpr double kBendSigma = 0.002;   // m, of an entry against the line between its neighbours
-constexpr int kRounds = 3;             // of the weights
-constexpr double kKnownSigma = 0.001;  // m: entries below it decide
+constexpr double kEntrySigma = 0.01;   // m, prior of an entry
+constexpr double kBendSigma = 0.002;   // m, prior of an entry against the line between its neighbours
+constexpr int kRounds = 3;             // of reweighting
+constexpr double kKnownSigma = 0.001;  // m: entries with a smaller sigma count as known
 constexpr int kLeastKnown = 6;         // entries
-// Of the root mean square of the entries, what is worth the trouble, m, and how many sigmas; and how far the two
-// halves of the planes have to agree.
+// The root mean square of the known entries must exceed kWorthwhile, m, and kSure sigmas; and the curves from two
+// halves of the planes must have at least this correlation.
 constexpr double kWorthwhile = 5e-4, kSure = 4.0, kLeastCorrelation = 0.5;
 
 constexpr float kWorthTelling = 0.002f;  // m
@@ -32,7 +32,7 @@ class CurveFit {
  public:
   CurveFit(int entries, const DepthNoise& noise) : entries_(entries), noise_(noise), value_(VectorXd::Zero(entries)) {}
 
-  /// With the weights of the present value.
+  /// One Gauss-Newton step with the weights of the present value.
   void round(const std::vector<const MapKeyframe*>& keyframes, const PlaneSet& planes) {
     CurveEquations equations = curveEquations(keyframes, planes, value_, noise_);
     information_ = equations.H.diagonal() / equations.scatter;
@@ -45,7 +45,7 @@ class CurveFit {
 
   const VectorXd& value() const { return value_; }
   const VectorXd& sigma() const { return sigma_; }
-  const VectorXd& information() const { return information_; }  ///< of each entry, without what is assumed of it
+  const VectorXd& information() const { return information_; }  ///< of each entry, without its priors
 
  private:
   void addPriors(CurveEquations* equations) const {
@@ -63,7 +63,7 @@ class CurveFit {
   VectorXd value_, sigma_, information_;
 };
 
-/// Entries without what offset and scale explain, and which of them are known.
+/// Entries after removing the best offset and scale, and the indices of the known ones.
 struct CurveEstimate {
   VectorXd value, sigma, information;
   std::vector<int> known;
@@ -91,8 +91,8 @@ CurveEstimate estimateCurve(const std::vector<const MapKeyframe*>& keyframes, co
   return estimate;
 }
 
-/// Of what two estimates say about the entries that both know, besides offset and scale, which differ with where each
-/// has its points.
+/// Correlation of two estimates over the entries known to both, without offset and scale, which depend on the distances
+/// of each estimate's points.
 double correlation(const CurveEstimate& a, const CurveEstimate& b) {
   std::vector<int> common;
   std::set_intersection(a.known.begin(), a.known.end(), b.known.begin(), b.known.end(), std::back_inserter(common));
@@ -124,12 +124,12 @@ std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise)
   }
   const auto n = static_cast<double>(found.known.size());
   if (squares < n * kWorthwhile * kWorthwhile || ratios < n * kSure * kSure) return std::nullopt;
-  // Surfaces that pass for one plane bend the curve as well, but each plane its own way.
+  // Surfaces that are not exactly planar distort the curve as well, but each plane differently.
   const auto [first, second] = halves(keyframes, planes);
   const double agree = correlation(estimateCurve(keyframes, first, noise), estimateCurve(keyframes, second, noise));
   if (agree < kLeastCorrelation) return std::nullopt;
 
-  // Where few points were read, the less of it the fewer they are; next to nothing is the best guess beyond all.
+  // Shrink entries with little information towards zero, which is the best guess where there are no readings.
   DepthCurve curve;
   for (Eigen::Index i = 0; i < found.value.size(); ++i) {
     const double said = std::max(0.0, found.information(i)) * squares / n;

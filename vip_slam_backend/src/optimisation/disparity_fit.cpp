@@ -12,13 +12,13 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kOffsetSigma = 0.02, kScaleSigma = 0.02;  // m and share, of what comes with it and is not asked for
-constexpr int kFitRounds = 4;                              // of the weights, and of what is not linear
-// What is beyond doubt: sigmas, and of what all planes say the share that each half says. In maps of exact depth up to
-// 0.26 mm at one metre are found.
+constexpr double kOffsetSigma = 0.02, kScaleSigma = 0.02;  // m and share, priors of the nuisance offset and scale
+constexpr int kFitRounds = 4;                              // of reweighting and relinearisation
+// An error is significant above kCertain sigmas and, the first time, kFirst, 1/m, when each half of the planes gives at
+// least kLeastShare of it. In maps with exact depth errors of up to 0.26 mm at one metre are estimated.
 constexpr double kCertain = 3.0, kLeastShare = 0.5, kFirst = 3e-4;
-constexpr double kMost = 0.01;     // 1/m; a centimetre at one metre is no matter of calibration
-constexpr double kFurther = 4e-5;  // once there is an error its best estimate is the best guess
+constexpr double kMost = 0.01;     // 1/m; a centimetre at one metre is more than a calibration error
+constexpr double kFurther = 4e-5;  // 1/m; smallest further change once there is an error
 
 struct DisparityError {
   double value = 0, sigma = 0;  ///< 1/m
@@ -44,7 +44,7 @@ DisparityError fit(const std::vector<const MapKeyframe*>& keyframes, const Plane
     const Eigen::LDLT<Eigen::Matrix3d> ldlt(H);
     x -= ldlt.solve(g);
     if (!x.allFinite()) return {};
-    // By the scatter of points, and by that of whole keyframes, whose poses may be off.
+    // The larger sigma of two: by the scatter of points, and by that of keyframes, whose poses have errors.
     const Eigen::Vector3d row = ldlt.solve(Eigen::Vector3d::Unit(2));
     const Eigen::VectorXd moved = equations.shares.transpose() * (J * row) / equations.scatter;
     found = {x(2), std::sqrt(std::max({0.0, row(2), moved.squaredNorm()}))};
@@ -66,7 +66,7 @@ std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise,
     return std::nullopt;
   }
   if (!(std::abs(found.value) > std::max(kCertain * found.sigma, kFirst))) return std::nullopt;
-  // Surfaces that pass for one plane bend as well, but each plane its own way.
+  // Surfaces that are not exactly planar give an error as well, but each plane a different one.
   const auto [first, second] = halves(keyframes, planes);
   for (const PlaneSet& half : {first, second}) {
     if (!(fit(keyframes, half, noise).value / found.value > kLeastShare)) return std::nullopt;

@@ -15,7 +15,6 @@ GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job) {
   for (int round = 0; round < kRounds; ++round) {
     solution.built = buildProblem(map, globalScope(map), job.settings);
     solution.summary = solver->solve(solution.built.problem, options);
-    ++solution.rounds;
     if (round + 1 < kRounds) {
       storeProblem(solution.built, job.noise, &map);
       removeOutliers(solution.built, job.settings.measurement.outlier_chi2, &map);
@@ -44,7 +43,7 @@ void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map*
     for (const auto& plane : entry.second.planes) seen_by[plane.first] = entry.first;
   }
   map->moveKeyframes(moved);
-  // Planes that the solution says nothing about, such as those that became known meanwhile, go with who saw them last.
+  // Planes that the solution does not constrain, such as new ones, move with the newest keyframe that sees them.
   const std::vector<char> held = heldPlanes(solution.built.problem);
   for (std::size_t p = 0; p < solution.built.planes.size(); ++p)
     if (held[p]) seen_by.erase(solution.built.planes[p]);

@@ -9,7 +9,7 @@
 namespace vip_slam {
 namespace {
 
-// A landmark in the list of a frame that could host it.
+// A landmark and its view in a frame that could host it.
 struct Candidate {
   int landmark = 0, view = 0;
 };
@@ -34,7 +34,7 @@ void shareHosts(const LandmarkViews& views, const std::vector<int>& landmarks, c
   while (!queue.empty()) {
     const auto [count, frame] = queue.top();
     queue.pop();
-    if (count != left[frame]) {  // others took some meanwhile
+    if (count != left[frame]) {  // outdated: other hosts took some of its landmarks
       if (left[frame] > 0) queue.emplace(left[frame], frame);
       continue;
     }
@@ -64,7 +64,7 @@ bool seesWell(const SeenPlane& plane, const Eigen::Vector2f& xy) {
          -plane.distance / incidence >= kMinPlaneDepth;
 }
 
-// Takes the first and the last third of a track's views out of those that may host it.
+// Removes the first and the last third of a track's views from its possible hosts.
 void leaveMiddle(const LandmarkViews& views, int landmark, std::vector<char>* good) {
   const int first = views.first(landmark), end = first + static_cast<int>(views.end(landmark) - views.begin(landmark));
   const int count = static_cast<int>(std::count(good->begin() + first, good->begin() + end, 1));

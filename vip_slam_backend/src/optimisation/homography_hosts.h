@@ -1,4 +1,4 @@
-// Which keyframe each landmark on a plane is compared with: its host in the host-observer pairs of the homographies.
+// Chooses the host keyframe of each landmark on a plane, for the host-observer pairs of the homographies.
 #pragma once
 
 #include <vector>
@@ -8,13 +8,13 @@
 
 namespace vip_slam {
 
-/// Per landmark the view (counted from its first) that is its host, -1: none sees it well enough or it is on no plane.
-/// `plane`: per landmark, -1: none. A host must see the plane well and be of the point's own track, since its ray is
-/// what the others are compared with.
-/// The first such view; with `shared`, the frame that could host most of the landmarks still without host becomes
-/// theirs, whichever plane they are on, and so on: few hosts, so that few pairs of frames share a factor and the system
-/// is sparse. `middle`: only views from the middle of its track may host a landmark then. The host's noise is in all of
-/// its pairs; with views before and after it, what it does to the motion cancels.
+/// Per landmark the view (counted from its first) that is its host; -1: no view is suitable or it is on no plane.
+/// `plane`: per landmark, -1: none. A host must see the plane well and belong to the point's own track, since the other
+/// views are compared with its ray. Without `shared` the first such view. With `shared` the frame that can host most of
+/// the landmarks still without host becomes their host, whichever plane they are on, and so on: few hosts, so that few
+/// pairs of frames share a factor and the system is sparse. `middle`: then only views from the middle of its track may
+/// host a landmark. The host's noise is in all of its pairs; with views before and after it the effect on the motion
+/// cancels.
 std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>& plane,
                              const std::vector<BaPlane>& planes, const std::vector<FrameGeometry>& geometry,
                              bool shared, bool middle);

@@ -8,11 +8,12 @@
 namespace vip_slam {
 namespace {
 
-// Of the normalised square per degree of freedom: in sound sequences it is 0.5 in the median, 3 at the 95th percentile
-// and 11 at most, but for the first keyframes of an odometry.
+// Limit of the normalised squared residual per degree of freedom: in sequences without faults it is 0.5 in the median,
+// 3 at the 95th percentile and 11 at most, except for the first keyframes of an odometry.
 constexpr double kBelievable = 25.0;
 
-// Of tilt, velocity and biases. Where both keyframes are the odometry does not know, but what lies between them.
+// Covariance of the odometry's state without position: the absolute position is not known, but cancels in the relative
+// motion of the two keyframes.
 Matrix15d doubt(const Keyframe& keyframe) {
   Matrix15d P = keyframe.frame.covariance;
   P.middleRows<3>(3).setZero();

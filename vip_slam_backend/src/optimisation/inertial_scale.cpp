@@ -10,15 +10,15 @@
 namespace vip_slam {
 namespace {
 
-// Shorter intervals are joined: within them the poses' noise is no longer small against what acceleration moves.
+// Shorter intervals are joined, since in them the poses' noise is not small against the displacement by acceleration.
 constexpr double kLeastInterval = 0.5, kLongestInterval = 3.0;   // s
-constexpr double kLeastTime = 10.0;                              // s of all intervals
-constexpr double kLeastPoseSigma = 1e-5, kMostPoseSigma = 0.01;  // of a keyframe against its neighbour, m
+constexpr double kLeastTime = 10.0;                              // s, total of all intervals
+constexpr double kLeastPoseSigma = 1e-5, kMostPoseSigma = 0.01;  // of a keyframe relative to its neighbour, m
 constexpr int kPoseSigmaSteps = 8;
-constexpr double kTiltSigma = 0.01;      // of the map against gravity, rad
-constexpr double kGravitySigma = 0.002;  // relative, over the earth's places
-constexpr double kBiasSigma = 0.5;       // at the beginning of each chain, m/s^2
-// Above it the motion shows no more of the scale than the noise of the poses does.
+constexpr double kTiltSigma = 0.01;      // prior of the map's tilt against gravity, rad
+constexpr double kGravitySigma = 0.002;  // relative, variation over the earth
+constexpr double kBiasSigma = 0.5;       // prior at the beginning of each chain, m/s^2
+// With a larger sigma of the scale the motion is not informative enough: it is reported as unknown.
 constexpr double kLargestSigma = 0.01;
 constexpr double kSure = 5.0, kLeastDifference = 0.005;
 
@@ -30,7 +30,7 @@ struct Increments {
   double dt = 0;
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   Eigen::Vector3d alpha = Eigen::Vector3d::Zero(), beta = Eigen::Vector3d::Zero();      ///< at bias zero
-  Eigen::Matrix3d J_alpha = Eigen::Matrix3d::Zero(), J_beta = Eigen::Matrix3d::Zero();  ///< by the accelerometer's bias
+  Eigen::Matrix3d J_alpha = Eigen::Matrix3d::Zero(), J_beta = Eigen::Matrix3d::Zero();  ///< by the accelerometer bias
   Matrix6 covariance = Matrix6::Zero();
 
   void append(const Preintegration& next) {
@@ -51,8 +51,8 @@ struct Increments {
   }
 };
 
-/// Least squares over corrections of [what all intervals share | velocity, bias of one keyframe], the keyframes one
-/// after the other: x^T A x - 2 b^T x + c.
+/// Least squares over corrections of [states shared by all intervals | velocity, bias of one keyframe], keyframe by
+/// keyframe: x^T A x - 2 b^T x + c.
 class ScaleFit {
  public:
   static constexpr int kShared = 4;  ///< scale, tilt about the world's x and y, gravity
@@ -61,7 +61,7 @@ class ScaleFit {
     A_(3, 3) = 1.0 / (kGravitySigma * kGravitySigma * gravity * gravity);
   }
 
-  /// A keyframe without IMU from the one before.
+  /// Begins a chain: a keyframe without IMU from the one before.
   void begin() {
     forgetFirst();
     A_.diagonal().segment<3>(kShared).setConstant(1e-6);
@@ -97,8 +97,8 @@ class ScaleFit {
     Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
     covariance.topLeftCorner<6, 6>() = turn * imu.covariance * turn.transpose();
     covariance.diagonal().tail<3>().setConstant(random_walk * random_walk * dt);
-    // The adjustment has the poses give way to the IMU: what is left of a residual is its share in the sum of both
-    // noises.
+    // The bundle adjustment has already moved the poses towards the IMU, so a residual is only the IMU's share of it:
+    // scale it up to the sum of both noises.
     const Eigen::Matrix<double, 9, 1> share = covariance.llt().solve(r);
     covariance.diagonal().head<3>().array() += pose_variance_;
     r = covariance * share;
@@ -110,11 +110,11 @@ class ScaleFit {
     b_ += J.transpose() * r;
     c_ += r.squaredNorm();
     time_ += dt;
-    rows_ += 3;  // of six, three are the new velocity's
+    rows_ += 3;  // of six rows, three determine the new velocity
     forgetFirst();
   }
 
-  /// Ends the last chain. False when there is too little to go by.
+  /// Ends the last chain and solves. False with too little data.
   bool solve() {
     forgetFirst();
     if (time_ < kLeastTime || rows_ <= kShared) return false;
@@ -165,7 +165,7 @@ class ScaleFit {
   int rows_ = 0;
 };
 
-/// From keyframe to keyframe; without `from` a chain begins at `to`.
+/// IMU from one keyframe to another; without `from` a chain begins at `to`.
 struct Interval {
   const MapKeyframe *from, *to;
   Increments imu;
@@ -203,7 +203,7 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
     fit.solve();
     return fit;
   };
-  // How exact the poses are, the residuals say.
+  // The poses' sigma is the one for which the residuals are consistent, found by bisection.
   double low = kLeastPoseSigma, high = kMostPoseSigma;
   for (int step = 0; step < kPoseSigmaSteps; ++step) {
     const double middle = std::sqrt(low * high);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLeastDepth = 0.05, kMostApart = 4.0;
 
-// How many landmarks ahead its memory is asked for: the landmark itself, the list of its observations, their features.
+// Prefetch distances, in landmarks: of the landmark itself, the list of its observations, their features.
 constexpr std::size_t kAheadLandmark = 12, kAheadList = 8, kAheadFeatures = 4;
 
 void prefetch(const void* p, std::size_t bytes) {
@@ -123,7 +123,7 @@ void LandmarkViews::addPoints(const Map& map, const MapLandmark& landmark, const
                                         [](const Track& a, const Track& b) { return a.views < b.views; });
   points_.push_back(&landmark);
   first_.push_back(viewCount());
-  // Of each other track the view in its middle.
+  // Other tracks are tied to the longest one by their middle view.
   for (Track& track : tracks_) track.until_tie = track.views / 2;
   if (tracks_.size() > 1) findFirstDepths(map, landmark);
   for (const Seen& s : seen_) {

@@ -1,9 +1,10 @@
-// The landmarks of a problem and who sees them, in flat arrays: looked up in the map once, read by all who build
-// factors. Features lie scattered over the keyframes, beyond the second-level cache: what is needed of them is copied.
+// The landmarks of a problem and their views in flat arrays: looked up in the map once, read by all builders of
+// factors. Features are scattered over the keyframes' memory, beyond the second-level cache: the fields needed are
+// copied.
 //
-// A landmark that was found again is known by several tracks. Within a track every view matches one reference patch,
-// and its error is constant to a few hundredths of a pixel; another track began at a corner detected anew, half a pixel
-// of that image beside the first. So each track becomes a point of its own, and one view of it, as uncertain as that,
+// A landmark that was re-acquired has several tracks. Within a track all views match one reference patch, and their
+// common error is constant to a few hundredths of a pixel; another track began at a newly detected corner, about half a
+// pixel away in that image. So each track becomes a point of its own, and one view of it, with a sigma of that size,
 // ties it to the landmark's longest track.
 #pragma once
 
@@ -18,10 +19,10 @@ struct LandmarkView {
   int frame = 0;                                 ///< of the problem
   std::uint32_t feature_index = 0;               ///< in the keyframe
   Eigen::Vector2f xy = Eigen::Vector2f::Zero();  ///< undistorted normalised coordinates
-  float depth = 0, depth_sigma = 0;              ///< as the feature's
-  double sigma = 0;                              ///< of the view of this point, normalised
-  bool own_track = true;  ///< false: of another track than the point, or a corner that is not tracked
-  bool slides = false;    ///< of a track that slides with the motion
+  float depth = 0, depth_sigma = 0;              ///< those of the feature, metres
+  double sigma = 0;                              ///< one sigma of this view of the point, normalised
+  bool own_track = true;  ///< false: belongs to another track than the point, or is an untracked corner
+  bool slides = false;    ///< belongs to a track that slides with the motion
 };
 
 class LandmarkViews {
@@ -31,18 +32,18 @@ class LandmarkViews {
   LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes,
                 const PixelNoise& noise);
 
-  /// All sigmas grow by a factor.
+  /// Multiplies all sigmas by a factor.
   void inflate(double factor) {
     for (LandmarkView& v : views_) v.sigma *= factor;
   }
 
   int size() const { return static_cast<int>(points_.size()); }
   const MapLandmark& landmark(int l) const { return *points_[l]; }
-  /// Of the points of one landmark the first, which holds its longest track, stands for it.
+  /// The first point of a landmark, that of its longest track, represents the landmark.
   bool standsForLandmark(int l) const { return l == 0 || points_[l - 1] != points_[l]; }
   const LandmarkView* begin(int l) const { return views_.data() + first_[l]; }
   const LandmarkView* end(int l) const { return views_.data() + first_[l + 1]; }
-  /// Place of a landmark's first view in arrays over all views.
+  /// Index of a landmark's first view in arrays over all views.
   int first(int l) const { return first_[l]; }
   int viewCount() const { return static_cast<int>(views_.size()); }
 
@@ -56,15 +57,15 @@ class LandmarkViews {
   struct Track {
     LandmarkId id;
     int views;
-    int until_tie;       ///< views left before the one in its middle
-    double first_depth;  ///< m: of the landmark where the track began, as far as the map knows
+    int until_tie;       ///< number of views left before the middle one
+    double first_depth;  ///< m: depth of the landmark in the track's first keyframe; 0: unknown
   };
   /// Views of one landmark whose keyframes are frames of the problem.
   void collect(const MapLandmark& landmark);
   void addPoints(const Map& map, const MapLandmark& landmark, const std::vector<KeyframeId>& keyframes,
                  const PixelNoise& noise);
   void findFirstDepths(const Map& map, const MapLandmark& landmark);
-  /// See PixelNoise::sigma(). `depth`: of the landmark where it is seen, m.
+  /// Factor `apart` of PixelNoise::sigma(). `depth`: of the landmark in the present view, m.
   static double cornersApart(const Track& a, const Track& b, double depth);
   void addView(const Seen& seen, bool own_track, double apart, const PixelNoise& noise);
 

@@ -5,7 +5,7 @@
 namespace vip_slam {
 namespace {
 
-// No odometry is better than this over the shortest of motions: rad, m.
+// Smallest sigmas of an odometry factor, even for the shortest motion: rad, m.
 constexpr double kLeastRotation = 5e-5, kLeastTranslation = 3e-4;
 
 }  // namespace

@@ -1,6 +1,6 @@
-// What the odometry says about the motion between successive keyframes. It saw every image and every depth image in
-// between, the back end sees the keyframes only: where few landmarks live from one keyframe to the next that is most of
-// what is known. It also keeps landmarks that move together from taking the map along. Not in the paper.
+// Factors from the odometry's motion between successive keyframes. The odometry used every image and depth image in
+// between, the back end only keyframes: where few landmarks survive from one keyframe to the next this is most of the
+// information. It also keeps landmarks that move together from distorting the map. Not in the paper.
 #pragma once
 
 #include "vip_slam_backend/back_end_options.h"
@@ -9,7 +9,7 @@
 
 namespace vip_slam {
 
-/// The factor of `keyframe`'s motion since its previous one, i and j being their frames. False: nothing is known of it.
+/// The factor of `keyframe`'s motion since its previous one; i and j are their frames. False: the motion is not known.
 bool odometryFactor(const MapKeyframe& keyframe, int i, int j, const MeasurementOptions& options,
                     BaRelativePose* factor);
 

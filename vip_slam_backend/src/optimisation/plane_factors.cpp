@@ -12,11 +12,11 @@
 namespace vip_slam {
 namespace {
 
-// At true poses half of the pairs of one track are off by less than half of what their sigmas expect, and a few per
-// cent by several times that: a loss that forgets the far ones, and the sigma of the others.
+// At true poses half of the pairs of a track have less than half of the expected error, and a few per cent several
+// times as much: so the sigma of the core is reduced (kCore), with a redescending loss for the tail (kTail, sigmas).
 constexpr double kCore = 0.6, kTail = 3.0;
 
-// How many squared errors of the expected size a track is believed to have shown before its own are counted.
+// Prior of a track's variance: equivalent to this many squared errors of the expected size.
 constexpr double kTrackFreedom = 4.0;
 
 }  // namespace
@@ -26,7 +26,7 @@ PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope
     : map_(map), scope_(scope), settings_(settings), built_(built), geometry_(frameGeometry(built->problem)) {
   BaProblem& problem = built->problem;
   if (settings.variant == Variant::kVi) return;
-  // Planes that a free frame sees by depth; a plane without depth has nothing that fixes its distance but homographies.
+  // Only planes that a free frame sees with depth: without it only homographies would determine a plane's distance.
   for (const KeyframeId id : scope.free)
     for (const auto& observation : map.keyframe(id).planes) planes_[observation.first] = 0;
   for (auto& entry : planes_) {
@@ -41,7 +41,7 @@ PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope
   }
 }
 
-// What one keyframe sees of the landmarks of one host on one plane.
+// Views by one keyframe of the landmarks with one host on one plane.
 struct PlaneFactorBuilder::Observer {
   int frame = 0, pairs = 0;
   bool usable = true;  // far enough from the plane
@@ -64,7 +64,7 @@ std::vector<char> PlaneFactorBuilder::addHomographies(const LandmarkViews& views
   }
   const std::vector<int> hosts =
       chooseHosts(views, plane, built_->problem.planes, geometry_, settings_.shared_hosts, settings_.middle_hosts);
-  // Group by group of a plane and a host, so that what the pairs of a group share is computed once.
+  // Grouped by plane and host, so that the homographies shared by a group's pairs are computed once.
   struct Member {
     int plane, host, landmark;
     bool operator<(const Member& o) const {
@@ -108,7 +108,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
   const Plane& parameters = built_->problem.planes[plane].plane;
   const LandmarkView& host = views.begin(landmark)[host_view];
   const bool host_fixed = built_->problem.frames[host.frame].fixed;
-  // Variances, inflated; an outlier is judged against at least the gate's.
+  // Inflated variances; outliers are judged with at least the gate's variance.
   const auto square = [](double x) { return x * x; };
   const double inflation = square(options.homography_inflation), gate = inflation / square(built_->gate_weight);
   const double host_variance = square(host.sigma) * inflation;
@@ -130,11 +130,11 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
       refused_.push_back(v);
       continue;
     }
-    // The pair's noise is that of the observer and that of the host, seen from the observer.
+    // The pair's variance: the observer's plus the host's transferred into the observer.
     const double gain = hostNoiseGain(observer.h, p);
     const double own = square(v->sigma) * inflation;
     const double variance = own + gain * host_variance, judged = std::max(own, gate) + gain * host_judged;
-    // Outliers cannot be down-weighted after compression: gate and weigh here, at the present estimate.
+    // After compression outliers cannot be down-weighted: gate and weight here, at the present estimate.
     const Eigen::Vector2d xy_j = v->xy.cast<double>();
     const double error = (p.head<2>() - rho * xy_j).squaredNorm() / (rho * rho);
     if (error > options.outlier_chi2 * judged) {
@@ -173,8 +173,8 @@ void PlaneFactorBuilder::keepRefused(LandmarkId landmark) {
   }
 }
 
-// What is wrong with a track is wrong with most of its pairs: the patch slides, shows a rim, or lies beside the plane.
-// So its variance is a variable of its own with a prior, which makes its errors jointly Student's t.
+// The errors of a bad track are common to its pairs: the patch slides, shows a depth edge, or is not on the plane. So
+// its variance is unknown with a prior, which makes its errors jointly Student's t.
 void PlaneFactorBuilder::weighTrack() {
   double expected = kTrackFreedom, found = kTrackFreedom;
   for (const PairOfObserver& p : pairs_) {
@@ -212,7 +212,6 @@ std::vector<PlaneFactorBuilder::DepthBlock> PlaneFactorBuilder::collectDepthBloc
   for (const auto& entry : map_.keyframes()) {
     const auto frame = frames.find(entry.first);
     const bool constant = frame == frames.end() || problem.frames[frame->second].fixed;
-    if (constant && !scope_.outside_planes) continue;
     const Eigen::Matrix4d T_W_C = entry.second.T_W_C().matrix();
     for (const auto& observation : entry.second.planes) {
       const auto plane = planes_.find(observation.first);
@@ -238,7 +237,7 @@ void PlaneFactorBuilder::addDepthBlocks() {
   for (const DepthBlock& block : blocks) misfits.push_back({block.plane, block.misfit});
   const double map_scale = planeInformationScale(misfits);
   const std::vector<double> weights = planeWeights(misfits, problem.planes.size());
-  // Keyframes that are constants: one block per plane in the world, seen from a fixed frame at the origin.
+  // Constant keyframes: their points form one block per plane in world coordinates, of a fixed frame at the origin.
   std::map<int, BaPointToPlane> outside;
   for (const DepthBlock& block : blocks) {
     const PlaneObservation& o = *block.observation;

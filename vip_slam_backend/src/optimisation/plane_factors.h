@@ -15,10 +15,10 @@ class PlaneFactorBuilder {
  public:
   /// Adds the planes that a free frame sees to the problem.
   PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings, BuiltProblem* built);
-  /// Turns landmarks on planes into host-observer pairs, compressed unless the variant says otherwise. Per landmark
-  /// whether it was; one that is on no plane or fails the gate stays a free point.
+  /// Turns landmarks on planes into host-observer pairs, compressed unless the variant says otherwise. Returns per
+  /// landmark whether it was used; one that is on no plane or fails the gate stays a free point.
   std::vector<char> addHomographies(const LandmarkViews& views);
-  /// Blocks of the depth points of the keyframes, weighed by how well they agree with the planes.
+  /// Adds blocks of the keyframes' depth points, weighted by their agreement with the planes.
   void addDepthBlocks();
 
  private:
@@ -27,9 +27,9 @@ class PlaneFactorBuilder {
                  std::vector<Observer>* observers) const;
   bool collectPairs(const LandmarkViews& views, int landmark, int host_view, int plane, std::vector<int>* slot,
                     std::vector<Observer>* observers);
-  // Depth points of one keyframe on one plane, as far as they belong to it.
+  // Depth points of one keyframe on one plane, after gating.
   struct DepthBlock {
-    int frame, plane;  // frame -1: a constant
+    int frame, plane;  // frame -1: the keyframe is constant
     Eigen::Matrix4d T_W_C, G;
     double misfit;
     const PlaneObservation* observation;
@@ -44,14 +44,14 @@ class PlaneFactorBuilder {
   struct PairOfObserver {
     int observer;
     HomographyPair pair;
-    bool own_track;  // of the host's
+    bool own_track;  // the view is of the host's track
     double error;    // squared, in sigmas
   };
-  /// Whether they are wrong shows once the problem is solved.
+  /// Records the gated views, to be judged again once the problem is solved.
   void keepRefused(LandmarkId landmark);
-  /// A track whose pairs disagree more than they should counts for less altogether.
+  /// Reduces the weight of all pairs of a track whose errors are larger than expected.
   void weighTrack();
-  std::vector<PairOfObserver> pairs_;         // of the landmark at hand
+  std::vector<PairOfObserver> pairs_;         // of the present landmark
   std::vector<const LandmarkView*> refused_;  // likewise
   BuiltProblem* built_;
   std::vector<FrameGeometry> geometry_;

@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/util/statistics.h"
+
 namespace vip_slam {
 namespace {
 
-constexpr double kGoodFit = 1.5;  // mean squared sigmas of an observation that needs no closer look
+constexpr double kGoodFit = 1.5;  // mean squared residual, sigmas^2, up to which all points are kept unchecked
 constexpr double kSigmas = 3.0;
 constexpr double kFarthest = 0.05;                 // metres
-constexpr double kMostNear = 0.5, kMostFar = 0.9;  // shares that must be kept, by where the median lies
+constexpr double kMostNear = 0.5, kMostFar = 0.9;  // shares that must be kept, with the median within kFarthest or not
 
 }  // namespace
 
@@ -19,9 +21,7 @@ PlaneGate::PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d&
     return;
   std::vector<double> distance;
   for (const PlanePoint& p : points) distance.push_back(plane_C.dot(p.p_C.cast<double>().homogeneous()));
-  std::vector<double> sorted = distance;
-  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-  const double median = sorted[sorted.size() / 2];
+  const double median = upperMedian(distance);
   for (std::size_t k = 0; k < points.size(); ++k)
     if (std::abs(distance[k] - median) <= kSigmas * points[k].sigma) kept_.push_back(static_cast<int>(k));
   all_ = kept_.size() == points.size();

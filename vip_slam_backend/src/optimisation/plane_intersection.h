@@ -1,4 +1,4 @@
-// Landmarks on planes that were no variables: where their rays meet the plane.
+// Positions of landmarks on planes that were no variables: intersections of their rays with the plane.
 #pragma once
 
 #include <vector>
@@ -7,14 +7,14 @@
 
 namespace vip_slam {
 
-/// Reads the map's poses as they are at the first use of each keyframe.
+/// Reads each keyframe's pose from the map at its first use, and keeps it.
 class PlaneIntersection {
  public:
   explicit PlaneIntersection(const Map& map);
-  /// Robust weighted mean of where the rays of a landmark's observations meet the plane; the projection of its position
-  /// when none does.
+  /// Robust weighted mean of the intersections of a landmark's rays with the plane; the projection of its position when
+  /// no ray intersects.
   Eigen::Vector3d operator()(const MapLandmark& landmark, const Plane& plane);
-  /// Asks for the memory that a later call with this landmark will read.
+  /// Prefetches the memory that a later call with this landmark will read.
   void prefetch(const MapLandmark& landmark);
 
  private:
@@ -23,16 +23,16 @@ class PlaneIntersection {
     Eigen::Vector3d t_W_C;
     const Feature* features;
   };
-  const Camera& camera(KeyframeId id);  // until the next call
+  const Camera& camera(KeyframeId id);  // valid until the next call
 
   struct Hit {
     Eigen::Vector3d p_W;
     double weight;
   };
-  std::vector<Hit> hits_;  // of the landmark at hand
+  std::vector<Hit> hits_;  // of the present landmark
   const Map& map_;
   KeyframeId lowest_;
-  std::vector<int> camera_of_;  // by keyframe - lowest_: keyframes lie close together in their ids
+  std::vector<int> camera_of_;  // by keyframe - lowest_, since keyframe ids are dense
   std::vector<Camera> cameras_;
 };
 

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "../util/union_find.h"
+
 #include "landmark_views.h"
 #include "odometry_factors.h"
 #include "pixel_noise.h"
@@ -14,21 +16,8 @@
 namespace vip_slam {
 namespace {
 
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int find(int a) {
-    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
-    return a;
-  }
-  void join(int a, int b) { parent_[std::max(find(a), find(b))] = std::min(find(a), find(b)); }
-
- private:
-  std::vector<int> parent_;
-};
-
-// Position and yaw of every connected part that hangs on no fixed frame are held at its oldest frame; parts without IMU
-// are held altogether.
+// Fixes position and yaw of every connected part without a fixed frame at its oldest frame; in parts without IMU also
+// roll and pitch.
 void addGauges(BaProblem* problem) {
   UnionFind parts(problem->frames.size());
   for (const BaPoint& p : problem->points)
@@ -55,7 +44,7 @@ void addGauges(BaProblem* problem) {
   }
 }
 
-// Velocity and biases need a hold where no IMU factor reaches from before.
+// Velocity and biases need a prior where there is no IMU factor from the frame before.
 void addMotionPriors(BaProblem* problem) {
   std::vector<char> reached(problem->frames.size(), 0);
   for (const BaImu& f : problem->imu) reached[f.j] = 1;
@@ -146,7 +135,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
       built.observations.push_back({built.frames[v->frame], v->feature_index});
     }
     point.count = static_cast<int>(problem.observations.size()) - point.first;
-    // One view says nothing about poses; two without depth hang on a baseline that may be nothing.
+    // One view does not constrain poses; two without depth depend on a baseline that may be zero.
     if (point.count < 2 || (point.count < 3 && !depth)) {
       problem.observations.resize(point.first);
       built.observations.resize(point.first);

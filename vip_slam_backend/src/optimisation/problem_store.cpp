@@ -9,7 +9,7 @@
 namespace vip_slam {
 namespace {
 
-// Landmarks whose position is settled; few bytes and no nodes, since every feature of the map is asked about.
+// Landmarks whose position is set; a compact hash set, since it is queried for every feature of the map.
 class LandmarkSet {
  public:
   explicit LandmarkSet(std::size_t most) {
@@ -21,7 +21,7 @@ class LandmarkSet {
   bool contains(LandmarkId id) const { return slots_[slotOf(id)] == id; }
 
  private:
-  // Where it is, or the free slot where it would be.
+  // Slot of the landmark, or the free slot for it.
   std::size_t slotOf(LandmarkId id) const {
     std::size_t slot = (static_cast<std::uint64_t>(id) * 0x9e3779b97f4a7c15ull) >> 32;
     for (slot &= slots_.size() - 1; slots_[slot] != id && slots_[slot] != kNoLandmark;)
@@ -31,12 +31,12 @@ class LandmarkSet {
   std::vector<LandmarkId> slots_;
 };
 
-// Views that a plane contradicts are left out anew at each build, whatever the estimate is by then: what is removed for
-// good has to be far off.
+// Factor on the outlier limit for views refused by their plane. These are gated again at each build, with the estimate
+// of that time, so only gross errors are removed for good.
 constexpr double kGross = 10.0;
 
 void storePlanePoints(const BuiltProblem& built, Map* map, LandmarkSet* done) {
-  // A few landmarks ahead their features are asked for, which lie scattered over the keyframes.
+  // Prefetch features a few landmarks ahead, since they are scattered over the keyframes.
   constexpr std::size_t kAhead = 4;
   std::vector<const MapLandmark*> landmarks;
   landmarks.reserve(built.plane_points.size());
@@ -70,7 +70,7 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   for (std::size_t f = 0; f < built.frames.size(); ++f) {
     if (problem.frames[f].fixed || !map->hasKeyframe(built.frames[f])) continue;
     NavState state = problem.frames[f].state;
-    // The camera is what was adjusted; how it is mounted may be known better by now.
+    // The camera's pose was adjusted; the extrinsics may have changed since the problem was built.
     const SE3& T_I_C = map->keyframe(built.frames[f]).T_I_C;
     if (T_I_C.matrix() != problem.frames[f].T_I_C.matrix()) {
       state.T_W_I = problem.frames[f].T_W_C() * T_I_C.inverse();
@@ -83,13 +83,13 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
     if (held[p] && map->hasPlane(built.planes[p])) map->setPlaneParameters(built.planes[p], problem.planes[p].plane);
   LandmarkSet done(built.points.size() + built.plane_points.size());
   for (std::size_t p = 0; p < built.points.size(); ++p) {
-    if (done.contains(built.points[p])) continue;  // another track of it
+    if (done.contains(built.points[p])) continue;  // another track of the landmark
     done.insert(built.points[p]);
     if (map->hasLandmark(built.points[p])) map->setPosition(built.points[p], problem.points[p].p_W);
   }
   storePlanePoints(built, map, &done);
   for (const auto& moved : motion) {
-    // Landmarks that no factor held go with the keyframe that made them.
+    // Landmarks without factors move with their host keyframe.
     for (const LandmarkId id : map->keyframe(moved.first).landmarks) {
       if (id == kNoLandmark || done.contains(id) || map->landmark(id).host() != moved.first) continue;
       map->setPosition(id, moved.second * map->landmark(id).p_W);

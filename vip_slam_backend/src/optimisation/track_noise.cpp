@@ -7,29 +7,23 @@
 #include <Eigen/Cholesky>
 
 #include "vip_slam_backend/factors/reprojection.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr int kLeastViews = 5;            // of a track: so many keyframes ago its landmark was made, and adjusted since
-constexpr std::size_t kLeastTracks = 30;  // below it the median is one of a few
-constexpr double kClearly = 2.0, kLargest = 8.0;  // a factor below the one is none
-
-/// Root of the median; reorders.
-double rootOfMedian(std::vector<double>* ratios) {
-  const auto middle = ratios->begin() + static_cast<std::ptrdiff_t>(ratios->size() / 2);
-  std::nth_element(ratios->begin(), middle, ratios->end());
-  return std::sqrt(*middle);
-}
+constexpr int kLeastViews = 5;            // of a track: its landmark has then been adjusted over as many keyframes
+constexpr std::size_t kLeastTracks = 30;  // for a stable median
+constexpr double kClearly = 2.0, kLargest = 8.0;  // a factor below kClearly is not significant; upper limit
 
 }  // namespace
 
 double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeometry>& frames) {
-  std::vector<double> ratios, of_the_map;  // of how the views of a track agree, and of how they agree with the map
+  std::vector<double> ratios, of_the_map;  // chi2 per dof of a track's views with each other, and with the map
   for (int l = 0; l < views.size(); ++l) {
     if (!views.standsForLandmark(l)) continue;
-    // Landmarks that were found again are where several tracks have them together, a corner of half a pixel off each;
-    // what a track's noise explains is how its views agree, with the point where this one has it.
+    // A re-acquired landmark is a compromise of several tracks, whose corners differ by about half a pixel. A track's
+    // own noise is the scatter of its views about the point that fits this track best.
     int seen = 0;
     double squared = 0;
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -48,16 +42,16 @@ double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeome
       g.noalias() += J.transpose() * r;
     }
     if (seen < kLeastViews) continue;
-    H.diagonal() *= 1.0 + 1e-9;  // all views from one place leave the depth open
+    H.diagonal() *= 1.0 + 1e-9;  // with all views from one place the depth is not observable
     const double explained = g.dot(H.ldlt().solve(g));
     if (!std::isfinite(explained)) continue;
-    ratios.push_back(std::max(0.0, squared - explained) / (2 * seen - 3));  // the point takes three
+    ratios.push_back(std::max(0.0, squared - explained) / (2 * seen - 3));  // the point takes three degrees of freedom
     of_the_map.push_back(squared / (2 * seen - 3));
   }
   if (ratios.size() < kLeastTracks) return 1;
-  if (!(rootOfMedian(&ratios) > kClearly)) return 1;
-  // An error that the views of a track share moves their point along, so that they agree better than they are right.
-  return std::clamp(rootOfMedian(&of_the_map), kClearly, kLargest);
+  if (!(std::sqrt(upperMedian(std::move(ratios))) > kClearly)) return 1;
+  // An error shared by the views of a track moves their common point, so their mutual agreement underestimates it.
+  return std::clamp(std::sqrt(upperMedian(std::move(of_the_map))), kClearly, kLargest);
 }
 
 std::string trackNoiseDifference(double factor) {

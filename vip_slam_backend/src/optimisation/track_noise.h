@@ -1,7 +1,7 @@
-// How much more than they are told to the pixels of tracks are off, as the map tells: by how much they miss the
-// landmarks that it has by now. Told are the noise of the image and of the matching alone. A camera whose lens or
-// readout is not quite as configured, or whose depth is of another moment, makes errors of a few tenths of a pixel that
-// the views of a track share, and a map that takes them for noise of a tenth believes its pixels far above its depth.
+// Estimates the actual pixel error of tracks relative to the reported sigmas, from their residuals against the map's
+// landmarks. The reported sigmas cover only the noise of image and matching. A camera whose lens or readout differs
+// slightly from its configuration, or whose depth is from another time, has errors of a few tenths of a pixel that a
+// track's views share; with sigmas of a tenth the map would weight pixels far too much against depth.
 #pragma once
 
 #include <string>
@@ -12,12 +12,12 @@
 
 namespace vip_slam {
 
-/// Factor on the sigmas of all views, 1 to 8; 1 unless the views of a track miss each other by clearly more than told,
-/// or when too few tracks say anything. Then it is by how much they miss the map. `frames`: the problem's, at the map's
-/// present estimate.
+/// Factor on the sigmas of all views, 1 to 8: 1 unless the views of tracks scatter by clearly more than their reported
+/// sigmas, and with too few tracks; otherwise the ratio of their residuals against the map to those sigmas. `frames`:
+/// the problem's, at the map's present estimate.
 double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeometry>& frames);
 
-/// What to tell the user of such a factor; empty at 1.
+/// Message to the user about such a factor; empty at 1.
 std::string trackNoiseDifference(double factor);
 
 }  // namespace vip_slam

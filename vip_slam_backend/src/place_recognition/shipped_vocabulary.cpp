@@ -1,4 +1,4 @@
-// The shipped vocabulary is linked into the library (shipped_vocabulary.S), so that no search path can be wrong.
+// The shipped vocabulary is linked into the library (shipped_vocabulary.S), so that it does not depend on search paths.
 #include <memory>
 
 #include "vip_slam_backend/place_recognition/vocabulary_io.h"

@@ -1,4 +1,4 @@
-// The text vocabulary format that ORB-SLAM users have: a header "k L scoring weighting" and one line per node,
+// The text vocabulary format of ORB-SLAM: a header "k L scoring weighting" and one line per node,
 // "parent is_leaf d0 ... d31 weight", nodes numbered from 1 in file order, node 0 being the root.
 #include <charconv>
 #include <cmath>

@@ -76,7 +76,7 @@ Clusters kMedians(const std::vector<Descriptor>& all, const Indices& members, co
       c.members[best].push_back(members[m]);
     }
     if (!changed) break;
-    if (round + 1 == options.iterations) break;  // centres must stay those that made the clusters
+    if (round + 1 == options.iterations) break;  // keep the centres that the clusters were assigned with
     for (std::size_t k = 0; k < c.centres.size(); ++k)
       if (!c.members[k].empty()) c.centres[k] = medianOf(all, c.members[k]);
   }
@@ -112,7 +112,7 @@ Vocabulary trainVocabulary(const std::vector<std::vector<Descriptor>>& images, c
   std::iota(open.front().members.begin(), open.front().members.end(), 0u);
   std::mt19937_64 random(options.seed);
   double done = 0;
-  // Breadth first: nodes are appended in the order the tree stores them.
+  // Breadth first: nodes are appended in the order in which the tree stores them.
   while (!open.empty()) {
     Open node = std::move(open.front());
     open.pop_front();

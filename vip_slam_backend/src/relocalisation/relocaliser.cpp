@@ -30,7 +30,7 @@ std::optional<Relocalisation> Relocaliser::relocalise(const Map& map, const Loop
 std::optional<Relocalisation> Relocaliser::track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
                                                  const SE3& T_W_I,
                                                  const std::function<bool(KeyframeId)>& allowed) const {
-  // The nearest keyframe that looks the same way.
+  // The nearest keyframe with a similar viewing direction.
   const SE3 T_W_C = T_W_I * keyframe.frame.T_I_C;
   const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
   KeyframeId nearest = 0;

@@ -1,5 +1,5 @@
-// The reference: the same factors in Ceres' Levenberg-Marquardt with SPARSE_SCHUR. Used in tests, in the benchmark, and
-// wherever a user asks for it.
+// The reference solver: the same factors in Ceres' Levenberg-Marquardt with SPARSE_SCHUR. Used in tests, in the
+// benchmark, and when the user selects it.
 #pragma once
 
 #include <memory>

@@ -7,7 +7,7 @@
 
 namespace vip_slam {
 
-// A node goes where the first of its parts goes; they are alike, so the ordering keeps them together.
+// A node takes the position of the first of its parts; these have equal structure, so the ordering keeps them together.
 std::vector<int> minimumDegree(const std::vector<int>& sizes, const Lists& neighbours) {
   const int n = static_cast<int>(sizes.size());
   std::vector<int> first(1, 0), node_of, starts(1, 0), indices;
@@ -21,7 +21,7 @@ std::vector<int> minimumDegree(const std::vector<int>& sizes, const Lists& neigh
         for (int k = first[w]; k < first[w + 1]; ++k)
           if (k != part) indices.push_back(k);
       };
-      bool self = false;  // ascending, itself in between
+      bool self = false;  // whether v itself has been inserted at its place in the ascending order
       for (const int w : neighbours[v]) {
         if (w > v && !self) {
           add(v);

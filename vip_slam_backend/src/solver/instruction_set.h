@@ -1,6 +1,6 @@
-// Which vector instructions the kernels use. Each kernel is built once per set (kernel_builds.inc) and chosen when the
-// program runs, so that nothing depends on -march; only plain pointers cross, so that no Eigen object meets another
-// alignment.
+// Vector instruction sets of the kernels. Each kernel is built once per set (kernel_builds.inc) and chosen at run time,
+// so that nothing depends on -march; only plain pointers are passed to them, so that no Eigen object is used with
+// different alignments.
 #pragma once
 
 namespace vip_slam {
@@ -8,9 +8,9 @@ namespace vip_slam {
 enum class InstructionSet { kBaseline, kAvx2, kAvx512 };
 
 const char* instructionSetName(InstructionSet set);
-/// Whether this processor runs it.
+/// Whether this processor supports it.
 bool runsHere(InstructionSet set);
-/// Of those that this processor runs.
+/// The fastest set that this processor supports.
 InstructionSet fastestInstructionSet();
 
 }  // namespace vip_slam

@@ -24,7 +24,7 @@ void KernelArray::resize(std::size_t count) {
   }
   capacity_ = bytes / sizeof(double);
 #if defined(__linux__)
-  if (unit == kHugePage) madvise(data_.get(), bytes, MADV_HUGEPAGE);  // advice: what it answers changes nothing
+  if (unit == kHugePage) madvise(data_.get(), bytes, MADV_HUGEPAGE);  // only advice: its result does not matter
 #endif
 }
 

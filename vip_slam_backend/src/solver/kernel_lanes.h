@@ -3,7 +3,7 @@
 
 namespace vip_slam {
 
-/// Factors of one batch; the last batch is filled up with copies of any factor.
+/// Factors per batch; the last batch is padded with copies of any factor.
 constexpr int kKernelLanes = 8;
 
 }  // namespace vip_slam

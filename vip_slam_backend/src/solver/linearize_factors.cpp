@@ -1,4 +1,5 @@
-// The factors that are no points: IMU, planes, priors. Each adds J^T J and J^T r to the blocks of the reduced system.
+// All factors except those of points: IMU, planes, priors. Each adds J^T J and J^T r to the blocks of the reduced
+// system.
 #include "structured_solver.h"
 #include "vip_slam_backend/factors/plane_prior.h"
 #include "vip_slam_backend/factors/point_to_plane.h"
@@ -36,7 +37,7 @@ struct NodeSums {
 
 }  // namespace
 
-// What the rotation's residual needs beside the states: trigonometry, which stays out of the vectors.
+// Computes the rotation residual's terms with trigonometric functions here, since the vectorised kernels have none.
 double StructuredSolver::linearizeImu(const BaProblem& problem) {
   for (std::size_t k = 0; k < problem.imu.size(); ++k) {
     const Preintegration& p = *problem.imu[k].preintegration;

@@ -31,7 +31,7 @@ struct HomographyKernelArguments {
 };
 
 struct HomographyKernels {
-  /// Adds J^T G J and J^T G h of `count` factors; the sum of h^T G h.
+  /// Adds J^T G J and J^T G h of `count` factors; returns the sum of h^T G h.
   double (*linearize)(const HomographyKernelArguments& a, int count);
   /// Sum of h^T G h.
   double (*cost)(const HomographyKernelArguments& a, int count);
@@ -55,7 +55,7 @@ struct PointToPlaneKernelArguments {
 };
 
 struct PointToPlaneKernels {
-  /// Adds J^T G J and J^T G u of `count` factors; the sum of u^T G u.
+  /// Adds J^T G J and J^T G u of `count` factors; returns the sum of u^T G u.
   double (*linearize)(const PointToPlaneKernelArguments& a, int count);
 };
 

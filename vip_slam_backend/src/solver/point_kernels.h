@@ -1,5 +1,5 @@
-// The hot loops of the structured solver on plain arrays: all observations of a point are linearised at once, so that
-// its Jacobians never leave the first-level cache; what its elimination needs of them is kept.
+// The inner loops of the structured solver on plain arrays: all observations of a point are linearised at once, so that
+// its Jacobians stay in the first-level cache; the parts needed for its elimination are stored.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ struct KernelFrame {
   double t_W_I[3];
   double offset_C[3];             ///< R_C_I t_I_C: p_C = R_C_W (p - t_W_I) - offset_C
   std::int64_t diagonal = -1;     ///< offset of its diagonal block in the values; -1: fixed
-  alignas(64) double turn[3][8];  ///< lines of R_C_I, then zeros
-  alignas(64) double move[3][8];  ///< three zeros, lines of -R_C_W, two zeros
+  alignas(64) double turn[3][8];  ///< rows of R_C_I, then zeros
+  alignas(64) double move[3][8];  ///< three zeros, rows of -R_C_W, two zeros
   double R_C_I[9];
   double t_W_C[3];
   double lever_C[9];         ///< R_C_I [t_I_C]x
@@ -46,9 +46,9 @@ struct PointKernelArguments {
 };
 
 struct PointKernels {
-  /// Points [begin, end): their Jacobians, which do not depend on the radius, and their robust cost (not halved); the
-  /// elimination with the Jacobians. A block of the reduced matrix gets its points in ascending order whatever the
-  /// ranges, so that the sums are the same to the last bit.
+  /// For points [begin, end): linearize() computes the Jacobians, which do not depend on the radius, and returns the
+  /// robust cost (not halved); eliminate() eliminates the points with them. A block of the reduced matrix gets its
+  /// points in ascending order whatever the ranges, so that the sums are bit-identical.
   double (*linearize)(const PointKernelArguments& a, int begin, int end);
   void (*eliminate)(const PointKernelArguments& a, int begin, int end);
   /// Robust cost (not halved).

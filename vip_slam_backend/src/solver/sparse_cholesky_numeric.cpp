@@ -9,7 +9,7 @@
 namespace vip_slam {
 namespace {
 
-// A block of the matrix into its front. What stands above the diagonal of a diagonal block goes along and is never
+// Copies a block of the matrix into its front. The entries above the diagonal of a diagonal block are copied but never
 // read.
 template <int Rows>
 void copyBlock(const double* source, int columns, double* target, int ld) {
@@ -23,7 +23,7 @@ void copyBlock(const double* source, int columns, double* target, int ld) {
 bool SparseCholesky::factorizeFront(const Front& front, const double* values, const double* b) {
   const DenseKernels& kernels = denseKernels();
   const int n = front.rows, c = front.columns, ld = front.ld, m = front.updateRows(), ldu = front.updateLeading();
-  // Pivot columns are assembled where the factor stays.
+  // Pivot columns are assembled directly at their place in the factor.
   double* panel = factor_.data() + front.factor_offset;
   std::memset(panel, 0, sizeof(double) * ld * c);
   for (const Entry& e : front.entries) {
@@ -50,7 +50,7 @@ bool SparseCholesky::factorizeFront(const Front& front, const double* values, co
   if (m == 1) return true;
   double* update = updates_.data() + front.update_offset;
   kernels.negativeSyrk(update, ldu, panel + c, ld, m, m - 1, c);
-  // Rows and columns of the others are counted from the parent's first update row.
+  // Segments of update rows are indexed from the front's first row: shift the origin by the pivots.
   double* origin = update - static_cast<std::ptrdiff_t>(c) * ldu - c;
   for (const int child : front.children) {
     const Front& f = fronts_[child];

@@ -1,4 +1,4 @@
-// Symbolic part of the block-sparse Cholesky: fronts, their places and their parts.
+// Symbolic part of the block-sparse Cholesky: fronts, their memory offsets and their parts.
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -10,15 +10,15 @@
 namespace vip_slam {
 namespace {
 
-// Doubles that a block takes, rounded up to whole cache lines.
+// Size of a block in doubles, rounded up to whole cache lines.
 std::size_t blockValues(int rows, int columns) {
   return (static_cast<std::size_t>(SparseCholesky::leading(rows)) * columns + 7) / 8 * 8;
 }
 
 }  // namespace
 
-// Two parts of the tree that cost about the same: from the roots down, the dearest subtree is opened (its root goes to
-// what is left for later) as long as that shortens the longer way.
+// Splits the tree into two parts of about equal cost: from the roots down, the most expensive subtree is opened (its
+// root is left for the serial rest) as long as that shortens the critical path.
 void SparseCholesky::splitTree() {
   const int n = static_cast<int>(fronts_.size());
   std::vector<double> cost(n, 0);  // of the whole subtree
@@ -62,8 +62,8 @@ void SparseCholesky::splitTree() {
     fronts_[f].part = parent[f] >= 0 && best_part[parent[f]] < 2 ? best_part[f] = best_part[parent[f]] : best_part[f];
 }
 
-// Places of the update matrices: an update lives until its parent has taken it up; its place is then free for others of
-// its part. The first gap that is large enough is taken.
+// Memory offsets of the update matrices: an update lives until its parent has been assembled; its memory is then reused
+// within its part. The first gap that is large enough is used.
 void SparseCholesky::placeUpdates() {
   struct Live {
     std::size_t begin, end;
@@ -93,25 +93,26 @@ void SparseCholesky::placeUpdates() {
   updates_.resize(base + kKernelPadding);
 }
 
-void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<std::pair<int, int>>& pairs) {
-  sizes_ = sizes;
-  const int n = nodes();
-  unknown_.resize(n);
-  diagonal_offset_.resize(n);
-  dimension_ = 0;
-  value_count_ = 0;
-  for (int v = 0; v < n; ++v) {
-    unknown_[v] = dimension_;
-    dimension_ += sizes[v];
+/// Supernodes: consecutive nodes of the elimination that are factorised as one front. Indexed by front:
+struct SparseCholesky::Supernodes {
+  std::vector<int> first, last;      // positions
+  Lists rows, row_offset;            // positions of its rows, and where each begins in the front
+  std::vector<int> of;               // front of each position
+  std::vector<int> offset_in_front;  // of each position, in the front of the last enter(); work space
+  void enter(int front) {
+    for (std::size_t k = 0; k < rows[front].size(); ++k) offset_in_front[rows[front][k]] = row_offset[front][k];
   }
+};
+
+Lists SparseCholesky::order(const std::vector<std::pair<int, int>>& pairs) {
+  const int n = nodes();
   Lists neighbours(n);
-  pair_offset_.resize(pairs.size());
   std::vector<int> degree(n, 0);
   for (const auto& pair : pairs) ++degree[pair.first], ++degree[pair.second];
   for (int v = 0; v < n; ++v) neighbours[v].reserve(degree[v]);
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    neighbours[pairs[k].first].push_back(pairs[k].second);
-    neighbours[pairs[k].second].push_back(pairs[k].first);
+  for (const auto& pair : pairs) {
+    neighbours[pair.first].push_back(pair.second);
+    neighbours[pair.second].push_back(pair.first);
   }
   for (auto& list : neighbours) std::sort(list.begin(), list.end());
   position_ = minimumDegree(sizes_, neighbours);
@@ -121,23 +122,29 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   std::vector<int> renumber(n);
   for (int k = 0; k < n; ++k) renumber[post[k]] = k;
   for (int v = 0; v < n; ++v) position_[v] = renumber[position_[v]];
-  Lists structure(n);  // the same elimination by other numbers
+  node_at_.resize(n);
+  for (int v = 0; v < n; ++v) node_at_[position_[v]] = v;
+  Lists structure(n);  // the same elimination, renumbered
   for (int k = 0; k < n; ++k) {
     for (int& p : eliminated[k]) p = renumber[p];
     std::sort(eliminated[k].begin(), eliminated[k].end());
     structure[renumber[k]] = std::move(eliminated[k]);
   }
-  for (int k = 0; k < n; ++k) parent[k] = structure[k].empty() ? -1 : structure[k].front();
-  node_at_.resize(n);
-  for (int v = 0; v < n; ++v) node_at_[position_[v]] = v;
-  const auto sizeAt = [&](int p) { return sizes_[node_at_[p]]; };
+  return structure;
+}
 
-  // Supernodes: a chain in the tree joins while the zeros it stores stay few.
-  std::vector<int> first, last_of, front_of(n);
+// Nodes of a chain in the elimination tree are joined while this stores few additional zeros: the narrower a front, the
+// more zeros its overhead justifies (measured limits, docs/bundle_adjustment.md).
+SparseCholesky::Supernodes SparseCholesky::joinSupernodes(const Lists& structure) const {
+  const int n = nodes();
+  Supernodes supernodes;
+  supernodes.of.resize(n);
+  supernodes.offset_in_front.assign(n, -1);
+  const auto parent = [&](int k) { return structure[k].empty() ? -1 : structure[k].front(); };
   for (int k = 0; k < n;) {
     int end = k, columns = sizeAt(k);
     double zeros = 0;
-    while (end + 1 < n && parent[end] == end + 1) {
+    while (end + 1 < n && parent(end) == end + 1) {
       double missing = 0;  // rows of the parent that the present front lacks
       std::size_t i = 0;
       for (const int p : structure[end + 1]) {
@@ -155,47 +162,44 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
       columns = static_cast<int>(joined_columns);
       ++end;
     }
-    for (int p = k; p <= end; ++p) front_of[p] = static_cast<int>(first.size());
-    first.push_back(k);
-    last_of.push_back(end);
+    for (int p = k; p <= end; ++p) supernodes.of[p] = static_cast<int>(supernodes.first.size());
+    supernodes.first.push_back(k);
+    supernodes.last.push_back(end);
     k = end + 1;
   }
+  return supernodes;
+}
 
-  fronts_.assign(first.size(), Front());
-  factor_size_ = factor_nonzeros_ = 0;
-  factor_flops_ = 0;
-  std::vector<std::vector<int>> rows_of(fronts_.size());
-  std::vector<int> offset_in_front(n, -1);
-  std::vector<std::vector<int>> row_offset(fronts_.size());
+void SparseCholesky::layFronts(const Lists& structure, Supernodes* supernodes) {
+  fronts_.assign(supernodes->first.size(), Front());
+  supernodes->rows.resize(fronts_.size());
+  supernodes->row_offset.resize(fronts_.size());
+  factor_size_ = 0;
   for (std::size_t f = 0; f < fronts_.size(); ++f) {
     Front& front = fronts_[f];
-    std::vector<int>& rows = rows_of[f];
-    for (int p = first[f]; p <= last_of[f]; ++p) rows.push_back(p);
-    rows.insert(rows.end(), structure[last_of[f]].begin(), structure[last_of[f]].end());
+    const int last = supernodes->last[f];
+    std::vector<int>& rows = supernodes->rows[f];
+    for (int p = supernodes->first[f]; p <= last; ++p) rows.push_back(p);
+    rows.insert(rows.end(), structure[last].begin(), structure[last].end());
     for (const int p : rows) {
-      row_offset[f].push_back(front.rows);
+      supernodes->row_offset[f].push_back(front.rows);
       for (int u = 0; u < sizeAt(p); ++u) front.unknowns.push_back(unknown_[node_at_[p]] + u);
       front.rows += sizeAt(p);
-      if (p <= last_of[f]) front.columns += sizeAt(p);
+      if (p <= last) front.columns += sizeAt(p);
     }
     ++front.rows;  // the right-hand side
     front.ld = (front.rows + kKernelPadding + 7) / 8 * 8;
-    if (front.ld % 64 == 0) front.ld += 8;  // columns must not fall on the same cache sets
+    if (front.ld % 64 == 0) front.ld += 8;  // so that columns do not map to the same cache sets
     front.factor_offset = factor_size_;
     factor_size_ += static_cast<std::size_t>(front.ld) * front.columns;
-    for (int c = 0; c < front.columns; ++c) {
-      const double below = front.rows - 1 - c;
-      factor_nonzeros_ += static_cast<std::size_t>(below);
-      factor_flops_ += below * below;
-    }
   }
-  // Rows of each front in its parent.
-  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {  // rows of each front in its parent
     Front& front = fronts_[f];
     if (front.updateRows() == 1) continue;
-    const int up = front_of[structure[last_of[f]].front()];
+    const std::vector<int>& below = structure[supernodes->last[f]];
+    const int up = supernodes->of[below.front()];
     fronts_[up].children.push_back(static_cast<int>(f));
-    for (std::size_t k = 0; k < rows_of[up].size(); ++k) offset_in_front[rows_of[up][k]] = row_offset[up][k];
+    supernodes->enter(up);
     const auto append = [&](int parent_row, int size) {
       const int child_row = front.to_parent.empty() ? 0 : front.to_parent.back().child + front.to_parent.back().size;
       if (!front.to_parent.empty() && front.to_parent.back().parent + front.to_parent.back().size == parent_row)
@@ -204,13 +208,14 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
         front.to_parent.push_back({child_row, parent_row, size});
       if (parent_row < fronts_[up].columns) front.parent_pivots += size;
     };
-    for (const int p : structure[last_of[f]]) append(offset_in_front[p], sizeAt(p));
+    for (const int p : below) append(supernodes->offset_in_front[p], sizeAt(p));
     append(fronts_[up].rows - 1, 1);
   }
-  splitTree();
-  placeUpdates();
+}
 
-  // Where each block of the matrix goes. The values lie in the order in which the fronts read them.
+// Offset of each block of the matrix in the values, which are in the order in which the fronts read them.
+void SparseCholesky::placeBlocks(const std::vector<std::pair<int, int>>& pairs, Supernodes* supernodes) {
+  const int n = nodes();
   struct Placed {
     int earlier, later;
     std::size_t* value_offset;
@@ -222,7 +227,7 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
     const int a = position_[pairs[k].first], b = position_[pairs[k].second];
     placed.push_back({std::min(a, b), std::max(a, b), &pair_offset_[k]});
   }
-  // By column, then by row: two rounds of buckets, the last key first.
+  // Sorted by column, then by row: two stable bucket sorts, the minor key first.
   std::vector<int> begin;
   const auto sortBy = [&](int Placed::*key) {
     begin.assign(n + 1, 0);
@@ -233,18 +238,38 @@ void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<st
   };
   sortBy(&Placed::later);
   sortBy(&Placed::earlier);
+  value_count_ = 0;
   int front = -1;
   for (const Placed& b : placed) {
-    if (front_of[b.earlier] != front) {
-      front = front_of[b.earlier];
-      for (std::size_t k = 0; k < rows_of[front].size(); ++k) offset_in_front[rows_of[front][k]] = row_offset[front][k];
+    if (supernodes->of[b.earlier] != front) {
+      front = supernodes->of[b.earlier];
+      supernodes->enter(front);
     }
-    const Entry entry{value_count_, offset_in_front[b.later], offset_in_front[b.earlier], sizeAt(b.later),
-                      sizeAt(b.earlier)};
+    const Entry entry{value_count_, supernodes->offset_in_front[b.later], supernodes->offset_in_front[b.earlier],
+                      sizeAt(b.later), sizeAt(b.earlier)};
     *b.value_offset = value_count_;
     value_count_ += blockValues(entry.rows, entry.columns);
     fronts_[front].entries.push_back(entry);
   }
+}
+
+void SparseCholesky::analyze(const std::vector<int>& sizes, const std::vector<std::pair<int, int>>& pairs) {
+  sizes_ = sizes;
+  const int n = nodes();
+  unknown_.resize(n);
+  diagonal_offset_.resize(n);
+  pair_offset_.resize(pairs.size());
+  dimension_ = 0;
+  for (int v = 0; v < n; ++v) {
+    unknown_[v] = dimension_;
+    dimension_ += sizes[v];
+  }
+  const Lists structure = order(pairs);
+  Supernodes supernodes = joinSupernodes(structure);
+  layFronts(structure, &supernodes);
+  splitTree();
+  placeUpdates();
+  placeBlocks(pairs, &supernodes);
   factor_.resize(factor_size_);
   work_.assign(dimension_ + kKernelPadding, 0.0);
 }

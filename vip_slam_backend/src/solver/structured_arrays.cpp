@@ -10,7 +10,7 @@ void copyRowMajor(const Eigen::Matrix3d& M, double* out) {
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out, 3, 3) = M;
 }
 
-// A matrix, row by row, into one lane.
+// Stores a matrix, row by row, in one lane.
 template <typename Derived>
 void storeRows(const Eigen::MatrixBase<Derived>& expression, double* rows) {
   const typename Derived::PlainObject M = expression;

@@ -1,5 +1,5 @@
-// The normal equations of the structured solver: factors among poses, motions and planes, points, elimination of the
-// points.
+// The normal equations of the structured solver: factors between poses, motions and planes, and points with their
+// elimination.
 #include <algorithm>
 
 #include "structured_solver.h"
@@ -11,8 +11,8 @@ constexpr double kMinDiagonal = 1e-6, kMaxDiagonal = 1e32;
 
 }  // namespace
 
-// Whatever the number of threads, each number of the result is the same sum in the same order: what a thread adds to is
-// either its own (the points' sums over frames) or a part of the matrix that no other touches.
+// The result is bit-identical for any number of threads: each number is the same sum in the same order, since a thread
+// adds either to its own arrays (the points' sums over frames) or to a part of the matrix that no other thread touches.
 void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker* worker) {
   if (!loaded_) {
     loadFrames(problem);
@@ -65,7 +65,7 @@ void StructuredSolver::storeDiagonal() {
   });
 }
 
-// What the points gave to their frames: J^T J and J^T r before and after the elimination.
+// Adds the points' contributions to their frames: J^T J and J^T r before and after the elimination.
 void StructuredSolver::addPoints() {
   gradient_ = full_gradient_;
   for (std::size_t f = 0; f < frames_.size(); ++f) {

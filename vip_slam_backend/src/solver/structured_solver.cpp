@@ -105,6 +105,54 @@ StructuredSolver::Step StructuredSolver::stepAt(const BaProblem& problem, double
   return {copy(full_gradient_), copy(diagonal_), copy(step_), point_step};
 }
 
+void StructuredSolver::TrustRegion::accept(double ratio) {
+  radius = std::min(kMaxRadius, radius / std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * ratio - 1.0, 3)));
+  decrease_factor = 2;
+}
+
+bool StructuredSolver::TrustRegion::refuse() {
+  radius /= decrease_factor;
+  decrease_factor *= 2;
+  return radius >= kMinRadius;
+}
+
+double StructuredSolver::largestGradient() const {
+  double largest = 0;
+  for (const double g : full_gradient_) largest = std::max(largest, std::abs(g));
+  for (const double g : point_gradient_) largest = std::max(largest, std::abs(g));
+  return largest;
+}
+
+StructuredSolver::Trial StructuredSolver::tryStep(BaProblem& problem, const SolverOptions& options, bool last,
+                                                  double present, State* other) {
+  const auto exchange = [&] {
+    std::swap(problem.frames, other->frames);
+    std::swap(problem.points, other->points);
+    std::swap(problem.planes, other->planes);
+  };
+  Trial trial;
+  const double predicted = modelDecrease();
+  if (!(predicted > 0)) return trial;
+  trial.step_norm = stepNorm();
+  apply(problem, other);
+  exchange();
+  const bool goes_on = !last && (options.keep_iterating || predicted > options.function_tolerance * present);
+  trial.cost = cost(problem, goes_on, worker_.get());
+  const double decrease = present - trial.cost;
+  trial.ratio = decrease / predicted;
+  const double least = options.function_tolerance * present;
+  trial.accepted = std::isfinite(trial.cost) && trial.ratio > kMinRatio;
+  if (trial.accepted) {
+    trial.converged = decrease <= least || trial.step_norm < options.parameter_tolerance;
+  } else {
+    exchange();
+    loaded_ = false;
+    // Converged when even a rejected step hardly changes the cost.
+    trial.converged = std::isfinite(trial.cost) && std::abs(decrease) <= least;
+  }
+  return trial;
+}
+
 SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& options) {
   const auto start = Clock::now();
   const std::string bad = validateProblem(problem);
@@ -115,104 +163,64 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
   summary.observations = problem.observations.size();
   prepare(problem);
   ahead_ms_ = 0;
-  summary.factor_nonzeros = structure_.cholesky.factorNonzeros();
   State other{problem.frames, problem.points, problem.planes};
-  const auto exchange = [&] {
-    std::swap(problem.frames, other.frames);
-    std::swap(problem.points, other.points);
-    std::swap(problem.planes, other.planes);
-  };
+  // Adds the time since the last call to one part of the summary.
   auto mark = Clock::now();
   summary.preprocess_ms = ms(start, mark);
-  // The helper outlives the solve: to wait for its end on a busy machine takes as long as a small solve.
+  const auto spent = [&mark](double* part) {
+    const auto now = Clock::now();
+    *part += ms(mark, now);
+    mark = now;
+  };
+  // The helper thread is kept between solves: joining it on a busy machine takes as long as a small solve.
   if (!worker_ || helper_ != (options.threads > 1)) {
     helper_ = options.threads > 1;
     worker_ = std::make_unique<Worker>(helper_);
   }
-  Worker& worker = *worker_;
-  double present = cost(problem, options.max_iterations > 0, &worker);
-  summary.residual_ms += ms(mark, Clock::now());
+  double present = cost(problem, options.max_iterations > 0, worker_.get());
+  spent(&summary.residual_ms);
   summary.initial_cost = summary.final_cost = present;
   if (!std::isfinite(present)) {
     summary.usable = false;
     summary.message = "the initial cost is not finite";
     return summary;
   }
-  double radius = options.initial_radius, decrease_factor = 2;
+  TrustRegion region{options.initial_radius};
   summary.message = "iterations used up";
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     if (options.max_seconds > 0 && ms(start, Clock::now()) > 1e3 * options.max_seconds) {
       summary.message = "time used up";
       break;
     }
-    mark = Clock::now();
-    linearize(problem, radius, &worker);
-    auto next = Clock::now();
-    summary.jacobian_ms += ms(mark, next);
-    if (!options.keep_iterating) {
-      double largest = 0;
-      for (const double g : full_gradient_) largest = std::max(largest, std::abs(g));
-      for (const double g : point_gradient_) largest = std::max(largest, std::abs(g));
-      if (largest < options.gradient_tolerance) {
-        summary.message = "gradient vanished";
-        break;
-      }
+    linearize(problem, region.radius, worker_.get());
+    spent(&summary.jacobian_ms);
+    if (!options.keep_iterating && largestGradient() < options.gradient_tolerance) {
+      summary.message = "gradient vanished";
+      break;
     }
-    mark = next;
-    const bool solved = solveStep(problem, radius, &worker);
-    next = Clock::now();
-    summary.linear_ms += ms(mark, next);
+    const bool solved = solveStep(problem, region.radius, worker_.get());
+    spent(&summary.linear_ms);
     ++summary.iterations;
-    SolverIteration log;
-    log.radius = radius;
-    const double predicted = solved ? modelDecrease() : 0;
-    bool accepted = false, converged = false;
-    if (predicted > 0) {
-      mark = next;
-      log.step_norm = stepNorm();
-      apply(problem, &other);
-      exchange();
-      const bool goes_on = iteration + 1 < options.max_iterations &&
-                           (options.keep_iterating || predicted > options.function_tolerance * present);
-      const double trial = cost(problem, goes_on, &worker);
-      summary.residual_ms += ms(mark, Clock::now());
-      const double decrease = present - trial, ratio = decrease / predicted;
-      log.cost = trial;
-      if (std::isfinite(trial) && ratio > kMinRatio) {
-        accepted = true;
-        converged = decrease <= options.function_tolerance * present || log.step_norm < options.parameter_tolerance;
-        present = trial;
-        radius = std::min(kMaxRadius, radius / std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * ratio - 1.0, 3)));
-        decrease_factor = 2;
-      } else {
-        exchange();
-        loaded_ = false;
-        // No step of this length helps any more.
-        converged = std::isfinite(trial) && std::abs(decrease) <= options.function_tolerance * present;
-      }
+    Trial trial;
+    if (solved) trial = tryStep(problem, options, iteration + 1 == options.max_iterations, present, &other);
+    spent(&summary.residual_ms);
+    summary.log.push_back({trial.cost, region.radius, trial.step_norm, trial.accepted});
+    if (trial.accepted) {
+      present = trial.cost;
+      region.accept(trial.ratio);
+    } else if (!region.refuse()) {
+      summary.message = "trust region vanished";
+      break;
     }
-    log.accepted = accepted;
-    summary.log.push_back(log);
-    if (!accepted) {
-      radius /= decrease_factor;
-      decrease_factor *= 2;
-      if (radius < kMinRadius) {
-        summary.message = "trust region vanished";
-        break;
-      }
-    }
-    if (converged && !options.keep_iterating) {
+    if (trial.converged && !options.keep_iterating) {
       summary.message = "converged";
       break;
     }
   }
   summary.residual_ms -= ahead_ms_;
   summary.jacobian_ms += ahead_ms_;
-  mark = Clock::now();
   summary.final_cost = present;
-  const auto end = Clock::now();
-  summary.postprocess_ms = ms(mark, end);
-  summary.total_ms = ms(start, end);
+  summary.total_ms = ms(start, Clock::now());
   return summary;
 }
 

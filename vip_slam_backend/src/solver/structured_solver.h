@@ -1,5 +1,5 @@
-// Levenberg-Marquardt that knows the structure of a bundle adjustment: fixed-size blocks, points eliminated while they
-// are linearised, plane factors reduced to small dense blocks, one symbolic factorisation for all iterations.
+// Levenberg-Marquardt that exploits the structure of a bundle adjustment: fixed-size blocks, points eliminated while
+// they are linearised, plane factors reduced to small dense blocks, one symbolic factorisation for all iterations.
 #pragma once
 
 #include <functional>
@@ -54,8 +54,8 @@ class StructuredSolver : public BaSolver {
   void damp(double radius);
   void forEachNode(const std::function<void(int size, int unknown, double* block)>& f);
 
-  /// `ahead`: what the next linearisation needs of the same state and does not depend on the radius is done on the way,
-  /// which is all but the elimination of the points.
+  /// `ahead`: also computes the parts of the next linearisation at this state that do not depend on the radius, which
+  /// is everything except the elimination of the points.
   double cost(const BaProblem& problem, bool ahead, Worker* worker);
   bool solveStep(const BaProblem& problem, double radius, Worker* worker);
   /// Predicted decrease of the cost by the present step.
@@ -67,6 +67,22 @@ class StructuredSolver : public BaSolver {
   };
   void apply(const BaProblem& from, State* to) const;
   double stepNorm() const;
+  double largestGradient() const;
+  /// The damping of Levenberg and Marquardt by Ceres' rule.
+  struct TrustRegion {
+    double radius, decrease_factor = 2;
+    /// `ratio`: decrease of the cost over the predicted one.
+    void accept(double ratio);
+    /// False when the trust region has become too small.
+    bool refuse();
+  };
+  struct Trial {
+    bool accepted = false, converged = false;
+    double cost = 0, step_norm = 0;
+    double ratio = 0;  ///< decrease over predicted decrease
+  };
+  /// Takes the present step and keeps it when the cost falls; `present`: the cost before it, `other`: work space.
+  Trial tryStep(BaProblem& problem, const SolverOptions& options, bool last, double present, State* other);
 
   // linearize_factors.cpp; the cost of the factors (not halved)
   double linearizeImu(const BaProblem& problem);
@@ -76,11 +92,11 @@ class StructuredSolver : public BaSolver {
   double factorCost(const BaProblem& problem);
 
   std::unique_ptr<Worker> worker_;
-  bool helper_ = false;  ///< the worker has one
+  bool helper_ = false;  ///< whether the worker has a helper thread
   SystemStructure structure_;
   bool loaded_ = false;  ///< the arrays below hold the present variables
-  bool ahead_ = false;   ///< points and factors are linearised at the present variables, and no more
-  double ahead_ms_ = 0;  ///< what that took, all in all
+  bool ahead_ = false;   ///< points and factors are linearised at the present variables, points not yet eliminated
+  double ahead_ms_ = 0;  ///< total time spent on that
   std::vector<KernelFrame> frames_;
   std::vector<FrameGeometry> geometry_;
   std::vector<Eigen::Matrix<double, 3, 2>> basis_;

@@ -20,12 +20,12 @@ class Hash {
   std::uint64_t value_ = 0x2545f4914f6cdd1dull;
 };
 
-// Pairs that some factor asks for, each once, in ascending order of (second, first); and for every request its pair.
+// Pairs of nodes requested by factors, unique, in ascending order of (second, first); and the pair of every request.
 struct Requests {
   std::vector<std::pair<int, int>> wanted;  // first < second
   std::vector<int> pair_of;
 
-  // Buckets and marks instead of sorting: requests outnumber the pairs.
+  // Buckets and marks instead of sorting, since requests far outnumber the pairs.
   std::vector<std::pair<int, int>> unite(int nodes) {
     std::vector<int> begin(nodes + 1, 0), at(wanted.size()), last(nodes, -1), index(nodes, 0);
     for (const auto& w : wanted) ++begin[w.second + 1];
@@ -49,6 +49,8 @@ struct Requests {
 
 }  // namespace
 
+// Another structure with the same 64 bits would be taken for this one: the chance of that, 5e-20 for each problem, is
+// accepted.
 std::uint64_t SystemStructure::signature(const BaProblem& problem) const {
   Hash hash;
   hash.add(problem.frames.size());
@@ -112,7 +114,7 @@ void SystemStructure::orderPoints(const BaProblem& problem) {
 }
 
 void SystemStructure::splitElimination(const std::vector<int>& position) {
-  // A view costs one block for itself and each that is eliminated before it.
+  // A view costs one block for itself and one for each view that is eliminated before it.
   const int points = static_cast<int>(point_at.size());
   std::vector<std::int64_t> work(cholesky.nodes(), 0);
   std::int64_t total = 0;
@@ -159,7 +161,7 @@ bool SystemStructure::update(const BaProblem& problem) {
   for (std::size_t p = 0; p < problem.planes.size(); ++p)
     plane_node[p] = static_cast<int>(sizes.size()), sizes.push_back(3);
 
-  // Pairs: poses among each other in a table, the few others as requests.
+  // Pairs of poses are collected in a table, the few others as requests.
   std::vector<char> linked(static_cast<std::size_t>(poses) * poses, 0);
   Requests requests;
   const auto link = [&](int a, int b) {
@@ -220,7 +222,7 @@ bool SystemStructure::update(const BaProblem& problem) {
         static_cast<std::uint32_t>(cholesky.pairOffset(k));
   }
 
-  // The places are asked for in the order of the links above.
+  // The places must be requested in the same order as the links above.
   std::size_t request = 0;
   const auto placeOf = [&](int row, int column) {
     BlockPlace place;
@@ -242,7 +244,7 @@ bool SystemStructure::update(const BaProblem& problem) {
       for (int b = 0; b < a; ++b) imu[k].place[a][b] = placeOf(nodes[a], nodes[b]);
   }
   const auto placeTriple = [&](int i, int j, int plane) {
-    TriplePlaces places;  // one after the other: the order counts
+    TriplePlaces places;  // filled one by one: the order of the calls matters
     places.ji = placeOf(pose_node[j], pose_node[i]);
     places.pi = placeOf(plane_node[plane], pose_node[i]);
     places.pj = placeOf(plane_node[plane], pose_node[j]);

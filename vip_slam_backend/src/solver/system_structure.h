@@ -1,5 +1,5 @@
-// Which unknowns a problem has, which pairs of them share a factor, and where their blocks lie: everything about the
-// reduced system that stays the same over iterations, and over calls while the structure stays.
+// The unknowns of a problem, the pairs of them that share a factor, and the offsets of their blocks: everything about
+// the reduced system that is constant over iterations, and over calls with the same structure.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace vip_slam {
 
-/// Where a block between two nodes goes; offset -1: one of them is a constant.
+/// Offset of a block between two nodes; -1: one of them is constant.
 struct BlockPlace {
   std::int64_t offset = -1;
   bool transposed = false;  ///< the block is stored with rows and columns exchanged
@@ -18,7 +18,7 @@ struct BlockPlace {
 
 class SystemStructure {
  public:
-  /// Does nothing when the structure is that of the previous call. True when it was analysed anew.
+  /// Does nothing when the structure is that of the previous call. True when it was analysed again.
   bool update(const BaProblem& problem);
 
   SparseCholesky cholesky;
@@ -27,12 +27,12 @@ class SystemStructure {
   std::vector<int> point_at;
   /// Observations of the points in that order, per point by the elimination order of their frames (fixed frames first).
   std::vector<int> sorted, first;
-  /// Points [part_begin[k], part_begin[k + 1]) have as many observations in each part: pieces that can be linearised
-  /// side by side, each with sums of its own over the frames, whatever the number of threads.
+  /// Points [part_begin[k], part_begin[k + 1]) have about equally many observations in each part: parts that can be
+  /// linearised in parallel, each with its own sums over the frames, independent of the number of threads.
   static constexpr int kPointParts = 2;
   int part_begin[kPointParts + 1] = {};
   /// Ranges of the elimination order in which the elimination of points costs the same: per point its first observation
-  /// (of `sorted`) in each, and in the last place the one behind all.
+  /// (in `sorted`) in each range, and finally the end of its observations.
   static constexpr int kRanges = 4;
   std::vector<int> range_begin[kRanges + 1];
   std::vector<std::uint32_t> pair_offset;  ///< [earlier * frames + later] pose blocks

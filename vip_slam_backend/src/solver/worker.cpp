@@ -9,13 +9,13 @@
 namespace vip_slam {
 namespace {
 
-// Jobs follow each other within microseconds during a solve: looking again is cheaper than sleeping, for about twenty
-// microseconds. Afterwards the processor belongs to others.
+// Number of times the helper polls before it sleeps, about twenty microseconds: during a solve jobs follow each other
+// within microseconds, and waking up is more expensive.
 constexpr int kLooks = 1000;
 
-// The helper is judged by stretches of this many seconds in shared jobs, or as soon as it has cost that many. It must
-// save this share of a stretch, since pieces that can be shared are a little more work than the same in one go; else
-// the owner does some jobs alone, about ten iterations of a solve.
+// The helper is evaluated after every kStretch seconds of shared jobs, or as soon as it has cost kMostLost seconds. It
+// must save the share kLeastGain, since split work is a little more than the same in one piece; else the owner does
+// kJobsAlone jobs alone, about ten iterations of a solve.
 constexpr double kStretch = 2e-3, kMostLost = 0.5e-3, kLeastGain = 0.1;
 constexpr int kJobsAlone = 40;
 
@@ -90,7 +90,7 @@ void Worker::wake() {
   wake_.notify_one();
 }
 
-// What the owner would have needed for the helper's pieces counts, not what the helper took: it may be slow.
+// The gain is the time that the owner would have needed for the helper's pieces, not the time that the helper took.
 void Worker::judge(int pieces, Clock::time_point begin, Clock::time_point done, Clock::time_point end) {
   const int own = std::max(1, pieces - helped_);
   gain_ += helped_ * seconds(done - begin) / own - seconds(end - done);
@@ -100,7 +100,7 @@ void Worker::judge(int pieces, Clock::time_point begin, Clock::time_point done, 
   gain_ = spent_ = 0;
 }
 
-// Pieces from the back, as long as there are any; false when there was none.
+// The helper's loop: takes pieces from the back while there are any; false when there was none.
 bool Worker::work() {
   std::uint64_t left = left_.load(std::memory_order_acquire);
   bool any = false;

@@ -14,13 +14,13 @@ namespace {
 
 using namespace vip_slam;
 
-/// In the order of their stamps: sessions follow each other in id, not always in time, and TUM wants ascending stamps.
+/// Sorted by stamp, as TUM files require: ids ascend over sessions, stamps not always.
 Trajectory keyframePoses(const Map& map) {
   Trajectory poses;
   for (const auto& [id, keyframe] : map.keyframes()) poses.push_back({keyframe.data->frame.t, keyframe.state.T_W_I});
   const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.t < b.t; };
   std::stable_sort(poses.begin(), poses.end(), earlier);
-  // Two sessions over one recording have the same stamps.
+  // Two sessions of one recording have the same stamps.
   const auto same = [](const StampedPose& a, const StampedPose& b) { return a.t == b.t; };
   poses.erase(std::unique(poses.begin(), poses.end(), same), poses.end());
   return poses;

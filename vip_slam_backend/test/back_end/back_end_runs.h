@@ -1,4 +1,4 @@
-// A back end that is fed simulated keyframes, its map checked after every operation, and how far off it ends.
+// Feeds simulated keyframes to a back end, checks its map after every operation and returns the final error.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ inline BackEndOptions options(const std::string& variant) {
   return o;
 }
 
-/// Keyframes and what the planes say of each.
+/// Keyframes and the plane module's answer to each.
 inline void feed(SimulatedKeyframes* world, BackEnd* back_end, int keyframes) {
   for (int k = 0; k < keyframes; ++k) {
     back_end->addKeyframe(world->next());

@@ -89,7 +89,8 @@ class SimulatedKeyframes {
         continue;
       }
       if (p.track == kNoLandmark || random_() % 20 == 0) {
-        // A track follows its reference patch to a tenth of a pixel, but that began at a corner beside the point.
+        // A track follows its reference patch to 0.1 px, but the patch starts at a corner that is offset from the
+        // point.
         p.track = next_track_++;
         p.beside = Eigen::Vector2d(gauss(0.5), gauss(0.5));
       }
@@ -115,7 +116,7 @@ class SimulatedKeyframes {
     return kf;
   }
 
-  /// What a perfect plane module says after the newest keyframe: true planes seen by depth, all tracks on them
+  /// Output of a perfect plane module after the newest keyframe: true planes seen by depth, all tracks on them
   /// associated.
   PlaneUpdate planes() {
     PlaneUpdate update;
@@ -149,7 +150,7 @@ class SimulatedKeyframes {
     return update;
   }
 
-  /// A depth camera that reads so much too long at each distance, m, with this noise at so many points of each plane.
+  /// Sets the depth error over distance (m, positive: too long), and noise (m) and number of the points on each plane.
   void setDepthCamera(std::function<double(double)> read_too_long, double sigma_on_planes, int points_on_planes) {
     read_too_long_ = std::move(read_too_long);
     sigma_on_planes_ = sigma_on_planes;
@@ -182,7 +183,7 @@ class SimulatedKeyframes {
   int points_on_planes_ = 30;
 };
 
-/// The next keyframes at true poses, with what planes() says after each.
+/// The next keyframes at true poses, with the result of planes() after each.
 inline Map mapAtTruePoses(SimulatedKeyframes* world, int keyframes) {
   Map map;
   for (int k = 0; k < keyframes; ++k) {

@@ -10,7 +10,7 @@
 
 using namespace vip_slam;
 
-// Round and round in one room, where all keyframes see the same: so many of them stay as are enough.
+// Many rounds in one room, where all keyframes see the same: only as many stay as are needed.
 TEST(BackEnd, KeyframesDoNotCrowd) {
   BackEndOptions crowded = options("vip"), thinned = crowded;
   crowded.culling.enabled = false;
@@ -20,14 +20,14 @@ TEST(BackEnd, KeyframesDoNotCrowd) {
   EXPECT_GT(few.snapshot.keyframes.size(), 40u);
   EXPECT_LT(few.snapshot.keyframes.size(), 100u);
   EXPECT_LT(few.rmse, 1.5 * all.rmse + 0.002);
-  // What is kept is spread over the whole time.
+  // The kept keyframes are spread over the whole time.
   double last = few.snapshot.keyframes.front().t, widest = last;
   for (const SnapshotKeyframe& kf : few.snapshot.keyframes) widest = std::max(widest, kf.t - std::exchange(last, kf.t));
   EXPECT_LT(widest, 30.0);
 }
 
-// In a room that is seen again and again all keyframes are ends of loops. Those that tie two odometries stay, as far as
-// these need them.
+// In a room that is revisited many times all keyframes are ends of loops. Only loops that tie two odometries protect
+// their keyframes, as far as these need them.
 TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
   BackEndOptions o = options("vip");
   o.culling.enabled = false;
@@ -43,7 +43,7 @@ TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
   for (const bool two_odometries : {false, true}) {
     Map map = back_end.map();
     for (KeyframeId id = 1; id <= 90; ++id) map.keyframe(id).loop_keyframe = true;
-    // Those that could go are the ends of the oldest loops.
+    // The keyframes that could be culled are the ends of the oldest loops.
     std::vector<std::pair<KeyframeId, KeyframeId>> loops;
     for (const KeyframeId id : thinned) loops.emplace_back(90, id);
     if (two_odometries) {
@@ -72,7 +72,7 @@ TEST(BackEnd, ARequestOutlivesAResultThatComesTooLate) {
   EXPECT_TRUE(back_end.globalBaWanted());
 }
 
-// Also where a stored map has a keyframe by the number of its predecessor.
+// Also when a stored map has a keyframe with the same id as its predecessor.
 TEST(BackEnd, ANewOdometryBringsItsOwnBiases) {
   SimulatedKeyframes world(3);
   BackEnd back_end(options("vip"), world.sensor());
@@ -102,7 +102,7 @@ TEST(BackEnd, AllVariantsBeatTheOdometry) {
   }
 }
 
-// Where few landmarks live from one keyframe to the next, what the odometry knows of the images in between counts.
+// Where few landmarks are shared by successive keyframes, the odometry adds information from the images in between.
 TEST(BackEnd, OdometryHoldsWhereLandmarksAreFew) {
   double with = 0, without = 0;
   for (unsigned seed = 1; seed <= 4; ++seed) {

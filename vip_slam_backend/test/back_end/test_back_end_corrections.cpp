@@ -1,4 +1,4 @@
-// What the front end finds out late about mounting, depth, gyro and intrinsics holds for all keyframes.
+// Corrections of extrinsics, depth, gyro and intrinsics that the front end learns late apply to all keyframes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +11,7 @@ using namespace vip_slam;
 
 namespace {
 
-/// The keyframe as a front end publishes it that holds the camera's mounting to be off by `error`.
+/// The keyframe as published by a front end whose extrinsics are wrong by `error`.
 KeyframePtr mountedWrongly(const KeyframePtr& keyframe, const SE3& error) {
   auto wrong = std::make_shared<Keyframe>(*keyframe);
   wrong->frame.T_I_C = keyframe->frame.T_I_C * error;
@@ -21,7 +21,7 @@ KeyframePtr mountedWrongly(const KeyframePtr& keyframe, const SE3& error) {
   return wrong;
 }
 
-/// The keyframe of a camera that reads `too_long` m too long, as a front end publishes it that corrects for
+/// The keyframe of a camera whose depth is `too_long` m too long, as published by a front end that applies
 /// `correction`.
 KeyframePtr readTooLong(const KeyframePtr& keyframe, double too_long, double correction) {
   auto exact = std::make_shared<Keyframe>(*keyframe);
@@ -37,7 +37,7 @@ PlaneUpdate readTooLong(PlaneUpdate update, double too_long, double correction) 
   return update;
 }
 
-/// Largest error of a keyframe's direction, degrees, after the best common turn about the vertical is taken out.
+/// Largest orientation error of a keyframe, degrees, after removing the best common rotation about the vertical.
 double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& world) {
   double yaw = 0, worst = 0;
   for (const SnapshotKeyframe& kf : snapshot.keyframes) {
@@ -54,8 +54,8 @@ double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& wor
 
 }  // namespace
 
-// The front end learns the mounting in the first keyframes, by halves. What the last one knows holds for all: those at
-// the beginning, long fixed, would stay turned by two degrees.
+// The front end learns the extrinsics in the first keyframes, halving the error each time. The newest estimate has to
+// be applied to all: the first keyframes, long fixed, would stay turned by two degrees.
 TEST(BackEnd, AMountingLearntOnTheWayHoldsForAllKeyframes) {
   SimulatedKeyframes world(5);
   BackEnd back_end(options("vip"), world.sensor());
@@ -88,12 +88,12 @@ TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackAnOldMounting) {
   const SE3 between = T_W_C.inverse() * back_end.map().keyframe(17).T_W_C();
   back_end.merge(solution);
   EXPECT_EQ(checkMap(back_end.map()), "");
-  // Cameras stay where the adjustment has them, to what little it changes.
+  // The correction keeps the adjusted camera poses, up to small changes.
   const SE3 after = back_end.map().keyframe(5).T_W_C().inverse() * back_end.map().keyframe(17).T_W_C();
   EXPECT_LT(after.boxminus(between).norm(), 0.01);
 }
 
-// Depth reads 2 cm too long; the front end knows with the 16th keyframe, and a little better with each further one.
+// Depth reads 2 cm too long; the front end learns it at the 16th keyframe and refines it with each further one.
 TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
   SimulatedKeyframes world(4);
   BackEnd back_end(options("vip"), world.sensor());
@@ -132,7 +132,7 @@ TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
     } else {
       EXPECT_FALSE(back_end.globalBaWanted());
     }
-    // Planes may lag behind by what the map knows.
+    // Plane updates may still be based on the previous correction.
     back_end.applyPlaneUpdate(readTooLong(world.planes(), 0.02, k % 2 ? correction : 0.0));
   }
   back_end.finish();  // with what the newest keyframe knows
@@ -146,7 +146,7 @@ TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
   EXPECT_LT(known, never_wrong + 0.001);
 }
 
-/// As from a gyro that measures 5 % too much, and what its front end knows of that.
+/// As from a gyro that measures 5 % too much and a front end that applies `correction`.
 KeyframePtr turningTooFast(const KeyframePtr& keyframe, double correction) {
   auto kf = std::make_shared<Keyframe>(*keyframe);
   for (ImuSample& sample : kf->imu) sample.gyro *= 1.05;
@@ -180,10 +180,10 @@ TEST(BackEnd, AGyroCorrectionHoldsForAllKeyframes) {
   std::printf("rmse %.2f mm, with an exact gyro %.2f, the gyro believed %.2f mm\n", 1e3 * known, 1e3 * exact,
               1e3 * believed);
   EXPECT_LT(known, exact + 0.001);
-  EXPECT_GT(believed, exact + 0.0005);  // where the odometry contradicts it, it is believed less
+  EXPECT_GT(believed, exact + 0.0005);  // where the odometry contradicts the gyro, it gets less weight
 }
 
-// Blows of 20 ms that the accelerometer has otherwise; the odometry, which has images, was not misled.
+// Shocks of 20 ms that the accelerometer measures wrongly; the odometry, thanks to images, was not affected.
 TEST(BackEnd, AnImuThatTheOdometryContradictsDoesNotBendTheMap) {
   double square = 0, worst = 0;
   for (const unsigned seed : {4u, 5u, 6u}) {
@@ -207,7 +207,7 @@ TEST(BackEnd, AnImuThatTheOdometryContradictsDoesNotBendTheMap) {
     }
   }
   std::printf("with blows: rmse %.1f mm, worst %.1f\n", 1e3 * std::sqrt(square), 1e3 * worst);
-  EXPECT_LT(worst, 0.01);  // believed, 0.04
+  EXPECT_LT(worst, 0.01);  // 0.04 if the IMU were trusted fully
 }
 
 TEST(BackEnd, AKeyframeTellsHowNoisyItsImuIs) {
@@ -238,7 +238,7 @@ TEST(BackEnd, AGlobalAdjustmentOfAGyroAsItMeasuredIsDoneAgain) {
   EXPECT_TRUE(back_end.globalBaWanted());
 }
 
-// Focal lengths 0.4 % too long, a principal point that is a pixel off; the front end knows from the 15th keyframe on.
+// Focal lengths 0.4 % too long, principal point a pixel off; the front end knows from the 15th keyframe on.
 TEST(BackEnd, IntrinsicsThatAreKnownBetterHoldForAllKeyframes) {
   SimulatedKeyframes world(4);
   BackEnd back_end(options("vip"), world.sensor());
@@ -254,7 +254,7 @@ TEST(BackEnd, IntrinsicsThatAreKnownBetterHoldForAllKeyframes) {
   };
   for (int k = 0; k < 30; ++k) {
     const KeyframePtr kf = exact[k + 1] = world.next();
-    // What this camera sees, and what of it is corrected for by now.
+    // What this camera sees, with the correction known so far.
     auto seen = std::make_shared<Keyframe>(*kf);
     seen->frame.camera_correction.bearing = bearing;
     const MapUpdate update =

@@ -1,4 +1,4 @@
-// The back end when its map is reset, loaded or only localised in.
+// The back end when its map is reset, loaded, or used for localisation only.
 #include <gtest/gtest.h>
 
 #include "back_end/back_end_runs.h"
@@ -36,7 +36,7 @@ TEST(BackEndMaps, GlobalAdjustmentOfAMapThatIsNoMoreIsDropped) {
 TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   SimulatedKeyframes world(3), other(9);
   BackEnd back_end(options("vip"), world.sensor());
-  back_end.applyPlaneUpdate(PlaneUpdate());  // before any map update came
+  back_end.applyPlaneUpdate(PlaneUpdate());  // before any map update
   PlaneUpdate late;
   for (int k = 0; k < 6; ++k) {
     late.revision = back_end.addKeyframe(world.next()).revision;
@@ -66,7 +66,7 @@ TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   EXPECT_EQ(back_end.map().planes().size(), world.walls().size());
 }
 
-// The front end's tracks go on under the ids they have.
+// The front end's tracks keep their ids.
 TEST(BackEndMaps, NoLandmarkOfAMapHasTheIdOfOneLoadedBefore) {
   SimulatedKeyframes world(3);
   BackEnd back_end(options("vip"), world.sensor());
@@ -118,7 +118,7 @@ TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {
     const KeyframePtr keyframe = world.next();
     const MapUpdate update = back_end.addKeyframe(keyframe);
     EXPECT_EQ(update.newest_keyframe, 0u);
-    EXPECT_EQ(update.removed_keyframes, std::vector<KeyframeId>{keyframe->id});  // or the planes would wait for it
+    EXPECT_EQ(update.removed_keyframes, std::vector<KeyframeId>{keyframe->id});  // else the planes would wait for it
     EXPECT_NE(back_end.lastRefusal().find("localisation without a map"), std::string::npos) << back_end.lastRefusal();
   }
   EXPECT_TRUE(back_end.map().empty());
@@ -140,7 +140,7 @@ TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
   EXPECT_EQ(back_end.map().keyframe(3).state.T_W_I.boxminus(before).norm(), 0.0);
   back_end.requestGlobalBa();
   EXPECT_FALSE(back_end.globalBaWanted());
-  // A keyframe that was on its way when the map was loaded bears a number of the map's.
+  // A keyframe in transit while the map was loaded has an id that the map uses too.
   SimulatedKeyframes other(9);
   const MapUpdate update = back_end.addKeyframe(other.next());
   EXPECT_TRUE(update.removed_keyframes.empty());
@@ -149,13 +149,13 @@ TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
   EXPECT_TRUE(back_end.globalBaWanted());
 }
 
-// Hours in a place that the map does not know: what was refused is not kept for ever.
+// Hours in a place that is not mapped: refused keyframes are not kept for ever.
 TEST(BackEndMaps, LookingInVainForLongKeepsTheNewestRefusalsOnly) {
   SimulatedKeyframes world(3), other(9);
   BackEnd back_end(options("vip"), world.sensor());
   feed(&world, &back_end, 8);
   back_end.setLocalisationMode(true);
-  for (int k = 0; k < 8; ++k) other.next();  // bear numbers of the map
+  for (int k = 0; k < 8; ++k) other.next();  // their ids are used by the map
   std::size_t refused = 0;
   KeyframeId last = 0;
   for (int k = 0; k < 1200; ++k) {
@@ -181,7 +181,7 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   back_end.loadMap(path);
   back_end.setLocalisationMode(true);
   EXPECT_TRUE(back_end.snapshot().localised.empty());
-  // The same walk in an odometry that began elsewhere and looks elsewhere.
+  // The same walk in an odometry with another origin and heading.
   const SE3 T_other_odom(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {7, -3, 1});
   std::vector<ChainedPose> chain;
   for (int k = 0; k < 25; ++k) {
@@ -236,8 +236,8 @@ TEST(BackEndMaps, APartThatNothingTiesToTheMapIsNeitherPlacedNorLocalisedIn) {
   EXPECT_FALSE(back_end.snapshot().localised.empty());
 }
 
-// The camera is in the map and comes to a fragment, which is brought there; an adjustment that knew the fragment where
-// it was would put it back.
+// The camera, localised in the map, reaches a fragment, which is moved to the map; an adjustment started before that
+// would move it back.
 TEST(BackEndMaps, AnAdjustmentFromBeforeAFragmentCameToTheMapIsDropped) {
   SimulatedKeyframes world(4), again(4), other(9), other_again(9);
   BackEndOptions closing = options("vip");
@@ -254,7 +254,7 @@ TEST(BackEndMaps, AnAdjustmentFromBeforeAFragmentCameToTheMapIsDropped) {
   for (int k = 0; k < 25; ++k) add(world.next(), 0, k == 0);
   for (int k = 0; k < 25; ++k) add(other.next(), 1, k == 0);
   const SE3 guess = back_end.map().keyframe(1010).state.T_W_I;
-  // Back in the map; then what is seen is the fragment's room.
+  // Back in the map; then into the fragment's room.
   bool placed = false;
   for (int k = 0; k < 14; ++k, other_again.next()) placed = add(again.next(), 2, k == 0).placed;
   ASSERT_TRUE(placed);
@@ -276,7 +276,7 @@ PlaneUpdate withoutTheFirst(const MapSnapshot& before) {
   return update;
 }
 
-// What the plane module had to say when localisation was switched on it says only once.
+// Results the plane module had pending when localisation was switched on are sent only once.
 TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   SimulatedKeyframes world(4);
   BackEnd back_end(options("vip"), world.sensor());
@@ -311,7 +311,7 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
   BackEnd mapper(options("vip"), world.sensor());
   feed(&world, &mapper, 25);
   mapper.saveMap(path);
-  for (const double pause : {0.0, 60.0}) {  // seconds in which nothing was found
+  for (const double pause : {0.0, 60.0}) {  // seconds without localisation
     SimulatedKeyframes session(4);
     BackEnd back_end(options("vip"), world.sensor());
     back_end.loadMap(path);
@@ -328,7 +328,7 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
       if (k >= 18) kf->frame.t += pause;
       const MapUpdate update = back_end.addKeyframe(kf);
       if (k >= 18) {
-        EXPECT_TRUE(update.placed);  // the odometry has gone on all the time
+        EXPECT_TRUE(update.placed);  // the odometry continued throughout
         EXPECT_EQ(update.epoch, 7u);
         EXPECT_EQ(partOf(update, 7) == partOf(update, kLoadedEpochs), pause == 0) << k;
       }
@@ -383,7 +383,7 @@ TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
     const bool hosted = plane.host.keyframe != 0, second = plane.estimate.id > 1000;
     for (const auto& [id, kf] : back_end.map().keyframes())
       if (!hosted || id < plane.host.keyframe) EXPECT_EQ(kf.planes.count(plane.estimate.id), 0u) << id;
-    if (!hosted) {  // nobody saw it: it counts to the part that others are brought to
+    if (!hosted) {  // no keyframe observes it: it belongs to the reference part
       EXPECT_EQ(plane.host.epoch, kLoadedEpochs);
       continue;
     }
@@ -399,7 +399,7 @@ TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
   EXPECT_GT(of_second, 0);
 }
 
-// Lost, four keyframes are mapped at a guess; then the place is found, and mapping goes on.
+// After tracking loss four keyframes are mapped at a guessed pose; then the place is recognised, and mapping goes on.
 TEST(BackEndMaps, WhatWasMappedAtAGuessComesAlongWhenItsOdometryIsFound) {
   SimulatedKeyframes world(4), session(4);
   BackEnd back_end(options("vip"), world.sensor());
@@ -436,7 +436,7 @@ TEST(BackEndMaps, WhatWasMappedAtAGuessComesAlongWhenItsOdometryIsFound) {
   EXPECT_EQ(checkMap(back_end.map()), "");
 }
 
-// The odometry has drifted by half a metre since its last keyframe in the map; an adjustment ends before the next one.
+// The odometry has drifted by 0.5 m since its last keyframe in the map; an adjustment finishes before the next one.
 TEST(BackEndMaps, AnAdjustmentLeavesTheOdometryWhereItWasFound) {
   SimulatedKeyframes world(4), again(4);
   BackEnd back_end(options("vip"), world.sensor());

@@ -13,7 +13,7 @@ namespace vip_slam {
 
 class RingWorld {
  public:
-  /// `bays` > 1: the wall repeats itself, points and looks, that many times round.
+  /// `bays` > 1: the wall repeats itself, points and descriptors, that many times round.
   explicit RingWorld(int bays = 1, std::uint64_t seed = 4) : random_(seed) {
     CameraIntrinsics k;
     k.width = 640;
@@ -74,8 +74,8 @@ class RingWorld {
   }
 
   /// A walk from angle 0 to `turns` times round, two keyframes a second; position and yaw drift by `drift` metres and
-  /// radians over the walk. Tracks of the second round are new landmarks. The map has the ring's centre at `centre`;
-  /// what is estimated tips over by `tilt` radians.
+  /// radians over the walk. Tracks of the second round are new landmarks. The ring's centre is at `centre` in the map;
+  /// the estimate is tilted by `tilt` radians.
   void walk(Map& map, double turns, double drift, std::vector<SE3>* truths,
             const Eigen::Vector3d& centre = Eigen::Vector3d::Zero(), double tilt = 0) {
     const SE3 T_map_ring(Eigen::Quaterniond::Identity(), centre);
@@ -97,7 +97,7 @@ class RingWorld {
     }
   }
 
-  /// Each track of a keyframe is a landmark, which lies where the first keyframe has it.
+  /// Adds each track of a keyframe as a landmark, at its position seen from the first keyframe.
   void addLandmarks(Map& map, const Keyframe& keyframe) const {
     const SE3 estimate = map.keyframe(keyframe.id).state.T_W_I;
     for (std::uint32_t f = 0; f < keyframe.frame.features.size(); ++f) {
@@ -111,7 +111,7 @@ class RingWorld {
     }
   }
 
-  /// Each keyframe of a walk sees the floor before it; from keyframe `second` on that is held to be another plane.
+  /// Each keyframe of a walk observes the floor in front of it; from keyframe `second` on as another plane.
   void addFloors(Map& map, const std::vector<SE3>& truths, KeyframeId second) {
     const Plane floor(Eigen::Vector3d::UnitZ(), 0);
     for (std::size_t k = 0; k < truths.size(); ++k) {

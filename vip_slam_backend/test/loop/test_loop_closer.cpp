@@ -36,12 +36,12 @@ TEST(LoopCloser, ClosesTheRingAndRemovesTheDrift) {
   EXPECT_EQ(checkMap(map), "");
   EXPECT_GT(before, 0.1);
   EXPECT_LT((map.keyframe(last).state.T_W_I.t() - truth.back().t()).norm(), 0.05);
-  EXPECT_LT(map.landmarks().size(), landmarks - 100);  // the second round's points were the first's
+  EXPECT_LT(map.landmarks().size(), landmarks - 100);  // the second round's points were merged with the first's
   for (const LoopEvent& loop : loops) {
     const SE3 found = loop.T_match_query, right = truth[loop.match - 1].inverse() * truth[loop.query - 1];
     EXPECT_LT((found.t() - right.t()).norm(), 0.03) << loop.query << " -> " << loop.match;
   }
-  // A keyframe that leaves the map takes its loops along.
+  // Removing a keyframe from the map removes its loops.
   const std::size_t all = closer.loops().size();
   closer.remove(loops[0].query);
   EXPECT_LT(closer.loops().size(), all);
@@ -95,7 +95,7 @@ TEST(LoopCloser, NothingToCloseOnAWayWithoutReturn) {
 }
 
 TEST(LoopCloser, IdenticalBaysMakeNoLoop) {
-  // Six bays that look exactly alike, five metres apart: only odometry tells them apart.
+  // Six bays that look exactly alike, five metres apart: only odometry distinguishes them.
   RingWorld world(6);
   Map map;
   std::vector<SE3> truth;
@@ -106,8 +106,8 @@ TEST(LoopCloser, IdenticalBaysMakeNoLoop) {
                              << loops.front().match << ": " << loops.front().reason;
 }
 
-/// A walk of `count` keyframes round the ring, `step` radians each, in an odometry of its own whose place in the map is
-/// `guess` until a loop tells. The id of the last keyframe.
+/// A walk of `count` keyframes round the ring, `step` radians each, in a separate odometry whose pose in the map is
+/// `guess` until a loop is found. Returns the id of the last keyframe.
 KeyframeId walkAnew(RingWorld& world, LoopCloser& closer, Map& map, KeyframeId first, std::uint32_t epoch, double from,
                     double step, int count, const SE3& guess) {
   KeyframeId previous = 0;
@@ -131,7 +131,7 @@ KeyframeId walkAnew(RingWorld& world, LoopCloser& closer, Map& map, KeyframeId f
   return previous;
 }
 
-/// Where somebody is put who was carried blindfolded.
+/// A wrong guess of the pose, as after the camera was carried while covered.
 SE3 guessOf(double yaw) {
   return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(3, -4, 0.5));
 }
@@ -157,7 +157,7 @@ TEST(LoopCloser, OdometryThatBeganAnewJoinsWhereOnlyOnePlaceFits) {
   }
 }
 
-// A fragment that was mapped after a loss and never tied comes to the map, not the map to it.
+// A fragment that was mapped after tracking loss and never tied to the map is moved to the map, not the map to it.
 TEST(LoopCloser, TheMapStaysWhenAFragmentIsFoundAgain) {
   RingWorld world(1);
   Map map;
@@ -166,10 +166,10 @@ TEST(LoopCloser, TheMapStaysWhenAFragmentIsFoundAgain) {
   LoopCloser closer(LoopOptions(), world.camera());
   closeAll(closer, map);
   const SE3 first = map.keyframe(1).state.T_W_I;
-  walkAnew(world, closer, map, 1000, 1, 2.9, 0.07, 8, guessOf(2.0));  // a place that the map does not have
+  walkAnew(world, closer, map, 1000, 1, 2.9, 0.07, 8, guessOf(2.0));  // a place that is not mapped
   EXPECT_GT((map.keyframe(1000).state.T_W_I.t() - world.truth(2.9).t()).norm(), 1.0);
   EXPECT_EQ(0u, referencePart(map, closer.loops()).count(1000));
-  walkAnew(world, closer, map, 2000, 2, 1.2, 0.07, 32, guessOf(-1.0));  // back in the map, then on to that place
+  walkAnew(world, closer, map, 2000, 2, 1.2, 0.07, 32, guessOf(-1.0));  // starts in the map and goes on to that place
   EXPECT_LT((map.keyframe(1).state.T_W_I.t() - first.t()).norm(), 0.05);
   EXPECT_LT((map.keyframe(2000).state.T_W_I.t() - world.truth(1.2).t()).norm(), 0.1);
   EXPECT_TRUE(closer.tied(map, 1000));
@@ -177,7 +177,7 @@ TEST(LoopCloser, TheMapStaysWhenAFragmentIsFoundAgain) {
   EXPECT_EQ(checkMap(map), "");
 }
 
-// As after a while of localisation that found nothing: the odometry drifted, and nothing of the way is in the map.
+// As after a period of localisation without success: the odometry drifted, and no keyframe of that way is in the map.
 TEST(LoopCloser, AHoleInTheOdometryIsNoStiffEdge) {
   RingWorld world;
   Map map;
@@ -216,7 +216,7 @@ TEST(Relocaliser, FindsItsPlaceAndRefusesTwoThatLookAlike) {
     Relocaliser relocaliser{RelocalisationOptions()};
     int found = 0;
     for (int k = 0; k < 20; ++k) {
-      // Off the path, another heading, and an odometry frame of its own.
+      // Off the path, with another heading and in another odometry frame.
       SE3 T = world.truth(0.3 + 0.22 * k);
       T = T *
           SE3(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(-0.3, 0.2, 0.1));

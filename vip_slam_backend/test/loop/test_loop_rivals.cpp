@@ -1,4 +1,4 @@
-// An aisle of equal bays that is walked twice with a long way in between: what looks alike is no place.
+// An aisle of equal bays that is walked twice, with a long way in between: similar appearance alone makes no loop.
 #include <cmath>
 #include <memory>
 #include <random>
@@ -20,7 +20,7 @@ constexpr int kPointsPerMetre = 60;
 
 class Aisle {
  public:
-  /// Bays of `period` metres; `unique`: share of each one's points that no other has.
+  /// Bays of `period` metres; `unique`: share of each bay's points that no other bay has.
   Aisle(double period, double unique) {
     CameraIntrinsics intrinsics;
     intrinsics.width = 640, intrinsics.height = 480;
@@ -47,7 +47,7 @@ class Aisle {
   static SE3 poseAt(double x, double y, double turn) {
     return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2 + turn, Eigen::Vector3d::UnitZ())), {x, y, 1.5});
   }
-  /// What a camera at `T_W_I` sees of the aisle; elsewhere (`there` false) of nothing in particular.
+  /// Features of a camera at `T_W_I` in the aisle; random ones when it is elsewhere (`there` false).
   std::vector<Feature> see(const SE3& T_W_I, LandmarkId first, bool there) {
     std::vector<Feature> features;
     const SE3 T_C_W = (T_W_I * T_I_C()).inverse();
@@ -87,7 +87,7 @@ struct Walk {
   int right = 0, wrong = 0;
 };
 
-/// Along the aisle, `way` metres round and along it again with 5 cm of drift by then.
+/// Along the aisle, `way` metres elsewhere and along the aisle again, with 5 cm of drift by then.
 Walk walkTwice(double period, double unique, double way, TrackingState state) {
   constexpr double kEnd = 25, kStep = 0.4, kDrift = 0.05;
   struct Stop {
@@ -152,7 +152,7 @@ TEST(LoopRivals, ABayIsNotTakenForItsNeighbour) {
   }
 }
 
-// A camera without depth is degraded all the time, and its odometry believed ten times less.
+// Without depth the tracking state is always degraded, which inflates the odometry's sigmas ten times.
 TEST(LoopRivals, NorWhereTheOdometryKnowsLittle) {
   const Walk walk = walkTwice(5.0, 0.1, 100.0, TrackingState::kDegraded);
   EXPECT_EQ(walk.wrong, 0);

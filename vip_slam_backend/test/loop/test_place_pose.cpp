@@ -50,7 +50,7 @@ class PlacePoseTest : public ::testing::Test {
     const int all = static_cast<int>(std::count(truth_.begin(), truth_.end(), true));
     EXPECT_GE(right, 0.9 * all);
     EXPECT_LE(wrong, 2);
-    // The information says how far off it is: 6 degrees of freedom, 99.99 % below 28.
+    // The information matrix predicts the error: 6 degrees of freedom, 99.99 % below 28.
     EXPECT_LT(error.dot(fine.information * error), 40.0);
   }
   std::mt19937_64 random_{5};
@@ -90,7 +90,7 @@ TEST_F(PlacePoseTest, NothingButOutliersGivesFewInliers) {
   EXPECT_LT(worst, 8);
 }
 
-// Three cameras of one body, each too poor alone.
+// Three cameras on one body, each with too few matches alone.
 TEST_F(PlacePoseTest, RigOfCameras) {
   for (int trial = 0; trial < 20; ++trial) {
     make(1, 1.0, true);
@@ -119,7 +119,7 @@ TEST_F(PlacePoseTest, RigOfCameras) {
     const PlacePose coarse = ransacPlacePose(matches, rig, R_G_B, options);
     ASSERT_TRUE(coarse.found);
     EXPECT_GE(coarse.inliers.size(), 20u);
-    // Without noise the pose is exact, and so it stays when gravity has a say.
+    // Without noise the pose is exact, and it stays exact with a gravity prior.
     for (const double tilt_sigma : {0.0, 0.003}) {
       options.tilt_sigma = tilt_sigma;
       const PlacePose fine = refinePlacePose(matches, rig, coarse.T_W_B, R_G_B, options);

@@ -27,7 +27,7 @@ class PlaceSearchTest : public ::testing::Test {
   KeyframePtr query(int k) const {
     return world_->see(1000 + k, 900 + 0.4 * k, poseAt(k), T_odom_map_ * poseAt(k), 500000);
   }
-  /// The keyframe with all but each n-th feature taken away.
+  /// The keyframe with only every n-th feature.
   static KeyframePtr thinned(const KeyframePtr& keyframe, std::size_t n) {
     auto thin = std::make_shared<Keyframe>(*keyframe);
     thin->frame.features.clear();
@@ -61,7 +61,7 @@ TEST_F(PlaceSearchTest, SupportMovesAWrongStartToTheTruth) {
   EXPECT_GT(support.explainedCells(), 0.8);
   // Three keyframes see many of the points more than once: these count once.
   EXPECT_LT(support.points, support.matches);
-  // One keyframe alone has less to say.
+  // One keyframe alone has less support.
   const PlaceSupport alone = placeSupport(map_, {keyframes.back()}, off * T_W_odom, places_->verifier(), {});
   EXPECT_LT(alone.points, support.points);
 }
@@ -122,7 +122,8 @@ TEST_F(PlaceSearchTest, PlacesThatRepeatThemselvesAreRefused) {
   }
 }
 
-// Parts that nothing ties lie over each other by a guess. Here every other keyframe of one place belongs to another.
+// Parts that are not tied may overlap, as their relative pose is a guess. Here every other keyframe of a place belongs
+// to another part.
 TEST_F(PlaceSearchTest, WhatSeveralPartsShowSpeaksForNoPlaceTogether) {
   map(1);
   PlaceSearch one{RelocalisationOptions()}, several{RelocalisationOptions()};
@@ -141,7 +142,7 @@ TEST_F(PlaceSearchTest, WhatSeveralPartsShowSpeaksForNoPlaceTogether) {
 
 TEST_F(PlaceSearchTest, APlaceTheMapDoesNotShowToTheNewestKeyframeIsNotForgotten) {
   map(1);
-  // The newest keyframe looks at the middle of the ring, where the map has no view; the one before speaks for the
+  // The newest keyframe looks at the middle of the ring, of which the map has no view; the one before supports the
   // place.
   auto turned = std::make_shared<Keyframe>(*query(1));
   turned->frame.features.clear();
@@ -163,7 +164,7 @@ TEST_F(PlaceSearchTest, AnotherOdometryBeginsAnew) {
   map(1);
   PlaceSearch search{RelocalisationOptions()};
   for (int k = 0; k < 3; ++k) add(search, query(k));
-  // The same view in an odometry that lies elsewhere: what the keyframes before said about theirs is of no use.
+  // The same view in another odometry with another pose: the earlier keyframes' evidence does not apply to it.
   auto other = std::make_shared<Keyframe>(*world_->see(
       1003, 901.2, poseAt(3), SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(50, 0, 0)) * poseAt(3), 500000));
   other->frame.epoch = 1;

@@ -7,7 +7,7 @@
 namespace vip_slam {
 namespace {
 
-// A wall five metres ahead and the floor, seen by a keyframe of the map and by a query beside it.
+// A wall five metres ahead and the floor, seen by a keyframe of the map and by a query next to it.
 class PlaceSurfacesTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -70,7 +70,7 @@ TEST_F(PlaceSurfacesTest, EachPointGetsThePlaneItLiesOn) {
   std::size_t other = 0;
   for (const PlaceSurface& s : surfaces) {
     EXPECT_EQ(s.camera, 3u);
-    // As near to the edge as the guess is wrong, a point may go to either.
+    // Nearer to the edge than the error of the guess, a point may be assigned to either surface.
     const double off = std::abs(s.plane_W.signedDistance(truth * s.p_C));
     EXPECT_LT(off, 0.05);
     other += off > 0.001;
@@ -79,13 +79,13 @@ TEST_F(PlaceSurfacesTest, EachPointGetsThePlaneItLiesOn) {
   EXPECT_GT(surfaces.size(), 200u);
   EXPECT_LT(other, surfaces.size() / 50);
   ASSERT_EQ(weight.size(), 2u);
-  // The wall fills more of the image than the floor and has no more to say.
+  // The wall fills more of the image than the floor but gets no more weight.
   EXPECT_NEAR(weight[true], weight[false], 1e-6 * weight[true]);
 }
 
 TEST_F(PlaceSurfacesTest, SurfacesThatTheMapDoesNotHaveThereAreLeftAlone) {
   DepthGrid moved = see(T_W_V_);
-  for (float& z : moved.z) z -= 0.4f;  // a cupboard before the wall
+  for (float& z : moved.z) z -= 0.4f;  // a cupboard in front of the wall
   EXPECT_TRUE(matchSurfaces(map_, 1, moved, T_W_V_, *camera_, 0).empty());
   EXPECT_TRUE(matchSurfaces(map_, 1, DepthGrid(), T_W_V_, *camera_, 0).empty());
   map_.removePlane(1);

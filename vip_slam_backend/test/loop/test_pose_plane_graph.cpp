@@ -113,7 +113,7 @@ TEST_F(GraphTest, SeparatePartsAreHeldSeparately) {
   EXPECT_LT(s.chi2, 1e-9);
 }
 
-// What the camera's pose is not sure of becomes the residual's, which has the match's axes.
+// The uncertainty of the camera's pose adds to that of the residual, which is in the axes of the match.
 TEST(Graph, ALoopIsAsSureAsItsCamera) {
   const SE3 T_W_match(expQuaternion({0.3, -0.2, 1.5}), {1, 2, 3}),
       T_W_query(expQuaternion({-0.1, 0.4, -0.9}), {2, 0, 1});

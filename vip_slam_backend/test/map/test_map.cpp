@@ -1,4 +1,4 @@
-// The map's operations keep its invariants; what breaks them is refused and changes nothing.
+// The map's operations keep its invariants; operations that would break them are refused and change nothing.
 #include <gtest/gtest.h>
 
 #include "back_end/simulated_keyframes.h"
@@ -14,7 +14,7 @@ namespace {
 struct Fixture {
   SimulatedKeyframes world{11};
   Map map;
-  LandmarkMaker maker{LandmarkMakerOptions()};
+  LandmarkMaker maker(500.0);
   void add(int count) {
     for (int k = 0; k < count; ++k) {
       const KeyframePtr kf = world.next();
@@ -47,7 +47,7 @@ TEST(Map, TracksBecomeLandmarks) {
   EXPECT_EQ(covisible.front().first, 5u);
 }
 
-// Also where a keyframe in between was culled, but not in those of another session.
+// Also when a keyframe in between was culled, but not for keyframes of another session.
 TEST(Map, AGyroThatIsKnownBetterIsIntegratedAnew) {
   Fixture f;
   f.add(5);
@@ -72,7 +72,7 @@ TEST(Map, AGyroThatIsKnownBetterIsIntegratedAnew) {
     const Eigen::Vector3d at_rest = before.at(id).state.bias_gyro;
     EXPECT_LT((kf.state.bias_gyro - (at_rest + correction * at_rest)).norm(), 1e-12);
   }
-  // What was joined over a culled keyframe stays corrected when another one goes.
+  // An IMU factor merged over a culled keyframe stays corrected when another keyframe is culled.
   f.map.removeKeyframe(4, ImuNoise(), 5.0);
   EXPECT_EQ(f.map.keyframe(5).gyro_correction, correction);
 }
@@ -126,7 +126,7 @@ TEST(Map, DepthThatIsKnownBetterHoldsForAllKeyframesButStoredOnes) {
     EXPECT_EQ(kf.imu.get(), &kf.data->imu);
     EXPECT_EQ(kf.imu->size(), before.at(id).imu->size());
   }
-  // An observation made of the readings as they were is brought to what they are now.
+  // An observation made from uncorrected readings is corrected when it is added.
   observation.keyframe = 3;
   ASSERT_TRUE(f.map.setPlaneObservation(observation));
   const PlaneObservation& late = f.map.keyframe(3).planes.at(observation.plane);
@@ -137,7 +137,7 @@ TEST(Map, DepthThatIsKnownBetterHoldsForAllKeyframesButStoredOnes) {
 TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {
   // Track 900 has no depth; while it waits, its first view is matched with landmark 800.
   Map map;
-  LandmarkMaker maker{LandmarkMakerOptions()};
+  LandmarkMaker maker(500.0);
   for (KeyframeId id = 1; id <= 4; ++id) {
     auto kf = std::make_shared<Keyframe>();
     kf->id = id;
@@ -163,7 +163,7 @@ TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {
   EXPECT_GE(map.landmark(800).observations.size(), 3u);
 }
 
-// Texture repeats itself: what a new odometry finds where it guesses to be need not be what the map has there.
+// Texture repeats itself: points seen by a new odometry at its guessed pose may differ from the map points there.
 TEST(Map, LandmarksOfAPartThatNothingTiesAreNotMet) {
   for (const bool tied : {true, false}) {
     Fixture f;
@@ -174,7 +174,7 @@ TEST(Map, LandmarksOfAPartThatNothingTiesAreNotMet) {
     f.maker.process(kf->id, &f.map, allowed);
     const bool meets = !f.map.covisible(kf->id).empty();
     EXPECT_EQ(meets, tied);
-    // Some share landmarks already: by the name of a track, or through a third keyframe.
+    // Some share landmarks already: by a track's id, or through a third keyframe.
     Fixture shared;
     shared.add(5);
     const Reobservation reobservation({}, makeCamera(shared.world.sensor().camera));
@@ -312,7 +312,8 @@ TEST(Map, CullingKeepsTheMapValid) {
     if (entry.second.preintegration) EXPECT_LE(entry.second.preintegration->dt(), options.max_imu_seconds + 1e-9);
 }
 
-// What stands before a landmark hides it from keyframes that it is predicted into: many views of a track outweigh that.
+// An object in front of a landmark occludes it in keyframes into which it is predicted: many views of a track outweigh
+// these misses.
 TEST(Map, LandmarksOfManyViewsAreKeptHoweverOftenTheyAreHidden) {
   Fixture f;
   f.add(30);

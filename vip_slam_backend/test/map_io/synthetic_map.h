@@ -92,7 +92,7 @@ inline Map syntheticMap(int keyframes, int features, double imu_rate, std::uint6
   }
   for (LandmarkId id = 0; id < next; id += 7)
     if (map.hasLandmark(id)) map.associate(id, id % 2 ? 3 : 9);
-  // Ids with gaps and merges, as a run leaves them.
+  // Ids with gaps and merges, as after a run.
   for (LandmarkId id = 10; id + 1 < next; id += 50)
     if (map.hasLandmark(id) && map.hasLandmark(id + 1)) map.mergeLandmarks(id + 1, id);
   map.keyframe(2).loop_keyframe = true;

@@ -58,9 +58,9 @@ TEST(MapCamera, AVersion4FileIsReadWithout) {
   constexpr double kScale = 1.2345678901;
   for (const KeyframeId id : {1, 2, 3}) map.widenImuNoise(id, kScale, ImuNoise());
   std::string bytes = serialiseMap(map, {}, 1);
-  bytes.erase(24 + 8, 1);  // the flag that no camera follows
+  bytes.erase(24 + 8, 1);  // the flag for "no camera stored"
   const std::string scale(reinterpret_cast<const char*>(&kScale), sizeof kScale);
-  int scales = 0;  // that version 6 has of each keyframe
+  int scales = 0;  // stored per keyframe since version 6
   for (std::size_t at; (at = bytes.find(scale)) != std::string::npos; ++scales) bytes.erase(at, sizeof kScale);
   ASSERT_EQ(scales, 3);
   bytes[8] = 4;
@@ -87,7 +87,7 @@ TEST(MapCamera, AnotherOneIsRefusedByName) {
       "test.vsm: made with images of 640 x 480 pixels, fx 615.2, fy 614.5, cx 321.1, cy 238.8, but the camera now "
       "has 640 x 480 pixels, fx 620.8, fy 626.8, cx 321.1, cy 238.8; expected the same");
   now = camera();
-  now.cx += 25;  // a recalibration finds some pixels
+  now.cx += 25;  // a change as after recalibration
   EXPECT_EQ(refusal(stored, now), "");
   now.cx += 15;
   EXPECT_NE(refusal(stored, now).find("cx 361.1"), std::string::npos) << refusal(stored, now);

@@ -17,7 +17,8 @@ TEST(ResetBarrier, HoldsBackWhatWasOnItsWay) {
   EXPECT_TRUE(barrier.passes(12.1, 0));
 }
 
-// Images that the front end finished before it obeyed have later stamps, but are of the odometry that is forgotten.
+// Images that the front end finishes before it handles the reset have later stamps, but belong to the discarded
+// odometry.
 TEST(ResetBarrier, AnEpochThatHadKeyframesIsOver) {
   ResetBarrier barrier;
   barrier.seeKeyframe(11.5, 2);
@@ -26,7 +27,7 @@ TEST(ResetBarrier, AnEpochThatHadKeyframesIsOver) {
   barrier.seeKeyframe(12.1, 2);
   EXPECT_FALSE(barrier.passes(12.1, 2));
   EXPECT_TRUE(barrier.passes(12.2, 3));
-  // Of epoch 3 nothing but frames of a front end that has not begun: it keeps that epoch.
+  // Of epoch 3 there are only frames from before initialisation, so the front end keeps that epoch after the reset.
   barrier.see(12.3, 4);
   barrier.raise();
   EXPECT_FALSE(barrier.passes(12.3, 4));
@@ -38,16 +39,16 @@ TEST(ResetBarrier, ALaterEpochLiftsIt) {
   barrier.see(12.0, 3);
   barrier.raise();
   EXPECT_FALSE(barrier.passes(0.1, 3));
-  EXPECT_TRUE(barrier.passes(0.1, 4));  // the device's clock began anew
+  EXPECT_TRUE(barrier.passes(0.1, 4));  // the device's clock restarted
   EXPECT_TRUE(barrier.passes(0.2, 4));
 }
 
-// The device was plugged in anew before the reset: the epoch that waits for a start has small stamps.
+// The device was reconnected before the reset: the epoch that waits for initialisation has small stamps.
 TEST(ResetBarrier, StampsOfEarlierEpochsDoNotCount) {
   ResetBarrier barrier;
   barrier.seeKeyframe(5000.0, 0);
   barrier.see(1.0, 1);
-  barrier.see(5000.1, 0);  // on its way since before
+  barrier.see(5000.1, 0);  // was in transit before the reset
   EXPECT_EQ(barrier.newest(), 1.0);
   barrier.raise();
   EXPECT_FALSE(barrier.passes(5000.1, 0));
@@ -62,13 +63,13 @@ TEST(ResetBarrier, AResetBeforeAnythingCameHoldsNothingBack) {
   EXPECT_TRUE(barrier.passes(-5.0, 0));
 }
 
-// A front end that was loaded anew counts its epochs from the beginning.
+// A reloaded front end counts its epochs from zero.
 TEST(ResetBarrier, AFrontEndThatBeganAnewIsNotKeptOut) {
   for (const bool reset_at_once : {false, true}) {
     ResetBarrier barrier;
     barrier.seeKeyframe(10, 2);
     if (reset_at_once) barrier.raise();
-    barrier.see(10.1, 1);  // one that was late
+    barrier.see(10.1, 1);  // a late frame
     barrier.see(10.2, 2);
     EXPECT_EQ(!reset_at_once, barrier.passes(10.2, 2));
     for (int i = 0; i < 10; ++i) barrier.see(20 + 0.05 * i, 0);

@@ -1,4 +1,4 @@
-// What a map says about the depth camera: found when it is there, and nothing else taken for it.
+// Depth curve estimated from a map: an existing error is found, and other errors are not mistaken for it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +24,7 @@ std::optional<DepthCurve> curveOf(std::function<double(double)> read_too_long, i
   return fitDepthCurve(mapAtTruePoses(&world, keyframes), DepthNoise());
 }
 
-/// Root mean square of curve + what is read too long, between 2 and 6 m, without offset and scale.
+/// RMS of the curve plus the depth error, between 2 and 6 m, after removing offset and scale.
 double leftOver(const DepthCurve& curve) {
   Eigen::MatrixX2d lines(32, 2);
   Eigen::VectorXd left(32);
@@ -42,7 +42,7 @@ TEST(DepthCurveFit, FindsTheWiggleOfATimeOfFlightCamera) {
   ASSERT_TRUE(curve);
   EXPECT_GT(leftOver(DepthCurve()), 0.0025);
   EXPECT_LT(leftOver(*curve), 0.0006);
-  // Nothing was read there.
+  // There are no readings at these depths.
   EXPECT_EQ(curve->at(0.0f), 0.0f);
   EXPECT_LT(std::abs(curve->at(8.0f)), 0.001f);
 }
@@ -53,7 +53,7 @@ TEST(DepthCurveFit, FindsNothingInWhatIsExact) {
   EXPECT_FALSE(curveOf(exact, 60, 0.03));
 }
 
-// Both are the business of others, see the header.
+// Both are estimated elsewhere, see the header.
 TEST(DepthCurveFit, LeavesOffsetAndScaleAlone) {
   EXPECT_FALSE(curveOf([](double) { return 0.02; }));
   EXPECT_FALSE(curveOf([](double z) { return 0.01 * z; }));
@@ -75,7 +75,7 @@ TEST(DepthCurveFit, TellsTheUserOfWhatMatters) {
   EXPECT_NE(depthCurveDifference({{0.f, 0.001f, -0.0042f}}).find("up to 4.2 mm"), std::string::npos);
 }
 
-// A wall whose far part stands back by 4 cm passes for one plane: that is no error of the camera's.
+// A wall whose far part is set back by 4 cm is mapped as one plane: that is no error of the camera.
 TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(exact, 0.004, kPoints);
@@ -94,7 +94,7 @@ TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   EXPECT_FALSE(fitDepthCurve(map, DepthNoise()));
 }
 
-// The whole way: the map finds it, tells the others, and all keyframes have it.
+// End to end: the back end estimates the curve, reports it, and applies it to all keyframes.
 TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
   SimulatedKeyframes world(6);
   world.setDepthCamera(wiggle, 0.004, kPoints);
@@ -103,7 +103,7 @@ TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
   options.loop_closing = false;
   BackEnd back_end(options, world.sensor());
   MapUpdate update;
-  std::set<LandmarkId> told;  // what one who hears all updates knows of landmarks
+  std::set<LandmarkId> told;  // the landmarks known to a listener that receives all updates
   const auto hear = [&told, &update] {
     for (const LandmarkEstimate& landmark : update.landmarks) told.insert(landmark.id);
     for (const LandmarkId id : update.removed_landmarks) told.erase(id);
@@ -116,7 +116,7 @@ TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
     hear();
     back_end.applyPlaneUpdate(world.planes());
     told_all += update.global && !update.depth_curve.empty();
-    if (!back_end.globalBaWanted() || k > 40) continue;  // the end has something to do as well
+    if (!back_end.globalBaWanted() || k > 40) continue;  // leaves work for finish() as well
     update = back_end.merge(back_end.run(back_end.startGlobalBa()));
     hear();
   }

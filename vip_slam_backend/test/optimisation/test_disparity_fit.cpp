@@ -1,4 +1,4 @@
-// Disparities that are all off by the same: found when they are, with the offset and scale that come with them.
+// A constant error of all disparities: found when it is there, together with the depth offset and scale it implies.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -41,8 +41,8 @@ TEST(DisparityFit, FindsTheErrorAndWhatComesWithIt) {
   EXPECT_NEAR(*other, -0.001, 1e-4);
 }
 
-// Noise that grows with the square of the distance, twice as large at four metres as the error: what is too short by
-// chance must not count for more.
+// Noise that grows with the square of the distance, twice as large as the error at 4 m: readings that are too short by
+// chance must not get a larger weight.
 TEST(DisparityFit, IsNotMisledByNoise) {
   DepthNoise noise = stereo();
   noise.a = 0.001, noise.b = 0, noise.c = 0.0035;
@@ -83,7 +83,7 @@ TEST(DisparityFit, IsNotAskedOfOtherCamerasOrOfTooLittle) {
   EXPECT_FALSE(fitDisparityError(map, stereo(), false));
 }
 
-// A wall whose far part stands back by 4 cm passes for one plane.
+// A wall whose far part is set back by 4 cm is mapped as one plane.
 TEST(DisparityFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   SimulatedKeyframes world(3);
   world.setDepthCamera(exact, 0.004, kPoints);
@@ -103,7 +103,7 @@ TEST(DisparityFit, WhatNoCalibrationExplainsIsNotBelieved) {
   EXPECT_TRUE(errorOf([](double z) { return z / (1 + 0.004 * z) - z; }));
 }
 
-// Where poses are off the points of a keyframe are off all together: they are one error, not hundreds.
+// An error of a pose shifts all points of the keyframe alike: it counts as one error, not as hundreds.
 TEST(DisparityFit, PosesThatAreOffAreNotMistakenForManyErrors) {
   int found = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
@@ -128,14 +128,14 @@ TEST(DisparityFit, TellsTheUser) {
             std::string::npos);
 }
 
-// The whole way: what the front end took for an offset until then goes.
+// End to end: the depth offset which the front end estimated in its place is withdrawn.
 TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   SimulatedKeyframes world(6);
   world.setDepthCamera(tooLong, 0.004, kPoints);
   BackEndOptions options;
   options.lockstep = true;
   options.loop_closing = false;
-  options.variant = "vi";  // so that poses do not give way to what planes say
+  options.variant = "vi";  // so that plane factors do not pull the poses
   SensorConfig sensor = world.sensor();
   sensor.depth_noise.type = DepthSensorType::kStereo;
   BackEnd back_end(options, sensor);
@@ -144,7 +144,8 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   for (int k = 0; k < 60; ++k) {
     auto read = std::make_shared<Keyframe>(*world.next());
     for (Feature& f : read->frame.features) f.depth = 0;
-    // Until then the front end took it for an offset; what was on its way when it heard of it has that still.
+    // Until it knows the disparity error the front end estimates it as an offset; keyframes in transit still carry
+    // that.
     const bool known = back_end.disparityError() != 0 && k % 2 == 1;
     with_offset += back_end.disparityError() == 0;
     const KeyframePtr keyframe =

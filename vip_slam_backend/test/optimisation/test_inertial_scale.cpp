@@ -1,4 +1,5 @@
-// How large the map is by the accelerometer: found where the motion shows it, with an honest sigma, unknown elsewhere.
+// Scale of the map from the accelerometer: estimated with a consistent sigma when the motion makes it observable,
+// otherwise unknown.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +15,7 @@ struct Walk {
   double map_scale = 1;  ///< map's distance over the true one
   double swing = 0.25;   ///< of the body to and fro, m; accelerations of up to 0.6 m/s^2
   double seconds = 40;
-  double jump_at = 1e9;    ///< here the map is shifted and the IMU is missing for one interval, s
+  double jump_at = 1e9;    ///< s; here the map is shifted and the IMU is missing for one interval
   double gravity = 9.81;   ///< of the place
   double accel_scale = 1;  ///< of the accelerometer
   unsigned seed = 1;
@@ -116,7 +117,7 @@ TEST(InertialScale, FindsAMapThatIsTooLargeOrTooSmall) {
     EXPECT_NE(words.find(map_scale > 1 ? "too long" : "too short"), std::string::npos) << words;
     EXPECT_NE(words.find(map_scale > 1 ? "0.000988142" : "0.00101215"), std::string::npos) << words;
     SensorConfig metres;
-    metres.depth_encoding = "32FC1";  // no key changes what it says
+    metres.depth_encoding = "32FC1";  // depth in metres: no key of the sensor file scales it
     EXPECT_EQ(scaleDifference({1 / map_scale, 0.001}, metres).find("depth/scale"), std::string::npos);
   }
 }
@@ -165,7 +166,7 @@ TEST(InertialScale, NothingIsKnownWithoutMotionOrTime) {
 
 TEST(InertialScale, SaysNothingUnlessSureAndLargeEnough) {
   EXPECT_EQ(scaleDifference({0.99, 0.0025}, SensorConfig()), "");   // four sigmas
-  EXPECT_EQ(scaleDifference({0.996, 0.0002}, SensorConfig()), "");  // twenty, but of what no camera promises
-  EXPECT_EQ(scaleDifference({0.98, 0}, SensorConfig()), "");        // not known
+  EXPECT_EQ(scaleDifference({0.996, 0.0002}, SensorConfig()), "");  // twenty, but within any camera's accuracy
+  EXPECT_EQ(scaleDifference({0.98, 0}, SensorConfig()), "");        // sigma zero: not known
   EXPECT_NE(scaleDifference({0.99, 0.0015}, SensorConfig()), "");
 }

@@ -1,4 +1,4 @@
-// The odometry's motion as a factor: weighed by what it says of itself, left out when it says nothing.
+// The odometry's motion as a factor: weighted by its reported covariance, left out when it reports none.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -31,7 +31,7 @@ TEST(OdometryFactors, InformationIsThatOfTheInflatedCovariance) {
   EXPECT_EQ(factor.i, 4);
   EXPECT_EQ(factor.j, 7);
   const Matrix6d covariance = (factor.sqrt_information.transpose() * factor.sqrt_information).inverse();
-  // The floor below which no odometry goes adds a hundredth at most.
+  // The lower bound on the odometry's noise adds at most one per cent.
   EXPECT_LT((covariance - 9 * kf.motion.covariance).norm(), 0.01 * covariance.norm());
   EXPECT_TRUE(factor.sqrt_information.isUpperTriangular());
   const SE3 T_W_i(expQuaternion(Eigen::Vector3d(1, 2, -1)), Eigen::Vector3d(5, -3, 1));

@@ -1,4 +1,4 @@
-// Homographies out of a map: what becomes of views that do not belong, whichever keyframe is the host.
+// Homographies built from a map: what happens to wrongly associated views, whichever keyframe is the host.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -59,7 +59,7 @@ struct Wall {
       map.associate(l + 1, 1);
     }
   }
-  /// View `k` of a landmark becomes one of another track.
+  /// Assigns view `k` of a landmark to another track.
   void track(int k, LandmarkId landmark, LandmarkId track) {
     auto data = std::make_shared<Keyframe>(*map.keyframe(k + 1).data);
     data->frame.features[static_cast<std::size_t>(landmark - 1)].id = track;
@@ -106,13 +106,13 @@ TEST(PlaneFactors, AWrongViewIsLeftOut) {
 }
 
 TEST(PlaneFactors, AWrongViewNeitherPullsItsLandmarkNorStays) {
-  Wall wall(5, [](int k) { return k == 6 ? 10.0 : 0.0; });  // its poses are true, there is nothing to solve
+  Wall wall(5, [](int k) { return k == 6 ? 10.0 : 0.0; });  // the poses are true, so the solver need not run
   BuiltProblem built = buildProblem(wall.map, globalScope(wall.map), wall.settings);
   storeProblem(built, ImuNoise(), &wall.map);
-  EXPECT_LT((wall.map.landmark(5).p_W - Wall::point(4)).norm(), 0.003);  // the mean of all is 8 mm off
+  EXPECT_LT((wall.map.landmark(5).p_W - Wall::point(4)).norm(), 0.003);  // the mean of all views would be 8 mm off
   EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map), 1);
   for (const MapObservation& o : wall.map.landmark(5).observations) EXPECT_NE(o.keyframe, 7u);
-  // What the poses explain after all is no outlier.
+  // A view that agrees with the optimised poses is no outlier.
   built.refused.front().observation.x -= 10.0 / kFocal;
   built.refused.front().keyframe = 6;
   EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map), 0);
@@ -138,7 +138,7 @@ TEST(PlaneFactors, SharedHostsGiveFewerFactors) {
   EXPECT_EQ(shared, std::size_t(kKeyframes - 1));  // one keyframe hosts all
 }
 
-// Of eight views the first two and the last two host nothing, in the second track of a landmark neither.
+// The first two and the last two of eight views are not hosts, in the second track of a landmark neither.
 TEST(PlaneFactors, HostsComeFromTheMiddleOfATrack) {
   Wall wall;
   for (int k = 4; k < kKeyframes; ++k) wall.track(k, 5, 900);  // views 0 to 3 and 4 to 7
@@ -155,7 +155,7 @@ TEST(PlaneFactors, HostsComeFromTheMiddleOfATrack) {
   EXPECT_EQ(hosts(false).count(kKeyframes - 1), 1u);
 }
 
-// The second half of one landmark's views belong to another track, that of a corner a little beside the first.
+// The second half of one landmark's views belong to another track, that of a corner slightly offset from the first.
 TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
   const auto beside = [](int k) { return k < 5 ? 0.0 : 0.7; };
   for (const bool shared : {false, true})
@@ -165,7 +165,7 @@ TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
       for (int k = 5; k < kKeyframes; ++k) wall.track(k, 5, 900);
       wall.settings.variant = one.settings.variant = variant;
       wall.settings.shared_hosts = one.settings.shared_hosts = shared;
-      // A loss would forgive what is counted here.
+      // Without robust loss, which would change the costs compared here.
       wall.settings.measurement.huber = one.settings.measurement.huber = 0;
       BuiltProblem split = buildProblem(wall.map, globalScope(wall.map), wall.settings);
       BuiltProblem joint = buildProblem(one.map, globalScope(one.map), one.settings);
@@ -174,10 +174,10 @@ TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
         EXPECT_EQ(split.problem.observations.size(), joint.problem.observations.size() + 1);
         EXPECT_EQ(std::count(split.points.begin(), split.points.end(), 5), 2);
       } else {
-        EXPECT_EQ(wall.pairs(shared), one.pairs(shared));  // one host more takes a view, and the tie is a pair
+        EXPECT_EQ(wall.pairs(shared), one.pairs(shared));  // one view fewer (the second host), one pair more (the tie)
         EXPECT_EQ(split.plane_points, joint.plane_points);
       }
-      // Each track agrees with itself; only the tie pays for what lies between them.
+      // Each track is consistent in itself; only the tie between them has a cost.
       for (BuiltProblem* built : {&split, &joint}) {
         for (BaFrame& frame : built->problem.frames) frame.fixed = true;
         built->problem.gauges.clear();
@@ -192,7 +192,7 @@ TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
     }
 }
 
-// A view that slides is in no pair, and a host that slides gives none; the rest of the landmark's views stay.
+// A sliding view is in no pair, and a sliding host has no pairs; the rest of the landmark's views stay.
 TEST(PlaneFactors, TracksThatSlideTellNothingAboutThePlane) {
   Wall wall;
   const int all = wall.pairs(true);
@@ -204,7 +204,7 @@ TEST(PlaneFactors, TracksThatSlideTellNothingAboutThePlane) {
   EXPECT_EQ(everywhere.pairs(true), all - (kKeyframes - 1));
 }
 
-// A view two pixels off weighs next to nothing beside the others, though it is no outlier yet.
+// A view that is two pixels off gets almost no weight compared with the others, though it is no outlier yet.
 TEST(PlaneFactors, PairsFarOffWeighLittle) {
   const auto information = [](double shift) {
     Wall wall(5, [shift](int k) { return k == 6 ? shift : 0.0; });
@@ -219,9 +219,9 @@ TEST(PlaneFactors, PairsFarOffWeighLittle) {
   EXPECT_GT(information(0.05), (kLandmarks - 0.3) * one);
 }
 
-// A track that is off in some views is believed less in the others, too: the less the more of them are off.
+// A track with wrong views gets less weight in its other views too, the less the more views are wrong.
 TEST(PlaneFactors, ATrackCountsAsItsPairsAgree) {
-  const auto information = [](int wrong) {  // of the pairs with view 1, which is right as the host is, view 0
+  const auto information = [](int wrong) {  // of the pairs with view 1; it and the host, view 0, are correct
     Wall wall(5, [wrong](int k) { return k > 7 - wrong ? 0.19 : 0.0; });
     wall.settings.shared_hosts = false;
     double sum = 0;
@@ -235,7 +235,7 @@ TEST(PlaneFactors, ATrackCountsAsItsPairsAgree) {
   EXPECT_GT(information(4), all - one);
 }
 
-// What lies between the corners of two tracks was detected from twice as far: it is twice as many pixels here.
+// The offset between the corners of two tracks arose at twice the distance, so it is twice as many pixels here.
 TEST(PlaneFactors, CornersOfTwoTracksLieFartherApartWhenSeenFromNearer) {
   const auto weight = [](double z) {  // of the tie
     Wall wall(0);
@@ -282,7 +282,7 @@ TEST(PlaneFactors, DepthPointsBesideThePlaneAreLeftOut) {
         G += f.weight * f.weight * f.p_C.homogeneous() * f.p_C.homogeneous().transpose();
       }
       if (wrong == 15) {
-        EXPECT_EQ(points, 0) << variantName(variant);  // which of the two is the wall is not known
+        EXPECT_EQ(points, 0) << variantName(variant);  // it is not known which of the two is the wall
         continue;
       }
       if (wrong == 20) right = seen.G;  // one surface: the keyframe is off, not the points

@@ -24,7 +24,7 @@ TEST(ProblemStore, PlanesThatTheSolutionLacksMoveWithWhoSawThemLast) {
       ASSERT_TRUE(map.setPlaneObservation(seen));
     }
   }
-  // A solution of the time when there was but the first keyframe, which it shifts by 1 m.
+  // A solution from when only the first keyframe existed, which it shifts by 1 m.
   GlobalBaSolution solution;
   BaFrame frame;
   frame.state = map.keyframe(1).state;

@@ -1,4 +1,4 @@
-// Whether the map notices that pixels are off by more than they are told to be.
+// Whether the map detects pixel errors larger than their reported sigma.
 #include <gtest/gtest.h>
 
 #include "../../src/optimisation/track_noise.h"
@@ -11,8 +11,8 @@ using namespace vip_slam;
 
 namespace {
 
-/// The tracks' noise is 0.1 px, as told; `shift`: sigma of what all views of one keyframe are off by besides, px, along
-/// a row as by colour that is of another moment than the pose.
+/// The tracks' noise is 0.1 px, as reported; `shift`: sigma (px) of an additional error along the row, common to all
+/// views of a keyframe, as when the image was taken at another time than the pose.
 struct Adjusted {
   Map map;
   BuiltProblem built;  ///< at the adjusted map's estimate
@@ -21,12 +21,12 @@ struct Adjusted {
 Adjusted adjustedMap(double shift, int keyframes) {
   SimulatedKeyframes world(3);
   Adjusted result;
-  LandmarkMaker maker{LandmarkMakerOptions()};
+  LandmarkMaker maker(500.0);
   BuilderSettings settings;
   settings.focal = world.sensor().camera.fx;
   for (int k = 0; k < keyframes; ++k) {
     auto kf = std::make_shared<Keyframe>(*world.next());
-    // A shift that depends on the depth, which no turn of the camera takes up.
+    // A shift that depends on the depth, which no rotation of the camera can absorb.
     const double off = world.gauss(shift);
     for (Feature& f : kf->frame.features) f.xy.x() += static_cast<float>((f.depth > 2.5 ? off : -off) / settings.focal);
     result.map.addKeyframe(kf, world.truth(kf->frame.t), ImuNoise());
@@ -68,8 +68,8 @@ TEST(TrackNoise, ALandmarkThatOtherTracksPullAsideIsNoNoiseOfThisOne) {
 }
 
 TEST(TrackNoise, WhatTheMapContradictsWeighsLess) {
-  // Half a pixel in one of two directions, beside a tenth in both: sqrt((0.1^2 + 0.1^2 + 0.5^2) / (0.1^2 + 0.1^2))
-  // = 3.7, less what the adjustment bends away.
+  // 0.5 px in one of two directions, in addition to 0.1 px in both: sqrt((0.1^2 + 0.1^2 + 0.5^2) / (0.1^2 + 0.1^2)) =
+  // 3.7, less what the adjustment absorbs in the poses.
   const Adjusted off = adjustedMap(0.5, 12);
   EXPECT_GT(off.built.track_noise_factor, 2.2);
   EXPECT_LT(off.built.track_noise_factor, 4.5);

@@ -73,7 +73,7 @@ TEST_F(VocabularyTest, ScoreIsL1) {
 }
 
 TEST_F(VocabularyTest, RareWordsWeighMore) {
-  // A descriptor that only one image shows must weigh more than one that all show.
+  // A descriptor that occurs in only one image must get more weight than one that occurs in all.
   const Descriptor common = randomDescriptor(random_), rare = randomDescriptor(random_);
   auto images = images_;
   for (auto& image : images)

@@ -18,7 +18,7 @@ struct SyntheticOptions {
   double keyframe_dt = 0.4;
   bool compressed = false, uncompressed = false, plane_point_states = true;
   double noise = 1.0;     ///< factor on all measurement noise
-  double perturb = 0.02;  ///< disturbance of the start: metres and radians
+  double perturb = 0.02;  ///< perturbation of the initial values: metres and radians
   unsigned seed = 1;
 };
 
@@ -174,10 +174,10 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
     p.homography_pairs.clear();
     p.plane_points.clear();
   }
-  std::mt19937 odometry_random(options.seed + 1000);  // of its own: the rest stays as it is without
+  std::mt19937 odometry_random(options.seed + 1000);  // separate, so that the rest does not change with it
   std::normal_distribution<double> odometry_normal;
   for (std::size_t k = 1; k < p.frames.size(); ++k) {
-    // Every component knows of every other, as a filter's covariance does.
+    // A full covariance with correlations between all components, like that of a filter.
     BaRelativePose f;
     f.i = static_cast<int>(k) - 1, f.j = static_cast<int>(k);
     f.T_i_j = p.frames[f.i].state.T_W_I.inverse() * p.frames[f.j].state.T_W_I;

@@ -98,13 +98,13 @@ TEST(Solvers, SameIteratesAndMinimum) {
   }
 }
 
-// The trial's factors are linearised with its cost; when the trial is refused, nothing of that may stay: the next step
-// is that of a solver which starts there.
+// A trial step linearises the factors together with its cost. After a rejected trial no trace of that may remain: the
+// next step equals that of a solver started at the same state.
 TEST(Solvers, RefusedStepsLeaveNothingBehind) {
   for (const Named& v : variants())
     for (const int threads : {1, 2}) {
       BaProblem start = makeSyntheticProblem(v.options);
-      start.relative_poses.clear();  // with them no step is refused
+      start.relative_poses.clear();  // with them no step is rejected
       for (std::size_t k = 0; k < start.frames.size(); ++k) {
         NavState& state = start.frames[k].state;
         state.T_W_I = state.T_W_I.boxplus((Vector6d() << 0, 0, k % 2 ? 1 : -1, 0, 0, 0).finished());

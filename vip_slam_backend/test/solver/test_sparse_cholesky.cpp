@@ -110,7 +110,7 @@ TEST(DenseKernels, AllBuildsAgree) {
     const Eigen::MatrixXd expected = -L21 * L21.transpose();
     for (int j = 0; j < columns; ++j)
       EXPECT_LT((C.col(j).segment(j, m - j) - expected.col(j).tail(m - j)).norm(), 1e-11 * S.norm()) << name;
-    // Back with the first c columns of L.
+    // Back substitution with the first c columns of L.
     const Eigen::VectorXd b = Eigen::VectorXd::Random(n);
     Eigen::MatrixXd K = Eigen::MatrixXd::Identity(n, n);
     K.leftCols(c) = L.leftCols(c);

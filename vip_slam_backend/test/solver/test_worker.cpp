@@ -1,4 +1,5 @@
-// The solver's helper thread: every piece is done once, whoever does it and however late the helper is.
+// The solver's helper thread: every piece of work is done exactly once, by either thread and however late the helper
+// is.
 #include <atomic>
 #include <chrono>
 #include <set>
@@ -46,7 +47,7 @@ TEST(Worker, WhatTheHelperWroteIsSeen) {
   }
 }
 
-// A processor that others use as well: the helper needs ten times as long, and the owner waits for it.
+// On a processor shared with other programs the helper takes ten times as long, and the owner would wait for it.
 TEST(Worker, ASlowHelperIsGivenUp) {
   Worker worker(true);
   if (!worker.helps()) GTEST_SKIP() << "one processor";

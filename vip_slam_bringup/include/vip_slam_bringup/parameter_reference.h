@@ -1,11 +1,11 @@
-// The parameter reference of the documents, made from the option structs.
+// The parameter reference of the documentation, generated from the option structs.
 #pragma once
 
 #include <string>
 
 namespace vip_slam {
 
-/// All of docs/parameters.md.
+/// The complete text of docs/parameters.md.
 std::string parameterReference();
 
 }  // namespace vip_slam

@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "check_bag", ros::init_options::AnonymousName | ros::init_options::NoSigintHandler);
   vip_slam::CommandLine line("check_bag",
                              "Tells what is missing or wrong in a bag or on live topics before VIP-SLAM sees them.");
-  std::string bag, sensor = "simulator";
+  std::string bag, sensor;
   bool live = false;
   double seconds = 0;
   line.argument("bag", bag, "the bag to check", false);
@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   line.option("sensor,s", sensor, "name of a shipped sensor or a YAML file");
   line.option("seconds", seconds, "how long to listen, or how much of the bag's images to look at; 0: 10 and 60",
               vip_slam::between(0.0, 1e6));
+  line.required("sensor");
   if (const auto status = line.parse(argc, argv)) return *status;
   if (live != bag.empty()) return line.mistake("give either a bag or --live");
   try {

@@ -46,7 +46,7 @@ void addArguments(vip_slam::CommandLine& line, Arguments& arguments) {
   line.option("extrinsics", arguments.extrinsics,
               "where T_imu_cam comes from: tf in the bag, config (the sensor file), or auto: tf when the bag has it",
               vip_slam::oneOf("auto, tf, config"));
-  line.option("params", arguments.parameters, "YAML file with options, in groups");
+  line.option("params", arguments.parameters, "YAML file with options in groups, without those of the nodelets");
   line.option("set", arguments.settings, "one option as group/key=value; repeatable");
   line.option("start", arguments.start, "seconds to skip at the beginning", vip_slam::between(0.0, 1e6));
   line.option("duration", arguments.duration, "seconds to process; default: to the end", vip_slam::above(0.0));
@@ -59,7 +59,12 @@ std::string onOff(const std::string& name, const std::string& text) {
 
 vip_slam::PipelineOptions loadPipelineOptions(const Arguments& arguments) {
   vip_slam::PipelineOptions options;
-  if (!arguments.parameters.empty()) vip_slam::loadOptions(options, arguments.parameters, "");
+  try {
+    if (!arguments.parameters.empty()) vip_slam::loadOptions(options, arguments.parameters, "");
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(std::string(error.what()) +
+                                " (files for the nodelets have options of theirs, which --params does not take)");
+  }
   std::vector<std::pair<std::string, std::string>> values;
   if (!arguments.variant.empty()) values.emplace_back("backend/variant", arguments.variant);
   if (!arguments.loop.empty()) values.emplace_back("backend/loop_closing", onOff("--loop", arguments.loop));
@@ -68,7 +73,7 @@ vip_slam::PipelineOptions loadPipelineOptions(const Arguments& arguments) {
   return options;
 }
 
-/// The report's own script lies beside this program.
+/// The report script is in the folder of this program.
 void makeReport(const std::string& folder) {
   const auto script = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "make_report";
   const pid_t child = fork();
@@ -148,10 +153,10 @@ int main(int argc, char** argv) {
                              "Runs VIP-SLAM over a bag, as fast as the machine allows; two runs give the same bits.");
   Arguments arguments;
   addArguments(line, arguments);
-  if (const auto status = line.parse(argc, argv)) return *status == 0 ? 0 : 1;  // 2 tells of the bag
+  if (const auto status = line.parse(argc, argv)) return *status == 0 ? 0 : 1;  // status 2 is reserved for the bag
   std::signal(SIGINT, [](int) { g_interrupted = 1; });
   std::signal(SIGTERM, [](int) { g_interrupted = 1; });
-  // The pipeline has its own threads, one for each core; OpenCV's would only stand in their way.
+  // The pipeline has its own threads; those of OpenCV would only compete with them.
   cv::setNumThreads(1);
   try {
     return run(arguments);

@@ -1,5 +1,5 @@
-// train_vocabulary INPUT... --out FILE: a place-recognition vocabulary from bags and pictures, with the very corners
-// and descriptors that the front end computes.
+// train_vocabulary INPUT... --out FILE: a place-recognition vocabulary from bags and pictures, with the same corners
+// and descriptors as in the front end.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -56,7 +56,7 @@ bool isDepth(const sensor_msgs::Image& image) {
   return image.encoding == "16UC1" || image.encoding == "32FC1" || image.encoding == "mono16";
 }
 
-/// Every picture of the colour topics that lies at least `every` seconds after the one before.
+/// Uses the images of the colour topics that are at least `every` seconds after the one used before.
 void describeBag(const std::string& path, double every, const Describer& describe, Images* images) {
   rosbag::Bag bag;
   vip_slam::openBag(path, &bag);

@@ -7,16 +7,26 @@
 
 #include <rosbag/bag.h>
 
+#include "vip_slam_bringup/convert/converters.h"
+
 namespace vip_slam {
 
 BagOutput::BagOutput(const std::string& path, bool overwrite)
     : path_(path), temporary_(path + ".part" + std::to_string(::getpid())), bag_(new rosbag::Bag) {
-  if (!overwrite && std::filesystem::exists(path))
-    throw std::runtime_error(path + ": exists already; remove it or give --force");
+  if (!overwrite) {
+    // The companion files are protected too: the user may have edited them, a calibrated sensor file above all.
+    const std::string stem = bagStem(path);
+    for (const std::string& file : {path, stem + "_sensor.yaml", stem + "_truth.tum"}) {
+      if (std::filesystem::exists(file)) throw std::runtime_error(file + ": exists already; remove it or give --force");
+    }
+  }
   try {
     bag_->open(temporary_, rosbag::bagmode::Write);
   } catch (const rosbag::BagException& e) {
-    throw std::runtime_error(path + ": cannot be written: " + e.what());
+    // The words of the bag library name the temporary file.
+    std::string why = e.what();
+    if (const auto at = why.find(temporary_); at != std::string::npos) why.replace(at, temporary_.size(), path);
+    throw std::runtime_error(path + ": cannot be written: " + why);
   }
   bag_->setCompression(rosbag::compression::LZ4);
 }
@@ -26,8 +36,8 @@ BagOutput::~BagOutput() {
   try {
     bag_->close();
   } catch (const std::exception&) {
-    // The half-written bag is removed next; there is nothing to tell the user about it. The bag would close itself once
-    // more and, on a full disk, end the program by throwing.
+    // The half-written bag is removed next, so the error need not be reported. Released, since the bag's destructor
+    // would close it again and, on a full disk, end the program by throwing.
     static_cast<void>(bag_.release());
   }
   std::error_code ignored;

@@ -146,7 +146,7 @@ SensorConfig sensorOf(const StereoDepth& stereo, const std::string& imu_yaml, do
   sensor.imu_noise.gyro_random_walk = noise("gyroscope_random_walk");
   sensor.imu_noise.accel_noise_density = noise("accelerometer_noise_density");
   sensor.imu_noise.accel_random_walk = noise("accelerometer_random_walk");
-  // Half a pixel of disparity: dz = z^2 / (f B) * 0.5.
+  // One sigma of half a pixel of disparity: dz = z^2 / (f B) * 0.5.
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStereo);
   sensor.depth_noise.c = 0.5 / (stereo.rectified().fx * stereo.baseline());
   return sensor;

@@ -16,7 +16,7 @@ std::string bagStem(const std::string& bag) {
 void finishConversion(const ConversionOptions& options, const SensorConfig& sensor, const Trajectory& truth,
                       BagOutput* bag, ConversionReport* report) {
   const std::string stem = bagStem(options.bag);
-  // Before anything else is written: when the bag fails, what lies beside an older one of that name stays whole.
+  // Before the other files are written: when the bag fails, those of an older bag with this name stay intact.
   bag->finish(options.progress);
   try {
     report->files.push_back(stem + "_sensor.yaml");

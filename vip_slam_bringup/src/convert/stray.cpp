@@ -1,4 +1,4 @@
-// Stray Scanner layout: rgb.mp4 (1920x1440, one frame a row of odometry.csv), depth/NNNNNN.png (16-bit millimetres,
+// Stray Scanner layout: rgb.mp4 (1920x1440, one frame per row of odometry.csv), depth/NNNNNN.png (16-bit millimetres,
 // 256x192, registered to the colour camera), confidence/NNNNNN.png (0, 1, 2), odometry.csv (stamp, frame, position,
 // quaternion xyzw [, fx, fy, cx, cy]), camera_matrix.csv, imu.csv (stamp, accelerometer, gyro). One clock for all.
 #include <algorithm>
@@ -18,6 +18,7 @@
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace fs = std::filesystem;
 
@@ -72,8 +73,8 @@ std::vector<Row> readOdometry(const std::string& folder) {
   return rows;
 }
 
-/// CoreMotion reports minus the specific force, older versions of the app in m/s^2, newer ones in g: told apart by the
-/// median length. IMU axes: x right, y up, z out of the screen, phone upright.
+/// CoreMotion reports minus the specific force, older versions of the app in m/s^2, newer ones in g: distinguished by
+/// the median length. IMU axes: x right, y up, z out of the screen, phone upright.
 std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path) {
   const TextTable table(path, ",", 7);
   std::vector<double> length;
@@ -96,8 +97,7 @@ std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path) {
     samples.push_back(sample);
     length.push_back(std::sqrt(v[1] * v[1] + v[2] * v[2] + v[3] * v[3]));
   }
-  std::nth_element(length.begin(), length.begin() + length.size() / 2, length.end());
-  const double median = length[length.size() / 2];
+  const double median = upperMedian(std::move(length));
   if (median < 0.5 || (median > 2.0 && (median < 8.0 || median > 12.0)))
     throw std::runtime_error(path + ": median acceleration is " + std::to_string(median) +
                              ", expected about 1 (g) or about 9.81 (m/s^2)");
@@ -153,7 +153,7 @@ sensor_msgs::CompressedImage compressed(const cv::Mat& image, const char* ending
   return message;
 }
 
-/// Optical axes in the axes of CoreMotion: the image's x runs down the upright phone, its y to the phone's left.
+/// Optical axes in the axes of CoreMotion: the image's x points down the upright phone, its y to the phone's left.
 SE3 cameraInImu() {
   Eigen::Matrix3d R;
   R << 0, -1, 0, -1, 0, 0, 0, 0, -1;
@@ -171,7 +171,7 @@ ConversionReport convertStray(const StrayOptions& options) {
   cv::Size video_size;
   const int frames = countFrames(options.folder + "/rgb.mp4", &video_size);
   ConversionReport report;
-  // The app's edit list hides the first frame from most decoders: then the video's frames belong to the rows' end.
+  // The app's edit list hides the first frames from most decoders: then the video's frames belong to the last rows.
   std::size_t skip = 0;
   if (frames < static_cast<int>(rows.size())) {
     skip = rows.size() - frames;

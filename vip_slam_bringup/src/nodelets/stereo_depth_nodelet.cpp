@@ -25,7 +25,7 @@ namespace vip_slam {
 class StereoDepthNodelet : public nodelet::Nodelet {
  public:
   void onInit() override {
-    // One callback at a time: pairs leave in the order in which they came. Matching uses the cores by itself.
+    // One callback at a time, so that pairs are published in order. The matching itself is multi-threaded.
     ros::NodeHandle& nh = getNodeHandle();
     ros::NodeHandle& parameters = getPrivateNodeHandle();
     const std::string calibration = parameters.param<std::string>("calibration", "");
@@ -42,7 +42,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     image_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("rectified/camera_info", 5);
     depth_publisher_ = nh.advertise<sensor_msgs::Image>("depth/image", 5);
     depth_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("depth/camera_info", 5);
-    // Short queues: when matching is too slow for the rate, images are left out instead of coming ever later.
+    // Short queues: when matching is too slow for the rate, images are dropped instead of increasing the latency.
     left_.subscribe(nh, "left/image_raw", 3);
     right_.subscribe(nh, "right/image_raw", 3);
     sync_ = std::make_unique<message_filters::Synchronizer<Policy>>(Policy(3), left_, right_);
@@ -75,7 +75,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     }
   }
 
-  // Rectifying turns the camera by up to a degree: whoever asks tf for its mounting must not get the raw one's.
+  // Rectification rotates the camera by up to a degree, so the rectified images need their own frame in tf.
   std_msgs::Header rectifiedHeader(std_msgs::Header header) {
     if (header.frame_id.empty()) return header;
     const std::string raw = header.frame_id;
@@ -105,7 +105,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
   std::unique_ptr<StereoDepth> stereo_;
   ros::Time last_;  ///< stamp of the last pair
   tf2_ros::StaticTransformBroadcaster tf_;
-  std::string raw_frame_;  ///< whose rectified one tf knows
+  std::string raw_frame_;  ///< frame whose rectified one was sent to tf
   ros::Publisher image_publisher_, image_info_publisher_, depth_publisher_, depth_info_publisher_;
   message_filters::Subscriber<sensor_msgs::Image> left_, right_;
   std::unique_ptr<message_filters::Synchronizer<Policy>> sync_;

@@ -4,6 +4,7 @@
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/image_pairer.h"
 
 namespace vip_slam {
@@ -34,7 +35,7 @@ void checkEncoding(const std::string& role, const StreamRecord& stream, const st
 
 void checkCamera(const std::string& role, const StreamRecord& info, const CameraIntrinsics& camera,
                  const std::string& error, const StreamRecord& images, bool required, Findings* out) {
-  if (info.stamps.empty()) return;  // checkTopics has said it
+  if (info.stamps.empty()) return;  // reported by checkTopics
   if (!error.empty()) {
     out->push_back({required ? Severity::kError : Severity::kWarning, role, error,
                     "calibrate the camera, or put the intrinsics into the sensor file"});
@@ -56,7 +57,7 @@ void checkCamera(const std::string& role, const StreamRecord& info, const Camera
                     words("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
 }
 
-/// The calibration of the sensor file against the images, and against camera_info where there is one.
+/// Compares the calibration of the sensor file with the images, and with camera_info where there is one.
 void checkSensorFileCamera(const Recording& r, Findings* out) {
   const CameraIntrinsics& camera = r.sensor.camera;
   if (r.color.sizes.size() == 1 && *r.color.sizes.begin() != std::make_pair(camera.width, camera.height))
@@ -94,12 +95,12 @@ void checkBrightness(const std::vector<BrightnessSample>& samples, Findings* out
     mean.push_back(s.mean);
     spread.push_back(s.spread);
   }
-  if (median(spread) < 2)
+  if (upperMedian(spread) < 2)
     out->push_back({Severity::kError, "colour image",
-                    words("shows nothing: all pixels about %.0f of 255", median(mean)),
+                    words("shows nothing: all pixels about %.0f of 255", upperMedian(mean)),
                     "lens cap, exposure, or a wrong encoding?"});
-  else if (median(mean) < 15)
-    out->push_back({Severity::kWarning, "colour image", words("is dark: %.0f of 255 on average", median(mean)),
+  else if (upperMedian(mean) < 15)
+    out->push_back({Severity::kWarning, "colour image", words("is dark: %.0f of 255 on average", upperMedian(mean)),
                     "more light or exposure"});
 }
 
@@ -125,23 +126,23 @@ void checkDepth(const Recording& r, Findings* out) {
     spread.push_back(d.spread);
     if (d.valid > 0) middle.push_back(d.median);
   }
-  const double share = median(valid);
+  const double share = upperMedian(valid);
   const DepthNoise& noise = r.sensor.depth_noise;
   if (middle.empty() || share < 0.02) {
     out->push_back(
         {Severity::kError, "depth image", "holds almost no depth", "emitter off, wrong topic, or out of range?"});
     return;
   }
-  const double z = median(middle);
+  const double z = upperMedian(middle);
   if (z < 0.05 || z > 50)
     out->push_back({Severity::kError, "depth image", words("median depth is %.4g m", z),
                     "depth scale or encoding in the sensor file is wrong (millimetres against metres?)"});
-  else if (median(usable) < 0.02)
+  else if (upperMedian(usable) < 0.02)
     out->push_back(
         {Severity::kError, "depth image",
          words("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range, noise.max_range),
          "depth scale or depth_noise/max_range in the sensor file is wrong"});
-  else if (median(spread) < 1e-6)
+  else if (upperMedian(spread) < 1e-6)
     out->push_back({Severity::kError, "depth image", words("every pixel says %.4g m", z), "the driver is broken"});
   else if (share < 0.3)
     out->push_back({Severity::kWarning, "depth image", words("only %.0f %% of the pixels have depth", 100 * share),

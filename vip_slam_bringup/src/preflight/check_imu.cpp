@@ -3,6 +3,7 @@
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
@@ -16,8 +17,8 @@ double spread(const std::vector<StampedVector>& samples, std::size_t begin, std:
   return std::sqrt(sum / double(end - begin));
 }
 
-/// The mean specific force over the half seconds with the least motion (those about as quiet as the
-/// quietest, a fifth of all at most).
+/// The mean specific forces over the half-second windows with the least motion (about as quiet as the quietest, at most
+/// a fifth of all).
 std::vector<Eigen::Vector3d> quietForces(const std::vector<StampedVector>& accel, double* least_spread) {
   struct Window {
     double spread;
@@ -26,7 +27,7 @@ std::vector<Eigen::Vector3d> quietForces(const std::vector<StampedVector>& accel
   std::vector<Window> windows;
   std::size_t begin = 0;
   for (std::size_t i = 0; i < accel.size(); ++i) {
-    // Two samples across a gap are no quiet half second.
+    // A window must not span a gap.
     if (i > begin && std::abs(accel[i].t - accel[i - 1].t) > 0.1) begin = i;
     if (accel[i].t - accel[begin].t < 0.5) continue;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -43,10 +44,10 @@ std::vector<Eigen::Vector3d> quietForces(const std::vector<StampedVector>& accel
   return out;
 }
 
-/// An accelerometer that reports gravity instead of the specific force against it turns the world upside down, and
-/// nothing else about it looks wrong.
+/// Detects an accelerometer that reports gravity instead of the specific force, which turns the world upside down and
+/// has no other symptom.
 void checkUpright(const std::vector<Eigen::Vector3d>& forces, const SE3& T_imu_cam, Findings* out) {
-  double down = 0;  // of the image, against up
+  double down = 0;  // mean component of the specific force along the image's down axis
   for (const Eigen::Vector3d& force : forces)
     down += (T_imu_cam.R().transpose() * force).normalized().y() / double(forces.size());
   if (down > 0.7)
@@ -67,7 +68,7 @@ void checkGaps(const std::string& role, const std::vector<StampedVector>& sample
     }
   }
   if (steps.empty()) return;
-  const double period = median(steps);
+  const double period = upperMedian(steps);
   std::size_t gaps = 0;
   for (const double step : steps) gaps += step > std::max(3.5 * period, 0.012) ? 1 : 0;
   if (gaps > 0)
@@ -121,7 +122,7 @@ Findings checkImu(const Recording& r) {
   if (forces.empty()) return out;
   std::vector<double> lengths;
   for (const Eigen::Vector3d& force : forces) lengths.push_back(force.norm());
-  const double g = median(lengths);
+  const double g = upperMedian(lengths);
   if (g > 0.85 && g < 1.15)
     out.push_back({Severity::kError, "gravity", words("%.2f when quiet: the accelerometer reports in g", g),
                    "multiply by 9.81 in the driver; m/s^2 are expected"});

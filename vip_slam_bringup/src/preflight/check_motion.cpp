@@ -1,7 +1,7 @@
 // Camera-IMU delay and rotation from the motion: the gyro and the images see the same rotation.
 //   gyro(t + td) = R_I_C rate_C(t) + b
-// For each delay in a grid, R and b by orthogonal Procrustes; the delay with the least residual wins. Twice: with wide
-// bounds on what a step may contradict, then with bounds that the first round's errors give.
+// For each delay in a grid, R and b by orthogonal Procrustes; the delay with the smallest residual is taken. Two
+// rounds: with wide bounds on the error of a step, then with bounds from the errors of the first round.
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +11,8 @@
 #include "vip_slam_bringup/preflight/gyro_integral.h"
 #include "vip_slam_bringup/preflight/readout.h"
 #include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
@@ -23,8 +25,9 @@ struct Fit {
   std::size_t count = 0;
 };
 
-/// A step that disagrees by more than `floor + share * its rate` is blur, a moving object or a mismatch: it counts with
-/// that bound, and the later rounds fit without it. The bound hardly depends on the delay, so that residuals compare.
+/// A step with an error above `floor + share * its rate` is due to blur, a moving object or a mismatch: its error is
+/// capped at that bound, and later rounds fit without it. The bound hardly depends on the delay, so that residuals of
+/// different delays are comparable.
 struct Bound {
   double floor, share;  ///< rad/s, -
 };
@@ -60,9 +63,7 @@ Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro
       spread += b * b.transpose() / n;
       variance += a.squaredNorm() / n;
     }
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() > 0 ? 1 : -1);
-    fit.R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+    fit.R = nearestRotation(cross);
     fit.camera_variances = Eigen::JacobiSVD<Eigen::Matrix3d>(spread).singularValues();
     fit.scale = fit.camera_variances.sum() > 0 ? std::sqrt(variance / fit.camera_variances.sum()) : 1;
     fit.variance = variance;
@@ -74,13 +75,13 @@ Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro
       use[i] = errors.back() <= bound;
       fit.residual += std::min(errors.back(), bound) * std::min(errors.back(), bound) / double(imu.size());
     }
-    fit.median_error = median(errors);
+    fit.median_error = upperMedian(errors);
     if (std::count(use.begin(), use.end(), true) < 10) break;
   }
   return fit;
 }
 
-constexpr double kUsefulReadout = 0.003;  // one sigma beyond which rows are left out of account, seconds
+constexpr double kUsefulReadout = 0.003;  // largest sigma of a readout that is used, seconds
 constexpr double kStep = 0.002;           // of the grid of delays, seconds
 
 struct Search {
@@ -89,7 +90,7 @@ struct Search {
   double sigma = 0;  ///< of the offset, from the curvature of the residual; seconds
 };
 
-/// The best delay within `range` of `middle`; false when the two never overlap.
+/// The best delay within `range` of `middle`; false when gyro and images never overlap.
 bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, double middle, double range,
             const Bound& limit, Search* out) {
   const int half = static_cast<int>(std::lround(range / kStep));
@@ -105,8 +106,8 @@ bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, do
     const double a = fits[best - 1].residual, b = out->fit.residual, c = fits[best + 1].residual, curve = a - 2 * b + c;
     if (curve > 0) {
       out->offset += kStep * 0.5 * (a - c) / curve;
-      // The residual is a mean over n steps of three components: variance of one is b / 3, and the second derivative
-      // of the residual is twice the mean square of what a second of delay changes.
+      // The residual is a mean over n steps of three components: the variance of one component is b / 3, and the second
+      // derivative of the residual is twice the mean square of the change per second of delay.
       out->sigma = std::sqrt(2.0 / 3.0 * b * kStep * kStep / (curve * double(out->fit.count)));
     }
   }
@@ -156,12 +157,12 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
   }
   out.time_offset = fine.offset;
   out.time_sigma = fine.sigma;
-  // The rotation is known once a second axis moves: 0.05 rad/s.
+  // The rotation is observable once there is motion about a second axis, 0.05 rad/s.
   out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
   out.usable = true;
   const auto rows = estimateReadout(r.rotations, gyro, {fine.offset, 0.0, out.R_imu_cam});
   if (rows && rows->readout_sigma < kUsefulReadout) {
-    // A delay found without regard to rows belongs to no row in particular.
+    // With a rolling shutter the delay estimated without rows does not refer to a definite row.
     out.time_offset = rows->time_offset;
     out.time_sigma = rows->time_sigma;
     out.readout = rows->readout;
@@ -196,7 +197,7 @@ Findings checkMotion(const Recording& r) {
     return out;
   }
   const double angle = r.sensor.T_imu_cam.rotation().angularDistance(motion.R_imu_cam) * 180 / M_PI;
-  // Without depth a step aside is taken for a turn.
+  // Without depth a sideways translation looks like a rotation.
   const double most = r.depths.empty() ? 15 : 5;
   if (angle > most) {
     const Eigen::Matrix3d R = motion.R_imu_cam.toRotationMatrix();

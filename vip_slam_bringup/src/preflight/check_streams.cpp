@@ -5,6 +5,7 @@
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
@@ -52,7 +53,7 @@ std::string candidates(const Recording& r, const Wanted& w) {
                       : "of type " + w.types.front() + " " + where + ": " + list;
 }
 
-/// What to do about a topic of the wrong type.
+/// Advice on a topic of the wrong type.
 std::string adviceOnType(const Recording& r, const Wanted& w, const std::string& type) {
   const std::string key = w.role == "colour image" ? "color/encoding" : "depth/encoding";
   if (w.role.find("image") != std::string::npos && type == "sensor_msgs/CompressedImage")
@@ -62,26 +63,25 @@ std::string adviceOnType(const Recording& r, const Wanted& w, const std::string&
   return candidates(r, w);
 }
 
-/// One sigma by which stamps scatter about the instants they stand for, s. A stamp that is late makes the step before
-/// it longer and the one after it shorter by as much; a rate that varies does not.
+/// Jitter of stamps against the true times, one sigma, s. A late stamp makes the step before it longer and the one
+/// after it shorter by the same amount; a varying rate does not.
 double stampJitter(const std::vector<double>& stamps, double period) {
   constexpr std::size_t kEnough = 50;
   double sum = 0;
   std::size_t pairs = 0;
   for (std::size_t i = 2; i < stamps.size(); ++i) {
     const double before = stamps[i - 1] - stamps[i - 2] - period, after = stamps[i] - stamps[i - 1] - period;
-    if (std::max(std::abs(before), std::abs(after)) > 0.5 * period) continue;  // a hole, or time ran back
+    if (std::max(std::abs(before), std::abs(after)) > 0.5 * period) continue;  // a gap, or time ran back
     sum -= before * after;
     ++pairs;
   }
   return pairs < kEnough ? 0.0 : std::sqrt(std::max(0.0, sum / static_cast<double>(pairs)));
 }
 
-constexpr double kLargeJitter = 0.001;  // s; a turn of 60 degrees/s is a milliradian in 1 ms, half a pixel
+constexpr double kLate = 1.0;  // seconds that a stream may begin later, or end earlier, than the others
 
-constexpr double kLate = 1.0;  // seconds by which a stream may begin later, or end earlier, than the others
-
-/// Streams that end before the others, begin after them, or have other clocks: each by itself looks well.
+/// Reports streams that begin later or end earlier than the others, or have another clock: each of them alone looks
+/// fine.
 void checkCoverage(const Recording& r, Findings* out) {
   double begin = 1e300, end = -1e300;
   std::vector<std::pair<std::string, std::pair<double, double>>> streams;
@@ -102,7 +102,7 @@ void checkCoverage(const Recording& r, Findings* out) {
       return;
     }
   }
-  if (r.live) return;  // subscriptions come one after the other
+  if (r.live) return;  // subscriptions start one after the other
   for (const auto& [role, span] : streams) {
     const double late = span.first - begin, early = end - span.second;
     const Severity severity = std::max(late, early) > 0.1 * (end - begin) ? Severity::kError : Severity::kWarning;
@@ -151,11 +151,11 @@ double medianDelay(const StreamRecord& stream) {
   std::vector<double> delays;
   for (std::size_t i = 0; i < stream.stamps.size() && i < stream.arrivals.size(); ++i)
     delays.push_back(stream.arrivals[i] - stream.stamps[i]);
-  return delays.empty() ? 0 : median(delays);
+  return delays.empty() ? 0 : upperMedian(delays);
 }
 
-/// A bag is read in the order of its record times: what lies far from the images of the same time comes too late for
-/// them, whatever its stamps say.
+/// A bag is read in the order of its record times: messages recorded much later than images with the same stamps come
+/// too late for them.
 void checkOrder(const Recording& r, Findings* out) {
   constexpr double kDepthWaits = 0.3, kImuWaits = 0.5, kImuKept = 25;  // s
   if (r.live || r.color.stamps.empty()) return;
@@ -206,7 +206,7 @@ Findings checkRates(const Recording& r) {
       out.push_back({Severity::kError, w.role, "all stamps are the same", "the driver does not stamp its messages"});
       continue;
     }
-    const double period = median(steps), rate = 1.0 / period;
+    const double period = upperMedian(steps), rate = 1.0 / period;
     for (const double step : steps)
       if (step > 1.7 * period) lost += static_cast<std::size_t>(std::lround(step / period)) - 1;
     if (stamps.front() < 1.0 && !r.live)
@@ -227,7 +227,7 @@ Findings checkRates(const Recording& r) {
       out.push_back({Severity::kGood, w.role, words("%.1f Hz", rate), ""});
     }
     const double jitter = stampJitter(stamps, period);
-    if (w.role == "colour image" && jitter > kLargeJitter)
+    if (w.role == "colour image" && jitter > kLargeStampJitter)
       out.push_back({Severity::kWarning, w.role, words("stamps jitter by %.1f ms", 1e3 * jitter),
                      "stamped on arrival? let the driver take the device's own time; poses lose accuracy in turns"});
     const double share = double(lost) / (stamps.size() + lost);

@@ -1,4 +1,4 @@
-// All checks together, and what they found in words.
+// All checks together, and their findings as text.
 #include <algorithm>
 
 #include "vip_slam_bringup/preflight/checks.h"

@@ -9,6 +9,7 @@
 
 #include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
@@ -29,21 +30,19 @@ std::optional<Eigen::Matrix3d> alignBearings(const std::vector<Eigen::Vector3d>&
       ++n;
     }
     if (n < kLeastCorners) return std::nullopt;
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() > 0 ? 1 : -1);
-    R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+    R = nearestRotation(cross);
     std::vector<double> errors;
     for (std::size_t i = 0; i < from.size(); ++i) errors.push_back((to[i] - R * from[i]).norm());
-    const double limit = 2.5 * median(errors) + 1e-9;
+    const double limit = 2.5 * upperMedian(errors) + 1e-9;
     for (std::size_t i = 0; i < from.size(); ++i) use[i] = errors[i] <= limit;
   }
   return R;
 }
 
-/// Camera motion from points of the first image and their places in the second, both in normalised coordinates: RANSAC,
-/// then refinement with the tracks that agree within 2.5 times the median error of all. A fixed threshold would keep
-/// tracks that are off by a pixel or two, and a least-squares fit follows a few of those by more than it gains from all
-/// the good ones. `pixel`: size of a pixel in these coordinates.
+/// Camera motion from 3D points of the first image and their projections in the second, in normalised coordinates:
+/// RANSAC, then refinement with the tracks that agree within 2.5 times the median error of all. A fixed threshold would
+/// keep tracks with errors of a pixel or two, and a few of those bias a least-squares fit by more than all the good
+/// ones improve it. `pixel`: size of a pixel in these coordinates.
 std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& points,
                                              const std::vector<cv::Point2f>& images, double pixel) {
   const cv::Matx33d K = cv::Matx33d::eye();
@@ -64,7 +63,7 @@ std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& poi
     cv::projectPoints(points, r, t, K, cv::noArray(), projected);
     std::vector<double> errors;
     for (std::size_t i = 0; i < points.size(); ++i) errors.push_back(cv::norm(projected[i] - images[i]));
-    const double limit = std::max(2.5 * median(errors), 0.02 * pixel);
+    const double limit = std::max(2.5 * upperMedian(errors), 0.02 * pixel);
     good_points.clear();
     good_images.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -84,7 +83,7 @@ std::optional<RotationStep> ImageRotation::add(double t, const cv::Mat& gray, co
   if (!gray_.empty() && t > t_ && t - t_ < 0.2) {
     std::vector<CornerTrack> tracks;
     if (const auto R_now_before = rotationTo(gray, &tracks)) {
-      // A camera turning by w dt sees the scene turn by -w dt.
+      // For a camera rotating by w dt the scene rotates by -w dt.
       const Eigen::Vector3d angle = logSO3(Eigen::Matrix3d(R_now_before->transpose()));
       step = RotationStep{t_, t, angle / (t - t_), std::move(tracks)};
     }

@@ -6,6 +6,7 @@
 
 #include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
@@ -25,8 +26,8 @@ struct State {
   }
 };
 
-/// Where the corners of a step should be in its second image were the camera not moving along, and what each metre per
-/// second adds (two rows per corner).
+/// Residuals of a step's corners in its second image, predicted about a given motion, and their Jacobian by the
+/// velocity (two rows per corner).
 struct Prediction {
   Eigen::VectorXd residual;
   Eigen::MatrixX3d by_speed;
@@ -36,12 +37,12 @@ bool covered(const RotationStep& step, const GyroIntegral& gyro, double margin) 
   return gyro.covers(step.t0 - margin) && gyro.covers(step.t1 + margin);
 }
 
-/// How the camera goes along between two images, in the first camera: m/s in the middle between them, m/s^2.
+/// Translation of the camera between two images, in the first camera: m/s at the middle between them, m/s^2.
 struct Course {
   Eigen::Vector3d speed = Eigen::Vector3d::Zero(), acceleration = Eigen::Vector3d::Zero();
 };
 
-/// `course`: about which the projection is taken.
+/// `course`: linearisation point of the projection.
 Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const State& x, const Course& course) {
   const int n = static_cast<int>(step.tracks.size());
   Prediction p{Eigen::VectorXd(2 * n), Eigen::MatrixX3d(2 * n, 3)};
@@ -62,13 +63,13 @@ Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const Sta
   return p;
 }
 
-/// Of each corner's two rows: by how much the corners of this step are off, with weights of Huber at twice the median.
-/// A blurred pair of images counts for little.
+/// Weights of the corners' rows: inverse of the step's typical error, with Huber weights at twice the median, so that a
+/// blurred pair of images has little weight.
 Eigen::VectorXd weightsOf(const Eigen::VectorXd& residual) {
   constexpr double kLeastError = 1e-4;  // a twentieth of a pixel
   std::vector<double> errors;
   for (int i = 0; i < residual.size() / 2; ++i) errors.push_back(residual.segment<2>(2 * i).norm());
-  const double typical = median(errors) + kLeastError;
+  const double typical = upperMedian(errors) + kLeastError;
   Eigen::VectorXd weights(residual.size());
   for (std::size_t i = 0; i < errors.size(); ++i)
     weights.segment<2>(2 * static_cast<int>(i))
@@ -76,13 +77,13 @@ Eigen::VectorXd weightsOf(const Eigen::VectorXd& residual) {
   return weights;
 }
 
-/// One step's share in the normal equations, its speed eliminated.
+/// One step's contribution to the normal equations, its velocity eliminated.
 struct Share {
   Eigen::Matrix<double, kUnknowns, kUnknowns> H;
   Unknowns g;
 };
 
-/// Gives `course` the speed that fits best.
+/// Also sets the velocity of `course` to the best fit.
 Share shareOf(const RotationStep& step, const GyroIntegral& gyro, const State& x, Course* course) {
   Prediction p = predict(step, gyro, x, *course);
   Eigen::VectorXd w;
@@ -106,8 +107,8 @@ Share shareOf(const RotationStep& step, const GyroIntegral& gyro, const State& x
   return {projected.transpose() * w.asDiagonal() * projected, projected.transpose() * (w.asDiagonal() * p.residual)};
 }
 
-/// Accelerations from the speeds before and after, where images follow each other: a drone accelerates as it tilts,
-/// which would pass for a part of the readout.
+/// Accelerations from the velocities before and after, where images follow each other: a drone accelerates as it tilts,
+/// which would otherwise bias the readout.
 void accelerate(const std::vector<const RotationStep*>& steps, const GyroIntegral& gyro, const State& x,
                 std::vector<Course>* courses) {
   const auto turned = [&](double from, double to) {  // R_from_to of the camera
@@ -153,7 +154,7 @@ std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& 
       return std::nullopt;
     settled = std::abs(d(0)) < 1e-5 && std::abs(d(1)) < 1e-5;
     accelerate(used, gyro, x, &courses);
-    // What the images of a pair have in common (blur, noise of the gyro) is in all their corners: count by pairs.
+    // Errors common to a pair of images (blur, gyro noise) are in all their corners: take the covariance by pairs.
     const Eigen::Matrix<double, kUnknowns, kUnknowns> inverse =
         H.ldlt().solve(Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity());
     covariance = inverse * scatter * inverse;

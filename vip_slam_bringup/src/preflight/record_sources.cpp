@@ -11,7 +11,7 @@
 namespace vip_slam {
 namespace {
 
-/// `source` is a rosbag::MessageInstance or a ShapeShifter: both say their type and make messages of it.
+/// `source`: a rosbag::MessageInstance or a ShapeShifter, which both have a type and instantiate messages.
 template <class Source>
 void dispatch(Recorder* recorder, const std::string& topic, double arrival, const Source& source) {
   const std::string type = source.getDataType();
@@ -64,11 +64,14 @@ Recording recordLive(const SensorConfig& sensor, double seconds) {
   Recorder recorder(sensor, true, seconds);
   std::vector<ros::Subscriber> subscribers;
   for (const std::string& topic : topicsOf(sensor)) {
-    const boost::function<void(const topic_tools::ShapeShifter::ConstPtr&)> take =
-        [&recorder, topic](const topic_tools::ShapeShifter::ConstPtr& message) {
-          dispatch(&recorder, topic, ros::Time::now().toSec(), *message);
+    // When it came, not when its turn comes here: decoding the images may lag behind on a busy machine.
+    const boost::function<void(const ros::MessageEvent<const topic_tools::ShapeShifter>&)> take =
+        [&recorder, topic](const ros::MessageEvent<const topic_tools::ShapeShifter>& event) {
+          dispatch(&recorder, topic, event.getReceiptTime().toSec(), *event.getConstMessage());
         };
-    subscribers.push_back(nh.subscribe<topic_tools::ShapeShifter>(topic, 400, take));
+    subscribers.push_back(
+        nh.subscribe<topic_tools::ShapeShifter, const ros::MessageEvent<const topic_tools::ShapeShifter>&>(topic, 400,
+                                                                                                           take));
   }
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
   while (ros::ok() && ros::WallTime::now() < end) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));

@@ -9,6 +9,7 @@
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/util/same_pixels.h"
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/image_decoding.h"
 
@@ -140,7 +141,7 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
     if (!values.empty()) {
       const auto [nearest, farthest] = std::minmax_element(values.begin(), values.end());
       sample.spread = *farthest - *nearest;
-      sample.median = median(values);
+      sample.median = upperMedian(values);
     }
     recording_.depths.push_back(sample);
   }
@@ -149,7 +150,7 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
   flushGray(false);
 }
 
-// What is rendered without noise repeats by itself while it stands.
+// Images simulated without noise repeat while the camera stands, so repetitions count only while it rotates.
 bool Recorder::turns() const {
   constexpr double kTurns = 0.05;  // rad/s
   return !recording_.gyro_samples.empty() && recording_.gyro_samples.back().value.norm() > kTurns;
@@ -159,7 +160,7 @@ void Recorder::addGray(double t, const cv::Mat& gray) {
   ++recording_.color.decoded;
   if (turns() && samePixels(gray, newest_gray_)) {
     ++recording_.color.repeated;
-    return;  // says nothing of the motion at this time
+    return;  // a repetition has no information on the motion at this time
   }
   newest_gray_ = gray;
   if (recording_.color.stamps.size() % 5 == 1) {
@@ -171,7 +172,7 @@ void Recorder::addGray(double t, const cv::Mat& gray) {
   flushGray(false);
 }
 
-/// A colour image goes on once its depth is there, or when others already wait behind it.
+/// A colour image is processed once its depth has arrived, or when others already wait behind it.
 void Recorder::flushGray(bool all) {
   while (!waiting_gray_.empty()) {
     const Stamped& gray = waiting_gray_.front();

@@ -1,7 +1,6 @@
 #include "vip_slam_bringup/runner/bag_reader.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <set>
 #include <stdexcept>
@@ -9,18 +8,14 @@
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/CompressedImage.h>
-#include <sensor_msgs/Image.h>
-#include <sensor_msgs/Imu.h>
 
 #include "vip_slam_bringup/runner/bag_extrinsics.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/camera_info.h"
-#include "vip_slam_ros/geometry_conversions.h"
-#include "vip_slam_ros/image_decoding.h"
-#include "vip_slam_ros/stream_clock.h"
 #include "vip_slam_ros/tf_lookup.h"
+
+#include "bag_decoding.h"
 
 namespace vip_slam {
 namespace {
@@ -32,20 +27,6 @@ std::string join(const std::set<std::string>& names) {
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text.empty() ? "none" : text;
 }
-
-std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
-
-/// `decode` gets the image, raw or compressed.
-template <class Decode>
-StampedImage stampedImage(const rosbag::MessageInstance& message, const Decode& decode) {
-  if (const auto image = message.instantiate<sensor_msgs::Image>())
-    return {image->header.stamp.toSec(), decode(*image), 0};
-  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>())
-    return {image->header.stamp.toSec(), decode(*image), 0};
-  throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
-}
-
-enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
 
 }  // namespace
 
@@ -61,15 +42,28 @@ struct BagReader::Source {
 
   void checkTopics(const SensorConfig& sensor) {
     const SensorTopics& topics = sensor.topics;
-    std::set<std::string> there, missing;
+    std::map<std::string, std::string> there;  // with their types
+    std::set<std::string> names, missing;
     rosbag::View view(bag);
-    for (const rosbag::ConnectionInfo* connection : view.getConnections()) there.insert(connection->topic);
-    for (const std::string& topic : {topics.color, topics.depth, topics.imu, topics.gyro, topics.accel}) {
-      if (!topic.empty() && there.count(topic) == 0) missing.insert(topic);
+    for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+      there[connection->topic] = connection->datatype;
+      names.insert(connection->topic);
     }
+    const auto check = [&](const std::string& topic, const std::set<std::string>& types) {
+      if (topic.empty()) return;
+      const auto found = there.find(topic);
+      if (found == there.end())
+        missing.insert(topic);
+      else if (types.count(found->second) == 0)
+        throw std::runtime_error(bag.getFileName() + ": topic " + topic + " is " + found->second + ", expected " +
+                                 join(types) + "; is it the right topic in sensor '" + sensor.name + "'?");
+    };
+    for (const std::string& topic : {topics.color, topics.depth})
+      check(topic, {"sensor_msgs/Image", "sensor_msgs/CompressedImage"});
+    for (const std::string& topic : {topics.imu, topics.gyro, topics.accel}) check(topic, {"sensor_msgs/Imu"});
     if (!missing.empty()) {
       throw std::runtime_error(bag.getFileName() + ": no topic " + join(missing) + ", which sensor '" + sensor.name +
-                               "' names; in the bag are: " + join(there));
+                               "' names; in the bag are: " + join(names));
     }
   }
 
@@ -170,132 +164,29 @@ void BagReader::read() {
   for (const auto& name : {topics.color, topics.depth, topics.imu, topics.gyro, topics.accel}) {
     if (!name.empty()) names.push_back(name);
   }
-  ImagePairer pairer(options_.pairing);
-  StreamClock clock(kStreams, options_.time_jump);
-  bool open = true;
-  const auto handOut = [&] {
-    for (; open && pairer.front(); pairer.pop()) open = channel_.push(*pairer.front());
+  BagDecoding decoding(sensor_, source_->registration.get(), options_,
+                       [this](SensorEvent&& event) { return channel_.push(std::move(event)); });
+  const auto report = [&] {
+    counters_ = decoding.counters();
+    warnings_.insert(warnings_.end(), decoding.warnings().begin(), decoding.warnings().end());
   };
-  // As in the live system: what belongs together is told from what comes before and after a jump of the clock.
-  const auto inTime = [&](Stream stream, double t) {
-    const StreamClock::Verdict verdict = clock.notice(stream, t);
-    if (verdict == StreamClock::Verdict::kStray) ++counters_["stray_messages"];
-    if (verdict == StreamClock::Verdict::kJumpedBack) {
-      ++counters_["time_jumps"];
-      pairer.end();
-      handOut();
-      pairer.clear();
-      if (open) open = channel_.push(TimeJump{clock.lastJump()});
-    }
-    return open && verdict != StreamClock::Verdict::kStray;
-  };
-  std::set<std::string> complained;
-  const auto decode = [&](const rosbag::MessageInstance& message, auto&& use) {
-    try {
-      use();
-    } catch (const rosbag::BagException&) {
-      throw;
-    } catch (const std::exception& error) {
-      ++counters_["undecodable_images"];
-      if (complained.insert(message.getTopic()).second) {
-        warnings_.push_back("topic " + message.getTopic() + ": " + error.what());
+  try {
+    rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
+    for (const auto& message : view) {
+      if (stop_ || !decoding.open()) break;
+      try {
+        decoding.take(message);
+      } catch (const ros::Exception& error) {  // a damaged chunk or message; those after it may be intact
+        damaged_ = true;
+        decoding.countUnreadable(error.what());
       }
     }
-  };
-
-  const cv::Size calibrated(sensor_.camera.width, sensor_.camera.height);
-  const auto compareWithCalibration = [&](const cv::Mat& image) {
-    if (image.size() == calibrated) return;
-    if (++counters_["images_of_wrong_size"] > 1) return;
-    warnings_.push_back("topic " + topics.color + ": images are " + sizeText(image.size()) +
-                        ", the calibration is for " + sizeText(calibrated) + ": they cannot be used");
-  };
-  cv::Size color_size;
-  std::size_t depth_images = 0, without_any = 0;
-  const auto compareSizes = [&](const cv::Mat& depth) {
-    if (color_size.empty() || depth.size() == color_size || !complained.insert("sizes").second) return;
-    warnings_.push_back("topic " + topics.depth + ": depth is " + sizeText(depth.size()) + ", the colour images are " +
-                        sizeText(color_size) + ", so that no depth is used: switch on the driver's depth " +
-                        "registration, or set depth/registered: false with the depth camera's calibration");
-  };
-
-  const auto take = [&](const rosbag::MessageInstance& message) {
-    const std::string& topic = message.getTopic();
-    if (topic == topics.color) {
-      decode(message, [&] {
-        const auto [t, image, stamp] = stampedImage(message, [](const auto& m) { return decodeGray(m); });
-        color_size = image.size();
-        compareWithCalibration(image);
-        if (inTime(kColor, t)) pairer.addColor(t, image);
-      });
-    } else if (topic == topics.depth) {
-      decode(message, [&] {
-        auto [t, depth, stamp] = stampedImage(
-            message, [&](const auto& m) { return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset); });
-        if (source_->registration) depth = (*source_->registration)(depth);
-        compareSizes(depth);
-        ++depth_images;
-        without_any += holdsNoDepth(depth, sensor_.depth_noise);
-        if (inTime(kDepth, t)) pairer.addDepth(t, depth);
-      });
-    } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
-      const double t = imu->header.stamp.toSec();
-      const Eigen::Vector3d gyro = fromMsg(imu->angular_velocity), accel = fromMsg(imu->linear_acceleration);
-      if (inTime(topic == topics.accel ? kAccel : kGyro, t)) {
-        SensorEvent event = ImuSample{t, gyro, accel};
-        if (topic == topics.gyro) event = GyroSample{t, gyro};
-        if (topic == topics.accel) event = AccelSample{t, accel};
-        open = channel_.push(std::move(event));
-      }
-    } else {
-      ++counters_["messages_of_wrong_type"];
-      if (complained.insert(topic).second) {
-        warnings_.push_back("topic " + topic + ": type " + message.getDataType() + ", expected sensor_msgs/Imu");
-      }
-    }
-  };
-
-  rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
-  for (const auto& message : view) {
-    if (stop_) break;
-    try {
-      take(message);
-    } catch (const ros::Exception& error) {  // a chunk or a message that is damaged; those after it may be whole
-      damaged_ = true;
-      if (++counters_["unreadable_messages"] == 1)
-        warnings_.push_back(std::string("the bag is damaged, what cannot be read is left out: ") + error.what());
-    }
-    handOut();
-    if (!open) break;
+  } catch (...) {
+    report();
+    throw;
   }
-  pairer.end();
-  handOut();
-  const std::size_t paired = pairer.counters().pairs, alone = pairer.counters().without_depth;
-  if (!topics.depth.empty() && alone > 5 && 20 * alone > paired + alone)
-    warnings_.push_back("topic " + topics.depth + ": " + std::to_string(alone) + " of " +
-                        std::to_string(paired + alone) + " colour images have no depth within " +
-                        std::to_string(std::lround(1e3 * options_.pairing.tolerance)) +
-                        " ms: switch on the driver's synchronisation, or equal rates; when check_bag finds "
-                        "the depth elsewhere in the bag, sort that");
-  if (2 * without_any > depth_images) {
-    char range[60];
-    std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);
-    warnings_.push_back("topic " + topics.depth + ": " + std::to_string(without_any) + " of " +
-                        std::to_string(depth_images) + " depth images hold nothing within " + range +
-                        ", the sensor file's range: wrong depth/scale, emitter off, wrong topic?");
-  }
-  if (const std::size_t backward = pairer.counters().backward; backward > 0)
-    warnings_.push_back(std::to_string(backward) +
-                        " images are left out: their stamps repeat or precede the one before");
-  if (const auto jumps = counters_.find("time_jumps"); jumps != counters_.end())
-    warnings_.push_back(
-        "time ran backwards " + std::to_string(jumps->second) +
-        " times (a bag that was joined, or recorded while another was played in a loop?): the odometry " +
-        "starts anew there, the map goes on");
-  counters_["image_pairs"] = pairer.counters().pairs;
-  counters_["images_without_depth"] = pairer.counters().without_depth;
-  counters_["unused_depth_images"] = pairer.counters().unused_depth;
-  counters_["images_out_of_order"] = pairer.counters().backward;
+  decoding.finish();
+  report();
 }
 
 }  // namespace vip_slam

@@ -6,17 +6,6 @@
 #include <stdexcept>
 
 namespace vip_slam {
-namespace {
-
-/// From (theta in the body, p in odom, ...) to x y z and rotation, both in odom.
-Matrix6d poseCovariance(const TrackedFrame& frame) {
-  Matrix6d J = Matrix6d::Zero();
-  J.topRightCorner<3, 3>().setIdentity();
-  J.bottomLeftCorner<3, 3>() = frame.state.T_W_I.R();
-  return J * frame.covariance.topLeftCorner<6, 6>() * J.transpose();
-}
-
-}  // namespace
 
 Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing)
     : options_(options), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
@@ -27,7 +16,7 @@ Pipeline::~Pipeline() = default;
 
 void Pipeline::loadMap(const std::string& path, bool localise) {
   if (!mapping_) throw std::invalid_argument("a map was given, but mapping is switched off");
-  // First: what the planes make of the loaded map would change it.
+  // Before the planes process the loaded map, since their updates would change it.
   if (localise) mapping_->localiseOnly();
   front_end_->applyMapUpdate(mapping_->loadMap(path));
 }
@@ -114,7 +103,7 @@ void Pipeline::process(const ImagePair& pair) {
   if (states_.empty() || states_.back().status.state != frame.status.state)
     states_.push_back({frame.t, frame.status});
   else if (frame.status.state == TrackingState::kInitialising)
-    states_.back().status.reason = frame.status.reason;  // what the start waited for in the end
+    states_.back().status.reason = frame.status.reason;  // keep the newest reason for waiting
   const bool posed = frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
   if (posed && passes_.take(frame.t)) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});

@@ -38,7 +38,7 @@ std::string format(const char* pattern, double a, double b) {
   return text;
 }
 
-/// Points as an SVG path in drawing coordinates: x to the right, y up turned to y down.
+/// Points as an SVG path in drawing coordinates: x to the right, y (up) flipped to y down.
 std::string pathData(const std::vector<Eigen::Vector3d>& points, bool closed) {
   std::string data;
   for (const auto& p : points) data += format(data.empty() ? "M%.3f %.3f" : "L%.3f %.3f", p.x(), -p.y());
@@ -123,7 +123,7 @@ void writeFloorPlan(const std::string& path, const std::vector<PlaneEstimate>& p
   drawing += "</g>\n";
   std::vector<Eigen::Vector3d> line;
   for (const auto& pose : trajectory) {
-    // A point every five centimetres draws the same line.
+    // A point every five centimetres is enough for the drawing.
     if (line.empty() || (pose.T_W_B.t() - line.back()).norm() > 0.05) line.push_back(pose.T_W_B.t());
     box.add(pose.T_W_B.t());
   }

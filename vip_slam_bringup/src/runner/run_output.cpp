@@ -87,7 +87,7 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
     put("inliers", loop.inliers);
     const auto match = std::find_if(map.keyframes.begin(), map.keyframes.end(),
                                     [&loop](const SnapshotKeyframe& k) { return k.id == loop.match; });
-    if (match != map.keyframes.end()) put("t_match", match->t);  // else it was culled meanwhile
+    if (match != map.keyframes.end()) put("t_match", match->t);  // otherwise it was culled meanwhile
     put("reason", loop.reason);
     yaml << YAML::EndMap;
   }
@@ -102,7 +102,7 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   yaml << YAML::EndSeq;
 }
 
-/// In the words and units of a sensor file, so that it can be copied there.
+/// With the keys and units of a sensor file, so that it can be copied there.
 void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const DepthCurve& depth_curve,
                   const InertialScale& scale, double depth_scale) {
   const auto list = [&yaml](const char* key, const Eigen::VectorXd& values) {
@@ -205,13 +205,13 @@ void writePoints(const std::string& path, const std::vector<LandmarkEstimate>& l
   file.commit();
 }
 
-/// All that docs/outputs.md names, whichever of it a run writes.
+/// All files named in docs/outputs.md, whether or not a run writes them.
 constexpr const char* kFiles[] = {"trajectory.tum", "realtime.tum", "odometry.tum", "odometry_covariance.csv",
                                   "planes.yaml",    "planes.ply",   "points.csv",   "plane_history.csv",
                                   "floorplan.svg",  "map.vsm",      "timing.csv",   "summary.yaml",
                                   "report.html"};
 
-/// Where each plane lay after each map update: how steady it is.
+/// Parameters of each plane after each map update, to judge their stability.
 void writePlaneHistory(const std::string& path, const std::vector<PlaneRecord>& history) {
   AtomicFile file(path);
   file.stream() << "t,id,nx,ny,nz,d\n" << std::fixed;
@@ -227,7 +227,7 @@ void writePlaneHistory(const std::string& path, const std::vector<PlaneRecord>& 
 
 void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader,
               const TimingLog& timing) {
-  // Of an earlier run into the same folder nothing may pass for this one's.
+  // Files of an earlier run in the same folder must not be mistaken for this run's.
   for (const char* name : kFiles) std::filesystem::remove(std::filesystem::path(folder) / name);
   Trajectory odometry;
   for (const OdometryPose& pose : pipeline.odometry()) odometry.push_back({pose.t, pose.T_odom_I});

@@ -1,4 +1,4 @@
-// What a user should know of a run that ended well.
+// Warnings for the user after a successful run.
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "vip_slam_backend/optimisation/inertial_scale.h"
+#include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/runner/run_output.h"
 
 namespace vip_slam {
@@ -15,7 +16,7 @@ bool hasPose(const StateChange& change) {
   return change.status.state == TrackingState::kTracking || change.status.state == TrackingState::kDegraded;
 }
 
-/// A first pose that comes late, in words.
+/// Warning about a late first pose.
 std::string lateStart(const Pipeline& pipeline) {
   constexpr double kSoon = 3.0;  // s; standing for a second, or two tries in motion
   const std::vector<StateChange>& states = pipeline.states();
@@ -33,7 +34,7 @@ std::string lateStart(const Pipeline& pipeline) {
   return after + std::string(words);
 }
 
-/// Where poses are missing after the first one, when that is more than a moment; in words.
+/// Warning about poses missing after the first one, for longer than a moment.
 std::string missingPoses(const Pipeline& pipeline) {
   constexpr double kMoment = 1.0;  // s
   const std::vector<StateChange>& states = pipeline.states();
@@ -97,15 +98,14 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
                   " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
                   "signs and units, T_imu_cam, the stamps and the scale of depth right? check_bag tells");
-  constexpr double kLargeJitter = 0.001;
-  if (c.stamp_sigma > kLargeJitter) {
+  if (c.stamp_sigma > kLargeStampJitter) {
     char words[120];
     std::snprintf(words, sizeof words,
                   "stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
                   1e3 * c.stamp_sigma);
     all.push_back(words);
   }
-  // A mounting that was learnt against a wrong IMU means nothing.
+  // A calibration estimated with a wrong IMU is meaningless.
   if (10 * c.imu_contradicted < c.images) {
     for (const std::string& difference :
          mountingDifferences(pipeline.frontEnd().givenMounting(), pipeline.frontEnd().mounting())) {

@@ -8,8 +8,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr float kLargestStep = 0.6f;    // px; more means that the match itself is wrong
-constexpr float kLeastGradient = 2.4f;  // mean square, (grey levels / px)^2: well above what image noise makes
+constexpr float kLargestStep = 0.6f;    // px; a larger step means that the match itself is wrong
+constexpr float kLeastGradient = 2.4f;  // mean square, (grey levels / px)^2: well above that of image noise
 
 }  // namespace
 

@@ -1,18 +1,25 @@
 #!/usr/bin/python3
 """What users get wrong is named: by the launch, by the tracking status, by run_bag."""
+import csv
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 import numpy as np
 import rosbag
 import rospy
 import rostest
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from vip_slam_msgs.msg import TrackingStatus
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, Image
+from vip_slam_msgs.msg import TrackedFrame, TrackingStatus
+from vip_slam_msgs.srv import SaveMap, SaveTrajectory
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from live import Listener, wait_for  # noqa: E402
@@ -175,6 +182,118 @@ class BadInputTest(unittest.TestCase):
         finally:
             launch.terminate()
             launch.wait(30)
+
+    def test_07_a_bag_that_is_not_there_ends_the_launch(self):
+        for more in ('exit_at_end:=false', 'exit_at_end:=true'):
+            done = subprocess.run(['roslaunch', 'vip_slam_bringup', 'bag.launch', 'bag:=/nowhere/none.bag', 'sensor:=' +
+                                   os.path.join(self.data, 'smoke_sensor.yaml'), 'rviz:=false', more],
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60)
+            self.assertIn('/nowhere/none.bag', done.stdout)
+            self.assertNotIn('Traceback', done.stdout)
+
+    def test_08_a_forgotten_argument_is_named(self):
+        for launch, given, name in (('vip_slam', [], 'sensor'), ('bag', ['sensor:=d435i'], 'bag'),
+                                    ('offline', ['sensor:=d435i', 'bag:=a.bag'], 'out')):
+            command = ['roslaunch', 'vip_slam_bringup', launch + '.launch']
+            done = subprocess.run(command + given, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                  timeout=60)
+            self.assertIn("requires the '%s' arg to be set" % name, done.stdout)
+            done = subprocess.run(command + ['--ros-args'], stdout=subprocess.PIPE, text=True, timeout=60)
+            self.assertRegex(done.stdout, 'Required Arguments:(.|\n)*  sensor: ')
+
+    def test_09_files_are_named_as_the_caller_sees_them(self):
+        folder = os.path.join(self.folder, "the caller's own")
+        os.mkdir(folder)
+
+        def roslaunch(launch, *more):
+            return subprocess.run(['roslaunch', 'vip_slam_bringup', launch, *more], stdout=subprocess.PIPE, text=True,
+                                  cwd=folder, env={**os.environ, 'PWD': folder}, timeout=60).stdout
+        for given, expected in (('a.yml', folder + '/a.yml'), ('./a', folder + '/./a'), ('/b/a.yaml', '/b/a.yaml'),
+                                ('~/a.yaml', os.environ['HOME'] + '/a.yaml'), ('d435i', 'd435i')):
+            words = roslaunch('vip_slam.launch', 'sensor:=' + given, '--dump-params')
+            for nodelet in ('frontend', 'backend', 'planes'):
+                self.assertEqual(yaml.safe_load(words)['/vip_slam/%s/sensor' % nodelet], expected)
+        words = roslaunch('offline.launch', 'sensor:=d435i', 'bag:=a.bag', 'out:=../out', '--args', '/run_bag')
+        self.assertIn(' %s/a.bag --sensor d435i --out %s/../out ' % (folder, folder), words)
+        words = roslaunch('bag.launch', 'sensor:=d435i', 'bag:=a.bag', '--args', '/player')
+        self.assertIn(' %s/a.bag ' % folder, words)
+
+    def record_run(self, out, during):
+        """Exit status and what it prints when `during` happens and then an interrupt."""
+        command = ['rosrun', 'vip_slam_bringup', 'record_run', '--out', out, '--ns', '/fake', '--as-is']
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        try:
+            during()
+        finally:
+            process.send_signal(signal.SIGINT)
+            words, _ = process.communicate(timeout=30)
+        return process.returncode, words
+
+    def test_10_a_recording_replaces_another_as_a_whole_or_not_at_all(self):
+        # A system of topics and services only. Of 20 images two have no answer and two more no pose, and of one the pose
+        # comes before the image.
+        rospy.set_param('/use_sim_time', True)
+        rospy.set_param('/fake/frontend/sensor', self.sensor_with(r'"/camera/', '"/fake/camera/'))
+        publish = {name: rospy.Publisher('/fake/' + name, kind, queue_size=100)
+                   for name, kind in (('odom', Odometry), ('tracked_frame', TrackedFrame),
+                                      ('camera/color/image_raw', Image), ('camera/color/camera_info', CameraInfo))}
+
+        def send(name, stamp):
+            message = publish[name].data_class()
+            message.header.stamp = rospy.Time.from_sec(stamp)
+            publish[name].publish(message)
+
+        def run():
+            wait_for(lambda: all(p.get_num_connections() for p in publish.values()), 20, 'the recorder')
+            for k in range(20):
+                answers = [(name, 100 + 0.05 * k) for name in ('tracked_frame', 'odom')]
+                images = [(name, 100 + 0.05 * k) for name in ('camera/color/camera_info', 'camera/color/image_raw')]
+                answers = answers[:0 if k in (7, 8) else 1 if k < 2 else 2]
+                for first_or_second in (answers, images) if k == 12 else (images, answers):
+                    for name, stamp in first_or_second:
+                        send(name, stamp)
+                    time.sleep(0.1)
+
+        def save(request):
+            with open(request.path, 'w') as file:
+                file.write('new\n')
+            return True, 'written'
+        services = [rospy.Service('/fake/save_trajectory', SaveTrajectory, save),
+                    rospy.Service('/fake/save_map', SaveMap, save)]
+        out = os.path.join(self.folder, 'recording')
+        os.mkdir(out)
+        earlier = ['odometry.tum', 'report.html', 'trajectory.tum']
+        for name in earlier:
+            with open(os.path.join(out, name), 'w') as file:
+                file.write('earlier\n')
+
+        def texts():
+            return {name: open(os.path.join(out, name)).read() for name in sorted(os.listdir(out))}
+        code, words = self.record_run(out, lambda: wait_for(lambda: publish['odom'].get_num_connections(), 20, 'it'))
+        self.assertEqual((code, texts()), (1, {name: 'earlier\n' for name in earlier}), words)
+
+        code, words = self.record_run(out, run)
+        self.assertEqual(code, 0, words)
+        self.assertIn('20 images sent, 2 of them without an answer, 16 with a pose', words)
+        self.assertIn('1 of 16 not measurable', words)
+        self.assertEqual(sorted(texts()), ['map.vsm', 'odometry.tum', 'planes.yaml', 'realtime.tum', 'summary.yaml',
+                                           'timing.csv', 'trajectory.tum'])
+        self.assertEqual(texts()['trajectory.tum'], 'new\n')
+        summary = yaml.safe_load(texts()['summary.yaml'])
+        self.assertEqual((summary['images'], summary['tracked_images']), (20, 16))
+        self.assertEqual(summary['counters']['images_lost'], 2)
+        self.assertAlmostEqual(summary['duration'], 0.95, 3)
+        latencies = [float(row['ms']) for row in csv.DictReader(texts()['timing.csv'].splitlines())
+                     if row['stage'] == 'live.latency']
+        self.assertEqual(len(latencies), 15)
+        self.assertGreaterEqual(min(latencies), 0)
+        for service in services:
+            service.shutdown()
+
+        blocked = os.path.join(self.folder, 'a file')
+        open(blocked, 'w').close()
+        code, words = self.record_run(blocked, lambda: time.sleep(3))
+        self.assertEqual((code, words), (1, 'record_run: %s: a file, expected a folder\n' % blocked))
 
 
 if __name__ == '__main__':

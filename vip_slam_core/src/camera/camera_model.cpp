@@ -52,7 +52,7 @@ std::string CameraIntrinsics::validate() const {
   if (height <= 0) return "height must be > 0, is " + std::to_string(height);
   if (!(fx > 0) || !std::isfinite(fx)) return "fx must be > 0, is " + formatDouble(fx);
   if (!(fy > 0) || !std::isfinite(fy)) return "fy must be > 0, is " + formatDouble(fy);
-  // Off-centre crops exist; a principal point an image away is a mistake.
+  // Off-centre crops exist, but a principal point outside by the size of the image is a mistake.
   if (!(cx > -width && cx < 2 * width)) return "cx must be near the image, is " + formatDouble(cx);
   if (!(cy > -height && cy < 2 * height)) return "cy must be near the image, is " + formatDouble(cy);
   for (std::size_t i = 0; i < distortion.size(); ++i) {

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kNearest = 1e-3;      // m
 constexpr double kSteepest = 0.5;      // of the curve, m/m
-constexpr int kInverseIterations = 4;  // each takes the error to a share of the curve's slope, a few per cent
+constexpr int kInverseIterations = 4;  // each reduces the error by the curve's slope, a few per cent
 
 }  // namespace
 

@@ -9,21 +9,26 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kLargestRadius = 7;
-constexpr int kLargestWindow = (2 * kLargestRadius + 1) * (2 * kLargestRadius + 1);
+constexpr int kRadius = 2;  // half window, px
+constexpr int kSide = 2 * kRadius + 1;
+// A spread of the window's depths above kEdgeRatio * z + kEdgeSigmas * sigma(z) is an edge: 3 % over four
+// pixels is a surface seen at 75 degrees (focal length 500 px), six sigmas are beyond the extremes of 25 noisy
+// readings.
+constexpr double kEdgeRatio = 0.03, kEdgeSigmas = 6.0;
+constexpr double kLeastValid = 0.6;  // share of the window's pixels that need a reading
 
-// What the window around one pixel holds, gathered in one pass.
+// The valid readings of the window around one pixel, gathered in one pass.
 struct Window {
   int count = 0;
   float low, high;
-  float z[kLargestWindow];  ///< depths, later their inverses
-  signed char x[kLargestWindow], y[kLargestWindow];
+  float z[kSide * kSide];  ///< depths, later their inverses
+  signed char x[kSide * kSide], y[kSide * kSide];
 };
 
-void gather(const cv::Mat& depth, int cu, int cv, int radius, const DepthNoise& noise, Window* w) {
+void gather(const cv::Mat& depth, int cu, int cv, const DepthNoise& noise, Window* w) {
   const float min_range = float(noise.min_range), max_range = float(noise.max_range);
-  const int x0 = std::max(-radius, -cu), x1 = std::min(radius, depth.cols - 1 - cu);
-  const int y0 = std::max(-radius, -cv), y1 = std::min(radius, depth.rows - 1 - cv);
+  const int x0 = std::max(-kRadius, -cu), x1 = std::min(kRadius, depth.cols - 1 - cu);
+  const int y0 = std::max(-kRadius, -cv), y1 = std::min(kRadius, depth.rows - 1 - cv);
   w->low = max_range;
   w->high = 0;
   for (int y = y0; y <= y1; ++y) {
@@ -58,28 +63,27 @@ void fitSlope(const Window& w, float mean, float* slope_x, float* slope_y) {
   *slope_y = (sxx * syz - sxy * sxz) / determinant;
 }
 
-bool isEdge(float low, float high, const DepthNoise& noise, const DepthLookupOptions& options) {
+bool isEdge(float low, float high, const DepthNoise& noise) {
   const float middle = 0.5f * (low + high);
-  return high - low > options.edge_ratio * middle + options.edge_sigmas * noise.sigma(middle);
+  return high - low > kEdgeRatio * middle + kEdgeSigmas * noise.sigma(middle);
 }
 
-// On a plane the inverse of z is linear over the image. z itself bends: a straight line through the z of a corridor's
-// wall puts it too far by some 0.02 % at five metres, and the corridor comes out too long.
+// On a plane the inverse of z is linear over the image, z itself is not: a linear fit to the z of a corridor's wall
+// would be too far by some 0.02 % at five metres, and the corridor too long.
 
-// Whether levelled inverse depths, the local slope taken out, show anything but noise. `low` and `high` are theirs.
-// Beyond a certain slope there is no surface that one could measure.
-bool isEdgeOnSlope(float low, float high, float slope_x, float slope_y, const DepthNoise& noise,
-                   const DepthLookupOptions& options) {
+// Whether inverse depths without their local slope have more than noise; `low` and `high`: their extremes. Beyond
+// kSteepest no surface can be measured.
+bool isEdgeOnSlope(float low, float high, float slope_x, float slope_y, const DepthNoise& noise) {
   constexpr float kSteepest = 0.02f;  // relative rise per pixel: about 84 degrees for a focal length of 500 px
   const float z = 2.0f / (low + high);
   return !((slope_x * slope_x + slope_y * slope_y) * z * z <= kSteepest * kSteepest) ||
-         (high - low) * z * z > float(options.edge_sigmas * noise.sigma(z));
+         (high - low) * z * z > float(kEdgeSigmas * noise.sigma(z));
 }
 
-// The common case, a full 5x5 window of valid pixels: the sums of the slope fit are constants and nothing branches per
-// pixel. False when some pixel is invalid; the general way then decides.
-bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, const DepthNoise& noise,
-                   const DepthLookupOptions& options, bool grazing, float* result) {
+// The common case, a full 5x5 window of valid pixels: the sums of the slope fit are constants and there are no branches
+// per pixel. False when some pixel is invalid: use the general case then.
+bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, const DepthNoise& noise, bool grazing,
+                   float* result) {
   float z[25];
   const float* at = depth.ptr<float>(cv - 2) + cu - 2;
   const std::size_t step = depth.step1();
@@ -95,9 +99,9 @@ bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, con
       sum += value;
     }
   }
-  // Comparisons pass over NaN, the sum does not.
+  // Comparisons miss NaN, the sum does not.
   if (!(sum == sum && low > 0 && low >= float(noise.min_range) && high <= float(noise.max_range))) return false;
-  const bool edge = isEdge(low, high, noise, options);
+  const bool edge = isEdge(low, high, noise);
   if (edge && !grazing) {
     *result = 0.0f;
     return true;
@@ -116,7 +120,7 @@ bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, con
   }
   if (edge) {
     const auto [lowest, highest] = std::minmax_element(z, z + 25);
-    if (isEdgeOnSlope(*lowest, *highest, slope_x, slope_y, noise, options)) {
+    if (isEdgeOnSlope(*lowest, *highest, slope_x, slope_y, noise)) {
       *result = 0.0f;
       return true;
     }
@@ -126,28 +130,26 @@ bool lookUpFull5x5(const cv::Mat& depth, int cu, int cv, float du, float dv, con
   return true;
 }
 
-// With `grazing`, where the spread says edge it is judged again with the local slope taken out: floors and table tops
-// at a grazing angle rise by more than an edge over the window, yet they are surfaces.
-float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options,
-             bool grazing) {
+// With `grazing`, windows with a large spread are tested again without the local slope: floors and table tops at a
+// grazing angle vary by more than an edge over the window, but are surfaces.
+float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, bool grazing) {
   if (!(u > -1 && v > -1 && u < depth.cols && v < depth.rows)) return 0.0f;
   const int cu = static_cast<int>(std::floor(u + 0.5)), cv = static_cast<int>(std::floor(v + 0.5));
   if (cu < 0 || cv < 0 || cu >= depth.cols || cv >= depth.rows) return 0.0f;
-  const int radius = std::clamp(options.radius, 0, kLargestRadius);
-  if (radius == 2 && cu >= 2 && cv >= 2 && cu + 2 < depth.cols && cv + 2 < depth.rows) {
+  if (cu >= 2 && cv >= 2 && cu + 2 < depth.cols && cv + 2 < depth.rows) {
     float result;
-    if (lookUpFull5x5(depth, cu, cv, float(u - cu), float(v - cv), noise, options, grazing, &result)) return result;
+    if (lookUpFull5x5(depth, cu, cv, float(u - cu), float(v - cv), noise, grazing, &result)) return result;
   }
   Window w;
-  gather(depth, cu, cv, radius, noise, &w);
-  const int side = 2 * radius + 1;
-  const int inside = (std::min(cu + radius, depth.cols - 1) - std::max(cu - radius, 0) + 1) *
-                     (std::min(cv + radius, depth.rows - 1) - std::max(cv - radius, 0) + 1);
-  if (w.count == 0 || w.count < options.min_valid_fraction * std::min(inside, side * side)) return 0.0f;
-  const bool edge = isEdge(w.low, w.high, noise, options);
+  gather(depth, cu, cv, noise, &w);
+  const int inside = (std::min(cu + kRadius, depth.cols - 1) - std::max(cu - kRadius, 0) + 1) *
+                     (std::min(cv + kRadius, depth.rows - 1) - std::max(cv - kRadius, 0) + 1);
+  if (w.count == 0 || w.count < kLeastValid * std::min(inside, kSide * kSide)) return 0.0f;
+  const bool edge = isEdge(w.low, w.high, noise);
   if (edge && !grazing) return 0.0f;
 
-  // The median of the inverses carried along the local slope to (u, v): robust, and unbiased on slanted surfaces.
+  // The median of the inverse depths extrapolated along the local slope to (u, v): robust, and unbiased on slanted
+  // surfaces.
   float mean = 0;
   for (int i = 0; i < w.count; ++i) {
     w.z[i] = 1.0f / w.z[i];
@@ -160,7 +162,7 @@ float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, 
   for (int i = 0; i < w.count; ++i) w.z[i] += slope_x * (du - w.x[i]) + slope_y * (dv - w.y[i]);
   if (edge) {
     const auto [lowest, highest] = std::minmax_element(w.z, w.z + w.count);
-    if (isEdgeOnSlope(*lowest, *highest, slope_x, slope_y, noise, options)) return 0.0f;
+    if (isEdgeOnSlope(*lowest, *highest, slope_x, slope_y, noise)) return 0.0f;
   }
   float* median = w.z + w.count / 2;
   std::nth_element(w.z, median, w.z + w.count);
@@ -185,10 +187,10 @@ void requireFloatDepth(const cv::Mat& depth) {
 
 }  // namespace
 
-float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise, const DepthLookupOptions& options) {
+float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise) {
   if (depth.empty()) return 0.0f;
   requireFloatDepth(depth);
-  return lookUp(depth, u, v, noise, options, false);
+  return lookUp(depth, u, v, noise, false);
 }
 
 cv::Mat depthToMetres(const cv::Mat& raw, double scale, double offset) {
@@ -214,7 +216,7 @@ cv::Mat depthToMetres(const cv::Mat& raw, double scale, double offset) {
                               ", expected CV_16UC1 or CV_32FC1");
 }
 
-DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise, const DepthLookupOptions& options) {
+DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise) {
   DepthGrid grid;
   if (depth.empty()) return grid;
   requireFloatDepth(depth);
@@ -227,7 +229,7 @@ DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& nois
   for (int r = 0; r < grid.rows; ++r) {
     for (int c = 0; c < grid.cols; ++c) {
       grid.z[static_cast<std::size_t>(r) * grid.cols + c] =
-          lookUp(depth, grid.offset + c * stride, grid.offset + r * stride, noise, options, true);
+          lookUp(depth, grid.offset + c * stride, grid.offset + r * stride, noise, true);
     }
   }
   return grid;

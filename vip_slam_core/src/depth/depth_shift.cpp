@@ -8,13 +8,13 @@
 namespace vip_slam {
 namespace {
 
-constexpr float kOneSurface = 0.03f;  // of the depth between neighbouring pixels: more is an edge
-constexpr double kStraight = 0.02;    // of the inverse depth: what the nodes around may be off a plane
+constexpr float kOneSurface = 0.03f;  // relative difference of neighbouring pixels; more is an edge
+constexpr double kStraight = 0.02;    // relative deviation of inverse depth of neighbouring nodes from a plane
 
 /// Inverse depth per pixel between two nodes; 0 where one is missing.
 double slopeBetween(float a, float b, double pixels) { return a > 0 && b > 0 ? (1.0 / b - 1.0 / a) / pixels : 0.0; }
 
-/// Inverse depth per pixel along a row or column at its middle one of three nodes.
+/// Slope of inverse depth per pixel along a row or column, at the middle one of three nodes.
 double slopeAt(float before, float here, float after, double pixels) {
   if (!(before > 0) || !(after > 0)) return 0.0;
   const double bend = 1.0 / before - 2.0 / here + 1.0 / after;
@@ -23,7 +23,7 @@ double slopeAt(float before, float here, float after, double pixels) {
 
 float moved(float z, const Eigen::Vector2d& slope, const Eigen::Vector2d& px) {
   const double inverse = 1.0 / z + slope.dot(px);
-  // Twice as far or half as far within a few pixels is no surface any more.
+  // A change by a factor of two within a few pixels is not on one surface.
   return inverse * z > 0.5 && inverse * z < 2.0 ? static_cast<float>(1.0 / inverse) : z;
 }
 

@@ -7,7 +7,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kAtOffset = 2.0, kOffsetMatters = 0.001;  // m
-constexpr double kLeastShrink = 0.1;                       // of 1/z: nearer to infinity no reading is corrected
+constexpr double kLeastShrink = 0.1;                       // least 1/z relative to 1/reading, to stay off infinity
 
 }  // namespace
 

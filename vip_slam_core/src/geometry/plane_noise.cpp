@@ -5,28 +5,29 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_core/util/statistics.h"
+
 namespace vip_slam {
 namespace {
 
 constexpr std::size_t kLeastObservations = 30;
 constexpr double kMedian = 2.366;  // of a chi square with three degrees of freedom
-// A sigma shrinks to a fifth at most: planes and poses are fitted to the same points, so that a map of few planes
-// agrees with itself too well. It does not grow: with a camera that bends its depth that would take away what holds
-// the map.
+// A sigma is reduced to a fifth at most: planes and poses are fitted to the same points, so that the residuals of a map
+// with few planes are too small. It is not increased: with a camera whose depth is warped that would remove the
+// constraints that hold the map.
 constexpr double kMost = 25.0;
-// A plane is believed as if four observations had shown that it is one.
+// Prior degrees of freedom of a plane's variance: as if four observations had confirmed that it is one surface.
 constexpr double kPlaneFreedom = 12.0;
-// Observations that tell of a plane whether it is one, and by how much they must be worse than the map's.
+// Least observations for a decision on a plane, and the factor by which their median must exceed that of the map.
 constexpr std::size_t kLeastOfPlane = 4;
 constexpr double kDisagrees = 10.0;
-// A wall is no ideal plane: one that bows by a centimetre over its length is one, however exact the map.
+// Unevenness of a real wall, one sigma: one that bows by a centimetre over its length still counts as one plane,
+// however accurate the map.
 constexpr double kSurfaceSigma = 0.006;  // m
 
-/// The median misfit, in units of what the noise model expects; below 1 / kMost points agree with themselves too well.
+/// The median misfit relative to the noise model's, at least 1 / kMost: smaller values are due to overfitting.
 double typicalMisfit(std::vector<double> misfits) {
-  const auto middle = misfits.begin() + misfits.size() / 2;
-  std::nth_element(misfits.begin(), middle, misfits.end());
-  return std::max(*middle / kMedian, 1.0 / kMost);
+  return std::max(upperMedian(std::move(misfits)) / kMedian, 1.0 / kMost);
 }
 
 double typicalMisfit(const std::vector<PlaneMisfit>& misfits) {
@@ -79,9 +80,7 @@ std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size
   const double most = std::max(1.0, kDisagrees * unit);
   for (std::size_t p = 0; p < planes; ++p) {
     if (own[p].size() < kLeastOfPlane || typicalMisfit(std::move(own[p])) < most) continue;
-    const auto middle = squares[p].begin() + squares[p].size() / 2;
-    std::nth_element(squares[p].begin(), middle, squares[p].end());
-    agree[p] = *middle < kSurfaceSigma * kSurfaceSigma;
+    agree[p] = upperMedian(std::move(squares[p])) < kSurfaceSigma * kSurfaceSigma;
   }
   return agree;
 }

@@ -54,7 +54,7 @@ void bridge(const Outline& hole, Outline* outline) {
     const Eigen::Vector2d &a = (*outline)[p.outer].at, &b = hole[p.inner].at;
     return !blocked(*outline, a, b) && !blocked(hole, a, b);
   });
-  if (open == pairs.end()) return;  // a hole that lies across the outline: drawn over rather than cut out
+  if (open == pairs.end()) return;  // a hole that crosses the outline is ignored
   Outline joined(outline->begin(), outline->begin() + std::ptrdiff_t(open->outer) + 1);
   for (std::size_t k = 0; k <= hole.size(); ++k) joined.push_back(hole[(open->inner + k) % hole.size()]);
   joined.insert(joined.end(), outline->begin() + std::ptrdiff_t(open->outer), outline->end());
@@ -87,7 +87,7 @@ std::vector<Triangle> triangulate(const PlanePolygon& polygon, const Plane& plan
     const std::size_t n = outline.size();
     std::size_t ear = 0;
     while (ear < n && !isEar(outline, ear)) ++ear;
-    // No ear: what is left is flat or crosses itself. The flattest corner goes, with or without a triangle.
+    // No ear: the rest is degenerate or crosses itself. Remove the flattest corner, with or without a triangle.
     const bool found = ear < n;
     if (!found) {
       double flattest = std::numeric_limits<double>::infinity();

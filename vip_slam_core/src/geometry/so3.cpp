@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <Eigen/SVD>
+
 namespace vip_slam {
 namespace {
 
@@ -83,12 +85,18 @@ double yawOf(const Eigen::Quaterniond& R_W_B) {
 
 Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up_B) {
   const Eigen::Quaterniond levelled = rotationBetween(up_B.normalized(), Eigen::Vector3d::UnitZ());
-  // An x axis that points up has no heading; y has one then.
+  // An x axis that points up has no heading; use the y axis then.
   const Eigen::Matrix3d R = levelled.toRotationMatrix();
   const bool x_upright = R.col(0).head<2>().norm() < 0.5;
   const double yaw = x_upright ? std::atan2(R(1, 1), R(0, 1)) - 0.5 * M_PI : yawOf(levelled);
   const Eigen::Quaterniond unyaw = expQuaternion(Eigen::Vector3d(0, 0, -yaw));
   return (unyaw * levelled).normalized();
+}
+
+Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& M) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
 }  // namespace vip_slam

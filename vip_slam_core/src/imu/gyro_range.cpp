@@ -5,11 +5,11 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastEnd = 1.0;  // rad/s; no gyro ends earlier
-// Samples at the very extreme that prove an end of the range: a stream that repeats each value a few times has as many
-// once, at its fastest turn.
+constexpr double kLeastEnd = 1.0;  // rad/s; no gyro has a smaller range
+// Number of samples at exactly the extreme value that prove saturation: a stream that repeats each value a few times
+// has a few of them at its fastest turn.
 constexpr int kProof = 10;
-constexpr double kSame = 1e-6;  // of the value
+constexpr double kSame = 1e-6;  // relative tolerance of equal values
 constexpr double kKept = 5.0;   // s
 
 }  // namespace

@@ -6,7 +6,7 @@
 namespace vip_slam {
 namespace {
 
-// Shorter than this is no interval: within the rounding of stamps there is nothing to integrate, s.
+// Shortest interval, s: below, within the rounding of stamps, there is nothing to integrate.
 constexpr double kShortest = 1e-6;
 
 bool earlier(const ImuSample& sample, double t) { return sample.t < t; }
@@ -47,7 +47,7 @@ void ImuBuffer::countSpikes() {
 }
 
 bool ImuBuffer::add(const ImuSample& sample) {
-  // A bus that fails says zero; nothing measures that exactly.
+  // A failing bus delivers zeros; no sensor measures exactly zero on all axes.
   const bool silent = sample.gyro.isZero(0) && sample.accel.isZero(0);
   const bool finite = sample.gyro.allFinite() && sample.accel.allFinite() && !silent;
   if (!acceptable(sample.t, finite, united_spikes_.newest())) return false;
@@ -64,13 +64,13 @@ void ImuBuffer::append(const ImuSample& sample) {
 }
 
 bool ImuBuffer::addGyro(double t, const Eigen::Vector3d& gyro) {
-  // Where nothing is kept there is nothing to be out of order with.
+  // With an empty buffer an earlier stamp is not out of order.
   if (samples_.empty() && gyro_.empty() && t < gyro_spikes_.newest()) gyro_spikes_.clear();
   if (!acceptable(t, gyro.allFinite(), gyro_spikes_.newest())) return false;
   for (const ImuSample& settled : gyro_spikes_.add({t, gyro, Eigen::Vector3d::Zero()})) {
     gyro_.push_back({settled.t, settled.gyro});
   }
-  // When the other stream never comes, memory must still be bounded.
+  // Bounds memory when the other stream never arrives.
   while (!gyro_.empty() && gyro_.back().t - gyro_.front().t > capacity_seconds_) gyro_.pop_front();
   countSpikes();
   joinStreams();
@@ -103,7 +103,7 @@ void ImuBuffer::joinStreams() {
     sample.accel = accel_[0].value;
     if (accel_[0].t < gyro.t) {
       const double span = accel_[1].t - accel_[0].t;
-      if (span > gap_seconds_) {  // a line across a hole of the accelerometer is an invention: a gap shows as one
+      if (span > gap_seconds_) {  // do not interpolate across an accelerometer gap: it must remain visible as a gap
         gyro_.pop_front();
         continue;
       }
@@ -134,7 +134,7 @@ std::vector<ImuSample> ImuBuffer::between(double t0, double t1, double* max_gap)
   result.insert(result.end(), begin, end);
   result.push_back(end->t == t1 ? *end : interpolate(*std::prev(end), *end, t1));
   if (max_gap) {
-    // Between the buffered samples themselves: interpolating the ends inside a gap must not hide it.
+    // Steps between the buffered samples themselves, since interpolated ends inside a gap would hide it.
     auto previous = begin->t > t0 ? std::prev(begin) : begin;
     for (auto it = std::next(previous); it != samples_.end(); previous = it++) {
       *max_gap = std::max(*max_gap, it->t - previous->t);

@@ -35,7 +35,7 @@ struct Step {
 };
 
 // Angular rate and specific force are taken as linear between the samples. With the mid sample held constant the
-// integrals of Exp(w t) a are closed; what remains of the linear change (da, dw) are the coning term dt^2/12 w0 x w1 in
+// integrals of Exp(w t) a have closed forms; the linear change (da, dw) adds the coning term dt^2/12 w0 x w1 in
 // rotation, dt^2/12 (w x da - dw x a) in velocity, and -dt^2/12 da - dt^3/24 dw x a in position.
 Step integrateStep(const ImuSample& first, const ImuSample& second, const Eigen::Vector3d& bias_gyro,
                    const Eigen::Vector3d& bias_accel) {
@@ -65,9 +65,8 @@ Step integrateStep(const ImuSample& first, const ImuSample& second, const Eigen:
   return step;
 }
 
-// One step's noise is one vector for velocity and position alike, so that the covariance of a single step has no
-// inverse. Two images within a gap of the IMU have no more than that between them: the line between the samples is then
-// taken in two steps, which is the same motion.
+// In one step velocity and position have the same noise vector, so the covariance of a single step is singular. Between
+// two images within an IMU gap there is only one step: split it in two, which is the same motion.
 std::vector<ImuSample> halved(const std::vector<ImuSample>& step) {
   ImuSample middle;
   middle.t = 0.5 * (step[0].t + step[1].t);
@@ -122,7 +121,7 @@ Preintegration::Preintegration(const std::vector<ImuSample>& given, const Eigen:
     F.block<3, 3>(kV, kBg) = delta_R_ * step.velocity_bg;
     F.block<3, 3>(kV, kBa) = delta_R_ * step.velocity_ba;
 
-    // White noise enters like a bias of this step alone: variance sigma^2/dt. The random walk grows by sigma_w^2 dt.
+    // White noise acts like a bias of this step alone, with variance sigma^2/dt. The random walk adds sigma_w^2 dt.
     const Eigen::Matrix<double, 9, 3> by_gyro = F.block<9, 3>(0, kBg), by_accel = F.block<9, 3>(0, kBa);
     covariance_ = (F * covariance_ * F.transpose()).eval();
     covariance_.topLeftCorner<9, 9>() +=

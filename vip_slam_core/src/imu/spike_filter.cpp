@@ -8,19 +8,19 @@
 namespace vip_slam {
 namespace {
 
-// A spike is at least so large, and so many times what successive samples usually differ by. IMUs at 100 to 400 Hz in
-// the hand or on a robot differ by a few tenths of a m/s^2 and a few hundredths of a rad/s.
+// Smallest size of a spike, absolute and relative to the usual difference of successive samples. With IMUs at 100 to
+// 400 Hz in the hand or on a robot these are a few tenths of a m/s^2 and a few hundredths of a rad/s.
 constexpr double kLeastGyro = 0.5;   // rad/s
 constexpr double kLeastAccel = 3.0;  // m/s^2
 constexpr double kLeastRatio = 10.0;
 
-// What comes before it, and before and after it, agrees: at most two steps of a motion apart. Differences below these
-// are quiet and count as such.
+// The samples before a spike, and those before and after it, must agree within this many usual differences (two steps
+// of a motion). The usual differences are taken as at least these quiet levels.
 constexpr double kAgreeRatio = 4.0;
 constexpr double kQuietGyro = 0.02;  // rad/s
 constexpr double kQuietAccel = 0.2;  // m/s^2
 
-// Across a longer step the motion itself may go anywhere, s.
+// Longest step between samples for a decision, s: across a longer one the motion itself may change by any amount.
 constexpr double kLongestStep = 0.025;
 
 }  // namespace
@@ -83,7 +83,7 @@ std::vector<ImuSample> SpikeFilter::add(const ImuSample& sample) {
     suspect_.reset();
     if (spike) {
       remember(sample);
-      calm_ = true;  // the step back from it is none
+      calm_ = true;  // the step back from a spike is not a motion
       settled.push_back(sample);
       return settled;
     }

@@ -3,108 +3,19 @@
 #include <charconv>
 #include <filesystem>
 #include <fstream>
-#include <set>
 #include <stdexcept>
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "util/text.h"
+#include "util/yaml_section.h"
 #include "vip_slam_core/util/atomic_file.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kMostDepthShift = 50;  // px; so much more is no error but another camera
-
-/// A map whose every key must be asked for: what is left over is an unknown key.
-class Section {
- public:
-  Section(YAML::Node node, std::string name) : node_(std::move(node)), name_(std::move(name)) {
-    if (!node_.IsMap()) throw std::runtime_error((name_.empty() ? "file" : name_) + ": expected a map");
-  }
-  bool has(const std::string& key) {
-    known_.insert(key);
-    return static_cast<bool>(node_[key]);
-  }
-  std::string full(const std::string& key) const { return name_.empty() ? key : name_ + "/" + key; }
-  YAML::Node need(const std::string& key) {
-    if (!has(key)) throw std::runtime_error(full(key) + ": missing, expected a value");
-    return node_[key];
-  }
-  /// A finite number within [min, max].
-  void number(const std::string& key, double& value, double min, double max, bool required = true) {
-    if (!required && !has(key)) return;
-    get(key, value);
-    if (!(value >= min && value <= max)) {
-      throw std::runtime_error(full(key) + ": is " + formatDouble(value) + ", expected " + formatDouble(min) + " to " +
-                               formatDouble(max));
-    }
-  }
-  void choice(const std::string& key, std::string& value, const std::vector<std::string>& choices) {
-    get(key, value);
-    std::string expected;
-    for (const std::string& name : choices) {
-      if (name == value) return;
-      expected += (expected.empty() ? "" : ", ") + name;
-    }
-    throw std::runtime_error(full(key) + ": is '" + value + "', expected one of " + expected);
-  }
-  Section section(const std::string& key) { return Section(need(key), full(key)); }
-
-  template <class T>
-  void get(const std::string& key, T& value, bool required = true) {
-    if (!required && !has(key)) return;
-    const YAML::Node node = need(key);
-    try {
-      value = node.as<T>();
-    } catch (const YAML::Exception&) {
-      throw std::runtime_error(full(key) + ": is '" + (node.IsScalar() ? node.Scalar() : "a list") + "', expected " +
-                               expectedType(value));
-    }
-  }
-  template <int N>
-  void matrix(const std::string& key, Eigen::Matrix<double, N, N>& M, bool required = true) {
-    if (!required && !has(key)) return;
-    const YAML::Node node = need(key);
-    const std::string n = std::to_string(N), numbers = "expected " + n + " numbers";
-    if (!node.IsSequence() || node.size() != N)
-      throw std::runtime_error(full(key) + ": expected " + n + " rows of " + n + " numbers");
-    for (int r = 0; r < N; ++r) {
-      const std::string row = full(key) + ": row " + std::to_string(r + 1) + ": ";
-      if (!node[r].IsSequence() || node[r].size() != N) throw std::runtime_error(row + numbers);
-      for (int c = 0; c < N; ++c) {
-        if (!node[r][c].IsScalar() || !parseDouble(node[r][c].Scalar(), &M(r, c)))
-          throw std::runtime_error(row + numbers);
-      }
-    }
-  }
-  void pose(const std::string& key, SE3& T, bool required = true) {
-    if (!required && !has(key)) return;
-    Eigen::Matrix4d M;
-    matrix(key, M);
-    const Eigen::Matrix3d R = M.topLeftCorner<3, 3>();
-    const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0;
-    if (!M.allFinite() || !rotation || (M.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-9)
-      throw std::runtime_error(full(key) + ": not a rigid transform (orthonormal rotation, last row 0 0 0 1 expected)");
-    T = SE3(R, M.topRightCorner<3, 1>());
-  }
-  void finish() const {
-    for (const auto& entry : node_)
-      if (!known_.count(entry.first.Scalar())) throw std::runtime_error(full(entry.first.Scalar()) + ": unknown key");
-  }
-
- private:
-  static const char* expectedType(bool) { return "true or false"; }
-  static const char* expectedType(int) { return "a whole number"; }
-  static const char* expectedType(double) { return "a number"; }
-  static const char* expectedType(const std::string&) { return "a text"; }
-  static const char* expectedType(const std::vector<double>&) { return "a list of numbers"; }
-
-  YAML::Node node_;
-  std::string name_;
-  std::set<std::string> known_;
-};
+constexpr double kMostDepthShift = 50;  // px; a larger shift cannot be a registration error
 
 CameraIntrinsics cameraFrom(Section section) {
   CameraIntrinsics camera;
@@ -125,7 +36,7 @@ CameraIntrinsics cameraFrom(Section section) {
 std::string list(const std::vector<float>& numbers) {
   std::string out = "[";
   for (const float number : numbers) {
-    char digits[32];  // as few as give the same float again
+    char digits[32];  // shortest text that reads back as the same float
     out += out.size() > 1 ? ", " : "";
     out.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
   }
@@ -153,7 +64,7 @@ void writeCamera(std::ostream& out, const char* key, const CameraIntrinsics& cam
 }
 
 /// White: 255, black: 0.
-cv::Mat readMask(const std::string& path) {
+cv::Mat loadMask(const std::string& path) {
   if (!std::ifstream(path)) throw std::runtime_error("mask: " + path + " cannot be read");
   const cv::Mat picture = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (picture.empty()) throw std::runtime_error("mask: " + path + " is no picture, expected PNG");
@@ -163,109 +74,126 @@ cv::Mat readMask(const std::string& path) {
   return mask;
 }
 
-/// `folder`: of the file; what it names is looked for there.
-SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& folder) {
-  SensorConfig config;
-  Section root(node, "");
-  root.get("name", config.name);
-
-  Section topics = root.section("topics");
-  topics.get("color", config.topics.color);
-  topics.get("color_info", config.topics.color_info, false);
-  topics.get("depth", config.topics.depth, false);
-  topics.get("depth_info", config.topics.depth_info, false);
-  topics.get("imu", config.topics.imu, false);
-  topics.get("gyro", config.topics.gyro, false);
-  topics.get("accel", config.topics.accel, false);
+void readTopics(Section topics, SensorTopics* config) {
+  topics.get("color", config->color);
+  topics.get("color_info", config->color_info, false);
+  topics.get("depth", config->depth, false);
+  topics.get("depth_info", config->depth_info, false);
+  topics.get("imu", config->imu, false);
+  topics.get("gyro", config->gyro, false);
+  topics.get("accel", config->accel, false);
   topics.finish();
-  const bool split = !config.topics.gyro.empty() && !config.topics.accel.empty();
-  if (config.topics.imu.empty() && !split)
+  const bool split = !config->gyro.empty() && !config->accel.empty();
+  if (config->imu.empty() && !split)
     throw std::runtime_error("topics/imu: expected one united topic, or both gyro and accel");
-  if (!config.topics.imu.empty() && (!config.topics.gyro.empty() || !config.topics.accel.empty()))
+  if (!config->imu.empty() && (!config->gyro.empty() || !config->accel.empty()))
     throw std::runtime_error(
         "topics/imu: there are topics/gyro or topics/accel beside it, expected one united topic or the two, not all: "
         "leave out (\"\") those that are not to be read");
+}
 
-  Section color = root.section("color");
-  color.choice("encoding", config.color_encoding, {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
-  color.number("rate", config.color_rate, 0.1, 1000);
-  color.number("rolling_shutter", config.rolling_shutter, 0, 0.1, false);
+void readColor(Section color, SensorConfig* config) {
+  color.choice("encoding", config->color_encoding, {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
+  color.number("rate", config->color_rate, 0.1, 1000);
+  color.number("rolling_shutter", config->rolling_shutter, 0, 0.1, false);
   color.finish();
-  Section depth = root.section("depth");
-  depth.choice("encoding", config.depth_encoding, {"16UC1", "32FC1", "compressed"});
-  depth.number("scale", config.depth_scale, 1e-6, 1.0);
-  depth.number("offset", config.depth_offset, -0.5, 0.5, false);
+}
+
+void readDepth(Section depth, SensorConfig* config) {
+  depth.choice("encoding", config->depth_encoding, {"16UC1", "32FC1", "compressed"});
+  depth.number("scale", config->depth_scale, 1e-6, 1.0);
+  depth.number("offset", config->depth_offset, -0.5, 0.5, false);
   std::vector<double> shift;
   depth.get("shift", shift, false);
   if (!shift.empty() && shift.size() != 2)
     throw std::runtime_error("depth/shift: " + std::to_string(shift.size()) + " numbers, expected two: right and down");
-  if (!shift.empty()) config.depth_shift = {shift[0], shift[1]};
-  if (!(config.depth_shift.cwiseAbs().maxCoeff() <= kMostDepthShift))
+  if (!shift.empty()) config->depth_shift = {shift[0], shift[1]};
+  if (!(config->depth_shift.cwiseAbs().maxCoeff() <= kMostDepthShift))
     throw std::runtime_error("depth/shift: expected at most " + formatDouble(kMostDepthShift) + " pixels");
   std::vector<double> added;
   depth.get("curve", added, false);
-  config.depth_curve.added.assign(added.begin(), added.end());
-  const std::string bent = validateDepthCurve(config.depth_curve);
+  config->depth_curve.added.assign(added.begin(), added.end());
+  const std::string bent = validateDepthCurve(config->depth_curve);
   if (!bent.empty()) throw std::runtime_error("depth/curve: " + bent);
-  depth.number("rate", config.depth_rate, 0.1, 1000);
-  depth.get("registered", config.depth_registered);
-  depth.number("rolling_shutter", config.depth_rolling_shutter, 0, 0.1, false);
+  depth.number("rate", config->depth_rate, 0.1, 1000);
+  depth.get("registered", config->depth_registered);
+  depth.number("rolling_shutter", config->depth_rolling_shutter, 0, 0.1, false);
   depth.finish();
+}
 
-  root.get("intrinsics_from_camera_info", config.intrinsics_from_camera_info);
-  if (root.has("camera")) config.camera = cameraFrom(root.section("camera"));
-  if (root.has("depth_camera")) config.depth_camera = cameraFrom(root.section("depth_camera"));
-  root.pose("T_color_depth", config.T_color_depth, !config.depth_registered);
-  const bool own_depth = !config.depth_registered && !config.topics.depth.empty();
-  if (config.intrinsics_from_camera_info && config.topics.color_info.empty())
-    throw std::runtime_error("topics/color_info: missing, though intrinsics_from_camera_info is true");
-  if (config.intrinsics_from_camera_info && own_depth && config.topics.depth_info.empty())
-    throw std::runtime_error(
-        "topics/depth_info: missing, though depth/registered is false and intrinsics_from_camera_info is true");
-  if (!config.intrinsics_from_camera_info) {
-    const std::string wrong = config.camera.validate();
+/// To be called after topics and depth, which determine the keys required here.
+void readCameras(Section* root, SensorConfig* config) {
+  root->get("intrinsics_from_camera_info", config->intrinsics_from_camera_info);
+  if (root->has("camera")) config->camera = cameraFrom(root->section("camera"));
+  if (root->has("depth_camera")) config->depth_camera = cameraFrom(root->section("depth_camera"));
+  root->pose("T_color_depth", config->T_color_depth, !config->depth_registered);
+  const bool own_depth = !config->depth_registered && !config->topics.depth.empty();
+  if (config->intrinsics_from_camera_info) {
+    if (config->topics.color_info.empty())
+      throw std::runtime_error("topics/color_info: missing, though intrinsics_from_camera_info is true");
+    if (own_depth && config->topics.depth_info.empty())
+      throw std::runtime_error(
+          "topics/depth_info: missing, though depth/registered is false and intrinsics_from_camera_info is true");
+  } else {
+    const std::string wrong = config->camera.validate();
     if (!wrong.empty()) throw std::runtime_error("camera: " + wrong);
-    const std::string depth_wrong = config.depth_registered ? "" : config.depth_camera.validate();
+    const std::string depth_wrong = config->depth_registered ? "" : config->depth_camera.validate();
     if (!depth_wrong.empty()) throw std::runtime_error("depth_camera: " + depth_wrong);
   }
-  root.pose("T_imu_cam", config.T_imu_cam);
-  root.pose("T_base_imu", config.T_base_imu, false);
+  root->pose("T_imu_cam", config->T_imu_cam);
+  root->pose("T_base_imu", config->T_base_imu, false);
+}
 
-  Section imu = root.section("imu");
-  imu.number("rate", config.imu_rate, 1, 10000);
-  imu.number("gyro_noise_density", config.imu_noise.gyro_noise_density, 1e-9, 10);
-  imu.number("gyro_random_walk", config.imu_noise.gyro_random_walk, 1e-9, 10);
-  imu.number("accel_noise_density", config.imu_noise.accel_noise_density, 1e-9, 10);
-  imu.number("accel_random_walk", config.imu_noise.accel_random_walk, 1e-9, 10);
-  imu.matrix("gyro_correction", config.gyro_correction, false);
-  if (!(config.gyro_correction.cwiseAbs().maxCoeff() <= 0.2))
+void readImu(Section imu, SensorConfig* config) {
+  imu.number("rate", config->imu_rate, 1, 10000);
+  imu.number("gyro_noise_density", config->imu_noise.gyro_noise_density, 1e-9, 10);
+  imu.number("gyro_random_walk", config->imu_noise.gyro_random_walk, 1e-9, 10);
+  imu.number("accel_noise_density", config->imu_noise.accel_noise_density, 1e-9, 10);
+  imu.number("accel_random_walk", config->imu_noise.accel_random_walk, 1e-9, 10);
+  imu.matrix("gyro_correction", config->gyro_correction, false);
+  if (!(config->gyro_correction.cwiseAbs().maxCoeff() <= 0.2))
     throw std::runtime_error("imu/gyro_correction: expected numbers from -0.2 to 0.2");
-  imu.number("gyro_correction_sigma", config.imu_noise.gyro_correction_sigma, 1e-6, 0.2, false);
-  imu.number("gravity", config.gravity, 9.0, 10.5, false);
+  imu.number("gyro_correction_sigma", config->imu_noise.gyro_correction_sigma, 1e-6, 0.2, false);
+  imu.number("gravity", config->gravity, 9.0, 10.5, false);
   imu.finish();
+}
 
-  Section noise = root.section("depth_noise");
+void readDepthNoise(Section noise, DepthNoise* config) {
   std::string type;
   noise.get("model", type);
-  config.depth_noise = DepthNoise::preset(depthSensorTypeFromName(type));
-  noise.get("a", config.depth_noise.a, false);
-  noise.get("b", config.depth_noise.b, false);
-  noise.get("c", config.depth_noise.c, false);
-  noise.get("min_range", config.depth_noise.min_range, false);
-  noise.get("max_range", config.depth_noise.max_range, false);
-  noise.get("bias_floor", config.depth_noise.bias_floor, false);
+  *config = DepthNoise::preset(depthSensorTypeFromName(type));
+  noise.get("a", config->a, false);
+  noise.get("b", config->b, false);
+  noise.get("c", config->c, false);
+  noise.get("min_range", config->min_range, false);
+  noise.get("max_range", config->max_range, false);
+  noise.get("bias_floor", config->bias_floor, false);
   noise.finish();
-  const std::string wrong = config.depth_noise.validate();
+  const std::string wrong = config->validate();
   if (!wrong.empty()) throw std::runtime_error("depth_noise: " + wrong);
+}
 
-  root.get("mask", config.mask_file, false);
-  if (!config.mask_file.empty()) {
-    config.mask_file = std::filesystem::absolute(folder / config.mask_file).lexically_normal().string();
-    config.mask = readMask(config.mask_file);
-    const std::string problem = maskProblem(config, config.camera.width, config.camera.height);
-    if (!config.intrinsics_from_camera_info && !problem.empty()) throw std::runtime_error(problem);
-  }
+/// `folder`: of the sensor file, where the mask is searched. To be called after the cameras, whose size it must have.
+void readMask(Section* root, const std::filesystem::path& folder, SensorConfig* config) {
+  root->get("mask", config->mask_file, false);
+  if (config->mask_file.empty()) return;
+  config->mask_file = std::filesystem::absolute(folder / config->mask_file).lexically_normal().string();
+  config->mask = loadMask(config->mask_file);
+  const std::string problem = maskProblem(*config, config->camera.width, config->camera.height);
+  if (!config->intrinsics_from_camera_info && !problem.empty()) throw std::runtime_error(problem);
+}
 
+SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& folder) {
+  SensorConfig config;
+  Section root(node, "");
+  root.get("name", config.name);
+  readTopics(root.section("topics"), &config.topics);
+  readColor(root.section("color"), &config);
+  readDepth(root.section("depth"), &config);
+  readCameras(&root, &config);
+  readImu(root.section("imu"), &config);
+  readDepthNoise(root.section("depth_noise"), &config.depth_noise);
+  readMask(&root, folder, &config);
   root.number("time_offset", config.time_offset, -1, 1, false);
   root.finish();
   return config;

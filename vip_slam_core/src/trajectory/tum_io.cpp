@@ -45,7 +45,7 @@ Trajectory readTum(const std::string& path) {
     if (first == std::string::npos || line[first] == '#') continue;
     const std::string where = path + ":" + std::to_string(number) + ": ";
     const StampedPose pose = parseLine(line, where);
-    if (!trajectory.empty() && pose.t == trajectory.back().t) continue;  // public recordings repeat a few
+    if (!trajectory.empty() && pose.t == trajectory.back().t) continue;  // public recordings repeat a few poses
     if (!trajectory.empty() && !(pose.t > trajectory.back().t)) {
       throw std::runtime_error(where + "timestamp " + formatDouble(pose.t) + " does not follow " +
                                formatDouble(trajectory.back().t) + ", expected ascending times");

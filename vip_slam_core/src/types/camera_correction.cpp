@@ -3,13 +3,13 @@
 namespace vip_slam {
 namespace {
 
-/// Of (x, y, 1) that have the bearing correction `from` to those that have `to`.
+/// Maps (x, y, 1) with the bearing correction `from` to those with `to`.
 Eigen::Matrix3f bearingChange(const BearingCorrection& from, const BearingCorrection& to) {
   return (to.matrix() * from.matrix().inverse()).cast<float>();
 }
 
-/// The same of depth points, which lie where their reading was: the farther right the depth image is found to lie, the
-/// farther left.
+/// The same for depth points, which lie at the pixel of their reading: a depth image shifted to the right moves them to
+/// the left.
 Eigen::Matrix3f pointChange(const CameraCorrection& from, const CameraCorrection& to) {
   Eigen::Matrix3d back = Eigen::Matrix3d::Identity();
   back.col(2).head<2>() = from.shift.bearing - to.shift.bearing;

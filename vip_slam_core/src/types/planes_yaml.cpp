@@ -120,7 +120,7 @@ std::vector<PlaneEstimate> readPlanesYaml(const std::string& path) {
     throw std::runtime_error(path + ": line " + std::to_string(error.mark.line + 1) + ": " + error.msg);
   }
   if (!root.IsMap() || !root["planes"]) throw std::runtime_error(path + ": planes: missing, expected a list");
-  // summary.yaml has a number there; taken for a list it would be an empty one.
+  // summary.yaml has a number there, which would be read as an empty list.
   if (!root["planes"].IsSequence()) throw std::runtime_error(path + ": planes: expected a list");
   std::vector<PlaneEstimate> planes;
   for (const YAML::Node& node : root["planes"]) {

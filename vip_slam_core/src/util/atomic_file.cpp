@@ -39,7 +39,7 @@ void AtomicFile::commit() {
   stream_.flush();
   const bool written = stream_.good();
   stream_.close();
-  // On the disk before the name changes: a power cut must not leave an empty file in place of the one before.
+  // Synced to disk before the rename: a power cut must not leave an empty file in place of the old one.
   if (!written || stream_.fail() || !synced(temporary_))
     throw std::runtime_error(path_ + ": writing failed, is the disk full?");
   if (std::rename(temporary_.c_str(), path_.c_str()) != 0) {
@@ -47,7 +47,7 @@ void AtomicFile::commit() {
   }
   committed_ = true;
   const auto slash = path_.find_last_of('/');
-  synced(slash == std::string::npos ? "." : path_.substr(0, slash + 1));  // the new name; not all file systems can
+  synced(slash == std::string::npos ? "." : path_.substr(0, slash + 1));  // the new name, where supported
 }
 
 }  // namespace vip_slam

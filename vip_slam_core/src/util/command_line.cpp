@@ -1,5 +1,6 @@
 #include "vip_slam_core/util/command_line.h"
 
+#include <algorithm>
 #include <iostream>
 #include <stdexcept>
 
@@ -44,6 +45,10 @@ void CommandLine::refuse(const std::string& name, const std::string& value, cons
   throw std::invalid_argument("--" + name + " " + value + ": expected " + expected);
 }
 
+bool CommandLine::isArgument(const std::string& name) const {
+  return std::any_of(arguments_.begin(), arguments_.end(), [&](const auto& a) { return a.first == name; });
+}
+
 std::string CommandLine::written(const std::string& name) const {
   for (const auto& [argument, help] : arguments_)
     if (argument == name) return name + " (" + help + ")";
@@ -52,7 +57,12 @@ std::string CommandLine::written(const std::string& name) const {
 
 void CommandLine::printHelp() const {
   std::cout << purpose_ << "\n\nUsage: " << program_;
-  for (const auto& [name, help] : arguments_) std::cout << " " << name;
+  for (const auto& [name, help] : arguments_) {
+    const bool needed = std::find(required_.begin(), required_.end(), name) != required_.end();
+    std::cout << (needed ? " " + name : " [" + name + "]");
+  }
+  for (const std::string& name : required_)
+    if (!isArgument(name)) std::cout << " --" << name << " ...";
   std::cout << " [options]\n\n";
   for (const auto& [name, help] : arguments_) std::cout << "  " << name << ": " << help << "\n";
   if (!arguments_.empty()) std::cout << "\n";
@@ -60,7 +70,7 @@ void CommandLine::printHelp() const {
 }
 
 std::optional<int> CommandLine::parse(int argc, const char* const* argv) const {
-  // roslaunch adds __name:=... and __log:=... to what a launch file gives a program.
+  // roslaunch adds __name:=... and __log:=... to a program's arguments.
   std::vector<std::string> arguments;
   for (int k = 1; k < argc; ++k) {
     const std::string argument = argv[k];
@@ -70,7 +80,7 @@ std::optional<int> CommandLine::parse(int argc, const char* const* argv) const {
     po::options_description all;
     all.add(visible_).add(hidden_);
     po::variables_map values;
-    // Guessing would let today's abbreviation mean something else tomorrow.
+    // No guessing of abbreviated options: a new option could change an abbreviation's meaning.
     po::command_line_parser parser(arguments);
     parser.options(all).positional(positional_).extra_style_parser(takeNegativeNumber);
     parser.style(po::command_line_style::default_style & ~po::command_line_style::allow_guessing);
@@ -81,7 +91,13 @@ std::optional<int> CommandLine::parse(int argc, const char* const* argv) const {
     }
     const auto given = [&](const std::string& name) { return values.count(name) && !values[name].defaulted(); };
     for (const std::string& name : required_)
-      if (!given(name)) throw std::invalid_argument(written(name) + " is missing");
+      if (!given(name)) {
+        // An option with a list takes all words that follow.
+        const auto list = std::find_if(lists_.begin(), lists_.end(), given);
+        const std::string hint =
+            isArgument(name) && list != lists_.end() ? "; it has to stand before --" + *list : std::string();
+        throw std::invalid_argument(written(name) + " is missing" + hint);
+      }
     for (const auto& [name, other] : needs_)
       if (given(name) && !given(other)) throw std::invalid_argument("--" + name + " needs --" + other);
     po::notify(values);

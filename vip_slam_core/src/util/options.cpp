@@ -17,21 +17,6 @@ std::string joined(const std::vector<std::string>& parts) {
   return out;
 }
 
-std::size_t editDistance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
-
 std::string rangeText(const std::string& min, const std::string& max) { return min + " … " + max; }
 
 void flatten(const YAML::Node& node, const std::string& prefix, const std::string& path,
@@ -136,7 +121,7 @@ void OptionSetter::finish() const {
         nearest = &name;
       }
     }
-    // With every letter exchanged any name would do.
+    // With an edit distance of the whole length any name would match.
     if (best >= values_[k].first.size()) nearest = nullptr;
     throw std::invalid_argument((source_.empty() ? "" : source_ + ": ") + "unknown option '" + values_[k].first + "'" +
                                 (nearest ? ", did you mean '" + *nearest + "'?" : ""));

@@ -1,11 +1,13 @@
 #include "util/text.h"
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <locale>
 #include <sstream>
+#include <vector>
 
 namespace vip_slam {
 
@@ -59,6 +61,21 @@ bool parseBool(const std::string& text, bool* value) {
   if (lower == "true" || lower == "yes" || lower == "on" || lower == "1") return *value = true, true;
   if (lower == "false" || lower == "no" || lower == "off" || lower == "0") return *value = false, true;
   return false;
+}
+
+std::size_t editDistance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
 }
 
 }  // namespace vip_slam

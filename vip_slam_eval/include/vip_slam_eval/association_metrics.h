@@ -1,4 +1,4 @@
-// Are the map points that the system ties to planes really on them?
+// Precision and recall of the point-to-plane associations of a map.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@ struct LabelledPoint {
   std::int64_t id = 0;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
   PlaneId plane = 0;
-  int keyframes = 0;  ///< that see it
+  int keyframes = 0;  ///< number of keyframes that observe it
 };
 
 /// CSV with the header id,x,y,z,plane,keyframes. Throws std::runtime_error "file:line: what, expected what".
 std::vector<LabelledPoint> readLabelledPoints(const std::string& path);
-/// Whole or not at all.
+/// Atomic: leaves the complete file or none.
 void writeLabelledPoints(const std::string& path, const std::vector<LabelledPoint>& points);
 
 struct AssociationMetrics {
@@ -31,9 +31,9 @@ struct AssociationMetrics {
   double precision = 1, recall = 1;
 };
 
-/// `points` in the truth's world. A point is on a plane when within `tolerance` metres of it and inside its outline
-/// (or within `tolerance` of a place inside). Points that fewer than `min_keyframes` see cannot be tied to a plane yet,
-/// by the paper's rule, and do not count for recall; wrongly tied ones count wherever they are.
+/// `points` in the truth's world. A point is on a plane when it is within `tolerance` metres of it and inside its
+/// outline (or within `tolerance` of the inside). Points seen by fewer than `min_keyframes` keyframes cannot be tied to
+/// a plane yet, by the paper's rule, and do not count for recall; every wrongly tied point counts against precision.
 AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<PlaneEstimate>& truth,
                                       const PlaneMetrics& planes, int min_keyframes = 4, double tolerance = 0.05);
 

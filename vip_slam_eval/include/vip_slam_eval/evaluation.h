@@ -1,4 +1,4 @@
-// The whole judgement of one run: everything the command `evaluate` prints, writes and draws.
+// The complete evaluation of one run: everything that the command `evaluate` prints, writes and draws.
 #pragma once
 
 #include <optional>
@@ -20,9 +20,9 @@ struct EvaluationInput {
   std::optional<std::vector<PlaneEstimate>> true_planes, planes;
   std::optional<std::vector<LabelledPoint>> points;
 
-  Alignment alignment = Alignment::kYaw;  ///< of the picture, the planes and the points
-  double max_gap = 0.1;                   ///< seconds between true poses that may be interpolated
-  double gap_seconds = 0.5;               ///< a longer hole in the estimate is a gap
+  Alignment alignment = Alignment::kYaw;  ///< used for the picture, the planes and the points
+  double max_gap = 0.1;                   ///< seconds; true poses further apart are not interpolated
+  double gap_seconds = 0.5;               ///< a longer interval without an estimate is a gap
   double time_offset = 0;                 ///< t_truth = t_estimate + time_offset
   std::vector<double> rpe_seconds = {1.0, 10.0};
   std::vector<double> rpe_metres = {1.0, 5.0, 10.0};
@@ -39,7 +39,7 @@ struct Evaluation {
   std::optional<AssociationMetrics> associations;
 };
 
-/// Throws std::runtime_error when no estimate meets the truth in time.
+/// Throws std::runtime_error when estimate and truth do not overlap in time.
 Evaluation evaluate(const EvaluationInput& input);
 
 MetricTable metricsOf(const EvaluationInput& input, const Evaluation& evaluation);

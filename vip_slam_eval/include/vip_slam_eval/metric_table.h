@@ -1,4 +1,4 @@
-// A list of named figures and its two spellings: terminal table and CSV.
+// A list of named values and its two output formats: terminal table and CSV.
 #pragma once
 
 #include <ostream>
@@ -19,7 +19,7 @@ void printMetrics(std::ostream& out, const MetricTable& table);
 /// Columns group,name,value,unit.
 void writeMetricsCsv(std::ostream& out, const MetricTable& table);
 
-/// A number in at most `digits` significant digits, without exponent for ordinary sizes.
+/// A number with at most `digits` significant digits, without exponent for ordinary magnitudes.
 std::string shortNumber(double value, int digits = 4);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// The plane module alone: the front end tracks and chooses keyframes, the poses are the true ones.
+// Benchmark of the plane module alone: the front end tracks and selects keyframes, whose poses are the true ones.
 #pragma once
 
 #include <string>
@@ -33,9 +33,9 @@ struct PlaneBenchmarkResult {
   PlaneMapperCounters counters;
 };
 
-/// Stages "planes.update" (all that a keyframe costs) and "planes.grow" go to `timing` (not null), the same with ".cpu"
-/// as computing time of the thread. Throws std::runtime_error
-/// naming what cannot be read, or when the truth covers no keyframe.
+/// Stages "planes.update" (the total cost of a keyframe) and "planes.grow" go to `timing` (not null), and with the
+/// suffix ".cpu" as CPU time of the thread. Throws std::runtime_error naming what cannot be read, or when the truth
+/// covers no keyframe.
 PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing);
 
 MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing);

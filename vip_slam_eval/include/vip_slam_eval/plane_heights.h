@@ -1,4 +1,4 @@
-// How steady the level planes of a map are: their height as each image's depth measures it, under the estimated poses.
+// How stable the horizontal planes of a map are: their height as measured by each depth image at its estimated pose.
 #pragma once
 
 #include <map>
@@ -19,8 +19,9 @@ struct PlaneHeight {
 };
 using PlaneHeights = std::map<PlaneId, std::vector<PlaneHeight>>;  ///< per horizontal plane, in order of time
 
-/// Adds what one depth image (32FC1 metres, of `camera`) says about every horizontal plane that it shows from its own
-/// side: points inside the outline and within 10 cm of the plane, at least `min_points` of every fourth row and column.
+/// Adds the height measured by one depth image (32FC1 metres, of `camera`) for every horizontal plane seen from its
+/// front side, from the depth points, every fourth row and column, inside the outline and within 10 cm of the plane.
+/// Planes with fewer than `min_points` of them are skipped.
 void measureHeights(double t, const cv::Mat& depth, const CameraModel& camera, const SE3& T_map_C,
                     const std::vector<PlaneEstimate>& planes, PlaneHeights* heights, std::size_t min_points = 200);
 

@@ -1,4 +1,4 @@
-// How good is a plane map: which true planes were found, how often, how exactly, and which planes are invented.
+// Quality of a plane map: which true planes were found, how often, how accurately, and which estimates are false.
 #pragma once
 
 #include <cmath>
@@ -13,10 +13,10 @@ namespace vip_slam {
 struct PlaneMatchOptions {
   double max_angle = 10.0 * M_PI / 180.0;  ///< radians, normals on the same side
   double max_distance = 0.10;              ///< metres, mean over the estimated outline
-  double min_overlap = 0.25;               ///< of the smaller of both areas
-  double min_area = 1.0;                   ///< m^2 a true plane must show to count for recall
-  double min_seconds = 2.0;                ///< it must have been in view, where the truth says so
-  double false_area = 0.5;                 ///< m^2 above which an invented plane is a large one
+  double min_overlap = 0.25;               ///< fraction of the smaller of the two areas
+  double min_area = 1.0;                   ///< m^2 of a true plane that must be visible for it to count for recall
+  double min_seconds = 2.0;                ///< time in view needed to count for recall, where the truth states it
+  double false_area = 0.5;                 ///< m^2; a false plane above this counts as large
 };
 
 struct PlaneMatch {
@@ -32,18 +32,18 @@ struct TruePlaneResult {
   PlaneId id = 0;
   bool counts = false;             ///< horizontal or vertical, large enough and long enough in view
   bool found = false;              ///< some estimate matches it
-  std::size_t represented_by = 0;  ///< estimates whose best truth it is; above one: duplicates
+  std::size_t represented_by = 0;  ///< estimates whose best match it is; above one: duplicates
   double visible_area = 0;         ///< m^2
   double covered_area = 0;         ///< m^2 under estimates
 };
 
 struct PlaneMetrics {
   std::size_t expected = 0;  ///< true planes that count
-  std::size_t found = 0;     ///< of these
+  std::size_t found = 0;     ///< how many of the expected ones were found
   double recall = 0;         ///< found / expected; 1 when nothing was expected
   std::size_t estimated = 0;
-  std::size_t duplicates = 0;          ///< estimates too many
-  std::size_t false_planes = 0;        ///< estimates that no true plane explains
+  std::size_t duplicates = 0;          ///< surplus estimates of a true plane
+  std::size_t false_planes = 0;        ///< estimates that match no true plane
   std::size_t large_false_planes = 0;  ///< of these, larger than options.false_area
   std::size_t forced_planes = 0;       ///< horizontal or vertical estimates of true planes that are neither
   ErrorStatistics normal;              ///< degrees
@@ -52,7 +52,7 @@ struct PlaneMetrics {
   std::vector<TruePlaneResult> truths;
 };
 
-/// Both in the same world: bring estimates there with transformPlanes().
+/// Both must be in the same world frame: use transformPlanes() on the estimates first.
 PlaneMetrics planeMetrics(const std::vector<PlaneEstimate>& truth, const std::vector<PlaneEstimate>& estimate,
                           const PlaneMatchOptions& options = {});
 

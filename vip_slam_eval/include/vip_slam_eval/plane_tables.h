@@ -12,9 +12,9 @@ namespace vip_slam {
 void appendPlaneMetrics(MetricTable* table, const PlaneMetrics& planes);
 void appendAssociationMetrics(MetricTable* table, const AssociationMetrics& associations);
 
-/// One row per estimate: the true plane it stands for, errors, overlap and area.
+/// One row per estimate: the true plane it matches, errors, overlap and area.
 std::string planeMatchesCsv(const PlaneMetrics& planes);
-/// One row per true plane: whether it counts, was found, how many estimates stand for it, area seen and covered.
+/// One row per true plane: whether it counts, was found, how many estimates match it, area seen and covered.
 std::string truePlanesCsv(const PlaneMetrics& planes);
 
 }  // namespace vip_slam

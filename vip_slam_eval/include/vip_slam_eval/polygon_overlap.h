@@ -7,7 +7,7 @@
 
 namespace vip_slam {
 
-/// Disjoint pieces with holes, dropped along the normal onto a plane's 2D coordinates.
+/// Disjoint pieces with holes, projected along the normal into a plane's 2D coordinates.
 class FlatRegion {
  public:
   FlatRegion(const std::vector<PlanePolygon>& polygons, const Plane& plane);
@@ -20,14 +20,14 @@ class FlatRegion {
   const std::vector<std::vector<Eigen::Vector2d>>& rings() const { return rings_; }
 
  private:
-  /// Ascending x of the crossings of a scan line; between the 1st and 2nd, 3rd and 4th, ... is inside.
+  /// Ascending x of a scan line's crossings with the rings; between the 1st and 2nd, 3rd and 4th, ... is inside.
   std::vector<double> crossings(double y) const;
 
   std::vector<std::vector<Eigen::Vector2d>> rings_;
   double min_y_ = 0, max_y_ = 0;
 };
 
-/// Coordinates of x in the plane: origin at the foot of the world's origin, axes tangentBasis(n).
+/// Coordinates of x in the plane: origin at the projection of the world's origin, axes tangentBasis(n).
 Eigen::Vector2d planeCoordinates(const Plane& plane, const Eigen::Vector3d& x);
 
 }  // namespace vip_slam

@@ -28,9 +28,9 @@ class SvgPage {
   void polygon(const std::vector<std::vector<Eigen::Vector2d>>& rings, const SvgStyle& style);
   void text(double x, double y, const std::string& text, double size, SvgAnchor anchor = SvgAnchor::kStart,
             const std::string& colour = "#333", bool bold = false, double turn_degrees = 0);
-  /// A rectangle to cut to, for beginClip().
+  /// Defines a clip rectangle and returns its id for beginClip().
   int addClip(double x, double y, double width, double height);
-  /// Everything until endClip() is cut to the rectangle.
+  /// Everything until endClip() is clipped to the rectangle.
   void beginClip(int clip);
   void endClip();
   std::string str() const;
@@ -45,7 +45,7 @@ class SvgPage {
 class SvgAxes {
  public:
   SvgAxes(SvgPage* page, double x, double y, double width, double height);
-  /// Data range; `equal` widens one side so that both axes have the same scale.
+  /// Sets the data range; `equal` widens one axis so that both have the same scale.
   void range(double x0, double x1, double y0, double y1, bool equal = false);
   /// Frame, grid, ticks, title and axis labels.
   void draw(const std::string& title, const std::string& x_label, const std::string& y_label);
@@ -66,7 +66,7 @@ class SvgAxes {
 
 /// A step of 1, 2 or 5 times a power of ten that divides `span` into about `count` parts.
 double niceStep(double span, int count);
-/// Dark blue (0) over green to yellow (1): reads in grey and for colour-blind eyes.
+/// Dark blue (0) over green to yellow (1): readable in greyscale and with colour blindness.
 std::string colourScale(double s);
 
 }  // namespace vip_slam

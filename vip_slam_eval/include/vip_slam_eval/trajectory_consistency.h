@@ -1,4 +1,4 @@
-// Is the trajectory complete, and are its covariances honest?
+// Completeness of a trajectory, and consistency of its covariances with its errors (NEES).
 #pragma once
 
 #include <vector>
@@ -12,10 +12,10 @@ struct Gap {
   double begin = 0, end = 0;  ///< seconds
 };
 
-/// How much of the truth's time the estimate covers. Gaps include what is missing before its first and after its last
-/// pose.
+/// How much of the truth's duration the estimate covers. Gaps include missing time before the first and after the last
+/// estimated pose.
 struct Coverage {
-  double fraction = 0;  ///< of the truth's duration, gaps taken away
+  double fraction = 0;  ///< of the truth's duration that lies outside gaps
   std::vector<Gap> gaps;
   double longest_gap = 0;  ///< seconds
 };
@@ -29,8 +29,8 @@ struct PoseWithCovariance {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-/// Error of a pose with the truth joined to the estimate at its first pose, in position and yaw: the filter's
-/// uncertainty counts from its start.
+/// Error of a pose after aligning the truth to the first estimated pose in position and yaw, because the filter's
+/// covariance is relative to its start.
 struct JoinedError {
   double t = 0;
   Vector6d error = Vector6d::Zero();  ///< x y z, rotation, both in M; metres and radians
@@ -40,7 +40,8 @@ struct JoinedError {
 std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate,
                                       double max_gap = 0.1, double time_offset = 0.0);
 
-/// Normalised estimation error squared: e^T P^-1 e. An honest filter has a mean of `dof`.
+/// Normalised estimation error squared: e^T P^-1 e. Its mean is the number of degrees of freedom for a consistent
+/// filter.
 struct Nees {
   ErrorStatistics pose;      ///< 6 degrees of freedom
   ErrorStatistics position;  ///< 3

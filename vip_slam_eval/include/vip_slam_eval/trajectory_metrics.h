@@ -1,4 +1,4 @@
-// How far a trajectory is from the truth: absolute error after alignment (ATE), relative errors over time and over
+// Errors of a trajectory against the truth: absolute error after alignment (ATE), relative errors over time and over
 // distance (RPE). Poses are of the body (IMU); the truth's world and the estimate's world may differ.
 #pragma once
 
@@ -22,14 +22,15 @@ struct PosePair {
 std::vector<PosePair> associate(const Trajectory& truth, const Trajectory& estimate, double max_gap = 0.1,
                                 double time_offset = 0.0);
 
-/// What the alignment may change. A visual-inertial system knows where up is: kYaw judges that too, kSe3 forgives it.
+/// What the alignment may change. A visual-inertial system observes gravity: with kYaw its error in roll and pitch
+/// counts, kSe3 removes it.
 enum class Alignment { kNone, kPosition, kYaw, kSe3 };
 /// "none", "position", "yaw", "se3"; throws std::invalid_argument on others.
 Alignment alignmentFromName(const std::string& name);
 std::string alignmentName(Alignment alignment);
 
-/// T_W_M that minimises the squared distances of the positions. Orientations take part with a lever shorter than
-/// the positions err, which decides what those leave open and no more. Throws std::invalid_argument without pairs.
+/// T_W_M that minimises the squared distances of the positions. Orientations have a small weight (see orientationWeight
+/// in the source), to fix only what the positions leave undetermined. Throws std::invalid_argument without pairs.
 SE3 align(const std::vector<PosePair>& pairs, Alignment alignment);
 
 /// Errors of one pair after alignment.

@@ -11,7 +11,7 @@ namespace vip_slam {
 /// A bag when `path` ends in .bag, else TUM. From a bag: nav_msgs/Odometry, geometry_msgs/PoseStamped or
 /// geometry_msgs/PoseWithCovarianceStamped of `topic` (empty: the only such topic). Throws std::runtime_error naming
 /// the file, the topic and what was expected: no or several such topics, repeated or unordered stamps, a damaged bag.
-/// `covariances`, when given, receives the poses that carry a covariance that is not all zero.
+/// `covariances`, when given, receives the poses whose covariance is not all zero.
 Trajectory readTrajectory(const std::string& path, const std::string& topic = "",
                           std::vector<PoseWithCovariance>* covariances = nullptr);
 

@@ -1,9 +1,10 @@
 // rosrun vip_slam_eval draw_planes BAG --sensor S --trajectory T.tum --planes P.yaml --time SECONDS... --out DIR
-// [--heights] The planes of a run over the images of its bag; how steady the height of its level planes is.
+// [--heights]: draws the planes of a run over images of its bag; --heights measures how stable horizontal planes are.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <sstream>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -44,7 +45,6 @@ int draw(Arguments arguments) {
   prepareOutputFolder(arguments.out);
   std::sort(arguments.times.begin(), arguments.times.end());
   std::size_t next = 0;
-  int written = 0;
   PlaneHeights heights;
   reader.start();
   while (const auto event = reader.next()) {
@@ -63,7 +63,6 @@ int draw(Arguments arguments) {
     const std::string path = (std::filesystem::path(arguments.out) / name).string();
     writePicture(path, picture);
     std::cout << path << "\n";
-    ++written;
     while (next < arguments.times.size() && pair->t >= reader.beginTime() + arguments.times[next]) ++next;
   }
   if (arguments.heights) {
@@ -72,9 +71,11 @@ int draw(Arguments arguments) {
     file.stream() << heightsCsv(heights);
     file.commit();
   }
-  if (written == 0 && !arguments.times.empty()) {
-    throw std::runtime_error(arguments.trajectory + ": no pose for any image of " + arguments.bag +
-                             " at or after the given times");
+  if (next < arguments.times.size()) {
+    std::ostringstream missing;
+    for (std::size_t k = next; k < arguments.times.size(); ++k) missing << (k > next ? ", " : "") << arguments.times[k];
+    throw std::runtime_error("no picture for --time " + missing.str() + ": " + arguments.bag + " and " +
+                             arguments.trajectory + " have no image with a pose at or after that");
   }
   return 0;
 }

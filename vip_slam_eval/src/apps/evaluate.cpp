@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
   line.needs("planes", "planes-truth");
   line.option("points", points, "map points with their plane, CSV id,x,y,z,plane,keyframes");
   line.needs("points", "planes");
-  line.option("align", alignment, "alignment of the picture, the planes and the points",
+  line.option("align", alignment, "alignment of the picture, the planes and the points: se3, yaw, position or none",
               oneOf("none, position, yaw, se3"));
   line.option("max-gap", input.max_gap, "largest step of the truth to interpolate over, seconds", above(0.0));
   line.option("gap", input.gap_seconds, "a longer hole in the estimate is reported as a gap, seconds", above(0.0));
@@ -47,7 +47,9 @@ int main(int argc, char** argv) {
     const Evaluation evaluation = evaluate(input);
     if (!out.empty()) writeEvaluation(out, input, evaluation);
     printMetrics(std::cout, metricsOf(input, evaluation));
-    if (!out.empty()) std::cout << "written: " << out << "/metrics.csv, errors.csv, evaluation.svg\n";
+    if (!out.empty())
+      std::cout << "written: " << out << "/metrics.csv, errors.csv, evaluation.svg"
+                << (evaluation.planes ? ", planes.csv, true_planes.csv" : "") << "\n";
   } catch (const std::exception& error) {
     std::cerr << "evaluate: " << error.what() << "\n";
     return 1;

@@ -1,7 +1,7 @@
 // rosrun vip_slam_eval odometry_consistency SEQUENCE [--seeds N] [--seconds S] [--out FILE]
-// Is the odometry as uncertain as it says? One rendering goes through the whole front end many times, each time with
-// noise of its own in images, depth and IMU. What all runs err alike is the scene's, what they scatter is the noise's.
-// With --seeds 1 also the drift of a sequence too long to keep as a bag.
+// Consistency of the odometry's covariance. One rendered sequence runs through the whole front end many times, each
+// time with different noise in images, depth and IMU: errors common to all runs come from the scene, their scatter from
+// the noise. Use --seeds 1 for the drift on a sequence that is too long to store as a bag.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -29,15 +29,15 @@ constexpr int kSeedStep = 37;
 constexpr double kDriftMetres = 10.0;
 constexpr double kImuAhead = 0.02;  ///< s of IMU handed over beyond the image
 
-/// The filter can be as uncertain as it is only if it starts from what is true of the sensor: the seeds draw their
-/// biases with these sigmas, the defaults are wider, for sensors that nobody knows.
+/// Sets the initial bias sigmas to those with which the seeds draw their biases; otherwise the filter could not be
+/// consistent, as the default sigmas are wider, to suit unknown sensors.
 FrontEndOptions knowing(const SequenceSpec& spec, FrontEndOptions options) {
   if (spec.imu.gyro_bias > 0) options.filter.sigma_bias_gyro = spec.imu.gyro_bias;
   if (spec.imu.accel_bias > 0) options.filter.sigma_bias_accel = spec.imu.accel_bias;
   return options;
 }
 
-/// One noise seed.
+/// The front end on one noise seed.
 class Run {
  public:
   Run(const SequenceRenderer& sequence, const FrontEndOptions& options, int seed)
@@ -58,11 +58,7 @@ class Run {
     }
     const TrackedFramePtr tracked = front_end_.process({t, gray, depth}).frame;
     if (tracked->status.state != TrackingState::kTracking && tracked->status.state != TrackingState::kDegraded) return;
-    // From (theta in the body, p in odom) to x y z and rotation, both in odom.
-    Matrix6d J = Matrix6d::Zero();
-    J.topRightCorner<3, 3>().setIdentity();
-    J.bottomLeftCorner<3, 3>() = tracked->state.T_W_I.R();
-    poses_.push_back({t, tracked->state.T_W_I, J * tracked->covariance.topLeftCorner<6, 6>() * J.transpose()});
+    poses_.push_back({t, tracked->state.T_W_I, poseCovariance(*tracked)});
   }
   const std::vector<PoseWithCovariance>& poses() const { return poses_; }
 
@@ -75,7 +71,7 @@ class Run {
   std::vector<PoseWithCovariance> poses_;
 };
 
-/// Drift over 10 m of the path, or where the camera stays put the farthest it seemed to go.
+/// Drift over 10 m of the path or, for a camera that stays in place, the largest estimated displacement.
 void printDrift(const Trajectory& truth, const std::vector<PoseWithCovariance>& poses) {
   Trajectory estimate;
   for (const PoseWithCovariance& pose : poses) estimate.push_back({pose.t, pose.T_M_B});
@@ -97,7 +93,7 @@ void printDrift(const Trajectory& truth, const std::vector<PoseWithCovariance>& 
   std::printf("  off at most %.2f mm, %.3f deg\n", 1000 * farthest, turned * 180 / M_PI);
 }
 
-/// Errors and the sigmas that the filter told, image by image.
+/// Errors and the sigmas reported by the filter, one line per image.
 void writeErrors(std::ostream& out, int seed, const std::vector<JoinedError>& errors) {
   for (const JoinedError& e : errors) {
     out << seed << ',' << e.t << ',' << e.nees;

@@ -1,5 +1,5 @@
 // rosrun vip_slam_eval place_metrics --map M.vsm --truth T.tum [--query Q.vsm --query-truth QT.tum]
-// Judges loops (right or wrong, revisits closed) of a stored map, and relocalisation of another session in it.
+// Evaluates the loops of a stored map (correct or wrong, revisits closed) and relocalisation of another session in it.
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
@@ -24,7 +24,7 @@ using namespace vip_slam;
 constexpr double kRevisitSeconds = 30;
 constexpr double kWrongMetres = 0.3, kWrongAngle = 5 * M_PI / 180;
 
-/// A share in words; of nothing there is none.
+/// A share in per cent; "-" when `all` is zero.
 std::string percent(int part, int all) {
   char text[16] = "-";
   if (all > 0) std::snprintf(text, sizeof text, "%.1f %%", 100.0 * part / all);
@@ -93,7 +93,7 @@ void judgeRevisits(const StoredMap& stored, const TruePoses& truth) {
               percent(episodes_closed, episodes).c_str());
 }
 
-/// A place counts as mapped when a keyframe of the map within 2 m and 30 degrees shows half of what is seen there.
+/// A query view counts as mapped when a keyframe of the map within 2 m and 30 degrees sees at least this share of it.
 constexpr double kMappedOverlap = 0.5;
 constexpr int kFewCorners = 30;
 constexpr double kRightMetres = 0.03;
@@ -119,8 +119,10 @@ void judgeRelocalisation(const std::vector<RelocalisationTrial>& trials, bool li
                   trial.reason.c_str());
   }
   std::sort(errors.begin(), errors.end());
-  std::printf("relocalisation: %zu trials, %d found, median error %.4f m, wrong (> 0.3 m or 5 deg) %d\n", trials.size(),
-              found, errors.empty() ? 0 : errors[errors.size() / 2], wrong);
+  char median[32] = "-";
+  if (!errors.empty()) std::snprintf(median, sizeof median, "%.4f m", errors[errors.size() / 2]);
+  std::printf("relocalisation: %zu trials, %d found, median error %s, wrong (> 0.3 m or 5 deg) %d\n", trials.size(),
+              found, median, wrong);
   std::printf("trials at mapped places %d, within 1 s and 3 cm %d (%s)\n", mapped, right,
               percent(right, mapped).c_str());
   std::printf("of these with %d corners of the map in view %d, within 1 s and 3 cm %d (%s)\n", kFewCorners, textured,
@@ -156,10 +158,11 @@ int main(int argc, char** argv) {
     if (!query.empty()) {
       const vip_slam::StoredMap session = vip_slam::loadMapFile(query, vip_slam::ImuNoise());
       const auto session_poses = posesOf(session.map, query_truth);
-      judgeRelocalisation(
-          vip_slam::relocalisationTrials(stored, poses, session, session_poses,
-                                         vip_slam::loadSensorConfig(vip_slam::resolveSensor(sensor)), options),
-          list);
+      const vip_slam::SensorConfig config = vip_slam::loadSensorConfig(vip_slam::resolveSensor(sensor));
+      // Intrinsics in a sensor file may be a template that the driver's replace: make sure that they match the maps.
+      vip_slam::requireCamera(stored, config.camera, map);
+      vip_slam::requireCamera(session, config.camera, query);
+      judgeRelocalisation(vip_slam::relocalisationTrials(stored, poses, session, session_poses, config, options), list);
     }
   } catch (const std::exception& error) {
     std::cerr << "place_metrics: " << error.what() << "\n";

@@ -1,5 +1,5 @@
 // rosrun vip_slam_eval plane_benchmark BAG --sensor S --truth T.tum --planes-truth P.yaml [--out DIR]
-// Planes with true poses: what the plane module does by itself.
+// Evaluates the plane module alone, with true poses.
 #include <filesystem>
 #include <iostream>
 

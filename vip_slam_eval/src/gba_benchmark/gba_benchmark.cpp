@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include "vip_slam_backend/optimisation/problem_builder.h"
+#include "vip_slam_core/geometry/so3.h"
 
 namespace vip_slam {
 
@@ -20,10 +21,7 @@ double alignedRmse(const std::vector<Eigen::Vector3d>& truth, const std::vector<
   mean_e /= n;
   Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
   for (std::size_t k = 0; k < n; ++k) C += (truth[k] - mean_t) * (estimate[k] - mean_e).transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(C, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) S(2, 2) = -1;
-  const Eigen::Matrix3d R = svd.matrixU() * S * svd.matrixV().transpose();
+  const Eigen::Matrix3d R = nearestRotation(C);
   double sum = 0;
   for (std::size_t k = 0; k < n; ++k) sum += (truth[k] - mean_t - R * (estimate[k] - mean_e)).squaredNorm();
   return std::sqrt(sum / n);
@@ -57,7 +55,7 @@ BuilderSettings builderSettings(const SimulatedMap& map, const GbaSetup& setup) 
   settings.shared_hosts = setup.hosts != HomographyHosts::kFirstViews;
   settings.middle_hosts = setup.hosts == HomographyHosts::kSharedMiddle;
   settings.measurement.pixel_sigma = map.pixel_sigma;
-  // The simulation has no outliers: plain squares, so that neither solver spends time on losses.
+  // The simulation has no outliers: plain least squares, so that neither solver spends time on robust losses.
   settings.measurement.huber = settings.measurement.depth_huber = 0;
   settings.measurement.outlier_chi2 = 1e6;
   return settings;
@@ -69,7 +67,7 @@ struct Repeats {
   std::vector<SolverSummary> summaries;
   std::vector<double> build, store;
 
-  /// `adjusted`, a copy of the map, receives what was adjusted.
+  /// `adjusted`, a copy of `map`, receives the optimised values.
   void once(const SimulatedMap& map, int iterations, Map* adjusted) {
     SolverOptions options;
     options.max_iterations = iterations;

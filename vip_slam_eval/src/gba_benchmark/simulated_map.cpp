@@ -24,8 +24,8 @@ struct SimulatedPoint {
   Eigen::Vector3d first_ray = Eigen::Vector3d::Zero();
 };
 
-// How a tracker treats the two kinds. A mark on a flat surface looks alike over a wide range of views; a corner of
-// clutter is a silhouette that changes with the view and is soon hidden.
+// How the tracker performs on the two kinds of points. A mark on a flat surface looks alike over a wide range of views;
+// a corner of clutter is a silhouette that changes with the view and is soon hidden.
 struct TrackerModel {
   double keep;        // probability that a track survives one keyframe
   double find;        // probability that a visible, lost point is found again within kForgotten keyframes
@@ -34,7 +34,7 @@ struct TrackerModel {
 };
 constexpr TrackerModel kPlaneTracker{0.98, 0.15, 1.1, 7.0};
 constexpr TrackerModel kFreeTracker{0.88, 0.05, 0.45, 4.5};
-constexpr int kForgotten = 10;  // later it would be a new landmark
+constexpr int kForgotten = 10;  // keyframes; a point lost for longer would become a new landmark
 
 class Simulator {
  public:
@@ -73,7 +73,7 @@ class Simulator {
     double area = 0;
     for (const auto& r : world_.rectangles) area += r.u.norm() * r.v.norm();
     for (const auto& r : world_.rectangles) {
-      // Twice to thrice as many as are kept: many are never seen often enough.
+      // Two to three times the number kept, because many are never seen often enough.
       const int count = static_cast<int>(3.0 * options_.plane_points * r.u.norm() * r.v.norm() / area) + 20;
       for (int k = 0; k < count; ++k) {
         SimulatedPoint p;
@@ -140,8 +140,8 @@ class Simulator {
     points_ = std::move(kept);
   }
 
-  // The start: a random walk of position and yaw away from the truth, as odometry would leave it. Gravity holds the
-  // tilt: its error wanders without growing.
+  // The initial poses: the truth plus a random walk in position and yaw, as from odometry. The error of roll and pitch,
+  // which gravity makes observable, varies without growing.
   void drift() {
     SE3 error;
     Eigen::Vector2d tilt = Eigen::Vector2d::Zero();
@@ -202,7 +202,7 @@ class Simulator {
     for (std::size_t p = 0; p < points_.size(); ++p) {
       const SimulatedPoint& point = points_[p];
       const KeyframeId host = point.frames.front() + 1;
-      // Where local bundle adjustments would have left it: right beside its host, with a centimetre of noise.
+      // As local bundle adjustments would have left it: correct relative to its host, with 1 cm of noise.
       const Eigen::Vector3d x = start_[host - 1].T_W_I * (truth_[host - 1].T_W_I.inverse() * point.x) + gauss3(0.01);
       const LandmarkId id = static_cast<LandmarkId>(p);
       out->map.addLandmark(id, x, {host, feature_[p].front()});
@@ -213,7 +213,7 @@ class Simulator {
   }
 
   void insertPlanes(SimulatedMap* out) {
-    std::map<int, SE3> first_seen;  // start from truth at the keyframe that first sees the plane
+    std::map<int, SE3> first_seen;  // initial from true world frame, at the keyframe that first sees the plane
     std::vector<PlaneObservation> observations;
     for (int k = 0; k < options_.keyframes; ++k) {
       const SE3 T_W_C = truth_[k].T_W_I * T_I_C_;
@@ -256,7 +256,7 @@ class Simulator {
       PlaneEstimate e;
       e.id = entry.first + 1;
       e.kind = world_.planes[entry.first].kind;
-      // As the plane module leaves it: fitted to what is known of its surface.
+      // As the plane module would estimate it: fitted to the (drifted) points on its surface.
       const Plane drifted = transformPlane(entry.second, world_.planes[entry.first].plane);
       if (!fitPlane(surfaces[entry.first], PlaneKind::kGeneral, drifted.n, &e.plane)) e.plane = drifted;
       out->map.setPlane(e);

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// A wall, floor or table top: a rectangle on a plane of its own.
+// A wall, floor or table top: one rectangle on its own plane.
 void addPlane(World* w, const Vector3d& corner, const Vector3d& u, const Vector3d& v, const Vector3d& normal,
               PlaneKind kind) {
   WorldPlane plane;
@@ -45,7 +45,7 @@ World rooms() {
         Vector3d(4.6, 4.6, 0.4), Vector3d(9.4, 4.4, 0.4), Vector3d(2.4, 8.7, 0.5), Vector3d(11, 8.7, 0.5),
         Vector3d(1.4, 2.0, 0.6), Vector3d(12.6, 2.0, 0.6), Vector3d(6.3, 5.2, 1.2), Vector3d(7.7, 5.2, 1.2)})
     w.clutter.push_back({c - Vector3d(0.5, 0.5, 0.35), c + Vector3d(0.5, 0.5, 0.45)});
-  // Through both rooms and back: first looking around outwards, on the way back the other way.
+  // Through both rooms and back, looking outwards on the way there and in the opposite direction on the way back.
   const std::vector<Vector3d> way = {{3.2, 1.8, 1.4},  {2.6, 3.4, 1.5},  {2.8, 5.2, 1.4}, {3.6, 7.0, 1.5},
                                      {5.4, 8.0, 1.4},  {7.0, 8.1, 1.5},  {8.8, 7.9, 1.5}, {10.3, 6.8, 1.4},
                                      {11.0, 5.0, 1.5}, {10.8, 3.2, 1.4}, {10.2, 1.9, 1.5}};

@@ -1,4 +1,4 @@
-// Rectangles that carry points and hide what is behind them, boxes of free clutter, and a path through them.
+// Rectangles that carry points and occlude what is behind them, boxes of free clutter, and a path through them.
 #pragma once
 
 #include <string>

@@ -23,7 +23,8 @@ bool liesOn(const PlaneEstimate& plane, const FlatRegion& region, const Eigen::V
 
 AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<PlaneEstimate>& truth,
                                       const PlaneMetrics& planes, int min_keyframes, double tolerance) {
-  // One estimate may stand for several true planes in one plane (tables of one height): all within its reach count.
+  // One estimate may represent several coplanar true planes (tables of equal height): a point on any of them is
+  // correct.
   std::map<PlaneId, Plane> represented;
   for (const PlaneMatch& match : planes.matches) {
     for (const PlaneEstimate& plane : truth) {

@@ -9,7 +9,7 @@ namespace vip_slam {
 namespace {
 
 struct Outline {
-  double mean_distance = 0;  ///< of the outline's points to the true plane
+  double mean_distance = 0;  ///< metres, mean along the outline to the true plane
   bool empty = true;
 };
 
@@ -18,7 +18,7 @@ Outline outlineAgainst(const Plane& truth, const PlaneEstimate& estimate) {
   for (const PlanePolygon& polygon : estimate.polygons) {
     const Ring& ring = polygon.outer;
     for (std::size_t i = 0; i < ring.size(); ++i) {
-      // Per length, so that densely sampled corners do not count more.
+      // Weighted by length, so that densely sampled corners do not count more.
       const Eigen::Vector3d &a = ring[i], &b = ring[(i + 1) % ring.size()];
       const double weight = (b - a).norm();
       sum += weight * 0.5 * (std::abs(truth.signedDistance(a)) + std::abs(truth.signedDistance(b)));
@@ -28,7 +28,7 @@ Outline outlineAgainst(const Plane& truth, const PlaneEstimate& estimate) {
   return {length > 0 ? sum / length : 0.0, length <= 0};
 }
 
-// Area-weighted middle of the outlines, on the estimated plane.
+// Area-weighted centroid of the outlines, on the estimated plane.
 Eigen::Vector3d middleOf(const PlaneEstimate& plane) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double total = 0;
@@ -75,7 +75,8 @@ PlaneMetrics planeMetrics(const std::vector<PlaneEstimate>& truth, const std::ve
     TruePlaneResult row;
     row.id = plane.id;
     row.visible_area = plane.seen_area >= 0 ? plane.seen_area : areas.back();
-    // Slanted surfaces are left alone by design; a system that finds them all the same is not punished either.
+    // The system ignores slanted surfaces by design, so they do not count for recall; estimating one is no error
+    // either.
     row.counts = plane.kind != PlaneKind::kGeneral && row.visible_area >= options.min_area &&
                  (plane.seen_seconds < 0 || plane.seen_seconds >= options.min_seconds);
     result.truths.push_back(row);

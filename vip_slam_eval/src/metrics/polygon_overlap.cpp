@@ -49,7 +49,7 @@ bool FlatRegion::contains(const Eigen::Vector2d& p) const {
 }
 
 double FlatRegion::area() const {
-  // Holes may turn either way, so outlines and holes cannot be told by their sign: scan instead.
+  // Holes may have either orientation, so the sign of a ring's area does not distinguish it from an outline: scan.
   return overlap(*this, *this);
 }
 

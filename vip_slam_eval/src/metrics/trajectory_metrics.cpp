@@ -8,6 +8,7 @@
 #include <Eigen/SVD>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/geometry/so3.h"
 
 namespace vip_slam {
 namespace {
@@ -41,20 +42,18 @@ Eigen::Matrix3d crossCovariance(const std::vector<PosePair>& pairs, const Eigen:
   return covariance;
 }
 
-// The admitted rotation R that maximises the trace of R^T M.
+// The rotation R, of those that `alignment` allows, that maximises the trace of R^T M.
 Eigen::Matrix3d bestRotation(const Eigen::Matrix3d& M, Alignment alignment) {
   if (alignment == Alignment::kYaw) {
     return expSO3(Eigen::Vector3d(0, 0, std::atan2(M(1, 0) - M(0, 1), M(0, 0) + M(1, 1))));
   }
   if (alignment != Alignment::kSe3) return Eigen::Matrix3d::Identity();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  return nearestRotation(M);
 }
 
-// Weight of the orientations beside the positions, m^2: a tenth of the mean square of what the positions err by, a
-// square millimetre at least. Positions that spread further than they err rule; of a camera that stood, or about the
-// line along which it went, they would fit a rotation to the noise.
+// Weight of the orientations relative to the positions, m^2: a tenth of the mean square position error after alignment,
+// at least 1 mm^2. Positions that spread wider than their errors dominate; but a camera at rest, or one that moved on
+// a straight line, leaves the rotation (about that line) to the noise of the positions, so orientations must fix it.
 double orientationWeight(const std::vector<PosePair>& pairs, const Eigen::Vector3d& mean_truth,
                          const Eigen::Vector3d& mean_estimate, const Eigen::Matrix3d& R) {
   constexpr double kShare = 0.1, kLeast = 1e-6;

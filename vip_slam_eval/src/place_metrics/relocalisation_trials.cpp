@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kTrialSeconds = 1.0;
 
-// Share of the query's depth nodes that lie on surfaces the other depth image shows; T_o_q: query camera into the
-// other's.
+// Share of the query's depth grid nodes that lie on surfaces seen by the other depth image; T_o_q: query camera to
+// other camera.
 double sharedView(const DepthGrid& query, const DepthGrid& other, const SE3& T_o_q, const CameraModel& camera) {
   int nodes = 0, shared = 0;
   for (int r = 0; r < query.rows; ++r)

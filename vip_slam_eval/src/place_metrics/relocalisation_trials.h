@@ -1,6 +1,6 @@
-// Relocalisation of one session in the stored map of another, as the back end does it: each keyframe of the query
-// begins a trial that knows nothing, is given the keyframes of the next second one by one, and ends with the first
-// answer.
+// Relocalisation of one session in the stored map of another, as the back end does it: a trial starts at each keyframe
+// of the query session with no prior pose, receives the keyframes of the next second one by one, and ends with the
+// first pose found.
 #pragma once
 
 #include <string>
@@ -13,20 +13,20 @@
 
 namespace vip_slam {
 
-/// What the map has of a view, by the true poses: judged without any matching.
+/// How much of a view the map covers, computed from the true poses and without any matching.
 struct MappedView {
-  /// Largest share of the query's depth image that a keyframe of the map within 2 m and 30 degrees shows too.
+  /// Largest share of the query's depth image that is also seen by one keyframe of the map within 2 m and 30 degrees.
   double overlap = 0;
-  int corners = 0;  ///< most corners with a known position that such a keyframe has in the query's view
+  int corners = 0;  ///< most map points of one such keyframe that project into the query's image
 };
 
 struct RelocalisationTrial {
-  KeyframeId first = 0;  ///< keyframe that begins it
+  KeyframeId first = 0;  ///< keyframe at which the trial starts
   double t = 0;
   MappedView view;  ///< of that keyframe
   bool found = false;
-  double seconds = 0;           ///< until the answer
-  double error = 0, angle = 0;  ///< of the answer against the truth: metres, radians
+  double seconds = 0;           ///< until a pose was found
+  double error = 0, angle = 0;  ///< of the found pose against the truth: metres, radians
   std::string reason;           ///< of the last keyframe tried
 };
 

@@ -1,4 +1,4 @@
-// A stored map and the truth of its trajectory.
+// True poses of the keyframes of a stored map.
 #pragma once
 
 #include <map>

@@ -13,14 +13,14 @@
 namespace vip_slam {
 namespace {
 
-/// Milliseconds that the thread has computed: other programs on the machine do not show in it.
+/// CPU time of the thread in milliseconds, which other programs on the machine do not affect.
 double threadTime() {
   timespec now;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return 1e3 * double(now.tv_sec) + 1e-6 * double(now.tv_nsec);
 }
 
-/// Front end, plane mapper and the true map between them, in lock-step.
+/// Front end, true map and plane mapper, run in lock-step.
 class Bench {
  public:
   Bench(const PlaneBenchmarkInput& input, const SensorConfig& sensor, TimingLog* timing)
@@ -39,7 +39,7 @@ class Bench {
     } else if (const auto* pair = std::get_if<ImagePair>(&event)) {
       waiting_.push_back(*pair);
     } else {
-      waiting_.clear();  // time ran back; the front end notices that, too
+      waiting_.clear();  // time jumped back; the front end detects that by itself
     }
     while (!waiting_.empty() && front_end_.ready(waiting_.front().t, waiting_.front().depth_lag)) {
       process(waiting_.front());
@@ -48,7 +48,7 @@ class Bench {
   }
 
   PlaneBenchmarkResult finish(const PlaneBenchmarkInput& input) {
-    map_.apply(mapper_.applyMapUpdate({}));  // what was grown since the last keyframe
+    map_.apply(mapper_.applyMapUpdate({}));  // changes since the last keyframe
     result_.planes = mapper_.planes();
     result_.points = map_.points();
     result_.metrics = planeMetrics(input.true_planes, result_.planes);

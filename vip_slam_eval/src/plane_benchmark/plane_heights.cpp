@@ -6,6 +6,7 @@
 #include <locale>
 #include <sstream>
 
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_eval/polygon_overlap.h"
 
 namespace vip_slam {
@@ -29,8 +30,7 @@ void measureHeights(double t, const cv::Mat& depth, const CameraModel& camera, c
       }
     }
     if (z.size() < min_points) continue;
-    std::nth_element(z.begin(), z.begin() + z.size() / 2, z.end());
-    (*heights)[plane.id].push_back({t, z[z.size() / 2], z.size()});
+    (*heights)[plane.id].push_back({t, upperMedian(z), z.size()});
   }
 }
 

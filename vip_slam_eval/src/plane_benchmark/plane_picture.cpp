@@ -10,7 +10,7 @@
 namespace vip_slam {
 namespace {
 
-/// A plane as the pixels ask for it.
+/// A plane, prepared for look-up by pixel ray.
 struct Layer {
   Plane plane_C;
   Plane plane;
@@ -28,7 +28,7 @@ cv::Vec3b colourOf(const PlaneEstimate& plane) {
   return bgr.at<cv::Vec3b>(0, 0);
 }
 
-/// Index of the plane that the ray meets first inside its outline (where depth is known: on it), -1: none.
+/// Index of the plane whose area the ray hits first (where depth is known, one at that depth), -1: none.
 int planeAt(const std::vector<Layer>& layers, const Eigen::Vector2d& xy, float measured, const SE3& T_map_C,
             const PlanePictureOptions& options) {
   const Eigen::Vector3d ray(xy.x(), xy.y(), 1.0);

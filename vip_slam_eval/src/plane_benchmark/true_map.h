@@ -1,5 +1,5 @@
-// Stands in for the back end where the planes alone are judged: keyframes at their true poses, landmarks where their
-// measured depths put them.
+// Replaces the back end when the plane module is evaluated alone: keyframes have their true poses, landmarks the
+// weighted mean of their measured positions.
 #pragma once
 
 #include <map>
@@ -22,14 +22,14 @@ class TrueMap {
   bool place(TrackedFrame* frame) const;
   /// The update with which a back end would answer a placed keyframe: its pose and the landmarks it sees.
   MapUpdate addKeyframe(const Keyframe& keyframe);
-  /// What the plane module says about landmarks.
+  /// Applies the plane module's associations, merges and removals to the landmarks.
   void apply(const PlaneUpdate& update);
-  /// Landmarks with a place, and their plane.
+  /// Landmarks that have a position, with their plane.
   std::vector<LabelledPoint> points() const;
 
  private:
   struct Landmark {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();  ///< of positions over their variances
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();  ///< of measured positions, each divided by its variance
     double weight = 0;
     int keyframes = 0;
     PlaneId plane = 0;

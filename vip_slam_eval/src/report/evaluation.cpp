@@ -91,8 +91,10 @@ MetricTable metricsOf(const EvaluationInput& input, const Evaluation& evaluation
   table.push_back({"ATE, SE3 aligned", "rotation rmse", evaluation.se3.rotation.rmse, "deg"});
   addStatistics(&table, "ATE, position and yaw aligned", "position", evaluation.yaw.position, "m");
   table.push_back({"ATE, position and yaw aligned", "rotation rmse", evaluation.yaw.rotation.rmse, "deg"});
-  table.push_back({"ATE, position aligned", "position rmse", evaluation.position.position.rmse, "m"});
-  table.push_back({"ATE, position aligned", "rotation rmse", evaluation.position.rotation.rmse, "deg"});
+  table.push_back(
+      {"ATE, position aligned, yaw as in the odometry", "position rmse", evaluation.position.position.rmse, "m"});
+  table.push_back(
+      {"ATE, position aligned, yaw as in the odometry", "rotation rmse", evaluation.position.rotation.rmse, "deg"});
   for (const RelativeError& error : evaluation.over_time) addRelative(&table, error, "s");
   for (const RelativeError& error : evaluation.over_distance) addRelative(&table, error, "m");
 

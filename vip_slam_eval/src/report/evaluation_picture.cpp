@@ -22,7 +22,7 @@ struct Box {
   }
 };
 
-// Seen from above. Walls become lines; ceilings, which would hide everything, are left out.
+// Top view. Walls become lines; ceilings, which would hide everything, are left out.
 void drawPlanesFromAbove(SvgAxes* axes, const std::vector<PlaneEstimate>& planes, const SvgStyle& line,
                          const SvgStyle& area) {
   for (const PlaneEstimate& plane : planes) {
@@ -40,7 +40,7 @@ void drawPlanesFromAbove(SvgAxes* axes, const std::vector<PlaneEstimate>& planes
   }
 }
 
-// Which judged poses come after a hole in the estimate: no line leads to them.
+// Which evaluated poses follow a gap in the estimate: no line is drawn to them.
 std::vector<char> followsGap(const EvaluationInput& input, const Evaluation& evaluation) {
   std::vector<char> after(evaluation.pairs.size(), 0);
   for (std::size_t i = 1; i < after.size(); ++i) {
@@ -49,7 +49,7 @@ std::vector<char> followsGap(const EvaluationInput& input, const Evaluation& eva
   return after;
 }
 
-// The estimate in runs of one colour each, by position error.
+// The estimate, coloured by position error, as one polyline per run of equal colour.
 void drawColoured(SvgAxes* axes, const std::vector<Eigen::Vector2d>& points, const std::vector<double>& errors,
                   double worst, const std::vector<char>& after_gap) {
   constexpr int kLevels = 24;
@@ -81,10 +81,10 @@ void drawScale(SvgPage* page, double x, double y, double height, double worst) {
     page->rectangle(x, y + height * (kSteps - 1 - k) / kSteps, 12, height / kSteps + 0.6,
                     {"none", colourScale(double(k) / (kSteps - 1)), 0, 1.0, ""});
   }
-  const bool millimetres = worst < 0.1;
-  page->text(x + 16, y + 9, shortNumber(millimetres ? 1000 * worst : worst, 3) + (millimetres ? " mm" : " m"), 11);
+  page->text(x + 16, y + 9, shortNumber(100 * worst, 3) + " cm", 11);
   page->text(x + 16, y + height, "0", 11);
-  page->text(x - 4, y - 8, "error", 11);
+  page->text(x - 4, y - 22, "error, up to what", 11);
+  page->text(x - 4, y - 8, "95 % are within", 11);
 }
 
 void drawTopView(SvgPage* page, const EvaluationInput& input, const Evaluation& evaluation) {
@@ -152,7 +152,7 @@ void drawTopView(SvgPage* page, const EvaluationInput& input, const Evaluation& 
   }
 }
 
-// One curve, or several, over the time since the first judged pose.
+// A curve over the time since the first evaluated pose.
 struct Curve {
   std::vector<double> values;
   SvgStyle style;

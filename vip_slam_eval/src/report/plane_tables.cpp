@@ -18,7 +18,7 @@ void appendPlaneMetrics(MetricTable* table, const PlaneMetrics& p) {
   put("false", double(p.false_planes), "");
   put("large false", double(p.large_false_planes), "");
   put("slanted taken as level or upright", double(p.forced_planes), "");
-  if (p.normal.count == 0) return;  // no plane was found: an error of 0 would be praise
+  if (p.normal.count == 0) return;  // no plane was found: an error of 0 would be misleading
   put("normal error mean", p.normal.mean, "deg");
   put("normal error median", p.normal.median, "deg");
   put("normal error max", p.normal.max, "deg");

@@ -11,7 +11,7 @@
 namespace vip_slam {
 namespace {
 
-// Hundredths of a pixel are enough and keep the files small.
+// One decimal (a tenth of a pixel) is enough and keeps the files small.
 std::string pixel(double value) {
   std::ostringstream out;
   out.imbue(std::locale::classic());
@@ -26,7 +26,7 @@ std::string number(double value) {
   return out.str();
 }
 
-// As many decimals as tell neighbouring ticks apart.
+// With as many decimals as are needed to distinguish neighbouring ticks.
 std::string tickLabel(double value, double step) {
   if (std::abs(value) < 1e-9 * step) return "0";
   const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));

@@ -27,8 +27,8 @@ struct FrameInput {
   double t = 0;   ///< image stamp, seconds
   cv::Mat gray;   ///< 8UC1, the size of the colour camera
   cv::Mat depth;  ///< 32FC1 metres registered to gray, 0 or NaN invalid; empty when there is none
-  /// Stamp of depth - stamp of gray, seconds: cameras that are not synchronised. Depth is carried over to the stamp of
-  /// gray by the IMU.
+  /// Stamp of depth - stamp of gray, seconds, not zero for cameras that are not synchronised. Depth is warped to the
+  /// stamp of gray by the motion that the IMU predicts.
   double depth_lag = 0;
 };
 
@@ -49,28 +49,28 @@ struct FrontEndCounters {
   std::uint64_t imu_rejected = 0;    ///< non-finite, all zero, repeated or backward samples
   std::uint64_t imu_gaps = 0;
   std::uint64_t imu_spikes = 0;        ///< single wrong samples, replaced
-  std::uint64_t imu_shocks = 0;        ///< images that showed a step of the velocity which the IMU has not
-  std::uint64_t gyro_cut_off = 0;      ///< samples at the end of the gyro's range
+  std::uint64_t imu_shocks = 0;        ///< images that showed a velocity step which the IMU did not measure
+  std::uint64_t gyro_cut_off = 0;      ///< samples at the limit of the gyro's range
   std::uint64_t imu_missing = 0;       ///< images not covered by the IMU
   std::uint64_t zero_velocity = 0;     ///< images taken standing still
   std::uint64_t coasting = 0;          ///< images passed on the IMU alone
-  std::uint64_t moving = 0;            ///< images most of which moved by itself
+  std::uint64_t moving = 0;            ///< images in which most of the view moved independently of the camera
   std::uint64_t lost = 0;              ///< times the state went to LOST
-  std::uint64_t imu_contradicted = 0;  ///< images that no plausible noise of the IMU reconciles with it
+  std::uint64_t imu_contradicted = 0;  ///< images that contradict the IMU by more than any plausible noise of it
   std::uint64_t features_used = 0, features_gated = 0;
   std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
   double sigma_px = 0;         ///< adapted pixel noise
-  double gyro_range = 0;       ///< its end, rad/s; 0: never reached
+  double gyro_range = 0;       ///< limit of the gyro's range, rad/s; 0: never reached
   double imu_noise_scale = 1;  ///< factor on the IMU's noise, see ImuNoiseMonitor
-  double stamp_sigma = 0;      ///< by which images are taken earlier or later than their stamps say, as learnt, s
+  double stamp_sigma = 0;      ///< learnt jitter of the image stamps, one sigma, s
   double nis_per_dof = 0;      ///< of the last update; about 1 when consistent
 };
 
 class FrontEnd {
  public:
   /// Throws std::invalid_argument when sensor.camera is unusable. `timing` may be null and must outlive this. A stamp
-  /// further back than `clock_jump` seconds is a looped bag or a restarted clock, less is a message out of order.
+  /// that is more than `clock_jump` seconds back means a looped bag or a restarted clock, less a message out of order.
   FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing = nullptr,
            double clock_jump = 1.0);
   ~FrontEnd();
@@ -81,7 +81,7 @@ class FrontEnd {
   bool addImu(const ImuSample& sample);
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
-  /// The IMU covers t_image + time offset, and the depth image so much later.
+  /// Whether the IMU samples cover the image at t_image + time offset, and the depth image `depth_lag` s after it.
   bool ready(double t_image, double depth_lag = 0) const;
 
   /// Always returns a frame. Bad input is counted and named in its status; it never throws on data.
@@ -96,21 +96,21 @@ class FrontEnd {
 
   /// The newest state integrated with the IMU to time t (IMU clock), in odom; empty before tracking starts.
   std::optional<NavState> predict(double t) const;
-  /// Measured rate of turn at time t (IMU clock), rad/s in the IMU frame, bias included, wrong samples replaced, its
-  /// scale corrected; that nearest to t outside of what is kept, zero before the first sample.
+  /// Measured angular rate at time t (IMU clock), rad/s in the IMU frame, bias included, spikes replaced, scale
+  /// corrected. Outside the buffered time span the nearest sample's; zero before the first sample.
   Eigen::Vector3d gyro(double t) const;
-  /// Starts anew: a new epoch; keyframe and landmark ids go on.
+  /// Restarts the odometry in a new epoch; keyframe and landmark ids go on.
   void reset(const std::string& reason);
-  /// Likewise, and what comes has stamps that precede those so far.
+  /// Likewise, when the clock has jumped back: stamps to come precede those so far.
   void clockRanBack(const std::string& reason);
-  /// The back end has forgotten its map: its landmarks are not looked for any more.
+  /// The back end has discarded its map: its landmarks are not searched for any more.
   void forgetMap();
 
-  /// Where the camera sits on the IMU and by how much its stamps lag, as found so far.
+  /// Present estimate of the camera-IMU extrinsics, the time offset and the other calibration states.
   MountingEstimate mounting() const;
-  /// That of mounting(), without the cost of its sigmas.
+  /// The time offset of mounting(), s, without the cost of computing its sigmas.
   double timeOffset() const;
-  /// As the sensor's configuration has it.
+  /// The same calibration as given by the sensor's configuration.
   MountingEstimate givenMounting() const;
   const FrontEndCounters& counters() const;
   const FrontEndOptions& options() const;

@@ -26,7 +26,7 @@ void eliminateFeature(double* A, long stride, int width, int feature, int begin,
     // (alpha - beta) without cancellation
     const double v0 = alpha <= 0 ? alpha - beta : -tail2 / (alpha + beta);
     const double tau = 2.0 / (tail2 + v0 * v0);
-    double v[5];  // a view has up to three rows, the views after it hand up three
+    double v[5];  // a view has up to three rows, and the views after it pass on up to three
     int rows = 0;
     for (double* row = head + stride; row < last; row += stride) v[rows++] = row[feature + pivot];
     for (int c = column; c < width; c += 4) {
@@ -99,11 +99,11 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     if (window.calibration.time_offset) {
       H_x->block(row, window.timeOffsetColumn(), rows, 1) = (M_theta * clone.omega_I - M_f * clone.v_W).topRows(rows);
     }
-    // The residual grows with the offset, where the rows are those of the prediction.
+    // Sign: the offset is added to the measured depth, whereas the other columns are Jacobians of the predicted one.
     if (window.calibration.depth_offset && with_depth) (*H_x)(row + 2, window.depthOffsetColumn()) = -1.0 / sigma_z;
     if (window.calibration.intrinsics) {
-      // At the bearing that is expected: the measured one has the residual's noise, whose square would pass for an
-      // error of the focal length (a quarter of a per cent with 0.2 px).
+      // Evaluated at the predicted bearing: the measured one has the residual's noise, and its square would bias the
+      // focal length (by 0.25 % with 0.2 px).
       BearingJacobian by_intrinsics = o.by_intrinsics;
       by_intrinsics.leftCols<2>() += (q_C.head<2>() / q_C.z() - xy).asDiagonal();
       H_x->block<2, 4>(row, window.intrinsicsColumn()) = -weight.topLeftCorner<2, 2>() * by_intrinsics;
@@ -132,9 +132,9 @@ FeatureRows featureRows(const WindowState& window, const std::vector<Observation
   A.leftCols(nav) = H_x.leftCols(nav);
   A.middleCols<3>(nav) = H_f;
   A.col(nav + 3) = r;
-  // From the last view to the first: the three rows that hold the feature go on to the view before, those that are
-  // free of it stay and keep the zeros of the clones before their view.
-  int below = 0;  // rows that hold the feature in the views done so far
+  // From the last view to the first: the three rows that contain the feature are passed on to the view before; the rows
+  // free of it stay and keep their zeros for the clones before their view.
+  int below = 0;  // rows that contain the feature in the views done so far
   for (int i = static_cast<int>(views.size()) - 1; i >= 0; --i) {
     const int begin = views[i].begin, next = i + 1 < static_cast<int>(views.size()) ? views[i + 1].begin : rows;
     eliminateFeature(A.data(), A.cols(), width, nav, begin, next + below, views[i].column);

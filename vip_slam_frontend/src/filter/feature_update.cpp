@@ -1,7 +1,8 @@
-// The filter's update with features: which tracks, their rows, how far each may be believed.
+// The filter's update with features: selection of tracks, their rows, and their weights.
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_frontend/filter/feature_rows.h"
 #include "vip_slam_frontend/filter/triangular_solve.h"
 #include "vip_slam_frontend/filter/triangulation.h"
@@ -11,24 +12,24 @@ namespace vip_slam {
 
 namespace {
 
-// Up to here a sensor is as good as its model says.
+// Adapted factor on the depth noise up to which the sensor's noise model is used unchanged.
 constexpr double kWorseThanModel = 1.1;
-// px that the velocity's uncertainty moves a point by across the window: beyond, residuals at the present poses are the
-// velocity's, as when points come back after a stretch on the IMU alone.
+// Image motion by the velocity's uncertainty over the window, px, beyond which residuals at the present poses are
+// mainly due to the velocity, as when points come back after a stretch on the IMU alone.
 constexpr double kOpen = 2.0;
-// Updates from there, each linearised where the one before led to: the second one's poses are right to a pixel.
+// Number of iterated updates, each linearised at the result of the one before: after the first, poses are right to a
+// pixel.
 constexpr int kPasses = 3;
-constexpr double kUsualDistance = 3.0;  // m, of a point without depth
+constexpr double kUsualDistance = 3.0;  // m, assumed for a point without depth
 
-/// Tells a monitor the median of what the features left over per degree of freedom, and the rows behind it.
-void tell(NoiseMonitor* monitor, std::vector<double>& chi2, int rows) {
+/// Gives a monitor the median of the features' chi-squares per degree of freedom, and the number of rows.
+void tell(NoiseMonitor* monitor, std::vector<double> chi2, int rows) {
   if (chi2.size() < 3) return;
   // The median of a chi-square per degree of freedom with the usual dozen of rows lies some 5 % below its mean.
-  std::nth_element(chi2.begin(), chi2.begin() + chi2.size() / 2, chi2.end());
-  monitor->add(1.05 * chi2[chi2.size() / 2], rows);
+  monitor->add(1.05 * upperMedian(std::move(chi2)), rows);
 }
 
-/// All features' rows, those that begin further right below: what the triangularisation likes best.
+/// Stacks all features' rows sorted by their first non-zero column, which costs the triangularisation least.
 void stackStaircase(const std::vector<FeatureRows>& features, int rows, Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   struct Row {
     int column, feature, row;
@@ -68,7 +69,7 @@ std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool w
     const bool leaving = window_full && observations.front().clone == oldest;
     if ((lost || leaving || all) && observations.size() >= 2) candidates.push_back({&entry.second, lost});
   }
-  // Long tracks say most. Ties go by id, so that two runs agree.
+  // Long tracks are the most informative. Ties keep the order of ids, so that two runs agree.
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.track->observations.size() > b.track->observations.size();
   });
@@ -96,7 +97,7 @@ double VioFilter::openPixels() const {
 }
 
 double VioFilter::depthScale() const {
-  // Errors of a depth camera last longer than those between images: what scatters less is not more exact.
+  // Depth errors are correlated between images: a smaller scatter than the model's does not mean a smaller error.
   return depth_noise_.sigma() > kWorseThanModel ? depth_noise_.sigma() : 1.0;
 }
 
@@ -133,7 +134,7 @@ VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& c
       batch.chi2_rows += point.pixel_rows - 3;
     }
     if (point.depth_rows >= 5) {
-      const double scale = depthScale() / depth_noise_.sigma();  // of what they were whitened by
+      const double scale = depthScale() / depth_noise_.sigma();  // from the whitening used to the monitor's sigma
       batch.depth_chi2.push_back(scale * scale * point.depth_chi2 / (point.depth_rows - 1));
       batch.depth_rows += point.depth_rows - 1;
     }
@@ -143,9 +144,8 @@ VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& c
       ++batch.gated;
       continue;
     }
-    // A patch that creeps along with the motion (two edges at different depths that meet) explains all its residuals by
-    // another motion: among two dozen rows that passes any gate, but it pulls at the few directions of the state that
-    // the feature measures.
+    // A patch that slides with the motion (crossing edges at different depths) looks like another motion: spread over
+    // two dozen rows that passes any gate, but it biases the few directions of the state that the feature measures.
     const double weight = huberWeight(innovation.distance / dof, options_.huber) *
                           huberWeight(innovation.pull / innovation.expected_pull, options_.pull_huber);
     if (weight < 1) {
@@ -185,13 +185,13 @@ UpdateResult VioFilter::updateRelinearised(const std::vector<Candidate>& candida
 
 void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report) {
   const Eigen::VectorXd here = Eigen::VectorXd::Zero(filter_.window().dimension());
-  // Points seen from poses that are wrong together leave residuals that are none of their own.
+  // After a velocity step the poses themselves are wrong: the residuals are not the features' own noise.
   FeatureBatch batch =
       judgeFeatures(candidates, filter_.window(), here, after_step ? OwnNoise::kNone : OwnNoise::kResiduals);
   const bool open = openPixels() > kOpen * batch.nearest_noisy;
   const UpdateResult result = open ? updateRelinearised(candidates, &batch) : apply(batch);
-  tell(&noise_, batch.chi2, batch.chi2_rows);
-  tell(&depth_noise_, batch.depth_chi2, batch.depth_rows);
+  tell(&noise_, std::move(batch.chi2), batch.chi2_rows);
+  tell(&depth_noise_, std::move(batch.depth_chi2), batch.depth_rows);
   report->features_tried = batch.tried;
   report->features_gated = batch.gated;
   if (batch.rows == 0) return;

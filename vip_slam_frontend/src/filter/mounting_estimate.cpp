@@ -18,7 +18,7 @@ std::string sentence(const char* format, Numbers... numbers) {
   return text;
 }
 
-/// Some component is further off than its uncertainty explains.
+/// Whether some component's difference is significant, above kSure sigmas.
 bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
   return sigma.minCoeff() > 0 && (difference.cwiseAbs().array() > kSure * sigma.array()).any();
 }

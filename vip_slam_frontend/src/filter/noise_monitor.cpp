@@ -7,18 +7,18 @@ namespace vip_slam {
 
 namespace {
 
-// What it begins with is a guess that may be off by this much (logarithm), and so many images may say so.
+// The initial sigma is a guess: during the first kGuessed images its logarithm may be off by this much, later by 1.
 constexpr double kMostOfGuess = 3.0;
 constexpr int kGuessed = 3;
 constexpr double kGain = 0.05;            // per image, of the moving averages
-constexpr double kMostCorrection = 20.0;  // one image may not decide
-// Three sigmas above 1 for the moving average of six honest degrees of freedom.
+constexpr double kMostCorrection = 20.0;  // limits the influence of a single image
+// Three sigmas above 1 for the moving average of a consistent correction with six degrees of freedom.
 constexpr double kContradiction = 1.3;
 constexpr double kManyGated = 0.3;
 constexpr double kWidest = 30.0;
-// Slower turns do not tell the stamps from the gyro's noise, rad/s.
+// Below this angular rate stamp jitter cannot be separated from the gyro's noise, rad/s.
 constexpr double kLeastTurn = 0.1;
-// s: below it does no harm; more is no jitter but a wrong IMU.
+// Range of the estimated stamp jitter, s: less does no harm, more means a wrong IMU.
 constexpr double kLeastJitter = 1e-4, kMostJitter = 5e-3;
 
 }  // namespace
@@ -28,7 +28,7 @@ NoiseMonitor::NoiseMonitor(double sigma, double lowest, double highest, bool ada
 
 void NoiseMonitor::add(double chi2_per_dof, int dof) {
   if (!adapt_ || dof < 20 || !(chi2_per_dof > 0) || !std::isfinite(chi2_per_dof)) return;
-  // The first images count as much as those after them, so that a wrong start is soon forgotten.
+  // Plain average over the first 20 updates, then exponential: a wrong initial value is forgotten quickly.
   const double gain = 1.0 / (updates_ = std::min(updates_ + 1, 20));
   const double most = updates_ <= kGuessed ? kMostOfGuess : 1.0;
   const double step = gain * std::clamp(0.5 * std::log(chi2_per_dof), -most, most);

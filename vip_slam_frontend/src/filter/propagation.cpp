@@ -21,8 +21,8 @@ Eigen::Matrix<double, 15, 1> noiseFloor() {
   return floor;
 }
 
-// A hand turns and shakes a camera by so much, rad/s and m/s^2, once or twice a second: a line across a gap is off by
-// its square, until it tells nothing of what went on between. (1/s^3, m/s^4)
+// Motion of a hand-held camera, one sigma, rad/s and m/s^2, at one to two hertz. Linear interpolation across a gap is
+// wrong by curvature * gap^2 (1/s^3 and m/s^4), up to the full amplitude.
 constexpr double kRate = 2.0, kRateCurvature = 8.0, kAcceleration = 6.0, kAccelerationCurvature = 24.0;
 
 Matrix15d whitening(const Matrix15d& Q) {
@@ -35,7 +35,7 @@ Matrix15d whitening(const Matrix15d& Q) {
 void Propagation::admitGap(double gap, double dt) {
   const double rate = std::min(kRate, kRateCurvature * gap * gap);
   const double acceleration = std::min(kAcceleration, kAccelerationCurvature * gap * gap);
-  // The same for all of the interval.
+  // The error is constant over the whole interval.
   const double theta = rate * dt, v = acceleration * dt, p = 0.5 * v * dt;
   for (int axis = 0; axis < 3; ++axis) {
     Q(axis, axis) += theta * theta;
@@ -67,7 +67,7 @@ void Propagation::admitStep(double dv, double dt) {
 
 double Propagation::displacementSigma(const Matrix15d& P) const {
   Eigen::Matrix<double, 3, 15> J = Phi.middleRows<3>(3);
-  J.middleCols<3>(3).setZero();  // the position itself is at both ends
+  J.middleCols<3>(3).setZero();  // the position's own error is the same at both ends
   const Eigen::Matrix3d covariance = J * P * J.transpose() + Q.block<3, 3>(3, 3);
   return std::sqrt(std::max(0.0, covariance.diagonal().maxCoeff()));
 }
@@ -106,7 +106,7 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   Phi.block<3, 3>(6, 9) = R_now * pre.J_beta_bg();
   Phi.block<3, 3>(6, 12) = R_now * pre.J_beta_ba();
 
-  // A bias that grows with the rate, which hardly changes between two images.
+  // The correction acts as a bias proportional to the rate, which hardly changes between two images.
   const Eigen::Vector3d rate = window.rates.expected(samples);
   for (int axis = 0; axis < 3; ++axis) result.Phi_gyro.block<9, 3>(0, 3 * axis) = -rate(axis) * Phi.block<9, 3>(0, 9);
   result.rates = window.rates;
@@ -118,7 +118,7 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   T.block<3, 3>(6, 6) = R_now;
   result.Q = T * pre.covariance() * T.transpose();
   if (stamp_sigma > 0) {
-    // Of both images; the motion goes on as at the end.
+    // Jitter of both images' stamps, with the motion at the end of the interval.
     Eigen::Matrix<double, 9, 1> rate;
     rate << result.omega_I, result.predicted.v_W,
         result.predicted.T_W_I.R() * (samples.back().accel - window.bias_accel) - G;

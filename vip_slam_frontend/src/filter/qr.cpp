@@ -65,8 +65,8 @@ VIP_SLAM_INLINE void timesTransposedT(const Panel& panel, double* s) {
   }
 }
 
-/// The panel's reflectors on N columns of the matrix. `top`: the entries above each which V meets with the identity
-/// (`width` of them); `width` 0: none.
+/// Applies the panel's reflectors to N columns of the matrix. `top`: the `width` entries above each column on which V
+/// acts as the identity; `width` 0: none.
 template <int N>
 VIP_SLAM_INLINE void applyPanel(const Panel& panel, double* const* columns, double* const* top, int width) {
   const int m = panel.m, whole = m - m % 4;
@@ -123,7 +123,7 @@ void triangulariseRaw(double* A, int rows, int cols, int pivots, double toleranc
         other[0] -= s;
         subtractScaled(other + 1, column + 1, s, n);
       }
-      // The reflector moves over to V, with its leading one and the zeros above; below the diagonal A is zero.
+      // Moves the reflector to V, with its leading one and the zeros above; A becomes zero below the diagonal.
       double* v = V + static_cast<long>(i) * m;
       for (int k = 0; k < i; ++k) v[k] = 0;
       v[i] = 1;
@@ -202,7 +202,7 @@ void triangularise(Eigen::MatrixXd& A, int pivots) {
 
 void stackTriangular(Eigen::MatrixXd& R, Eigen::VectorXd& r, Eigen::MatrixXd& H, Eigen::VectorXd& h) {
   const int n = static_cast<int>(R.rows()), rows = static_cast<int>(H.rows());
-  // Rows below the last that is not zero in the columns so far stay out: eliminating a column fills only those above.
+  // Eliminating a column fills only the rows down to the last non-zero one of the columns so far; skip those below.
   std::vector<int> filled(n);
   int last = 0;
   for (int c = 0; c < n; ++c) {

@@ -7,12 +7,13 @@ namespace vip_slam {
 
 namespace {
 
-// Time constants of the rate and of its changes, and what is taken for a moment, s.
+// Time constants of the smoothed rate and of its squared changes, and the time that last() averages over, s.
 constexpr double kLately = 0.05, kChanges = 0.5, kMoment = 0.01;
-// Of so many times the noise's variance. A delay that is learnt from noise alone came out 10 ms off at a sigma of 1 ms;
-// at this limit it is off by two sigmas (docs/accuracy.md), well above it by less than one.
+// The rate changes clearly when its variance is this many times that of the noise. A delay estimated from noise alone
+// was wrong by 10 ms at a sigma of 1 ms; at this limit it is off by two sigmas, well above by less than one
+// (docs/notebook/depth_and_calibration.md).
 constexpr double kClearly = 40.0;
-constexpr double kUneven = 0.3;  // steps between samples that differ by more do not compare
+constexpr double kUneven = 0.3;  // largest relative difference of two sample steps for a second difference
 
 Eigen::Vector3d mean(const std::vector<ImuSample>& samples) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -20,7 +21,7 @@ Eigen::Vector3d mean(const std::vector<ImuSample>& samples) {
   return sum / static_cast<double>(samples.size());
 }
 
-/// How many samples lie within the last moment.
+/// Number of samples within the last kMoment seconds.
 std::ptrdiff_t lastOnes(const std::vector<ImuSample>& samples) {
   const double since = samples.back().t - kMoment - 1e-4;
   return samples.end() -
@@ -47,8 +48,8 @@ void RateHistory::add(const std::vector<ImuSample>& samples) {
   smoothed_ += (1.0 - std::exp(-dt / kLately)) * change;
 }
 
-// Second differences of white noise have six times its variance, those of motion hardly any. An interval may have one
-// sample or two between its ends, which are interpolated: what the intervals before measured counts on.
+// Second differences of white noise have six times its variance, those of motion hardly any. An interval may have only
+// one or two samples between its interpolated ends, so the second differences continue across intervals.
 bool RateHistory::noiseOf(const std::vector<ImuSample>& samples, double* variance) {
   double squares = 0;
   int n = 0;

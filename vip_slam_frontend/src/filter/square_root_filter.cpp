@@ -54,7 +54,7 @@ void SquareRootFilter::augment(const Propagation& propagation, CloneId id, doubl
   std::vector<int> order;
   order.reserve(n + 16);
   for (int c = nav; c < n; ++c) order.push_back(c);                          // E_k goes
-  if (changed) order.push_back(delay);                                       // and the delay until then
+  if (changed) order.push_back(delay);                                       // and the delay before its change
   for (int c = 0; c < window_.calibrationColumn(); ++c) order.push_back(c);  // clones
   for (int c = n; c < n + 6; ++c) order.push_back(c);                        // C_k+1
   for (int c = window_.calibrationColumn(); c < nav; ++c) order.push_back(changed && c == delay ? n + 15 : c);
@@ -116,7 +116,7 @@ void SquareRootFilter::renew(int column, double sigma) {
 }
 
 void SquareRootFilter::consider(int column, double change, double sigma) {
-  // With the column last, the rows above tell of the others given it, the last one of it alone.
+  // With this column last, the upper rows hold the conditional of the others given it, and the last row its marginal.
   const int n = window_.dimension();
   const auto rotate = [this, n](int pivot, int from) {  // makes (pivot + 1, from) zero
     Eigen::JacobiRotation<double> rotation;
@@ -189,7 +189,7 @@ RelativeMotion SquareRootFilter::relativeMotion(int a, int b) const {
   const Clone &from = window_.clones[a], &to = window_.clones[b];
   RelativeMotion motion;
   motion.T_a_b = from.T_W_I.inverse() * to.T_W_I;
-  // At the first estimates as all rows of R, or some of the common uncertainty would be left.
+  // Jacobians at the first estimates, as for all rows of R, or the common position and yaw would not cancel.
   const Eigen::Matrix3d R_a_W = from.T_W_I_fej.R().transpose();
   Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(6, window_.dimension());
   Y.block<3, 3>(0, window_.cloneColumn(b)).setIdentity();

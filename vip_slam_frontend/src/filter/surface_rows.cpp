@@ -12,10 +12,10 @@ namespace vip_slam {
 namespace {
 
 constexpr double kGateSigmas = 4.0;
-// Fewer surviving pairs say too little about themselves to be believed.
+// With fewer surviving pairs outliers among them cannot be recognised.
 constexpr int kLeastPairs = 20;
-// Pairs share errors (the reference's patches with all its images, one warp of the depth, the calibration): many of
-// them tell no more than so many independent ones.
+// Pairs share errors (the reference's patches, the warp of the depth, the calibration): any number of them counts as at
+// most this many independent ones.
 constexpr double kMostEffective = 50.0;
 
 /// Columns of the rows before compression: newest clone (theta, p), calibration of the camera, reference's clone
@@ -52,7 +52,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const int depth = offset + (window.calibration.time_offset ? 1 : 0);
   const int intrinsics = depth + (window.calibration.depth_offset ? 1 : 0);
   const int shift = intrinsics + (window.calibration.intrinsics ? 4 : 0);
-  // Of depth points alone a shift of their image and one of the principal point are the same.
+  // For points from depth alone a shift of the depth image is equivalent to one of the principal point.
   Eigen::Matrix3d bearing = window.bearing.matrix();
   bearing.col(2).head<2>() -= window.depth_shift;
   const Eigen::Matrix3d given = bearing.inverse(), normal = given.transpose();
@@ -61,7 +61,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   for (int i = 0; i < A.rows(); ++i) {
     const SurfacePair& pair = pairs[i];
     const double w = 1.0 / pair.sigma;
-    // What the offset adds lies along the rays.
+    // The depth offset moves the points along their rays.
     const Eigen::Vector3d q_given = window.trueDepth(pair.q_cur.z()) / pair.q_cur.z() * pair.q_cur;
     const Eigen::Vector3d p_given = window.trueDepth(pair.p_ref.z()) / pair.p_ref.z() * pair.p_ref;
     const Eigen::Vector3d q_cur = bearing * q_given, p_ref = bearing * p_given;
@@ -90,8 +90,8 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
     }
     if (window.calibration.depth_offset) A(i, depth) = w * n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
     if (window.calibration.intrinsics || window.calibration.depth_shift) {
-      // Of a point (x, y, z) by (sx, sy, cx, cy): (x, 0), (0, y), (z, 0), (0, z). The normal turns against it, which
-      // shows in how far beside each other the two points lie.
+      // d(x, y) of a point (x, y, z) by (sx, sy, cx, cy): (x, 0), (0, y), (z, 0), (0, z). The normal rotates the other
+      // way, which acts on the distance of the two points along the plane.
       const Eigen::Matrix3d R_ref_cur = R_I_C.transpose() * R_ab * R_I_C;
       const Eigen::RowVector3d n_cur = n_ref.transpose() * R_ref_cur;
       const Eigen::Vector3d apart = R_I_C.transpose() * (s_I - t_I_C) - p_ref;
@@ -119,7 +119,7 @@ SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, con
   const Layout layout(window);
   Eigen::MatrixXd A = stackPairs(window, layout, a, b, matches.pairs);
 
-  // What each residual may be: the state's uncertainty plus one for its noise.
+  // Variance of each whitened residual: the state's uncertainty plus one for its noise.
   const Eigen::MatrixXd P = covarianceOf(window, layout, a, b, R);
   int kept = 0;
   for (int i = 0; i < A.rows(); ++i) {

@@ -40,7 +40,7 @@ VIP_SLAM_INLINE void solveRows(const double* R, int n, double* H, int m, int fir
   for (; c < n; ++c) solveBlock<1, P>(R, n, H, m, first, c);
 }
 
-/// First of the n columns in which one of `count` rows is not zero.
+/// Index of the first of the n columns in which any of the `count` rows is not zero.
 VIP_SLAM_INLINE int firstFilled(const double* H, int n, int m, int count) {
   for (int c = 0; c < n; ++c) {
     for (int i = 0; i < count; ++i) {

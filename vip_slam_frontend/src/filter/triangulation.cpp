@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "vip_slam_core/util/statistics.h"
+
 namespace vip_slam {
 
 namespace {
@@ -13,16 +15,10 @@ struct View {
   Eigen::Matrix3d R;  // R_C_A: anchor into this camera
   Eigen::Vector3d t;
   const Observation* observation;
-  Eigen::Vector2d xy;  // what the observation's bearing means
+  Eigen::Vector2d xy;  // corrected bearing of the observation
 };
 
-double medianOf(std::vector<double>& values) {
-  const std::size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
-
-/// z in the anchor from the depth readings, each carried along its own ray; 0 when there are none.
+/// Median z in the anchor of the depth readings, each transformed as a point on its own ray; 0 when there are none.
 double depthInAnchor(const WindowState& window, const std::vector<View>& views) {
   std::vector<double> z;
   for (const View& view : views) {
@@ -31,7 +27,7 @@ double depthInAnchor(const WindowState& window, const std::vector<View>& views) 
     const Eigen::Vector3d p_C = trueDepth(window, o) * view.xy.homogeneous();
     z.push_back((view.R.transpose() * (p_C - view.t)).z());
   }
-  return z.empty() ? 0.0 : medianOf(z);
+  return z.empty() ? 0.0 : upperMedian(std::move(z));
 }
 
 /// z in the anchor along the anchor's ray by least squares over all views (point on the ray nearest to all rays).
@@ -167,7 +163,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
   result.sigma_inverse_depth = std::sqrt(std::max(0.0, covariance(2, 2)));
   result.p_W = T_W_A * Eigen::Vector3d(x.x() / x.z(), x.y() / x.z(), 1.0 / x.z());
   result.ok = result.p_W.allFinite() && x.z() > 1e-3 && x.z() < 20.0;
-  // Without depth a distant point says nothing about translation and its linearisation is poor.
+  // Without depth a distant point has no information about translation and linearises poorly.
   if (result.depth_rows == 0 && result.sigma_inverse_depth > 0.5 * result.inverse_depth) result.ok = false;
   return result;
 }

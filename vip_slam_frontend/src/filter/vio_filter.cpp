@@ -7,13 +7,13 @@ namespace vip_slam {
 
 namespace {
 
-// A depth camera may be this much worse than its noise model before readings are wrong rather than noisy.
+// Largest factor on the depth camera's noise model; beyond it readings are wrong rather than noisy.
 constexpr double kMostDepthNoise = 5.0;
 constexpr double kLeastDepthNoise = 0.3;
-// Features whose update tells of the stamps.
+// Number of features in an update from which on it is used to estimate the stamps' jitter.
 constexpr int kLeastOfStamps = 5;
 
-/// Squared correction of orientation and velocity per degree of freedom, whitened by what the covariance lost.
+/// Squared correction of orientation and velocity per degree of freedom, whitened by the decrease of the covariance.
 double correctionPerDof(const NavState& before, const Matrix15d& P_before, const NavState& after,
                         const Matrix15d& P_after) {
   Vector6d d;
@@ -103,7 +103,8 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
     rows(c, c) = 1.0 / sigma;
   }
   if (window.calibration.intrinsics) {
-    // Pixels are square to a few parts in ten thousand, however long the focal length.
+    // Prior on the mean of the two focal lengths, and a tight one on their ratio: pixels are square to a few parts in
+    // ten thousand.
     const int c = window.intrinsicsColumn();
     rows.block<1, 2>(c, c).setConstant(0.5 / calibration.sigma_focal);
     rows.block<1, 2>(c + 1, c) << 1.0 / calibration.sigma_aspect, -1.0 / calibration.sigma_aspect;
@@ -178,7 +179,6 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
 void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report) {
   SurfaceRows surface = surfaceRows(filter_.window(), filter_.R(), surfaces, options_.huber);
   report->surfaces_used = surface.used;
-  report->surfaces_gated = surface.gated;
   const int dof = static_cast<int>(surface.rows.r.size());
   if (dof == 0) return;
   const UpdateResult result = filter_.update(surface.rows.H, surface.rows.r);
@@ -186,17 +186,17 @@ void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* r
 }
 
 StepReport VioFilter::step(const Propagation& propagation, CloneId id,
-                           const std::vector<FilterMeasurement>& measurements, std::optional<Unrest> unrest,
-                           const SurfaceMatches* surfaces) {
+                           const std::vector<FilterMeasurement>& measurements,
+                           std::optional<ResidualMotion> residual_motion, const SurfaceMatches* surfaces) {
   StepReport report;
-  const bool still = unrest.has_value();
+  const bool still = residual_motion.has_value();
   const CloneId previous = filter_.window().clones.back().id;
   if (!filter_.window().calibration.time_offset || propagation.rates.changes()) {
     delay_before_.reset();
   } else if (!delay_before_) {
     delay_before_ = Delay{filter_.window().time_offset, mounting().sigma_time_offset};
   }
-  // What is held neither changes nor is learnt.
+  // While the delay is held it neither drifts nor is estimated.
   const double since = propagation.predicted.t - filter_.window().clones.back().t;
   const double delay_change = delay_before_ ? 0.0 : options_.calibration.time_offset_walk * std::sqrt(since);
   filter_.augment(propagation, id, delay_change);
@@ -205,7 +205,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   // motion and does not fill with copies of one pose.
   const bool replace = still && still_images_ > 0;
   if (replace && previous != still_anchor_) {
-    // To the anchor, which stays: image by image each would be a piece, known no better than the IMU predicts it.
+    // The mark moves to the anchor, which stays: image by image the motion would be composed of many IMU predictions.
     if (previous == mark_) moveMark(still_anchor_);
     filter_.marginalise({static_cast<int>(filter_.window().clones.size()) - 2});
     forgetClone(previous);
@@ -216,8 +216,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     if (still_images_ == 0) still_anchor_ = id;
     Eigen::MatrixXd H;
     Eigen::VectorXd h;
-    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, *unrest, options_.zupt,
-                     &H, &h);
+    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, *residual_motion,
+                     options_.zupt, &H, &h);
     const UpdateResult result = filter_.update(H, h);
     report.zero_velocity = true;
     report.healthy = result.ok;
@@ -229,7 +229,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const NavState predicted = nav();
   const Matrix15d P_predicted = covariance();
   const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
-  // After a step of the velocity only images know it: with the first one that is whole again all tracks are asked.
+  // After a velocity step only images can measure the velocity: the first image after it updates with all tracks.
   const bool all = after_step_ && !propagation.step_admitted;
   after_step_ = propagation.step_admitted;
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full, all);
@@ -242,7 +242,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   judgeGyroCorrection();
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
   if (!still) {
-    // What the stamps' scatter may explain yet is not held against the IMU.
+    // While more stamp jitter may explain the correction about the rotation axis, that part is not blamed on the IMU.
     double correction = report.correction;
     if (report.features_used >= kLeastOfStamps) {
       const Eigen::Vector3d& w = propagation.omega_I;
@@ -257,7 +257,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     imu_monitor_.add(correction, report.features_used, report.features_gated);
   }
 
-  // Used sightings may not be used again: lost tracks go, those at the window's end start anew with the next image.
+  // Observations must not be used twice: lost and used tracks are deleted, and start anew with the next image.
   const int used = std::min<int>(report.features_tried, static_cast<int>(candidates.size()));
   std::vector<LandmarkId> gone;
   for (int i = 0; i < static_cast<int>(candidates.size()); ++i) {

@@ -1,4 +1,4 @@
-// What the filter knows of the camera's mounting, of its depth and of the gyro: what of it is told, believed and kept.
+// The filter's calibration states (extrinsics, depth, intrinsics, gyro): which values are reported, plausible, kept.
 #include <algorithm>
 #include <cmath>
 
@@ -8,24 +8,26 @@ namespace vip_slam {
 
 namespace {
 
-// Sigmas of the prior within which a mounting that was found is kept over a restart; and what an entry of
-// the gyro's correction may be off by, whose sigma is that of a data sheet rather than of somebody's care.
+// An estimate is plausible, and kept over a restart, within this many sigmas of the prior; an entry of the gyro's
+// correction within a fixed limit, since its prior sigma is only a data-sheet value.
 constexpr double kBelievableChange = 4.0, kMostGyroError = 0.05;
-// An offset of depth is beyond doubt from so many of its sigmas and metres on, until it is half as large.
+// A depth offset becomes significant above this many sigmas and metres, and stays so until below half as many metres.
 constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
-// ... and it has not changed by more than a share of it for a while: on its way beyond belief it is nobody's business.
+// It must also not change by more than this share of itself within this time, s: an offset that is still growing may
+// become implausible, and must not be passed on before.
 constexpr double kSteadySeconds = 1.0, kSteadyShare = 0.25;
-// One sigma of an offset that is taken back or known to be none, m.
+// One sigma of a depth offset that is reset to its given value, m: holds it there.
 constexpr double kHeldOffset = 1e-6;
-// How far the depth image lies beside: of the focal length, what is beyond doubt, worth the trouble and well enough
-// known to be taken. One pixel made 13 mm of 0.8 in an office.
+// Shift of the depth image, in bearings (px over the focal length): significant above kSureShift sigmas, worth
+// correcting above kLeastShift, known well enough below a sigma of kKnownShift. In an office one pixel of shift raised
+// the error from 0.8 to 13 mm.
 constexpr double kSureShift = 4.0, kLeastShift = 1e-4, kKnownShift = 2e-4;
-// One sigma of one that is taken back.
+// One sigma of a shift that is reset to zero, in bearings: holds it there.
 constexpr double kHeldShift = 1e-7;
-// An entry of the gyro's correction likewise: half a thousandth of a turn by 60 degrees is 0.03 degrees.
+// An entry of the gyro's correction is significant above these: 5e-4 of a rotation by 60 degrees is 0.03 degrees.
 constexpr double kSureGyroError = 4.0, kLeastGyroError = 5e-4;
-// An entry of the bearings' correction likewise: focal lengths, principal point. Exact focal lengths come out within
-// 0.03 %, with depth that has a wiggle within 0.1 %.
+// An entry of the bearings' correction (focal lengths, principal point) likewise. Exact focal lengths are estimated
+// within 0.03 %, and within 0.1 % when depth has a periodic error.
 constexpr double kSureBearing = 4.0;
 const Eigen::Array4d kLeastBearing(1e-3, 1e-3, 5e-4, 5e-4);
 
@@ -115,7 +117,7 @@ void VioFilter::judgeDepthOffset() {
     depth_is_off_ = false;
   }
   if (std::abs(change) <= kBelievableChange * options_.calibration.sigma_depth_offset) return;
-  // To measure that it is what was given makes of everything else what it would be had it never been in doubt.
+  // A measurement that the offset has its given value corrects all other states as if it had never been uncertain.
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, window.dimension());
   H(0, window.depthOffsetColumn()) = 1.0 / kHeldOffset;
   Eigen::VectorXd r = Eigen::VectorXd::Constant(1, -change / kHeldOffset);

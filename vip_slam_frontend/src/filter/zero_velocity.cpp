@@ -9,20 +9,21 @@ namespace vip_slam {
 
 namespace {
 
-// Beyond this many repeats the sigmas stay: without an end to their growth the IMU's noise would carry the pose away.
+// The sigmas stop growing after this many repeats; else the IMU's noise would make the standing pose drift.
 constexpr int kMostRepeats = 8;
-// Without an image, the IMU's means may leave those at rest by this much (or five sigmas of their noise), ...
+// Without an image, the IMU's means may differ from those at rest by this much (or five sigmas of their noise), ...
 constexpr double kMostGyroShift = 0.005;  // rad/s
 constexpr double kMostAccelShift = 0.05;  // m/s^2
-// ... and those at rest follow by this share per image, as the biases walk.
+// ... and those at rest follow by this share of the difference per image, since the biases drift.
 constexpr double kRestFollows = 0.01;
-// So many images after standing still, slow motion may have begun without the IMU's noticing.
+// Number of images after standing still from which on slow motion may have begun unnoticed by the IMU.
 constexpr int kForgotten = 40;
-// The sigmas fit image motion at the limit and surfaces two metres away. However quiet the image, they do not fall
-// below a share.
-constexpr double kFar = 3.0, kLeastUnrest = 0.2;
-// So far along the view a step of a centimetre moves a wall's image by a pixel: there the limits on image motion hold.
-// Where a step shows less the limits are lower, as far down as the noise of pixels.
+// Factor from image motion over its limit to the factor on the zero-velocity sigmas. The configured sigmas fit image
+// motion at the limit for surfaces about two metres away; kFar allows for three times that distance. However little the
+// image moves, the sigmas do not fall below the share kLeastUnrest.
+constexpr double kFar = 3.0, kLeastResidualMotion = 0.2;
+// Image motion per metre of translation, px/m, from which on the limits on image motion hold unchanged: 0.8 px for a
+// centimetre. Where a translation shows less the limits are lower in proportion, down to the share kLeastLimit (noise).
 constexpr double kPxPerMetre = 80.0, kLeastLimit = 0.2;
 
 bool restsAs(const ImuSpread& now, const ImuSpread& rest) {
@@ -70,17 +71,17 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   const double limit = options_.max_disparity_px * std::clamp(shows, kLeastLimit, 1.0);
   bool wants = options_.enabled && quiet && cues.speed < options_.max_speed;
   if (still_) {
-    // Inside, an image without features (lights off) does not end the standing; one that moves does.
+    // While still, an image without features (lights off) does not end the stillness; image motion does.
     wants = wants && (image_known ? cues.disparity_px < 1.5 * limit : restsAs(cues.imu, rest_)) &&
             cues.anchor_disparity_px < 3.0 * limit;
   } else {
     wants = wants && image_known && cues.disparity_px < limit;
   }
-  unrest_ = {};
+  residual_motion_ = {};
   if (image_known) {
     const double moved = kFar * std::max(cues.disparity_px, cues.anchor_disparity_px);
-    unrest_.rotation = std::max(kLeastUnrest, moved / options_.max_disparity_px);
-    unrest_.translation = std::max(kLeastUnrest, moved / limit);
+    residual_motion_.rotation = std::max(kLeastResidualMotion, moved / options_.max_disparity_px);
+    residual_motion_.translation = std::max(kLeastResidualMotion, moved / limit);
   }
   if (wants) {
     const double share = image_known ? 1.0 : kRestFollows;
@@ -95,7 +96,7 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   }
   since_still_ = still_ ? 0 : std::min(since_still_ + 1, kForgotten);
   imu_rests_ = quiet && since_still_ < kForgotten && restsAs(cues.imu, rest_);
-  // A first doubt already suspends the updates; it takes frames_in images to start them.
+  // A single image with motion already suspends the updates; it takes frames_in images to start them.
   return still_ && wants;
 }
 
@@ -128,12 +129,12 @@ double leastImageMotion(const std::vector<Eigen::Vector3d>& points, double focal
   return std::sqrt(std::max(0.0, least));
 }
 
-void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const Unrest& unrest,
+void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ResidualMotion& residual_motion,
                       const ZuptOptions& options, Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   const int newest = static_cast<int>(window.clones.size()) - 1;
   const bool relative = anchor >= 0 && anchor != newest;
   const double root = std::sqrt(1.0 + std::min(repeats, kMostRepeats));
-  const double step = unrest.translation * root, turn = unrest.rotation * root;
+  const double step = residual_motion.translation * root, turn = residual_motion.rotation * root;
   *H = Eigen::MatrixXd::Zero(relative ? 9 : 3, window.dimension());
   *h = Eigen::VectorXd::Zero(relative ? 9 : 3);
   const double wv = 1.0 / (options.sigma_velocity * step);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
 #include "vip_slam_frontend/initialisation/moving_start.h"
 #include "vip_slam_frontend/tracking/outlier_rejection.h"
@@ -12,14 +13,14 @@ namespace vip_slam {
 
 namespace {
 constexpr double kWatched = 0.5;         // share of the standing time that images have to cover
-constexpr double kMostTurn = 0.3;        // rad/s, of a gyro that stands: its bias
-constexpr double kMostOffGravity = 1.5;  // m/s^2, of an accelerometer that stands
+constexpr double kMostTurn = 0.3;        // rad/s, mean rate at rest that may be gyro bias
+constexpr double kMostOffGravity = 1.5;  // m/s^2, deviation from gravity at rest that may be accelerometer bias
 constexpr int kFewestCommon = 5;         // features
-constexpr double kDepthMoved = 2.0;      // sigmas, and times what changes from one image to the next
-constexpr double kBetweenTries = 0.2;    // s, of a start in motion
-constexpr double kBetweenPoses = 0.03;   // s, of those that a start in motion takes
+constexpr double kDepthMoved = 2.0;      // sigmas, and factor on the change between consecutive images
+constexpr double kBetweenTries = 0.2;    // s, between attempts of a start in motion
+constexpr double kBetweenPoses = 0.03;   // s, between the poses that a start in motion uses
 
-// f(xy in a, xy in b) of features common to both; their number.
+// Calls f(xy in a, xy in b) for the features common to both; returns their number.
 template <class F>
 int forCommon(const std::vector<FilterMeasurement>& a, const std::vector<FilterMeasurement>& b, F f) {
   // Both lists are small; ids ascend within neither, so look each one up.
@@ -72,8 +73,7 @@ double depthChange(const DepthGrid& a, const DepthGrid& b, const DepthNoise& noi
     if (a.z[i] > 0 && b.z[i] > 0) changes.push_back(std::abs(b.z[i] - a.z[i]) / noise.sigma(a.z[i]));
   }
   if (changes.size() < 30) return -1.0;
-  std::nth_element(changes.begin(), changes.begin() + changes.size() / 2, changes.end());
-  return changes[changes.size() / 2];
+  return upperMedian(std::move(changes));
 }
 
 FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOptions& options, const ImuNoise& noise,
@@ -86,7 +86,7 @@ FilterPrior standingPrior(const std::vector<ImuSample>& samples, const FilterOpt
   prior.state.t = samples.back().t;
   prior.state.T_W_I = SE3(gravityAlignedRotation(spread.mean_accel), Eigen::Vector3d::Zero());
   prior.state.bias_gyro = spread.mean_gyro;
-  // Of the accelerometer bias a rest shows only the part along gravity.
+  // At rest only the accelerometer bias along gravity is observable.
   prior.state.bias_accel = (spread.mean_accel.norm() - gravity) * up;
   prior.sigma_tilt = 0.3;
   prior.sigma_velocity = 0.02;
@@ -141,7 +141,7 @@ std::optional<FilterPrior> Initialiser::add(const InitialisationInput& image, co
     return std::nullopt;
   }
   auto prior = moving(imu);
-  // One that is refused is hardly better with the next image, and takes tens of milliseconds.
+  // A rejected attempt hardly improves with the next image, and costs tens of milliseconds.
   if (!prior) {
     next_try_t_ = image.t_imu + kBetweenTries;
     refusal_ = reason_;
@@ -180,8 +180,8 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     reason_ = "moving: gathering images for a start in motion";
     return std::nullopt;
   }
-  // The oldest image inside the second shows whether the scene stood, too: a steady motion is quiet as well. After a
-  // restart the IMU reaches back further than the images.
+  // The oldest image inside the standing time shows whether the camera stood: for the IMU a uniform motion is quiet as
+  // well. After a restart the IMU reaches back further than the images.
   std::size_t oldest = 0;
   while (oldest < images_.size() && images_[oldest].t_imu < from - 1e-9) ++oldest;
   if (oldest == images_.size() || now - images_[oldest].t_imu < kWatched * options_.standing_seconds) {
@@ -206,10 +206,10 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
   return standingPrior(samples, filter_, noise_, gravity_);
 }
 
-// Of a view of which nothing is left after a second: whether it has moved on. What is left of a shorter while tells, by
-// the mean of how all of it moved; the tracks of noise in the dark go this way and that, and end as soon.
+// Whether the view has moved on, when no feature of a second ago is left. The oldest image with common features decides
+// by their mean motion vector: tracks of noise in the dark end as quickly, but move in all directions.
 bool Initialiser::turnsOver(std::size_t oldest) {
-  constexpr int kMostReplaced = 5;  // images; where no track lasts from one to the next nothing can be told by them
+  constexpr int kMostReplaced = 5;  // images; when no track ever survives to the next image tracks are no evidence
   const std::vector<FilterMeasurement>& now = images_.back().features;
   if (static_cast<int>(now.size()) < options_.min_tracks) return false;
   for (std::size_t k = oldest + 1; k + 1 < images_.size(); ++k) {
@@ -224,7 +224,7 @@ bool Initialiser::turnsOver(std::size_t oldest) {
 }
 
 bool Initialiser::depthMoved(const InitialisationInput& since) const {
-  // A motion adds up, noise that the model does not know of does not.
+  // A motion accumulates over time, unmodelled noise does not.
   const double all = depthChange(since.depth, images_.back().depth, depth_noise_);
   const double last = depthChange(images_[images_.size() - 2].depth, images_.back().depth, depth_noise_);
   return all > kDepthMoved && all > kDepthMoved * last;
@@ -269,7 +269,7 @@ std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {
   if (!enough()) return std::nullopt;
   std::vector<TimedCameraPose> poses;
   for (std::size_t broken = 0; !chainPoses(&poses, &broken);) {
-    // What comes after the break may do by itself.
+    // The images after the break may suffice.
     images_.erase(images_.begin(), images_.begin() + static_cast<long>(broken));
     if (!enough()) return std::nullopt;
   }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "vip_slam_core/util/statistics.h"
+
 namespace vip_slam {
 
 namespace {
@@ -32,7 +34,7 @@ std::string KeyframeSelector::decide(double t, const SE3& T_odom_C, const std::v
     const Eigen::Vector3d p = R_last_now * f.xy.homogeneous().cast<double>();
     if (p.z() > 0.1) parallax += (p.head<2>() / p.z() - it->second.cast<double>()).norm() * focal_px;
   }
-  // Of a handful of features the ratio says nothing.
+  // With a handful of features the ratio is not meaningful.
   const auto before = static_cast<double>(features_.size());
   if (features_.size() >= kLeastForRatio && common < options_.min_tracked_ratio * before) return "tracked ratio";
   if (common > 0 && parallax / common > options_.min_parallax_px) return "parallax";
@@ -51,11 +53,7 @@ void KeyframeSelector::accept(double t, const SE3& T_odom_C, const std::vector<F
     features_[f.id] = f.xy;
     if (f.depth > 0) depths.push_back(f.depth);
   }
-  median_depth_ = 0;
-  if (!depths.empty()) {
-    std::nth_element(depths.begin(), depths.begin() + depths.size() / 2, depths.end());
-    median_depth_ = depths[depths.size() / 2];
-  }
+  median_depth_ = depths.empty() ? 0 : upperMedian(std::move(depths));
 }
 
 }  // namespace vip_slam

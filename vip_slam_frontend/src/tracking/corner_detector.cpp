@@ -9,7 +9,7 @@ namespace vip_slam {
 
 namespace {
 
-/// Marks places that are taken, on a raster of min_distance / 2, and answers distance questions from the neighbours.
+/// Occupied pixels on a raster of min_distance / 2, so that a distance check only visits neighbouring cells.
 class Occupancy {
  public:
   Occupancy(const cv::Size& size, double distance)

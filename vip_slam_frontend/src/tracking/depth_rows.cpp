@@ -11,12 +11,12 @@ namespace {
 
 // Neighbours whose depths differ by more than this share belong to two surfaces.
 constexpr float kOneSurface = 0.05f;
-// A surface that is farther than this from where it was expected moved otherwise: look again.
+// When the depth found differs from the expected one by more than this share, the look-up is repeated with it.
 constexpr float kElsewhere = 0.02f;
-// Where nothing is expected yet, m.
+// Expected depth before any was found, m.
 constexpr float kUnknownDepth = 2.f;
 
-/// Looks up 1/z, which is affine over a plane, in an image of inverse depths; 0 where nothing was read.
+/// Interpolates 1/z, which is affine over a plane, in an image of inverse depths; 0 where there is no reading.
 inline float inverseAt(const cv::Mat& inverse, float u, float v) {
   if (!(u > -0.5f && v > -0.5f && u < static_cast<float>(inverse.cols) - 0.5f &&
         v < static_cast<float>(inverse.rows) - 0.5f)) {
@@ -39,7 +39,7 @@ void invert(const float* depth, float* inverse, int n) {
   for (int i = 0; i < n; ++i) inverse[i] = depth[i] > 0 ? 1.f / depth[i] : 0.f;  // NaN as well
 }
 
-/// R and t of p_stamp = R p_row + t (R column by column), and what they grow by from this row to the next.
+/// R and t of p_stamp = R p_row + t (R column by column), and their increments from this row to the next.
 struct RowMotion {
   float R[9], t[3], dR[9], dt[3];
 };
@@ -49,14 +49,14 @@ struct RowRays {
   const float *x, *y, *ux, *uy, *vx, *vy;
 };
 
-/// A row of the result: what is expected there, where its pixels were read, and z at the stamp over z there.
+/// A row of the result: expected depth, source pixels, and the map from z at the source to z at the stamp.
 struct RowBuffers {
   explicit RowBuffers(int n) : z(n, kUnknownDepth), offset(n, 0.f), u(n), v(n), gain(n), shift(n) {}
-  std::vector<float> z, offset;          ///< expected depth, m, and rows from here to where it was read
+  std::vector<float> z, offset;          ///< expected depth, m, and offset to the source row, px
   std::vector<float> u, v, gain, shift;  ///< pixel; z_stamp = gain z_read + shift
 };
 
-/// Where pixels begin .. end of row `row` were read, by the expected depth and offset: the row's pose to first order.
+/// Source pixels of begin .. end in row `row`, from the expected depth and offset, with the row's pose to first order.
 VIP_SLAM_VECTOR_CLONES
 void findSources(const RowRays& rays, const RowMotion& m, int row, int begin, int end, RowBuffers* b) {
   const float* __restrict x0 = rays.x, * __restrict y0 = rays.y, * __restrict ux = rays.ux, * __restrict uy = rays.uy, * __restrict vx = rays.vx, * __restrict vy = rays.vy;
@@ -123,7 +123,7 @@ cv::Mat DepthRows::atStamp(const cv::Mat& depth, const RowPoses& rows) const {
   cv::Mat inverse(depth.size(), CV_32FC1), result(depth.size(), CV_32FC1);
   for (int v = 0; v < depth.rows; ++v) invert(depth.ptr<float>(v), inverse.ptr<float>(v), n);
   const std::vector<RowMotion> motions = motionOfRows(rows, depth.rows);
-  // Neighbours move alike: each pixel begins where the one above was found.
+  // Neighbours move alike: each pixel starts with depth and offset of the one above.
   RowBuffers b(n);
   const float cols = static_cast<float>(depth.cols), height = static_cast<float>(depth.rows);
   for (int v = 0; v < depth.rows; ++v) {
@@ -148,7 +148,7 @@ cv::Mat DepthRows::atStamp(const cv::Mat& depth, const RowPoses& rows) const {
       }
       if (z > 0) b.z[u] = z;
       if (misled) {
-        // By a speck close to the camera, which looks far aside: the pixels below are not it and begin afresh.
+        // Misled by a speck close to the camera, whose source lies far away: the pixels below start afresh.
         b.z[u] = kUnknownDepth;
         b.offset[u] = 0;
       }

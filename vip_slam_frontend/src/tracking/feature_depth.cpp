@@ -16,9 +16,9 @@ constexpr int kRadius = 3;
 constexpr int kMost = (2 * kRadius + 1) * (2 * kRadius + 1);
 constexpr int kLeastReadings = 30;  // of the 49 in the window
 constexpr int kLeastNear = 12;
-// Corners are placed to about this much against the depth image, px.
+// Accuracy of a corner's position relative to the depth image, px.
 constexpr double kPixelError = 0.5;
-// A corner farther than this from the rim belongs to what lies behind it, px.
+// A corner farther than this from the nearer surface's edge belongs to the surface behind, px.
 constexpr double kMostOffRim = 1.5;
 constexpr double kInlierSigmas = 3.5;
 constexpr double kMostRelativeSigma = 0.05;
@@ -110,7 +110,7 @@ FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
   InversePlane plane;
   if (!fit(readings, n, near, &plane)) return unclear;
   if (countExplained(readings, n, plane, near) < 0.85 * split) return unclear;
-  // What lies beyond the gap must lie behind the plane, too: else the gap was a column of a slanted surface.
+  // Readings beyond the gap must also lie behind the plane: else the gap was between columns of a slanted surface.
   int behind = 0;
   double off2 = 1e300;
   for (int i = 0; i < n; ++i) {

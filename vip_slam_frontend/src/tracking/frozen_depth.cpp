@@ -4,7 +4,7 @@ namespace vip_slam {
 namespace {
 
 constexpr int kStep = 12;        // pixels
-constexpr int kLeastDepth = 50;  // samples; noise makes no so many alike
+constexpr int kLeastDepth = 50;  // samples with depth; with noise that many are never all equal
 
 }  // namespace
 

@@ -7,7 +7,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kCell = 5.0;      // m
-constexpr double kFarthest = 1e6;  // cells; beyond, a coordinate is none
+constexpr double kFarthest = 1e6;  // cells; coordinates beyond are clamped
 
 int cellAlong(double x) { return static_cast<int>(std::floor(std::clamp(x / kCell, -kFarthest, kFarthest))); }
 

@@ -12,14 +12,14 @@ namespace vip_slam {
 namespace {
 
 constexpr int kLeastRadius = 14;  // the narrow one likewise
-constexpr int kPatchRadius = 41;  // a wide patch at half its size, however it is rolled
+constexpr int kPatchRadius = 41;  // px, holds a wide patch shown at half its size, at any roll angle
 constexpr std::size_t kMostPatches = 8000;
 constexpr int kMostPerImage = 60;
-// A corner detected anew may lie this far from where the old track saw it, px.
+// Largest distance of a newly detected corner from the pixel of the old track, px.
 constexpr double kCornerOffset = 3.0;
 constexpr double kNearest = 0.2, kFarthest = 15.0;  // m along the optical axis
 
-// Length of the longest ray of the image with unit depth; infinite for a lens that has none at its corners.
+// Length of the longest ray of the image at unit depth; infinite when a corner of the image has no ray.
 double longestRay(const CameraModel& camera) {
   double longest = 1;
   for (int corner = 0; corner < 4; ++corner) {
@@ -43,7 +43,7 @@ void LandmarkMatcher::clear() {
 }
 
 void LandmarkMatcher::apply(const MapUpdate& update) {
-  if (update.global) {  // it tells of all; what it does not tell of is of another map
+  if (update.global) {  // it lists all landmarks; any other is from another map
     landmarks_.clear();
     index_.clear();
   }
@@ -64,7 +64,7 @@ void LandmarkMatcher::apply(const MapUpdate& update) {
 }
 
 void LandmarkMatcher::retire(const Track& track) {
-  // A short-lived track's patch is not worth keeping, nor are more than a few thousand of them: the oldest go.
+  // Patches of short-lived tracks are not kept; beyond kMostPatches the oldest are dropped.
   if (!track.reference || track.feature.age < 5) return;
   const cv::Mat& image = track.reference->gray;
   const int x = static_cast<int>(std::lround(track.reference_pixel.x()));
@@ -116,10 +116,10 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
                    [](const Visible& a, const Visible& b) { return a.entry->observations > b.entry->observations; });
   if (static_cast<int>(visible.size()) > 2 * kMostPerImage) visible.resize(2 * kMostPerImage);
 
-  // Where each may be: its patch aligned from the projection, and the corners around; described in one go.
+  // Candidates of each landmark: its patch aligned from the projection, and the corners around; described in one call.
   std::vector<Feature> corners;
   std::vector<std::size_t> owner;
-  std::vector<Track> direct;  // those whose patch was found there, with what the alignment says
+  std::vector<Track> direct;  // tracks of landmarks whose patch was aligned
   std::vector<int> aligned;   // index of direct, -1: a corner
   const auto withPatch = [&](std::size_t i, Track* track) {
     const auto patch = patches_.find(visible[i].id);
@@ -173,7 +173,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     if (known < 0 && withPatch(i, &track) && !tracker->alignTrack(&track, T_odom_C, kCornerOffset)) continue;
     if (!free(track.feature.pixel.cast<double>(), options_.min_distance)) continue;
     tracker->measure(&track.feature);
-    // Another surface in front of it is not the landmark.
+    // A different depth means that another surface hides the landmark.
     if (track.feature.depth > 0 && std::abs(track.feature.depth - visible[i].z) > 0.05 * visible[i].z + 0.05) continue;
     taken.push_back(track.feature.pixel);
     tracker->addTrack(std::move(track), T_odom_C);

@@ -6,13 +6,13 @@ namespace vip_slam {
 
 namespace {
 
-// Fewer, or a smaller share of all, are mismatches.
+// Fewer moving points than this, or a smaller share of all points, are taken for mismatches.
 constexpr std::size_t kLeast = 5;
 constexpr double kLeastShare = 0.08;
-// A body has corners at least this close, px, unless it hides nearly all else.
+// A pixel belongs to a moving body only within this distance of a moving point, px, unless nearly all points move.
 constexpr float kReach = 120.0f;
 constexpr std::size_t kNearlyAll = 4;  // moving points for each that stands still
-// A body is that deep, as a share of its distance.
+// Largest difference in depth from the moving point, as a share of its depth.
 constexpr double kDeep = 0.2;
 
 }  // namespace

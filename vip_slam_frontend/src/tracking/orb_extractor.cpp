@@ -69,7 +69,7 @@ std::vector<Feature> OrbExtractor::extract(const cv::Mat& gray, const std::vecto
   detector_->detect(gray, keypoints, mask);
   std::stable_sort(keypoints.begin(), keypoints.end(),
                    [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; });
-  // Even spread: at most a few per raster cell, and none beside a tracked feature.
+  // Even spread: at most a few per raster cell, and none close to a tracked feature.
   const int cell = 32, cols = gray.cols / cell + 1, rows = gray.rows / cell + 1;
   const int most = 2 + 2 * corners_ / (cols * rows);
   std::vector<int> count(static_cast<std::size_t>(cols) * rows, 0);

@@ -14,14 +14,14 @@ namespace vip_slam {
 
 namespace {
 
-// The gyro's rotation is doubted when it leaves all but a third of at least so many pairs unexplained ...
+// The gyro's rotation is rejected when it explains less than a third of at least this many pairs ...
 constexpr int kLeastToDoubt = 15;
-// ... and a motion with a free rotation explains two thirds of them. Less could be another body that moves by itself.
+// ... and a motion with a free rotation explains two thirds of them. Less could belong to a moving body.
 
 Eigen::Vector3d bearing(const Eigen::Vector2d& xy) { return {xy.x(), xy.y(), 1.0}; }
 
-/// What the second view of a pair with depth is off the point moved by R, t (pixels over the focal length), and how
-/// that changes with the moved point.
+/// Reprojection residual of a pair with depth under R, t (pixels over the focal length), and its Jacobian by the
+/// transformed point.
 bool reprojectionOf(const PointPair& pair, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, Eigen::Vector2d* r,
                     Eigen::Matrix<double, 2, 3>* J_p) {
   const Eigen::Vector3d p = R * (bearing(pair.xy_previous) * pair.depth_previous) + t;
@@ -99,7 +99,7 @@ TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::ve
   Eigen::Matrix3d A;
   double squares = 0;
   int n = 0;
-  for (int round = 0; round <= kRounds; ++round) {  // the last one only measures what is left
+  for (int round = 0; round <= kRounds; ++round) {  // the last round only computes the residuals
     A.setZero();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     squares = 0, n = 0;
@@ -190,7 +190,8 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
     }
   };
   classify();
-  // A small turn looks like a step aside before a wall: when the translation is bounded the gyro's rotation stays.
+  // In front of a wall a small rotation looks like a sideways step: with a bounded translation keep the gyro's
+  // rotation.
   const bool bounded = options.most_apart > 0;
   if (!bounded && result.with_depth && result.inliers >= 8 &&
       refinePose(pairs, result.inlier, 0.5 * options.threshold, &T)) {

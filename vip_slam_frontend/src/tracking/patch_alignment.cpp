@@ -13,10 +13,10 @@ namespace {
 
 constexpr int kIterations = 12;
 constexpr double kFarthestStep = 3.0, kConverged = 0.01;  // px
-// The camera's own blur, one sigma in px. An enlarged patch shows the reference's, enlarged as well; the newest image
-// is blurred to match where it would be by at least the second of these.
+// The camera's own blur, one sigma in px. A patch that is enlarged by the warp has an enlarged blur too; the newest
+// image is blurred to match when that takes at least kLeastBlur, px.
 constexpr double kBlurOfCamera = 0.55, kLeastBlur = 0.3;
-constexpr int kBlurReach = 5;  // px around the patch that it may move by
+constexpr int kBlurReach = 5;  // px, margin of the blurred window that the patch may move within
 
 template <int kRadius>
 struct Patch {
@@ -51,7 +51,7 @@ bool Patch<kRadius>::sample(const cv::Mat& image, const Eigen::Vector2d& pixel, 
       const double dx = x - kRadius - 1;
       const Eigen::Vector2d p = begin + (slope + bend * dx) * dx;
       const auto u = static_cast<float>(p.x()), v = static_cast<float>(p.y());
-      // What is just inside may round to the last column or row, which has none beyond.
+      // A double just inside may round to the last column or row, which has no neighbour to interpolate with.
       if (!(u >= 0) || !(v >= 0) || u >= static_cast<float>(image.cols - 1) || v >= static_cast<float>(image.rows - 1))
         return false;
       framed[y * kRow + x] = bilinear(image, u, v);
@@ -76,7 +76,7 @@ Eigen::Matrix3d Patch<kRadius>::gradients() {
   return A.selfadjointView<Eigen::Upper>();
 }
 
-/// What the position keeps when the brightness is estimated along.
+/// Information on the position after eliminating the brightness offset (Schur complement).
 Eigen::Matrix2d textureOf(const Eigen::Matrix3d& A) {
   return A.topLeftCorner<2, 2>() - A.topRightCorner<2, 1>() * A.topRightCorner<2, 1>().transpose() / A(2, 2);
 }
@@ -93,7 +93,7 @@ struct Window {
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();
 };
 
-/// The image around the patch with the blur that the reference's has been enlarged to, or the image as it is.
+/// The image around the patch, blurred like the enlarged reference patch, or the unchanged image when that is little.
 Window matchBlur(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp, int radius) {
   const Eigen::Matrix2d A = warp.A.inverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(A * A.transpose());
@@ -155,7 +155,7 @@ PatchAlignment align(const cv::Mat& reference, const Eigen::Vector2d& reference_
       return result;
     const float seen_mean = seen.mean();
     seen.array() -= seen_mean;
-    // Exposure may change the contrast; noise must not blow it up.
+    // A gain for contrast changes by exposure, limited so that noise is not amplified.
     const float gain = std::clamp(deviation / std::sqrt(std::max(1e-6f, seen.squaredNorm() / kCount)), 0.5f, 2.0f);
     seen = gain * seen - (patch.grey.array() - mean).matrix();
     result.residual = std::sqrt(seen.squaredNorm() / kCount);
@@ -163,7 +163,7 @@ PatchAlignment align(const cv::Mat& reference, const Eigen::Vector2d& reference_
     if (!step.allFinite() || step.head<2>().norm() > kFarthestStep) return result;
     pixel -= step.head<2>();
     if (step.head<2>().squaredNorm() < kConverged * kConverged) {
-      // What is left over must be small beside the patch's own contrast, else it shows something else.
+      // The residual must be small compared with the patch's own contrast, else another patch was found.
       result.ok = result.residual < 0.6 * deviation + 2.0;
       break;
     }

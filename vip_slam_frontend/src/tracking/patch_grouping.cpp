@@ -12,10 +12,10 @@ namespace {
 constexpr int kLeastPatches = 6;
 constexpr int kRefinements = 3;
 constexpr double kSigmas = 3.5;
-// A wall's own unevenness, m, and the turn of a patch beside an edge, rad.
+// Unevenness of a wall, m, and error of a patch's normal close to an edge, rad; one sigma each.
 constexpr double kUneven = 0.003;
 constexpr double kTurned = 0.03;
-// By how much the normals of all patches of a plane together may be off: warped depth, rad.
+// Common error of the normals of all patches of a plane (warped depth), one sigma, rad.
 constexpr double kTurnedTogether = 0.005;
 
 /// N^T x = 1, in the camera frame.
@@ -47,8 +47,8 @@ bool fitPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>&
   return plane->N.allFinite() && plane->N.norm() > 1e-6;
 }
 
-/// A plane that leans across a step from one wall to another one set back is near enough to stripes of both, and none
-/// of their patches alone knows its normal well enough to object; all of them together do.
+/// Whether the plane spans a step between a wall and another one set back: it is close to stripes of both, and no
+/// single patch's normal is exact enough to contradict it, but the mean of all normals is.
 bool leansAcrossAStep(const std::vector<SurfacePatch>& patches, const std::vector<char>& member,
                       const PlaneFit& plane) {
   const Eigen::Vector3d n = plane.normal();
@@ -64,7 +64,8 @@ bool leansAcrossAStep(const std::vector<SurfacePatch>& patches, const std::vecto
 }
 
 /// The plane round patch `seed` and its members among those that are not `done`; false when there is none.
-/// `extrapolate`: begins with all that the seed's own normal allows however far away, else with its surroundings.
+/// `extrapolate`: starts with all patches at any distance that the seed's normal and its sigma allow, else with those
+/// close to the seed's plane.
 bool growPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>& done, std::size_t seed,
                bool extrapolate, std::vector<char>* member, PlaneFit* plane) {
   const SurfacePatch& from = patches[seed];

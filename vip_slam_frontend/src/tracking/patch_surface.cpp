@@ -10,18 +10,18 @@ namespace {
 
 constexpr int kStride = 2;
 constexpr double kFewest = 0.4;        // of the readings
-constexpr double kMostForeign = 0.05;  // far before or behind: something else covers part of the patch
-// Slopes are a few per cent a pixel at the flattest angles that can be tracked; the prior decides where readings are
-// few.
+constexpr double kMostForeign = 0.05;  // share of readings far in front or behind: another surface in the patch
+// One sigma of the prior and upper limit of the slope, 1/px. At the flattest angles that can be tracked slopes are a
+// few per cent a pixel; the prior matters where readings are few.
 constexpr double kPriorSlope = 0.03;
 constexpr double kSteepest = 0.06;
 
-// Squared deviations of the means of the window's rows and columns from the plane, in their sigmas, a degree of
-// freedom. Room for noise that neighbouring readings share, and for a part of the depth that is nobody's noise.
+// Limit on the chi-square per degree of freedom of the deviations of the window's row and column means from the plane,
+// with room for correlated noise; kLineFloor is a systematic error as a share of the depth.
 constexpr double kMostOfLines = 3.5, kLineFloor = 0.0003;
 constexpr int kFewestOfLine = 3;
-// One sigma of a reading over its depth, up to which a wide patch's lines show steps of 0.3 %, which would move half of
-// it by a pixel within three hundred.
+// Largest relative sigma of a reading for a wide patch: up to it the line means show steps of 0.3 % of the depth, which
+// would move half of the patch by a pixel after an image motion of three hundred.
 constexpr double kQuiet = 0.005;
 
 /// Readings in one row or column of the window.
@@ -79,9 +79,9 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
   if (count < kFewest * kSide * kSide || foreign > kMostForeign * count) return surface;
   const Eigen::Vector3d fit = A.ldlt().solve(b);
   const double residual = std::sqrt(std::max(0.0, square - b.dot(fit)) / count);
-  // A step or a rim inside the window is no plane, and its slope would be worse than none.
+  // With a step or an edge inside the window the fit is no plane, and its slope would be worse than none.
   if (residual > 2.0 * sigma + 0.002 || !(fit.tail<2>().norm() < kSteepest)) return surface;
-  // Noise hides a step or a bend from single readings, not from the means of lines across it.
+  // A step or a bend that single readings hide in their noise shows in the means of rows and columns.
   double chi2 = 0;
   for (int i = 0; i < kSide; ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
   if (chi2 > kMostOfLines * (2 * kSide - 4)) return surface;
@@ -115,7 +115,7 @@ bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen
   PatchSurface plane = surface;
   if (!(plane.depth > 0)) plane.depth = 1e4;
   const double h = 3.0;
-  // The way there by differences over nine points ...
+  // The warp from reference to current and its derivatives by differences over nine points ...
   Eigen::Vector2d seen[3][3];
   for (int y = 0; y < 3; ++y) {
     for (int x = 0; x < 3; ++x) {
@@ -132,7 +132,7 @@ bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen
   const Eigen::Vector2d xx = (seen[1][2] - 2.0 * seen[1][1] + seen[1][0]) / (h * h);
   const Eigen::Vector2d yy = (seen[2][1] - 2.0 * seen[1][1] + seen[0][1]) / (h * h);
   const Eigen::Vector2d xy = (seen[2][2] - seen[2][0] - seen[0][2] + seen[0][0]) / (4 * h * h);
-  // ... and back: d_ref = A d - A G(A d, A d) / 2, with G the second derivatives of the way there.
+  // ... and its inverse: d_ref = A d - A G(A d, A d) / 2, with G the second derivatives of the forward warp.
   const Eigen::Matrix2d A = A_cur_ref.inverse();
   const auto second = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) -> Eigen::Vector2d {
     return -(A * (xx * (a.x() * b.x()) + xy * (a.x() * b.y() + a.y() * b.x()) + yy * (a.y() * b.y())));

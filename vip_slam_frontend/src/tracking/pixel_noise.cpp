@@ -11,20 +11,20 @@ namespace vip_slam {
 
 namespace {
 
-// Beside noise the scatter of a grey level has a part of its own for every patch: interpolation, blur, shading, slope.
-// This much in grey levels brings the errors of faint and strong patches, measured against true poses, to one level.
+// Sigma of a grey level: besides image noise it covers each patch's own errors by interpolation, blur, shading, slope.
+// With this value, grey levels, the normalised errors of faint and strong patches against true poses are equal.
 constexpr double kGrey = 5.0;
-// A match that leaves more than noise behind is as uncertain as what it left.
+// Factor on a match's residual, which replaces kGrey when it is larger.
 constexpr double kResidual = 2.0;
-// What is left over for a patch of infinite contrast, px: the unit.
+// Remaining sigma of a patch with infinite contrast, px: the unit of the covariance.
 constexpr double kFloor = 0.05;
 constexpr double kAtEdge = 2.5;
-// Matches with a patch whose surface the depth shows (wide, narrow), shows in parts, does not show; px.
+// One sigma of a match, px, for a patch on a known plane (wide, narrow), with depth but no plane, without depth.
 constexpr double kWideSurface = 0.06, kKnownSurface = 0.08, kUnclearSurface = 0.25, kNoSurface = 0.6;
-// What reads the sigma tells by it which tracks slide.
+// The back end recognises sliding tracks by their sigma, so it must separate the kinds of patches.
 static_assert(kUnclearSurface < kSlidingPixelSigma && kNoSurface > kSlidingPixelSigma,
               "the kinds of tracks cannot be told");
-// (grey levels / px)^2 that no patch falls below, so that a bare edge keeps a finite covariance.
+// Added to the texture, (grey levels / px)^2, so that a patch on a straight edge keeps a finite covariance.
 constexpr double kLeastTexture = 20.0;
 
 }  // namespace

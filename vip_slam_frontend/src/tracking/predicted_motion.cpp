@@ -1,4 +1,4 @@
-#include "vip_slam_frontend/tracking/foretold_motion.h"
+#include "vip_slam_frontend/tracking/predicted_motion.h"
 
 #include <algorithm>
 
@@ -8,17 +8,19 @@ namespace {
 
 constexpr int kLeast = 5;
 constexpr double kSigmas = 4.0;
-// Shares of the inliers.
+// Above these shares of found's inliers both motions explain the points, or the bounded one explains enough of them.
 constexpr double kSame = 0.95, kMost = 0.67;
-// When nearly all points, and so many that are old, tell one motion, the IMU has missed something.
+// When nearly all points, at least kEnoughOld of them old, agree on one motion, the IMU has missed something.
 constexpr double kNearlyAll = 0.95;
 constexpr int kEnoughOld = 20;
-// What else a translation may be off by: blur, rolling rows, a clock. m/s
+// Allowance for other errors of a translation (blur, rolling shutter, clock), m/s.
 constexpr double kLeastSpeed = 0.1;
 
 }  // namespace
 
-double mostApart(const ForetoldMotion& foretold) { return kSigmas * foretold.sigma + kLeastSpeed * foretold.interval; }
+double mostApart(const PredictedMotion& prediction) {
+  return kSigmas * prediction.sigma + kLeastSpeed * prediction.interval;
+}
 
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded) {
   int old_found = 0, old_bounded = 0;
@@ -40,21 +42,21 @@ bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found) 
   return old >= kEnoughOld && old_found >= kNearlyAll * old && found.inliers >= kNearlyAll * pairs.size();
 }
 
-RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldMotion& foretold, RansacOptions options,
-                            bool* moves) {
+RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const PredictedMotion& prediction,
+                            RansacOptions options, bool* moves) {
   *moves = false;
   options.most_apart = 0;
-  options.turn_unknown = foretold.turn_unknown;
-  RansacResult found = rejectOutliers(pairs, foretold.T_current_previous, options);
-  if (!(foretold.interval > 0) || !found.ok || !found.with_depth) return found;
-  options.most_apart = mostApart(foretold);
-  if ((found.t_given_rotation - foretold.T_current_previous.t()).norm() < options.most_apart) return found;
-  if (!foretold.wary && !foretold.at_rest && shownByAll(pairs, found)) return found;
-  RansacResult bounded = rejectOutliers(pairs, foretold.T_current_previous, options);
-  // Points far away or few leave the translation open: then both motions explain them.
-  if (!foretold.wary && bounded.inliers > kSame * found.inliers) return found;
+  options.turn_unknown = prediction.turn_unknown;
+  RansacResult found = rejectOutliers(pairs, prediction.T_current_previous, options);
+  if (!(prediction.interval > 0) || !found.ok || !found.with_depth) return found;
+  options.most_apart = mostApart(prediction);
+  if ((found.t_given_rotation - prediction.T_current_previous.t()).norm() < options.most_apart) return found;
+  if (!prediction.wary && !prediction.at_rest && shownByAll(pairs, found)) return found;
+  RansacResult bounded = rejectOutliers(pairs, prediction.T_current_previous, options);
+  // Few or distant points hardly constrain the translation: then both motions explain them.
+  if (!prediction.wary && bounded.inliers > kSame * found.inliers) return found;
   if (bounded.inliers > kMost * found.inliers) return bounded;
-  *moves = foretold.at_rest || movesByItself(pairs, found, bounded);
+  *moves = prediction.at_rest || movesByItself(pairs, found, bounded);
   return *moves ? bounded : found;
 }
 

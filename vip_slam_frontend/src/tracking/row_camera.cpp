@@ -33,7 +33,7 @@ RowPoses::RowPoses(const Readout& readout, const NavState& nav, const std::vecto
   const Eigen::Vector3d v_stamp = nav.T_W_I.R().transpose() * nav.v_W;
   int later = 0;  // the first knot that is not before the stamp
   while (later <= intervals && timeOf(later) < 0) ++later;
-  // From the stamp both ways: body there seen from the body at the stamp, turned into cameras.
+  // Integrates from the stamp in both directions: body pose at a knot relative to the stamp, converted to the camera.
   const auto march = [&](int begin, int end, int way) {
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
     Eigen::Vector3d p = Eigen::Vector3d::Zero(), v = v_stamp;
@@ -73,7 +73,8 @@ bool RowCamera::project(const Eigen::Vector3d& p_stamp, Eigen::Vector2d* uv) con
   if (!rows_) return true;
   Eigen::Matrix3d R;
   Eigen::Vector3d t;
-  // Rows move by a few per cent of what the image moves while it is read, so each turn leaves a few per cent.
+  // Fixed-point iteration: the row moves by a few per cent of the image motion during readout, so each turn leaves a
+  // few per cent of the error.
   for (int turn = 0; turn < 4; ++turn) {
     rows_->at(share(uv->y()), &R, &t);
     if (!camera_->project(R.transpose() * (p_stamp - t), uv)) return false;

@@ -17,9 +17,9 @@ constexpr int kLeastSamples = 42;
 constexpr double kInlierSigmas = 3.5;
 constexpr double kLeastCosine = 0.12;
 constexpr double kMostTurned = 0.985;  // cosine between the normals of a pair
-// Neighbouring readings share part of their error: a patch counts as this share of one reading's sigma at least.
+// Neighbouring readings have correlated errors: a patch's sigma is at least this share of a single reading's.
 constexpr double kLeastShare = 0.35;
-// Errors that no average removes: warped depth, skirtings, doors a little open. Metres.
+// Errors that averaging does not reduce (warped depth, skirting boards, doors slightly ajar), metres.
 constexpr double kFloor = 0.002;
 
 }  // namespace
@@ -44,9 +44,9 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   Eigen::Matrix2d d_uv_xy;
   if (!camera_->undistort(Eigen::Vector2d(u, v), &xy)) return false;
   camera_->distort(xy, &d_uv_xy);
-  // A plane N^T p = 1 is affine in inverse depth, 1/z = N^T (x, y, 1), and for a pinhole also in pixels. Where the lens
-  // bends straight lines it is so in the pixels of a pinhole that touches it in the middle of the patch: in a fisheye's
-  // own the bend of a floor passes for an offset of all depth.
+  // A plane N^T p = 1 is affine in inverse depth, 1/z = N^T (x, y, 1), and for a pinhole also in pixels. With
+  // distortion use the pixels of the pinhole that is tangent to the lens at the patch's centre: in a fisheye's own
+  // pixels the curvature of a floor would appear as an offset of all depth.
   const Eigen::Matrix2d to_samples = d_uv_xy / kSampleStep;
   const auto place = [&](int x, int y) -> Eigen::Vector2d {
     if (undistorted_.empty()) return {x, y};
@@ -99,7 +99,7 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   if (towards < kLeastCosine * ray.norm()) return false;
   const double fitted = std::sqrt(covariance(0, 0)) / (c.x() * c.x());
   patch->sigma = towards * std::max(fitted, kLeastShare * noise_.sigma(1.0 / c.x()));
-  // Turning N by the gradient's errors; the camera's own magnification is left out.
+  // Rotation of N by the gradient's errors; the camera's own magnification is left out.
   const double slope = std::sqrt(std::max(covariance(1, 1), covariance(2, 2))) / kSampleStep;
   patch->sigma_normal = slope * d_uv_xy.norm() / N.norm();
   return true;

@@ -1,4 +1,4 @@
-// Parameters of the planes nodelet beside those of the estimator.
+// Parameters of the planes nodelet in addition to those of the estimator.
 #pragma once
 
 #include <string>

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 
 namespace vip_slam {
@@ -44,7 +45,7 @@ std::vector<Eigen::Vector3d> PlaneSampler::spreadEvenly(const std::vector<Eigen:
     at.push_back(basis.transpose() * p);
     low = low.cwiseMin(at.back()), high = high.cwiseMax(at.back());
   }
-  // The number of a voxel's sum, by its place within the points' bounds; not finer than this many can tell.
+  // Index of each voxel's sum within the points' bounds; the voxel size is raised when there would be more than these.
   constexpr double kMostVoxels = 1e6;
   std::vector<int> index;
   double voxel = std::max(options_.voxel, std::sqrt((high - low).prod() / kMostVoxels));
@@ -82,10 +83,8 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
     sigmas.push_back(sigmaAlong(n_C, p) + 0.001);
     weights.push_back(1.0 / (sigmas.back() * sigmas.back()));
   }
-  std::vector<double> sorted = sigmas;
-  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
   Plane local;
-  const double median = sorted[sorted.size() / 2];
+  const double median = upperMedian(sigmas);
   if (!fitPlaneRobust(*points, weights, median, PlaneKind::kGeneral, n_C, &local, nullptr)) return false;
   std::vector<Eigen::Vector3d> kept;
   PlaneMoments moments;
@@ -94,7 +93,7 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
     kept.push_back((*points)[i]);
     moments.add((*points)[i], 1.0);
   }
-  // Mostly off: clutter. Turned away beyond what noise does to a surface of this size: another surface.
+  // Mostly outliers: clutter. Rotated by more than noise explains for a surface of this size: another surface.
   if (kept.size() < std::max<std::size_t>(options_.min_points, points->size() / 2)) return false;
   const Eigen::Vector3d mean = moments.centroid();
   const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();

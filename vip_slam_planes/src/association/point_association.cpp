@@ -10,7 +10,7 @@
 namespace vip_slam {
 namespace {
 
-// Views of one point that a test uses; more add time, not certainty.
+// Largest number of views of one point in a test; more only cost time.
 constexpr std::size_t kMaxSightings = 12;
 
 }  // namespace
@@ -74,7 +74,7 @@ void PointAssociation::applyMapUpdate(const MapUpdate& update) {
     }
     if (!kept.candidate) assign(target, &kept, moved.candidate, kept.plane);
     if (!kept.placed) kept.p_W = moved.p_W, kept.placed = moved.placed;
-    // The back end gave the joint landmark a plane by its own rule; stating ours settles it.
+    // The back end gave the merged landmark a plane by its own rule; reporting ours keeps both consistent.
     if (!kept.plane && moved.plane) setPlane(target, &kept, moved.plane);
   }
   for (LandmarkId id : update.removed_landmarks) {
@@ -121,7 +121,7 @@ void PointAssociation::removeKeyframe(const Keyframe& keyframe) {
 }
 
 bool PointAssociation::isDue(const Landmark& landmark) const {
-  // Decided points are asked again when their evidence has doubled.
+  // Associated points are tested again when their number of sightings has doubled.
   const std::size_t due = landmark.plane ? 2 * landmark.tested : landmark.tested + 1;
   return landmark.sightings.size() >= std::max<std::size_t>(options_.min_keyframes, due);
 }
@@ -156,8 +156,8 @@ PlaneId PointAssociation::chooseCandidate(const Feature& f, const Landmark& land
                                           const FindPlane& find_plane) const {
   const std::vector<SurfaceLabels::Node> nodes = labels.nodesAround(f.pixel);
   if (nodes.size() < 2) return 0;
-  // Beside a hollow edge, where floor and wall meet, either plane may be it: the nearer one first, and the other one
-  // when the test refuses. Points on an edge that stands out belong to an outline, which moves with the view.
+  // At a concave edge, where floor and wall meet, either plane is possible: the nearer one first, and the other one
+  // when the test refuses it. Points on a convex edge belong to an occluding outline, which moves with the view.
   const Eigen::Matrix3d R = T_map_C.R();
   const auto range = [&](const Plane& plane, const Eigen::Vector3d& ray) {
     const double facing = plane.n.dot(ray);
@@ -222,7 +222,7 @@ void PointAssociation::decide(PlaneId id, const Plane& plane, const CameraPoses&
 
 void PointAssociation::recheck(const FindPlane& find_plane) {
   for (auto& [id, landmark] : landmarks_) {
-    landmark.refused.clear();  // the map has moved: everyone gets another chance
+    landmark.refused.clear();  // the map has moved: refused planes may be tested again
     if (!landmark.plane || !landmark.placed) continue;
     const Plane* plane = find_plane(landmark.plane);
     if (plane && std::abs(plane->signedDistance(landmark.p_W)) < options_.candidate_distance) continue;
@@ -236,7 +236,7 @@ void PointAssociation::renamePlane(PlaneId from, PlaneId into) {
   for (LandmarkId id : landmarksOf(from)) {
     Landmark& landmark = landmarks_.at(id);
     const auto renamed = [from, into](PlaneId plane) { return plane == from ? into : plane; };
-    assign(id, &landmark, renamed(landmark.candidate), renamed(landmark.plane));  // the back end knows by the merge
+    assign(id, &landmark, renamed(landmark.candidate), renamed(landmark.plane));  // not reported: the merge implies it
   }
 }
 
@@ -267,7 +267,7 @@ void PointAssociation::clear() {
 }
 
 std::vector<std::pair<LandmarkId, PlaneId>> PointAssociation::takeAssociated() {
-  // The last word per landmark, in order of ids: the hash table's order must not show.
+  // The final state per landmark, ordered by id, so that the output does not depend on the hash table.
   std::set<LandmarkId> ids;
   for (const auto& [id, plane] : associated_) ids.insert(resolve(id));
   std::vector<std::pair<LandmarkId, PlaneId>> result;

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
 #include "vip_slam_planes/detection/surface_layers.h"
@@ -81,7 +82,7 @@ class Detector {
     }
   }
 
-  // Starts planes from the triangles of a peak; what their surfaces consist of.
+  // Starts planes from the triangles of a peak; returns the triangles that their surfaces consist of.
   std::vector<int> startFrom(const std::vector<int>& members, PlaneKind kind) {
     std::vector<int> used;
     Plane plane;
@@ -108,7 +109,7 @@ class Detector {
     return used;
   }
 
-  // Flood fill over the mesh, after the peaks; accept() takes what is neither horizontal nor vertical.
+  // Flood fill over the mesh, after the peaks; accept() checks that a surface is neither horizontal nor vertical.
   void generalSurfaces() {
     std::vector<char> visited(triangles_.size(), 0);
     const std::vector<char> nowhere(triangles_.size(), 0);
@@ -139,7 +140,7 @@ class Detector {
            std::abs(plane.signedDistance(t.centre)) < widening * distanceGate(t, growth_.distance);
   }
 
-  // The free triangles on the plane, but for those of another layer.
+  // The free triangles on the plane, except those of another layer.
   std::vector<int> gather(const Plane& plane, const std::vector<char>& apart) const {
     std::vector<int> members;
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
@@ -152,7 +153,7 @@ class Detector {
     std::vector<Eigen::Vector3d> points;
     std::vector<double> weights;
     for (int i : members) {
-      // Area, so that dense features do not rule; noise, so that the far end does not.
+      // Weighted by area, so that dense features do not dominate, and by noise, so that the far end does not.
       points.push_back(triangles_[i].centre - camera_);
       const double sigma = triangles_[i].sigma + 0.005;
       weights.push_back(triangles_[i].area / (sigma * sigma));
@@ -169,8 +170,7 @@ class Detector {
   double medianSigma(const std::vector<int>& members) const {
     std::vector<double> sigmas;
     for (int i : members) sigmas.push_back(triangles_[i].sigma);
-    std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
-    return sigmas[sigmas.size() / 2];
+    return upperMedian(std::move(sigmas));
   }
 
   // Connected parts: cells of growth.gap side, joined with their eight neighbours.
@@ -188,7 +188,7 @@ class Detector {
     for (int i : members) {
       const Eigen::Vector2d q = basis.transpose() * (triangles_[i].centre - camera_) / side;
       const auto x = static_cast<std::int64_t>(std::floor(q.x())), y = static_cast<std::int64_t>(std::floor(q.y()));
-      // Triangles come in the order of the mesh: the next one is often in the same cell.
+      // Triangles are in mesh order: the next one is often in the same cell.
       if (cell_of.empty() || cells[cell_of.back()].x != x || cells[cell_of.back()].y != y) {
         const auto [it, fresh] = cell_at.emplace(key(x, y), static_cast<int>(cells.size()));
         if (fresh) cells.push_back({x, y, -1});
@@ -229,7 +229,8 @@ class Detector {
       result.area += triangles_[i].area;
       for (const Eigen::Vector3d& p : triangles_[i].corner) moments.add(p - camera_, triangles_[i].area / 3);
     }
-    // Level surfaces are seen at a flat angle, a few nodes high; what spans a step is level by accident only.
+    // Horizontal surfaces may be strips: they are seen at a flat angle, a few nodes high, and a mesh across a step is
+    // horizontal by accident only.
     if (result.area < options_.min_area) return false;
     const bool strip = kind != PlaneKind::kHorizontal && !isSolid(triangles_, surface);
     if (strip && (!strips_ || kind != PlaneKind::kVertical)) return false;
@@ -250,7 +251,7 @@ class Detector {
     const double spread = std::sqrt(std::max(1e-12, minor));
     if (spread * std::sqrt(12.0) < options_.min_width) return false;  // side of a uniform rectangle
 
-    // Surfaces that lean are left alone: what a free fit says, less what noise explains.
+    // Surfaces that lean are not accepted: the tilt of a free fit minus what noise explains.
     Plane free;
     double free_rms = 0;
     if (!fit(surface, PlaneKind::kGeneral, &free, &free_rms)) return false;
@@ -264,11 +265,11 @@ class Detector {
       const double tilt = kind == PlaneKind::kHorizontal ? std::acos(z) : std::asin(z);
       if (tilt > limit + 2 * uncertainty) return false;
     }
-    // A strip may be the rim of a column; whether it is shows when it is seen from elsewhere.
+    // A strip may be the rim of a column; views from elsewhere will show that (StripEvidence).
     if (!strip && isCurved(triangles_, surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
     result.centroid = mean + camera_;
     for (int i : surface) {
-      // The free triangles were gathered around the whole peak; keep those on this surface's own plane.
+      // The triangles were gathered around the whole peak; keep those on this surface's own plane.
       if (!joins(triangles_[i], result.plane, 1.0)) continue;
       result.triangles.push_back(i);
       if (!strip) taken_[i] = 1;

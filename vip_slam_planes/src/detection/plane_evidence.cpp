@@ -17,16 +17,16 @@ constexpr double kPatchReach = 0.4;  // metres from the patch's first triangle
 constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegree;
 constexpr double kLeastPatch = 0.01;  // m^2
 constexpr std::size_t kLeastTriangles = 4;
-// Of the area that starts a plane in one image. Small upright things are furniture. Dark or polished table tops show in
-// pieces only: what is left of them starts small and waits for frames to grow it.
+// Least area, relative to that for a plane in one image. Small upright surfaces are mostly furniture. Dark or polished
+// table tops have depth in pieces only: such planes start small and are grown by tracked frames.
 constexpr double kLeastUpright = 2.0, kLeastLevel = 0.4;
 constexpr int kMostTests = 4;  // peaks tested per keyframe, the largest ones
-// Of the area of a wall's peak that must be new since its patches were tested. Level ones are tested every time: what
-// shows of a dark table top comes and goes.
+// Share of the area of a wall's peak that must be new since its last test. Horizontal peaks are tested every time,
+// since the visible pieces of a dark table top change.
 constexpr double kFreshShare = 0.25;
 
-// Enough keyframes show a part of the plane, and two of them more than a strip: what spans a step is a strip in every
-// image, however many there are.
+// Whether enough keyframes show a part of the plane, and two of them more than a strip: the mesh across a step is a
+// strip in every image.
 bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::vector<MapTriangle>& triangles,
                     const DetectedPlane& plane, int min_keyframes) {
   std::map<KeyframeId, std::vector<int>> parts;
@@ -39,7 +39,7 @@ bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::ve
          }) >= 2;
 }
 
-// What lies on a floor or table, hardly higher than what joins those, is no surface of its own.
+// Whether the plane lies on a known floor or table, hardly higher than the distance at which it would join that.
 bool liesOn(const DetectedPlane& plane, const std::vector<const PlaneTrack*>& known, const PlaneGrowthOptions& growth) {
   return std::any_of(known.begin(), known.end(), [&](const PlaneTrack* track) {
     if (track->kind() != plane.kind || track->plane().n.dot(plane.plane.n) < 0) return false;
@@ -217,7 +217,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     std::vector<char> taken(triangles.size());
     for (std::size_t i = 0; i < triangles.size(); ++i) taken[i] = label[i] >= 0;
     for (const DetectedPlane& plane : detectPlanesAt(triangles, taken, kind, origin, together, growth_)) {
-      // Each keyframe sees the same surface: what counts is the area that they cover together.
+      // The keyframes see overlapping parts of the surface: use the area that they cover together.
       PlaneTrack area(0, kind, plane.plane, plane.centroid, 0.5 * growth_.cell);
       for (int i : plane.triangles) area.cover(triangles[i], 1, SE3(), nullptr);
       const bool small = area.area() < kLeastUpright * detection_.min_area;

@@ -9,7 +9,7 @@
 namespace vip_slam {
 namespace {
 
-// PlaneMoments of many points: the sums of one triangle, in registers.
+// Accumulates PlaneMoments of many points: only the matrix's upper triangle, kept in registers.
 class MomentSum {
  public:
   void add(const Eigen::Vector3d& p, double w) {
@@ -83,7 +83,7 @@ double normalSigma(const PlaneMoments& moments, PlaneKind kind) {
   if (kind == PlaneKind::kHorizontal) return 0;
   const Eigen::Vector3d mean = moments.centroid();
   const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() - moments.weight() * mean * mean.transpose();
-  double information;  // sum w x^2 about the axis that a turn has the least leverage on
+  double information;  // sum w x^2 about the axis with the least lever arm for a rotation
   if (kind == PlaneKind::kVertical) {
     information = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter.topLeftCorner<2, 2>()).eigenvalues()(1);
   } else {

@@ -12,15 +12,15 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastTurn = 3.0 * kDegree;  // of the line of sight
-constexpr double kTurnsAlong = 1.0 / 3.0;     // share of that by which the face may seem to turn
-constexpr double kShows = 6.0;                // sigmas by which what turns with the line of sight would be off
-constexpr double kOff = 0.02;                 // m, of each one's middle to the other one's plane
+constexpr double kLeastTurn = 3.0 * kDegree;  // change of the line of sight between the two views
+constexpr double kTurnsAlong = 1.0 / 3.0;     // share of that by which the two normals may differ
+constexpr double kShows = 6.0;                // sigmas that a strip turning with the line of sight must deviate by
+constexpr double kOff = 0.02;                 // m, largest distance of each centroid from the other plane
 constexpr double kUpright = 0.5;              // sine of the angle to the vertical; normals of narrow things are noisy
 constexpr double kLeastRemains = 0.03;        // m^2
 constexpr std::size_t kLeastInStrip = 6;
 constexpr double kBeside = 0.15;  // m
-// A body bends; beyond a corner lies another face.
+// Angles to a neighbouring surface between which it counts as a round body; beyond, it is another face at a corner.
 constexpr double kBends = 10.0 * kDegree, kTurnsOff = 60.0 * kDegree;
 constexpr double kBendingShare = 0.25;  // of the strip's area
 
@@ -36,7 +36,8 @@ Eigen::AlignedBox2d boundsOf(const std::vector<MapTriangle>& triangles, const Ei
   return bounds;
 }
 
-/// Whether what lies beside the triangles is turned against them, but not as another face is. All in the camera frame.
+/// Whether surfaces next to the triangles are turned a little against them, as on a round body, but less than another
+/// face is. All in the camera frame.
 bool bendsOn(const std::vector<MapTriangle>& triangles, const Plane& plane, const Eigen::Vector3d& up,
              const std::vector<MapTriangle>& all) {
   const Eigen::Vector3d along = up.cross(plane.n).normalized();
@@ -105,7 +106,7 @@ bool StripEvidence::isOneFace(const Placed& a, const Placed& b) const {
   const Eigen::Vector3d from_a = a.T_C_map.inverse().t(), from_b = b.T_C_map.inverse().t();
   const double turn = angleBetweenUnits(level(middle - from_a), level(middle - from_b));
   if (turn < kLeastTurn || angleBetweenUnits(a.plane.n, b.plane.n) > kTurnsAlong * turn) return false;
-  // How far apart its ends are shows how far off they would be.
+  // The ends of a strip that turned with the line of sight would deviate by half its width times the turn.
   const Eigen::Matrix3d R = a.T_C_map.R();
   const double width = boundsOf(a.strip->triangles, R * along, R.col(2)).sizes().x();
   return 0.5 * width * turn > kShows * std::max(a.strip->sigma, b.strip->sigma);
@@ -156,7 +157,7 @@ std::vector<JointPlane> StripEvidence::stripsWithRemains(const CameraPoses& pose
     for (std::size_t k = 0; k < strips.size();) {
       const Placed strip = place(frames_[f], strips[k], poses);
       JointPlane face;
-      // An older strip has been held against the others when they came.
+      // Strips of older keyframes were already tested against the other keyframes; only the newest is left.
       for (std::size_t g = f == newest ? 0 : newest; g <= newest && !strips[k].bends_on; ++g) {
         Strip remains;
         if (g == f || !poses.count(frames_[g].id) || !remainsOf(strip, frames_[g], poses, &remains)) continue;
@@ -213,7 +214,7 @@ void StripEvidence::take(const Placed& placed, JointPlane* face) const {
 }
 
 bool StripEvidence::fit(const Placed& mine, JointPlane* face) const {
-  PlaneMoments moments;  // about the strip: far from the origin of `map` the scatter would drown
+  PlaneMoments moments;  // relative to the strip: far from the origin of `map` the scatter would lose precision
   for (const EvidenceTriangle& e : face->triangles) {
     const double sigma = e.triangle.sigma + 0.005;
     moments.add(e.triangle.centre - mine.centroid, e.triangle.area / (sigma * sigma));

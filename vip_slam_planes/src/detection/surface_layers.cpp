@@ -8,8 +8,8 @@ namespace vip_slam {
 namespace {
 
 constexpr double kFinest = 0.0025;   // m, bins of the distances along the normal
-constexpr double kValley = 0.4;      // of the lower hump beside it
-constexpr double kLeastShare = 0.2;  // of the whole weight; what is less is outliers
+constexpr double kValley = 0.4;      // largest height of a valley, relative to the lower of the two modes
+constexpr double kLeastShare = 0.2;  // of the whole weight; a smaller part counts as outliers
 constexpr int kLeastVotes = 10;      // fewer have valleys by chance
 constexpr int kMostBins = 1000;      // members of a peak lie within a few tens of centimetres
 
@@ -19,8 +19,8 @@ struct Bin {
   int votes_below = 0;
 };
 
-// Splits [first, last) at its deepest valley, as long as there is one; `cuts` are the first bins of the upper parts.
-// One more bin follows the last.
+// Splits [first, last) recursively at its deepest valley; adds the first bins of the upper parts to `cuts`. One more
+// bin follows the last.
 void cutAtValleys(const std::vector<Bin>& bins, int first, int last, std::vector<int>* cuts) {
   const double least = kLeastShare * bins.back().below;
   const auto suffices = [&](int from, int to) {

@@ -13,7 +13,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kLeastUpright = 0.5;  // sine of the angle between a normal and the vertical
-constexpr double kCore = 0.12;  // share of the width that vertices inside must span; one column of a mesh zigzags
+constexpr double kCore = 0.12;  // share of the width that inner vertices must span; a single column zigzags by less
 
 struct Extent {
   double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
@@ -59,8 +59,8 @@ bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& 
 
 bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
               double sigma) {
-  constexpr double kBends = 1 / 4.0;   // 1/m, for certain; lens and depth distortion bend walls less than that
-  constexpr double kColumn = 1 / 1.0;  // 1/m, possibly
+  constexpr double kBends = 1 / 4.0;   // 1/m, at three sigmas; lens and depth distortion bend walls by less
+  constexpr double kColumn = 1 / 1.0;  // 1/m, curvature that must be excluded by one sigma
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   const Eigen::Matrix<double, 3, 2> basis = tangentBasis(plane.n);
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
@@ -90,8 +90,8 @@ bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>&
 
 bool mayBeAStep(const std::vector<MapTriangle>& triangles, const std::vector<int>& surface, const Plane& plane,
                 const Eigen::Vector3d& camera) {
-  constexpr double kSteep = 0.6;              // cosine of the angle at which it is seen
-  constexpr double kHiddenStep = 5.0 * 2.45;  // sigmas; the mesh asks for five of a second difference, sqrt(1 + 4 + 1)
+  constexpr double kSteep = 0.6;              // cosine of the angle between normal and viewing ray
+  constexpr double kHiddenStep = 5.0 * 2.45;  // sigmas; the mesh breaks at five of a second difference, sqrt(1 + 4 + 1)
   double nearest = std::numeric_limits<double>::infinity(), farthest = 0, facing = 0, sigma = 0;
   for (int i : surface) {
     const Eigen::Vector3d ray = triangles[i].centre - camera;

@@ -6,8 +6,8 @@
 namespace vip_slam {
 
 bool CellGrid::cover(CellIndex c) {
-  constexpr int kSlack = 8;  // cells beyond the need, so that growth copies seldom
-  // 64 MB, 800 m x 800 m of cells of 10 cm: what lies beyond was put there by a pose that went astray.
+  constexpr int kSlack = 8;  // cells allocated in advance, so that growth seldom copies
+  // 64 MB, 800 m x 800 m of cells of 10 cm: cells beyond must be due to a wrong pose.
   constexpr std::int64_t kMostCells = 1 << 26, kFarthest = 1 << 24;
   if (std::abs(std::int64_t(c.x)) > kFarthest || std::abs(std::int64_t(c.y)) > kFarthest) return false;
   if (hits_.empty()) {
@@ -39,7 +39,7 @@ void CellGrid::set(CellIndex c, int hits) {
 }
 
 int CellGrid::count(int min_hits) const {
-  if (min_hits == 1) return covered_;  // asked for several times per keyframe and plane
+  if (min_hits == 1) return covered_;  // needed several times per keyframe and plane
   return static_cast<int>(std::count_if(hits_.begin(), hits_.end(), [&](int h) { return h >= min_hits; }));
 }
 

@@ -6,19 +6,20 @@
 #include <Eigen/Eigenvalues>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/growth/triangle_association.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kLeastTriangles = 10;  // fewer tell no direction
-constexpr double kFacing = 0.7;              // cosine; sides of things that stand on the plane are turned further
-constexpr double kMost = 0.5;                // of the plane's area; a part of a wall may bend, and the wall is one
+constexpr std::size_t kLeastTriangles = 10;  // fewer do not determine a direction
+constexpr double kFacing = 0.7;              // cosine to the plane's normal; sides of objects on it are turned further
+constexpr double kMost = 0.5;                // share of the plane's area; a smaller part of a wall may bend
 constexpr double kSigmas = 3.0;
-constexpr double kOnPlane = 0.01;  // m and three sigmas; further off a corner is no plane's
+constexpr double kOnPlane = 0.01;  // m, plus three sigmas: largest distance of a corner that lies on a plane
 
-/// The plane on whose covered area a corner lies, of several the nearest; null: none.
+/// The nearest plane on whose covered area a corner lies; null: none.
 const PlaneTrack* ownerOf(const Eigen::Vector3d& corner, double sigma, const std::vector<const PlaneTrack*>& tracks) {
   const PlaneTrack* owner = nullptr;
   double best = kOnPlane + kSigmas * sigma;
@@ -32,8 +33,8 @@ const PlaneTrack* ownerOf(const Eigen::Vector3d& corner, double sigma, const std
   return owner;
 }
 
-/// A triangle that spans from one plane to another lies on none. Over a narrow shelf that is seen flat there may be no
-/// others, and from its front edge over its one row of points to the wall behind they make a smooth ramp.
+/// Whether a triangle spans two planes, and so lies on neither. A narrow shelf seen at a flat angle may have only such
+/// triangles: from its front edge over its single row of points to the wall behind they form a smooth ramp.
 bool spansPlanes(const MapTriangle& t, const std::vector<const PlaneTrack*>& tracks) {
   const PlaneTrack* first = nullptr;
   for (const Eigen::Vector3d& corner : t.corner) {
@@ -63,8 +64,7 @@ PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const Plane
     area += t.area;
   }
   if (points.size() < kLeastTriangles || area < kMost * track.area()) return PlaneVerdict::kNone;
-  std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
-  const double sigma = sigmas[sigmas.size() / 2];
+  const double sigma = upperMedian(std::move(sigmas));
   Plane shown;
   double rms = 0;
   if (!fitPlaneRobust(points, weights, sigma + 0.002, PlaneKind::kGeneral, track.plane().n, &shown, &rms)) {
@@ -76,7 +76,7 @@ PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const Plane
   const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
   const double spread =
       std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
-  // Neighbouring triangles share vertices: a quarter of them is independent.
+  // Neighbouring triangles share vertices: count a quarter of them as independent.
   const double uncertainty = std::max(sigma, rms) / (spread * std::sqrt(double(points.size()) / 4.0));
   const double turned = std::acos(std::min(1.0, shown.n.dot(track.plane().n)));
   const bool against = turned > detection.max_tilt_deg * kDegree + kSigmas * uncertainty;

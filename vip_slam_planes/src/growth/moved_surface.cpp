@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::size_t kLeastBefore = 3, kLeastSince = 4;  // observations
 constexpr double kMoved = 0.02;                           // m
-constexpr double kScatter = 0.25;                         // of the way moved, of each group
-constexpr double kSamePlace = 0.4;                        // of the square root of the area, between centroids
+constexpr double kScatter = 0.25;                         // largest scatter of each group, relative to the shift
+constexpr double kSamePlace = 0.4;                        // distance of centroids, relative to the root of the area
 
 struct Seen {
   KeyframeId keyframe;
@@ -43,7 +43,7 @@ KeyframeId surfaceMovedAt(const PlaneTrack& track, const CameraPoses& poses) {
   }
   if (seen.size() < kLeastBefore + kLeastSince) return 0;
   KeyframeId moved_at = 0;
-  double least = 1;  // scatter over way
+  double least = 1;  // scatter over shift
   for (auto since = seen.begin() + kLeastBefore; since + kLeastSince <= seen.end(); ++since) {
     const Group before = groupOf(seen.begin(), since), after = groupOf(since, seen.end());
     const double way = std::abs(after.mean - before.mean), most = std::max(before.deviation, after.deviation);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/surface_layers.h"
 
 namespace vip_slam {
@@ -11,12 +12,6 @@ namespace {
 constexpr std::size_t kLeastInLayers = 30;  // fewer do not show two layers
 constexpr double kLeastStep = 0.02;         // m, between the layers
 constexpr double kStepSigmas = 3.0;
-
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -35,7 +30,7 @@ void releaseOtherLayers(const std::vector<MapTriangle>& triangles, const std::ve
       area.push_back(triangles[i].area);
       sigma.push_back(triangles[i].sigma);
     }
-    const double noise = medianOf(sigma), step = std::max(kLeastStep, kStepSigmas * noise);
+    const double noise = upperMedian(sigma), step = std::max(kLeastStep, kStepSigmas * noise);
     const auto [low, high] = std::minmax_element(offset.begin(), offset.end());
     if (*high - *low < step) continue;
     const auto layers = splitLayers(offset, area, noise);
@@ -44,7 +39,7 @@ void releaseOtherLayers(const std::vector<MapTriangle>& triangles, const std::ve
     for (const std::vector<int>& layer : layers) {
       std::vector<double> own;
       for (int i : layer) own.push_back(offset[i]);
-      depth.push_back(medianOf(std::move(own)));
+      depth.push_back(upperMedian(std::move(own)));
     }
     const double nearest =
         *std::min_element(depth.begin(), depth.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });

@@ -34,7 +34,7 @@ class Tracer {
     for (int y = y0_; y < y0_ + height_; ++y) {
       const unsigned char *below = &covered_[cell(x0_ - 1, y - 1)], *above = &covered_[cell(x0_ - 1, y)];
       for (int i = 0; i < width_; ++i) {
-        // Most corners have the same on all sides, and so do those beside them.
+        // Most corners have four equal cells around them, and so do their neighbours: skip them by words.
         if (i + kWord <= width_ && uniform(below + i, above + i)) {
           i += kWord - 1;
           continue;
@@ -51,12 +51,12 @@ class Tracer {
   }
 
  private:
-  // A rim of one empty cell all around spares the checks of the bounds.
+  // A margin of one empty cell all around avoids bounds checks.
   std::size_t cell(int x, int y) const {
     return static_cast<std::size_t>(y - y0_ + 1) * (width_ + 1) + static_cast<std::size_t>(x - x0_ + 1);
   }
   bool covered(int x, int y) const { return covered_[cell(x, y)]; }
-  // Whether kWord + 1 cells of two rows are all covered or all not.
+  // Whether kWord + 1 cells of two rows are all covered or all empty.
   static bool uniform(const unsigned char* below, const unsigned char* above) {
     std::uint64_t b, a;
     std::memcpy(&b, below, kWord);
@@ -89,7 +89,7 @@ class Tracer {
       last = direction;
       c.x += kDx[direction];
       c.y += kDy[direction];
-      // Left first where two borders cross: diagonal cells then belong to different rings (4-connected).
+      // Turn left first where two borders cross: diagonal cells then belong to different rings (4-connected).
       for (int turn : {1, 0, 3}) {
         if (border(c, (direction + turn) % 4)) {
           direction = (direction + turn) % 4;
@@ -131,7 +131,7 @@ void simplify(const Ring2d& ring, std::size_t first, std::size_t last, double to
 
 Ring2d simplified(const Ring2d& ring, double tolerance) {
   if (ring.size() <= 4) return ring;
-  // Anchored at two far corners, which are true corners of the shape whatever the start of the trace.
+  // Anchored at two opposite extreme corners, which are true corners of the shape wherever the trace starts.
   std::size_t a = 0, b = 0;
   for (std::size_t i = 1; i < ring.size(); ++i) {
     if (ring[i].sum() < ring[a].sum()) a = i;
@@ -187,7 +187,7 @@ std::vector<Outline> traceOutlines(const CellGrid& grid, double cell, int min_hi
   }
   std::vector<Outline> outlines(outers.size());
   for (const Ring2d& hole : holes) {
-    // Half a cell into the covered side of the first border lies in the piece that owns the hole.
+    // The point half a cell into the covered side of the first border lies in the piece that owns the hole.
     const Eigen::Vector2d along = (hole[1] - hole[0]).normalized();
     const Eigen::Vector2d probe = hole[0] + 0.5 * cell * (along + Eigen::Vector2d(-along.y(), along.x()));
     std::size_t owner = outers.size();  // the smallest: an island's ring also lies inside the piece around it

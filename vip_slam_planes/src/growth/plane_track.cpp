@@ -6,14 +6,14 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastTurn = 1e-3, kLeastShift = 1e-3;  // radians, metres; less is no change
-constexpr double kLargeTurn = 0.3;  // radians; an adjustment turns by less, a loop that ties parts by anything
+constexpr double kLeastTurn = 1e-3, kLeastShift = 1e-3;  // radians, metres; smaller changes are ignored
+constexpr double kLargeTurn = 0.3;  // radians; an adjustment turns hosts by less, a loop that joins parts by any angle
 
 }  // namespace
 
 PlaneTrack::PlaneTrack(PlaneId id, PlaneKind kind, const Plane& plane, const Eigen::Vector3d& origin, double cell)
     : id_(id), kind_(kind), plane_(plane), cell_(cell) {
-  // Walls: x level, y up. Floors: x east. So that polygons of upright things are upright rectangles.
+  // Walls: x horizontal, y up. Floors: x along the map's x. So that cells and polygons of walls are upright rectangles.
   const Eigen::Vector3d level = Eigen::Vector3d::UnitZ().cross(plane.n);
   alignFrame(level.norm() > 0.1 ? level : Eigen::Vector3d::UnitX(), origin);
 }
@@ -32,7 +32,7 @@ void PlaneTrack::setPlane(const Plane& plane) {
 void PlaneTrack::coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C) {
   const int before = cells_.at(c);
   cells_.set(c, std::min(kMostHits, before + hits));
-  if (before > 0 || cells_.at(c) == 0) return;  // beyond what a grid takes
+  if (before > 0 || cells_.at(c) == 0) return;  // covered before, or outside the largest grid
   area_changed_ = grown_ = true;
   lost_ = std::max(0, lost_ - 1);
   auto [it, fresh] = patches_.try_emplace(host);
@@ -74,7 +74,7 @@ void PlaneTrack::coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& ho
   for (const Eigen::Vector2d& q : outer) low = low.cwiseMin(q), high = high.cwiseMax(q);
   std::vector<const Ring2d*> rings = {&outer};
   for (const Ring2d& hole : holes) rings.push_back(&hole);
-  std::vector<double> edges;  // where the outline and the holes cross a row: inside between the first two, the next two
+  std::vector<double> edges;  // crossings of outline and holes with a row: inside between each pair of them
   for (int y = cellAt(low).y; y <= cellAt(high).y; ++y) {
     const double v = (y + 0.5) * cell_;
     edges.clear();
@@ -146,7 +146,7 @@ void PlaneTrack::followKeyframes(const CameraPoses& poses) {
   if (!moved) return;
   area_changed_ = grown_ = true;
 
-  // Where each cell was, before the frame moves.
+  // Position of each cell before the frame moves.
   CellGrid old;
   std::swap(old, cells_);
   struct Source {
@@ -176,7 +176,7 @@ void PlaneTrack::followKeyframes(const CameraPoses& poses) {
       cells_.set(c, std::max(cells_.at(c), source.hits[i]));
     }
   }
-  // The frame went with most of them: in it they are about where they were.
+  // The frame moved with the host of most cells, so in it most cells are about where they were.
   cells_.closePinholes([&old](CellIndex c) { return old.at(c) > 0; });
 }
 
@@ -215,7 +215,7 @@ void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
     PlaneObservation& mine = it->second;
     mine.plane = id_;
     if (fresh) continue;
-    // Both saw parts of the same plane: the samples join, and the joint count is capped as each was.
+    // Both saw parts of the same plane: the samples are joined, and the effective count is capped as each was.
     const double n1 = double(mine.points.size()), n2 = double(theirs.points.size());
     const double effective = std::max(mine.weight_scale * n1, theirs.weight_scale * n2);
     const Eigen::Matrix4d sum = mine.G / mine.weight_scale + theirs.G / theirs.weight_scale;
@@ -246,7 +246,7 @@ bool PlaneTrack::changed(bool reset) {
 }
 
 std::vector<PlanePolygon> PlaneTrack::polygons(int min_hits) {
-  // Stairs of diagonal borders are one cell high; anything smaller than three by three cells is a speck.
+  // Staircases of diagonal borders are one cell high; pieces smaller than three by three cells are specks.
   const double speck = 9 * cell_ * cell_;
   const auto lift = [&](const Ring2d& ring) {
     Ring out;
@@ -254,7 +254,7 @@ std::vector<PlanePolygon> PlaneTrack::polygons(int min_hits) {
     return out;
   };
   std::vector<PlanePolygon> result;
-  // One more hit shows only where more than one is asked for.
+  // A change of hits alone matters only with min_hits above one.
   if (area_changed_ || (hits_changed_ && min_hits > 1)) {
     outlines_ = traceOutlines(cells_, cell_, min_hits, 0.5 * speck, speck, 0.8 * cell_);
   }

@@ -13,10 +13,10 @@ struct CellBox {
   CellIndex first, last;
 };
 
-// Cells that may lie in the image no further than `range` along its axis: a floor has tens of thousands, an image shows
-// a few hundred of them. The bounds of the view's pyramid, laid onto the plane.
+// Bounds of the cells that may lie in the image within `range` along its axis, from the view's pyramid projected onto
+// the plane: a floor has tens of thousands of cells, an image shows a few hundred.
 CellBox cellsInView(const PlaneTrack& track, const CameraModel& camera, const SE3& T_map_C, double range) {
-  constexpr double kSlack = 1.02;  // lens distortion bends the sides of the image between the points asked
+  constexpr double kSlack = 1.02;  // lens distortion bends the sides of the image between the points used
   const CellGrid& cells = track.cells();
   const CellBox all{{cells.x0(), cells.y0()}, {cells.x0() + cells.width() - 1, cells.y0() + cells.height() - 1}};
   Eigen::Vector2d low = track.toPlane(T_map_C.t()), high = low;
@@ -68,7 +68,7 @@ int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, co
   if (grid.empty()) return 0;
   const SE3 T_C_map = T_map_C.inverse();
   const Eigen::Vector3d n_C = T_C_map.rotation() * track->plane().n;
-  // Nothing is refuted far behind all that was measured.
+  // Cells far behind all measured depth cannot be refuted.
   const double deepest = *std::max_element(grid.z.begin(), grid.z.end());
   const double range = std::min(noise.max_range, deepest + margin / kGrazing + 3 * noise.sigma(noise.max_range));
   const CellBox view = cellsInView(*track, camera, T_map_C, range);

@@ -9,18 +9,19 @@ namespace {
 
 constexpr double kWidestAngle = 25.0 * kDegree;
 constexpr int kNone = -1;
-constexpr double kToldApart = 2.0;    // sigmas of a triangle's distance by which one plane must be nearer than another
+constexpr double kToldApart = 2.0;    // sigmas of a triangle's distance by which the nearest plane must be nearer
 constexpr double kLeastSigma = 1e-3;  // m
-constexpr double kWorstSquare = 9.0;  // what lies further off speaks against neither plane the more
+constexpr double kWorstSquare = 9.0;  // cap on a squared distance, sigmas^2, so that outliers do not decide
 
-/// A triangle between two planes that its noise does not tell apart.
+/// A triangle whose noise does not allow a decision between two planes.
 struct Doubt {
   int track[2] = {kNone, kNone};  ///< in ascending order; none: no doubt
-  double squares[2] = {0, 0};     ///< of its distance to each, in sigmas
+  double squares[2] = {0, 0};     ///< squared distance to each, in sigmas
 };
 
-// From afar half of the triangles of a wall lie nearer to whatever runs a few centimetres before it, a door or a plane
-// that noise has tilted, and would go on growing and tilting it. All of a connected patch in doubt tell better.
+// From afar half of a wall's triangles are nearer to a plane that runs a few centimetres in front of it, a door or one
+// tilted by noise, and would keep growing and tilting it. So each connected patch of doubtful triangles decides
+// jointly.
 void settleDoubts(const std::vector<MapTriangle>& triangles, const std::vector<Doubt>& doubts,
                   std::vector<int>* label) {
   std::vector<char> visited(triangles.size(), 0);
@@ -45,7 +46,7 @@ void settleDoubts(const std::vector<MapTriangle>& triangles, const std::vector<D
   }
 }
 
-// The nearest admissible plane of each open triangle, but for the one that let it go.
+// Labels each open triangle with its nearest admissible plane, except the one that refused it.
 void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
                    const std::vector<int>& refused, const PlaneGrowthOptions& options, std::vector<int>* label) {
   const AngleGate gate(options.angle_deg);
@@ -77,8 +78,8 @@ void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<
   settleDoubts(triangles, doubts, label);
 }
 
-// Takes the label from connected patches that come nowhere near the area of their plane, and notes who refused them.
-// Returns true when any did.
+// Removes the label from connected patches that are not near the covered area of their plane, and records the plane in
+// `refused`. Returns true when there was any.
 bool dropDetached(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
                   const std::vector<char>& settled, double gap, std::vector<int>* label, std::vector<int>* refused) {
   std::vector<char> visited(triangles.size(), 0);
@@ -127,7 +128,7 @@ std::vector<int> associateTriangles(const std::vector<MapTriangle>& triangles,
   std::vector<char> settled(triangles.size(), 0);
   nearestPlanes(triangles, tracks, refused, options, &label);
   if (!dropDetached(triangles, tracks, settled, options.gap, &label, &refused)) return label;
-  // A plane far away in its own extent may have been a little nearer than the right one; ask again without it.
+  // A plane whose covered area is far away may have been slightly nearer than the right one: try again without it.
   for (std::size_t i = 0; i < triangles.size(); ++i) settled[i] = label[i] != kNone;
   nearestPlanes(triangles, tracks, refused, options, &label);
   dropDetached(triangles, tracks, settled, options.gap, &label, &refused);

@@ -9,12 +9,12 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kWays = 8, kPlaces = 12;  // from as many border cells of the smaller piece, on each
-constexpr double kRim = 0.15;                   // m; the rim of a piece is not known better
-constexpr double kOpen = 0.05;                  // share of the places; poses and depth are not exact
+constexpr std::size_t kWays = 8, kPlaces = 12;  // lines from the smaller piece to the larger, and points on each
+constexpr double kRim = 0.15;                   // m, uncertainty of a piece's border, not tested
+constexpr double kOpen = 0.05;                  // share of points that may be open, since poses and depth have errors
 constexpr double kFlat = 0.25;                  // cosine of 75 degrees
-constexpr double kUnsure = 0.5;                 // share of the places that nothing needs to tell of
-constexpr double kFlattest = 0.1;               // cosine of 84 degrees, as far as level surfaces are looked for
+constexpr double kUnsure = 0.5;                 // share of points that may be undecided
+constexpr double kFlattest = 0.1;               // cosine of 84 degrees, the mesh's limit for horizontal surfaces
 
 std::vector<Eigen::Vector3d> borderOf(const PlaneTrack& track) {
   std::vector<Eigen::Vector3d> border;
@@ -56,8 +56,8 @@ std::vector<Eigen::Vector3d> placesBetween(const PlaneTrack& small, const PlaneT
 
 enum class Sight { kOutside, kUnsure, kBlocked, kOpen };
 
-// Of the four nodes around a place's image: when none shows anything in front of it or on the plane it is open. Not
-// every floor beside a table gives depth.
+// Judges a point by the four nodes around its projection: it is open when none of them shows a surface on the plane or
+// in front of it. Missing depth counts as open, since not every floor next to a table has depth.
 Sight look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3d& n_C, const SceneView& view) {
   Eigen::Vector2d uv;
   int c = 0, r = 0;
@@ -72,7 +72,7 @@ Sight look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3
     if (z > 0 && z <= p.z() + slack) return Sight::kBlocked;
     behind += z > 0;
   }
-  // A surface that is seen flat may give no depth itself.
+  // At a flat angle missing depth may be that of the surface itself.
   return behind < 4 && -n_C.dot(p) < kFlat * p.norm() ? Sight::kUnsure : Sight::kOpen;
 }
 

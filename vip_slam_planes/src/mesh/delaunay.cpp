@@ -53,7 +53,7 @@ void Delaunay::start(int width, int height) {
 
 int Delaunay::locate(const Point& p) const {
   int f = last_;
-  // The walk ends in a Delaunay triangulation; the bound only guards against a broken one.
+  // In a Delaunay triangulation the walk terminates; the bound only guards against a broken one.
   for (std::size_t step = 0; step < 4 * faces_.size() + 16; ++step) {
     const Face& face = faces_[f];
     int next = -1;
@@ -76,7 +76,7 @@ void Delaunay::insert(int vertex) {
     if (points_[v].x == p.x && points_[v].y == p.y) return;  // repeated point
   }
 
-  // The cavity: faces whose circumcircle holds p, a connected star-shaped region around p.
+  // The cavity: faces whose circumcircle contains p, a connected star-shaped region around p.
   ++stamp_;
   cavity_.clear();
   rim_.clear();
@@ -102,7 +102,7 @@ void Delaunay::insert(int vertex) {
     free_.push_back(f);
   }
 
-  // One new face per side of the rim; face_from_[a] is the one whose rim side starts at a.
+  // One new face per side of the rim; face_from_[a] is the face whose rim side starts at a.
   for (const Side& side : rim_) {
     const int f = newFace();
     faces_[f] = {{side.a, side.b, vertex}, {-1, -1, side.outside}, true, 0};
@@ -140,7 +140,7 @@ const std::vector<DelaunayTriangle>& Delaunay::triangulate(const std::vector<Eig
     insert(kCorners + static_cast<int>(i));
   }
 
-  // Faces that touch the box's corners are no part of the result.
+  // Faces that touch the box's corners are not part of the result.
   std::vector<int>& number = stack_;
   number.assign(faces_.size(), -1);
   result_.clear();

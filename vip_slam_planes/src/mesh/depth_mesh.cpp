@@ -11,9 +11,9 @@
 namespace vip_slam {
 namespace {
 
-// Share of a pixel's depth sigma left in a safe depth, which is the median of a 5x5 window of correlated pixels.
+// Sigma of an edge-safe depth relative to a single pixel's: it is the median of a 5x5 window of correlated pixels.
 constexpr float kMedianGain = 0.5f;
-constexpr float kLevel = 0.9f;        // cosine to the vertical: before neighbours are averaged normals are noisy
+constexpr float kLevel = 0.9f;        // cosine to the vertical of horizontal normals, which are noisy before averaging
 constexpr float kSameSurface = 0.9f;  // cosine between neighbouring normals that are averaged (26 degrees)
 
 }  // namespace
@@ -104,7 +104,7 @@ void DepthMeshBuilder::collectVertices(const std::vector<Feature>& features, con
     for (int c = 0; c < grid.cols; c += step) {
       add(c, r, false);
       if (step < 2 || flatBlock(grid, c, r, step)) continue;
-      // Narrow strips of a surface beside an edge would fall between the coarse nodes.
+      // Narrow strips of a surface next to an edge would be missed by the coarse nodes.
       for (int y = r; y <= std::min(r + step, grid.rows - 1); ++y) {
         for (int x = c; x <= std::min(c + step, grid.cols - 1); ++x) add(x, y, true);
       }
@@ -132,14 +132,14 @@ bool DepthMeshBuilder::flatBlock(const DepthGrid& grid, int c, int r, int step) 
 }
 
 bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const {
-  // Grid nodes beside the middle of each side must lie on the triangle's plane.
+  // Grid nodes around the middle of each side must lie on the triangle's plane.
   int missing = 0;
   const float d = -triangle.n_C.dot(triangle.centre_C);
   for (int k = 0; k < 3; ++k) {
     const MeshVertex& a = mesh_.vertices[triangle.vertex[(k + 1) % 3]];
     const MeshVertex& b = mesh_.vertices[triangle.vertex[(k + 2) % 3]];
     const Eigen::Vector2f middle = 0.5f * (a.pixel + b.pixel);
-    // Between neighbouring nodes there is no third one to ask.
+    // Between neighbouring nodes there is no third one to test.
     const bool neighbours =
         a.feature < 0 && b.feature < 0 && (a.pixel - b.pixel).cwiseAbs().maxCoeff() < 1.5f * float(grid.stride);
     if (neighbours && brokenBetween(a, b, grid)) return true;
@@ -157,13 +157,13 @@ bool DepthMeshBuilder::crossesDepthEdge(const MeshTriangle& triangle, const Dept
     const float sigma = float(noise_.sigma(z)) * kMedianGain * std::abs(triangle.n_C.dot(ray));
     if (off > float(options_.gap_sigmas) * sigma + 0.005f) return true;
   }
-  return missing >= 2;  // the depth look-up refuses pixels beside an edge
+  return missing >= 2;  // the edge-safe depth look-up refuses pixels next to an edge
 }
 
 bool DepthMeshBuilder::brokenBetween(const MeshVertex& a, const MeshVertex& b, const DepthGrid& grid) const {
-  // On a surface inverse depth goes on linearly. There is a step or a crease in between when neither end goes on to the
-  // other one, and one of them lies on a surface with the two nodes behind it. (A strip of two nodes between other
-  // things may be a surface; nothing speaks against it.)
+  // On a surface inverse depth is linear in the image. There is a step or a crease in between when neither end
+  // continues linearly to the other one, and one of them lies on a surface with the two nodes behind it. (A strip of
+  // two nodes between other surfaces may be a surface itself.)
   const auto node = [&](const Eigen::Vector2f& pixel) {
     const int c = static_cast<int>(std::lround((pixel.x() - float(grid.offset)) / float(grid.stride)));
     const int r = static_cast<int>(std::lround((pixel.y() - float(grid.offset)) / float(grid.stride)));
@@ -214,7 +214,7 @@ bool DepthMeshBuilder::lift(const DelaunayTriangle& flat, const DepthGrid& grid,
   triangle->sigma = float(noise_.sigma(z)) * kMedianGain * facing / z;
   triangle->sigma_angle = triangle->sigma / altitude;
   if (grid.empty()) return true;
-  // Between the nodes of a grid as coarse as the mesh there is nothing to ask, but across a hole in the depth there is.
+  // In a grid as coarse as the mesh there are no nodes in between to test, except across a hole in the depth.
   return (step < 2 && !skipsNodes(flat, grid)) || !crossesDepthEdge(*triangle, grid);
 }
 

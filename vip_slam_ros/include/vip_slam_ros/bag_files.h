@@ -1,4 +1,4 @@
-// Opening recordings: every tool says in the same words what is wrong with a bag.
+// Opening recordings, with the same error messages in every tool.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace vip_slam {
 
-/// Opens `path` for reading. Throws std::runtime_error naming the file: not there, no bag, or cut off, with what mends
-/// it.
+/// Opens `path` for reading. Throws std::runtime_error naming the file: missing, not a bag, or truncated, with the
+/// remedy.
 void openBag(const std::string& path, rosbag::Bag* bag);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// The calibration that the front end resolved, handed to the other nodelets.
+// The calibration that the front end resolved, passed to the other nodelets.
 #pragma once
 
 #include <string>

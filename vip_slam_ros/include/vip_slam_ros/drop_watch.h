@@ -1,5 +1,5 @@
-// Whether messages are being dropped, as against: once were. Diagnostics that warn for good after one hiccup at the
-// start teach people not to look.
+// Whether messages have been dropped recently, not ever: diagnostics that keep warning after one hiccup at the start
+// would be ignored.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@ namespace vip_slam {
 
 class DropWatch {
  public:
-  /// `total`: messages dropped so far; a smaller one than before begins a new count. `now`: seconds on a clock that
-  /// does not run back. True when some were dropped within the last 30 s as far as the calls tell.
+  /// `total`: messages dropped so far; a smaller value than before starts a new count. `now`: seconds on a monotonic
+  /// clock. True when some were dropped within the last 30 s, as seen by these calls.
   bool lately(std::size_t total, double now) {
     if (total > last_) since_ = now;
     last_ = total;

@@ -1,4 +1,4 @@
-// What the front end hands on: core types <-> messages, without loss.
+// The front end's output: core types <-> messages, without loss.
 #pragma once
 
 #include <string>
@@ -22,8 +22,8 @@ vip_slam_msgs::DepthGrid toMsg(const DepthGrid& grid);
 vip_slam_msgs::TrackedFrame toMsg(const TrackedFrame& frame, const std::string& odom_frame);
 vip_slam_msgs::Keyframe toMsg(const Keyframe& keyframe, const std::string& odom_frame);
 
-/// All throw std::invalid_argument naming the field when a message contradicts itself (a state that does not exist, a
-/// depth grid whose size is not cols x rows).
+/// All throw std::invalid_argument naming the field when a message is inconsistent (an unknown state, a depth grid
+/// whose size is not cols x rows).
 TrackingStatus fromMsg(const vip_slam_msgs::TrackingStatus& msg);
 ImuSample fromMsg(const vip_slam_msgs::ImuSample& msg);
 NavState fromMsg(const vip_slam_msgs::NavState& msg);

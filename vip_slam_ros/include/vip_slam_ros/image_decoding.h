@@ -1,4 +1,4 @@
-// Images from drivers, recordings and phones to what the front end takes: 8-bit gray, and depth in metres.
+// Converts images from drivers, recordings and phones to the front end's input: 8-bit gray, and depth in metres.
 #pragma once
 
 #include <sensor_msgs/CompressedImage.h>
@@ -9,20 +9,20 @@
 
 namespace vip_slam {
 
-/// 8UC1 of its own memory. Takes mono8, 8UC1, mono16, rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, yuv422, yuv422_yuy2 and
+/// 8UC1 with its own memory. Accepts mono8, 8UC1, mono16, rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, yuv422, yuv422_yuy2 and
 /// 8-bit Bayer. All decoders throw std::invalid_argument naming the encoding or size found and what was expected.
 cv::Mat decodeGray(const sensor_msgs::Image& image);
 /// JPEG or PNG.
 cv::Mat decodeGray(const sensor_msgs::CompressedImage& image);
 
-/// 32FC1 metres, 0 = invalid. Takes 16UC1 and mono16 (times `scale` metres per unit) and 32FC1 (metres); `offset`
+/// 32FC1 metres, 0 = invalid. Accepts 16UC1 and mono16 (times `scale` metres per unit) and 32FC1 (metres); `offset`
 /// metres are added to every reading.
 cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset = 0);
 /// 16-bit PNG, bare or behind the 12-byte header of compressedDepth (16UC1, or 32FC1 quantised as inverse depth).
 cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, double offset = 0);
 
-/// Whether a depth image (32FC1 metres) holds next to nothing that the sensor could have measured, judged on some of
-/// its pixels: a wrong scale, another topic, an emitter that is off.
+/// Whether a depth image (32FC1 metres) has hardly any values within the sensor's range, judged on a sample of its
+/// pixels: a wrong scale, another topic, an emitter that is off.
 bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise);
 
 }  // namespace vip_slam

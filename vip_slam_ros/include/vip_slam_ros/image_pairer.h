@@ -1,5 +1,5 @@
-// Joins colour and depth images by their stamps. ROS-free, single owner; the nodelet and the offline runner share it,
-// so that both see the same pairs.
+// Pairs colour and depth images by their stamps. ROS-free, single owner; used by the nodelet and the offline runner, so
+// that both get the same pairs.
 #pragma once
 
 #include <cstddef>
@@ -20,13 +20,13 @@ struct StampedImage {
 struct ImagePair {
   double t = 0;  ///< stamp of gray
   cv::Mat gray;
-  cv::Mat depth;            ///< empty: none came in time
+  cv::Mat depth;            ///< empty: none arrived in time
   double depth_lag = 0;     ///< stamp of depth - stamp of gray, seconds
-  std::uint64_t stamp = 0;  ///< of gray in nanoseconds, as it was handed in: t cannot hold each of them
+  std::uint64_t stamp = 0;  ///< of gray in nanoseconds, as given: exact, unlike the double t
 };
 
 struct PairerOptions {
-  double tolerance = 0.035;  ///< largest difference between the stamps of a pair, seconds: an image at 30 Hz
+  double tolerance = 0.035;  ///< largest difference between the stamps of a pair, seconds: one period at 30 Hz
   double patience = 0.15;    ///< colour waits for its depth until any image is this much newer, seconds
   std::size_t capacity = 20;
 };
@@ -35,28 +35,28 @@ struct PairerCounters {
   std::size_t pairs = 0;
   std::size_t without_depth = 0;  ///< colour images that no depth matched
   std::size_t unused_depth = 0;
-  std::size_t dropped = 0;   ///< colour images that the queue could not hold
+  std::size_t dropped = 0;   ///< colour images dropped from a full queue
   std::size_t backward = 0;  ///< images whose stamp was not newer than the one before
   double skew = 0;           ///< depth stamp - colour stamp of the newest pair, seconds
 };
 
-/// Most colour images between two counts have found no depth: the streams are not synchronised.
+/// Whether most colour images between two counts had no depth: the streams are not synchronised.
 bool mostlyUnpaired(const PairerCounters& before, const PairerCounters& now);
 
 class ImagePairer {
  public:
   explicit ImagePairer(const PairerOptions& options = {}) : options_(options) {}
 
-  /// Images come in the order of their stamps per stream; others are counted and refused (false).
+  /// Images of each stream must be in the order of their stamps; others are counted and refused (false).
   bool addColor(double t, cv::Mat gray, std::uint64_t stamp = 0);
   bool addDepth(double t, cv::Mat depth);
 
-  /// The oldest colour image once its depth is there, or cannot come any more. Depth matches by the nearest stamp.
-  /// A depth image goes to no colour image but the one nearest to it. One between two colour images waits for the later
-  /// of them, unless their interval tells already that it is nearer to the earlier.
+  /// The oldest colour image once its depth has arrived or can no longer arrive, with the depth of the nearest stamp.
+  /// A depth image is only paired with the colour image nearest to it. Between two colour images it waits for the later
+  /// one, unless the usual interval shows already that it is nearer to the earlier.
   const ImagePair* front();
   void pop();
-  /// Nothing comes any more: what waits is handed out by front(), with what depth there is.
+  /// No more images will come: front() returns the waiting ones with the depth available.
   void end() { ended_ = true; }
   void clear();
 
@@ -66,14 +66,14 @@ class ImagePairer {
 
  private:
   void popColor();
-  /// A depth image at `t` is not nearer to another colour image than to the oldest that waits.
+  /// Whether a depth image at `t` is not nearer to another colour image than to the oldest waiting one.
   bool belongsToFront(double t) const;
-  double colorInterval() const;  ///< the shortest of late, seconds
+  double colorInterval() const;  ///< the shortest recent interval, seconds
 
   PairerOptions options_;
   std::deque<StampedImage> color_, depth_;
   std::deque<double> color_intervals_;    ///< of the last colour images, seconds
-  std::optional<double> previous_color_;  ///< stamp of the one before the oldest that waits
+  std::optional<double> previous_color_;  ///< stamp of the colour image before the oldest waiting one
   std::optional<double> newest_color_, newest_depth_;
   std::optional<ImagePair> front_;
   bool ended_ = false;

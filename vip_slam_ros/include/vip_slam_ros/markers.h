@@ -11,7 +11,7 @@
 namespace vip_slam {
 
 std_msgs::ColorRGBA makeColor(double r, double g, double b, double a = 1.0);
-/// A colour that stays with the id and differs from its neighbours': hues a golden ratio apart.
+/// A constant colour per id that differs from those of neighbouring ids: hues in golden-ratio steps.
 std_msgs::ColorRGBA colorOfId(std::uint64_t id, double alpha = 1.0);
 /// An ADD marker with identity pose and unit scale.
 visualization_msgs::Marker makeMarker(const std_msgs::Header& header, const std::string& ns, int id, int type);

@@ -1,5 +1,5 @@
-// The thread that owns an estimator: everything that touches the estimator runs here, in the order it was handed over.
-// Work comes in lanes of bounded length; a full lane loses its oldest work, and the loss is counted.
+// The thread that owns an estimator: all tasks that use the estimator run here, in the order of their posting.
+// Tasks are queued in lanes of bounded length; a full lane drops its oldest task and counts it.
 #pragma once
 
 #include <condition_variable>
@@ -17,24 +17,26 @@ namespace vip_slam {
 class OwnerThread {
  public:
   using Lane = std::size_t;
-  /// Called with the words of an exception that a task let out.
+  /// Called with what() of a std::exception thrown by a task. Any other exception of a task ends the process.
   using ErrorHandler = std::function<void(const std::string&)>;
 
   explicit OwnerThread(ErrorHandler on_error);
-  /// Finishes the task at hand, forgets the rest.
+  /// Finishes the running task, discards the rest.
   ~OwnerThread();
   OwnerThread(const OwnerThread&) = delete;
   OwnerThread& operator=(const OwnerThread&) = delete;
 
   /// Before start().
   Lane addLane(const std::string& name, std::size_t capacity);
-  /// `niceness`: how far the thread gives way, see thread_priority.h.
+  /// `niceness`: added to the thread's nice value, see thread_priority.h.
   void start(int niceness = 0);
+  /// Finishes the running task, discards the rest; waiting call()s of discarded tasks return false.
   void stop();
 
-  /// False when the lane was full and its oldest task went, or when the thread has stopped.
+  /// False when the lane was full and its oldest task was dropped, or when the thread has stopped.
   bool post(Lane lane, std::function<void()> task);
-  /// Runs `task` on the thread and waits for it. False when it did not begin within `seconds` (it then never will).
+  /// Runs `task` on the thread, waits for it and rethrows its exception. False when it did not start within `seconds`,
+  /// was dropped from a full lane, or the thread has stopped; then it never runs.
   bool call(Lane lane, std::function<void()> task, double seconds);
 
   struct LaneState {

@@ -1,4 +1,4 @@
-// Option structs from ROS parameters: "group/name" is looked up below the given namespace.
+// Option structs from ROS parameters: "group/name" is read below the given namespace.
 #pragma once
 
 #include <set>
@@ -12,14 +12,14 @@
 
 namespace vip_slam {
 
-/// The parameters below `nh`'s namespace but for `others`, as "group/name" -> text. Throws std::invalid_argument naming
+/// The parameters below `nh`'s namespace except `others`, as "group/name" -> text. Throws std::invalid_argument naming
 /// a parameter that is a list.
 std::vector<std::pair<std::string, std::string>> readParameters(const ros::NodeHandle& nh,
                                                                 const std::set<std::string>& others);
 
 /// Sets the options that have a parameter. Throws std::invalid_argument naming the parameter, its value and what was
-/// expected; a parameter that no option has is an error, with the nearest known name. `others`: names that somebody
-/// else reads, such as dynamic_reconfigure.
+/// expected; a parameter without an option is an error, with the nearest known name. `others`: names read by others,
+/// such as dynamic_reconfigure.
 template <class Options>
 void loadOptionsFromParameters(Options& options, const ros::NodeHandle& nh, const std::set<std::string>& others) {
   setOptions(options, readParameters(nh, others));

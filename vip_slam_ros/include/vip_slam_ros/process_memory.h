@@ -1,9 +1,9 @@
-// What this process holds in memory.
+// Memory of this process.
 #pragma once
 
 namespace vip_slam {
 
-/// Resident size in megabytes; 0 when the system does not tell.
+/// Resident size in megabytes; 0 when it is not available.
 double processMemoryMb();
 
 }  // namespace vip_slam

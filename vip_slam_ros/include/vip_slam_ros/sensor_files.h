@@ -1,4 +1,4 @@
-// Where a sensor's configuration is found.
+// Paths of sensor configurations.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@ namespace vip_slam {
 
 /// Names of the shipped sensor configurations, sorted.
 std::vector<std::string> shippedSensors();
-/// Path of a sensor configuration: a file as it is, else the shipped one of that name. Throws std::invalid_argument
-/// with the list of names when there is neither.
+/// Path of a sensor configuration: the given file if it exists, else the shipped one of that name. Throws
+/// std::invalid_argument with the list of names when there is neither.
 std::string resolveSensor(const std::string& name_or_path);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// Tells when time ran backwards over several streams that are delivered side by side, as when a bag loops.
+// Detects that time ran backwards over several streams that are delivered in parallel, as when a bag loops.
 #pragma once
 
 #include <cstddef>
@@ -10,15 +10,14 @@ class StreamClock {
  public:
   enum class Verdict {
     kInOrder,
-    kJumpedBack,  ///< time has run back: start anew
-    kStray,       ///< to be left out: a single wrong stamp, or of another stream, from before the jump, delivered late
+    kJumpedBack,  ///< time has run back: restart
+    kStray,       ///< to be left out: a single wrong stamp, or a message from before the jump that arrives late
   };
 
-  /// `jump`: seconds by which stamps have to be older than the newest of their stream, two in a row: one may be wrong.
-  /// One that is newer by so much than all streams has to be followed by another of its stream as well: a pause of all
-  /// streams costs the first message after it.
-  /// An image that comes late, from a slow matcher or a busy machine, is older than other streams' newest; that is not
-  /// a jump.
+  /// `jump`: seconds by which two successive stamps must be older than the newest of their stream (a single one may be
+  /// wrong). A stamp that is newer by as much than all streams must also be confirmed by the next one of its stream, so
+  /// a pause of all streams costs the first message after it. An image that is delayed by a slow stereo matcher or a
+  /// busy machine is older than the newest of other streams; that is not a jump.
   StreamClock(std::size_t streams, double jump);
 
   /// `t`: stamp in seconds.
@@ -35,10 +34,10 @@ class StreamClock {
   static constexpr double kNever = -1e300;
   struct Stream {
     double newest = kNever;
-    double ahead = kNever;        ///< the last stamp, when it was far ahead and nothing has followed it yet
+    double ahead = kNever;        ///< the last stamp, when it was far ahead and is not confirmed yet
     double before_jump = kNever;  ///< newest of all streams when time jumped
     bool suspect = false;         ///< the last stamp was far back
-    int stragglers_left = 0;      ///< until the stream has jumped too, or this many were left out
+    int stragglers_left = 0;      ///< late messages still to be left out, until the stream has jumped too
   };
 
   std::vector<Stream> streams_;

@@ -1,4 +1,4 @@
-// Watches the stamps of one input topic: measured rate, gaps, repetitions, backward steps, silence.
+// Monitors the stamps of one input topic: measured rate, gaps, repetitions, backward steps, silence.
 #pragma once
 
 #include <cstddef>
@@ -15,19 +15,19 @@ class StreamMonitor {
   StreamMonitor(std::string topic, double nominal_rate, double gap_factor = 2.5);
 
   enum class Step { kGood, kGap, kRepeated, kBackward };
-  /// `t`: header stamp, `arrival`: when it came (same clock), seconds. Thread-safe, as all of this class.
+  /// `t`: header stamp, `arrival`: time of arrival (same clock), seconds. Thread-safe, as all of this class.
   Step add(double t, double arrival);
   void reject(const std::string& why);  ///< a message that could not be used
-  /// What is known of a topic that has brought nothing yet, for the words of complaint().
+  /// Sets the explanation of a topic without messages so far, for the text of complaint().
   void explainAbsence(const std::string& why);
 
   struct Report {
     std::string topic;
     std::size_t messages = 0, gaps = 0, repeated = 0, backward = 0, rejected = 0;
-    std::size_t rejected_in_a_row = 0;  ///< the newest messages
+    std::size_t rejected_in_a_row = 0;  ///< number of newest messages that were all rejected
     std::string last_rejection;
     double nominal_rate = 0;
-    double rate = 0;         ///< Hz over the last seconds of stamps
+    double rate = 0;         ///< Hz, over the last stamps
     double largest_gap = 0;  ///< seconds
     double delay = 0;        ///< arrival - stamp of the newest message, seconds
     double newest = 0;       ///< stamp, seconds
@@ -36,14 +36,14 @@ class StreamMonitor {
   Report report() const;
   /// One sentence on why the stream cannot be used at time `now` ("topic /x: ..."); empty when it can.
   std::string fault(double now) const;
-  /// The same, and what is odd: another rate than told.
+  /// The same, and also a rate that differs from the nominal one.
   std::string complaint(double now) const;
-  /// The same only of a stream that has come and stopped, or brings nothing usable any more: empty while good messages
-  /// come, and before the first one.
+  /// Only for a stream that has stopped or no longer has usable messages: empty while good messages arrive, and before
+  /// the first one.
   std::string silence(double now) const;
-  /// Why there is nothing of a stream: no message so far, or silence().
+  /// Why there is no data of a stream: no message so far, or silence().
   std::string absence(double now) const;
-  /// After time ran backwards: the next stamp may be anything.
+  /// To be called after time ran backwards: the next stamp may have any value.
   void restart();
 
  private:
@@ -51,7 +51,7 @@ class StreamMonitor {
   mutable std::mutex mutex_;
   Report report_;
   std::deque<double> stamps_;
-  std::optional<double> backward_;  ///< the newest stamp, when it lies before those in stamps_
+  std::optional<double> backward_;  ///< the newest stamp, when it is older than those in stamps_
   std::string absence_ = "is the name right, and the driver running?";
   bool newest_rejected_ = false;
 };

@@ -10,16 +10,16 @@
 
 namespace vip_slam {
 
-/// A frame's name without the leading slash that drivers older than tf2 put before it.
+/// A frame's name without the leading slash that drivers from before tf2 prepend.
 std::string bareFrame(const std::string& frame);
 
 /// The fixed transform T_target_source, newest available; empty when tf does not connect the frames (now).
 std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source);
 
-/// How far two opinions on one mounting are apart.
+/// Difference of two camera-IMU extrinsics.
 struct MountingGap {
   double degrees = 0, metres = 0;
-  /// More than the tolerances of a holder: one of the two is wrong.
+  /// More than mechanical tolerances: one of the two is wrong.
   bool large() const { return degrees > 3.0 || metres > 0.02; }
 };
 MountingGap mountingGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b);

@@ -1,13 +1,13 @@
-// Threads that may wait for those that must not: mapping gives way to tracking.
+// Thread priorities: mapping yields to tracking.
 #pragma once
 
 namespace vip_slam {
 
-/// How far what a keyframe brings to map and planes stands behind the odometry, and the global adjustment behind that.
+/// Nice values added: of map and planes relative to the odometry, and of the global adjustment relative to those.
 constexpr int kMappingNiceness = 5, kAdjustmentNiceness = 5;
 
-/// The calling thread, and threads that it starts from now on, become nicer by so much: they give way to the others of
-/// the process. Needs no privilege; where threads have no niceness of their own nothing changes.
+/// Adds `niceness` to the nice value of the calling thread, and of threads that it starts from now on, so that they
+/// yield to others of the process. Needs no privilege; has no effect where threads have no nice value of their own.
 void lowerThreadPriority(int niceness);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// Why a topic brings nothing, by what the ROS master knows of it.
+// Explains why a topic has no messages, from the ROS master's information.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace vip_slam {
 
-/// Words for StreamMonitor::explainAbsence(): nobody publishes `topic` (resolved name), its type is not `type`
-/// ("sensor_msgs/Image"), or it is there but nothing has come.
+/// Text for StreamMonitor::explainAbsence(): nobody publishes `topic` (resolved name), its type is not `type`
+/// ("sensor_msgs/Image"), or it is published but no message has arrived.
 std::string whyNoMessage(const std::string& topic, const std::string& type, const ros::master::V_TopicInfo& published);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// Random numbers that give the same bytes on every machine: the standard distributions do not promise that.
+// Random numbers that are the same on every machine, which the standard distributions do not guarantee.
 #pragma once
 
 #include <cmath>

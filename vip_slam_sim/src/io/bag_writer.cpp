@@ -101,7 +101,8 @@ class BagWriter : public SequenceWriter {
     try {
       bag_->close();
     } catch (const std::exception&) {
-      // The file goes anyway. The bag would close itself once more and, on a full disk, end the program by throwing.
+      // The file is deleted below anyway. Leak the bag: its destructor would close it again and, on a full disk, throw
+      // and so terminate the program.
       static_cast<void>(bag_.release());
     }
     std::error_code ignored;

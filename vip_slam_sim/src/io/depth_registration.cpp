@@ -10,12 +10,12 @@ namespace vip_slam {
 namespace {
 
 constexpr int kStep = 4;   ///< px between points
-constexpr int kReach = 6;  ///< px from a point to those its normal is made of
+constexpr int kReach = 6;  ///< px from a point to the neighbours that define its normal
 constexpr int kIterations = 12;
-constexpr double kFar = 4;                             ///< m
-constexpr double kFirstGate = 0.15, kLastGate = 0.03;  ///< m between point and plane
-constexpr double kAlike = 30;                          ///< neighbouring points err alike: so many count for one
-constexpr double kWorstRotation = 0.004, kWorstPosition = 0.006;  ///< rad, m; the worst direction's sigma
+constexpr double kFar = 4;                                        ///< m
+constexpr double kFirstGate = 0.15, kLastGate = 0.03;             ///< m between point and plane
+constexpr double kAlike = 30;                                     ///< points with correlated errors that count as one
+constexpr double kWorstRotation = 0.004, kWorstPosition = 0.006;  ///< rad, m; limits on the worst direction's sigma
 constexpr double kRobust = 0.01;                                  ///< m
 
 DepthSurface surfaceOf(const cv::Mat& depth, const CameraIntrinsics& c) {
@@ -42,7 +42,7 @@ DepthSurface surfaceOf(const cv::Mat& depth, const CameraIntrinsics& c) {
   return s;
 }
 
-/// `T_b_a` in and out. False when the surfaces leave a direction (nearly) open.
+/// `T_b_a`: in, initial guess; out, result. False when the surfaces do not constrain every direction.
 bool registerSurfaces(const DepthSurface& a, const DepthSurface& b, const CameraIntrinsics& c, SE3* T_b_a,
                       PoseError* error) {
   double gate = kFirstGate;
@@ -78,7 +78,7 @@ bool registerSurfaces(const DepthSurface& a, const DepthSurface& b, const Camera
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> rotation(covariance.topLeftCorner<3, 3>()),
           position(covariance.bottomRightCorner<3, 3>());
       *error = {std::sqrt(rotation.eigenvalues()[2]), std::sqrt(position.eigenvalues()[2])};
-      // Not a number fails, too.
+      // Written so that NaN fails as well.
       if (!(error->rotation < kWorstRotation && error->position < kWorstPosition)) return false;
     }
     *T_b_a = SE3(expQuaternion(d.head<3>()), d.tail<3>()) * *T_b_a;
@@ -91,14 +91,14 @@ bool registerSurfaces(const DepthSurface& a, const DepthSurface& b, const Camera
 const DepthSurface& PoseRegistration::surface(std::size_t i) {
   const auto known = surfaces_.find(i);
   if (known != surfaces_.end()) return known->second;
-  while (surfaces_.size() > 64) surfaces_.erase(surfaces_.begin());  // pairs come in the order of time
+  while (surfaces_.size() > 64) surfaces_.erase(surfaces_.begin());  // the oldest: pairs come in time order
   cv::Mat rgb, depth;
   loadRgbdFrame(folder_, folder_.frames[i], &rgb, &depth);
   return surfaces_[i] = surfaceOf(depth, folder_.depth_registered ? folder_.camera : folder_.depth_camera);
 }
 
 bool PoseRegistration::align(std::size_t i, std::size_t j, SE3* T_j_i, PoseError* error) {
-  const DepthSurface from = surface(i);  // a copy: making room for the other may drop it
+  const DepthSurface from = surface(i);  // a copy, as surface(j) may evict it from the cache
   return registerSurfaces(from, surface(j), folder_.depth_registered ? folder_.camera : folder_.depth_camera, T_j_i,
                           error);
 }

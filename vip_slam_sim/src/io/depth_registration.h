@@ -8,19 +8,19 @@
 
 namespace vip_slam {
 
-/// Points on a grid over a depth image, with the normals of smooth places.
+/// Points on a grid over a depth image, with normals where the surface is smooth.
 struct DepthSurface {
   int columns = 0, rows = 0;
-  std::vector<Eigen::Vector3d> point, normal;  ///< depth camera's frame; normal zero: none
+  std::vector<Eigen::Vector3d> point, normal;  ///< depth camera's frame, m; a zero normal means none
 };
 
-/// Keeps the surfaces of the last images it was asked for.
+/// Registers images pairwise and caches the surfaces of the last images used.
 class PoseRegistration {
  public:
   explicit PoseRegistration(const RgbdFolder& folder) : folder_(folder) {}
 
-  /// Depth camera of image i into that of image j, m; in: where to begin. False when too little is common to both or
-  /// the surfaces leave a direction nearly open. `error`: one sigma of the worst direction.
+  /// `T_j_i`: depth camera of image i to that of image j; its input is the initial guess. False when the overlap is too
+  /// small or the surfaces do not constrain every direction. `error`: one sigma of the worst direction.
   bool align(std::size_t i, std::size_t j, SE3* T_j_i, PoseError* error);
 
  private:

@@ -8,8 +8,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kNeighbour = 8;            ///< px between the points of a normal: bridges the sensor's quantisation
-constexpr double kLeastAgreement = 0.8;  ///< length of the mean of the images' up directions
+constexpr int kNeighbour = 8;            ///< px from a point to its normal's neighbours: wide, as depth is quantised
+constexpr double kLeastAgreement = 0.8;  ///< minimum length of the mean of the images' up directions
 
 /// Normals of locally flat patches, in the folder's world.
 void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_D,
@@ -45,11 +45,12 @@ Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
     ++posed;
     if (i % 8 == 0) collectNormals(folder, folder.frames[i], T_W_C * folder.T_color_depth, &normals);
   }
-  // A camera that is rolled or looks at the floor says too little of where up is: a wall could be taken for the floor.
+  // Cameras that roll or look at the floor give no reliable up direction: a wall could be mistaken for the floor.
   if (up.norm() < kLeastAgreement * static_cast<double>(posed))
     throw std::runtime_error("gravity: the images do not agree on which side is up; give --up X Y Z");
   up.normalize();
-  // Cameras are held level only roughly: narrow the cone in steps. A floor and a wall agree on the same direction.
+  // Cameras are only roughly level: narrow the cone of accepted normals in steps. Floor normals (parallel to up) and,
+  // once the cone is below 20 degrees, wall normals (perpendicular to it) contribute.
   std::size_t used = 0;
   for (const double degrees : {35.0, 25.0, 15.0, 10.0, 7.0, 5.0, 5.0, 5.0}) {
     const double c = std::cos(degrees * M_PI / 180), s = std::sin(degrees * M_PI / 180);

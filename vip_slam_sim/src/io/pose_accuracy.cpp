@@ -3,17 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_sim/motion/spline_trajectory.h"
 
 namespace vip_slam {
 namespace {
 
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+double medianOf(std::vector<double> values) { return values.empty() ? 0 : upperMedian(std::move(values)); }
 
 /// Root mean square over the three axes of each axis' robust sigma.
 double robustSigma(const std::vector<Eigen::Vector3d>& values) {
@@ -69,7 +65,7 @@ PoseError poseJitter(const Trajectory& poses) {
     rotation.push_back(turn(3) - 3 * turn(2) + 3 * turn(1) - turn(0));
   }
   if (position.size() < 10) return out;
-  const double gain = std::sqrt(70.0);  // 1 + 16 + 36 + 16 + 1
+  const double gain = std::sqrt(70.0);  // noise gain of a fourth difference: 1 + 16 + 36 + 16 + 1
   out.position = robustSigma(position) / gain;
   out.rotation = robustSigma(rotation) / gain;
   return out;
@@ -79,7 +75,7 @@ double splineSpacing(const Trajectory& poses, const PoseError& jitter, int itera
   const double step = poseInterval(poses);
   for (const double factor : {6.0, 4.0, 3.0, 2.0, 1.5}) {
     const PoseError e = residualOf(SplineTrajectory::fit(poses, factor * step, iterations), poses);
-    // Below a tenth of a millimetre nothing is cut.
+    // Residuals below 0.1 mm (and 0.1 mrad) are always acceptable, whatever the jitter.
     if (e.position < std::max(1.2 * jitter.position, 1e-4) && e.rotation < std::max(1.2 * jitter.rotation, 1e-4))
       return factor * step;
   }
@@ -88,12 +84,12 @@ double splineSpacing(const Trajectory& poses, const PoseError& jitter, int itera
 
 ImuNoise noiseOfImuFromPoses(const ImuNoise& sensor, const PoseError& jitter, double interval,
                              const std::vector<DepthDisagreement>& drift, double gravity) {
-  // White noise of density N makes an angle that is off by N sqrt(t) after t, and a position off by N sqrt(t^3 / 3).
-  // Two poses an interval apart are off by sqrt(2) times their jitter; the noise has to reach that from one image to
-  // the next already, though jitter does not grow afterwards.
+  // White noise of density N gives an angle error of N sqrt(t) after t, and a position error of N sqrt(t^3 / 3). The
+  // relative error of two poses is sqrt(2) times their jitter; the noise has to cover that already over one image
+  // interval, although jitter does not grow over longer ones.
   double gyro = 2 * jitter.rotation * jitter.rotation / interval;
   double accel = 6 * jitter.position * jitter.position / std::pow(interval, 3);
-  // What grows with the lag is drift; what does not is jitter again, and the noise of the registration.
+  // Only the error's growth with the lag is drift; the constant part is jitter, covered above, and registration noise.
   const DepthDisagreement* first = nullptr;
   double rate = 0, force = 0;
   for (const DepthDisagreement& d : drift) {
@@ -106,7 +102,7 @@ ImuNoise noiseOfImuFromPoses(const ImuNoise& sensor, const PoseError& jitter, do
     const double time = d.lag - first->lag;
     const double angle = growth(d.error.rotation, first->error.rotation);
     rate = std::max(rate, angle / time);
-    // Poses that are tilted put gravity in the wrong place, for as long as the tilt lasts.
+    // A tilt error of the poses misdirects gravity, which acts as an acceleration error while the tilt lasts.
     force = std::max(force, 3 * growth(d.error.position, first->error.position) / std::pow(time, 3));
     force = std::max(force, gravity * gravity * angle * time);
   }

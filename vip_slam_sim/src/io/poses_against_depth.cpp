@@ -1,4 +1,4 @@
-// Motion from depth image to depth image, to judge and to mend poses by.
+// Relative motion from depth image registration, to evaluate and refine given poses.
 #include <algorithm>
 #include <cmath>
 
@@ -10,10 +10,10 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kPairs = 40;  ///< for each lag
+constexpr std::size_t kPairs = 40;  ///< image pairs per lag
 
 double rootMeanSquare(std::vector<double> squares) {
-  // A registration that has slipped is not the poses' error: the largest tenth is left out.
+  // Leaves out the largest tenth, so that failed registrations do not count as errors of the poses.
   std::sort(squares.begin(), squares.end());
   squares.resize(squares.size() - squares.size() / 10);
   double sum = 0;
@@ -32,14 +32,14 @@ std::vector<bool> depthCameras(const RgbdFolder& folder, const Trajectory& T_W_C
   return known;
 }
 
-/// The image a lag after image i; the number of images when there is none.
+/// First image at least `lag` seconds after image i; the number of images when there is none.
 std::size_t after(const std::vector<RgbdFrame>& frames, std::size_t i, double lag) {
   std::size_t j = i + 1;
   while (j < frames.size() && frames[j].t - frames[i].t < 0.999 * lag) ++j;
   return j < frames.size() && frames[j].t - frames[i].t < 1.5 * lag + 0.01 ? j : frames.size();
 }
 
-/// A relative pose that was measured, or given.
+/// A relative pose, from registration or from the given poses.
 struct Edge {
   std::size_t a, b;
   SE3 T_b_a;
@@ -87,7 +87,7 @@ Trajectory refinePoses(const RgbdFolder& folder, const PoseError& jitter, const 
   const PoseError near{1.5 * std::max(jitter.rotation, 1e-4), 1.5 * std::max(jitter.position, 1e-4)};
   for (std::size_t i = 0; i < given.size(); ++i) {
     if (!known[i]) continue;
-    // Neighbours keep the motion they were given as far as the images do not deny it.
+    // Neighbours keep their given relative motion unless the registrations contradict it.
     if (i + 1 < given.size() && known[i + 1]) edges.push_back({i, i + 1, given[i + 1].inverse() * given[i], near});
     std::size_t last = i;
     for (const double lag : {0.0, 0.1, 0.3, 1.0, 2.0}) {
@@ -97,7 +97,8 @@ Trajectory refinePoses(const RgbdFolder& folder, const PoseError& jitter, const 
       SE3 found = given[j].inverse() * given[i];
       PoseError own;
       if (!registration.align(i, j, &found, &own)) continue;
-      // Sensors warp their depth a little, which no statistics of the points show, and more so as the view changes.
+      // Depth sensors distort slightly, an error that the points' residuals do not show and that grows as the view
+      // changes: 1 mrad and 1.5 mm, times 1 + 2 lag.
       const double warp = 1 + 2 * lag;
       edges.push_back({i, j, found, {std::hypot(own.rotation, 0.001 * warp), std::hypot(own.position, 0.0015 * warp)}});
     }

@@ -11,6 +11,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/geometry/so3.h"
+
 namespace vip_slam {
 namespace {
 
@@ -28,18 +30,10 @@ std::vector<double> numbersOf(const fs::path& path, std::size_t expected) {
   return values;
 }
 
-/// The nearest rotation to a matrix that is slightly off.
-Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d s = Eigen::Matrix3d::Identity();
-  s(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * s * svd.matrixV().transpose();
-}
-
 /// Kinect v1: the colour camera sits 25 mm to the right of the infrared one; focal length as drivers assume it.
 constexpr double kKinectBaseline = 0.025, kKinectColourFocal = 525.0;
 
-/// The folder's camera becomes the depth camera, with the poses, and a colour camera is put beside it.
+/// Makes the folder's camera the depth camera, adds a colour camera next to it and converts the poses to that.
 void separateColour(RgbdFolder* folder) {
   folder->depth_registered = false;
   folder->depth_camera = folder->camera;
@@ -95,7 +89,7 @@ std::vector<std::pair<double, std::string>> readList(const fs::path& path) {
     std::string file;
     if (!(s >> t >> file))
       throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": expected 'stamp file'");
-    if (!out.empty() && t == out.back().first) continue;  // public recordings repeat a few
+    if (!out.empty() && t == out.back().first) continue;  // some public recordings repeat lines
     if (!out.empty() && t < out.back().first)
       throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": stamp runs backwards");
     out.emplace_back(t, file);

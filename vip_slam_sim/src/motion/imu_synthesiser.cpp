@@ -17,7 +17,7 @@ ImuLog synthesiseImu(const SplineTrajectory& trajectory, const ImuOptions& o, in
   M_gyro.diagonal() += deviate(o.scale_error);
   M_accel.diagonal() += deviate(o.scale_error);
   for (Eigen::Matrix3d* M : {&M_gyro, &M_accel}) {
-    if (!(o.misalignment > 0)) break;  // draws nothing that other sequences do not
+    if (!(o.misalignment > 0)) break;  // draws no random numbers, so that other sequences stay the same
     const Eigen::Vector3d right = deviate(o.misalignment), left = deviate(o.misalignment);
     *M += (Eigen::Matrix3d() << 0, right.z(), left.y(), left.z(), 0, right.x(), right.y(), left.x(), 0).finished();
   }

@@ -1,4 +1,4 @@
-// Walks and flights along waypoints.
+// Walking and flying motions along waypoints.
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -114,7 +114,7 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
     }
   }
   stay(legs.back().to, 1.5, 0);
-  // Ease in and out of every leg; look into a corner half a second before walking round it.
+  // Start and end every leg smoothly; turn the view into a corner half a second before walking round it.
   const auto samples = [](double seconds) { return static_cast<int>(seconds / kFine); };
   p = smoothed(p, samples(0.8));
   lively = smoothed(lively, samples(1.2));
@@ -136,7 +136,7 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
     v.p = p[i] * (1 - s) + p[i + 1] * s;
     v.yaw = heading[i] * (1 - s) + heading[i + 1] * s;
     v.pitch = o.pitch * kDeg;
-    // Nothing moves while holding: the average above reaches into the hold.
+    // No shake during the hold, into which the moving average above leaks; it fades in over 1.5 s afterwards.
     v.liveliness = (lively[i] * (1 - s) + lively[i + 1] * s) * smoothStep((at - o.hold) / 1.5);
     shake.apply(at, &v);
     return v;

@@ -119,7 +119,7 @@ SplineTrajectory SplineTrajectory::fit(const Trajectory& poses, double spacing, 
     for (int k = 0; k < spans + 5; ++k) {
       const SE3 reached = now.at(t0 + (k - 2) * spacing).T_W_I;
       const Vector6d residual = goal[k].boxminus(reached);
-      // Beyond the ends the curve cannot be sampled: those follow their neighbours' correction through the clamp.
+      // Control poses beyond the ends, where at() clamps its time, are corrected by the residual at the end.
       control[k] = control[k].boxplus(0.9 * residual);
     }
   }

@@ -1,4 +1,4 @@
-// How a motion is planned: where the camera is and looks at each time, made into the IMU's spline.
+// Motion planning: position and viewing direction of the camera over time, converted to the spline of the IMU.
 #pragma once
 
 #include <functional>
@@ -11,11 +11,11 @@ namespace vip_slam {
 
 constexpr double kDeg = M_PI / 180;
 
-/// Where the camera is and looks: forward has this yaw and pitch (rad), roll about forward.
+/// Position and viewing direction of the camera: yaw and pitch of its forward axis, roll about it (rad).
 struct View {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
   double yaw = 0, pitch = 0, roll = 0;
-  double liveliness = 0;  ///< 0 standing, 1 moving: scales the shake
+  double liveliness = 0;  ///< 0 at rest to 1 in motion: scales the shake
 
   /// T_W_cam.
   SE3 pose() const;
@@ -31,7 +31,7 @@ class Wander {
   std::vector<double> f_, phase_;
 };
 
-/// Adds what a walking hand or a hovering drone adds.
+/// Adds the shake of a hand-held camera of a walker or of a hovering drone.
 class Shake {
  public:
   Shake(const std::string& style, double yaw_swing, int seed);

@@ -9,10 +9,10 @@ namespace vip_slam {
 namespace {
 
 constexpr int kAmbientRays = 64;
-constexpr float kAmbientReach = 1.6f;  ///< metres; nearer things take ambient light away
-constexpr float kLampReach = 9.f;      ///< metres; light fades to nothing here
-constexpr float kOffset = 3e-3f;       ///< rays start this far off the surface
-constexpr float kInset = 0.012f;       ///< and this far from the edges, clear of the neighbouring wall
+constexpr float kAmbientReach = 1.6f;  ///< metres; surfaces nearer than this block ambient light
+constexpr float kLampReach = 9.f;      ///< metres; a lamp's light has faded to zero here
+constexpr float kOffset = 3e-3f;       ///< metres; rays start this far off the surface
+constexpr float kInset = 0.012f;       ///< metres; and this far from its edges, clear of the adjoining wall
 
 /// Cosine-weighted directions about +z on a Fibonacci spiral.
 std::vector<Vec3> hemisphere() {

@@ -15,9 +15,9 @@ constexpr float kHalfThickness = 0.14f;  // m
 constexpr float kTexelsPerMetre = 400;
 constexpr int kTextureSize = 1024;
 constexpr float kNear = 0.05f;
-constexpr float kLight = 0.75f;  // what falls on them, radiance of white
+constexpr float kLight = 0.75f;  // illumination on them, as the radiance of a white surface
 
-/// A stack of photographs, so that there are corners at every scale.
+/// A texture made of photographs, so that there are corners at every scale.
 cv::Mat pattern(int seed) {
   cv::Mat image(kTextureSize, kTextureSize, CV_32FC3);
   constexpr int kCells = 8, kSide = kTextureSize / kCells;
@@ -47,7 +47,7 @@ std::vector<PassersBy::Body> PassersBy::bodies(double t) const {
     const double since = t - options_.start;
     double side = 0, distance = options_.distance, heading_t = t;
     if (options_.way == "across") {
-      // Straight on, whatever way the camera turns meanwhile.
+      // On a straight line: its direction is that of the camera at mid-crossing, even if the camera turns.
       const double reach = 0.8 * options_.distance + 0.5 * options_.width;
       const double passing = std::fmod(since + k * options_.interval / options_.count, options_.interval);
       side = -reach + options_.speed * passing;

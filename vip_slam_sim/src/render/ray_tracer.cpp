@@ -144,7 +144,8 @@ void RayTracer::intersect(RayBatch* rays, std::size_t n, float near, bool cohere
 }
 
 float RayTracer::clearance(const Vec3& point, float radius) const {
-  // Rays over the sphere: walls and furniture are much larger than the spacing at half a metre.
+  // Samples directions over the sphere, which suffices as walls and furniture are much larger than the rays' spacing
+  // at half a metre.
   constexpr int kRays = 256;
   RayBatch rays;
   rays.resize(kRays);

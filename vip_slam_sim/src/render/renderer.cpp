@@ -14,7 +14,7 @@ inline float coverage(float u, float f, float a, float b) {
   return (std::min(b, u + h) - std::max(a, u - h)) / f;
 }
 
-// Rotated grid inside the pixel, and its middle is left out.
+// Sample positions in the pixel: a rotated grid without its centre.
 constexpr float kSamples[6][2] = {{-0.417f, -0.083f}, {-0.25f, 0.417f}, {-0.083f, -0.25f},
                                   {0.083f, 0.25f},    {0.25f, -0.417f}, {0.417f, 0.083f}};
 constexpr int kSampleCount = 6;

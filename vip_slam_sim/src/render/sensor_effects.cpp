@@ -9,7 +9,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kTable = 1 << 20;
-constexpr std::size_t kMargin = 1 << 14;  ///< longest run read from one place
+constexpr std::size_t kMargin = 1 << 14;  ///< longest run of deviates read from one random position
 
 }  // namespace
 
@@ -70,7 +70,7 @@ void SensorEffects::motionBlur(const CameraTwist& twist, FrameBuffers* frame) co
 double SensorEffects::gain(double t) const {
   const double phase = static_cast<double>(seed_ % 17);
   const double drift = 0.65 * std::sin(2 * M_PI * t / 19.0 + phase) + 0.35 * std::sin(2 * M_PI * t / 7.3 + 2 * phase);
-  // From one level to the other and back; the seed says where it begins.
+  // The exposure alternates between two levels; the seed selects the first.
   const auto jumps = static_cast<long>(std::floor(t / effects_.exposure_jump_interval)) + static_cast<long>(seed_ % 2);
   const double level = std::pow(effects_.exposure_jump, jumps % 2 == 0 ? 0.5 : -0.5);
   return effects_.exposure * level * (1 + effects_.exposure_drift * drift);
@@ -118,7 +118,7 @@ cv::Mat SensorEffects::depth(const FrameBuffers& frame, const cv::Mat& brightnes
   }
   if (!hard) return out;
 
-  // Losses: clumps of about 3 px for drop-outs; edges, grazing angles and dark surfaces fade out.
+  // Missing depth: drop-outs in clumps of about 3 px; increasing loss at edges, grazing angles and on dark surfaces.
   Rng rng(seed_ * 77003 + key);
   const int cw = (w + 2) / 3, ch = (h + 2) / 3;
   std::vector<char> lost(static_cast<std::size_t>(cw) * ch);
@@ -140,7 +140,7 @@ cv::Mat SensorEffects::depth(const FrameBuffers& frame, const cv::Mat& brightnes
         if (hi - lo > 0.03f * z + 0.02f && rng.uniform() < depth_.edge_hole) {
           if (rng.uniform() < 0.7)
             gone = true;
-          else  // a pixel that flies between foreground and background
+          else  // a flying pixel between foreground and background
             mm = static_cast<std::uint16_t>(std::min(1000.0 * (lo + rng.uniform() * (hi - lo)), 65535.0));
         }
       }

@@ -1,5 +1,5 @@
-// A corridor whose every bay looks like the last: the same door, the same poster, the same lamp, eight times over. A
-// loop closer that trusts appearance alone goes wrong here. Only the ends differ.
+// A corridor of identical bays: the same door, the same poster, the same lamp, eight times. A loop closer that trusts
+// appearance alone fails here. Only the ends differ.
 #include <cmath>
 
 #include "scene_parts.h"

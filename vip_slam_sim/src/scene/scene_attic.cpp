@@ -28,7 +28,7 @@ Scene buildAttic() {
     b.decal(roof_s, 1.0 + 2.9 * i, 0.5, 1.9 + 2.9 * i, 1.6, p.blinds);  // skylights
     hangPoster(&b, roof_n, p, i, 0.9 + 2.3 * i, 1.0, 0.8);
   }
-  // Gables reach up behind the roof's slopes; the half-open door leads nowhere.
+  // Gables extend up behind the roof's slopes; the half-open door leads nowhere.
   const int west =
       b.wall({0, 0}, {0, W}, 0, top, p.wall, {{2.4f, 3.25f, 1.95f, Opening::Kind::kClosed, 0.35f, p.door}}, p.carpet);
   b.wall({0, W}, {L, W}, 0, eave, p.wall);

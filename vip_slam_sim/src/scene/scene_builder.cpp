@@ -42,7 +42,7 @@ int SceneBuilder::rectangle(const Eigen::Vector3d& o, const Eigen::Vector3d& u, 
 
 int SceneBuilder::floor(double x0, double y0, double x1, double y1, double z, const Material& material) {
   const int chart = rectangle({x0, y0, z}, {x1 - x0, 0, 0}, {0, y1 - y0, 0}, material);
-  scene_.charts[chart].tu = static_cast<float>(x0);  // tiles run on from one floor to the next
+  scene_.charts[chart].tu = static_cast<float>(x0);  // the texture continues from one floor to the next
   scene_.charts[chart].tv = static_cast<float>(y0);
   return chart;
 }
@@ -178,7 +178,7 @@ void SceneBuilder::cylinder(const Eigen::Isometry3d& pose, double radius, double
 }
 
 void SceneBuilder::sphere(const Eigen::Vector3d& centre, double radius, const Material& material, int strips) {
-  // Bands of rectangles, a touch too wide at their narrow end: no gaps, and the overlap hides inside.
+  // Bands of rectangles, slightly too wide at their narrow end: this avoids gaps, and the overlap is hidden inside.
   const int bands = strips / 2;
   for (int b = 0; b < bands; ++b) {
     const double p0 = M_PI * b / bands - M_PI / 2, p1 = M_PI * (b + 1) / bands - M_PI / 2;

@@ -90,7 +90,7 @@ void OfficePlan::corridors() {
       lamps(chart, 29.8, 2.2, 9, 1, 10.0);
       continue;
     }
-    // One strip of light from end to end: nothing in it tells how far one has walked.
+    // One strip of light from end to end: it gives no cue about the position along the corridor.
     b.decal(chart, 1.0, 1.02, 28.8, 1.18, -1, rgb(1, 1, 1), 0.75);
     for (int i = 0; i < 18; ++i) b.lamp(chart, 1.0 + 27.8 * (i + 0.5) / 18, 1.1, 27.8 / 18, 0.16, 7.5);
   }

@@ -11,13 +11,13 @@
 
 namespace vip_slam {
 
-/// The materials and pictures a scene draws from.
+/// The materials and pictures available to a scene.
 struct Palette {
   Material wall, carpet, ceiling, wood, white, dark, metal, cardboard;
   std::vector<int> posters, photographs, screens, books, signs;
   int door = -1, blinds = -1, exit_sign = -1;
 };
-/// `contrast` scales what carpet, ceiling and doors show (walls have their own figure).
+/// `contrast` scales the texture contrast of carpet, ceiling and doors (walls: `wall_contrast`).
 Palette makePalette(SceneBuilder* builder, std::uint64_t seed, int posters, double wall_contrast,
                     double contrast = 1.0);
 

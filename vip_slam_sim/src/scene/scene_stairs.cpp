@@ -57,7 +57,7 @@ Scene buildStairs() {
   const Eigen::Vector3d r0(gx - ramp, 0.8, 0), up(ramp, 0, gz);
   const int slope = b.rectangle(r0, up, {0, 2.0, 0}, p.carpet);
   for (int i = 0; i < 6; ++i) b.decal(slope, 0.6 + i, 0.1, 0.68 + i, 1.9, -1, rgb(0.68f, 0.66f, 0.35f));
-  // Its flanks are right triangles: stand-in panels of steps, set in a little so that none pokes through the slope.
+  // Its flanks are right triangles, approximated by narrow panels, each low enough not to protrude through the slope.
   const int slices = 40;
   for (int side = 0; side < 2; ++side)
     for (int k = 0; k < slices; ++k) {

@@ -8,7 +8,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr float kTouch = 2e-3f;  ///< pieces this close touch
+constexpr float kTouch = 2e-3f;  ///< metres; pieces no further apart count as touching
 
 struct Rect {
   float u0, v0, u1, v1;
@@ -40,7 +40,7 @@ int root(std::vector<int>& parent, int i) {
 }  // namespace
 
 void groupSurfaces(Scene* scene) {
-  // Bucket by quantised plane; neighbours in the next bucket are found by comparing with exact tolerances.
+  // Sort by the plane's offset n . o, so that each piece is compared only with pieces within 1 mm of its plane.
   std::vector<int> planar;
   for (std::size_t i = 0; i < scene->pieces.size(); ++i)
     if (scene->charts[scene->pieces[i].chart].planar) planar.push_back(static_cast<int>(i));

@@ -26,7 +26,7 @@ bool powerOfTwo(int v) { return v > 0 && (v & (v - 1)) == 0; }
 
 inline Vec4 load(const std::uint16_t* p) {
 #ifdef __SSE2__
-  // Compilers convert 16-bit lanes one by one here; two instructions do.
+  // Explicit intrinsics, because compilers convert the 16-bit lanes one by one here.
   const __m128i raw = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(p));
   return _mm_cvtepi32_ps(_mm_unpacklo_epi16(raw, _mm_setzero_si128()));
 #else

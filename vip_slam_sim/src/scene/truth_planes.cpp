@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kCell = 0.1;         ///< m, seen-area grid
 constexpr int kStride = 8;            ///< px between samples
-constexpr double kSeenShare = 0.005;  ///< of the image, to count as seen
+constexpr double kSeenShare = 0.005;  ///< share of the image that a plane must fill to count as seen
 
 struct SurfaceRect {
   double u0, v0, u1, v1;
@@ -106,7 +106,7 @@ std::vector<std::vector<Node>> traceCells(const std::vector<std::vector<char>>& 
         for (const Node& option : it->second) {
           const int cross = (at.first - before.first) * (option.second - at.second) -
                             (at.second - before.second) * (option.first - at.first);
-          if (cross > 0) next = option;  // stay with the own cell
+          if (cross > 0) next = option;  // stay on the boundary of the same cell
         }
       it->second.erase(next);
       if (it->second.empty()) edges.erase(it);

@@ -85,7 +85,7 @@ double SequenceRenderer::toSeconds(std::int64_t stamp_ns) const {
 double SequenceRenderer::frameTime(int index) const {
   const double t =
       kMargin + 0.5 * std::abs(spec_.imu.time_offset) + 0.5 * spec_.effects.rolling_shutter + index / spec_.camera.rate;
-  return std::round(t * 1e9) * 1e-9;  // what the stamp can say
+  return std::round(t * 1e9) * 1e-9;  // to the resolution of the stamp
 }
 
 NavState SequenceRenderer::stateAt(double t) const {

@@ -167,7 +167,7 @@ SensorConfig SequenceSpec::sensorConfig() const {
   s.imu_noise.accel_random_walk = imu.accel_random_walk;
   s.imu_noise.gyro_correction_sigma = std::max({s.imu_noise.gyro_correction_sigma, imu.scale_error, imu.misalignment});
   s.depth_noise.type = depthSensorTypeFromName(depth.model);
-  s.depth_noise.a = std::max(depth.a, 0.0005);  // 16UC1 millimetres round
+  s.depth_noise.a = std::max(depth.a, 0.0005);  // at least the rounding to millimetres in 16UC1
   s.depth_noise.b = depth.b;
   s.depth_noise.c = depth.c;
   s.depth_noise.min_range = depth.min_range;
@@ -208,7 +208,7 @@ YAML::Node loadLibrary(const std::string& path) {
   return library;
 }
 
-/// The node's values over those of the sequences it is based on; base last, so that later ones win.
+/// Applies the sequences on which the node is based, then the node's own values, which therefore win.
 void applySequence(const YAML::Node& library, const YAML::Node& node, const std::string& where, int depth,
                    SequenceSpec* spec) {
   if (!node.IsMap()) throw std::runtime_error(where + ": expected a map of keys");

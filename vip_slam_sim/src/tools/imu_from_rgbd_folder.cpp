@@ -30,7 +30,7 @@ struct Settings {
   ImuOptions imu;
 };
 
-/// Prints largest and root-mean-square distance of the spline from the poses it was fitted to; the latter one of an
+/// Prints the largest and the RMS distance of the spline from the poses to which it was fitted; returns the RMS per
 /// axis.
 PoseError reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
   double position = 0, angle = 0, worst = 0;
@@ -47,9 +47,9 @@ PoseError reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
   return {std::sqrt(angle / (3 * n)), std::sqrt(position / (3 * n))};
 }
 
-/// The noise of the IMU that is made from these poses, and what it comes from.
+/// The noise of the IMU synthesised from these poses; prints the contributions.
 ImuNoise coveringNoise(const ImuNoise& own, const PoseError& jitter, const RgbdFolder& folder) {
-  // The IMU is held against images: what the poses do in between does not count.
+  // The estimators compare the IMU with images, so errors of poses between two images do not matter.
   const double interval = std::max(poseInterval(folder.T_W_C), imageInterval(folder));
   std::vector<DepthDisagreement> drift;
   for (const DepthDisagreement& d : posesAgainstDepth(folder, folder.T_W_C, {interval, 0.1, 0.3, 1.0})) {
@@ -69,7 +69,7 @@ ImuNoise coveringNoise(const ImuNoise& own, const PoseError& jitter, const RgbdF
   return noise;
 }
 
-/// Mends the folder's poses by its depth images, and says by how much.
+/// Refines the folder's poses by its depth images and prints by how much they moved.
 void refine(RgbdFolder* folder) {
   const Trajectory given = folder->T_W_C;
   const DepthDisagreement drift = posesAgainstDepth(*folder, given, {1.0})[0];
@@ -199,7 +199,7 @@ int run(int argc, char** argv) {
   ProgressBar bar(s.name);
   for (std::size_t i = 0; i < folder.frames.size(); ++i) {
     const double t = folder.frames[i].t - begin;
-    if (t < 0 || t > spline.end() - 1.0 / s.imu.rate) continue;  // no IMU there
+    if (t < 0 || t > spline.end() - 1.0 / s.imu.rate) continue;  // no IMU samples at this time
     SimFrame frame;
     frame.index = static_cast<int>(i);
     frame.stamp_ns = stamp(t);

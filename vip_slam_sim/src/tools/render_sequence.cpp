@@ -28,7 +28,7 @@ namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
 
-/// Colour beside depth (near = warm), as a PNG to look at.
+/// Colour and depth (near = warm) side by side, as a PNG for viewing.
 void saveSnapshot(const SimFrame& frame, const std::string& path) {
   cv::Mat bgr, metres, shown, colours, both;
   cv::cvtColor(frame.rgb, bgr, cv::COLOR_RGB2BGR);
@@ -137,7 +137,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Image buffers come and go with every frame: keep their pages instead of asking the system anew.
+  // Image buffers are allocated and freed with every frame: keep their pages instead of returning them to the system.
   mallopt(M_MMAP_THRESHOLD, 1 << 28);
   mallopt(M_TRIM_THRESHOLD, 1 << 29);
   try {

@@ -28,23 +28,24 @@ struct HomographyPair {
 Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
                           const Eigen::Matrix<double, 3, 2>* basis = nullptr, HomographyJacobian* J = nullptr);
 
-/// A homography is too weak for a factor with a camera nearer to the plane than this, metres, ...
+/// The geometry of a homography is too weak for a factor with a camera nearer to the plane than this, metres, ...
 constexpr double kMinPlaneDistance = 0.15;
-/// ... or a depth ratio outside these, or a host's ray within 10 degrees of the plane, or a point nearer than this.
+/// ... or with a depth ratio outside these limits, a host's ray within 10 degrees of the plane (sine), or a point depth
+/// below kMinPlaneDepth, metres.
 constexpr double kMinDepthRatio = 0.25, kMaxDepthRatio = 4.0, kMinIncidence = 0.1736, kMinPlaneDepth = 0.05;
 
 /// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor (above).
 bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
                           const Eigen::Vector2d& xy_i, double* rho);
 
-/// H p_i of p_i = (xy_i, 1), whose third number is the depth ratio.
+/// H p_i for p_i = (xy_i, 1); the third entry is the depth ratio.
 inline Eigen::Vector3d transfer(const Vector9d& h, const Eigen::Vector2d& xy_i) {
   const double x = xy_i.x(), y = xy_i.y();
   return {h(0) * x + h(1) * y + h(2), h(3) * x + h(4) * y + h(5), h(6) * x + h(7) * y + h(8)};
 }
 
-/// Mean square of the factor by which noise of xy_i grows on its way into frame j: half the squared Frobenius norm of
-/// d p^_j / d p_i. The noise of a pair is that of j and the grown one of i. `p` = H p_i.
+/// Mean factor on the variance of xy_i when it is transferred into frame j: half the squared Frobenius norm of
+/// d p^_j / d p_i. A pair's variance is that of j plus this gain times that of i. `p` = H p_i.
 double hostNoiseGain(const Vector9d& h, const Eigen::Vector3d& p);
 
 /// The two rows C_l, weighted.

@@ -1,4 +1,4 @@
-// Points of the map that a camera at a known pose should see, looked for around their projections.
+// Matches points of the map that a camera at a known pose should see with features around their projections.
 #pragma once
 
 #include <functional>
@@ -12,13 +12,13 @@
 
 namespace vip_slam {
 
-/// A landmark, or a corner of one keyframe that no other saw and that has depth.
+/// A landmark, or a corner with depth that only one keyframe saw.
 struct MapPoint {
   Eigen::Vector3d p_W;
   double sigma = 0;  ///< of p_W along a ray to it, metres
   LandmarkId landmark = kNoLandmark;
-  KeyframeId keyframe = 0;    ///< who sees it,
-  std::uint32_t feature = 0;  ///< and in which feature
+  KeyframeId keyframe = 0;    ///< a keyframe that sees it
+  std::uint32_t feature = 0;  ///< and its feature there
 };
 
 /// The point behind a feature of a keyframe of the map. False when it has neither landmark nor depth.
@@ -30,8 +30,8 @@ std::vector<MapPoint> mapPointsOf(const Map& map, const std::vector<KeyframeId>&
 /// A query feature that shows `p_W`.
 PlaceMatch makePlaceMatch(const Feature& feature, const MapPoint& point);
 
-/// Keyframes that look the way a camera at T_W_C does, nearest views first, at most `most`; only those that `allowed`
-/// lets pass (empty: all).
+/// Keyframes with a viewing direction similar to a camera at T_W_C, nearest views first, at most `most`; only those
+/// accepted by `allowed` (empty: all).
 std::vector<KeyframeId> viewsAlong(const Map& map, const SE3& T_W_C, std::size_t most,
                                    const std::function<bool(KeyframeId)>& allowed);
 
@@ -40,9 +40,9 @@ struct GuidedMatches {
   std::vector<std::pair<std::uint32_t, LandmarkId>> source;  ///< of each: query feature, landmark or kNoLandmark
 };
 
-/// How a point's looks are compared. Strict: by the descriptor nearest to all it was seen with, and each second corner
-/// around the projection is a rival; few matches, for loops that odometry backs. Wide: by any descriptor it was seen
-/// with, and two detections of one corner are no rivals; more of the true ones, where nothing else helps.
+/// How descriptors are compared. Strict: with the landmark's medoid descriptor, and any second corner around the
+/// projection counts in the ratio test; fewer matches, for loops that odometry supports. Wide: with all descriptors of
+/// the landmark, and two detections of one corner do not compete; more true matches, where there is no other evidence.
 enum class GuidedLooks { kStrict, kWide };
 
 /// Best match of each query feature among the points that project within `radius` px of it. `features`: of the query,

@@ -1,5 +1,6 @@
-// Loop closing: recognises places, verifies them, corrects the map by the pose-plane graph and fuses landmarks.
-// A loop is taken only when appearance, neighbouring keyframes, geometry, gravity, depth, planes and odometry agree.
+// Loop closing (paper section "Loop Detection and Pose Plane Graph Optimization"): recognises places, verifies them,
+// corrects the map by the pose-plane graph and fuses landmarks. A loop is accepted only when appearance, neighbouring
+// keyframes, geometry, gravity, depth, planes and odometry agree.
 #pragma once
 
 #include <deque>
@@ -25,19 +26,19 @@ class LoopCloser {
   /// Throws std::runtime_error when the vocabulary of the options cannot be read. `timing` may be null.
   LoopCloser(const LoopOptions& options, std::shared_ptr<const CameraModel> camera, TimingLog* timing = nullptr);
 
-  /// Enters a keyframe of the map into the database.
+  /// Adds a keyframe of the map to the database.
   void add(const Map& map, KeyframeId id);
-  /// Enters all keyframes of the map anew (after loading one).
+  /// Rebuilds the database from all keyframes of the map (after loading one).
   void rebuild(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops);
   /// Looks for a loop at a keyframe that add() knows. On success the map is corrected and fused: all keyframes,
   /// landmarks and planes may have moved. One event per verified candidate; the accepted one is the last.
   std::vector<LoopEvent> close(Map& map, KeyframeId query);
-  /// A keyframe that left the map, with its loops.
+  /// Forgets a keyframe that was removed from the map, and its loops.
   void remove(KeyframeId id);
   void clear();
-  /// A relocalised keyframe: from now on its epoch and that of `match` are one part of the map.
+  /// Adds a relocalised keyframe as a loop: its epoch and that of `match` become one part of the map.
   void tie(Map& map, KeyframeId query, KeyframeId match);
-  /// Whether the odometry of `id` is known relative to all else.
+  /// Whether the odometry of `id` is tied to the rest of the map.
   bool tied(const Map& map, KeyframeId id) const;
 
   /// (query, match) of the accepted loops, oldest first.
@@ -48,17 +49,17 @@ class LoopCloser {
   BowResult describe(const Keyframe& keyframe) const;
 
  private:
-  /// Keyframes of the query's own part of the map that look like it, one a place, best first.
+  /// Keyframes of the query's own part of the map with similar appearance, one per place, best first.
   std::vector<KeyframeId> candidates(const Map& map, KeyframeId query, const std::set<KeyframeId>& part);
-  /// Of another odometry or so long ago that the query does not follow from it.
+  /// Whether a keyframe is of another odometry, or so old that the query's pose does not depend on it directly.
   bool isOld(const Map& map, KeyframeId id, const Keyframe& query) const;
-  /// Looks for the query in those parts of the map that nothing ties to its own yet.
+  /// Searches the query in those parts of the map that are not tied to its own part yet.
   LoopEvent joinParts(Map& map, KeyframeId query, const std::set<KeyframeId>& part);
-  /// Where the query would be as well, in words, when `place` lies elsewhere than the map has it: what looks alike is no
-  /// place. Empty: nowhere.
+  /// Description of another place that fits the query as well, when `place` is far from the query's pose in the map: an
+  /// ambiguous appearance is no evidence. Empty: there is none.
   std::string rival(const Map& map, KeyframeId query, const PlaceVerification& place,
                     const std::vector<KeyframeId>& candidates, const std::function<bool(KeyframeId)>& old) const;
-  /// The map's veto on a place that was verified, or the correction.
+  /// Corrects the map by a verified place, unless its planes or the pose-plane graph contradict it.
   LoopEvent correct(Map& map, KeyframeId query, const PlaceVerification& place);
   void fuse(Map& map, KeyframeId query, const PlaceVerification& place);
 
@@ -69,8 +70,8 @@ class LoopCloser {
   KeyframeDatabase database_;
   PlaceVerifier verifier_;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops_;
-  PlaceSearch joins_;  ///< for the newest part of the map when nothing ties it to the rest yet
-  std::deque<std::set<KeyframeId>> recent_places_;  ///< neighbourhoods that the last keyframes pointed to, newest last
+  PlaceSearch joins_;                               ///< for the newest part of the map while it is not tied to the rest
+  std::deque<std::set<KeyframeId>> recent_places_;  ///< candidate neighbourhoods of the last keyframes, newest last
 };
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// After a loop: landmarks that are one point become one landmark.
+// Merges duplicate landmarks after a loop.
 #pragma once
 
 #include <utility>
@@ -8,9 +8,9 @@
 
 namespace vip_slam {
 
-/// Joins what keyframe `query` saw in some features with landmarks of the map: a free feature gets the observation, a
-/// feature with a landmark of its own merges it into the given one. Two landmarks that lie farther apart in the
-/// corrected map than one point can (3 cm and 2 % of the distance) are left. Returns how many were joined.
+/// Joins features of keyframe `query` with landmarks of the map: a feature without landmark becomes an observation, a
+/// feature's own landmark is merged into the given one. Two landmarks that are too far apart in the corrected map for
+/// one point (3 cm and 2 % of the distance) are not merged. Returns the number joined.
 int fuseLandmarks(Map& map, KeyframeId query, const std::vector<std::pair<std::uint32_t, LandmarkId>>& pairs);
 
 }  // namespace vip_slam

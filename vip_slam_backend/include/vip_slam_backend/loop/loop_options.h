@@ -7,7 +7,8 @@
 
 namespace vip_slam {
 
-/// Does the same place show at two keyframes, and from where? Shared by loop closing and relocalisation.
+/// Verification that two keyframes show the same place, and their relative pose. Shared by loop closing and
+/// relocalisation.
 struct PlaceVerificationOptions {
   int max_hamming = 64;
   double ratio = 0.85;

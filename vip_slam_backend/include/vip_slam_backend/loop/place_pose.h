@@ -1,7 +1,7 @@
-// The pose of a camera, or of a rig of cameras, among points of the map: a RANSAC on pairs of points that uses depth
-// and the known direction of gravity, then Gauss-Newton on pixels and depths. World is any frame with z up in which
-// the points are given. Several keyframes of one odometry are a rig: over a second or two its drift is far below a
-// pixel.
+// The pose of a camera, or of a rig of cameras, from matched points of the map: a RANSAC on pairs of points that uses
+// depth and the known direction of gravity, then Gauss-Newton on pixels and depths. World is any frame with z up in
+// which the points are given. Several keyframes of one odometry form a rig: over a second or two its drift is far below
+// a pixel.
 #pragma once
 
 #include <vector>
@@ -39,7 +39,7 @@ struct PlacePoseOptions {
   double ransac_px = 4.0;
   double inlier_px = 3.0;     ///< after refinement
   double depth_sigmas = 4.0;  ///< gate on depth
-  double tilt_sigma = 0;      ///< of the refined attitude against the given one, radians; 0: gravity has no say in it
+  double tilt_sigma = 0;      ///< of the refined attitude's tilt against the given one, radians; 0: tilt is free
   std::uint64_t seed = 1;
 };
 
@@ -47,7 +47,7 @@ struct PlacePose {
   bool found = false;
   SE3 T_W_B;
   std::vector<std::uint32_t> inliers;  ///< ascending
-  /// Of the perturbation (theta, t) of T_W_B, with pixel noise of one pixel.
+  /// Information of the perturbation (theta, t) of T_W_B, with pixel noise of one pixel.
   Matrix6d information = Matrix6d::Zero();
 };
 
@@ -60,7 +60,7 @@ PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const CameraRi
                           const PlacePoseOptions& options);
 
 /// All six degrees of freedom from `start` (T_W_B): robust Gauss-Newton, inliers chosen anew at inlier_px. The tilt of
-/// R_G_B is one more measurement when options.tilt_sigma is set, and so are the surfaces. Not found when fewer than
+/// R_G_B is a further measurement when options.tilt_sigma is set, and so are the surfaces. Not found when fewer than
 /// three inliers are left or the pose is not observable.
 PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const SE3& start,
                           const Eigen::Quaterniond& R_G_B, const PlacePoseOptions& options,

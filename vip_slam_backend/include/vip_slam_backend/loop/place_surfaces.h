@@ -1,4 +1,4 @@
-// Which planes of the map a depth image shows, point by point.
+// Associates the points of a depth image with planes of the map.
 #pragma once
 
 #include <vector>
@@ -10,9 +10,9 @@
 
 namespace vip_slam {
 
-/// Points of `grid`, taken at T_W_C up to a few centimetres and a degree, with the plane that the view (a keyframe of
-/// the map) shows in the same spot. A plane weighs the same however much of the image it fills: the errors of one
-/// depth image are of one piece. `camera` goes into the result.
+/// Points of `grid`, whose pose T_W_C is known to a few centimetres and a degree, with the plane that the view (a
+/// keyframe of the map) shows at the same place. Each plane has the same total weight regardless of its size in the
+/// image, since the errors of one depth image are correlated. `camera` is copied to the result.
 std::vector<PlaceSurface> matchSurfaces(const Map& map, KeyframeId view, const DepthGrid& grid, const SE3& T_W_C,
                                         const CameraModel& model, std::uint32_t camera);
 

@@ -1,5 +1,6 @@
 // Geometric verification that a keyframe shows a place of the map: descriptor matches by the direct index, RANSAC with
-// depth and gravity, guided matching of the neighbourhood's landmarks, refinement, and the witnesses: gravity, depth.
+// depth and gravity, guided matching of the neighbourhood's landmarks, refinement, and independent checks by gravity
+// and depth.
 #pragma once
 
 #include <functional>
@@ -18,9 +19,9 @@ namespace vip_slam {
 
 struct PlaceVerification {
   bool accepted = false;
-  std::string reason;  ///< why not, or what convinced
+  std::string reason;  ///< why it was refused, or the evidence for it
   KeyframeId match = 0;
-  SE3 T_W_I;                                ///< the query's pose in the map, by the landmarks it was matched with
+  SE3 T_W_I;                                ///< the query's pose in the map, from the matched landmarks
   Matrix6d information = Matrix6d::Zero();  ///< of the perturbation (theta, t) of the query's camera pose
   int matches = 0, inliers = 0;
   double depth_agreement = -1;                                  ///< -1: no depth to compare
@@ -31,16 +32,16 @@ class PlaceVerifier {
  public:
   PlaceVerifier(const PlaceVerificationOptions& options, std::shared_ptr<const CameraModel> camera);
 
-  /// `T_G_I`: the query's pose in any gravity-aligned frame. Landmarks are taken from keyframes that `allowed` lets
-  /// pass (empty: all); `database` knows those around `match`.
+  /// `T_G_I`: the query's pose in any gravity-aligned frame. Landmarks are taken from keyframes accepted by `allowed`
+  /// (empty: all); `database` contains those around `match`.
   PlaceVerification verify(const Map& map, const Keyframe& query, const SE3& T_G_I, const BowResult& query_bow,
                            KeyframeId match, const KeyframeDatabase& database,
                            const std::function<bool(KeyframeId)>& allowed) const;
-  /// The same from a predicted pose in the map, without appearance: guided matching around `match` at once.
+  /// The same from a predicted pose in the map, without place recognition: starts with guided matching around `match`.
   PlaceVerification track(const Map& map, const Keyframe& query, const SE3& T_W_I, KeyframeId match,
                           const std::function<bool(KeyframeId)>& allowed) const;
 
-  /// Points of the map around `match` that features of the query look like, by the direct index; of camera 0.
+  /// Matches of the query's features with map points around `match`, by the direct index; all of camera 0.
   std::vector<PlaceMatch> match(const Map& map, const Keyframe& query, const BowResult& query_bow, KeyframeId match,
                                 const KeyframeDatabase& database, const std::function<bool(KeyframeId)>& allowed) const;
 

@@ -1,6 +1,6 @@
 // The pose-plane graph (paper section "Loop Detection and Pose Plane Graph Optimization", corrected residuals: see
-// factors/relative_pose.h and factors/pose_plane.h). Poses move in yaw and position; roll and pitch are held, the IMU
-// observes them. Planes move on S^2 x R. ROS-free and independent of the map.
+// factors/relative_pose.h and factors/pose_plane.h). Poses have yaw and position as variables; roll and pitch are
+// fixed, since the IMU observes them. Planes are variables on S^2 x R. ROS-free and independent of the map.
 #pragma once
 
 #include <map>
@@ -29,20 +29,19 @@ struct PosePlaneSolution {
   bool usable = false;
   std::map<KeyframeId, SE3> T_W_I;
   std::map<PlaneId, Plane> planes;
-  double chi2 = 0;                    ///< sum of whitened squares over all edges
-  std::vector<double> relative_chi2;  ///< per relative edge, in the order they were added
+  double chi2 = 0;  ///< sum of whitened squares over all edges
   int iterations = 0;
 };
 
 class PosePlaneGraph {
  public:
-  /// A node of that id replaces the one before. Edges to unknown nodes throw std::invalid_argument.
+  /// A node with an id in use replaces that node. Edges to unknown nodes throw std::invalid_argument.
   void addPose(KeyframeId id, const SE3& T_W_I) { poses_[id] = T_W_I; }
   void addPlane(PlaneId id, const Plane& plane_W) { planes_[id] = plane_W; }
   void addEdge(const RelativePoseEdge& edge);
   void addEdge(const PosePlaneEdge& edge);
 
-  /// The lowest id of each connected part is held. Optimises from the poses given.
+  /// Optimises from the poses given; the lowest id of each connected part is fixed.
   PosePlaneSolution solve(int max_iterations) const;
 
  private:

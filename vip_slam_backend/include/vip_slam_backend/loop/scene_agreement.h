@@ -1,5 +1,5 @@
-// Witnesses for a place match that do not come from its feature points: do the depth images and the planes of the two
-// keyframes describe one scene?
+// Checks of a place match that are independent of its feature points: whether the depth images and the planes of the
+// two keyframes describe one scene.
 #pragma once
 
 #include <set>
@@ -13,10 +13,10 @@
 namespace vip_slam {
 
 struct DepthAgreement {
-  int compared = 0;     ///< nodes of either grid seen by the other
+  int compared = 0;     ///< nodes of either grid that project into the other
   int agree = 0;        ///< on the same surface
-  int see_through = 0;  ///< the other camera sees something farther: this surface is not there
-  int occluded = 0;     ///< the other camera sees something nearer
+  int see_through = 0;  ///< the other camera sees a farther surface: this one cannot be there
+  int occluded = 0;     ///< the other camera sees a nearer surface
   double agreement() const { return compared ? static_cast<double>(agree) / compared : 0; }
   double seeThrough() const { return compared ? static_cast<double>(see_through) / compared : 0; }
 };
@@ -26,11 +26,11 @@ DepthAgreement compareDepth(const DepthGrid& a, const DepthGrid& b, const SE3& T
 
 struct PlaneAgreement {
   std::vector<std::pair<PlaneId, PlaneId>> same;  ///< (plane of the query, plane of the match): one surface
-  int contradictions = 0;                         ///< overlapping parallel surfaces of one side at different depth
+  int contradictions = 0;                         ///< overlapping parallel surfaces, seen from one side, with an offset
 };
 
 /// Compares the planes seen by `query` keyframes with those seen by `match` keyframes, where `T_W_W` moves the query's
-/// part of the map onto the match's. Planes that both have already are not compared.
+/// part of the map onto the match's. Planes seen by both are not compared.
 PlaneAgreement comparePlanes(const Map& map, const std::set<KeyframeId>& query, const std::set<KeyframeId>& match,
                              const SE3& T_W_W);
 

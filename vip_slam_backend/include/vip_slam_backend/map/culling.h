@@ -1,4 +1,4 @@
-// Keeps the map small: landmarks that never proved themselves, keyframes that others make redundant.
+// Keeps the map small: removes landmarks with too few views, and redundant keyframes.
 #pragma once
 
 #include <utility>
@@ -9,16 +9,17 @@
 
 namespace vip_slam {
 
-/// Removes landmarks with fewer than three views once their track ended, and those with hardly more that are predicted
-/// into keyframes far more often than found. Landmarks that a keyframe at or above `recent` sees are spared. Returns
-/// their number.
+/// Removes landmarks with fewer than three views once their track has ended, and those with three views that were
+/// predicted into keyframes at least five times as often as found. Landmarks seen by keyframes from `recent` on are
+/// kept. Returns the number removed.
 int cullLandmarks(KeyframeId recent, Map* map);
 
-/// Removes keyframes outside the newest `window` whose landmarks are seen elsewhere, at least `redundancy` of them by
-/// three other keyframes: of a map that is too large those that just left the window; and a few, just left or older,
-/// of those that share landmarks with too many others, where landmarks that fewer see do not count. Never the first of
-/// a chain, one that alone holds a plane, one whose removal would tear the IMU chain, or the end of a loop (in a crowd
-/// only of the oldest few between each two odometries, which tie these). `loops`: (query, match), oldest first.
+/// Removes redundant keyframes outside the newest `window`: at least the share `redundancy` of their landmarks is seen
+/// by three other keyframes. In a map that is too large any candidate (those that just left the window, and the older
+/// ones in turn) may go; else only a few at a time that share landmarks with too many keyframes (a crowd), where
+/// landmarks with fewer views do not count. Never removed: the first and last of an IMU chain, one that too few others
+/// replace on a plane, one whose removal would make an IMU factor too long, or the end of a loop (in a crowd only the
+/// ends of the oldest few loops between each two odometries, which tie these). `loops`: (query, match), oldest first.
 std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window, const ImuNoise& noise,
                                       const std::vector<std::pair<KeyframeId, KeyframeId>>& loops, Map* map);
 

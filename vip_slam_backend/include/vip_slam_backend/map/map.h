@@ -27,15 +27,14 @@ class Map {
   /// Inserts a keyframe of a stored map: any id not taken, no check of time; the chain is given by `previous`.
   MapKeyframe& restoreKeyframe(const KeyframePtr& data, const NavState& state, KeyframeId previous,
                                const std::vector<ImuSample>& imu, const ImuNoise& noise);
-  /// The front end knows better how its camera is mounted: holds for all keyframes but those of a stored map. Their
-  /// cameras stay where they are, so that landmarks and planes fit as before; the body turns about them.
+  /// Sets newly estimated camera-IMU extrinsics in all keyframes but those of a stored map. The camera poses stay, so
+  /// that landmarks and planes fit as before; the body poses change.
   void adoptMounting(const SE3& T_I_C);
-  /// The front end knows better what its depth camera reads too long or its intrinsics get wrong: holds for features,
-  /// readings and depth points on planes of all keyframes but those of a stored map. Landmarks, planes and poses are
-  /// left to the next optimisation.
+  /// Applies a newly estimated correction of depth and intrinsics to features, depth grids and depth points on planes
+  /// of all keyframes but those of a stored map. Landmarks, planes and poses follow with the next optimisation.
   void adoptCameraCorrection(const CameraCorrection& correction);
-  /// The front end knows better what its gyro gets wrong: the IMU factors of all keyframes but those of a stored map
-  /// are integrated anew.
+  /// Applies a newly estimated gyro correction: the IMU factors of all keyframes but those of a stored map are
+  /// integrated again.
   void adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise& noise);
   /// Removes it with its observations; landmarks left without observation go too. The IMU chain is joined over the gap
   /// while the joined factor stays below `max_imu_seconds`, else it is cut.
@@ -48,17 +47,17 @@ class Map {
   KeyframeId newestKeyframe() const { return keyframes_.empty() ? 0 : keyframes_.rbegin()->first; }
   /// Keyframes that share landmarks with `id`, most shared first (ties: newer first).
   std::vector<std::pair<KeyframeId, int>> covisible(KeyframeId id, int min_shared = 1) const;
-  /// Sets the state. Integrates the IMU anew when the biases moved too far.
+  /// Sets the state. Integrates the IMU again when the biases have changed too much.
   void setState(KeyframeId id, const NavState& state, const ImuNoise& noise);
 
   // ---- landmarks ----
   /// A new landmark with its first observation. Refused: id taken, position not finite, feature taken or unknown.
   MapLandmark& addLandmark(LandmarkId id, const Eigen::Vector3d& p_W, const MapObservation& first);
-  /// A landmark of a stored map with all its observations, as it is. Refused like the single steps would be.
+  /// Inserts a landmark of a stored map with all its observations. Refused for the same reasons as the single steps.
   MapLandmark& restoreLandmark(const MapLandmark& stored);
   /// False when that feature has a landmark already or that keyframe sees this landmark already.
   bool addObservation(LandmarkId id, const MapObservation& observation);
-  /// The landmark goes when it was the last one.
+  /// The landmark is removed with its last observation.
   void removeObservation(LandmarkId id, KeyframeId keyframe);
   void removeLandmark(LandmarkId id);
   /// Moves the observations of `from` to `into`. False (nothing done) when both are seen by one keyframe in different
@@ -77,25 +76,25 @@ class Map {
   const Feature& feature(const MapObservation& o) const { return keyframe(o.keyframe).features()[o.feature]; }
 
   // ---- planes ----
-  /// Adds or updates; keeps our parameters when the plane was optimised already.
+  /// Adds or updates; keeps the map's plane parameters when they have been optimised already.
   void setPlane(const PlaneEstimate& estimate);
   void setPlaneParameters(PlaneId id, const Plane& plane);
-  /// Takes it to where `motion`, new from old world, has brought the keyframes that see it.
+  /// Moves the plane by `motion`, new from old world, as the keyframes that see it were moved.
   void movePlane(PlaneId id, const SE3& motion);
   void mergePlanes(PlaneId from, PlaneId into);
   void removePlane(PlaneId id);
   bool hasPlane(PlaneId id) const { return planes_.count(id) != 0; }
   const std::map<PlaneId, MapPlane>& planes() const { return planes_; }
-  /// One without points withdraws that of the same keyframe and plane. Ignored (false) when keyframe or plane are gone,
-  /// or the numbers are not finite.
+  /// Replaces the observation of the same keyframe and plane; one without points removes it. Ignored (false) when
+  /// keyframe or plane do not exist, or the numbers are not finite.
   bool setPlaneObservation(const PlaneObservation& observation);
   /// 0 removes the association.
   void associate(LandmarkId landmark, PlaneId plane);
 
   // ---- all ----
-  /// Moves keyframes to new poses (loop correction): velocities turn with them, each landmark follows its host.
+  /// Moves keyframes to new poses (loop correction): velocities rotate with them, each landmark follows its host.
   void moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I);
-  /// The IMU factor into a keyframe is believed by as much less.
+  /// Multiplies the noise of the IMU factor into a keyframe by `factor`.
   void widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise);
   MapChanges takeChanges();
   void clear();

@@ -1,4 +1,4 @@
-// What a map takes in, whether from a front end or from a file: what is accepted can be saved and loaded again.
+// Limits on the data of a map, from a front end or a file: what is accepted can be saved and loaded again.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@ constexpr double kMostRate = 1e3;          ///< rad/s
 constexpr double kMostAcceleration = 1e4;  ///< m/s^2
 constexpr double kMostNoiseScale = 1e4;    ///< of the IMU
 constexpr double kLongestImu = 1e4;        ///< s, of one keyframe
-/// Of numbers between the first keyframe and any other: tables go by them; three months of keyframes.
+/// Largest difference of keyframe ids in a map, since tables are indexed by them: three months of keyframes.
 constexpr std::uint64_t kWidestIds = std::uint64_t{1} << 24;
-constexpr double kUnitNormal = 1e-7;  ///< what the length of a plane's normal may be off by
+constexpr double kUnitNormal = 1e-7;  ///< tolerance of the length of a plane's normal
 
 }  // namespace vip_slam::map_limits

@@ -15,29 +15,29 @@ struct SnapshotKeyframe {
   double t = 0;  ///< image stamp
   std::uint32_t epoch = 0;
   NavState state;  ///< T_map_I, v, biases
-  SE3 T_chain_C;   ///< as the front end had it, see TrackedFrame
-  SE3 T_I_C;       ///< the camera's mounting as known now
+  SE3 T_chain_C;   ///< as published by the front end, see TrackedFrame
+  SE3 T_I_C;       ///< present camera-IMU extrinsics
   std::uint32_t landmarks = 0;
   bool stored = false;  ///< of a loaded map
-  bool placed = true;   ///< false: in a part of the map that nothing ties to the rest; where that lies is a guess
+  bool placed = true;   ///< false: in a part of the map that no loop ties to the rest; its place is a guess
 };
 
-/// How large the map is by the accelerometer, see optimisation/inertial_scale.h.
+/// Scale of the map according to the accelerometer, see optimisation/inertial_scale.h.
 struct InertialScale {
   double factor = 1;  ///< true distance over the map's distance
   double sigma = 0;   ///< one sigma of factor; 0: not known
 };
 
 struct BackEndStatistics {
-  std::uint64_t keyframes_received = 0, keyframes_refused = 0, keyframes_culled = 0;
+  std::uint64_t keyframes_received = 0;
   std::uint64_t landmarks = 0, plane_landmarks = 0, observations = 0;
   std::uint64_t reobserved = 0;  ///< landmarks found again by projection
   std::uint64_t merged = 0;      ///< duplicate tracks joined
   std::uint64_t outliers = 0;    ///< observations removed by residual
   std::uint64_t local_ba = 0, global_ba = 0;
   std::uint64_t loops_accepted = 0, loops_rejected = 0;
-  double track_noise_factor = 1;  ///< see optimisation/problem_builder.h; as of the last adjustment
-  InertialScale scale;            ///< as of the last global adjustment, or some keyframes ago
+  double track_noise_factor = 1;  ///< see optimisation/problem_builder.h; of the last adjustment, local or global
+  InertialScale scale;            ///< of the last global adjustment, or from some keyframes ago
 };
 
 struct MapSnapshot {
@@ -53,10 +53,10 @@ struct MapSnapshot {
   BackEndStatistics statistics;
 };
 
-/// Where the odometry lies in the map, by the map's keyframes and those that were only found in it; ascending times.
+/// Anchors of the odometry in the map: the map's keyframes and those that were only localised in it; ascending times.
 std::vector<Anchor> anchorsOf(const MapSnapshot& snapshot);
 
-/// First and last stamps of keyframes in a row, of this session, whose place is a guess.
+/// First and last stamps of runs of this session's keyframes whose place in the map is a guess.
 std::vector<std::pair<double, double>> guessedTimes(const MapSnapshot& snapshot);
 
 }  // namespace vip_slam

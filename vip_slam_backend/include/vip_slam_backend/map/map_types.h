@@ -27,24 +27,24 @@ struct MapObservation {
 };
 
 struct MapKeyframe {
-  KeyframePtr data;     ///< as the front end published it, its depth corrected by what is known now
+  KeyframePtr data;     ///< as published by the front end, with the present corrections of depth and bearings
   NavState state;       ///< estimate in `map`: T_map_I, v, biases
-  SE3 T_I_C;            ///< the camera's mounting as known now
-  bool stored = false;  ///< from a stored map, made by a camera whose mounting the present one says nothing about
+  SE3 T_I_C;            ///< present camera-IMU extrinsics
+  bool stored = false;  ///< from a stored map: the present camera's calibration does not apply to it
   /// Landmark of each feature, kNoLandmark when none; same length as data->frame.features.
   std::vector<LandmarkId> landmarks;
   /// Neighbours on the IMU chain (0: none). They skip keyframes that were culled.
   KeyframeId previous = 0, next = 0;
-  /// Samples as they were measured, and factor, from `previous`; null when there is none or a gap made it useless.
+  /// Measured samples, and IMU factor, from `previous`; null when there is none or a gap made it useless.
   std::shared_ptr<const std::vector<ImuSample>> imu;
   std::shared_ptr<const Preintegration> preintegration;
-  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< that the factor has, see Keyframe
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< applied in the factor, see Keyframe
   double imu_noise_scale = 1;                                 ///< likewise
   /// The odometry's motion from `previous`; unknown when there is none.
   RelativeMotion motion;
   /// Depth points of this keyframe on planes.
   std::map<PlaneId, PlaneObservation> planes;
-  bool loop_keyframe = false;  ///< end of an accepted loop: hardly ever culled
+  bool loop_keyframe = false;  ///< end of an accepted loop: culled in a crowd only, see culling.h
 
   KeyframeId id() const { return data->id; }
   const std::vector<Feature>& features() const { return data->frame.features; }
@@ -54,7 +54,7 @@ struct MapKeyframe {
 struct MapLandmark {
   LandmarkId id = kNoLandmark;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
-  Descriptor descriptor{};                   ///< of the observation nearest to all others
+  Descriptor descriptor{};                   ///< medoid of its newest observations' descriptors
   std::vector<MapObservation> observations;  ///< ascending keyframe id, one per keyframe; never empty
   PlaneId plane = 0;                         ///< 0: on none
   std::uint32_t visible = 0, found = 0;      ///< times predicted into a keyframe, and times matched there

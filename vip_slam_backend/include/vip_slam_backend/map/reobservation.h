@@ -1,6 +1,6 @@
 // Finds landmarks of nearby keyframes again in a new keyframe: projection, pixel gate, Hamming distance. Untracked
-// corners become observations; a tracked feature that has a landmark of its own is the same point seen anew, and the
-// two merge.
+// corners become observations; a tracked feature that has another landmark is the same point under a new track, and the
+// two landmarks merge.
 #pragma once
 
 #include <functional>
@@ -25,7 +25,7 @@ class Reobservation {
   /// `id` is in the map with its predicted or optimised pose.
   /// `allowed` names the keyframes whose landmarks may be looked for (empty: all).
   ReobservationResult process(KeyframeId id, Map* map, const std::function<bool(KeyframeId)>& allowed = {}) const;
-  /// Keyframes whose landmarks are looked for: covisible ones, then near ones that look the same way.
+  /// Keyframes whose landmarks are searched: covisible ones, then near ones with a similar viewing direction.
   std::vector<KeyframeId> neighbours(const Map& map, KeyframeId id,
                                      const std::function<bool(KeyframeId)>& allowed = {}) const;
 

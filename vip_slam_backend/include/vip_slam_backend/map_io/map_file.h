@@ -1,15 +1,15 @@
-// Map files (.vsm): everything a later session needs to relocalise and to go on mapping.
+// Map files (.vsm): everything that a later session needs to relocalise and to continue mapping.
 //
 // Layout, little-endian: "VIPMAP" 0 0 | u32 version = 6 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32
-// of all before it. Version 1, without the features' pixel_sigma, version 2, which does not tell a landmark's tracks
-// apart, version 3, without the odometry's motion, version 4, without the camera, and version 5, without the scale of
-// the IMU's noise, are read, too. The payload holds the vocabulary's id, the camera, planes, keyframes (state, features
+// of all before it. Version 1 (without the features' pixel_sigma), version 2 (without track numbers within a landmark),
+// version 3 (without the odometry's motion), version 4 (without the camera) and version 5 (without the scale of the
+// IMU's noise) are read, too. The payload holds the vocabulary's id, the camera, planes, keyframes (state, features
 // with descriptors, depth grid in mm, IMU samples, plane observations), landmarks and loops.
 //
-// A file is the same bytes for the same map: landmarks and epochs are numbered anew in ascending order when written,
-// the tracks of a landmark in the order of their first views. Read back, landmarks get ids from kLoadedLandmarks and
-// epochs from kLoadedEpochs on, so that they never meet those of the running odometry. Tracks get ids of their own, no
-// landmark's: whoever finds a landmark again begins another track. Keyframe and plane ids stay as they are.
+// The same map gives the same bytes: landmarks and epochs are renumbered in ascending order when written, the tracks of
+// a landmark in the order of their first views. When read, landmarks get ids from kLoadedLandmarks on and epochs from
+// kLoadedEpochs on, so that they never collide with those of the running odometry. Tracks get ids that differ from
+// those of landmarks, since a landmark that is found again starts another track. Keyframe and plane ids are kept.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +24,8 @@
 namespace vip_slam {
 
 constexpr LandmarkId kLoadedLandmarks = LandmarkId(1) << 40;
-constexpr LandmarkId kLoadedTracks = LandmarkId(1) << 42;  ///< times a track's number, added to the landmark's id
-/// Between the landmarks of maps that are loaded one after the other: tracks of the front end outlive a map.
+constexpr LandmarkId kLoadedTracks = LandmarkId(1) << 42;  ///< times a track's number plus the landmark's id: track id
+/// Offset between the landmark ids of maps loaded one after the other, since tracks of the front end outlive a map.
 constexpr LandmarkId kLoadedApart = LandmarkId(1) << 51;
 constexpr std::uint32_t kLoadedEpochs = 0x80000000u;
 
@@ -33,7 +33,7 @@ struct StoredMap {
   Map map;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops;  ///< (query, match)
   std::uint64_t vocabulary_id = 0;
-  std::optional<CameraIntrinsics> camera;  ///< of the features and depth grids; older files do not know it
+  std::optional<CameraIntrinsics> camera;  ///< of the features and depth grids; empty in older files
 };
 
 std::string serialiseMap(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
@@ -49,8 +49,8 @@ void saveMapFile(const std::string& path, const Map& map, const std::vector<std:
 StoredMap loadMapFile(const std::string& path, const ImuNoise& noise, LandmarkId first_landmark = kLoadedLandmarks);
 
 /// Throws std::runtime_error "path: made with ..., but the camera is ..." when places of the map would not be
-/// recognised by `camera`: another image size, or a focal length that differs by more than a per cent. A map that does
-/// not know its camera is taken for one that fits.
+/// recognised with `camera`: another image size or lens model, a focal length that differs by more than a per cent, or
+/// a principal point by more than 5 % of the width. A map without a camera is accepted.
 void requireCamera(const StoredMap& stored, const CameraIntrinsics& camera, const std::string& path);
 
 }  // namespace vip_slam

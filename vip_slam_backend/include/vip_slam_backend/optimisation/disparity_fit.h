@@ -1,7 +1,6 @@
-// What the map says about the disparities of a stereo or structured-light camera. When they are all off by the same (a
-// tenth of a pixel, say), most of what it does to depth passes for an offset and a scale, which a map cannot tell. But
-// what bends shows, where planes are seen from near and from far, and as the camera can make nothing else of it, offset
-// and scale follow from the bend.
+// Estimates a common disparity error of a stereo or structured-light camera (a tenth of a pixel, say) from the map.
+// Most of its effect on depth is an offset and a scale, which a map cannot observe. But its curvature is observable
+// where planes are seen from near and from far, and since the error has one parameter, offset and scale follow from it.
 #pragma once
 
 #include <optional>
@@ -12,13 +11,13 @@
 
 namespace vip_slam {
 
-/// 1/m: what 1/reading has too much (disparity_curve.h), by the depth points on planes of this session's newest
-/// keyframes over what they have been added already. Nothing unless it is beyond doubt and, the first time
-/// (`again` = false), large enough to be no accident; nothing for cameras that measure no disparity. Poses are held,
-/// planes are free; poses have adapted to some of it, so it takes two or three rounds with an adjustment in between.
+/// Excess of 1/reading (disparity_curve.h), 1/m, from the depth points on planes of this session's newest keyframes, in
+/// addition to the correction that they have already. Empty unless it is significant and, the first time (`again` =
+/// false), large enough; empty for cameras that measure no disparity. Poses are fixed, planes are free; poses have
+/// absorbed part of the error, so it takes two or three rounds with an adjustment in between.
 std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise, bool again);
 
-/// What to tell the user of an error that was found; empty for 0.
+/// Message to the user about an estimated error; empty for 0.
 std::string disparityDifference(double error);
 
 }  // namespace vip_slam

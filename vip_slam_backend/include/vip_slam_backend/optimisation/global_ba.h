@@ -1,5 +1,5 @@
-// Global bundle adjustment beside the running back end: a copy of the problem goes in, a solution comes out, and is
-// merged with what the map has become meanwhile.
+// Global bundle adjustment in parallel to the running back end (paper section "Global Plane and Point Bundle
+// Adjustment"): it solves a copy of the problem, and the solution is merged with the map, which has changed meanwhile.
 #pragma once
 
 #include <memory>
@@ -22,15 +22,14 @@ struct GlobalBaProblem {
 struct GlobalBaSolution {
   BuiltProblem built;
   SolverSummary summary;  ///< of the last round
-  int rounds = 0;
 };
 
-/// Solves in rounds: between them homographies are compressed anew at the better estimate (depth ratios, gates,
+/// Solves in rounds: between them homographies are compressed again at the better estimate (depth ratios, gates,
 /// weights).
 GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job);
 
-/// Writes the solution into `map`. Keyframes and landmarks that came meanwhile, and planes that only such keyframes
-/// see, move rigidly with the newest keyframe of the solution; what was removed meanwhile stays removed.
+/// Writes the solution into `map`. Keyframes and landmarks added meanwhile, and planes that only such keyframes see,
+/// move rigidly with the newest keyframe of the solution; what was removed meanwhile stays removed.
 void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map* map);
 
 }  // namespace vip_slam

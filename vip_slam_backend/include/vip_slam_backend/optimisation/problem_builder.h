@@ -1,5 +1,6 @@
-// From the map to a bundle adjustment and back: which keyframes are free, which are held, and how the four variants
-// turn landmarks and planes into factors.
+// From the map to a bundle adjustment and back (paper sections "Local Plane and Point Bundle Adjustment" and "Global
+// Plane and Point Bundle Adjustment"): which keyframes are free, which are fixed, and how the four variants turn
+// landmarks and planes into factors.
 #pragma once
 
 #include <set>
@@ -11,11 +12,10 @@
 
 namespace vip_slam {
 
+/// Keyframes outside both constrain the planes through one block per plane (their poses are constants).
 struct ProblemScope {
   std::vector<KeyframeId> free;   ///< optimised, ascending
-  std::vector<KeyframeId> fixed;  ///< held, ascending
-  /// Keyframes outside both hold the planes through one block per plane (their poses are constants).
-  bool outside_planes = true;
+  std::vector<KeyframeId> fixed;  ///< constant, ascending
 };
 
 /// Newest `window` keyframes, the IMU neighbour before them, and the observers of their landmarks (most shared first).
@@ -23,7 +23,7 @@ ProblemScope localScope(const Map& map, const LocalBaOptions& options);
 /// All keyframes.
 ProblemScope globalScope(const Map& map);
 
-/// View of a landmark on a plane that the plane contradicted when the problem was built.
+/// View of a landmark on a plane that was gated when the problem was built, since it contradicts the plane.
 struct RefusedView {
   LandmarkId landmark = kNoLandmark;
   KeyframeId keyframe = 0;
@@ -33,14 +33,14 @@ struct RefusedView {
 struct BuiltProblem {
   BaProblem problem;
   std::vector<KeyframeId> frames;  ///< per problem frame; 0: the world frame of outside planes
-  std::vector<LandmarkId> points;  ///< one per track: a landmark's first is its longest
+  std::vector<LandmarkId> points;  ///< landmark of each point, one point per track, a landmark's longest track first
   std::vector<PlaneId> planes;
-  std::vector<LandmarkId> plane_points;  ///< landmarks that stand for homographies only (vip)
-  std::vector<RefusedView> refused;      ///< of those
+  std::vector<LandmarkId> plane_points;  ///< landmarks that occur in homographies only (vip)
+  std::vector<RefusedView> refused;      ///< gated views of those
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
-  double track_noise_factor = 1;  ///< on the sigmas of all pixels, as the map tells (src/optimisation/track_noise.h)
-  double gate_weight = 0;         ///< largest weight by which an observation is judged
+  double track_noise_factor = 1;  ///< on the sigmas of all pixels, estimated in src/optimisation/track_noise.h
+  double gate_weight = 0;         ///< largest weight, focal / sigma, with which outliers are judged
 };
 
 struct BuilderSettings {
@@ -54,17 +54,18 @@ struct BuilderSettings {
 
 BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings);
 
-/// Per plane of a problem, whether some factor holds it. Others have only the prior of their kind, or nothing: where a
-/// window saw them but none of its depth was believed.
+/// Per plane of a problem, whether some measurement constrains it. Other planes have at most the prior of their kind:
+/// the window saw them, but all their depth was gated.
 std::vector<char> heldPlanes(const BaProblem& problem);
 
-/// Writes the optimised variables back. Landmarks that are no variables follow: plane points are intersected with their
-/// plane, single views move with their keyframe. Keyframes that are gone meanwhile are skipped.
+/// Writes the optimised variables back to the map. Landmarks that were no variables follow: plane points are
+/// intersected with their plane, single views move with their keyframe. Keyframes that were removed meanwhile are
+/// skipped.
 void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);
 
-/// Observations whose residual is above `chi2` (squared sigmas, at least `gate_sigma` each) or behind the camera are
-/// removed from the map; their number. To be called after storeProblem(): of landmarks on planes those that were
-/// refused are judged by the position stored.
+/// Removes observations with a residual above `chi2` (squared sigmas, each at least the gate's) or behind the camera;
+/// returns their number. To be called after storeProblem(): the refused views of landmarks on planes are judged by the
+/// position stored there.
 int removeOutliers(const BuiltProblem& built, double chi2, Map* map);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// Inverse index from words to keyframes: which keyframes look like this one?
+// Inverse index from words to keyframes, to find keyframes of similar appearance.
 #pragma once
 
 #include <functional>

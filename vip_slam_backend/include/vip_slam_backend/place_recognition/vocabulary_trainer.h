@@ -14,7 +14,7 @@ struct VocabularyTrainerOptions {
   int branching = 10;       ///< children per node, 2..255
   int levels = 5;           ///< depth of the tree
   int iterations = 12;      ///< k-medians rounds per node
-  int min_descriptors = 8;  ///< a node with fewer is not split: words must mean something
+  int min_descriptors = 8;  ///< a node with fewer is not split, since its words would not generalise
   std::uint64_t seed = 1;
 };
 

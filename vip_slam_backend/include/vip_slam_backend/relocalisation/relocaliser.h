@@ -1,5 +1,5 @@
-// Where in the map is this keyframe? Without any prior pose: after LOST, in a loaded map, in localisation-only mode.
-// See loop/place_search.h for what makes it refuse.
+// Relocalisation: finds a keyframe in the map without a prior pose (after LOST, in a loaded map, in localisation-only
+// mode). See loop/place_search.h for the reasons of a refusal.
 #pragma once
 
 #include <functional>
@@ -21,15 +21,15 @@ class Relocaliser {
  public:
   explicit Relocaliser(const RelocalisationOptions& options) : search_(options) {}
 
-  /// By appearance, of this keyframe and those given before it. Empty when no place fits, or two do; `reason` (may be
-  /// null) says what was seen.
+  /// By appearance of this keyframe and those given before it. Empty when no place fits, or more than one; `reason`
+  /// (may be null) explains the result.
   std::optional<Relocalisation> relocalise(const Map& map, const LoopCloser& places, const KeyframePtr& keyframe,
                                            const std::function<bool(KeyframeId)>& allowed = {},
                                            std::string* reason = nullptr);
-  /// From a predicted pose: the landmarks around it are looked for at once, at the nearest of the keyframes allowed.
+  /// From a predicted pose: guided matching of the landmarks around the nearest of the keyframes allowed.
   std::optional<Relocalisation> track(const Map& map, const LoopCloser& places, const Keyframe& keyframe,
                                       const SE3& T_W_I, const std::function<bool(KeyframeId)>& allowed = {}) const;
-  /// Forgets the keyframes before (another map, another odometry).
+  /// Forgets the earlier keyframes, when the map or the odometry has changed.
   void clear() { search_.clear(); }
 
  private:

@@ -109,10 +109,9 @@ struct BaProblem {
 
   std::size_t residualBlocks() const;
   std::size_t parameters() const;  ///< tangent dimension of all variables
-  std::size_t pixelObservations() const { return observations.size(); }
 };
 
-/// Of each frame, at its present estimate.
+/// Geometry of each frame at its present estimate.
 std::vector<FrameGeometry> frameGeometry(const BaProblem& problem);
 
 /// Empty when the arrays are consistent, else the first error in words.

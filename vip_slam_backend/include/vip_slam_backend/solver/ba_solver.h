@@ -19,7 +19,7 @@ struct SolverOptions {
   double function_tolerance = 1e-6;  ///< stop when the cost falls by less than this fraction
   double gradient_tolerance = 1e-10;
   double parameter_tolerance = 1e-8;
-  bool keep_iterating = false;  ///< run all max_iterations whatever the tolerances say (benchmarks)
+  bool keep_iterating = false;  ///< run all max_iterations regardless of the tolerances (benchmarks)
 };
 
 struct SolverIteration {
@@ -29,12 +29,11 @@ struct SolverIteration {
 
 struct SolverSummary {
   double initial_cost = 0, final_cost = 0;
-  int iterations = 0;  ///< steps tried
-  bool usable = true;  ///< false: the problem was left as it was
+  int iterations = 0;  ///< steps tried, accepted or not
+  bool usable = true;  ///< false: the problem was left unchanged
   std::string message;
   double residual_ms = 0, jacobian_ms = 0, linear_ms = 0, preprocess_ms = 0, postprocess_ms = 0, total_ms = 0;
   std::size_t residual_blocks = 0, parameters = 0, observations = 0;
-  std::size_t factor_nonzeros = 0;  ///< of the reduced system's Cholesky factor, when known
   std::vector<SolverIteration> log;
 };
 
@@ -42,7 +41,7 @@ class BaSolver {
  public:
   virtual ~BaSolver() = default;
   virtual std::string name() const = 0;
-  /// Improves the variables in place. Throws std::invalid_argument with validateProblem()'s words.
+  /// Improves the variables in place. Throws std::invalid_argument with the message of validateProblem().
   virtual SolverSummary solve(BaProblem& problem, const SolverOptions& options) = 0;
 };
 

@@ -1,5 +1,5 @@
-// Doubles for the solver's kernels: on whole cache lines, and large ones on huge pages, since a solver of its own for
-// each adjustment would spend a tenth of its time on the first touch of small pages.
+// Arrays of doubles for the solver's kernels: aligned to cache lines, and large ones on huge pages, since a solver that
+// is made for a single adjustment would spend a tenth of its time on the first touch of small pages.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@ namespace vip_slam {
 
 class KernelArray {
  public:
-  /// What was there is lost; the new content is anything.
+  /// The old content is lost, the new content is undefined.
   void resize(std::size_t count);
   void fillZero();
 

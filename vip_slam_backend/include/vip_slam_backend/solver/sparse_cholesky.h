@@ -1,8 +1,8 @@
 // Block-sparse Cholesky of a symmetric positive definite matrix whose unknowns come in nodes (6 pose, 9 motion, 3
 // plane): approximate minimum degree, then a multifrontal factorisation on dense fronts. The symbolic part is done once
-// per structure; numbers go straight from the caller's blocks into the fronts. The right-hand side goes along as the
-// last row of every front, so that the forward substitution is part of the factorisation. Two disjoint parts of the
-// elimination tree can be factorised side by side; the numbers are the same to the last bit.
+// per structure; values are copied directly from the caller's blocks into the fronts. The right-hand side is the last
+// row of every front, so that the forward substitution is part of the factorisation. Two disjoint parts of the
+// elimination tree can be factorised in parallel, with bit-identical results.
 #pragma once
 
 #include <cstddef>
@@ -45,9 +45,6 @@ class SparseCholesky {
   /// tree.
   bool solve(const double* values, double* b, Worker* worker = nullptr);
 
-  std::size_t factorNonzeros() const { return factor_nonzeros_; }
-  double factorFlops() const { return factor_flops_; }
-
  private:
   struct Entry {         // a block of the matrix inside its front
     std::size_t offset;  // into values
@@ -59,7 +56,7 @@ class SparseCholesky {
     std::vector<Entry> entries;
     std::vector<int> children;
     std::vector<FrontSegment> to_parent;
-    int parent_pivots = 0;      // update columns that are pivots of the parent
+    int parent_pivots = 0;      // number of update columns that are pivots of the parent
     std::vector<int> unknowns;  // caller's unknown of each row but the last
     std::size_t factor_offset = 0;
     std::size_t update_offset = 0;  // of the update matrix
@@ -70,13 +67,20 @@ class SparseCholesky {
   bool factorizeFront(const Front& front, const double* values, const double* b);
   bool factorize(const double* values, const double* b, Worker* worker);
   void backSubstitute(double* b) const;
+  // sparse_cholesky_symbolic.cpp: the steps of analyze()
+  struct Supernodes;
+  /// Fixes the order of elimination; returns the structure of the factor below each node, in positions, ascending.
+  std::vector<std::vector<int>> order(const std::vector<std::pair<int, int>>& pairs);
+  Supernodes joinSupernodes(const std::vector<std::vector<int>>& structure) const;
+  void layFronts(const std::vector<std::vector<int>>& structure, Supernodes* supernodes);
   void splitTree();
   void placeUpdates();
+  void placeBlocks(const std::vector<std::pair<int, int>>& pairs, Supernodes* supernodes);
+  int sizeAt(int position) const { return sizes_[node_at_[position]]; }
 
   std::vector<int> sizes_, unknown_, position_, node_at_;
   std::vector<std::size_t> diagonal_offset_, pair_offset_;
-  std::size_t value_count_ = 0, factor_nonzeros_ = 0;
-  double factor_flops_ = 0;
+  std::size_t value_count_ = 0;
   int dimension_ = 0;
   std::vector<Front> fronts_;
   std::size_t factor_size_ = 0;

@@ -4,9 +4,14 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <boost/crc.hpp>
+
 namespace vip_slam {
 
-/// `seed` is the CRC of what came before: crc32(b, crc32(a)) is the CRC of a followed by b.
-std::uint32_t crc32(const void* data, std::size_t size, std::uint32_t seed = 0);
+inline std::uint32_t crc32(const void* data, std::size_t size) {
+  boost::crc_32_type crc;
+  crc.process_bytes(data, size);
+  return crc.checksum();
+}
 
 }  // namespace vip_slam

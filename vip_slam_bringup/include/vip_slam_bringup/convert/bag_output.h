@@ -1,4 +1,4 @@
-// A bag that appears whole or not at all, filled from streams that are each in time order.
+// A bag that appears completely or not at all, filled from streams that are each in time order.
 #pragma once
 
 #include <functional>
@@ -16,8 +16,8 @@ namespace vip_slam {
 
 class BagOutput {
  public:
-  /// Writes beside `path` and renames in finish(). Throws std::runtime_error naming the path when it cannot, or when
-  /// the file is there and `overwrite` is false.
+  /// Writes a temporary file next to `path`, which finish() renames. Throws std::runtime_error naming the path when it
+  /// cannot be opened, or when the bag or one of its companion files (sensor, truth) exists and `overwrite` is false.
   BagOutput(const std::string& path, bool overwrite);
   /// Removes what was written when finish() was not reached.
   ~BagOutput();

@@ -1,5 +1,5 @@
-// Data-set folders to bags. Each converter reads every table before it writes, names file and line of what it cannot
-// read (std::runtime_error, one line), and leaves either all of its files or none.
+// Converts data-set folders to bags. Each converter reads all tables before it writes, reports file and line of what it
+// cannot read (std::runtime_error, one line), and leaves either all of its files or none.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ struct ConversionReport {
 
 struct ConversionOptions {
   std::string folder;  ///< the data set
-  std::string bag;     ///< NAME.bag; beside it NAME_sensor.yaml and, with truth, NAME_truth.tum
+  std::string bag;     ///< NAME.bag; next to it NAME_sensor.yaml and, with ground truth, NAME_truth.tum
   bool overwrite = false;
   std::function<void(std::size_t, std::size_t)> progress;
 };

@@ -1,4 +1,4 @@
-// Tables in text files (CSV or blank-separated), read so that every error names file and line.
+// Tables in text files (CSV or blank-separated); every error names file and line.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The preflight checks: each looks at one aspect of a recording and says in plain words what it found.
+// The preflight checks: each tests one aspect of a recording and reports its findings in plain words.
 #pragma once
 
 #include <string>
@@ -7,6 +7,10 @@
 #include "vip_slam_bringup/preflight/recording.h"
 
 namespace vip_slam {
+
+/// Jitter of image stamps that is reported, s: at 60 degrees/s the camera rotates by a milliradian, half a pixel, in 1
+/// ms.
+constexpr double kLargeStampJitter = 0.001;
 
 enum class Severity {
   kGood,     ///< as it should be
@@ -23,7 +27,7 @@ struct Finding {
 };
 using Findings = std::vector<Finding>;
 
-Findings checkTopics(const Recording& recording);  ///< there, of the right type, with messages
+Findings checkTopics(const Recording& recording);  ///< topics exist, have the right type, have messages
 Findings checkRates(const Recording& recording);   ///< rates, missing messages, order of stamps, stamps against clock
 Findings checkImages(const Recording& recording);  ///< encodings, sizes, camera_info, depth values
 Findings checkSkew(const Recording& recording);    ///< colour against depth stamps
@@ -31,16 +35,16 @@ Findings checkImu(const Recording& recording);     ///< gaps, units, gravity, va
 Findings checkMotion(const Recording& recording);  ///< camera-IMU delay and rotation from the motion itself
 Findings checkTf(const Recording& recording);      ///< frames, and extrinsics against the sensor file
 
-/// All of them in this order; the later ones only when their input is there.
+/// All of them in this order; the later ones only when their input is available.
 Findings checkAll(const Recording& recording);
 Severity worst(const Findings& findings);
-/// One line a finding, the worst first within each check, then the verdict; `color`: ANSI colours.
+/// One line per finding, the worst first within each check, then the verdict; `color`: ANSI colours.
 std::string toText(const Findings& findings, bool color);
 
 /// Camera-IMU delay and rotation estimated from gyro rates and image rotation.
 struct MotionEstimate {
   bool usable = false;
-  std::string why_not;     ///< in words when not usable
+  std::string why_not;     ///< reason when not usable
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
   double time_sigma = 0;   ///< one sigma of it, seconds
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();

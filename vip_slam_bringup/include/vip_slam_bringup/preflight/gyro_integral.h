@@ -1,4 +1,4 @@
-// The angle that the gyro has turned by, as a function of time: for motions so short that turns add up.
+// The integrated rotation angle of the gyro as a function of time: for motions so short that rotations are additive.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Rotation between successive images, for the check of delay and extrinsics: corners tracked by KLT, with depth by PnP
-// (parallax taken out), else by aligning the bearing vectors.
+// Rotation between successive images, for the check of delay and extrinsics: from corners tracked by KLT, with depth by
+// PnP (accounts for parallax), else by aligning the bearing vectors.
 #pragma once
 
 #include <memory>
@@ -14,11 +14,11 @@ namespace vip_slam {
 
 class ImageRotation {
  public:
-  /// Corners are taken where `mask` is not zero; empty: anywhere.
+  /// Corners are used where `mask` is not zero; empty: anywhere.
   explicit ImageRotation(std::shared_ptr<const CameraModel> camera, const cv::Mat& mask = cv::Mat())
       : camera_(std::move(camera)), mask_(mask) {}
-  /// `gray` 8UC1 of the camera's size, `depth` 32FC1 metres of the same size or empty. A step when the two last images
-  /// are less than 0.2 s apart and enough corners agree on the motion.
+  /// `gray` 8UC1 of the camera's size, `depth` 32FC1 metres of the same size or empty. Returns a step when the last two
+  /// images are less than 0.2 s apart and enough corners agree on the motion.
   std::optional<RotationStep> add(double t, const cv::Mat& gray, const cv::Mat& depth);
 
  private:

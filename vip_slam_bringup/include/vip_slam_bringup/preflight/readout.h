@@ -1,9 +1,10 @@
-// How long a rolling shutter takes from the first row of an image to its last, and by how much its stamps lag.
+// Estimates the readout time of a rolling shutter, from the first row of an image to the last, and the camera-IMU
+// delay.
 //
-// A corner seen at row a of one image and row b of the next was seen at the times t0 + td + r a and t1 + td + r b.
-// Between those the gyro tells how the camera turned; its speed, the same for all corners of the two images, is left to
-// them. The readout r, the delay td, the camera's rotation on the IMU and the gyro's bias are what fits all corners of
-// all images best: Gauss and Newton with weights of Huber, the speeds eliminated image by image.
+// A corner seen at row a of one image and row b of the next was seen at the times t0 + td + r a and t1 + td + r b. The
+// gyro gives the camera's rotation between those; its velocity, common to all corners of the two images, is a free
+// parameter. The readout r, the delay td, the camera-IMU rotation and the gyro's bias are fitted to all corners of all
+// images: Gauss-Newton with Huber weights, the velocities eliminated image by image.
 #pragma once
 
 #include <optional>
@@ -17,12 +18,12 @@ namespace vip_slam {
 
 struct ReadoutEstimate {
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset for the middle row
-  double readout = 0;      ///< seconds; negative: the last row comes first
+  double readout = 0;      ///< seconds; negative: the last row is read first
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
-  double time_sigma = 0, readout_sigma = 0;  ///< seconds, from the scatter of the images among each other
+  double time_sigma = 0, readout_sigma = 0;  ///< one sigma, seconds, from the scatter between images
 };
 
-/// `start`: where the search begins. Empty when there are too few corners with depth or they do not settle it.
+/// `start`: initial values. Empty when there are too few corners with depth or the fit is not determined.
 std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& steps, const GyroIntegral& gyro,
                                                const ReadoutEstimate& start);
 

@@ -26,7 +26,7 @@ class Recorder {
   void add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message);
   void add(const std::string& topic, double arrival, const sensor_msgs::Imu& message);
   void add(const tf2_msgs::TFMessage& message);
-  /// Every topic that is there, wanted or not.
+  /// All existing topics, used or not.
   void setTopics(std::map<std::string, std::string> topics) { recording_.topics = std::move(topics); }
 
   /// After the last message.
@@ -46,14 +46,14 @@ class Recorder {
   const double image_seconds_;
   double first_image_ = -1;
   std::unique_ptr<ImageRotation> rotation_;
-  cv::Size rotation_size_;  ///< of the camera that rotation_ has
+  cv::Size rotation_size_;  ///< image size of rotation_'s camera
   struct Stamped {
     double t;
     cv::Mat image;
   };
   FrozenDepth frozen_depth_;
-  cv::Mat newest_gray_;                               ///< that was no repeat
-  std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour waits a moment for its depth
+  cv::Mat newest_gray_;                               ///< newest image that was not a repetition
+  std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour images wait a moment for their depth
 };
 
 /// Reads a bag. Throws std::runtime_error naming the file when it cannot be read.

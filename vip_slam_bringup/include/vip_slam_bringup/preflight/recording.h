@@ -1,5 +1,5 @@
-// What was seen of a sensor in a bag or on live topics, reduced to what the checks need. Neither bag nor master,
-// so that the checks are tested on invented recordings.
+// Data of a sensor from a bag or live topics, reduced to what the checks need. It depends on neither bag nor master, so
+// that the checks can be tested on synthetic recordings.
 #pragma once
 
 #include <map>
@@ -25,8 +25,8 @@ struct StreamRecord {
   std::string frame_id;                 ///< of the last message
   std::size_t unusable = 0;             ///< messages that could not be decoded
   std::string unusable_reason;
-  std::size_t decoded = 0;   ///< messages whose pixels were looked at
-  std::size_t repeated = 0;  ///< of these, with the pixels of the one before while the sensor turns
+  std::size_t decoded = 0;   ///< messages whose pixels were decoded
+  std::size_t repeated = 0;  ///< of these, with the pixels of the one before while the sensor rotates
 };
 
 struct StampedVector {
@@ -34,25 +34,25 @@ struct StampedVector {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
 };
 
-/// A corner seen in two images in a row.
+/// A corner seen in two successive images.
 struct CornerTrack {
   Eigen::Vector3f point;   ///< metres, in the colour camera when its row of the first image was read
   Eigen::Vector2f image;   ///< normalised coordinates in the second image
-  float row_from, row_to;  ///< its rows, -0.5 upper rim of the image, 0.5 lower
+  float row_from, row_to;  ///< its rows, -0.5 at the upper border of the image, 0.5 at the lower
 };
 
 /// Motion of the camera between two images.
 struct RotationStep {
   double t0 = 0, t1 = 0;
   Eigen::Vector3d rate_C = Eigen::Vector3d::Zero();  ///< mean rotation rate, rad/s, in the colour optical frame
-  std::vector<CornerTrack> tracks;                   ///< those with depth
+  std::vector<CornerTrack> tracks;                   ///< corners with depth
 };
 
 struct DepthSample {
   double valid = 0;   ///< share of pixels with a value
   double usable = 0;  ///< share of pixels within the sensor file's range
   double median = 0;  ///< metres, of those with a value
-  double spread = 0;  ///< metres, between the nearest and the farthest of them
+  double spread = 0;  ///< metres, farthest minus nearest of those
 };
 
 struct BrightnessSample {
@@ -61,9 +61,9 @@ struct BrightnessSample {
 };
 
 struct Recording {
-  SensorConfig sensor;  ///< what is expected
+  SensorConfig sensor;  ///< the expected configuration
   bool live = false;
-  std::map<std::string, std::string> topics;  ///< everything that is there: topic -> type
+  std::map<std::string, std::string> topics;  ///< all existing topics: topic -> type
   StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
   CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
   std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable

@@ -1,5 +1,5 @@
-// The camera's place on the IMU as tf in the bag has it, by the rule of the front-end nodelet: frame names of messages
-// decide, /tf_static counts always and /tf when it comes early.
+// Camera-IMU extrinsics from the bag's tf, by the rules of the front-end nodelet: frame names are those of the
+// messages, /tf_static is used always, and /tf when it is early enough.
 #pragma once
 
 #include <optional>
@@ -11,9 +11,9 @@
 
 namespace vip_slam {
 
-/// The frames that the first messages within a part of the bag name, and how tf connects them.
+/// The frames of the first messages within a part of the bag, and the transform between them.
 struct BagExtrinsics {
-  std::string camera_frame, imu_frame;  ///< empty: no such message, or its driver leaves the name empty
+  std::string camera_frame, imu_frame;  ///< empty: no such message, or the driver leaves the name empty
   std::optional<SE3> T_imu_cam;         ///< none when tf does not connect the two
 };
 

@@ -1,5 +1,5 @@
 // A bag as a sequence of decoded sensor data: IMU samples and paired images, in the order of the bag. Reading, decoding
-// and pairing run ahead in a thread of their own; what comes out does not depend on its speed.
+// and pairing run ahead in their own thread; the output does not depend on its speed.
 #pragma once
 
 #include <atomic>
@@ -29,7 +29,7 @@ struct AccelSample {
   double t;
   Eigen::Vector3d accel;
 };
-/// Stamps have run back: what comes next belongs to nothing before it.
+/// Stamps have run back: the following events are not related to those before.
 struct TimeJump {
   double seconds;
 };
@@ -41,14 +41,14 @@ struct BagReaderOptions {
   PairerOptions pairing;
   double time_jump = 1.0;           ///< stamps run back by more than this, seconds: a TimeJump
   std::string extrinsics = "auto";  ///< "tf", "config" (the sensor file), or tf when the bag has it
-  double tf_patience = 2.0;         ///< seconds of /tf that are looked at; /tf_static counts always
+  double tf_patience = 2.0;         ///< seconds of /tf that are read; /tf_static is used always
 };
 
 class BagReader {
  public:
-  /// Opens the bag and looks for the sensor's topics; fills `sensor.camera` from camera_info when the sensor says so,
-  /// and `sensor.T_imu_cam` from tf. Throws std::runtime_error naming the file, the topics that are missing and those
-  /// that are there, or the frames that tf ought to connect and does not.
+  /// Opens the bag and finds the sensor's topics; fills `sensor.camera` from camera_info when the sensor file says so,
+  /// and `sensor.T_imu_cam` from tf. Throws std::runtime_error naming the file, the missing and the existing topics, or
+  /// the frames that tf should connect and does not.
   BagReader(const std::string& path, SensorConfig& sensor, const BagReaderOptions& options = {});
   ~BagReader();
   BagReader(const BagReader&) = delete;
@@ -56,19 +56,19 @@ class BagReader {
 
   /// Starts to read ahead.
   void start();
-  /// Reads no further: the end, before the end.
+  /// Stops reading before the end of the bag.
   void stop();
-  /// The next event; empty at the end. What cannot be read of a damaged bag is left out, with a warning.
+  /// The next event; empty at the end. Unreadable parts of a damaged bag are skipped, with a warning.
   std::optional<SensorEvent> next();
 
   double beginTime() const;  ///< seconds, of the part that is read
   double endTime() const;
   /// Where `sensor.T_imu_cam` comes from: "sensor file", or "tf" with the frames that it connects.
   const std::string& extrinsicsSource() const { return extrinsics_source_; }
-  /// After the end: what was counted ("undecodable_images", "images_without_depth", ...), and what a user should know.
+  /// After the end: counters ("undecodable_images", "images_without_depth", ...), and warnings for the user.
   const std::map<std::string, std::uint64_t>& counters() const { return counters_; }
   const SensorConfig& sensor() const { return sensor_; }
-  bool damaged() const { return damaged_; }  ///< after the end: some of the bag could not be read
+  bool damaged() const { return damaged_; }  ///< after the end: whether parts of the bag could not be read
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:

@@ -1,5 +1,5 @@
-// A bounded queue between two threads that loses nothing: the writer waits while it is full. (The nodelets' queues drop
-// instead, since a camera does not wait.)
+// A lossless bounded queue between two threads: the writer waits while it is full. (The nodelets' queues drop instead,
+// since a camera does not wait.)
 #pragma once
 
 #include <condition_variable>

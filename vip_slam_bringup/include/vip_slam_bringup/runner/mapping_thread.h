@@ -1,5 +1,5 @@
-// Planes and back end in a thread of their own: work is done in the order it is handed over, so that the results do not
-// depend on how fast either thread runs.
+// Planes and back end in their own thread: tasks are done in the order of their posting, so that the results do not
+// depend on the speed of either thread.
 #pragma once
 
 #include <exception>
@@ -25,7 +25,7 @@ struct GlobalBaRecord {
   double milliseconds = 0;
 };
 
-/// A plane as it stood after a map update.
+/// A plane's parameters after a map update.
 struct PlaneRecord {
   double t = 0;  ///< stamp of the newest keyframe
   PlaneId id = 0;
@@ -40,16 +40,17 @@ class MappingThread {
   MappingThread(const MappingThread&) = delete;
   MappingThread& operator=(const MappingThread&) = delete;
 
-  /// Before the first keyframe: starts in a stored map. Throws std::runtime_error naming the file when it is unusable.
+  /// To be called before the first keyframe: starts with a stored map. Throws std::runtime_error naming the file when
+  /// it is unusable.
   MapUpdate loadMap(const std::string& path);
-  /// Only finds its way in the map from now on.
+  /// Localisation-only mode from now on.
   void localiseOnly() { back_end_->setLocalisationMode(true); }
 
   void grow(TrackedFramePtr frame);
-  /// The map updates that follow from the keyframe, in order. An exception of the estimators comes out of get().
+  /// Returns the map updates that result from the keyframe, in order. get() throws an exception of the estimators.
   std::future<std::vector<MapUpdate>> addKeyframe(KeyframePtr keyframe);
-  /// Does what waits, then the last global adjustment. Afterwards the estimators may be read. Throws what that, or
-  /// grow(), has met with.
+  /// Finishes the waiting tasks, then the last global adjustment. Afterwards the estimators may be read. Throws the
+  /// exception of that, or of an earlier grow().
   void finish();
 
   const BackEnd& backEnd() const { return *back_end_; }
@@ -72,7 +73,7 @@ class MappingThread {
   std::vector<GlobalBaRecord> adjustments_;
   std::vector<PlaneRecord> plane_history_;
   std::vector<std::string> refusals_;
-  std::exception_ptr failure_;  ///< of the thread, to be read after its end
+  std::exception_ptr failure_;  ///< exception of the thread, to be read after its end
   Channel<std::function<void()>> work_;
   std::thread thread_;
 };

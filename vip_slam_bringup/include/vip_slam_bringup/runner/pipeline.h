@@ -1,8 +1,8 @@
-// The estimators in lock-step: sensor events go in, poses come out, the same bits each time.
+// The estimators in lock-step: sensor events are input, poses are output, with bit-identical results each time.
 //
-// The front end runs in the calling thread, planes and back end in a thread of their own. What the back end says about
-// a keyframe reaches the front end a fixed number of images later, whenever it is computed, so that the two threads
-// never race. With a lag of 0 the front end waits for it.
+// The front end runs in the calling thread, planes and back end in their own thread. The back end's update for a
+// keyframe is applied to the front end a fixed number of images later, whenever it is computed, so that the result does
+// not depend on timing. With a lag of 0 the front end waits for it.
 #pragma once
 
 #include <cstdint>
@@ -30,15 +30,15 @@ struct StateChange {
   TrackingStatus status;
 };
 
-/// An image's pose as the front end gave it.
+/// An image's pose as published by the front end.
 struct OdometryPose {
   double t = 0;  ///< image stamp, seconds
   std::uint32_t epoch = 0;
   SE3 T_odom_I;
 };
 
-/// What the front end says of its own error, ordered as in nav_msgs/Odometry: x y z in odom, then rotation about the
-/// axes of odom.
+/// The front end's reported covariance, ordered as in nav_msgs/Odometry: x y z in odom, then rotation about the axes of
+/// odom.
 struct OdometryCovariance {
   double t;
   Matrix6d covariance;
@@ -49,25 +49,25 @@ class Pipeline {
   Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing);
   ~Pipeline();
 
-  /// Before the first event: starts in a stored map, and with `localise` leaves that map as it is.
+  /// To be called before the first event: starts with a stored map, and with `localise` does not change it.
   void loadMap(const std::string& path, bool localise);
   void add(const SensorEvent& event);
-  /// End of the data: processes what waits, and the last global adjustment.
+  /// End of the data: processes the waiting images, and runs the last global adjustment.
   void finish();
 
   std::size_t images() const { return images_; }
-  /// From the first to the last image, stamps, seconds; of a clock that ran back the stretches together.
+  /// Time from the first to the last image by their stamps, seconds; the sum of the parts when the clock ran back.
   double duration() const {
     return newest_taken_ > oldest_taken_ ? duration_ + newest_taken_ - oldest_taken_ : duration_;
   }
-  /// Images with a pose; in order of their stamps after finish(). Where stamps ran back and come a second time, the
-  /// first pass counts.
+  /// Images with a pose; in order of their stamps after finish(). Of stamps that repeat after the clock ran back, the
+  /// first pass is used.
   const std::vector<OdometryPose>& odometry() const { return odometry_; }
   const std::vector<ChainedPose>& chain() const { return chain_; }                     ///< one for each of odometry()
   const std::vector<OdometryCovariance>& covariances() const { return covariances_; }  ///< one for each of odometry()
   const std::vector<StateChange>& states() const { return states_; }
   const TrackingStatus& status() const { return status_; }  ///< of the last image
-  const Trajectory& realtime() const { return realtime_; }  ///< in map, as known at that time
+  const Trajectory& realtime() const { return realtime_; }  ///< poses in map, as estimated at the time of each image
   const FrontEnd& frontEnd() const { return *front_end_; }
   const MappingThread* mapping() const { return mapping_.get(); }  ///< null: odometry only. Read it after finish()
 
@@ -79,10 +79,10 @@ class Pipeline {
   void applyAnswers(std::size_t image);
   void process(const ImagePair& pair);
   void processReady();
-  void processRest();  ///< what waits, as far as the IMU covers it
-  /// Stamps ran back: what waits is done with, and the odometry begins anew.
+  void processRest();  ///< the waiting images, as far as the IMU covers them
+  /// Stamps ran back: processes the waiting images and restarts the odometry.
   void restart(double seconds);
-  /// How far the data has gone on since an image at `t`, seconds.
+  /// Time by which the data has advanced past an image at `t`, seconds.
   double waitedFor(double t) const;
 
   const PipelineOptions options_;
@@ -93,7 +93,7 @@ class Pipeline {
   SE3 T_map_odom_;
   std::uint32_t epoch_ = 0;
   bool placed_ = false;                                 ///< T_map_odom_ is known for epoch_
-  double newest_image_ = -1e300, newest_imu_ = -1e300;  ///< stamps, each by its own clock
+  double newest_image_ = -1e300, newest_imu_ = -1e300;  ///< stamps, each on its own clock
   std::size_t images_ = 0;
   double duration_ = 0;                                            ///< of the images before the clock last ran back
   double oldest_taken_ = std::numeric_limits<double>::infinity();  ///< stamps of the images since then

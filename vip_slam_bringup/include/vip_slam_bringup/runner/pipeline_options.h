@@ -1,4 +1,4 @@
-// All options of the estimators, as run_bag and the parameter reference name them.
+// All options of the estimators, with the names used by run_bag and the parameter reference.
 #pragma once
 
 #include "vip_slam_backend/back_end_options.h"

@@ -1,4 +1,4 @@
-// Planes for other programs: a mesh, and a floor plan.
+// Export of planes: a mesh, and a floor plan.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The files that a run leaves (docs/outputs.md).
+// The output files of a run (docs/outputs.md).
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace vip_slam {
 
-/// What the pipeline itself does not know.
+/// Facts about the run that the pipeline itself does not have.
 struct RunFacts {
   std::string bag, sensor, variant;
   bool loop_closing = true;
@@ -17,7 +17,7 @@ struct RunFacts {
   double processing_time = 0;  ///< seconds, wall clock
 };
 
-/// What a user should know of a run that has ended, one sentence each.
+/// Warnings for the user after a run, one sentence each.
 std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader);
 
 /// Throws std::runtime_error naming the file that cannot be written.

@@ -1,8 +1,8 @@
 // Sub-pixel refinement of a disparity image by the images' own intensities: one Lucas-Kanade step along the rows.
 //
-// Semi-global matching decides between whole pixels and interpolates costs, and its smoothness penalty holds slanted
-// surfaces on steps: 0.12 px of median error on a wall at 24 degrees, half of it bias. With the right image warped by
-// the disparity d, left(x) - right(x - d) is the error that a step delta explains as -delta right'(x - d); delta is the
+// Semi-global matching selects whole pixels and interpolates costs, and its smoothness penalty turns slanted surfaces
+// into steps: 0.12 px of median error on a wall at 24 degrees, half of it bias. With the right image warped by the
+// disparity d, left(x) - right(x - d) is the error that a step delta explains as -delta right'(x - d); delta is the
 // least-squares solution over a window. The warp follows the surface, so the window need not be fronto-parallel.
 #pragma once
 

@@ -1,6 +1,6 @@
 // Depth from a calibrated stereo pair: rectification, OpenCV's semi-global block matching, sub-pixel refinement,
 // depth = f B / disparity.
-// The depth belongs to the rectified left camera, whose optical frame is the left one turned by the rectification.
+// The depth belongs to the rectified left camera, whose optical frame is the left one rotated by the rectification.
 #pragma once
 
 #include <memory>

@@ -1,8 +1,8 @@
-// What the intrinsics of a camera get wrong, in normalised coordinates: a bearing (x, y, 1) that they make of a pixel
-// means (x + sx x + cx, y + sy y + cy, 1). A focal length that is given too long makes s positive, a principal point
-// that is given too far right or down makes c positive. The map is linear in (x, y, 1), so that depth points follow it
-// as they are: p -> (I + K) p. Through a lens with distortion that is right to a tenth of the correction; the filter,
-// which sees a few hundredths of a pixel, takes each bearing's own Jacobian instead.
+// Correction of a camera's intrinsics in normalised coordinates: the true bearing of a pixel is (x + sx x + cx, y + sy
+// y + cy, 1), where (x, y, 1) is the one computed with the given intrinsics. s is positive when the given focal length
+// is too long, c when the given principal point is too far right or down. The map is linear in (x, y, 1), so that it
+// applies to depth points as well: p -> (I + K) p. For a lens with distortion that is accurate to a tenth of the
+// correction; the filter, which resolves a few hundredths of a pixel, uses each bearing's own Jacobian.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@ struct BearingCorrection {
   bool operator!=(const BearingCorrection& other) const { return value != other.value; }
 };
 
-/// (fx, fy, cx, cy) in pixels that need no correction any more, instead of `given`.
+/// Intrinsics (fx, fy, cx, cy), pixels, that include the correction; to be used instead of `given` without it.
 inline Eigen::Vector4d correctedIntrinsics(const Eigen::Vector4d& given, const BearingCorrection& bearing) {
   const Eigen::Vector2d focal = given.head<2>().array() / (1.0 + bearing.value.head<2>().array());
   Eigen::Vector4d corrected;

@@ -59,7 +59,7 @@ class CameraModel {
   double max_radius2_ = std::numeric_limits<double>::infinity();
 };
 
-/// Throws std::invalid_argument with intrinsics.validate()'s words when unusable.
+/// Throws std::invalid_argument with the message of intrinsics.validate() when unusable.
 std::shared_ptr<const CameraModel> makeCamera(const CameraIntrinsics& intrinsics);
 
 }  // namespace vip_slam

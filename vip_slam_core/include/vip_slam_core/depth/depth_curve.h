@@ -1,5 +1,5 @@
-// What a depth camera reads too short at each distance (negative: too long), where that is neither an offset nor a
-// scale: the wiggle of a time-of-flight camera over range. A table over the reading, linear in between.
+// Correction of a depth camera's distance-dependent error that is neither an offset nor a scale, such as the periodic
+// error of a time-of-flight camera: a table over the reading, linear in between; positive where it reads too short.
 #pragma once
 
 #include <string>
@@ -14,12 +14,12 @@ namespace vip_slam {
 
 struct DepthCurve {
   static constexpr double kStep = 0.125;  ///< m
-  static constexpr double kMost = 1.0;    ///< m of any entry; so much more is no error but another sensor
+  static constexpr double kMost = 1.0;    ///< m, largest entry; a larger one cannot be an error of the camera
 
-  std::vector<float> added;  ///< m, for readings of 0, kStep, 2 kStep, ...; beyond the last as there; empty: nothing
+  std::vector<float> added;  ///< m, for readings of 0, kStep, 2 kStep, ...; constant beyond the last; empty: zero
 
   bool empty() const { return added.empty(); }
-  /// What a reading of `z` m has to be added.
+  /// Correction to be added to a reading of `z` m.
   float at(float z) const {
     if (added.empty()) return 0.f;
     const float k = z > 0 ? z / static_cast<float>(kStep) : 0.f;
@@ -33,22 +33,22 @@ struct DepthCurve {
   bool operator!=(const DepthCurve& other) const { return !(*this == other); }
 };
 
-/// Both at once: `first` for the readings, `then` for what comes of them.
+/// Both in one curve: `first` applied to the readings, `then` to the result.
 DepthCurve chained(const DepthCurve& first, const DepthCurve& then);
 
-/// What is wrong with it in words, empty when nothing is: entries that are not finite or beyond kMost, or that fall so
-/// steeply that two readings mean one depth.
+/// Message on what is wrong, empty when nothing is: entries that are not finite or beyond kMost, or that fall so
+/// steeply that two readings give the same depth.
 std::string validateDepthCurve(const DepthCurve& curve);
 
 /// In place; 32FC1, 0 and NaN stay.
 void applyDepthCurve(const DepthCurve& curve, cv::Mat* depth);
 
-/// All that a camera's readings are added, and what its bearings mean.
+/// All corrections of a camera's depth readings and bearings.
 struct CameraCorrection {
   double offset = 0;  ///< m, after the curve
   DepthCurve curve;
   BearingCorrection bearing;
-  DepthShift shift;  ///< that depth was read with
+  DepthShift shift;  ///< applied when depth was read
 
   bool operator==(const CameraCorrection& other) const {
     return offset == other.offset && curve == other.curve && bearing == other.bearing && shift == other.shift;
@@ -56,11 +56,11 @@ struct CameraCorrection {
   bool operator!=(const CameraCorrection& other) const { return !(*this == other); }
 };
 
-/// From a depth that has one correction to the depth that has another.
+/// Converts a depth with one correction to the depth with another.
 class DepthChange {
  public:
   DepthChange(const CameraCorrection& from, const CameraCorrection& to);
-  /// 0 is no depth and stays so, anything else stays before the camera.
+  /// 0 (no depth) stays 0; any other depth stays positive.
   float operator()(float z) const;
 
  private:

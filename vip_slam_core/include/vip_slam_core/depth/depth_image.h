@@ -1,4 +1,4 @@
-// Reading depth safely: a look-up that refuses values beside depth edges, and a coarse grid of safe depths.
+// Edge-safe depth: a look-up that refuses values next to depth edges, and a coarse grid of such depths.
 #pragma once
 
 #include <cmath>
@@ -12,20 +12,13 @@
 
 namespace vip_slam {
 
-struct DepthLookupOptions {
-  int radius = 2;            ///< half window in pixels
-  double edge_ratio = 0.03;  ///< a spread (max - min) above edge_ratio * z + edge_sigmas * sigma(z) is an edge
-  double edge_sigmas = 6.0;
-  double min_valid_fraction = 0.6;
-};
-
 /// Depth z in metres at sub-pixel (u, v): a local plane-aware robust value (median), 0 when invalid, out of range, or
-/// beside an edge. `depth` is CV_32FC1, metres; 0 and NaN are invalid.
-float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise,
-                const DepthLookupOptions& options = {});
+/// next to an edge. `depth` is CV_32FC1, metres; 0 and NaN are invalid.
+float safeDepth(const cv::Mat& depth, double u, double v, const DepthNoise& noise);
 
-/// Converts 16UC1 (times `scale` metres) or 32FC1 to 32FC1 metres with invalid = 0; valid readings get `offset` metres
-/// added, and are invalid when nothing is left. Throws std::invalid_argument on other types, naming the type.
+/// Converts 16UC1 (times `scale` metres) or 32FC1 to 32FC1 metres with invalid = 0; `offset` metres are added to valid
+/// readings, which become invalid when the result is not positive. Throws std::invalid_argument on other types, naming
+/// the type.
 cv::Mat depthToMetres(const cv::Mat& raw, double scale, double offset = 0);
 
 /// Depths on a regular pixel grid; node (c, r) sits at pixel (offset + c*stride, offset + r*stride). 0 = invalid.
@@ -42,11 +35,10 @@ struct DepthGrid {
     return *c >= 0 && *r >= 0 && *c + 1 < cols && *r + 1 < rows;
   }
 };
-DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise,
-                        const DepthLookupOptions& options = {});
+DepthGrid makeDepthGrid(const cv::Mat& depth, int stride, const DepthNoise& noise);
 
-/// Registers depth images taken by their own camera into the colour camera (z-buffered forward warp). Rays and the
-/// footprint of each depth pixel are computed once, so that a stream of images pays for the warp only.
+/// Registers depth images of a separate depth camera to the colour camera (z-buffered forward warp). Rays and the
+/// footprint of each depth pixel are computed once, so that each image of a stream only costs the warp.
 class DepthRegistration {
  public:
   /// Throws std::invalid_argument when a camera is null.

@@ -24,8 +24,8 @@ struct DepthNoise {
 
   double sigma(double z) const { return a + (b + c * z) * z; }
   bool inRange(double z) const { return z >= min_range && z <= max_range; }
-  /// Up to here hardly a reading is lost beyond the range. Farther off those are left that noise makes too short, and
-  /// the mean of many is too short as well.
+  /// Depth up to which hardly any noisy reading falls outside the range, m. Farther off mainly readings that noise
+  /// makes too short remain, and their mean is biased.
   double unbiasedRange() const { return max_range - 3.0 * sigma(max_range); }
   /// Defaults of a type: structured light after Khoshelham & Elberink 2012; stereo and ToF from data sheets.
   static DepthNoise preset(DepthSensorType type);

@@ -1,6 +1,6 @@
-// Depth of a stereo or structured-light camera whose disparities are all off by the same: with d = f B / z of focal
-// length and baseline, 1/z = 1/reading - error, error = (what d has too much) / (f B). Grows with the square of the
-// distance.
+// Depth error of a stereo or structured-light camera with a common error of all disparities: with d = f B / z of focal
+// length and baseline, 1/z = 1/reading - error, error = (excess of d) / (f B). The depth error grows with the square of
+// the distance.
 #pragma once
 
 #include "vip_slam_core/depth/depth_curve.h"
@@ -8,17 +8,17 @@
 
 namespace vip_slam {
 
-/// The camera measures disparities.
+/// Whether this type of camera measures disparities.
 bool measuresDisparity(DepthSensorType type);
 
-/// What a reading of `z` m has to be added because of `error`, 1/m.
+/// Correction, m, to be added to a reading of `z` m because of `error`, 1/m.
 double addedForDisparity(double error, double z);
 
-/// For readings up to `range`, m; as much of it as a curve may have.
+/// The correction as a curve for readings up to `range`, m, limited to the entries that a curve may have.
 DepthCurve disparityCurve(double error, double range);
 
-/// A change of the error by so much, 1/m, is a millimetre or more at two metres: an offset of depth that was
-/// estimated before stood for some of it.
+/// Whether a change of the error, 1/m, is a millimetre or more at two metres: then a depth offset estimated before
+/// contains part of it and is invalid.
 bool voidsDepthOffset(double change);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// How far apart on the image depth is looked up.
+// Spacing of depth look-ups on the image.
 #pragma once
 
 #include <algorithm>
@@ -6,11 +6,13 @@
 
 namespace vip_slam {
 
-/// Distances between nodes are set for an image whose longer side has 640 px, and shrink with a smaller one, so that as
-/// many nodes show a surface: 16 px of an image of 320 x 240 span the door of a corridor. Larger images keep them.
+/// Length of the longer image side, px, that options on image distances refer to.
+constexpr double kReferenceSide = 640.0;
+
+/// Scales the spacing of nodes with a smaller image, so that a surface has as many of them: 16 px of an image of
+/// 320 x 240 can span a whole door in a corridor. Larger images keep the spacing.
 inline double spacingOn(int width, int height, double spacing) {
-  constexpr double kGivenFor = 640.0;  // px
-  return spacing * std::min(1.0, std::max(width, height) / kGivenFor);
+  return spacing * std::min(1.0, std::max(width, height) / kReferenceSide);
 }
 
 /// The same in whole pixels, at least one.

@@ -24,7 +24,7 @@ struct Plane {
   Eigen::Vector4d coefficients() const { return Eigen::Vector4d(n.x(), n.y(), n.z(), d); }
   Plane flipped() const;
 
-  /// eta = n d (paper); blind to (n, d) -> (-n, -d).
+  /// eta = n d (paper); the same for (n, d) and (-n, -d).
   Eigen::Vector3d toCp() const { return n * d; }
   /// Throws std::invalid_argument when |eta| < 1e-9: the normal is then undefined.
   static Plane fromCp(const Eigen::Vector3d& eta);

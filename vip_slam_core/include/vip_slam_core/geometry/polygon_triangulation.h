@@ -12,8 +12,8 @@ namespace vip_slam {
 using Triangle = std::array<Eigen::Vector3d, 3>;
 
 /// Ear clipping, after each hole has been joined to the outline by a bridge. Triangles turn counter-clockwise seen from
-/// the side the normal points to. A ring may turn either way; one of fewer than three points gives nothing. Rings that
-/// cross themselves give some triangulation, never an endless loop. Quadratic in the number of points.
+/// the side the normal points to. A ring may have either orientation; one of fewer than three points gives nothing.
+/// Rings that cross themselves give some triangulation, never an endless loop. Quadratic in the number of points.
 std::vector<Triangle> triangulate(const PlanePolygon& polygon, const Plane& plane);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// A measured motion of the body and how well it is known: what an odometry says about two of its poses.
+// A measured motion of the body with its covariance, as between two poses of an odometry.
 #pragma once
 
 #include "vip_slam_core/geometry/se3.h"
@@ -15,7 +15,7 @@ struct RelativeMotion {
   bool isUsable() const;
 };
 
-/// First the one motion, then the other; their errors count as independent. Unknown when one of them is.
+/// Composition of two motions, whose errors are taken as independent. Unknown when one of them is.
 RelativeMotion compose(const RelativeMotion& ab, const RelativeMotion& bc);
 
 }  // namespace vip_slam

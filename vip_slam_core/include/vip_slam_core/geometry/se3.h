@@ -45,9 +45,9 @@ class SE3 {
   Eigen::Vector3d t_;
 };
 
-/// T_A_C, a turn about z and a shift, for two levelled worlds that know the same body at T_A_B and T_C_B: the turn that
-/// brings the orientations nearest to each other, however the body is held (headings are undefined for an x axis that
-/// points up).
+/// T_A_C, a rotation about z and a translation, for two levelled worlds in which the same body has the poses T_A_B and
+/// T_C_B: the rotation that aligns the two orientations best, for any orientation of the body (the heading would be
+/// undefined for an x axis that points up).
 SE3 alignLevelled(const SE3& T_A_B, const SE3& T_C_B);
 
 /// Interpolates a (s=0) to b (s=1): slerp and lerp.

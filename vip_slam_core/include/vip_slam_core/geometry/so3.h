@@ -1,6 +1,6 @@
 // Rotations: exponential map, logarithm and Jacobians of SO(3).
 // Hamilton quaternions, right perturbation R <- R Exp(dtheta), radians throughout.
-// Source: Forster et al. 2015; docs of the paper's IMU and reprojection factors use J_r and J_r^-1.
+// Source: Forster et al. 2015. The IMU factor uses J_r and J_r^-1.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,8 +39,12 @@ Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vec
 double yawOf(const Eigen::Quaterniond& R_W_B);
 
 /// R_W_B of a levelled world: the rotation with R * up_B = (0,0,1) and yaw(R) = 0; for a body whose x axis points up
-/// (within 30 degrees) the one whose y axis heads along y.
+/// (within 30 degrees) the one with its y axis along the world's y.
 /// `up_B` is the measured specific force of a body at rest (points up), any positive length.
 Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up_B);
+
+/// The rotation R that maximises the trace of R^T M: the nearest one to M, and Kabsch's for M = sum to_i from_i^T
+/// (to ~ R from, both about their means).
+Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& M);
 
 }  // namespace vip_slam

@@ -1,6 +1,6 @@
-// A gyro's scale errors and misaligned axes, which no white noise describes: a correction C with
-// omega = (I + C) * measured, biases counting after it. Scale errors lie on its diagonal (-0.003: measures 0.3 % too
-// much), beside it what one axis measures of the turning about another (radians).
+// A gyro's scale errors and axis misalignment, which are not white noise: a correction C with
+// omega = (I + C) * measured, applied before the bias is removed. Scale errors are on its diagonal (-0.003: measures
+// 0.3 % too much), cross-axis sensitivities (radians) off the diagonal.
 #pragma once
 
 #include <vector>

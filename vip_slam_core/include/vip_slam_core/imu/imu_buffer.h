@@ -1,6 +1,6 @@
-// Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams, and takes single
-// wrong samples out (spike_filter.h): one that looks wrong is in the buffer when the next one has come.
-// Not thread-safe: one owner; shells lock around it.
+// Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams, and replaces
+// single wrong samples (spike_filter.h): a suspicious sample enters the buffer only with the next one.
+// Not thread-safe: one owner; callers lock around it.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ namespace vip_slam {
 
 struct ImuBufferCounters {
   std::size_t accepted = 0, out_of_order = 0, duplicate = 0, not_finite = 0, gaps = 0;
-  std::size_t spikes = 0;  ///< samples replaced by the line between their neighbours
+  std::size_t spikes = 0;  ///< samples replaced by interpolation between their neighbours
 };
 
 class ImuBuffer {
@@ -26,7 +26,7 @@ class ImuBuffer {
 
   /// False (and counted) when the sample is not finite, repeats or precedes the newest stamp.
   bool add(const ImuSample& sample);
-  /// Split streams: the accelerometer is interpolated onto the gyro stamps; samples come out once both sides cover
+  /// Split streams: the accelerometer is interpolated to the gyro stamps; samples are available once both streams cover
   /// them.
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
@@ -53,7 +53,7 @@ class ImuBuffer {
     double t;
     Eigen::Vector3d value;
   };
-  /// Counts what is wrong with it otherwise.
+  /// Whether a sample may be added; counts the reason otherwise.
   bool acceptable(double t, bool finite, double newest);
   void countSpikes();
   void append(const ImuSample& sample);
@@ -62,7 +62,7 @@ class ImuBuffer {
   double gap_seconds_, capacity_seconds_;
   std::deque<ImuSample> samples_;
   std::deque<Stamped> gyro_, accel_;
-  // Split streams are looked at before they are joined: interpolation would spread a spike over its neighbours.
+  // Split streams are filtered before they are joined: interpolation would spread a spike over its neighbours.
   SpikeFilter united_spikes_, gyro_spikes_, accel_spikes_;
   ImuBufferCounters counters_;
 };

@@ -17,7 +17,7 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< specific force, m/s^2; at rest about +9.81 along up
 };
 
-/// Continuous-time densities as Kalibr states them, and what is no noise.
+/// Continuous-time noise densities as in Kalibr, and the prior of the gyro's systematic errors.
 struct ImuNoise {
   double gyro_noise_density = 1e-3;     ///< rad/s/sqrt(Hz)
   double gyro_random_walk = 1e-5;       ///< rad/s^2/sqrt(Hz)

@@ -1,4 +1,5 @@
-// IMU preintegration between two keyframes (paper section "IMU Measurement"; Forster 2015, VINS residual).
+// IMU preintegration between two keyframes (paper section "IMU and Point Feature Measurement"; Forster 2015, residual
+// as in VINS-Mono).
 // Mid-point gyro and accelerometer over each step, closed-form rotation increment; J and Sigma use the same F.
 // Noise is given as Kalibr densities. Residual order and state order: (theta, p, v, b_g, b_a).
 #pragma once
@@ -32,7 +33,7 @@ class Preintegration {
   /// Upper-triangular W with W^T W = covariance^-1 (computed once).
   const Matrix15d& sqrtInformation() const { return sqrt_information_; }
 
-  /// True when the biases moved so far that integrating anew pays (|db_g| > 0.01 rad/s or |db_a| > 0.1 m/s^2).
+  /// True when the biases have changed so much that reintegration pays (|db_g| > 0.01 rad/s or |db_a| > 0.1 m/s^2).
   bool needsReintegration(const Eigen::Vector3d& bias_gyro, const Eigen::Vector3d& bias_accel) const;
 
   /// State j predicted from state i (biases copied). G = (0,0,g).

@@ -1,12 +1,13 @@
-// Takes single wrong samples (a bus error, a flipped bit) out of an IMU's stream before anybody integrates it: 30 m/s^2
-// for one sample of 5 ms is 15 cm/s that nothing in the noise figures allows for.
+// Replaces single wrong samples (a bus error, a flipped bit) of an IMU's stream before integration: 30 m/s^2 during one
+// sample of 5 ms is 15 cm/s, far beyond the noise model.
 //
-// A sample is wrong when it leaves the two before by far more than this IMU's samples lately differ from each other,
-// and the sample after it is back where they were. It is replaced, both quantities, by the line between its neighbours.
-// A shock lasts longer, rings, and spreads the differences; a vibration has them spread already.
+// A sample is wrong when it differs from the two before by far more than this IMU's samples have recently differed from
+// each other, and the sample after it agrees with those before. Both its gyro and accelerometer values are replaced by
+// interpolation between its neighbours. A shock lasts longer and rings, which raises the usual differences; with a
+// vibration they are large already.
 //
-// What looks ordinary passes at once; a suspect waits for the next sample. What comes out depends on the samples alone,
-// not on when they arrive.
+// An ordinary sample passes at once; a suspect waits for the next sample. The output depends on the samples alone, not
+// on when they arrive.
 #pragma once
 
 #include <array>
@@ -20,10 +21,10 @@ namespace vip_slam {
 
 class SpikeFilter {
  public:
-  /// Stamps must increase. Gives the samples that are settled now, in order: none while a suspect waits, both it and
+  /// Stamps must increase. Returns the samples that are decided now, in order: none while a suspect waits, both it and
   /// its successor afterwards. A quantity that is not measured is left at zero.
   std::vector<ImuSample> add(const ImuSample& sample);
-  /// Stamp of the newest sample that was given, settled or not, s; minus infinity before the first.
+  /// Stamp of the newest sample added, decided or not, s; minus infinity before the first.
   double newest() const;
   std::size_t spikes() const { return spikes_; }
   /// Forgets the stream; the count stays.
@@ -36,7 +37,7 @@ class SpikeFilter {
     void add(double difference);
     void clear() { count_ = 0; }
     bool full() const { return count_ >= kWindow; }
-    /// What three quarters of them stay below: an odd spike among them does not count.
+    /// Their upper quartile, which an occasional spike does not affect.
     double usual() const;
 
    private:
@@ -49,10 +50,10 @@ class SpikeFilter {
   bool agree(const ImuSample& a, const ImuSample& b) const;
   void remember(const ImuSample& sample);
 
-  std::optional<ImuSample> last_;     ///< the newest that was settled
-  std::optional<ImuSample> suspect_;  ///< after last_
-  Differences gyro_, accel_;          ///< as they came, spikes and all
-  bool calm_ = false;                 ///< last_ agrees with the one before: the flank and the top of a shock do not
+  std::optional<ImuSample> last_;     ///< the newest decided sample
+  std::optional<ImuSample> suspect_;  ///< the sample after last_, waiting for the next
+  Differences gyro_, accel_;          ///< of the raw samples, including spikes
+  bool calm_ = false;                 ///< last_ agrees with the one before; not so at the flank and peak of a shock
   std::size_t spikes_ = 0;
 };
 

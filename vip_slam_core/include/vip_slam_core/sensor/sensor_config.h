@@ -1,5 +1,6 @@
 // One sensor = one YAML file: topics, encodings, intrinsics, extrinsics, IMU and depth noise, delay.
-// Keys are documented in vip_slam_bringup/config/sensors/README.md; every shipped and every rendered file has them all.
+// Keys are documented in vip_slam_bringup/config/sensors/README.md; every shipped and every simulated file has them
+// all.
 #pragma once
 
 #include <string>
@@ -27,12 +28,12 @@ struct SensorConfig {
   double depth_scale = 0.001;            ///< metres per unit of 16UC1
   double depth_offset = 0;               ///< metres to be added to every reading
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();    ///< px, see depth_shift.h
-  DepthCurve depth_curve;                                   ///< and then what it takes at that distance
+  DepthCurve depth_curve;                                   ///< distance-dependent correction, applied after that
   bool depth_registered = true;                             ///< depth pixels belong to the colour camera
   double color_rate = 30, depth_rate = 30, imu_rate = 200;  ///< Hz, nominal; for checks and messages
 
   double rolling_shutter = 0;  ///< colour: seconds from first to last row, stamp at the middle row; 0: global shutter
-  double depth_rolling_shutter = 0;  ///< of the depth image in the same way; 0: depth of one instant
+  double depth_rolling_shutter = 0;  ///< the same for the depth image; 0: global shutter
 
   bool intrinsics_from_camera_info = true;  ///< else `camera` below is used
   CameraIntrinsics camera;                  ///< colour camera; may be empty when from camera_info
@@ -44,15 +45,15 @@ struct SensorConfig {
   ImuNoise imu_noise;
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   DepthNoise depth_noise;
-  /// What of the colour image, as it is published, is looked at: 255, and 0 where the robot itself is in view; empty:
-  /// all of it. `mask_file`: where it was read from.
+  /// Mask of the colour image as published: 255 where it is used, 0 where the robot itself is in view; empty: all is
+  /// used. `mask_file`: the file that it was read from.
   cv::Mat mask;
   std::string mask_file;
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
   double gravity = 9.81;   ///< m/s^2
 };
 
-/// Empty when the mask is as large as the colour image; else "mask: ..." in words.
+/// Empty when the mask has the size of the colour image; else a message "mask: ...".
 std::string maskProblem(const SensorConfig& config, int width, int height);
 
 /// Throws std::runtime_error "file: key: what, expected what" on a missing file, unknown or missing key, bad value.

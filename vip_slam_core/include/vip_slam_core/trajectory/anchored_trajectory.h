@@ -8,26 +8,26 @@
 
 namespace vip_slam {
 
-/// Where the camera was at an image, as the front end gave it.
+/// Camera pose at an image as published by the front end.
 struct ChainedPose {
   double t = 0;  ///< image stamp, seconds
   std::uint32_t epoch = 0;
   SE3 T_chain_C;  ///< see TrackedFrame
 };
 
-/// A keyframe's pose when it was made and as the map has it in the end.
+/// A keyframe's pose when it was created, and its final pose in the map.
 struct Anchor {
   double t = 0;
   std::uint32_t epoch = 0;
   SE3 T_chain_C, T_map_I;
-  /// The camera's mounting as it is known now. What the images tell is the camera's motion; the body's follows.
+  /// Present camera-IMU extrinsics: images give the camera's motion, and these the body's.
   SE3 T_I_C;
 };
 
-/// Carries each image's chained pose over to the neighbouring keyframes of its epoch: before the first and after the
-/// last keyframe it follows that one, in between the two predictions are blended by time. Blending poses (not the
-/// corrections map->odom) keeps the lever arm to the origin of odom out of it. Images of an epoch without keyframes
-/// have no pose in map and are left out. Both lists ascend in t.
+/// Places each image relative to the neighbouring keyframes of its epoch by their chained poses: before the first and
+/// after the last keyframe relative to that one, in between the two predictions are interpolated in time. Interpolating
+/// poses (not the corrections map->odom) avoids the lever arm to the origin of odom. Images of an epoch without
+/// keyframes have no pose in map and are left out. Both lists ascend in t.
 Trajectory anchorTrajectory(const std::vector<ChainedPose>& chain, const std::vector<Anchor>& anchors);
 
 }  // namespace vip_slam

@@ -1,5 +1,5 @@
-// Which stamps enter a trajectory where the clock runs back: a bag that loops, recordings that were joined, a device
-// that began to count anew. A trajectory has each time once, so that of times that come again the first pass counts.
+// Selects the stamps of a trajectory when the clock runs back: a looping bag, joined recordings, a device whose clock
+// restarts. A trajectory has each time only once, so for repeated times the first pass is used.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace vip_slam {
 
 class TimePasses {
  public:
-  /// The next stamp, s: whether it belongs into the trajectory.
+  /// Whether the next stamp, s, belongs into the trajectory.
   bool take(double t) {
     if (t == newest_) return false;
     if (t < newest_) {
@@ -30,9 +30,9 @@ class TimePasses {
 
  private:
   static constexpr double kNever = std::numeric_limits<double>::infinity();
-  std::vector<std::pair<double, double>> passes_;  ///< first and last stamp taken of each pass that is over
-  double newest_ = -kNever;                        ///< of the pass under way
-  double begin_ = kNever, end_ = -kNever;          ///< of what was taken of it
+  std::vector<std::pair<double, double>> passes_;  ///< first and last stamp taken of each finished pass
+  double newest_ = -kNever;                        ///< newest stamp of the present pass
+  double begin_ = kNever, end_ = -kNever;          ///< first and last stamp taken of the present pass
 };
 
 }  // namespace vip_slam

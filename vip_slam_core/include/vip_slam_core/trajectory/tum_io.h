@@ -1,4 +1,4 @@
-// Trajectories in TUM format: "timestamp tx ty tz qx qy qz qw", one pose a line, '#' comments.
+// Trajectories in TUM format: "timestamp tx ty tz qx qy qz qw", one pose per line, '#' comments.
 #pragma once
 
 #include <string>

@@ -1,7 +1,7 @@
-// What a depth camera reads too long or too short, and what the intrinsics get wrong, when it becomes known only after
-// readings and bearings were handed on: all that holds them takes over the better correction. A reading moves its point
-// along the point's ray; a bearing turns the ray. Where the depth image lies beside the colour image, points on planes
-// move beside with their readings, while pixels of features and of the grid stay and have other readings.
+// Applies corrections of depth and intrinsics that are estimated only after readings and bearings were passed on: all
+// data derived from them is converted to the newest correction. A corrected reading moves its point along the ray; a
+// corrected bearing rotates the ray. With a shift of the depth image, points on planes move sideways with their
+// readings, while pixels of features and of the grid stay and get other readings.
 #pragma once
 
 #include "vip_slam_core/types/keyframe.h"
@@ -9,11 +9,11 @@
 
 namespace vip_slam {
 
-/// The keyframe with `correction` added to the camera's readings and bearings instead of what they have now; the same
-/// one when that is what it has. Sigmas and pixels stay, and so does the grid's layout, which knows pixels only.
+/// The keyframe with `correction` instead of its present correction of readings and bearings; the same object when they
+/// are equal. Sigmas, pixels and the grid's layout, which is in pixels, stay.
 KeyframePtr withCameraCorrection(const KeyframePtr& keyframe, const CameraCorrection& correction);
 
-/// The same for depth points on a plane; G is summed anew from the points.
+/// The same for depth points on a plane; G is recomputed from the points.
 void setCameraCorrection(const CameraCorrection& correction, PlaneObservation* observation);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// Identifiers and image features that travel from the front end to planes and back end.
+// Identifiers and image features that the front end passes to planes and back end.
 #pragma once
 
 #include <array>
@@ -20,12 +20,12 @@ struct Feature {
   LandmarkId id = kNoLandmark;  ///< track id; kNoLandmark for a corner that was detected but is not tracked
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< distorted pixel, colour image
   Eigen::Vector2f xy = Eigen::Vector2f::Zero();     ///< undistorted normalised coordinates (z = 1)
-  float pixel_sigma = 0;                            ///< one sigma of pixel in each direction, px; 0 = not told
+  float pixel_sigma = 0;                            ///< one sigma of pixel in each direction, px; 0 = not reported
   float depth = 0;                                  ///< z in the camera, metres; 0 = no safe depth
   float depth_sigma = 0;                            ///< one sigma of depth, metres
   float angle = 0;                                  ///< ORB orientation, radians
   std::uint8_t octave = 0;
-  std::uint32_t age = 0;  ///< images this track has lived
+  std::uint32_t age = 0;  ///< number of images that the track has survived
   Descriptor descriptor{};
 };
 

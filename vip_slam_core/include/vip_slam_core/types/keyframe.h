@@ -1,4 +1,4 @@
-// What the front end hands on: a tracked frame per image and a keyframe now and then. Immutable once published.
+// Output of the front end: a tracked frame per image, and keyframes. Immutable once published.
 #pragma once
 
 #include <cstddef>
@@ -22,18 +22,27 @@ struct TrackedFrame {
   NavState state;                            ///< T_odom_I, v, biases
   Matrix15d covariance = Matrix15d::Zero();  ///< of state, order (theta, p, v, b_g, b_a)
   SE3 T_I_C;                                 ///< extrinsics in use (online-calibrated)
-  /// The camera, put together of its motions since one keyframe after the other, each as the filter knew it at the
-  /// later image. The way from one image to the next in `state` has in it what the filter has corrected of both
-  /// meanwhile (the direction of gravity, by tenths of a degree when the body begins to move); this has not. Its origin
-  /// is the odometry's, but it drifts freely: only ways between neighbours mean something.
+  /// The camera's pose chained from its motions since successive keyframes, each as estimated at the later image.
+  /// Differences of `state` between images also contain the filter's corrections of both in the meantime (of the
+  /// gravity direction by tenths of a degree when the body begins to move); differences of this pose do not. Its origin
+  /// is that of odom, but it drifts freely: only motions between neighbouring images are meaningful.
   SE3 T_chain_C;
   double time_offset = 0;              ///< t_imu = t_image + time_offset
-  CameraCorrection camera_correction;  ///< what features and grid have been added to the camera's readings
+  CameraCorrection camera_correction;  ///< applied to the depth and bearings of features and grid
   std::vector<Feature> features;       ///< tracked features only
   DepthGrid depth_grid;                ///< coarse, for plane growth; empty without depth
   bool zero_velocity = false;          ///< standing still
   KeyframeId keyframe = 0;             ///< newest keyframe at or before this image
 };
+
+/// Covariance of (x y z, rotation), both in odom, as in messages and evaluation. The state's covariance has the
+/// rotation in the body frame and the order (rotation, position).
+inline Matrix6d poseCovariance(const TrackedFrame& frame) {
+  Matrix6d J = Matrix6d::Zero();
+  J.topRightCorner<3, 3>().setIdentity();
+  J.bottomLeftCorner<3, 3>() = frame.state.T_W_I.R();
+  return J * frame.covariance.topLeftCorner<6, 6>() * J.transpose();
+}
 
 struct Keyframe {
   KeyframeId id = 0;        ///< 1, 2, 3, ...
@@ -42,16 +51,16 @@ struct Keyframe {
   /// Samples from the previous keyframe's IMU time to this one's, both ends interpolated; empty when previous == 0
   /// or when a gap made them useless.
   std::vector<ImuSample> imu;
-  /// What the front end found out by now about the rates in `imu`, which do not have it: see gyro_correction.h.
+  /// Present estimate of the gyro's correction, which is not applied to the rates in `imu`: see gyro_correction.h.
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();
-  double imu_noise_scale = 1;  ///< how many times as noisy as configured the front end has found the IMU
-  /// The odometry's motion since the previous keyframe; unknown when previous == 0 or when it lost the thread. Not the
-  /// difference of the two published states: those were corrected in between.
+  double imu_noise_scale = 1;  ///< factor on the configured IMU noise, estimated by the front end
+  /// The odometry's motion since the previous keyframe; unknown when previous == 0 or when tracking was interrupted.
+  /// Not the difference of the two published states, which were corrected in between.
   RelativeMotion motion;
 };
 
-/// Keyframes that wait while a loaded map is not recognised yet, about ten minutes of them: the back end and the plane
-/// module keep the same ones, so that all that enter the map late have their planes.
+/// Largest number of keyframes that wait while a loaded map is not recognised yet, about ten minutes: back end and
+/// plane module use the same limit, so that all keyframes that enter the map late have their planes.
 constexpr std::size_t kMostWaitingKeyframes = 1500;
 
 using KeyframePtr = std::shared_ptr<const Keyframe>;

@@ -1,7 +1,6 @@
-// What the back end hands to front end and planes after each optimisation. World is `map`.
+// The back end's output to front end and planes after each optimisation. World is `map`.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,9 +14,9 @@ namespace vip_slam {
 
 struct KeyframeEstimate {
   KeyframeId id = 0;
-  NavState state;  ///< T_map_I, v_map, biases
-  SE3 T_I_C;       ///< the camera's mounting as known now; the keyframe itself has what was known when it was made
-  CameraCorrection camera_correction;  ///< of its depth readings and bearings as known now, likewise
+  NavState state;                      ///< T_map_I, v_map, biases
+  SE3 T_I_C;                           ///< present camera-IMU extrinsics; the keyframe itself has those of its creation
+  CameraCorrection camera_correction;  ///< present correction of its depth readings and bearings, likewise
 };
 
 struct LandmarkEstimate {
@@ -31,14 +30,14 @@ struct LandmarkEstimate {
 struct LoopEvent {
   KeyframeId query = 0, match = 0;
   bool accepted = false;
-  std::string reason;  ///< why rejected, or what convinced
+  std::string reason;  ///< why it was rejected, or the evidence for it
   int inliers = 0;
   SE3 T_match_query;  ///< IMU frames
   double t = 0;
 };
 
-/// Epochs of the odometry with the same `part` lie in one frame. Where parts lie to each other is a guess until a loop
-/// or relocalisation ties them.
+/// Epochs of the odometry with the same `part` have a known relative pose. The relative pose of parts is a guess until
+/// a loop or relocalisation ties them.
 struct EpochPart {
   std::uint32_t epoch = 0;
   std::uint32_t part = 0;  ///< named by one of its epochs
@@ -49,11 +48,11 @@ struct MapUpdate {
   double t = 0;                ///< stamp of the newest keyframe in it
   std::uint32_t epoch = 0;     ///< epoch that T_map_odom belongs to
   SE3 T_map_odom;
-  bool placed = true;  ///< false: where that epoch lies in the map is a guess, until a loop or relocalisation tells
+  bool placed = true;  ///< false: T_map_odom is a guess until a loop or relocalisation ties that epoch to the map
   std::vector<EpochPart> parts;  ///< all epochs of the map, in every update
   KeyframeId newest_keyframe = 0;
-  DepthCurve depth_curve;                         ///< what the map has found out about the depth camera
-  double disparity_error = 0;                     ///< 1/m, what part of depth_curve is there for; see disparity_curve.h
+  DepthCurve depth_curve;                         ///< depth correction estimated from the map
+  double disparity_error = 0;                     ///< 1/m, the part of depth_curve due to it; see disparity_curve.h
   bool global = false;                            ///< everything moved (GBA, loop); else a local window
   std::vector<KeyframeEstimate> keyframes;        ///< changed ones (all when global)
   std::vector<LandmarkEstimate> landmarks;        ///< changed ones (all when global)
@@ -63,7 +62,5 @@ struct MapUpdate {
   std::vector<std::pair<LandmarkId, LandmarkId>> merged_landmarks;  ///< (from, into)
   std::vector<LoopEvent> loops;                                     ///< since the previous update
 };
-
-using MapUpdatePtr = std::shared_ptr<const MapUpdate>;
 
 }  // namespace vip_slam

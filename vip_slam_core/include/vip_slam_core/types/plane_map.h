@@ -1,7 +1,6 @@
-// What the plane module hands to the back end: the plane map and what changed. World here is `map`.
+// The plane module's output to the back end: the plane map and its changes. World here is `map`.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "vip_slam_core/depth/depth_curve.h"
@@ -27,13 +26,13 @@ struct PlaneEstimate {
   std::vector<PlanePolygon> polygons;  ///< disjoint pieces
   double area = 0;                     ///< m^2
   std::uint32_t keyframes = 0;         ///< keyframes that saw it
-  double seen_seconds = -1;            ///< simulator's truth: time in view; -1: not known
-  double seen_area = -1;               ///< simulator's truth: m^2 of it that was ever in view; -1: not known
+  double seen_seconds = -1;            ///< simulator's truth: time in view, s; -1: not known
+  double seen_area = -1;               ///< simulator's truth: area that was ever in view, m^2; -1: not known
 };
 
-/// Where a plane of a loaded map belongs: its area moves with the oldest keyframe that saw it.
+/// Host keyframe of a plane of a loaded map: the plane's area moves with the oldest keyframe that saw it.
 struct PlaneHost {
-  KeyframeId keyframe = 0;  ///< 0: none is left, it stays where it is
+  KeyframeId keyframe = 0;  ///< 0: no such keyframe is left, and the area stays where it is
   std::uint32_t epoch = 0;  ///< of its odometry, see EpochPart
   SE3 T_map_C;
 };
@@ -57,7 +56,7 @@ struct PlaneObservation {
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
   double weight_scale = 1.0;           ///< G = weight_scale * sum 1/sigma^2 p~ p~^T over `points`
   std::vector<PlanePoint> points;      ///< the samples behind G
-  CameraCorrection camera_correction;  ///< of the readings behind them, see TrackedFrame
+  CameraCorrection camera_correction;  ///< applied to their readings, see TrackedFrame
 };
 
 struct PlaneMerge {
@@ -70,12 +69,10 @@ struct PlaneUpdate {
   double t = 0;
   std::vector<PlaneMerge> merges;
   std::vector<PlaneId> removed;
-  std::vector<PlaneEstimate> planes;                       ///< all planes as they are now
+  std::vector<PlaneEstimate> planes;                       ///< all planes, present estimates
   std::vector<PlaneObservation> observations;              ///< new ones, or replacing the same (keyframe, plane)
   std::vector<std::pair<LandmarkId, PlaneId>> associated;  ///< landmarks found to lie on a plane
   std::vector<LandmarkId> dissociated;                     ///< landmarks that no longer do
 };
-
-using PlaneUpdatePtr = std::shared_ptr<const PlaneUpdate>;
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// The state every published pose carries.
+// The tracking state of every published pose.
 #pragma once
 
 #include <string>
@@ -25,7 +25,7 @@ inline const char* trackingStateName(TrackingState state) {
 
 struct TrackingStatus {
   TrackingState state = TrackingState::kWaiting;
-  std::string reason;  ///< in words, empty while TRACKING
+  std::string reason;  ///< as text, empty while TRACKING
 };
 
 }  // namespace vip_slam

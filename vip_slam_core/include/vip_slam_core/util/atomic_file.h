@@ -1,4 +1,4 @@
-// Files appear whole or not at all: written beside the target and renamed on commit().
+// Files that appear completely or not at all: written next to the target and renamed on commit().
 #pragma once
 
 #include <fstream>

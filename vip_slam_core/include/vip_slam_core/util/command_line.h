@@ -1,4 +1,4 @@
-// The command line of a tool: a thin coat over Boost.Program_options, so that all tools speak the same way: defaults in
+// The command line of a tool: a thin wrapper of Boost.Program_options, so that all tools behave alike: defaults in
 // --help, one line for a mistake that names the option and what was expected, exit status 2.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace vip_slam {
 
-/// Says what was expected ("a number above 0") when a value is refused; empty when it is accepted.
+/// Returns what was expected ("a number above 0") when a value is refused; empty when it is accepted.
 template <class T>
 using ValueCheck = std::function<std::string(const T&)>;
 
@@ -65,7 +65,7 @@ class CommandLine {
   /// `program` begins messages; `purpose` is the first line of --help.
   CommandLine(std::string program, std::string purpose);
 
-  /// An argument without a name; a vector takes all that follow. Whether it may be left out is the caller's word.
+  /// A positional argument; a vector takes all that follow. `required`: it may not be left out.
   template <class T>
   void argument(const std::string& name, T& value, const std::string& help, bool required = true) {
     positional_.add(name.c_str(), isList(value) ? -1 : 1);
@@ -79,6 +79,7 @@ class CommandLine {
   template <class T>
   void option(const std::string& name, T& value, const std::string& help, ValueCheck<T> check = {}) {
     visible_.add_options()(name.c_str(), semantic(value), help.c_str());
+    if (isList(value)) lists_.push_back(longName(name));
     if (check)
       checks_.emplace_back(longName(name), [name = longName(name), &value, check = std::move(check)] {
         if (const std::string expected = check(value); !expected.empty()) refuse(name, text(value), expected);
@@ -92,9 +93,9 @@ class CommandLine {
   /// When `name` is given, `other` must be given too.
   void needs(const std::string& name, const std::string& other) { needs_.emplace_back(name, other); }
 
-  /// Fills the variables. An exit status when the program has nothing more to do: 0 after --help, 2 after a mistake.
+  /// Fills the variables. Returns an exit status when the program must end: 0 after --help, 2 after a mistake.
   std::optional<int> parse(int argc, const char* const* argv) const;
-  /// Says on one line what is wrong with the arguments as a whole; the exit status.
+  /// Prints one line on what is wrong with the arguments as a whole; returns the exit status.
   int mistake(const std::string& what) const;
 
  private:
@@ -137,6 +138,7 @@ class CommandLine {
   static std::string longName(const std::string& name) { return name.substr(0, name.find(',')); }
   [[noreturn]] static void refuse(const std::string& name, const std::string& value, const std::string& expected);
   void printHelp() const;
+  bool isArgument(const std::string& name) const;
   std::string written(const std::string& name) const;
 
   std::string program_, purpose_;
@@ -144,12 +146,13 @@ class CommandLine {
   boost::program_options::positional_options_description positional_;
   std::vector<std::pair<std::string, std::string>> arguments_;
   std::vector<std::string> required_;
+  std::vector<std::string> lists_;  ///< options that take several values
   std::vector<std::pair<std::string, std::string>> needs_;
-  std::vector<std::pair<std::string, std::function<void()>>> checks_;  ///< of values that were given
+  std::vector<std::pair<std::string, std::function<void()>>> checks_;  ///< of the values given
 };
 
-/// What a repeatable option like `--set group/key=value` was given, as pairs for setOptions. Throws
-/// std::invalid_argument that names the text without a key or an equals sign.
+/// Splits the values of a repeatable option like `--set group/key=value` into pairs for setOptions. Throws
+/// std::invalid_argument naming a text without a key or an equals sign.
 std::vector<std::pair<std::string, std::string>> splitSettings(const std::vector<std::string>& settings);
 
 }  // namespace vip_slam

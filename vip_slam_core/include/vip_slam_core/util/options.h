@@ -1,5 +1,5 @@
 // Option structs. One declaration per option gives name, default, range, unit and meaning; loading from YAML or ROS
-// parameters, range checks, printing and the parameter reference all come from it:
+// parameters, range checks, printing and the parameter reference are all derived from it:
 //
 //   struct TrackerOptions {
 //     int max_features = 200;
@@ -82,7 +82,7 @@ class OptionSetter : public OptionVisitor {
   void field(const std::string& name, double& value, double min, double max, const std::string& meaning) override;
   void field(const std::string& name, std::string& value, const std::vector<std::string>& choices,
              const std::string& meaning) override;
-  /// Throws when a value was given for a name that no field took.
+  /// Throws when a value was given for a name that no field has.
   void finish() const;
 
  private:

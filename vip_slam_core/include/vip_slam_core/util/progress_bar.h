@@ -1,4 +1,4 @@
-// Progress with the time that is left: a bar that redraws itself on a terminal, a line each tenth elsewhere.
+// Progress with the remaining time: a bar that is redrawn on a terminal, elsewhere a line per tenth.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,5 @@
-// Whether two images are one. Noise makes no two of a camera alike, so the comparison ends with the first row, mostly.
+// Whether two images are equal. By noise no two images of a camera are, so the comparison mostly ends with the first
+// row.
 #pragma once
 
 #include <cstring>

@@ -1,4 +1,5 @@
-// The paper's Table III and time-over-keyframes figure: one map, four variants, two solvers, the times split.
+// The paper's Table III and time-over-keyframes figure: four variants and two solvers on one map, with the time of
+// each part.
 #pragma once
 
 #include <string>
@@ -10,8 +11,8 @@
 
 namespace vip_slam {
 
-/// Which keyframes are the hosts of homographies: each landmark's first view, few that many landmarks share, or, as in
-/// the live system, few from the middle of the landmarks' tracks.
+/// Which keyframes host the homographies: each landmark's first view, a few views shared by many landmarks, or, as in
+/// the live system, a few shared views from the middle of the landmarks' tracks.
 enum class HomographyHosts { kFirstViews, kShared, kSharedMiddle };
 
 struct GbaSetup {
@@ -28,7 +29,7 @@ struct GbaRun {
   double build_ms = 0;    ///< map to problem, compression included; median
   double store_ms = 0;    ///< problem to map, points on planes included; median
   SolverSummary summary;  ///< of the run with the median total time
-  /// From map to map.
+  /// Total time: map to problem, optimisation and problem to map.
   double wholeMs() const { return build_ms + summary.total_ms + store_ms; }
   double rmse_before = 0, rmse = 0;  ///< ATE of the keyframes after rigid alignment, metres
 };

@@ -1,5 +1,5 @@
 // A map as the system would have it at the end of a sequence, from a landmark-level simulation: geometry, visibility
-// with occlusion, a tracker that loses and finds points, pixel, depth and IMU noise, and a start that drifted.
+// with occlusion, a tracker that loses and finds points, pixel, depth and IMU noise, and drifted initial poses.
 #pragma once
 
 #include <map>

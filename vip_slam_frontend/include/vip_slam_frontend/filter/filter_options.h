@@ -5,8 +5,8 @@
 
 namespace vip_slam {
 
-/// What of camera and gyro is estimated along the way. There is no threshold of motion below which it would be
-/// frozen: to leave the calibration out of an update says that it is exact there, which a filter cannot take back.
+/// Which calibration of camera and gyro is estimated online. There is no threshold of motion below which it is frozen:
+/// leaving the calibration out of an update treats it as exact there, which a filter cannot undo later.
 struct CalibrationOptions {
   bool rotation = true;
   bool translation = false;

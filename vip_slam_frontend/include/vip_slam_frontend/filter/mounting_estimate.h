@@ -1,5 +1,5 @@
-// How the camera is mounted on the IMU, and by how much its depth and the gyro are off, as the filter estimates it
-// along the way.
+// Camera-IMU extrinsics, time offset, and the corrections of depth, intrinsics and gyro, as estimated online by the
+// filter.
 #pragma once
 
 #include <string>
@@ -10,20 +10,19 @@
 
 namespace vip_slam {
 
-/// Where the camera sits on the IMU and by how much its stamps lag; sigmas are zero for what is not estimated.
+/// Extrinsics and calibration with their sigmas; a sigma is zero for what is not estimated.
 struct MountingEstimate {
   SE3 T_I_C;
   double time_offset = 0;                                       ///< s: t_imu = t_image + time_offset
   Eigen::Vector3d sigma_rotation = Eigen::Vector3d::Zero();     ///< rad, right perturbation
   Eigen::Vector3d sigma_translation = Eigen::Vector3d::Zero();  ///< m, in the IMU frame
   double sigma_time_offset = 0;                                 ///< s
-  double depth_offset =
-      0;  ///< m: what every reading of the depth camera has to be added, in the words of a sensor file
+  double depth_offset = 0;        ///< m, to be added to every reading of the depth camera, as in a sensor file
   double sigma_depth_offset = 0;  ///< m
-  /// How far right and down of the colour image the depth image lies, in bearings, and one sigma.
+  /// Shift of the depth image to the right and down against the colour image, in bearings, and one sigma.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero(), sigma_depth_shift = Eigen::Vector2d::Zero();
-  Eigen::Vector2d depth_shift_px = Eigen::Vector2d::Zero();  ///< the same in the words of a sensor file
-  BearingCorrection bearing = {};                            ///< what the intrinsics in use get wrong
+  Eigen::Vector2d depth_shift_px = Eigen::Vector2d::Zero();  ///< the same in px, as in a sensor file
+  BearingCorrection bearing = {};                            ///< correction of the intrinsics in use
   Eigen::Vector4d sigma_bearing = Eigen::Vector4d::Zero();
   Eigen::Vector4d intrinsics = Eigen::Vector4d::Zero();       ///< fx, fy, cx, cy in px that make `bearing` zero
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
@@ -31,9 +30,9 @@ struct MountingEstimate {
   bool depth_contradicts = false;  ///< depth and images disagree by more than any offset; none is used
 };
 
-/// What the sensor's configuration should be corrected by, in sentences: differences that are both sure (five sigmas)
-/// and large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth, half a pixel of where it lies; 0.1 % of the
-/// focal length; 0.2 % of the gyro). Empty when it is right.
+/// Corrections of the sensor's configuration as sentences: differences that are both significant (five sigmas) and
+/// large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth, half a pixel of depth shift; 0.1 % of the focal
+/// length; 0.2 % of the gyro). Empty when it is right.
 std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found);
 
 }  // namespace vip_slam

@@ -1,6 +1,6 @@
-// Adapts the noise of pixels, and that of depth, to what the triangulations leave over: log-domain moving average,
-// clamped, adopted by the next image. Each by its own rows, so that a wrong noise model of the one does not leak into
-// the other.
+// Adapts the noise of pixels, and that of depth, to the residuals of triangulation: log-domain moving average, clamped,
+// used from the next image on. Each uses its own rows, so that a wrong noise model of the one does not affect the
+// other.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@ namespace vip_slam {
 
 class NoiseMonitor {
  public:
-  /// Begins with `sigma`, px for pixels, for depth a factor on the sensor's noise model.
+  /// `sigma`: initial value, for pixels in px, for depth a factor on the sensor's noise model.
   NoiseMonitor(double sigma, double lowest, double highest, bool adapt);
   /// `chi2_per_dof`: squared residuals whitened by sigma() over their degrees of freedom; `dof` rows behind it.
   void add(double chi2_per_dof, int dof);
@@ -21,17 +21,17 @@ class NoiseMonitor {
   int updates_ = 0;
 };
 
-/// How far the stamps of images scatter about the times at which they were taken, when the host stamps them. A camera
-/// that turns shows it at once: the updates turn the predicted pose to and fro about the axis about which it turns
-/// anyway, by more than the covariance shrinks by them.
+/// Estimates the jitter of the images' stamps against the times at which they were taken, as when the host stamps them.
+/// It shows while the camera rotates: updates correct the predicted rotation to and fro about the rotation axis, by
+/// more than the covariance shrinks.
 class StampMonitor {
  public:
   explicit StampMonitor(bool adapt) : adapt_(adapt) {}
-  /// `omega`: rate of turn, rad/s; `turned`: what the update made of the predicted orientation, a rotation vector, rad;
-  /// `lost`: by how much its covariance shrank, rad^2. All in the body frame.
+  /// `omega`: angular rate, rad/s; `turned`: the update's correction of the predicted orientation, a rotation vector,
+  /// rad; `lost`: decrease of its covariance by the update, rad^2. All in the body frame.
   void add(const Eigen::Vector3d& omega, const Eigen::Vector3d& turned, const Eigen::Matrix3d& lost);
-  double sigma() const { return sigma_; }  ///< s; 0 while the stamps are as good as one can tell
-  /// The corrections are not explained yet, and may still be by the stamps.
+  double sigma() const { return sigma_; }  ///< s; 0 while no jitter is measurable
+  /// Whether the corrections are still larger than explained, and more stamp jitter may explain them.
   bool isGrowing() const;
   void reset();
 
@@ -40,15 +40,15 @@ class StampMonitor {
   double sigma_ = 0, ratio_ = 0.5;
 };
 
-/// Widens the IMU's noise when the images contradict it by more than both admit: by the corrections they make to the
-/// predicted motion, which should scatter as the covariance shrinks by them, or when the gate turns away far more
-/// features than its probability explains. Then the prediction is surer of itself than it should be (noise figures from
-/// a data sheet, vibration, stamps). Narrows again when all is well.
+/// Raises the IMU's noise when the images contradict it by more than the noise of both explains: when the corrections
+/// of the predicted motion are larger than the decrease of its covariance, or when the gate rejects far more features
+/// than its probability explains. Then the prediction is overconfident (data-sheet noise, vibration, stamps). The noise
+/// goes down again when the residuals are consistent.
 class ImuNoiseMonitor {
  public:
   explicit ImuNoiseMonitor(bool adapt) : adapt_(adapt) {}
-  /// `correction`: squared correction of the predicted motion per degree of freedom, whitened by what the covariance
-  /// shrank; honest: 1, less when the pixels' noise is rated high to be safe.
+  /// `correction`: squared correction of the predicted motion per degree of freedom, whitened by the decrease of the
+  /// covariance; 1 when consistent, less when the pixels' noise is inflated to be safe.
   void add(double correction, int used, int gated);
   double scale() const { return scale_; }
   void reset();

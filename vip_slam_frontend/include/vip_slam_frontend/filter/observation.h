@@ -1,4 +1,4 @@
-// A feature's sightings as the filter sees them.
+// A feature's observations as the filter uses them.
 #pragma once
 
 #include <vector>
@@ -13,10 +13,10 @@ namespace vip_slam {
 
 using BearingJacobian = Eigen::Matrix<double, 2, 4>;
 
-/// Of a bearing of this camera. The correction holds before the lens bends the bearing; undistorted, it is another one
-/// at each radius.
+/// Jacobian of an undistorted bearing of this camera by WindowState::bearing. The correction applies to the distorted
+/// bearing, so the Jacobian of the undistorted one depends on the radius.
 BearingJacobian bearingJacobian(const CameraModel& camera, const Eigen::Vector2d& xy);
-/// Of a lens that bends nothing.
+/// The same for a lens without distortion.
 BearingJacobian bearingJacobian(const Eigen::Vector2d& xy);
 
 struct Observation {
@@ -24,16 +24,16 @@ struct Observation {
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< undistorted normalised coordinates
   double depth = 0;                              ///< z, metres; 0: none
   double depth_sigma = 0;                        ///< metres
-  /// d z / d xy of the surface there, metres; zero where it is not known. Its depth is read beside it when the depth
-  /// image is shifted (WindowState::depth_shift).
+  /// d z / d xy of the surface there, metres; zero where it is not known. When the depth image is shifted
+  /// (WindowState::depth_shift) the depth is read next to the pixel, and this slope gives the difference.
   Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();
-  /// What WindowState::bearing does to xy: d xy / d (sx, sy, cx, cy). Zero where the intrinsics are none of the states.
+  /// Jacobian by WindowState::bearing: d xy / d (sx, sy, cx, cy). Zero when the intrinsics are not estimated.
   BearingJacobian by_intrinsics = BearingJacobian::Zero();
   /// L with L^T L the inverse of the pixel's covariance in units of MeasurementNoise::sigma_xy^2.
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
 };
 
-/// z of a sighting, m, as far as it is known what its reading means.
+/// Depth z of an observation, m: its reading corrected by the estimated offset and shift.
 inline double trueDepth(const WindowState& window, const Observation& o) {
   return window.trueDepth(o.depth) + o.depth_slope.dot(window.depth_shift);
 }

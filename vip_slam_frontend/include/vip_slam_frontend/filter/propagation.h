@@ -13,29 +13,29 @@ namespace vip_slam {
 struct Propagation {
   NavState predicted;
   Matrix15d Phi = Matrix15d::Identity();
-  /// What the predicted state changes by with the gyro's correction, column by column of its nine entries.
+  /// Jacobian of the predicted state with respect to the nine entries of the gyro's correction, column by column.
   Eigen::Matrix<double, 15, 9> Phi_gyro = Eigen::Matrix<double, 15, 9>::Zero();
   Matrix15d Q = Matrix15d::Identity();
-  /// Upper-triangular-free W with W^T W = Q^-1 (here lower triangular).
+  /// Whitening of the noise: lower triangular W with W^T W = Q^-1.
   Matrix15d W = Matrix15d::Identity();
-  /// One sigma, along the least certain axis, of the way since the newest clone, m; `P` is the covariance of the state
-  /// there.
+  /// One sigma, along the least certain axis, of the displacement since the newest clone, m; `P` is the covariance of
+  /// the state there.
   double displacementSigma(const Matrix15d& P) const;
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
-  RateHistory rates;                                  ///< the window's, up to the end
-  /// Adds to Q what a straight line between two samples `gap` seconds apart may be off the motion between them, for the
-  /// `dt` seconds of this interval, all of which may lie in the gap.
+  RateHistory rates;                                  ///< the window's, extended to the end
+  /// Adds to Q the error of linear interpolation between two samples that are `gap` seconds apart, for the `dt` seconds
+  /// of this interval, all of which may lie in the gap.
   void admitGap(double gap, double dt);
-  /// Adds to Q a turn by a rate that the IMU has not, of one sigma `rate`, rad/s, for `dt` seconds.
+  /// Adds to Q a rotation at an unmeasured rate of one sigma `rate`, rad/s, for `dt` seconds.
   void admitRate(double rate, double dt);
-  /// Adds to Q a step of the velocity by `dv` (one sigma of each axis, m/s) at an unknown moment of the `dt` seconds.
+  /// Adds to Q a velocity step of `dv` (one sigma of each axis, m/s) at an unknown moment of the `dt` seconds.
   void admitStep(double dv, double dt);
-  bool step_admitted = false;  ///< by that
+  bool step_admitted = false;  ///< admitStep() was called
 };
 
 /// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.
-/// `noise_scale` multiplies all noise densities; `stamp_sigma`: the image may have been taken so much
-/// earlier or later than its stamp says, s. The window is not changed.
+/// `noise_scale` multiplies all noise densities; `stamp_sigma`: jitter of both images' stamps, one sigma, s. The window
+/// is not changed.
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
                       const Eigen::Vector3d& G, double noise_scale = 1.0, double stamp_sigma = 0.0);
 

@@ -35,24 +35,24 @@ class SquareRootFilter {
   /// Marginalises clones (indices ascending). Removing the oldest ones only deletes rows; others cost a QR.
   void marginalise(const std::vector<int>& clone_indices);
 
-  /// Forgets all that is known of one column's state, which has `sigma` from then on; of the others nothing is lost.
+  /// Replaces all information on one column's state by `sigma`; the information on the others is kept.
   void renew(int column, double sigma);
-  /// What is known of the state in this column alone becomes the given sigma again, at `change` from its present value;
-  /// what is known of the others when it is given stays (a consider update, as Schmidt's filter does).
+  /// Resets the marginal of the state in this column to the given sigma, at `change` from its present value; the
+  /// conditional of the others given this state is kept (a consider update, as in the Schmidt-Kalman filter).
   void consider(int column, double change, double sigma);
 
   /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.
   UpdateResult update(Eigen::MatrixXd& H, Eigen::VectorXd& h);
 
-  /// The present estimates are the first ones from now on: where Jacobians to come are taken.
+  /// Makes the present estimates the first estimates, where later Jacobians are evaluated.
   void relinearise();
 
   /// One sigma of each calibration state.
   Eigen::VectorXd calibrationSigmas() const;
   /// Covariance of (theta, p, v, b_g, b_a) of the newest pose.
   Matrix15d navCovariance() const;
-  /// The motion between two clones, by index, with its covariance: that of the window's position and yaw, which nobody
-  /// knows, cancels.
+  /// The motion between two clones, by index, with its covariance: the unobservable position and yaw of the window
+  /// cancel.
   RelativeMotion relativeMotion(int a, int b) const;
   /// Joint covariance of the whole state; for tests.
   Eigen::MatrixXd covariance() const;
@@ -64,8 +64,8 @@ class SquareRootFilter {
   Eigen::MatrixXd R_;
 };
 
-/// The trailing (n - k) square triangle after the columns in `order` (a permutation of R's columns whose first k are
-/// to go) were brought to the front and triangularised. A may have more rows than columns.
+/// The trailing (n - k) square triangle after sorting the columns by `order` (a permutation of A's columns whose first
+/// k are to be marginalised) and triangularising. A may have more rows than columns.
 Eigen::MatrixXd marginaliseColumns(const Eigen::MatrixXd& A, const std::vector<int>& order, int k);
 
 }  // namespace vip_slam

@@ -1,5 +1,5 @@
 // Rows from depth alone: points of the newest depth image lie on the flat patches that an earlier one saw. They need no
-// corners, so they hold five degrees of freedom in a corridor whose walls show nothing. Per pair, in the patch's
+// corners, so they constrain five degrees of freedom in a corridor with textureless walls. Per pair, in the patch's
 // camera:
 //   n^T (T_ref_cur q - p) = 0.
 // The rows depend on the relative pose of two clones only: position and yaw of the window stay unobservable.
@@ -14,7 +14,7 @@
 
 namespace vip_slam {
 
-/// A point on a patch and one that should lie on it, both as the depth camera reads them: its offset is a state.
+/// A point on a patch and one that should lie on it, both from raw depth readings: the depth offset is a state.
 struct SurfacePair {
   Eigen::Vector3d p_ref = Eigen::Vector3d::Zero();  ///< on the patch, camera frame of the reference, metres
   Eigen::Vector3d n_ref = Eigen::Vector3d::Zero();  ///< unit normal, same frame
@@ -32,9 +32,9 @@ struct SurfaceRows {
   int used = 0, gated = 0;
 };
 
-/// Rows between the reference's clone and the newest one. `R` is the filter's factor: pairs beyond four sigmas of what
-/// state and noise allow are gated (another surface), the rest is Huber-weighted at `huber`. Residuals at the present
-/// estimate, Jacobians at the first estimates.
+/// Rows between the reference's clone and the newest one. `R` is the filter's factor: pairs with residuals beyond four
+/// sigmas of state and noise are gated (another surface), the rest is Huber-weighted at `huber`. Residuals at the
+/// present estimate, Jacobians at the first estimates.
 SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, const SurfaceMatches& matches,
                         double huber);
 

@@ -1,4 +1,4 @@
-// Solutions with the filter's triangular factor, vectorised over the rows; rows that begin further right cost less.
+// Solves with the filter's triangular factor, vectorised over the rows; rows with leading zeros cost less.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +8,7 @@ namespace vip_slam {
 /// H <- H R^-1 (m x n), R upper triangular: H P H^T = Z Z^T. Used by the gate and for covariances.
 void solveRight(const Eigen::MatrixXd& R, Eigen::MatrixXd& H);
 
-/// What rows H, r would do to the state on their own; both whitened, P = R^-1 R^-T, S = H P H^T + I.
+/// Effect of rows H, r on the state if applied alone; both whitened, P = R^-1 R^-T, S = H P H^T + I.
 struct Innovation {
   double distance = 0;       ///< r^T S^-1 r, expected to be the number of rows
   double pull = 0;           ///< dx^T P^-1 dx of the correction dx = P H^T S^-1 r

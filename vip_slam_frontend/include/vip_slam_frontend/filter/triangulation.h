@@ -1,4 +1,4 @@
-// A feature's position from its sightings in the window: start from the median of the depth readings (robust against
+// A feature's position from its observations in the window: start from the median of the depth readings (robust against
 // readings across an edge) or, without depth, from the two most separated rays; then Gauss-Newton over pixels and
 // depths in the inverse-depth form (x/z, y/z, 1/z) of the first camera.
 #pragma once
@@ -23,7 +23,7 @@ struct Triangulation {
 Triangulation triangulate(const WindowState& window, const std::vector<Observation>& observations,
                           const MeasurementNoise& noise);
 
-/// Camera pose T_W_C of a clone, with the delay's shift, at the present estimate.
+/// Camera pose T_W_C of a clone at the present estimate, moved along by the change of the delay.
 SE3 cameraPose(const WindowState& window, const Clone& clone);
 
 }  // namespace vip_slam

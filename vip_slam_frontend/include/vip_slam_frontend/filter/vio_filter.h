@@ -23,35 +23,35 @@ namespace vip_slam {
 /// One feature in the present image.
 struct FilterMeasurement {
   LandmarkId id = kNoLandmark;
-  Eigen::Vector2d xy = Eigen::Vector2d::Zero();
-  double depth = 0, depth_sigma = 0;
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero();             ///< undistorted normalised coordinates
+  double depth = 0, depth_sigma = 0;                        ///< z in the camera and its sigma, metres; 0: none
   Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();    ///< see Observation
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< likewise
   BearingJacobian by_intrinsics = BearingJacobian::Zero();  ///< likewise
 };
 
-/// Where the estimate starts and how well that is known.
+/// Initial state and its one-sigma uncertainties.
 struct FilterPrior {
   NavState state;
-  double sigma_tilt = 0.02;      ///< rad, about the world's x and y
-  double sigma_yaw = 1e-4;       ///< rad, gauge
-  double sigma_position = 1e-4;  ///< m, gauge
-  double sigma_velocity = 0.02;  ///< m/s
-  double sigma_bias_gyro = 0.01, sigma_bias_accel = 0.1;
-  /// The state was levelled by the mean specific force of a standing body (R^T G + b_a = mean): ties tilt to the
-  /// accelerometer bias instead of counting their errors apart.
+  double sigma_tilt = 0.02;                               ///< rad, about the world's x and y
+  double sigma_yaw = 1e-4;                                ///< rad, gauge
+  double sigma_position = 1e-4;                           ///< m, gauge
+  double sigma_velocity = 0.02;                           ///< m/s
+  double sigma_bias_gyro = 0.01, sigma_bias_accel = 0.1;  ///< rad/s and m/s^2, IMU frame
+  /// The state was levelled by the mean specific force of a standing body (R^T G + b_a = mean): couples tilt and
+  /// accelerometer bias, whose errors are not independent then.
   bool standing = false;
-  double sigma_mean_accel = 0.01;
+  double sigma_mean_accel = 0.01;  ///< m/s^2, of that mean
 };
 
 struct StepReport {
   bool healthy = true;
   bool zero_velocity = false;
   int features_tried = 0, features_used = 0, features_gated = 0;
-  int surfaces_used = 0, surfaces_gated = 0;  ///< point-to-patch pairs
+  int surfaces_used = 0;  ///< point-to-patch pairs
   int rows = 0;
   double nis = 0;
-  double correction = 0;  ///< of the predicted motion, see ImuNoiseMonitor
+  double correction = 0;  ///< normalised squared correction of the predicted motion, see ImuNoiseMonitor
 };
 
 class VioFilter {
@@ -62,45 +62,45 @@ class VioFilter {
   void start(const FilterPrior& prior, CloneId id, const Eigen::Vector3d& omega_I);
   bool started() const { return started_; }
   void stop();
-  /// Readings mean something else from now on: what was known of their offset is void, and so is depth in the tracks.
-  /// `none`: they have no offset any more; else it is estimated anew. Holds for later starts as well.
+  /// To be called when depth readings are corrected differently from now on: discards the estimate of their offset and
+  /// the depth in the tracks. `none`: the offset is held at its given value; else it is estimated anew. Holds for later
+  /// starts as well.
   void restartDepthOffset(bool none);
 
   /// Prediction from the newest clone over `samples` (first at its time); does not change the filter.
   Propagation predict(const std::vector<ImuSample>& samples) const;
   /// One image: `propagation` from predict(). Without measurements this coasts. `surfaces` (may be null) ties the new
-  /// image's depth to that of an earlier clone. `unrest`: see StillnessDetector; nothing when the body moves.
+  /// image's depth to that of an earlier clone. `residual_motion`: see StillnessDetector; empty when the body moves.
   StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,
-                  std::optional<Unrest> unrest, const SurfaceMatches* surfaces = nullptr);
+                  std::optional<ResidualMotion> residual_motion, const SurfaceMatches* surfaces = nullptr);
 
   const WindowState& window() const { return filter_.window(); }
-  /// How the camera is mounted, as known now; also between two starts.
+  /// Present estimate of extrinsics and calibration; valid also between two starts.
   MountingEstimate mounting() const;
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
-  /// From now on the motion since the newest clone is asked for (its image became a keyframe).
+  /// Marks the newest clone (its image became a keyframe) as the start of motionSinceMark().
   void markNewest();
-  /// The motion from the marked clone to the newest. When the marked one has left the window meanwhile it is put
-  /// together from pieces as long as the window, whose errors count as independent. Unknown when nothing was marked.
+  /// The motion from the marked clone to the newest. When the marked clone has left the window it is composed of pieces
+  /// as long as the window, whose errors are taken as independent. Unknown when nothing was marked.
   RelativeMotion motionSinceMark() const;
-  /// Its pose alone, at next to no cost; empty when nothing was marked.
+  /// The pose of motionSinceMark() without the cost of its covariance; empty when nothing was marked.
   std::optional<SE3> poseSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }
   double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s
-  /// What is to be added to depth readings for others, m: the offset once it is beyond doubt and large enough to
-  /// matter, else 0. The estimate itself wanders by a millimetre before it is known, which a map of exact depth would
-  /// keep.
+  /// Offset to be added to depth readings outside the filter, m: the estimate once it is significant and large enough
+  /// to matter, else 0. Before it converges the estimate varies by a millimetre, which would stay in a map of exact
+  /// depth.
   double depthCorrection() const { return depth_is_off_ ? filter_.window().depth_offset : 0.0; }
-  /// The gyro's correction for others: of each entry the estimate once it is beyond doubt and large enough to matter,
-  /// else zero.
+  /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
+  /// matter, else zero.
   Eigen::Matrix3d gyroCorrection() const;
-  /// What bearings mean, for others: of each entry the estimate once it is beyond doubt and large enough to matter,
-  /// else zero.
+  /// Correction of bearings for use outside the filter: each entry's estimate once it is significant and large enough
+  /// to matter, else zero.
   BearingCorrection bearingCorrection() const;
-  /// How far the depth image lies beside the colour image (WindowState::depth_shift), for readings to come: nothing
-  /// until it is known to a tenth of a pixel and beyond doubt, then what is still found of it. From then on the filter
-  /// estimates the rest.
+  /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is significant
+  /// and known to a tenth of a pixel. The part taken is removed from the state, and the filter estimates the rest.
   const Eigen::Vector2d& takeDepthShift();
   double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
@@ -113,65 +113,68 @@ class VioFilter {
   void addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements);
   /// Tracks that have ended and those that are about to leave the window; `all`: the others as well.
   std::vector<Candidate> chooseCandidates(CloneId id, bool window_full, bool all);
-  /// Factor on the common pixel noise for a feature whose residuals that does not explain: its patch shows something
-  /// that is no point (an occluding edge, a reflection). Such patches also wander along with the motion, by much more
-  /// than their residuals say: measured against true poses about as the square of them.
+  /// Per-feature scale of the pixel sigma, 1 or more, where the common noise does not explain the residuals: the patch
+  /// shows no fixed point (an occluding edge, a reflection). Such patches also drift with the motion by much more than
+  /// their residuals: measured against true poses about as the square, hence chi2 per dof and not its root.
   double ownNoise(const Triangulation& point) const;
-  /// What is left of that factor when the state's uncertainty has its share; `feature`: with the common noise.
+  /// The same scale when the state's uncertainty explains its share of the residuals; `feature`: rows whitened with the
+  /// common noise.
   double beyondState(const FeatureRows& feature) const;
-  /// Uncertainty of the velocity over the time of the window, times the focal length: px at one metre.
+  /// Displacement by the velocity's uncertainty over the time of the window, as image motion: px at one metre.
   double openPixels() const;
-  /// Which residuals of a feature are noise of its own: none, all that the common noise does not explain, or of these
-  /// what the state's uncertainty does not explain either.
+  /// Which residuals go into a feature's own noise scale: none, all that the common noise does not explain, or only
+  /// those that the state's uncertainty does not explain either.
   enum class OwnNoise { kNone, kResiduals, kBeyondState };
-  /// An image's features, ready for an update, and what they say about the noise.
+  /// An image's features, ready for an update, with their residual statistics for the noise monitors.
   struct FeatureBatch {
     std::vector<FeatureRows> accepted;
     int rows = 0, tried = 0, gated = 0;
     std::vector<double> chi2, depth_chi2;  ///< per degree of freedom, of single features
     int chi2_rows = 0, depth_rows = 0;
-    double nearest_noisy = 1e9;  ///< m, z of the nearest feature with a noise of its own
+    double nearest_noisy = 1e9;  ///< m, z of the nearest feature with a noise scale above 1
   };
-  /// Rows that are linearised at `window`, for an update of the filter's own, which is `moved` away from it.
+  /// Rows linearised at `window`, for an update of the filter's prior; `moved`: error state from the prior to `window`.
   FeatureBatch judgeFeatures(const std::vector<Candidate>& candidates, const WindowState& window,
                              const Eigen::VectorXd& moved, OwnNoise own_noise) const;
   UpdateResult apply(FeatureBatch& batch);
-  /// Where the velocity is open, poses are wrong together by more than rows linearised there can tell (a stretch on the
-  /// IMU alone): a first update takes all residuals that the state may explain for the state's, the next ones begin
-  /// from the same prior, but linearise and judge the features' own noise where the one before led to (iterated Kalman
-  /// update). First estimates are renewed with it.
+  /// Iterated Kalman update, for when the velocity is poorly known (after a stretch on the IMU alone) and all poses are
+  /// off by more than the linearisation allows. The first pass attributes to the state all residuals that it may
+  /// explain; the next ones start from the same prior, but linearise and judge the features' noise at the result of the
+  /// pass before. The first estimates are reset to the result.
   UpdateResult updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
-  /// Whether depth is off beyond doubt. An offset that is beyond belief stands for something else; it is taken back and
-  /// estimated no more.
+  /// Decides whether the depth offset is significant. An implausibly large one stands for some other error: it is reset
+  /// to the given value and no longer estimated.
   void judgeDepthOffset();
   bool isSteady(double depth_offset);
-  /// While the rate hardly changes, noise alone would tell of the camera-IMU delay: it stays what it was, and as sure.
+  /// Estimate of the camera-IMU delay while it is held.
   struct Delay {
     double value, sigma;  ///< s
   };
+  /// Resets the camera-IMU delay and its sigma to delay_before_: while the rate hardly changes, noise alone would drive
+  /// its estimate.
   void holdDelay();
-  /// The same of the depth image's shift.
+  /// Resets an implausibly large shift of the depth image and stops applying it.
   void judgeDepthShift();
-  /// Depth in the tracks becomes what is read with so much more of the shift.
+  /// Adjusts the depth in the tracks to readings that are shifted by this much more, in bearings.
   void moveDepth(const Eigen::Vector2d& shift);
   void judgeIntrinsics();
   void judgeGyroCorrection();
-  /// Keeps what was found about the mounting for the next start, unless it is further from what was given than that
-  /// allows: then whatever broke the estimate broke this as well.
+  /// Keeps the estimated extrinsics and calibration for the next start, unless they are implausibly far from the given
+  /// ones: then they are as wrong as the estimate that failed.
   void learnMounting();
   void forgetClone(CloneId id);
   /// From the marked clone to another one; unknown when nothing is marked.
   RelativeMotion motionFromMark(int clone) const;
-  /// Clone `to` stands for the marked one, which is about to go.
+  /// Clone `to` replaces the marked one, which is about to be marginalised.
   void moveMark(CloneId to);
 
   FilterOptions options_;
   ImuNoise imu_noise_;
   const MountingEstimate given_;  ///< by the sensor's configuration
-  MountingEstimate learnt_;       ///< what a start begins with: given_, or what earlier runs found
-  double sigma_depth_offset_;     ///< m, at a start
+  MountingEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
+  double sigma_depth_offset_;     ///< m, of the prior at a start
   double focal_;
   Eigen::Vector3d G_;
   Gate gate_, explained_;
@@ -181,23 +184,23 @@ class VioFilter {
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
-  Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();  ///< that readings have by now
-  bool shift_contradicts_ = false;                         ///< it went beyond belief
+  Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();  ///< already applied to the readings, in bearings
+  bool shift_contradicts_ = false;                         ///< it became implausibly large
   struct Offset {
     double t = -1e300, value = 0;  ///< s, m
   };
-  Offset offset_before_;  ///< when it was looked at last
+  Offset offset_before_;  ///< at the last check of its steadiness
   bool offset_is_steady_ = false;
-  bool depth_is_off_ = false;                                                            ///< beyond doubt
+  bool depth_is_off_ = false;                                                            ///< significantly
   Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
-  bool depth_contradicts_ = false;     ///< its offset went beyond belief
-  int still_images_ = 0;               ///< images since the standing began; 0 when moving
-  bool after_step_ = false;            ///< the propagation before admitted a step of the velocity
-  std::optional<Delay> delay_before_;  ///< while it is held
+  bool depth_contradicts_ = false;     ///< its offset became implausibly large
+  int still_images_ = 0;               ///< images since standing still began; 0 when moving
+  bool after_step_ = false;            ///< the propagation before admitted a velocity step
+  std::optional<Delay> delay_before_;  ///< the value held; empty while the delay is estimated
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none
-  std::optional<RelativeMotion> to_mark_;  ///< from the clone that was marked, when mark_ is another by now
+  std::optional<RelativeMotion> to_mark_;  ///< from the clone marked originally to mark_, when that is another one
 };
 
 }  // namespace vip_slam

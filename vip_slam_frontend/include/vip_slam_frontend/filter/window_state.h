@@ -1,6 +1,6 @@
 // The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
-// present pose), E = (v, b_g, b_a), calibration = those of (theta_IC, t_IC, td, depth offset, bearing correction, depth
-// shift, gyro correction) that are estimated.
+// present pose), E = (v, b_g, b_a), calibration = the estimated ones of (theta_IC, t_IC, td, depth offset, bearing
+// correction, depth shift, gyro correction).
 // Rotations are perturbed on the right, positions in the world.
 #pragma once
 
@@ -21,17 +21,17 @@ struct Clone {
   CloneId id = 0;
   double t = 0;   ///< IMU time at which the pose holds
   SE3 T_W_I;      ///< estimate
-  SE3 T_W_I_fej;  ///< first estimate: right after propagation; every Jacobian is taken there
+  SE3 T_W_I_fej;  ///< first estimate, right after propagation; all Jacobians are evaluated there
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< rad/s, for the delay's Jacobian
   Eigen::Vector3d v_W = Eigen::Vector3d::Zero();      ///< m/s, same
-  double time_offset = 0;  ///< td that was used to choose t; a later td shifts the pose by (td' - td)
+  double time_offset = 0;  ///< td from which t was computed, s; a later td' moves the pose along by (td' - td)
 };
 
 struct CalibrationFlags {
   bool rotation = false, translation = false, time_offset = false, depth_offset = false;
   bool intrinsics = false, depth_shift = false;
   bool gyro_scale = false, gyro_misalignment = false;
-  /// States of the camera, which its measurements depend on.
+  /// Number of the camera's calibration states, on which the measurements depend.
   int camera() const {
     return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0) + (depth_offset ? 1 : 0) +
            (intrinsics ? 4 : 0) + (depth_shift ? 2 : 0);
@@ -51,13 +51,14 @@ struct WindowState {
   Eigen::Vector3d bias_accel = Eigen::Vector3d::Zero();
   SE3 T_I_C;
   double time_offset = 0;
-  double depth_offset = 0;    ///< m: what every reading of the depth camera has to be added
-  BearingCorrection bearing;  ///< what the camera's intrinsics get wrong
-  /// How far right and down of the colour image the depth image lies, in bearings: what is read at b is of b - shift.
+  double depth_offset = 0;    ///< m, to be added to every reading of the depth camera
+  BearingCorrection bearing;  ///< correction of the camera's intrinsics
+  /// Shift of the depth image to the right and down against the colour image, in bearings: depth read at bearing b
+  /// belongs to b - shift.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
   CalibrationFlags calibration;
-  RateHistory rates;  ///< of the gyro, up to the newest clone
+  RateHistory rates;  ///< angular rates up to the newest clone
 
   int cloneColumn(int index) const { return 6 * index; }
   int calibrationColumn() const { return 6 * static_cast<int>(clones.size()); }
@@ -70,10 +71,10 @@ struct WindowState {
   int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
   int intrinsicsColumn() const { return depthOffsetColumn() + (calibration.depth_offset ? 1 : 0); }
   int depthShiftColumn() const { return intrinsicsColumn() + (calibration.intrinsics ? 4 : 0); }
-  /// The correction's diagonal, then what lies beside it, as far as they are estimated: see gyroEntry().
+  /// The correction's diagonal (scale), then its off-diagonal entries (misalignment), if estimated: see gyroEntry().
   int gyroColumn() const { return calibrationColumn() + calibration.camera(); }
 
-  /// z that a reading of the depth camera means, m.
+  /// Depth z for a reading of the depth camera, m: the offset added.
   double trueDepth(double reading) const { return reading + depth_offset; }
   /// Index of the clone, -1 when it is not in the window.
   int indexOf(CloneId id) const;

@@ -1,4 +1,4 @@
-// Options of the start, standing or moving.
+// Options of the initialisation, standing or moving.
 #pragma once
 
 #include "vip_slam_core/util/options.h"

@@ -1,4 +1,4 @@
-// Options of keyframe choice.
+// Options of keyframe selection.
 #pragma once
 
 #include "vip_slam_core/util/options.h"

@@ -1,5 +1,5 @@
-// A depth image whose rows were read one after the other while the camera moved, as the camera at the stamp would have
-// seen it. Depth sensors with a rolling shutter only; the others' images belong to one instant.
+// Removes rolling shutter and stamp lag from a depth image: the result is what the camera at the stamp would have seen.
+// Not needed for depth sensors with a global shutter and the stamps of the colour image.
 #pragma once
 
 #include <memory>
@@ -16,8 +16,9 @@ class DepthRows {
  public:
   explicit DepthRows(std::shared_ptr<const CameraModel> camera);
 
-  /// `depth`: 32FC1, metres along z, 0 or NaN where there is none. Every pixel of the result is looked up where its
-  /// surface was when its row was read: by inverse depth among four neighbours on one surface, else the nearest.
+  /// `depth`: 32FC1, metres along z, 0 or NaN invalid. Every pixel of the result is looked up where its surface was
+  /// when its row was read: interpolated in inverse depth among four neighbours on one surface, else the nearest
+  /// reading.
   cv::Mat atStamp(const cv::Mat& depth, const RowPoses& rows) const;
 
  private:

@@ -19,7 +19,7 @@ struct FeatureDepth {
     kRim       ///< the nearer of two surfaces
   };
   float z = 0;      ///< metres; 0: none
-  float sigma = 0;  ///< one sigma of z; with what half a pixel makes on a slanted surface
+  float sigma = 0;  ///< one sigma of z, metres; on a slanted surface it includes an error of half a pixel
   Source source = Source::kNone;
 };
 

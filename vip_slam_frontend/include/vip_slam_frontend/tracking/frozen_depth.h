@@ -1,4 +1,4 @@
-// A depth camera that has stopped goes on with its last image under new stamps.
+// Detects a frozen depth camera, which repeats its last image under new stamps.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@ namespace vip_slam {
 
 class FrozenDepth {
  public:
-  /// Whether this image is the one given before, pixel by pixel, as far as a sample of them tells. One that has hardly
-  /// any depth may be.
+  /// Whether this image equals the one before, by a sample of its pixels. False for an image with hardly any depth,
+  /// which may repeat by chance.
   bool repeats(const cv::Mat& depth);
   void clear() { last_.clear(); }
 

@@ -1,7 +1,7 @@
 // Outlier rejection when the rotation between two images is not known (IMU gap, wrong calibration): camera pose from
-// points with depth, else the fundamental matrix. Coplanar points, or a rotation on the spot, leave a three-dimensional
-// family of fundamental matrices and with it room for outliers; so a homography competes, and the geometric robust
-// information criterion (Torr 1998) decides which model the pairs call for.
+// points with depth, else the fundamental matrix. Coplanar points or a pure rotation leave a three-dimensional family
+// of fundamental matrices, which outliers can fit; so a homography competes, and the geometric robust information
+// criterion (Torr 1998) selects the model.
 #pragma once
 
 #include <vector>
@@ -19,8 +19,8 @@ struct GeneralMotion {
   SE3 T_current_previous;  ///< only of kPose
 };
 
-/// Pose from samples of four points with depth, started at `predicted`; kNone with fewer than eight of them. Pairs
-/// without depth are judged by their distance from the epipolar line.
+/// Pose from samples of four points with depth, started at `predicted`; kNone with fewer than eight points with depth.
+/// Pairs without depth are judged by their distance from the epipolar line.
 GeneralMotion poseFromDepth(const std::vector<PointPair>& pairs, const SE3& predicted, const RansacOptions& options);
 
 /// Fundamental matrix or homography; kNone with fewer than 12 pairs.

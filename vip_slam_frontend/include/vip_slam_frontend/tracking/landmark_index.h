@@ -1,4 +1,4 @@
-// Which landmarks of the map lie around a place: a building has hundreds of thousands, an image shows some hundred.
+// Spatial index of the map's landmarks: a building has hundreds of thousands, an image shows some hundred.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace vip_slam {
 
 class LandmarkIndex {
  public:
-  /// A new landmark, or where it lies now; metres, in `map`. One that is not finite is left out.
+  /// Adds or moves a landmark; metres, in `map`. A position that is not finite removes it.
   void put(LandmarkId id, const Eigen::Vector3d& p_map);
   void remove(LandmarkId id);
   void clear();
-  /// Those within `radius` metres of `centre` in plan, and some beyond; ascending.
+  /// Landmarks within `radius` metres of `centre` horizontally, and some beyond; ids ascending.
   std::vector<LandmarkId> around(const Eigen::Vector3d& centre, double radius) const;
 
  private:
-  std::unordered_map<std::int64_t, std::vector<LandmarkId>> cells_;  ///< columns of space
+  std::unordered_map<std::int64_t, std::vector<LandmarkId>> cells_;  ///< vertical columns of space
   std::unordered_map<LandmarkId, std::int64_t> cell_of_;
 };
 

@@ -1,6 +1,6 @@
-// Brings back landmarks of the map that are in view but not tracked: projected with the corrected pose, matched by
+// Re-acquires landmarks of the map that are in view but not tracked: projected with the corrected pose, matched by
 // Hamming distance to the corners around and aligned with the patch of their old track, so that a track starts again
-// under the landmark's id.
+// with the landmark's id.
 #pragma once
 
 #include <map>
@@ -20,14 +20,14 @@ class LandmarkMatcher {
   LandmarkMatcher(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera);
 
   void apply(const MapUpdate& update);
-  /// Keeps the patch of a track that ended, for its landmark's return.
+  /// Keeps the patch of a track that ended, to re-acquire its landmark later.
   void retire(const Track& track);
   /// Adds a track for every landmark found again in the tracker's newest image; returns how many.
   int reacquire(FeatureTracker* tracker, const OrbExtractor& orb, const SE3& T_map_C, const SE3& T_odom_C) const;
   std::size_t size() const { return landmarks_.size(); }
   /// Forgets the map.
   void clear();
-  /// Forgets the patches: where they were taken is known in an odometry that has ended.
+  /// Forgets the patches: their camera poses belong to an odometry epoch that has ended.
   void forgetPatches() { patches_.clear(); }
 
  private:
@@ -44,7 +44,7 @@ class LandmarkMatcher {
   };
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;
-  double reach_;  ///< m from the camera to the corners of its view, as far as landmarks are looked for
+  double reach_;  ///< m, search radius: from the camera to the corners of its view at the largest depth searched
   std::unordered_map<LandmarkId, Entry> landmarks_;
   LandmarkIndex index_;  ///< of landmarks_
   std::map<LandmarkId, Patch> patches_;

@@ -1,5 +1,5 @@
-// Where in an image things move by themselves, as far as its tracks tell: beside a point that does not follow the
-// camera's motion, and as far away as that, when no point that does is nearer.
+// Regions of an image that move independently of the camera, from its tracks: around a point that does not follow the
+// camera's motion and at about its depth, when no static point is nearer.
 #pragma once
 
 #include <vector>
@@ -12,10 +12,10 @@ class MovingRegions {
  public:
   /// A tracked point of the image, its depth in metres (0: none), and whether the camera's motion explains it.
   void add(const Eigen::Vector2f& pixel, double z, bool still);
-  /// Whether what is seen at `pixel` in a depth of `z` (0: unknown) moves. False everywhere when only stray points do
-  /// not follow: those are mismatches.
+  /// Whether the surface at `pixel` with depth `z`, m (0: unknown), moves. False everywhere when only a few points do
+  /// not follow the camera's motion: those are mismatches.
   bool moves(const Eigen::Vector2d& pixel, double z) const;
-  /// There is more than stray points.
+  /// Whether there are more moving points than mismatches explain.
   bool any() const;
 
  private:

@@ -1,5 +1,5 @@
 // Sub-pixel alignment of a patch with its first appearance (inverse compositional Lucas-Kanade over shift and
-// brightness). Frame-to-frame tracking creeps by a few hundredths of a pixel per image; this takes the creep back.
+// brightness). It removes the drift of frame-to-frame tracking, a few hundredths of a pixel per image.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,14 +17,14 @@ struct PatchAlignment {
   Eigen::Matrix2d texture = Eigen::Matrix2d::Zero();  ///< see patchTexture, of the warped patch in `current`'s pixels
 };
 
-/// Sum of the gradient products over the narrow or wide patch around `pixel`, the mean gradient taken out since
-/// brightness is estimated along: (grey levels / px)^2, times the variance of a grey level's inverse the information of
-/// its position. Zero outside the image.
+/// Sum of the gradient products over the narrow or wide patch around `pixel`, (grey levels / px)^2, without the mean
+/// gradient since brightness is estimated as well. Divided by the variance of a grey level it is the information of the
+/// patch's position. Zero outside the image.
 Eigen::Matrix2d patchTexture(const cv::Mat& image, const Eigen::Vector2d& pixel, bool wide = false);
 
-/// Finds in `current` the patch that `reference` shows at `reference_pixel`. `warp` maps pixel offsets of the
-/// current image into the reference. Starts at `start`; not ok when it leaves the image or does not converge. `wide`:
-/// with the wide patch where that succeeds.
+/// Finds in `current` the patch that `reference` shows at `reference_pixel`. `warp` maps pixel offsets of the current
+/// image into the reference. Starts at `start`; not ok when it leaves the image or does not converge. `wide`: use the
+/// wide patch where that succeeds.
 PatchAlignment alignPatch(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
                           const cv::Mat& current, const Eigen::Vector2d& start, bool wide = false);
 

@@ -1,5 +1,5 @@
-// Patches that lie on one plane share its normal. A single patch is some centimetres wide and knows its normal to a
-// degree; rows with such normals would claim to see motion along a bare wall, again and again.
+// Patches that lie on one plane share its normal. A single patch is some centimetres wide and gives its normal to about
+// a degree; measurement rows with such normals would falsely constrain the motion along a bare wall.
 #pragma once
 
 #include <vector>
@@ -15,8 +15,8 @@ struct SurfacePatch {
   double sigma_normal = 0;                        ///< one sigma of the normal's direction, rad
 };
 
-/// Finds planes among the patches and gives each patch on one the plane's normal. Patches on none are dropped: what
-/// they say across their normal is noise.
+/// Finds planes among the patches and gives each patch on a plane the plane's normal. Patches on no plane are dropped:
+/// the error of their own normals makes them noisy.
 std::vector<SurfacePatch> shareNormals(std::vector<SurfacePatch> patches);
 
 }  // namespace vip_slam

@@ -1,5 +1,5 @@
-// The small piece of surface that a patch shows. With its depth and slope the patch can be warped into another view to
-// second order, also on a wall seen at a flat angle, where a patch taken to face the camera would creep.
+// The piece of surface that a patch shows. With its depth and slope the patch can be warped into another view to second
+// order. On a wall seen at a flat angle a patch that is assumed to face the camera would drift.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,31 +11,30 @@
 
 namespace vip_slam {
 
-/// Half the side of a patch, px. The wide one halves the variance of where the patch is; it takes one plane all over
-/// it.
+/// Half the side of a patch, px. The wide patch halves the variance of the match, but needs one plane over all of it.
 constexpr int kNarrowPatch = 6, kWidePatch = 12;
 
 /// A plane is affine in inverse depth over the image: 1/z(p + d) = (1 + slope . d) / depth.
 struct PatchSurface {
-  double depth = 0;                                 ///< z at the patch's middle, metres; 0: unknown, far away
+  double depth = 0;                                 ///< z at the patch's centre, metres; 0: unknown, far away
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< 1/pixel; zero: facing the camera
   bool known = false;                               ///< one plane explains the depth readings of the whole patch
-  bool wide = false;                                ///< ... of the wide one as well
+  bool wide = false;                                ///< ... and those of the wide patch as well
 
   double depthAt(const Eigen::Vector2d& offset_px) const { return depth / (1.0 + slope.dot(offset_px)); }
 };
 
-/// Surface around `pixel` in `depth_image` (32FC1, metres, 0 or NaN invalid), whose depth in the middle is known to be
-/// `depth`. Facing the camera where the readings are too few or lie on no plane.
+/// Surface around `pixel` in `depth_image` (32FC1, metres, 0 or NaN invalid), whose depth at the pixel is `depth`.
+/// Fronto-parallel where the readings are too few or lie on no plane.
 PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
                           const DepthNoise& noise);
 
-/// The same over the narrow patch alone.
+/// The same for the narrow patch alone.
 PatchSurface narrowPatchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
                                 const DepthNoise& noise);
 
-/// Offsets from the patch's middle in the current image, px, into those in the reference. The second order counts: over
-/// a patch its mean is a shift in the direction of the motion, the same for all patches of a wall or of a turn.
+/// Maps offsets from the patch's centre in the current image, px, to those in the reference. The second order matters:
+/// averaged over a patch it is a shift along the motion, with the same sign for all patches of a wall or of a turn.
 struct PatchWarp {
   Eigen::Matrix2d A = Eigen::Matrix2d::Identity();
   Eigen::Vector2d xx = Eigen::Vector2d::Zero(), xy = xx, yy = xx;  ///< second derivatives, 1/px
@@ -47,7 +46,7 @@ struct PatchWarp {
   }
 };
 
-/// `reference` and `current`: the camera during either image. False when the patch is out of sight or all but edge-on.
+/// `reference` and `current`: the camera during either image. False when the patch is not visible or nearly edge-on.
 bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen::Vector2d& reference_pixel,
                const PatchSurface& surface, const SE3& T_cur_ref, PatchWarp* warp_ref_cur);
 

@@ -1,5 +1,5 @@
-// What the IMU foretells of the camera's motion between two images. When somebody walks by so close that he fills the
-// view, the motion that explains most points is his, not the camera's; the IMU knows better for some seconds.
+// The camera's motion between two images as predicted by the IMU, for outlier rejection. When a person close to the
+// camera fills the view, most points follow the person's motion; for some seconds the IMU is the better judge.
 #pragma once
 
 #include <cstdint>
@@ -10,33 +10,33 @@
 
 namespace vip_slam {
 
-/// Images after which a point has shown that it stands still.
+/// Number of images that a point must have been followed for to count as proven static.
 constexpr std::uint32_t kOldPoint = 8;
 
-struct ForetoldMotion {
+struct PredictedMotion {
   SE3 T_current_previous;
-  double sigma = 0;           ///< of the translation along its least certain axis, m
-  double interval = 0;        ///< between the two images, s; 0: nothing is foretold
-  bool turn_unknown = false;  ///< the IMU had a gap
-  bool wary = false;          ///< something moved a moment ago: when in doubt the IMU is right
-  bool at_rest = false;  ///< the IMU has not stirred since the camera stood still: points that move do so themselves
+  double sigma = 0;           ///< one sigma of the translation along its least certain axis, m
+  double interval = 0;        ///< between the two images, s; 0: the prediction must not judge the points
+  bool turn_unknown = false;  ///< the rotation is not known: the IMU had a gap
+  bool wary = false;          ///< something moved a moment ago: in doubt prefer the IMU
+  bool at_rest = false;  ///< the IMU has been at rest since the camera stood still: points that move are not static
 };
 
-/// How far a translation may be from the foretold one, m.
-double mostApart(const ForetoldMotion& foretold);
+/// Largest plausible distance of a translation from the predicted one, m.
+double mostApart(const PredictedMotion& prediction);
 
-/// Whether `found`, the motion that explains most pairs, is that of something else: the IMU excludes it, and the points
-/// that speak for it are new, or others that are not agree with the IMU. Points followed for long that all of a sudden
-/// contradict the IMU together are believed: then the IMU, or what was made of it, is wrong. `bounded`: the motion no
-/// further than mostApart() from the foretold one that explains most.
+/// Whether `found`, the motion that explains most pairs and that the IMU excludes, belongs to a moving body: fewer than
+/// a quarter of its inliers are old points, or old points (at least a quarter as many) agree with the IMU. Old points
+/// that together suddenly contradict the IMU are believed: then the IMU, or the state, is wrong. `bounded`: the motion
+/// within mostApart() of the predicted one that explains most pairs.
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded);
 
-/// Whether nearly all points agree with `found`, many of them old: a scene does not begin to move as one.
+/// Whether nearly all points agree with `found`, many of them old: a static scene does not start to move as a whole.
 bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found);
 
-/// Outliers rejected with both in mind. `options.most_apart` is set here. `moves`: whether what is seen moves by
-/// itself; then only points that agree with the IMU are inliers.
-RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const ForetoldMotion& foretold, RansacOptions options,
-                            bool* moves);
+/// Outlier rejection that weighs `found` against `bounded`. `options.most_apart` is set here. `moves`: whether most of
+/// the view moves independently of the camera; then only points that agree with the IMU are inliers.
+RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const PredictedMotion& prediction,
+                            RansacOptions options, bool* moves);
 
 }  // namespace vip_slam

@@ -1,6 +1,6 @@
 // The colour camera during one image. A rolling shutter reads the rows one after the other while the camera moves, so
-// every row has a pose of its own. Here pixels become points seen from the pose at the stamp and back, so that nobody
-// else needs to know of rows.
+// every row has a pose of its own. This class converts pixels to points seen from the pose at the stamp and back, so
+// that the rest of the code can assume a global shutter.
 #pragma once
 
 #include <memory>
@@ -14,11 +14,11 @@
 
 namespace vip_slam {
 
-/// When an image is read: the times of its first and its last row, seconds after the stamp that poses belong to.
+/// Readout times of an image's first and last row, seconds after the stamp that poses belong to.
 struct Readout {
   double first = 0, last = 0;
 
-  /// `seconds` from first to last row, about the instant `lag` after that stamp.
+  /// `seconds` from first to last row, centred `lag` seconds after that stamp.
   static Readout around(double seconds, double lag = 0) { return {lag - 0.5 * seconds, lag + 0.5 * seconds}; }
   /// Everything at the stamp.
   bool instant() const { return first == 0 && last == 0; }
@@ -27,8 +27,8 @@ struct Readout {
 /// Poses of the camera while an image is read, relative to its pose at the stamp.
 class RowPoses {
  public:
-  /// `nav`: state at the stamp. `imu`: samples around the readout and the stamp on the clock of `nav.t`; where they do
-  /// not reach, the nearest counts. `T_I_C`: camera into IMU. `gravity` in m/s^2.
+  /// `nav`: state at the stamp. `imu`: samples around the readout and the stamp on the clock of `nav.t`; outside them
+  /// the nearest is used. `T_I_C`: camera to IMU. `gravity` in m/s^2.
   RowPoses(const Readout& readout, const NavState& nav, const std::vector<ImuSample>& imu, const SE3& T_I_C,
            double gravity = 9.81);
 

@@ -20,8 +20,8 @@ class SurfaceTracker {
  public:
   SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
 
-  /// Patches of an image, one at most per cell of the raster; none where the window is not flat, is seen too obliquely
-  /// or shows what moves.
+  /// Patches of an image, at most one per cell of the raster; none where the surface is not flat, is seen too obliquely
+  /// or belongs to a moving region.
   std::vector<SurfacePatch> patches(const cv::Mat& depth, const MovingRegions& moving = {}) const;
   /// The image of `clone` becomes the reference, with those of its patches that lie on planes.
   void setReference(const cv::Mat& depth, CloneId clone, const MovingRegions& moving = {});
@@ -29,7 +29,7 @@ class SurfaceTracker {
   CloneId reference() const { return reference_; }  ///< 0: none
   std::size_t size() const { return patches_.size(); }
   /// Pairs of the reference's patches with patches of `depth`, looked up where `T_cur_ref` (cameras) puts them. Both
-  /// are fitted in the same way, so that what a fit makes of noise and curvature cancels.
+  /// are fitted in the same way, so that the fit's systematic errors from noise and curvature cancel.
   SurfaceMatches match(const cv::Mat& depth, const SE3& T_cur_ref, const MovingRegions& moving = {}) const;
 
  private:

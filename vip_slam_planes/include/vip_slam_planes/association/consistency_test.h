@@ -1,6 +1,6 @@
-// The paper's geometric-consistency test of a map point against a plane (section "Point and Plane Association"): is its
-// reprojection error as good when it is forced onto the plane? Depth takes part, since with little parallax any point
-// can slide onto a plane behind it at no cost in pixels.
+// The paper's geometric-consistency test of a map point against a plane (section "Point and Plane Association"):
+// whether its reprojection error stays as small when it is forced onto the plane. Depth is used as well, since with
+// little parallax any point can be moved onto a plane behind it without a larger reprojection error.
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@ struct PointSighting {
   Eigen::Vector2d xy;      ///< normalised
   double depth = 0;        ///< metres, 0: none
   double depth_sigma = 0;  ///< metres, systematic part included
-  double pixel_sigma = 0;  ///< px; the options' counts when it is larger
+  double pixel_sigma = 0;  ///< px; the options' value is used when it is larger
 };
 
 struct ConsistencyResult {
@@ -27,7 +27,7 @@ struct ConsistencyResult {
   bool consistent = false;
 };
 
-/// `start` is a first guess of the point in `map`; focal in pixels.
+/// `start`: initial estimate of the point in `map`; focal in pixels.
 ConsistencyResult testConsistency(const std::vector<PointSighting>& sightings, const Plane& plane,
                                   const Eigen::Vector3d& start, double focal, const PointAssociationOptions& options);
 

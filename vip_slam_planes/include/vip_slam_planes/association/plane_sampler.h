@@ -1,8 +1,8 @@
 // The compressed point-to-plane measurement of one keyframe on one plane (paper section "Compressed Point-to-Plane
 // Measurement"): samples spread evenly in 3D, G = s * sum p~ p~^T / sigma^2.
-// The back end cannot take back a wrong sample once it is summed, so the choice is strict: nodes one stride inside the
-// surface's image region, near the plane at the corrected pose, and on the surface that these nodes form by themselves.
-// The last test does not depend on the pose, so that it does not hide the pose error which the measurement is to show.
+// A wrong sample cannot be removed once it is summed, so the selection is strict: nodes one stride inside the surface's
+// image region, near the plane at the corrected pose, and on the surface fitted to these nodes alone. The last test
+// does not depend on the pose, so that it does not hide the pose error which the measurement has to correct.
 #pragma once
 
 #include <optional>
@@ -17,8 +17,8 @@
 
 namespace vip_slam {
 
-/// The depth points that show each of `count` labels, in the camera frame: the nodes inside its region of the image and
-/// the features in it. `rays` belong to the keyframe's depth grid.
+/// The depth points of each of `count` labels, in the camera frame: the nodes inside its image region and the features
+/// in it. `rays` belong to the keyframe's depth grid.
 std::vector<std::vector<Eigen::Vector3d>> pointsByLabel(const Keyframe& keyframe, const SurfaceLabels& labels,
                                                         const std::vector<Eigen::Vector2f>& rays, std::size_t count);
 
@@ -30,11 +30,11 @@ class PlaneSampler {
   /// One sigma of the distance along n_C of a depth point, without bias: sigma_z(z) |n.ray| / |ray.e_z|.
   double sigmaAlong(const Eigen::Vector3d& n_C, const Eigen::Vector3d& p_C) const;
 
-  /// Samples of the points that show a plane; empty when too few remain or they lie on another surface.
+  /// Samples of the points `shown` on a plane; empty when too few remain or they lie on another surface.
   std::optional<PlaneObservation> sample(KeyframeId keyframe, const std::vector<Eigen::Vector3d>& shown,
                                          const SE3& T_map_C, PlaneId plane_id, const Plane& plane) const;
 
-  /// Sums the samples with sigmas for normal n_C into observation->G; sets weight_scale.
+  /// Computes observation->G from its samples with their sigmas along n_C; sets weight_scale.
   void accumulate(const Eigen::Vector3d& n_C, PlaneObservation* observation) const;
 
  private:

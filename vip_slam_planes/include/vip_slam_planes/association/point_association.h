@@ -1,5 +1,5 @@
-// Which landmarks lie on which plane: the paper's candidate set and its decisions. Landmarks keep their identity
-// through the back end's merges; what is known about one follows its MapUpdates.
+// Association of landmarks with planes (paper section "Point and Plane Association"): candidate set and decisions. The
+// data of landmarks follow the merges and positions in the back end's MapUpdates.
 #pragma once
 
 #include <functional>
@@ -24,25 +24,25 @@ class PointAssociation {
       : options_(options), focal_(focal), depth_floor_(depth_floor) {}
 
   void applyMapUpdate(const MapUpdate& update);
-  /// Sightings of a placed keyframe, once per keyframe.
+  /// Adds the sightings of a placed keyframe, once per keyframe.
   void addSightings(const Keyframe& keyframe);
-  /// Its depth is known better by now.
+  /// Replaces its sightings after a new camera correction.
   void renewSightings(const Keyframe& keyframe);
   void removeKeyframe(const Keyframe& keyframe);
 
   using FindPlane = std::function<const Plane*(PlaneId)>;
-  /// Candidates from a keyframe whose nodes are labelled with indices into `plane_of_label`; decides on those that
+  /// Adds candidates from a keyframe whose nodes are labelled with indices into `plane_of_label`; decides on those that
   /// enough keyframes see. `trusted[k]` is false for planes that may not take points yet.
   void process(const Keyframe& keyframe, const SurfaceLabels& labels, const std::vector<PlaneId>& plane_of_label,
                const std::vector<char>& trusted, const CameraPoses& poses, const FindPlane& plane);
-  /// Decides on the candidates of a plane that may take points from now on, in view or not.
+  /// Decides on all candidates of a plane that may take points from now on, in view or not.
   void decide(PlaneId id, const Plane& plane, const CameraPoses& poses);
   /// Re-checks all associated landmarks against moved planes; cheap.
   void recheck(const FindPlane& plane);
 
   void renamePlane(PlaneId from, PlaneId into);
   void removePlane(PlaneId id);
-  /// The points of a plane that may be none leave it; they stay its candidates.
+  /// Dissociates the points of a plane that may be several surfaces; they stay its candidates.
   void releaseFrom(PlaneId id);
   void clear();
 
@@ -51,13 +51,13 @@ class PointAssociation {
   std::vector<LandmarkId> takeDissociated();
   /// The plane of a landmark, 0: none.
   PlaneId planeOf(LandmarkId id) const;
-  /// Landmarks with a candidate that is not decided on; counted along, as there are many landmarks.
+  /// Number of landmarks with an undecided candidate; counted incrementally, since there are many landmarks.
   std::size_t candidates() const { return undecided_; }
 
  private:
   struct Sighting {
     KeyframeId keyframe;
-    std::uint32_t feature;  ///< its place among the keyframe's
+    std::uint32_t feature;  ///< index among the keyframe's features
     Eigen::Vector2f xy;
     float depth, depth_sigma, pixel_sigma;
   };
@@ -68,7 +68,7 @@ class PointAssociation {
     PlaneId plane = 0;      ///< associated
     PlaneId candidate = 0;  ///< 0: none
     int failures = 0;
-    std::size_t tested = 0;  ///< sightings at the last test
+    std::size_t tested = 0;  ///< number of sightings at the last test
     std::vector<PlaneId> refused;
   };
   using Landmarks = std::unordered_map<LandmarkId, Landmark>;
@@ -77,11 +77,11 @@ class PointAssociation {
   void assign(LandmarkId id, Landmark* landmark, PlaneId candidate, PlaneId plane);
   void erase(Landmarks::iterator it);
   std::vector<LandmarkId> landmarksOf(PlaneId plane) const;
-  /// The plane that a feature may lie on by the labels around it, 0: none.
+  /// The plane that a feature may lie on according to the labels around it, 0: none.
   PlaneId chooseCandidate(const Feature& feature, const Landmark& landmark, const SurfaceLabels& labels,
                           const std::vector<PlaneId>& plane_of_label, const SE3& T_map_C, const FindPlane& plane) const;
   void setPlane(LandmarkId id, Landmark* landmark, PlaneId plane);
-  /// Enough has been seen of a candidate since it was decided on last.
+  /// Whether there are enough sightings for a (new) test.
   bool isDue(const Landmark& landmark) const;
   void test(LandmarkId id, Landmark* landmark, const CameraPoses& poses, const Plane& plane);
 

@@ -1,4 +1,4 @@
-// Which node of a keyframe's depth grid shows which plane.
+// Plane labels of the nodes of a keyframe's depth grid.
 #pragma once
 
 #include <vector>
@@ -27,7 +27,7 @@ struct SurfaceLabels {
   int inner(int c, int r) const;
 };
 
-/// Paints the 2D triangles' labels onto the nodes they cover.
+/// Transfers the labels of the 2D triangles to the nodes that they cover.
 SurfaceLabels labelNodes(const DepthMesh& mesh, const std::vector<int>& triangle_label, const DepthGrid& grid);
 
 }  // namespace vip_slam

@@ -1,11 +1,11 @@
-// Evidence of planes that no single image shows enough of: a wall far away behind an opening, whose normals are noisy,
-// or a dark worktop, which gives depth in pieces only. Level planes may start smaller than in one image; frames grow
-// them.
+// Evidence of planes that no single image shows well enough: a distant wall behind an opening, whose normals are noisy,
+// or a dark worktop, which has depth in pieces only. Horizontal planes may start smaller than in one image; tracked
+// frames grow them.
 //
-// What detection leaves over in a keyframe is kept as patches, small connected pieces of one orientation. Their votes
-// go into one histogram over the last keyframes (paper section "Plane Detection": histograms of the whole map); where
-// several keyframes agree, the same tests as for a single image decide on all their triangles together. A plane that
-// one image starts finds here who has seen it before.
+// Triangles that detection leaves over in a keyframe are kept as patches, small connected pieces of one orientation.
+// Their votes go into one histogram over the last keyframes (paper section "Plane Detection and Merging": histograms of
+// the whole map); where several keyframes agree, the same tests as for a single image are applied to all their
+// triangles together. For a plane that one image starts, it also tells which keyframes have seen it before.
 #pragma once
 
 #include <deque>
@@ -37,18 +37,18 @@ class PlaneEvidence {
   PlaneEvidence(const PlaneDetectionOptions& detection, const PlaneGrowthOptions& growth)
       : detection_(detection), growth_(growth) {}
 
-  /// Keeps those triangles of a placed keyframe that have no label (< 0); the oldest keyframe goes.
+  /// Keeps those triangles of a placed keyframe that have no label (< 0); drops the oldest keyframe.
   void add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles, const std::vector<int>& label);
   void remove(KeyframeId id);
   void clear() { frames_.clear(); }
-  /// Keyframes have moved against each other: what made no plane before may do now.
+  /// To be called when keyframes have moved relative to each other: peaks that failed before are tested again.
   void forgetTests();
 
-  /// Keyframes of which at least `area` m^2 was left over on the plane.
+  /// Number of keyframes with at least `area` m^2 of left-over triangles on the plane.
   int seenBy(const PlaneTrack& plane, const CameraPoses& poses, double area) const;
-  /// Planes that patches of the newest keyframe make with those of earlier ones. `known` are the planes in view; what
-  /// they explain by now is forgotten, and so is what a new plane takes. Keyframes without a pose count for nothing. A
-  /// wall's peak that made no plane is tested again when a fair part of it is new.
+  /// Planes from patches of the newest keyframe together with those of earlier ones. `known` are the planes in view;
+  /// patches that they explain by now are dropped, and so are those of a new plane. Keyframes without a pose are not
+  /// used. A wall's peak that failed is tested again when a fair part of it is new.
   std::vector<JointPlane> detect(const CameraPoses& poses, const std::vector<const PlaneTrack*>& known);
 
  private:
@@ -56,9 +56,9 @@ class PlaneEvidence {
     PlaneKind kind;
     Eigen::Vector3d centre_C, n_C;  ///< area-weighted means
     double area = 0;
-    bool tested = false;                 ///< in a peak that was tested already
+    bool tested = false;                 ///< was part of a peak that was tested already
     std::vector<int> index;              ///< of each triangle in the keyframe's mesh
-    std::vector<MapTriangle> triangles;  ///< in the camera frame; neighbours count within the patch
+    std::vector<MapTriangle> triangles;  ///< in the camera frame; `neighbour` are indices within the patch
   };
   struct Frame {
     KeyframeId id;

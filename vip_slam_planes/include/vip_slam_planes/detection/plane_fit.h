@@ -34,17 +34,18 @@ struct PlaneMoments {
 /// `towards` (n . towards >= 0). False when the points do not determine it (no weight, or no extent).
 bool fitPlane(const PlaneMoments& moments, PlaneKind kind, const Eigen::Vector3d& towards, Plane* plane);
 
-/// The same with a lean off the kind's normal that has a prior of `lean_sigma` radians; the weights are inverse
-/// variances. What is level leans in a map whose gravity is not known yet, and its distance from the origin would be
-/// off by that lean times how far away its points are.
+/// The same with a free lean off the kind's normal, with a prior of `lean_sigma` radians; the weights are inverse
+/// variances. While gravity is not known exactly, horizontal surfaces lean in the map; without it the plane's distance
+/// from the origin would be wrong by the lean times the distance of its points.
 bool fitLeaningPlane(const PlaneMoments& moments, PlaneKind kind, double lean_sigma, const Eigen::Vector3d& towards,
                      Plane* plane);
 
 /// One sigma of the least certain direction of that plane's normal, radians, when the weights are inverse variances: a
-/// column of samples tells nothing about which way its wall runs. 0 for horizontal planes, infinite without points.
+/// single column of samples does not determine the direction of its wall. 0 for horizontal planes, infinite without
+/// points.
 double normalSigma(const PlaneMoments& moments, PlaneKind kind);
 
-/// fitPlane() with Tukey's weights: points beyond about 4.7 times the scale (never below sigma) count nothing.
+/// fitPlane() with Tukey's weights: points beyond about 4.7 times the scale (at least sigma) have no weight.
 /// `weights` are the points' areas or inverse variances. `rms` (may be null) is that of the weighted inliers.
 bool fitPlaneRobust(const std::vector<Eigen::Vector3d>& points, const std::vector<double>& weights, double sigma,
                     PlaneKind kind, const Eigen::Vector3d& towards, Plane* plane, double* rms);

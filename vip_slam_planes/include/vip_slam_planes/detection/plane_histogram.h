@@ -1,7 +1,7 @@
 // Sparse, unbounded voting spaces for planes: height for horizontal triangles, angle x distance for vertical ones.
-// Votes are areas. Facing matters: floor and ceiling, or the two faces of a thin wall, vote apart. With the normal
-// turned to the camera the angle runs over the full circle and wraps at +-180 degrees without the sign flip of d that
-// a half circle needs. Distances are measured from a local origin, because theta-d bins shear with the lever arm.
+// Votes are areas. Opposite normals have separate bins: floor and ceiling, or the two faces of a thin wall. With
+// normals towards the camera the angle covers the full circle and wraps at +-180 degrees, without the sign flip of d
+// that a half circle needs. Distances are measured from a local origin, because theta-d bins shear with the lever arm.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ class PlaneHistogram {
   PlaneHistogram(double height_bin, double distance_bin, double angle_bin_deg);
 
   void clear();
-  /// A vote for the plane through p with unit normal n; `index` comes back with the peak. The mode says which space.
-  /// Indices count from zero without large gaps.
+  /// Adds a vote for the plane through p with unit normal n to one of the two spaces; `index` is returned with the
+  /// peak. Indices start at zero and have no large gaps.
   void addHorizontal(const Eigen::Vector3d& n, const Eigen::Vector3d& p_local, double area, int index);
   void addVertical(const Eigen::Vector3d& n, const Eigen::Vector3d& p_local, double area, int index);
 
@@ -51,7 +51,7 @@ class PlaneHistogram {
 
   double height_bin_, distance_bin_, angle_bin_;
   int angles_;
-  std::vector<Bin> bins_;  ///< in order of their first vote, so that ties break the same way everywhere
+  std::vector<Bin> bins_;  ///< in order of their first vote, so that ties are resolved deterministically
   std::unordered_map<std::uint64_t, std::size_t> index_;
   std::vector<Vote> votes_;  ///< by index
 };

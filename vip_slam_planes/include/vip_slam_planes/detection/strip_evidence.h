@@ -1,9 +1,10 @@
-// Faces seen at so flat an angle that they fill a column or two of the depth grid: sides of pillars, ends of walls.
+// Evidence of faces seen at such a flat angle that they fill only a column or two of the depth grid: sides of pillars,
+// ends of walls.
 //
-// In one image nothing tells such a strip from one that the mesh spans across a depth edge, from the near surface to
-// the one behind it, or from the rim of something round. Those lie along the line of sight and turn with it; a face
-// does not. So two keyframes that look at it from different sides must agree on its direction. One of them may show too
-// little of it for a strip, as it does from near: then nothing may bend on beside either, as the body of a column does.
+// In one image such a strip cannot be distinguished from one that the mesh spans across a depth edge, from the near
+// surface to the one behind it, or from the rim of a round body. Those follow the line of sight when the camera moves;
+// a face does not. So two keyframes that look at it from different sides must agree on its direction. One of them may
+// show too little of it for a strip, as from near: then the surface must not bend on next to either, as a column does.
 #pragma once
 
 #include <deque>
@@ -18,14 +19,15 @@ class StripEvidence {
   StripEvidence(const PlaneDetectionOptions& detection, const PlaneGrowthOptions& growth)
       : keyframes_(static_cast<std::size_t>(detection.keyframes)), growth_(growth) {}
 
-  /// `strips` of detectPlanes(), with indices into `triangles`, and what has no label (< 0); the oldest keyframe goes.
+  /// Adds `strips` of detectPlanes(), with indices into `triangles`, and the triangles without label (< 0); drops the
+  /// oldest keyframe.
   void add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles, const std::vector<int>& label,
            const std::vector<DetectedPlane>& strips);
   void remove(KeyframeId id);
   void clear() { frames_.clear(); }
 
-  /// Planes that strips of the newest keyframe make with those of earlier ones, or one of either with what else the
-  /// other shows of it. Strips are used up by that.
+  /// Planes from strips of the newest keyframe together with strips of earlier ones, or from a strip of either with
+  /// other unlabelled triangles of the other. Strips that were used are removed.
   std::vector<JointPlane> detect(const CameraPoses& poses);
 
  private:
@@ -33,17 +35,17 @@ class StripEvidence {
     Plane plane_C;
     Eigen::Vector3d centroid_C = Eigen::Vector3d::Zero();
     double sigma = 0;                    ///< of its points along the normal, metres
-    bool bends_on = false;               ///< something beside it is turned a little against it
+    bool bends_on = false;               ///< a surface next to it is turned a little, as on a round body
     std::vector<int> index;              ///< of each triangle in the keyframe's mesh
     std::vector<MapTriangle> triangles;  ///< in the camera frame
   };
   struct Frame {
     KeyframeId id;
     std::vector<Strip> strips;
-    std::vector<MapTriangle> upright;  ///< all that has no label, in the camera frame
+    std::vector<MapTriangle> upright;  ///< upright triangles without label, in the camera frame
     std::vector<int> index;            ///< of each of those in the keyframe's mesh
   };
-  /// A strip where its keyframe is now.
+  /// A strip at its keyframe's present pose.
   struct Placed {
     const Strip* strip;
     KeyframeId keyframe;
@@ -53,7 +55,8 @@ class StripEvidence {
   };
   Placed place(const Frame& frame, const Strip& strip, const CameraPoses& poses) const;
   bool isOneFace(const Placed& a, const Placed& b) const;
-  /// What the frame shows of the face that a strip of another frame may be, when it is a face of its own.
+  /// Collects the frame's unlabelled triangles on the plane of another frame's strip into `remains`. False when they
+  /// are too few or bend on.
   bool remainsOf(const Placed& strip, const Frame& frame, const CameraPoses& poses, Strip* remains) const;
   std::vector<JointPlane> pairsOfStrips(const CameraPoses& poses);
   std::vector<JointPlane> stripsWithRemains(const CameraPoses& poses);

@@ -1,6 +1,6 @@
-// Which epochs of the odometry lie in one frame, as the back end tells. Where a new epoch lies in the map is a guess
-// until a loop closure or relocalisation ties it to another one; only within a group of tied epochs do views speak for
-// or against planes.
+// Groups of odometry epochs whose relative pose is known, as reported by the back end. The place of a new epoch in the
+// map is a guess until a loop closure or relocalisation ties it to another one; only within a group of tied epochs are
+// views evidence for or against planes.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,9 @@ namespace vip_slam {
 
 class EpochGroups {
  public:
-  /// An epoch; one of which nothing has been told is a group by itself.
+  /// Adds an epoch; it is a group by itself until it is tied.
   void add(std::uint32_t epoch) { group_.emplace(epoch, epoch); }
-  /// Ties are for good: epochs that are no longer named stay where they were. True when epochs have come together that
-  /// were known apart.
+  /// Ties are permanent: epochs that are no longer named keep their group. True when known groups were joined.
   bool tie(const std::vector<EpochPart>& parts);
   bool tied(std::uint32_t a, std::uint32_t b) const { return groupOf(a) == groupOf(b); }
   bool allTied() const;

@@ -1,5 +1,6 @@
 // A plane's covered area as square cells of its own 2D frame, each with the number of sightings (saturating).
-// Memory follows the covered area, whatever the number of frames; area, containment, overlap and polygons come from it.
+// Memory depends on the covered area, not on the number of frames; area, containment, overlap and polygons are computed
+// from it.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +18,8 @@ struct CellIndex {
   bool operator==(const CellIndex& o) const { return x == o.x && y == o.y; }
 };
 
-/// Sightings of a cell beyond these are not counted: few enough that a surface which has gone is forgotten after as
-/// many sightings of what is behind it.
+/// Largest count of sightings of a cell: small enough that a surface which was removed is forgotten after as many
+/// sightings of the surface behind it.
 constexpr int kMostHits = 8;
 
 class CellGrid {
@@ -54,7 +55,7 @@ class CellGrid {
   void forEach(F f) const {
     forEachIn({x0_, y0_}, {x0_ + width_ - 1, y0_ + height_ - 1}, f);
   }
-  /// The same for those from `first` to `last`, both included.
+  /// The same for the cells from `first` to `last`, both included.
   template <class F>
   void forEachIn(CellIndex first, CellIndex last, F f) const {
     const int i0 = std::max(0, first.x - x0_), i1 = std::min(width_ - 1, last.x - x0_);
@@ -67,8 +68,8 @@ class CellGrid {
     }
   }
 
-  /// Covers single empty cells between covered opposite neighbours (re-sampling leaves such pinholes), where
-  /// `was_covered` says that before the re-sampling there was something.
+  /// Covers single empty cells between covered opposite neighbours (re-sampling leaves such pinholes), if
+  /// `was_covered` confirms that the cell was covered before the re-sampling.
   void closePinholes(const std::function<bool(CellIndex)>& was_covered);
 
  private:
@@ -83,7 +84,7 @@ class CellGrid {
 template <class F>
 void forCellsOfTriangle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c, double cell,
                         F f) {
-  // Half the triangles cover no centre: most of the time goes into the bounds, so they stay cheap.
+  // Half the triangles cover no cell centre, so most of the time is spent on the bounds: keep them cheap.
   const auto first = [cell](double low) {
     const double q = low / cell - 0.5;
     const int i = static_cast<int>(q);

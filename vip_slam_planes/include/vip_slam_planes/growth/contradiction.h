@@ -1,4 +1,4 @@
-// Whether an image shows another surface where a plane is said to be.
+// Tests whether an image shows another surface at the place of a plane.
 #pragma once
 
 #include <vector>
@@ -10,16 +10,16 @@
 namespace vip_slam {
 
 enum class PlaneVerdict {
-  kNone,     ///< too little of it is in view
-  kFor,      ///< it is there
-  kAgainst,  ///< another surface is
+  kNone,     ///< too little of the plane is in view
+  kFor,      ///< the image shows the plane
+  kAgainst,  ///< the image shows another surface there
 };
 
-/// What looks like one surface from afar, where depth scatters by more than the step between a door and its wall or the
-/// rise of a ramp, is from near another one. Evidence against a plane: the triangles in most of its covered cells, near
-/// enough to belong to it and whatever way they face, lie on a surface that is turned against it by more than
-/// detection.max_tilt_deg and noise. Triangles from one plane of `all` (those in view, `track` among them) to another
-/// tell nothing.
+/// From afar, where depth noise exceeds the step between a door and its wall or the rise of a ramp, two surfaces can
+/// look like one plane that a near view does not confirm. Evidence against a plane: the triangles over at least half of
+/// its area, near enough to belong to it and facing roughly its way, lie on a surface that is turned against it by more
+/// than detection.max_tilt_deg and noise. Triangles that span two planes of `all` (those in view, including `track`)
+/// are not used.
 PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const PlaneTrack& track,
                           const std::vector<const PlaneTrack*>& all, const PlaneDetectionOptions& detection,
                           const PlaneGrowthOptions& growth);

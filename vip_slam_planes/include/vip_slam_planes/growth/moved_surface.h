@@ -1,13 +1,14 @@
-// Whether a surface has been moved: a cupboard put elsewhere by a hand's breadth, a door left ajar.
+// Detects that a surface was moved: a cupboard shifted by a hand's breadth, a door left ajar.
 #pragma once
 
 #include "vip_slam_planes/growth/plane_track.h"
 
 namespace vip_slam {
 
-/// The first keyframe that saw the surface where it is now; 0: it was not moved. Moved it was when from one keyframe on
-/// all observations lie beside those before, along the normal, by far more than each group scatters, and show the same
-/// part of it. (Fronts of boxes on a shelf disagree as well, but each keyframe shows others.)
+/// The first keyframe that saw the surface at its present place; 0: it was not moved. It was moved when from one
+/// keyframe on all observations are offset along the normal against those before, by far more than the scatter of each
+/// group, and show the same part of it. (Fronts of boxes on a shelf disagree as well, but each keyframe shows other
+/// ones.)
 KeyframeId surfaceMovedAt(const PlaneTrack& track, const CameraPoses& poses);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// What one image shows at two depths is two surfaces, though both are near enough to a plane to join it.
+// Surfaces that one image shows at two depths are separate, even if both are near enough to one plane to join it.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace vip_slam {
 
-/// Takes the label from triangles that lie on another layer than those nearest to their plane: a board 4 cm before a
-/// wall is a surface of its own. A pose that is off moves all layers alike and takes none. `label` as of
+/// Removes the label from triangles that lie on another layer than those nearest to their plane: a board 4 cm in front
+/// of a wall is a separate surface. A pose error moves all layers alike and removes no label. `label`: from
 /// associateTriangles().
 void releaseOtherLayers(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
                         std::vector<int>* label);

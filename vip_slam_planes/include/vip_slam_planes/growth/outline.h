@@ -17,14 +17,14 @@ struct Outline {
   std::vector<Ring2d> holes;  ///< clockwise
 };
 
-/// Pieces of cells with at least min_hits, 4-connected; those below min_area and holes below min_hole (m^2) are left
-/// out. `tolerance` (metres) bounds how far the simplified rings stray.
+/// Outlines of the 4-connected pieces of cells with at least min_hits; pieces below min_area and holes below min_hole
+/// (m^2) are left out. `tolerance` (metres) bounds the deviation of the simplified rings.
 std::vector<Outline> traceOutlines(const CellGrid& grid, double cell, int min_hits, double min_area, double min_hole,
                                    double tolerance);
 
 /// Signed area, positive when counter-clockwise.
 double ringArea(const Ring2d& ring);
-/// Even-odd rule; the border may fall either way.
+/// Even-odd rule; points on the border may count either way.
 bool ringContains(const Ring2d& ring, const Eigen::Vector2d& p);
 
 }  // namespace vip_slam

@@ -1,7 +1,7 @@
-// One plane as the mapper keeps it: parameters, covered cells, and what each keyframe contributed.
+// One plane of the mapper: parameters, covered cells, and the contributions of each keyframe.
 //
 // Cells are stored as points in the camera frame of the keyframe that first covered them, so that a correction of the
-// keyframes (loop closure) carries the area along; the grid is a rasterisation of them in the plane's own 2D frame.
+// keyframes (loop closure) moves the area with them; the grid is a rasterisation of them in the plane's own 2D frame.
 #pragma once
 
 #include <algorithm>
@@ -43,20 +43,20 @@ class PlaneTrack {
   }
   Eigen::Vector3d cellCentre(CellIndex c) const { return fromPlane({(c.x + 0.5) * cell_, (c.y + 0.5) * cell_}); }
 
-  /// New parameters; the normal is turned to the side kept so far, and the area moves along.
+  /// Sets new parameters; the normal keeps its present side, and the area moves with the plane.
   void setPlane(const Plane& plane);
-  /// While the back end sets the parameters they are not refitted here.
+  /// Whether the back end optimises the parameters; then they are not refitted here.
   void setOptimised(bool optimised) { optimised_ = optimised; }
   bool optimised() const { return optimised_; }
 
-  /// Covers the cells under a triangle, seen from keyframe `host` with camera pose T_map_C; `counted` cells gain a hit.
+  /// Covers the cells under a triangle, seen from keyframe `host` with camera pose T_map_C, and adds them to `touched`.
   void cover(const MapTriangle& triangle, KeyframeId host, const SE3& T_map_C, std::vector<CellIndex>* touched);
   void hit(CellIndex c) {
     cells_.set(c, std::min(kMostHits, cells_.at(c) + 1));
     hits_changed_ = true;
   }
   void coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C);
-  /// Covers a polygon of a loaded map. Without a host it moves with the plane alone.
+  /// Covers a polygon of a loaded map. Without a host it only moves with the plane.
   void coverPolygon(const Ring2d& outer, const std::vector<Ring2d>& holes, int hits, const PlaneHost& host = {});
   void miss(CellIndex c) {
     cells_.set(c, cells_.at(c) - 1);
@@ -64,14 +64,14 @@ class PlaneTrack {
     lost_ += cells_.at(c) == 0;
   }
 
-  /// A correction that turns the hosts by much, as when a loop ties a part to the rest, turns the plane as it is with
-  /// the host with most cells, so that what comes next finds its normal on the side it was seen from.
+  /// After a correction that rotates the hosts by a large angle, as when a loop ties parts of the map, rotates the
+  /// plane with the host with most cells, so that its normal stays on the side that it was seen from.
   void turnWithKeyframes(const CameraPoses& poses);
-  /// Rasterises the cells anew when hosts have moved (against where they were when last rasterised) by more than half a
-  /// cell; the 2D frame follows the host with most cells, so that a rigid correction moves all without resampling. So
-  /// does the plane itself while nothing else holds it.
+  /// Rasterises the cells again when hosts have moved by more than half a cell since the last time; the 2D frame
+  /// follows the host with most cells, so that a rigid correction needs no resampling. So does the plane itself while
+  /// nothing else determines it.
   void followKeyframes(const CameraPoses& poses);
-  /// Hands the cells of a keyframe that goes away to another one.
+  /// Hands the cells of a removed keyframe over to another one.
   void rehost(KeyframeId from, KeyframeId to, const CameraPoses& poses);
   /// Takes over the cells and observations of a plane that was merged into this one.
   void absorb(const PlaneTrack& other, const CameraPoses& poses);
@@ -80,47 +80,47 @@ class PlaneTrack {
   const std::map<KeyframeId, PlaneObservation>& observations() const { return observations_; }
   /// Whether some of its area or an observation belongs to a keyframe.
   bool restsOn(KeyframeId keyframe) const { return observations_.count(keyframe) > 0 || patches_.count(keyframe) > 0; }
-  /// No observation holds it and no loaded map, and all its keyframes are there: it moves with the one that shows most.
+  /// Whether it has neither observations nor a loaded map's data, and all its hosts exist: it moves with its main host.
   bool followsHosts() const { return observations_.empty() && !stored && !patches_.count(0); }
   /// Moments of all observations in `map`.
   PlaneMoments moments(const CameraPoses& poses) const;
 
-  /// Drawn anew only when the area changed; always on the plane as it is now.
+  /// Outlines are traced again only when the area changed; the points always lie on the present plane.
   std::vector<PlanePolygon> polygons(int min_hits);
-  /// Area or parameters changed noticeably since the last call with `reset`.
+  /// Whether area or parameters changed noticeably since the last call with `reset`.
   bool changed(bool reset);
 
-  /// Most of what was covered has been looked through since: the surface is gone, and what is left are the rims that
-  /// no view can refute (the foot of a partition has the floor close behind it).
+  /// Whether keyframes have seen through most of the covered area: the surface was removed, and the remaining cells are
+  /// rims that no view can refute (the foot of a partition has the floor close behind it).
   bool mostlyGone() const { return lost_ > cells_.count(1); }
 
-  /// Whether others hear of it.
+  /// Whether it is published to other modules.
   bool known() const { return confirmed && (agrees || kind_ != PlaneKind::kVertical); }
 
   // Book-keeping of the mapper.
   std::uint32_t epoch = 0;  ///< of the keyframe that started it
   bool stored = false;      ///< all or part of it comes from a loaded map
   bool confirmed = false;
-  bool determined = false;    ///< its observations tell its direction; until then the back end does not get them
-  bool agrees = true;         ///< its observations agree; otherwise it may be several surfaces: no points
-  bool takes_points = false;  ///< confirmed, determined and agreeing, as of the last update
-  bool refit_due = false;     ///< observations have gone since the last fit
-  int keyframes_seen = 0;     ///< keyframes that saw a fair part of it, ever
-  int views_seen = 0;         ///< growth frames that did so before it was confirmed, each from another place
+  bool determined = false;    ///< its observations determine its direction; until then they are not published
+  bool agrees = true;         ///< its observations agree; otherwise it may be several surfaces and takes no points
+  bool takes_points = false;  ///< known, determined and agreeing at the last update
+  bool refit_due = false;     ///< observations were removed since the last fit
+  int keyframes_seen = 0;     ///< number of keyframes that ever saw a fair part of it
+  int views_seen = 0;         ///< number of growth frames that did before it was confirmed, each from another place
   Eigen::Vector3d viewed_from = Eigen::Vector3d::Zero();  ///< camera centre of the last keyframe or view that did
-  int contradictions = 0;    ///< keyframes in a row that showed something else in its place
-  int keyframes_waited = 0;  ///< that looked its way before it was confirmed
+  int contradictions = 0;    ///< consecutive keyframes that showed another surface at its place
+  int keyframes_waited = 0;  ///< number of keyframes with it in view before it was confirmed
 
  private:
   struct Patch {
     SE3 T_map_C;                           ///< of the host, when last rasterised
     std::vector<Eigen::Vector3f> cells_C;  ///< cell centres in the host's camera frame
   };
-  /// Leaves one entry of each covered cell, with its first host.
+  /// Keeps one entry of each covered cell, with its first host.
   void dropStaleCells();
   /// The host with most cells and how it has moved since they were last rasterised; null without any.
   std::pair<const Patch*, SE3> mainMove(const CameraPoses& poses) const;
-  /// The plane moved with the keyframe that shows these cells; it stays level or upright.
+  /// The plane moved with the keyframe that shows these cells; a horizontal or vertical plane stays so.
   Plane carriedAlong(const SE3& move, const SE3& T_map_C, const std::vector<Eigen::Vector3f>& cells_C) const;
   void alignFrame(const Eigen::Vector3d& ex_hint, const Eigen::Vector3d& origin_hint);
 
@@ -136,7 +136,7 @@ class PlaneTrack {
   int covered_since_ = 0;  ///< cells covered since stale entries were dropped
   std::vector<Outline> outlines_;
   Plane last_checked_;
-  std::map<KeyframeId, Patch> patches_;  ///< host 0: cells whose keyframe is gone, in `map`
+  std::map<KeyframeId, Patch> patches_;  ///< by host; host 0: cells whose keyframe was removed, in `map`
   std::map<KeyframeId, PlaneObservation> observations_;
 };
 

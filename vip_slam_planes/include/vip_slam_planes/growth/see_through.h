@@ -11,10 +11,10 @@
 
 namespace vip_slam {
 
-/// Takes a hit from every cell that the keyframe refutes: each of the four grid nodes around its image either measures
-/// depth more than `margin` metres (plus noise) behind the plane, or is nearer than that and shows another plane than
-/// `own` (what looks like one slanted surface from afar, wall and door of a recess, is two from near). The plane must
-/// be seen from its own side and not at a grazing angle. Returns the number of such cells.
+/// Removes a hit from every cell that the keyframe refutes: each of the four grid nodes around its projection either
+/// measures depth more than `margin` metres (plus noise) behind the plane, or is nearer than that and shows another
+/// plane than `own` (wall and recessed door look like one slanted surface from afar, and are two from near). The plane
+/// must be seen from its own side and not at a grazing angle. Returns the number of such cells.
 int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, const CameraModel& camera,
                  const DepthNoise& noise, const SE3& T_map_C, double margin, PlaneTrack* track);
 

@@ -1,4 +1,4 @@
-// Which triangles of a placed mesh belong to which known plane (paper: 10 degrees, 5 cm).
+// Association of the triangles of a placed mesh with known planes (paper: 10 degrees, 5 cm).
 #pragma once
 
 #include <algorithm>
@@ -11,12 +11,12 @@
 
 namespace vip_slam {
 
-/// Angle within which a triangle's normal counts as a plane's: the option, widened where noise makes normals unsteady.
+/// Largest angle between a triangle's normal and a plane's: the option, widened where noise makes normals uncertain.
 class AngleGate {
  public:
   explicit AngleGate(double angle_deg);
   double angle(const MapTriangle& triangle) const { return std::clamp(2.0 * triangle.sigma_angle, narrow_, wide_); }
-  /// Its cosine; most triangles are steady or hopeless, and cost none.
+  /// Its cosine; for most triangles the angle is at one of its limits, and the cosine is cached.
   double cosine(const MapTriangle& triangle) const {
     const double gate = angle(triangle);
     return gate == narrow_ ? cos_narrow_ : gate == wide_ ? cos_wide_ : std::cos(gate);
@@ -28,7 +28,7 @@ class AngleGate {
 double distanceGate(const MapTriangle& triangle, double distance);
 
 /// Index into `tracks` per triangle, -1: none. A connected patch of triangles joins only where it comes within
-/// options.gap of the plane's covered area: planes are surfaces, and two tables of one height are two.
+/// options.gap of the plane's covered area: planes are bounded surfaces, so two tables of one height are two planes.
 /// `tracks` holds the planes that can be in view.
 std::vector<int> associateTriangles(const std::vector<MapTriangle>& triangles,
                                     const std::vector<const PlaneTrack*>& tracks, const PlaneGrowthOptions& options);

@@ -1,5 +1,5 @@
-// What keyframes saw between two pieces of one plane. Beside a table one sees what is below it; that a counter goes on
-// behind what stands before it, or beyond the edge of the images, nobody saw.
+// Tests what keyframes saw between two pieces of one plane. Between two tables the floor below is visible; a counter
+// that continues behind an object in front of it, or outside the images, was never seen to end.
 #pragma once
 
 #include <algorithm>
@@ -14,12 +14,12 @@
 
 namespace vip_slam {
 
-/// Pairs of planes that somebody has looked through between: they stay two when the keyframe that saw it has gone.
+/// Pairs of planes with a gap that some keyframe saw through: they stay separate also after that keyframe is removed.
 class OpenGaps {
  public:
   void add(PlaneId a, PlaneId b) { pairs_.insert(std::minmax(a, b)); }
   bool has(PlaneId a, PlaneId b) const { return pairs_.count(std::minmax(a, b)) > 0; }
-  /// What was seen beside `from` was seen beside `into`.
+  /// Transfers the pairs of `from` to `into`.
   void rename(PlaneId from, PlaneId into);
   void remove(PlaneId id);
   void clear() { pairs_.clear(); }
@@ -28,22 +28,22 @@ class OpenGaps {
   std::set<std::pair<PlaneId, PlaneId>> pairs_;
 };
 
-/// What it takes to look at a map's planes once more.
+/// Data needed to check a map's planes against its keyframes.
 struct SceneView {
   const std::map<KeyframeId, KeyframePtr>& keyframes;
-  const CameraPoses& poses;  ///< of those that count
+  const CameraPoses& poses;  ///< keyframes without a pose are not used
   const CameraModel& camera;
   const DepthNoise& noise;
   double see_through;  ///< metres behind a plane, beyond noise, from which depth counts as behind it
   OpenGaps& open_gaps;
 };
 
-/// Whether there may be an opening between two pieces, along the shortest ways from one to the other: more than a few
-/// places are open, or nothing tells of more than half of them. A place is open when a keyframe that shows one of the
-/// pieces looks through it: in the image, within range, and depth shows something behind the plane or, unless it is
-/// seen flat, nothing at all. One that is in an image too far away or too flat tells nothing. Something before it, or
-/// the edge of every image, hides it. Taken for open when no keyframe shows one of the pieces, as when its map was
-/// loaded.
+/// Whether there may be an opening between two pieces, tested at points along the shortest lines from one to the other:
+/// more than a few points are open, or more than half of them are undecided. A point is open when a keyframe that shows
+/// one of the pieces sees through it: it is in the image, within range, and depth is behind the plane or, unless it is
+/// seen at a flat angle, missing. It is undecided when it is in an image but too far away or seen too flat. It is
+/// hidden when something is in front of it, or it is outside all images. True when no keyframe shows one of the pieces,
+/// as with a loaded map.
 bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneView& view);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// When two planes of the map are one surface (paper section "Plane Merging").
+// Decides whether two planes of the map are one surface (paper section "Plane Detection and Merging").
 #pragma once
 
 #include <vector>
@@ -9,12 +9,11 @@
 
 namespace vip_slam {
 
-/// Same kind and side, within the angle, boundary points near each other's plane where the areas meet, and then either
-/// a shared area, or a gap that suits their size and a joint fit that serves both. Pieces beside each other may differ
-/// by more where the noise of their depth explains it; pieces that are further apart must not show anything behind
-/// their plane between them. The plane offsets d are not compared: their difference grows
-/// with the distance from the origin. `known` are all planes of the map, which tell whether a ceiling has anything
-/// above it.
+/// Requires the same kind and side, normals within the angle, boundary points near each other's plane where the areas
+/// meet, and then either a shared area, or a gap that is small for their size and a joint fit that suits both. Pieces
+/// next to each other may differ by more if the noise of their depth explains it; between pieces further apart no
+/// keyframe may see anything behind their plane. The plane offsets d are not compared, since their difference grows
+/// with the distance from the origin. `known`: all planes of the map, to check whether anything is above a ceiling.
 bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known,
                  const SceneView& view, const PlaneMergingOptions& options);
 

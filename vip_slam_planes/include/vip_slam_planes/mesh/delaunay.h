@@ -1,6 +1,6 @@
 // Delaunay triangulation of image points (Bowyer-Watson, incremental).
 // Coordinates are rounded to a fixed sub-pixel lattice so that orientation and in-circle tests are exact in 64-bit
-// integers: regular grids, where four points share a circle everywhere, need no tolerance and cannot break it.
+// integers: regular grids, with four points on a circle everywhere, are handled without tolerances.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ struct DelaunayTriangle {
 };
 
 /// Keeps its memory between calls. Points outside [0, width) x [0, height), not finite, or closer than the lattice
-/// (1/8 px up to 2000 px) to an earlier one take no part. Throws std::invalid_argument when width or height is outside
+/// (1/8 px up to 2000 px) to an earlier one are ignored. Throws std::invalid_argument when width or height is outside
 /// 1..16000.
 class Delaunay {
  public:

@@ -1,9 +1,9 @@
 // The image's Delaunay mesh lifted to 3D by depth (paper section "Plane Detection"), in the camera's optical frame.
 //
-// The paper triangulates the features alone. White walls, the very planes that hold the drift down, have none; so nodes
-// of the image's grid of edge-safe depths fill in wherever no feature with depth is near: coarsely on flat blocks,
-// every node beside depth edges. Triangles that cross a depth edge, are long and thin, or are seen at a grazing angle
-// are dropped.
+// The paper triangulates the features alone. White walls, which are most useful against drift, have none; so nodes of
+// the grid of edge-safe depths are added wherever no feature with depth is near: coarsely on flat blocks, every node
+// close to depth edges. Triangles that cross a depth edge, are long and thin, or are seen at a grazing angle are
+// dropped.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct MeshVertex {
 
 struct MeshTriangle {
   std::array<int, 3> vertex;
-  std::array<int, 3> neighbour;  ///< triangles that were kept; -1: none
+  std::array<int, 3> neighbour;  ///< neighbouring triangles of the mesh; -1: none
   Eigen::Vector3f n_C;           ///< unit, towards the camera, averaged with neighbours of the same surface
   Eigen::Vector3f centre_C;
   float area;         ///< m^2
@@ -44,16 +44,16 @@ struct DepthMesh {
 class GridRays {
  public:
   explicit GridRays(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {}
-  /// Undistorted once for the grids of keyframes and once for the coarser ones of frames, which take turns; the result
-  /// is valid until the next but one call.
+  /// Cached for two layouts, the grids of keyframes and the coarser ones of frames, which alternate. The result is
+  /// valid until the next but one call.
   const std::vector<Eigen::Vector2f>& operator()(const DepthGrid& grid, const BearingCorrection& bearing = {});
 
  private:
   struct Layout {
     int stride = 0, offset = 0, cols = 0, rows = 0;
-    std::vector<Eigen::Vector2f> given;  // by the intrinsics as they are
+    std::vector<Eigen::Vector2f> given;  // with the configured intrinsics
     BearingCorrection bearing;
-    std::vector<Eigen::Vector2f> rays;  // `given` with `bearing`
+    std::vector<Eigen::Vector2f> rays;  // `given` corrected by `bearing`
   };
   const std::vector<Eigen::Vector2f>& corrected(Layout* layout, const BearingCorrection& bearing);
 
@@ -65,22 +65,22 @@ class GridRays {
 class DepthMeshBuilder {
  public:
   DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
-  /// The result is valid until the next call. The grid may be empty. `up_C` is the world's z axis in the camera frame:
-  /// what is level may be seen at a flatter angle, where upright strips may be nothing but a step in depth. `bearing`:
-  /// what the camera's bearings mean; the features have it already.
+  /// The result is valid until the next call. The grid may be empty. `up_C`: the world's z axis in the camera frame;
+  /// horizontal surfaces may be seen at a flatter angle than upright ones, which may be just a step in depth.
+  /// `bearing`: correction of the camera's bearings; the features are already corrected.
   const DepthMesh& build(const std::vector<Feature>& features, const DepthGrid& grid, const Eigen::Vector3d& up_C,
                          const BearingCorrection& bearing = {});
 
  private:
   void collectVertices(const std::vector<Feature>& features, const DepthGrid& grid);
-  /// Whether a side is longer than from a node of the grid to the next.
+  /// Whether a side is longer than the spacing of the grid's nodes.
   bool skipsNodes(const DelaunayTriangle& flat, const DepthGrid& grid) const;
   bool lift(const DelaunayTriangle& flat, const DepthGrid& grid, int step, MeshTriangle* triangle) const;
   bool flatBlock(const DepthGrid& grid, int c, int r, int step) const;
   bool crossesDepthEdge(const MeshTriangle& triangle, const DepthGrid& grid) const;
   bool brokenBetween(const MeshVertex& a, const MeshVertex& b, const DepthGrid& grid) const;
   void smoothNormals();
-  double spacing() const;  ///< of the nodes, px of this camera
+  double spacing() const;  ///< of the mesh's nodes, px of this camera
   int gridStep(const DepthGrid& grid) const;
 
   PlaneMeshOptions options_;

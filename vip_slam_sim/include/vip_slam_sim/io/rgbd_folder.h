@@ -1,7 +1,7 @@
 // Folders of real RGB-D images with poses: 7-Scenes layout (frame-N.color.*, frame-N.depth.png, frame-N.pose.txt,
 // camera-intrinsics.txt) or TUM layout (rgb.txt, depth.txt, groundtruth.txt).
-// In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the colour images come from a camera
-// of their own that nobody calibrated: it gets the nominal figures of the Kinect v1.
+// In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the colour camera, a separate one, is
+// not calibrated: it gets the nominal intrinsics and extrinsics of the Kinect v1.
 #pragma once
 
 #include <string>
@@ -22,8 +22,8 @@ struct RgbdFrame {
 
 struct RgbdFolder {
   std::vector<RgbdFrame> frames;
-  Trajectory T_W_C;         ///< colour camera, in the folder's own world
-  CameraIntrinsics camera;  ///< colour; width and height from the first image; focal lengths 0: the folder is silent
+  Trajectory T_W_C;               ///< colour camera, in the folder's own world
+  CameraIntrinsics camera;        ///< colour; width and height from the first image; focal lengths 0: not in the folder
   bool depth_registered = true;   ///< depth pixels belong to the colour camera
   CameraIntrinsics depth_camera;  ///< only when not registered
   SE3 T_color_depth;              ///< only when not registered; else identity
@@ -37,8 +37,9 @@ RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registere
 /// RGB image and depth in 16UC1 millimetres (0 = invalid). Throws std::runtime_error naming the file.
 void loadRgbdFrame(const RgbdFolder& folder, const RgbdFrame& frame, cv::Mat* rgb, cv::Mat* depth_mm);
 
-/// Up in the folder's world, from floors and walls: normals of the depth images near the cameras' mean up direction
-/// must be parallel to it, those near the horizon perpendicular. Throws std::runtime_error when too few are found.
+/// Up direction in the folder's world, from floors and walls: the direction that depth image normals near the cameras'
+/// mean up direction are parallel to and those near the horizon perpendicular to. Throws std::runtime_error when there
+/// are too few such normals or the cameras' up directions disagree.
 Eigen::Vector3d upFromDepth(const RgbdFolder& folder);
 
 }  // namespace vip_slam

@@ -1,4 +1,4 @@
-// Where a rendered sequence goes: a bag (vip_slam_sim_bag) or a folder.
+// Output of a rendered sequence: a bag (vip_slam_sim_bag) or a folder.
 #pragma once
 
 #include <memory>
@@ -8,8 +8,8 @@
 
 namespace vip_slam {
 
-/// Takes IMU samples and frames in time order. Nothing but whole files is left behind: commit() puts them in place, a
-/// writer destroyed before it removes what it wrote.
+/// Takes IMU samples and frames in time order. Never leaves partial output: commit() moves the complete files into
+/// place, a writer destroyed without it removes what it wrote.
 class SequenceWriter {
  public:
   virtual ~SequenceWriter() = default;
@@ -19,7 +19,7 @@ class SequenceWriter {
 };
 
 /// A folder in TUM RGB-D's layout (rgb/STAMP.png, depth/STAMP.png with 5000 per metre, rgb.txt, depth.txt,
-/// associations.txt, groundtruth.txt of the colour camera) with EuRoC's IMU and states beside it (imu0/data.csv,
+/// associations.txt, groundtruth.txt of the colour camera) plus IMU and states in EuRoC's format (imu0/data.csv,
 /// state_groundtruth_estimate0/data.csv).
 std::unique_ptr<SequenceWriter> makeFolderWriter(const std::string& folder);
 

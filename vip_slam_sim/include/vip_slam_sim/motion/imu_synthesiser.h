@@ -1,4 +1,4 @@
-// What an IMU riding on a trajectory would measure.
+// Synthesises the measurements of an IMU that moves along a trajectory.
 #pragma once
 
 #include <vector>

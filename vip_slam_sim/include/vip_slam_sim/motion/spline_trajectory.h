@@ -9,7 +9,7 @@
 
 namespace vip_slam {
 
-/// Motion of the body at one moment. World z up.
+/// Motion of the body at one time. World z up.
 struct MotionState {
   SE3 T_W_I;
   Eigen::Vector3d v_W, a_W;          ///< m/s, m/s^2

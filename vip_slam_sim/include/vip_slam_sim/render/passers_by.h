@@ -1,5 +1,5 @@
-// Bodies that walk about before the camera: upright elliptic cylinders in patterned clothes. They hide the scene from
-// colour and depth alike, belong to no true plane, and cast no shadows.
+// People who walk in front of the camera: upright elliptic cylinders with a texture. They occlude the scene in colour
+// and depth, belong to no true plane, and cast no shadows.
 #pragma once
 
 #include <functional>
@@ -15,10 +15,10 @@ namespace vip_slam {
 
 class PassersBy {
  public:
-  /// `camera(t)`: T_W_C, which they stay before.
+  /// `camera(t)`: T_W_C at time t; they walk in front of it.
   PassersBy(const PasserOptions& options, std::function<SE3(double t)> camera, int seed);
 
-  /// Draws those in view at time `t` over what `renderer` has rendered. `row_pose(row)`: T_W_C while the row is read.
+  /// Draws those in view at time `t` over a frame rendered by `renderer`. `row_pose(row)`: T_W_C when the row is read.
   void draw(const Renderer& renderer, double t, const std::function<SE3(int row)>& row_pose, FrameBuffers* frame) const;
 
  private:

@@ -1,4 +1,4 @@
-// Embree behind a small face: rays in, distances and pieces out.
+// A small interface to Embree: takes rays, returns distances and the pieces hit.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace vip_slam {
 
-/// Rays and hits as structures of arrays. Directions need no unit length: t counts in their lengths.
+/// Rays and hits as a structure of arrays. Directions need not have unit length: t is in units of their length.
 struct RayBatch {
-  std::vector<float> ox, oy, oz, dx, dy, dz, t;  ///< t: in the farthest distance, out the hit
+  std::vector<float> ox, oy, oz, dx, dy, dz, t;  ///< t, in: greatest distance; out: distance of the hit
   std::vector<int> piece;                        ///< out: -1 for none
   void resize(std::size_t n);
   std::size_t size() const { return t.size(); }
@@ -21,7 +21,7 @@ struct RayBatch {
 /// Thread-safe after construction.
 class RayTracer {
  public:
-  /// Throws std::runtime_error with Embree's words when it refuses.
+  /// Throws std::runtime_error with Embree's message when it fails.
   explicit RayTracer(const Scene& scene);
   ~RayTracer();
   RayTracer(const RayTracer&) = delete;

@@ -1,4 +1,4 @@
-// From radiance and exact depth to what the sensors deliver.
+// Turns radiance and exact depth into sensor images with blur, exposure, noise and missing depth.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class SensorEffects {
   void motionBlur(const CameraTwist& twist, FrameBuffers* frame) const;
   /// 8UC3 RGB of frame number `index`, taken `t` seconds into the sequence.
   cv::Mat colour(const FrameBuffers& frame, int index, double t) const;
-  /// 16UC1 millimetres, 0 = invalid. `brightness` (8UC3, may be empty) tells dark surfaces.
+  /// 16UC1 millimetres, 0 = invalid. `brightness` (8UC3, may be empty) shows which surfaces are dark.
   cv::Mat depth(const FrameBuffers& frame, const cv::Mat& brightness, int index) const;
 
  private:

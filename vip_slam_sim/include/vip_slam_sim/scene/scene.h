@@ -1,5 +1,5 @@
 // A scene: planar charts (a frame, a texture, a light map, decals) cut into rectangular pieces. World z is up, metres.
-// Curved objects are strips of narrow charts that are not `planar`: they have a shape but no plane to be found.
+// Curved objects are strips of narrow charts that are not `planar`: they are rendered but are no true planes.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace vip_slam {
 
-/// What covers a chart. Texture -1: plain colour. Tint and textures are square roots of reflectance.
+/// Surface appearance of a chart. Texture -1: plain colour. Tint and textures are square roots of reflectance.
 struct Material {
   int texture = -1;
   float texels_per_metre = 256;
@@ -39,7 +39,7 @@ struct Chart {
   int surface = -1;  ///< index into Scene::surfaces, -1: not planar
 };
 
-/// A rectangle of a chart that is really there (walls have holes).
+/// A rectangle of a chart that is solid (walls have holes).
 struct Piece {
   int chart;
   float u0, v0, u1, v1;

@@ -13,7 +13,7 @@ namespace vip_slam {
 struct Opening {
   enum class Kind {
     kCut,      ///< just a hole
-    kPassage,  ///< jambs and threshold of `depth` lead to what lies behind
+    kPassage,  ///< a doorway with jambs and a threshold of `depth`
     kClosed,   ///< a door leaf set back by `depth`
     kProud,    ///< a door leaf standing out from the wall by `depth`
   };
@@ -38,7 +38,7 @@ class SceneBuilder {
   int floor(double x0, double y0, double x1, double y1, double z, const Material& material);
   int ceiling(double x0, double y0, double x1, double y1, double z, const Material& material);
 
-  /// Box about `pose` (its middle), six faces. Returns the first of six charts: +x -x +y -y +z -z.
+  /// Box centred at `pose`, six faces. Returns the first of six charts: +x -x +y -y +z -z.
   int box(const Eigen::Isometry3d& pose, const Eigen::Vector3d& size, const Material& side, const Material& top);
   /// Upright box standing at (x, y, z) with its lower face, turned by yaw.
   int boxAt(double x, double y, double z, double yaw, const Eigen::Vector3d& size, const Material& side,
@@ -50,7 +50,7 @@ class SceneBuilder {
 
   void decal(int chart, double u0, double v0, double u1, double v1, int texture, Vec4 tint = rgb(1, 1, 1),
              double emission = 0);
-  /// Light from a rectangle of a chart; the picture of it is left to decals.
+  /// Light from a rectangle of a chart; its visible appearance needs a decal of its own.
   void lamp(int chart, double u, double v, double su, double sv, double power);
   /// A lamp panel in a ceiling chart: a bright decal and the light it gives.
   void ceilingLamp(int chart, double u, double v, double su, double sv, double power);

@@ -1,4 +1,4 @@
-// A mip-mapped texture with anisotropic look-up, so that nothing shimmers when seen from afar or at a slant.
+// A mip-mapped texture with anisotropic look-up, which avoids aliasing at long range and grazing angles.
 // Colours are stored as the square root of the reflectance (gamma 2): filtering happens in that space.
 #pragma once
 

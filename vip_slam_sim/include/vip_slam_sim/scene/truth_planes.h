@@ -34,8 +34,8 @@ class VisibilityCounter {
   std::vector<Grid> grids_;
 };
 
-/// Planes of at least `min_area` m^2, ids from 1, normals to the open side. seen_seconds counts frames of which the
-/// plane filled at least 0.5 % within depth range, seen_area what was ever in view.
+/// Planes of at least `min_area` m^2, ids from 1, normals towards free space. seen_seconds counts frames of which the
+/// plane filled at least 0.5 % within depth range, seen_area the area that was ever in view.
 std::vector<PlaneEstimate> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area = 0.02);
 
 }  // namespace vip_slam

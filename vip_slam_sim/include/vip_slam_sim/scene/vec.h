@@ -1,4 +1,4 @@
-// Small float vectors for the renderer's inner loops, which keep Eigen out.
+// Small float vectors for the renderer's inner loops, used in place of Eigen.
 #pragma once
 
 #include <cmath>

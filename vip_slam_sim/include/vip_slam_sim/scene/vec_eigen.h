@@ -1,4 +1,4 @@
-// Between the renderer's vectors and Eigen's.
+// Conversions between the renderer's vectors and Eigen's.
 #pragma once
 
 #include <Eigen/Core>

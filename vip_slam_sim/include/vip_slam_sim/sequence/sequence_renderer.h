@@ -64,7 +64,7 @@ class SequenceRenderer {
   SimFrame renderFrame(int index) const;
   /// All frames in order on the calling thread; returning false stops. Visibility is counted on the way.
   void render(const std::function<bool(const SimFrame&)>& take);
-  /// The true planes, with what the frames rendered so far have seen.
+  /// The true planes, with the time and area for which the frames rendered so far show them.
   std::vector<PlaneEstimate> planes() const;
   /// Least distance between camera and scene over the motion, and when.
   double leastClearance(double* when) const;

@@ -42,7 +42,7 @@ struct DepthOptions {
   bool registered = true;
   double baseline = 0.015;
   double lag = 0;
-  /// A sensor of its own, of which each image is taken at one instant; else depth comes with the colour image's rays.
+  /// Whether depth comes from a separate sensor with a global shutter; otherwise it is rendered with the colour image.
   bool separate() const { return !registered || lag != 0; }
   void visit(OptionVisitor& v);
 };
@@ -67,7 +67,7 @@ struct EffectOptions {
   void visit(OptionVisitor& v);
 };
 
-/// Bodies that walk about before the camera.
+/// People who walk in front of the camera (PassersBy).
 struct PasserOptions {
   int count = 0;
   std::string way = "to_and_fro";
@@ -90,7 +90,7 @@ struct SequenceSpec {
   PasserOptions passers;
   void visit(OptionVisitor& v);
 
-  SE3 T_imu_cam() const;  ///< the rig's own, a little off every axis
+  SE3 T_imu_cam() const;  ///< fixed extrinsics of the rig, about a degree and 1 to 2 cm off in every axis
   SensorConfig sensorConfig() const;
 };
 

@@ -1,0 +1,166 @@
+#include "bag_decoding.h"
+
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+#include <rosbag/exceptions.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
+
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/image_decoding.h"
+
+namespace vip_slam {
+namespace {
+
+enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
+
+std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
+
+/// `decode` gets the image, raw or compressed.
+template <class Decode>
+StampedImage stampedImage(const rosbag::MessageInstance& message, const Decode& decode) {
+  if (const auto image = message.instantiate<sensor_msgs::Image>())
+    return {image->header.stamp.toSec(), decode(*image), 0};
+  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>())
+    return {image->header.stamp.toSec(), decode(*image), 0};
+  throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
+}
+
+}  // namespace
+
+BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthRegistration* registration,
+                         const BagReaderOptions& options, Sink sink)
+    : sensor_(sensor),
+      registration_(registration),
+      options_(options),
+      sink_(std::move(sink)),
+      pairer_(options.pairing),
+      clock_(kStreams, options.time_jump) {}
+
+void BagDecoding::take(const rosbag::MessageInstance& message) {
+  const std::string& topic = message.getTopic();
+  if (topic == sensor_.topics.color)
+    decode(message, [&] { takeColor(message); });
+  else if (topic == sensor_.topics.depth)
+    decode(message, [&] { takeDepth(message); });
+  else
+    takeImu(message);
+  handOut();
+}
+
+void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
+  const auto [t, image, stamp] = stampedImage(message, [](const auto& m) { return decodeGray(m); });
+  color_size_ = image.size();
+  const cv::Size calibrated(sensor_.camera.width, sensor_.camera.height);
+  if (color_size_ != calibrated && ++counters_["images_of_wrong_size"] == 1)
+    warnings_.push_back("topic " + message.getTopic() + ": images are " + sizeText(color_size_) +
+                        ", the calibration is for " + sizeText(calibrated) + ": they cannot be used");
+  if (inTime(kColor, t)) pairer_.addColor(t, image);
+}
+
+void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
+  auto [t, depth, stamp] =
+      stampedImage(message, [&](const auto& m) { return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset); });
+  if (registration_) depth = (*registration_)(depth);
+  if (!color_size_.empty() && depth.size() != color_size_)
+    complain("sizes", "topic " + message.getTopic() + ": depth is " + sizeText(depth.size()) +
+                          ", the colour images are " + sizeText(color_size_) +
+                          ", so that no depth is used: switch on the driver's depth registration, or set " +
+                          "depth/registered: false with the depth camera's calibration");
+  ++depth_images_;
+  without_any_ += holdsNoDepth(depth, sensor_.depth_noise);
+  if (inTime(kDepth, t)) pairer_.addDepth(t, depth);
+}
+
+void BagDecoding::takeImu(const rosbag::MessageInstance& message) {
+  const std::string& topic = message.getTopic();
+  const auto imu = message.instantiate<sensor_msgs::Imu>();
+  if (!imu) {
+    ++counters_["messages_of_wrong_type"];
+    complain(topic, "topic " + topic + ": type " + message.getDataType() + ", expected sensor_msgs/Imu");
+    return;
+  }
+  const double t = imu->header.stamp.toSec();
+  const Eigen::Vector3d gyro = fromMsg(imu->angular_velocity), accel = fromMsg(imu->linear_acceleration);
+  if (!inTime(topic == sensor_.topics.accel ? kAccel : kGyro, t)) return;
+  SensorEvent event = ImuSample{t, gyro, accel};
+  if (topic == sensor_.topics.gyro) event = GyroSample{t, gyro};
+  if (topic == sensor_.topics.accel) event = AccelSample{t, accel};
+  open_ = sink_(std::move(event));
+}
+
+bool BagDecoding::inTime(int stream, double t) {
+  const StreamClock::Verdict verdict = clock_.notice(stream, t);
+  if (verdict == StreamClock::Verdict::kStray) ++counters_["stray_messages"];
+  if (verdict == StreamClock::Verdict::kJumpedBack) {
+    ++counters_["time_jumps"];
+    pairer_.end();
+    handOut();
+    pairer_.clear();
+    if (open_) open_ = sink_(TimeJump{clock_.lastJump()});
+  }
+  return open_ && verdict != StreamClock::Verdict::kStray;
+}
+
+void BagDecoding::handOut() {
+  for (; open_ && pairer_.front(); pairer_.pop()) open_ = sink_(*pairer_.front());
+}
+
+void BagDecoding::decode(const rosbag::MessageInstance& message, const std::function<void()>& use) {
+  try {
+    use();
+  } catch (const rosbag::BagException&) {
+    throw;  // an error of the bag, not of the image
+  } catch (const std::exception& error) {
+    ++counters_["undecodable_images"];
+    complain(message.getTopic(), "topic " + message.getTopic() + ": " + error.what());
+  }
+}
+
+void BagDecoding::complain(const std::string& about, const std::string& words) {
+  if (complained_.insert(about).second) warnings_.push_back(words);
+}
+
+void BagDecoding::countUnreadable(const std::string& why) {
+  if (++counters_["unreadable_messages"] == 1)
+    warnings_.push_back("the bag is damaged, what cannot be read is left out: " + why);
+  handOut();
+}
+
+void BagDecoding::finish() {
+  pairer_.end();
+  handOut();
+  const std::string& depth_topic = sensor_.topics.depth;
+  const auto& pairs = pairer_.counters();
+  if (!depth_topic.empty() && pairs.without_depth > 5 && 20 * pairs.without_depth > pairs.pairs + pairs.without_depth)
+    warnings_.push_back("topic " + depth_topic + ": " + std::to_string(pairs.without_depth) + " of " +
+                        std::to_string(pairs.pairs + pairs.without_depth) + " colour images have no depth within " +
+                        std::to_string(std::lround(1e3 * options_.pairing.tolerance)) +
+                        " ms: switch on the driver's synchronisation, or equal rates; when check_bag finds "
+                        "the depth elsewhere in the bag, sort that");
+  if (2 * without_any_ > depth_images_) {
+    char range[60];
+    std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);
+    warnings_.push_back("topic " + depth_topic + ": " + std::to_string(without_any_) + " of " +
+                        std::to_string(depth_images_) + " depth images hold nothing within " + range +
+                        ", the sensor file's range: wrong depth/scale, emitter off, wrong topic?");
+  }
+  if (pairs.backward > 0)
+    warnings_.push_back(std::to_string(pairs.backward) +
+                        " images are left out: their stamps repeat or precede the one before");
+  if (const auto jumps = counters_.find("time_jumps"); jumps != counters_.end())
+    warnings_.push_back(
+        "time ran backwards " + std::to_string(jumps->second) +
+        " times (a bag that was joined, or recorded while another was played in a loop?): the odometry " +
+        "starts anew there, the map goes on");
+  counters_["image_pairs"] = pairs.pairs;
+  counters_["images_without_depth"] = pairs.without_depth;
+  counters_["unused_depth_images"] = pairs.unused_depth;
+  counters_["images_out_of_order"] = pairs.backward;
+}
+
+}  // namespace vip_slam

@@ -1,0 +1,64 @@
+// Converts a bag's messages to sensor events: images are decoded and paired, clock jumps detected, irregularities
+// counted and reported once each.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <rosbag/message_instance.h>
+
+#include "vip_slam_bringup/runner/bag_reader.h"
+#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_ros/stream_clock.h"
+
+namespace vip_slam {
+
+class BagDecoding {
+ public:
+  /// Receives the events in order; returns false to stop.
+  using Sink = std::function<bool(SensorEvent&&)>;
+  /// `registration` may be null: depth is registered already. It and `sensor` must outlive this.
+  BagDecoding(const SensorConfig& sensor, const DepthRegistration* registration, const BagReaderOptions& options,
+              Sink sink);
+
+  /// Throws ros::Exception when the message cannot be read from the bag.
+  void take(const rosbag::MessageInstance& message);
+  void countUnreadable(const std::string& why);
+  /// Delivers the last pairs and completes counters and warnings.
+  void finish();
+  bool open() const { return open_; }
+
+  const std::map<std::string, std::uint64_t>& counters() const { return counters_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  void takeColor(const rosbag::MessageInstance& message);
+  void takeDepth(const rosbag::MessageInstance& message);
+  void takeImu(const rosbag::MessageInstance& message);
+  /// Whether the message may be used. Messages before and after a jump of the clock are not paired with each other.
+  bool inTime(int stream, double t);
+  void handOut();
+  /// Counts an image that `use` cannot decode and warns once per topic.
+  void decode(const rosbag::MessageInstance& message, const std::function<void()>& use);
+  /// Adds a warning once per `about`.
+  void complain(const std::string& about, const std::string& words);
+
+  const SensorConfig& sensor_;
+  const DepthRegistration* registration_;
+  const BagReaderOptions options_;
+  Sink sink_;
+  ImagePairer pairer_;
+  StreamClock clock_;
+  bool open_ = true;
+  cv::Size color_size_;
+  std::size_t depth_images_ = 0, without_any_ = 0;  ///< depth images; those without a reading within the range
+  std::set<std::string> complained_;
+  std::map<std::string, std::uint64_t> counters_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace vip_slam

@@ -1,0 +1,101 @@
+// The feature tracker's optical flow: predicted starts, exposure, forward-backward check.
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/video/tracking.hpp>
+
+#include "vip_slam_core/util/statistics.h"
+#include "vip_slam_frontend/tracking/feature_tracker.h"
+
+namespace vip_slam {
+
+namespace {
+
+// Changes of contrast (ratio) and mean grey level between two images beyond which KLT's brightness constancy is
+// violated.
+constexpr double kExposureGain = 0.1;
+constexpr double kExposureShift = 6.0;
+constexpr int kExposureReach = 12;             // px around a track
+constexpr std::size_t kLeastForExposure = 10;  // tracks
+
+Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
+
+}  // namespace
+
+bool FeatureTracker::predictMotion(const Track& track, const SE3& predicted, bool has_translation,
+                                   Eigen::Vector2d* uv) const {
+  const double z = has_translation && track.carried_depth > 0 ? track.carried_depth : kFarAway;
+  const Eigen::Vector3d p = predicted.R() * (track.feature.xy.homogeneous().cast<double>() * z) +
+                            (has_translation ? predicted.t() : Eigen::Vector3d(Eigen::Vector3d::Zero()));
+  return view_.project(p, uv) && camera_->inImage(*uv);
+}
+
+void FeatureTracker::matchExposure(const cv::Mat& gray, const SE3& predicted, bool has_translation) {
+  std::vector<double> gains, last, now;
+  for (const Track& track : tracks_) {
+    const Eigen::Vector2d here = track.feature.pixel.cast<double>();
+    Eigen::Vector2d there;
+    if (!predictMotion(track, predicted, has_translation, &there)) continue;
+    if (!camera_->inImage(here, kExposureReach + 1) || !camera_->inImage(there, kExposureReach + 1)) continue;
+    const auto around = [](const Eigen::Vector2d& uv) {
+      return cv::Rect(cvRound(uv.x()) - kExposureReach, cvRound(uv.y()) - kExposureReach, 2 * kExposureReach + 1,
+                      2 * kExposureReach + 1);
+    };
+    cv::Scalar mean_last, deviation_last, mean, deviation;
+    cv::meanStdDev(gray_(around(here)), mean_last, deviation_last);
+    cv::meanStdDev(gray(around(there)), mean, deviation);
+    if (deviation_last[0] < 2.0 || deviation[0] < 1.0) continue;
+    gains.push_back(deviation[0] / deviation_last[0]);
+    last.push_back(mean_last[0]);
+    now.push_back(mean[0]);
+  }
+  if (gains.size() < kLeastForExposure) return;
+  const double gain = upperMedian(gains);
+  std::vector<double> offsets, changes;
+  for (std::size_t i = 0; i < gains.size(); ++i) {
+    offsets.push_back(now[i] - gain * last[i]);
+    changes.push_back(now[i] - last[i]);
+  }
+  if (std::abs(gain - 1.0) < kExposureGain && std::abs(upperMedian(changes)) < kExposureShift) return;
+  const double offset = upperMedian(offsets);
+  cv::Mat adapted;
+  gray_.convertTo(adapted, CV_8U, gain, offset);
+  last_pyramid_.clear();
+  cv::buildOpticalFlowPyramid(adapted, last_pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
+                              options_.klt_levels);
+}
+
+void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation,
+                            std::vector<cv::Point2f>* next, std::vector<char>* found) {
+  const cv::Size window(options_.klt_window | 1, options_.klt_window | 1);
+  std::vector<cv::Point2f> previous;
+  previous.reserve(tracks_.size());
+  next->clear();
+  for (const Track& track : tracks_) {
+    const Feature& f = track.feature;
+    previous.emplace_back(f.pixel.x(), f.pixel.y());
+    Eigen::Vector2d uv;
+    const bool usable = predictMotion(track, predicted, has_translation, &uv);
+    next->push_back(usable ? cv::Point2f(static_cast<float>(uv.x()), static_cast<float>(uv.y())) : previous.back());
+  }
+  found->assign(tracks_.size(), 0);
+  if (tracks_.empty()) return;
+
+  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.klt_iterations, 0.01);
+  std::vector<std::uint8_t> status, back_status;
+  cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, previous, *next, status, cv::noArray(), window, options_.klt_levels,
+                           criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  // Backward check from the forward result, started at the previous pixel: one pyramid level is enough.
+  std::vector<cv::Point2f> back = previous;
+  cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, *next, back, back_status, cv::noArray(), window,
+                           std::min(1, options_.klt_levels), criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  for (std::size_t i = 0; i < previous.size(); ++i) {
+    const cv::Point2f d = back[i] - previous[i];
+    const Eigen::Vector2d uv = asVector((*next)[i]);
+    (*found)[i] = status[i] && back_status[i] && std::hypot(d.x, d.y) < options_.forward_backward_px &&
+                  uv.allFinite() && uv.x() >= options_.border && uv.y() >= options_.border &&
+                  uv.x() < gray.cols - options_.border && uv.y() < gray.rows - options_.border && allowed(uv);
+  }
+}
+
+}  // namespace vip_slam
