@@ -1,4 +1,4 @@
-// Where the calibration comes from, and how long it is waited for.
+// Sources of the calibration, and how long the nodelet waits for them.
 #include <gtest/gtest.h>
 
 #include "calibration_source.h"
@@ -67,7 +67,7 @@ TEST_F(CalibrationSourceTest, WithoutTfTheConfigurationIsTakenInTheEndUnlessTfIs
     EXPECT_EQ(bool(source.resolve(50)), from == "config") << from;  // needs no image
     source.addColorFrame("camera");
     EXPECT_EQ(bool(source.resolve(50)), from == "config") << from;
-    // A bag that loops meanwhile.
+    // Time jumps back, as when a bag loops.
     EXPECT_EQ(bool(source.resolve(1)), from == "config") << from;
     EXPECT_EQ(bool(source.resolve(2)), from == "config") << from;
     const auto late = source.resolve(1 + options_.tf_patience + 0.1);

@@ -1,4 +1,4 @@
-// Depth of a size that nobody announced is named and left out.
+// Depth of an unexpected size is reported and left out.
 #include <gtest/gtest.h>
 
 #include "depth_alignment.h"

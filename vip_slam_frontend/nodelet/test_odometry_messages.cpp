@@ -1,4 +1,4 @@
-// The odometry message: base_link's pose and twist, and covariances that follow when the state is perturbed.
+// The odometry message: base_link's pose and twist, and covariances checked by perturbing the state.
 #include <gtest/gtest.h>
 
 #include "odometry_messages.h"
@@ -44,7 +44,7 @@ class OdometryMessage : public ::testing::Test {
 };
 
 TEST_F(OdometryMessage, TheStampIsExact) {
-  const ros::Time stamp(1700000000, 123456789);  // no double is equal to it
+  const ros::Time stamp(1700000000, 123456789);  // not representable as a double
   const auto msg = toOdometry(stamp, state_, Matrix15d::Zero(), gyro_, 0, frames_);
   EXPECT_EQ(msg.header.stamp, stamp);
   EXPECT_EQ(toTransform(msg).header.stamp, stamp);

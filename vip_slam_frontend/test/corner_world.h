@@ -15,7 +15,7 @@ namespace vip_slam {
 
 constexpr double kStill = 1.2;  // s at the start
 
-/// For its small images.
+/// Options for its small images.
 inline FrontEndOptions cornerOptions() {
   FrontEndOptions options;
   options.tracking.max_features = 120;
@@ -39,9 +39,9 @@ inline SensorConfig cornerSensor(double colour_readout, double depth_readout) {
   return config;
 }
 
-/// Something with the same texture that stands across the view, from wall to wall upright.
+/// An upright screen with the same texture, across the view.
 struct Screen {
-  double x = 0.9;    ///< m before the start of the camera
+  double x = 0.9;    ///< m in front of the camera's start
   double y = 0;      ///< its middle
   double width = 0;  ///< 0: not there
 };
@@ -55,7 +55,7 @@ class CornerWorld {
     cv::normalize(texture_, texture_, 0, 255, cv::NORM_MINMAX);
   }
 
-  /// Up to 1.3 rad/s and 6 rad/s^2, 0.6 m/s.
+  /// True pose T_W_I at time t: up to 1.3 rad/s, 6 rad/s^2 and 0.6 m/s.
   static SE3 pose(double t) {
     const double s = std::max(0.0, t - kStill), ramp = 1.0 - std::exp(-s * s);
     const Eigen::Vector3d angles =
@@ -64,7 +64,7 @@ class CornerWorld {
         ramp * Eigen::Vector3d(0.2 * std::sin(1.1 * s), 0.4 * std::sin(1.3 * s), 0.2 * std::sin(1.6 * s));
     return SE3(Eigen::Matrix3d(expSO3(angles)), p);
   }
-  /// When it is where the motion at `speed` times its own is at `t`.
+  /// Time at which the motion is where the motion at `speed` times its speed is at `t`.
   static double atSpeed(double speed, double t) { return kStill + speed * (t - kStill); }
   static ImuSample imu(double t, double speed = 1.0) {
     const double h = 1e-3;
@@ -75,7 +75,7 @@ class CornerWorld {
     sample.accel = now.R().transpose() * ((before.t() - 2 * now.t() + after.t()) / (h * h) + gravityVector());
     return sample;
   }
-  /// Every row where the camera is when it is read.
+  /// Renders each row from the camera's pose at its readout time.
   void look(double t, double readout, cv::Mat* image, cv::Mat* depth, const Screen& screen = {}) const {
     const SensorConfig config = cornerSensor(0, 0);
     *image = cv::Mat(240, 320, CV_8U);

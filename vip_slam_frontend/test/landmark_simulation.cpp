@@ -111,13 +111,13 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
   }
   const SE3 T_C_W = (poseAt(t) * T_I_C_).inverse();
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  // Tracks already running come first: a tracker holds on to what it has.
+  // Running tracks come first, as in a tracker.
   for (const bool running : {true, false}) {
     for (std::size_t i = 0; i < points_.size(); ++i) {
       if ((track_[i] != kNoLandmark) != running) continue;
       const Eigen::Vector3d p = T_C_W * points_[i];
       const bool visible = p.z() > 0.4 && std::abs(p.x() / p.z()) < 0.62 && std::abs(p.y() / p.z()) < 0.46;
-      // A track ends for reasons of its own now and then.
+      // Some tracks end at random.
       const bool survives = !running || unit(random_) > 0.02;
       if (!visible || !survives || seen.size() >= most) {
         if (running) track_[i] = kNoLandmark;

@@ -16,24 +16,24 @@ struct SimulationOptions {
   double focal = 500;
   double imu_rate = 200, image_rate = 20;
   double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
-  double depth_told = 1.0;                  ///< share of that sigma which the filter is told
+  double depth_told = 1.0;                  ///< share of that sigma reported to the filter
   double depth_offset = 0;                  ///< m, added to all readings
-  /// In bearings: how far right and down of the colour image the depth image lies.
+  /// Shift of the depth image against the colour image, right and down, in bearings.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();
-  BearingCorrection bearing;  ///< what the intrinsics get wrong: sightings are those that need it
+  BearingCorrection bearing;  ///< error of the intrinsics: the sightings need this correction
   bool depth = true;
   bool imu_noise = true;
   int points = 1200;
   double outlier_ratio = 0;
-  /// Tracks that are no points: each creeps by its own constant rate, Gaussian of this size, px per image.
+  /// Tracks that are not fixed points: each creeps at its own constant rate, drawn with this sigma, px per image.
   double creep_px = 0;
   double creep_ratio = 0;  ///< share of such tracks
   double speed = 1.0;      ///< factor on the motion's frequencies; 0: standing
   ImuNoise noise{1.7e-3, 2e-5, 2e-2, 3e-4};
   Eigen::Matrix3d gyro_error = Eigen::Matrix3d::Zero();  ///< it measures (I + this) * omega
-  double noise_told = 1.0;                               ///< share of the IMU's noise that the filter is told
+  double noise_told = 1.0;                               ///< share of the IMU's noise reported to the filter
   double time_offset = 0;                                ///< t_imu = t_image + time_offset
-  double later_time_offset = 0;                          ///< instead, from `later` on
+  double later_time_offset = 0;                          ///< replaces time_offset from `later` on
   double later = 1e9;                                    ///< s
   std::size_t most_points = 200;                         ///< in view at a time
   double blind_from = 1e9, blind_until = 1e9;            ///< s: no point is seen, the tracks end
@@ -43,14 +43,14 @@ class LandmarkSimulation {
  public:
   explicit LandmarkSimulation(const SimulationOptions& options);
 
-  /// True pose, velocity; biases as they wander.
+  /// True pose and velocity, and the random-walk biases.
   NavState stateAt(double t) const;
   /// Noisy samples covering [t0, t1] on the fixed IMU raster.
   const std::vector<ImuSample>& imu() const { return imu_; }
   std::vector<ImuSample> imuBetween(double t0, double t1) const;
   /// Noisy sightings at IMU time t of at most `most` points; a point keeps its track id while it stays in view.
   std::vector<FilterMeasurement> sight(double t, std::size_t most);
-  /// From now on depth is read with so much of its shift.
+  /// Corrects depth readings for this shift from now on.
   void readDepthWith(const Eigen::Vector2d& shift) { read_with_ = shift; }
   const SE3& T_I_C() const { return T_I_C_; }
   void generateImu(double until);
@@ -76,18 +76,17 @@ struct RunResult {
   double final_velocity = 0;  ///< m/s
   double length = 0;          ///< m travelled
   double nis_per_dof = 0;
-  double depth_scale = 1;  ///< factor on the depth noise that the filter found, at the end
-  /// Of the motion between every eighth and every twentieth image in turn, as between keyframes: mean normalised square
-  /// of the error (expectation 6), sum of the error's lengths, and the same for the difference of the two poses as they
-  /// were when they were the newest; m.
+  double depth_scale = 1;  ///< factor on the depth noise estimated by the filter, at the end
+  /// Motions over 8 and 20 images in turn, as between keyframes: mean NEES (expectation 6), sum of the error lengths
+  /// (m), and that sum for the difference of the two poses at the time when each was the newest.
   double motion_nees = 0, motion_error = 0, newest_error = 0;
   int gated = 0, used = 0;
   WindowState window;  ///< at the end
   MountingEstimate mounting;
   double most_depth_correction = 0;                           ///< m, of all images, with its sign
-  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();      ///< taken, at the end
-  double most_bearing_correction = 0;                         ///< handed on, largest entry of all images
-  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< handed on, at the end
+  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();      ///< applied, at the end
+  double most_bearing_correction = 0;                         ///< passed on, largest entry of all images
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< passed on, at the end
   double most_gyro_correction = 0;                            ///< its largest entry of all images
   Matrix15d covariance = Matrix15d::Zero();
 };

@@ -1,4 +1,5 @@
-// What the filter learns about mounting, depth and gyro: found, honest, handed on, kept, told.
+// Extrinsics, depth and gyro errors learnt by the filter: accuracy, consistency, and that they are passed on, kept and
+// reported.
 #include <algorithm>
 #include <cmath>
 
@@ -10,7 +11,7 @@
 namespace vip_slam::testing {
 namespace {
 
-/// Depth and pixels that tell of a camera's small errors.
+/// Depth and pixels accurate enough to show small calibration errors.
 SimulationOptions exactReadings(int seed) {
   SimulationOptions simulation;
   simulation.seed = static_cast<std::uint32_t>(seed);
@@ -25,7 +26,7 @@ TEST(Calibration, FindsExtrinsicsAndDelay) {
   simulation.seed = 4;
   simulation.speed = 1.5;
   simulation.time_offset = 0.008;
-  simulation.noise.gyro_noise_density = 3e-4;  // the motion has to stand out of it, or the delay is held
+  simulation.noise.gyro_noise_density = 3e-4;  // below the motion, or the delay is held
   FilterOptions options = singlePixels();
   options.calibration.translation = true;
   options.calibration.sigma_rotation = 0.02;
@@ -42,7 +43,8 @@ TEST(Calibration, FindsExtrinsicsAndDelay) {
   EXPECT_NEAR(run.window.time_offset, 0.008, 0.001);
 }
 
-// As by another exposure time. A delay that is taken for the same for ever is followed by a twentieth in that time.
+// A change as from another exposure time. An estimator that assumes a constant delay would follow only a twentieth of
+// it in that time.
 TEST(Calibration, FollowsADelayThatChanges) {
   SimulationOptions simulation;
   simulation.seed = 6;
@@ -59,8 +61,8 @@ TEST(Calibration, FollowsADelayThatChanges) {
   EXPECT_LT(mounting.sigma_time_offset, 0.0003);
 }
 
-// In slow motion the gyro's noise would tell both: the delay came out at -6 ms with a sigma of 0.6, the scale at -4 %
-// with one of 2.5.
+// In slow motion both would be learnt from the gyro's noise: the delay would become -6 ms with a sigma of 0.6 ms, the
+// scale -4 % with a sigma of 2.5 %.
 TEST(Calibration, LearnsNeitherDelayNorGyroScaleFromNoise) {
   SimulationOptions simulation;
   simulation.image_rate = 30;
@@ -80,7 +82,7 @@ TEST(Calibration, LearnsNeitherDelayNorGyroScaleFromNoise) {
   EXPECT_LT(scale.norm(), 0.02);
 }
 
-// What is held stays honest: the delay is 8 ms, 1.6 sigmas, and the pose knows that it may be.
+// The held delay stays consistent: it is 8 ms, 1.6 sigmas, and the pose covariance accounts for it.
 TEST(Calibration, ADelayThatIsHeldIsAllowedFor) {
   SimulationOptions simulation;
   simulation.image_rate = 30;
@@ -97,8 +99,8 @@ TEST(Calibration, ADelayThatIsHeldIsAllowedFor) {
   EXPECT_LT(nees, 9.0);
 }
 
-// A camera that is turned by 0.8 degrees against what is configured, while the body hardly turns: what cannot be told
-// yet has to stay unsure.
+// Extrinsic rotation error of 0.8 degrees while the body hardly rotates: unobservable directions have to keep their
+// uncertainty.
 TEST(Calibration, IsHonestWhileTheMotionSaysLittle) {
   double nees = 0, believed = 0;
   constexpr int kRuns = 8;
@@ -140,7 +142,7 @@ TEST(Calibration, FindsWhatDepthIsTooLongBy) {
   EXPECT_GT(believed, 1.5 * nees);
 }
 
-// The estimate wanders about zero, and nobody is told.
+// The estimate varies about zero and must not be passed on.
 TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
   for (int seed = 1; seed <= 3; ++seed) {
     SimulationOptions simulation;
@@ -190,7 +192,7 @@ TEST(Calibration, AnExactDepthImageStaysWhereItIs) {
   }
 }
 
-// Beyond belief it stands for something else: depth of another camera, say.
+// An implausible shift has another cause, such as depth of another camera.
 TEST(Calibration, AShiftBeyondBeliefIsTakenBack) {
   SimulationOptions simulation;
   simulation.depth_shift << 0.03, 0.0;
@@ -202,7 +204,7 @@ TEST(Calibration, AShiftBeyondBeliefIsTakenBack) {
   EXPECT_TRUE(run.mounting.depth_contradicts);
 }
 
-// On its way there nobody is told of it: the map would go to and fro.
+// It is not passed on while it grows either, or the map would move back and forth.
 TEST(Calibration, AnOffsetBeyondBeliefIsNotHandedOn) {
   for (int seed = 1; seed <= 3; ++seed) {
     for (const double speed : {0.3, 1.0}) {
@@ -253,7 +255,7 @@ TEST(Calibration, ExactIntrinsicsAreHandedOnAsTheyAre) {
   }
 }
 
-/// A gyro as cameras have them.
+/// With the gyro noise of real cameras.
 SimulationOptions goodGyro(std::uint32_t seed) {
   SimulationOptions simulation;
   simulation.seed = seed;
@@ -280,7 +282,7 @@ TEST(Calibration, FindsTheScaleOfTheGyro) {
     for (int axis = 0; axis < 3; ++axis) {
       const double found = run.mounting.gyro_correction(axis, axis);
       const bool sure = std::abs(found) > 4.0 * run.mounting.sigma_gyro_correction(axis, axis);
-      // Once it was beyond doubt it stays handed on.
+      // Once significant it stays passed on.
       const double handed_on = run.gyro_correction(axis, axis);
       EXPECT_TRUE(handed_on == found || (!sure && handed_on == 0)) << handed_on << " of " << found;
     }
@@ -309,7 +311,7 @@ TEST(Calibration, FindsHowTheGyroIsMisaligned) {
   EXPECT_LT((left.array().abs() / run.mounting.sigma_gyro_correction.array()).maxCoeff(), 4.0);
 }
 
-// The estimate wanders about zero, and nobody is told.
+// The estimate varies about zero and must not be passed on.
 TEST(Calibration, AnExactGyroIsHandedOnAsItIs) {
   for (int seed = 1; seed <= 3; ++seed) {
     const RunResult run = runFilter(goodGyro(seed), singlePixels(), 15.0, false);
@@ -318,7 +320,7 @@ TEST(Calibration, AnExactGyroIsHandedOnAsItIs) {
   }
 }
 
-// Such as colour and depth of different moments would ask for: no offset is better than a wrong one.
+// As when colour and depth are taken at different times: no offset is better than a wrong one.
 TEST(Calibration, AnOffsetOfDepthBeyondBeliefIsTakenBack) {
   SimulationOptions simulation;
   simulation.depth_offset = 0.06;
@@ -343,7 +345,7 @@ TEST(Calibration, StandingTeachesNothing) {
   EXPECT_LT(std::abs(run.window.depth_offset), 0.2 * options.calibration.sigma_depth_offset);
 }
 
-/// A filter that stands at the origin with this much said about its mounting by one measurement of it.
+/// A filter at rest at the origin, whose extrinsic rotation was corrected by `turn` by one measurement.
 VioFilter taught(const FilterOptions& options, const SE3& given, const Eigen::Vector3d& turn) {
   VioFilter filter(options, ImuNoise(), given, 0.0, 500, 9.81);
   filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
@@ -367,7 +369,7 @@ TEST(Calibration, OutlivesARestart) {
   EXPECT_LT((filter.mounting().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
   filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
   EXPECT_LT((filter.window().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
-  // But with the doubt of the first start: it may have been what went wrong.
+  // But with the initial sigma: the estimate may have caused the failure.
   EXPECT_NEAR(filter.mounting().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
 }
 
@@ -411,7 +413,7 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   EXPECT_NE(all[2].find("4.0 ms"), std::string::npos) << all[2];
   EXPECT_NE(all[3].find("9.8 mm too long"), std::string::npos) << all[3];
   EXPECT_NE(all[3].find("depth/offset in the sensor's configuration should be -0.0098"), std::string::npos) << all[3];
-  given.depth_offset = -0.005;  // and is too long by what is left
+  given.depth_offset = -0.005;  // applied already: 7 mm remain
   found.depth_offset = -0.012;
   const std::string more = mountingDifferences(given, found).back();
   EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
@@ -427,7 +429,7 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   EXPECT_NE(gyro.find("up to 1.2 %"), std::string::npos) << gyro;
   EXPECT_NE(gyro.find("[0.0000, -0.0123, 0.0000]"), std::string::npos) << gyro;
   found.sigma_gyro_correction(1, 1) = 0.003;
-  found.sigma_rotation.setConstant(0.01);  // not sure
+  found.sigma_rotation.setConstant(0.01);  // not significant
   found.sigma_translation.setConstant(0.01);
   found.sigma_time_offset = 0.002;
   found.sigma_depth_offset = 0.002;

@@ -9,9 +9,8 @@
 namespace vip_slam::testing {
 namespace {
 
-/// The simulation's depth readings are single pixels, not medians. Its gyro is ten times worse than that of any camera,
-/// and the noise of a gyro that bad looks like the turning which would teach the delay (see
-/// TheMountingIsLearntHonestly).
+/// The simulation's depth readings are single pixels, not medians. Its gyro is ten times noisier than that of any
+/// camera, and such noise looks like the rotation from which the delay is learnt (see TheMountingIsLearntHonestly).
 FilterOptions filterOptions() {
   FilterOptions options;
   options.depth_inflation = 1.0;
@@ -35,7 +34,7 @@ double meanNees(SimulationOptions simulation, const FilterOptions& options, int 
   return nees;
 }
 
-/// The motions reach over the window (8 images) and beyond it (20), where they are put together from pieces.
+/// The motions span the window (8 images) or more than it (20), where they are composed of several.
 TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
   constexpr int kSeeds = 20;
   double nees = 0, nis = 0, drift = 0, motion_nees = 0, motion_error = 0, newest_error = 0;
@@ -65,8 +64,8 @@ TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
   EXPECT_LT(motion_error, newest_error);
 }
 
-/// With a gyro as cameras have them (3.4e-4 rad/s/sqrt(Hz)), the camera turned by 0.6 degrees against what is
-/// configured and its stamps late by 3 ms.
+/// With a gyro as in real cameras (3.4e-4 rad/s/sqrt(Hz)), an extrinsic rotation error of 0.6 degrees and a time offset
+/// of 3 ms.
 TEST(Consistency, TheMountingIsLearntHonestly) {
   constexpr int kSeeds = 20;
   double nees = 0, turn = 0, delay = 0;
@@ -93,7 +92,7 @@ TEST(Consistency, TheMountingIsLearntHonestly) {
   EXPECT_LT(delay, 0.0005);
 }
 
-/// What the defaults are for: tracks of which two in five are no points and creep along with the motion.
+/// The case for which the defaults are tuned: 40 % of the tracks are not fixed points but creep with the motion.
 TEST(Consistency, CreepingTracksDoNotMakeItSurerThanItIs) {
   constexpr int kSeeds = 20, kControlSeeds = 5;
   SimulationOptions simulation;

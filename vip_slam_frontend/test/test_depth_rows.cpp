@@ -65,7 +65,7 @@ TEST(DepthRows, ShowsWhatTheCameraAtTheStampSees) {
   const cv::Mat read = image(&rows), truth = image(nullptr);
   const cv::Mat result = DepthRows(camera()).atStamp(read, rows);
   EXPECT_GT(wrongShare(read, truth, 1e-3), 0.5);
-  // What is left lies at the edges between the planes.
+  // The remaining ones are at the edges between the planes.
   EXPECT_LT(wrongShare(result, truth, 1e-3), 0.01);
   EXPECT_GT(cv::countNonZero(result), 0.9 * 320 * 240);
 }

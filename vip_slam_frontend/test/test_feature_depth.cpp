@@ -33,7 +33,7 @@ cv::Mat render(const std::function<double(double, double)>& z, double scale, uns
   return depth;
 }
 
-/// A wall to the right, one metre beside the camera's axis: z = f / (u - cx).
+/// A wall to the right, one metre from the camera's axis: z = f / (u - cx).
 double sideWall(double u, double) { return u > kCx + 60 ? kFocal / (u - kCx) : 8.0; }
 
 /// A wall 3 m ahead that ends at column 320 and leaves a recess behind it.
@@ -64,9 +64,9 @@ TEST(FeatureDepth, FlatAnglesAreReadWithTheRightUncertainty) {
       ++count;
     }
   }
-  ASSERT_GT(refused, 1000);  // what the edge-safe look-up makes of it
+  ASSERT_GT(refused, 1000);  // for which the edge-safe look-up gives no depth
   EXPECT_GT(count, 0.9 * refused);
-  EXPECT_LT(std::sqrt(sum2 / count), 1.0);  // sigma also holds half a pixel of misplacement, which is not in here
+  EXPECT_LT(std::sqrt(sum2 / count), 1.0);  // sigma also covers half a pixel of corner error, absent here
   EXPECT_LT(sigma / count, 0.02);
 }
 
@@ -78,14 +78,14 @@ TEST(FeatureDepth, RimsGiveTheNearSide) {
       ASSERT_EQ(found.source, FeatureDepth::Source::kRim) << u << " " << v;
       EXPECT_NEAR(found.z, 3.0, 0.015);
     }
-    // Two pixels and more beyond the rim the corner may be the background's: nothing, then the background.
+    // Two pixels beyond the rim the corner may belong to the background: no depth; further away, the background's.
     EXPECT_EQ(featureDepth(depth, 322.0, v, noise()).z, 0.0f);
     EXPECT_NEAR(featureDepth(depth, 324.0, v, noise()).z, 3.2, 0.02);
   }
 }
 
 TEST(FeatureDepth, RimOfASlantedWallIsExtrapolatedOnItsPlane) {
-  // The side wall ends at column 440 (a doorway); behind it lies another room.
+  // The side wall ends at column 440 (a doorway); behind it is another room.
   const auto scene = [](double u, double v) { return u >= 440 ? sideWall(u, v) : 9.0; };
   const cv::Mat depth = render(scene, 1.0, 4);
   int found_rim = 0;

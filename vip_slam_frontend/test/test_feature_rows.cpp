@@ -68,7 +68,7 @@ TEST(FeatureRows, JacobiansMatchCentralDifferences) {
     stackFeature(b, scene.observations, fb, noise, &unused_x, &unused_f, &minus);
     return Eigen::VectorXd(-(plus - minus) / (2 * h));
   };
-  // The columns of the focal lengths are taken where the bearing is expected, not where it was measured.
+  // The columns of the focal lengths are evaluated at the predicted bearing, not at the measured one.
   const int focal = scene.window.intrinsicsColumn();
   for (int c = 0; c < scene.window.dimension(); ++c) {
     if (c == focal || c == focal + 1) continue;
@@ -115,7 +115,7 @@ TEST(FeatureRows, FocalLengthsAreAskedWhereTheBearingIsExpected) {
   }
 }
 
-// What other intrinsics make of the same pixel.
+// Change of a pixel's bearing under other intrinsics.
 TEST(FeatureRows, ALensBendsWhatTheIntrinsicsGetWrong) {
   CameraIntrinsics given;
   given.width = 640, given.height = 480, given.fx = 481, given.fy = 478, given.cx = 320, given.cy = 241;
@@ -173,7 +173,7 @@ TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
   point = triangulate(scene.window, scene.observations, noise);
   ASSERT_TRUE(point.ok);
   EXPECT_LT((point.p_W - scene.f_W).norm(), 1e-4);
-  // One depth read across an edge does not carry the point away.
+  // One depth reading from across an edge does not shift the point.
   noise.use_depth = true;
   scene.observations[1].depth += 1.5;
   point = triangulate(scene.window, scene.observations, noise);
@@ -181,7 +181,7 @@ TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
   EXPECT_LT((point.p_W - scene.f_W).norm(), 0.05);
 }
 
-/// A window with this pose alone.
+/// A window with only this pose.
 WindowState windowOfOne(const NavState& state) {
   WindowState window;
   Clone clone;
@@ -243,7 +243,7 @@ TEST(Propagation, GyroCorrectionMatchesCentralDifferences) {
       Eigen::Matrix<double, 9, 1> change;
       change << a.T_W_I.boxminus(nominal.predicted.T_W_I) - b.T_W_I.boxminus(nominal.predicted.T_W_I), a.v_W - b.v_W;
       const Eigen::Matrix<double, 9, 1> expected = nominal.Phi_gyro.col(3 * column + row).head<9>();
-      // Jacobians take the rates for constant over the image interval.
+      // The Jacobians assume constant rates over the image interval.
       EXPECT_LT((change / (2 * h) - expected).norm(), 0.02 * expected.norm() + 1e-6) << row << column;
     }
     EXPECT_EQ(entries.size(), misalignment ? 9u : 3u);

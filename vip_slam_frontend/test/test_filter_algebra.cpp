@@ -244,7 +244,7 @@ TEST_F(AlgebraOnSimulation, EqualsTheReferenceEkf) {
     const Eigen::MatrixXd predicted = filter_.covariance();
     EXPECT_LT(relative(predicted, ekf_.P), 1e-9);
     if (k % 3 == 0) {
-      // Both see the same rows, linearised at the filter's window.
+      // Both filters get the same rows, linearised at the filter's window.
       Eigen::MatrixXd H(0, filter_.window().dimension());
       Eigen::VectorXd h(0);
       int used = 0;
@@ -296,7 +296,7 @@ TEST_F(AlgebraOnSimulation, EqualsTheReferenceEkf) {
   }
 }
 
-/// Directions that nothing may observe: three translations and a turn about the vertical, at the first estimates.
+/// Unobservable directions: three translations and the rotation about the vertical, at the first estimates.
 Eigen::MatrixXd nullDirections(const WindowState& window) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(window.dimension(), 4);
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
@@ -338,7 +338,7 @@ TEST_F(AlgebraOnSimulation, MotionBetweenClonesHasTheJointCovariance) {
 TEST_F(AlgebraOnSimulation, UnobservableDirectionsStayUnobservable) {
   MeasurementNoise noise;
   noise.sigma_xy = options_.sigma_px / options_.focal;
-  // A prior that knows nothing of the four directions: R N = 0 must survive propagation, updates and marginalisation.
+  // A prior without information on the four directions: R N = 0 must survive propagation, updates and marginalisation.
   WindowState window = filter_.window();
   const Eigen::MatrixXd N0 =
       nullDirections(window).householderQr().householderQ() * Eigen::MatrixXd::Identity(window.dimension(), 4);
@@ -350,7 +350,7 @@ TEST_F(AlgebraOnSimulation, UnobservableDirectionsStayUnobservable) {
   int updates = 0;
   for (int k = 1; k <= 12; ++k, ++id) {
     advance(id, 0.2 + 0.05 * k);
-    // The estimate moves away from the first estimates, which is when a plain filter starts to learn the yaw.
+    // The estimate moves away from the first estimates, where a filter without FEJ starts to gain information on yaw.
     std::mt19937 random(static_cast<unsigned>(k));
     filter_.window().boxplus(0.005 * randomMatrix(filter_.window().dimension(), 1, random));
     const Eigen::MatrixXd N = nullDirections(filter_.window());

@@ -10,7 +10,8 @@
 namespace vip_slam::testing {
 namespace {
 
-// Whatever is known of a motion's first second was weighed with the start's sigma.
+// All information from the first second of motion is weighted with the initial sigma, so a wrong one must be corrected
+// soon.
 TEST(NoiseMonitor, AWrongStartIsForgottenWithinThreeImages) {
   for (const double truth : {0.03, 0.5, 1.5}) {
     NoiseMonitor monitor(0.5, 0.01, 2.0, true);
@@ -26,8 +27,7 @@ TEST(StampMonitor, FindsTheJitterOfStampsAndNoneWhereThereIsNone) {
     StampMonitor monitor(true);
     for (int image = 0; image < 400; ++image) {
       const Eigen::Vector3d omega(0.5 * std::sin(0.3 * image), 0.6 * std::cos(0.21 * image), 0.1);
-      // One update: the orientation as predicted, off by the gyro's noise and the stamps', against a better
-      // measurement.
+      // One update: the predicted orientation, with errors of gyro and stamps, against a more accurate measurement.
       const double gyro = 4e-5, image_sigma = 2e-4;
       const Eigen::Vector3d error = gyro * Eigen::Vector3d(normal(random), normal(random), normal(random)) +
                                     std::sqrt(2.0) * truth * normal(random) * omega;
@@ -55,8 +55,8 @@ TEST(FilterRuns, OutliersAreGatedAway) {
   EXPECT_LT(run.final_position / run.length, 0.006);
 }
 
-/// The correction of the velocity, in sigmas of what the IMU leaves of it, by one track of a point that in truth goes
-/// at `speed` (m/s): each of its residuals is small, all of them together are another motion.
+/// Correction of the velocity, in sigmas of the IMU's prediction, caused by one track of a point that moves at `speed`
+/// (m/s): each residual is small, but together they describe another motion.
 double pulled(double speed, double pull_huber) {
   SimulationOptions still;
   still.speed = 0;
@@ -65,7 +65,7 @@ double pulled(double speed, double pull_huber) {
   simulation.generateImu(1.0);
   FilterOptions options = singlePixels();
   options.pull_huber = pull_huber;
-  options.sigma_px = 1.0;  // one track says about as much as the start
+  options.sigma_px = 1.0;  // one track has about the weight of the prior
   VioFilter filter(options, still.noise, simulation.T_I_C(), 0.0, still.focal, 9.81);
   FilterPrior prior;
   prior.state = simulation.stateAt(0.2);
@@ -80,7 +80,7 @@ double pulled(double speed, double pull_huber) {
     const Eigen::Vector3d p_C(speed * 0.05 * k, 0.3, 3.0);
     FilterMeasurement m;
     m.id = 1, m.xy = p_C.head<2>() / p_C.z(), m.depth = p_C.z(), m.depth_sigma = 0.01;
-    const bool in_view = k < 9;  // what is lost is used
+    const bool in_view = k < 9;  // tracks are used when they end
     filter.step(propagation, id++, in_view ? std::vector<FilterMeasurement>{m} : std::vector<FilterMeasurement>(),
                 std::nullopt);
   }
@@ -98,7 +98,7 @@ TEST(FilterRuns, WhatAsksForTooMuchPullsLess) {
   EXPECT_LT(much, 0.8 * much_freely);
 }
 
-// Two keyframes with a minute of standing between them lie where they lie, to what standing still says of each image.
+// The motion between two keyframes a minute of rest apart is known as accurately as zero velocity makes each image.
 TEST(FilterRuns, StandingDoesNotWearOutTheMotionBetweenKeyframes) {
   SimulationOptions still;
   still.speed = 0;
@@ -128,7 +128,7 @@ TEST(FilterRuns, StandingDoesNotWearOutTheMotionBetweenKeyframes) {
   }
 }
 
-// Their first residuals are the velocity's error, not their own: taken for noise they left it at 0.8 m/s.
+// Their first residuals come from the velocity error: if taken for measurement noise, the error stays at 0.8 m/s.
 TEST(FilterRuns, PointsThatComeBackAfterAStretchWithoutTellTheVelocity) {
   double sum = 0;
   for (const std::uint32_t seed : {1, 2, 3, 4}) {
@@ -165,7 +165,7 @@ TEST(FilterRuns, DepthNoisierThanToldIsFoundOut) {
   EXPECT_NEAR(run.depth_scale, 3.0, 0.6);
 }
 
-/// A data sheet's IMU that shakes: the images know better, and the filter must come to say so.
+/// An IMU with data sheet noise that vibrates: the images are more accurate, which the filter must detect.
 TEST(FilterRuns, AnImuNoisierThanToldIsFoundOut) {
   SimulationOptions simulation;
   simulation.noise_told = 0.1;
@@ -197,7 +197,7 @@ TEST(StandingStill, FiveMinutesWithoutDrift) {
   const RunResult run = runFilter(simulation, singlePixels(), 300.0, true);
   std::printf("five minutes: %.2f mm, %.3f deg\n", 1e3 * run.final_position, run.final_rotation * 180 / M_PI);
   EXPECT_LT(run.final_position, 0.005);
-  EXPECT_LT(run.final_rotation * 180 / M_PI, 0.2);  // with the tilt error it starts with
+  EXPECT_LT(run.final_rotation * 180 / M_PI, 0.2);  // includes the initial tilt error
   EXPECT_LE(run.window.clones.size(), 3u);
 }
 

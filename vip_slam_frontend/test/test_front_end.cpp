@@ -1,4 +1,4 @@
-// The facade on rendered images of a textured wall: a whole run, bits that repeat, standing still, feedback from a map.
+// The facade on rendered images of a textured wall: a whole run, bitwise repeatability, rest, feedback from a map.
 #include <cmath>
 #include <map>
 #include <random>
@@ -55,7 +55,7 @@ TEST_F(FrontEndTest, WholeRunFollowsAndHandsOnKeyframes) {
     EXPECT_EQ(described, static_cast<int>(keyframe.frame.features.size()));
     EXPECT_GT(untracked, 10);
   }
-  // Prediction runs ahead of the last image with the IMU.
+  // Prediction extrapolates from the last image with the IMU.
   feedImu(6.1);
   const auto predicted = front_end_.predict(6.05);
   ASSERT_TRUE(predicted);
@@ -117,8 +117,8 @@ TEST_F(FrontEndTest, DepthHasWhatTheMapFoundOutAboutItsCamera) {
   EXPECT_EQ(output.frame->camera_correction.curve, update.depth_curve);
   const double z = kWall - World::position(2.05).x() + 0.02 + output.frame->camera_correction.offset;
   EXPECT_NEAR(output.frame->depth_grid.at(10, 10), z, 5e-4);
-  EXPECT_EQ(cv::norm(read, before, cv::NORM_INF), 0.0);  // the caller's own stays as it is
-  // One that no camera has is not believed.
+  EXPECT_EQ(cv::norm(read, before, cv::NORM_INF), 0.0);  // the caller's image is unchanged
+  // An implausible curve is ignored.
   update.depth_curve.added[3] = std::nanf("");
   front_end_.applyMapUpdate(update);
   feedImu(2.10);
@@ -126,7 +126,7 @@ TEST_F(FrontEndTest, DepthHasWhatTheMapFoundOutAboutItsCamera) {
   EXPECT_FLOAT_EQ(output.frame->camera_correction.curve.at(3.0f), 0.02f);
 }
 
-// Disparities that are all off by the same pass for an offset of depth until the map tells them apart.
+// A constant disparity error looks like a depth offset until the map distinguishes the two.
 TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
   double t = 0;
   const auto go = [&](int images, double too_long) {
@@ -148,7 +148,7 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
   EXPECT_LT(std::abs(front_end_.mounting().depth_offset), 1e-6);
   EXPECT_EQ(output.frame->camera_correction, (CameraCorrection{0.0, update.depth_curve}));
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
-  // A further hundredth changes nothing; a map that was begun anew knows nothing.
+  // A further change by a hundredth has no effect; a new map has no knowledge of it.
   update.depth_curve = disparityCurve(-0.00202, 8);
   update.disparity_error = -0.00202;
   front_end_.applyMapUpdate(update);
@@ -159,7 +159,7 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
   EXPECT_LT(front_end_.mounting().depth_offset, -0.001);
 }
 
-// What is known better about the depth camera is no motion.
+// A change of the depth calibration must not look like motion.
 TEST_F(FrontEndTest, ADepthCurveDoesNotMoveThePose) {
   FrameOutput output = run(0.0, 4.0);
   const auto off = [&] { return output.frame->state.T_W_I.t().x() - World::position(output.frame->t).x(); };
@@ -175,7 +175,7 @@ TEST_F(FrontEndTest, ADepthCurveDoesNotMoveThePose) {
   EXPECT_LT(worst, 0.002);
 }
 
-// Readings have what the sensor's configuration adds by the time they get here; what is found comes on top.
+// Readings already include the offset of the sensor file when they arrive; the estimated offset comes on top.
 TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
   SensorConfig known = sensor();
   known.depth_offset = -0.03;
@@ -196,7 +196,7 @@ TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
   EXPECT_NEAR(front_end.mounting().depth_offset, front_end_.mounting().depth_offset - 0.03, 1e-9);
 }
 
-// So have rates.
+// Likewise for the gyro's rates.
 TEST_F(FrontEndTest, TheGyroCorrectionIsTheConfiguredOneAndWhatWasFound) {
   SensorConfig known = sensor();
   known.gyro_correction << 0.05, 0.01, 0, -0.02, -0.1, 0.03, 0.01, 0, 0.08;
@@ -275,7 +275,7 @@ TEST_F(FrontEndTest, StandsStillForAMinuteUnderNoise) {
 
 TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
   FrameOutput output = run(0.0, 4.0);
-  // A map as a back end would hold it, in a frame turned and shifted against odom.
+  // A map as a back end would have it, in a frame rotated and shifted against odom.
   MapUpdate update;
   update.T_map_odom = SE3(expQuaternion(Eigen::Vector3d(0, 0, 0.5)), Eigen::Vector3d(3, -1, 0.5));
   update.newest_keyframe = keyframes_.back()->id;
@@ -297,12 +297,12 @@ TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
   front_end_.applyMapUpdate(update);
   ASSERT_TRUE(before);
   EXPECT_EQ(front_end_.predict(4.0)->T_W_I.t(), before->T_W_I.t());
-  // Darkness ends all tracks; afterwards some come back under their old ids.
+  // Darkness ends all tracks; afterwards some are found again under their old ids.
   run(4.0, 4.3, true, false);
   output = run(4.3, 6.0);
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
   EXPECT_GT(front_end_.counters().landmarks_reacquired, 10u);
-  // ... and where they say they are: each lies on the wall point the map has.
+  // ... at the right places: each is on the wall point of the map's landmark.
   std::map<LandmarkId, Eigen::Vector3d> map;
   for (const LandmarkEstimate& landmark : update.landmarks) map[landmark.id] = landmark.p_W;
   const SE3 T_C_map = (update.T_map_odom * output.frame->state.T_W_I * output.frame->T_I_C).inverse();
@@ -315,7 +315,7 @@ TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
   }
   EXPECT_GT(back, 5);
 
-  // In an odometry that began anew they are found as well, once the back end says where it is.
+  // After a reset of the odometry they are found too, once the back end reports its pose in the map.
   const std::uint64_t reacquired = front_end_.counters().landmarks_reacquired;
   front_end_.reset("of the test");
   output = run(6.0, 9.0);
@@ -329,7 +329,7 @@ TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
   run(9.3, 10.5);
   EXPECT_GT(front_end_.counters().landmarks_reacquired, reacquired + 10);
 
-  // A map that takes its place: nothing is looked for in it before the back end knows where the odometry lies there ...
+  // A loaded map replaces it: no landmark of it is searched for before the back end knows the odometry's pose in it ...
   MapUpdate loaded = update;
   loaded.epoch = 1u << 31;
   loaded.global = true;
@@ -338,7 +338,7 @@ TEST_F(FrontEndTest, MapUpdateBringsLandmarksBackWithoutMovingOdom) {
   run(10.5, 10.8, true, false);
   run(10.8, 12.0);
   EXPECT_EQ(front_end_.counters().landmarks_reacquired, until);
-  // ... and nothing of the old one afterwards.
+  // ... and none of the old map afterwards.
   loaded.epoch = update.epoch;
   loaded.landmarks.clear();
   front_end_.applyMapUpdate(loaded);

@@ -1,4 +1,4 @@
-// The facade when images and IMU contradict each other: images that come again, blows that the IMU has missed.
+// The facade when images and IMU contradict each other: repeated images, shocks that the IMU measures wrongly.
 #include <cmath>
 #include <functional>
 
@@ -21,7 +21,7 @@ TEST_F(ContradictionTest, ATopicThatIsFasterThanItsCameraCostsNothing) {
   for (int k = 60; k < 200; ++k) {
     output = show(0.05 * k, 0.05 * (k - k % 2));  // every image twice
     EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << k << ' ' << output.frame->status.reason;
-    EXPECT_LT(error(output), 0.03) << k;  // that of the IMU's prediction in between, too
+    EXPECT_LT(error(output), 0.03) << k;  // also for the IMU prediction in between
   }
   EXPECT_EQ(front_end_.counters().repeated_image, 70u);
   EXPECT_LT(front_end_.counters().imu_noise_scale, 2.0);
@@ -45,7 +45,7 @@ TEST_F(ContradictionTest, ACameraThatFreezesIsNamedAndWaitedFor) {
   EXPECT_LT(error(output), 0.03);
 }
 
-// What is seen moves on before depth that has stopped: taken for the world, it would be.
+// Depth that has frozen while the image moves on must not be used.
 TEST_F(ContradictionTest, DepthThatFreezesIsLeftOut) {
   run(0.0, 3.0);
   FrameOutput output;
@@ -65,7 +65,7 @@ TEST_F(ContradictionTest, DepthThatFreezesIsLeftOut) {
 
 TEST_F(ContradictionTest, WhatIsRenderedWithoutNoiseMayStand) {
   run(0.0, 3.0);
-  // From 3 s on time slows down and stops within a second, and goes on at 7 s.
+  // From 3 s on the motion slows down to rest within a second, and continues at 7 s.
   const auto warped = [](double t) {
     const double s = std::min(1.0, t - 3.0);
     if (t < 7.0) return 3.0 + s - s * s * s + 0.5 * s * s * s * s;
@@ -94,7 +94,7 @@ TEST_F(ContradictionTest, WhatIsRenderedWithoutNoiseMayStand) {
 
 TEST_F(ContradictionTest, ABlowThatTheImuHasOtherwiseIsSeen) {
   run(0.0, 4.01);
-  // 30 ms of it, 0.3 m/s of which nothing is true.
+  // A false acceleration for 30 ms, 0.3 m/s in all.
   for (int i = 0; i < 6; ++i, imu_t_ += 0.005) {
     ImuSample sample = World::imu(imu_t_);
     sample.accel += Eigen::Vector3d(6.0, 6.0, 5.3);

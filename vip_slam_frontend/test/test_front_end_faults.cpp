@@ -1,4 +1,4 @@
-// The facade when the input is bad: refused images, no depth, darkness, light that changes, gaps, clocks that jump.
+// The facade with bad input: rejected images, no depth, darkness, changing light, gaps, clock jumps.
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -95,7 +95,7 @@ TEST_F(FrontEndTest, DarknessBeforeACornerIsHeldByDepth) {
   EXPECT_NE(output.frame->status.reason.find("held by depth surfaces"), std::string::npos);
   EXPECT_EQ(front_end_.counters().lost, 0u);
   EXPECT_GT(front_end_.counters().surfaces_used, 200u * 20u);
-  // After ten seconds; the IMU alone is off by metres then. No surface tells how high it is.
+  // After ten seconds, when the IMU alone is off by metres. No surface constrains the height.
   const Eigen::Vector3d off = output.frame->state.T_W_I.t() - World::position(output.frame->t);
   EXPECT_LT(off.head<2>().norm(), 0.02);
   EXPECT_LT(std::abs(off.z()), 0.1);
@@ -136,7 +136,7 @@ TEST_F(FrontEndTest, LowLightAndBlurAreFollowed) {
     if (k < 110) {
       cv::blur(image, image, cv::Size(9, 3));  // a smear of nine pixels
     } else {
-      image.convertTo(dim, CV_16S, 0.06, 2);  // fifteen grey levels are left, under noise of 1.5
+      image.convertTo(dim, CV_16S, 0.06, 2);  // fifteen grey levels remain, with noise of 1.5
       random.fill(noise, cv::RNG::NORMAL, 0, 1.5);
       dim += noise;
       dim.convertTo(image, CV_8U);
@@ -161,7 +161,7 @@ TEST_F(FrontEndTest, AfterLostTheOdometryGoesOnWhileTheImuStillTellsWhere) {
   EXPECT_EQ(output.frame->epoch, 0u);
   EXPECT_LT(error(output), 4 * lost_sigma);
   ASSERT_GT(keyframes_.size(), before);
-  EXPECT_EQ(keyframes_[before]->previous, before);  // tied by six seconds of IMU
+  EXPECT_EQ(keyframes_[before]->previous, before);  // connected by six seconds of IMU
   EXPECT_FALSE(keyframes_[before]->imu.empty());
 }
 
@@ -177,7 +177,7 @@ TEST_F(FrontEndTest, WithoutDepthLostIsLeftAsWell) {
   EXPECT_GT(keyframes_.size(), before);
 }
 
-// A hall: depth reaches the floor, which shows nothing, and what shows something lies beyond its reach.
+// A hall: depth reaches the floor, which has no texture; textured surfaces are beyond its range.
 TEST_F(FrontEndTest, WhereDepthLiesOnSurfacesAloneLostIsLeft) {
   run(0.0, 3.0);
   FrameOutput output = run(3.0, 9.0, true, false);
@@ -196,7 +196,7 @@ TEST_F(FrontEndTest, WhereDepthLiesOnSurfacesAloneLostIsLeft) {
 
 TEST_F(FrontEndTest, WhatIsSaidIsLostAsLongAsNoKeyframesCome) {
   FrontEndOptions few = options();
-  few.tracking.max_features = 15;  // enough to go on with, too few to trust after LOST
+  few.tracking.max_features = 15;  // enough to continue, too few to recover from LOST
   FrontEnd front_end(few, sensor());
   for (int k = 0; k < 180; ++k) {
     const double t = 0.05 * k;
@@ -225,7 +225,7 @@ TEST_F(FrontEndTest, WhereTheImuEndsThePoseGoesOnSteadilyAndIsTrustedLess) {
   ASSERT_GT(steady.norm(), 0.1);
   EXPECT_LT((way - steady).norm(), 0.1 * steady.norm());
   const double blind = t - newest, sigma = std::sqrt(output.frame->covariance(4, 4));
-  EXPECT_GT(sigma, blind * blind);  // of 2 m/s^2 that nobody told of
+  EXPECT_GT(sigma, blind * blind);  // covers an unmeasured acceleration of 2 m/s^2
   EXPECT_LT(error(output), 3 * sigma);
   EXPECT_GT(std::sqrt(output.frame->covariance(0, 0)), 2 * blind * blind);
 }
@@ -262,13 +262,13 @@ TEST_F(FrontEndTest, WhenTheImuNoLongerTellsWhereANewEpochBegins) {
   output = feed(9.0, 13.0, false);
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
   EXPECT_GE(output.frame->epoch, 1u);
-  // It moves steadily when the light comes back: quiet to the IMU, but no standing start.
+  // It moves steadily when the light returns: the IMU is quiet, but it must not initialise as at rest.
   const double t = output.frame->t, h = 1e-3;
   const double speed = (World::position(t + h) - World::position(t - h)).norm() / (2 * h);
   EXPECT_GT(speed, 0.5);
   EXPECT_NEAR(output.frame->state.v_W.norm(), speed, 0.03);
   ASSERT_GT(keyframes_.size(), before);
-  EXPECT_EQ(keyframes_[before]->id, before + 1);  // ids go on
+  EXPECT_EQ(keyframes_[before]->id, before + 1);  // ids continue
   EXPECT_EQ(keyframes_[before]->previous, 0u);    // nothing ties it to the old epoch
 }
 
@@ -301,7 +301,7 @@ TEST_F(FrontEndTest, ImagesThatAreMissingWhileTheImuTellsNothingStartAnew) {
 }
 
 TEST_F(FrontEndTest, WhoStandsBeforeAndAfterAHoleInTheImagesMayHaveMovedInIt) {
-  // Dark from 1 s on, so that only the IMU tells of standing; 26 cm on between the images of 1.3 and 2.5 s.
+  // Dark from 1 s on, so that only the IMU shows rest; a move of 26 cm between the images at 1.3 and 2.5 s.
   FrameOutput output;
   for (double t = 0; t < 3.0; t += 0.05) {
     for (; imu_t_ < t + 0.02; imu_t_ += 0.005) {
@@ -319,7 +319,7 @@ TEST_F(FrontEndTest, WhoStandsBeforeAndAfterAHoleInTheImagesMayHaveMovedInIt) {
 }
 
 TEST_F(FrontEndTest, AnImuThatStopsEndsInLost) {
-  // A driver that died: a pose that stays where it was must not go out as one for ever.
+  // A driver that died: a frozen pose must not be published as valid for ever.
   FrameOutput output = run(0.0, 3.0);
   const auto imageAt = [&](double t) { return front_end_.process({t, world_.image(t), World::depth(t)}); };
   output = imageAt(3.2);
@@ -367,7 +367,7 @@ TEST_F(FrontEndTest, ClockRunningBackStartsAnew) {
   EXPECT_LT(error(output), 0.02);
 }
 
-// The first accelerometer sample of a device that tells its streams apart has the time of another clock.
+// The first accelerometer sample of a device with separate streams has the time of another clock.
 TEST_F(FrontEndTest, AFirstSampleFarAheadDoesNotEndASplitImu) {
   const Eigen::Vector3d gyro(0.01, 0, 0), accel(0, 0, 9.81);
   EXPECT_TRUE(front_end_.addAccel(1e6, accel));

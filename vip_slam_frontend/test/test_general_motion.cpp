@@ -1,4 +1,4 @@
-// Outlier rejection without a usable rotation: general scenes, and the two that fool a fundamental matrix.
+// Outlier rejection without a usable rotation: general scenes, and the two degenerate for a fundamental matrix.
 #include <algorithm>
 #include <random>
 
@@ -95,7 +95,7 @@ TEST(GeneralMotion, OutlierRejectionFallsBackOnlyWhenTheGyroIsContradicted) {
         rejectOutliers(set.pairs, SE3(set.truth.rotation(), Eigen::Vector3d::Zero()), RansacOptions());
     EXPECT_TRUE(right.ok);
     EXPECT_FALSE(right.free_rotation);
-    // The gyro saw nothing of a rotation by seven degrees.
+    // The gyro missed a rotation of seven degrees.
     const RansacResult wrong = rejectOutliers(set.pairs, SE3(), RansacOptions());
     EXPECT_TRUE(wrong.ok);
     EXPECT_TRUE(wrong.free_rotation);
@@ -106,7 +106,7 @@ TEST(GeneralMotion, OutlierRejectionFallsBackOnlyWhenTheGyroIsContradicted) {
 }
 
 TEST(GeneralMotion, ABodyThatMovesByItselfDoesNotWinAgainstTheGyro) {
-  // Six in ten pairs lie on something that moves its own way; the gyro fits the rest.
+  // Six in ten pairs are on a moving body; the gyro agrees with the rest.
   Pairs set = make(Scene::kGeneral, true, 7);
   const SE3 other(expSO3(Eigen::Vector3d(0, 0.1, 0)), Eigen::Vector3d(0.3, 0, 0));
   int on_body = 0;

@@ -1,4 +1,4 @@
-// Gaps of the IMU, in a turn, with images and without.
+// IMU gaps during rotation, with images and without.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -11,16 +11,16 @@
 namespace vip_slam {
 namespace {
 
-/// What a flight with gaps comes to.
+/// Results of a flight with gaps.
 struct Flight {
-  double most_nees = 0, most_motion_nees = 0;  ///< of a pose, of a keyframe's motion, after the first gap
+  double most_nees = 0, most_motion_nees = 0;  ///< largest after the first gap: of a pose, of a keyframe's motion
   double most_turn = 0, most_off = 0;          ///< rad, m
   std::uint64_t restarts = 0;
   std::string reason;  ///< of the first image after the first gap
 };
 
-/// Eight seconds before the corner at `speed` times its own; the IMU is missing for `gap` seconds at 4, 6 and 8 s,
-/// the images likewise where `images_too`.
+/// Eight seconds in front of the corner at `speed` times its motion; the IMU is missing for `gap` seconds at 4, 6 and 8
+/// s, and with `images_too` the images as well.
 Flight fly(double gap, bool images_too, double speed = 1.0) {
   const CornerWorld world;
   FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));

@@ -1,4 +1,4 @@
-// Starts, standing and moving, on the landmark simulation; stillness; keyframe choice.
+// Initialisation at rest and in motion on the landmark simulation; stillness; keyframe selection.
 #include <cmath>
 #include <random>
 
@@ -18,8 +18,8 @@ struct Start {
   std::string reason;
 };
 
-/// `scene`: the images show something that moves with the camera by this share. `gyro`: it measures as many times a
-/// turn. `turned`: the camera, against what is configured. `learnt`: both are known by now.
+/// `scene`: the scene moves with the camera by this share of its motion. `gyro`: scale factor of the gyro. `turned`:
+/// error of the configured extrinsic rotation, rad. `learnt`: both are already known.
 Start start(double speed, bool depth, double accel_unit = 1, double scene = 0, double gyro = 1, double turned = 0,
             bool learnt = false, double standing_seconds = 1.0) {
   SimulationOptions options;
@@ -86,13 +86,13 @@ TEST(Initialiser, ALongerRestIsWaitedFor) {
     EXPECT_TRUE(s.prior->standing) << depth;
     EXPECT_GE(s.t, 2.9) << depth;
   }
-  const Start moving = start(1.0, true, 1, 0, 1, 0, false, 3.0);  // nothing rests there: it does not wait
+  const Start moving = start(1.0, true, 1, 0, 1, 0, false, 3.0);  // no rest in the data: it does not wait
   ASSERT_TRUE(moving.prior) << moving.reason;
   EXPECT_LT(moving.t, 2.5);
 }
 
 TEST(Initialiser, TheRobotBeginsAtTheOriginHeadingAlongX) {
-  // As a camera's IMU sits on a robot: x right, y down, z forward; half a metre up and ahead, tilted.
+  // A camera's IMU mounted on a robot: x right, y down, z forward; half a metre up and ahead, tilted.
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const SE3 T_base_imu(Eigen::Quaterniond(R) * expQuaternion({0.2, 0, 0}), {0.3, 0, 0.5});
@@ -129,11 +129,11 @@ TEST(Initialiser, MovingFindsVelocityAndGravity) {
   EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.01);
 }
 
-// As after a restart in motion: what the filter has learnt is not to be learnt again as a bias.
+// As after a restart in motion: the gyro and extrinsics errors already learnt must not be estimated again as a bias.
 TEST(Initialiser, AStartInMotionKnowsWhatWasLearnt) {
   for (const bool learnt : {false, true}) {
     const Start s = start(1.0, true, 1, 0, 1.05, 0.02, learnt);
-    if (!learnt && !s.prior) continue;  // refused: gyro and camera disagree
+    if (!learnt && !s.prior) continue;  // rejected: gyro and camera disagree
     ASSERT_TRUE(s.prior) << s.reason;
     const double off = (s.prior->state.bias_gyro - truthOf(1.0, s.t).bias_gyro).norm();
     EXPECT_EQ(learnt, off < 0.01) << off;
@@ -154,10 +154,11 @@ TEST(Initialiser, MovingWithoutDepthSaysWhyItWaits) {
   EXPECT_NE(s.reason.find("features with depth"), std::string::npos) << s.reason;
 }
 
-// A steady motion that turns the view over within the second is quiet, and shares nothing with the oldest image.
+// During a steady motion the IMU is quiet; when the view changes completely within a second, no feature is shared with
+// the oldest image.
 TEST(Initialiser, ASteadyMotionIsNoRestHoweverSoonTheViewHasTurnedOver) {
   ImuNoise noise;
-  for (const double speed : {0.0, 0.04}) {  // of the view from image to image, normalised
+  for (const double speed : {0.0, 0.04}) {  // image motion per image, normalised
     ImuBuffer imu;
     Initialiser initialiser(InitialisationOptions(), FilterOptions(), noise, SE3(), 480, 9.81, DepthNoise());
     std::optional<FilterPrior> prior;
@@ -167,7 +168,7 @@ TEST(Initialiser, ASteadyMotionIsNoRestHoweverSoonTheViewHasTurnedOver) {
       InitialisationInput image{0.05 * k, {}};
       for (int i = 0; i < 100; ++i) {
         FilterMeasurement m;
-        m.id = 1000 * (k / 8) + i + 1;  // all of them are new every 0.4 s
+        m.id = 1000 * (k / 8) + i + 1;  // all tracks are new every 0.4 s
         m.xy = Eigen::Vector2d(0.01 * (i % 10) + speed * (k % 8), 0.01 * (i / 10));
         image.features.push_back(m);
       }
@@ -178,7 +179,7 @@ TEST(Initialiser, ASteadyMotionIsNoRestHoweverSoonTheViewHasTurnedOver) {
   }
 }
 
-// In the dark the corners are noise: none lasts from one image to the next, or they jump this way and that.
+// In the dark corners are noise: they last for one image only, or jump at random.
 TEST(Initialiser, NoiseIsNoMotion) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> u(-0.3, 0.3), jump(-0.01, 0.01);
@@ -205,7 +206,7 @@ TEST(Initialiser, NoiseIsNoMotion) {
   }
 }
 
-// A slow steady turn is quiet to the IMU, and a bare wall has no features that could tell.
+// During a slow steady rotation the IMU is quiet, and a bare wall has no features to show the rotation.
 TEST(Initialiser, BeforeABareWallTheDepthTellsWhetherItStands) {
   ImuNoise noise;
   for (const double rate : {0.0, 0.05}) {
@@ -257,7 +258,7 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
   EXPECT_FALSE(detector.update(moving));
   EXPECT_FALSE(detector.still());
 
-  // A wall that moves along: the image stands, the IMU does not.
+  // A wall that moves with the camera: the image is at rest, the IMU is not.
   StillnessCues wall = quiet();
   wall.imu.accel_std = 1.0;
   // Even flight past a distant view: IMU quiet, image quiet, but the estimate moves.
@@ -271,8 +272,7 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
   }
 }
 
-// Between the first image of a motion and the verdict that it is one, standing still must not be claimed to a
-// millimetre.
+// Between the first image of a motion and its detection, zero velocity must not be claimed with millimetre accuracy.
 TEST(Stillness, IsAsExactAsTheImagesAreQuiet) {
   const ZuptOptions options;
   StillnessDetector detector(options);
@@ -294,7 +294,7 @@ TEST(Stillness, IsAsExactAsTheImagesAreQuiet) {
   EXPECT_EQ(detector.residualMotion().translation, 1.0);
 }
 
-// Eight metres before a wall the first three centimetres of a motion towards it pass for the noise of pixels nearby.
+// At 8 m from a wall the image motion of the first 3 cm towards it is no larger than pixel noise at short range.
 TEST(Stillness, WhereAllIsFarASmallerImageMotionEndsIt) {
   StillnessDetector detector((ZuptOptions()));
   std::vector<Eigen::Vector3d> near, far;
@@ -312,12 +312,13 @@ TEST(Stillness, WhereAllIsFarASmallerImageMotionEndsIt) {
   EXPECT_TRUE(detector.update(begins));
   begins.px_per_metre = stands.px_per_metre = leastImageMotion(far, 480);
   EXPECT_TRUE(detector.update(stands));
-  EXPECT_GT(detector.residualMotion().translation, 1.0);  // and what stands is known less well, but for its direction
+  EXPECT_GT(detector.residualMotion().translation, 1.0);  // the residual translation is larger, the rotation is not
   EXPECT_LT(detector.residualMotion().rotation, 1.0);
   EXPECT_FALSE(detector.update(begins));
 }
 
-// Along the view a translation shows as far from the middle as the points lie, across it everywhere.
+// Translation along the viewing direction moves a point in proportion to its distance from the image centre;
+// translation across it moves all points.
 TEST(Stillness, ImageMotionOfATranslationIsLeastAlongTheView) {
   EXPECT_NEAR(leastImageMotion({{1, 0, 4}, {-1, 0, 4}, {0, 1, 4}, {0, -1, 4}}, 480), 480 / 4.0 * 0.25, 1e-9);
   EXPECT_EQ(leastImageMotion({}, 480), 0);
@@ -331,11 +332,11 @@ TEST(Stillness, AStartAtRestBeforeABareWallLastsUntilTheImuShowsAMotion) {
   blind.disparity_px = -1;
   blind.imu.mean_gyro = {0.01, -0.02, 0.005};
   blind.imu.mean_accel = {0.3, -9.7, 0.2};
-  EXPECT_FALSE(detector.update(blind));  // sees nothing, knows nothing
+  EXPECT_FALSE(detector.update(blind));  // no features and no calibrated rest
   detector.begin(blind.imu);
   for (int i = 0; i < 100; ++i) {
     EXPECT_TRUE(detector.update(blind));
-    blind.imu.mean_accel.x() += 0.0003;  // a walking bias
+    blind.imu.mean_accel.x() += 0.0003;  // a random-walk bias
   }
   StillnessCues leaves = blind, turns = blind;
   leaves.imu.mean_accel.z() += 0.12;

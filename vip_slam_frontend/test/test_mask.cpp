@@ -1,4 +1,4 @@
-// What the mask blackens - the robot's own bumper - is not seen by anything: no features, no depth, no corners.
+// Nothing is detected in the masked area (the robot's own bumper): no features, no depth, no corners.
 #include <gtest/gtest.h>
 
 #include "corner_world.h"
@@ -25,7 +25,7 @@ struct Drive {
   double error = 0;  ///< m, largest
 };
 
-/// A chequered board that goes along with the camera, before the corner of a room.
+/// A chequered board that moves with the camera, in front of the corner of a room.
 Drive drive(const SensorConfig& sensor) {
   const CornerWorld world;
   FrontEndOptions options = cornerOptions();
@@ -46,7 +46,7 @@ Drive drive(const SensorConfig& sensor) {
       }
     }
     const FrameOutput output = front_end.process(input);
-    EXPECT_EQ(input.depth.at<float>(239, 160), kBumperDepth);  // the caller's image stays as it is
+    EXPECT_EQ(input.depth.at<float>(239, 160), kBumperDepth);  // the caller's image is unchanged
     const auto gridPoints = [](const DepthGrid& grid) {
       std::size_t points = 0;
       for (int v = 0; v < grid.rows; ++v) {
@@ -83,7 +83,7 @@ TEST(Mask, NothingIsSeenThere) {
   EXPECT_GT(with.keyframes, 2u);
   EXPECT_LT(with.error, 0.02);
 
-  const Drive without = drive(cornerSensor(0, 0));  // what it would have been
+  const Drive without = drive(cornerSensor(0, 0));  // the reference without bumper
   EXPECT_GT(without.on_bumper, 100u);
   EXPECT_GT(without.corners_on_bumper, 10u);
   EXPECT_GT(without.depth_on_bumper, 100u);

@@ -1,5 +1,5 @@
-// What moves by itself is not taken for the camera's motion: pairs of points, regions of an image, and a screen that is
-// carried past the camera and fills its view.
+// Moving objects are not mistaken for camera motion: pairs of points, regions of an image, and a screen that is carried
+// past the camera and fills its view.
 #include <gtest/gtest.h>
 
 #include "corner_world.h"
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kThreshold = 2.0 / 480;
 
-/// Points in a cloud before the camera, seen after it moved by `T_current_previous`.
+/// A point cloud in front of the camera, seen again after a motion of `T_current_previous`.
 std::vector<PointPair> points(int n, const SE3& T_current_previous, int age, unsigned seed) {
   cv::RNG random(seed);
   std::vector<PointPair> pairs;
@@ -31,7 +31,7 @@ std::vector<PointPair> operator+(std::vector<PointPair> a, const std::vector<Poi
 }
 
 const SE3 kCamera(Eigen::Matrix3d(expSO3(Eigen::Vector3d(0.01, -0.02, 0.005))), Eigen::Vector3d(0.02, 0.0, -0.01));
-/// The camera as it would have to move if a body that goes sideways by 5 cm stood still.
+/// Apparent motion of the camera relative to a body that moves sideways by 5 cm.
 const SE3 kBody(kCamera.rotation(), kCamera.t() + Eigen::Vector3d(0.05, 0, 0));
 
 PredictedMotion prediction() { return {kCamera, 0.0005, 0.05}; }
@@ -109,7 +109,7 @@ TEST(MovingBodies, RegionsGoByTheNearestPointAndItsDepth) {
   EXPECT_TRUE(regions.moves({300, 215}, 0));
   EXPECT_FALSE(regions.moves({280, 215}, 4.0));  // the wall behind
   EXPECT_FALSE(regions.moves({300, 120}, 2.0));
-  EXPECT_FALSE(regions.moves({300, 400}, 2.0));  // far from all
+  EXPECT_FALSE(regions.moves({300, 400}, 2.0));  // far from all pairs
   EXPECT_FALSE(MovingRegions().moves({10, 10}, 1.0));
 }
 
@@ -130,7 +130,7 @@ TEST(MovingBodies, AScreenCarriedPastTheCameraMovesNothing) {
     const TrackedFramePtr frame = output.frame;
     status = frame->status;
     if (output.keyframe && t > 2.0) {
-      // The first to show the screen's edge cannot know yet.
+      // The first keyframe that shows the screen's edge cannot detect it yet.
       const SE3 T_W_C = CornerWorld::pose(t) * cornerSensor(0, 0).T_imu_cam;
       for (const Feature& f : output.keyframe->frame.features) {
         const Eigen::Vector3d p_W = T_W_C * Eigen::Vector3d(f.xy.homogeneous().cast<double>() * f.depth);

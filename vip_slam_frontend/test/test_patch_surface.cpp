@@ -83,15 +83,15 @@ TEST(PatchSurface, WideWhereOnePlaneIsAllOverTheWidePatch) {
   const PatchSurface narrow = patchSurface(step, kPixel, wallDepth(kPixel), noise());
   EXPECT_TRUE(narrow.known);
   EXPECT_FALSE(narrow.wide);
-  cv::Mat bar = wallDepthImage(0.0017);  // not near the wall: no step within it, but not the wall either
+  cv::Mat bar = wallDepthImage(0.0017);  // no step within the bar itself, but it is not on the wall's plane
   bar.colRange(static_cast<int>(kPixel.x()) + 9, 640) *= 0.4;
   EXPECT_FALSE(patchSurface(bar, kPixel, wallDepth(kPixel), noise()).wide);
   DepthNoise loud = noise();
-  loud.b = 0.007;  // would hide what moves the wide patch
+  loud.b = 0.007;  // noise so large that it would hide the step
   EXPECT_FALSE(patchSurface(wallDepthImage(0.0017), kPixel, wallDepth(kPixel), loud).wide);
 }
 
-// A step of four sigmas is hidden in every single reading, yet a patch across it creeps by pixels.
+// A step of four sigmas is hidden in every single reading, but a patch across it drifts by pixels.
 TEST(PatchSurface, AStepHiddenInTheNoiseIsNoPlane) {
   DepthNoise loud = noise();
   loud.b = 0.006;
@@ -125,7 +125,7 @@ TEST(PatchSurface, WarpIsTheHomographysDerivative) {
   PatchSurface facing = surface;
   facing.slope.setZero();
   ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, facing, kMotion, &warp));
-  EXPECT_GT((warp.A - exact).norm(), 0.1);  // what the slope is there for
+  EXPECT_GT((warp.A - exact).norm(), 0.1);  // hence the slope
   EXPECT_FALSE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface,
                          SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &warp));
 }
@@ -140,7 +140,7 @@ TEST(PatchSurface, WarpFollowsTheHomographyOverTheWholePatch) {
   for (int y = -6; y <= 6; ++y) {
     for (int x = -6; x <= 6; ++x) {
       const Eigen::Vector2d d(x, y);
-      // From the reference by the warp and on by the exact homography: back at the current offset.
+      // The exact homography applied after the inverse warp should return the offset in the current image.
       const auto off = [&](const Eigen::Vector2d& in_reference) -> Eigen::Vector2d {
         return transfer(kMotion, kPixel + in_reference) - middle - d;
       };

@@ -1,4 +1,4 @@
-// How fast the body turns, told apart from the gyro's noise.
+// Separates the body's rotation from the gyro's noise.
 #include <cmath>
 #include <random>
 #include <string>
@@ -11,7 +11,7 @@
 namespace vip_slam {
 namespace {
 
-// Whatever the rates of images and IMU: what is noise is not taken for motion, nor the other way round.
+// At any image and IMU rate noise is not mistaken for motion, nor motion for noise.
 TEST(RateHistory, TellsMotionFromNoise) {
   const double rates[][2] = {{30, 200}, {30, 1000}, {90, 200}, {60, 100}, {50, 100}};  // images, IMU
   for (const auto& [images, imu] : rates) {

@@ -1,5 +1,5 @@
-// Images and depth whose rows are read one after the other, and depth that is taken at another time than colour, while
-// the body turns and sways before a textured corner.
+// Rolling-shutter images and depth, and depth taken at another time than colour, while the body turns and sways in
+// front of a textured corner.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kReadout = 0.03;
 
-/// Root mean square of the position's error over five seconds of motion, metres. `see`: fills the images of the time t.
+/// RMS position error over five seconds of motion, metres. `see`: fills the images at time t.
 template <class See>
 double errorOf(const SensorConfig& sensor, double depth_lag, const See& see) {
   const CornerWorld world;
@@ -33,7 +33,7 @@ double errorOf(const SensorConfig& sensor, double depth_lag, const See& see) {
   return std::sqrt(square / n);
 }
 
-/// Colour that is read row by row, depth as well or not. `told`: the sensor's readouts.
+/// Rolling-shutter colour, depth likewise or global. `..._told`: readout times configured for the sensor.
 double errorOfRows(double colour_told, double depth_told, bool depth_rolls) {
   return errorOf(cornerSensor(colour_told, depth_told), 0, [&](const CornerWorld& world, FrameInput* input) {
     world.look(input->t, kReadout, &input->gray, &input->depth);
@@ -42,7 +42,7 @@ double errorOfRows(double colour_told, double depth_told, bool depth_rolls) {
   });
 }
 
-/// Colour of one instant, depth that is taken `lag` later. `told`: what the front end hears of it.
+/// Global-shutter colour, depth taken `lag` later. `told`: the lag reported to the front end.
 double errorWithLag(double lag, double told, double depth_readout) {
   return errorOf(cornerSensor(0, depth_readout), told, [&](const CornerWorld& world, FrameInput* input) {
     cv::Mat not_used;

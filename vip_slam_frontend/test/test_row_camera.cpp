@@ -13,7 +13,7 @@ constexpr double kReadout = 0.02;
 
 std::shared_ptr<const CameraModel> camera() { return distortedCamera(640, 480, 500); }
 
-/// A body that swings about all axes and along them, 2 rad/s and 15 rad/s^2 at most, and its IMU.
+/// A body that oscillates about all axes and along them, 2 rad/s and 15 rad/s^2 at most, and its IMU.
 struct Swing {
   SE3 T_I_C = SE3(expSO3(Eigen::Vector3d(0.3, -1.2, 0.5)), Eigen::Vector3d(0.05, -0.03, 0.08));
   Eigen::Vector3d bias_gyro = {0.01, -0.02, 0.03}, bias_accel = {0.1, 0.05, -0.2};
@@ -24,7 +24,7 @@ struct Swing {
     return SE3(Eigen::Matrix3d(expSO3(Eigen::Vector3d(0.2, 0.4, -1.0)) * expSO3(Eigen::Vector3d(axis * angle(t)))),
                Eigen::Vector3d(1, 2, 3) + along * (0.2 * std::sin(5 * t + 0.9)));
   }
-  /// By differences of the motion, so that nothing is shared with the code under test.
+  /// By differences of the motion, so that it is independent of the code under test.
   NavState nav(double t) const {
     NavState x;
     x.t = t;

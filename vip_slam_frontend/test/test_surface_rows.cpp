@@ -1,4 +1,4 @@
-// Rows from flat surfaces: Jacobians, what they leave unobservable, and the association behind them.
+// Rows from flat surfaces: Jacobians, unobservable directions, and the association of the pairs.
 #include <cmath>
 #include <random>
 
@@ -73,7 +73,7 @@ double cost(const WindowState& window, const SurfaceMatches& matches) {
     bearing.col(2).head<2>() -= window.depth_shift;
     const Eigen::Vector3d q = bearing * (window.trueDepth(pair.q_cur.z()) / pair.q_cur.z() * pair.q_cur);
     const Eigen::Vector3d p = bearing * (window.trueDepth(pair.p_ref.z()) / pair.p_ref.z() * pair.p_ref);
-    // Two directions in the patch, wherever the bearings put them, span the plane that its points lie on.
+    // Two directions in the patch, after the bearing correction, span the plane of its points.
     const Eigen::Vector3d along = bearing * pair.n_ref.unitOrthogonal();
     const Eigen::Vector3d across = bearing * pair.n_ref.cross(pair.n_ref.unitOrthogonal());
     const double r = along.cross(across).normalized().dot(T_ref_cur * q - p) / pair.sigma;
@@ -181,7 +181,7 @@ TEST(SurfaceRows, NothingFromFewPairsOrAForgottenReference) {
   const Eigen::MatrixXd R = Eigen::MatrixXd::Identity(n, n);
   matches.reference = 99;
   EXPECT_EQ(surfaceRows(window, R, matches, 1.5).rows.r.size(), 0);
-  matches.reference = window.clones.back().id;  // against itself
+  matches.reference = window.clones.back().id;  // matched with itself
   EXPECT_EQ(surfaceRows(window, R, matches, 1.5).rows.r.size(), 0);
   matches.reference = window.clones.front().id;
   matches.pairs.resize(10);
@@ -233,7 +233,7 @@ TEST(SurfaceTracker, PatchesLieOnTheWallsAndMatchesAgreeWithTheMotion) {
   int tilted = 0;
   for (const SurfacePatch& patch : tracker.patches(reference)) {
     const Eigen::Vector3d n_W = T_W_ref.R() * patch.n_C;
-    // At worst a little of the next wall is in the window.
+    // At worst the window contains a little of the adjacent wall.
     EXPECT_GT(n_W.cwiseAbs().maxCoeff(), std::cos(6.0 * M_PI / 180));
     tilted += n_W.cwiseAbs().maxCoeff() < std::cos(2.0 * M_PI / 180);
     EXPECT_LT(patch.n_C.dot(patch.p_C), 0.0);  // towards the camera
@@ -254,8 +254,8 @@ TEST(SurfaceTracker, PatchesLieOnTheWallsAndMatchesAgreeWithTheMotion) {
     sum += std::min(9.0, e * e);
     beyond += std::abs(e) > 4;
   }
-  EXPECT_LT(std::sqrt(sum / matches.pairs.size()), 1.0);  // sigma must not promise more than there is
-  EXPECT_LT(beyond, 0.05 * matches.pairs.size());         // beside corners of the room a reading is the next wall's
+  EXPECT_LT(std::sqrt(sum / matches.pairs.size()), 1.0);  // sigma must not be too small
+  EXPECT_LT(beyond, 0.05 * matches.pairs.size());         // at room corners: adjacent wall
   tracker.clear();
   EXPECT_EQ(tracker.match(reference, SE3()).pairs.size(), 0u);
 }
@@ -272,8 +272,8 @@ double informationAlong(const SurfaceMatches& matches, const Eigen::Vector3d& al
   return (rows.rows.H.middleCols<3>(window.cloneColumn(3) + 3) * along).squaredNorm();
 }
 
-// A floor and a ceiling through a fisheye: fitted in its pixels their patches lay beside them by up to 6 mm at
-// the rim, nearer and farther ones differently, which passed for an offset of the depth camera.
+// A floor and a ceiling through a fisheye: when fitted in its pixels, patches are off by up to 6 mm at the rim,
+// depending on distance, which looks like a depth offset.
 TEST(SurfaceTracker, PatchesOfAFisheyeLieOnTheirPlanes) {
   CameraIntrinsics k;
   k.width = 640, k.height = 480;
@@ -314,7 +314,7 @@ TEST(SurfaceTracker, ABareWallSaysNothingOfMotionAlongIt) {
   tracker.setReference(wall(), 3);
   ASSERT_GT(tracker.size(), 200u);
   double across = 0, along = 0;
-  for (int i = 0; i < 100; ++i) {  // some seconds of standing before it
+  for (int i = 0; i < 100; ++i) {  // a few seconds at rest in front of it
     const SurfaceMatches matches = tracker.match(wall(), SE3());
     across += informationAlong(matches, Eigen::Vector3d::UnitZ());
     along += informationAlong(matches, Eigen::Vector3d::UnitX());
@@ -342,8 +342,8 @@ TEST(PatchGrouping, PatchesOfTheSameWallShareOneNormalAndLonersGo) {
   }
 }
 
-// A door leaf set back by 12 cm: a plane that leans across the step is near stripes of both, and rows with its normal
-// would see motion along the wall that is not there.
+// A door leaf set back by 12 cm: a plane that leans across the step fits stripes of both surfaces, and rows with its
+// normal would report false motion along the wall.
 TEST(PatchGrouping, NoPlaneLeansAcrossAStep) {
   const DepthNoise noise;
   SurfaceTracker tracker(camera(), noise);

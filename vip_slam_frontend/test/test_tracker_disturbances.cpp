@@ -1,4 +1,4 @@
-// Images that say little for a moment, and what enters the view: tracks stay what they were.
+// Temporarily poor images, and objects that enter the view: tracks stay on their points.
 #include <map>
 #include <vector>
 
@@ -75,8 +75,8 @@ TEST_F(DisturbanceTest, ABrightAreaThatEntersIsNoChangeOfTheExposure) {
   EXPECT_GT(left, beside * 9 / 10);
 }
 
-// The exposure changes by so much that a third of the image is saturated, or motion blurs three images: what is found
-// again is what the tracks began with, and as exact.
+// The exposure changes so much that a third of the image is saturated, or motion blurs three images: tracks recover at
+// their original points, with the same accuracy.
 TEST_F(DisturbanceTest, TracksComeBackToWhatTheyBeganWith) {
   for (const bool blurred : {false, true}) {
     SCOPED_TRACE(blurred ? "blurred" : "saturated");
@@ -132,13 +132,13 @@ TEST_F(DisturbanceTest, DepthCarriesOverImagesWithoutIt) {
     if (k == 0) tracker_.replenish(pose(0), true, 0);
     if (k > 0) EXPECT_TRUE(result.pose_ok) << k;
     for (const Track& track : tracker_.tracks()) {
-      EXPECT_EQ(track.feature.depth > 0, k % 3 == 0);  // what the filter is told
+      EXPECT_EQ(track.feature.depth > 0, k % 3 == 0);  // as passed to the filter
       EXPECT_NEAR(track.carried_depth, kWall, 1e-3);
     }
   }
 }
 
-// A landmark that was found by its descriptor is a pixel unsure, and stays so when its patch is found again later.
+// A landmark found by its descriptor has a sigma of a pixel, and keeps it when its patch is found again later.
 TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
   show(0, image(0));
   LandmarkMatcher matcher(TrackingOptions(), testCamera(kFocal));
@@ -161,7 +161,7 @@ TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
   }
   matcher.apply(update);
   tracker_.clear();
-  // Seen from nearer by.
+  // Seen from a shorter distance.
   const SE3 near(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, kWall / 6));
   cv::Mat enlarged;
   const double scale = 1.2;

@@ -141,7 +141,7 @@ cv::Mat squares(double scale) {
   return image;
 }
 
-// A sharp image against an enlarged blur: edges whose two sides differ pull the match aside.
+// A sharp image against an enlarged, blurred reference: asymmetric edges bias the match.
 TEST(PatchAlignment, AnEnlargedPatchMatchesAnImageAsBlurred) {
   const cv::Mat reference = squares(9), current = squares(4);
   const PatchWarp warp(Eigen::Matrix2d((4.0 / 9.0) * Eigen::Matrix2d::Identity()));
@@ -158,7 +158,7 @@ TEST(PatchAlignment, AnEnlargedPatchMatchesAnImageAsBlurred) {
   }
   ASSERT_GT(count, 1000);
   std::printf("%.4f px of %d\n", std::sqrt(sum / count), count);
-  EXPECT_LT(std::sqrt(sum / count), 0.15);  // 0.32 with the image as it is
+  EXPECT_LT(std::sqrt(sum / count), 0.15);  // 0.32 without blurring the image
 }
 
 TEST(PatchAlignment, TheNarrowPatchServesWhereTheWideOneLeavesTheImage) {
@@ -180,8 +180,8 @@ TEST(PatchAlignment, RefusesADifferentPatch) {
   EXPECT_LT(accepted, 8);
 }
 
-/// Half dark, half bright along a slanted edge that fades a little along it, shifted by `shift`, with noise. (Where the
-/// image shows nothing along the edge but noise, the noise's own gradients pass for texture.)
+/// Half dark, half bright at a slanted edge whose contrast fades slightly along it, shifted by `shift`, with noise.
+/// (Without any signal along the edge the gradients of the noise would count as texture.)
 cv::Mat edgePatch(const Eigen::Vector2d& shift, double noise, unsigned seed) {
   cv::Mat image(60, 60, CV_8U);
   cv::RNG random(seed);
@@ -252,7 +252,7 @@ TEST(PixelNoise, WidePatchesAreMoreExactAndLargerOnesLess) {
   wide.known = narrow.known = wide.wide = true;
   EXPECT_LT(matchSigma(wide, 1), matchSigma(narrow, 1));
   EXPECT_LT(matchSigma(narrow, 1), matchSigma(rim, 1));
-  EXPECT_EQ(matchSigma(wide, 0.5), matchSigma(wide, 1));  // smaller than the reference is no more exact
+  EXPECT_EQ(matchSigma(wide, 0.5), matchSigma(wide, 1));  // a reduced view is no more accurate
   EXPECT_NEAR(matchSigma(wide, 2), std::pow(2, 1.5) * matchSigma(wide, 1), 1e-12);
 }
 
@@ -374,7 +374,7 @@ TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
   EXPECT_LT(std::sqrt(sum / old), 0.12);  // px, after 25 images and more
 }
 
-// Bars one metre before the wall cover the outskirts of wide patches: those match their narrow patch.
+// Bars one metre in front of the wall occlude the outer part of wide patches: these fall back to their narrow patch.
 TEST(FeatureTracker, WhatCoversPartOfAWidePatchDoesNotMoveIt) {
   const cv::Mat texture = makeTexture();
   FeatureTracker tracker(TrackingOptions(), camera(), DepthNoise(), nullptr);
@@ -439,7 +439,7 @@ TEST(FeatureTracker, ATrackBeginsAnewWhenDepthFirstShowsItsSurface) {
     if (k == 0) tracker.replenish(poseAt(k), true, k);
     for (const Track& track : tracker.tracks()) (k < 6 ? blind : seeing)[track.feature.id] = track.feature.pixel_sigma;
     if (k == 6) EXPECT_FALSE(tracker.ended().empty());
-    if (k > 6) EXPECT_TRUE(tracker.ended().size() < 10) << k;  // once and no more
+    if (k > 6) EXPECT_TRUE(tracker.ended().size() < 10) << k;  // tracks end only once
   }
   ASSERT_GT(blind.size(), 60u);
   ASSERT_GT(seeing.size(), 60u);

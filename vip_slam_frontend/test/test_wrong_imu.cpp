@@ -1,5 +1,4 @@
-// An IMU whose axes or signs are not what the configuration says: the poses are wrong then, and the status does not say
-// TRACKING.
+// An IMU whose axes or signs differ from the configuration: the poses are wrong, and the status must not be TRACKING.
 #include <functional>
 #include <random>
 
@@ -15,7 +14,7 @@ using Fault = std::function<ImuSample(ImuSample)>;
 
 struct Verdict {
   std::uint64_t contradicted = 0;
-  int named = 0, silent = 0;  ///< images after the first three seconds of motion: with the reason; as TRACKING
+  int named = 0, silent = 0;  ///< images after 3 s of motion: with the reason given; as TRACKING
 };
 
 Verdict judge(const Fault& fault, const SensorConfig& sensor) {
@@ -38,7 +37,7 @@ Verdict judge(const Fault& fault, const SensorConfig& sensor) {
   return verdict;
 }
 
-// A host that stamps images when they arrive: two milliseconds are two pixels at this rate of turn.
+// A host that stamps images on arrival: 2 ms are two pixels at this rotation rate.
 TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
   const CornerWorld world;
   const SensorConfig sensor = cornerSensor(0, 0);
@@ -63,7 +62,7 @@ TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
   EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(output.frame->t).t()).norm(), 0.02);
 }
 
-/// 76 images are judged.
+/// 76 images are evaluated.
 void expectNamed(const Fault& fault) {
   const Verdict verdict = judge(fault, cornerSensor(0, 0));
   EXPECT_GT(verdict.contradicted, 20u);
@@ -71,7 +70,7 @@ void expectNamed(const Fault& fault) {
   EXPECT_LT(verdict.silent, 8);
 }
 
-/// Tracks do not even hold: LOST, coasting, or a start that is refused, each with its own reason.
+/// Faults with which tracking itself fails: LOST, coasting, or a rejected initialisation, each with its own reason.
 void expectNotTracking(const Fault& fault) { EXPECT_LT(judge(fault, cornerSensor(0, 0)).silent, 8); }
 
 TEST(WrongImu, ReversedAccelerometer) {
@@ -111,7 +110,7 @@ TEST(WrongImu, DegreesPerSecond) {
   });
 }
 
-// A bus that now and then delivers one wrong sample: 30 m/s^2 for 5 ms are 15 cm/s.
+// A bus that occasionally delivers one wrong sample: 30 m/s^2 for 5 ms are 15 cm/s.
 TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
   const CornerWorld world;
   FrontEnd front_end(cornerOptions(), cornerSensor(0, 0));
@@ -135,14 +134,14 @@ TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
     if (t < kStill + 3) continue;
     EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
     EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(t).t()).norm(), 0.02) << t;
-    // Nor does a twist have them.
+    // The published twist does not contain them either.
     EXPECT_LT((front_end.gyro(wrong_gyro_t) - CornerWorld::imu(wrong_gyro_t).gyro).norm(), 0.1) << wrong_gyro_t;
   }
   EXPECT_EQ(front_end.counters().imu_spikes, wrong);
   EXPECT_EQ(front_end.counters().imu_contradicted, 0u);
 }
 
-/// What is learnt on the way, and a scale that is off by what cheap sensors are off by, contradict nothing.
+/// Calibration errors that the filter learns online, and scale errors of cheap sensors, are no contradiction.
 TEST(WrongImu, ModerateErrorsAreNoContradiction) {
   SensorConfig sensor = cornerSensor(0, 0);
   sensor.T_imu_cam = SE3(expQuaternion({0.015, -0.01, 0.01}), {0, 0, 0}) * sensor.T_imu_cam;

@@ -1,4 +1,4 @@
-// A camera that sways before a textured wall, and the front end that looks at it; of the tests of the facade.
+// A camera that sways in front of a textured wall, and its front end, for tests of the facade.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace vip_slam {
 
 constexpr double kFocal = 200, kCx = 159.5, kCy = 119.5, kWall = 2.5, kStill = 1.2;
 
-/// The body stands for a while, then sways in front of a wall at x = kWall without turning.
+/// The body is at rest for a while, then sways in front of a wall at x = kWall without rotating.
 struct World {
   cv::Mat texture;
   World() : texture(1200, 2000, CV_8U) {
@@ -51,8 +51,7 @@ struct World {
     return result;
   }
   static cv::Mat depth(double t) { return cv::Mat(240, 320, CV_32FC1, cv::Scalar(kWall - position(t).x())); }
-  /// The same wall with a floor 0.9 m below and another wall 1.1 m to the left: three directions that depth alone
-  /// holds.
+  /// The same wall with a floor 0.9 m below and another wall 1.1 m to the left: depth alone constrains all directions.
   static cv::Mat cornerDepth(double t) {
     const Eigen::Vector3d p = position(t);
     cv::Mat_<float> depth(240, 320);

@@ -1,4 +1,4 @@
-// Test support: the whole plane module with poses that are given as a back end would give them.
+// Test support: the whole plane module, with poses given as by a back end.
 #pragma once
 
 #include <cmath>
@@ -20,7 +20,7 @@ class Rig {
   PlaneUpdate look(const Scene& scene, const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
     return place(camera.keyframe(scene, lookAt(eye, target)), lookAt(eye, target));
   }
-  /// A keyframe that the back end puts at T_W_C, wherever it was taken.
+  /// A keyframe that the back end places at T_W_C, which may differ from where it was taken.
   PlaneUpdate place(const std::shared_ptr<Keyframe>& keyframe, const SE3& T_W_C, const MapUpdate& base = {}) {
     mapper.addKeyframe(keyframe);
     MapUpdate update = updateFor(*keyframe, T_W_C);
@@ -42,7 +42,7 @@ class Rig {
   std::map<KeyframeId, SE3> poses;
 };
 
-/// As a back end gives them of a loaded map; `first` hosts them all.
+/// The planes of a loaded map as passed by the back end; keyframe `first` hosts them all.
 inline std::vector<StoredPlane> storedPlanes(const std::vector<PlaneEstimate>& planes, std::uint32_t epoch = 0,
                                              KeyframeId first = 0, const SE3& T_map_C = {}) {
   std::vector<StoredPlane> stored;

@@ -57,7 +57,7 @@ struct Scene {
   }
 };
 
-/// The camera whose intrinsics are right when those of `given` have to be corrected by `bearing`.
+/// The camera with the true intrinsics, if those of `given` have to be corrected by `bearing`.
 inline std::shared_ptr<const CameraModel> cameraThatMeans(const CameraModel& given, const BearingCorrection& bearing) {
   CameraIntrinsics k = given.intrinsics();
   const Eigen::Vector4d right = correctedIntrinsics({k.fx, k.fy, k.cx, k.cy}, bearing);
@@ -158,7 +158,7 @@ class SceneCamera {
   cv::Mat last_depth_;
 };
 
-/// What a back end that knows the truth says about one keyframe.
+/// The update for one keyframe by a back end that knows the truth.
 inline MapUpdate updateFor(const Keyframe& keyframe, const SE3& T_W_I) {
   MapUpdate update;
   update.revision = keyframe.id;

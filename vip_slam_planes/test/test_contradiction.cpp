@@ -1,4 +1,4 @@
-// When an image shows another surface where a plane is said to be.
+// When an image shows another surface in place of a plane.
 #include <random>
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ class Contradiction : public ::testing::Test {
       for (int x = -3; x < 3; ++x) track.coverCell({x, y}, 1, 1, SE3());
     return track;
   }
-  // What a mesh shows of a surface through the plane's middle that rises by `slope` along x, from x = first to last.
+  // Mesh triangles of a surface through the plane's middle that rises by `slope` along x, from x = first to last.
   std::vector<MapTriangle> surface(double slope, double sigma, double first = -0.3, double last = 0.3) {
     std::vector<MapTriangle> triangles;
     std::normal_distribution<double> gauss;
@@ -74,8 +74,8 @@ TEST_F(Contradiction, WhatStandsOnItDoesNotRefuteIt) {
   EXPECT_FALSE(contradicted(triangles));
 }
 
-// A shelf 0.4 m deep before a wall, seen so flat that one row of points lies on it: triangles from its front edge over
-// that row to the wall behind make a smooth ramp of four degrees.
+// A shelf 0.4 m deep in front of a wall, seen at such a flat angle that it has one row of points: triangles from its
+// front edge over that row to the wall behind form a smooth ramp of four degrees.
 TEST_F(Contradiction, TrianglesFromPlaneToPlaneTellNothing) {
   PlaneTrack shelf(1, PlaneKind::kHorizontal, Plane({0, 0, 1}, -0.9), {0, 0, 0.9}, 0.1);
   PlaneTrack wall(2, PlaneKind::kVertical, Plane({-1, 0, 0}, 0.4), {0.4, 0, 1.2}, 0.1);

@@ -141,7 +141,7 @@ TEST(Detection, ARoundColumnIsNoPlane) {
 }
 
 TEST(Detection, WallAndDoorOfARecessAreNotOneSlantedPlane) {
-  // A structured-light sensor across a room: the door stands back by a few sigma of a pixel.
+  // A structured-light sensor across a room: the door is set back by a few sigmas of a single depth reading.
   DepthNoise noise;
   noise.a = 0.001, noise.b = 0, noise.c = 0.001425, noise.min_range = 0.3, noise.max_range = 10;
   Scene scene;
@@ -161,7 +161,7 @@ TEST(Detection, WallAndDoorOfARecessAreNotOneSlantedPlane) {
 }
 
 TEST(Detection, AStepThatNoiseHidesMayLookLikeASurface) {
-  // A surface that begins 5 m ahead and goes on by `depth` along the view and by `across`.
+  // A surface that starts 5 m ahead and extends by `depth` along the viewing direction and by `across` sideways.
   const auto seen = [](double depth, double across, double depth_sigma) {
     const Plane plane = Plane::fromPointNormal({5, 0, 0}, Eigen::Vector3d(-across, depth, 0).normalized());
     const double facing = -plane.n.dot(Eigen::Vector3d::UnitX());
@@ -177,7 +177,7 @@ TEST(Detection, AStepThatNoiseHidesMayLookLikeASurface) {
   };
   EXPECT_TRUE(seen(0.5, 0.2, 0.05));    // half a metre is hidden by 5 cm of noise
   EXPECT_FALSE(seen(0.5, 0.2, 0.005));  // but not by 5 mm: a pillar's side
-  EXPECT_FALSE(seen(3.0, 1.0, 0.05));   // a wall that goes on
+  EXPECT_FALSE(seen(3.0, 1.0, 0.05));   // a continuous wall
   EXPECT_FALSE(seen(0.1, 0.8, 0.05));   // a wall seen from the front
 }
 
@@ -266,7 +266,7 @@ TEST(Detection, HistogramKeepsSidesApartAndForgets) {
 TEST(Detection, HeightsAndDistancesHaveBinsOfTheirOwn) {
   PlaneHistogram histogram(0.5, 0.05, 3);
   histogram.addHorizontal({0, 0, 1}, {0, 0, 0.1}, 1.0, 0);
-  histogram.addHorizontal({0, 0, 1}, {0, 0, 0.6}, 1.0, 1);  // a neighbour at half a metre, not at 5 cm
+  histogram.addHorizontal({0, 0, 1}, {0, 0, 0.6}, 1.0, 1);  // a neighbour for bins of 0.5 m, not of 5 cm
   histogram.addVertical({1, 0, 0}, {0.1, 0, 0}, 0.9, 2);
   histogram.addVertical({1, 0, 0}, {0.6, 0, 0}, 0.9, 3);
   EXPECT_EQ((std::vector<int>{0, 1}), histogram.peak().members);

@@ -81,7 +81,7 @@ TEST(Shape, AFaceOfThreeColumnsIsAStrip) {
     return isSolid(mesh, all);
   };
   EXPECT_FALSE(solid(1));
-  EXPECT_FALSE(solid(2));  // one column inside: the outer two may be its neighbours'
+  EXPECT_FALSE(solid(2));  // one inner column: the outer two may belong to adjacent surfaces
   EXPECT_TRUE(solid(3));
   EXPECT_TRUE(solid(6));
 }
@@ -95,7 +95,7 @@ TEST_F(Evidence, PiecesOfOneWallInThreeKeyframesStartIt) {
   EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), found[0].plane), 1e-6);
   EXPECT_NEAR(3, found[0].plane.d, 1e-6);
   EXPECT_GT(found[0].triangles.size(), 140u);  // of 150: corners may fall out of the patches
-  EXPECT_TRUE(add(4, {}).empty());             // what it took is not there any more
+  EXPECT_TRUE(add(4, {}).empty());             // its triangles have been consumed
 }
 
 TEST_F(Evidence, SeeingASmallThingOftenDoesNotMakeItLarge) {
@@ -111,7 +111,7 @@ TEST_F(Evidence, WhatWasTooSmallIsTestedAgainWhenMoreOfItHasShown) {
 }
 
 TEST_F(Evidence, WhatFailedIsTestedAgainWhenKeyframesHaveMoved) {
-  // Six views of one wall, half of them from poses that are 20 cm off: they agree on nothing that is large enough.
+  // Six views of one wall, half of them with poses that are 20 cm off: they do not agree on a large enough area.
   const auto view = [](KeyframeId id) { return board(id % 2 ? 0.0 : 0.3, 0.8, 5, 5); };
   for (KeyframeId id = 1; id <= 6; ++id) {
     poses[id] = SE3(Eigen::Quaterniond::Identity(), {id % 2 ? 0.0 : 0.2, 0.1 * double(id), 1});
@@ -121,7 +121,7 @@ TEST_F(Evidence, WhatFailedIsTestedAgainWhenKeyframesHaveMoved) {
     EXPECT_TRUE(evidence.detect(poses, {}).empty()) << id;
   }
   for (auto& [id, pose] : poses) pose.t().x() = 0;
-  EXPECT_TRUE(evidence.detect(poses, {}).empty());  // known to have failed, not known to have moved
+  EXPECT_TRUE(evidence.detect(poses, {}).empty());  // failed before, and the move is not noticed yet
   evidence.forgetTests();
   EXPECT_EQ(1u, evidence.detect(poses, {}).size());
 }
@@ -131,7 +131,7 @@ TEST_F(Evidence, StripsOneCellWideAreNoWall) {
 }
 
 TEST_F(Evidence, WhatShowsOfAWorktopStartsItBetweenTheTraysOnIt) {
-  // A dark worktop gives depth in a small piece only; the trays beside it are larger, but too narrow for a plane.
+  // A dark worktop gives depth only in a small piece; the trays next to it are larger, but too narrow for a plane.
   const auto view = [](double shift) {
     return together(shelf(1.0 + shift, 0.0, 0.0, 3, 2), shelf(1.0, 0.4, 0.045, 8, 2));
   };
@@ -177,7 +177,7 @@ TEST_F(Evidence, FollowsTheKeyframesAndForgetsThem) {
   EXPECT_EQ(1, evidence.seenBy(track, poses, 0.1));
   evidence.remove(1);
   EXPECT_EQ(0, evidence.seenBy(track, poses, 0.1));
-  // With one of three gone, the others do not suffice.
+  // With one of three removed, the others do not suffice.
   poses[2].t().x() -= 0.3;
   EXPECT_TRUE(add(3, board(0.4, 0.8, 5, 5)).empty());
 }

@@ -64,8 +64,8 @@ TEST_F(Growth, OfTwoPlanesTheNearerOneTakesIt) {
   EXPECT_EQ(1, label(triangle({2.95, 0, 0}, 0), {&at_three, &door}));
 }
 
-// A strip of wall 8 cm behind another plane. Noise puts its triangles before the wall, a third of them nearer to the
-// other plane.
+// A strip of wall 8 cm behind another plane. Noise moves its triangles in front of the wall, a third of them nearer to
+// the other plane.
 TEST_F(Growth, ThePatchTellsWhatItsTrianglesDoNot) {
   const PlaneTrack door = wall(2.92, 2);
   const double off[3] = {-0.055, -0.015, -0.01};
@@ -77,7 +77,7 @@ TEST_F(Growth, ThePatchTellsWhatItsTrianglesDoNot) {
   EXPECT_EQ(1, label(strip[0], {&at_three, &door})) << "by itself";
   for (int l : associateTriangles(strip, {&at_three, &door}, PlaneGrowthOptions())) EXPECT_EQ(0, l);
   for (int l : associateTriangles(strip, {&door, &at_three}, PlaneGrowthOptions())) EXPECT_EQ(1, l);
-  for (MapTriangle& t : strip) t.sigma = 0.01;  // not noise: a step that the mesh did not notice
+  for (MapTriangle& t : strip) t.sigma = 0.01;  // not noise: a step that the mesh bridges
   EXPECT_EQ(1, associateTriangles(strip, {&at_three, &door}, PlaneGrowthOptions())[0]);
   EXPECT_EQ(0, associateTriangles(strip, {&at_three, &door}, PlaneGrowthOptions())[1]);
 }
@@ -100,7 +100,7 @@ TEST_F(Growth, WhenTheNearerPlaneIsOutOfReachTheNextOneIsAsked) {
                                                          {&far, &at_three}, PlaneGrowthOptions()));
 }
 
-// At the rim of what noise lets in cells are cleared and covered again by one keyframe after the other.
+// At the limit of what noise allows, cells are alternately cleared and covered by successive keyframes.
 TEST(PlaneTrack, ACellThatComesAndGoesCountsOnceInAMerge) {
   const auto level = [](PlaneId id) {
     return PlaneTrack(id, PlaneKind::kHorizontal, Plane({0, 0, 1}, 0), Eigen::Vector3d::Zero(), 0.1);
@@ -137,7 +137,7 @@ TEST(PlaneTrack, AStoredPolygonCoversTheCellsWhoseCentresLieInItAndInNoHole) {
   EXPECT_GT(covered, 1000);
 }
 
-// Between the fronts of two cupboards; the other host of the area moves by less than a cell.
+// The gap is between the fronts of two cupboards; the other host of the area moves by less than a cell.
 TEST(PlaneTrack, AGapOfOneCellStaysOpenWhenTheMapMoves) {
   PlaneTrack track(1, PlaneKind::kVertical, Plane({-1, 0, 0}, 3), {3, 0, 0}, 0.1);
   CameraPoses poses = {{1, SE3()}, {2, SE3()}};

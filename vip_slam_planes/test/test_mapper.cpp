@@ -1,4 +1,4 @@
-// The whole plane module on exact scenes, with poses that are given as a back end would give them.
+// The whole plane module on exact scenes, with poses given as by a back end.
 #include <cmath>
 #include <limits>
 
@@ -56,7 +56,7 @@ TEST(Mapper, AFloorIsAsFarBelowTheOriginBeforeGravityIsKnown) {
 }
 
 TEST(Mapper, ADoorWhoseRecessDidNotShowFromAfarIsStillFound) {
-  // From afar and at a flat angle the wall goes on across the recess, so all of the leaf lies where the wall is known.
+  // From afar and at a flat angle the wall seems to continue across the recess, so the leaf is where wall is mapped.
   Rig rig;
   Scene afar, near;
   afar.add({3, -3, 0}, {0, 6, 0}, {0, 0, 2.6});
@@ -74,7 +74,7 @@ TEST(Mapper, ADoorWhoseRecessDidNotShowFromAfarIsStillFound) {
 TEST(Mapper, APlaneWaitsForASecondSightingWhileNobodyLooks) {
   Rig rig;
   Scene scene;
-  scene.add({3, -0.4, 0.8}, {0, 0.8, 0}, {0, 0, 0.8});  // a board, too small to be sure of at once
+  scene.add({3, -0.4, 0.8}, {0, 0.8, 0}, {0, 0, 0.8});  // a board, too small to be accepted at once
   scene.add({-3, -2, 0}, {0, 4, 0}, {0, 0, 2.5});
   const Plane board({-1, 0, 0}, 3);
   rig.look(scene, {0, 0, 1.2}, {3, 0, 1.2});
@@ -87,7 +87,7 @@ TEST(Mapper, APlaneWaitsForASecondSightingWhileNobodyLooks) {
 TEST(Mapper, FramesFromFurtherOnConfirmAPlaneThatOneKeyframeSaw) {
   Scene scene;
   scene.add({3, -0.4, 0.8}, {0, 0.8, 0}, {0, 0, 0.8});
-  for (const double step : {0.05, 0.1}) {  // two places 0.1 m apart are not enough, five are
+  for (const double step : {0.05, 0.1}) {  // viewpoints count when 0.1 m apart: two are not enough, five are
     Rig rig;
     rig.look(scene, {0, 0, 1.2}, {3, 0, 1.2});
     for (int i = 1; i <= 5; ++i) {
@@ -113,7 +113,7 @@ TEST(Mapper, WhoHasSeenAPlaneBeforeItsStartCounts) {
 }
 
 TEST(Mapper, WhatKeyframesStartSmallIsPublishedWhenFramesHaveGrownIt) {
-  // Of a dark worktop the keyframes see a corner, a later frame more.
+  // The keyframes see a corner of a dark worktop, a later frame more of it.
   Scene corner, more;
   corner.add({1.0, 0, 0.9}, {0.34, 0, 0}, {0, 0.30, 0});
   more.add({1.0, 0, 0.9}, {0.6, 0, 0}, {0, 0.5, 0});
@@ -178,7 +178,7 @@ TEST(Mapper, DoorwayIsAHoleInTheWall) {
   EXPECT_FALSE(covers(*wall, {3, 0, 1.0}));
 }
 
-// What lies behind is out of the depth camera's reach, or is glass: nothing ever speaks against a wall there.
+// Behind it is glass, or nothing within the depth camera's range: no depth ever refutes a wall there.
 TEST(Mapper, DoorwayThatShowsNoDepthStaysOpenAtImageRate) {
   Rig rig;
   const Scene scene = wallWithDoorway();
@@ -190,7 +190,7 @@ TEST(Mapper, DoorwayThatShowsNoDepthStaysOpenAtImageRate) {
     rig.mapper.grow(frame, SE3());
   }
   rig.mapper.applyMapUpdate(MapUpdate());
-  EXPECT_GE(rig.mapper.counters().frames_grown, 8u);  // now and then one follows too closely
+  EXPECT_GE(rig.mapper.counters().frames_grown, 8u);  // some follow too closely and are skipped
   const PlaneEstimate* wall = rig.find(Plane({-1, 0, 0}, 3), 0.01);
   ASSERT_TRUE(wall);
   EXPECT_GT(wall->area, 5);
@@ -230,7 +230,7 @@ TEST(Mapper, GrowsWithFramesButStartsNothing) {
 TEST(Mapper, ObservationsHoldOnlyPointsOfTheirPlane) {
   Rig rig;
   Scene scene = room();
-  scene.add({1.5, -0.4, 0}, {0, 0.8, 0}, {0, 0, 0.9});  // a box before the wall
+  scene.add({1.5, -0.4, 0}, {0, 0.8, 0}, {0, 0, 0.9});  // a box in front of the wall
   scene.add({1.5, -0.4, 0.9}, {0, 0.8, 0}, {0.6, 0, 0});
   scene.add({2.95, 0.6, 0.8}, {0, 1, 0}, {0, 0, 1.0});  // a picture 5 cm off the wall
   std::size_t observations = 0, points = 0;
@@ -268,7 +268,7 @@ TEST(Mapper, OptimisedParametersReplaceOursAndPolygonsFollow) {
   for (int i = 0; i < 3; ++i) rig.look(scene, {0, 0.2 * i, 1.4}, {3, 0, 1.0});
   const PlaneEstimate wall = *rig.find(Plane({-1, 0, 0}, 3));
   MapUpdate update;
-  const Plane optimised(Eigen::Vector3d(1, 0.01, 0), -3.01);  // on the other gauge
+  const Plane optimised(Eigen::Vector3d(1, 0.01, 0), -3.01);  // with the opposite sign of normal and distance
   update.planes.emplace_back(wall.id, optimised);
   rig.mapper.applyMapUpdate(update);
   const PlaneEstimate* moved = rig.find(optimised.flipped(), 1e-9);
@@ -353,7 +353,7 @@ TEST(Mapper, KeyframesWaitAsLongAsTheBackEndHoldsThem) {
   EXPECT_EQ(0u, rig.mapper.counters().keyframes_forgotten);
   rig.mapper.applyMapUpdate(update);
   EXPECT_EQ(kMostWaitingKeyframes + 1, rig.mapper.counters().keyframes);
-  // One that finds as many waiting already, which the back end has given up, makes room for itself.
+  // A keyframe that arrives when the queue is full of keyframes dropped by the back end evicts one of them.
   for (KeyframeId id = 1; id <= kMostWaitingKeyframes + 2; ++id) {
     const auto keyframe = std::make_shared<Keyframe>(*taken);
     keyframe->id = 10000 + id;
@@ -399,7 +399,7 @@ TEST(Mapper, PosesThatAreNoNumbersChangeNothing) {
   ASSERT_GT(planes, 0u);
   const SE3 nowhere(Eigen::Quaterniond::Identity(), {kNan, 0, 0});
 
-  MapUpdate update;  // of a keyframe that is placed, of a plane, of a landmark
+  MapUpdate update;  // with NaN: a placed keyframe, a plane, a landmark
   update.keyframes.push_back({1, {}});
   update.keyframes.back().state.T_W_I = nowhere;
   for (const PlaneEstimate& p : rig.mapper.planes()) {
@@ -416,7 +416,7 @@ TEST(Mapper, PosesThatAreNoNumbersChangeNothing) {
   rig.place(keyframe, nowhere);
   EXPECT_EQ(planes, rig.mapper.planes().size());
   EXPECT_TRUE(allFinite(rig.mapper.planes()));
-  // The keyframe waits for a pose that is one.
+  // The keyframe waits for a valid pose.
   EXPECT_EQ(1u, rig.mapper.counters().keyframes_waiting);
   rig.mapper.applyMapUpdate(updateFor(*keyframe, lookAt({0, 0.6, 1.4}, {3, 0, 1.0})));
   EXPECT_EQ(4u, rig.mapper.counters().keyframes);

@@ -1,4 +1,4 @@
-// What the back end corrects, on exact scenes: poses, the camera's mounting and intrinsics, the depth's offset.
+// Corrections by the back end, on exact scenes: poses, extrinsics, intrinsics and depth offset.
 #include <cmath>
 #include <set>
 
@@ -15,7 +15,7 @@ using testing::room;
 using testing::Scene;
 using testing::updateFor;
 
-/// All of `result` are of one keyframe at T_W_C, say that they have `correction`, and lie on their planes.
+/// Expects all observations in `result` to be of one keyframe at T_W_C, with `correction`, and on their planes.
 void expectCorrectedObservations(const PlaneUpdate& result, const SE3& T_W_C, const CameraCorrection& correction) {
   ASSERT_FALSE(result.observations.empty());
   for (const PlaneObservation& o : result.observations) {
@@ -29,7 +29,7 @@ void expectCorrectedObservations(const PlaneUpdate& result, const SE3& T_W_C, co
 }
 
 TEST(Mapper, KeyframesLookFromTheMountingThatIsKnownNow) {
-  // The front end held the mounting to be 3 degrees off when it made the keyframes; the back end knows better.
+  // The front end's extrinsics were 3 degrees off when it made the keyframes; the back end has corrected them.
   Rig rig;
   const Scene scene = room();
   const SE3 T_I_C(expQuaternion({0.2, -0.1, 0.3}), {0.05, 0.02, 0});
@@ -49,7 +49,7 @@ TEST(Mapper, KeyframesLookFromTheMountingThatIsKnownNow) {
 }
 
 TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
-  // Read 2 cm too long at first; the back end tells of it with the sixth keyframe.
+  // Depth reads 2 cm too long at first; the back end reports the error with the sixth keyframe.
   Rig rig;
   const Scene scene = room();
   const Plane truth({-1, 0, 0}, 3);
@@ -69,7 +69,7 @@ TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
   EXPECT_GT(std::abs(wall->plane.d - truth.d), 0.01);
   rig.mapper.applyMapUpdate(all);
   EXPECT_TRUE(rig.find(truth, 0.002));
-  // One that is placed later than that is known is corrected as well, and says so.
+  // A keyframe placed after the error is known is corrected as well, and its observations state the correction.
   const SE3 T_W_C = lookAt({0.3, 0.1, 1.4}, {3, 0.2, 1.1});
   const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
   for (float& z : keyframe->frame.depth_grid.z) z += z > 0 ? 0.02f : 0.0f;
@@ -82,7 +82,7 @@ TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {
 }
 
 TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
-  // Focal lengths 2 % too long, the principal point 8 px off; the back end tells of it with the sixth keyframe.
+  // Focal lengths 2 % too long, the principal point 8 px off; the back end reports it with the sixth keyframe.
   Rig rig;
   const BearingCorrection bearing{{0.02, 0.02, 0.015, -0.01}};
   rig.camera.camera = testing::cameraThatMeans(*rig.camera.camera, bearing);
@@ -100,7 +100,7 @@ TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
   EXPECT_FALSE(rig.find(truth, 0.005));
   rig.mapper.applyMapUpdate(all);
   EXPECT_TRUE(rig.find(truth, 0.003));
-  // One that comes with the correction is seen with it at once.
+  // A keyframe that carries the correction is used with it at once.
   const SE3 T_W_C = lookAt({0.3, 0.1, 1.4}, {3, -1.2, 1.1});
   const std::shared_ptr<Keyframe> keyframe = rig.camera.keyframe(scene, T_W_C);
   keyframe->frame.camera_correction.bearing = bearing;
@@ -143,13 +143,13 @@ void expectCarriedAlong(double yaw, bool optimised) {
   EXPECT_LT((high - high2).norm(), 0.15);
 }
 
-// Those beyond a right angle leave the normal on the side that was seen.
+// Rotations beyond a right angle keep the normal on the side that was seen.
 TEST(Mapper, CorrectionsCarryPlanesAndAreaAlong) {
   for (const bool optimised : {false, true})
     for (const double yaw : {0.1, 0.5, M_PI / 2, 2.0, M_PI}) expectCarriedAlong(yaw, optimised);
 }
 
-// The keyframe before it saw nothing of the wall yet.
+// The keyframe before it did not see the wall yet.
 TEST(Mapper, AreaOfAKeyframeThatGoesMovesWithTheUpdateThatItGoesWith) {
   Rig rig;
   Scene scene;
@@ -183,7 +183,7 @@ TEST(Mapper, AreaOfAKeyframeThatGoesMovesWithTheUpdateThatItGoesWith) {
   EXPECT_NEAR(low + 2, moved_low, 0.1);
 }
 
-// The first keyframe leans by more than gravity will say; the floor far ahead shows too flat for samples.
+// The first keyframe is tilted against its final pose; the floor far ahead is seen at too flat an angle for samples.
 TEST(Mapper, APlaneThatNoObservationHoldsMovesWithTheKeyframeThatShowsIt) {
   PlaneMapperOptions options;
   options.observation.min_points = 1000;
@@ -203,8 +203,8 @@ TEST(Mapper, APlaneThatNoObservationHoldsMovesWithTheKeyframeThatShowsIt) {
   EXPECT_NEAR(before.planes[0].area, after.planes[0].area, 0.05 * before.planes[0].area);
 }
 
-// These few samples of a strip do not tell its direction, so that the back end does not get them: what it says about
-// the plane is what it was told before.
+// These few samples of a strip do not determine its normal, so they are withheld from the back end: the plane in its
+// updates is the one it was given before.
 TEST(Mapper, APlaneWhoseObservationsAreWithheldIsNotTheBackEnds) {
   PlaneMapperOptions options;
   options.observation.effective_points = 1;
@@ -264,7 +264,7 @@ TEST(MapperCorrections, AGlobalUpdateHealsWhatALostOneHadRemoved) {
   }
   MapUpdate removal;
   removal.removed_keyframes = {6};
-  told.mapper.applyMapUpdate(removal);  // the other one loses this
+  told.mapper.applyMapUpdate(removal);  // the other mapper does not receive this update
   for (Rig* rig : {&told, &missed}) {
     rig->poses.erase(6);
     rig->mapper.applyMapUpdate(everything(rig->poses));
@@ -290,7 +290,7 @@ TEST(MapperCorrections, KeyframesThatTheBackEndNeverTookAreNotKept) {
   }
   EXPECT_EQ(3u, rig.mapper.counters().keyframes_waiting);
   rig.mapper.applyMapUpdate(everything(rig.poses));
-  EXPECT_EQ(1u, rig.mapper.counters().keyframes_waiting);  // the newest one may be placed yet
+  EXPECT_EQ(1u, rig.mapper.counters().keyframes_waiting);  // the newest one may still be placed
 }
 
 TEST(MapperCorrections, AKeyframeOnItsWayIsNoneOfAMapThatIsLoadedMeanwhile) {
@@ -304,7 +304,7 @@ TEST(MapperCorrections, AKeyframeOnItsWayIsNoneOfAMapThatIsLoadedMeanwhile) {
   EXPECT_EQ(stored.mapper.planes().size(), rig.mapper.planes().size());
 }
 
-// A cupboard that is put further back or forward: the two places are merged, and disagree.
+// A cupboard that is moved back or forward: its two positions are merged, and disagree.
 TEST(Mapper, AFrontThatWasMovedIsWhereItIsNow) {
   for (const double way : {0.06, 0.09, -0.06}) {
     const auto with_front_at = [](double y) {

@@ -1,4 +1,4 @@
-// What keyframes of an odometry that started anew may do to planes before and after their place in the map is known.
+// Effect of keyframes of a restarted odometry on planes, before and after their pose in the map is known.
 #include <algorithm>
 #include <set>
 #include <vector>
@@ -25,15 +25,15 @@ std::shared_ptr<Keyframe> taken(Rig* rig, const SE3& T_W_C, std::uint32_t epoch,
 
 SE3 view(int i) { return lookAt({-1 + 0.3 * i, 0.1 * i, 1.4}, {3, -0.8 + 0.4 * i, 1.0}); }
 
-/// In `map` as a back end puts them that goes on where the map ends: 1.5 m off, the wall ahead seems to be further
+/// Guessed pose in `map` of a back end that continues where the map ends: 1.5 m off, so the wall ahead seems further
 /// away.
 SE3 guess(const SE3& truth) { return SE3(truth.rotation(), truth.t() + Eigen::Vector3d(1.5, 0, 0)); }
 
 std::vector<EpochPart> together(std::uint32_t a, std::uint32_t b) { return {{a, a}, {b, a}}; }
 std::vector<EpochPart> apart(std::uint32_t a, std::uint32_t b) { return {{a, a}, {b, b}}; }
 
-/// The update in which the back end places a keyframe and closes a loop with it: it brings all to where they are, and
-/// the keyframe's epoch to `epoch`.
+/// The update in which the back end places a keyframe and closes a loop with it: it moves all keyframes to their true
+/// poses, and joins the keyframe's epoch to `epoch`.
 MapUpdate closing(const Keyframe& query, std::uint32_t epoch, const std::map<KeyframeId, SE3>& truth) {
   MapUpdate update = updateFor(query, truth.at(query.id));
   update.global = true;
@@ -129,7 +129,8 @@ TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   for (int i = 0; i < 6; ++i) first.place(taken(&first, view(i), 0), view(i));
   rig.mapper.restore(testing::storedPlanes(first.mapper.planes(), kLoaded), kFirst - 1);
   const std::set<PlaneId> loaded = idsOf(rig);
-  // Localisation found the place of one that does not enter the map; mapping goes on later, where odometry has drifted.
+  // Localisation places a keyframe that does not enter the map; mapping continues later, after the odometry has
+  // drifted.
   const auto passing = taken(&rig, view(0), 4, kFirst);
   MapUpdate update = updateFor(*passing, view(0));
   update.keyframes.clear();
@@ -193,7 +194,7 @@ TEST(MapperEpochs, AreaOfARemovedKeyframeStaysWithItsEpoch) {
     for (const Eigen::Vector3d& q : p.outer) EXPECT_LT(q.z(), 2.75);
 }
 
-// The update with the loop is lost; the one that places the next keyframe tells as well.
+// The update with the loop is lost; the one that places the next keyframe reports the tie as well.
 TEST(MapperEpochs, ATieInALostUpdateComesWithTheNext) {
   Rig rig;
   std::map<KeyframeId, SE3> truth;
@@ -217,7 +218,7 @@ TEST(MapperEpochs, ATieInALostUpdateComesWithTheNext) {
   EXPECT_EQ(twice, 2 * rig.mapper.planes().size());
 }
 
-// A stored map of two parts, the second of which lies 1.5 m off, as the back end guessed.
+// A stored map of two parts, of which the second is 1.5 m off, at the back end's guess.
 TEST(MapperEpochs, AStoredFragmentSaysNothingUntilItIsTiedAndThenComesAlong) {
   constexpr KeyframeId kFirst = 100, kHost = 1, kOther = 50;
   constexpr std::uint32_t kMap = 0x80000000u, kFragment = 0x80000001u;
@@ -233,12 +234,12 @@ TEST(MapperEpochs, AStoredFragmentSaysNothingUntilItIsTiedAndThenComesAlong) {
     planes.push_back(plane);
   }
   rig.mapper.restore(planes, kFirst - 1);
-  rig.mapper.applyMapUpdate({});  // polygons are drawn anew
+  rig.mapper.applyMapUpdate({});  // polygons are recomputed
   const Plane far_wall({-1, 0, 0}, 4.5);
   ASSERT_TRUE(rig.find(far_wall));
   const double area = rig.find(far_wall)->area;
 
-  // Views of the map, through where the fragment's walls would be.
+  // Views of the map through the apparent position of the fragment's walls.
   std::map<KeyframeId, SE3> truth = {{kHost, view(0)}, {kOther, view(0)}};
   const auto place = [&](int i, const std::vector<EpochPart>& parts) {
     const auto keyframe = taken(&rig, view(i % 6), 0, kFirst);
@@ -257,7 +258,7 @@ TEST(MapperEpochs, AStoredFragmentSaysNothingUntilItIsTiedAndThenComesAlong) {
   ASSERT_TRUE(rig.find(far_wall));
   EXPECT_EQ(area, rig.find(far_wall)->area);
 
-  // A loop ties the fragment; the back end says where its wall is now, its host where it was seen from.
+  // A loop ties the fragment; the back end reports the wall's new position and the pose of its host.
   const auto query = taken(&rig, view(2), 0, kFirst);
   truth[query->id] = view(2);
   rig.mapper.addKeyframe(query);
@@ -271,7 +272,7 @@ TEST(MapperEpochs, AStoredFragmentSaysNothingUntilItIsTiedAndThenComesAlong) {
   const PlaneUpdate update = rig.mapper.applyMapUpdate(loop);
   EXPECT_EQ(once, update.merges.size());
   EXPECT_EQ(once, rig.mapper.planes().size());
-  // What was drawn 1.5 m beside came along: no floor beyond the wall.
+  // Polygons drawn 1.5 m off have moved along: no floor beyond the wall.
   for (const PlaneEstimate& plane : rig.mapper.planes())
     for (const PlanePolygon& p : plane.polygons)
       for (const Eigen::Vector3d& q : p.outer) EXPECT_LT(q.x(), 3.25) << plane.id;

@@ -1,4 +1,4 @@
-// Which pieces the plane module takes for one surface, on exact scenes.
+// Which pieces the plane module merges into one surface, on exact scenes.
 #include <cmath>
 #include <set>
 
@@ -27,8 +27,8 @@ TEST(Mapper, DoorBeforeTheWallStaysTwoWhateverTheView) {
   EXPECT_NEAR(2.1, rig.find(Plane({-1, 0, 0}, 2.88))->area, 0.35);
 }
 
-// From almost six metres depth scatters by as much as the door stands before its wall, and one plane begins that leans
-// across both.
+// At almost six metres depth noise is as large as the distance of the door from its wall, so that one plane starts that
+// leans across both.
 TEST(Mapper, ADoorThatNoiseMadeOneWithItsWallIsOfItsOwnFromNear) {
   DepthNoise noise = testing::quietNoise();
   noise.a = 0.001, noise.b = 0, noise.c = 0.0035, noise.max_range = 6;
@@ -55,7 +55,7 @@ TEST(Mapper, WhatNoiseLetInIsTakenAwayByOneNearView) {
   afar.add({3, -1.5, 0}, {0, 3, 0}, {0, 0, 2.5});
   near.add({3, -1.5, 0}, {0, 1.0, 0}, {0, 0, 2.5});
   near.add({3, 0.5, 0}, {0, 1.0, 0}, {0, 0, 2.5});
-  near.add({3.5, -0.8, 0}, {0, 1.6, 0}, {0, 0, 2.5});  // a niche that did not show
+  near.add({3.5, -0.8, 0}, {0, 1.6, 0}, {0, 0, 2.5});  // a niche that was not visible before
   for (int i = 0; i < 6; ++i) rig.look(afar, {-2.2, -0.5 + 0.2 * i, 1.3}, {3, 0, 1.25});
   const Plane wall({-1, 0, 0}, 3);
   ASSERT_TRUE(rig.find(wall, 0.03));
@@ -64,7 +64,7 @@ TEST(Mapper, WhatNoiseLetInIsTakenAwayByOneNearView) {
   EXPECT_LT(rig.find(wall, 0.03)->area, 6.0);
 }
 
-// From afar noise hides the step; a wall that took the board then lets it go.
+// At long range noise hides the step; a wall that has absorbed the board has to give it up later.
 TEST(Mapper, ABoardOnTheWallIsASurfaceOfItsOwnWhereItShows) {
   for (const double step : {0.0, 0.045}) {
     DepthNoise noise = testing::quietNoise();
@@ -88,7 +88,7 @@ TEST(Mapper, CorridorWallSeenFromBothEndsBecomesOne) {
   Rig rig;
   Scene scene;
   scene.add({-6, 1, 0}, {12, 0, 0}, {0, 0, 2.5});
-  // Each end looks at its own half first; what lies between comes last. The far end has drifted by 2.5 cm.
+  // Each half is seen first from its own end, the part in between last. The far end has drifted by 2.5 cm.
   const auto at = [&](double x, double target_x, double drift) {
     const SE3 truth = lookAt({x, -1, 1.3}, {target_x, 1, 1.2});
     const auto keyframe = rig.camera.keyframe(scene, truth);
@@ -138,9 +138,9 @@ TEST(Mapper, TheFurtherApartTheBetterPiecesOfOneWallMustAgree) {
   }
 }
 
-// Two pieces of a wall, a metre apart and seen from six, that differ by one to four centimetres and a degree: all
-// the same to a camera whose depth scatters there by 13 cm and is off by as much together in neighbouring pixels, but
-// not to a good one; nor is a step of 20 cm the same to any.
+// Two pieces of a wall, 1 m apart and seen from 6 m, that differ by 1 to 4 cm and 1 degree: equal for a camera with 13
+// cm of depth noise there, correlated between neighbouring pixels, but not for an accurate one. A step of 20 cm is
+// different for both.
 TEST(Mapper, PiecesThatDifferByWhatNoiseExplainsAreOneWall) {
   DepthNoise noisy = testing::quietNoise();
   noisy.a = 0.001, noisy.b = 0, noisy.c = 0.0036, noisy.max_range = 6.5;
@@ -214,8 +214,8 @@ TEST(Mapper, ASmallPieceOfCeilingBelongsToTheCeiling) {
   }
 }
 
-// Two corners of a ceiling, 2.4 and 0.8 m^2, seen over a wall that ends there or goes on above them; the estimator may
-// have tilted the larger one.
+// Two corners of a ceiling, 2.4 and 0.8 m^2, seen over a wall that ends at them or extends above them; the estimator
+// may have tilted the larger one.
 TEST(Mapper, CornersOfACeilingAreOneUnlessSomethingShowsAboveThem) {
   struct Case {
     double wall, step, tilt;
@@ -244,8 +244,8 @@ TEST(Mapper, CornersOfACeilingAreOneUnlessSomethingShowsAboveThem) {
   }
 }
 
-// Two pieces of floor, 0.9 and 0.5 m^2, before a wall that ends there or goes on below them, as it does below tables;
-// or something lies lower in another corner of the map.
+// Two pieces of floor, 0.9 and 0.5 m^2, in front of a wall that ends at them or extends below them, as below tables; or
+// with a lower surface in another corner of the map.
 TEST(Mapper, PiecesOfTheLowestFloorAreOneButTablesAreTwo) {
   struct Case {
     double foot, step;
@@ -289,7 +289,7 @@ TEST(Mapper, TheUndersideOfADuctIsOneWithItsMiddleUnseen) {
   }
 }
 
-// Two keyframes that saw one end of it first stand a little too low.
+// Two keyframes that saw one end of it first are placed slightly too low.
 TEST(Mapper, ACeilingWhoseEndsMeetIsOne) {
   for (const double off : {0.025, 0.07}) {
     Rig rig;
@@ -316,7 +316,7 @@ TEST(Mapper, TablesOfOneHeightStayTwo) {
   for (const PlaneEstimate& table : rig.mapper.planes()) EXPECT_NEAR(-0.75, table.plane.d, 0.004);
 }
 
-// A counter of which a cupboard hides the middle, the same with a step behind it, and two counters with an aisle.
+// A counter whose middle is hidden by a cupboard, the same with a step behind it, and two counters with an aisle.
 TEST(Mapper, ACounterGoesOnBehindACupboardButNotAcrossAnAisle) {
   struct Case {
     bool cupboard, floor;
@@ -341,7 +341,7 @@ TEST(Mapper, ACounterGoesOnBehindACupboardButNotAcrossAnAisle) {
   }
 }
 
-// Two desks of one height, seen so flat that one hardly looks between them; then, from above, between them.
+// Two desks of equal height, seen at such a flat angle that the gap hardly shows; then from above, where it shows.
 TEST(Mapper, DesksSeenFromAfarStayTwo) {
   for (const double x : {0.0, -1.5}) {  // at 82 and 85 degrees from upright
     Rig rig(0.3);
@@ -358,7 +358,7 @@ TEST(Mapper, DesksSeenFromAfarStayTwo) {
   }
 }
 
-// A threshold or the floor of a wet room: one keyframe shows both, so that it is no drift.
+// A threshold or the floor of a wet room: one keyframe shows both levels, so that the step is no drift.
 TEST(Mapper, AStepOfThreeCentimetresInAFloorStays) {
   Scene scene;
   scene.add({-6, -2, 0}, {6, 0, 0}, {0, 4, 0});
@@ -372,7 +372,7 @@ TEST(Mapper, AStepOfThreeCentimetresInAFloorStays) {
   EXPECT_FALSE(rig.find(Plane({0, 0, 1}, 0.015), 0.008));
 }
 
-// Depth that has frozen looks through a ceiling until nothing is left of it.
+// Frozen depth refutes a ceiling until none of its area is left.
 TEST(SameSurface, WhatHasNoAreaLeftIsNoPieceOfAnything) {
   Rig rig;
   PlaneTrack strip(1, PlaneKind::kHorizontal, Plane({0, 0, -1}, 2.6), {0, 0, 2.6}, 0.1);
@@ -398,7 +398,7 @@ TEST(OpenGaps, GoWithTheirPlanes) {
   EXPECT_FALSE(gaps.has(2, 5));
   EXPECT_TRUE(gaps.has(3, 2));
   EXPECT_TRUE(gaps.has(3, 7));
-  gaps.rename(3, 2);  // what had been seen apart was one all the same
+  gaps.rename(3, 2);  // planes seen as separate were merged nevertheless
   EXPECT_TRUE(gaps.has(2, 7));
   gaps.remove(7);
   EXPECT_FALSE(gaps.has(2, 7));
@@ -427,7 +427,7 @@ void visitTwice(const Scene& scene, Rig* rig) {
   }
 }
 
-/// Takes the drift out, but puts some keyframes half a metre off.
+/// Removes the drift, but places some keyframes half a metre off.
 MapUpdate closing(const Rig& rig, const std::set<KeyframeId>& astray) {
   MapUpdate update;
   update.global = true;
@@ -455,8 +455,8 @@ TEST(Mapper, OneWallMappedTwiceBecomesOneWhenTheLoopCloses) {
   EXPECT_NEAR(3.0, result.planes[0].plane.d, 0.004);
 }
 
-// One keyframe of either visit is not corrected like the others, so that what it saw no longer lies on the wall. The
-// back end moves that along when the planes merge, and must hear that it does not hold.
+// One keyframe of either visit is not corrected like the others, so that its observation is no longer on the wall. The
+// back end transfers it when the planes merge, and must be told to withdraw it.
 TEST(Mapper, WhatNoLongerHoldsIsWithdrawnFromThePlaneThatItsPlaneBecame) {
   for (const KeyframeId astray : {KeyframeId(2), KeyframeId(5)}) {
     Rig rig;

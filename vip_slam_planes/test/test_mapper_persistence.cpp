@@ -1,4 +1,4 @@
-// What stays in the map though single views or an exact map speak against it.
+// Planes that stay in the map although single views or a very accurate map contradict them.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ using testing::Rig;
 using testing::room;
 using testing::Scene;
 
-// From some distance there is one row of points on such a top.
+// From some distance such a top has only one row of points.
 TEST(Mapper, ASideboardSeenFlatKeepsItsTop) {
   Scene scene = room();
   scene.add({2.6, -0.8, 0.9}, {0.4, 0, 0}, {0, 1.6, 0});
@@ -33,7 +33,7 @@ TEST(Mapper, ASideboardSeenFlatKeepsItsTop) {
   }
 }
 
-// With a back end's poses to half a millimetre the other walls agree far better.
+// With poses accurate to 0.5 mm the other walls agree far better.
 TEST(Mapper, AWallThatBowsIsOneWallThatStays) {
   Scene scene;
   scene.add({-3, -2.5, 0}, {6, 0, 0}, {0, 5, 0});

@@ -1,4 +1,4 @@
-// What one image shows at two depths, though both are near enough to a plane to join it.
+// One image shows two surfaces, both near enough to a plane to join it.
 #include <random>
 
 #include <gtest/gtest.h>

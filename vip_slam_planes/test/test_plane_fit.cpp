@@ -71,7 +71,7 @@ TEST(PlaneFit, ALeanIsWhatPointsAndPriorSayTogether) {
     EXPECT_LT(angleBetween(truth, plane), 1e-6);
     ASSERT_TRUE(fitLeaningPlane(sum(truth, 1.0), kind, 1e-6, n, &plane));
     EXPECT_LT(level ? plane.n.head<2>().norm() : std::abs(plane.n.z()), 1e-6);
-    // Points and prior that know equally much meet halfway. The points' axes: those of their scatter.
+    // Points and prior with equal information give the mean. The points' axes are those of their scatter.
     const PlaneMoments unit = sum(truth, 1.0);
     const Eigen::Vector3d mean = unit.centroid(), along = level ? Eigen::Vector3d::UnitX() : z;
     const double spread = along.dot((unit.M.topLeftCorner<3, 3>() - unit.weight() * mean * mean.transpose()) * along);

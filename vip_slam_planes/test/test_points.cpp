@@ -1,4 +1,4 @@
-// Which map points lie on which plane.
+// Association of map points with planes.
 #include <random>
 #include <set>
 
@@ -161,7 +161,7 @@ TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
   EXPECT_LE(wrong, correct / 50);
   EXPECT_GE(found, expected * 8 / 10);
 
-  // A merge of landmarks keeps the answer; a plane that moves away loses its points.
+  // A merge of landmarks keeps the association; a plane that moves away loses its points.
   const LandmarkId first = associated.begin()->first;
   MapUpdate merge;
   merge.merged_landmarks.emplace_back(first, 100000);
@@ -175,7 +175,7 @@ TEST(Points, PrecisionAndRecallAndMergedLandmarks) {
   EXPECT_GT(mapper.applyMapUpdate(away).dissociated.size(), 20u);
 }
 
-// Three keyframes, one less than are asked, see the points by focal lengths 2 % too long; then this is known.
+// Three keyframes, one fewer than required, see the points with focal lengths 2 % too long; then the error is known.
 TEST(Points, WhatWasSeenByWrongIntrinsicsCountsAsItIsMeant) {
   const World w = world();
   SceneCamera camera(testing::quietNoise(), 1.0);
@@ -221,8 +221,8 @@ TEST(Points, WhatWasSeenByWrongIntrinsicsCountsAsItIsMeant) {
   EXPECT_GE(found, expected * 8 / 10);
 }
 
-// What the back end makes of a plane may fit none of the keyframes that saw it: then it is several surfaces, and the
-// map does without it. This one is a surface, and comes back with all that was seen of it.
+// A plane optimised by the back end may fit none of the keyframes that saw it: then it covers several surfaces and is
+// removed from the map. This one is a single surface, and comes back with all its observations.
 TEST(Points, LeaveAPlaneWhoseObservationsDisagreeAndComeBack) {
   const World w = world();
   SceneCamera camera(testing::quietNoise(), 1.0);
@@ -247,7 +247,7 @@ TEST(Points, LeaveAPlaneWhoseObservationsDisagreeAndComeBack) {
   EXPECT_EQ(away.dissociated.size(), on_wall);
   EXPECT_EQ(away.removed, std::vector<PlaneId>{wall});
   EXPECT_EQ(0, shown());
-  // What they saw still holds: nobody has to look at them again.
+  // The earlier observations are still valid: no new keyframe is needed.
   const PlaneUpdate again = mapper.applyMapUpdate(MapUpdate());
   EXPECT_EQ(1, shown());
   std::size_t back = 0, observed = 0;

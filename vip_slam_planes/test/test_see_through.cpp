@@ -1,4 +1,4 @@
-// What a keyframe says against the cells of a plane.
+// A keyframe's evidence against the cells of a plane.
 #include <gtest/gtest.h>
 
 #include "scene.h"

@@ -1,4 +1,4 @@
-// Narrow faces, which show what they are only when they are seen from two sides.
+// Narrow faces, whose orientation becomes certain only when they are seen from two sides.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -33,10 +33,10 @@ std::vector<MapTriangle> strip(double azimuth, double sigma) {
   return triangles;
 }
 
-/// What the second keyframe shows of the strip: a strip as well, less of it, or a strip that a body goes on from.
+/// What the second keyframe shows: the same strip, a part of it, or a part of it that continues as another face.
 enum class Second { kStrip, kLess, kLessOfABody };
 
-/// What keyframes make of it that look along the x axis from the side by `turn`, when the strip turns along by `share`.
+/// Result of keyframes that look along the x axis, turned to the side by `turn`, if the strip turns by `share` of it.
 std::vector<JointPlane> facesSeenFrom(double turn, double share, double sigma = 0.002, Second second = Second::kStrip) {
   StripEvidence evidence{PlaneDetectionOptions(), PlaneGrowthOptions()};
   CameraPoses poses;

@@ -135,7 +135,7 @@ TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
     // Plane updates may still be based on the previous correction.
     back_end.applyPlaneUpdate(readTooLong(world.planes(), 0.02, k % 2 ? correction : 0.0));
   }
-  back_end.finish();  // with what the newest keyframe knows
+  back_end.finish();  // applies the newest correction
   EXPECT_LT(worst(), std::abs(correction + 0.02) + 1e-6);
   double rmse = 0;
   for (const SnapshotKeyframe& kf : back_end.snapshot().keyframes)
@@ -168,7 +168,7 @@ TEST(BackEnd, AGyroCorrectionHoldsForAllKeyframes) {
       if (back_end.globalBaWanted()) back_end.merge(back_end.run(back_end.startGlobalBa()));
       back_end.applyPlaneUpdate(world.planes());
     }
-    back_end.finish();  // with what the newest keyframe knows
+    back_end.finish();  // applies the newest correction
     double sum = 0;
     for (const auto& [id, kf] : back_end.map().keyframes()) {
       EXPECT_EQ(kf.gyro_correction(1, 1), correction);

@@ -255,7 +255,7 @@ TEST(PlaneFactors, CornersOfTwoTracksLieFartherApartWhenSeenFromNearer) {
 }
 
 TEST(PlaneFactors, DepthPointsBesideThePlaneAreLeftOut) {
-  for (const int wrong : {0, 6, 15, 20}) {  // of 20, on a cupboard 8 cm before the wall; the others 1 cm off
+  for (const int wrong : {0, 6, 15, 20}) {  // of 20 points, on a cupboard 8 cm before the wall; others are 1 cm off
     Wall wall;
     PlaneObservation seen;
     seen.plane = 1;

@@ -47,7 +47,7 @@ TEST(Worker, WhatTheHelperWroteIsSeen) {
   }
 }
 
-// On a processor shared with other programs the helper takes ten times as long, and the owner would wait for it.
+// On a processor shared with other programs the helper takes ten times as long: the owner stops using it.
 TEST(Worker, ASlowHelperIsGivenUp) {
   Worker worker(true);
   if (!worker.helps()) GTEST_SKIP() << "one processor";

@@ -230,8 +230,8 @@ class BadInputTest(unittest.TestCase):
         return process.returncode, words
 
     def test_10_a_recording_replaces_another_as_a_whole_or_not_at_all(self):
-        # A system of topics and services only. Of 20 images two have no answer and two more no pose, and of one the pose
-        # comes before the image.
+        # A system of topics and services only. Of 20 images two have no answer and two more no pose, and of one the
+        # pose comes before the image.
         rospy.set_param('/use_sim_time', True)
         rospy.set_param('/fake/frontend/sensor', self.sensor_with(r'"/camera/', '"/fake/camera/'))
         publish = {name: rospy.Publisher('/fake/' + name, kind, queue_size=100)
@@ -292,8 +292,10 @@ class BadInputTest(unittest.TestCase):
 
         blocked = os.path.join(self.folder, 'a file')
         open(blocked, 'w').close()
-        code, words = self.record_run(blocked, lambda: time.sleep(3))
-        self.assertEqual((code, words), (1, 'record_run: %s: a file, expected a folder\n' % blocked))
+        done = subprocess.run(['rosrun', 'vip_slam_bringup', 'record_run', '--out', blocked], stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True, timeout=60)
+        self.assertEqual((done.returncode, done.stdout),
+                         (1, 'record_run: %s: a file, expected a folder\n' % blocked))
 
 
 if __name__ == '__main__':
