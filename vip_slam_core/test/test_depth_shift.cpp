@@ -14,7 +14,7 @@ namespace {
 constexpr double kFocal = 200, kCx = 80, kCy = 60;
 const Eigen::Vector3d kSlanted(-0.5, 0.3, 0.8);
 
-/// Of the plane n^T p = 2 at pixel + `beside`.
+/// Depth of the plane n^T p = 2 at pixel + `beside`.
 float planeAt(double u, double v, const Eigen::Vector2d& beside = Eigen::Vector2d::Zero()) {
   const Eigen::Vector3d ray((u + beside.x() - kCx) / kFocal, (v + beside.y() - kCy) / kFocal, 1.0);
   return static_cast<float>(2.0 / kSlanted.dot(ray));

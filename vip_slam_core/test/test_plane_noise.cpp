@@ -105,7 +105,7 @@ TEST(PlaneNoise, WhatIsNoPlaneCountsForLess) {
     for (int plane = 0; plane < 8; ++plane) EXPECT_GT(weights[plane], 0.7) << unit << " " << plane;
     EXPECT_GT(weights[8], 0.3);
     EXPECT_LT(weights[9], 0.03);
-    EXPECT_EQ(weights[10], 1.0);  // seen by nobody
+    EXPECT_EQ(weights[10], 1.0);  // without observations
     const std::vector<char> agree = planesAgree(misfits, 12);
     for (int plane = 0; plane < 12; ++plane) EXPECT_EQ(agree[plane] != 0, plane != 9) << unit << " " << plane;
   }

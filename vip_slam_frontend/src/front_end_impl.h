@@ -81,7 +81,7 @@ class FrontEnd::Impl {
   /// clock and of this one on its own, s.
   StepReport updateFilter(const Propagation& propagation, const cv::Mat& depth, const SurfaceMatches& surfaces,
                           double previous_t_imu, double t);
-  /// Why the estimate is not to be believed any more; empty when it is.
+  /// Reason why the estimate can no longer be trusted; empty when it can.
   std::string divergence(const StepReport& report, const TrackingResult& tracking, double t) const;
   /// Judges the tracking state and ends LOST when features are back. False when the position is too uncertain by then.
   bool resume(const TrackingResult& tracking, bool surfaces_hold, double t);
@@ -193,7 +193,7 @@ class FrontEnd::Impl {
   double last_points_t_ = 0;          ///< last image with enough points that have depth
   double last_agreed_t_ = 0;          ///< last image whose points agreed with the IMU
   double cut_off_imu_t_ = -1e300;     ///< last image before which the gyro reached the limit of its range
-  double doubt_imu_t_ = 0;            ///< last image whose points deviated from the IMU somewhat, or could not tell
+  double doubt_imu_t_ = 0;            ///< last image whose points deviated slightly from the IMU or gave no test
   double shock_imu_t_ = -1e300;       ///< first such image after a calm time: a shock may begin there
   int gated_in_a_row_ = 0;
   bool still_ = false;

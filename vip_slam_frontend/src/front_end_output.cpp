@@ -112,7 +112,7 @@ FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
   const bool imu_ended = imu_.empty() || t_imu - imu_.newest() > longestImuGap();
   if (phase_ != Phase::kLost && (imu_ended || t_imu - filter_.nav().t > options_.recovery.coast_seconds)) {
     phase_ = Phase::kLost;
-    status_ = {TrackingState::kLost, why};  // also reported for the next images, until one of them is judged anew
+    status_ = {TrackingState::kLost, why};  // also reported for the next images, until the state is re-evaluated
     ++counters_.lost;
   }
   return statusOnly(t, phase_ == Phase::kLost ? TrackingState::kLost : TrackingState::kDegraded, why);

@@ -53,7 +53,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   started_imu_t_ = t_imu;
   status_ = {TrackingState::kTracking, ""};
   last_good_t_ = last_held_t_ = last_metric_t_ = last_points_t_ = last_agreed_t_ = t;
-  doubt_imu_t_ = t_imu;  // the initial velocity has to be confirmed before a shock can be told from its error
+  doubt_imu_t_ = t_imu;  // until the initial velocity is confirmed, its error cannot be distinguished from a shock
   shock_imu_t_ = -1e300;
   last_good_variance_ = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();
   // The tracks' references were taken under unknown poses: begin them here.

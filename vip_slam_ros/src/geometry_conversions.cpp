@@ -81,8 +81,8 @@ BearingCorrection bearingFromArray(const boost::array<double, 4>& bearing) {
 
 ros::Time toStamp(double t) {
   if (!std::isfinite(t) || !(t > 0)) return ros::Time();
-  // A double of today's time has steps of 0.24 us. Of the stamps that it may stand for the roundest one is meant:
-  // whole milliseconds or microseconds are what drivers and simulators stamp with.
+  // A double of today's time has steps of 0.24 us. Of the stamps within that step the roundest one is chosen, since
+  // drivers and simulators stamp with whole milliseconds or microseconds.
   const double seconds = std::floor(t);
   for (const double unit : {1e3, 1e6}) {
     const ros::Time round =

@@ -63,7 +63,7 @@ TEST(CameraInfo, ZeroCoefficientsLeaveAFisheyeAFisheye) {
   }
 }
 
-// image_proc publishes beside image_raw, image_rect and image_rect_color one camera_info, that of the lens.
+// image_proc publishes one camera_info, that of the lens, for image_raw, image_rect and image_rect_color alike.
 TEST(CameraInfo, OfRectifiedImagesIsTheProjection) {
   sensor_msgs::CameraInfo info;
   info.width = 640;

@@ -49,7 +49,7 @@ struct Requests {
 
 }  // namespace
 
-// Another structure with the same 64 bits would be taken for this one: the chance of that, 5e-20 for each problem, is
+// Another structure with the same 64-bit hash would be mistaken for this one; the probability of 5e-20 per problem is
 // accepted.
 std::uint64_t SystemStructure::signature(const BaProblem& problem) const {
   Hash hash;

@@ -257,7 +257,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     imu_monitor_.add(correction, report.features_used, report.features_gated);
   }
 
-  // Observations must not be used twice: lost and used tracks are deleted, and start anew with the next image.
+  // Observations must not be used twice: lost and used tracks are deleted, and restart with the next image.
   const int used = std::min<int>(report.features_tried, static_cast<int>(candidates.size()));
   std::vector<LandmarkId> gone;
   for (int i = 0; i < static_cast<int>(candidates.size()); ++i) {

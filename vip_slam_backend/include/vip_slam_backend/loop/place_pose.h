@@ -59,7 +59,7 @@ bool explains(const SE3& T_W_C, const PlaceMatch& match, double max_px, const Pl
 PlacePose ransacPlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const Eigen::Quaterniond& R_G_B,
                           const PlacePoseOptions& options);
 
-/// All six degrees of freedom from `start` (T_W_B): robust Gauss-Newton, inliers chosen anew at inlier_px. The tilt of
+/// All six degrees of freedom from `start` (T_W_B): robust Gauss-Newton, inliers reselected at inlier_px. The tilt of
 /// R_G_B is a further measurement when options.tilt_sigma is set, and so are the surfaces. Not found when fewer than
 /// three inliers are left or the pose is not observable.
 PlacePose refinePlacePose(const std::vector<PlaceMatch>& matches, const CameraRig& rig, const SE3& start,

@@ -24,7 +24,7 @@ struct PlaneMisfit {
 /// with three degrees of freedom. 1 with too few observations.
 double planeInformationScale(const std::vector<PlaneMisfit>& misfits);
 
-/// Additional factors on the information of single planes. One plane may in truth be several surfaces: fronts of boxes
+/// Additional factors on the information of single planes. One plane may represent several surfaces: fronts of boxes
 /// on a shelf, offset by a hand's breadth, turned by a few degrees. Each keyframe sees other parts of it, and the error
 /// is common to most of its observations. So its variance, in units of the map's typical misfit, is unknown with a
 /// prior, which makes its misfits jointly Student's t. By index of plane; 1 for planes without observations, and for

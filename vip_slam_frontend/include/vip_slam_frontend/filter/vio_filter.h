@@ -144,8 +144,8 @@ class VioFilter {
   UpdateResult updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
-  /// Decides whether the depth offset is significant. An implausibly large one stands for some other error: it is reset
-  /// to the given value and no longer estimated.
+  /// Decides whether the depth offset is significant. An implausibly large one has some other cause: it is reset to the
+  /// given value and no longer estimated.
   void judgeDepthOffset();
   bool isSteady(double depth_offset);
   /// Estimate of the camera-IMU delay while it is held.

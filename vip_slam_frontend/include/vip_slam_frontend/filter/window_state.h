@@ -40,7 +40,7 @@ struct CalibrationFlags {
   int size() const { return camera() + gyro(); }
 };
 
-/// Row and column of the gyro's correction that its state number `index` stands for.
+/// Row and column, in the gyro's correction matrix, of its estimated entry number `index`.
 std::pair<int, int> gyroEntry(const CalibrationFlags& calibration, int index);
 
 struct WindowState {

@@ -27,8 +27,8 @@ double mostApart(const PredictedMotion& prediction);
 
 /// Whether `found`, the motion that explains most pairs and that the IMU excludes, belongs to a moving body: fewer than
 /// a quarter of its inliers are old points, or old points (at least a quarter as many) agree with the IMU. Old points
-/// that together suddenly contradict the IMU are believed: then the IMU, or the state, is wrong. `bounded`: the motion
-/// within mostApart() of the predicted one that explains most pairs.
+/// that all suddenly contradict the IMU are trusted: then the IMU, or the state, is wrong. `bounded`: the motion within
+/// mostApart() of the predicted one that explains most pairs.
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded);
 
 /// Whether nearly all points agree with `found`, many of them old: a static scene does not start to move as a whole.

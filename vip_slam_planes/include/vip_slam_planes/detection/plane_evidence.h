@@ -5,7 +5,7 @@
 // Triangles that detection leaves over in a keyframe are kept as patches, small connected pieces of one orientation.
 // Their votes go into one histogram over the last keyframes (paper section "Plane Detection and Merging": histograms of
 // the whole map); where several keyframes agree, the same tests as for a single image are applied to all their
-// triangles together. For a plane that one image starts, it also tells which keyframes have seen it before.
+// triangles together. For a plane that one image starts, it also finds the keyframes that have seen it before.
 #pragma once
 
 #include <deque>
