@@ -14,7 +14,7 @@ namespace {
 struct Fixture {
   SimulatedKeyframes world{11};
   Map map;
-  LandmarkMaker maker(500.0);
+  LandmarkMaker maker{500.0};
   void add(int count) {
     for (int k = 0; k < count; ++k) {
       const KeyframePtr kf = world.next();
@@ -137,7 +137,7 @@ TEST(Map, DepthThatIsKnownBetterHoldsForAllKeyframesButStoredOnes) {
 TEST(Map, AWaitingTrackThatWasRecognisedJoinsThatLandmark) {
   // Track 900 has no depth; while it waits, its first view is matched with landmark 800.
   Map map;
-  LandmarkMaker maker(500.0);
+  LandmarkMaker maker{500.0};
   for (KeyframeId id = 1; id <= 4; ++id) {
     auto kf = std::make_shared<Keyframe>();
     kf->id = id;

@@ -21,7 +21,7 @@ struct Adjusted {
 Adjusted adjustedMap(double shift, int keyframes) {
   SimulatedKeyframes world(3);
   Adjusted result;
-  LandmarkMaker maker(500.0);
+  LandmarkMaker maker{500.0};
   BuilderSettings settings;
   settings.focal = world.sensor().camera.fx;
   for (int k = 0; k < keyframes; ++k) {
