@@ -1,4 +1,4 @@
-// The tables command with stubs of the programs it calls: handling of failures, and which runs are repeated.
+// The tables command with small scripts in place of the programs it calls: handling of failures, and which runs are repeated.
 #include <gtest/gtest.h>
 
 #include <algorithm>

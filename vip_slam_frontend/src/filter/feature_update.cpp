@@ -188,7 +188,8 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
   // After a velocity step the poses themselves are wrong: the residuals are not the features' own noise.
   FeatureBatch batch =
       judgeFeatures(candidates, filter_.window(), here, after_step ? OwnNoise::kNone : OwnNoise::kResiduals);
-  const bool open = openPixels() > kOpen * batch.nearest_noisy;
+  // The covariance is asked for only when some feature has noise of its own, which is rare.
+  const bool open = std::isfinite(batch.nearest_noisy) && openPixels() > kOpen * batch.nearest_noisy;
   const UpdateResult result = open ? updateRelinearised(candidates, &batch) : apply(batch);
   tell(&noise_, std::move(batch.chi2), batch.chi2_rows);
   tell(&depth_noise_, std::move(batch.depth_chi2), batch.depth_rows);

@@ -20,7 +20,7 @@ constexpr double kPositionSigma = 0.006;
 // rolling shutter of 20 ms passes in half of its attempts; with a person in front of the camera it is 7 to 100 mm and 4
 // to 100 mrad.
 constexpr double kWorstPosition = 0.008, kWorstRotation = 0.004;
-constexpr int kGravityRounds = 4;         // the direction turns by a degree at most after the second
+constexpr int kGravityRounds = 4;         // each turns gravity, of known length, in its tangent plane
 constexpr double kLargestGyroBias = 0.5;  // rad/s; no gyro that works is further off
 
 /// What camera and IMU say about the motion since the first image; all in the IMU frame of that image.

@@ -2,6 +2,7 @@
 // features, update, marginalise). Source: paper section "Motion Estimation"; Wu et al. 2015.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <optional>
 #include <vector>
@@ -131,7 +132,8 @@ class VioFilter {
     int rows = 0, tried = 0, gated = 0;
     std::vector<double> chi2, depth_chi2;  ///< per degree of freedom, of single features
     int chi2_rows = 0, depth_rows = 0;
-    double nearest_noisy = 1e9;  ///< m, z of the nearest feature with a noise scale above 1
+    /// z of the nearest feature with a noise scale above 1, m; infinite: there is none.
+    double nearest_noisy = std::numeric_limits<double>::infinity();
   };
   /// Rows linearised at `window`, for an update of the filter's prior; `moved`: error state from the prior to `window`.
   FeatureBatch judgeFeatures(const std::vector<Candidate>& candidates, const WindowState& window,
