@@ -35,7 +35,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   if (first_time) removeContradicted(triangles, T_map_C, keyframe.frame.epoch);
   std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, keyframe.frame.epoch);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
-  releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
+  const std::vector<PlaneId> beside = releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
 
   std::vector<CellIndex> seen_again;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
@@ -53,7 +53,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const std::size_t known = tracks.size();
   if (first_time) {
     std::vector<DetectedPlane> strips = startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
-    evidence_.add(keyframe.id, T_map_C, triangles, label);
+    evidence_.add(keyframe.id, T_map_C, triangles, label, beside);
     startJointPlanes(keyframe, evidence_.detect(posesTiedTo(keyframe.frame.epoch), {tracks.begin(), tracks.end()}),
                      &label, &tracks);
     const auto known_by_now = [&](const DetectedPlane& strip) {

@@ -66,7 +66,7 @@ class Evidence : public ::testing::Test {
  protected:
   std::vector<JointPlane> add(KeyframeId id, const std::vector<MapTriangle>& mesh) {
     poses[id] = SE3(Eigen::Quaterniond::Identity(), {0, 0.1 * double(id), 1});
-    evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1));
+    evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1), std::vector<PlaneId>(mesh.size()));
     return evidence.detect(poses, {});
   }
   CameraPoses poses;
@@ -117,7 +117,7 @@ TEST_F(Evidence, WhatFailedIsTestedAgainWhenKeyframesHaveMoved) {
     poses[id] = SE3(Eigen::Quaterniond::Identity(), {id % 2 ? 0.0 : 0.2, 0.1 * double(id), 1});
     SE3 seen_from = poses[id];
     seen_from.t().x() = 0;
-    evidence.add(id, seen_from, view(id), std::vector<int>(view(id).size(), -1));
+    evidence.add(id, seen_from, view(id), std::vector<int>(view(id).size(), -1), std::vector<PlaneId>(view(id).size()));
     EXPECT_TRUE(evidence.detect(poses, {}).empty()) << id;
   }
   for (auto& [id, pose] : poses) pose.t().x() = 0;
@@ -133,7 +133,7 @@ TEST_F(Evidence, StripsOneCellWideAreNoWall) {
 TEST_F(Evidence, WhatShowsOfAWorktopStartsItBetweenTheTraysOnIt) {
   // A dark worktop gives depth only in a small piece; the trays next to it are larger, but too narrow for a plane.
   const auto view = [](double shift) {
-    return together(shelf(1.0 + shift, 0.0, 0.0, 3, 2), shelf(1.0, 0.4, 0.045, 8, 2));
+    return together(shelf(1.0 + shift, 0.0, 0.0, 3, 2), shelf(1.0, 0.4, 0.045, 12, 1));
   };
   EXPECT_TRUE(add(1, view(0.0)).empty());
   EXPECT_TRUE(add(2, view(0.05)).empty());
@@ -142,6 +142,25 @@ TEST_F(Evidence, WhatShowsOfAWorktopStartsItBetweenTheTraysOnIt) {
   EXPECT_EQ(PlaneKind::kHorizontal, found[0].kind);
   EXPECT_NEAR(0.0, found[0].plane.d, 1e-3);
   EXPECT_EQ(36u, found[0].triangles.size());
+}
+
+TEST_F(Evidence, TheWorktopUnderKnownTraysStartsWhenItWasToldFromThem) {
+  PlaneTrack trays(1, PlaneKind::kHorizontal, Plane({0, 0, 1}, -0.045), {1, 0.4, 0.045}, 0.1);
+  for (const MapTriangle& t : shelf(1.0, 0.4, 0.045, 8, 2)) trays.cover(t, 1, SE3(), nullptr);
+  for (const PlaneId beside : {PlaneId(0), trays.id()}) {
+    evidence.clear();
+    std::size_t found = 0;
+    for (KeyframeId id = 1; id <= 3; ++id) {
+      poses[id] = SE3(Eigen::Quaterniond::Identity(), {0, 0.1 * double(id), 1});
+      const std::vector<MapTriangle> mesh = shelf(1.0 + 0.05 * double(id), 0.0, 0.0, 3, 2);
+      evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1), std::vector<PlaneId>(mesh.size(), beside));
+      for (const JointPlane& plane : evidence.detect(poses, {&trays})) {
+        EXPECT_NEAR(0.0, plane.plane.d, 1e-3);
+        ++found;
+      }
+    }
+    EXPECT_EQ(beside == 0 ? 0u : 1u, found);
+  }
 }
 
 TEST_F(Evidence, WhatLiesOnAFloorStartsNothing) {
@@ -153,7 +172,7 @@ TEST_F(Evidence, WhatLiesOnAFloorStartsNothing) {
     for (KeyframeId id = 1; id <= 4; ++id) {
       poses[id] = SE3(Eigen::Quaterniond::Identity(), {0, 0.1 * double(id), 1});
       const std::vector<MapTriangle> mesh = shelf(1.0, 0.0, height, 3, 4);
-      evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1));
+      evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1), std::vector<PlaneId>(mesh.size()));
       found += evidence.detect(poses, {&floor}).size();
     }
     EXPECT_EQ(height > 0.1 ? 1u : 0u, found) << height;
@@ -188,7 +207,7 @@ TEST_F(Evidence, WhatAKnownPlaneExplainsStartsNoOther) {
   for (KeyframeId id = 1; id <= 4; ++id) {
     poses[id] = SE3(Eigen::Quaterniond::Identity(), {0, 0.1 * double(id), 1});
     const std::vector<MapTriangle> mesh = board(0.1 * double(id), 0.8, 5, 5);
-    evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1));
+    evidence.add(id, poses[id], mesh, std::vector<int>(mesh.size(), -1), std::vector<PlaneId>(mesh.size()));
     EXPECT_TRUE(evidence.detect(poses, {&track}).empty()) << id;
   }
 }

@@ -115,7 +115,7 @@ TEST(Mapper, WhoHasSeenAPlaneBeforeItsStartCounts) {
 TEST(Mapper, WhatKeyframesStartSmallIsPublishedWhenFramesHaveGrownIt) {
   // The keyframes see a corner of a dark worktop, a later frame more of it.
   Scene corner, more;
-  corner.add({1.0, 0, 0.9}, {0.34, 0, 0}, {0, 0.30, 0});
+  corner.add({1.0, 0, 0.9}, {0.27, 0, 0}, {0, 0.27, 0});
   more.add({1.0, 0, 0.9}, {0.6, 0, 0}, {0, 0.5, 0});
   const auto eye = [](int i) { return Eigen::Vector3d(0, 0.1 * i, 1.5); };
   for (const bool grown : {false, true}) {

@@ -147,7 +147,7 @@ struct PlaneSupportOptions {
   int min_views = 3;
   double view_distance = 0.1;
   double sure_area = 1.0;
-  double min_area = 0.1;
+  double min_area = 0.07;
   double see_through = 0.10;
   int patience = 8;
 

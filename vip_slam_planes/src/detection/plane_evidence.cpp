@@ -18,8 +18,11 @@ constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegre
 constexpr double kLeastPatch = 0.01;  // m^2
 constexpr std::size_t kLeastTriangles = 4;
 // Least area, relative to that for a plane in one image. Small upright surfaces are mostly furniture. Dark or polished
-// table tops have depth in pieces only: such planes start small and are grown by tracked frames.
-constexpr double kLeastUpright = 2.0, kLeastLevel = 0.4;
+// table tops have depth in pieces only: such planes start small and narrow, and are grown by tracked frames.
+constexpr double kLeastUpright = 2.0, kLeastLevel = 0.3;
+constexpr double kLeastLevelWidth = 0.6;  // likewise of the width
+// A plane this far below a known one may be what that lies on, m.
+constexpr double kStepDown = 0.02;
 constexpr int kMostTests = 4;  // peaks tested per keyframe, the largest ones
 // Share of the area of a wall's peak that must be new since its last test. Horizontal peaks are tested every time,
 // since the visible pieces of a dark table top change.
@@ -43,7 +46,8 @@ bool shownBySeveral(const std::vector<EvidenceTriangle>& evidence, const std::ve
 bool liesOn(const DetectedPlane& plane, const std::vector<const PlaneTrack*>& known, const PlaneGrowthOptions& growth) {
   return std::any_of(known.begin(), known.end(), [&](const PlaneTrack* track) {
     if (track->kind() != plane.kind || track->plane().n.dot(plane.plane.n) < 0) return false;
-    if (std::abs(track->plane().signedDistance(plane.centroid)) > 2 * growth.distance) return false;
+    const double height = track->plane().signedDistance(plane.centroid);
+    if (height < -kStepDown || height > 2 * growth.distance) return false;
     const int reach = static_cast<int>(std::ceil(growth.gap / track->cellSize()));
     return track->cells().near(track->cellAt(track->toPlane(plane.centroid)), reach);
   });
@@ -52,7 +56,7 @@ bool liesOn(const DetectedPlane& plane, const std::vector<const PlaneTrack*>& kn
 }  // namespace
 
 void PlaneEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
-                        const std::vector<int>& label) {
+                        const std::vector<int>& label, const std::vector<PlaneId>& beside) {
   Frame frame{id, {}};
   const SE3 T_C_map = T_map_C.inverse();
   const double level = std::cos(detection_.gravity_deg * kDegree), upright = std::sin(detection_.gravity_deg * kDegree);
@@ -93,6 +97,7 @@ void PlaneEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<Map
     patch.area = area;
     patch.index = members;
     for (int i : members) {
+      patch.beside.push_back(beside[i]);
       patch.triangles.push_back(moved(T_C_map, triangles[i]));
       for (int& g : patch.triangles.back().neighbour) g = g >= 0 && first[g] == seed ? place[g] : -1;
     }
@@ -125,7 +130,7 @@ std::vector<EvidenceTriangle> PlaneEvidence::collect(const std::vector<Vote>& vo
       MapTriangle t = moved(T_map_C, patch.triangles[i]);
       for (int& g : t.neighbour) g = g < 0 ? -1 : g + first;
       for (int& k : t.vertex) k += vertices, next = std::max(next, k + 1);
-      all.push_back({t, frames_[v.frame].id, patch.index[i]});
+      all.push_back({t, frames_[v.frame].id, patch.index[i], patch.beside[i]});
     }
     vertices = next;
   }
@@ -201,6 +206,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     const PlaneKind kind = frames_[votes.front().frame].patches[votes.front().patch].kind;
     PlaneDetectionOptions together = detection_;
     together.min_area *= kind == PlaneKind::kHorizontal ? kLeastLevel : kLeastUpright;
+    if (kind == PlaneKind::kHorizontal) together.min_width *= kLeastLevelWidth;
     if (peak.area < together.min_area) continue;
     double fresh = 0;
     for (const Vote& v : votes) {
@@ -215,7 +221,9 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     for (const EvidenceTriangle& e : evidence) triangles.push_back(e.triangle);
     const std::vector<int> label = associateTriangles(triangles, known, growth_);
     std::vector<char> taken(triangles.size());
-    for (std::size_t i = 0; i < triangles.size(); ++i) taken[i] = label[i] >= 0;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      taken[i] = label[i] >= 0 && known[label[i]]->id() != evidence[i].beside;
+    }
     for (const DetectedPlane& plane : detectPlanesAt(triangles, taken, kind, origin, together, growth_)) {
       // The keyframes see overlapping parts of the surface: use the area that they cover together.
       PlaneTrack area(0, kind, plane.plane, plane.centroid, 0.5 * growth_.cell);

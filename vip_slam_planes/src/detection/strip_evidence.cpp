@@ -209,7 +209,7 @@ std::vector<JointPlane> StripEvidence::pairsOfStrips(const CameraPoses& poses) {
 void StripEvidence::take(const Placed& placed, JointPlane* face) const {
   const SE3 T_map_C = placed.T_C_map.inverse();
   for (std::size_t i = 0; i < placed.strip->triangles.size(); ++i) {
-    face->triangles.push_back({moved(T_map_C, placed.strip->triangles[i]), placed.keyframe, placed.strip->index[i]});
+    face->triangles.push_back({moved(T_map_C, placed.strip->triangles[i]), placed.keyframe, placed.strip->index[i], 0});
   }
 }
 

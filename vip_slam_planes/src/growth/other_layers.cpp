@@ -15,8 +15,9 @@ constexpr double kStepSigmas = 3.0;
 
 }  // namespace
 
-void releaseOtherLayers(const std::vector<MapTriangle>& triangles, const std::vector<const PlaneTrack*>& tracks,
-                        std::vector<int>* label) {
+std::vector<PlaneId> releaseOtherLayers(const std::vector<MapTriangle>& triangles,
+                                        const std::vector<const PlaneTrack*>& tracks, std::vector<int>* label) {
+  std::vector<PlaneId> beside(label->size(), 0);
   std::vector<std::vector<int>> members(tracks.size());
   for (std::size_t i = 0; i < label->size(); ++i) {
     if ((*label)[i] >= 0) members[(*label)[i]].push_back(static_cast<int>(i));
@@ -45,9 +46,13 @@ void releaseOtherLayers(const std::vector<MapTriangle>& triangles, const std::ve
         *std::min_element(depth.begin(), depth.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
     for (std::size_t j = 0; j < layers.size(); ++j) {
       if (std::abs(depth[j] - nearest) < step) continue;
-      for (int i : layers[j]) (*label)[members[k][i]] = -1;
+      for (int i : layers[j]) {
+        (*label)[members[k][i]] = -1;
+        beside[members[k][i]] = tracks[k]->id();
+      }
     }
   }
+  return beside;
 }
 
 }  // namespace vip_slam

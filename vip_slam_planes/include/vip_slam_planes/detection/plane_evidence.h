@@ -22,7 +22,8 @@ namespace vip_slam {
 struct EvidenceTriangle {
   MapTriangle triangle;
   KeyframeId keyframe;
-  int index;  ///< in that keyframe's mesh
+  int index;       ///< in that keyframe's mesh
+  PlaneId beside;  ///< plane that it is another layer of; 0: none
 };
 
 struct JointPlane {
@@ -37,8 +38,10 @@ class PlaneEvidence {
   PlaneEvidence(const PlaneDetectionOptions& detection, const PlaneGrowthOptions& growth)
       : detection_(detection), growth_(growth) {}
 
-  /// Keeps those triangles of a placed keyframe that have no label (< 0); drops the oldest keyframe.
-  void add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles, const std::vector<int>& label);
+  /// Keeps those triangles of a placed keyframe that have no label (< 0); drops the oldest keyframe. `beside`: the
+  /// plane that each triangle is another layer of (other_layers.h), 0: none.
+  void add(KeyframeId id, const SE3& T_map_C, const std::vector<MapTriangle>& triangles, const std::vector<int>& label,
+           const std::vector<PlaneId>& beside);
   void remove(KeyframeId id);
   void clear() { frames_.clear(); }
   /// To be called when keyframes have moved relative to each other: peaks that failed before are tested again.
@@ -47,8 +50,9 @@ class PlaneEvidence {
   /// Number of keyframes with at least `area` m^2 of left-over triangles on the plane.
   int seenBy(const PlaneTrack& plane, const CameraPoses& poses, double area) const;
   /// Planes from patches of the newest keyframe together with those of earlier ones. `known` are the planes in view;
-  /// patches that they explain by now are dropped, and so are those of a new plane. Keyframes without a pose are not
-  /// used. A wall's peak that failed is tested again when a fair part of it is new.
+  /// patches that they explain by now are dropped, unless they were another layer of it, and so are those of a new
+  /// plane. Keyframes without a pose are not used. A wall's peak that failed is tested again when a fair part of it is
+  /// new.
   std::vector<JointPlane> detect(const CameraPoses& poses, const std::vector<const PlaneTrack*>& known);
 
  private:
@@ -58,6 +62,7 @@ class PlaneEvidence {
     double area = 0;
     bool tested = false;                 ///< was part of a peak that was tested already
     std::vector<int> index;              ///< of each triangle in the keyframe's mesh
+    std::vector<PlaneId> beside;         ///< of each triangle: plane that it is another layer of; 0: none
     std::vector<MapTriangle> triangles;  ///< in the camera frame; `neighbour` are indices within the patch
   };
   struct Frame {
