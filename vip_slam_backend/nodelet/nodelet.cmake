@@ -5,6 +5,7 @@ find_package(catkin REQUIRED COMPONENTS
 
 add_library(vip_slam_backend_nodelets
   nodelet/back_end_nodelet.cpp
+  nodelet/back_end_output.cpp
   nodelet/back_end_services.cpp
   nodelet/map_display.cpp
   nodelet/pose_in_map.cpp

@@ -143,53 +143,6 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   return update;
 }
 
-void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
-  if (update.revision < first_revision) return;  // it refers to a map that was reset or replaced meanwhile
-  if (frozen()) {
-    // The plane module sends each change only once: keep those that it sent before it learnt of localisation-only mode.
-    const bool says = !update.merges.empty() || !update.removed.empty() || !update.observations.empty() ||
-                      !update.associated.empty() || !update.dissociated.empty();
-    if (says) held_updates.push_back(update);
-    return;
-  }
-  const ScopedTimer timer(log, "backend.planes", update.t);
-  for (const PlaneMerge& merge : update.merges) map.mergePlanes(merge.from, merge.into);
-  for (const PlaneId id : update.removed) map.removePlane(id);
-  for (const PlaneEstimate& plane : update.planes) {
-    try {
-      map.setPlane(plane);
-    } catch (const MapError& e) {
-      refusal = e.what();
-    }
-  }
-  removeUnnamedPlanes(update);
-  for (const PlaneObservation& observation : update.observations) map.setPlaneObservation(observation);
-  for (const auto& pair : update.associated) {
-    const LandmarkId id = map.resolve(pair.first);
-    if (map.hasLandmark(id) && map.hasPlane(pair.second)) map.associate(id, pair.second);
-  }
-  for (const LandmarkId landmark : update.dissociated) {
-    const LandmarkId id = map.resolve(landmark);
-    if (map.hasLandmark(id)) map.associate(id, 0);
-  }
-}
-
-// An update lists all planes. A plane that it does not list was removed or merged in an update that was lost.
-void BackEnd::Impl::removeUnnamedPlanes(const PlaneUpdate& update) {
-  std::set<PlaneId> named;
-  for (const PlaneEstimate& plane : update.planes) named.insert(plane.id);
-  std::vector<PlaneId> gone;
-  for (const auto& entry : map.planes())
-    if (!named.count(entry.first)) gone.push_back(entry.first);
-  for (const PlaneId id : gone) map.removePlane(id);
-}
-
-void BackEnd::Impl::applyHeldUpdates() {
-  std::vector<PlaneUpdate> held;
-  held.swap(held_updates);
-  for (const PlaneUpdate& update : held) applyPlaneUpdate(update);
-}
-
 MapSnapshot BackEnd::Impl::snapshot() const {
   MapSnapshot snapshot;
   snapshot.revision = revision;

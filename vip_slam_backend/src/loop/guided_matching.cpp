@@ -10,7 +10,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFarthestView = 6.0, kCosineOfView = 0.5;
+constexpr double kFarthestLandmark = 6.0, kCosineOfView = 0.5;
 constexpr double kMetresPerCosine = 4.0;  // weight of a change of direction against one of position
 constexpr double kRatio = 0.9;            // of best to second distance; weak, since few corners lie around a projection
 constexpr float kSameCorner2 = 4.0f;      // px^2: two detections of one corner do not compete
@@ -75,7 +75,7 @@ std::vector<KeyframeId> viewsAlong(const Map& map, const SE3& T_W_C, std::size_t
     const SE3 other = entry.second.T_W_C();
     const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
     const double distance = (other.t() - T_W_C.t()).norm();
-    if (cosine < kCosineOfView || distance > kFarthestView || (allowed && !allowed(entry.first))) continue;
+    if (cosine < kCosineOfView || distance > kFarthestLandmark || (allowed && !allowed(entry.first))) continue;
     near.emplace_back(distance + kMetresPerCosine * (1.0 - cosine), entry.first);
   }
   std::sort(near.begin(), near.end());

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
 #include <Eigen/Eigenvalues>
 
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_planes/detection/connected_surfaces.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
 #include "vip_slam_planes/detection/surface_layers.h"
@@ -135,6 +135,10 @@ class Detector {
     }
   }
 
+  std::vector<std::vector<int>> surfaces(const std::vector<int>& members, const Plane& plane) const {
+    return connectedSurfaces(triangles_, members, plane, camera_, std::max(0.05, growth_.gap));
+  }
+
   bool joins(const MapTriangle& t, const Plane& plane, double widening) const {
     return plane.n.dot(t.n) > joins_.cosine(t) &&
            std::abs(plane.signedDistance(t.centre)) < widening * distanceGate(t, growth_.distance);
@@ -171,54 +175,6 @@ class Detector {
     std::vector<double> sigmas;
     for (int i : members) sigmas.push_back(triangles_[i].sigma);
     return upperMedian(std::move(sigmas));
-  }
-
-  // Connected parts: cells of growth.gap side, joined with their eight neighbours.
-  std::vector<std::vector<int>> surfaces(const std::vector<int>& members, const Plane& plane) const {
-    const Eigen::Matrix<double, 3, 2> basis = tangentBasis(plane.n);
-    const auto key = [](std::int64_t x, std::int64_t y) { return (x << 32) ^ (y & 0xffffffff); };
-    struct Cell {
-      std::int64_t x, y;
-      int part;  ///< -1: open
-    };
-    std::vector<Cell> cells;
-    std::unordered_map<std::int64_t, int> cell_at;
-    std::vector<int> cell_of;
-    const double side = std::max(0.05, growth_.gap);
-    for (int i : members) {
-      const Eigen::Vector2d q = basis.transpose() * (triangles_[i].centre - camera_) / side;
-      const auto x = static_cast<std::int64_t>(std::floor(q.x())), y = static_cast<std::int64_t>(std::floor(q.y()));
-      // Triangles are in mesh order: the next one is often in the same cell.
-      if (cell_of.empty() || cells[cell_of.back()].x != x || cells[cell_of.back()].y != y) {
-        const auto [it, fresh] = cell_at.emplace(key(x, y), static_cast<int>(cells.size()));
-        if (fresh) cells.push_back({x, y, -1});
-        cell_of.push_back(it->second);
-      } else {
-        cell_of.push_back(cell_of.back());
-      }
-    }
-    std::vector<std::vector<int>> parts;
-    std::vector<int> queue;
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      if (cells[cell_of[i]].part < 0) {
-        const int part = static_cast<int>(parts.size());
-        parts.emplace_back();
-        cells[cell_of[i]].part = part;
-        queue.assign(1, cell_of[i]);
-        while (!queue.empty()) {
-          const Cell cell = cells[queue.back()];
-          queue.pop_back();
-          for (int k = 0; k < 9; ++k) {
-            const auto near = cell_at.find(key(cell.x + k % 3 - 1, cell.y + k / 3 - 1));
-            if (near == cell_at.end() || cells[near->second].part >= 0) continue;
-            cells[near->second].part = part;
-            queue.push_back(near->second);
-          }
-        }
-      }
-      parts[cells[cell_of[i]].part].push_back(members[i]);
-    }
-    return parts;
   }
 
   bool accept(const std::vector<int>& surface, PlaneKind kind) {
