@@ -74,6 +74,8 @@ class PlaneMapper::Impl {
                         std::vector<PlaneTrack*>* tracks);
   void observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
                const std::vector<int>& label, const SurfaceLabels& labels, const DepthMesh& mesh, bool first_time);
+  /// The plane that shows the same surface as this one, the best if there are several; 0: none.
+  PlaneId samePlane(PlaneId id);
   void mergePlanes(const std::vector<PlaneId>& changed);
   void mergeInto(PlaneId from, PlaneId into);
   void removePlane(PlaneId id);

@@ -1,6 +1,7 @@
 // Updates the plane map with a placed keyframe: grow, start, observe, associate.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plane_mapper_impl.h"
 #include "vip_slam_planes/detection/plane_detector.h"
@@ -179,30 +180,43 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
   points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });
 }
 
+// A piece of a wall seen from afar may pass for the door in it as well: it goes to the one that it suits best.
+PlaneId PlaneMapper::Impl::samePlane(PlaneId id) {
+  const PlaneTrack& mine = tracks_.at(id);
+  const SceneView view{placed_, poses_, *camera, noise, options.support.see_through, open_gaps_};
+  std::vector<const PlaneTrack*> known;
+  for (const auto& [other_id, other] : tracks_) {
+    if (epochs_.tied(mine.epoch, other.epoch)) known.push_back(&other);
+  }
+  PlaneId best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (const PlaneTrack* other : known) {
+    if (other->id() == id || !sameSurface(mine, *other, known, view, options.merging)) continue;
+    const double misfit = jointMisfit(mine, *other, poses_);
+    if (best == 0 || misfit < least) best = other->id(), least = misfit;
+  }
+  return best;
+}
+
 void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
   // Each merge may make further merges possible; each removes a plane, so this terminates.
   std::set<PlaneId> open(changed.begin(), changed.end());
-  const SceneView view{placed_, poses_, *camera, noise, options.support.see_through, open_gaps_};
   while (!open.empty()) {
     const PlaneId id = *open.begin();
     open.erase(open.begin());
-    const auto mine = tracks_.find(id);
-    if (mine == tracks_.end()) continue;
-    std::vector<const PlaneTrack*> known;
-    for (const auto& [other_id, other] : tracks_) {
-      if (epochs_.tied(mine->second.epoch, other.epoch)) known.push_back(&other);
+    const PlaneId other = tracks_.count(id) ? samePlane(id) : 0;
+    if (other == 0) continue;
+    if (samePlane(other) != id) {
+      open.insert(
+          other);  // it suits another plane better; each time the misfit is less, until two suit each other best
+      continue;
     }
-    for (auto& [other_id, other] : tracks_) {
-      if (other_id == id || !epochs_.tied(mine->second.epoch, other.epoch)) continue;
-      if (!sameSurface(mine->second, other, known, view, options.merging)) continue;
-      // The older id is kept, unless only the newer one is known to the back end.
-      PlaneId into = std::min(id, other_id), from = std::max(id, other_id);
-      if (tracks_.at(from).known() && !tracks_.at(into).known()) std::swap(into, from);
-      mergeInto(from, into);
-      open.erase(from);
-      open.insert(into);
-      break;
-    }
+    // The older id is kept, unless only the newer one is known to the back end.
+    PlaneId into = std::min(id, other), from = std::max(id, other);
+    if (tracks_.at(from).known() && !tracks_.at(into).known()) std::swap(into, from);
+    mergeInto(from, into);
+    open.erase(from);
+    open.insert(into);
   }
 }
 

@@ -158,6 +158,24 @@ TEST(Mapper, PiecesThatDifferByWhatNoiseExplainsAreOneWall) {
   EXPECT_EQ(2u, planes(testing::quietNoise(), 0.01));
 }
 
+// A piece between a wall and a door 12 cm behind it, seen from afar: noise would allow that it belongs to either.
+TEST(Mapper, APieceThatSuitsTwoPlanesGoesToTheOneThatItSuitsBetter) {
+  DepthNoise noisy = testing::quietNoise();
+  noisy.a = 0.001, noisy.b = 0, noisy.c = 0.0036, noisy.max_range = 6.5;
+  Rig rig(noisy);
+  Scene door, wall, piece;
+  door.add({3.12, 1.35, 0}, {0, 0.95, 0}, {0, 0, 2.5});
+  wall.add({3, -4.5, 0}, {0, 3.5, 0}, {0, 0, 2.5});
+  piece.add({3.053, -0.6, 0}, {0, 1.6, 0}, {0, 0, 2.5});
+  for (int i = 0; i < 3; ++i) rig.look(door, {0.5, 1.6 + 0.2 * i, 1.3}, {3, 1.8, 1.2});
+  for (int i = 0; i < 4; ++i) rig.look(wall, {0.5, -3.2 + 0.4 * i, 1.3}, {3, -3.2 + 0.4 * i, 1.2});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  for (int i = 0; i < 3; ++i) rig.look(piece, {-2.8, 0.2 * i, 1.3}, {3, 0.2 * i, 1.2});
+  ASSERT_EQ(2u, rig.mapper.planes().size());
+  EXPECT_LT(rig.mapper.planes()[0].area, 3.0) << "the door";
+  EXPECT_GT(rig.mapper.planes()[1].area, 9.0) << "the wall";
+}
+
 TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
   for (const double step : {0.0, 0.04}) {
     Rig rig;

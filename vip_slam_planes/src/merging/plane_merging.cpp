@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plane_extent.h"
 
@@ -34,15 +35,18 @@ PlaneMoments surfaceMoments(const PlaneTrack& track, const CameraPoses& poses) {
   return moments;
 }
 
-bool jointFitServes(const PlaneMoments& a, const PlaneMoments& b, const PlaneTrack& track, double slack) {
+/// What a joint fit adds to the RMS of the worse of both, m; infinity when there is no fit.
+double jointMisfit(const PlaneMoments& a, const PlaneMoments& b, const PlaneTrack& track) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
   const PlaneMoments both{a.M + b.M};
   Plane joint, own;
-  if (!fitPlane(both, track.kind(), track.plane().n, &joint)) return false;
+  if (!fitPlane(both, track.kind(), track.plane().n, &joint)) return kNone;
+  double worst = 0;
   for (const PlaneMoments* m : {&a, &b}) {
-    if (!fitPlane(*m, track.kind(), track.plane().n, &own)) return false;
-    if (m->meanSquare(joint) > m->meanSquare(own) + slack * slack) return false;
+    if (!fitPlane(*m, track.kind(), track.plane().n, &own)) return kNone;
+    worst = std::max(worst, m->meanSquare(joint) - m->meanSquare(own));
   }
-  return true;
+  return std::sqrt(worst);
 }
 
 /// Whether the noise of their depth points allows that both are one plane (chi-square test). From afar the noise is
@@ -121,6 +125,10 @@ Allowance allowanceFor(const PlaneTrack& small, const PlaneTrack& large, const s
 
 }  // namespace
 
+double jointMisfit(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& poses) {
+  return jointMisfit(surfaceMoments(a, poses), surfaceMoments(b, poses), a.area() < b.area() ? b : a);
+}
+
 bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known,
                  const SceneView& view, const PlaneMergingOptions& options) {
   const CameraPoses& poses = view.poses;
@@ -179,7 +187,7 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
   if (shared > 2 * options.overlap) return true;
   if (noise && !out_of_reach) return true;
   const double slack = options.max_rms * (ceiling ? kCeilingSlack : 1.0);
-  return jointFitServes(surfaceMoments(a, poses), surfaceMoments(b, poses), large, slack) &&
+  return jointMisfit(surfaceMoments(a, poses), surfaceMoments(b, poses), large) <= slack &&
          !(out_of_reach && gapMayBeOpen(small, large, view));
 }
 

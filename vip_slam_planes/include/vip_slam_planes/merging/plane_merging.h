@@ -17,4 +17,8 @@ namespace vip_slam {
 bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<const PlaneTrack*>& known,
                  const SceneView& view, const PlaneMergingOptions& options);
 
+/// What one plane for both adds to the distances of their points, RMS of the worse of both, m; infinity when they do not
+/// determine a plane.
+double jointMisfit(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& poses);
+
 }  // namespace vip_slam
