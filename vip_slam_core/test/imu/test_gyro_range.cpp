@@ -8,7 +8,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kStep = 0.005;
+constexpr double kInterval = 0.005;
 
 Eigen::Vector3d swing(double t) { return {0.3, -5.0 * std::sin(4.0 * t), 0.1 * std::cos(t)}; }
 
@@ -16,10 +16,10 @@ TEST(GyroRange, FindsTheEndThatSamplesStopAt) {
   GyroRange range;
   int cut = 0;
   for (int k = 0; k < 800; ++k) {
-    Eigen::Vector3d rate = swing(k * kStep);
+    Eigen::Vector3d rate = swing(k * kInterval);
     cut += std::abs(rate.y()) > 3.49;
     rate.y() = std::clamp(rate.y(), -3.49, 3.49);
-    range.add(k * kStep, rate);
+    range.add(k * kInterval, rate);
   }
   EXPECT_GT(range.samples(), static_cast<std::uint64_t>(cut * 3 / 4));
   EXPECT_LE(range.samples(), static_cast<std::uint64_t>(cut));
@@ -32,9 +32,9 @@ TEST(GyroRange, FindsTheEndThatSamplesStopAt) {
 TEST(GyroRange, WhatOnlyTurnsFastOrRepeatsItsSamplesHasNoEnd) {
   GyroRange fast, repeating, slow;
   for (int k = 0; k < 2000; ++k) {
-    fast.add(k * kStep, swing(k * kStep));
-    repeating.add(k * kStep, swing((k - k % 4) * kStep));
-    slow.add(k * kStep, {0.5, 0.5, 0.5});
+    fast.add(k * kInterval, swing(k * kInterval));
+    repeating.add(k * kInterval, swing((k - k % 4) * kInterval));
+    slow.add(k * kInterval, {0.5, 0.5, 0.5});
   }
   EXPECT_EQ(fast.samples(), 0u);
   EXPECT_EQ(repeating.samples(), 0u);

@@ -24,24 +24,24 @@ Eigen::Matrix4d observation(double offset, double slope, double scatter, std::mt
   return G;
 }
 
-const Eigen::Vector4d kPlane(0, 0, -1, 2);
+const Eigen::Vector4d kAhead(0, 0, -1, 2);
 
 }  // namespace
 
 TEST(PlaneNoise, MisfitIsDistanceAndTiltWithoutScatter) {
   std::mt19937 random(1);
-  EXPECT_NEAR(planeMisfit(observation(0, 0, 0, &random), kPlane), 0, 1e-6);
+  EXPECT_NEAR(planeMisfit(observation(0, 0, 0, &random), kAhead), 0, 1e-6);
   const double distance = 0.003;
-  EXPECT_NEAR(planeMisfit(observation(distance, 0, 0, &random), kPlane),
+  EXPECT_NEAR(planeMisfit(observation(distance, 0, 0, &random), kAhead),
               kPoints * distance * distance / (kSigma * kSigma), 1e-6);
   // Tilt: the squared distances along x that the slope makes; the best plane has none left.
   const double slope = 0.01, spread = 0.33;  // mean of x^2
-  EXPECT_NEAR(planeMisfit(observation(0, slope, 0, &random), kPlane),
+  EXPECT_NEAR(planeMisfit(observation(0, slope, 0, &random), kAhead),
               kPoints * slope * slope * spread / (kSigma * kSigma), 1e-3 * kPoints);
   // Points that scatter by their sigma say little about the plane being wrong: three degrees of freedom, not 50.
   double sum = 0;
   constexpr int kDraws = 300;
-  for (int k = 0; k < kDraws; ++k) sum += planeMisfit(observation(0, 0, kSigma, &random), kPlane);
+  for (int k = 0; k < kDraws; ++k) sum += planeMisfit(observation(0, 0, kSigma, &random), kAhead);
   EXPECT_NEAR(sum / kDraws, 3.0, 0.5);
 }
 
@@ -50,7 +50,7 @@ TEST(PlaneNoise, WeightsFollowTheAgreement) {
   const auto scaleOf = [&](double scatter, int observations) {
     std::vector<PlaneMisfit> misfits;
     for (int k = 0; k < observations; ++k)
-      misfits.push_back({0, planeMisfit(observation(0, 0, scatter, &random), kPlane)});
+      misfits.push_back({0, planeMisfit(observation(0, 0, scatter, &random), kAhead)});
     return planeInformationScale(misfits);
   };
   EXPECT_NEAR(scaleOf(kSigma / 3, 1000), 9.0, 1.0);
@@ -64,7 +64,7 @@ TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {
   std::mt19937 random(3);
   std::vector<PlaneMisfit> misfits;
   for (int k = 0; k < 1000; ++k)
-    misfits.push_back({0, planeMisfit(observation(k % 5 ? 0 : 0.03, 0, kSigma / 3, &random), kPlane)});
+    misfits.push_back({0, planeMisfit(observation(k % 5 ? 0 : 0.03, 0, kSigma / 3, &random), kAhead)});
   const double scale = planeInformationScale(misfits);
   EXPECT_GT(scale, 5.0);
   EXPECT_LT(scale, 9.0);
@@ -99,7 +99,7 @@ TEST(PlaneNoise, WhatIsNoPlaneCountsForLess) {
       const int plane = k % 10;
       // Plane 9 is a row of boxes whose fronts lie a centimetre apart (in units), plane 8 had one bad keyframe.
       const double offset = plane == 9 ? normal(random) : plane == 8 && k < 10 ? 0.01 * unit : 0.0;
-      misfits.push_back({plane, planeMisfit(observation(offset, 0, unit * kSigma, &random), kPlane), 4e-4});
+      misfits.push_back({plane, planeMisfit(observation(offset, 0, unit * kSigma, &random), kAhead), 4e-4});
     }
     const std::vector<double> weights = planeWeights(misfits, 12);
     for (int plane = 0; plane < 8; ++plane) EXPECT_GT(weights[plane], 0.7) << unit << " " << plane;
