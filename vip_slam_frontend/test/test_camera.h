@@ -1,4 +1,4 @@
-// The pinhole camera of the front end's tests: 640 x 480, no distortion.
+// The pinhole camera of the front end's tests: 640 x 480, no distortion, 400 pixels of focal length in most of them.
 #pragma once
 
 #include <memory>
@@ -7,9 +7,9 @@
 
 namespace vip_slam {
 
-constexpr double kCx = 319.5, kCy = 239.5;
+constexpr double kFocal = 400, kCx = 319.5, kCy = 239.5;
 
-inline std::shared_ptr<const CameraModel> testCamera(double focal) {
+inline std::shared_ptr<const CameraModel> testCamera(double focal = kFocal) {
   CameraIntrinsics intrinsics;
   intrinsics.width = 640;
   intrinsics.height = 480;

@@ -12,7 +12,7 @@
 
 namespace vip_slam {
 
-constexpr double kFocal = 200, kCx = 159.5, kCy = 119.5, kWall = 2.5, kStill = 1.2;
+constexpr double kFocal = 200, kCx = 159.5, kCy = 119.5, kWall = 2.5, kRest = 1.2;
 
 /// The body is at rest for a while, then sways in front of a wall at x = kWall without rotating.
 struct World {
@@ -24,7 +24,7 @@ struct World {
     cv::normalize(texture, texture, 0, 255, cv::NORM_MINMAX);
   }
   static Eigen::Vector3d position(double t) {
-    const double s = std::max(0.0, t - kStill), ramp = 1.0 - std::exp(-s * s);
+    const double s = std::max(0.0, t - kRest), ramp = 1.0 - std::exp(-s * s);
     return ramp * Eigen::Vector3d(0.3 * std::sin(1.1 * s), 0.6 * std::sin(0.9 * s), 0.25 * std::sin(1.6 * s));
   }
   static ImuSample imu(double t) {

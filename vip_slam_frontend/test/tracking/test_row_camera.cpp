@@ -9,9 +9,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kReadout = 0.02;
-
-std::shared_ptr<const CameraModel> camera() { return distortedCamera(640, 480, 500); }
+std::shared_ptr<const CameraModel> largeCamera() { return distortedCamera(640, 480, 500); }
 
 /// A body that oscillates about all axes and along them, 2 rad/s and 15 rad/s^2 at most, and its IMU.
 struct Swing {
@@ -54,7 +52,7 @@ struct Swing {
     Eigen::Vector2d uv(0, 239.5);
     for (int k = 0; k < 30; ++k) {
       const double at = t + kReadout * ((uv.y() + 0.5) / 480 - 0.5);
-      EXPECT_TRUE(camera()->project((T_W_I(at) * T_I_C).inverse() * p_W, &uv));
+      EXPECT_TRUE(largeCamera()->project((T_W_I(at) * T_I_C).inverse() * p_W, &uv));
     }
     return uv;
   }
@@ -64,8 +62,8 @@ TEST(RowCamera, EveryRowAgreesWithTheMotionThere) {
   const Swing swing;
   double most_apart = 0;
   for (double t : {0.2, 0.5, 1.1}) {
-    const RowCamera view(camera(), std::make_shared<RowPoses>(Readout::around(kReadout), swing.nav(t),
-                                                              swing.imu(t - 0.01, t + 0.01), swing.T_I_C));
+    const RowCamera view(largeCamera(), std::make_shared<RowPoses>(Readout::around(kReadout), swing.nav(t),
+                                                                   swing.imu(t - 0.01, t + 0.01), swing.T_I_C));
     const SE3 T_W_C = swing.T_W_I(t) * swing.T_I_C;
     for (double x = -0.5; x <= 0.5; x += 0.25) {
       for (double y = -0.4; y <= 0.4; y += 0.1) {
@@ -74,7 +72,7 @@ TEST(RowCamera, EveryRowAgreesWithTheMotionThere) {
           const Eigen::Vector2d truth = swing.seenByItsRow(t, T_W_C * p);
           Eigen::Vector2d uv, global;
           ASSERT_TRUE(view.project(p, &uv));
-          ASSERT_TRUE(camera()->project(p, &global));
+          ASSERT_TRUE(largeCamera()->project(p, &global));
           most_apart = std::max(most_apart, (truth - global).norm());
           EXPECT_LT((uv - truth).norm(), 0.01) << t << ": " << x << " " << y << " " << z;
           EXPECT_LT((view.unproject(truth, z) - p).norm(), 2e-5 * z) << t << ": " << x << " " << y << " " << z;
@@ -101,12 +99,12 @@ TEST(RowCamera, BeyondTheImuItsLastSampleCounts) {
 }
 
 TEST(RowCamera, AGlobalShutterIsTheCamera) {
-  const RowCamera view(camera());
+  const RowCamera view(largeCamera());
   EXPECT_FALSE(view.rolls());
   const Eigen::Vector3d p(0.3, -0.2, 1.5);
   Eigen::Vector2d uv, same;
   ASSERT_TRUE(view.project(p, &uv));
-  ASSERT_TRUE(camera()->project(p, &same));
+  ASSERT_TRUE(largeCamera()->project(p, &same));
   EXPECT_EQ(uv, same);
   EXPECT_LT((view.unproject(uv, 1.5) - p).norm(), 1e-9);
 }

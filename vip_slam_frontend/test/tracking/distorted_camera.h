@@ -1,4 +1,4 @@
-// A camera with some radial distortion, its centre in the middle of the image.
+// A rolling-shutter camera with some radial distortion, its centre in the middle of the image.
 #pragma once
 
 #include <memory>
@@ -6,6 +6,8 @@
 #include "vip_slam_core/camera/camera_model.h"
 
 namespace vip_slam {
+
+constexpr double kReadout = 0.02;  ///< from the first row to the last, s
 
 inline std::shared_ptr<const CameraModel> distortedCamera(int width, int height, double focal) {
   CameraIntrinsics k;

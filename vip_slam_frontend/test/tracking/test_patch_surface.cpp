@@ -11,10 +11,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFocal = 400;
 const Eigen::Vector2d kPixel(420, 200);
-
-std::shared_ptr<const CameraModel> camera() { return testCamera(kFocal); }
 
 /// A wall on the right, along which the camera looks: seen at about 15 degrees in kPixel.
 const Eigen::Vector3d kNormal = Eigen::Vector3d(-1.0, 0.1, 0.02).normalized();
@@ -120,20 +117,20 @@ TEST(PatchSurface, WarpIsTheHomographysDerivative) {
   const Eigen::Matrix2d exact = A_cur_ref.inverse();
   const PatchSurface surface = patchSurface(wallDepthImage(0), kPixel, wallDepth(kPixel), noise());
   PatchWarp warp;
-  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(testCamera()), RowCamera(testCamera()), kPixel, surface, kMotion, &warp));
   EXPECT_LT((warp.A - exact).norm(), 0.01);
   PatchSurface facing = surface;
   facing.slope.setZero();
-  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, facing, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(testCamera()), RowCamera(testCamera()), kPixel, facing, kMotion, &warp));
   EXPECT_GT((warp.A - exact).norm(), 0.1);  // hence the slope
-  EXPECT_FALSE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface,
+  EXPECT_FALSE(patchWarp(RowCamera(testCamera()), RowCamera(testCamera()), kPixel, surface,
                          SE3(Eigen::Quaterniond::Identity(), {0, 0, -50}), &warp));
 }
 
 TEST(PatchSurface, WarpFollowsTheHomographyOverTheWholePatch) {
   const PatchSurface surface = patchSurface(wallDepthImage(0), kPixel, wallDepth(kPixel), noise());
   PatchWarp warp;
-  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(testCamera()), RowCamera(testCamera()), kPixel, surface, kMotion, &warp));
   const Eigen::Vector2d middle = transfer(kMotion, kPixel);
   double linear = 0, second = 0, mean_linear = 0, mean_second = 0;
   int count = 0;
@@ -173,7 +170,7 @@ TEST(PatchSurface, AlignmentOnASlantedWallFindsTheExactPixel) {
   const Eigen::Vector2d exact = transfer(kMotion, kPixel);
   const PatchSurface surface = patchSurface(wallDepthImage(0.0017), kPixel, wallDepth(kPixel), noise());
   PatchWarp warp;
-  ASSERT_TRUE(patchWarp(RowCamera(camera()), RowCamera(camera()), kPixel, surface, kMotion, &warp));
+  ASSERT_TRUE(patchWarp(RowCamera(testCamera()), RowCamera(testCamera()), kPixel, surface, kMotion, &warp));
   const PatchAlignment aligned = alignPatch(reference, kPixel, warp, current, exact + Eigen::Vector2d(0.6, -0.4));
   ASSERT_TRUE(aligned.ok);
   EXPECT_LT((aligned.pixel - exact).norm(), 0.1);

@@ -190,9 +190,9 @@ TEST(SurfaceRows, NothingFromFewPairsOrAForgottenReference) {
 
 // ---- association ----
 
-constexpr double kFocal = 480;
+constexpr double kLongFocal = 480;
 
-std::shared_ptr<const CameraModel> camera() { return testCamera(kFocal); }
+std::shared_ptr<const CameraModel> camera() { return testCamera(kLongFocal); }
 
 /// A corridor 2.2 m wide and 2.8 m high with an end wall 6 m ahead, seen by a camera at `T_W_C` (world: x right, y
 /// down, z ahead).
@@ -212,7 +212,7 @@ cv::Mat corridor(const SE3& T_W_C, const DepthNoise& noise, unsigned seed) {
   const Eigen::Matrix3d R = T_W_C.R();
   for (int v = 0; v < 480; ++v) {
     for (int u = 0; u < 640; ++u) {
-      const Eigen::Vector3d ray = R * Eigen::Vector3d((u - kCx) / kFocal, (v - kCy) / kFocal, 1);
+      const Eigen::Vector3d ray = R * Eigen::Vector3d((u - kCx) / kLongFocal, (v - kCy) / kLongFocal, 1);
       double z = 1e9;
       for (const Wall& wall : walls) {
         const double towards = wall.n.dot(ray);

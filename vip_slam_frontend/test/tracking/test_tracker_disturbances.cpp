@@ -13,13 +13,12 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFocal = 400, kWall = 2.0, kStep = 0.004;
+constexpr double kWall = 2.0, kStep = 0.004;
 
 /// A camera that goes sideways before a textured wall.
 class DisturbanceTest : public ::testing::Test {
  protected:
-  DisturbanceTest()
-      : tracker_(TrackingOptions(), testCamera(kFocal), DepthNoise(), nullptr), texture_(1200, 1600, CV_8U) {
+  DisturbanceTest() : tracker_(TrackingOptions(), testCamera(), DepthNoise(), nullptr), texture_(1200, 1600, CV_8U) {
     cv::RNG random(7);
     random.fill(texture_, cv::RNG::UNIFORM, 0, 255);
     cv::GaussianBlur(texture_, texture_, cv::Size(), 3.0);
@@ -141,7 +140,7 @@ TEST_F(DisturbanceTest, DepthCarriesOverImagesWithoutIt) {
 // A landmark found by its descriptor has a sigma of a pixel, and keeps it when its patch is found again later.
 TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
   show(0, image(0));
-  LandmarkMatcher matcher(TrackingOptions(), testCamera(kFocal));
+  LandmarkMatcher matcher(TrackingOptions(), testCamera());
   MapUpdate update;
   const OrbExtractor orb(300);
   std::vector<Feature> features;

@@ -18,10 +18,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFocal = 400;
-
-std::shared_ptr<const CameraModel> camera() { return testCamera(kFocal); }
-
 /// Smooth random texture on the plane z = 2 of the world, seen from a camera at `t` without rotation.
 cv::Mat render(const cv::Mat& texture, const Eigen::Vector3d& t, double noise, unsigned seed) {
   const double z = 2.0 - t.z();
@@ -341,7 +337,7 @@ TEST(OutlierRejection, AFisheyesPairsAreJudgedByPixels) {
 TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
   const cv::Mat texture = makeTexture();
   DepthNoise noise;
-  FeatureTracker tracker(TrackingOptions(), camera(), noise, nullptr);
+  FeatureTracker tracker(TrackingOptions(), testCamera(), noise, nullptr);
   const auto poseAt = [](int k) {
     return SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.006 * k, 0.002 * k, 0));
   };
@@ -377,7 +373,7 @@ TEST(FeatureTracker, FollowsThePlaneWithoutCreeping) {
 // Bars one metre in front of the wall occlude the outer part of wide patches: these fall back to their narrow patch.
 TEST(FeatureTracker, WhatCoversPartOfAWidePatchDoesNotMoveIt) {
   const cv::Mat texture = makeTexture();
-  FeatureTracker tracker(TrackingOptions(), camera(), DepthNoise(), nullptr);
+  FeatureTracker tracker(TrackingOptions(), testCamera(), DepthNoise(), nullptr);
   const auto poseAt = [](int k) { return SE3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.004 * k, 0, 0)); };
   std::map<LandmarkId, Eigen::Vector2d> first;
   constexpr int kBarEvery = 64, kBar = 24;
@@ -411,7 +407,7 @@ TEST(FeatureTracker, WhatCoversPartOfAWidePatchDoesNotMoveIt) {
 
 TEST(FeatureTracker, PatchesStayWideThroughAnImageWithoutDepth) {
   const cv::Mat texture = makeTexture(), wall(480, 640, CV_32F, cv::Scalar(2.0));
-  FeatureTracker tracker(TrackingOptions(), camera(), DepthNoise(), nullptr);
+  FeatureTracker tracker(TrackingOptions(), testCamera(), DepthNoise(), nullptr);
   for (int k = 0; k < 3; ++k) {
     const SE3 pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.004 * k, 0, 0));
     const SE3 motion(Eigen::Matrix3d::Identity(), Eigen::Vector3d(k == 0 ? 0 : -0.004, 0, 0));
@@ -428,7 +424,7 @@ TEST(FeatureTracker, PatchesStayWideThroughAnImageWithoutDepth) {
 TEST(FeatureTracker, ATrackBeginsAnewWhenDepthFirstShowsItsSurface) {
   const cv::Mat texture = makeTexture();
   DepthNoise noise;
-  FeatureTracker tracker(TrackingOptions(), camera(), noise, nullptr);
+  FeatureTracker tracker(TrackingOptions(), testCamera(), noise, nullptr);
   const auto poseAt = [](int k) { return SE3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.004 * k, 0, 0)); };
   const cv::Mat wall(480, 640, CV_32F, cv::Scalar(2.0)), nothing(480, 640, CV_32F, cv::Scalar(0.0));
   std::map<LandmarkId, float> blind, seeing;

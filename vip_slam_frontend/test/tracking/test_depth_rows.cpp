@@ -9,9 +9,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kReadout = 0.02;
-
-std::shared_ptr<const CameraModel> camera() { return distortedCamera(320, 240, 250); }
+std::shared_ptr<const CameraModel> smallCamera() { return distortedCamera(320, 240, 250); }
 
 /// Level, turning at 1.9 rad/s and moving at 1.4 m/s.
 RowPoses motion() {
@@ -25,7 +23,7 @@ RowPoses motion() {
 
 /// Floor and two walls seen from a pose relative to the stamp; nearest hit of a pixel's ray, z in that pose.
 double nearest(const Eigen::Vector2d& uv, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
-  const Eigen::Vector3d ray = camera()->unproject(uv, 1.0), way = R * ray;
+  const Eigen::Vector3d ray = smallCamera()->unproject(uv, 1.0), way = R * ray;
   double z = 0;
   const Eigen::Vector4d planes[] = {{0, 1, 0, -1.3}, {0.3, 0, 1, -3.5}, {-1, 0, 0.1, -1.0}};
   for (const Eigen::Vector4d& plane : planes) {
@@ -63,7 +61,7 @@ double wrongShare(const cv::Mat& depth, const cv::Mat& truth, double limit) {
 TEST(DepthRows, ShowsWhatTheCameraAtTheStampSees) {
   const RowPoses rows = motion();
   const cv::Mat read = image(&rows), truth = image(nullptr);
-  const cv::Mat result = DepthRows(camera()).atStamp(read, rows);
+  const cv::Mat result = DepthRows(smallCamera()).atStamp(read, rows);
   EXPECT_GT(wrongShare(read, truth, 1e-3), 0.5);
   // The remaining ones are at the edges between the planes.
   EXPECT_LT(wrongShare(result, truth, 1e-3), 0.01);
@@ -75,23 +73,23 @@ TEST(DepthRows, HolesStayHolesAndNothingIsMadeUp) {
   cv::Mat read = image(&rows);
   read(cv::Rect(100, 80, 60, 50)) = 0.f;
   read(cv::Rect(200, 20, 40, 40)) = std::nanf("");
-  const cv::Mat result = DepthRows(camera()).atStamp(read, rows);
+  const cv::Mat result = DepthRows(smallCamera()).atStamp(read, rows);
   EXPECT_LT(wrongShare(result, image(nullptr), 1e-2), 0.01);
   EXPECT_EQ(cv::countNonZero(result != result), 0);
   EXPECT_LT(cv::countNonZero(result), 320 * 240 - 4000);
   const cv::Mat nothing = cv::Mat::zeros(240, 320, CV_32FC1);
-  EXPECT_EQ(cv::countNonZero(DepthRows(camera()).atStamp(nothing, rows)), 0);
+  EXPECT_EQ(cv::countNonZero(DepthRows(smallCamera()).atStamp(nothing, rows)), 0);
 }
 
 TEST(DepthRows, ANearSpeckCostsItselfAndNotTheColumnBelowIt) {
   const RowPoses rows = motion();
   const cv::Mat whole = image(&rows);
-  const int before = cv::countNonZero(DepthRows(camera()).atStamp(whole, rows));
+  const int before = cv::countNonZero(DepthRows(smallCamera()).atStamp(whole, rows));
   for (const float z : {0.002f, 0.005f, 0.01f, 0.02f}) {
     for (const int row : {10, 60, 115, 180}) {
       cv::Mat read = whole.clone();
       read.rowRange(row, row + 3) = z;
-      const cv::Mat result = DepthRows(camera()).atStamp(read, rows);
+      const cv::Mat result = DepthRows(smallCamera()).atStamp(read, rows);
       EXPECT_GT(cv::countNonZero(result), before - 6 * 320) << z << " m in row " << row;
     }
   }
@@ -102,7 +100,8 @@ TEST(DepthRows, AtRestNothingChanges) {
   ImuSample s;
   s.accel = gravityVector();
   const cv::Mat truth = image(nullptr);
-  const cv::Mat result = DepthRows(camera()).atStamp(truth, RowPoses(Readout::around(kReadout), still, {s}, SE3()));
+  const cv::Mat result =
+      DepthRows(smallCamera()).atStamp(truth, RowPoses(Readout::around(kReadout), still, {s}, SE3()));
   EXPECT_LT(cv::norm(result, truth, cv::NORM_INF), 1e-3);
 }
 
