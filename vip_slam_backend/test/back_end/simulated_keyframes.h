@@ -17,6 +17,9 @@
 
 namespace vip_slam {
 
+/// The error over distance of a depth camera that has none.
+inline double exact(double) { return 0.0; }
+
 class SimulatedKeyframes {
  public:
   explicit SimulatedKeyframes(unsigned seed = 1, int points = 500) : random_(seed) {
@@ -151,7 +154,7 @@ class SimulatedKeyframes {
   }
 
   /// Sets the depth error over distance (m, positive: too long), and noise (m) and number of the points on each plane.
-  void setDepthCamera(std::function<double(double)> read_too_long, double sigma_on_planes, int points_on_planes) {
+  void setDepthCamera(std::function<double(double)> read_too_long, double sigma_on_planes, int points_on_planes = 200) {
     read_too_long_ = std::move(read_too_long);
     sigma_on_planes_ = sigma_on_planes;
     points_on_planes_ = points_on_planes;

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <random>
+#include <string>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map_io/map_file.h"
 #include "vip_slam_core/testing/analytic_motion.h"
 
 namespace vip_slam {
@@ -97,6 +99,11 @@ inline Map syntheticMap(int keyframes, int features, double imu_rate, std::uint6
     if (map.hasLandmark(id) && map.hasLandmark(id + 1)) map.mergeLandmarks(id + 1, id);
   map.keyframe(2).loop_keyframe = true;
   return map;
+}
+
+/// What the bytes of a map file hold.
+inline StoredMap parse(const std::string& bytes) {
+  return parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), "test.vsm", ImuNoise());
 }
 
 }  // namespace vip_slam

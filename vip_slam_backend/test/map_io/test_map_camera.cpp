@@ -23,10 +23,6 @@ CameraIntrinsics camera() {
   return k;
 }
 
-StoredMap parse(const std::string& bytes) {
-  return parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), "test.vsm", ImuNoise());
-}
-
 std::string refusal(const StoredMap& stored, const CameraIntrinsics& now) {
   try {
     requireCamera(stored, now, "test.vsm");

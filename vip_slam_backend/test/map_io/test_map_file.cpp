@@ -19,10 +19,6 @@ namespace {
 
 using Loops = std::vector<std::pair<KeyframeId, KeyframeId>>;
 
-StoredMap parse(const std::string& bytes) {
-  return parseMap(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), "test.vsm", ImuNoise());
-}
-
 std::string sealed(std::string bytes) {
   const std::uint32_t crc = crc32(bytes.data(), bytes.size() - 4);
   std::memcpy(&bytes[bytes.size() - 4], &crc, 4);

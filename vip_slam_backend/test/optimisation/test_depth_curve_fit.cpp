@@ -13,14 +13,12 @@ namespace vip_slam {
 namespace {
 
 constexpr double kWave = 4.1, kAmplitude = 0.004;  // a time-of-flight camera's, 1/m and m
-constexpr int kPoints = 200;                       // of each plane in each keyframe
 double wiggle(double z) { return kAmplitude * std::sin(kWave * z); }
-double exact(double) { return 0.0; }
 
 std::optional<DepthCurve> curveOf(std::function<double(double)> read_too_long, int keyframes = 60,
                                   double sigma = 0.004) {
   SimulatedKeyframes world(3);
-  world.setDepthCamera(std::move(read_too_long), sigma, kPoints);
+  world.setDepthCamera(std::move(read_too_long), sigma);
   return fitDepthCurve(mapAtTruePoses(&world, keyframes), DepthNoise());
 }
 
@@ -63,7 +61,7 @@ TEST(DepthCurveFit, WaitsForEnoughKeyframes) { EXPECT_FALSE(curveOf(wiggle, 14))
 
 TEST(DepthCurveFit, SaysNothingOfAStoredMapsCamera) {
   SimulatedKeyframes world(3);
-  world.setDepthCamera(wiggle, 0.004, kPoints);
+  world.setDepthCamera(wiggle, 0.004);
   Map map = mapAtTruePoses(&world, 60);
   for (KeyframeId id = 1; id <= 60; ++id) map.keyframe(id).stored = true;
   EXPECT_FALSE(fitDepthCurve(map, DepthNoise()));
@@ -78,7 +76,7 @@ TEST(DepthCurveFit, TellsTheUserOfWhatMatters) {
 // A wall whose far part is set back by 4 cm is mapped as one plane: that is no error of the camera.
 TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   SimulatedKeyframes world(3);
-  world.setDepthCamera(exact, 0.004, kPoints);
+  world.setDepthCamera(exact, 0.004);
   Map map = mapAtTruePoses(&world, 60);
   int moved = 0;
   for (KeyframeId id = 1; id <= 60; ++id) {
@@ -97,7 +95,7 @@ TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
 // End to end: the back end estimates the curve, reports it, and applies it to all keyframes.
 TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
   SimulatedKeyframes world(6);
-  world.setDepthCamera(wiggle, 0.004, kPoints);
+  world.setDepthCamera(wiggle, 0.004);
   BackEndOptions options;
   options.lockstep = true;
   options.loop_closing = false;
@@ -138,7 +136,7 @@ TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
 
   options.depth_curve = false;
   SimulatedKeyframes again(6);
-  again.setDepthCamera(wiggle, 0.004, kPoints);
+  again.setDepthCamera(wiggle, 0.004);
   BackEnd believing(options, again.sensor());
   for (int k = 0; k < 60; ++k) {
     believing.addKeyframe(again.next());

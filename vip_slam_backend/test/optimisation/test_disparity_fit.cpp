@@ -15,9 +15,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kError = 0.002;  // 1/m
-constexpr int kPoints = 200;      // of each plane in each keyframe
 double tooLong(double z) { return z / (1 + kError * z) - z; }
-double exact(double) { return 0.0; }
 
 DepthNoise stereo() {
   DepthNoise noise;
@@ -28,7 +26,7 @@ DepthNoise stereo() {
 std::optional<double> errorOf(std::function<double(double)> read_too_long, const DepthNoise& noise = stereo(),
                               int keyframes = 60, double sigma = 0.004, bool again = false) {
   SimulatedKeyframes world(3);
-  world.setDepthCamera(std::move(read_too_long), sigma, kPoints);
+  world.setDepthCamera(std::move(read_too_long), sigma);
   return fitDisparityError(mapAtTruePoses(&world, keyframes), noise, again);
 }
 
@@ -48,7 +46,7 @@ TEST(DisparityFit, IsNotMisledByNoise) {
   noise.a = 0.001, noise.b = 0, noise.c = 0.0035;
   for (const unsigned seed : {3u, 4u, 5u}) {
     SimulatedKeyframes world(seed);
-    world.setDepthCamera(exact, 0.03, kPoints);
+    world.setDepthCamera(exact, 0.03);
     EXPECT_FALSE(fitDisparityError(mapAtTruePoses(&world, 60), noise, false)) << seed;
   }
 }
@@ -77,7 +75,7 @@ TEST(DisparityFit, IsNotAskedOfOtherCamerasOrOfTooLittle) {
   EXPECT_FALSE(errorOf(tooLong, tof));
   EXPECT_FALSE(errorOf(tooLong, stereo(), 14));
   SimulatedKeyframes world(3);
-  world.setDepthCamera(tooLong, 0.004, kPoints);
+  world.setDepthCamera(tooLong, 0.004);
   Map map = mapAtTruePoses(&world, 60);
   for (KeyframeId id = 1; id <= 60; ++id) map.keyframe(id).stored = true;
   EXPECT_FALSE(fitDisparityError(map, stereo(), false));
@@ -86,7 +84,7 @@ TEST(DisparityFit, IsNotAskedOfOtherCamerasOrOfTooLittle) {
 // A wall whose far part is set back by 4 cm is mapped as one plane.
 TEST(DisparityFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   SimulatedKeyframes world(3);
-  world.setDepthCamera(exact, 0.004, kPoints);
+  world.setDepthCamera(exact, 0.004);
   Map map = mapAtTruePoses(&world, 60);
   for (KeyframeId id = 1; id <= 60; ++id) {
     const auto seen = map.keyframe(id).planes.find(1);
@@ -108,7 +106,7 @@ TEST(DisparityFit, PosesThatAreOffAreNotMistakenForManyErrors) {
   int found = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     SimulatedKeyframes world(seed);
-    world.setDepthCamera(exact, 0.004, kPoints);
+    world.setDepthCamera(exact, 0.004);
     Map map = mapAtTruePoses(&world, 60);
     for (KeyframeId id = 1; id <= 60; ++id) {
       NavState& state = map.keyframe(id).state;
@@ -131,7 +129,7 @@ TEST(DisparityFit, TellsTheUser) {
 // End to end: the depth offset which the front end estimated in its place is withdrawn.
 TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   SimulatedKeyframes world(6);
-  world.setDepthCamera(tooLong, 0.004, kPoints);
+  world.setDepthCamera(tooLong, 0.004);
   BackEndOptions options;
   options.lockstep = true;
   options.loop_closing = false;
