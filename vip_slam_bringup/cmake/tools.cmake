@@ -46,40 +46,26 @@ install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_
 install(DIRECTORY config launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 
+# One test program per folder below test/: test_FOLDER, made of its test_*.cpp.
 if(CATKIN_ENABLE_TESTING)
-  catkin_add_gtest(test_stereo_depth test/test_stereo_depth.cpp)
-  target_link_libraries(test_stereo_depth vip_slam_bringup)
-  target_compile_definitions(test_stereo_depth PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
-
-  catkin_add_gtest(test_converters test/test_converters.cpp)
-  target_link_libraries(test_converters vip_slam_bringup)
-
-  catkin_add_gtest(test_sensor_files test/test_sensor_files.cpp)
-  target_link_libraries(test_sensor_files vip_slam_bringup)
-  target_compile_definitions(test_sensor_files PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
-
-  catkin_add_gtest(test_readout test/test_readout.cpp)
-  target_link_libraries(test_readout vip_slam_bringup gtest_main)
-
   add_library(${PROJECT_NAME}_driver_bag test/driver_bag.cpp)
   target_link_libraries(${PROJECT_NAME}_driver_bag vip_slam_bringup)
-  foreach(thing bag_extrinsics bag_reader check_bag driver_bags)
-    catkin_add_gtest(test_${thing} test/test_${thing}.cpp)
-    target_link_libraries(test_${thing} ${PROJECT_NAME}_driver_bag vip_slam_bringup vip_slam_runner)
-    target_compile_definitions(test_${thing} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
+  file(GLOB test_folders CONFIGURE_DEPENDS test/*)
+  foreach(folder ${test_folders})
+    file(GLOB sources CONFIGURE_DEPENDS ${folder}/test_*.cpp)
+    string(REGEX REPLACE "^.*/" "test_" name ${folder})
+    if(sources)
+      catkin_add_gtest(${name} ${sources})
+    endif()
+    if(TARGET ${name})
+      target_include_directories(${name} PRIVATE test)
+      target_link_libraries(${name} ${PROJECT_NAME}_driver_bag vip_slam_bringup vip_slam_runner gtest_main)
+      target_compile_definitions(${name} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config"
+        ROOT="${CMAKE_CURRENT_SOURCE_DIR}/.." SCRIPT="${CMAKE_CURRENT_SOURCE_DIR}/scripts/make_report")
+    endif()
   endforeach()
 
-  catkin_add_gtest(test_pipeline test/test_pipeline.cpp)
-  target_link_libraries(test_pipeline vip_slam_bringup vip_slam_runner gtest_main)
-
-  catkin_add_gtest(test_documents test/test_documents.cpp)
-  target_link_libraries(test_documents vip_slam_bringup)
-  target_compile_definitions(test_documents PRIVATE ROOT="${CMAKE_CURRENT_SOURCE_DIR}/..")
-
-  catkin_add_gtest(test_report test/test_report.cpp)
-  target_link_libraries(test_report yaml-cpp)
-  target_compile_definitions(test_report PRIVATE SCRIPT="${CMAKE_CURRENT_SOURCE_DIR}/scripts/make_report")
-
+  # Talks to running nodes.
   find_package(rostest REQUIRED)
   add_rostest_gtest(test_live_tools test/live_tools.test test/test_live_tools.cpp)
   target_link_libraries(test_live_tools ${PROJECT_NAME}_driver_bag vip_slam_bringup)

@@ -153,8 +153,3 @@ TEST(StereoDepth, RefusesWhatItCannotUse) {
 
 }  // namespace
 }  // namespace vip_slam
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}

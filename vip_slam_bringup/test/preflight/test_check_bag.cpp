@@ -290,8 +290,3 @@ TEST_F(CheckBag, UnreadableBag) {
 
 }  // namespace
 }  // namespace vip_slam
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}

@@ -71,8 +71,3 @@ TEST(Documents, ReadmeNamesTopicsAndServicesThatExist) {
 }
 
 }  // namespace
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}

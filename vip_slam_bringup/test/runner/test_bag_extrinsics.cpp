@@ -82,8 +82,3 @@ TEST_F(BagExtrinsicsTest, TfThatIsDemandedAndMissingIsNamed) {
 
 }  // namespace
 }  // namespace vip_slam
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}

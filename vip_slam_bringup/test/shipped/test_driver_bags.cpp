@@ -65,8 +65,3 @@ INSTANTIATE_TEST_SUITE_P(Shipped, DriverBags,
 
 }  // namespace
 }  // namespace vip_slam
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}

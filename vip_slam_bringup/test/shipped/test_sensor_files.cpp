@@ -114,8 +114,3 @@ TEST(SensorFiles, EurocFollowsFromItsStereoCalibration) {
 
 }  // namespace
 }  // namespace vip_slam
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}

@@ -129,8 +129,3 @@ TEST_F(BagReaderTest, OfADamagedBagTheRestIsRead) {
 
 }  // namespace
 }  // namespace vip_slam
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}

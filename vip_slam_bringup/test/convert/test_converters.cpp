@@ -353,8 +353,3 @@ TEST_F(StrayConverter, OneHiddenFrameIsForgivenAShortVideoIsNot) {
 
 }  // namespace
 }  // namespace vip_slam
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  return RUN_ALL_TESTS();
-}
