@@ -204,15 +204,17 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
   while (!open.empty()) {
     const PlaneId id = *open.begin();
     open.erase(open.begin());
-    const PlaneId other = tracks_.count(id) ? samePlane(id) : 0;
+    PlaneId one = id, other = tracks_.count(id) ? samePlane(id) : 0;
     if (other == 0) continue;
-    if (samePlane(other) != id) {
-      open.insert(
-          other);  // it suits another plane better; each time the misfit is less, until two suit each other best
-      continue;
+    // On to the plane that suits each better, until two suit each other best; bounded, whatever the misfits are.
+    for (std::size_t steps = 0; steps < tracks_.size(); ++steps) {
+      const PlaneId better = samePlane(other);
+      if (better == one || better == 0) break;
+      one = other, other = better;
     }
+    if (one != id && other != id) open.insert(id);
     // The older id is kept, unless only the newer one is known to the back end.
-    PlaneId into = std::min(id, other), from = std::max(id, other);
+    PlaneId into = std::min(one, other), from = std::max(one, other);
     if (tracks_.at(from).known() && !tracks_.at(into).known()) std::swap(into, from);
     mergeInto(from, into);
     open.erase(from);
