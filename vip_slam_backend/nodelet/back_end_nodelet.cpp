@@ -19,7 +19,7 @@
 
 namespace vip_slam {
 
-constexpr int kMostPlaneUpdates = 1000;
+constexpr int kMaxPlaneUpdates = 1000;
 
 BackEndNodelet::~BackEndNodelet() {
   timer_.stop();
@@ -52,7 +52,7 @@ void BackEndNodelet::onInit() {
   });
   keyframe_lane_ = owner_->addLane("keyframes", std::size_t(options_.keyframe_queue));
   // Observations and associations are sent only once: the queue holds minutes of them.
-  update_lane_ = owner_->addLane("plane updates", kMostPlaneUpdates);
+  update_lane_ = owner_->addLane("plane updates", kMaxPlaneUpdates);
   control_lane_ = owner_->addLane("control", 100);
   adjustment_lane_ = owner_->addLane("adjustments", 2);  // its own lane: if an end were dropped, no other would start
   advertise();
@@ -101,7 +101,7 @@ void BackEndNodelet::subscribe() {
         }
       }));
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::PlaneUpdate>(
-      "plane_update", kMostPlaneUpdates, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
+      "plane_update", kMaxPlaneUpdates, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
         if (!owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); })) {
           NODELET_WARN_THROTTLE(5, "the back end is too slow: an update of the planes was dropped");
         }

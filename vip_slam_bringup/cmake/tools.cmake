@@ -46,23 +46,13 @@ install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_
 install(DIRECTORY config launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 
-# One test program per folder below test/: test_FOLDER, made of its test_*.cpp.
 if(CATKIN_ENABLE_TESTING)
   add_library(${PROJECT_NAME}_driver_bag test/driver_bag.cpp)
   target_link_libraries(${PROJECT_NAME}_driver_bag vip_slam_bringup)
-  file(GLOB test_folders CONFIGURE_DEPENDS test/*)
-  foreach(folder ${test_folders})
-    file(GLOB sources CONFIGURE_DEPENDS ${folder}/test_*.cpp)
-    string(REGEX REPLACE "^.*/" "test_" name ${folder})
-    if(sources)
-      catkin_add_gtest(${name} ${sources})
-    endif()
-    if(TARGET ${name})
-      target_include_directories(${name} PRIVATE test)
-      target_link_libraries(${name} ${PROJECT_NAME}_driver_bag vip_slam_bringup vip_slam_runner gtest_main)
-      target_compile_definitions(${name} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config"
-        ROOT="${CMAKE_CURRENT_SOURCE_DIR}/.." SCRIPT="${CMAKE_CURRENT_SOURCE_DIR}/scripts/make_report")
-    endif()
+  vip_slam_add_test_folders(${PROJECT_NAME}_driver_bag vip_slam_bringup vip_slam_runner)
+  foreach(test ${vip_slam_test_programs})
+    target_compile_definitions(${test} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config"
+      ROOT="${CMAKE_CURRENT_SOURCE_DIR}/.." SCRIPT="${CMAKE_CURRENT_SOURCE_DIR}/scripts/make_report")
   endforeach()
 
   # Talks to running nodes.

@@ -127,9 +127,9 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("IMU noise in use, times the configured", c.imu_noise_scale);
   status.add("jitter of image stamps in use (ms)", 1e3 * c.stamp_sigma);
   status.add("images that contradict the IMU", c.imu_contradicted);
-  status.add("camera's delay in use (ms)", 1e3 * shown.mounting.time_offset);
+  status.add("camera's delay in use (ms)", 1e3 * shown.calibration.time_offset);
   status.add("extrinsics", shown.extrinsics);
-  for (const std::string& difference : shown.mounting_differences) status.add("calibration", difference);
+  for (const std::string& difference : shown.calibration_differences) status.add("calibration", difference);
   status.add("images", c.images);
   status.add("keyframes", c.keyframes);
   status.add("restarts", c.restarts);

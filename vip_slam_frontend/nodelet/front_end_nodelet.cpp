@@ -225,14 +225,14 @@ void FrontEndNodelet::process(const ImagePair& pair) {
   const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
   publish(pair, output, milliseconds);
 
-  constexpr std::uint64_t kRenewMounting = 30;  // images: its sigmas cost an inversion
-  std::optional<MountingEstimate> mounting;
-  if (front_end_->counters().images % kRenewMounting == 0) mounting = front_end_->mounting();
+  constexpr std::uint64_t kRenewCalibration = 30;  // images: its sigmas cost an inversion
+  std::optional<CalibrationEstimate> calibration;
+  if (front_end_->counters().images % kRenewCalibration == 0) calibration = front_end_->calibration();
 
   std::lock_guard<std::mutex> lock(shown_mutex_);
-  if (mounting) {
-    shown_.mounting = *mounting;
-    shown_.mounting_differences = mountingDifferences(front_end_->givenMounting(), *mounting);
+  if (calibration) {
+    shown_.calibration = *calibration;
+    shown_.calibration_differences = calibrationDifferences(front_end_->givenCalibration(), *calibration);
   }
   shown_.size_problem = size_problem;
   shown_.status = output.frame->status;

@@ -118,8 +118,8 @@ class FrontEndNodelet : public nodelet::Nodelet {
   struct Shown {
     TrackingStatus status;
     FrontEndCounters counters;
-    MountingEstimate mounting;                      ///< renewed about once a second
-    std::vector<std::string> mounting_differences;  ///< against the configuration
+    CalibrationEstimate calibration;                   ///< renewed about once a second
+    std::vector<std::string> calibration_differences;  ///< against the configuration
     PairerCounters pairs;
     std::size_t features = 0;
     double latency = 0;         ///< stamp to publishing, seconds (by ROS time)

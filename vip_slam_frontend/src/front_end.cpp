@@ -21,9 +21,9 @@ Eigen::Vector3d FrontEnd::gyro(double t) const { return impl_->gyro(t); }
 void FrontEnd::reset(const std::string& reason) { impl_->reset(reason); }
 void FrontEnd::clockRanBack(const std::string& reason) { impl_->clockRanBack(reason); }
 void FrontEnd::forgetMap() { impl_->forgetMap(); }
-MountingEstimate FrontEnd::mounting() const { return impl_->mounting(); }
+CalibrationEstimate FrontEnd::calibration() const { return impl_->calibration(); }
 double FrontEnd::timeOffset() const { return impl_->timeOffset(); }
-MountingEstimate FrontEnd::givenMounting() const { return impl_->givenMounting(); }
+CalibrationEstimate FrontEnd::givenCalibration() const { return impl_->givenCalibration(); }
 const FrontEndCounters& FrontEnd::counters() const { return impl_->counters_; }
 const FrontEndOptions& FrontEnd::options() const { return impl_->options_; }
 

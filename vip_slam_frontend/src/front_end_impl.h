@@ -37,10 +37,10 @@ class FrontEnd::Impl {
   void applyMapUpdate(const MapUpdate& update);
   std::optional<NavState> predict(double t) const;
   Eigen::Vector3d gyro(double t) const;
-  MountingEstimate mounting() const;
-  MountingEstimate givenMounting() const;
+  CalibrationEstimate calibration() const;
+  CalibrationEstimate givenCalibration() const;
   double timeOffset() const {
-    return filter_.started() ? filter_.window().time_offset : filter_.mounting().time_offset;
+    return filter_.started() ? filter_.window().time_offset : filter_.calibration().time_offset;
   }
   void reset(const std::string& reason);
   void clockRanBack(const std::string& reason);
@@ -57,7 +57,7 @@ class FrontEnd::Impl {
 
   /// TrackedFrame::T_chain_C for the body pose T_odom_I, at the newest image or a little later.
   SE3 chainedCamera(const SE3& T_odom_I) const;
-  SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.mounting().T_I_C; }
+  SE3 extrinsics() const { return filter_.started() ? filter_.window().T_I_C : filter_.calibration().T_I_C; }
   /// A depth image at its own stamp; empty when there is none.
   struct DepthReading {
     cv::Mat image;

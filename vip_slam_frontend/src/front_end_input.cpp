@@ -48,12 +48,12 @@ cv::Mat featureMask(const cv::Mat& mask, int border) {
 
 /// Scales pixel distances, which the options give for images of 640 x 480, to smaller images with the same view.
 FrontEndOptions forSize(FrontEndOptions options, int width, int height) {
-  constexpr double kLeast = 0.5;   // of the scale: smaller images than 320 x 240 were not measured
-  constexpr int kLeastBorder = 8;  // px, for patches and their gradients
-  const double scale = std::clamp(std::max(width, height) / kReferenceSide, kLeast, 1.0);
+  constexpr double kMinScale = 0.5;  // of the scale: smaller images than 320 x 240 were not measured
+  constexpr int kMinBorder = 8;      // px, for patches and their gradients
+  const double scale = std::clamp(std::max(width, height) / kReferenceSide, kMinScale, 1.0);
   options.tracking.min_distance *= scale;
   const int border = options.tracking.border;
-  options.tracking.border = std::max(std::min(border, kLeastBorder), static_cast<int>(std::ceil(scale * border)));
+  options.tracking.border = std::max(std::min(border, kMinBorder), static_cast<int>(std::ceil(scale * border)));
   return options;
 }
 

@@ -36,20 +36,20 @@ void carryOn(const Eigen::Vector3d& omega, double dt, NavState* state, Matrix15d
 
 }  // namespace
 
-MountingEstimate FrontEnd::Impl::mounting() const {
-  MountingEstimate mounting = filter_.mounting();
+CalibrationEstimate FrontEnd::Impl::calibration() const {
+  CalibrationEstimate calibration = filter_.calibration();
   // The filter sees readings and rates to which the configured corrections are already applied: add those back.
-  mounting.depth_offset += sensor_.depth_offset;
+  calibration.depth_offset += sensor_.depth_offset;
   const CameraIntrinsics& camera = sensor_.camera;
-  mounting.depth_shift_px =
-      sensor_.depth_shift + mounting.depth_shift.cwiseProduct(Eigen::Vector2d(camera.fx, camera.fy));
-  mounting.intrinsics = correctedIntrinsics({camera.fx, camera.fy, camera.cx, camera.cy}, mounting.bearing);
-  mounting.gyro_correction += sensor_.gyro_correction + mounting.gyro_correction * sensor_.gyro_correction;
-  return mounting;
+  calibration.depth_shift_px =
+      sensor_.depth_shift + calibration.depth_shift.cwiseProduct(Eigen::Vector2d(camera.fx, camera.fy));
+  calibration.intrinsics = correctedIntrinsics({camera.fx, camera.fy, camera.cx, camera.cy}, calibration.bearing);
+  calibration.gyro_correction += sensor_.gyro_correction + calibration.gyro_correction * sensor_.gyro_correction;
+  return calibration;
 }
 
-MountingEstimate FrontEnd::Impl::givenMounting() const {
-  MountingEstimate given{sensor_.T_imu_cam, sensor_.time_offset};
+CalibrationEstimate FrontEnd::Impl::givenCalibration() const {
+  CalibrationEstimate given{sensor_.T_imu_cam, sensor_.time_offset};
   given.depth_offset = sensor_.depth_offset;
   given.gyro_correction = sensor_.gyro_correction;
   return given;

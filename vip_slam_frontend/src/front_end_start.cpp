@@ -31,7 +31,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   tracker_.replenish(SE3(), true, t);
   const int stride = strideOn(camera_->width(), camera_->height(), options_.frame_grid_stride);
   // After a restart extrinsics and gyro correction are known better than from the configuration.
-  initialiser_.setMounting(extrinsics(), filter_.mounting().gyro_correction);
+  initialiser_.setCalibration(extrinsics(), filter_.calibration().gyro_correction);
   std::optional<FilterPrior> prior =
       initialiser_.add({t_imu, measurements(), makeDepthGrid(depth, stride, sensor_.depth_noise)}, imu_);
   if (!prior) {

@@ -249,7 +249,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   result.motion_nees /= std::max(1, motions);
   result.nis_per_dof = rows > 0 ? nis / rows : 0;
   result.window = filter.window();
-  result.mounting = filter.mounting();
+  result.calibration = filter.calibration();
   result.depth_scale = filter.depthScale();
   return result;
 }

@@ -82,7 +82,7 @@ struct RunResult {
   double motion_nees = 0, motion_error = 0, newest_error = 0;
   int gated = 0, used = 0;
   WindowState window;  ///< at the end
-  MountingEstimate mounting;
+  CalibrationEstimate calibration;
   double most_depth_correction = 0;                           ///< m, of all images, with its sign
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();      ///< applied, at the end
   double most_bearing_correction = 0;                         ///< passed on, largest entry of all images

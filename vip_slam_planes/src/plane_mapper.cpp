@@ -171,7 +171,7 @@ void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
   if (!isSound(keyframe->frame.depth_grid)) return;
   waiting_.emplace(keyframe->id, keyframe);
   // One more than the back end holds: the newest one, which it may still place.
-  while (waiting_.size() > kMostWaitingKeyframes + 1) {
+  while (waiting_.size() > kMaxWaitingKeyframes + 1) {
     waiting_.erase(waiting_.begin());
     ++counters.keyframes_forgotten;
   }

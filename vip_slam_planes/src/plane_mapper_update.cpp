@@ -13,7 +13,7 @@ namespace {
 
 // Largest number of keyframes per update that are processed again after the map has moved their observations off
 // planes.
-constexpr std::size_t kMostRenewed = 10;
+constexpr std::size_t kMaxRenewed = 10;
 constexpr double kSureDirection = 2.0 * M_PI / 180.0;                  // largest sigma of a determined direction, rad
 constexpr double kMovedTurn = 0.5 * M_PI / 180.0, kMovedShift = 0.02;  // of a keyframe by one update, rad and m
 
@@ -290,7 +290,7 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
       track.refit_due = true;
     }
   }
-  while (renewed.size() > kMostRenewed) renewed.erase(renewed.begin());  // keep the newest
+  while (renewed.size() > kMaxRenewed) renewed.erase(renewed.begin());  // keep the newest
   for (KeyframeId id : renewed) processKeyframe(*placed_.at(id), false);
 }
 

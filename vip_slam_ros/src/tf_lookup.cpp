@@ -18,8 +18,8 @@ std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::str
   }
 }
 
-MountingGap mountingGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b) {
-  MountingGap gap;
+ExtrinsicsGap extrinsicsGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b) {
+  ExtrinsicsGap gap;
   gap.degrees = T_imu_cam_a.rotation().angularDistance(T_imu_cam_b.rotation()) * 180 / M_PI;
   gap.metres = (T_imu_cam_a.t() - T_imu_cam_b.t()).norm();
   return gap;

@@ -54,7 +54,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   }
   // New extrinsics change the body poses outside the local window as well. These are published with the next global
   // update; until then the published camera poses are still right.
-  map.adoptMounting(keyframe->frame.T_I_C);
+  map.adoptExtrinsics(keyframe->frame.T_I_C);
   followCameraCorrection(keyframe->frame.camera_correction);
   followGyroCorrection(keyframe->gyro_correction);
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kRestSeconds = 15;
 // Number of refused loops that are kept; a day has about a hundred thousand.
-constexpr std::size_t kMostRejected = 1000;
+constexpr std::size_t kMaxRejected = 1000;
 
 }  // namespace
 
@@ -19,7 +19,7 @@ void BackEnd::Impl::remember(const LoopEvent& event) {
   new_loops.push_back(event);
   loops.push_back(event);
   rejected_kept += !event.accepted;
-  if (rejected_kept <= kMostRejected) return;
+  if (rejected_kept <= kMaxRejected) return;
   loops.erase(std::find_if(loops.begin(), loops.end(), [](const LoopEvent& e) { return !e.accepted; }));
   --rejected_kept;
 }

@@ -9,8 +9,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::uint64_t kMostLoads = 4096;  // number of loads until ranges of landmark ids are reused
-constexpr double kRecent = 5.0;             // s after the last localisation while the odometry's drift is negligible
+constexpr std::uint64_t kMaxLoads = 4096;  // number of loads until ranges of landmark ids are reused
+constexpr double kRecent = 5.0;            // s after the last localisation while the odometry's drift is negligible
 
 PlaneHost hostAt(const MapKeyframe& kf) { return {kf.id(), kf.data->frame.epoch, kf.state.T_W_I * kf.T_I_C}; }
 
@@ -22,7 +22,7 @@ void BackEnd::Impl::saveMap(const std::string& path) const {
 
 MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
   // Both throw before the back end is changed.
-  StoredMap stored = loadMapFile(path, sensor.imu_noise, kLoadedLandmarks + (loads % kMostLoads) * kLoadedApart);
+  StoredMap stored = loadMapFile(path, sensor.imu_noise, kLoadedLandmarks + (loads % kMaxLoads) * kLoadedApart);
   requireCamera(stored, sensor.camera, path);
   ++loads;
   reset();
@@ -80,7 +80,7 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
   if (!findInMap(keyframe, &found)) {
     held.push_back(keyframe);
-    if (held.size() > kMostWaitingKeyframes) held.pop_front();
+    if (held.size() > kMaxWaitingKeyframes) held.pop_front();
     return false;
   }
   searching = false;

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kViews = 15, kCoveringViews = 5;
 constexpr double kPointSize = 0.05;   // metres
 constexpr double kTiltSigma = 0.003;  // radians: tilt of the odometry and of the map against gravity
-constexpr double kLeastContradiction = 0.005, kUnknownContradiction = 0.05;  // of depth
+constexpr double kMinContradiction = 0.005, kUnknownContradiction = 0.05;  // of depth
 constexpr double kOccludedWeight = 0.25;
 constexpr std::size_t kEstablishedViews = 4;
 constexpr int kFewDepths = 100;
@@ -47,7 +47,7 @@ double PlaceSupport::evidence() const {
   // occluded.
   double contradiction = kUnknownContradiction;
   if (depth.compared >= kFewDepths)
-    contradiction = kLeastContradiction + depth.seeThrough() + kOccludedWeight * depth.occluded / depth.compared;
+    contradiction = kMinContradiction + depth.seeThrough() + kOccludedWeight * depth.occluded / depth.compared;
   // Even at the right place corners are missed, and with few landmarks the share is uncertain: regularise it.
   const double there = (refound + 2.0) / (established + 10.0);
   return points * explainedCells() * there / contradiction;

@@ -9,7 +9,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kGate = 12.0;               // px; a known track farther than this from its projection is not added
-constexpr double kLeastParallax = 1.0;       // degrees between the two outermost rays, for triangulation
+constexpr double kMinParallax = 1.0;         // degrees between the two outermost rays, for triangulation
 constexpr double kTriangulationError = 3.0;  // px; largest reprojection error of a triangulated point
 
 }  // namespace
@@ -91,7 +91,7 @@ bool LandmarkMaker::triangulate(const Map& map, const std::vector<MapObservation
   double smallest = 1;
   for (std::size_t i = 0; i < rays.size(); ++i)
     for (std::size_t j = i + 1; j < rays.size(); ++j) smallest = std::min(smallest, rays[i].dot(rays[j]));
-  if (smallest > std::cos(kLeastParallax * M_PI / 180.0)) return false;
+  if (smallest > std::cos(kMinParallax * M_PI / 180.0)) return false;
   *p_W = A.ldlt().solve(b);
   if (!p_W->allFinite()) return false;
   for (const MapObservation& o : views) {

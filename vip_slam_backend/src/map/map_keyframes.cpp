@@ -10,10 +10,10 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kMostBearing = 0.2;         // share of the focal length
-constexpr double kMostDepthShift = 100;      // px
-constexpr double kMostGyroCorrection = 0.5;  // each entry
-constexpr double kSameTime = 1e-6;           // s
+constexpr double kMaxBearing = 0.2;         // share of the focal length
+constexpr double kMaxDepthShift = 100;      // px
+constexpr double kMaxGyroCorrection = 0.5;  // each entry
+constexpr double kSameTime = 1e-6;          // s
 
 bool finite(const NavState& s) {
   return std::isfinite(s.t) && s.T_W_I.isFinite() && s.v_W.allFinite() && s.bias_gyro.allFinite() &&
@@ -59,21 +59,21 @@ std::string validateKeyframe(const Keyframe& keyframe) {
       return name + "IMU sample " + std::to_string(k) + " is not finite";
     if (k > 0 && !(s.t > keyframe.imu[k - 1].t))
       return name + "IMU sample " + std::to_string(k) + " is not after the one before";
-    if (s.gyro.norm() > map_limits::kMostRate || s.accel.norm() > map_limits::kMostAcceleration)
+    if (s.gyro.norm() > map_limits::kMaxRate || s.accel.norm() > map_limits::kMaxAcceleration)
       return name + "IMU sample " + std::to_string(k) + " is out of any sensor's range";
   }
   if (!keyframe.imu.empty() && keyframe.imu.back().t - keyframe.imu.front().t > map_limits::kLongestImu)
     return name + "its IMU samples span hours";
   // The newest keyframe's camera correction is applied to all keyframes.
   const CameraCorrection& camera = keyframe.frame.camera_correction;
-  if (!std::isfinite(camera.offset) || !(camera.bearing.value.cwiseAbs().maxCoeff() < kMostBearing) ||
+  if (!std::isfinite(camera.offset) || !(camera.bearing.value.cwiseAbs().maxCoeff() < kMaxBearing) ||
       !camera.bearing.value.allFinite() || !camera.shift.px.allFinite() || !camera.shift.bearing.allFinite() ||
-      camera.shift.px.cwiseAbs().maxCoeff() > kMostDepthShift ||
-      camera.shift.bearing.cwiseAbs().maxCoeff() > kMostBearing)
+      camera.shift.px.cwiseAbs().maxCoeff() > kMaxDepthShift ||
+      camera.shift.bearing.cwiseAbs().maxCoeff() > kMaxBearing)
     return name + "the camera's correction is not finite, or beyond what a camera can be off by";
-  if (!keyframe.gyro_correction.allFinite() || keyframe.gyro_correction.cwiseAbs().maxCoeff() > kMostGyroCorrection)
+  if (!keyframe.gyro_correction.allFinite() || keyframe.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroCorrection)
     return name + "the gyro's correction is not finite, or beyond what a gyro can be off by";
-  if (!(keyframe.imu_noise_scale > 0 && keyframe.imu_noise_scale <= map_limits::kMostNoiseScale))
+  if (!(keyframe.imu_noise_scale > 0 && keyframe.imu_noise_scale <= map_limits::kMaxNoiseScale))
     return name + "the scale of the IMU's noise is " + std::to_string(keyframe.imu_noise_scale);
   if (keyframe.motion.known() && !keyframe.motion.isUsable())
     return name + "the odometry's motion is not finite, or its covariance is none";
@@ -149,7 +149,7 @@ MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, Keyfram
   return inserted;
 }
 
-void Map::adoptMounting(const SE3& T_I_C) {
+void Map::adoptExtrinsics(const SE3& T_I_C) {
   for (auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.T_I_C.matrix() == T_I_C.matrix()) continue;
     const SE3 T_now_then = T_I_C * kf.T_I_C.inverse();
@@ -254,7 +254,7 @@ void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) 
 
 void Map::widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise) {
   MapKeyframe& kf = keyframe(id);
-  kf.imu_noise_scale = std::min(factor * kf.imu_noise_scale, map_limits::kMostNoiseScale);
+  kf.imu_noise_scale = std::min(factor * kf.imu_noise_scale, map_limits::kMaxNoiseScale);
   if (kf.preintegration)
     kf.preintegration = integrate(kf.imu, kf.gyro_correction, keyframe(kf.previous).state, noise, kf.imu_noise_scale);
 }

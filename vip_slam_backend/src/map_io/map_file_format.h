@@ -15,8 +15,8 @@ constexpr std::uint32_t kOldestVersion = 1;
 constexpr float kPixelSigmaOfVersion1 = 0.3f;  ///< average sigma of tracks, px
 constexpr std::size_t kHeader = 8 + 4 + 4 + 8;
 constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;
-constexpr std::size_t kMostTracks = 255;  ///< largest number of a track within a landmark
-constexpr double kDepthUnit = 0.001;      ///< metres per unit of a stored depth grid
+constexpr std::size_t kMaxTracks = 255;  ///< largest number of a track within a landmark
+constexpr double kDepthUnit = 0.001;     ///< metres per unit of a stored depth grid
 
 // Smallest sizes of elements in bytes, to reject counts that exceed the file.
 constexpr std::size_t kFeatureBytes = 7 * 4 + 2 + 32 + 4;

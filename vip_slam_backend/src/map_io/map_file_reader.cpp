@@ -196,7 +196,7 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
     imu[k].t = finite(in, "IMU sample");
     imu[k].gyro = finiteVector<Eigen::Vector3d>(in, "IMU sample");
     imu[k].accel = finiteVector<Eigen::Vector3d>(in, "IMU sample");
-    if (imu[k].gyro.norm() > map_limits::kMostRate || imu[k].accel.norm() > map_limits::kMostAcceleration)
+    if (imu[k].gyro.norm() > map_limits::kMaxRate || imu[k].accel.norm() > map_limits::kMaxAcceleration)
       in.fail("IMU sample is out of any sensor's range");
     if (k > 0 && !(imu[k].t > imu[k - 1].t)) in.fail("IMU samples are not in order");
   }

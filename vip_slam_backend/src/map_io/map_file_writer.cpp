@@ -104,8 +104,8 @@ struct LandmarkNumbers {
     std::vector<LandmarkId>& known = tracks[index.at(landmark)];
     const auto at = std::find(known.begin(), known.end(), f.id);
     const std::size_t number = static_cast<std::size_t>(at - known.begin()) + 1;
-    if (at == known.end() && number <= map_file::kMostTracks) known.push_back(f.id);
-    return static_cast<std::uint8_t>(std::min(number, map_file::kMostTracks));
+    if (at == known.end() && number <= map_file::kMaxTracks) known.push_back(f.id);
+    return static_cast<std::uint8_t>(std::min(number, map_file::kMaxTracks));
   }
 };
 

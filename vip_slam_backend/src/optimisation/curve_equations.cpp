@@ -15,7 +15,7 @@ constexpr int kKeyframes = 200;
 constexpr double kFarthest = 12.0;         // m
 constexpr double kPlaneInformation = 1e2;  // 1/m^2, prior so that a plane with a single point is determined
 constexpr double kOutlier = 3.0;           // sigmas, scale of a redescending loss
-constexpr double kMostOff = 0.1;           // share of the reading; a point farther off its plane uses its own reading
+constexpr double kMaxOff = 0.1;            // share of the reading; a point farther off its plane uses its own reading
 constexpr double kUneven = 4.0;            // times the usual squared residual: beyond, "one plane" may be several
 
 /// Normal equations of a plane's points: of the entries, of the plane's normal (two angles) and distance, and mixed.
@@ -80,7 +80,7 @@ void add(const PlanePoint& point, const SE3& T_W_C, const Plane& plane, const Ei
   const double off = (plane.n.dot(corrected) + plane.d) / along;
   // Use the depth expected from the plane instead of the noisy reading: a reading that noise makes too short would get
   // a smaller sigma and count for another entry.
-  const double z = std::abs(off) < kMostOff * reading ? reading - off : reading;
+  const double z = std::abs(off) < kMaxOff * reading ? reading - off : reading;
   const Eigen::Index i = entryOf(z);
   if (!(z > 0) || z > question.noise.unbiasedRange() || i + 1 >= question.value.size()) return;
   const double share = z / DepthCurve::kStep - static_cast<double>(i), shares[2] = {1 - share, share};

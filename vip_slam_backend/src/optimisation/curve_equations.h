@@ -16,7 +16,7 @@ namespace vip_slam {
 using PlaneSet = std::map<PlaneId, const Plane*>;
 
 /// Smallest number of keyframes for a fit.
-constexpr int kLeastCurveKeyframes = 15;
+constexpr int kMinCurveKeyframes = 15;
 
 /// This session's newest keyframes (200 at most) with depth points on planes.
 std::vector<const MapKeyframe*> newestKeyframesOnPlanes(const Map& map);

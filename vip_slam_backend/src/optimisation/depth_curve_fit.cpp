@@ -17,10 +17,10 @@ constexpr double kEntrySigma = 0.01;   // m, prior of an entry
 constexpr double kBendSigma = 0.002;   // m, prior of an entry against the line between its neighbours
 constexpr int kRounds = 3;             // of reweighting
 constexpr double kKnownSigma = 0.001;  // m: entries with a smaller sigma count as known
-constexpr int kLeastKnown = 6;         // entries
+constexpr int kMinKnown = 6;           // entries
 // The root mean square of the known entries must exceed kWorthwhile, m, and kSure sigmas; and the curves from two
 // halves of the planes must have at least this correlation.
-constexpr double kWorthwhile = 5e-4, kSure = 4.0, kLeastCorrelation = 0.5;
+constexpr double kWorthwhile = 5e-4, kSure = 4.0, kMinCorrelation = 0.5;
 
 constexpr float kWorthTelling = 0.002f;  // m
 
@@ -84,7 +84,7 @@ CurveEstimate estimateCurve(const std::vector<const MapKeyframe*>& keyframes, co
     A += fit.information()(i) * line(i) * line(i).transpose();
     b += fit.information()(i) * fit.value()(i) * line(i);
   }
-  if (int(estimate.known.size()) < kLeastKnown) return {};
+  if (int(estimate.known.size()) < kMinKnown) return {};
   const Eigen::Vector2d straight = A.ldlt().solve(b);
   for (int i = 0; i < entries; ++i) estimate.value(i) -= straight.dot(line(i));
   if (!estimate.value.allFinite()) return {};
@@ -97,7 +97,7 @@ double correlation(const CurveEstimate& a, const CurveEstimate& b) {
   std::vector<int> common;
   std::set_intersection(a.known.begin(), a.known.end(), b.known.begin(), b.known.end(), std::back_inserter(common));
   const auto n = static_cast<Eigen::Index>(common.size());
-  if (n < kLeastKnown) return 0.0;
+  if (n < kMinKnown) return 0.0;
   Eigen::MatrixX2d lines(n, 2), values(n, 2);
   for (Eigen::Index k = 0; k < n; ++k) {
     const int i = common[static_cast<std::size_t>(k)];
@@ -113,7 +113,7 @@ double correlation(const CurveEstimate& a, const CurveEstimate& b) {
 
 std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise) {
   const std::vector<const MapKeyframe*> keyframes = newestKeyframesOnPlanes(map);
-  if (int(keyframes.size()) < kLeastCurveKeyframes) return std::nullopt;
+  if (int(keyframes.size()) < kMinCurveKeyframes) return std::nullopt;
   const PlaneSet planes = allPlanes(map);
   const CurveEstimate found = estimateCurve(keyframes, planes, noise);
   if (found.known.empty()) return std::nullopt;
@@ -127,7 +127,7 @@ std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise)
   // Surfaces that are not exactly planar distort the curve as well, but each plane differently.
   const auto [first, second] = halves(keyframes, planes);
   const double agree = correlation(estimateCurve(keyframes, first, noise), estimateCurve(keyframes, second, noise));
-  if (agree < kLeastCorrelation) return std::nullopt;
+  if (agree < kMinCorrelation) return std::nullopt;
 
   // Shrink entries with little information towards zero, which is the best guess where there are no readings.
   DepthCurve curve;

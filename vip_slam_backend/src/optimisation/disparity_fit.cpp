@@ -15,10 +15,10 @@ namespace {
 constexpr double kOffsetSigma = 0.02, kScaleSigma = 0.02;  // m and share, priors of the nuisance offset and scale
 constexpr int kFitRounds = 4;                              // of reweighting and relinearisation
 // An error is significant above kCertain sigmas and, the first time, kFirst, 1/m, when each half of the planes gives at
-// least kLeastShare of it. In maps with exact depth errors of up to 0.26 mm at one metre are estimated.
-constexpr double kCertain = 3.0, kLeastShare = 0.5, kFirst = 3e-4;
-constexpr double kMost = 0.01;     // 1/m; a centimetre at one metre is more than a calibration error
-constexpr double kFurther = 4e-5;  // 1/m; smallest further change once there is an error
+// least kMinShare of it. In maps with exact depth errors of up to 0.26 mm at one metre are estimated.
+constexpr double kCertain = 3.0, kMinShare = 0.5, kFirst = 3e-4;
+constexpr double kMaxError = 0.01;  // 1/m; a centimetre at one metre is more than a calibration error
+constexpr double kFurther = 4e-5;   // 1/m; smallest further change once there is an error
 
 struct DisparityError {
   double value = 0, sigma = 0;  ///< 1/m
@@ -57,10 +57,10 @@ DisparityError fit(const std::vector<const MapKeyframe*>& keyframes, const Plane
 std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise, bool again) {
   if (!measuresDisparity(noise.type)) return std::nullopt;
   const std::vector<const MapKeyframe*> keyframes = newestKeyframesOnPlanes(map);
-  if (int(keyframes.size()) < kLeastCurveKeyframes) return std::nullopt;
+  if (int(keyframes.size()) < kMinCurveKeyframes) return std::nullopt;
   const PlaneSet planes = allPlanes(map);
   const DisparityError found = fit(keyframes, planes, noise);
-  if (std::abs(found.value) > kMost) return std::nullopt;
+  if (std::abs(found.value) > kMaxError) return std::nullopt;
   if (again) {
     if (std::abs(found.value) > std::max(found.sigma, kFurther)) return found.value;
     return std::nullopt;
@@ -69,7 +69,7 @@ std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise,
   // Surfaces that are not exactly planar give an error as well, but each plane a different one.
   const auto [first, second] = halves(keyframes, planes);
   for (const PlaneSet& half : {first, second}) {
-    if (!(fit(keyframes, half, noise).value / found.value > kLeastShare)) return std::nullopt;
+    if (!(fit(keyframes, half, noise).value / found.value > kMinShare)) return std::nullopt;
   }
   return found.value;
 }

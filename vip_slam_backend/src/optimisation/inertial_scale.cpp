@@ -11,16 +11,16 @@ namespace vip_slam {
 namespace {
 
 // Shorter intervals are joined, since in them the poses' noise is not small against the displacement by acceleration.
-constexpr double kLeastInterval = 0.5, kLongestInterval = 3.0;   // s
-constexpr double kLeastTime = 10.0;                              // s, total of all intervals
-constexpr double kLeastPoseSigma = 1e-5, kMostPoseSigma = 0.01;  // of a keyframe relative to its neighbour, m
+constexpr double kMinInterval = 0.5, kLongestInterval = 3.0;  // s
+constexpr double kMinTime = 10.0;                             // s, total of all intervals
+constexpr double kMinPoseSigma = 1e-5, kMaxPoseSigma = 0.01;  // of a keyframe relative to its neighbour, m
 constexpr int kPoseSigmaSteps = 8;
 constexpr double kTiltSigma = 0.01;      // prior of the map's tilt against gravity, rad
 constexpr double kGravitySigma = 0.002;  // relative, variation over the earth
 constexpr double kBiasSigma = 0.5;       // prior at the beginning of each chain, m/s^2
 // With a larger sigma of the scale the motion is not informative enough: it is reported as unknown.
 constexpr double kLargestSigma = 0.01;
-constexpr double kSure = 5.0, kLeastDifference = 0.005;
+constexpr double kSure = 5.0, kMinDifference = 0.005;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -117,7 +117,7 @@ class ScaleFit {
   /// Ends the last chain and solves. False with too little data.
   bool solve() {
     forgetFirst();
-    if (time_ < kLeastTime || rows_ <= kShared) return false;
+    if (time_ < kMinTime || rows_ <= kShared) return false;
     const Eigen::LDLT<Eigen::Matrix4d> ldlt(A_.topLeftCorner<kShared, kShared>());
     const Eigen::Vector4d x = ldlt.solve(b_.head<kShared>());
     misfit_ = (c_ - b_.head<kShared>().dot(x)) / (rows_ - kShared);
@@ -182,7 +182,7 @@ std::vector<Interval> intervalsOf(const Map& map) {
     newest = id;
     if (linked) {
       imu.append(*kf.preintegration);
-      if (imu.dt < kLeastInterval) continue;
+      if (imu.dt < kMinInterval) continue;
     }
     intervals.push_back({linked && imu.dt < kLongestInterval ? from : nullptr, &kf, imu});
     from = &kf;
@@ -204,7 +204,7 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
     return fit;
   };
   // The poses' sigma is the one for which the residuals are consistent, found by bisection.
-  double low = kLeastPoseSigma, high = kMostPoseSigma;
+  double low = kMinPoseSigma, high = kMaxPoseSigma;
   for (int step = 0; step < kPoseSigmaSteps; ++step) {
     const double middle = std::sqrt(low * high);
     (fitWith(middle).misfit() < 1 ? low : high) = middle;
@@ -214,7 +214,7 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
 
 std::string scaleDifference(const InertialScale& scale, const SensorConfig& sensor) {
   const double difference = scale.factor - 1;
-  if (!(scale.sigma > 0) || std::abs(difference) < std::max(kLeastDifference, kSure * scale.sigma)) return "";
+  if (!(scale.sigma > 0) || std::abs(difference) < std::max(kMinDifference, kSure * scale.sigma)) return "";
   char remedy[120] = "";
   if (sensor.depth_encoding != "32FC1") {
     std::snprintf(remedy, sizeof remedy, ", and depth/scale in the sensor's configuration should be %.6g",

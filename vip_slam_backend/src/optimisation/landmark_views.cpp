@@ -9,7 +9,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastDepth = 0.05, kMostApart = 4.0;
+constexpr double kMinDepth = 0.05, kMaxApart = 4.0;
 
 // Prefetch distances, in landmarks: of the landmark itself, the list of its observations, their features.
 constexpr std::size_t kAheadLandmark = 12, kAheadList = 8, kAheadFeatures = 4;
@@ -22,7 +22,7 @@ void prefetch(const void* p, std::size_t bytes) {
 
 double depthIn(const Map& map, KeyframeId keyframe, const Eigen::Vector3d& p_W) {
   const SE3 T_W_C = map.keyframe(keyframe).T_W_C();
-  return std::max(kLeastDepth, T_W_C.R().col(2).dot(p_W - T_W_C.t()));
+  return std::max(kMinDepth, T_W_C.R().col(2).dot(p_W - T_W_C.t()));
 }
 
 }  // namespace
@@ -74,7 +74,7 @@ LandmarkViews::LandmarkViews(const Map& map, const ProblemScope& scope, const st
 }
 
 double LandmarkViews::cornersApart(const Track& a, const Track& b, double depth) {
-  return std::min(kMostApart, std::hypot(a.first_depth, b.first_depth) / depth);
+  return std::min(kMaxApart, std::hypot(a.first_depth, b.first_depth) / depth);
 }
 
 void LandmarkViews::collect(const MapLandmark& landmark) {

@@ -6,7 +6,7 @@ namespace vip_slam {
 namespace {
 
 // Smallest sigmas of an odometry factor, even for the shortest motion: rad, m.
-constexpr double kLeastRotation = 5e-5, kLeastTranslation = 3e-4;
+constexpr double kMinRotation = 5e-5, kMinTranslation = 3e-4;
 
 }  // namespace
 
@@ -14,8 +14,8 @@ bool odometryFactor(const MapKeyframe& keyframe, int i, int j, const Measurement
                     BaRelativePose* factor) {
   if (!options.use_odometry || !keyframe.motion.known()) return false;
   Matrix6d covariance = options.odometry_inflation * options.odometry_inflation * keyframe.motion.covariance;
-  covariance.diagonal().head<3>().array() += kLeastRotation * kLeastRotation;
-  covariance.diagonal().tail<3>().array() += kLeastTranslation * kLeastTranslation;
+  covariance.diagonal().head<3>().array() += kMinRotation * kMinRotation;
+  covariance.diagonal().tail<3>().array() += kMinTranslation * kMinTranslation;
   const Matrix6d information = covariance.llt().solve(Matrix6d::Identity());
   const Eigen::LLT<Matrix6d> root(information);
   if (root.info() != Eigen::Success || !information.allFinite()) return false;

@@ -12,8 +12,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kLeastViews = 5;            // of a track: its landmark has then been adjusted over as many keyframes
-constexpr std::size_t kLeastTracks = 30;  // for a stable median
+constexpr int kMinViews = 5;            // of a track: its landmark has then been adjusted over as many keyframes
+constexpr std::size_t kMinTracks = 30;  // for a stable median
 constexpr double kClearly = 2.0, kLargest = 8.0;  // a factor below kClearly is not significant; upper limit
 
 }  // namespace
@@ -41,14 +41,14 @@ double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeome
       H.noalias() += J.transpose() * J;
       g.noalias() += J.transpose() * r;
     }
-    if (seen < kLeastViews) continue;
+    if (seen < kMinViews) continue;
     H.diagonal() *= 1.0 + 1e-9;  // with all views from one place the depth is not observable
     const double explained = g.dot(H.ldlt().solve(g));
     if (!std::isfinite(explained)) continue;
     ratios.push_back(std::max(0.0, squared - explained) / (2 * seen - 3));  // the point takes three degrees of freedom
     of_the_map.push_back(squared / (2 * seen - 3));
   }
-  if (ratios.size() < kLeastTracks) return 1;
+  if (ratios.size() < kMinTracks) return 1;
   if (!(std::sqrt(upperMedian(std::move(ratios))) > kClearly)) return 1;
   // An error shared by the views of a track moves their common point, so their mutual agreement underestimates it.
   return std::clamp(std::sqrt(upperMedian(std::move(of_the_map))), kClearly, kLargest);

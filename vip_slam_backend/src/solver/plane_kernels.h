@@ -25,8 +25,8 @@ struct HomographyKernelArguments {
   const KernelFrame* frames = nullptr;
   const KernelPlane* planes = nullptr;
   const KernelHomography* factors = nullptr;
-  bool shared_mounting = false;  ///< all frames have the same T_I_C
-  const double* sums = nullptr;  ///< HomographySums, [batch][24][kKernelLanes]
+  bool shared_extrinsics = false;  ///< all frames have the same T_I_C
+  const double* sums = nullptr;    ///< HomographySums, [batch][24][kKernelLanes]
   double *values = nullptr, *gradient = nullptr;
 };
 
@@ -49,8 +49,8 @@ struct PointToPlaneKernelArguments {
   const KernelFrame* frames = nullptr;
   const KernelPlane* planes = nullptr;
   const KernelPointToPlane* factors = nullptr;
-  bool shared_mounting = false;  ///< all frames have the same T_I_C
-  const double* sums = nullptr;  ///< G as [batch][10][kKernelLanes]: its 3 x 3 (upper triangle by rows), g, s
+  bool shared_extrinsics = false;  ///< all frames have the same T_I_C
+  const double* sums = nullptr;    ///< G as [batch][10][kKernelLanes]: its 3 x 3 (upper triangle by rows), g, s
   double *values = nullptr, *gradient = nullptr;
 };
 

@@ -35,8 +35,8 @@ void SparseCholesky::splitTree() {
     if (parent[f] < 0) open.emplace_back(cost[f], f);
   double above = 0, best = std::numeric_limits<double>::infinity();
   std::vector<int> best_part(n, 2);
-  constexpr int kMostOpened = 64;
-  for (int opened = 0; !open.empty() && opened < kMostOpened; ++opened) {
+  constexpr int kMaxOpened = 64;
+  for (int opened = 0; !open.empty() && opened < kMaxOpened; ++opened) {
     std::sort(open.begin(), open.end());
     double sum[2] = {0, 0};
     std::vector<int> part(n, 2);

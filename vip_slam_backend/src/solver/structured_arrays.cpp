@@ -34,9 +34,9 @@ void StructuredSolver::prepare(const BaProblem& problem) {
   point_gradient_.resize(points_.size());
   point_damping_.resize(points_.size());
   point_system_.resize(2 * points_.size());
-  shared_mounting_ = true;
+  shared_extrinsics_ = true;
   for (const BaFrame& f : problem.frames)
-    shared_mounting_ &= f.T_I_C.R() == problem.frames[0].T_I_C.R() && f.T_I_C.t() == problem.frames[0].T_I_C.t();
+    shared_extrinsics_ &= f.T_I_C.R() == problem.frames[0].T_I_C.R() && f.T_I_C.t() == problem.frames[0].T_I_C.t();
   packHomographies(problem);
   packPointToPlane(problem);
   packImu(problem);
@@ -197,7 +197,7 @@ HomographyKernelArguments StructuredSolver::homographyArguments() const {
   a.frames = frames_.data();
   a.planes = planes_.data();
   a.factors = homographies_.data();
-  a.shared_mounting = shared_mounting_;
+  a.shared_extrinsics = shared_extrinsics_;
   a.sums = homography_sums_.data();
   return a;
 }
@@ -207,7 +207,7 @@ PointToPlaneKernelArguments StructuredSolver::pointToPlaneArguments() {
   a.frames = frames_.data();
   a.planes = planes_.data();
   a.factors = point_to_plane_.data();
-  a.shared_mounting = shared_mounting_;
+  a.shared_extrinsics = shared_extrinsics_;
   a.sums = point_to_plane_sums_.data();
   a.values = values_.data();
   a.gradient = full_gradient_.data();

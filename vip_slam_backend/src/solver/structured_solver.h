@@ -103,7 +103,7 @@ class StructuredSolver : public BaSolver {
   std::vector<BaObservation> observations_;
   std::vector<KernelPlane> planes_;
   std::vector<KernelHomography> homographies_;
-  bool shared_mounting_ = false;  ///< all frames have the same T_I_C
+  bool shared_extrinsics_ = false;  ///< all frames have the same T_I_C
   std::vector<KernelPointToPlane> point_to_plane_;
   std::vector<double> homography_sums_, point_to_plane_sums_;
   std::vector<KernelImu> imu_;

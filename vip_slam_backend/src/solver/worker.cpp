@@ -13,10 +13,10 @@ namespace {
 // within microseconds, and waking up is more expensive.
 constexpr int kLooks = 1000;
 
-// The helper is evaluated after every kStretch seconds of shared jobs, or as soon as it has cost kMostLost seconds. It
-// must save the share kLeastGain, since split work is a little more than the same in one piece; else the owner does
+// The helper is evaluated after every kStretch seconds of shared jobs, or as soon as it has cost kMaxLost seconds. It
+// must save the share kMinGain, since split work is a little more than the same in one piece; else the owner does
 // kJobsAlone jobs alone, about ten iterations of a solve.
-constexpr double kStretch = 2e-3, kMostLost = 0.5e-3, kLeastGain = 0.1;
+constexpr double kStretch = 2e-3, kMaxLost = 0.5e-3, kMinGain = 0.1;
 constexpr int kJobsAlone = 40;
 
 inline void pause() {
@@ -95,8 +95,8 @@ void Worker::judge(int pieces, Clock::time_point begin, Clock::time_point done, 
   const int own = std::max(1, pieces - helped_);
   gain_ += helped_ * seconds(done - begin) / own - seconds(end - done);
   spent_ += seconds(end - begin);
-  if (spent_ < kStretch && gain_ > -kMostLost) return;
-  if (gain_ < kLeastGain * spent_) alone_ = kJobsAlone;
+  if (spent_ < kStretch && gain_ > -kMaxLost) return;
+  if (gain_ < kMinGain * spent_) alone_ = kJobsAlone;
   gain_ = spent_ = 0;
 }
 

@@ -56,7 +56,7 @@ double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& wor
 
 // The front end learns the extrinsics in the first keyframes, halving the error each time. The newest estimate has to
 // be applied to all: the first keyframes, long fixed, would stay turned by two degrees.
-TEST(BackEnd, AMountingLearntOnTheWayHoldsForAllKeyframes) {
+TEST(BackEnd, ExtrinsicsLearntOnTheWayHoldForAllKeyframes) {
   SimulatedKeyframes world(5);
   BackEnd back_end(options("vip"), world.sensor());
   Eigen::Vector3d turn(0.03, -0.02, 0.02);
@@ -70,7 +70,7 @@ TEST(BackEnd, AMountingLearntOnTheWayHoldsForAllKeyframes) {
   EXPECT_LT(worstDirection(back_end.snapshot(), world), 0.3);
 }
 
-TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackAnOldMounting) {
+TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackOldExtrinsics) {
   SimulatedKeyframes world(3);
   BackEnd back_end(options("vip"), world.sensor());
   const SE3 error(expQuaternion({0.02, 0.02, -0.02}), Eigen::Vector3d::Zero());

@@ -77,7 +77,7 @@ TEST(Map, AGyroThatIsKnownBetterIsIntegratedAnew) {
   EXPECT_EQ(f.map.keyframe(5).gyro_correction, correction);
 }
 
-TEST(Map, AMountingThatIsKnownBetterTurnsBodiesAboutTheirCameras) {
+TEST(Map, ExtrinsicsThatAreKnownBetterTurnBodiesAboutTheirCameras) {
   Fixture f;
   f.add(4);
   const KeyframePtr stored = f.addStored();
@@ -86,7 +86,7 @@ TEST(Map, AMountingThatIsKnownBetterTurnsBodiesAboutTheirCameras) {
   std::map<KeyframeId, MapKeyframe> before = f.map.keyframes();
 
   const SE3 T_I_C = before.at(1).T_I_C * SE3(expQuaternion({0.02, -0.01, 0.015}), {0.01, 0.02, -0.01});
-  f.map.adoptMounting(T_I_C);
+  f.map.adoptExtrinsics(T_I_C);
   EXPECT_EQ(checkMap(f.map), "");
   for (const auto& [id, kf] : f.map.keyframes()) {
     EXPECT_LT(kf.T_W_C().boxminus(before.at(id).T_W_C()).norm(), 1e-12) << id;

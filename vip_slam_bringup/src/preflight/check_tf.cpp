@@ -29,7 +29,7 @@ Findings checkTf(const Recording& r) {
                    "the extrinsics of the sensor file are used"});
     return out;
   }
-  const MountingGap gap = mountingGap(r.sensor.T_imu_cam, *T_imu_cam);
+  const ExtrinsicsGap gap = extrinsicsGap(r.sensor.T_imu_cam, *T_imu_cam);
   if (gap.large())
     out.push_back({Severity::kWarning, "tf",
                    words("%s to %s differs from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",

@@ -14,7 +14,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kLeastCorners = 15;
+constexpr std::size_t kMinCorners = 15;
 
 /// Rotation with to ~ R from, by Kabsch with two rounds of trimming.
 std::optional<Eigen::Matrix3d> alignBearings(const std::vector<Eigen::Vector3d>& from,
@@ -29,7 +29,7 @@ std::optional<Eigen::Matrix3d> alignBearings(const std::vector<Eigen::Vector3d>&
       cross += to[i] * from[i].transpose();
       ++n;
     }
-    if (n < kLeastCorners) return std::nullopt;
+    if (n < kMinCorners) return std::nullopt;
     R = nearestRotation(cross);
     std::vector<double> errors;
     for (std::size_t i = 0; i < from.size(); ++i) errors.push_back((to[i] - R * from[i]).norm());
@@ -49,7 +49,7 @@ std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& poi
   cv::Mat r, t, inliers;
   if (!cv::solvePnPRansac(points, images, K, cv::noArray(), r, t, false, 60, static_cast<float>(2.0 * pixel), 0.99,
                           inliers, cv::SOLVEPNP_EPNP) ||
-      inliers.rows < static_cast<int>(kLeastCorners))
+      inliers.rows < static_cast<int>(kMinCorners))
     return std::nullopt;
   std::vector<cv::Point3f> good_points;
   std::vector<cv::Point2f> good_images;
@@ -98,7 +98,7 @@ std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray, st
   std::vector<cv::Point2f> before, after;
   cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0,
                           mask_.size() == gray_.size() ? mask_ : cv::Mat());
-  if (before.size() < kLeastCorners) return std::nullopt;
+  if (before.size() < kMinCorners) return std::nullopt;
   std::vector<unsigned char> found;
   std::vector<float> error;
   cv::calcOpticalFlowPyrLK(gray_, gray, before, after, found, error, cv::Size(21, 21), 4);
@@ -121,7 +121,7 @@ std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray, st
     const auto rowOf = [&](float y) { return (y + 0.5f) / static_cast<float>(gray.rows) - 0.5f; };
     tracks->push_back({{points.back().x, points.back().y, z}, b.cast<float>(), rowOf(before[i].y), rowOf(after[i].y)});
   }
-  if (points.size() >= kLeastCorners) {
+  if (points.size() >= kMinCorners) {
     if (const auto R = rotationByPnp(points, images, 1.0 / camera_->focal())) return R;
   }
   return alignBearings(from, to);

@@ -11,7 +11,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kLeastTracks = 12;
+constexpr std::size_t kMinTracks = 12;
 constexpr int kRounds = 12, kUnknowns = 8;  // td, r, rotation (3), bias (3)
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 
@@ -66,10 +66,10 @@ Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const Sta
 /// Weights of the corners' rows: inverse of the step's typical error, with Huber weights at twice the median, so that a
 /// blurred pair of images has little weight.
 Eigen::VectorXd weightsOf(const Eigen::VectorXd& residual) {
-  constexpr double kLeastError = 1e-4;  // a twentieth of a pixel
+  constexpr double kMinError = 1e-4;  // a twentieth of a pixel
   std::vector<double> errors;
   for (int i = 0; i < residual.size() / 2; ++i) errors.push_back(residual.segment<2>(2 * i).norm());
-  const double typical = upperMedian(errors) + kLeastError;
+  const double typical = upperMedian(errors) + kMinError;
   Eigen::VectorXd weights(residual.size());
   for (std::size_t i = 0; i < errors.size(); ++i)
     weights.segment<2>(2 * static_cast<int>(i))
@@ -131,7 +131,7 @@ std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& 
   constexpr double kMargin = 0.1;  // seconds of gyro around the images
   std::vector<const RotationStep*> used;
   for (const RotationStep& s : steps)
-    if (s.tracks.size() >= kLeastTracks && covered(s, gyro, kMargin + std::abs(start.time_offset))) used.push_back(&s);
+    if (s.tracks.size() >= kMinTracks && covered(s, gyro, kMargin + std::abs(start.time_offset))) used.push_back(&s);
   if (used.size() < 40) return std::nullopt;
 
   State x{start.time_offset, start.readout, start.R_imu_cam.toRotationMatrix()};

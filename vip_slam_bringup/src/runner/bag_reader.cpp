@@ -122,7 +122,7 @@ void BagReader::takeExtrinsics(SensorConfig* sensor) {
                              found.imu_frame + "'; record /tf_static, or use the sensor file's extrinsics");
   }
   extrinsics_source_ = "tf: " + found.camera_frame + " to " + found.imu_frame;
-  const MountingGap off = mountingGap(sensor->T_imu_cam, *found.T_imu_cam);
+  const ExtrinsicsGap off = extrinsicsGap(sensor->T_imu_cam, *found.T_imu_cam);
   if (off.large()) {
     char words[160];
     std::snprintf(words, sizeof words, "differ from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",

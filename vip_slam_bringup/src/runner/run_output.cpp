@@ -103,8 +103,8 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
 }
 
 /// With the keys and units of a sensor file, so that it can be copied there.
-void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const DepthCurve& depth_curve,
-                  const InertialScale& scale, double depth_scale) {
+void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration, const DepthCurve& depth_curve,
+                     const InertialScale& scale, double depth_scale) {
   const auto list = [&yaml](const char* key, const Eigen::VectorXd& values) {
     yaml << YAML::Key << key << YAML::Value << YAML::Flow
          << std::vector<double>(values.data(), values.data() + values.size());
@@ -115,24 +115,24 @@ void emitMounting(YAML::Emitter& yaml, const MountingEstimate& mounting, const D
     yaml << YAML::EndSeq;
   };
   yaml << YAML::Key << "calibration" << YAML::Value << YAML::BeginMap;
-  rows("T_imu_cam", mounting.T_I_C.matrix());
-  yaml << YAML::Key << "time_offset" << YAML::Value << mounting.time_offset;
-  list("sigma_rotation_deg", mounting.sigma_rotation * 180 / M_PI);
-  list("sigma_translation", mounting.sigma_translation);
-  yaml << YAML::Key << "sigma_time_offset" << YAML::Value << mounting.sigma_time_offset;
-  list("intrinsics", mounting.intrinsics);
-  list("sigma_bearing", mounting.sigma_bearing);
-  yaml << YAML::Key << "depth_offset" << YAML::Value << mounting.depth_offset;
-  yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << mounting.sigma_depth_offset;
-  list("depth_shift", mounting.depth_shift_px);
-  list("sigma_depth_shift", mounting.sigma_depth_shift);
+  rows("T_imu_cam", calibration.T_I_C.matrix());
+  yaml << YAML::Key << "time_offset" << YAML::Value << calibration.time_offset;
+  list("sigma_rotation_deg", calibration.sigma_rotation * 180 / M_PI);
+  list("sigma_translation", calibration.sigma_translation);
+  yaml << YAML::Key << "sigma_time_offset" << YAML::Value << calibration.sigma_time_offset;
+  list("intrinsics", calibration.intrinsics);
+  list("sigma_bearing", calibration.sigma_bearing);
+  yaml << YAML::Key << "depth_offset" << YAML::Value << calibration.depth_offset;
+  yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << calibration.sigma_depth_offset;
+  list("depth_shift", calibration.depth_shift_px);
+  list("sigma_depth_shift", calibration.sigma_depth_shift);
   Eigen::VectorXd added(static_cast<Eigen::Index>(depth_curve.added.size()));
   for (Eigen::Index k = 0; k < added.size(); ++k) {
     added(k) = 1e-5 * std::round(1e5 * double(depth_curve.added[static_cast<std::size_t>(k)]));
   }
   list("depth_curve", added);
-  rows("gyro_correction", mounting.gyro_correction);
-  rows("sigma_gyro_correction", mounting.sigma_gyro_correction);
+  rows("gyro_correction", calibration.gyro_correction);
+  rows("sigma_gyro_correction", calibration.sigma_gyro_correction);
   if (scale.sigma > 0) {
     yaml << YAML::Key << "depth_scale_by_imu" << YAML::Value << depth_scale * scale.factor;
     yaml << YAML::Key << "sigma_depth_scale_by_imu" << YAML::Value << depth_scale * scale.sigma;
@@ -166,9 +166,9 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
           pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());
   const BackEnd* back_end = pipeline.mapping() ? &pipeline.mapping()->backEnd() : nullptr;
-  emitMounting(yaml, pipeline.frontEnd().mounting(),
-               chained(reader.sensor().depth_curve, back_end ? back_end->depthCurve() : DepthCurve()),
-               back_end ? back_end->scale() : InertialScale(), reader.sensor().depth_scale);
+  emitCalibration(yaml, pipeline.frontEnd().calibration(),
+                  chained(reader.sensor().depth_curve, back_end ? back_end->depthCurve() : DepthCurve()),
+                  back_end ? back_end->scale() : InertialScale(), reader.sensor().depth_scale);
   emitStates(yaml, pipeline.states());
   put("warnings", runWarnings(pipeline, reader));
   yaml << YAML::EndMap;

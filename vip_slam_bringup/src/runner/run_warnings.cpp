@@ -108,7 +108,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   // A calibration estimated with a wrong IMU is meaningless.
   if (10 * c.imu_contradicted < c.images) {
     for (const std::string& difference :
-         mountingDifferences(pipeline.frontEnd().givenMounting(), pipeline.frontEnd().mounting())) {
+         calibrationDifferences(pipeline.frontEnd().givenCalibration(), pipeline.frontEnd().calibration())) {
       all.push_back(difference + " (summary.yaml: calibration)");
     }
   }

@@ -8,8 +8,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr float kLargestStep = 0.6f;    // px; a larger step means that the match itself is wrong
-constexpr float kLeastGradient = 2.4f;  // mean square, (grey levels / px)^2: well above that of image noise
+constexpr float kLargestStep = 0.6f;  // px; a larger step means that the match itself is wrong
+constexpr float kMinGradient = 2.4f;  // mean square, (grey levels / px)^2: well above that of image noise
 
 }  // namespace
 
@@ -40,7 +40,7 @@ void refineDisparity(const cv::Mat& left, const cv::Mat& right, int window, cv::
     short* d = disparity->ptr<short>(v);
     const float *n = numerator.ptr<float>(v), *g = denominator.ptr<float>(v);
     for (int u = 0; u < left.cols; ++u) {
-      if (d[u] <= 0 || g[u] < kLeastGradient) continue;
+      if (d[u] <= 0 || g[u] < kMinGradient) continue;
       const float step = -n[u] / g[u];
       if (std::abs(step) < kLargestStep) d[u] = static_cast<short>(std::lround(static_cast<float>(d[u]) + 16.f * step));
     }

@@ -28,8 +28,8 @@ std::string validateDepthCurve(const DepthCurve& curve) {
   char words[120];
   for (std::size_t k = 0; k < curve.added.size(); ++k) {
     const double here = curve.added[k], z = DepthCurve::kStep * static_cast<double>(k);
-    if (!(std::abs(here) <= DepthCurve::kMost)) {
-      std::snprintf(words, sizeof words, "%g m are added at %g m, expected at most %g", here, z, DepthCurve::kMost);
+    if (!(std::abs(here) <= DepthCurve::kMaxEntry)) {
+      std::snprintf(words, sizeof words, "%g m are added at %g m, expected at most %g", here, z, DepthCurve::kMaxEntry);
       return words;
     }
     if (k > 0 && here - curve.added[k - 1] < -kSteepest * DepthCurve::kStep) {

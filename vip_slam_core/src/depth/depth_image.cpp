@@ -15,7 +15,7 @@ constexpr int kSide = 2 * kRadius + 1;
 // pixels is a surface seen at 75 degrees (focal length 500 px), six sigmas are beyond the extremes of 25 noisy
 // readings.
 constexpr double kEdgeRatio = 0.03, kEdgeSigmas = 6.0;
-constexpr double kLeastValid = 0.6;  // share of the window's pixels that need a reading
+constexpr double kMinValid = 0.6;  // share of the window's pixels that need a reading
 
 // The valid readings of the window around one pixel, gathered in one pass.
 struct Window {
@@ -144,7 +144,7 @@ float lookUp(const cv::Mat& depth, double u, double v, const DepthNoise& noise, 
   gather(depth, cu, cv, noise, &w);
   const int inside = (std::min(cu + kRadius, depth.cols - 1) - std::max(cu - kRadius, 0) + 1) *
                      (std::min(cv + kRadius, depth.rows - 1) - std::max(cv - kRadius, 0) + 1);
-  if (w.count == 0 || w.count < kLeastValid * std::min(inside, kSide * kSide)) return 0.0f;
+  if (w.count == 0 || w.count < kMinValid * std::min(inside, kSide * kSide)) return 0.0f;
   const bool edge = isEdge(w.low, w.high, noise);
   if (edge && !grazing) return 0.0f;
 

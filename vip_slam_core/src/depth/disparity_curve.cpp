@@ -7,7 +7,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kAtOffset = 2.0, kOffsetMatters = 0.001;  // m
-constexpr double kLeastShrink = 0.1;                       // least 1/z relative to 1/reading, to stay off infinity
+constexpr double kMinShrink = 0.1;                         // least 1/z relative to 1/reading, to stay off infinity
 
 }  // namespace
 
@@ -15,13 +15,13 @@ bool measuresDisparity(DepthSensorType type) {
   return type == DepthSensorType::kStereo || type == DepthSensorType::kStructuredLight;
 }
 
-double addedForDisparity(double error, double z) { return z / std::max(kLeastShrink, 1 - error * z) - z; }
+double addedForDisparity(double error, double z) { return z / std::max(kMinShrink, 1 - error * z) - z; }
 
 DepthCurve disparityCurve(double error, double range) {
   DepthCurve curve;
   for (int k = 0; k * DepthCurve::kStep < range + DepthCurve::kStep; ++k) {
     const double added = addedForDisparity(error, k * DepthCurve::kStep);
-    curve.added.push_back(static_cast<float>(std::clamp(added, -DepthCurve::kMost, DepthCurve::kMost)));
+    curve.added.push_back(static_cast<float>(std::clamp(added, -DepthCurve::kMaxEntry, DepthCurve::kMaxEntry)));
   }
   return curve;
 }

@@ -10,24 +10,24 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kLeastObservations = 30;
+constexpr std::size_t kMinObservations = 30;
 constexpr double kMedian = 2.366;  // of a chi square with three degrees of freedom
 // A sigma is reduced to a fifth at most: planes and poses are fitted to the same points, so that the residuals of a map
 // with few planes are too small. It is not increased: with a camera whose depth is warped that would remove the
 // constraints that hold the map.
-constexpr double kMost = 25.0;
+constexpr double kMaxReduction = 25.0;
 // Prior degrees of freedom of a plane's variance: as if four observations had confirmed that it is one surface.
 constexpr double kPlaneFreedom = 12.0;
 // Least observations for a decision on a plane, and the factor by which their median must exceed that of the map.
-constexpr std::size_t kLeastOfPlane = 4;
+constexpr std::size_t kMinOfPlane = 4;
 constexpr double kDisagrees = 10.0;
 // Unevenness of a real wall, one sigma: one that bows by a centimetre over its length still counts as one plane,
 // however accurate the map.
 constexpr double kSurfaceSigma = 0.006;  // m
 
-/// The median misfit relative to the noise model's, at least 1 / kMost: smaller values are due to overfitting.
+/// The median misfit relative to the noise model's, at least 1 / kMaxReduction: smaller values are due to overfitting.
 double typicalMisfit(std::vector<double> misfits) {
-  return std::max(upperMedian(std::move(misfits)) / kMedian, 1.0 / kMost);
+  return std::max(upperMedian(std::move(misfits)) / kMedian, 1.0 / kMaxReduction);
 }
 
 double typicalMisfit(const std::vector<PlaneMisfit>& misfits) {
@@ -52,12 +52,12 @@ double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C) {
 }
 
 double planeInformationScale(const std::vector<PlaneMisfit>& misfits) {
-  return misfits.size() < kLeastObservations ? 1.0 : std::max(1.0, 1.0 / typicalMisfit(misfits));
+  return misfits.size() < kMinObservations ? 1.0 : std::max(1.0, 1.0 / typicalMisfit(misfits));
 }
 
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes) {
   std::vector<double> weights(planes, 1.0);
-  if (misfits.size() < kLeastObservations) return weights;
+  if (misfits.size() < kMinObservations) return weights;
   const double unit = typicalMisfit(misfits);
   std::vector<double> expected(planes, kPlaneFreedom), found(planes, kPlaneFreedom);
   for (const PlaneMisfit& m : misfits) {
@@ -70,7 +70,7 @@ std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::s
 
 std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size_t planes) {
   std::vector<char> agree(planes, 1);
-  if (misfits.size() < kLeastObservations) return agree;
+  if (misfits.size() < kMinObservations) return agree;
   const double unit = typicalMisfit(misfits);
   std::vector<std::vector<double>> own(planes), squares(planes);
   for (const PlaneMisfit& m : misfits) {
@@ -79,7 +79,7 @@ std::vector<char> planesAgree(const std::vector<PlaneMisfit>& misfits, std::size
   }
   const double most = std::max(1.0, kDisagrees * unit);
   for (std::size_t p = 0; p < planes; ++p) {
-    if (own[p].size() < kLeastOfPlane || typicalMisfit(std::move(own[p])) < most) continue;
+    if (own[p].size() < kMinOfPlane || typicalMisfit(std::move(own[p])) < most) continue;
     agree[p] = upperMedian(std::move(squares[p])) < kSurfaceSigma * kSurfaceSigma;
   }
   return agree;

@@ -5,7 +5,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastEnd = 1.0;  // rad/s; no gyro has a smaller range
+constexpr double kMinEnd = 1.0;  // rad/s; no gyro has a smaller range
 // Number of samples at exactly the extreme value that prove saturation: a stream that repeats each value a few times
 // has a few of them at its fastest turn.
 constexpr int kProof = 10;
@@ -18,7 +18,7 @@ void GyroRange::add(double t, const Eigen::Vector3d& rate) {
   double cut = 0;
   for (int k = 0; k < 6; ++k) {
     const double value = k < 3 ? rate(k) : -rate(k - 3);
-    if (!(value > kLeastEnd)) continue;
+    if (!(value > kMinEnd)) continue;
     Extreme& extreme = extremes_[static_cast<std::size_t>(k)];
     if (value > extreme.value * (1 + kSame)) {
       extreme = {value, 1};

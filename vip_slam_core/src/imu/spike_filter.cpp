@@ -10,9 +10,9 @@ namespace {
 
 // Smallest size of a spike, absolute and relative to the usual difference of successive samples. With IMUs at 100 to
 // 400 Hz in the hand or on a robot these are a few tenths of a m/s^2 and a few hundredths of a rad/s.
-constexpr double kLeastGyro = 0.5;   // rad/s
-constexpr double kLeastAccel = 3.0;  // m/s^2
-constexpr double kLeastRatio = 10.0;
+constexpr double kMinGyro = 0.5;   // rad/s
+constexpr double kMinAccel = 3.0;  // m/s^2
+constexpr double kMinRatio = 10.0;
 
 // The samples before a spike, and those before and after it, must agree within this many usual differences (two steps
 // of a motion). The usual differences are taken as at least these quiet levels.
@@ -56,8 +56,8 @@ bool SpikeFilter::agree(const ImuSample& a, const ImuSample& b) const {
 bool SpikeFilter::suspicious(const ImuSample& sample) const {
   if (!calm_ || !gyro_.full() || sample.t - last_->t > kLongestStep) return false;
   const double gyro = (sample.gyro - last_->gyro).norm(), accel = (sample.accel - last_->accel).norm();
-  return (gyro > kLeastGyro && gyro > kLeastRatio * gyro_.usual()) ||
-         (accel > kLeastAccel && accel > kLeastRatio * accel_.usual());
+  return (gyro > kMinGyro && gyro > kMinRatio * gyro_.usual()) ||
+         (accel > kMinAccel && accel > kMinRatio * accel_.usual());
 }
 
 void SpikeFilter::remember(const ImuSample& sample) {

@@ -15,7 +15,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kMostDepthShift = 50;  // px; a larger shift cannot be a registration error
+constexpr double kMaxDepthShift = 50;  // px; a larger shift cannot be a registration error
 
 CameraIntrinsics cameraFrom(Section section) {
   CameraIntrinsics camera;
@@ -108,8 +108,8 @@ void readDepth(Section depth, SensorConfig* config) {
   if (!shift.empty() && shift.size() != 2)
     throw std::runtime_error("depth/shift: " + std::to_string(shift.size()) + " numbers, expected two: right and down");
   if (!shift.empty()) config->depth_shift = {shift[0], shift[1]};
-  if (!(config->depth_shift.cwiseAbs().maxCoeff() <= kMostDepthShift))
-    throw std::runtime_error("depth/shift: expected at most " + formatDouble(kMostDepthShift) + " pixels");
+  if (!(config->depth_shift.cwiseAbs().maxCoeff() <= kMaxDepthShift))
+    throw std::runtime_error("depth/shift: expected at most " + formatDouble(kMaxDepthShift) + " pixels");
   std::vector<double> added;
   depth.get("curve", added, false);
   config->depth_curve.added.assign(added.begin(), added.end());

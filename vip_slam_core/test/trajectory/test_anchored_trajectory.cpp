@@ -38,7 +38,7 @@ TEST(AnchorTrajectory, BlendsBetweenKeyframesFarFromTheOrigin) {
   EXPECT_NEAR(yawOf(trajectory[5].T_W_B.rotation()), 0.2, 1e-9);
 }
 
-TEST(AnchorTrajectory, TheBodyFollowsTheCameraByTheMountingKnownNow) {
+TEST(AnchorTrajectory, TheBodyFollowsTheCameraByTheExtrinsicsKnownNow) {
   const SE3 T_I_C(expQuaternion({-1.2, 1.2, -1.2}), {0.05, 0, 0});
   const SE3 T_chain_map(expQuaternion({0.1, 0.2, -0.3}), {1, 0, 2});
   std::vector<SE3> truth;

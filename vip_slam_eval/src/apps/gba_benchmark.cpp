@@ -17,8 +17,8 @@ using namespace vip_slam;
 namespace {
 
 constexpr Variant kVariants[] = {Variant::kVi, Variant::kViP, Variant::kViCp, Variant::kVip};
-constexpr int kMostCeresRuns = 3;     // each takes a second
-constexpr int kMostRunsOfFigure = 5;  // per point of the figures over keyframes
+constexpr int kMaxCeresRuns = 3;     // each takes a second
+constexpr int kMaxRunsOfFigure = 5;  // per point of the figures over keyframes
 
 void writeText(const std::string& path, const std::string& text) {
   AtomicFile file(path);
@@ -66,7 +66,7 @@ void Benchmark::describe() {
       << options_.keyframes << " keyframes, " << options_.plane_points << " points on planes ("
       << map_.plane_observations << " observations), " << options_.free_points << " free points ("
       << map_.free_observations << " observations), seed " << options_.seed << ", " << iterations_
-      << " iterations, median of " << repeats_ << " runs (Ceres: " << kMostCeresRuns
+      << " iterations, median of " << repeats_ << " runs (Ceres: " << kMaxCeresRuns
       << ") that take turns with those of the other columns.\n\nThe structured solver eliminates the points while it "
          "evaluates the Jacobians, so its elimination counts there; Ceres counts it as linear solving. Only sums "
          "compare across solvers. `Sum` is the solver's, as in the paper; `Sum from map to map` adds the gathering of "
@@ -101,7 +101,7 @@ void Benchmark::table() {
   print("Structured solver, two threads", own2);
   print("VIP with first views as hosts, structured solver, one thread", {first});
   print("VIP with hosts from the middle of tracks, as the live system, structured solver, one thread", {middle});
-  const auto stock = timed("stock Ceres, one thread", everyVariant("ceres", 1), std::min(repeats_, kMostCeresRuns));
+  const auto stock = timed("stock Ceres, one thread", everyVariant("ceres", 1), std::min(repeats_, kMaxCeresRuns));
   print("Stock Ceres (SPARSE_SCHUR), one thread", stock);
 
   md_ << "\n## Ratios\n\n| ratio | of the solver | from map to map | aim (paper) |\n|---|---:|---:|---|\n";
@@ -142,7 +142,7 @@ void Benchmark::overKeyframes(const std::string& out, std::ostringstream* csv) {
   };
   for (int n = 30; n <= options_.keyframes; n += std::max(10, (options_.keyframes - 30) / 6)) {
     const SimulatedMap part = prefix(map_, n);
-    const int runs = std::min(repeats_, kMostRunsOfFigure);
+    const int runs = std::min(repeats_, kMaxRunsOfFigure);
     const std::vector<GbaRun> own = runGba(part, everyVariant("structured", 1), iterations_, runs);
     for (std::size_t v = 0; v < own.size(); ++v) add(&series[v], n, own[v]);
     add(&series.back(), n, runGba(part, {{Variant::kVi, "ceres"}}, iterations_, 1).front());
@@ -163,7 +163,7 @@ void Benchmark::overCorridor(const std::string& out, std::ostringstream* csv) {
     corridor.plane_points = 10 * n;
     corridor.free_points = 6 * n;
     const std::vector<GbaRun> runs = runGba(simulateMap(corridor), {{Variant::kVi}, {Variant::kVip}}, iterations_,
-                                            std::min(repeats_, kMostRunsOfFigure));
+                                            std::min(repeats_, kMaxRunsOfFigure));
     for (std::size_t k = 0; k < runs.size(); ++k) {
       const double ms = runs[k].summary.total_ms;
       series[k].x.push_back(n);

@@ -56,12 +56,12 @@ Eigen::Matrix3d bestRotation(const Eigen::Matrix3d& M, Alignment alignment) {
 // a straight line, leaves the rotation (about that line) to the noise of the positions, so orientations must fix it.
 double orientationWeight(const std::vector<PosePair>& pairs, const Eigen::Vector3d& mean_truth,
                          const Eigen::Vector3d& mean_estimate, const Eigen::Matrix3d& R) {
-  constexpr double kShare = 0.1, kLeast = 1e-6;
+  constexpr double kShare = 0.1, kFloor = 1e-6;
   double sum = 0;
   for (const PosePair& pair : pairs) {
     sum += (pair.T_W_B.t() - mean_truth - R * (pair.T_M_B.t() - mean_estimate)).squaredNorm();
   }
-  return std::max(kLeast, kShare * sum / double(pairs.size()));
+  return std::max(kFloor, kShare * sum / double(pairs.size()));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@
 #include "vip_slam_core/types/keyframe.h"
 #include "vip_slam_core/types/map_update.h"
 #include "vip_slam_core/util/timing.h"
-#include "vip_slam_frontend/filter/mounting_estimate.h"
+#include "vip_slam_frontend/filter/calibration_estimate.h"
 #include "vip_slam_frontend/front_end_options.h"
 
 namespace vip_slam {
@@ -107,11 +107,11 @@ class FrontEnd {
   void forgetMap();
 
   /// Present estimate of the camera-IMU extrinsics, the time offset and the other calibration states.
-  MountingEstimate mounting() const;
-  /// The time offset of mounting(), s, without the cost of computing its sigmas.
+  CalibrationEstimate calibration() const;
+  /// The time offset of calibration(), s, without the cost of computing its sigmas.
   double timeOffset() const;
   /// The same calibration as given by the sensor's configuration.
-  MountingEstimate givenMounting() const;
+  CalibrationEstimate givenCalibration() const;
   const FrontEndCounters& counters() const;
   const FrontEndOptions& options() const;
 

@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kGateSigmas = 4.0;
 // With fewer surviving pairs outliers among them cannot be recognised.
-constexpr int kLeastPairs = 20;
+constexpr int kMinPairs = 20;
 // Pairs share errors (the reference's patches, the warp of the depth, the calibration): any number of them counts as at
 // most this many independent ones.
-constexpr double kMostEffective = 50.0;
+constexpr double kMaxEffective = 50.0;
 
 /// Columns of the rows before compression: newest clone (theta, p), calibration of the camera, reference's clone
 /// (theta, p).
@@ -115,7 +115,7 @@ SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, con
                         double huber) {
   SurfaceRows result;
   const int a = window.indexOf(matches.reference), b = static_cast<int>(window.clones.size()) - 1;
-  if (a < 0 || a == b || static_cast<int>(matches.pairs.size()) < kLeastPairs) return result;
+  if (a < 0 || a == b || static_cast<int>(matches.pairs.size()) < kMinPairs) return result;
   const Layout layout(window);
   Eigen::MatrixXd A = stackPairs(window, layout, a, b, matches.pairs);
 
@@ -132,11 +132,11 @@ SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, con
     }
     A.row(kept++) = (relative > huber ? std::sqrt(huber / relative) : 1.0) * A.row(i);
   }
-  if (kept < kLeastPairs || kept < result.gated) return result;
+  if (kept < kMinPairs || kept < result.gated) return result;
   result.used = kept;
 
   A.conservativeResize(kept, Eigen::NoChange);
-  A *= std::sqrt(std::min(1.0, kMostEffective / kept));
+  A *= std::sqrt(std::min(1.0, kMaxEffective / kept));
   triangularise(A, layout.rank());
   const int rank = layout.rank();
   result.rows.H = Eigen::MatrixXd::Zero(rank, window.dimension());

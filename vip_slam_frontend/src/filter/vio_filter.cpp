@@ -8,10 +8,10 @@ namespace vip_slam {
 namespace {
 
 // Largest factor on the depth camera's noise model; beyond it readings are wrong rather than noisy.
-constexpr double kMostDepthNoise = 5.0;
-constexpr double kLeastDepthNoise = 0.3;
+constexpr double kMaxDepthNoise = 5.0;
+constexpr double kMinDepthNoise = 0.3;
 // Number of features in an update from which on it is used to estimate the stamps' jitter.
-constexpr int kLeastOfStamps = 5;
+constexpr int kMinOfStamps = 5;
 
 /// Squared correction of orientation and velocity per degree of freedom, whitened by the decrease of the covariance.
 double correctionPerDof(const NavState& before, const Matrix15d& P_before, const NavState& after,
@@ -38,12 +38,12 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       gate_(options.gate_probability),
       explained_(0.95),
       noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px),
-      depth_noise_(1.0, kLeastDepthNoise, kMostDepthNoise, options.adapt_depth_noise),
+      depth_noise_(1.0, kMinDepthNoise, kMaxDepthNoise, options.adapt_depth_noise),
       stamp_monitor_(options.adapt_imu_noise),
       imu_monitor_(options.adapt_imu_noise) {}
 
 void VioFilter::stop() {
-  if (started_) learnMounting();
+  if (started_) learnCalibration();
   started_ = false;
   tracks_.clear();
   stamp_monitor_.reset();
@@ -194,7 +194,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (!filter_.window().calibration.time_offset || propagation.rates.changes()) {
     delay_before_.reset();
   } else if (!delay_before_) {
-    delay_before_ = Delay{filter_.window().time_offset, mounting().sigma_time_offset};
+    delay_before_ = Delay{filter_.window().time_offset, calibration().sigma_time_offset};
   }
   // While the delay is held it neither drifts nor is estimated.
   const double since = propagation.predicted.t - filter_.window().clones.back().t;
@@ -244,7 +244,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (!still) {
     // While more stamp jitter may explain the correction about the rotation axis, that part is not blamed on the IMU.
     double correction = report.correction;
-    if (report.features_used >= kLeastOfStamps) {
+    if (report.features_used >= kMinOfStamps) {
       const Eigen::Vector3d& w = propagation.omega_I;
       const Eigen::Vector3d turned = logSO3(Eigen::Matrix3d(predicted.T_W_I.R().transpose() * nav().T_W_I.R()));
       const Eigen::Matrix3d lost = (P_predicted - covariance()).topLeftCorner<3, 3>();

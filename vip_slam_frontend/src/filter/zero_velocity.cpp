@@ -10,26 +10,26 @@ namespace vip_slam {
 namespace {
 
 // The sigmas stop growing after this many repeats; else the IMU's noise would make the standing pose drift.
-constexpr int kMostRepeats = 8;
+constexpr int kMaxRepeats = 8;
 // Without an image, the IMU's means may differ from those at rest by this much (or five sigmas of their noise), ...
-constexpr double kMostGyroShift = 0.005;  // rad/s
-constexpr double kMostAccelShift = 0.05;  // m/s^2
+constexpr double kMaxGyroShift = 0.005;  // rad/s
+constexpr double kMaxAccelShift = 0.05;  // m/s^2
 // ... and those at rest follow by this share of the difference per image, since the biases drift.
 constexpr double kRestFollows = 0.01;
 // Number of images after standing still from which on slow motion may have begun unnoticed by the IMU.
 constexpr int kForgotten = 40;
 // Factor from image motion over its limit to the factor on the zero-velocity sigmas. The configured sigmas fit image
 // motion at the limit for surfaces about two metres away; kFar allows for three times that distance. However little the
-// image moves, the sigmas do not fall below the share kLeastUnrest.
-constexpr double kFar = 3.0, kLeastResidualMotion = 0.2;
+// image moves, the sigmas do not fall below the share kMinUnrest.
+constexpr double kFar = 3.0, kMinResidualMotion = 0.2;
 // Image motion per metre of translation, px/m, from which on the limits on image motion hold unchanged: 0.8 px for a
-// centimetre. Where a translation shows less the limits are lower in proportion, down to the share kLeastLimit (noise).
-constexpr double kPxPerMetre = 80.0, kLeastLimit = 0.2;
+// centimetre. Where a translation shows less the limits are lower in proportion, down to the share kMinLimit (noise).
+constexpr double kPxPerMetre = 80.0, kMinLimit = 0.2;
 
 bool restsAs(const ImuSpread& now, const ImuSpread& rest) {
   const double root = std::sqrt(static_cast<double>(std::max<std::size_t>(1, now.count)));
-  return (now.mean_gyro - rest.mean_gyro).norm() < std::max(kMostGyroShift, 5.0 * now.gyro_floor / root) &&
-         (now.mean_accel - rest.mean_accel).norm() < std::max(kMostAccelShift, 5.0 * now.accel_floor / root);
+  return (now.mean_gyro - rest.mean_gyro).norm() < std::max(kMaxGyroShift, 5.0 * now.gyro_floor / root) &&
+         (now.mean_accel - rest.mean_accel).norm() < std::max(kMaxAccelShift, 5.0 * now.accel_floor / root);
 }
 
 }  // namespace
@@ -68,7 +68,7 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   const bool quiet = cues.imu.count >= 5 && cues.imu.quiet(options_.max_gyro_std, options_.max_accel_std);
   const bool image_known = cues.disparity_px >= 0 && cues.tracks > options_.min_tracks;
   const double shows = cues.px_per_metre > 0 ? cues.px_per_metre / kPxPerMetre : 1.0;
-  const double limit = options_.max_disparity_px * std::clamp(shows, kLeastLimit, 1.0);
+  const double limit = options_.max_disparity_px * std::clamp(shows, kMinLimit, 1.0);
   bool wants = options_.enabled && quiet && cues.speed < options_.max_speed;
   if (still_) {
     // While still, an image without features (lights off) does not end the stillness; image motion does.
@@ -80,8 +80,8 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   residual_motion_ = {};
   if (image_known) {
     const double moved = kFar * std::max(cues.disparity_px, cues.anchor_disparity_px);
-    residual_motion_.rotation = std::max(kLeastResidualMotion, moved / options_.max_disparity_px);
-    residual_motion_.translation = std::max(kLeastResidualMotion, moved / limit);
+    residual_motion_.rotation = std::max(kMinResidualMotion, moved / options_.max_disparity_px);
+    residual_motion_.translation = std::max(kMinResidualMotion, moved / limit);
   }
   if (wants) {
     const double share = image_known ? 1.0 : kRestFollows;
@@ -133,7 +133,7 @@ void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const 
                       const ZuptOptions& options, Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   const int newest = static_cast<int>(window.clones.size()) - 1;
   const bool relative = anchor >= 0 && anchor != newest;
-  const double root = std::sqrt(1.0 + std::min(repeats, kMostRepeats));
+  const double root = std::sqrt(1.0 + std::min(repeats, kMaxRepeats));
   const double step = residual_motion.translation * root, turn = residual_motion.rotation * root;
   *H = Eigen::MatrixXd::Zero(relative ? 9 : 3, window.dimension());
   *h = Eigen::VectorXd::Zero(relative ? 9 : 3);

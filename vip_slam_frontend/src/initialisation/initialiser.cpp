@@ -12,13 +12,13 @@
 namespace vip_slam {
 
 namespace {
-constexpr double kWatched = 0.5;         // share of the standing time that images have to cover
-constexpr double kMostTurn = 0.3;        // rad/s, mean rate at rest that may be gyro bias
-constexpr double kMostOffGravity = 1.5;  // m/s^2, deviation from gravity at rest that may be accelerometer bias
-constexpr int kFewestCommon = 5;         // features
-constexpr double kDepthMoved = 2.0;      // sigmas, and factor on the change between consecutive images
-constexpr double kBetweenTries = 0.2;    // s, between attempts of a start in motion
-constexpr double kBetweenPoses = 0.03;   // s, between the poses that a start in motion uses
+constexpr double kWatched = 0.5;        // share of the standing time that images have to cover
+constexpr double kMaxTurn = 0.3;        // rad/s, mean rate at rest that may be gyro bias
+constexpr double kMaxOffGravity = 1.5;  // m/s^2, deviation from gravity at rest that may be accelerometer bias
+constexpr int kFewestCommon = 5;        // features
+constexpr double kDepthMoved = 2.0;     // sigmas, and factor on the change between consecutive images
+constexpr double kBetweenTries = 0.2;   // s, between attempts of a start in motion
+constexpr double kBetweenPoses = 0.03;  // s, between the poses that a start in motion uses
 
 // Calls f(xy in a, xy in b) for the features common to both; returns their number.
 template <class F>
@@ -118,7 +118,7 @@ Initialiser::Initialiser(const InitialisationOptions& options, const FilterOptio
       gravity_(gravity),
       depth_noise_(depth_noise) {}
 
-void Initialiser::setMounting(const SE3& T_I_C, const Eigen::Matrix3d& gyro_correction) {
+void Initialiser::setCalibration(const SE3& T_I_C, const Eigen::Matrix3d& gyro_correction) {
   T_I_C_ = T_I_C;
   gyro_correction_ = gyro_correction;
 }
@@ -168,7 +168,7 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
   }
   const bool quiet = spread.quiet(options_.max_gyro_std, options_.max_accel_std);
   const double weight = spread.mean_accel.norm();
-  weighs_wrong_ = quiet && std::abs(weight - gravity_) > kMostOffGravity;
+  weighs_wrong_ = quiet && std::abs(weight - gravity_) > kMaxOffGravity;
   if (weighs_wrong_) {
     char words[120];
     std::snprintf(words, sizeof words, "the accelerometer reads %.2f at rest, expected %.2f m/s^2: is its unit right?",
@@ -176,7 +176,7 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     reason_ = words;
     return std::nullopt;
   }
-  if (!quiet || spread.mean_gyro.norm() > kMostTurn) {
+  if (!quiet || spread.mean_gyro.norm() > kMaxTurn) {
     reason_ = "moving: gathering images for a start in motion";
     return std::nullopt;
   }
@@ -209,7 +209,7 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
 // Whether the view has moved on, when no feature of a second ago is left. The oldest image with common features decides
 // by their mean motion vector: tracks of noise in the dark end as quickly, but move in all directions.
 bool Initialiser::turnsOver(std::size_t oldest) {
-  constexpr int kMostReplaced = 5;  // images; when no track ever survives to the next image tracks are no evidence
+  constexpr int kMaxReplaced = 5;  // images; when no track ever survives to the next image tracks are no evidence
   const std::vector<FilterMeasurement>& now = images_.back().features;
   if (static_cast<int>(now.size()) < options_.min_tracks) return false;
   for (std::size_t k = oldest + 1; k + 1 < images_.size(); ++k) {
@@ -218,7 +218,7 @@ bool Initialiser::turnsOver(std::size_t oldest) {
     replaced_in_a_row_ = 0;
     return shift > options_.max_disparity_px;
   }
-  if (replaced_in_a_row_ >= kMostReplaced) return false;
+  if (replaced_in_a_row_ >= kMaxReplaced) return false;
   ++replaced_in_a_row_;
   return true;
 }

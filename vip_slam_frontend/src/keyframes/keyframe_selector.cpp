@@ -8,7 +8,7 @@ namespace vip_slam {
 
 namespace {
 
-constexpr std::size_t kLeastForRatio = 20;
+constexpr std::size_t kMinForRatio = 20;
 
 }  // namespace
 
@@ -36,7 +36,7 @@ std::string KeyframeSelector::decide(double t, const SE3& T_odom_C, const std::v
   }
   // With a handful of features the ratio is not meaningful.
   const auto before = static_cast<double>(features_.size());
-  if (features_.size() >= kLeastForRatio && common < options_.min_tracked_ratio * before) return "tracked ratio";
+  if (features_.size() >= kMinForRatio && common < options_.min_tracked_ratio * before) return "tracked ratio";
   if (common > 0 && parallax / common > options_.min_parallax_px) return "parallax";
   if (t - t_ > options_.max_seconds) return "time";
   return "";

@@ -51,7 +51,7 @@ bool stronger(const Corner& a, const Corner& b) {
 }
 
 // Structure below this is image noise of a few grey levels, not a corner.
-constexpr float kLeastScore = 4.0f;
+constexpr float kMinScore = 4.0f;
 
 }  // namespace
 
@@ -112,7 +112,7 @@ std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Poi
         const cv::Point2f p(k.pt.x + roi.x, k.pt.y + roi.y);
         if (!occupancy.free(p)) continue;
         const float score = cornerScore(gray, cvRound(p.x), cvRound(p.y), 4);
-        if (score > kLeastScore) cell.push_back({p, score});
+        if (score > kMinScore) cell.push_back({p, score});
       }
       if (cell.empty()) continue;
       std::sort(cell.begin(), cell.end(), stronger);

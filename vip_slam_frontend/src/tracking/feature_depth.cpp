@@ -13,15 +13,15 @@ namespace vip_slam {
 namespace {
 
 constexpr int kRadius = 3;
-constexpr int kMost = (2 * kRadius + 1) * (2 * kRadius + 1);
-constexpr int kLeastReadings = 30;  // of the 49 in the window
-constexpr int kLeastNear = 12;
+constexpr int kWindow = (2 * kRadius + 1) * (2 * kRadius + 1);
+constexpr int kMinReadings = 30;  // of the 49 in the window
+constexpr int kMinNear = 12;
 // Accuracy of a corner's position relative to the depth image, px.
 constexpr double kPixelError = 0.5;
 // A corner farther than this from the nearer surface's edge belongs to the surface behind, px.
-constexpr double kMostOffRim = 1.5;
+constexpr double kMaxOffRim = 1.5;
 constexpr double kInlierSigmas = 3.5;
-constexpr double kMostRelativeSigma = 0.05;
+constexpr double kMaxRelativeSigma = 0.05;
 
 struct Reading {
   double x, y, z;  // offset from the corner in px; metres
@@ -55,7 +55,7 @@ bool fit(const Reading* readings, int n, const Use& use, InversePlane* plane) {
     b += J * (w / r.z);
     ++count;
   }
-  if (count < kLeastNear) return false;
+  if (count < kMinNear) return false;
   bool invertible = false;
   double determinant;
   // Scaled so that the determinant says whether the pixels span a plane rather than a line.
@@ -81,7 +81,7 @@ FeatureDepth evaluate(const InversePlane& plane, FeatureDepth::Source source, co
   const double slope = z * z * plane.c.tail<2>().norm();  // metres per px
   const double fitted = z * z * std::sqrt(std::max(0.0, plane.covariance(0, 0)));
   const double sigma = std::hypot(noise.sigma(z), std::hypot(kPixelError * slope, fitted));
-  if (!noise.inRange(z) || sigma > kMostRelativeSigma * z) return result;
+  if (!noise.inRange(z) || sigma > kMaxRelativeSigma * z) return result;
   result.z = static_cast<float>(z);
   result.sigma = static_cast<float>(sigma);
   result.source = source;
@@ -92,12 +92,12 @@ FeatureDepth evaluate(const InversePlane& plane, FeatureDepth::Source source, co
 FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
   FeatureDepth unclear;
   unclear.source = FeatureDepth::Source::kUnclear;
-  double sorted[kMost];
+  double sorted[kWindow];
   for (int i = 0; i < n; ++i) sorted[i] = readings[i].z;
   std::sort(sorted, sorted + n);
   int split = -1;
   double widest = 0;
-  for (int i = kLeastNear; i < n; ++i) {
+  for (int i = kMinNear; i < n; ++i) {
     const double gap = sorted[i] - sorted[i - 1];
     if (gap > widest) {
       widest = gap;
@@ -121,7 +121,7 @@ FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
       off2 = std::min(off2, r.x * r.x + r.y * r.y);
     }
   }
-  if (behind < 0.85 * (n - split) || off2 > kMostOffRim * kMostOffRim) return unclear;
+  if (behind < 0.85 * (n - split) || off2 > kMaxOffRim * kMaxOffRim) return unclear;
   return evaluate(plane, FeatureDepth::Source::kRim, noise);
 }
 
@@ -138,7 +138,7 @@ FeatureDepth featureDepth(const cv::Mat& depth, double u, double v, const DepthN
   }
   if (!(u > -0.5 && v > -0.5 && u < depth.cols - 0.5 && v < depth.rows - 0.5)) return result;
   const int cu = static_cast<int>(std::floor(u + 0.5)), cv = static_cast<int>(std::floor(v + 0.5));
-  Reading readings[kMost];
+  Reading readings[kWindow];
   int n = 0;
   for (int y = std::max(0, cv - kRadius); y <= std::min(depth.rows - 1, cv + kRadius); ++y) {
     const float* row = depth.ptr<float>(y);
@@ -148,7 +148,7 @@ FeatureDepth featureDepth(const cv::Mat& depth, double u, double v, const DepthN
     }
   }
   if (n > 0) result.source = FeatureDepth::Source::kUnclear;
-  if (n < kLeastReadings) return result;
+  if (n < kMinReadings) return result;
   const auto all = [](const Reading&) { return true; };
   InversePlane plane;
   if (fit(readings, n, all, &plane) && countExplained(readings, n, plane, all) >= 0.95 * n) {

@@ -15,8 +15,8 @@ namespace {
 // violated.
 constexpr double kExposureGain = 0.1;
 constexpr double kExposureShift = 6.0;
-constexpr int kExposureReach = 12;             // px around a track
-constexpr std::size_t kLeastForExposure = 10;  // tracks
+constexpr int kExposureReach = 12;           // px around a track
+constexpr std::size_t kMinForExposure = 10;  // tracks
 
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
 
@@ -49,7 +49,7 @@ void FeatureTracker::matchExposure(const cv::Mat& gray, const SE3& predicted, bo
     last.push_back(mean_last[0]);
     now.push_back(mean[0]);
   }
-  if (gains.size() < kLeastForExposure) return;
+  if (gains.size() < kMinForExposure) return;
   const double gain = upperMedian(gains);
   std::vector<double> offsets, changes;
   for (std::size_t i = 0; i < gains.size(); ++i) {

@@ -10,8 +10,8 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kMostMissed = 5;               // images in a row in which a patch is not found
-constexpr double kMostFromPrediction = 3.0;  // px
+constexpr int kMaxMissed = 5;               // images in a row in which a patch is not found
+constexpr double kMaxFromPrediction = 3.0;  // px
 
 // Variance of a corner that was recognised by its descriptor, px^2.
 constexpr double kCornerVariance = 1.0;
@@ -102,7 +102,7 @@ void FeatureTracker::findLost(const SE3& predicted, const SE3& T_odom_C, std::ve
     if (!camera_->inImage(uv, options_.border) || !allowed(uv)) continue;
     Track there = tracks_[i];
     there.feature.pixel = uv.cast<float>();
-    if (!alignTrack(&there, T_odom_C, kMostFromPrediction)) continue;
+    if (!alignTrack(&there, T_odom_C, kMaxFromPrediction)) continue;
     (*next)[i] = cv::Point2f(there.feature.pixel.x(), there.feature.pixel.y());
     (*found)[i] = 1;
   }
@@ -152,7 +152,7 @@ void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
     track.missed = match == Match::kFound ? 0 : track.missed + 1;
     if (match == Match::kFound && (known || !surfaceIsKnown(&track))) continue;
     // Probably blur or an exposure jump: keep the reference, since a new one would lose the original point for good.
-    if (match == Match::kNotFound && known && track.missed <= kMostMissed) continue;
+    if (match == Match::kNotFound && known && track.missed <= kMaxMissed) continue;
     if (!here) here = referenceHere(T_odom_C);
     measure(&track.feature);
     if (!known && surfaceIsKnown(&track)) {

@@ -3,8 +3,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kStep = 12;        // pixels
-constexpr int kLeastDepth = 50;  // samples with depth; with noise that many are never all equal
+constexpr int kStep = 12;      // pixels
+constexpr int kMinDepth = 50;  // samples with depth; with noise that many are never all equal
 
 }  // namespace
 
@@ -18,7 +18,7 @@ bool FrozenDepth::repeats(const cv::Mat& depth) {
       with_depth += row[x] > 0;
     }
   }
-  const bool same = with_depth >= kLeastDepth && now == last_;
+  const bool same = with_depth >= kMinDepth && now == last_;
   last_ = std::move(now);
   return same;
 }

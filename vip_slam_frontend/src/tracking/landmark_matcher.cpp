@@ -11,10 +11,10 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kLeastRadius = 14;  // the narrow one likewise
+constexpr int kMinRadius = 14;    // the narrow one likewise
 constexpr int kPatchRadius = 41;  // px, holds a wide patch shown at half its size, at any roll angle
-constexpr std::size_t kMostPatches = 8000;
-constexpr int kMostPerImage = 60;
+constexpr std::size_t kMaxPatches = 8000;
+constexpr int kMaxPerImage = 60;
 // Largest distance of a newly detected corner from the pixel of the old track, px.
 constexpr double kCornerOffset = 3.0;
 constexpr double kNearest = 0.2, kFarthest = 15.0;  // m along the optical axis
@@ -64,19 +64,19 @@ void LandmarkMatcher::apply(const MapUpdate& update) {
 }
 
 void LandmarkMatcher::retire(const Track& track) {
-  // Patches of short-lived tracks are not kept; beyond kMostPatches the oldest are dropped.
+  // Patches of short-lived tracks are not kept; beyond kMaxPatches the oldest are dropped.
   if (!track.reference || track.feature.age < 5) return;
   const cv::Mat& image = track.reference->gray;
   const int x = static_cast<int>(std::lround(track.reference_pixel.x()));
   const int y = static_cast<int>(std::lround(track.reference_pixel.y()));
-  if (x < kLeastRadius || y < kLeastRadius || x + kLeastRadius >= image.cols || y + kLeastRadius >= image.rows) return;
+  if (x < kMinRadius || y < kMinRadius || x + kMinRadius >= image.cols || y + kMinRadius >= image.rows) return;
   const cv::Rect whole(x - kPatchRadius, y - kPatchRadius, 2 * kPatchRadius + 1, 2 * kPatchRadius + 1);
   const cv::Rect window = whole & cv::Rect(0, 0, image.cols, image.rows);
   auto reference = std::make_shared<ReferenceImage>(*track.reference);
   reference->gray = image(window).clone();
   reference->origin = track.reference->origin + Eigen::Vector2d(window.x, window.y);
   patches_[track.feature.id] = {reference, track.reference_pixel, track.surface, track.reference_variance};
-  if (patches_.size() > kMostPatches) patches_.erase(patches_.begin());
+  if (patches_.size() > kMaxPatches) patches_.erase(patches_.begin());
 }
 
 int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb, const SE3& T_map_C,
@@ -114,7 +114,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   }
   std::stable_sort(visible.begin(), visible.end(),
                    [](const Visible& a, const Visible& b) { return a.entry->observations > b.entry->observations; });
-  if (static_cast<int>(visible.size()) > 2 * kMostPerImage) visible.resize(2 * kMostPerImage);
+  if (static_cast<int>(visible.size()) > 2 * kMaxPerImage) visible.resize(2 * kMaxPerImage);
 
   // Candidates of each landmark: its patch aligned from the projection, and the corners around; described in one call.
   std::vector<Feature> corners;
@@ -164,7 +164,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   }
 
   int count = 0;
-  for (std::size_t i = 0; i < visible.size() && count < kMostPerImage; ++i) {
+  for (std::size_t i = 0; i < visible.size() && count < kMaxPerImage; ++i) {
     if (best[i] < 0) continue;
     const int known = aligned[best[i]];
     Track track = known < 0 ? Track() : direct[known];

@@ -7,8 +7,8 @@ namespace vip_slam {
 namespace {
 
 // Fewer moving points than this, or a smaller share of all points, are taken for mismatches.
-constexpr std::size_t kLeast = 5;
-constexpr double kLeastShare = 0.08;
+constexpr std::size_t kMinFeatures = 5;
+constexpr double kMinShare = 0.08;
 // A pixel belongs to a moving body only within this distance of a moving point, px, unless nearly all points move.
 constexpr float kReach = 120.0f;
 constexpr std::size_t kNearlyAll = 4;  // moving points for each that stands still
@@ -22,8 +22,8 @@ void MovingRegions::add(const Eigen::Vector2f& pixel, double z, bool still) {
 }
 
 bool MovingRegions::any() const {
-  return moving_.size() >= kLeast &&
-         static_cast<double>(moving_.size()) > kLeastShare * static_cast<double>(moving_.size() + still_.size());
+  return moving_.size() >= kMinFeatures &&
+         static_cast<double>(moving_.size()) > kMinShare * static_cast<double>(moving_.size() + still_.size());
 }
 
 float MovingRegions::nearest(const std::vector<Mark>& marks, const Eigen::Vector2f& pixel, const Mark** mark) {

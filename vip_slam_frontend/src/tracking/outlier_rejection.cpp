@@ -15,7 +15,7 @@ namespace vip_slam {
 namespace {
 
 // The gyro's rotation is rejected when it explains less than a third of at least this many pairs ...
-constexpr int kLeastToDoubt = 15;
+constexpr int kMinToDoubt = 15;
 // ... and a motion with a free rotation explains two thirds of them. Less could belong to a moving body.
 
 Eigen::Vector3d bearing(const Eigen::Vector2d& xy) { return {xy.x(), xy.y(), 1.0}; }
@@ -93,7 +93,7 @@ bool refinePose(const std::vector<PointPair>& pairs, const std::vector<char>& us
 
 TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::vector<char>& use,
                               const Eigen::Matrix3d& R_current_previous, const Eigen::Vector3d& start, double huber) {
-  constexpr int kRounds = 4, kLeast = 8;
+  constexpr int kRounds = 4, kMinPairs = 8;
   TranslationFit fit;
   fit.t = start;
   Eigen::Matrix3d A;
@@ -114,7 +114,7 @@ TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::ve
       squares += w * r.squaredNorm();
       ++n;
     }
-    if (n < kLeast) return fit;
+    if (n < kMinPairs) return fit;
     const Eigen::LDLT<Eigen::Matrix3d> ldlt(A);
     if (ldlt.vectorD().minCoeff() < 1e-9) return fit;
     if (round < kRounds) fit.t += ldlt.solve(b);
@@ -200,7 +200,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
   result.T_current_previous = T;
   result.ok = result.inliers >= 5;
   const int n = static_cast<int>(pairs.size());
-  const bool doubtful = n >= kLeastToDoubt && 3 * result.inliers < n && !bounded;
+  const bool doubtful = n >= kMinToDoubt && 3 * result.inliers < n && !bounded;
   if (!doubtful && !options.turn_unknown) return result;
   GeneralMotion general = poseFromDepth(pairs, predicted, options);
   if (doubtful && general.model == GeneralModel::kNone) general = fundamentalOrHomography(pairs, options);

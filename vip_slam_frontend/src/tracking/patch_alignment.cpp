@@ -14,8 +14,8 @@ namespace {
 constexpr int kIterations = 12;
 constexpr double kFarthestStep = 3.0, kConverged = 0.01;  // px
 // The camera's own blur, one sigma in px. A patch that is enlarged by the warp has an enlarged blur too; the newest
-// image is blurred to match when that takes at least kLeastBlur, px.
-constexpr double kBlurOfCamera = 0.55, kLeastBlur = 0.3;
+// image is blurred to match when that takes at least kMinBlur, px.
+constexpr double kBlurOfCamera = 0.55, kMinBlur = 0.3;
 constexpr int kBlurReach = 5;  // px, margin of the blurred window that the patch may move within
 
 template <int kRadius>
@@ -100,7 +100,7 @@ Window matchBlur(const cv::Mat& image, const Eigen::Vector2d& pixel, const Patch
   const Eigen::Vector2d added = (solver.eigenvalues().array() - 1.0).max(0.0);
   const Eigen::Matrix2d covariance = solver.eigenvectors() * added.asDiagonal() * solver.eigenvectors().transpose();
   const double sx = kBlurOfCamera * std::sqrt(covariance(0, 0)), sy = kBlurOfCamera * std::sqrt(covariance(1, 1));
-  if (!(std::max(sx, sy) > kLeastBlur)) return {image, Eigen::Vector2d::Zero()};
+  if (!(std::max(sx, sy) > kMinBlur)) return {image, Eigen::Vector2d::Zero()};
   const int reach = radius + kBlurReach, side = 2 * reach + 1;
   const cv::Rect rect = cv::Rect(static_cast<int>(pixel.x()) - reach, static_cast<int>(pixel.y()) - reach, side, side) &
                         cv::Rect(0, 0, image.cols, image.rows);

@@ -9,7 +9,7 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kLeastPatches = 6;
+constexpr int kMinPatches = 6;
 constexpr int kRefinements = 3;
 constexpr double kSigmas = 3.5;
 // Unevenness of a wall, m, and error of a patch's normal close to an edge, rad; one sigma each.
@@ -79,7 +79,7 @@ bool growPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>
     if (!fitPlane(patches, *member, plane)) return false;
     int count = 0;
     for (std::size_t i = 0; i < patches.size(); ++i) count += (*member)[i] = !done[i] && plane->holds(patches[i]);
-    if (count < kLeastPatches) return false;
+    if (count < kMinPatches) return false;
   }
   return fitPlane(patches, *member, plane) && !leansAcrossAStep(patches, *member, *plane);
 }

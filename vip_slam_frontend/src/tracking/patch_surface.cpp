@@ -9,8 +9,8 @@ namespace vip_slam {
 namespace {
 
 constexpr int kStride = 2;
-constexpr double kFewest = 0.4;        // of the readings
-constexpr double kMostForeign = 0.05;  // share of readings far in front or behind: another surface in the patch
+constexpr double kFewest = 0.4;       // of the readings
+constexpr double kMaxForeign = 0.05;  // share of readings far in front or behind: another surface in the patch
 // One sigma of the prior and upper limit of the slope, 1/px. At the flattest angles that can be tracked slopes are a
 // few per cent a pixel; the prior matters where readings are few.
 constexpr double kPriorSlope = 0.03;
@@ -18,7 +18,7 @@ constexpr double kSteepest = 0.06;
 
 // Limit on the chi-square per degree of freedom of the deviations of the window's row and column means from the plane,
 // with room for correlated noise; kLineFloor is a systematic error as a share of the depth.
-constexpr double kMostOfLines = 3.5, kLineFloor = 0.0003;
+constexpr double kMaxOfLines = 3.5, kLineFloor = 0.0003;
 constexpr int kFewestOfLine = 3;
 // Largest relative sigma of a reading for a wide patch: up to it the line means show steps of 0.3 % of the depth, which
 // would move half of the patch by a pixel after an image motion of three hundred.
@@ -76,7 +76,7 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
       columns[(x + kRadius) / kStride].add(row_of_A, value);
     }
   }
-  if (count < kFewest * kSide * kSide || foreign > kMostForeign * count) return surface;
+  if (count < kFewest * kSide * kSide || foreign > kMaxForeign * count) return surface;
   const Eigen::Vector3d fit = A.ldlt().solve(b);
   const double residual = std::sqrt(std::max(0.0, square - b.dot(fit)) / count);
   // With a step or an edge inside the window the fit is no plane, and its slope would be worse than none.
@@ -84,7 +84,7 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
   // A step or a bend that single readings hide in their noise shows in the means of rows and columns.
   double chi2 = 0;
   for (int i = 0; i < kSide; ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
-  if (chi2 > kMostOfLines * (2 * kSide - 4)) return surface;
+  if (chi2 > kMaxOfLines * (2 * kSide - 4)) return surface;
   surface.slope = fit.tail<2>();
   surface.known = true;
   return surface;

@@ -25,13 +25,13 @@ constexpr double kWideSurface = 0.06, kKnownSurface = 0.08, kUnclearSurface = 0.
 static_assert(kUnclearSurface < kSlidingPixelSigma && kNoSurface > kSlidingPixelSigma,
               "the kinds of tracks cannot be told");
 // Added to the texture, (grey levels / px)^2, so that a patch on a straight edge keeps a finite covariance.
-constexpr double kLeastTexture = 20.0;
+constexpr double kMinTexture = 20.0;
 
 }  // namespace
 
 Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, double wander) {
   const double grey = std::max(kGrey, kResidual * residual) / kFloor;
-  const Eigen::Matrix2d G = texture + kLeastTexture * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d G = texture + kMinTexture * Eigen::Matrix2d::Identity();
   Eigen::Matrix2d covariance;
   covariance << G(1, 1), -G(0, 1), -G(1, 0), G(0, 0);
   covariance *= grey * grey / (G(0, 0) * G(1, 1) - G(0, 1) * G(1, 0));

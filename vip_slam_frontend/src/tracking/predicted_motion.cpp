@@ -6,20 +6,20 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kLeast = 5;
+constexpr int kMinInliers = 5;
 constexpr double kSigmas = 4.0;
 // Above these shares of found's inliers both motions explain the points, or the bounded one explains enough of them.
-constexpr double kSame = 0.95, kMost = 0.67;
+constexpr double kSameShare = 0.95, kBoundedShare = 0.67;
 // When nearly all points, at least kEnoughOld of them old, agree on one motion, the IMU has missed something.
 constexpr double kNearlyAll = 0.95;
 constexpr int kEnoughOld = 20;
 // Allowance for other errors of a translation (blur, rolling shutter, clock), m/s.
-constexpr double kLeastSpeed = 0.1;
+constexpr double kMinSpeed = 0.1;
 
 }  // namespace
 
 double mostApart(const PredictedMotion& prediction) {
-  return kSigmas * prediction.sigma + kLeastSpeed * prediction.interval;
+  return kSigmas * prediction.sigma + kMinSpeed * prediction.interval;
 }
 
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded) {
@@ -29,7 +29,7 @@ bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& foun
     old_found += found.inlier[i] != 0;
     old_bounded += bounded.inlier[i] != 0;
   }
-  return 4 * old_found < std::max(kLeast, found.inliers) || 4 * old_bounded > old_found;
+  return 4 * old_found < std::max(kMinInliers, found.inliers) || 4 * old_bounded > old_found;
 }
 
 bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found) {
@@ -54,8 +54,8 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const Predicted
   if (!prediction.wary && !prediction.at_rest && shownByAll(pairs, found)) return found;
   RansacResult bounded = rejectOutliers(pairs, prediction.T_current_previous, options);
   // Few or distant points hardly constrain the translation: then both motions explain them.
-  if (!prediction.wary && bounded.inliers > kSame * found.inliers) return found;
-  if (bounded.inliers > kMost * found.inliers) return bounded;
+  if (!prediction.wary && bounded.inliers > kSameShare * found.inliers) return found;
+  if (bounded.inliers > kBoundedShare * found.inliers) return bounded;
   *moves = prediction.at_rest || movesByItself(pairs, found, bounded);
   return *moves ? bounded : found;
 }

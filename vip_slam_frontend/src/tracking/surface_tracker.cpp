@@ -13,12 +13,12 @@ constexpr int kSampleStep = 3;  // px between samples of a patch
 constexpr int kHalf = 3;        // samples to each side of the centre
 constexpr int kReach = kHalf * kSampleStep;
 constexpr int kSamples = (2 * kHalf + 1) * (2 * kHalf + 1);
-constexpr int kLeastSamples = 42;
+constexpr int kMinSamples = 42;
 constexpr double kInlierSigmas = 3.5;
-constexpr double kLeastCosine = 0.12;
-constexpr double kMostTurned = 0.985;  // cosine between the normals of a pair
+constexpr double kMinCosine = 0.12;
+constexpr double kMaxTurned = 0.985;  // cosine between the normals of a pair
 // Neighbouring readings have correlated errors: a patch's sigma is at least this share of a single reading's.
-constexpr double kLeastShare = 0.35;
+constexpr double kMinShare = 0.35;
 // Errors that averaging does not reduce (warped depth, skirting boards, doors slightly ajar), metres.
 constexpr double kFloor = 0.002;
 
@@ -78,7 +78,7 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
       ++valid;
     }
   }
-  if (valid < kLeastSamples) return false;
+  if (valid < kMinSamples) return false;
   const Eigen::Matrix3d covariance = A.inverse();
   const Eigen::Vector3d c = covariance * b;
   if (!c.allFinite() || !(c.x() > 1.0 / noise_.max_range)) return false;
@@ -96,9 +96,9 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   patch->p_C = ray / c.x();
   patch->n_C = -N.normalized();
   const double towards = -patch->n_C.dot(ray);  // d distance / d z
-  if (towards < kLeastCosine * ray.norm()) return false;
+  if (towards < kMinCosine * ray.norm()) return false;
   const double fitted = std::sqrt(covariance(0, 0)) / (c.x() * c.x());
-  patch->sigma = towards * std::max(fitted, kLeastShare * noise_.sigma(1.0 / c.x()));
+  patch->sigma = towards * std::max(fitted, kMinShare * noise_.sigma(1.0 / c.x()));
   // Rotation of N by the gradient's errors; the camera's own magnification is left out.
   const double slope = std::sqrt(std::max(covariance(1, 1), covariance(2, 2))) / kSampleStep;
   patch->sigma_normal = slope * d_uv_xy.norm() / N.norm();
@@ -136,7 +136,7 @@ SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref,
     if (!camera_->project(T_cur_ref * patch.p_C, &uv) || !camera_->inImage(uv)) continue;
     if (!fit(depth, static_cast<int>(std::lround(uv.x())), static_cast<int>(std::lround(uv.y())), &seen)) continue;
     if (moving.moves(uv, seen.p_C.z())) continue;
-    if (seen.n_C.dot(R_cur_ref * patch.n_C) < kMostTurned) continue;
+    if (seen.n_C.dot(R_cur_ref * patch.n_C) < kMaxTurned) continue;
     result.pairs.push_back({patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kFloor)});
   }
   return result;

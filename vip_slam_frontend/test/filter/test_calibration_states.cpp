@@ -55,10 +55,10 @@ TEST(Calibration, FollowsADelayThatChanges) {
   simulation.later_time_offset = 0.004;
   FilterOptions options = singlePixels();
   options.calibration.time_offset_walk = 5e-5;
-  const MountingEstimate mounting = runFilter(simulation, options, 80.0, false).mounting;
-  std::printf("delay %.2f ms, sigma %.2f\n", 1e3 * mounting.time_offset, 1e3 * mounting.sigma_time_offset);
-  EXPECT_NEAR(mounting.time_offset, 0.004, 0.0005);
-  EXPECT_LT(mounting.sigma_time_offset, 0.0003);
+  const CalibrationEstimate calibration = runFilter(simulation, options, 80.0, false).calibration;
+  std::printf("delay %.2f ms, sigma %.2f\n", 1e3 * calibration.time_offset, 1e3 * calibration.sigma_time_offset);
+  EXPECT_NEAR(calibration.time_offset, 0.004, 0.0005);
+  EXPECT_LT(calibration.sigma_time_offset, 0.0003);
 }
 
 // In slow motion both would be learnt from the gyro's noise: the delay would become -6 ms with a sigma of 0.6 ms, the
@@ -73,10 +73,10 @@ TEST(Calibration, LearnsNeitherDelayNorGyroScaleFromNoise) {
   constexpr int kRuns = 3;
   for (int seed = 1; seed <= kRuns; ++seed) {
     simulation.seed = seed;
-    const MountingEstimate mounting = runFilter(simulation, singlePixels(), 60.0, false).mounting;
-    EXPECT_NEAR(mounting.time_offset, 0.0, 1e-4);
-    EXPECT_GT(mounting.sigma_time_offset, 0.004);
-    scale += mounting.gyro_correction.diagonal() / kRuns;
+    const CalibrationEstimate calibration = runFilter(simulation, singlePixels(), 60.0, false).calibration;
+    EXPECT_NEAR(calibration.time_offset, 0.0, 1e-4);
+    EXPECT_GT(calibration.sigma_time_offset, 0.004);
+    scale += calibration.gyro_correction.diagonal() / kRuns;
   }
   std::printf("gyro scale in slow motion: %.4f %.4f %.4f\n", scale.x(), scale.y(), scale.z());
   EXPECT_LT(scale.norm(), 0.02);
@@ -128,9 +128,9 @@ TEST(Calibration, FindsWhatDepthIsTooLongBy) {
     FilterOptions options = singlePixels();
     options.calibration.time_offset = false;  // which so noisy a gyro misleads
     const RunResult run = runFilter(simulation, options, 20.0, false);
-    EXPECT_NEAR(run.mounting.depth_offset, -0.01, 0.002);
+    EXPECT_NEAR(run.calibration.depth_offset, -0.01, 0.002);
     EXPECT_NEAR(run.most_depth_correction, -0.01, 0.003);
-    offset_nees += std::pow((run.mounting.depth_offset + 0.01) / run.mounting.sigma_depth_offset, 2) / kRuns;
+    offset_nees += std::pow((run.calibration.depth_offset + 0.01) / run.calibration.sigma_depth_offset, 2) / kRuns;
     nees += run.nees / kRuns;
     options.calibration.depth_offset = false;
     believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
@@ -148,7 +148,7 @@ TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
     SimulationOptions simulation;
     simulation.seed = seed;
     const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
-    EXPECT_NE(run.mounting.depth_offset, 0.0);
+    EXPECT_NE(run.calibration.depth_offset, 0.0);
     EXPECT_EQ(run.most_depth_correction, 0.0);
   }
 }
@@ -163,10 +163,10 @@ TEST(Calibration, FindsWhereTheDepthImageLies) {
     FilterOptions options = singlePixels();
     options.calibration.time_offset = false;  // which so noisy a gyro misleads
     const RunResult run = runFilter(simulation, options, 20.0, false);
-    EXPECT_LT((run.mounting.depth_shift - simulation.depth_shift).cwiseAbs().maxCoeff(), 3e-4);
+    EXPECT_LT((run.calibration.depth_shift - simulation.depth_shift).cwiseAbs().maxCoeff(), 3e-4);
     EXPECT_LT((run.depth_shift - simulation.depth_shift).cwiseAbs().maxCoeff(), 4e-4) << "taken";
-    own_nees += (run.mounting.depth_shift - simulation.depth_shift)
-                    .cwiseQuotient(run.mounting.sigma_depth_shift)
+    own_nees += (run.calibration.depth_shift - simulation.depth_shift)
+                    .cwiseQuotient(run.calibration.sigma_depth_shift)
                     .squaredNorm() /
                 (2 * kRuns);
     nees += run.nees / kRuns;
@@ -186,8 +186,8 @@ TEST(Calibration, AnExactDepthImageStaysWhereItIs) {
     simulation.depth_a = 0.001;
     simulation.depth_c = 0.0005;
     const RunResult run = runFilter(simulation, singlePixels(), 20.0, false);
-    EXPECT_GT(run.mounting.sigma_depth_shift.minCoeff(), 0.0);
-    EXPECT_LT(run.mounting.sigma_depth_shift.maxCoeff(), 4e-4);
+    EXPECT_GT(run.calibration.sigma_depth_shift.minCoeff(), 0.0);
+    EXPECT_LT(run.calibration.sigma_depth_shift.maxCoeff(), 4e-4);
     EXPECT_TRUE(run.depth_shift.isZero()) << run.depth_shift.transpose();
   }
 }
@@ -200,8 +200,8 @@ TEST(Calibration, AShiftBeyondBeliefIsTakenBack) {
   simulation.depth_c = 0.0005;
   const RunResult run = runFilter(simulation, singlePixels(), 20.0, false);
   EXPECT_TRUE(run.depth_shift.isZero());
-  EXPECT_LT(run.mounting.depth_shift.norm(), 1e-5);
-  EXPECT_TRUE(run.mounting.depth_contradicts);
+  EXPECT_LT(run.calibration.depth_shift.norm(), 1e-5);
+  EXPECT_TRUE(run.calibration.depth_contradicts);
 }
 
 // It is not passed on while it grows either, or the map would move back and forth.
@@ -212,7 +212,7 @@ TEST(Calibration, AnOffsetBeyondBeliefIsNotHandedOn) {
       simulation.speed = speed;
       simulation.depth_offset = speed < 1 ? 0.04 : 0.03;
       const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
-      EXPECT_TRUE(run.mounting.depth_contradicts);
+      EXPECT_TRUE(run.calibration.depth_contradicts);
       EXPECT_EQ(run.most_depth_correction, 0.0);
     }
   }
@@ -230,10 +230,10 @@ TEST(Calibration, FindsTheIntrinsics) {
     FilterOptions options = singlePixels();
     options.calibration.time_offset = false;  // which so noisy a gyro misleads
     const RunResult run = runFilter(simulation, options, 20.0, false);
-    const Eigen::Vector4d off = run.mounting.bearing.value - simulation.bearing.value;
+    const Eigen::Vector4d off = run.calibration.bearing.value - simulation.bearing.value;
     EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.0015);
     EXPECT_GT(run.most_bearing_correction, 0.003);
-    own_nees += off.cwiseQuotient(run.mounting.sigma_bearing).squaredNorm() / kRuns;
+    own_nees += off.cwiseQuotient(run.calibration.sigma_bearing).squaredNorm() / kRuns;
     nees += run.nees / kRuns;
     options.calibration.intrinsics = false;
     believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
@@ -250,7 +250,7 @@ TEST(Calibration, ExactIntrinsicsAreHandedOnAsTheyAre) {
     SimulationOptions simulation;
     simulation.seed = seed;
     const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
-    EXPECT_NE(run.mounting.bearing.value, Eigen::Vector4d::Zero());
+    EXPECT_NE(run.calibration.bearing.value, Eigen::Vector4d::Zero());
     EXPECT_EQ(run.most_bearing_correction, 0.0);
   }
 }
@@ -276,12 +276,12 @@ TEST(Calibration, FindsTheScaleOfTheGyro) {
     const RunResult run = runFilter(simulation, options, 20.0, false);
     const Eigen::Vector3d expected =
         (Eigen::Vector3d::Ones() + simulation.gyro_error.diagonal()).cwiseInverse() - Eigen::Vector3d::Ones();
-    const Eigen::Vector3d off = run.mounting.gyro_correction.diagonal() - expected;
-    scale_nees += off.cwiseQuotient(run.mounting.sigma_gyro_correction.diagonal()).squaredNorm() / kRuns;
+    const Eigen::Vector3d off = run.calibration.gyro_correction.diagonal() - expected;
+    scale_nees += off.cwiseQuotient(run.calibration.sigma_gyro_correction.diagonal()).squaredNorm() / kRuns;
     EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.003);
     for (int axis = 0; axis < 3; ++axis) {
-      const double found = run.mounting.gyro_correction(axis, axis);
-      const bool sure = std::abs(found) > 4.0 * run.mounting.sigma_gyro_correction(axis, axis);
+      const double found = run.calibration.gyro_correction(axis, axis);
+      const bool sure = std::abs(found) > 4.0 * run.calibration.sigma_gyro_correction(axis, axis);
       // Once significant it stays passed on.
       const double handed_on = run.gyro_correction(axis, axis);
       EXPECT_TRUE(handed_on == found || (!sure && handed_on == 0)) << handed_on << " of " << found;
@@ -306,16 +306,16 @@ TEST(Calibration, FindsHowTheGyroIsMisaligned) {
   options.calibration.gyro_misalignment = true;
   const RunResult run = runFilter(simulation, options, 40.0, false);
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d left = (I + run.mounting.gyro_correction) * (I + simulation.gyro_error) - I;
+  const Eigen::Matrix3d left = (I + run.calibration.gyro_correction) * (I + simulation.gyro_error) - I;
   EXPECT_LT(left.norm(), 0.3 * simulation.gyro_error.norm());
-  EXPECT_LT((left.array().abs() / run.mounting.sigma_gyro_correction.array()).maxCoeff(), 4.0);
+  EXPECT_LT((left.array().abs() / run.calibration.sigma_gyro_correction.array()).maxCoeff(), 4.0);
 }
 
 // The estimate varies about zero and must not be passed on.
 TEST(Calibration, AnExactGyroIsHandedOnAsItIs) {
   for (int seed = 1; seed <= 3; ++seed) {
     const RunResult run = runFilter(goodGyro(seed), singlePixels(), 15.0, false);
-    EXPECT_NE(run.mounting.gyro_correction.norm(), 0.0);
+    EXPECT_NE(run.calibration.gyro_correction.norm(), 0.0);
     EXPECT_EQ(run.most_gyro_correction, 0.0);
   }
 }
@@ -326,11 +326,11 @@ TEST(Calibration, AnOffsetOfDepthBeyondBeliefIsTakenBack) {
   simulation.depth_offset = 0.06;
   FilterOptions options = singlePixels();
   const RunResult run = runFilter(simulation, options, 10.0, false);
-  EXPECT_TRUE(run.mounting.depth_contradicts);
-  EXPECT_NEAR(run.mounting.depth_offset, 0, 1e-4);
-  EXPECT_EQ(mountingDifferences({run.mounting.T_I_C, run.mounting.time_offset}, run.mounting).size(), 1u);
+  EXPECT_TRUE(run.calibration.depth_contradicts);
+  EXPECT_NEAR(run.calibration.depth_offset, 0, 1e-4);
+  EXPECT_EQ(calibrationDifferences({run.calibration.T_I_C, run.calibration.time_offset}, run.calibration).size(), 1u);
   simulation.depth_offset = 0.01;
-  EXPECT_FALSE(runFilter(simulation, options, 10.0, false).mounting.depth_contradicts);
+  EXPECT_FALSE(runFilter(simulation, options, 10.0, false).calibration.depth_contradicts);
 }
 
 TEST(Calibration, StandingTeachesNothing) {
@@ -363,14 +363,14 @@ TEST(Calibration, OutlivesARestart) {
   const SE3 given(expSO3(Eigen::Vector3d(0.3, 0.2, 0.1)), Eigen::Vector3d(0.05, 0, 0));
   const Eigen::Vector3d turn(0.006, -0.004, 0.003);
   VioFilter filter = taught(options, given, turn);
-  EXPECT_LT((filter.mounting().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
-  EXPECT_GT(filter.mounting().sigma_rotation.minCoeff(), 0);
+  EXPECT_LT((filter.calibration().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
+  EXPECT_GT(filter.calibration().sigma_rotation.minCoeff(), 0);
   filter.stop();
-  EXPECT_LT((filter.mounting().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
+  EXPECT_LT((filter.calibration().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
   filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
   EXPECT_LT((filter.window().T_I_C.boxminus(given).head<3>() - turn).norm(), 1e-5);
   // But with the initial sigma: the estimate may have caused the failure.
-  EXPECT_NEAR(filter.mounting().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
+  EXPECT_NEAR(filter.calibration().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
 }
 
 TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
@@ -393,20 +393,20 @@ TEST(Calibration, IsForgottenWhenItWentAstray) {
   const FilterOptions options = singlePixels();
   VioFilter filter = taught(options, SE3(), 6 * options.calibration.sigma_rotation * Eigen::Vector3d::UnitY());
   filter.stop();
-  EXPECT_EQ(filter.mounting().T_I_C.matrix(), SE3().matrix());
+  EXPECT_EQ(filter.calibration().T_I_C.matrix(), SE3().matrix());
 }
 
 TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
-  MountingEstimate given, found;
+  CalibrationEstimate given, found;
   found.T_I_C = SE3(expSO3(Eigen::Vector3d(0, 0.01, 0)), Eigen::Vector3d(0.02, 0, 0));
   found.time_offset = 0.004;
-  EXPECT_TRUE(mountingDifferences(given, found).empty()) << "nothing was estimated";
+  EXPECT_TRUE(calibrationDifferences(given, found).empty()) << "nothing was estimated";
   found.sigma_rotation.setConstant(0.0005);
   found.sigma_translation.setConstant(0.001);
   found.sigma_time_offset = 0.0002;
   found.depth_offset = -0.0098;
   found.sigma_depth_offset = 0.0003;
-  const std::vector<std::string> all = mountingDifferences(given, found);
+  const std::vector<std::string> all = calibrationDifferences(given, found);
   ASSERT_EQ(all.size(), 4u);
   EXPECT_NE(all[0].find("0.57 degrees"), std::string::npos) << all[0];
   EXPECT_NE(all[1].find("20.0 mm"), std::string::npos) << all[1];
@@ -415,17 +415,17 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   EXPECT_NE(all[3].find("depth/offset in the sensor's configuration should be -0.0098"), std::string::npos) << all[3];
   given.depth_offset = -0.005;  // applied already: 7 mm remain
   found.depth_offset = -0.012;
-  const std::string more = mountingDifferences(given, found).back();
+  const std::string more = calibrationDifferences(given, found).back();
   EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
   EXPECT_NE(more.find("-0.0120"), std::string::npos) << more;
   found.bearing.value << 0, 0.003, 0, 0;
   found.sigma_bearing.setConstant(0.0003);
   found.intrinsics << 480.04, 481.46, 320.2, 240.1;
-  const std::string intrinsics = mountingDifferences(given, found).back();
+  const std::string intrinsics = calibrationDifferences(given, found).back();
   EXPECT_NE(intrinsics.find("480.0, 481.5, 320.2, 240.1"), std::string::npos) << intrinsics;
   found.gyro_correction(1, 1) = -0.0123;
   found.sigma_gyro_correction(1, 1) = 0.0003;
-  const std::string gyro = mountingDifferences(given, found).back();
+  const std::string gyro = calibrationDifferences(given, found).back();
   EXPECT_NE(gyro.find("up to 1.2 %"), std::string::npos) << gyro;
   EXPECT_NE(gyro.find("[0.0000, -0.0123, 0.0000]"), std::string::npos) << gyro;
   found.sigma_gyro_correction(1, 1) = 0.003;
@@ -434,7 +434,7 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   found.sigma_time_offset = 0.002;
   found.sigma_depth_offset = 0.002;
   found.sigma_bearing.setConstant(0.001);
-  EXPECT_TRUE(mountingDifferences(given, found).empty());
+  EXPECT_TRUE(calibrationDifferences(given, found).empty());
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace vip_slam::testing {
 namespace {
 
 /// The simulation's depth readings are single pixels, not medians. Its gyro is ten times noisier than that of any
-/// camera, and such noise looks like the rotation from which the delay is learnt (see TheMountingIsLearntHonestly).
+/// camera, and such noise looks like the rotation from which the delay is learnt (see TheCalibrationIsLearntHonestly).
 FilterOptions filterOptions() {
   FilterOptions options;
   options.depth_inflation = 1.0;
@@ -66,7 +66,7 @@ TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
 
 /// With a gyro as in real cameras (3.4e-4 rad/s/sqrt(Hz)), an extrinsic rotation error of 0.6 degrees and a time offset
 /// of 3 ms.
-TEST(Consistency, TheMountingIsLearntHonestly) {
+TEST(Consistency, TheCalibrationIsLearntHonestly) {
   constexpr int kSeeds = 20;
   double nees = 0, turn = 0, delay = 0;
   for (int seed = 1; seed <= kSeeds; ++seed) {
@@ -84,7 +84,7 @@ TEST(Consistency, TheMountingIsLearntHonestly) {
     turn += run.window.T_I_C.boxminus(LandmarkSimulation(simulation).T_I_C()).head<3>().norm() / kSeeds;
     delay += std::abs(run.window.time_offset - simulation.time_offset) / kSeeds;
   }
-  std::printf("NEES %.2f; after 30 s the mounting is off by %.3f degrees and %.3f ms\n", nees, turn * 180 / M_PI,
+  std::printf("NEES %.2f; after 30 s the calibration is off by %.3f degrees and %.3f ms\n", nees, turn * 180 / M_PI,
               1e3 * delay);
   EXPECT_GT(nees, chiSquareQuantile(0.025, 6 * kSeeds) / kSeeds);
   EXPECT_LT(nees, chiSquareQuantile(0.975, 6 * kSeeds) / kSeeds);

@@ -93,7 +93,7 @@ TEST_F(FrontEndTest, DepthIsHandedOnAsWhatItMeans) {
     if (output.keyframe && t > 4) break;
   }
   ASSERT_TRUE(output.keyframe);
-  const double offset = front_end_.mounting().depth_offset;
+  const double offset = front_end_.calibration().depth_offset;
   EXPECT_LT(offset, -0.001);
   EXPECT_EQ(output.frame->camera_correction.offset, offset);
   EXPECT_EQ(keyframe->frame.camera_correction.offset, offset);
@@ -138,25 +138,25 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
     return output;
   };
   go(90, 0.015);
-  ASSERT_LT(front_end_.mounting().depth_offset, -0.001);
+  ASSERT_LT(front_end_.calibration().depth_offset, -0.001);
   MapUpdate update;
   update.depth_curve = disparityCurve(-0.002, 8);
   update.disparity_error = -0.002;
   front_end_.applyMapUpdate(update);
-  EXPECT_EQ(front_end_.mounting().depth_offset, 0.0);
+  EXPECT_EQ(front_end_.calibration().depth_offset, 0.0);
   FrameOutput output = go(20, 0.015);
-  EXPECT_LT(std::abs(front_end_.mounting().depth_offset), 1e-6);
+  EXPECT_LT(std::abs(front_end_.calibration().depth_offset), 1e-6);
   EXPECT_EQ(output.frame->camera_correction, (CameraCorrection{0.0, update.depth_curve}));
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
   // A further change by a hundredth has no effect; a new map has no knowledge of it.
   update.depth_curve = disparityCurve(-0.00202, 8);
   update.disparity_error = -0.00202;
   front_end_.applyMapUpdate(update);
-  EXPECT_LT(front_end_.mounting().sigma_depth_offset, 1e-5);
+  EXPECT_LT(front_end_.calibration().sigma_depth_offset, 1e-5);
   front_end_.applyMapUpdate(MapUpdate());
-  EXPECT_NEAR(front_end_.mounting().sigma_depth_offset, FilterOptions().calibration.sigma_depth_offset, 1e-9);
+  EXPECT_NEAR(front_end_.calibration().sigma_depth_offset, FilterOptions().calibration.sigma_depth_offset, 1e-9);
   go(60, 0.015);
-  EXPECT_LT(front_end_.mounting().depth_offset, -0.001);
+  EXPECT_LT(front_end_.calibration().depth_offset, -0.001);
 }
 
 // A change of the depth calibration must not look like motion.
@@ -180,8 +180,8 @@ TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
   SensorConfig known = sensor();
   known.depth_offset = -0.03;
   FrontEnd front_end(options(), known);
-  EXPECT_EQ(front_end.givenMounting().depth_offset, -0.03);
-  EXPECT_TRUE(mountingDifferences(front_end.givenMounting(), front_end.mounting()).empty());
+  EXPECT_EQ(front_end.givenCalibration().depth_offset, -0.03);
+  EXPECT_TRUE(calibrationDifferences(front_end.givenCalibration(), front_end.calibration()).empty());
   double imu_t = 0;
   for (int k = 0; k < 120; ++k) {
     const double t = 0.05 * k;
@@ -192,8 +192,8 @@ TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
     front_end.process({t, world_.image(t), World::depth(t) + 0.015});
     front_end_.process({t, world_.image(t), World::depth(t) + 0.015});
   }
-  EXPECT_LT(front_end_.mounting().depth_offset, -0.001);
-  EXPECT_NEAR(front_end.mounting().depth_offset, front_end_.mounting().depth_offset - 0.03, 1e-9);
+  EXPECT_LT(front_end_.calibration().depth_offset, -0.001);
+  EXPECT_NEAR(front_end.calibration().depth_offset, front_end_.calibration().depth_offset - 0.03, 1e-9);
 }
 
 // Likewise for the gyro's rates.
@@ -202,8 +202,8 @@ TEST_F(FrontEndTest, TheGyroCorrectionIsTheConfiguredOneAndWhatWasFound) {
   known.gyro_correction << 0.05, 0.01, 0, -0.02, -0.1, 0.03, 0.01, 0, 0.08;
   const Eigen::Matrix3d measures = (Eigen::Matrix3d::Identity() + known.gyro_correction).inverse();
   FrontEnd front_end(options(), known);
-  EXPECT_EQ(front_end.givenMounting().gyro_correction, known.gyro_correction);
-  EXPECT_TRUE(mountingDifferences(front_end.givenMounting(), front_end.mounting()).empty());
+  EXPECT_EQ(front_end.givenCalibration().gyro_correction, known.gyro_correction);
+  EXPECT_TRUE(calibrationDifferences(front_end.givenCalibration(), front_end.calibration()).empty());
   double imu_t = 0;
   int keyframes = 0;
   for (int k = 0; k < 120; ++k) {
@@ -224,8 +224,8 @@ TEST_F(FrontEndTest, TheGyroCorrectionIsTheConfiguredOneAndWhatWasFound) {
   }
   EXPECT_GT(keyframes, 0);
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d both = (I + front_end_.mounting().gyro_correction) * (I + known.gyro_correction) - I;
-  EXPECT_LT((front_end.mounting().gyro_correction - both).norm(), 1e-6);
+  const Eigen::Matrix3d both = (I + front_end_.calibration().gyro_correction) * (I + known.gyro_correction) - I;
+  EXPECT_LT((front_end.calibration().gyro_correction - both).norm(), 1e-6);
 }
 
 TEST_F(FrontEndTest, TwoRunsAgreeBitByBit) {

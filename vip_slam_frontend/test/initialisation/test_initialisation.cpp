@@ -36,7 +36,7 @@ Start start(double speed, bool depth, double accel_unit = 1, double scene = 0, d
   InitialisationOptions initialisation;
   initialisation.standing_seconds = standing_seconds;
   Initialiser initialiser(initialisation, FilterOptions(), options.noise, given, options.focal, 9.81);
-  if (learnt) initialiser.setMounting(T_I_C, (1 / gyro - 1) * Eigen::Matrix3d::Identity());
+  if (learnt) initialiser.setCalibration(T_I_C, (1 / gyro - 1) * Eigen::Matrix3d::Identity());
   std::size_t next = 0;
   Start result;
   for (int k = 0; k < 80 && !result.prior; ++k) {

@@ -75,7 +75,7 @@ struct PlaneGrowthOptions {
     v.field("gap", gap, 0.0, 5.0, "triangles further than this from a plane's covered area do not join it, m");
     v.field("min_move", min_move, 0.0, 1.0, "frames nearer than this to the last one that grew planes are skipped, m");
     v.field("min_turn_deg", min_turn_deg, 0.0, 45.0, "... unless the camera turned by this, degrees");
-    v.field("min_hits", min_hits, 1, kMostHits, "sightings that make a cell part of the plane");
+    v.field("min_hits", min_hits, 1, kMaxHits, "sightings that make a cell part of the plane");
   }
 };
 

@@ -46,9 +46,9 @@ std::vector<Eigen::Vector3d> PlaneSampler::spreadEvenly(const std::vector<Eigen:
     low = low.cwiseMin(at.back()), high = high.cwiseMax(at.back());
   }
   // Index of each voxel's sum within the points' bounds; the voxel size is raised when there would be more than these.
-  constexpr double kMostVoxels = 1e6;
+  constexpr double kMaxVoxels = 1e6;
   std::vector<int> index;
-  double voxel = std::max(options_.voxel, std::sqrt((high - low).prod() / kMostVoxels));
+  double voxel = std::max(options_.voxel, std::sqrt((high - low).prod() / kMaxVoxels));
   std::vector<std::pair<Eigen::Vector3d, int>> sums;
   while (true) {
     const Eigen::Vector2d first = (low / voxel).array().floor(), last = (high / voxel).array().floor();

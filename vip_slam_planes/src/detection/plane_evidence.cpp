@@ -15,15 +15,15 @@ namespace {
 
 constexpr double kPatchReach = 0.4;  // metres from the patch's first triangle
 constexpr double kPatchAngle = 15.0 * kDegree, kWidestPatchAngle = 45.0 * kDegree;
-constexpr double kLeastPatch = 0.01;  // m^2
-constexpr std::size_t kLeastTriangles = 4;
+constexpr double kMinPatch = 0.01;  // m^2
+constexpr std::size_t kMinTriangles = 4;
 // Least area, relative to that for a plane in one image. Small upright surfaces are mostly furniture. Dark or polished
 // table tops have depth in pieces only: such planes start small and narrow, and are grown by tracked frames.
-constexpr double kLeastUpright = 2.0, kLeastLevel = 0.3;
-constexpr double kLeastLevelWidth = 0.6;  // likewise of the width
+constexpr double kMinUpright = 2.0, kMinLevel = 0.3;
+constexpr double kMinLevelWidth = 0.6;  // likewise of the width
 // A plane this far below a known one may be what that lies on, m.
 constexpr double kStepDown = 0.02;
-constexpr int kMostTests = 4;  // peaks tested per keyframe, the largest ones
+constexpr int kMaxTests = 4;  // peaks tested per keyframe, the largest ones
 // Share of the area of a wall's peak that must be new since its last test. Horizontal peaks are tested every time,
 // since the visible pieces of a dark table top change.
 constexpr double kFreshShare = 0.25;
@@ -89,7 +89,7 @@ void PlaneEvidence::add(KeyframeId id, const SE3& T_map_C, const std::vector<Map
     }
     const Eigen::Vector3d n = normals.normalized();
     const double z = std::abs(n.z());
-    if (members.size() < kLeastTriangles || area < kLeastPatch || (z < level && z > upright)) continue;
+    if (members.size() < kMinTriangles || area < kMinPatch || (z < level && z > upright)) continue;
     Patch patch;
     patch.kind = z >= level ? PlaneKind::kHorizontal : PlaneKind::kVertical;
     patch.n_C = T_C_map.rotation() * n;
@@ -192,9 +192,9 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
       all.push_back({f, k});
     }
   }
-  for (int tests = 0; tests < kMostTests;) {
+  for (int tests = 0; tests < kMaxTests;) {
     const PlaneHistogram::Peak peak = histogram.peak();
-    if (peak.area < kLeastLevel * detection_.min_area) break;
+    if (peak.area < kMinLevel * detection_.min_area) break;
     std::vector<Vote> votes;
     std::set<std::size_t> frames;
     for (int i : peak.members) {
@@ -205,8 +205,8 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     if (int(frames.size()) < detection_.min_keyframes || *frames.rbegin() + 1 != frames_.size()) continue;
     const PlaneKind kind = frames_[votes.front().frame].patches[votes.front().patch].kind;
     PlaneDetectionOptions together = detection_;
-    together.min_area *= kind == PlaneKind::kHorizontal ? kLeastLevel : kLeastUpright;
-    if (kind == PlaneKind::kHorizontal) together.min_width *= kLeastLevelWidth;
+    together.min_area *= kind == PlaneKind::kHorizontal ? kMinLevel : kMinUpright;
+    if (kind == PlaneKind::kHorizontal) together.min_width *= kMinLevelWidth;
     if (peak.area < together.min_area) continue;
     double fresh = 0;
     for (const Vote& v : votes) {
@@ -228,7 +228,7 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
       // The keyframes see overlapping parts of the surface: use the area that they cover together.
       PlaneTrack area(0, kind, plane.plane, plane.centroid, 0.5 * growth_.cell);
       for (int i : plane.triangles) area.cover(triangles[i], 1, SE3(), nullptr);
-      const bool small = area.area() < kLeastUpright * detection_.min_area;
+      const bool small = area.area() < kMinUpright * detection_.min_area;
       if (area.area() < together.min_area || (small && liesOn(plane, known, growth_)) ||
           !shownBySeveral(evidence, triangles, plane, detection_.min_keyframes)) {
         continue;

@@ -12,13 +12,13 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastTurn = 3.0 * kDegree;  // change of the line of sight between the two views
-constexpr double kTurnsAlong = 1.0 / 3.0;     // share of that by which the two normals may differ
-constexpr double kShows = 6.0;                // sigmas that a strip turning with the line of sight must deviate by
-constexpr double kOff = 0.02;                 // m, largest distance of each centroid from the other plane
-constexpr double kUpright = 0.5;              // sine of the angle to the vertical; normals of narrow things are noisy
-constexpr double kLeastRemains = 0.03;        // m^2
-constexpr std::size_t kLeastInStrip = 6;
+constexpr double kMinTurn = 3.0 * kDegree;  // change of the line of sight between the two views
+constexpr double kTurnsAlong = 1.0 / 3.0;   // share of that by which the two normals may differ
+constexpr double kShows = 6.0;              // sigmas that a strip turning with the line of sight must deviate by
+constexpr double kOff = 0.02;               // m, largest distance of each centroid from the other plane
+constexpr double kUpright = 0.5;            // sine of the angle to the vertical; normals of narrow things are noisy
+constexpr double kMinRemains = 0.03;        // m^2
+constexpr std::size_t kMinInStrip = 6;
 constexpr double kBeside = 0.15;  // m
 // Angles to a neighbouring surface between which it counts as a round body; beyond, it is another face at a corner.
 constexpr double kBends = 10.0 * kDegree, kTurnsOff = 60.0 * kDegree;
@@ -105,7 +105,7 @@ bool StripEvidence::isOneFace(const Placed& a, const Placed& b) const {
   const Eigen::Vector3d middle = 0.5 * (a.centroid + b.centroid);
   const Eigen::Vector3d from_a = a.T_C_map.inverse().t(), from_b = b.T_C_map.inverse().t();
   const double turn = angleBetweenUnits(level(middle - from_a), level(middle - from_b));
-  if (turn < kLeastTurn || angleBetweenUnits(a.plane.n, b.plane.n) > kTurnsAlong * turn) return false;
+  if (turn < kMinTurn || angleBetweenUnits(a.plane.n, b.plane.n) > kTurnsAlong * turn) return false;
   // The ends of a strip that turned with the line of sight would deviate by half its width times the turn.
   const Eigen::Matrix3d R = a.T_C_map.R();
   const double width = boundsOf(a.strip->triangles, R * along, R.col(2)).sizes().x();
@@ -132,7 +132,7 @@ bool StripEvidence::remainsOf(const Placed& strip, const Frame& frame, const Cam
     remains->index.push_back(frame.index[i]);
   }
   Plane fitted;
-  if (remains->triangles.size() < kLeastInStrip || area < kLeastRemains) return false;
+  if (remains->triangles.size() < kMinInStrip || area < kMinRemains) return false;
   if (!fitPlane(moments, PlaneKind::kVertical, strip.plane.n, &fitted)) return false;
   remains->sigma /= double(remains->triangles.size());
   const Eigen::Vector3d centroid = moments.centroid() + strip.centroid;

@@ -7,11 +7,11 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFinest = 0.0025;   // m, bins of the distances along the normal
-constexpr double kValley = 0.4;      // largest height of a valley, relative to the lower of the two modes
-constexpr double kLeastShare = 0.2;  // of the whole weight; a smaller part counts as outliers
-constexpr int kLeastVotes = 10;      // fewer have valleys by chance
-constexpr int kMostBins = 1000;      // members of a peak lie within a few tens of centimetres
+constexpr double kFinest = 0.0025;  // m, bins of the distances along the normal
+constexpr double kValley = 0.4;     // largest height of a valley, relative to the lower of the two modes
+constexpr double kMinShare = 0.2;   // of the whole weight; a smaller part counts as outliers
+constexpr int kMinVotes = 10;       // fewer have valleys by chance
+constexpr int kMaxBins = 1000;      // members of a peak lie within a few tens of centimetres
 
 struct Bin {
   double weight = 0, hump = 0;  ///< of its votes; smoothed
@@ -22,9 +22,9 @@ struct Bin {
 // Splits [first, last) recursively at its deepest valley; adds the first bins of the upper parts to `cuts`. One more
 // bin follows the last.
 void cutAtValleys(const std::vector<Bin>& bins, int first, int last, std::vector<int>* cuts) {
-  const double least = kLeastShare * bins.back().below;
+  const double least = kMinShare * bins.back().below;
   const auto suffices = [&](int from, int to) {
-    return bins[to].below - bins[from].below >= least && bins[to].votes_below - bins[from].votes_below >= kLeastVotes;
+    return bins[to].below - bins[from].below >= least && bins[to].votes_below - bins[from].votes_below >= kMinVotes;
   };
   std::vector<double> right(last - first + 1, 0);
   for (int i = last - 1; i >= first; --i) right[i - first] = std::max(right[i - first + 1], bins[i].hump);
@@ -51,7 +51,7 @@ std::vector<std::vector<int>> splitLayers(const std::vector<double>& offset, con
   std::iota(layers[0].begin(), layers[0].end(), 0);
   if (offset.empty()) return layers;
   const auto [low, high] = std::minmax_element(offset.begin(), offset.end());
-  const double bin = std::max({kFinest, 0.5 * sigma, (*high - *low) / kMostBins});
+  const double bin = std::max({kFinest, 0.5 * sigma, (*high - *low) / kMaxBins});
   const int count = static_cast<int>((*high - *low) / bin) + 1;
   const auto binOf = [&, low = *low](double d) { return std::min(count - 1, static_cast<int>((d - low) / bin)); };
   std::vector<Bin> bins(count + 1);

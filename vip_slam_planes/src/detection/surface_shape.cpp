@@ -12,7 +12,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastSteepness = 0.5;  // sine of the angle between a normal and the vertical
+constexpr double kMinSteepness = 0.5;  // sine of the angle between a normal and the vertical
 constexpr double kCore = 0.12;  // share of the width that inner vertices must span; a single column zigzags by less
 
 struct Extent {
@@ -45,7 +45,7 @@ bool isSolid(const std::vector<MapTriangle>& triangles, const std::vector<int>& 
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   for (int i : surface) normal += triangles[i].area * triangles[i].n;
   const Eigen::Vector3d along = Eigen::Vector3d::UnitZ().cross(normal.normalized());
-  if (along.norm() < kLeastSteepness) return true;
+  if (along.norm() < kMinSteepness) return true;
   Extent all, core;
   for (int i : surface) {
     for (int k = 0; k < 3; ++k) {

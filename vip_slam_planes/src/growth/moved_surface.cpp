@@ -7,10 +7,10 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kLeastBefore = 3, kLeastSince = 4;  // observations
-constexpr double kMoved = 0.02;                           // m
-constexpr double kScatter = 0.25;                         // largest scatter of each group, relative to the shift
-constexpr double kSamePlace = 0.4;                        // distance of centroids, relative to the root of the area
+constexpr std::size_t kMinBefore = 3, kMinSince = 4;  // observations
+constexpr double kMoved = 0.02;                       // m
+constexpr double kScatter = 0.25;                     // largest scatter of each group, relative to the shift
+constexpr double kSamePlace = 0.4;                    // distance of centroids, relative to the root of the area
 
 struct Seen {
   KeyframeId keyframe;
@@ -41,10 +41,10 @@ KeyframeId surfaceMovedAt(const PlaneTrack& track, const CameraPoses& poses) {
     const Eigen::Vector3d centre = pose->second * PlaneMoments{observation.G}.centroid();
     seen.push_back({keyframe, track.plane().signedDistance(centre), track.toPlane(centre)});
   }
-  if (seen.size() < kLeastBefore + kLeastSince) return 0;
+  if (seen.size() < kMinBefore + kMinSince) return 0;
   KeyframeId moved_at = 0;
   double least = 1;  // scatter over shift
-  for (auto since = seen.begin() + kLeastBefore; since + kLeastSince <= seen.end(); ++since) {
+  for (auto since = seen.begin() + kMinBefore; since + kMinSince <= seen.end(); ++since) {
     const Group before = groupOf(seen.begin(), since), after = groupOf(since, seen.end());
     const double way = std::abs(after.mean - before.mean), most = std::max(before.deviation, after.deviation);
     if (way < kMoved || most > kScatter * way || most > least * way) continue;

@@ -9,8 +9,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kLeastInLayers = 30;  // fewer do not show two layers
-constexpr double kLeastStep = 0.02;         // m, between the layers
+constexpr std::size_t kMinInLayers = 30;  // fewer do not show two layers
+constexpr double kMinStep = 0.02;         // m, between the layers
 constexpr double kStepSigmas = 3.0;
 
 }  // namespace
@@ -24,14 +24,14 @@ std::vector<PlaneId> releaseOtherLayers(const std::vector<MapTriangle>& triangle
   }
   std::vector<double> offset, area, sigma;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (members[k].size() < kLeastInLayers) continue;
+    if (members[k].size() < kMinInLayers) continue;
     offset.clear(), area.clear(), sigma.clear();
     for (int i : members[k]) {
       offset.push_back(tracks[k]->plane().signedDistance(triangles[i].centre));
       area.push_back(triangles[i].area);
       sigma.push_back(triangles[i].sigma);
     }
-    const double noise = upperMedian(sigma), step = std::max(kLeastStep, kStepSigmas * noise);
+    const double noise = upperMedian(sigma), step = std::max(kMinStep, kStepSigmas * noise);
     const auto [low, high] = std::minmax_element(offset.begin(), offset.end());
     if (*high - *low < step) continue;
     const auto layers = splitLayers(offset, area, noise);

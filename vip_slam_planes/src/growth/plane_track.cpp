@@ -6,7 +6,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kLeastTurn = 1e-3, kLeastShift = 1e-3;  // radians, metres; smaller changes are ignored
+constexpr double kMinTurn = 1e-3, kMinShift = 1e-3;  // radians, metres; smaller changes are ignored
 constexpr double kLargeTurn = 0.3;  // radians; an adjustment turns hosts by less, a loop that joins parts by any angle
 
 }  // namespace
@@ -31,7 +31,7 @@ void PlaneTrack::setPlane(const Plane& plane) {
 
 void PlaneTrack::coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C) {
   const int before = cells_.at(c);
-  cells_.set(c, std::min(kMostHits, before + hits));
+  cells_.set(c, std::min(kMaxHits, before + hits));
   if (before > 0 || cells_.at(c) == 0) return;  // covered before, or outside the largest grid
   area_changed_ = grown_ = true;
   lost_ = std::max(0, lost_ - 1);
@@ -140,8 +140,8 @@ void PlaneTrack::followKeyframes(const CameraPoses& poses) {
   if (main && !main->cells_C.empty() && followsHosts()) {
     carried = carriedAlong(main_move, main->T_map_C, main->cells_C);
     const Eigen::Vector3d p = main_move * (main->T_map_C * main->cells_C.front().cast<double>());
-    moved = moved || std::abs(carried.signedDistance(p) - plane_.signedDistance(p)) > kLeastShift ||
-            (carried.n - plane_.n).norm() > kLeastTurn;
+    moved = moved || std::abs(carried.signedDistance(p) - plane_.signedDistance(p)) > kMinShift ||
+            (carried.n - plane_.n).norm() > kMinTurn;
   }
   if (!moved) return;
   area_changed_ = grown_ = true;
@@ -239,8 +239,8 @@ PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {
 }
 
 bool PlaneTrack::changed(bool reset) {
-  const bool changed = grown_ || (plane_.n - last_checked_.n).norm() > kLeastTurn ||
-                       std::abs(last_checked_.signedDistance(origin_)) > kLeastShift;
+  const bool changed = grown_ || (plane_.n - last_checked_.n).norm() > kMinTurn ||
+                       std::abs(last_checked_.signedDistance(origin_)) > kMinShift;
   if (reset) grown_ = false, last_checked_ = plane_;
   return changed;
 }

@@ -10,7 +10,7 @@ namespace {
 constexpr double kWidestAngle = 25.0 * kDegree;
 constexpr int kNone = -1;
 constexpr double kToldApart = 2.0;    // sigmas of a triangle's distance by which the nearest plane must be nearer
-constexpr double kLeastSigma = 1e-3;  // m
+constexpr double kMinSigma = 1e-3;    // m
 constexpr double kWorstSquare = 9.0;  // cap on a squared distance, sigmas^2, so that outliers do not decide
 
 /// A triangle whose noise does not allow a decision between two planes.
@@ -71,7 +71,7 @@ void nearestPlanes(const std::vector<MapTriangle>& triangles, const std::vector<
     }
     if (second == kNone || next_best - best > kToldApart * t.sigma) continue;
     const bool ascending = (*label)[i] < second;
-    const double sigma = std::max(t.sigma, kLeastSigma);
+    const double sigma = std::max(t.sigma, kMinSigma);
     doubts[i].track[!ascending] = (*label)[i], doubts[i].squares[!ascending] = best * best / (sigma * sigma);
     doubts[i].track[ascending] = second, doubts[i].squares[ascending] = next_best * next_best / (sigma * sigma);
   }

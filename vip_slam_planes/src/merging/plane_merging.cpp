@@ -11,16 +11,16 @@ namespace {
 
 // Smaller walls and ceilings may be furniture. Upward-facing planes are kept separate until they are as large as a
 // floor, since two tables are two planes.
-constexpr double kLargeFloor = 4.0;    // m^2
-constexpr double kFloor = 1.0;         // m^2; a smaller upward-facing plane may be an object on it
-constexpr double kPartition = 0.5;     // m^2; free-standing walls and doors whose middle is hidden
-constexpr double kNoTable = 20.0;      // m^2; a piece at the height of so large a surface belongs to it
-constexpr double kLeastCeiling = 4.0;  // m^2; larger than undersides of furniture, which are not level with a ceiling
+constexpr double kLargeFloor = 4.0;  // m^2
+constexpr double kFloor = 1.0;       // m^2; a smaller upward-facing plane may be an object on it
+constexpr double kPartition = 0.5;   // m^2; free-standing walls and doors whose middle is hidden
+constexpr double kNoTable = 20.0;    // m^2; a piece at the height of so large a surface belongs to it
+constexpr double kMinCeiling = 4.0;  // m^2; larger than undersides of furniture, which are not level with a ceiling
 // Smaller ones suffice for a ceiling at which walls end with nothing above, and for a floor with nothing below.
 constexpr double kTopmostCeiling = 1.0, kLowestFloor = 0.5;  // m^2
 // Ceilings are seen at flat angles and from afar, so their fits are worse; no two wide ones are so close in height.
 constexpr double kCeilingSlack = 1.5;   // factor on max_rms
-constexpr double kLeastStrip = 1.0;     // m^2; boards of shelves are smaller
+constexpr double kMinStrip = 1.0;       // m^2; boards of shelves are smaller
 constexpr double kSmallGap = 4.0;       // largest gap of a small piece of a wall, in its own widths
 constexpr double kHiddenGap = 4.0;      // m, reach of depth indoors: a surface may continue so far where it is not seen
 constexpr double kNoise = 11.3;         // 99 % quantile of the chi-square with three degrees of freedom
@@ -103,18 +103,18 @@ Allowance allowanceFor(const PlaneTrack& small, const PlaneTrack& large, const s
   if (smaller >= large_from) allowed.gap = std::max(options.gap, options.gap_per_area * smaller);
   // The rest of a parapet behind a stair is small, but within a centimetre of its plane, as furniture seldom is.
   const double wall_from = smaller >= kPartition ? kPartition : large_from;
-  const double larger_from = kind == PlaneKind::kVertical ? wall_from : ceiling ? kLeastCeiling : kNoTable;
+  const double larger_from = kind == PlaneKind::kVertical ? wall_from : ceiling ? kMinCeiling : kNoTable;
   if (smaller < large_from && kind != PlaneKind::kGeneral && larger >= larger_from) {
-    const double reach = ceiling ? options.gap_per_area * kLeastCeiling
+    const double reach = ceiling ? options.gap_per_area * kMinCeiling
                                  : std::min(options.gap_per_area * large_from, kSmallGap * std::sqrt(smaller));
     allowed = {std::max(options.gap, reach), 0.5 * options.distance_apart};
   }
   // The underside of a duct or a beam, parts of which were not seen.
-  if (ceiling && smaller < large_from && allowed.gap <= options.gap && larger >= kLeastStrip) {
+  if (ceiling && smaller < large_from && allowed.gap <= options.gap && larger >= kMinStrip) {
     allowed.gap = std::max(allowed.gap, lengthIfContinued(small, large));
     if (allowed.gap > options.gap) allowed.apart *= 0.5;
   }
-  const double level_reach = options.gap_per_area * kLeastCeiling;
+  const double level_reach = options.gap_per_area * kMinCeiling;
   if (kind == PlaneKind::kHorizontal && allowed.gap < level_reach &&
       larger >= (ceiling ? kTopmostCeiling : kLowestFloor) && boundsGap(small, large) <= level_reach &&
       heightDifference(small, large) < 0.5 * options.distance_apart && outermost(small, large, known)) {

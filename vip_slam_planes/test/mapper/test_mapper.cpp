@@ -344,7 +344,7 @@ TEST(Mapper, KeyframesWaitAsLongAsTheBackEndHoldsThem) {
   const auto taken = rig.camera.keyframe(room(), lookAt({0, 0, 1.4}, {3, 0, 1.0}));
   taken->frame.depth_grid = {};
   MapUpdate update;
-  for (KeyframeId id = 1; id <= kMostWaitingKeyframes + 1; ++id) {
+  for (KeyframeId id = 1; id <= kMaxWaitingKeyframes + 1; ++id) {
     const auto keyframe = std::make_shared<Keyframe>(*taken);
     keyframe->id = id;
     rig.mapper.addKeyframe(keyframe);
@@ -352,9 +352,9 @@ TEST(Mapper, KeyframesWaitAsLongAsTheBackEndHoldsThem) {
   }
   EXPECT_EQ(0u, rig.mapper.counters().keyframes_forgotten);
   rig.mapper.applyMapUpdate(update);
-  EXPECT_EQ(kMostWaitingKeyframes + 1, rig.mapper.counters().keyframes);
+  EXPECT_EQ(kMaxWaitingKeyframes + 1, rig.mapper.counters().keyframes);
   // A keyframe that arrives when the queue is full of keyframes dropped by the back end evicts one of them.
-  for (KeyframeId id = 1; id <= kMostWaitingKeyframes + 2; ++id) {
+  for (KeyframeId id = 1; id <= kMaxWaitingKeyframes + 2; ++id) {
     const auto keyframe = std::make_shared<Keyframe>(*taken);
     keyframe->id = 10000 + id;
     rig.mapper.addKeyframe(keyframe);

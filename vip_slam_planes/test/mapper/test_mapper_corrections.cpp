@@ -28,7 +28,7 @@ void expectCorrectedObservations(const PlaneUpdate& result, const SE3& T_W_C, co
   }
 }
 
-TEST(Mapper, KeyframesLookFromTheMountingThatIsKnownNow) {
+TEST(Mapper, KeyframesLookFromTheExtrinsicsThatAreKnownNow) {
   // The front end's extrinsics were 3 degrees off when it made the keyframes; the back end has corrected them.
   Rig rig;
   const Scene scene = room();

@@ -17,11 +17,11 @@ std::string bareFrame(const std::string& frame);
 std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source);
 
 /// Difference of two camera-IMU extrinsics.
-struct MountingGap {
+struct ExtrinsicsGap {
   double degrees = 0, metres = 0;
   /// More than mechanical tolerances: one of the two is wrong.
   bool large() const { return degrees > 3.0 || metres > 0.02; }
 };
-MountingGap mountingGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b);
+ExtrinsicsGap extrinsicsGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b);
 
 }  // namespace vip_slam

@@ -8,8 +8,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr int kNeighbour = 8;            ///< px from a point to its normal's neighbours: wide, as depth is quantised
-constexpr double kLeastAgreement = 0.8;  ///< minimum length of the mean of the images' up directions
+constexpr int kNeighbour = 8;          ///< px from a point to its normal's neighbours: wide, as depth is quantised
+constexpr double kMinAgreement = 0.8;  ///< minimum length of the mean of the images' up directions
 
 /// Normals of locally flat patches, in the folder's world.
 void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_D,
@@ -46,7 +46,7 @@ Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
     if (i % 8 == 0) collectNormals(folder, folder.frames[i], T_W_C * folder.T_color_depth, &normals);
   }
   // Cameras that roll or look at the floor give no reliable up direction: a wall could be mistaken for the floor.
-  if (up.norm() < kLeastAgreement * static_cast<double>(posed))
+  if (up.norm() < kMinAgreement * static_cast<double>(posed))
     throw std::runtime_error("gravity: the images do not agree on which side is up; give --up X Y Z");
   up.normalize();
   // Cameras are only roughly level: narrow the cone of accepted normals in steps. Floor normals (parallel to up) and,

@@ -29,7 +29,7 @@ class Map {
                                const std::vector<ImuSample>& imu, const ImuNoise& noise);
   /// Sets newly estimated camera-IMU extrinsics in all keyframes but those of a stored map. The camera poses stay, so
   /// that landmarks and planes fit as before; the body poses change.
-  void adoptMounting(const SE3& T_I_C);
+  void adoptExtrinsics(const SE3& T_I_C);
   /// Applies a newly estimated correction of depth and intrinsics to features, depth grids and depth points on planes
   /// of all keyframes but those of a stored map. Landmarks, planes and poses follow with the next optimisation.
   void adoptCameraCorrection(const CameraCorrection& correction);

@@ -6,10 +6,10 @@
 namespace vip_slam::map_limits {
 
 // Far beyond any sensor; larger numbers would overflow when integrated.
-constexpr double kMostRate = 1e3;          ///< rad/s
-constexpr double kMostAcceleration = 1e4;  ///< m/s^2
-constexpr double kMostNoiseScale = 1e4;    ///< of the IMU
-constexpr double kLongestImu = 1e4;        ///< s, of one keyframe
+constexpr double kMaxRate = 1e3;          ///< rad/s
+constexpr double kMaxAcceleration = 1e4;  ///< m/s^2
+constexpr double kMaxNoiseScale = 1e4;    ///< of the IMU
+constexpr double kLongestImu = 1e4;       ///< s, of one keyframe
 /// Largest difference of keyframe ids in a map, since tables are indexed by them: three months of keyframes.
 constexpr std::uint64_t kWidestIds = std::uint64_t{1} << 24;
 constexpr double kUnitNormal = 1e-7;  ///< tolerance of the length of a plane's normal

@@ -13,8 +13,8 @@
 namespace vip_slam {
 
 struct DepthCurve {
-  static constexpr double kStep = 0.125;  ///< m
-  static constexpr double kMost = 1.0;    ///< m, largest entry; a larger one cannot be an error of the camera
+  static constexpr double kStep = 0.125;    ///< m
+  static constexpr double kMaxEntry = 1.0;  ///< m, largest entry; a larger one cannot be an error of the camera
 
   std::vector<float> added;  ///< m, for readings of 0, kStep, 2 kStep, ...; constant beyond the last; empty: zero
 
@@ -36,7 +36,7 @@ struct DepthCurve {
 /// Both in one curve: `first` applied to the readings, `then` to the result.
 DepthCurve chained(const DepthCurve& first, const DepthCurve& then);
 
-/// Message on what is wrong, empty when nothing is: entries that are not finite or beyond kMost, or that fall so
+/// Message on what is wrong, empty when nothing is: entries that are not finite or beyond kMaxEntry, or that fall so
 /// steeply that two readings give the same depth.
 std::string validateDepthCurve(const DepthCurve& curve);
 

@@ -61,7 +61,7 @@ struct Keyframe {
 
 /// Largest number of keyframes that wait while a loaded map is not recognised yet, about ten minutes: back end and
 /// plane module use the same limit, so that all keyframes that enter the map late have their planes.
-constexpr std::size_t kMostWaitingKeyframes = 1500;
+constexpr std::size_t kMaxWaitingKeyframes = 1500;
 
 using KeyframePtr = std::shared_ptr<const Keyframe>;
 using TrackedFramePtr = std::shared_ptr<const TrackedFrame>;

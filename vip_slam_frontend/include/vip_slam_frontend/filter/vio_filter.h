@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "vip_slam_core/imu/imu_types.h"
+#include "vip_slam_frontend/filter/calibration_estimate.h"
 #include "vip_slam_frontend/filter/feature_rows.h"
 #include "vip_slam_frontend/filter/filter_options.h"
 #include "vip_slam_frontend/filter/gating.h"
-#include "vip_slam_frontend/filter/mounting_estimate.h"
 #include "vip_slam_frontend/filter/noise_monitor.h"
 #include "vip_slam_frontend/filter/observation.h"
 #include "vip_slam_frontend/filter/square_root_filter.h"
@@ -77,7 +77,7 @@ class VioFilter {
 
   const WindowState& window() const { return filter_.window(); }
   /// Present estimate of extrinsics and calibration; valid also between two starts.
-  MountingEstimate mounting() const;
+  CalibrationEstimate calibration() const;
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
   /// Marks the newest clone (its image became a keyframe) as the start of motionSinceMark().
@@ -165,7 +165,7 @@ class VioFilter {
   void judgeGyroCorrection();
   /// Keeps the estimated extrinsics and calibration for the next start, unless they are implausibly far from the given
   /// ones: then they are as wrong as the estimate that failed.
-  void learnMounting();
+  void learnCalibration();
   void forgetClone(CloneId id);
   /// From the marked clone to another one; unknown when nothing is marked.
   RelativeMotion motionFromMark(int clone) const;
@@ -174,9 +174,9 @@ class VioFilter {
 
   FilterOptions options_;
   ImuNoise imu_noise_;
-  const MountingEstimate given_;  ///< by the sensor's configuration
-  MountingEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
-  double sigma_depth_offset_;     ///< m, of the prior at a start
+  const CalibrationEstimate given_;  ///< by the sensor's configuration
+  CalibrationEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
+  double sigma_depth_offset_;        ///< m, of the prior at a start
   double focal_;
   Eigen::Vector3d G_;
   Gate gate_, explained_;

@@ -31,7 +31,7 @@ class Initialiser {
   /// Why it is still waiting.
   const std::string& reason() const { return reason_; }
   /// Extrinsics and gyro correction (core/imu/gyro_correction.h) as estimated so far, instead of the configured ones.
-  void setMounting(const SE3& T_I_C, const Eigen::Matrix3d& gyro_correction);
+  void setCalibration(const SE3& T_I_C, const Eigen::Matrix3d& gyro_correction);
   void reset();
 
  private:

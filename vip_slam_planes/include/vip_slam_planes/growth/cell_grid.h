@@ -20,7 +20,7 @@ struct CellIndex {
 
 /// Largest count of sightings of a cell: small enough that a surface which was removed is forgotten after as many
 /// sightings of the surface behind it.
-constexpr int kMostHits = 8;
+constexpr int kMaxHits = 8;
 
 class CellGrid {
  public:

@@ -52,7 +52,7 @@ class PlaneTrack {
   /// Covers the cells under a triangle, seen from keyframe `host` with camera pose T_map_C, and adds them to `touched`.
   void cover(const MapTriangle& triangle, KeyframeId host, const SE3& T_map_C, std::vector<CellIndex>* touched);
   void hit(CellIndex c) {
-    cells_.set(c, std::min(kMostHits, cells_.at(c) + 1));
+    cells_.set(c, std::min(kMaxHits, cells_.at(c) + 1));
     hits_changed_ = true;
   }
   void coverCell(CellIndex c, int hits, KeyframeId host, const SE3& T_map_C);

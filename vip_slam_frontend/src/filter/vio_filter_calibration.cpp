@@ -10,66 +10,66 @@ namespace {
 
 // An estimate is plausible, and kept over a restart, within this many sigmas of the prior; an entry of the gyro's
 // correction within a fixed limit, since its prior sigma is only a data-sheet value.
-constexpr double kBelievableChange = 4.0, kMostGyroError = 0.05;
+constexpr double kBelievableChange = 4.0, kMaxGyroError = 0.05;
 // A depth offset becomes significant above this many sigmas and metres, and stays so until below half as many metres.
-constexpr double kSureOffset = 4.0, kLeastOffset = 0.002;
+constexpr double kSureOffset = 4.0, kMinOffset = 0.002;
 // It must also not change by more than this share of itself within this time, s: an offset that is still growing may
 // become implausible, and must not be passed on before.
 constexpr double kSteadySeconds = 1.0, kSteadyShare = 0.25;
 // One sigma of a depth offset that is reset to its given value, m: holds it there.
 constexpr double kHeldOffset = 1e-6;
 // Shift of the depth image, in bearings (px over the focal length): significant above kSureShift sigmas, worth
-// correcting above kLeastShift, known well enough below a sigma of kKnownShift. In an office one pixel of shift raised
+// correcting above kMinShift, known well enough below a sigma of kKnownShift. In an office one pixel of shift raised
 // the error from 0.8 to 13 mm.
-constexpr double kSureShift = 4.0, kLeastShift = 1e-4, kKnownShift = 2e-4;
+constexpr double kSureShift = 4.0, kMinShift = 1e-4, kKnownShift = 2e-4;
 // One sigma of a shift that is reset to zero, in bearings: holds it there.
 constexpr double kHeldShift = 1e-7;
 // An entry of the gyro's correction is significant above these: 5e-4 of a rotation by 60 degrees is 0.03 degrees.
-constexpr double kSureGyroError = 4.0, kLeastGyroError = 5e-4;
+constexpr double kSureGyroError = 4.0, kMinGyroError = 5e-4;
 // An entry of the bearings' correction (focal lengths, principal point) likewise. Exact focal lengths are estimated
 // within 0.03 %, and within 0.1 % when depth has a periodic error.
 constexpr double kSureBearing = 4.0;
-const Eigen::Array4d kLeastBearing(1e-3, 1e-3, 5e-4, 5e-4);
+const Eigen::Array4d kMinBearing(1e-3, 1e-3, 5e-4, 5e-4);
 
 }  // namespace
 
-MountingEstimate VioFilter::mounting() const {
+CalibrationEstimate VioFilter::calibration() const {
   if (!started_) {
-    MountingEstimate mounting = learnt_;
-    mounting.depth_shift += depth_shift_;
-    mounting.depth_contradicts = depth_contradicts_ || shift_contradicts_;
-    return mounting;
+    CalibrationEstimate calibration = learnt_;
+    calibration.depth_shift += depth_shift_;
+    calibration.depth_contradicts = depth_contradicts_ || shift_contradicts_;
+    return calibration;
   }
   const WindowState& window = filter_.window();
-  MountingEstimate mounting;
-  mounting.T_I_C = window.T_I_C;
-  mounting.time_offset = window.time_offset;
-  mounting.depth_offset = window.depth_offset;
-  mounting.bearing = window.bearing;
-  mounting.depth_shift = depth_shift_ + window.depth_shift;
-  mounting.gyro_correction = window.gyro_correction;
-  mounting.depth_contradicts = depth_contradicts_ || shift_contradicts_;
-  if (window.calibration.size() == 0) return mounting;
+  CalibrationEstimate calibration;
+  calibration.T_I_C = window.T_I_C;
+  calibration.time_offset = window.time_offset;
+  calibration.depth_offset = window.depth_offset;
+  calibration.bearing = window.bearing;
+  calibration.depth_shift = depth_shift_ + window.depth_shift;
+  calibration.gyro_correction = window.gyro_correction;
+  calibration.depth_contradicts = depth_contradicts_ || shift_contradicts_;
+  if (window.calibration.size() == 0) return calibration;
   const Eigen::VectorXd sigmas = filter_.calibrationSigmas();
   const int first = window.calibrationColumn();
-  if (window.calibration.rotation) mounting.sigma_rotation = sigmas.segment<3>(window.rotationColumn() - first);
+  if (window.calibration.rotation) calibration.sigma_rotation = sigmas.segment<3>(window.rotationColumn() - first);
   if (window.calibration.translation) {
-    mounting.sigma_translation = sigmas.segment<3>(window.translationColumn() - first);
+    calibration.sigma_translation = sigmas.segment<3>(window.translationColumn() - first);
   }
-  if (window.calibration.time_offset) mounting.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
-  if (window.calibration.depth_offset) mounting.sigma_depth_offset = sigmas(window.depthOffsetColumn() - first);
-  if (window.calibration.intrinsics) mounting.sigma_bearing = sigmas.segment<4>(window.intrinsicsColumn() - first);
+  if (window.calibration.time_offset) calibration.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
+  if (window.calibration.depth_offset) calibration.sigma_depth_offset = sigmas(window.depthOffsetColumn() - first);
+  if (window.calibration.intrinsics) calibration.sigma_bearing = sigmas.segment<4>(window.intrinsicsColumn() - first);
   if (window.calibration.depth_shift) {
-    mounting.sigma_depth_shift = sigmas.segment<2>(window.depthShiftColumn() - first);
+    calibration.sigma_depth_shift = sigmas.segment<2>(window.depthShiftColumn() - first);
   }
   for (int k = 0; k < window.calibration.gyro(); ++k) {
     const auto [row, column] = gyroEntry(window.calibration, k);
-    mounting.sigma_gyro_correction(row, column) = sigmas(window.gyroColumn() - first + k);
+    calibration.sigma_gyro_correction(row, column) = sigmas(window.gyroColumn() - first + k);
   }
-  return mounting;
+  return calibration;
 }
 
-void VioFilter::learnMounting() {
+void VioFilter::learnCalibration() {
   const WindowState& window = filter_.window();
   learnt_ = given_;
   const Eigen::Vector2d depth_shift = depth_shift_;
@@ -84,7 +84,7 @@ void VioFilter::learnMounting() {
       (window.bearing.value.head<2>().array().abs() > kBelievableChange * options.sigma_focal).any() ||
       (window.bearing.value.tail<2>().array().abs() > kBelievableChange * options.sigma_centre).any() ||
       ((depth_shift + window.depth_shift).array().abs() > kBelievableChange * options.sigma_depth_shift).any() ||
-      window.gyro_correction.cwiseAbs().maxCoeff() > kMostGyroError) {
+      window.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroError) {
     return;
   }
   learnt_.T_I_C = window.T_I_C;
@@ -111,9 +111,9 @@ void VioFilter::judgeDepthOffset() {
   const double change = window.depth_offset - given_.depth_offset;
   if (!window.calibration.depth_offset || depth_contradicts_) return;
   const bool steady = isSteady(change);
-  if (!depth_is_off_ && std::abs(change) > kLeastOffset) {
-    depth_is_off_ = steady && std::abs(change) > kSureOffset * mounting().sigma_depth_offset;
-  } else if (std::abs(change) < kLeastOffset / 2) {
+  if (!depth_is_off_ && std::abs(change) > kMinOffset) {
+    depth_is_off_ = steady && std::abs(change) > kSureOffset * calibration().sigma_depth_offset;
+  } else if (std::abs(change) < kMinOffset / 2) {
     depth_is_off_ = false;
   }
   if (std::abs(change) <= kBelievableChange * options_.calibration.sigma_depth_offset) return;
@@ -152,10 +152,10 @@ void VioFilter::judgeDepthShift() {
 const Eigen::Vector2d& VioFilter::takeDepthShift() {
   if (!started_ || !filter_.window().calibration.depth_shift || shift_contradicts_) return depth_shift_;
   const Eigen::Vector2d rest = filter_.window().depth_shift;
-  if (rest.cwiseAbs().maxCoeff() < kLeastShift) return depth_shift_;
-  const Eigen::Vector2d sigma = mounting().sigma_depth_shift;
+  if (rest.cwiseAbs().maxCoeff() < kMinShift) return depth_shift_;
+  const Eigen::Vector2d sigma = calibration().sigma_depth_shift;
   const auto off = rest.array().abs();
-  if (sigma.maxCoeff() > kKnownShift || !(off > kLeastShift && off > kSureShift * sigma.array()).any()) {
+  if (sigma.maxCoeff() > kKnownShift || !(off > kMinShift && off > kSureShift * sigma.array()).any()) {
     return depth_shift_;
   }
   moveDepth(rest);
@@ -184,10 +184,10 @@ void VioFilter::holdDelay() {
 void VioFilter::judgeIntrinsics() {
   if (!filter_.window().calibration.intrinsics) return;
   const Eigen::Array4d change = filter_.window().bearing.value.array().abs();
-  bearing_is_off_ = bearing_is_off_ && change > kLeastBearing / 2;
-  if ((change > kLeastBearing && !bearing_is_off_).any()) {
+  bearing_is_off_ = bearing_is_off_ && change > kMinBearing / 2;
+  if ((change > kMinBearing && !bearing_is_off_).any()) {
     bearing_is_off_ =
-        bearing_is_off_ || (change > kLeastBearing && change > kSureBearing * mounting().sigma_bearing.array());
+        bearing_is_off_ || (change > kMinBearing && change > kSureBearing * calibration().sigma_bearing.array());
   }
 }
 
@@ -199,10 +199,10 @@ void VioFilter::judgeGyroCorrection() {
   const WindowState& window = filter_.window();
   if (window.calibration.gyro() == 0) return;
   const Eigen::Array33d change = window.gyro_correction.cwiseAbs();
-  gyro_is_off_ = gyro_is_off_ && change > kLeastGyroError / 2;
-  if ((change > kLeastGyroError && !gyro_is_off_).any()) {
+  gyro_is_off_ = gyro_is_off_ && change > kMinGyroError / 2;
+  if ((change > kMinGyroError && !gyro_is_off_).any()) {
     gyro_is_off_ = gyro_is_off_ ||
-                   (change > kLeastGyroError && change > kSureGyroError * mounting().sigma_gyro_correction.array());
+                   (change > kMinGyroError && change > kSureGyroError * calibration().sigma_gyro_correction.array());
   }
 }
 

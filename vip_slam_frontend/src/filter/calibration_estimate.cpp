@@ -1,4 +1,4 @@
-#include "vip_slam_frontend/filter/mounting_estimate.h"
+#include "vip_slam_frontend/filter/calibration_estimate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@ namespace vip_slam {
 namespace {
 
 constexpr double kSure = 5.0;  // sigmas
-constexpr double kLeastTurn = 0.2 * M_PI / 180.0, kLeastShift = 0.005, kLeastDelay = 0.002, kLeastDepth = 0.005,
-                 kLeastBearing = 0.001, kLeastGyroError = 0.002, kLeastDepthShift = 0.001;
+constexpr double kMinTurn = 0.2 * M_PI / 180.0, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005,
+                 kMinBearing = 0.001, kMinGyroError = 0.002, kMinDepthShift = 0.001;
 
 template <typename... Numbers>
 std::string sentence(const char* format, Numbers... numbers) {
@@ -25,24 +25,24 @@ bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
 
 }  // namespace
 
-std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found) {
+std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given, const CalibrationEstimate& found) {
   std::vector<std::string> all;
   const Vector6d change = found.T_I_C.boxminus(given.T_I_C);
   const Eigen::Vector3d turn = change.head<3>(), shift = change.tail<3>();
-  if (turn.norm() > kLeastTurn && sure(turn, found.sigma_rotation)) {
+  if (turn.norm() > kMinTurn && sure(turn, found.sigma_rotation)) {
     all.push_back(
         sentence("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration; "
                  "the one that was found is used",
                  turn.norm() * 180 / M_PI));
   }
-  if (shift.norm() > kLeastShift && sure(shift, found.sigma_translation)) {
+  if (shift.norm() > kMinShift && sure(shift, found.sigma_translation)) {
     all.push_back(
         sentence("the camera sits %.1f mm beside where T_imu_cam of the sensor's configuration has it; "
                  "the place that was found is used",
                  1e3 * shift.norm()));
   }
   const double delay = found.time_offset - given.time_offset;
-  const double least_delay = std::max(kLeastDelay, kSure * found.sigma_time_offset);
+  const double least_delay = std::max(kMinDelay, kSure * found.sigma_time_offset);
   if (found.sigma_time_offset > 0 && std::abs(delay) > least_delay) {
     all.push_back(
         sentence("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration; "
@@ -55,7 +55,7 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
         "moment, depth registered to the colour camera, its focal length right?");
   }
   const double depth = found.depth_offset - given.depth_offset;
-  if (found.sigma_depth_offset > 0 && std::abs(depth) > std::max(kLeastDepth, kSure * found.sigma_depth_offset)) {
+  if (found.sigma_depth_offset > 0 && std::abs(depth) > std::max(kMinDepth, kSure * found.sigma_depth_offset)) {
     all.push_back(
         sentence("depth reads %.1f mm too %s at all distances, which is corrected for; depth/offset in the sensor's "
                  "configuration should be %.4f",
@@ -64,7 +64,7 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
   }
   const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();
-  if ((beside_sigma > 0 && beside > (kSure * beside_sigma).cwiseMax(kLeastDepthShift)).any()) {
+  if ((beside_sigma > 0 && beside > (kSure * beside_sigma).cwiseMax(kMinDepthShift)).any()) {
     all.push_back(
         sentence("the depth image lies beside the colour image, which is corrected for; depth/shift in the sensor's "
                  "configuration should be [%.2f, %.2f] pixels",
@@ -72,7 +72,7 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
   }
   const Eigen::Array4d bearing = (found.bearing.value - given.bearing.value).cwiseAbs();
   const Eigen::Array4d& bearing_sigma = found.sigma_bearing.array();
-  if ((bearing_sigma > 0 && bearing > (kSure * bearing_sigma).cwiseMax(kLeastBearing)).any()) {
+  if ((bearing_sigma > 0 && bearing > (kSure * bearing_sigma).cwiseMax(kMinBearing)).any()) {
     const Eigen::Vector4d& k = found.intrinsics;
     all.push_back(
         sentence("focal length or principal point are off, which is corrected for; fx, fy, cx, cy in the sensor's "
@@ -81,7 +81,7 @@ std::vector<std::string> mountingDifferences(const MountingEstimate& given, cons
   }
   const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
   const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();
-  const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kLeastGyroError)).select(gyro, 0.0);
+  const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kMinGyroError)).select(gyro, 0.0);
   if (off.maxCoeff() > 0) {
     const Eigen::Matrix3d& C = found.gyro_correction;
     all.push_back(sentence(

@@ -11,7 +11,7 @@
 namespace vip_slam {
 
 /// Extrinsics and calibration with their sigmas; a sigma is zero for what is not estimated.
-struct MountingEstimate {
+struct CalibrationEstimate {
   SE3 T_I_C;
   double time_offset = 0;                                       ///< s: t_imu = t_image + time_offset
   Eigen::Vector3d sigma_rotation = Eigen::Vector3d::Zero();     ///< rad, right perturbation
@@ -33,6 +33,6 @@ struct MountingEstimate {
 /// Corrections of the sensor's configuration as sentences: differences that are both significant (five sigmas) and
 /// large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth, half a pixel of depth shift; 0.1 % of the focal
 /// length; 0.2 % of the gyro). Empty when it is right.
-std::vector<std::string> mountingDifferences(const MountingEstimate& given, const MountingEstimate& found);
+std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given, const CalibrationEstimate& found);
 
 }  // namespace vip_slam

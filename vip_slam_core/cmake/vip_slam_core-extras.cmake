@@ -1,0 +1,23 @@
+# For packages that find vip_slam_core.
+
+# vip_slam_add_test_folders(LIBRARY... [EXCEPT FOLDER...])   makes one test program per folder below test/: test_FOLDER of
+# its test_*.cpp, linked with the given libraries, where tests are enabled. Sets vip_slam_test_programs to their names.
+# Files may include what lies in test/.
+function(vip_slam_add_test_folders)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "" "EXCEPT")
+  set(programs)
+  file(GLOB folders RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}/test CONFIGURE_DEPENDS test/*)
+  list(REMOVE_ITEM folders "" ${arg_EXCEPT})
+  foreach(folder ${folders})
+    file(GLOB sources CONFIGURE_DEPENDS test/${folder}/test_*.cpp)
+    if(sources)
+      catkin_add_gtest(test_${folder} ${sources})
+    endif()
+    if(TARGET test_${folder})  # not without gtest
+      target_include_directories(test_${folder} PRIVATE test)
+      target_link_libraries(test_${folder} ${arg_UNPARSED_ARGUMENTS} gtest_main)
+      list(APPEND programs test_${folder})
+    endif()
+  endforeach()
+  set(vip_slam_test_programs ${programs} PARENT_SCOPE)
+endfunction()
