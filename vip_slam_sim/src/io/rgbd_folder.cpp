@@ -30,16 +30,30 @@ std::vector<double> numbersOf(const fs::path& path, std::size_t expected) {
   return values;
 }
 
-/// Kinect v1: the colour camera sits 25 mm to the right of the infrared one; focal length as drivers assume it.
-constexpr double kKinectBaseline = 0.025, kKinectColourFocal = 525.0;
+/// The colour camera that 7-Scenes does not calibrate: a Kinect v1's, 25 mm to the right of the infrared camera by
+/// construction. The rest is measured on 240 frames of its kitchen, by a bundle adjustment of corner tracks in colour
+/// and the depth of each view with all poses free: focal lengths of 526 to 536 px fit alike, each half of the frames
+/// gives a turn of about one degree about both axes and 26 to 33 ms of readout. Its robust cost is 9 % less than with
+/// the nominal 525 px, image centre, no turn and no readout.
+namespace colour_of_kinect {
+constexpr double kBaseline = 0.025;                                   // m
+constexpr double kFocal = 530.0, kCentreX = 329.7, kCentreY = 250.8;  // px of 640 x 480
+constexpr double kTurnDeg[3] = {1.2, -0.94, 0.12};                    // rotation vector of T_color_depth
+constexpr double kReadout = 0.031;                                    // s
+}  // namespace colour_of_kinect
 
 /// Makes the folder's camera the depth camera, adds a colour camera next to it and converts the poses to that.
 void separateColour(RgbdFolder* folder) {
+  namespace colour = colour_of_kinect;
   folder->depth_registered = false;
   folder->depth_camera = folder->camera;
   const double scale = folder->camera.width / 640.0;
-  folder->camera.fx = folder->camera.fy = kKinectColourFocal * scale;
-  folder->T_color_depth = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-kKinectBaseline, 0, 0));
+  folder->camera.fx = folder->camera.fy = colour::kFocal * scale;
+  folder->camera.cx = colour::kCentreX * scale;
+  folder->camera.cy = colour::kCentreY * scale;
+  folder->colour_readout = colour::kReadout;
+  const Eigen::Vector3d turn = Eigen::Vector3d(colour::kTurnDeg) * M_PI / 180;
+  folder->T_color_depth = SE3(expSO3(turn), Eigen::Vector3d(-colour::kBaseline, 0, 0));
   for (StampedPose& p : folder->T_W_C) p.T_W_B = p.T_W_B * folder->T_color_depth.inverse();
 }
 

@@ -96,6 +96,7 @@ SensorConfig sensorOf(const Settings& s, const RgbdFolder& folder, const Sequenc
   sensor.camera = folder.camera;
   sensor.depth_camera = folder.depth_camera;
   sensor.T_color_depth = folder.T_color_depth;
+  sensor.rolling_shutter = folder.colour_readout;
   sensor.color_rate = sensor.depth_rate = s.rate;
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStructuredLight);
   return sensor;

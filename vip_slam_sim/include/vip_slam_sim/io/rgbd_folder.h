@@ -1,7 +1,7 @@
 // Folders of real RGB-D images with poses: 7-Scenes layout (frame-N.color.*, frame-N.depth.png, frame-N.pose.txt,
 // camera-intrinsics.txt) or TUM layout (rgb.txt, depth.txt, groundtruth.txt).
-// In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the colour camera, a separate one, is
-// not calibrated: it gets the nominal intrinsics and extrinsics of the Kinect v1.
+// In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the folder does not calibrate the colour
+// camera, a separate one: it gets what was measured on that data set's frames.
 #pragma once
 
 #include <string>
@@ -27,6 +27,7 @@ struct RgbdFolder {
   bool depth_registered = true;   ///< depth pixels belong to the colour camera
   CameraIntrinsics depth_camera;  ///< only when not registered
   SE3 T_color_depth;              ///< only when not registered; else identity
+  double colour_readout = 0;      ///< s, of a rolling shutter, from first to last row; the stamp is the middle row's
   double depth_scale = 0.001;
 };
 
