@@ -13,10 +13,9 @@ namespace {
 constexpr double kBelievableChange = 4.0, kMaxGyroError = 0.05;
 // A depth offset becomes significant above this many sigmas and metres, and stays so until below half as many metres.
 constexpr double kSureOffset = 4.0, kMinOffset = 0.002;
-// It must also not change by more than this share of itself within this time, s, nor by more than this share of what is
-// left to the limit of what is believed: an offset that is still growing may become implausible, and must not be passed
-// on before.
-constexpr double kSteadySeconds = 1.0, kSteadyShare = 0.25, kShareOfRest = 0.5;
+// It must also not change by more than this share of itself within this time, s: an offset that is still growing may
+// become implausible, and must not be passed on before.
+constexpr double kSteadySeconds = 1.0, kSteadyShare = 0.25;
 // One sigma of a depth offset that is reset to its given value, m: holds it there.
 constexpr double kHeldOffset = 1e-6;
 // Shift of the depth image, in bearings (px over the focal length): significant above kSureShift sigmas, worth
@@ -98,14 +97,13 @@ void VioFilter::learnCalibration() {
 }
 
 bool VioFilter::isSteady(double depth_offset) {
-  const double t = nav().t, since = t - offset_before_.t, size = std::abs(depth_offset);
-  const double rest = kBelievableChange * options_.calibration.sigma_depth_offset - size;
-  const bool near = std::abs(depth_offset - offset_before_.value) < std::min(kSteadyShare * size, kShareOfRest * rest);
+  const double t = nav().t, since = t - offset_before_.t;
   if (!(since >= 0) || since >= kSteadySeconds) {
-    offset_is_steady_ = since < 2 * kSteadySeconds && near;
+    const double moved = std::abs(depth_offset - offset_before_.value);
+    offset_is_steady_ = since < 2 * kSteadySeconds && moved < kSteadyShare * std::abs(depth_offset);
     offset_before_ = {t, depth_offset};
   }
-  return offset_is_steady_ && near;
+  return offset_is_steady_;
 }
 
 void VioFilter::judgeDepthOffset() {
