@@ -57,6 +57,7 @@ PredictedMotion FrontEnd::Impl::predictMotion(const Propagation& propagation, co
   PredictedMotion motion;
   motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * extrinsics());
   motion.sigma = propagation.displacementSigma(filter_.covariance());
+  motion.unseen = propagation.predicted.t - from.t;
   motion.turn_unknown = doubtful;
   motion.wary = movedLately(propagation.predicted.t);
   motion.at_rest = stillness_.imuRests();

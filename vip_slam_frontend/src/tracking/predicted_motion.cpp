@@ -15,6 +15,13 @@ constexpr double kNearlyAll = 0.95;
 constexpr int kEnoughOld = 20;
 // Allowance for other errors of a translation (blur, rolling shutter, clock), m/s.
 constexpr double kMinSpeed = 0.1;
+// After this time without images, s, the view has changed: optical flow then finds mostly chance matches.
+constexpr double kLongUnseen = 0.5;
+
+/// After a long time without images, a few chance matches that agree on some motion would make a velocity of it.
+bool matchedByChance(const PredictedMotion& prediction, const RansacResult& found, std::size_t pairs) {
+  return prediction.unseen > kLongUnseen && (!found.ok || 2 * static_cast<std::size_t>(found.inliers) < pairs);
+}
 
 }  // namespace
 
@@ -48,6 +55,12 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const Predicted
   options.most_apart = 0;
   options.turn_unknown = prediction.turn_unknown;
   RansacResult found = rejectOutliers(pairs, prediction.T_current_previous, options);
+  if (matchedByChance(prediction, found, pairs.size())) {
+    found.ok = false;
+    found.inlier.assign(pairs.size(), 0);
+    found.inliers = 0;
+    return found;
+  }
   if (!(prediction.interval > 0) || !found.ok || !found.with_depth) return found;
   options.most_apart = mostApart(prediction);
   if ((found.t_given_rotation - prediction.T_current_previous.t()).norm() < options.most_apart) return found;

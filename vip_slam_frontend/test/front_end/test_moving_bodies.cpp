@@ -1,5 +1,7 @@
 // Moving objects are not mistaken for camera motion: pairs of points, regions of an image, and a screen that is carried
 // past the camera and fills its view.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "corner_world.h"
@@ -34,7 +36,7 @@ const SE3 kCamera(Eigen::Matrix3d(expSO3(Eigen::Vector3d(0.01, -0.02, 0.005))), 
 /// Apparent motion of the camera relative to a body that moves sideways by 5 cm.
 const SE3 kBody(kCamera.rotation(), kCamera.t() + Eigen::Vector3d(0.05, 0, 0));
 
-PredictedMotion prediction() { return {kCamera, 0.0005, 0.05}; }
+PredictedMotion prediction() { return {kCamera, 0.0005, 0.05, 0.05}; }
 
 RansacResult reject(const std::vector<PointPair>& pairs, const PredictedMotion& motion, bool* moves) {
   RansacOptions options;
@@ -95,6 +97,31 @@ TEST(MovingBodies, WithinWhatTheImuLeavesOpenThePointsDecide) {
   nothing.interval = 0;
   reject(pairs, nothing, &moves);
   EXPECT_FALSE(moves);
+}
+
+TEST(MovingBodies, AfterALongTimeWithoutImagesOnlyAMajorityIsBelieved) {
+  const auto random_matches = [](int n) {
+    std::vector<PointPair> pairs = points(n, kCamera, 30, 1);
+    const std::vector<PointPair> others = points(n, kCamera, 30, 2);
+    for (int i = 0; i < n; ++i) pairs[i].xy_current = others[i].xy_current;
+    return pairs;
+  };
+  PredictedMotion after_darkness = prediction();
+  after_darkness.sigma = 0.2;
+  after_darkness.unseen = 4.5;
+  bool moves = true;
+  const RansacResult few = reject(random_matches(30) + points(12, kCamera, 30, 3), after_darkness, &moves);
+  EXPECT_FALSE(few.ok);
+  EXPECT_EQ(few.inliers, 0);
+  EXPECT_EQ(std::count(few.inlier.begin(), few.inlier.end(), 0), 42);
+  EXPECT_FALSE(moves);
+  EXPECT_EQ(reject(points(4, kCamera, 30, 3), after_darkness, &moves).inliers, 0);  // four agree on anything
+  const RansacResult most = reject(random_matches(30) + points(50, kCamera, 30, 3), after_darkness, &moves);
+  EXPECT_TRUE(most.ok);
+  EXPECT_GE(most.inliers, 50);
+  EXPECT_LT((most.T_current_previous.t() - kCamera.t()).norm(), 1e-3);
+  // From one image to the next a minority may be all that stands still.
+  EXPECT_GE(reject(random_matches(30) + points(12, kCamera, 30, 3), prediction(), &moves).inliers, 12);
 }
 
 TEST(MovingBodies, RegionsGoByTheNearestPointAndItsDepth) {
