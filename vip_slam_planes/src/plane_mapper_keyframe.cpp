@@ -54,9 +54,12 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const std::size_t known = tracks.size();
   if (first_time) {
     std::vector<DetectedPlane> strips = startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
+    const CameraPoses& poses = posesTiedTo(keyframe.frame.epoch);
+    for (const auto& [track, e] : evidence_.takeJoining(poses, {tracks.begin(), tracks.end()})) {
+      tracks_.at(track->id()).cover(e.triangle, e.keyframe, poses.at(e.keyframe), nullptr);
+    }
     evidence_.add(keyframe.id, T_map_C, triangles, label, beside);
-    startJointPlanes(keyframe, evidence_.detect(posesTiedTo(keyframe.frame.epoch), {tracks.begin(), tracks.end()}),
-                     &label, &tracks);
+    startJointPlanes(keyframe, evidence_.detect(poses, {tracks.begin(), tracks.end()}), &label, &tracks);
     const auto known_by_now = [&](const DetectedPlane& strip) {
       return std::any_of(strip.triangles.begin(), strip.triangles.end(), [&](int i) { return label[i] >= 0; });
     };

@@ -39,7 +39,7 @@ struct PlaneDetectionOptions {
   double max_rms = 0.02;
   double max_tilt_deg = 2.5;
   int keyframes = 10;
-  int min_keyframes = 3;
+  int min_keyframes = 2;
   bool general = false;
 
   void visit(OptionVisitor& v) {
@@ -147,7 +147,7 @@ struct PlaneSupportOptions {
   int min_views = 3;
   double view_distance = 0.1;
   double sure_area = 1.0;
-  double min_area = 0.07;
+  double min_area = 0.03;
   double see_through = 0.10;
   int patience = 8;
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "evidence_layers.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
 #include "vip_slam_planes/detection/surface_shape.h"
@@ -23,6 +24,9 @@ constexpr double kMinUpright = 2.0, kMinLevel = 0.3;
 constexpr double kMinLevelWidth = 0.6;  // likewise of the width
 // A plane this far below a known one may be what that lies on, m.
 constexpr double kStepDown = 0.02;
+// Left-over triangles join a plane that has grown up to them within this distance, m, or as many of their sigmas:
+// further off they may be another layer that no keyframe has told apart yet.
+constexpr double kSameLayer = 0.02, kSameLayerSigmas = 3.0;
 constexpr int kMaxTests = 4;  // peaks tested per keyframe, the largest ones
 // Share of the area of a wall's peak that must be new since its last test. Horizontal peaks are tested every time,
 // since the visible pieces of a dark table top change.
@@ -137,19 +141,48 @@ std::vector<EvidenceTriangle> PlaneEvidence::collect(const std::vector<Vote>& vo
   return all;
 }
 
+std::vector<PlaneEvidence::Vote> PlaneEvidence::patchesNear(const PlaneTrack& plane, const CameraPoses& poses,
+                                                            std::size_t frame) const {
+  std::vector<Vote> near;
+  const auto pose = poses.find(frames_[frame].id);
+  if (pose == poses.end()) return near;
+  for (std::size_t k = 0; k < frames_[frame].patches.size(); ++k) {
+    const Patch& patch = frames_[frame].patches[k];
+    const double off = std::abs(plane.plane().signedDistance(pose->second * patch.centre_C));
+    if (patch.kind == plane.kind() && patch.area > 0 && off < 2 * growth_.distance) near.push_back({frame, k});
+  }
+  return near;
+}
+
+std::vector<std::pair<const PlaneTrack*, EvidenceTriangle>> PlaneEvidence::takeJoining(
+    const CameraPoses& poses, const std::vector<const PlaneTrack*>& known) {
+  std::vector<std::pair<const PlaneTrack*, EvidenceTriangle>> joining;
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    std::set<std::size_t> near;
+    for (const PlaneTrack* plane : known) {
+      for (const Vote& v : patchesNear(*plane, poses, f)) near.insert(v.patch);
+    }
+    if (near.empty()) continue;
+    std::vector<Vote> votes;
+    for (std::size_t k : near) votes.push_back({f, k});
+    const std::vector<EvidenceTriangle> evidence = collect(votes, poses);
+    const std::vector<int> label = associateTriangles(trianglesOf(evidence), known, growth_);
+    std::vector<char> joins = belongsTo(known, evidence, label);
+    for (std::size_t i = 0; i < evidence.size(); ++i) {
+      const MapTriangle& t = evidence[i].triangle;
+      joins[i] = joins[i] && std::abs(known[label[i]]->plane().signedDistance(t.centre)) <
+                                 std::max(kSameLayer, kSameLayerSigmas * t.sigma);
+      if (joins[i]) joining.emplace_back(known[label[i]], evidence[i]);
+    }
+    forget(votes, evidence, joins);
+  }
+  return joining;
+}
+
 int PlaneEvidence::seenBy(const PlaneTrack& plane, const CameraPoses& poses, double area) const {
   int count = 0;
   for (std::size_t f = 0; f < frames_.size(); ++f) {
-    const auto pose = poses.find(frames_[f].id);
-    if (pose == poses.end()) continue;
-    std::vector<Vote> near;
-    for (std::size_t k = 0; k < frames_[f].patches.size(); ++k) {
-      const Patch& patch = frames_[f].patches[k];
-      const double off = std::abs(plane.plane().signedDistance(pose->second * patch.centre_C));
-      if (patch.kind == plane.kind() && off < 2 * growth_.distance) near.push_back({f, k});
-    }
-    std::vector<MapTriangle> triangles;
-    for (const EvidenceTriangle& e : collect(near, poses)) triangles.push_back(e.triangle);
+    const std::vector<MapTriangle> triangles = trianglesOf(collect(patchesNear(plane, poses, f), poses));
     const std::vector<int> label = associateTriangles(triangles, {&plane}, growth_);
     double sum = 0;
     for (std::size_t i = 0; i < triangles.size(); ++i) sum += label[i] >= 0 ? triangles[i].area : 0.0;
@@ -217,13 +250,9 @@ std::vector<JointPlane> PlaneEvidence::detect(const CameraPoses& poses, const st
     for (const Vote& v : votes) frames_[v.frame].patches[v.patch].tested = true;
     ++tests;
     const std::vector<EvidenceTriangle> evidence = collect(votes, poses);
-    std::vector<MapTriangle> triangles;
-    for (const EvidenceTriangle& e : evidence) triangles.push_back(e.triangle);
+    const std::vector<MapTriangle> triangles = trianglesOf(evidence);
     const std::vector<int> label = associateTriangles(triangles, known, growth_);
-    std::vector<char> taken(triangles.size());
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      taken[i] = label[i] >= 0 && known[label[i]]->id() != evidence[i].beside;
-    }
+    std::vector<char> taken = belongsTo(known, evidence, label);
     for (const DetectedPlane& plane : detectPlanesAt(triangles, taken, kind, origin, together, growth_)) {
       // The keyframes see overlapping parts of the surface: use the area that they cover together.
       PlaneTrack area(0, kind, plane.plane, plane.centroid, 0.5 * growth_.cell);

@@ -118,8 +118,11 @@ TEST(Mapper, WhatKeyframesStartSmallIsPublishedWhenFramesHaveGrownIt) {
   corner.add({1.0, 0, 0.9}, {0.27, 0, 0}, {0, 0.27, 0});
   more.add({1.0, 0, 0.9}, {0.6, 0, 0}, {0, 0.5, 0});
   const auto eye = [](int i) { return Eigen::Vector3d(0, 0.1 * i, 1.5); };
+  PlaneMapperOptions options;
+  options.support.min_area = 0.07;
+  options.detection.min_keyframes = 3;
   for (const bool grown : {false, true}) {
-    Rig rig(0.5);
+    Rig rig(0.5, options);
     for (int i = 0; i < 3; ++i) EXPECT_TRUE(rig.look(corner, eye(i), {1.1, 0.1, 0.9}).planes.empty());
     EXPECT_EQ(1u, rig.mapper.counters().planes_started);
     TrackedFrame frame = rig.camera.frame(grown ? more : corner, lookAt(eye(4), {1.1, 0.1, 0.9}), 2, 16);

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <deque>
+#include <utility>
 #include <vector>
 
 #include "vip_slam_planes/detection/plane_detector.h"
@@ -49,6 +50,10 @@ class PlaneEvidence {
 
   /// Number of keyframes with at least `area` m^2 of left-over triangles on the plane.
   int seenBy(const PlaneTrack& plane, const CameraPoses& poses, double area) const;
+  /// Left-over triangles that lie on one of the planes in view, which has grown up to them since, each with that plane;
+  /// they are no longer kept. Keyframes without a pose are not used.
+  std::vector<std::pair<const PlaneTrack*, EvidenceTriangle>> takeJoining(const CameraPoses& poses,
+                                                                          const std::vector<const PlaneTrack*>& known);
   /// Planes from patches of the newest keyframe together with those of earlier ones. `known` are the planes in view;
   /// patches that they explain by now are dropped, unless they were another layer of it, and so are those of a new
   /// plane. Keyframes without a pose are not used. A wall's peak that failed is tested again when a fair part of it is
@@ -73,6 +78,7 @@ class PlaneEvidence {
     std::size_t frame, patch;
   };
 
+  std::vector<Vote> patchesNear(const PlaneTrack& plane, const CameraPoses& poses, std::size_t frame) const;
   std::vector<EvidenceTriangle> collect(const std::vector<Vote>& votes, const CameraPoses& poses) const;
   void forget(const std::vector<Vote>& votes, const std::vector<EvidenceTriangle>& all, const std::vector<char>& used);
 
