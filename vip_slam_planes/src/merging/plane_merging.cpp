@@ -14,6 +14,9 @@ namespace {
 constexpr double kLargeFloor = 4.0;  // m^2
 constexpr double kFloor = 1.0;       // m^2; a smaller upward-facing plane may be an object on it
 constexpr double kPartition = 0.5;   // m^2; free-standing walls and doors whose middle is hidden
+// Between the pieces of so large a wall lies a way on which poses drift, while no two such walls are nearly one plane.
+constexpr double kSideOfRoom = 4.0;  // m^2
+constexpr double kDrifted = 2.0;     // factor on the distance
 constexpr double kNoTable = 20.0;    // m^2; a piece at the height of so large a surface belongs to it
 constexpr double kMinCeiling = 4.0;  // m^2; larger than undersides of furniture, which are not level with a ceiling
 // Smaller ones suffice for a ceiling at which walls end with nothing above, and for a floor with nothing below.
@@ -101,6 +104,7 @@ Allowance allowanceFor(const PlaneTrack& small, const PlaneTrack& large, const s
   const bool ceiling = facesDown(small);
   Allowance allowed{options.gap, options.distance_apart};
   if (smaller >= large_from) allowed.gap = std::max(options.gap, options.gap_per_area * smaller);
+  if (kind == PlaneKind::kVertical && smaller >= kSideOfRoom) allowed.apart *= kDrifted;
   // The rest of a parapet behind a stair is small, but within a centimetre of its plane, as furniture seldom is.
   const double wall_from = smaller >= kPartition ? kPartition : large_from;
   const double larger_from = kind == PlaneKind::kVertical ? wall_from : ceiling ? kMinCeiling : kNoTable;
