@@ -92,8 +92,10 @@ struct PlaneMergingOptions {
     v.field("angle_deg", angle_deg, 0.5, 30.0, "largest angle between planes that are merged, degrees");
     v.field("distance", distance, 0.01, 0.5,
             "largest distance of each one's boundary points to the other, m; twice that where depth noise explains it");
-    v.field("distance_apart", distance_apart, 0.002, 0.5,
-            "the same, of the smaller one to the larger plane, when they are further apart than the gap, m");
+    v.field(
+        "distance_apart", distance_apart, 0.002, 0.5,
+        "the same, of the smaller one to the larger plane, when they are further apart than the gap, m; twice that for "
+        "walls of 4 m^2 and more, which drift moves apart");
     v.field("gap", gap, 0.0, 5.0, "largest gap between the covered areas, m");
     v.field("gap_per_area", gap_per_area, 0.0, 100.0,
             "gap allowed between walls (1 m^2 and more) and between floors (4 m^2), per m^2 of the smaller one, m");

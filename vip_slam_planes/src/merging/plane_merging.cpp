@@ -95,8 +95,7 @@ struct Allowance {
 };
 
 // A wall may continue behind a cupboard, and ceilings of two corridors may meet where they were not seen. The gap
-// allowed
-// between two pieces depends on the smaller one's area, which determines its plane, not on a fixed length.
+// allowed between two pieces depends on the smaller one's area, which determines its plane, not on a fixed length.
 Allowance allowanceFor(const PlaneTrack& small, const PlaneTrack& large, const std::vector<const PlaneTrack*>& known,
                        const PlaneMergingOptions& options) {
   const PlaneKind kind = small.kind();
