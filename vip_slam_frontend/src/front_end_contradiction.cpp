@@ -57,12 +57,12 @@ PredictedMotion FrontEnd::Impl::predictMotion(const Propagation& propagation, co
   PredictedMotion motion;
   motion.T_current_previous = T_odom_C.inverse() * (from.T_W_I * extrinsics());
   motion.sigma = propagation.displacementSigma(filter_.covariance());
-  motion.unseen = propagation.predicted.t - from.t;
+  motion.interval = propagation.predicted.t - from.t;
   motion.turn_unknown = doubtful;
   motion.wary = movedLately(propagation.predicted.t);
   motion.at_rest = stillness_.imuRests();
   const bool settled = options_.tracking.leave_out_moving && propagation.predicted.t - started_imu_t_ > kSettled;
-  motion.interval = settled && !doubtful ? propagation.predicted.t - from.t : 0.0;
+  motion.judges = settled && !doubtful;
   return motion;
 }
 
@@ -126,7 +126,7 @@ FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {
 void FrontEnd::Impl::admitShock(const TrackingResult& tracking, const PredictedMotion& prediction, double dt,
                                 Propagation* propagation) {
   const double t = propagation->predicted.t;
-  const bool told = prediction.interval > 0 && !prediction.wary && !tracking.moves_by_itself && tracking.step.ok &&
+  const bool told = prediction.judges && !prediction.wary && !tracking.moves_by_itself && tracking.step.ok &&
                     tracking.tracked >= kShockTracks && kShockOutliers * tracking.lost_outlier <= tracking.tracked;
   const Eigen::Vector3d apart = tracking.step.t - prediction.T_current_previous.t();
   const double length = kUntoldSpeed * dt + kUntoldLength;

@@ -104,8 +104,8 @@ class FrontEnd::Impl {
   SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
-  /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt its interval is
-  /// 0: then it must not be used to judge the points.
+  /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt it does not judge
+  /// the points.
   PredictedMotion predictMotion(const Propagation& propagation, const SE3& T_odom_C, bool doubtful) const;
   /// Longest IMU gap that is bridged, s; a longer one restarts tracking.
   double longestImuGap() const { return 5.0 * options_.recovery.max_imu_gap; }

@@ -60,7 +60,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     result.step = fitTranslation(pairs, model.inlier, predicted.T_current_previous.R(), model.t_given_rotation,
                                  0.5 * ransac.threshold);
   }
-  for (std::size_t k = 0; k < index.size() && predicted.interval > 0; ++k) {
+  for (std::size_t k = 0; k < index.size() && predicted.judges; ++k) {
     result.regions.add({next[index[k]].x, next[index[k]].y}, pairs[k].depth_previous, model.inlier[k]);
   }
   keepInliers(index, model.inlier, next, predicted.T_current_previous);

@@ -20,7 +20,7 @@ constexpr double kLongUnseen = 0.5;
 
 /// After a long time without images, a few chance matches that agree on some motion would make a velocity of it.
 bool matchedByChance(const PredictedMotion& prediction, const RansacResult& found, std::size_t pairs) {
-  return prediction.unseen > kLongUnseen && (!found.ok || 2 * static_cast<std::size_t>(found.inliers) < pairs);
+  return prediction.interval > kLongUnseen && (!found.ok || 2 * static_cast<std::size_t>(found.inliers) < pairs);
 }
 
 }  // namespace
@@ -61,7 +61,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const Predicted
     found.inliers = 0;
     return found;
   }
-  if (!(prediction.interval > 0) || !found.ok || !found.with_depth) return found;
+  if (!prediction.judges || !found.ok || !found.with_depth) return found;
   options.most_apart = mostApart(prediction);
   if ((found.t_given_rotation - prediction.T_current_previous.t()).norm() < options.most_apart) return found;
   if (!prediction.wary && !prediction.at_rest && shownByAll(pairs, found)) return found;

@@ -36,7 +36,7 @@ const SE3 kCamera(Eigen::Matrix3d(expSO3(Eigen::Vector3d(0.01, -0.02, 0.005))), 
 /// Apparent motion of the camera relative to a body that moves sideways by 5 cm.
 const SE3 kBody(kCamera.rotation(), kCamera.t() + Eigen::Vector3d(0.05, 0, 0));
 
-PredictedMotion prediction() { return {kCamera, 0.0005, 0.05, 0.05}; }
+PredictedMotion prediction() { return {kCamera, 0.0005, 0.05, true}; }
 
 RansacResult reject(const std::vector<PointPair>& pairs, const PredictedMotion& motion, bool* moves) {
   RansacOptions options;
@@ -94,7 +94,7 @@ TEST(MovingBodies, WithinWhatTheImuLeavesOpenThePointsDecide) {
   reject(points(60, kCamera, 1, 1), prediction(), &moves);
   EXPECT_FALSE(moves);
   PredictedMotion nothing = prediction();
-  nothing.interval = 0;
+  nothing.judges = false;
   reject(pairs, nothing, &moves);
   EXPECT_FALSE(moves);
 }
@@ -108,7 +108,7 @@ TEST(MovingBodies, AfterALongTimeWithoutImagesOnlyAMajorityIsBelieved) {
   };
   PredictedMotion after_darkness = prediction();
   after_darkness.sigma = 0.2;
-  after_darkness.unseen = 4.5;
+  after_darkness.interval = 4.5;
   bool moves = true;
   const RansacResult few = reject(random_matches(30) + points(12, kCamera, 30, 3), after_darkness, &moves);
   EXPECT_FALSE(few.ok);

@@ -113,7 +113,8 @@ struct FilterOptions {
     v.field("window", window, 4, 30, "clones kept");
     v.field("sigma_px", sigma_px, 0.05, 10.0, "one-sigma of a well textured patch's pixel at the start, px");
     v.field("adapt_sigma_px", adapt_sigma_px, "adapt sigma_px to the normalised innovations");
-    v.field("sigma_px_min", sigma_px_min, 0.01, 10.0, "lower bound of the adaptation, px; the error that good tracks share");
+    v.field("sigma_px_min", sigma_px_min, 0.01, 10.0,
+            "lower bound of the adaptation, px; the error that good tracks share");
     v.field("sigma_px_max", sigma_px_max, 0.05, 20.0, "upper bound of the adaptation, px");
     v.field("pixel_inflation", pixel_inflation, 1.0, 20.0,
             "factor on the adapted sigma_px; above 1: what a track errs in one image it errs in the next, too");

@@ -68,8 +68,8 @@ class FeatureTracker {
                  TimingLog* timing, const cv::Mat& mask = cv::Mat());
 
   /// Tracks into `gray`. `predicted` is the camera motion since the last image, `T_odom_C` the predicted pose of this
-  /// one; when the translation is unknown give only a rotation and `has_translation` false. With interval 0 `predicted`
-  /// is only the starting point of the search and does not judge the points.
+  /// one; when the translation is unknown give only a rotation and `has_translation` false. Unless it `judges`,
+  /// `predicted` is only the starting point of the search.
   /// `rows`: how the camera moves while the image is read, null: global shutter. `depth` belongs to the stamp.
   TrackingResult track(const cv::Mat& gray, const cv::Mat& depth, const PredictedMotion& predicted,
                        bool has_translation, const SE3& T_odom_C, const std::shared_ptr<const RowPoses>& rows,

@@ -16,8 +16,8 @@ constexpr std::uint32_t kOldPoint = 8;
 struct PredictedMotion {
   SE3 T_current_previous;
   double sigma = 0;           ///< one sigma of the translation along its least certain axis, m
-  double interval = 0;        ///< between the two images, s; 0: the prediction must not judge the points
-  double unseen = 0;          ///< time between the two images, s
+  double interval = 0;        ///< between the two images, s
+  bool judges = false;        ///< it is sure enough to judge the points
   bool turn_unknown = false;  ///< the rotation is not known: the IMU had a gap
   bool wary = false;          ///< something moved a moment ago: in doubt prefer the IMU
   bool at_rest = false;  ///< the IMU has been at rest since the camera stood still: points that move are not static
