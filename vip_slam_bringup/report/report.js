@@ -51,8 +51,8 @@ function timing(data) {
   const stages = data.stages, longest = Math.log10(1 + Math.max(...stages.map(s => s.p99)) * 10);
   const at = v => 100 * Math.log10(1 + v * 10) / longest;
   const bar = s => `<svg viewBox="0 0 100 16" preserveAspectRatio="none"><rect x="0" y="6" width="${at(s.p99)}" height="4" fill="var(--line)"/><rect x="0" y="3" width="${at(s.median)}" height="10" fill="var(--estimate)"/></svg>`;
-  el('timing-table').innerHTML = '<table><thead><tr><th>stage</th><th class="text">median and 99 % (log scale)</th><th>median ms</th><th>99 % ms</th><th>max ms</th><th>mean ms</th><th>calls</th><th>sum s</th></tr></thead><tbody>' +
-    stages.map((s, i) => `<tr class="pick" data-stage="${i}"><td>${escapeHtml(s.name)}</td><td class="bar">${bar(s)}</td><td>${number(s.median)}</td><td>${number(s.p99)}</td><td>${number(s.max)}</td><td>${number(s.mean)}</td><td>${s.count}</td><td>${number(s.total)}</td></tr>`).join('') + '</tbody></table><p class="hint">Choose a row to see it over time.</p>';
+  el('timing-table').innerHTML = '<table><thead><tr><th>stage</th><th class="text">median and 99 % (log scale)</th><th>median ms</th><th>99 % ms</th><th>max ms</th><th>mean ms</th><th title="mean time of the processor: without waiting for others">computing ms</th><th>calls</th><th>sum s</th></tr></thead><tbody>' +
+    stages.map((s, i) => `<tr class="pick" data-stage="${i}"><td>${escapeHtml(s.name)}</td><td class="bar">${bar(s)}</td><td>${number(s.median)}</td><td>${number(s.p99)}</td><td>${number(s.max)}</td><td>${number(s.mean)}</td><td>${s.cpu_mean === null ? '' : number(s.cpu_mean)}</td><td>${s.count}</td><td>${number(s.total)}</td></tr>`).join('') + '</tbody></table><p class="hint">Choose a row to see it over time.</p>';
   const rows = [...el('timing-table').querySelectorAll('tr.pick')];
   const pick = i => {
     rows.forEach((row, k) => row.classList.toggle('on', k === i));

@@ -76,9 +76,11 @@ def read_timing(path):
             if number == 1 and row[:1] == ['stage'] or not row:
                 continue
             try:
-                stages.setdefault(row[0], []).append((float(row[1]), float(row[2])))
+                # Live runs have no processor time.
+                cpu = float(row[3]) if len(row) > 3 else float('nan')
+                stages.setdefault(row[0], []).append((float(row[1]), float(row[2]), cpu))
             except (IndexError, ValueError):
-                raise Unreadable('%s:%d: expected stage,t,ms' % (path, number))
+                raise Unreadable('%s:%d: expected stage,t,ms[,cpu_ms]' % (path, number))
     return {name: np.array(rows) for name, rows in stages.items()}
 
 
@@ -107,7 +109,9 @@ def stage_summary(name, rows, t0):
     order = np.argsort(rows[:, 0], kind='stable')
     bins = np.array_split(order, min(MAX_STAGE_POINTS, len(order)))
     peaks = np.array([index[np.argmax(ms[index])] for index in bins])
-    return {'name': name, 'count': int(len(ms)), 'mean': float(ms.mean()), 'median': float(np.median(ms)),
+    cpu = rows[:, 2][np.isfinite(rows[:, 2])]
+    return {'name': name, 'count': int(len(ms)), 'mean': float(ms.mean()),
+            'cpu_mean': float(cpu.mean()) if len(cpu) else None, 'median': float(np.median(ms)),
             'p99': float(np.percentile(ms, 99)), 'max': float(ms.max()), 'total': float(ms.sum() / 1000.0),
             't': rounded(rows[peaks, 0] - t0, 3), 'ms': rounded(ms[peaks], 3)}
 

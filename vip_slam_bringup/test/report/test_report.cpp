@@ -51,7 +51,7 @@ class Report : public testing::Test {
     fs::create_directories(dir_);
     std::ofstream trajectory(dir_ / "trajectory.tum"), odometry(dir_ / "odometry.tum"), truth(dir_ / "truth.tum");
     std::ofstream timing(dir_ / "timing.csv");
-    timing << "stage,t,ms\n";
+    timing << "stage,t,ms,cpu_ms\n";
     char line[200];
     const int images = 1200;
     double sum = 0;
@@ -70,7 +70,7 @@ class Report : public testing::Test {
       std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f 0 0 %.9f %.9f\n", t, -y * (1 + 0.05 * s), x + 0.12 * s,
                     z + bend, std::sin(half), std::cos(half));
       odometry << line;
-      std::snprintf(line, sizeof(line), "frontend.track,%.3f,%.4f\nfrontend.update,%.3f,%.4f\n", t,
+      std::snprintf(line, sizeof(line), "frontend.track,%.3f,%.4f,1.5\nfrontend.update,%.3f,%.4f\n", t,
                     3 + std::sin(0.7 * i), t, 1.2 + 0.3 * std::cos(1.3 * i));
       timing << line;
       if (i % 20 == 0) {
@@ -177,10 +177,12 @@ TEST_F(Report, HoldsTheRunsNumbersInOneFile) {
   }
   EXPECT_EQ(data["stages"].size(), 4u);
   for (const auto& stage : data["stages"]) {
+    if (stage["name"].as<std::string>() == "frontend.update") EXPECT_TRUE(stage["cpu_mean"].IsNull());
     if (stage["name"].as<std::string>() != "frontend.track") continue;
     EXPECT_EQ(stage["count"].as<int>(), 1200);
     EXPECT_NEAR(stage["median"].as<double>(), 3.0, 0.05);
     EXPECT_NEAR(stage["max"].as<double>(), 4.0, 0.01);
+    EXPECT_EQ(stage["cpu_mean"].as<double>(), 1.5);
   }
 }
 
@@ -204,7 +206,7 @@ TEST_F(Report, NamesWhatItCannotRead) {
   expect("--out-dir /nowhere", "/nowhere: is not a folder");
   expect(folder + " --truth /nowhere.tum", "/nowhere.tum: is not there");
   std::ofstream(dir_ / "timing.csv") << "stage,t,ms\na,1,2\na,b,c\n";
-  expect(folder, "timing.csv:3: expected stage,t,ms");
+  expect(folder, "timing.csv:3: expected stage,t,ms[,cpu_ms]");
   std::ofstream(dir_ / "planes.yaml") << "planes: [{id: 1}]\n";
   expect(folder, "planes.yaml: plane 1");
   std::ofstream(dir_ / "trajectory.tum") << "1 0 0 0 0 0 0 1\n0.9 0 0 0 0 0 0 1\n";

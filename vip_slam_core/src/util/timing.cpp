@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <iomanip>
 #include <numeric>
 
@@ -9,18 +10,24 @@
 
 namespace vip_slam {
 
-void TimingLog::add(const std::string& stage, double t, double milliseconds) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  rows_[stage].push_back({t, milliseconds});
+double threadTimeMs() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * double(now.tv_sec) + 1e-6 * double(now.tv_nsec);
 }
 
-TimingSummary TimingLog::summary(const std::string& stage) const {
+void TimingLog::add(const std::string& stage, double t, double elapsed_ms, double processor_ms) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  rows_[stage].push_back({t, elapsed_ms, processor_ms});
+}
+
+TimingSummary TimingLog::summary(const std::string& stage, Clock clock) const {
   std::vector<double> ms;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     const auto found = rows_.find(stage);
     if (found == rows_.end()) return {};
-    for (const Row& row : found->second) ms.push_back(row.ms);
+    for (const Row& row : found->second) ms.push_back(clock == Clock::kElapsed ? row.ms : row.cpu_ms);
   }
   std::sort(ms.begin(), ms.end());
   TimingSummary summary;
@@ -36,12 +43,13 @@ TimingSummary TimingLog::summary(const std::string& stage) const {
 
 void TimingLog::writeCsv(const std::string& path) const {
   AtomicFile file(path);
-  file.stream() << "stage,t,ms\n" << std::fixed;
+  file.stream() << "stage,t,ms,cpu_ms\n" << std::fixed;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     for (const auto& [stage, rows] : rows_) {
       for (const Row& row : rows) {
-        file.stream() << stage << ',' << std::setprecision(9) << row.t << ',' << std::setprecision(4) << row.ms << '\n';
+        file.stream() << stage << ',' << std::setprecision(9) << row.t << ',' << std::setprecision(4) << row.ms << ','
+                      << row.cpu_ms << '\n';
       }
     }
   }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "util/text.h"
 #include "vip_slam_core/util/atomic_file.h"
@@ -192,23 +193,42 @@ TEST_F(Files, AppearWholeOrNotAtAll) {
 
 TEST_F(Files, TimingSummaryAndCsv) {
   TimingLog log;
-  for (int k = 1; k <= 100; ++k) log.add("stage", 0.1 * k, k);
-  log.add("another", 1, 5);
+  for (int k = 1; k <= 100; ++k) log.add("stage", 0.1 * k, k, 0.5 * k);
+  log.add("another", 1, 5, 4);
   const TimingSummary s = log.summary("stage");
   EXPECT_EQ(s.count, 100u);
   EXPECT_DOUBLE_EQ(s.mean, 50.5);
   EXPECT_DOUBLE_EQ(s.median, 50.5);
   EXPECT_DOUBLE_EQ(s.p99, 99);
   EXPECT_DOUBLE_EQ(s.max, 100);
+  EXPECT_DOUBLE_EQ(log.summary("stage", TimingLog::Clock::kProcessor).max, 50);
   EXPECT_EQ(log.summary("nothing").count, 0u);
   log.writeCsv(path("t.csv"));
   const std::string csv = textOf(path("t.csv"));
-  EXPECT_EQ(csv.compare(0, 11, "stage,t,ms\n"), 0);
+  EXPECT_EQ(csv.substr(0, csv.find('\n', 20)), "stage,t,ms,cpu_ms\nanother,1.000000000,5.0000,4.0000");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 102);
   EXPECT_THROW(log.writeCsv(path("no/t.csv")), std::runtime_error);
   { ScopedTimer timer(&log, "scope", 3); }
   { ScopedTimer timer(nullptr, "scope", 3); }
   EXPECT_EQ(log.summary("scope").count, 1u);
+}
+
+TEST(Timing, ProcessorTimeLeavesWaitingOut) {
+  TimingLog log;
+  {
+    ScopedTimer timer(&log, "waits", 0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  {
+    ScopedTimer timer(&log, "works", 0);
+    const double start = threadTimeMs();
+    while (threadTimeMs() < start + 20) {
+    }
+  }
+  EXPECT_GE(log.summary("waits").max, 50);
+  EXPECT_LT(log.summary("waits", TimingLog::Clock::kProcessor).max, 10);
+  EXPECT_GE(log.summary("works", TimingLog::Clock::kProcessor).max, 20);
+  EXPECT_GE(log.summary("works").max, 19.9);
 }
 
 }  // namespace

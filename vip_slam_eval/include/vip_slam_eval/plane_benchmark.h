@@ -33,9 +33,8 @@ struct PlaneBenchmarkResult {
   PlaneMapperCounters counters;
 };
 
-/// Stages "planes.update" (the total cost of a keyframe) and "planes.grow" go to `timing` (not null), and with the
-/// suffix ".cpu" as CPU time of the thread. Throws std::runtime_error naming what cannot be read, or when the truth
-/// covers no keyframe.
+/// Stages "planes.update" (the total cost of a keyframe) and "planes.grow" go to `timing` (not null). Throws
+/// std::runtime_error naming what cannot be read, or when the truth covers no keyframe.
 PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing);
 
 MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing);

@@ -1,8 +1,8 @@
 #include "vip_slam_eval/plane_benchmark.h"
 #include "vip_slam_core/util/progress_bar.h"
 
-#include <ctime>
 #include <stdexcept>
+#include <tuple>
 
 #include "plane_benchmark/true_map.h"
 #include "vip_slam_bringup/runner/bag_reader.h"
@@ -13,21 +13,13 @@
 namespace vip_slam {
 namespace {
 
-/// CPU time of the thread in milliseconds, which other programs on the machine do not affect.
-double threadTime() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * double(now.tv_sec) + 1e-6 * double(now.tv_nsec);
-}
-
 /// Front end, true map and plane mapper, run in lock-step.
 class Bench {
  public:
   Bench(const PlaneBenchmarkInput& input, const SensorConfig& sensor, TimingLog* timing)
       : front_end_(input.options.frontend, sensor),
         mapper_(input.options.planes, makeCamera(sensor.camera), sensor.depth_noise, timing),
-        map_(input.truth, sensor),
-        timing_(timing) {}
+        map_(input.truth, sensor) {}
 
   void add(const SensorEvent& event) {
     if (const auto* imu = std::get_if<ImuSample>(&event)) {
@@ -68,24 +60,16 @@ class Bench {
         ++result_.keyframes;
         mapper_.addKeyframe(keyframe);
         const MapUpdate placed = map_.addKeyframe(*keyframe);
-        const double start = threadTime();
-        const PlaneUpdate update = mapper_.applyMapUpdate(placed);
-        timing_->add("planes.update.cpu", pair.t, threadTime() - start);
-        map_.apply(update);
+        map_.apply(mapper_.applyMapUpdate(placed));
       }
     }
     TrackedFrame frame = *output.frame;
-    if (!map_.place(&frame)) return;
-    const std::uint64_t grown = mapper_.counters().frames_grown;
-    const double start = threadTime();
-    mapper_.grow(frame, SE3());
-    if (mapper_.counters().frames_grown > grown) timing_->add("planes.grow.cpu", pair.t, threadTime() - start);
+    if (map_.place(&frame)) mapper_.grow(frame, SE3());
   }
 
   FrontEnd front_end_;
   PlaneMapper mapper_;
   TrueMap map_;
-  TimingLog* timing_;
   std::deque<ImagePair> waiting_;
   PlaneBenchmarkResult result_;
 };
@@ -124,10 +108,12 @@ MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timin
   table.push_back({"run", "planes removed", double(result.counters.planes_removed), ""});
   appendPlaneMetrics(&table, result.metrics);
   appendAssociationMetrics(&table, result.associations);
-  for (const auto& [stage, name] :
-       {std::pair("planes.update", "keyframe"), std::pair("planes.grow", "growth frame"),
-        std::pair("planes.update.cpu", "keyframe computing"), std::pair("planes.grow.cpu", "growth frame computing")}) {
-    const TimingSummary time = timing.summary(stage);
+  using Clock = TimingLog::Clock;
+  for (const auto& [stage, clock, name] : {std::tuple("planes.update", Clock::kElapsed, "keyframe"),
+                                           std::tuple("planes.grow", Clock::kElapsed, "growth frame"),
+                                           std::tuple("planes.update", Clock::kProcessor, "keyframe computing"),
+                                           std::tuple("planes.grow", Clock::kProcessor, "growth frame computing")}) {
+    const TimingSummary time = timing.summary(stage, clock);
     table.push_back({"time", std::string(name) + " median", time.median, "ms"});
     table.push_back({"time", std::string(name) + " 99 %", time.p99, "ms"});
     table.push_back({"time", std::string(name) + " max", time.max, "ms"});
