@@ -184,6 +184,7 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_), back_end_->depthDifference(),
                                 back_end_->trackNoiseDifference()};
   }
+  reportRefusals();
   distribute(update);
   startGlobalBa();
 }
@@ -202,6 +203,16 @@ void BackEndNodelet::applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg) {
   if (planes_wanted_ != 0 && msg.restored != planes_wanted_) return;
   planes_wanted_ = 0;
   back_end_->applyPlaneUpdate(fromMsg(msg));
+  reportRefusals();
+}
+
+void BackEndNodelet::reportRefusals() {
+  for (const std::string& reason : back_end_->takeRefusals()) {
+    NODELET_WARN_THROTTLE(1, "refused: %s", reason.c_str());
+    std::lock_guard<std::mutex> lock(shown_mutex_);
+    ++refused_;
+    last_refusal_ = reason;
+  }
 }
 
 void BackEndNodelet::startGlobalBa() {

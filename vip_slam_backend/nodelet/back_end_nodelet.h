@@ -52,6 +52,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   void start(const vip_slam_msgs::Calibration& calibration);
   void addKeyframe(const vip_slam_msgs::Keyframe& msg);
   void applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg);
+  void reportRefusals();
   void startGlobalBa();
   void distribute(const MapUpdate& update);
   void publishStatistics();
@@ -89,10 +90,12 @@ class BackEndNodelet : public nodelet::Nodelet {
   bool adjusting_ = false;        ///< a global adjustment is under way
   std::thread adjustment_;
 
-  DropWatch drops_;  ///< used by diagnostics only
+  DropWatch drops_, refusals_;  ///< used by diagnostics only
   mutable std::mutex shown_mutex_;
   vip_slam_msgs::BackEndStatistics shown_;
   std::string problem_;
+  std::size_t refused_ = 0;                           ///< keyframes, planes and observations
+  std::string last_refusal_;                          ///< why
   std::vector<std::string> calibration_differences_;  ///< messages; empty ones are not shown
   std::string load_problem_;                          ///< why the initial map could not be loaded
   vip_slam_backend::BackEndConfig config_;            ///< as last set by dynamic_reconfigure

@@ -69,6 +69,8 @@ void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status)
     status.summary(DiagnosticStatus::ERROR, load_problem_);
   } else if (!problem_.empty()) {
     status.summary(DiagnosticStatus::WARN, problem_);
+  } else if (refusals_.lately(refused_, ros::WallTime::now().toSec())) {
+    status.summary(DiagnosticStatus::WARN, "refused: " + last_refusal_);
   } else if (drops_.lately(dropped, ros::WallTime::now().toSec())) {
     status.summary(DiagnosticStatus::WARN, std::to_string(dropped) + " messages dropped: the back end is too slow");
   } else {
@@ -84,6 +86,8 @@ void BackEndNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status)
   status.add("planes", shown_.planes);
   status.add("loops accepted", shown_.loops_accepted);
   status.add("loops rejected", shown_.loops_rejected);
+  status.add("refused", refused_);
+  if (refused_ > 0) status.add("last refused", last_refusal_);
   status.add("last keyframe (ms)", shown_.local_ms);
   status.add("last global adjustment (ms)", shown_.global_ms);
   status.add("global adjustments", shown_.global_adjustments);

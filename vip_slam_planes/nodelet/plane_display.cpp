@@ -8,8 +8,8 @@
 namespace vip_slam {
 namespace {
 
-std_msgs::ColorRGBA colorOf(const PlaneEstimate& plane, double alpha) {
-  return plane.kind == PlaneKind::kHorizontal ? makeColor(0.62, 0.62, 0.65, alpha) : colorOfId(plane.id, alpha);
+std_msgs::ColorRGBA colorOf(PlaneId id, bool horizontal, double alpha) {
+  return horizontal ? makeColor(0.62, 0.62, 0.65, alpha) : colorOfId(id, alpha);
 }
 
 void addRing(const Ring& ring, visualization_msgs::Marker* lines) {
@@ -28,9 +28,10 @@ visualization_msgs::MarkerArray PlaneDisplay::markers(const std::vector<PlaneEst
   std::set<PlaneId> now;
   for (const PlaneEstimate& plane : planes) {
     Marker fill = makeMarker(header, "planes", int(plane.id), Marker::TRIANGLE_LIST);
-    fill.color = colorOf(plane, opacity);
+    const bool horizontal = plane.kind == PlaneKind::kHorizontal;
+    fill.color = colorOf(plane.id, horizontal, opacity);
     Marker lines = makeMarker(header, "outlines", int(plane.id), Marker::LINE_LIST);
-    lines.color = colorOf(plane, 1.0);
+    lines.color = colorOf(plane.id, horizontal, 1.0);
     lines.scale.x = 0.02;
     for (const PlanePolygon& polygon : plane.polygons) {
       for (const Triangle& triangle : triangulate(polygon, plane.plane)) {
@@ -73,6 +74,10 @@ void PlaneDisplay::apply(const PlaneUpdate& update) {
     }
   }
   for (const PlaneId id : update.removed) points_.erase(id);
+  horizontal_.clear();  // an update lists all planes
+  for (const PlaneEstimate& plane : update.planes) {
+    if (plane.kind == PlaneKind::kHorizontal) horizontal_.insert(plane.id);
+  }
   for (const PlaneObservation& observation : update.observations) {
     auto& points = points_[observation.plane][observation.keyframe];
     points.clear();
@@ -84,7 +89,7 @@ sensor_msgs::PointCloud2 PlaneDisplay::cloud(const std_msgs::Header& header) con
   std::vector<ColoredPoint> all;
   all.reserve(points());
   for (const auto& [plane, observations] : points_) {
-    const std_msgs::ColorRGBA color = colorOfId(plane);
+    const std_msgs::ColorRGBA color = colorOf(plane, horizontal_.count(plane) > 0, 1.0);
     for (const auto& [keyframe, points] : observations) {
       const auto pose = keyframes_.find(keyframe);
       if (pose == keyframes_.end()) continue;
@@ -107,6 +112,7 @@ std::size_t PlaneDisplay::points() const {
 void PlaneDisplay::clear() {
   keyframes_.clear();
   points_.clear();
+  horizontal_.clear();
 }
 
 }  // namespace vip_slam

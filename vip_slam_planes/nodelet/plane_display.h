@@ -26,13 +26,14 @@ class PlaneDisplay {
   /// Stores the poses and points needed to draw the depth points on planes.
   void apply(const MapUpdate& update);
   void apply(const PlaneUpdate& update);
-  /// The depth points on planes, coloured by plane.
+  /// The depth points on planes, in the colours of the planes.
   sensor_msgs::PointCloud2 cloud(const std_msgs::Header& header) const;
   std::size_t points() const;
   void clear();
 
  private:
   std::set<PlaneId> shown_;
+  std::set<PlaneId> horizontal_;
   std::map<KeyframeId, SE3> keyframes_;  ///< T_map_C, with the present camera-IMU extrinsics
   std::map<PlaneId, std::map<KeyframeId, std::vector<Eigen::Vector3f>>> points_;
 };

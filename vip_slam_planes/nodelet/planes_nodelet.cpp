@@ -107,7 +107,15 @@ void PlanesNodelet::start(const vip_slam_msgs::Calibration& calibration) {
 }
 
 void PlanesNodelet::grow(const vip_slam_msgs::TrackedFrame& msg) {
-  if (mapper_ && placed_ && msg.epoch == epoch_) mapper_->grow(fromMsg(msg), T_map_odom_);
+  if (!mapper_ || !placed_ || msg.epoch != epoch_) return;
+  const TrackedFrame frame = fromMsg(msg);
+  const ros::WallTime begin = ros::WallTime::now();
+  const std::uint64_t grown = mapper_->counters().frames_grown;
+  mapper_->grow(frame, T_map_odom_);
+  if (mapper_->counters().frames_grown == grown) return;
+  const double milliseconds = (ros::WallTime::now() - begin).toSec() * 1e3;
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  shown_.growth_ms = milliseconds;
 }
 
 void PlanesNodelet::applyMapUpdate(const vip_slam_msgs::MapUpdate& msg) {
@@ -184,6 +192,7 @@ void PlanesNodelet::report(diagnostic_updater::DiagnosticStatusWrapper& status) 
   status.add("planes", shown_.planes);
   status.add("depth points on planes", shown_.points);
   status.add("last update (ms)", shown_.update_ms);
+  status.add("last growth (ms)", shown_.growth_ms);
   status.add("keyframes processed", c.keyframes);
   status.add("keyframes waiting for their place", c.keyframes_waiting);
   status.add("keyframes never placed", c.keyframes_forgotten);

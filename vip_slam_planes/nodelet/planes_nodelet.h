@@ -62,7 +62,7 @@ class PlanesNodelet : public nodelet::Nodelet {
   struct Shown {
     PlaneMapperCounters counters;
     std::size_t planes = 0, points = 0;
-    double update_ms = 0;
+    double update_ms = 0, growth_ms = 0;
   };
   DropWatch drops_;  ///< used by diagnostics only
   mutable std::mutex shown_mutex_;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "plane_mapper_impl.h"
+#include "vip_slam_core/types/camera_correction.h"
 #include "vip_slam_planes/growth/other_layers.h"
 #include "vip_slam_planes/growth/see_through.h"
 #include "vip_slam_planes/growth/triangle_association.h"
@@ -19,6 +20,8 @@ const CameraModel& checked(const std::shared_ptr<const CameraModel>& camera, con
   return *camera;
 }
 
+bool isSound(const CameraCorrection& correction) { return validateCameraCorrection(correction).empty(); }
+
 bool isSound(const DepthGrid& grid) {
   if (grid.cols < 0 || grid.rows < 0 || grid.z.size() != std::size_t(grid.cols) * std::size_t(grid.rows)) return false;
   return grid.empty() || grid.stride > 0;
@@ -32,6 +35,10 @@ bool isFinite(const PlanePolygon& polygon) {
 }
 
 }  // namespace
+
+bool isSound(const KeyframeEstimate& estimate) {
+  return estimate.state.T_W_I.isFinite() && estimate.T_I_C.isFinite() && isSound(estimate.camera_correction);
+}
 
 bool isSound(const Plane& plane) {
   return plane.n.allFinite() && std::isfinite(plane.d) && std::abs(plane.n.norm() - 1) < 1e-3;
@@ -71,7 +78,8 @@ const CameraPoses& PlaneMapper::Impl::posesTiedTo(std::uint32_t epoch) {
 
 void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   const bool usable = frame.status.state == TrackingState::kTracking && !frame.depth_grid.empty() && newest_ != 0 &&
-                      frame.epoch == epoch_ && !localising_ && !tracks_.empty() && isSound(frame.depth_grid);
+                      frame.epoch == epoch_ && !localising_ && !tracks_.empty() && isSound(frame.depth_grid) &&
+                      isSound(frame.camera_correction);
   const SE3 T_map_C = T_map_odom * frame.state.T_W_I * frame.T_I_C;
   const SE3 moved = grown_at_.inverse() * T_map_C;
   const bool still = has_grown_ && moved.t().norm() < options.growth.min_move &&
@@ -168,7 +176,7 @@ void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, Keyframe
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
   // A keyframe that was in transit when the map was loaded has the id of a stored one, which it would replace.
   if (!keyframe || keyframe->id <= stored_until_ || placed_.count(keyframe->id)) return;
-  if (!isSound(keyframe->frame.depth_grid)) return;
+  if (!isSound(keyframe->frame.depth_grid) || !isSound(keyframe->frame.camera_correction)) return;
   waiting_.emplace(keyframe->id, keyframe);
   // One more than the back end holds: the newest one, which it may still place.
   while (waiting_.size() > kMaxWaitingKeyframes + 1) {

@@ -18,6 +18,8 @@ namespace vip_slam {
 
 /// Finite, with a unit normal.
 bool isSound(const Plane& plane);
+/// Pose, extrinsics and camera correction are usable.
+bool isSound(const KeyframeEstimate& estimate);
 
 class PlaneMapper::Impl {
  public:
@@ -47,6 +49,8 @@ class PlaneMapper::Impl {
   /// False when the keyframe already has this correction.
   bool adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe);
   void removeKeyframe(KeyframeId id);
+  /// Forgets merged landmarks whose tracks no keyframe contains any more.
+  void forgetAliases();
   /// One sigma of the gravity direction in the newest placed keyframe, radians, from the front end's covariance.
   double gravitySigma() const;
   void refit(PlaneTrack* track);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <unordered_set>
 
 #include "plane_mapper_impl.h"
 #include "vip_slam_core/geometry/plane_noise.h"
@@ -38,7 +39,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
 
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto it = waiting_.find(estimate.id);
-    if (it == waiting_.end() || !estimate.state.T_W_I.isFinite()) continue;
+    if (it == waiting_.end() || !isSound(estimate)) continue;
     const KeyframePtr keyframe = withCameraCorrection(it->second, estimate.camera_correction);
     waiting_.erase(it);
     placed_[keyframe->id] = keyframe;
@@ -107,7 +108,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
   std::vector<KeyframeId> moved;
   for (const KeyframeEstimate& estimate : update.keyframes) {
     const auto pose = poses_.find(estimate.id);
-    if (pose == poses_.end() || !estimate.state.T_W_I.isFinite()) continue;
+    if (pose == poses_.end() || !isSound(estimate)) continue;
     SE3& T_map_C = pose->second;
     const SE3 corrected = estimate.state.T_W_I * estimate.T_I_C;
     const SE3 move = T_map_C.inverse() * corrected;
@@ -240,9 +241,20 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   evidence_.remove(id);
   strips_.remove(id);
   placed_.erase(placed);
+  if (points_.aliases().crowded()) forgetAliases();
   if (newest_ != id) return;
   newest_ = placed_.empty() ? 0 : placed_.rbegin()->first;
   if (newest_ != 0) epoch_ = placed_.rbegin()->second->frame.epoch;
+}
+
+void PlaneMapper::Impl::forgetAliases() {
+  std::unordered_set<LandmarkId> in_use;
+  for (const auto* keyframes : {&placed_, &waiting_}) {
+    for (const auto& [other, keyframe] : *keyframes) {
+      for (const Feature& f : keyframe->frame.features) in_use.insert(f.id);
+    }
+  }
+  points_.aliases().forgetUnused(in_use);
 }
 
 // Until the body has moved, the gravity direction may be wrong by a degree, so that horizontal and vertical surfaces

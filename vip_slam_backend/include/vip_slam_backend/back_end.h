@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "vip_slam_backend/back_end_options.h"
 #include "vip_slam_backend/map/map_snapshot.h"
@@ -42,7 +43,10 @@ class BackEnd {
   /// map as it was: the update then has no keyframes and lastRefusal() says why.
   MapUpdate addKeyframe(KeyframePtr keyframe);
   const std::string& lastRefusal() const;
-  /// Applies the plane module's changes; they take effect with the next optimisation.
+  /// Why keyframes, planes and observations were refused since the last call, oldest first, at most the last hundred.
+  std::vector<std::string> takeRefusals();
+  /// Applies the plane module's changes; they take effect with the next optimisation. Planes and observations that are
+  /// unusable are refused one by one.
   void applyPlaneUpdate(const PlaneUpdate& update);
 
   /// True after an accepted loop or requestGlobalBa(), until startGlobalBa(); never in localisation-only mode.

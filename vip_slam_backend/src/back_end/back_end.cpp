@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "../optimisation/imu_agreement.h"
@@ -125,6 +126,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     }
   } catch (const MapError& e) {
     refusal = e.what();
+    refuse(refusal);
     finishUpdate(&update);
     // Report it as removed, since other modules wait for it; not when the map has a keyframe with this id.
     const auto waits = [&keyframe](const KeyframePtr& other) { return other->id == keyframe->id; };
@@ -200,6 +202,7 @@ void BackEnd::Impl::reset() {
   newest_depth_shift = {};
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
+  refusals.clear();
   loops.clear();
   rejected_kept = 0;
   new_loops.clear();
@@ -212,6 +215,7 @@ BackEnd::~BackEnd() = default;
 
 MapUpdate BackEnd::addKeyframe(KeyframePtr keyframe) { return impl_->addKeyframe(keyframe); }
 const std::string& BackEnd::lastRefusal() const { return impl_->refusal; }
+std::vector<std::string> BackEnd::takeRefusals() { return std::exchange(impl_->refusals, {}); }
 void BackEnd::applyPlaneUpdate(const PlaneUpdate& update) { impl_->applyPlaneUpdate(update); }
 bool BackEnd::globalBaWanted() const { return impl_->global_wanted && !impl_->frozen(); }
 void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }

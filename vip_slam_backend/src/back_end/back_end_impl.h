@@ -34,6 +34,7 @@ struct BackEnd::Impl {
   /// Localisation-only mode with a map, which must not change.
   bool frozen() const { return localisation_only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
+  void refuse(const std::string& reason);
   void removeUnnamedPlanes(const PlaneUpdate& update);
   void applyHeldUpdates();
   MapSnapshot snapshot() const;
@@ -137,7 +138,8 @@ struct BackEnd::Impl {
   double disparity_error = 0;                                        ///< 1/m, corrected by the curve
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();         ///< applied to all keyframes of this session
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< reported with the newest keyframe
-  std::string refusal;
+  std::string refusal;                                               ///< of the last keyframe
+  std::vector<std::string> refusals;                                 ///< since takeRefusals()
   std::vector<LoopEvent> loops;      ///< all accepted so far, and the newest refused ones
   std::size_t rejected_kept = 0;     ///< number of refused ones in `loops`
   std::vector<LoopEvent> new_loops;  ///< since the last update

@@ -22,11 +22,15 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     try {
       map.setPlane(plane);
     } catch (const MapError& e) {
-      refusal = e.what();
+      refuse(e.what());
     }
   }
   removeUnnamedPlanes(update);
-  for (const PlaneObservation& observation : update.observations) map.setPlaneObservation(observation);
+  for (const PlaneObservation& observation : update.observations) {
+    const std::string bad = validateObservation(observation);
+    if (!bad.empty()) refuse(bad);
+    map.setPlaneObservation(observation);
+  }
   for (const auto& pair : update.associated) {
     const LandmarkId id = map.resolve(pair.first);
     if (map.hasLandmark(id) && map.hasPlane(pair.second)) map.associate(id, pair.second);
@@ -35,6 +39,12 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     const LandmarkId id = map.resolve(landmark);
     if (map.hasLandmark(id)) map.associate(id, 0);
   }
+}
+
+void BackEnd::Impl::refuse(const std::string& reason) {
+  constexpr std::size_t kMostKept = 100;  // nobody may ever ask for them
+  refusals.push_back(reason);
+  if (refusals.size() > kMostKept) refusals.erase(refusals.begin());
 }
 
 // An update lists all planes. A plane that it does not list was removed or merged in an update that was lost.

@@ -50,7 +50,7 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   ++statistics.local_ba;
   statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
-  statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map);
+  statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
   followNewest();
 
   std::set<LandmarkId> landmarks;
@@ -174,6 +174,7 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
     const SE3 match_before = found ? map.keyframe(last_found->match).state.T_W_I : SE3();
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     ++statistics.global_ba;
+    statistics.outliers += result.solution->outliers.size();
     statistics.track_noise_factor = result.solution->built.track_noise_factor;
     if (found) {
       // The newest keyframe is older than the localisation, and the odometry has drifted since.

@@ -51,21 +51,6 @@ Vector9d homographyVector(const FrameGeometry& i, const FrameGeometry& j, const 
   return h;
 }
 
-bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
-                          const Eigen::Vector2d& xy_i, double* rho) {
-  const double D = plane.d + plane.n.dot(i.t_W_C);
-  if (std::abs(D) < kMinPlaneDistance || std::abs(plane.d + plane.n.dot(j.t_W_C)) < kMinPlaneDistance) return false;
-  const Eigen::Vector3d ray(xy_i.x(), xy_i.y(), 1.0);
-  const double incidence = (i.R_C_W * plane.n).dot(ray);
-  if (std::abs(incidence) < kMinIncidence * ray.norm()) return false;
-  const double z_i = -D / incidence;
-  if (z_i < kMinPlaneDepth) return false;
-  const Eigen::Vector3d p_W = i.t_W_C + i.R_C_W.transpose() * (z_i * ray);
-  const double z_j = j.R_C_W.row(2).dot(p_W - j.t_W_C);
-  *rho = z_j / z_i;
-  return *rho >= kMinDepthRatio && *rho <= kMaxDepthRatio;
-}
-
 double hostNoiseGain(const Vector9d& h, const Eigen::Vector3d& p) {
   const double inverse = 1.0 / p.z(), u = p.x() * inverse, v = p.y() * inverse;
   const double a = h(0) - u * h(6), b = h(1) - u * h(7), c = h(3) - v * h(6), d = h(4) - v * h(7);

@@ -10,8 +10,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kMaxBearing = 0.2;         // share of the focal length
-constexpr double kMaxDepthShift = 100;      // px
 constexpr double kMaxGyroCorrection = 0.5;  // each entry
 constexpr double kSameTime = 1e-6;          // s
 
@@ -32,6 +30,13 @@ std::shared_ptr<const Preintegration> integrate(const std::shared_ptr<const std:
                                           scaled);
 }
 
+/// Whether samples tell the whole motion since `before`, the samples of the previous keyframe (null: none).
+bool tellMotion(const std::vector<ImuSample>& imu, const std::vector<ImuSample>* before) {
+  if (imu.size() < 2 || (before && imu.front().t > before->back().t + kSameTime)) return false;
+  const auto gap = [](const ImuSample& a, const ImuSample& b) { return b.t - a.t > map_limits::kLongestImuStep; };
+  return std::adjacent_find(imu.begin(), imu.end(), gap) == imu.end();
+}
+
 }  // namespace
 
 std::string validateKeyframe(const Keyframe& keyframe) {
@@ -40,6 +45,7 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   if (!std::isfinite(keyframe.frame.t)) return name + "stamp is not finite";
   if (!finite(keyframe.frame.state)) return name + "state is not finite";
   if (!keyframe.frame.T_I_C.isFinite()) return name + "extrinsics are not finite";
+  if (!keyframe.frame.T_chain_C.isFinite()) return name + "chained pose is not finite";
   if (!std::isfinite(keyframe.frame.time_offset)) return name + "the camera's delay is not finite";
   const DepthGrid& grid = keyframe.frame.depth_grid;
   if (!grid.empty() && grid.stride <= 0) return name + "depth grid without a stride";
@@ -65,12 +71,8 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   if (!keyframe.imu.empty() && keyframe.imu.back().t - keyframe.imu.front().t > map_limits::kLongestImu)
     return name + "its IMU samples span hours";
   // The newest keyframe's camera correction is applied to all keyframes.
-  const CameraCorrection& camera = keyframe.frame.camera_correction;
-  if (!std::isfinite(camera.offset) || !(camera.bearing.value.cwiseAbs().maxCoeff() < kMaxBearing) ||
-      !camera.bearing.value.allFinite() || !camera.shift.px.allFinite() || !camera.shift.bearing.allFinite() ||
-      camera.shift.px.cwiseAbs().maxCoeff() > kMaxDepthShift ||
-      camera.shift.bearing.cwiseAbs().maxCoeff() > kMaxBearing)
-    return name + "the camera's correction is not finite, or beyond what a camera can be off by";
+  const std::string camera = validateCameraCorrection(keyframe.frame.camera_correction);
+  if (!camera.empty()) return name + "the camera's correction: " + camera;
   if (!keyframe.gyro_correction.allFinite() || keyframe.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroCorrection)
     return name + "the gyro's correction is not finite, or beyond what a gyro can be off by";
   if (!(keyframe.imu_noise_scale > 0 && keyframe.imu_noise_scale <= map_limits::kMaxNoiseScale))
@@ -102,7 +104,7 @@ MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, co
       const auto& before = it->second.imu;
       if (before && !data->imu.empty() && data->imu.front().t < before->back().t - kSameTime)
         throw MapError(name + ": its IMU samples begin before those of its previous keyframe end");
-      if (data->imu.size() >= 2) imu = std::shared_ptr<const std::vector<ImuSample>>(data, &data->imu);
+      if (tellMotion(data->imu, before.get())) imu = std::shared_ptr<const std::vector<ImuSample>>(data, &data->imu);
     }
   }
   try {
@@ -215,6 +217,7 @@ void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_se
     keyframe(previous).next = 0;
   }
   keyframes_.erase(id);
+  if (aliases_.crowded()) forgetAliases();
   changes_.removed_keyframes.push_back(id);
 }
 

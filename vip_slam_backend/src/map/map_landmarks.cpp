@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <unordered_set>
 
 #include "vip_slam_backend/map/map.h"
 
@@ -27,7 +28,7 @@ int hammingDistance(const Descriptor& a, const Descriptor& b) {
 MapLandmark& Map::addLandmark(LandmarkId id, const Eigen::Vector3d& p_W, const MapObservation& first) {
   const std::string name = "landmark " + std::to_string(id);
   if (id == kNoLandmark) throw MapError("a landmark needs an id");
-  if (hasLandmark(id) || merged_into_.count(id)) throw MapError(name + " exists already");
+  if (hasLandmark(id) || aliases_.isAlias(id)) throw MapError(name + " exists already");
   if (!p_W.allFinite()) throw MapError(name + ": position is not finite");
   MapKeyframe& kf = keyframe(first.keyframe);
   if (first.feature >= kf.landmarks.size()) throw MapError(name + ": no such feature in its keyframe");
@@ -45,7 +46,7 @@ MapLandmark& Map::addLandmark(LandmarkId id, const Eigen::Vector3d& p_W, const M
 MapLandmark& Map::restoreLandmark(const MapLandmark& stored) {
   const std::string name = "landmark " + std::to_string(stored.id);
   if (stored.id == kNoLandmark) throw MapError("a landmark needs an id");
-  if (hasLandmark(stored.id) || merged_into_.count(stored.id)) throw MapError(name + " exists already");
+  if (hasLandmark(stored.id) || aliases_.isAlias(stored.id)) throw MapError(name + " exists already");
   if (!stored.p_W.allFinite()) throw MapError(name + ": position is not finite");
   if (stored.plane != 0 && !hasPlane(stored.plane)) throw MapError(name + ": lies on a plane that is not in the map");
   if (stored.observations.empty()) throw MapError(name + ": no observation");
@@ -112,15 +113,17 @@ bool Map::mergeLandmarks(LandmarkId from, LandmarkId into) {
   b.found += a.found;
   if (b.plane == 0) b.plane = a.plane;
   landmarks_.erase(from);
-  merged_into_[from] = into;
+  aliases_.merge(from, into);
   changes_.merged_landmarks.emplace_back(from, into);
   updateDescriptor(b);
   return true;
 }
 
-LandmarkId Map::resolve(LandmarkId id) const {
-  for (auto it = merged_into_.find(id); it != merged_into_.end(); it = merged_into_.find(id)) id = it->second;
-  return id;
+void Map::forgetAliases() {
+  std::unordered_set<LandmarkId> in_use;
+  for (const auto& entry : keyframes_)
+    for (const Feature& f : entry.second.data->frame.features) in_use.insert(f.id);
+  aliases_.forgetUnused(in_use);
 }
 
 MapLandmark& Map::landmark(LandmarkId id) {

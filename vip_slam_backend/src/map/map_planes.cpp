@@ -78,11 +78,21 @@ void Map::removePlane(PlaneId id) {
   planes_.erase(id);
 }
 
+std::string validateObservation(const PlaneObservation& observation) {
+  const std::string name = "plane " + std::to_string(observation.plane) + ", seen by keyframe " +
+                           std::to_string(observation.keyframe) + ": ";
+  if (!observation.G.allFinite()) return name + "moments are not finite";
+  if (!(observation.weight_scale > 0) || !std::isfinite(observation.weight_scale))
+    return name + "weight is " + std::to_string(observation.weight_scale);
+  for (const PlanePoint& p : observation.points)
+    if (!p.p_C.allFinite() || !(p.sigma > 0) || !std::isfinite(p.sigma)) return name + "a point is not finite";
+  const std::string camera = validateCameraCorrection(observation.camera_correction);
+  return camera.empty() ? "" : name + "the camera's correction: " + camera;
+}
+
 bool Map::setPlaneObservation(const PlaneObservation& observation) {
   if (!hasKeyframe(observation.keyframe) || !hasPlane(observation.plane)) return false;
-  if (!observation.G.allFinite() || !(observation.weight_scale > 0)) return false;
-  for (const PlanePoint& p : observation.points)
-    if (!p.p_C.allFinite() || !(p.sigma > 0)) return false;
+  if (!validateObservation(observation).empty()) return false;
   MapKeyframe& kf = keyframe(observation.keyframe);
   // An observation without points would count as a perfect fit.
   if (observation.points.empty()) {

@@ -17,7 +17,7 @@ GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job) {
     solution.summary = solver->solve(solution.built.problem, options);
     if (round + 1 < kRounds) {
       storeProblem(solution.built, job.noise, &map);
-      removeOutliers(solution.built, job.settings.measurement.outlier_chi2, &map);
+      solution.outliers = removeOutliers(solution.built, job.settings.measurement.outlier_chi2, &map);
     }
   }
   return solution;
@@ -49,6 +49,10 @@ void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map*
     if (held[p]) seen_by.erase(solution.built.planes[p]);
   for (const auto& plane : seen_by) map->movePlane(plane.first, motion.at(plane.second));
   storeProblem(solution.built, noise, map);
+  for (const OutlierView& outlier : solution.outliers) {
+    const LandmarkId id = map->resolve(outlier.landmark);
+    if (map->hasLandmark(id)) map->removeObservation(id, outlier.keyframe);
+  }
 }
 
 }  // namespace vip_slam

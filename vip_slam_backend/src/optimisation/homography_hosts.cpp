@@ -55,15 +55,6 @@ struct SeenPlane {
   bool known = false;
 };
 
-// As homographyDepthRatio() of a frame with itself.
-bool seesWell(const SeenPlane& plane, const Eigen::Vector2f& xy) {
-  if (std::abs(plane.distance) < kMinPlaneDistance) return false;
-  const double x = xy.x(), y = xy.y();
-  const double incidence = plane.n_C.x() * x + plane.n_C.y() * y + plane.n_C.z();
-  return incidence * incidence >= kMinIncidence * kMinIncidence * (x * x + y * y + 1.0) &&
-         -plane.distance / incidence >= kMinPlaneDepth;
-}
-
 // Removes the first and the last third of a track's views from its possible hosts.
 void leaveMiddle(const LandmarkViews& views, int landmark, std::vector<char>* good) {
   const int first = views.first(landmark), end = first + static_cast<int>(views.end(landmark) - views.begin(landmark));
@@ -96,7 +87,7 @@ std::vector<int> chooseHosts(const LandmarkViews& views, const std::vector<int>&
         const Plane& p = planes[plane[l]].plane;
         plane_seen = {g.R_C_W * p.n, p.signedDistance(g.t_W_C), true};
       }
-      if (!v->own_track || !seesWell(plane_seen, v->xy)) continue;
+      if (!v->own_track || !mayHost(plane_seen.n_C, plane_seen.distance, v->xy.cast<double>())) continue;
       good[views.first(l) + view] = 1;
       if (hosts[l] < 0 && !shared) hosts[l] = view;
     }

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <unordered_map>
 
-#include "../util/union_find.h"
-
+#include "gauges.h"
 #include "landmark_views.h"
 #include "odometry_factors.h"
 #include "pixel_noise.h"
@@ -14,54 +12,6 @@
 #include "track_noise.h"
 
 namespace vip_slam {
-namespace {
-
-// Fixes position and yaw of every connected part without a fixed frame at its oldest frame; in parts without IMU also
-// roll and pitch.
-void addGauges(BaProblem* problem) {
-  UnionFind parts(problem->frames.size());
-  for (const BaPoint& p : problem->points)
-    for (int o = p.first + 1; o < p.first + p.count; ++o)
-      parts.join(problem->observations[p.first].frame, problem->observations[o].frame);
-  for (const BaImu& f : problem->imu) parts.join(f.i, f.j);
-  for (const BaRelativePose& f : problem->relative_poses) parts.join(f.i, f.j);
-  for (const BaHomography& f : problem->homographies) parts.join(f.i, f.j);
-  for (const BaHomographyPair& f : problem->homography_pairs) parts.join(f.i, f.j);
-  const int n = static_cast<int>(problem->frames.size());
-  std::vector<char> held(n, 0), inertial(n, 0);
-  for (int f = 0; f < n; ++f)
-    if (problem->frames[f].fixed) held[parts.find(f)] = 1;
-  for (const BaImu& f : problem->imu) inertial[parts.find(f.i)] = 1;
-  for (int f = 0; f < n; ++f) {
-    const int part = parts.find(f);
-    if (held[part]) continue;
-    held[part] = 1;  // frames ascend: f is the oldest of its part
-    BaGauge gauge;
-    gauge.frame = f;
-    gauge.prior.T_W_I = problem->frames[f].state.T_W_I;
-    gauge.prior.tilt = !inertial[part];
-    problem->gauges.push_back(gauge);
-  }
-}
-
-// Velocity and biases need a prior where there is no IMU factor from the frame before.
-void addMotionPriors(BaProblem* problem) {
-  std::vector<char> reached(problem->frames.size(), 0);
-  for (const BaImu& f : problem->imu) reached[f.j] = 1;
-  for (std::size_t f = 0; f < problem->frames.size(); ++f) {
-    const BaFrame& frame = problem->frames[f];
-    if (frame.fixed || reached[f]) continue;
-    BaMotionPrior prior;
-    prior.frame = static_cast<int>(f);
-    prior.prior.v_W = frame.state.v_W;
-    prior.prior.bias_gyro = frame.state.bias_gyro;
-    prior.prior.bias_accel = frame.state.bias_accel;
-    problem->motion_priors.push_back(prior);
-  }
-}
-
-}  // namespace
-
 BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings) {
   BuiltProblem built;
   BaProblem& problem = built.problem;

@@ -97,7 +97,7 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   }
 }
 
-int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
+std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
   const BaProblem& problem = built.problem;
   const std::vector<FrameGeometry> geometry = frameGeometry(problem);
   const auto fits = [&](const BaObservation& b, const Eigen::Vector3d& p_W, double most) {
@@ -106,20 +106,20 @@ int removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
     return reprojectionResidual(geometry[b.frame], p_W, Eigen::Vector2d(b.x, b.y), weight, &r) &&
            r.squaredNorm() <= most;
   };
-  int removed = 0;
+  std::vector<OutlierView> removed;
   for (std::size_t p = 0; p < problem.points.size(); ++p) {
     const BaPoint& point = problem.points[p];
     for (int o = point.first; o < point.first + point.count && map->hasLandmark(built.points[p]); ++o) {
       if (fits(problem.observations[o], point.p_W, chi2)) continue;
       map->removeObservation(built.points[p], built.observations[o].keyframe);
-      ++removed;
+      removed.push_back({built.points[p], built.observations[o].keyframe});
     }
   }
   for (const RefusedView& view : built.refused) {
     const MapLandmark* landmark = map->findLandmark(view.landmark);
     if (!landmark || fits(view.observation, landmark->p_W, kGross * chi2)) continue;
     map->removeObservation(view.landmark, view.keyframe);
-    ++removed;
+    removed.push_back({view.landmark, view.keyframe});
   }
   return removed;
 }

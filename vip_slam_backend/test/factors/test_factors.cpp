@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "factors/depth_ratio.h"
 #include "vip_slam_backend/factors/gauge_prior.h"
 #include "vip_slam_backend/factors/homography.h"
 #include "vip_slam_backend/factors/motion_prior.h"
@@ -42,7 +43,7 @@ struct Scene {
       const Eigen::Vector2d ray(gauss(0.3), gauss(0.3));
       double rho;
       HomographyPair p;
-      if (!homographyDepthRatio(i, j, plane, ray, &rho)) continue;
+      if (!depthRatio(i, j, plane, ray, &rho)) continue;
       const Eigen::Vector3d ray3(ray.x(), ray.y(), 1);
       const double z = -(plane.d + plane.n.dot(i.t_W_C)) / (i.R_C_W * plane.n).dot(ray3);
       const Eigen::Vector3d x = i.t_W_C + i.R_C_W.transpose() * (z * ray3);
@@ -111,7 +112,7 @@ TEST(Factors, HomographyMapsPointsWithTheDepthRatio) {
   for (const HomographyPair& p : s.pairs(i, j, plane, 10, 0)) {
     EXPECT_LT((homographyRows(p) * h).norm(), 1e-9);
     double rho;
-    ASSERT_TRUE(homographyDepthRatio(i, j, plane, p.xy_i, &rho));
+    ASSERT_TRUE(depthRatio(i, j, plane, p.xy_i, &rho));
     EXPECT_NEAR(h.tail<3>().dot(Eigen::Vector3d(p.xy_i.x(), p.xy_i.y(), 1)), rho, 1e-9);
   }
 }
@@ -183,11 +184,11 @@ TEST(Factors, WeakHomographiesAreRefused) {
   const FrameGeometry i(identity, identity),
       j(SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.3, 0, 0)), identity);
   double rho;
-  EXPECT_TRUE(homographyDepthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 2), Eigen::Vector2d(0, 0), &rho));
+  EXPECT_TRUE(depthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 2), Eigen::Vector2d(0, 0), &rho));
   // Camera nearly in the plane; ray nearly along it; plane behind.
-  EXPECT_FALSE(homographyDepthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 0.1), Eigen::Vector2d(0, 0), &rho));
-  EXPECT_FALSE(homographyDepthRatio(i, j, Plane(Eigen::Vector3d(0, -1, -0.05), 2), Eigen::Vector2d(0, 0), &rho));
-  EXPECT_FALSE(homographyDepthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), -2), Eigen::Vector2d(0, 0), &rho));
+  EXPECT_FALSE(depthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), 0.1), Eigen::Vector2d(0, 0), &rho));
+  EXPECT_FALSE(depthRatio(i, j, Plane(Eigen::Vector3d(0, -1, -0.05), 2), Eigen::Vector2d(0, 0), &rho));
+  EXPECT_FALSE(depthRatio(i, j, Plane(Eigen::Vector3d(0, 0, -1), -2), Eigen::Vector2d(0, 0), &rho));
 }
 
 TEST(Factors, PointToPlaneJacobianAndCompression) {

@@ -110,12 +110,12 @@ TEST(PlaneFactors, AWrongViewNeitherPullsItsLandmarkNorStays) {
   BuiltProblem built = buildProblem(wall.map, globalScope(wall.map), wall.settings);
   storeProblem(built, ImuNoise(), &wall.map);
   EXPECT_LT((wall.map.landmark(5).p_W - Wall::point(4)).norm(), 0.003);  // the mean of all views would be 8 mm off
-  EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map), 1);
+  EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map).size(), 1u);
   for (const MapObservation& o : wall.map.landmark(5).observations) EXPECT_NE(o.keyframe, 7u);
   // A view that agrees with the optimised poses is no outlier.
   built.refused.front().observation.x -= 10.0 / kFocal;
   built.refused.front().keyframe = 6;
-  EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map), 0);
+  EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map).size(), 0u);
 }
 
 TEST(PlaneFactors, AWrongHostMakesItAPointOfItsOwn) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 
+#include "factors/depth_ratio.h"
 #include "vip_slam_backend/factors/frame_geometry.h"
 #include "vip_slam_backend/solver/ba_problem.h"
 
@@ -126,8 +127,7 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
         pair.pair.xy_i = Eigen::Vector2d(seen[0].x, seen[0].y);
         pair.pair.xy_j = Eigen::Vector2d(seen[s].x, seen[s].y);
         double rho = 1;
-        if (!homographyDepthRatio(geometry[pair.i], geometry[pair.j], walls[wall].first, pair.pair.xy_i, &rho))
-          continue;
+        if (!depthRatio(geometry[pair.i], geometry[pair.j], walls[wall].first, pair.pair.xy_i, &rho)) continue;
         pair.pair.weight = focal / (1.4 * sigma_px * rho);
         p.homography_pairs.push_back(pair);
       }

@@ -66,8 +66,6 @@ std::vector<MapUpdate> MappingThread::process(const KeyframePtr& keyframe) {
   std::vector<MapUpdate> updates;
   if (planes_) planes_->addKeyframe(keyframe);
   updates.push_back(back_end_->addKeyframe(keyframe));
-  const std::string& refusal = back_end_->lastRefusal();
-  if (!refusal.empty()) refusals_.push_back("keyframe " + std::to_string(keyframe->id) + ": " + refusal);
   distribute(updates.back());
   if (back_end_->globalBaWanted()) {
     ScopedTimer adjustment(timing_, "mapping.global_ba", keyframe->frame.t);
@@ -83,11 +81,13 @@ void MappingThread::distribute(const MapUpdate& update) {
   T_map_odom_ = update.T_map_odom;
   epoch_ = update.epoch;
   placed_ = update.newest_keyframe != 0;
-  if (!planes_) return;
-  back_end_->applyPlaneUpdate(planes_->applyMapUpdate(update));
-  for (const PlaneEstimate& estimate : planes_->planes()) {
-    plane_history_.push_back({update.t, estimate.id, estimate.plane});
+  if (planes_) {
+    back_end_->applyPlaneUpdate(planes_->applyMapUpdate(update));
+    for (const PlaneEstimate& estimate : planes_->planes()) {
+      plane_history_.push_back({update.t, estimate.id, estimate.plane});
+    }
   }
+  for (const std::string& reason : back_end_->takeRefusals()) refusals_.push_back("refused: " + reason);
 }
 
 void MappingThread::finish() {

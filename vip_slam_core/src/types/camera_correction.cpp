@@ -1,7 +1,18 @@
 #include "vip_slam_core/types/camera_correction.h"
 
+#include <cmath>
+
 namespace vip_slam {
 namespace {
+
+constexpr double kLargestOffset = 10;    // m
+constexpr double kLargestBearing = 0.2;  // share of the focal length
+constexpr double kLargestShift = 100;    // px
+
+template <class Derived>
+bool within(const Eigen::MatrixBase<Derived>& values, double limit) {
+  return values.allFinite() && values.cwiseAbs().maxCoeff() <= limit;
+}
 
 /// Maps (x, y, 1) with the bearing correction `from` to those with `to`.
 Eigen::Matrix3f bearingChange(const BearingCorrection& from, const BearingCorrection& to) {
@@ -17,6 +28,17 @@ Eigen::Matrix3f pointChange(const CameraCorrection& from, const CameraCorrection
 }
 
 }  // namespace
+
+std::string validateCameraCorrection(const CameraCorrection& correction) {
+  if (!(std::abs(correction.offset) <= kLargestOffset))
+    return "depth offset of " + std::to_string(correction.offset) + " m";
+  if (!within(correction.bearing.value, kLargestBearing))
+    return "bearings are not finite, or changed by more than a fifth";
+  if (!within(correction.shift.px, kLargestShift) || !within(correction.shift.bearing, kLargestBearing))
+    return "the depth image's shift is not finite, or too large";
+  const std::string curve = validateDepthCurve(correction.curve);
+  return curve.empty() ? "" : "depth curve: " + curve;
+}
 
 KeyframePtr withCameraCorrection(const KeyframePtr& keyframe, const CameraCorrection& correction) {
   if (keyframe->frame.camera_correction == correction) return keyframe;

@@ -15,11 +15,6 @@ constexpr std::size_t kMaxSightings = 12;
 
 }  // namespace
 
-LandmarkId PointAssociation::resolve(LandmarkId id) const {
-  for (auto it = alias_.find(id); it != alias_.end(); it = alias_.find(id)) id = it->second;
-  return id;
-}
-
 void PointAssociation::assign(LandmarkId id, Landmark* landmark, PlaneId candidate, PlaneId plane) {
   undecided_ -= undecided(*landmark);
   for (PlaneId old : {landmark->candidate, landmark->plane}) {
@@ -59,9 +54,9 @@ void PointAssociation::setPlane(LandmarkId id, Landmark* landmark, PlaneId plane
 
 void PointAssociation::applyMapUpdate(const MapUpdate& update) {
   for (const auto& [from, into] : update.merged_landmarks) {
-    const LandmarkId target = resolve(into), source = resolve(from);
+    const LandmarkId target = aliases_.resolve(into), source = aliases_.resolve(from);
     if (source == target) continue;
-    alias_[source] = target;
+    aliases_.merge(source, target);
     const auto it = landmarks_.find(source);
     if (it == landmarks_.end()) continue;
     const Landmark moved = it->second;
@@ -78,12 +73,12 @@ void PointAssociation::applyMapUpdate(const MapUpdate& update) {
     if (!kept.plane && moved.plane) setPlane(target, &kept, moved.plane);
   }
   for (LandmarkId id : update.removed_landmarks) {
-    const auto it = landmarks_.find(resolve(id));
+    const auto it = landmarks_.find(aliases_.resolve(id));
     if (it != landmarks_.end()) erase(it);
   }
   for (const LandmarkEstimate& estimate : update.landmarks) {
     if (!estimate.p_W.allFinite()) continue;
-    Landmark& landmark = landmarks_[resolve(estimate.id)];
+    Landmark& landmark = landmarks_[aliases_.resolve(estimate.id)];
     landmark.p_W = estimate.p_W;
     landmark.placed = true;
   }
@@ -94,7 +89,8 @@ void PointAssociation::addSightings(const Keyframe& keyframe) {
   for (std::uint32_t i = 0; i < features.size(); ++i) {
     const Feature& f = features[i];
     if (f.id == kNoLandmark) continue;
-    landmarks_[resolve(f.id)].sightings.push_back({keyframe.id, i, f.xy, f.depth, f.depth_sigma, f.pixel_sigma});
+    landmarks_[aliases_.resolve(f.id)].sightings.push_back(
+        {keyframe.id, i, f.xy, f.depth, f.depth_sigma, f.pixel_sigma});
   }
 }
 
@@ -102,7 +98,7 @@ void PointAssociation::renewSightings(const Keyframe& keyframe) {
   const std::vector<Feature>& features = keyframe.frame.features;
   for (std::uint32_t i = 0; i < features.size(); ++i) {
     const Feature& f = features[i];
-    const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(resolve(f.id));
+    const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(aliases_.resolve(f.id));
     if (it == landmarks_.end()) continue;
     for (Sighting& s : it->second.sightings) {
       if (s.keyframe == keyframe.id && s.feature == i) s.xy = f.xy, s.depth = f.depth;
@@ -112,7 +108,7 @@ void PointAssociation::renewSightings(const Keyframe& keyframe) {
 
 void PointAssociation::removeKeyframe(const Keyframe& keyframe) {
   for (const Feature& f : keyframe.frame.features) {
-    const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(resolve(f.id));
+    const auto it = f.id == kNoLandmark ? landmarks_.end() : landmarks_.find(aliases_.resolve(f.id));
     if (it == landmarks_.end()) continue;
     std::vector<Sighting>& s = it->second.sightings;
     s.erase(std::remove_if(s.begin(), s.end(), [&](const Sighting& o) { return o.keyframe == keyframe.id; }), s.end());
@@ -121,8 +117,10 @@ void PointAssociation::removeKeyframe(const Keyframe& keyframe) {
 }
 
 bool PointAssociation::isDue(const Landmark& landmark) const {
-  // Associated points are tested again when their number of sightings has doubled.
-  const std::size_t due = landmark.plane ? 2 * landmark.tested : landmark.tested + 1;
+  // Associated points are tested again when their number of sightings has doubled, and then at each sighting until they
+  // pass or are given up.
+  const bool settled = landmark.plane && landmark.failures == 0;
+  const std::size_t due = settled ? 2 * landmark.tested : landmark.tested + 1;
   return landmark.sightings.size() >= std::max<std::size_t>(options_.min_keyframes, due);
 }
 
@@ -191,7 +189,7 @@ void PointAssociation::process(const Keyframe& keyframe, const SurfaceLabels& la
   if (pose == poses.end()) return;
   for (const Feature& f : keyframe.frame.features) {
     if (f.id == kNoLandmark) continue;
-    const LandmarkId id = resolve(f.id);
+    const LandmarkId id = aliases_.resolve(f.id);
     const auto it = landmarks_.find(id);
     if (it == landmarks_.end()) continue;
     Landmark& landmark = it->second;
@@ -261,7 +259,7 @@ void PointAssociation::clear() {
   landmarks_.clear();
   on_plane_.clear();
   undecided_ = 0;
-  alias_.clear();
+  aliases_.clear();
   associated_.clear();
   dissociated_.clear();
 }
@@ -269,7 +267,7 @@ void PointAssociation::clear() {
 std::vector<std::pair<LandmarkId, PlaneId>> PointAssociation::takeAssociated() {
   // The final state per landmark, ordered by id, so that the output does not depend on the hash table.
   std::set<LandmarkId> ids;
-  for (const auto& [id, plane] : associated_) ids.insert(resolve(id));
+  for (const auto& [id, plane] : associated_) ids.insert(aliases_.resolve(id));
   std::vector<std::pair<LandmarkId, PlaneId>> result;
   for (LandmarkId id : ids) {
     const PlaneId plane = planeOf(id);
@@ -289,7 +287,7 @@ std::vector<LandmarkId> PointAssociation::takeDissociated() {
 }
 
 PlaneId PointAssociation::planeOf(LandmarkId id) const {
-  const auto it = landmarks_.find(resolve(id));
+  const auto it = landmarks_.find(aliases_.resolve(id));
   return it == landmarks_.end() ? 0 : it->second.plane;
 }
 

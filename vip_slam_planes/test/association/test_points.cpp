@@ -6,6 +6,7 @@
 
 #include "scene.h"
 #include "vip_slam_planes/association/consistency_test.h"
+#include "vip_slam_planes/association/point_association.h"
 #include "vip_slam_planes/plane_mapper.h"
 
 namespace vip_slam {
@@ -54,6 +55,45 @@ TEST(Consistency, NeedsSightingsInFront) {
   const Plane wall({-1, 0, 0}, 3);
   EXPECT_FALSE(testConsistency({}, wall, {3, 0, 1}, 525, {}).solved);
   EXPECT_FALSE(testConsistency(sightings({-3, 0, 1}, 1, 4, 0, 1), wall, {-3, 0, 1}, 525, {}).solved);
+}
+
+// A point 5 cm before the wall. At first all views are alike, so that it passes for a point on the wall; then the
+// camera moves sideways. It is tested after twice as many views as before, and then with each view until it has failed
+// often enough.
+TEST(Points, OneThatFailsIsGivenUpSoon) {
+  constexpr double kFocal = 525;
+  PointAssociationOptions options;
+  PointAssociation points(options, kFocal, 0.002);
+  const Plane wall({-1, 0, 0}, 3);
+  const auto find = [&wall](PlaneId id) { return id == 7 ? &wall : nullptr; };
+  const Eigen::Vector3d p(2.95, 0.1, 1.2);
+  SurfaceLabels labels;
+  labels.stride = 100, labels.cols = 7, labels.rows = 5;
+  labels.label.assign(35, 0);
+  CameraPoses poses;
+  int associated_at = 0, dropped_at = 0;
+  for (int k = 1; k <= 20; ++k) {
+    Keyframe keyframe;
+    keyframe.id = static_cast<KeyframeId>(k);
+    const double side = k <= 6 ? 0.0 : 0.15 * (k - 6);
+    poses[keyframe.id] = lookAt({0, side, 1.2}, {3, side, 1.2});
+    const Eigen::Vector3d q = poses[keyframe.id].inverse() * p;
+    Feature f;
+    f.id = 1;
+    f.xy = (q.head<2>() / q.z()).cast<float>();
+    f.pixel = (q.head<2>() / q.z() * kFocal + Eigen::Vector2d(320, 240)).cast<float>();
+    if (k == 1) f.depth = static_cast<float>(q.z()), f.depth_sigma = 0.1f;
+    keyframe.frame.features.push_back(f);
+    MapUpdate placed;
+    placed.landmarks.push_back({1, p, 0});
+    points.addSightings(keyframe);
+    points.applyMapUpdate(placed);
+    points.process(keyframe, labels, {7}, {1}, poses, find);
+    if (points.planeOf(1) == 7 && associated_at == 0) associated_at = k;
+    if (points.planeOf(1) == 0 && associated_at != 0 && dropped_at == 0) dropped_at = k;
+  }
+  EXPECT_EQ(associated_at, options.min_keyframes);
+  EXPECT_EQ(dropped_at, 2 * options.min_keyframes + options.max_failures - 1);
 }
 
 struct World {

@@ -34,9 +34,14 @@ constexpr double kMinPlaneDistance = 0.15;
 /// below kMinPlaneDepth, metres.
 constexpr double kMinDepthRatio = 0.25, kMaxDepthRatio = 4.0, kMinIncidence = 0.1736, kMinPlaneDepth = 0.05;
 
-/// Depth ratio z_j / z_i of the plane point seen at xy_i; false when the geometry is too weak for a factor (above).
-bool homographyDepthRatio(const FrameGeometry& i, const FrameGeometry& j, const Plane& plane,
-                          const Eigen::Vector2d& xy_i, double* rho);
+/// Whether a camera with normal `n_C` of a plane in its axes, at signed `distance` from it, may be the host of its
+/// point at xy (above): far enough from the plane, the ray not along it, the point before the camera.
+inline bool mayHost(const Eigen::Vector3d& n_C, double distance, const Eigen::Vector2d& xy) {
+  const double incidence = n_C.dot(xy.homogeneous());
+  return std::abs(distance) >= kMinPlaneDistance &&
+         incidence * incidence >= kMinIncidence * kMinIncidence * (xy.squaredNorm() + 1.0) &&
+         -distance / incidence >= kMinPlaneDepth;
+}
 
 /// H p_i for p_i = (xy_i, 1); the third entry is the depth ratio.
 inline Eigen::Vector3d transfer(const Vector9d& h, const Eigen::Vector2d& xy_i) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vip_slam_backend/map/map_types.h"
+#include "vip_slam_core/types/landmark_aliases.h"
 
 namespace vip_slam {
 
@@ -64,7 +65,7 @@ class Map {
   /// features, or they are the same.
   bool mergeLandmarks(LandmarkId from, LandmarkId into);
   /// Follows merges: the id under which a track is known now; the id itself when it was never merged.
-  LandmarkId resolve(LandmarkId id) const;
+  LandmarkId resolve(LandmarkId id) const { return aliases_.resolve(id); }
 
   bool hasLandmark(LandmarkId id) const { return landmarks_.count(id) != 0; }
   MapLandmark& landmark(LandmarkId id);  ///< throws MapError when there is none
@@ -86,7 +87,7 @@ class Map {
   bool hasPlane(PlaneId id) const { return planes_.count(id) != 0; }
   const std::map<PlaneId, MapPlane>& planes() const { return planes_; }
   /// Replaces the observation of the same keyframe and plane; one without points removes it. Ignored (false) when
-  /// keyframe or plane do not exist, or the numbers are not finite.
+  /// keyframe or plane do not exist, or validateObservation() finds fault with it.
   bool setPlaneObservation(const PlaneObservation& observation);
   /// 0 removes the association.
   void associate(LandmarkId landmark, PlaneId plane);
@@ -104,16 +105,20 @@ class Map {
   MapKeyframe& insert(const KeyframePtr& data, const NavState& state, KeyframeId previous,
                       const std::shared_ptr<const std::vector<ImuSample>>& imu, const ImuNoise& noise);
   void updateDescriptor(MapLandmark& landmark);
+  /// Forgets those of tracks that no keyframe contains any more.
+  void forgetAliases();
 
   std::map<KeyframeId, MapKeyframe> keyframes_;
   std::unordered_map<LandmarkId, MapLandmark> landmarks_;
-  std::unordered_map<LandmarkId, LandmarkId> merged_into_;
+  LandmarkAliases aliases_;
   std::map<PlaneId, MapPlane> planes_;
   MapChanges changes_;
 };
 
 /// Empty when the keyframe may enter a map, else the reason ("keyframe 7: feature 12 is not finite").
 std::string validateKeyframe(const Keyframe& keyframe);
+/// The same for a plane's observation; whether keyframe and plane exist is not looked at.
+std::string validateObservation(const PlaneObservation& observation);
 
 int hammingDistance(const Descriptor& a, const Descriptor& b);
 

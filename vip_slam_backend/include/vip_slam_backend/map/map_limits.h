@@ -10,6 +10,7 @@ constexpr double kMaxRate = 1e3;          ///< rad/s
 constexpr double kMaxAcceleration = 1e4;  ///< m/s^2
 constexpr double kMaxNoiseScale = 1e4;    ///< of the IMU
 constexpr double kLongestImu = 1e4;       ///< s, of one keyframe
+constexpr double kLongestImuStep = 0.2;   ///< s, between samples; over a longer one the motion is unknown
 /// Largest difference of keyframe ids in a map, since tables are indexed by them: three months of keyframes.
 constexpr std::uint64_t kWidestIds = std::uint64_t{1} << 24;
 constexpr double kUnitNormal = 1e-7;  ///< tolerance of the length of a plane's normal

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "vip_slam_backend/optimisation/problem_builder.h"
 #include "vip_slam_backend/solver/ba_solver.h"
@@ -21,15 +23,17 @@ struct GlobalBaProblem {
 
 struct GlobalBaSolution {
   BuiltProblem built;
-  SolverSummary summary;  ///< of the last round
+  std::vector<OutlierView> outliers;  ///< found between the rounds and left out of the last one
+  SolverSummary summary;              ///< of the last round
 };
 
 /// Solves in rounds: between them homographies are compressed again at the better estimate (depth ratios, gates,
 /// weights).
 GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job);
 
-/// Writes the solution into `map`. Keyframes and landmarks added meanwhile, and planes that only such keyframes see,
-/// move rigidly with the newest keyframe of the solution; what was removed meanwhile stays removed.
+/// Writes the solution into `map` and removes its outliers. Keyframes and landmarks added meanwhile, and planes that
+/// only such keyframes see, move rigidly with the newest keyframe of the solution; what was removed meanwhile stays
+/// removed.
 void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map* map);
 
 }  // namespace vip_slam

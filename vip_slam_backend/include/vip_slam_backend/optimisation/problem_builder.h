@@ -30,6 +30,11 @@ struct RefusedView {
   BaObservation observation;
 };
 
+struct OutlierView {
+  LandmarkId landmark = kNoLandmark;
+  KeyframeId keyframe = 0;
+};
+
 struct BuiltProblem {
   BaProblem problem;
   std::vector<KeyframeId> frames;  ///< per problem frame; 0: the world frame of outside planes
@@ -64,8 +69,8 @@ std::vector<char> heldPlanes(const BaProblem& problem);
 void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);
 
 /// Removes observations with a residual above `chi2` (squared sigmas, each at least the gate's) or behind the camera;
-/// returns their number. To be called after storeProblem(): the refused views of landmarks on planes are judged by the
+/// returns them. To be called after storeProblem(): the refused views of landmarks on planes are judged by the
 /// position stored there.
-int removeOutliers(const BuiltProblem& built, double chi2, Map* map);
+std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, Map* map);
 
 }  // namespace vip_slam

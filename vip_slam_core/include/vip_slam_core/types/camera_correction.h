@@ -4,10 +4,15 @@
 // readings, while pixels of features and of the grid stay and get other readings.
 #pragma once
 
+#include <string>
+
 #include "vip_slam_core/types/keyframe.h"
 #include "vip_slam_core/types/plane_map.h"
 
 namespace vip_slam {
+
+/// Message on what is wrong, empty when nothing is: not finite, or more than a camera can be off by.
+std::string validateCameraCorrection(const CameraCorrection& correction);
 
 /// The keyframe with `correction` instead of its present correction of readings and bearings; the same object when they
 /// are equal. Sigmas, pixels and the grid's layout, which is in pixels, stay.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "vip_slam_core/types/keyframe.h"
+#include "vip_slam_core/types/landmark_aliases.h"
 #include "vip_slam_core/types/map_update.h"
 #include "vip_slam_core/types/plane_map.h"
 #include "vip_slam_planes/association/surface_labels.h"
@@ -29,6 +30,9 @@ class PointAssociation {
   /// Replaces its sightings after a new camera correction.
   void renewSightings(const Keyframe& keyframe);
   void removeKeyframe(const Keyframe& keyframe);
+
+  /// Ids of merged landmarks: whoever owns the keyframes tells at times which tracks they still contain.
+  LandmarkAliases& aliases() { return aliases_; }
 
   using FindPlane = std::function<const Plane*(PlaneId)>;
   /// Adds candidates from a keyframe whose nodes are labelled with indices into `plane_of_label`; decides on those that
@@ -73,7 +77,6 @@ class PointAssociation {
   };
   using Landmarks = std::unordered_map<LandmarkId, Landmark>;
   static bool undecided(const Landmark& landmark) { return landmark.candidate && !landmark.plane; }
-  LandmarkId resolve(LandmarkId id) const;
   void assign(LandmarkId id, Landmark* landmark, PlaneId candidate, PlaneId plane);
   void erase(Landmarks::iterator it);
   std::vector<LandmarkId> landmarksOf(PlaneId plane) const;
@@ -90,7 +93,7 @@ class PointAssociation {
   Landmarks landmarks_;
   std::unordered_map<PlaneId, std::unordered_set<LandmarkId>> on_plane_;  ///< candidates and associated ones
   std::size_t undecided_ = 0;
-  std::unordered_map<LandmarkId, LandmarkId> alias_;
+  LandmarkAliases aliases_;
   std::vector<std::pair<LandmarkId, PlaneId>> associated_;
   std::vector<LandmarkId> dissociated_;
 };
