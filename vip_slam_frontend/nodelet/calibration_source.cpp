@@ -66,13 +66,16 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
       return std::nullopt;
     }
     if (!asked_since_ || t < *asked_since_) asked_since_ = t;
-    const auto T_imu_cam = lookUpTransform(tf_, imu_frame_, color_frame_);
+    const bool one_frame = bareFrame(imu_frame_) == bareFrame(color_frame_);
+    const auto T_imu_cam = lookUpExtrinsics(tf_, imu_frame_, color_frame_);
     const auto T_base_imu = lookUpTransform(tf_, options_.base_frame, imu_frame_);
     const bool patient = options_.extrinsics == "tf" || t - *asked_since_ < options_.tf_patience;
     if (!(T_imu_cam && T_base_imu) && patient) {
       const std::string& target = T_imu_cam ? options_.base_frame : imu_frame_;
       const std::string& source = T_imu_cam ? imu_frame_ : color_frame_;
       waiting_for_ = "tf does not connect '" + source + "' to '" + target + "' yet";
+      if (!T_imu_cam && one_frame)
+        waiting_for_ = "image and IMU name the same frame, '" + source + "': tf cannot tell where they are";
       return std::nullopt;
     }
     if (T_imu_cam) sensor_.T_imu_cam = *T_imu_cam;

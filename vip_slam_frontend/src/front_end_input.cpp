@@ -97,7 +97,7 @@ void FrontEnd::Impl::clockRanBack(const std::string& reason) {
 
 void FrontEnd::Impl::countImu() {
   const ImuBufferCounters& c = imu_.counters();
-  counters_.imu_rejected = c.out_of_order + c.duplicate + c.not_finite;
+  counters_.imu_rejected = c.out_of_order + c.ahead + c.duplicate + c.not_finite;
   counters_.imu_gaps = c.gaps;
   counters_.imu_spikes = c.spikes;
   counters_.gyro_cut_off = gyro_range_.samples();
@@ -106,16 +106,16 @@ void FrontEnd::Impl::countImu() {
 
 bool FrontEnd::Impl::addImu(const ImuSample& sample) {
   if (!imu_.empty() && std::isfinite(sample.t)) noticeTimeJump(sample.t, imu_.newest(), "IMU");
-  gyro_range_.add(sample.t, sample.gyro);
   const bool accepted = imu_.add({sample.t, correctedRate(sample.gyro, sensor_.gyro_correction), sample.accel});
+  if (accepted) gyro_range_.add(sample.t, sample.gyro);
   countImu();
   return accepted;
 }
 
 bool FrontEnd::Impl::addGyro(double t, const Eigen::Vector3d& gyro) {
   if (!imu_.empty() && std::isfinite(t)) noticeTimeJump(t, imu_.newest(), "gyro");
-  gyro_range_.add(t, gyro);
   const bool accepted = imu_.addGyro(t, correctedRate(gyro, sensor_.gyro_correction));
+  if (accepted) gyro_range_.add(t, gyro);
   countImu();
   return accepted;
 }
@@ -220,7 +220,8 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   landmarks_.forgetPatches();
   surfaces_.clear();
   moving_ = {};
-  moving_imu_t_ = last_depth_t_ = -1e300;  // the clock may have run back
+  moving_imu_t_ = last_depth_t_ = cut_off_imu_t_ = -1e300;  // the clock may have run back
+  gyro_range_.forgetTimes();
   filter_.stop();
   initialiser_.reset();
   stillness_.reset();

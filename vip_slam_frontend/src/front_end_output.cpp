@@ -184,7 +184,8 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
     frame->depth_grid = depthGrid(options_.frame_grid_stride);
   }
   output.frame = frame;
-  const double horizon = std::max(2.0, options_.initialisation.standing_seconds + 0.5);
+  const double horizon =
+      std::max({2.0, options_.initialisation.standing_seconds + 0.5, options_.filter.zupt.window + 0.5});
   imu_.dropBefore(last_keyframe_ != 0 ? std::min(last_keyframe_imu_t_, t_imu - horizon) : t_imu - horizon);
   return output;
 }

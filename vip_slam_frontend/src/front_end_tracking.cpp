@@ -118,7 +118,9 @@ std::string FrontEnd::Impl::keyframeReason(const TrackingResult& tracked, bool h
   const bool constrains = tracked.tracked >= options_.recovery.min_tracks || surfaces_hold;
   if (phase_ != Phase::kTracking || depth_comes || !constrains) return "";
   const SE3 T_now = filter_.nav().T_W_I * extrinsics();
-  return selector_.decide(t, T_now, makeFrame(t, true)->features, camera_->focal(), still_);
+  std::vector<Feature> features = makeFrame(t, true)->features;
+  correctDepth(&features);  // the selector compares them with those of the last keyframe
+  return selector_.decide(t, T_now, features, camera_->focal(), still_);
 }
 
 FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gray, const DepthReading& depth_read,

@@ -18,6 +18,12 @@ std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::str
   }
 }
 
+std::optional<SE3> lookUpExtrinsics(const tf2::BufferCore& buffer, const std::string& imu_frame,
+                                    const std::string& camera_frame) {
+  if (bareFrame(imu_frame) == bareFrame(camera_frame)) return std::nullopt;
+  return lookUpTransform(buffer, imu_frame, camera_frame);
+}
+
 ExtrinsicsGap extrinsicsGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b) {
   ExtrinsicsGap gap;
   gap.degrees = T_imu_cam_a.rotation().angularDistance(T_imu_cam_b.rotation()) * 180 / M_PI;

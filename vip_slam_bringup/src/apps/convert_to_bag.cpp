@@ -1,25 +1,30 @@
 // rosrun vip_slam_bringup convert_to_bag euroc|tum_rgbd|stray FOLDER --out NAME.bag
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <iostream>
+#include <stdexcept>
 
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_core/util/command_line.h"
 
 namespace {
 
+volatile std::sig_atomic_t interrupted = 0;
+
 void addCommon(vip_slam::CommandLine& line, vip_slam::ConversionOptions* options) {
   line.argument("folder", options->folder, "the data set's folder");
   line.option("out,o", options->bag, "bag to write; NAME_sensor.yaml and NAME_truth.tum appear beside it");
   line.required("out");
   line.flag("force,f", options->overwrite, "overwrite the bag");
-  if (::isatty(STDERR_FILENO)) {
-    options->progress = [](std::size_t done, std::size_t all) {
-      if (done % 200 == 0 || done == all)
-        std::fprintf(stderr, "\r%3zu %% of %zu messages%s", 100 * done / all, all, done == all ? "\n" : "");
-    };
-  }
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  options->progress = [shown = ::isatty(STDERR_FILENO) != 0](std::size_t done, std::size_t all) {
+    if (interrupted) throw std::runtime_error("interrupted, nothing is left behind");
+    if (shown && (done % 200 == 0 || done == all))
+      std::fprintf(stderr, "\r%3zu %% of %zu messages%s", 100 * done / all, all, done == all ? "\n" : "");
+  };
 }
 
 int printReport(const vip_slam::ConversionReport& report) {

@@ -24,6 +24,9 @@ void finishConversion(const ConversionOptions& options, const SensorConfig& sens
     if (!truth.empty()) {
       report->files.push_back(stem + "_truth.tum");
       writeTum(report->files.back(), truth);
+    } else {  // that of another recording, which this bag replaced
+      std::error_code ignored;
+      std::filesystem::remove(stem + "_truth.tum", ignored);
     }
   } catch (...) {
     for (const std::string& file : report->files) {

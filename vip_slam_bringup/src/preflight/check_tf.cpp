@@ -17,9 +17,14 @@ Findings checkTf(const Recording& r) {
       out.push_back({Severity::kNote, role, "messages have an empty frame_id",
                      "tf cannot be used for it; the sensor file's extrinsics are"});
   if (camera.empty() || imu.empty()) return out;
+  if (camera == imu) {
+    out.push_back({Severity::kNote, "tf", "image and IMU name the same frame, " + camera,
+                   "tf cannot tell where they are; the extrinsics of the sensor file are used"});
+    return out;
+  }
   tf2::BufferCore tf;
   for (const auto& transform : r.tf) tf.setTransform(transform, "recording", true);
-  const auto T_imu_cam = lookUpTransform(tf, imu, camera);
+  const auto T_imu_cam = lookUpExtrinsics(tf, imu, camera);
   if (!T_imu_cam) {
     std::string missing;
     for (const std::string& frame : {camera, imu})

@@ -40,7 +40,7 @@ BagExtrinsics extrinsicsInBag(const rosbag::Bag& bag, const SensorTopics& topics
   tf2::BufferCore tf;
   addAll(rosbag::View(bag, rosbag::TopicQuery("/tf"), begin, begin + ros::Duration(patience)), false, &tf);
   addAll(rosbag::View(bag, rosbag::TopicQuery("/tf_static")), true, &tf);
-  out.T_imu_cam = lookUpTransform(tf, out.imu_frame, out.camera_frame);
+  out.T_imu_cam = lookUpExtrinsics(tf, out.imu_frame, out.camera_frame);
   return out;
 }
 

@@ -45,7 +45,8 @@ std::string missingPoses(const Pipeline& pipeline) {
   const StateChange* worst = nullptr;
   for (auto it = first; it != states.end(); ++it) {
     if (hasPose(*it)) continue;
-    const double seconds = (std::next(it) == states.end() ? end : std::next(it)->t) - it->t;
+    // A clock that ran back ends a stretch without saying how long it was.
+    const double seconds = std::max(0.0, (std::next(it) == states.end() ? end : std::next(it)->t) - it->t);
     missing += seconds;
     if (seconds > longest) longest = seconds, worst = &*it;
   }

@@ -233,6 +233,17 @@ TEST_F(TumConverter, DepthKeepsItsUnitAndTheGyroIsMissed) {
   EXPECT_EQ(readTum((root_ / "out_truth.tum").string()).size(), 2u);
 }
 
+TEST_F(TumConverter, ABagThatReplacesAnotherLeavesNoTruthOfThat) {
+  makeFolder("rgbd_dataset_freiburg1_xyz");
+  convertTumRgbd(options_);
+  const std::string truth = bag_.substr(0, bag_.size() - 4) + "_truth.tum";
+  ASSERT_TRUE(fs::exists(truth));
+  fs::remove(root_ / "rgbd_dataset_freiburg1_xyz" / "groundtruth.txt");
+  options_.overwrite = true;
+  convertTumRgbd(options_);
+  EXPECT_FALSE(fs::exists(truth));
+}
+
 TEST_F(TumConverter, TheExifOrientationTurnsNothing) {
   makeFolder("rgbd_dataset_freiburg1_xyz");
   const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(10, 20, 30));

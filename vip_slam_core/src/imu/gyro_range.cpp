@@ -1,11 +1,13 @@
 #include "vip_slam_core/imu/gyro_range.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace vip_slam {
 namespace {
 
-constexpr double kMinEnd = 1.0;  // rad/s; no gyro has a smaller range
+// rad/s; no gyro has a smaller range (125 degrees per second), and a robot that turns at a steady rate is slower.
+constexpr double kMinEnd = 2.0;
 // Number of samples at exactly the extreme value that prove saturation: a stream that repeats each value a few times
 // has a few of them at its fastest turn.
 constexpr int kProof = 10;
@@ -20,10 +22,13 @@ void GyroRange::add(double t, const Eigen::Vector3d& rate) {
     const double value = k < 3 ? rate(k) : -rate(k - 3);
     if (!(value > kMinEnd)) continue;
     Extreme& extreme = extremes_[static_cast<std::size_t>(k)];
-    if (value > extreme.value * (1 + kSame)) {
-      extreme = {value, 1};
-    } else if (value >= extreme.value * (1 - kSame) && ++extreme.count >= kProof) {
-      cut = value;
+    // An extreme that is never reached again was a wrong sample.
+    const bool forgotten = extreme.count < kProof && std::abs(t - extreme.t) > kKept;
+    if (value > extreme.value * (1 + kSame) || forgotten) {
+      extreme = {value, t, 1};
+    } else if (value >= extreme.value * (1 - kSame)) {
+      extreme.t = t;
+      if (++extreme.count >= kProof) cut = value;
     }
   }
   if (cut == 0) return;

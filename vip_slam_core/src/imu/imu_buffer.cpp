@@ -24,14 +24,32 @@ ImuSample interpolate(const ImuSample& a, const ImuSample& b, double t) {
 }
 
 ImuBuffer::ImuBuffer(double gap_seconds, double capacity_seconds)
-    : gap_seconds_(gap_seconds), capacity_seconds_(capacity_seconds) {}
+    : gap_seconds_(gap_seconds),
+      capacity_seconds_(capacity_seconds),
+      united_(gap_seconds),
+      gyro_stream_(gap_seconds),
+      accel_stream_(gap_seconds) {}
 
-bool ImuBuffer::acceptable(double t, bool finite, double newest) {
+std::vector<ImuSample> ImuBuffer::Stream::add(const ImuSample& sample) {
+  std::vector<ImuSample> settled;
+  for (const ImuSample& in_time : stamps.add(sample)) {
+    for (const ImuSample& s : spikes.add(in_time)) settled.push_back(s);
+  }
+  return settled;
+}
+
+void ImuBuffer::Stream::clear() {
+  stamps.clear();
+  spikes.clear();
+}
+
+bool ImuBuffer::acceptable(double t, bool finite, const Stream& stream) {
   if (!std::isfinite(t) || !finite) {
     ++counters_.not_finite;
     return false;
   }
-  if (t == newest) {
+  const double newest = stream.stamps.newest();
+  if (t == newest || t == stream.stamps.waiting()) {
     ++counters_.duplicate;
     return false;
   }
@@ -42,18 +60,22 @@ bool ImuBuffer::acceptable(double t, bool finite, double newest) {
   return true;
 }
 
-void ImuBuffer::countSpikes() {
-  counters_.spikes = united_spikes_.spikes() + gyro_spikes_.spikes() + accel_spikes_.spikes();
+void ImuBuffer::countReplaced() {
+  counters_.spikes = counters_.ahead = 0;
+  for (const Stream* stream : {&united_, &gyro_stream_, &accel_stream_}) {
+    counters_.spikes += stream->spikes.spikes();
+    counters_.ahead += stream->stamps.dropped();
+  }
 }
 
 bool ImuBuffer::add(const ImuSample& sample) {
   // A failing bus delivers zeros; no sensor measures exactly zero on all axes.
   const bool silent = sample.gyro.isZero(0) && sample.accel.isZero(0);
   const bool finite = sample.gyro.allFinite() && sample.accel.allFinite() && !silent;
-  if (!acceptable(sample.t, finite, united_spikes_.newest())) return false;
+  if (!acceptable(sample.t, finite, united_)) return false;
   ++counters_.accepted;
-  for (const ImuSample& settled : united_spikes_.add(sample)) append(settled);
-  countSpikes();
+  for (const ImuSample& settled : united_.add(sample)) append(settled);
+  countReplaced();
   return true;
 }
 
@@ -65,25 +87,25 @@ void ImuBuffer::append(const ImuSample& sample) {
 
 bool ImuBuffer::addGyro(double t, const Eigen::Vector3d& gyro) {
   // With an empty buffer an earlier stamp is not out of order.
-  if (samples_.empty() && gyro_.empty() && t < gyro_spikes_.newest()) gyro_spikes_.clear();
-  if (!acceptable(t, gyro.allFinite(), gyro_spikes_.newest())) return false;
-  for (const ImuSample& settled : gyro_spikes_.add({t, gyro, Eigen::Vector3d::Zero()})) {
+  if (samples_.empty() && gyro_.empty() && t < gyro_stream_.stamps.newest()) gyro_stream_.clear();
+  if (!acceptable(t, gyro.allFinite(), gyro_stream_)) return false;
+  for (const ImuSample& settled : gyro_stream_.add({t, gyro, Eigen::Vector3d::Zero()})) {
     gyro_.push_back({settled.t, settled.gyro});
   }
   // Bounds memory when the other stream never arrives.
   while (!gyro_.empty() && gyro_.back().t - gyro_.front().t > capacity_seconds_) gyro_.pop_front();
-  countSpikes();
+  countReplaced();
   joinStreams();
   return true;
 }
 
 bool ImuBuffer::addAccel(double t, const Eigen::Vector3d& accel) {
-  if (!acceptable(t, accel.allFinite() && !accel.isZero(0), accel_spikes_.newest())) return false;
-  for (const ImuSample& settled : accel_spikes_.add({t, Eigen::Vector3d::Zero(), accel})) {
+  if (!acceptable(t, accel.allFinite() && !accel.isZero(0), accel_stream_)) return false;
+  for (const ImuSample& settled : accel_stream_.add({t, Eigen::Vector3d::Zero(), accel})) {
     accel_.push_back({settled.t, settled.accel});
   }
   while (!accel_.empty() && accel_.back().t - accel_.front().t > capacity_seconds_) accel_.pop_front();
-  countSpikes();
+  countReplaced();
   joinStreams();
   return true;
 }
@@ -152,9 +174,9 @@ void ImuBuffer::clear() {
   samples_.clear();
   gyro_.clear();
   accel_.clear();
-  united_spikes_.clear();
-  gyro_spikes_.clear();
-  accel_spikes_.clear();
+  united_.clear();
+  gyro_stream_.clear();
+  accel_stream_.clear();
 }
 
 }  // namespace vip_slam

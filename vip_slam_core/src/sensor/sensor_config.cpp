@@ -108,7 +108,7 @@ void readDepth(Section depth, SensorConfig* config) {
   if (!shift.empty() && shift.size() != 2)
     throw std::runtime_error("depth/shift: " + std::to_string(shift.size()) + " numbers, expected two: right and down");
   if (!shift.empty()) config->depth_shift = {shift[0], shift[1]};
-  if (!(config->depth_shift.cwiseAbs().maxCoeff() <= kMaxDepthShift))
+  if (!config->depth_shift.allFinite() || config->depth_shift.cwiseAbs().maxCoeff() > kMaxDepthShift)
     throw std::runtime_error("depth/shift: expected at most " + formatDouble(kMaxDepthShift) + " pixels");
   std::vector<double> added;
   depth.get("curve", added, false);
@@ -151,7 +151,7 @@ void readImu(Section imu, SensorConfig* config) {
   imu.number("accel_noise_density", config->imu_noise.accel_noise_density, 1e-9, 10);
   imu.number("accel_random_walk", config->imu_noise.accel_random_walk, 1e-9, 10);
   imu.matrix("gyro_correction", config->gyro_correction, false);
-  if (!(config->gyro_correction.cwiseAbs().maxCoeff() <= 0.2))
+  if (!config->gyro_correction.allFinite() || config->gyro_correction.cwiseAbs().maxCoeff() > 0.2)
     throw std::runtime_error("imu/gyro_correction: expected numbers from -0.2 to 0.2");
   imu.number("gyro_correction_sigma", config->imu_noise.gyro_correction_sigma, 1e-6, 0.2, false);
   imu.number("gravity", config->gravity, 9.0, 10.5, false);

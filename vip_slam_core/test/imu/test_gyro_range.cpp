@@ -29,12 +29,28 @@ TEST(GyroRange, FindsTheEndThatSamplesStopAt) {
   EXPECT_EQ(range.cutOff(3.88, 3.95), 0.0);
 }
 
+// One wrong sample beyond the end must not hide it for ever; a clock that ran back makes no old sample recent.
+TEST(GyroRange, AWrongSampleIsForgotten) {
+  GyroRange range;
+  for (int k = 0; k < 4000; ++k) {
+    Eigen::Vector3d rate = swing(k * kInterval);
+    rate.y() = k == 100 ? 40.0 : std::clamp(rate.y(), -3.49, 3.49);
+    range.add(k * kInterval, rate);
+  }
+  EXPECT_DOUBLE_EQ(range.end(), 3.49);
+  // Upwards, where the wrong sample was: fastest at 18.46 s.
+  EXPECT_DOUBLE_EQ(range.cutOff(18.44, 18.48), 3.49);
+  range.forgetTimes();
+  EXPECT_EQ(range.cutOff(0, 20), 0.0);
+  EXPECT_DOUBLE_EQ(range.end(), 3.49);
+}
+
 TEST(GyroRange, WhatOnlyTurnsFastOrRepeatsItsSamplesHasNoEnd) {
   GyroRange fast, repeating, slow;
   for (int k = 0; k < 2000; ++k) {
     fast.add(k * kInterval, swing(k * kInterval));
     repeating.add(k * kInterval, swing((k - k % 4) * kInterval));
-    slow.add(k * kInterval, {0.5, 0.5, 0.5});
+    slow.add(k * kInterval, {0.5, 0.5, 1.8});  // a simulated robot that turns steadily
   }
   EXPECT_EQ(fast.samples(), 0u);
   EXPECT_EQ(repeating.samples(), 0u);

@@ -297,7 +297,8 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("name:", "nom:", "name: missing");
   changed("time_offset:", "time_ofset:", "time_ofset: unknown key");
   changed("time_offset: -0.0123", "time_offset: -0.0123\ntime_offset: 0.03", "time_offset: stands there twice");
-  changed("gyro_noise_density: 0.00017", "gyro_nois_density: 0.00017", "'imu/gyro_nois_density' is no key, is it meant?");
+  changed("gyro_noise_density: 0.00017", "gyro_nois_density: 0.00017",
+          "'imu/gyro_nois_density' is no key, is it meant?");
   changed("  rate: 250", "  rate: fast", "imu/rate");
   changed("gyro_noise_density: 0.00017", "gyro_noise_density: -1", "imu");
   changed("accel_random_walk: 0.003", "accel_random_walk: .nan", "imu");
@@ -310,6 +311,7 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("gravity: 9.807", "gravity: 1.6", "gravity");
   changed("[0.01, 0.002, 0]", "[0.01, 0.002]", "imu/gyro_correction: row 1: expected 3 numbers");
   changed("[0.01, 0.002, 0]", "[0.01, 0.9, 0]", "imu/gyro_correction: expected numbers from -0.2 to 0.2");
+  changed("[0.01, 0.002, 0]", "[0.01, .nan, 0]", "imu/gyro_correction: expected numbers from -0.2 to 0.2");
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0", "imu/gyro_correction_sigma");
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0.3", "imu/gyro_correction_sigma");
   changed("scale: 0.0002", "scale: 0", "depth/scale");

@@ -135,19 +135,30 @@ void judge(const Study& study) {
     file->stream() << "seed,t,nees,x,y,z,rx,ry,rz,sx,sy,sz,srx,sry,srz\n";
   }
   double pose = 0, position = 0, rotation = 0;
+  int judged = 0;  // seeds with poses
   for (int i = 0; i < seeds; ++i) {
     if (file) writeErrors(file->stream(), i, joinedErrors(truth, runs[i]->poses()));
     const Nees result = nees(truth, runs[i]->poses());
+    if (result.pose.count == 0) {
+      std::printf("seed %2d  no pose that could be judged (%zu poses)\n", i, runs[i]->poses().size());
+      continue;
+    }
+    ++judged;
     std::printf("seed %2d  NEES pose %6.2f  position %6.2f  rotation %6.2f  poses %zu,", i, result.pose.mean,
                 result.position.mean, result.rotation.mean, runs[i]->poses().size());
     printDrift(truth, runs[i]->poses());
-    pose += result.pose.mean / seeds;
-    position += result.position.mean / seeds;
-    rotation += result.rotation.mean / seeds;
+    if (result.unusable > 0) std::printf("         %zu covariances are none and were left out\n", result.unusable);
+    pose += result.pose.mean;
+    position += result.position.mean;
+    rotation += result.rotation.mean;
   }
-  const double low = chiSquareQuantile(0.025, 6 * seeds) / seeds, high = chiSquareQuantile(0.975, 6 * seeds) / seeds;
+  if (judged == 0) throw std::runtime_error(spec.name + ": the odometry began with no seed, nothing can be judged");
+  pose /= judged, position /= judged, rotation /= judged;
+  if (judged < seeds) std::printf("%d of %d seeds have no poses and are not counted\n", seeds - judged, seeds);
+  const double low = chiSquareQuantile(0.025, 6 * judged) / judged;
+  const double high = chiSquareQuantile(0.975, 6 * judged) / judged;
   std::printf("mean over %d seeds: pose %.2f (honest: 6, 95 %% band %.2f to %.2f: %s), position %.2f, rotation %.2f\n",
-              seeds, pose, low, high, pose >= low && pose <= high ? "inside" : "outside", position, rotation);
+              judged, pose, low, high, pose >= low && pose <= high ? "inside" : "outside", position, rotation);
   if (file) file->commit();
 }
 

@@ -146,6 +146,8 @@ int main(int argc, char** argv) {
   line.option("set", settings, "option of relocalisation as key=value (`loop/` of the back end); repeatable");
   line.flag("list", list, "one line per keyframe at a mapped place or found");
   line.needs("query", "query-truth");
+  line.needs("query-truth", "query");
+  line.needs("sensor", "query");
   line.needs("query", "sensor");
   if (const auto status = line.parse(argc, argv)) return *status;
   try {

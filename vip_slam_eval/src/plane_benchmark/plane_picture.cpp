@@ -81,13 +81,14 @@ cv::Mat drawPlanes(const cv::Mat& gray, const cv::Mat& depth, const CameraModel&
     layers.push_back(
         {transformPlane(T_map_C.inverse(), plane.plane), plane.plane, FlatRegion(plane.polygons, plane.plane)});
   }
+  const bool aligned = depth.size() == gray.size();  // else it has no reading for a pixel of the picture
   cv::Mat picture, index(gray.size(), CV_32SC1, cv::Scalar(-1));
   cv::cvtColor(gray, picture, cv::COLOR_GRAY2BGR);
   for (int v = 0; v < gray.rows; ++v) {
     for (int u = 0; u < gray.cols; ++u) {
       Eigen::Vector2d xy;
       if (!camera.undistort({double(u), double(v)}, &xy)) continue;
-      const float z = depth.empty() ? 0.0f : depth.at<float>(v, u);
+      const float z = aligned ? depth.at<float>(v, u) : 0.0f;
       const int k = planeAt(layers, xy, z, T_map_C, options);
       if (k < 0) continue;
       index.at<int>(v, u) = k;

@@ -131,6 +131,11 @@ void writeEvaluation(const std::string& folder, const EvaluationInput& input, co
     if (!files.back()->stream()) throw std::runtime_error(folder + "/" + name + ": writing failed, is the disk full?");
   }
   for (const auto& file : files) file->commit();
+  if (evaluation.planes) return;
+  for (const char* of_an_earlier_one : {"planes.csv", "true_planes.csv"}) {
+    std::error_code ignored;
+    std::filesystem::remove(std::filesystem::path(folder) / of_an_earlier_one, ignored);
+  }
 }
 
 }  // namespace vip_slam

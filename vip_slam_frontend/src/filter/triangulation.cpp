@@ -92,8 +92,12 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
   Eigen::Matrix3d A;
   double last_cost = 1e300;
   double lambda = 1e-6;
+  constexpr int kSteps = 8;  // at most; what the last one leads to is evaluated as well
+  // What was evaluated last without being refused; only that is returned.
   Eigen::Vector3d x_good = x;
-  for (int iteration = 0; iteration < 8; ++iteration) {
+  Eigen::Matrix3d A_good;
+  Triangulation good;
+  for (int iteration = 0; iteration <= kSteps; ++iteration) {
     A.setZero();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     double cost = 0;
@@ -141,24 +145,29 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
     if (!valid || cost > last_cost) {
       if (iteration == 0) return result;
       lambda = std::max(lambda * 100.0, 1e-4);
-      if (lambda > 1e3) break;
       x = x_good;
       last_cost = 1e300;
       continue;
     }
     x_good = x;
+    A_good = A;
+    good = result;
     const bool settled = last_cost - cost < 1e-6 * cost;
     last_cost = cost;
-    if (settled) break;
+    if (settled || iteration == kSteps) break;
     Eigen::Matrix3d damped = A;
     damped.diagonal() *= 1.0 + lambda;
     const Eigen::Vector3d step = damped.ldlt().solve(b);
     if (!step.allFinite()) return result;
     x += step;
-    if (step.norm() < 1e-7) break;
+    if (step.norm() < 1e-7) {
+      x_good = x;  // as good as evaluated
+      break;
+    }
   }
-  if (!(x.z() > 1e-3)) x = x_good;
-  const Eigen::Matrix3d covariance = A.inverse();
+  x = x_good;
+  result = good;
+  const Eigen::Matrix3d covariance = A_good.inverse();
   result.inverse_depth = x.z();
   result.sigma_inverse_depth = std::sqrt(std::max(0.0, covariance(2, 2)));
   result.p_W = T_W_A * Eigen::Vector3d(x.x() / x.z(), x.y() / x.z(), 1.0 / x.z());

@@ -39,7 +39,7 @@ LandmarkMatcher::LandmarkMatcher(const TrackingOptions& options, std::shared_ptr
 void LandmarkMatcher::clear() {
   landmarks_.clear();
   index_.clear();
-  patches_.clear();
+  forgetPatches();
 }
 
 void LandmarkMatcher::apply(const MapUpdate& update) {
@@ -54,12 +54,12 @@ void LandmarkMatcher::apply(const MapUpdate& update) {
   for (LandmarkId id : update.removed_landmarks) {
     landmarks_.erase(id);
     index_.remove(id);
-    patches_.erase(id);
+    erasePatch(id);
   }
   for (const auto& merge : update.merged_landmarks) {
     landmarks_.erase(merge.first);
     index_.remove(merge.first);
-    patches_.erase(merge.first);
+    erasePatch(merge.first);
   }
 }
 
@@ -75,8 +75,22 @@ void LandmarkMatcher::retire(const Track& track) {
   auto reference = std::make_shared<ReferenceImage>(*track.reference);
   reference->gray = image(window).clone();
   reference->origin = track.reference->origin + Eigen::Vector2d(window.x, window.y);
-  patches_[track.feature.id] = {reference, track.reference_pixel, track.surface, track.reference_variance};
-  if (patches_.size() > kMaxPatches) patches_.erase(patches_.begin());
+  erasePatch(track.feature.id);
+  patches_[track.feature.id] = {reference, track.reference_pixel, track.surface, track.reference_variance, ++retired_};
+  by_age_[retired_] = track.feature.id;
+  if (patches_.size() > kMaxPatches) erasePatch(by_age_.begin()->second);
+}
+
+void LandmarkMatcher::erasePatch(LandmarkId id) {
+  const auto it = patches_.find(id);
+  if (it == patches_.end()) return;
+  by_age_.erase(it->second.number);
+  patches_.erase(it);
+}
+
+void LandmarkMatcher::forgetPatches() {
+  patches_.clear();
+  by_age_.clear();
 }
 
 int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb, const SE3& T_map_C,

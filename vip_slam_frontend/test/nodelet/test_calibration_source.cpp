@@ -46,6 +46,28 @@ TEST_F(CalibrationSourceTest, ACameraThatStartsLateStillGetsItsExtrinsicsFromTf)
   EXPECT_EQ(source.extrinsicsOrigin(), "T_imu_cam: from tf; T_base_imu: from tf");
 }
 
+// tf answers with the identity for any frame and itself, also for one that it never heard of.
+TEST_F(CalibrationSourceTest, OneFrameForImageAndImuSaysNothingOfTheirPlaces) {
+  connect(tf_, "base_link", "camera", 0.3);
+  SensorConfig given = sensor();
+  given.T_imu_cam.t().x() = 0.7;
+  CalibrationSource source(given, options_, tf_);
+  source.addImuFrame("/camera");
+  source.addColorFrame("camera");
+  EXPECT_FALSE(source.resolve(0));
+  EXPECT_NE(source.waitingFor().find("the same frame"), std::string::npos) << source.waitingFor();
+  const auto found = source.resolve(2 * options_.tf_patience);
+  ASSERT_TRUE(found);
+  EXPECT_DOUBLE_EQ(found->T_imu_cam.t().x(), 0.7);
+  EXPECT_DOUBLE_EQ(found->T_base_imu.t().x(), 0.3);
+  options_.extrinsics = "tf";
+  CalibrationSource demanding(given, options_, tf_);
+  demanding.addImuFrame("camera");
+  demanding.addColorFrame("camera");
+  EXPECT_FALSE(demanding.resolve(0));
+  EXPECT_FALSE(demanding.resolve(100));
+}
+
 TEST_F(CalibrationSourceTest, TfMayComeALittleAfterTheFrames) {
   CalibrationSource source(sensor(), options_, tf_);
   source.addImuFrame("imu");

@@ -175,5 +175,47 @@ TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
   }
 }
 
+// When there are too many patches the one that was retired first goes, whatever its id: an old landmark that was found
+// again and lost again keeps its patch.
+TEST_F(DisturbanceTest, PatchesOfLandmarksFoundAgainAreKept) {
+  show(0, image(0));
+  LandmarkMatcher matcher(TrackingOptions(), testCamera());
+  MapUpdate update;
+  const std::vector<Track> tracks = tracker_.tracks();
+  ASSERT_GT(tracks.size(), 50u);
+  LandmarkId other = 1000000;
+  const auto retireOthers = [&](int count) {
+    for (int k = 0; k < count; ++k) {
+      Track track = tracks[0];
+      track.feature.id = other++;
+      track.feature.age = 10;
+      matcher.retire(track);
+    }
+  };
+  retireOthers(8000);  // full
+  const OrbExtractor orb(300);
+  std::vector<Feature> features;
+  for (const Track& track : tracks) features.push_back(track.feature);
+  orb.describe(tracker_.gray(), &features);
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    Track track = tracks[i];
+    track.feature.age = 10;
+    matcher.retire(track);
+    LandmarkEstimate landmark;
+    landmark.id = track.feature.id;
+    landmark.p_W = kWall * track.feature.xy.cast<double>().homogeneous();
+    landmark.observations = 5;
+    landmark.descriptor = features[i].descriptor;
+    update.landmarks.push_back(landmark);
+  }
+  retireOthers(100);
+  matcher.apply(update);
+  tracker_.clear();
+  tracker_.track(image(0), cv::Mat(480, 640, CV_32F, cv::Scalar(kWall)), {SE3(), 0, 0}, true, SE3(), nullptr, 1);
+  ASSERT_GT(matcher.reacquire(&tracker_, orb, SE3(), SE3()), 10);
+  // Found by their patches; by descriptor alone the sigma is a pixel.
+  for (const Track& track : tracker_.tracks()) EXPECT_LT(track.feature.pixel_sigma, 0.8f);
+}
+
 }  // namespace
 }  // namespace vip_slam

@@ -69,8 +69,10 @@ struct PlaneGrowthOptions {
   int min_hits = 1;
 
   void visit(OptionVisitor& v) {
-    v.field("angle_deg", angle_deg, 1.0, 30.0, "largest angle between a plane and a triangle that joins it, degrees");
-    v.field("distance", distance, 0.005, 0.5, "largest distance of a triangle that joins a plane, m");
+    v.field("angle_deg", angle_deg, 1.0, 30.0,
+            "largest angle between a plane and a triangle that joins it, degrees; up to 25 where noise explains it");
+    v.field("distance", distance, 0.005, 0.5,
+            "largest distance of a triangle that joins a plane, m; up to twice that where noise explains it");
     v.field("cell", cell, 0.02, 1.0, "side of the cells that record a plane's covered area, m");
     v.field("gap", gap, 0.0, 5.0, "triangles further than this from a plane's covered area do not join it, m");
     v.field("min_move", min_move, 0.0, 1.0, "frames nearer than this to the last one that grew planes are skipped, m");

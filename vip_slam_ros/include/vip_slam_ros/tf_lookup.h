@@ -16,6 +16,11 @@ std::string bareFrame(const std::string& frame);
 /// The fixed transform T_target_source, newest available; empty when tf does not connect the frames (now).
 std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source);
 
+/// T_imu_cam likewise. Empty as well when both messages name one frame: tf then knows nothing of the sensors' places,
+/// but would answer with the identity, even for a frame that it never heard of.
+std::optional<SE3> lookUpExtrinsics(const tf2::BufferCore& buffer, const std::string& imu_frame,
+                                    const std::string& camera_frame);
+
 /// Difference of two camera-IMU extrinsics.
 struct ExtrinsicsGap {
   double degrees = 0, metres = 0;

@@ -109,7 +109,7 @@ class BagWriter : public SequenceWriter {
     std::filesystem::remove(part_, ignored);
   }
 
-  void imu(std::int64_t ns, const ImuSample& s, const NavState& x) override {
+  void imu(std::int64_t ns, const ImuSample& s, const NavState& x, const Eigen::Vector3d& omega_I) override {
     const ros::Time stamp = stampOf(ns);
     sensor_msgs::Imu m;
     m.header.seq = imu_seq_;
@@ -132,6 +132,7 @@ class BagWriter : public SequenceWriter {
     o.pose.pose.orientation.z = q.z();
     o.pose.pose.orientation.w = q.w();
     assign(&o.twist.twist.linear, x.T_W_I.rotation().conjugate() * x.v_W);
+    assign(&o.twist.twist.angular, omega_I);
     put("/ground_truth/odometry", stamp, o);
   }
 

@@ -45,7 +45,7 @@ class FolderWriter : public SequenceWriter {
     if (!committed_) fs::remove_all(work_, ignored);
   }
 
-  void imu(std::int64_t ns, const ImuSample& s, const NavState& x) override {
+  void imu(std::int64_t ns, const ImuSample& s, const NavState& x, const Eigen::Vector3d&) override {
     const auto list = [](std::ofstream& out, const Eigen::Vector3d& v) {
       out << ',' << v.x() << ',' << v.y() << ',' << v.z();
     };

@@ -1,4 +1,5 @@
 // imu_from_rgbd_folder FOLDER --out DIR: real RGB-D images with poses become a bag with a synthetic IMU.
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -18,6 +19,8 @@ namespace fs = std::filesystem;
 using namespace vip_slam;
 
 namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
 
 struct Settings {
   std::string folder, out, name, format = "bag";
@@ -97,7 +100,8 @@ SensorConfig sensorOf(const Settings& s, const RgbdFolder& folder, const Sequenc
   sensor.depth_camera = folder.depth_camera;
   sensor.T_color_depth = folder.T_color_depth;
   sensor.rolling_shutter = folder.colour_readout;
-  sensor.color_rate = sensor.depth_rate = s.rate;
+  sensor.color_rate = sensor.depth_rate = 1.0 / imageInterval(folder);
+  sensor.imu_rate = s.imu.rate;
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStructuredLight);
   return sensor;
 }
@@ -193,12 +197,15 @@ int run(int argc, char** argv) {
       x.v_W = m.v_W;
       x.bias_gyro = imu.biases[next].gyro;
       x.bias_accel = imu.biases[next].accel;
-      writer->imu(stamp(imu.samples[next].t), imu.samples[next], x);
+      writer->imu(stamp(imu.samples[next].t), imu.samples[next], x, m.omega_I);
       truth.push_back({static_cast<double>(stamp(imu.samples[next].t)) * 1e-9, m.T_W_I});
     }
   };
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
   ProgressBar bar(s.name);
   for (std::size_t i = 0; i < folder.frames.size(); ++i) {
+    if (interrupted) throw std::runtime_error("interrupted, nothing is left behind");
     const double t = folder.frames[i].t - begin;
     if (t < 0 || t > spline.end() - 1.0 / s.imu.rate) continue;  // no IMU samples at this time
     SimFrame frame;

@@ -80,8 +80,9 @@ int run(int argc, char** argv) {
 
   const SequenceSpec spec = loadSequence(what, library);
   const std::string base = (fs::path(out) / spec.name).string();
-  if (keep && fs::exists(base + ".bag") && fs::exists(base + "_planes.yaml")) {
-    std::fprintf(stderr, "%s: there already\n", (base + ".bag").c_str());
+  const std::string output = format == "bag" ? base + ".bag" : base;
+  if (keep && format != "none" && fs::exists(output) && fs::exists(base + "_planes.yaml")) {
+    std::fprintf(stderr, "%s: there already\n", output.c_str());
     return 0;
   }
   prepareOutputFolder(out);
@@ -104,7 +105,8 @@ int run(int argc, char** argv) {
   const auto imuUntil = [&](std::int64_t ns) {
     for (; next_imu < imu.size() && sequence.toNanoseconds(imu[next_imu].t) <= ns; ++next_imu)
       if (writer)
-        writer->imu(sequence.toNanoseconds(imu[next_imu].t), imu[next_imu], sequence.stateAt(imu[next_imu].t));
+        writer->imu(sequence.toNanoseconds(imu[next_imu].t), imu[next_imu], sequence.stateAt(imu[next_imu].t),
+                    sequence.trajectory().at(imu[next_imu].t).omega_I);
   };
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });

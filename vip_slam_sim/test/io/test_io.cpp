@@ -41,7 +41,8 @@ void writeAll(SequenceRenderer& s, SequenceWriter& writer) {
   const auto& imu = s.imu().samples;
   const auto until = [&](std::int64_t ns) {
     for (; next < imu.size() && s.toNanoseconds(imu[next].t) <= ns; ++next)
-      writer.imu(s.toNanoseconds(imu[next].t), imu[next], s.stateAt(imu[next].t));
+      writer.imu(s.toNanoseconds(imu[next].t), imu[next], s.stateAt(imu[next].t),
+                 s.trajectory().at(imu[next].t).omega_I);
   };
   s.render([&](const SimFrame& f) {
     until(f.stamp_ns);
@@ -170,8 +171,8 @@ TEST(Folder, SevenScenesHaveADepthCameraOfTheirOwn) {
   EXPECT_NEAR(folder.camera.fx, 530, 5);
   EXPECT_GT(folder.colour_readout, 0.02);
   EXPECT_EQ(folder.depth_camera.width, 640);
-  // The poses are the depth camera's: the colour camera is 25 mm to its right, along its own x axis, which is the world's
-  // y here but for the degree by which the cameras are turned against each other.
+  // The poses are the depth camera's: the colour camera is 25 mm to its right, along its own x axis, which is the
+  // world's y here but for the degree by which the cameras are turned against each other.
   const SE3 T_W_D = folder.T_W_C.front().T_W_B * folder.T_color_depth;
   EXPECT_NEAR((T_W_D.t() - Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-12);
   EXPECT_NEAR((folder.T_W_C.front().T_W_B.t() - Eigen::Vector3d(1, 2.025, 3)).norm(), 0, 1e-3);

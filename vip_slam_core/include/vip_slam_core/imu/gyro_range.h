@@ -16,12 +16,15 @@ class GyroRange {
   void add(double t, const Eigen::Vector3d& rate);
   /// The limit of the range, rad/s, when recent samples between t0 and t1 were saturated; else 0.
   double cutOff(double t0, double t1) const;
+  /// For a clock that may run back; the limit of the range stays known.
+  void forgetTimes() { cut_.clear(); }
   std::uint64_t samples() const { return samples_; }  ///< total number of saturated samples
   double end() const { return end_; }                 ///< limit of the range, rad/s, as last seen; 0: never reached
 
  private:
   struct Extreme {
     double value = 0;
+    double t = 0;   ///< of the last sample with this value, s
     int count = 0;  ///< number of samples with exactly this value
   };
   std::array<Extreme, 6> extremes_;  ///< maximum and minimum of each axis

@@ -8,8 +8,8 @@ namespace vip_slam {
 
 /// Triangularises the first `pivots` columns of A in place: on return A = Q^T A with zeros below the diagonal of these
 /// columns; all further columns are transformed along. Diagonal entries come out >= 0. Columns whose remaining norm is
-/// below sqrt(epsilon) of the largest entry in A are skipped (rank deficiency): their rows below stay as they are zero
-/// to that accuracy.
+/// below epsilon (of doubles) times the largest entry in A are skipped (rank deficiency): their rows below stay as they
+/// are zero to that accuracy.
 void triangularise(Eigen::MatrixXd& A, int pivots);
 
 /// [R; H] -> [R'; 0] with the right-hand sides [r; h] -> [r'; e], exploiting that R (n x n) is upper triangular.

@@ -16,7 +16,7 @@ struct InitialisationOptions {
 
   void visit(OptionVisitor& v) {
     v.field("standing_seconds", standing_seconds, 0.2, 20.0, "accelerometer time averaged for a standing start, s");
-    v.field("moving_seconds", moving_seconds, 0.5, 10.0, "images gathered for a moving start, s");
+    v.field("moving_seconds", moving_seconds, 0.5, 3.0, "images gathered for a moving start, s");
     v.field("max_gyro_std", max_gyro_std, 0.0, 1.0, "largest gyro deviation of a standing start, rad/s");
     v.field("max_accel_std", max_accel_std, 0.0, 10.0, "largest accelerometer deviation of a standing start, m/s^2");
     v.field("max_disparity_px", max_disparity_px, 0.0, 20.0, "largest mean image motion of a standing start, px");

@@ -28,7 +28,7 @@ class LandmarkMatcher {
   /// Forgets the map.
   void clear();
   /// Forgets the patches: their camera poses belong to an odometry epoch that has ended.
-  void forgetPatches() { patches_.clear(); }
+  void forgetPatches();
 
  private:
   struct Entry {
@@ -41,13 +41,18 @@ class LandmarkMatcher {
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
     PatchSurface surface;
     double reference_variance = 0;
+    std::uint64_t number = 0;  ///< of its retirement
   };
+  void erasePatch(LandmarkId id);
+
   TrackingOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   double reach_;  ///< m, search radius: from the camera to the corners of its view at the largest depth searched
   std::unordered_map<LandmarkId, Entry> landmarks_;
   LandmarkIndex index_;  ///< of landmarks_
   std::map<LandmarkId, Patch> patches_;
+  std::map<std::uint64_t, LandmarkId> by_age_;  ///< ids in patches_ by Patch::number
+  std::uint64_t retired_ = 0;
 };
 
 }  // namespace vip_slam

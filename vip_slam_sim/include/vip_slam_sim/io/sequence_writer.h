@@ -13,7 +13,9 @@ namespace vip_slam {
 class SequenceWriter {
  public:
   virtual ~SequenceWriter() = default;
-  virtual void imu(std::int64_t stamp_ns, const ImuSample& sample, const NavState& truth) = 0;
+  /// omega_I: true angular velocity in the body frame, rad/s.
+  virtual void imu(std::int64_t stamp_ns, const ImuSample& sample, const NavState& truth,
+                   const Eigen::Vector3d& omega_I) = 0;
   virtual void frame(const SimFrame& frame) = 0;
   virtual void commit() = 0;
 };
