@@ -91,7 +91,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
   if (c.imu_rejected > 0)
     all.push_back(std::to_string(c.imu_rejected) +
-                  " IMU messages are left out: not finite, all zero, or not newer than the one before");
+                  " IMU messages are left out: not finite, all zero, not newer than the one before, or stamped later "
+                  "than the next");
   if (pipeline.images() == 0) all.push_back("no image could be used");
   for (const std::string& missing : {lateStart(pipeline), missingPoses(pipeline)})
     if (!missing.empty()) all.push_back(missing);

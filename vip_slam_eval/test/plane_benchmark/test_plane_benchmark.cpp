@@ -58,8 +58,11 @@ TEST_F(PlaneBenchmark, FindsTheRoomWithTruePoses) {
   EXPECT_GE(m["points on planes/precision"], 98);
   EXPECT_GT(m["time/keyframe median"], 0);
   EXPECT_GT(m["time/growth frame median"], 0);
+  // Of the processor, so that a busy machine does not matter.
   EXPECT_GT(m["time/keyframe computing median"], 0);
+  EXPECT_LT(m["time/keyframe computing median"], 10);
   EXPECT_GT(m["time/growth frame computing median"], 0);
+  EXPECT_LT(m["time/growth frame computing median"], 3);
 
   const std::string draw = std::string(VIP_SLAM_DRAW_PLANES) + " " + sequence(".bag") + " --sensor " +
                            sequence("_sensor.yaml") + " --trajectory " + sequence("_truth.tum") + " --planes " +
