@@ -66,7 +66,7 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
       return std::nullopt;
     }
     if (!asked_since_ || t < *asked_since_) asked_since_ = t;
-    const bool one_frame = bareFrame(imu_frame_) == bareFrame(color_frame_);
+    const bool one_frame = !imu_frame_.empty() && bareFrame(imu_frame_) == bareFrame(color_frame_);
     const auto T_imu_cam = lookUpExtrinsics(tf_, imu_frame_, color_frame_);
     const auto T_base_imu = lookUpTransform(tf_, options_.base_frame, imu_frame_);
     const bool patient = options_.extrinsics == "tf" || t - *asked_since_ < options_.tf_patience;
@@ -80,7 +80,9 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     }
     if (T_imu_cam) sensor_.T_imu_cam = *T_imu_cam;
     if (T_base_imu) sensor_.T_base_imu = *T_base_imu;
-    const auto origin = [](bool from_tf, const std::string& target, const std::string& source) {
+    const auto origin = [](bool from_tf, const std::string& target, const std::string& source) -> std::string {
+      if (!from_tf && bareFrame(target) == bareFrame(source) && !target.empty())
+        return "the sensor file's, image and IMU name the same frame, '" + source + "'";
       return from_tf ? "from tf" : "the sensor file's, tf does not connect '" + source + "' to '" + target + "'";
     };
     origin_ = "T_imu_cam: " + origin(T_imu_cam.has_value(), imu_frame_, color_frame_) +

@@ -95,6 +95,7 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
       insert(kf);
     } catch (const MapError& e) {  // the others are inserted nevertheless
       refusal = e.what();
+      refuse(refusal);
       continue;
     }
     loop_closer.add(map, kf->id);

@@ -15,10 +15,12 @@ GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job) {
   for (int round = 0; round < kRounds; ++round) {
     solution.built = buildProblem(map, globalScope(map), job.settings);
     solution.summary = solver->solve(solution.built.problem, options);
-    if (round + 1 < kRounds) {
-      storeProblem(solution.built, job.noise, &map);
-      solution.outliers = removeOutliers(solution.built, job.settings.measurement.outlier_chi2, &map);
-    }
+    if (!solution.summary.usable) return solution;
+    storeProblem(solution.built, job.noise, &map);
+    const double chi2 = job.settings.measurement.outlier_chi2;
+    // The first round may have ended before the minimum, where good views look wrong: the last one decides.
+    solution.outliers = round + 1 < kRounds ? removeOutliers(solution.built, chi2, &map)
+                                            : stillOutliers(solution.built, solution.outliers, chi2, map);
   }
   return solution;
 }

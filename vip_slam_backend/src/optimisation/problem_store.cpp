@@ -53,6 +53,13 @@ void storePlanePoints(const BuiltProblem& built, Map* map, LandmarkSet* done) {
   }
 }
 
+bool isInlier(const FrameGeometry& frame, const BaObservation& b, const Eigen::Vector3d& p_W, double gate_weight,
+              double chi2) {
+  Eigen::Vector2d r;
+  const double weight = std::min(b.weight, gate_weight);
+  return reprojectionResidual(frame, p_W, Eigen::Vector2d(b.x, b.y), weight, &r) && r.squaredNorm() <= chi2;
+}
+
 }  // namespace
 
 std::vector<char> heldPlanes(const BaProblem& problem) {
@@ -101,10 +108,7 @@ std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, 
   const BaProblem& problem = built.problem;
   const std::vector<FrameGeometry> geometry = frameGeometry(problem);
   const auto fits = [&](const BaObservation& b, const Eigen::Vector3d& p_W, double most) {
-    Eigen::Vector2d r;
-    const double weight = std::min(b.weight, built.gate_weight);
-    return reprojectionResidual(geometry[b.frame], p_W, Eigen::Vector2d(b.x, b.y), weight, &r) &&
-           r.squaredNorm() <= most;
+    return isInlier(geometry[b.frame], b, p_W, built.gate_weight, most);
   };
   std::vector<OutlierView> removed;
   for (std::size_t p = 0; p < problem.points.size(); ++p) {
@@ -112,16 +116,28 @@ std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, 
     for (int o = point.first; o < point.first + point.count && map->hasLandmark(built.points[p]); ++o) {
       if (fits(problem.observations[o], point.p_W, chi2)) continue;
       map->removeObservation(built.points[p], built.observations[o].keyframe);
-      removed.push_back({built.points[p], built.observations[o].keyframe});
+      removed.push_back({built.points[p], built.observations[o].keyframe, problem.observations[o]});
     }
   }
   for (const RefusedView& view : built.refused) {
     const MapLandmark* landmark = map->findLandmark(view.landmark);
     if (!landmark || fits(view.observation, landmark->p_W, kGross * chi2)) continue;
     map->removeObservation(view.landmark, view.keyframe);
-    removed.push_back({view.landmark, view.keyframe});
+    removed.push_back({view.landmark, view.keyframe, view.observation});
   }
   return removed;
+}
+
+std::vector<OutlierView> stillOutliers(const BuiltProblem& built, const std::vector<OutlierView>& outliers, double chi2,
+                                       const Map& map) {
+  const std::vector<FrameGeometry> geometry = frameGeometry(built.problem);
+  std::vector<OutlierView> still;
+  for (const OutlierView& outlier : outliers) {
+    const MapLandmark* landmark = map.findLandmark(outlier.landmark);
+    const BaObservation& b = outlier.observation;
+    if (!landmark || !isInlier(geometry[b.frame], b, landmark->p_W, built.gate_weight, chi2)) still.push_back(outlier);
+  }
+  return still;
 }
 
 }  // namespace vip_slam

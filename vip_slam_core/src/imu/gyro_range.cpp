@@ -1,7 +1,6 @@
 #include "vip_slam_core/imu/gyro_range.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace vip_slam {
 namespace {
@@ -22,13 +21,10 @@ void GyroRange::add(double t, const Eigen::Vector3d& rate) {
     const double value = k < 3 ? rate(k) : -rate(k - 3);
     if (!(value > kMinEnd)) continue;
     Extreme& extreme = extremes_[static_cast<std::size_t>(k)];
-    // An extreme that is never reached again was a wrong sample.
-    const bool forgotten = extreme.count < kProof && std::abs(t - extreme.t) > kKept;
-    if (value > extreme.value * (1 + kSame) || forgotten) {
-      extreme = {value, t, 1};
-    } else if (value >= extreme.value * (1 - kSame)) {
-      extreme.t = t;
-      if (++extreme.count >= kProof) cut = value;
+    if (value > extreme.value * (1 + kSame)) {
+      extreme = {value, 1};
+    } else if (value >= extreme.value * (1 - kSame) && ++extreme.count >= kProof) {
+      cut = value;
     }
   }
   if (cut == 0) return;

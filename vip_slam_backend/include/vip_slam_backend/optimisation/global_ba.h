@@ -23,7 +23,7 @@ struct GlobalBaProblem {
 
 struct GlobalBaSolution {
   BuiltProblem built;
-  std::vector<OutlierView> outliers;  ///< found between the rounds and left out of the last one
+  std::vector<OutlierView> outliers;  ///< found between the rounds, left out of the last one, and outliers there
   SolverSummary summary;              ///< of the last round
 };
 

@@ -30,9 +30,11 @@ struct RefusedView {
   BaObservation observation;
 };
 
+/// View that was removed because its residual was too large.
 struct OutlierView {
   LandmarkId landmark = kNoLandmark;
   KeyframeId keyframe = 0;
+  BaObservation observation;
 };
 
 struct BuiltProblem {
@@ -72,5 +74,10 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);
 /// returns them. To be called after storeProblem(): the refused views of landmarks on planes are judged by the
 /// position stored there.
 std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, Map* map);
+
+/// Those of `outliers`, found in an earlier problem with the same frames, that are still outliers after `built` was
+/// solved and stored in `map`; those whose landmark is gone are.
+std::vector<OutlierView> stillOutliers(const BuiltProblem& built, const std::vector<OutlierView>& outliers, double chi2,
+                                       const Map& map);
 
 }  // namespace vip_slam

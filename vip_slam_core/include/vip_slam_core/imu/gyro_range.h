@@ -24,7 +24,6 @@ class GyroRange {
  private:
   struct Extreme {
     double value = 0;
-    double t = 0;   ///< of the last sample with this value, s
     int count = 0;  ///< number of samples with exactly this value
   };
   std::array<Extreme, 6> extremes_;  ///< maximum and minimum of each axis
