@@ -27,9 +27,9 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
   }
   removeUnnamedPlanes(update);
   for (const PlaneObservation& observation : update.observations) {
+    if (map.setPlaneObservation(observation)) continue;
     const std::string bad = validateObservation(observation);
-    if (!bad.empty()) refuse(bad);
-    map.setPlaneObservation(observation);
+    if (!bad.empty()) refuse(bad);  // else its keyframe or plane is gone
   }
   for (const auto& pair : update.associated) {
     const LandmarkId id = map.resolve(pair.first);

@@ -27,7 +27,7 @@ bool spanSpace(const BaProblem& problem, const std::set<int>& a, const std::set<
 void joinByPlanes(const BaProblem& problem, UnionFind* parts) {
   std::map<int, std::set<int>> planes_of;  // by part
   for (std::size_t f = 0; f < problem.frames.size(); ++f) planes_of[parts->find(static_cast<int>(f))];
-  if (planes_of.size() < 2) return;  // nearly always
+  if (planes_of.size() < 2) return;
   for (const BaPointToPlane& f : problem.point_to_plane) planes_of[parts->find(f.frame)].insert(f.plane);
   for (const BaPlanePoint& f : problem.plane_points) planes_of[parts->find(f.frame)].insert(f.plane);
   for (bool joined = true; joined;) {

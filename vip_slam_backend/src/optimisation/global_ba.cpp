@@ -51,7 +51,7 @@ void mergeGlobalBa(const GlobalBaSolution& solution, const ImuNoise& noise, Map*
     if (held[p]) seen_by.erase(solution.built.planes[p]);
   for (const auto& plane : seen_by) map->movePlane(plane.first, motion.at(plane.second));
   storeProblem(solution.built, noise, map);
-  for (const OutlierView& outlier : solution.outliers) {
+  for (const RefusedView& outlier : solution.outliers) {
     const LandmarkId id = map->resolve(outlier.landmark);
     if (map->hasLandmark(id)) map->removeObservation(id, outlier.keyframe);
   }

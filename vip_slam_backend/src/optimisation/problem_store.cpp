@@ -104,13 +104,13 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map) {
   }
 }
 
-std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
+std::vector<RefusedView> removeOutliers(const BuiltProblem& built, double chi2, Map* map) {
   const BaProblem& problem = built.problem;
   const std::vector<FrameGeometry> geometry = frameGeometry(problem);
   const auto fits = [&](const BaObservation& b, const Eigen::Vector3d& p_W, double most) {
     return isInlier(geometry[b.frame], b, p_W, built.gate_weight, most);
   };
-  std::vector<OutlierView> removed;
+  std::vector<RefusedView> removed;
   for (std::size_t p = 0; p < problem.points.size(); ++p) {
     const BaPoint& point = problem.points[p];
     for (int o = point.first; o < point.first + point.count && map->hasLandmark(built.points[p]); ++o) {
@@ -123,16 +123,16 @@ std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, 
     const MapLandmark* landmark = map->findLandmark(view.landmark);
     if (!landmark || fits(view.observation, landmark->p_W, kGross * chi2)) continue;
     map->removeObservation(view.landmark, view.keyframe);
-    removed.push_back({view.landmark, view.keyframe, view.observation});
+    removed.push_back(view);
   }
   return removed;
 }
 
-std::vector<OutlierView> stillOutliers(const BuiltProblem& built, const std::vector<OutlierView>& outliers, double chi2,
+std::vector<RefusedView> stillOutliers(const BuiltProblem& built, const std::vector<RefusedView>& outliers, double chi2,
                                        const Map& map) {
   const std::vector<FrameGeometry> geometry = frameGeometry(built.problem);
-  std::vector<OutlierView> still;
-  for (const OutlierView& outlier : outliers) {
+  std::vector<RefusedView> still;
+  for (const RefusedView& outlier : outliers) {
     const MapLandmark* landmark = map.findLandmark(outlier.landmark);
     const BaObservation& b = outlier.observation;
     if (!landmark || !isInlier(geometry[b.frame], b, landmark->p_W, built.gate_weight, chi2)) still.push_back(outlier);

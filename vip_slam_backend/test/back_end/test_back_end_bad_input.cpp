@@ -16,10 +16,7 @@ using namespace vip_slam;
 TEST(BackEnd, BadInputIsRefusedByName) {
   SimulatedKeyframes world(5);
   BackEnd back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 4; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &back_end, 4);
   const KeyframePtr good = world.next();
   const auto refusalOf = [&](const Keyframe& kf) {
     const std::size_t before = back_end.map().keyframes().size();

@@ -137,20 +137,17 @@ TEST_F(DisturbanceTest, DepthCarriesOverImagesWithoutIt) {
   }
 }
 
-// A landmark found by its descriptor has a sigma of a pixel, and keeps it when its patch is found again later.
-TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
-  show(0, image(0));
-  LandmarkMatcher matcher(TrackingOptions(), testCamera());
+// Retires all tracks, whose patches are off by `variance`, px^2; returns their landmarks as the map has them.
+MapUpdate retireAll(const FeatureTracker& tracker, const OrbExtractor& orb, double variance, LandmarkMatcher* matcher) {
   MapUpdate update;
-  const OrbExtractor orb(300);
   std::vector<Feature> features;
-  for (Track track : tracker_.tracks()) features.push_back(track.feature);
-  orb.describe(tracker_.gray(), &features);
+  for (const Track& track : tracker.tracks()) features.push_back(track.feature);
+  orb.describe(tracker.gray(), &features);
   for (std::size_t i = 0; i < features.size(); ++i) {
-    Track track = tracker_.tracks()[i];
+    Track track = tracker.tracks()[i];
     track.feature.age = 10;
-    track.reference_variance = 1.0;
-    matcher.retire(track);
+    track.reference_variance = variance;
+    matcher->retire(track);
     LandmarkEstimate landmark;
     landmark.id = track.feature.id;
     landmark.p_W = kWall * track.feature.xy.cast<double>().homogeneous();
@@ -158,7 +155,15 @@ TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
     landmark.descriptor = features[i].descriptor;
     update.landmarks.push_back(landmark);
   }
-  matcher.apply(update);
+  return update;
+}
+
+// A landmark found by its descriptor has a sigma of a pixel, and keeps it when its patch is found again later.
+TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
+  show(0, image(0));
+  LandmarkMatcher matcher(TrackingOptions(), testCamera());
+  const OrbExtractor orb(300);
+  matcher.apply(retireAll(tracker_, orb, 1.0, &matcher));
   tracker_.clear();
   // Seen from a shorter distance.
   const SE3 near(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, kWall / 6));
@@ -180,13 +185,12 @@ TEST_F(DisturbanceTest, APatchFoundAgainIsAsUnsureAsItsReference) {
 TEST_F(DisturbanceTest, PatchesOfLandmarksFoundAgainAreKept) {
   show(0, image(0));
   LandmarkMatcher matcher(TrackingOptions(), testCamera());
-  MapUpdate update;
-  const std::vector<Track> tracks = tracker_.tracks();
-  ASSERT_GT(tracks.size(), 50u);
+  ASSERT_GT(tracker_.tracks().size(), 50u);
+  const Track one = tracker_.tracks()[0];
   LandmarkId other = 1000000;
   const auto retireOthers = [&](int count) {
     for (int k = 0; k < count; ++k) {
-      Track track = tracks[0];
+      Track track = one;
       track.feature.id = other++;
       track.feature.age = 10;
       matcher.retire(track);
@@ -194,20 +198,7 @@ TEST_F(DisturbanceTest, PatchesOfLandmarksFoundAgainAreKept) {
   };
   retireOthers(8000);  // full
   const OrbExtractor orb(300);
-  std::vector<Feature> features;
-  for (const Track& track : tracks) features.push_back(track.feature);
-  orb.describe(tracker_.gray(), &features);
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    Track track = tracks[i];
-    track.feature.age = 10;
-    matcher.retire(track);
-    LandmarkEstimate landmark;
-    landmark.id = track.feature.id;
-    landmark.p_W = kWall * track.feature.xy.cast<double>().homogeneous();
-    landmark.observations = 5;
-    landmark.descriptor = features[i].descriptor;
-    update.landmarks.push_back(landmark);
-  }
+  const MapUpdate update = retireAll(tracker_, orb, 0.0, &matcher);
   retireOthers(100);
   matcher.apply(update);
   tracker_.clear();

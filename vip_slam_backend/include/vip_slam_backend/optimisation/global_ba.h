@@ -23,7 +23,7 @@ struct GlobalBaProblem {
 
 struct GlobalBaSolution {
   BuiltProblem built;
-  std::vector<OutlierView> outliers;  ///< found between the rounds, left out of the last one, and outliers there
+  std::vector<RefusedView> outliers;  ///< found between the rounds, left out of the last one, and outliers there
   SolverSummary summary;              ///< of the last round
 };
 

@@ -23,15 +23,8 @@ ProblemScope localScope(const Map& map, const LocalBaOptions& options);
 /// All keyframes.
 ProblemScope globalScope(const Map& map);
 
-/// View of a landmark on a plane that was gated when the problem was built, since it contradicts the plane.
+/// View of a landmark that contradicts the estimate: gated when the problem was built, or removed afterwards.
 struct RefusedView {
-  LandmarkId landmark = kNoLandmark;
-  KeyframeId keyframe = 0;
-  BaObservation observation;
-};
-
-/// View that was removed because its residual was too large.
-struct OutlierView {
   LandmarkId landmark = kNoLandmark;
   KeyframeId keyframe = 0;
   BaObservation observation;
@@ -73,11 +66,11 @@ void storeProblem(const BuiltProblem& built, const ImuNoise& noise, Map* map);
 /// Removes observations with a residual above `chi2` (squared sigmas, each at least the gate's) or behind the camera;
 /// returns them. To be called after storeProblem(): the refused views of landmarks on planes are judged by the
 /// position stored there.
-std::vector<OutlierView> removeOutliers(const BuiltProblem& built, double chi2, Map* map);
+std::vector<RefusedView> removeOutliers(const BuiltProblem& built, double chi2, Map* map);
 
 /// Those of `outliers`, found in an earlier problem with the same frames, that are still outliers after `built` was
 /// solved and stored in `map`; those whose landmark is gone are.
-std::vector<OutlierView> stillOutliers(const BuiltProblem& built, const std::vector<OutlierView>& outliers, double chi2,
+std::vector<RefusedView> stillOutliers(const BuiltProblem& built, const std::vector<RefusedView>& outliers, double chi2,
                                        const Map& map);
 
 }  // namespace vip_slam
