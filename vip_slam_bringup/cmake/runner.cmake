@@ -21,4 +21,7 @@ add_executable(train_vocabulary src/apps/train_vocabulary.cpp)
 target_link_libraries(train_vocabulary vip_slam_runner)
 
 install(TARGETS run_bag train_vocabulary RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-catkin_install_python(PROGRAMS scripts/record_run scripts/start_when_ready DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+catkin_install_python(PROGRAMS scripts/record_run scripts/start_when_ready
+  DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+# Both import it from their own folder, which in the devel space is the source folder.
+install(FILES scripts/sensor_topics.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

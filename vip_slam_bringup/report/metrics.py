@@ -1,5 +1,6 @@
-"""Errors against the truth. The judge of record is `vip_slam_eval evaluate`; the page computes the same two measures
-so that it stands on its own: absolute trajectory error after one rigid alignment, and plane angle and distance."""
+"""Errors against the truth, computed here so that the page stands on its own: absolute trajectory error after one rigid
+alignment, and plane angle and distance. The judge of record is `vip_slam_eval evaluate`, which also asks how much of a
+plane's area lies on a true one; here its middle has to."""
 import numpy as np
 
 
@@ -97,9 +98,9 @@ def plane_errors(found, true, T_truth_map):
         best = None
         for other in true:
             m = np.array(other['normal'])
-            angle = float(np.degrees(np.arccos(min(1.0, abs(n @ m)))))
+            angle = float(np.degrees(np.arccos(np.clip(n @ m, -1.0, 1.0))))  # both look to the open side
             distance = float(abs(m @ centre + other['distance']))
-            if angle > 10 or distance > 0.15 or (other['polygons'] and not contains(other, centre)):
+            if angle > 10 or distance > 0.10 or (other['polygons'] and not contains(other, centre)):
                 continue
             if best is None or distance < best['distance']:
                 best = {'truth': other['id'], 'angle': angle, 'distance': distance}

@@ -25,6 +25,5 @@ CalibrationEstimate FrontEnd::calibration() const { return impl_->calibration();
 double FrontEnd::timeOffset() const { return impl_->timeOffset(); }
 CalibrationEstimate FrontEnd::givenCalibration() const { return impl_->givenCalibration(); }
 const FrontEndCounters& FrontEnd::counters() const { return impl_->counters_; }
-const FrontEndOptions& FrontEnd::options() const { return impl_->options_; }
 
 }  // namespace vip_slam

@@ -81,7 +81,7 @@ void PlaneDisplay::apply(const PlaneUpdate& update) {
   for (const PlaneObservation& observation : update.observations) {
     auto& points = points_[observation.plane][observation.keyframe];
     points.clear();
-    for (const PlanePoint& point : observation.points) points.push_back(point.p_C);
+    for (const PlaneSample& point : observation.points) points.push_back(point.p_C);
   }
 }
 

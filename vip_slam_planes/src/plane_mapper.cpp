@@ -200,6 +200,5 @@ void PlaneMapper::restore(const std::vector<StoredPlane>& planes, KeyframeId new
 }
 void PlaneMapper::clear() { impl_->clear(); }
 const PlaneMapperCounters& PlaneMapper::counters() const { return impl_->counters; }
-const PlaneMapperOptions& PlaneMapper::options() const { return impl_->options; }
 
 }  // namespace vip_slam

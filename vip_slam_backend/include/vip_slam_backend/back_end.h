@@ -33,7 +33,8 @@ struct GbaResult {
 
 class BackEnd {
  public:
-  /// `sensor.camera` must be filled. Throws std::invalid_argument naming the option or sensor field that is unusable.
+  /// `sensor.camera` must be filled. Throws std::invalid_argument naming the option or sensor field that is unusable,
+  /// std::runtime_error when the vocabulary cannot be read.
   BackEnd(const BackEndOptions& options, const SensorConfig& sensor, TimingLog* log = nullptr);
   ~BackEnd();
   BackEnd(const BackEnd&) = delete;

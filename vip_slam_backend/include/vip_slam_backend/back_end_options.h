@@ -35,7 +35,7 @@ struct MeasurementOptions {
     v.field("max_pixel_sigma", max_pixel_sigma, 0.1, 10.0, "and for at most this, px");
     v.field("gate_sigma", gate_sigma, 0.1, 10.0, "outliers are judged against at least this sigma, px");
     v.field("matched_pixel_sigma", matched_pixel_sigma, 0.1, 10.0,
-            "one sigma of an untracked ORB corner, px per octave");
+            "one sigma of an untracked ORB corner of octave 0, px; 1.4 times as much with each octave");
     v.field("between_tracks_sigma", between_tracks_sigma, 0.01, 10.0,
             "how far a track's corner lies beside the point its landmark's other tracks show, px where it began");
     v.field("huber", huber, 0.5, 20.0, "reprojection residuals above this many sigmas weigh less");

@@ -170,11 +170,8 @@ MapSnapshot BackEnd::Impl::snapshot() const {
   snapshot.loops = loops;
   snapshot.localised = localised;
   snapshot.statistics = statistics;
-  snapshot.statistics.landmarks = snapshot.landmarks.size();
-  for (const LandmarkEstimate& landmark : snapshot.landmarks) {
-    snapshot.statistics.observations += landmark.observations;
+  for (const LandmarkEstimate& landmark : snapshot.landmarks)
     snapshot.statistics.plane_landmarks += landmark.plane != 0;
-  }
   return snapshot;
 }
 

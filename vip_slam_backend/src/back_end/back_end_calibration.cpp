@@ -10,11 +10,11 @@
 namespace vip_slam {
 namespace {
 
-// Smaller changes of the camera's correction are adopted only with the next global adjustment: m, normalised.
-constexpr double kNewDepthOffset = 0.001;
-constexpr double kNewBearing = 1e-4;
+// Smaller changes of the camera's correction are adopted only with the next global adjustment.
+constexpr double kNewDepthOffset = 0.001;    // m
+constexpr double kNewBearing = 1e-4;         // per entry of the matrix, normalised coordinates
 constexpr double kNewDepthShift = 0.02;      // px
-constexpr double kNewGyroCorrection = 5e-4;  // likewise, per entry
+constexpr double kNewGyroCorrection = 5e-4;  // per entry of the matrix
 
 }  // namespace
 

@@ -15,7 +15,6 @@ constexpr std::size_t kMaxRejected = 1000;
 }  // namespace
 
 void BackEnd::Impl::remember(const LoopEvent& event) {
-  (event.accepted ? statistics.loops_accepted : statistics.loops_rejected) += 1;
   new_loops.push_back(event);
   loops.push_back(event);
   rejected_kept += !event.accepted;

@@ -47,7 +47,6 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
     const SolverSummary summary = solver->solve(built.problem, solver_options);
     if (!summary.usable) return;
   }
-  ++statistics.local_ba;
   statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
   statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
@@ -173,7 +172,6 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
                        !(newest.epoch == epoch && newest.t > last_found->t);
     const SE3 match_before = found ? map.keyframe(last_found->match).state.T_W_I : SE3();
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
-    ++statistics.global_ba;
     statistics.outliers += result.solution->outliers.size();
     statistics.track_noise_factor = result.solution->built.track_noise_factor;
     if (found) {

@@ -13,7 +13,8 @@
 namespace vip_slam {
 namespace {
 
-// Odometry between neighbours: drift grows with the square root of the distance; ten times as much while coasting.
+// Odometry between neighbours: drift grows with the square root of the distance; ten times as much where it was
+// not tracking, or only just (without depth, say).
 Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, const PoseGraphOptions& options) {
   const double turned = a.state.T_W_I.rotation().angularDistance(b.state.T_W_I.rotation());
   // A rotation in place drifts too: a full turn counts as two metres of travel.

@@ -15,9 +15,6 @@ constexpr double kMetresPerCosine = 4.0;  // weight of a change of direction aga
 constexpr double kRatio = 0.9;            // of best to second distance; weak, since few corners lie around a projection
 constexpr float kSameCorner2 = 4.0f;      // px^2: two detections of one corner do not compete
 
-// ORB pyramids here and in common vocabularies grow by 1.2 to 1.4 per octave.
-double octaveScale(const Feature& f) { return std::pow(1.3, f.octave); }
-
 // With kWide over all descriptors of a landmark, since it looks different from other sides.
 int distanceOf(const Map& map, const MapPoint& point, const Descriptor& descriptor, GuidedLooks looks) {
   if (point.landmark == kNoLandmark)
@@ -63,7 +60,7 @@ PlaceMatch makePlaceMatch(const Feature& feature, const MapPoint& point) {
   m.xy = feature.xy.cast<double>();
   m.depth = feature.depth;
   m.depth_sigma = std::hypot(feature.depth_sigma, point.sigma);
-  m.scale = octaveScale(feature);
+  m.scale = std::pow(kOctaveScale, feature.octave);
   return m;
 }
 

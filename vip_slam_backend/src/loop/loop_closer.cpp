@@ -49,7 +49,6 @@ bool touch(const std::set<KeyframeId>& a, const std::set<KeyframeId>& b) {
 
 LoopCloser::LoopCloser(const LoopOptions& options, std::shared_ptr<const CameraModel> camera, TimingLog* timing)
     : options_(options),
-      camera_(camera),
       timing_(timing),
       vocabulary_(openVocabulary(options.vocabulary)),
       database_(vocabulary_->words()),

@@ -174,7 +174,6 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
   result.match = best.match;
   result.T_W_I = best.T_W_C * keyframes_.back()->frame.T_I_C.inverse();
   result.information = best.information;
-  result.matches = best.matches;
   result.inliers = best.points;
   result.landmarks = best.landmarks;
   if (best.depth.compared >= 100) result.depth_agreement = best.depth.agreement();

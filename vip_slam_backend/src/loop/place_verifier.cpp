@@ -56,8 +56,13 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
     pose = refinePlacePose(guided.matches, singleCamera(), T_W_C, T_G_I.rotation() * query.frame.T_I_C.rotation(),
                            pose_options_);
     result->inliers = static_cast<int>(pose.inliers.size());
-    if (!pose.found || result->inliers < options_.min_ransac_inliers) {
-      result->reason = words("%.0f inliers after guided matching, needs %.0f", result->inliers, options_.min_inliers);
+    if (result->inliers < options_.min_ransac_inliers) {
+      result->reason =
+          words("%.0f inliers of guided matching, needs %.0f", result->inliers, options_.min_ransac_inliers);
+      return;
+    }
+    if (!pose.found) {
+      result->reason = words("%.0f of %.0f matches do not fix a pose", result->inliers, guided.matches.size());
       return;
     }
     T_W_C = pose.T_W_B;
@@ -137,9 +142,8 @@ PlaceVerification PlaceVerifier::verify(const Map& map, const Keyframe& query, c
   PlaceVerification result;
   result.match = match;
   const std::vector<PlaceMatch> matches = this->match(map, query, query_bow, match, database, allowed);
-  result.matches = static_cast<int>(matches.size());
-  if (result.matches < options_.min_matches) {
-    result.reason = words("%.0f descriptor matches, needs %.0f", result.matches, options_.min_matches);
+  if (static_cast<int>(matches.size()) < options_.min_matches) {
+    result.reason = words("%.0f descriptor matches, needs %.0f", matches.size(), options_.min_matches);
     return result;
   }
   PlacePoseOptions pose_options = pose_options_;

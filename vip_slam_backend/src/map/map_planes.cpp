@@ -60,7 +60,7 @@ void Map::mergePlanes(PlaneId from, PlaneId into) {
     } else {
       // Two pieces of one wall in one keyframe: their blocks add (each keeps its own scale inside G).
       other->second.G += moved.G;
-      for (PlanePoint p : moved.points) {
+      for (PlaneSample p : moved.points) {
         p.sigma *= static_cast<float>(std::sqrt(other->second.weight_scale / moved.weight_scale));
         other->second.points.push_back(p);
       }
@@ -84,7 +84,7 @@ std::string validateObservation(const PlaneObservation& observation) {
   if (!observation.G.allFinite()) return name + "moments are not finite";
   if (!(observation.weight_scale > 0) || !std::isfinite(observation.weight_scale))
     return name + "weight is " + std::to_string(observation.weight_scale);
-  for (const PlanePoint& p : observation.points)
+  for (const PlaneSample& p : observation.points)
     if (!p.p_C.allFinite() || !(p.sigma > 0) || !std::isfinite(p.sigma)) return name + "a point is not finite";
   const std::string camera = validateCameraCorrection(observation.camera_correction);
   return camera.empty() ? "" : name + "the camera's correction: " + camera;

@@ -21,7 +21,7 @@ constexpr double kDepthUnit = 0.001;     ///< metres per unit of a stored depth 
 // Smallest sizes of elements in bytes, to reject counts that exceed the file.
 constexpr std::size_t kFeatureBytes = 7 * 4 + 2 + 32 + 4;
 constexpr std::size_t kImuBytes = 7 * 8;
-constexpr std::size_t kPlanePointBytes = 4 * 4;
+constexpr std::size_t kPlaneSampleBytes = 4 * 4;
 constexpr std::size_t kPointBytes = 3 * 8;
 constexpr std::size_t kLandmarkBytes = 3 * 8 + 8 + 4 + 4 + 32;
 constexpr std::size_t kKeyframeBytes = 8 + 8 + 4 + 1 + 2 * 17 * 8 + 7 * 8;

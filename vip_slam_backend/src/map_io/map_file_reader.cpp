@@ -116,8 +116,8 @@ PlaneObservation readObservation(ByteReader& in, KeyframeId keyframe) {
   for (int r = 0; r < 4; ++r)
     for (int c = r; c < 4; ++c) o.G(r, c) = o.G(c, r) = finite(in, "plane observation");
   o.weight_scale = finite(in, "plane observation");
-  o.points.resize(in.count(map_file::kPlanePointBytes, "plane points"));
-  for (PlanePoint& p : o.points) {
+  o.points.resize(in.count(map_file::kPlaneSampleBytes, "plane points"));
+  for (PlaneSample& p : o.points) {
     p.p_C = in.vector<Eigen::Vector3f>("plane point");
     p.sigma = in.get<float>("plane point");
   }

@@ -87,7 +87,7 @@ void write(ByteWriter& out, const PlaneObservation& observation) {
     for (int c = r; c < 4; ++c) out.put(observation.G(r, c));
   out.put(observation.weight_scale);
   out.put(static_cast<std::uint32_t>(observation.points.size()));
-  for (const PlanePoint& p : observation.points) {
+  for (const PlaneSample& p : observation.points) {
     out.vector(p.p_C);
     out.put(p.sigma);
   }

@@ -70,7 +70,7 @@ double between(const Eigen::VectorXd& value, double z) {
 }
 
 /// Adds one point to the system of its plane. `u`, `v`: unit vectors along the plane.
-void add(const PlanePoint& point, const SE3& T_W_C, const Plane& plane, const Eigen::Vector3d& u,
+void add(const PlaneSample& point, const SE3& T_W_C, const Plane& plane, const Eigen::Vector3d& u,
          const Eigen::Vector3d& v, const Question& question, PlaneSystem* system) {
   const double reading = point.p_C.z();
   if (!(reading > 0) || entryOf(reading) + 1 >= question.value.size()) return;
@@ -153,7 +153,7 @@ CurveEquations curveEquations(const std::vector<const MapKeyframe*>& keyframes, 
       const Eigen::Vector3d u = surface.n.unitOrthogonal(), v = surface.n.cross(u);
       const Eigen::VectorXd g_own = system.g_own;
       const Eigen::Vector3d g = system.g;
-      for (const PlanePoint& point : observation.points) add(point, T_W_C, surface, u, v, {value, noise}, &system);
+      for (const PlaneSample& point : observation.points) add(point, T_W_C, surface, u, v, {value, noise}, &system);
       system.shares.push_back({static_cast<Eigen::Index>(k), system.g_own - g_own, system.g - g});
     }
   }

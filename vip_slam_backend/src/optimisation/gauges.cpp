@@ -29,7 +29,7 @@ void joinByPlanes(const BaProblem& problem, UnionFind* parts) {
   for (std::size_t f = 0; f < problem.frames.size(); ++f) planes_of[parts->find(static_cast<int>(f))];
   if (planes_of.size() < 2) return;
   for (const BaPointToPlane& f : problem.point_to_plane) planes_of[parts->find(f.frame)].insert(f.plane);
-  for (const BaPlanePoint& f : problem.plane_points) planes_of[parts->find(f.frame)].insert(f.plane);
+  for (const BaPlaneSample& f : problem.plane_samples) planes_of[parts->find(f.frame)].insert(f.plane);
   for (bool joined = true; joined;) {
     joined = false;
     for (auto a = planes_of.begin(); a != planes_of.end(); ++a) {

@@ -14,7 +14,7 @@ PixelNoise::PixelNoise(const MeasurementOptions& options, double focal)
       gate_sigma_(options.gate_sigma / focal) {}
 
 double PixelNoise::sigma(const Feature& feature, bool own_track, double apart) const {
-  if (feature.id == kNoLandmark) return matched_ * std::pow(1.2, feature.octave);  // matched by its descriptor
+  if (feature.id == kNoLandmark) return matched_ * std::pow(kOctaveScale, feature.octave);  // matched by its descriptor
   const double tracked = std::clamp(feature.pixel_sigma / focal_, least_, most_);
   return own_track ? tracked : std::hypot(tracked, apart * between_tracks_);
 }

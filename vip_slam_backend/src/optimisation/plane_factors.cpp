@@ -23,7 +23,7 @@ constexpr double kTrackFreedom = 4.0;
 
 PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope, const BuilderSettings& settings,
                                        BuiltProblem* built)
-    : map_(map), scope_(scope), settings_(settings), built_(built), geometry_(frameGeometry(built->problem)) {
+    : map_(map), settings_(settings), built_(built), geometry_(frameGeometry(built->problem)) {
   BaProblem& problem = built->problem;
   if (settings.variant == Variant::kVi) return;
   // Only planes that a free frame sees with depth: without it only homographies would determine a plane's distance.
@@ -248,13 +248,13 @@ void PlaneFactorBuilder::addDepthBlocks() {
       ++sum.points;
     } else if (settings_.variant == Variant::kViP) {
       for (int k = 0; k < block.gate.points(); ++k) {
-        const PlanePoint& p = o.points[block.gate.all() ? k : block.gate.kept()[k]];
-        BaPlanePoint factor;
+        const PlaneSample& p = o.points[block.gate.all() ? k : block.gate.kept()[k]];
+        BaPlaneSample factor;
         factor.frame = block.frame;
         factor.plane = block.plane;
         factor.p_C = p.p_C.cast<double>();
         factor.weight = std::sqrt(scale * o.weight_scale) / p.sigma;
-        problem.plane_points.push_back(factor);
+        problem.plane_samples.push_back(factor);
       }
     } else {
       BaPointToPlane factor;

@@ -39,7 +39,6 @@ class PlaneFactorBuilder {
   void storeGroup(int host, int plane, std::vector<Observer>* observers, std::vector<int>* slot);
 
   const Map& map_;
-  const ProblemScope& scope_;
   const BuilderSettings& settings_;
   struct PairOfObserver {
     int observer;

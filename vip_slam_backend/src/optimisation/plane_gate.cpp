@@ -16,11 +16,11 @@ constexpr double kMaxNear = 0.5, kMaxFar = 0.9;  // shares that must be kept, wi
 }  // namespace
 
 PlaneGate::PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d& plane_C) : observation_(observation) {
-  const std::vector<PlanePoint>& points = observation.points;
+  const std::vector<PlaneSample>& points = observation.points;
   if (points.empty() || plane_C.dot(observation.G * plane_C) <= kGoodFit * observation.weight_scale * points.size())
     return;
   std::vector<double> distance;
-  for (const PlanePoint& p : points) distance.push_back(plane_C.dot(p.p_C.cast<double>().homogeneous()));
+  for (const PlaneSample& p : points) distance.push_back(plane_C.dot(p.p_C.cast<double>().homogeneous()));
   const double median = upperMedian(distance);
   for (std::size_t k = 0; k < points.size(); ++k)
     if (std::abs(distance[k] - median) <= kSigmas * points[k].sigma) kept_.push_back(static_cast<int>(k));

@@ -65,7 +65,7 @@ bool isInlier(const FrameGeometry& frame, const BaObservation& b, const Eigen::V
 std::vector<char> heldPlanes(const BaProblem& problem) {
   std::vector<char> held(problem.planes.size(), 0);
   for (const BaPointToPlane& f : problem.point_to_plane) held[f.plane] = 1;
-  for (const BaPlanePoint& f : problem.plane_points) held[f.plane] = 1;
+  for (const BaPlaneSample& f : problem.plane_samples) held[f.plane] = 1;
   for (const BaHomography& f : problem.homographies) held[f.plane] = 1;
   for (const BaHomographyPair& f : problem.homography_pairs) held[f.plane] = 1;
   return held;

@@ -10,7 +10,7 @@ namespace vip_slam {
 
 std::size_t BaProblem::residualBlocks() const {
   std::size_t n = observations.size() + imu.size() + homographies.size() + homography_pairs.size() +
-                  point_to_plane.size() + plane_points.size() + relative_poses.size() + gauges.size() +
+                  point_to_plane.size() + plane_samples.size() + relative_poses.size() + gauges.size() +
                   motion_priors.size();
   for (const BaPlane& p : planes) n += p.prior_weight > 0 && p.kind != PlaneKind::kGeneral;
   return n;
@@ -63,7 +63,7 @@ std::string validateProblem(const BaProblem& problem) {
   for (const BaPointToPlane& f : problem.point_to_plane)
     if (!frameOk(f.frame) || !planeOk(f.plane) || !f.G.allFinite())
       return "a compressed point-to-plane factor without its frame or plane, or not finite";
-  for (const BaPlanePoint& f : problem.plane_points)
+  for (const BaPlaneSample& f : problem.plane_samples)
     if (!frameOk(f.frame) || !planeOk(f.plane)) return "a plane point without its frame or plane";
   for (const BaRelativePose& f : problem.relative_poses)
     if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !f.T_i_j.isFinite() || !f.sqrt_information.allFinite())
@@ -111,7 +111,7 @@ double evaluateCost(const BaProblem& problem) {
     const Eigen::Vector4d u = planeInCamera(geometry[f.frame], problem.planes[f.plane].plane);
     cost += u.dot(f.G * u);
   }
-  for (const BaPlanePoint& f : problem.plane_points) {
+  for (const BaPlaneSample& f : problem.plane_samples) {
     const double r =
         f.weight * planeInCamera(geometry[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
     cost += r * r;

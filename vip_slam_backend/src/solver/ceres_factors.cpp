@@ -282,7 +282,7 @@ ceres::CostFunction* makePointToPlaneCost(const SE3& T_I_C, const Eigen::Matrix4
   decomposePointToPlane(G, &rows);
   return new PointToPlaneCost<4>(T_I_C, rows);
 }
-ceres::CostFunction* makePlanePointCost(const SE3& T_I_C, const Eigen::Vector3d& p_C, double weight) {
+ceres::CostFunction* makePlaneSampleCost(const SE3& T_I_C, const Eigen::Vector3d& p_C, double weight) {
   return new PointToPlaneCost<1>(T_I_C, weight * p_C.homogeneous().transpose());
 }
 ceres::CostFunction* makePlanePriorCost(PlaneKind kind, double weight) { return new PlanePriorCost(kind, weight); }

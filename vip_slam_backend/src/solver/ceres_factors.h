@@ -53,7 +53,7 @@ ceres::CostFunction* makeImuCost(std::shared_ptr<const Preintegration> preintegr
 ceres::CostFunction* makeHomographyCost(const SE3& T_I_C_i, const SE3& T_I_C_j, const Matrix9d& G);
 ceres::CostFunction* makeHomographyPairCost(const SE3& T_I_C_i, const SE3& T_I_C_j, const HomographyPair& pair);
 ceres::CostFunction* makePointToPlaneCost(const SE3& T_I_C, const Eigen::Matrix4d& G);
-ceres::CostFunction* makePlanePointCost(const SE3& T_I_C, const Eigen::Vector3d& p_C, double weight);
+ceres::CostFunction* makePlaneSampleCost(const SE3& T_I_C, const Eigen::Vector3d& p_C, double weight);
 ceres::CostFunction* makePlanePriorCost(PlaneKind kind, double weight);
 ceres::CostFunction* makeRelativePoseCost(const BaRelativePose& factor);
 ceres::CostFunction* makeGaugeCost(const GaugePrior& prior);

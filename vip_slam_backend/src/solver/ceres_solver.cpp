@@ -99,8 +99,8 @@ void build(BaProblem& problem, Blocks& b, ceres::Problem* out, ceres::ParameterB
   for (const BaPointToPlane& f : problem.point_to_plane)
     out->AddResidualBlock(makePointToPlaneCost(problem.frames[f.frame].T_I_C, f.G), nullptr, poseBlock(f.frame),
                           b.planes[f.plane].data());
-  for (const BaPlanePoint& f : problem.plane_points)
-    out->AddResidualBlock(makePlanePointCost(problem.frames[f.frame].T_I_C, f.p_C, f.weight), nullptr,
+  for (const BaPlaneSample& f : problem.plane_samples)
+    out->AddResidualBlock(makePlaneSampleCost(problem.frames[f.frame].T_I_C, f.p_C, f.weight), nullptr,
                           poseBlock(f.frame), b.planes[f.plane].data());
   for (std::size_t p = 0; p < problem.planes.size(); ++p)
     if (problem.planes[p].prior_weight > 0 && problem.planes[p].kind != PlaneKind::kGeneral)

@@ -12,7 +12,6 @@ namespace vip_slam {
 
 class CeresSolver : public BaSolver {
  public:
-  std::string name() const override { return "ceres"; }
   SolverSummary solve(BaProblem& problem, const SolverOptions& options) override;
 };
 

@@ -95,15 +95,15 @@ double StructuredSolver::linearizePlanes(const BaProblem& problem) {
     sums.add<3>(structure_.plane_node[plane], Hp.bottomRightCorner<3, 3>(), g.tail<3>());
     addBlock<3, 6>(values_.data(), place, Hp.bottomLeftCorner<3, 6>());
   };
-  for (std::size_t k = 0; k < problem.plane_points.size(); ++k) {
-    const BaPlanePoint& f = problem.plane_points[k];
+  for (std::size_t k = 0; k < problem.plane_samples.size(); ++k) {
+    const BaPlaneSample& f = problem.plane_samples[k];
     const Eigen::Vector4d u = planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane, &basis_[f.plane], &Jp);
     const Eigen::Vector4d p = f.weight * f.p_C.homogeneous();
     const Eigen::Matrix<double, 1, 9> row = p.transpose() * Jp;
     Hp.noalias() = row.transpose() * row;
     const double r = u.dot(p);
     cost += r * r;
-    addPair(structure_.plane_points[k], f.frame, f.plane, row.transpose() * r);
+    addPair(structure_.plane_samples[k], f.frame, f.plane, row.transpose() * r);
   }
   return cost;
 }
@@ -168,7 +168,7 @@ double StructuredSolver::factorCost(const BaProblem& problem) {
     const Eigen::Vector4d u = planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane);
     cost += u.dot(f.G * u);
   }
-  for (const BaPlanePoint& f : problem.plane_points) {
+  for (const BaPlaneSample& f : problem.plane_samples) {
     const double r =
         f.weight * planeInCamera(geometry_[f.frame], problem.planes[f.plane].plane).dot(f.p_C.homogeneous());
     cost += r * r;

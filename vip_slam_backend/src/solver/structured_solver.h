@@ -19,7 +19,6 @@ namespace vip_slam {
 
 class StructuredSolver : public BaSolver {
  public:
-  std::string name() const override { return "structured"; }
   SolverSummary solve(BaProblem& problem, const SolverOptions& options) override;
 
   /// For tests: the damped, reduced normal equations and the step at the problem's present state.
@@ -30,7 +29,6 @@ class StructuredSolver : public BaSolver {
     Eigen::VectorXd point_step;  ///< 3 per point
   };
   Step stepAt(const BaProblem& problem, double radius);
-  const SystemStructure& structure() const { return structure_; }
 
  private:
   // structured_arrays.cpp

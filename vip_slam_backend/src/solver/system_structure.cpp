@@ -67,7 +67,7 @@ std::uint64_t SystemStructure::signature(const BaProblem& problem) const {
   hash.add(-3);
   for (const BaPointToPlane& f : problem.point_to_plane) hash.add(f.frame), hash.add(f.plane);
   hash.add(-4);
-  for (const BaPlanePoint& f : problem.plane_points) hash.add(f.frame), hash.add(f.plane);
+  for (const BaPlaneSample& f : problem.plane_samples) hash.add(f.frame), hash.add(f.plane);
   hash.add(-5);
   for (const BaRelativePose& f : problem.relative_poses) hash.add(f.i), hash.add(f.j);
   return hash.value();
@@ -200,7 +200,7 @@ bool SystemStructure::update(const BaProblem& problem) {
   for (const BaHomography& f : problem.homographies) linkTriple(f.i, f.j, f.plane);
   for (const BaHomographyPair& f : problem.homography_pairs) linkTriple(f.i, f.j, f.plane);
   for (const BaPointToPlane& f : problem.point_to_plane) link(plane_node[f.plane], pose_node[f.frame]);
-  for (const BaPlanePoint& f : problem.plane_points) link(plane_node[f.plane], pose_node[f.frame]);
+  for (const BaPlaneSample& f : problem.plane_samples) link(plane_node[f.plane], pose_node[f.frame]);
   for (const BaRelativePose& f : problem.relative_poses) link(pose_node[f.j], pose_node[f.i]);
   std::vector<std::pair<int, int>> pairs = requests.unite(static_cast<int>(sizes.size()));
   const std::size_t others = pairs.size();
@@ -257,9 +257,9 @@ bool SystemStructure::update(const BaProblem& problem) {
   point_to_plane.clear();
   for (const BaPointToPlane& f : problem.point_to_plane)
     point_to_plane.push_back(placeOf(plane_node[f.plane], pose_node[f.frame]));
-  plane_points.clear();
-  for (const BaPlanePoint& f : problem.plane_points)
-    plane_points.push_back(placeOf(plane_node[f.plane], pose_node[f.frame]));
+  plane_samples.clear();
+  for (const BaPlaneSample& f : problem.plane_samples)
+    plane_samples.push_back(placeOf(plane_node[f.plane], pose_node[f.frame]));
 
   relative_poses.clear();
   for (const BaRelativePose& f : problem.relative_poses)

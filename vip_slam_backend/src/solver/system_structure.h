@@ -45,7 +45,7 @@ class SystemStructure {
   };
   std::vector<ImuPlaces> imu;
   std::vector<TriplePlaces> homographies, homography_pairs;
-  std::vector<BlockPlace> point_to_plane, plane_points, relative_poses;
+  std::vector<BlockPlace> point_to_plane, plane_samples, relative_poses;
 
  private:
   std::uint64_t signature(const BaProblem& problem) const;

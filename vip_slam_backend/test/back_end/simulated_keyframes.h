@@ -139,7 +139,7 @@ class SimulatedKeyframes {
         const Eigen::Vector3d ray(0.6 * u(random_), 0.45 * u(random_), 1);
         const double z = -walls_[w].first.signedDistance(T_W_C.t()) / walls_[w].first.n.dot(T_W_C.rotation() * ray);
         if (!(z > 0.4 && z < 6)) continue;
-        PlanePoint p;
+        PlaneSample p;
         p.sigma = static_cast<float>(1.25 * sigma_on_planes_);
         p.p_C = ((z + read_too_long_(z) + gauss(sigma_on_planes_)) * ray).cast<float>();
         o.points.push_back(p);

@@ -128,7 +128,7 @@ class RingWorld {
       }
       const SE3 T_C_W = (truths[k] * T_I_C()).inverse();
       for (int p = 0; p < 30; ++p) {
-        PlanePoint point;
+        PlaneSample point;
         point.sigma = 0.01f;
         const Eigen::Vector3d ahead = truths[k] * Eigen::Vector3d(2 + 0.2 * (p % 6), 0.2 * (p / 6) - 0.4, -1.5);
         point.p_C = (T_C_W * ahead).cast<float>();

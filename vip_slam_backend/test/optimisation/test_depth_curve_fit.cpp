@@ -82,7 +82,7 @@ TEST(DepthCurveFit, SurfacesThatPassForOneAreNoErrorOfTheCamera) {
   for (KeyframeId id = 1; id <= 60; ++id) {
     const auto seen = map.keyframe(id).planes.find(1);
     if (seen == map.keyframe(id).planes.end()) continue;
-    for (PlanePoint& point : seen->second.points) {
+    for (PlaneSample& point : seen->second.points) {
       if (point.p_C.z() < 3) continue;
       point.p_C *= 1 + 0.04f / point.p_C.z();
       ++moved;

@@ -276,7 +276,7 @@ TEST(PlaneFactors, DepthPointsBesideThePlaneAreLeftOut) {
       Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
       for (const BaPointToPlane& f : problem.point_to_plane)
         if (f.frame == 1) points += f.points, G += f.G;
-      for (const BaPlanePoint& f : problem.plane_points) {
+      for (const BaPlaneSample& f : problem.plane_samples) {
         if (f.frame != 1) continue;
         ++points;
         G += f.weight * f.weight * f.p_C.homogeneous() * f.p_C.homogeneous().transpose();

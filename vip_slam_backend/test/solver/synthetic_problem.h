@@ -147,11 +147,11 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
           const Eigen::Vector3d n_C = geometry[f].R_C_W * walls[w].first.n;
           const double z = -walls[w].first.signedDistance(geometry[f].t_W_C) / n_C.dot(ray);
           if (!(z > 0.4 && z < 8)) continue;
-          BaPlanePoint m;
+          BaPlaneSample m;
           m.frame = f, m.plane = static_cast<int>(w);
           m.p_C = (z + options.noise * gauss(0.01)) * ray;
           m.weight = 1 / (0.01 * std::abs(n_C.dot(ray)) + 0.003);
-          p.plane_points.push_back(m);
+          p.plane_samples.push_back(m);
         }
   if (options.compressed) {
     std::map<std::array<int, 3>, BaHomography> homographies;
@@ -163,7 +163,7 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
     }
     for (const auto& h : homographies) p.homographies.push_back(h.second);
     std::map<std::pair<int, int>, BaPointToPlane> blocks;
-    for (const BaPlanePoint& f : p.plane_points) {
+    for (const BaPlaneSample& f : p.plane_samples) {
       BaPointToPlane& b = blocks[{f.frame, f.plane}];
       b.frame = f.frame, b.plane = f.plane;
       const Eigen::Vector4d x = f.weight * f.p_C.homogeneous();
@@ -172,7 +172,7 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
     }
     for (const auto& b : blocks) p.point_to_plane.push_back(b.second);
     p.homography_pairs.clear();
-    p.plane_points.clear();
+    p.plane_samples.clear();
   }
   std::mt19937 odometry_random(options.seed + 1000);  // separate, so that the rest does not change with it
   std::normal_distribution<double> odometry_normal;

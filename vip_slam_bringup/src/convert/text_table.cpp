@@ -44,16 +44,9 @@ TextTable::TextTable(const std::string& path, const std::string& separators, std
   while (std::getline(file, line)) {
     ++number;
     const std::string text = stripped(line);
-    if (text.empty()) continue;
-    if (text[0] == '#') {
-      if (rows_.empty()) header_ = split(stripped(text.substr(1)), separators);
-      continue;
-    }
+    if (text.empty() || text[0] == '#') continue;
     TextRow row{number, split(text, separators)};
-    if (rows_.empty() && number == 1 && !isNumber(row.cells[0])) {
-      header_ = row.cells;
-      continue;
-    }
+    if (number == 1 && !isNumber(row.cells[0])) continue;  // a header
     if (row.cells.size() < min_columns)
       fail(row, std::to_string(row.cells.size()) + " columns, expected at least " + std::to_string(min_columns));
     rows_.push_back(std::move(row));

@@ -76,6 +76,9 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   put("landmarks", map.landmarks.size());
   put("planes", planes);
   put("plane_landmarks", map.statistics.plane_landmarks);
+  put("landmarks_found_again", map.statistics.reobserved);
+  put("landmarks_merged", map.statistics.merged);
+  put("outliers_removed", map.statistics.outliers);
   put("track_noise_factor", map.statistics.track_noise_factor);
   yaml << YAML::Key << "loops" << YAML::Value << YAML::BeginSeq;
   for (const LoopEvent& loop : map.loops) {

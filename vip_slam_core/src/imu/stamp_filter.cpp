@@ -25,8 +25,9 @@ std::vector<ImuSample> StampFilter::add(const ImuSample& sample) {
   waits_.reset();
   const double step = sample.t - newest_;
   // A stream that is slower than the gap must not wait all the time.
-  const bool first = std::isinf(newest_), usual = std::isfinite(step_) && step < kUsual * step_;
-  if (!first && !usual && step > gap_seconds_) {
+  const bool usual = std::isfinite(step_) && step < kUsual * step_;
+  if (!usual &&
+      step > gap_seconds_) {  // infinite for the first of a stream, which only the second tells right or wrong
     waits_ = sample;
   } else {
     decide(sample, &decided);

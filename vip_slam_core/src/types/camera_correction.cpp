@@ -67,7 +67,7 @@ void setCameraCorrection(const CameraCorrection& correction, PlaneObservation* o
   observation->camera_correction = correction;
   if (observation->points.empty()) return;
   observation->G.setZero();
-  for (PlanePoint& point : observation->points) {
+  for (PlaneSample& point : observation->points) {
     if (point.p_C.z() > 0) point.p_C *= change(point.p_C.z()) / point.p_C.z();
     point.p_C = turn * point.p_C;
     const Eigen::Vector4d p = point.p_C.cast<double>().homogeneous();

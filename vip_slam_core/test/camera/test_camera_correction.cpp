@@ -36,7 +36,7 @@ TEST(CameraCorrection, MovesPointsOnPlanesAlongTheirRays) {
     PlaneObservation observation;
     observation.weight_scale = 0.4;
     for (int k = 0; k < 3; ++k) {
-      const PlanePoint point{rays[k] * float(1.0 + 0.7 * k + too_long), 0.004f + 0.001f * float(k)};
+      const PlaneSample point{rays[k] * float(1.0 + 0.7 * k + too_long), 0.004f + 0.001f * float(k)};
       const Eigen::Vector4d p = point.p_C.cast<double>().homogeneous();
       observation.G += 0.4 * p * p.transpose() / std::pow(double(point.sigma), 2);
       observation.points.push_back(point);

@@ -110,9 +110,9 @@ TEST(DepthShift, AKeyframeFollowsWhatIsFoundOutLater) {
   EXPECT_EQ(moved.at(4, 3), 1.f);
   EXPECT_EQ(same, 2);  // adjacent nodes still have one valid slope
   setCameraCorrection(correction, &observation);
-  for (const PlanePoint& p : observation.points) EXPECT_NEAR(kSlanted.dot(p.p_C.cast<double>()), 2.0, 1e-4);
+  for (const PlaneSample& p : observation.points) EXPECT_NEAR(kSlanted.dot(p.p_C.cast<double>()), 2.0, 1e-4);
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
-  for (const PlanePoint& point : observation.points) {
+  for (const PlaneSample& point : observation.points) {
     const Eigen::Vector4d p = point.p_C.cast<double>().homogeneous();
     G += p * p.transpose() / (0.01 * 0.01);
   }

@@ -83,7 +83,7 @@ struct Repeats {
       run.planes = built.problem.planes.size();
       run.homographies = built.problem.homographies.size();
       run.homography_pairs = built.problem.homography_pairs.size();
-      run.point_to_plane = built.problem.point_to_plane.size() + built.problem.plane_points.size();
+      run.point_to_plane = built.problem.point_to_plane.size() + built.problem.plane_samples.size();
     }
     // A new solver each time: nothing is kept from the run before.
     summaries.push_back(makeSolver(run.setup.solver)->solve(built.problem, options));

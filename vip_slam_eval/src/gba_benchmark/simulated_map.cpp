@@ -231,7 +231,7 @@ class Simulator {
         if (slope < 0.15 * ray.norm()) continue;
         // A sample is the mean of a small patch, so less noisy than the single pixel under a corner.
         const double sigma_z = 0.5 * depthSigma(z);
-        PlanePoint point;
+        PlaneSample point;
         point.p_C = ((z + gauss(sigma_z)) * ray).cast<float>();
         point.sigma = static_cast<float>(std::hypot(sigma_z * slope, options_.depth_sample_floor));
         o.points.push_back(point);
@@ -241,7 +241,7 @@ class Simulator {
         if (o.points.size() < 10) continue;
         o.keyframe = k + 1;
         o.plane = entry.first + 1;
-        for (const PlanePoint& p : o.points) {
+        for (const PlaneSample& p : o.points) {
           const Eigen::Vector4d x = p.p_C.cast<double>().homogeneous();
           o.G += x * x.transpose() / (static_cast<double>(p.sigma) * p.sigma);
         }

@@ -37,7 +37,7 @@ struct FrameOutput {
   KeyframePtr keyframe;   ///< null: this image is none
 };
 
-/// Everything that was counted since construction; for diagnostics.
+/// What was counted since construction, and present values of what is learnt (the last five); for diagnostics.
 struct FrontEndCounters {
   std::uint64_t images = 0, keyframes = 0, restarts = 0;
   std::uint64_t bad_image = 0;       ///< wrong size or type, or empty
@@ -69,8 +69,9 @@ struct FrontEndCounters {
 
 class FrontEnd {
  public:
-  /// Throws std::invalid_argument when sensor.camera is unusable. `timing` may be null and must outlive this. A stamp
-  /// that is more than `clock_jump` seconds back means a looped bag or a restarted clock, less a message out of order.
+  /// Throws std::invalid_argument when sensor.camera is unusable or the mask does not fit it. `timing` may be null and
+  /// must outlive this. A stamp that is more than `clock_jump` seconds back means a looped bag or a restarted clock,
+  /// less a message out of order.
   FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing = nullptr,
            double clock_jump = 1.0);
   ~FrontEnd();
@@ -113,7 +114,6 @@ class FrontEnd {
   /// The same calibration as given by the sensor's configuration.
   CalibrationEstimate givenCalibration() const;
   const FrontEndCounters& counters() const;
-  const FrontEndOptions& options() const;
 
  private:
   class Impl;

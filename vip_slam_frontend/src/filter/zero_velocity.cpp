@@ -20,7 +20,7 @@ constexpr double kRestFollows = 0.01;
 constexpr int kForgotten = 40;
 // Factor from image motion over its limit to the factor on the zero-velocity sigmas. The configured sigmas fit image
 // motion at the limit for surfaces about two metres away; kFar allows for three times that distance. However little the
-// image moves, the sigmas do not fall below the share kMinUnrest.
+// image moves, the sigmas do not fall below the share kMinResidualMotion.
 constexpr double kFar = 3.0, kMinResidualMotion = 0.2;
 // Image motion per metre of translation, px/m, from which on the limits on image motion hold unchanged: 0.8 px for a
 // centimetre. Where a translation shows less the limits are lower in proportion, down to the share kMinLimit (noise).

@@ -11,8 +11,8 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kMinRadius = 14;    // the narrow one likewise
 constexpr int kPatchRadius = 41;  // px, holds a wide patch shown at half its size, at any roll angle
+constexpr int kMinRadius = 14;    // px, holds a narrow one likewise
 constexpr std::size_t kMaxPatches = 8000;
 constexpr int kMaxPerImage = 60;
 // Largest distance of a newly detected corner from the pixel of the old track, px.

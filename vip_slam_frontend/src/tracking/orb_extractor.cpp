@@ -38,7 +38,8 @@ void store(const cv::Mat& row, Feature* feature) { std::memcpy(feature->descript
 OrbExtractor::OrbExtractor(int corners) : corners_(corners) {
   describer_ = cv::ORB::create(10000, 1.2f, 1, kEdge, 0, 2, cv::ORB::FAST_SCORE, kPatch, 20);
   // Twice as many as wanted: the spreading below keeps the better ones.
-  detector_ = cv::ORB::create(std::max(1, 2 * corners), 1.4f, 3, kEdge + 12, 0, 2, cv::ORB::FAST_SCORE, kPatch, 8);
+  detector_ = cv::ORB::create(std::max(1, 2 * corners), static_cast<float>(kOctaveScale), 3, kEdge + 12, 0, 2,
+                              cv::ORB::FAST_SCORE, kPatch, 8);
 }
 
 void OrbExtractor::describe(const cv::Mat& gray, std::vector<Feature>* features) const {
@@ -99,17 +100,6 @@ std::vector<Feature> OrbExtractor::extract(const cv::Mat& gray, const std::vecto
     result.push_back(f);
   }
   return result;
-}
-
-int hammingDistance(const Descriptor& a, const Descriptor& b) {
-  int distance = 0;
-  for (int i = 0; i < 4; ++i) {
-    std::uint64_t x, y;
-    std::memcpy(&x, a.data() + 8 * i, 8);
-    std::memcpy(&y, b.data() + 8 * i, 8);
-    distance += __builtin_popcountll(x ^ y);
-  }
-  return distance;
 }
 
 }  // namespace vip_slam

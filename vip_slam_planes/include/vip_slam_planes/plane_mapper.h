@@ -60,7 +60,6 @@ class PlaneMapper {
   void clear();
 
   const PlaneMapperCounters& counters() const;
-  const PlaneMapperOptions& options() const;
 
  private:
   class Impl;

@@ -107,7 +107,7 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
 
 void PlaneSampler::accumulate(const Eigen::Vector3d& n_C, PlaneObservation* observation) const {
   PlaneMoments moments;
-  for (PlanePoint& point : observation->points) {
+  for (PlaneSample& point : observation->points) {
     const Eigen::Vector3d p = point.p_C.cast<double>();
     const double sigma = std::hypot(sigmaAlong(n_C, p), noise_.bias_floor);
     point.sigma = float(sigma);

@@ -250,7 +250,7 @@ TEST(Mapper, ObservationsHoldOnlyPointsOfTheirPlane) {
       EXPECT_LE(o.points.size(), 200u);
       EXPECT_LE(o.weight_scale * double(o.points.size()), 50.001);
       Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
-      for (const PlanePoint& p : o.points) {
+      for (const PlaneSample& p : o.points) {
         ++points;
         const Eigen::Vector3d p_W = T * p.p_C.cast<double>();
         EXPECT_LT(std::abs(plane.signedDistance(p_W)), 4 * p.sigma) << "plane " << o.plane << " at " << p_W.transpose();

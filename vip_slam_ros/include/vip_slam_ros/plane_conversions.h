@@ -1,4 +1,4 @@
-// Planes: core types <-> messages, without loss.
+// Planes: core types <-> messages, without loss but for what only the simulator knows (seen_seconds, seen_area).
 #pragma once
 
 #include <string>
@@ -21,8 +21,8 @@ vip_slam_msgs::PlaneUpdate toMsg(const PlaneUpdate& update, const std::string& m
 vip_slam_msgs::PlaneMap toPlaneMapMsg(const std::vector<PlaneEstimate>& planes, double t, std::uint64_t revision,
                                       const std::string& map_frame);
 
-/// All throw std::invalid_argument naming the field when a message is inconsistent (an unknown kind, a normal of zero
-/// length, a number of point values that is not a multiple of four).
+/// All throw std::invalid_argument naming the field when a message is inconsistent (an unknown kind, a normal not
+/// of unit length, a number of point values that is not a multiple of four).
 PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg);
 PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg);
 PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg);

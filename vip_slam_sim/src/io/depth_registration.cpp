@@ -44,7 +44,7 @@ DepthSurface surfaceOf(const cv::Mat& depth, const CameraIntrinsics& c) {
 
 /// `T_b_a`: in, initial guess; out, result. False when the surfaces do not constrain every direction.
 bool registerSurfaces(const DepthSurface& a, const DepthSurface& b, const CameraIntrinsics& c, SE3* T_b_a,
-                      PoseError* error) {
+                      PoseSigma* error) {
   double gate = kFirstGate;
   for (int n = 0; n < kIterations; ++n, gate = std::max(kLastGate, 0.8 * gate)) {
     Matrix6d H = Matrix6d::Zero();
@@ -97,7 +97,7 @@ const DepthSurface& PoseRegistration::surface(std::size_t i) {
   return surfaces_[i] = surfaceOf(depth, folder_.depth_registered ? folder_.camera : folder_.depth_camera);
 }
 
-bool PoseRegistration::align(std::size_t i, std::size_t j, SE3* T_j_i, PoseError* error) {
+bool PoseRegistration::align(std::size_t i, std::size_t j, SE3* T_j_i, PoseSigma* error) {
   const DepthSurface from = surface(i);  // a copy, as surface(j) may evict it from the cache
   return registerSurfaces(from, surface(j), folder_.depth_registered ? folder_.camera : folder_.depth_camera, T_j_i,
                           error);

@@ -21,7 +21,7 @@ class PoseRegistration {
 
   /// `T_j_i`: depth camera of image i to that of image j; its input is the initial guess. False when the overlap is too
   /// small or the surfaces do not constrain every direction. `error`: one sigma of the worst direction.
-  bool align(std::size_t i, std::size_t j, SE3* T_j_i, PoseError* error);
+  bool align(std::size_t i, std::size_t j, SE3* T_j_i, PoseSigma* error);
 
  private:
   const DepthSurface& surface(std::size_t i);

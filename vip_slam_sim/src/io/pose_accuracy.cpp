@@ -23,8 +23,8 @@ double robustSigma(const std::vector<Eigen::Vector3d>& values) {
   return std::sqrt(sum / 3);
 }
 
-PoseError residualOf(const SplineTrajectory& spline, const Trajectory& poses) {
-  PoseError e;
+PoseSigma residualOf(const SplineTrajectory& spline, const Trajectory& poses) {
+  PoseSigma e;
   for (const StampedPose& p : poses) {
     const SE3 s = spline.at(p.t).T_W_I;
     e.position += (s.t() - p.T_W_B.t()).squaredNorm();
@@ -50,8 +50,8 @@ double imageInterval(const RgbdFolder& folder) {
   return medianOf(std::move(steps));
 }
 
-PoseError poseJitter(const Trajectory& poses) {
-  PoseError out;
+PoseSigma poseJitter(const Trajectory& poses) {
+  PoseSigma out;
   if (poses.size() < 20) return out;
   const double step = poseInterval(poses);
   std::vector<Eigen::Vector3d> position, rotation;
@@ -71,10 +71,10 @@ PoseError poseJitter(const Trajectory& poses) {
   return out;
 }
 
-double splineSpacing(const Trajectory& poses, const PoseError& jitter, int iterations) {
+double splineSpacing(const Trajectory& poses, const PoseSigma& jitter, int iterations) {
   const double step = poseInterval(poses);
   for (const double factor : {6.0, 4.0, 3.0, 2.0, 1.5}) {
-    const PoseError e = residualOf(SplineTrajectory::fit(poses, factor * step, iterations), poses);
+    const PoseSigma e = residualOf(SplineTrajectory::fit(poses, factor * step, iterations), poses);
     // Residuals below 0.1 mm (and 0.1 mrad) are always acceptable, whatever the jitter.
     if (e.position < std::max(1.2 * jitter.position, 1e-4) && e.rotation < std::max(1.2 * jitter.rotation, 1e-4))
       return factor * step;
@@ -82,7 +82,7 @@ double splineSpacing(const Trajectory& poses, const PoseError& jitter, int itera
   return step;
 }
 
-ImuNoise noiseOfImuFromPoses(const ImuNoise& sensor, const PoseError& jitter, double interval,
+ImuNoise noiseOfImuFromPoses(const ImuNoise& sensor, const PoseSigma& jitter, double interval,
                              const std::vector<DepthDisagreement>& drift, double gravity) {
   // White noise of density N gives an angle error of N sqrt(t) after t, and a position error of N sqrt(t^3 / 3). The
   // relative error of two poses is sqrt(2) times their jitter; the noise has to cover that already over one image

@@ -43,7 +43,7 @@ std::size_t after(const std::vector<RgbdFrame>& frames, std::size_t i, double la
 struct Edge {
   std::size_t a, b;
   SE3 T_b_a;
-  PoseError sigma;
+  PoseSigma sigma;
 };
 
 }  // namespace
@@ -64,7 +64,7 @@ std::vector<DepthDisagreement> posesAgainstDepth(const RgbdFolder& folder, const
       if (j == folder.frames.size() || !known[i] || !known[j]) continue;
       const SE3 given = T_W_D[j].inverse() * T_W_D[i];
       SE3 found = given;
-      PoseError own;
+      PoseSigma own;
       if (!registration.align(i, j, &found, &own)) continue;
       rotation.push_back(logSO3((found * given.inverse()).rotation()).squaredNorm());
       position.push_back((found.inverse().t() - given.inverse().t()).squaredNorm());
@@ -78,13 +78,13 @@ std::vector<DepthDisagreement> posesAgainstDepth(const RgbdFolder& folder, const
   return out;
 }
 
-Trajectory refinePoses(const RgbdFolder& folder, const PoseError& jitter, const PoseError& drift) {
+Trajectory refinePoses(const RgbdFolder& folder, const PoseSigma& jitter, const PoseSigma& drift) {
   std::vector<SE3> T_W_D;
   const std::vector<bool> known = depthCameras(folder, folder.T_W_C, &T_W_D);
   const std::vector<SE3> given = T_W_D;
   PoseRegistration registration(folder);
   std::vector<Edge> edges;
-  const PoseError near{1.5 * std::max(jitter.rotation, 1e-4), 1.5 * std::max(jitter.position, 1e-4)};
+  const PoseSigma near{1.5 * std::max(jitter.rotation, 1e-4), 1.5 * std::max(jitter.position, 1e-4)};
   for (std::size_t i = 0; i < given.size(); ++i) {
     if (!known[i]) continue;
     // Neighbours keep their given relative motion unless the registrations contradict it.
@@ -95,7 +95,7 @@ Trajectory refinePoses(const RgbdFolder& folder, const PoseError& jitter, const 
       if (j >= given.size() || j == last || !known[j]) continue;
       last = j;
       SE3 found = given[j].inverse() * given[i];
-      PoseError own;
+      PoseSigma own;
       if (!registration.align(i, j, &found, &own)) continue;
       // Depth sensors distort slightly, an error that the points' residuals do not show and that grows as the view
       // changes: 1 mrad and 1.5 mm, times 1 + 2 lag.
@@ -112,7 +112,7 @@ Trajectory refinePoses(const RgbdFolder& folder, const PoseError& jitter, const 
         for (int x = 0; x < 6; ++x)
           H.emplace_back(static_cast<int>(6 * r) + y, static_cast<int>(6 * c) + x, block(y, x));
     };
-    const auto whiten = [](const PoseError& sigma) {
+    const auto whiten = [](const PoseSigma& sigma) {
       Vector6d w;
       w << Eigen::Vector3d::Constant(1 / sigma.rotation), Eigen::Vector3d::Constant(1 / sigma.position);
       return w;

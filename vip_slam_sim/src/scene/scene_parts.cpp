@@ -118,7 +118,7 @@ void boxStack(SceneBuilder* b, const Palette& p, double x, double y, Rng* rng, i
 }
 
 std::vector<std::string> sceneNames() {
-  return {"office", "office_bare", "room", "stairs", "alias_corridor", "attic", "gallery", "workshop"};
+  return {"office", "office_bare", "room", "stairs", "alias_corridor", "attic", "gallery", "workshop", "foyer"};
 }
 
 Scene buildScene(const std::string& name) {
@@ -130,6 +130,7 @@ Scene buildScene(const std::string& name) {
   if (name == "attic") return buildAttic();
   if (name == "gallery") return buildGallery();
   if (name == "workshop") return buildWorkshop();
+  if (name == "foyer") return buildFoyer();
   std::string known;
   for (const std::string& n : sceneNames()) known += (known.empty() ? "" : ", ") + n;
   throw std::invalid_argument("scene '" + name + "' is not known, expected one of: " + known);

@@ -46,5 +46,6 @@ Scene buildAliasCorridor();
 Scene buildAttic();
 Scene buildGallery();
 Scene buildWorkshop();
+Scene buildFoyer();
 
 }  // namespace vip_slam

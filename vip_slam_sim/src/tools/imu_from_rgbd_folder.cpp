@@ -35,7 +35,7 @@ struct Settings {
 
 /// Prints the largest and the RMS distance of the spline from the poses to which it was fitted; returns the RMS per
 /// axis.
-PoseError reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
+PoseSigma reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
   double position = 0, angle = 0, worst = 0;
   for (const StampedPose& p : poses) {
     const MotionState m = spline.at(p.t);
@@ -51,7 +51,7 @@ PoseError reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
 }
 
 /// The noise of the IMU synthesised from these poses; prints the contributions.
-ImuNoise coveringNoise(const ImuNoise& own, const PoseError& jitter, const RgbdFolder& folder) {
+ImuNoise coveringNoise(const ImuNoise& own, const PoseSigma& jitter, const RgbdFolder& folder) {
   // The estimators compare the IMU with images, so errors of poses between two images do not matter.
   const double interval = std::max(poseInterval(folder.T_W_C), imageInterval(folder));
   std::vector<DepthDisagreement> drift;
@@ -168,17 +168,17 @@ int run(int argc, char** argv) {
     return out;
   };
   const Trajectory body = bodyOf(folder.T_W_C);
-  const PoseError jitter = poseJitter(body);
+  const PoseSigma jitter = poseJitter(body);
   if (s.spacing == 0) s.spacing = splineSpacing(body, jitter, s.iterations);
   std::fprintf(stderr, "jitter of the poses: %.2f mm and %.3f deg per axis; spline knots %.0f ms apart\n",
                1000 * jitter.position, jitter.rotation * 180 / M_PI, 1000 * s.spacing);
   const SplineTrajectory spline = SplineTrajectory::fit(body, s.spacing, s.iterations);
-  const PoseError fit = reportFit(spline, body);
+  const PoseSigma fit = reportFit(spline, body);
   const ImuLog imu = synthesiseImu(spline, s.imu, s.seed);
 
   SensorConfig sensor = sensorOf(s, folder, rig);
   if (!s.nominal_noise) {
-    const PoseError error{std::max(jitter.rotation, fit.rotation), std::max(jitter.position, fit.position)};
+    const PoseSigma error{std::max(jitter.rotation, fit.rotation), std::max(jitter.position, fit.position)};
     sensor.imu_noise = coveringNoise(sensor.imu_noise, error, folder);
   }
   const auto start_ns = std::llround(rig.start_time) * 1000000000LL;

@@ -28,7 +28,7 @@ Eigen::Vector3d gauss(Rng& rng, double sigma) {
   return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
 }
 
-void addJitter(const PoseError& sigma, Trajectory* poses) {
+void addJitter(const PoseSigma& sigma, Trajectory* poses) {
   Rng rng(17);
   for (StampedPose& p : *poses) {
     const Eigen::Vector3d turn = gauss(rng, sigma.rotation), shift = gauss(rng, sigma.position);
@@ -38,12 +38,12 @@ void addJitter(const PoseError& sigma, Trajectory* poses) {
 
 TEST(PoseJitter, IsToldFromMotion) {
   Trajectory poses = handheld(30, 20);
-  const PoseError smooth = poseJitter(poses);
+  const PoseSigma smooth = poseJitter(poses);
   EXPECT_LT(smooth.position, 0.1e-3);
   EXPECT_LT(smooth.rotation, 0.01 * kDegree);
-  const PoseError sigma{0.06 * kDegree, 0.9e-3};
+  const PoseSigma sigma{0.06 * kDegree, 0.9e-3};
   addJitter(sigma, &poses);
-  const PoseError found = poseJitter(poses);
+  const PoseSigma found = poseJitter(poses);
   EXPECT_NEAR(found.position, sigma.position, 0.1 * sigma.position);
   EXPECT_NEAR(found.rotation, sigma.rotation, 0.1 * sigma.rotation);
   EXPECT_EQ(poseJitter(Trajectory(poses.begin(), poses.begin() + 12)).position, 0);
@@ -51,7 +51,7 @@ TEST(PoseJitter, IsToldFromMotion) {
 
 TEST(SplineSpacing, IsWideForSmoothPosesAndFollowsFastOnes) {
   Trajectory poses = handheld(30, 10);
-  const PoseError none;
+  const PoseSigma none;
   const double exact = splineSpacing(poses, none, 20), rough = splineSpacing(poses, {0.5 * kDegree, 10e-3}, 20);
   EXPECT_GT(rough, 1.9 * exact);
   // A hand tremor of 5 Hz needs knots closer than 200 ms.
@@ -72,7 +72,7 @@ TEST(NoiseOfImuFromPoses, CoversJitterAndDrift) {
   EXPECT_NEAR(rough.accel_noise_density * std::sqrt(std::pow(1.0 / 30, 3) / 3), std::sqrt(2.0) * 1e-3, 5e-5);
   // Disagreement that is constant over the lags is registration noise, growth is pose drift. Lags without pairs are
   // ignored.
-  const PoseError own_error{1e-3, 1e-3}, grown{std::hypot(1e-3, 8e-3), 1e-3};
+  const PoseSigma own_error{1e-3, 1e-3}, grown{std::hypot(1e-3, 8e-3), 1e-3};
   EXPECT_DOUBLE_EQ(
       noiseOfImuFromPoses(own, {}, 1.0 / 30, {{0.1, 9, own_error}, {1.1, 9, own_error}}).gyro_noise_density, 2e-4);
   const ImuNoise drift =
@@ -134,7 +134,7 @@ TEST_F(RenderedFolder, DepthTellsHowFarPosesAreOffAndMendsThem) {
   EXPECT_GT(drift[1].error.position, 0.006);
 
   const auto errorOver = [&](const Trajectory& poses, std::size_t step) {
-    PoseError worst;
+    PoseSigma worst;
     for (std::size_t i = 0; i + step < poses.size(); ++i) {
       const SE3 a = truth[i].T_W_B.inverse() * truth[i + step].T_W_B;
       const SE3 b = poses[i].T_W_B.inverse() * poses[i + step].T_W_B;
@@ -145,7 +145,7 @@ TEST_F(RenderedFolder, DepthTellsHowFarPosesAreOffAndMendsThem) {
   };
   const Trajectory mended = refinePoses(folder_, {0.05 * kDegree, 1e-3}, drift[1].error);
   ASSERT_EQ(mended.size(), truth.size());
-  const PoseError before = errorOver(folder_.T_W_C, 10), after = errorOver(mended, 10);
+  const PoseSigma before = errorOver(folder_.T_W_C, 10), after = errorOver(mended, 10);
   std::printf("  over 1 s: %.1f mm and %.2f deg at most, mended %.1f mm and %.2f deg\n", 1000 * before.position,
               before.rotation / kDegree, 1000 * after.position, after.rotation / kDegree);
   EXPECT_LT(after.position, 0.5 * before.position);

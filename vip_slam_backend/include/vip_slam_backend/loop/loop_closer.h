@@ -64,7 +64,6 @@ class LoopCloser {
   void fuse(Map& map, KeyframeId query, const PlaceVerification& place);
 
   LoopOptions options_;
-  std::shared_ptr<const CameraModel> camera_;
   TimingLog* timing_;
   std::shared_ptr<const Vocabulary> vocabulary_;
   KeyframeDatabase database_;

@@ -17,7 +17,7 @@ struct PlaceSupport {
   SE3 T_W_C;                                ///< camera of the newest keyframe
   Matrix6d information = Matrix6d::Zero();  ///< of the perturbation (theta, t) of T_W_C
   int matches = 0;                          ///< inliers of all keyframes together
-  int points = 0;                           ///< distinct map points among the inliers, at least 5 cm apart
+  int points = 0;                           ///< distinct map points among the inliers, one per cell of 5 cm
   int covered = 0;          ///< features with depth whose point the map's views of this place show as well
   int covered_cells = 0;    ///< cells of the images (an eighth by a sixth) with covered features
   int explained_cells = 0;  ///< covered cells that contain an inlier

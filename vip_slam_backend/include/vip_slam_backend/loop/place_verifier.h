@@ -23,8 +23,8 @@ struct PlaceVerification {
   KeyframeId match = 0;
   SE3 T_W_I;                                ///< the query's pose in the map, from the matched landmarks
   Matrix6d information = Matrix6d::Zero();  ///< of the perturbation (theta, t) of the query's camera pose
-  int matches = 0, inliers = 0;
-  double depth_agreement = -1;                                  ///< -1: no depth to compare
+  int inliers = 0;              ///< matches that agree with the pose; of a PlaceSearch, distinct points of the map
+  double depth_agreement = -1;  ///< -1: no depth to compare
   std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< inliers: feature of the query, landmark of the map
 };
 

@@ -120,6 +120,4 @@ std::string validateKeyframe(const Keyframe& keyframe);
 /// The same for a plane's observation; whether keyframe and plane exist is not looked at.
 std::string validateObservation(const PlaneObservation& observation);
 
-int hammingDistance(const Descriptor& a, const Descriptor& b);
-
 }  // namespace vip_slam

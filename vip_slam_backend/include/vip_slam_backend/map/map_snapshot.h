@@ -30,12 +30,10 @@ struct InertialScale {
 
 struct BackEndStatistics {
   std::uint64_t keyframes_received = 0;
-  std::uint64_t landmarks = 0, plane_landmarks = 0, observations = 0;
-  std::uint64_t reobserved = 0;  ///< landmarks found again by projection
-  std::uint64_t merged = 0;      ///< duplicate tracks joined
-  std::uint64_t outliers = 0;    ///< observations removed by residual
-  std::uint64_t local_ba = 0, global_ba = 0;
-  std::uint64_t loops_accepted = 0, loops_rejected = 0;
+  std::uint64_t plane_landmarks = 0;
+  std::uint64_t reobserved = 0;   ///< landmarks found again by projection
+  std::uint64_t merged = 0;       ///< duplicate tracks joined
+  std::uint64_t outliers = 0;     ///< observations removed by residual
   double track_noise_factor = 1;  ///< see optimisation/problem_builder.h; of the last adjustment, local or global
   InertialScale scale;            ///< of the last global adjustment, or from some keyframes ago
 };

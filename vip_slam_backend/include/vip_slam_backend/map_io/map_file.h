@@ -32,7 +32,7 @@ constexpr std::uint32_t kLoadedEpochs = 0x80000000u;
 struct StoredMap {
   Map map;
   std::vector<std::pair<KeyframeId, KeyframeId>> loops;  ///< (query, match)
-  std::uint64_t vocabulary_id = 0;
+  std::uint64_t vocabulary_id = 0;         ///< of the session that stored it; words are made anew on loading
   std::optional<CameraIntrinsics> camera;  ///< of the features and depth grids; empty in older files
 };
 

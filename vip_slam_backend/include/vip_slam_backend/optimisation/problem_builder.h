@@ -12,7 +12,7 @@
 
 namespace vip_slam {
 
-/// Keyframes outside both constrain the planes through one block per plane (their poses are constants).
+/// What fixed keyframes and those outside both see of a plane is one block per plane (their poses are constants).
 struct ProblemScope {
   std::vector<KeyframeId> free;   ///< optimised, ascending
   std::vector<KeyframeId> fixed;  ///< constant, ascending

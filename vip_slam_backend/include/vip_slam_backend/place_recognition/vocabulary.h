@@ -39,7 +39,7 @@ class Vocabulary {
 
   bool empty() const { return word_count_ == 0; }
   std::size_t words() const { return word_count_; }
-  /// Checksum of the content: maps name the vocabulary they were made with.
+  /// Checksum of the content; map files name it, for those who wonder later.
   std::uint64_t id() const { return id_; }
   const Tree& tree() const { return tree_; }
 

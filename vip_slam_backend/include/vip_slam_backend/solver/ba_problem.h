@@ -66,7 +66,7 @@ struct BaPointToPlane {  ///< compressed
   int points = 0;
 };
 
-struct BaPlanePoint {  ///< uncompressed
+struct BaPlaneSample {  ///< uncompressed
   int frame = 0, plane = 0;
   Eigen::Vector3d p_C = Eigen::Vector3d::Zero();
   double weight = 1;  ///< 1 / sigma
@@ -102,7 +102,7 @@ struct BaProblem {
   std::vector<BaHomography> homographies;
   std::vector<BaHomographyPair> homography_pairs;
   std::vector<BaPointToPlane> point_to_plane;
-  std::vector<BaPlanePoint> plane_points;
+  std::vector<BaPlaneSample> plane_samples;
   std::vector<BaRelativePose> relative_poses;
   std::vector<BaGauge> gauges;
   std::vector<BaMotionPrior> motion_priors;

@@ -32,7 +32,8 @@ struct SolverSummary {
   int iterations = 0;  ///< steps tried, accepted or not
   bool usable = true;  ///< false: the problem was left unchanged
   std::string message;
-  double residual_ms = 0, jacobian_ms = 0, linear_ms = 0, preprocess_ms = 0, postprocess_ms = 0, total_ms = 0;
+  double residual_ms = 0, jacobian_ms = 0, linear_ms = 0, preprocess_ms = 0, total_ms = 0;
+  double postprocess_ms = 0;  ///< of Ceres; the structured solver's solution is in place as it ends
   std::size_t residual_blocks = 0, parameters = 0, observations = 0;
   std::vector<SolverIteration> log;
 };
@@ -40,7 +41,6 @@ struct SolverSummary {
 class BaSolver {
  public:
   virtual ~BaSolver() = default;
-  virtual std::string name() const = 0;
   /// Improves the variables in place. Throws std::invalid_argument with the message of validateProblem().
   virtual SolverSummary solve(BaProblem& problem, const SolverOptions& options) = 0;
 };

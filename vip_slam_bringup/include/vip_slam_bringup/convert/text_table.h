@@ -19,8 +19,6 @@ class TextTable {
   TextTable(const std::string& path, const std::string& separators, std::size_t min_columns);
 
   const std::vector<TextRow>& rows() const { return rows_; }
-  /// The header's cells without a leading '#'; empty when there is none.
-  const std::vector<std::string>& header() const { return header_; }
   const std::string& path() const { return path_; }
 
   /// The cell as a finite number; throws std::runtime_error "file:line: gyro x is 'abc', expected a number".
@@ -33,7 +31,6 @@ class TextTable {
  private:
   std::string path_;
   std::vector<TextRow> rows_;
-  std::vector<std::string> header_;
 };
 
 }  // namespace vip_slam

@@ -25,7 +25,7 @@ struct CameraIntrinsics {
   /// radtan: k1 k2 p1 p2 [k3 [k4 k5 k6]] in OpenCV order; equidistant: k1 k2 k3 k4.
   std::vector<double> distortion;
 
-  /// Intrinsics of the image resized by (sx, sy) = new size / old size (pixel centres kept consistent).
+  /// Intrinsics of the image resized to that many pixels (pixel centres kept consistent).
   CameraIntrinsics scaled(int new_width, int new_height) const;
   /// Empty when usable, else what is wrong ("fx must be > 0, is 0").
   std::string validate() const;

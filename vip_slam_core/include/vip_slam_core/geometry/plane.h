@@ -1,7 +1,7 @@
 // Infinite planes n^T x + d = 0 with |n| = 1, metres, and their manifold S^2 x R.
 // Source: paper section "Notation"; closest-point (CP) vector as in Geneva et al. 2018. Here eta = n d with
 // n^T x + d = 0, so eta is minus the plane's closest point to the origin. n is undefined at eta = 0, which is why
-// the optimisers work on S^2 x R and CP is used at interfaces only.
+// the optimisers and messages have (n, d); toCp() and fromCp() are for exchange with code that has CP.
 #pragma once
 
 #include <Eigen/Core>

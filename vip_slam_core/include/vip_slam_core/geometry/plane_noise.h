@@ -18,10 +18,10 @@ struct PlaneMisfit {
   double square = 0;  ///< the same per point, m^2: mean squared distance from the plane
 };
 
-/// Factor on the information of all point-to-plane blocks. The configured floor of systematic depth error is far too
-/// large for many cameras and too small for some, and it does not average out, since the points of one image share it.
-/// So it is estimated from the map: the factor brings the median of the observations' misfits to that of a chi-square
-/// with three degrees of freedom. 1 with too few observations.
+/// Factor, at least 1, on the information of all point-to-plane blocks. The configured floor of systematic depth error
+/// is far too large for many cameras, and it does not average out, since the points of one image share it. So it is
+/// estimated from the map: the factor brings the median of the observations' misfits up to that of a chi-square with
+/// three degrees of freedom. 1 with too few observations, and where the floor is too small.
 double planeInformationScale(const std::vector<PlaneMisfit>& misfits);
 
 /// Additional factors on the information of single planes. One plane may represent several surfaces: fronts of boxes

@@ -1,6 +1,7 @@
 // IMU preintegration between two keyframes (paper section "IMU and Point Feature Measurement"; Forster 2015, residual
 // as in VINS-Mono).
-// Mid-point gyro and accelerometer over each step, closed-form rotation increment; J and Sigma use the same F.
+// Gyro and accelerometer are linear over each step, with the terms of coning and sculling that follow from it; J and
+// Sigma use the same F.
 // Noise is given as Kalibr densities. Residual order and state order: (theta, p, v, b_g, b_a).
 #pragma once
 
@@ -13,7 +14,8 @@ namespace vip_slam {
 class Preintegration {
  public:
   Preintegration() = default;
-  /// Integrates `samples` (>= 2, ascending, first at t_i and last at t_j) about the given biases.
+  /// Integrates `samples` (>= 2, ascending, first at t_i and last at t_j) about the given biases. Throws
+  /// std::invalid_argument when there are fewer, when they are not in order, or when a noise density is zero.
   Preintegration(const std::vector<ImuSample>& samples, const Eigen::Vector3d& bias_gyro,
                  const Eigen::Vector3d& bias_accel, const ImuNoise& noise);
 

@@ -1,6 +1,6 @@
 // Drops single samples of an IMU stream whose stamp is too late: taken as they are, one of them would make all samples
-// up to its stamp out of order, a gap of that length. A sample that comes after a gap waits for the next one, which
-// tells a wrong stamp (it lies in the gap) from a true gap.
+// up to its stamp out of order, a gap of that length. A sample that comes after a gap, or is the first of all, waits
+// for the next one, which tells a wrong stamp (the next one's lies before it) from a true gap.
 #pragma once
 
 #include <cstddef>

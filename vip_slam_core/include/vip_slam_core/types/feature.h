@@ -15,6 +15,11 @@ using LandmarkId = std::int64_t;
 constexpr LandmarkId kNoLandmark = -1;
 
 using Descriptor = std::array<std::uint8_t, 32>;  ///< 256-bit ORB
+/// Number of differing bits.
+int hammingDistance(const Descriptor& a, const Descriptor& b);
+
+/// By how much an octave of the corners' image pyramid is smaller than the one before.
+constexpr double kOctaveScale = 1.4;
 
 struct Feature {
   LandmarkId id = kNoLandmark;  ///< track id; kNoLandmark for a corner that was detected but is not tracked
@@ -24,7 +29,8 @@ struct Feature {
   float depth = 0;                                  ///< z in the camera, metres; 0 = no safe depth
   float depth_sigma = 0;                            ///< one sigma of depth, metres
   float angle = 0;                                  ///< ORB orientation, radians
-  std::uint8_t octave = 0;
+  std::uint8_t octave =
+      0;  ///< of the pyramid in which the corner was found; its pixel is known to kOctaveScale^octave px
   std::uint32_t age = 0;  ///< number of images that the track has survived
   Descriptor descriptor{};
 };

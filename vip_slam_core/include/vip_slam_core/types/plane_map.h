@@ -43,7 +43,7 @@ struct StoredPlane {
 };
 
 /// A depth point on a plane, in the keyframe's camera frame, with the one-sigma distance error used as its weight.
-struct PlanePoint {
+struct PlaneSample {
   Eigen::Vector3f p_C;
   float sigma;  ///< metres along the plane normal
 };
@@ -55,7 +55,7 @@ struct PlaneObservation {
   /// G_p = sum w [p_C;1][p_C;1]^T, w = 1/sigma^2 scaled so that the sum of effective points is capped.
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
   double weight_scale = 1.0;           ///< G = weight_scale * sum 1/sigma^2 p~ p~^T over `points`
-  std::vector<PlanePoint> points;      ///< the samples behind G
+  std::vector<PlaneSample> points;     ///< the samples behind G
   CameraCorrection camera_correction;  ///< applied to their readings, see TrackedFrame
 };
 

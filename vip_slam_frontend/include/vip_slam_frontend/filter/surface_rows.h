@@ -2,7 +2,8 @@
 // corners, so they constrain five degrees of freedom in a corridor with textureless walls. Per pair, in the patch's
 // camera:
 //   n^T (T_ref_cur q - p) = 0.
-// The rows depend on the relative pose of two clones only: position and yaw of the window stay unobservable.
+// The rows depend on the relative pose of two clones and on the camera's calibration only: position and yaw of the
+// window stay unobservable. However many there are, they weigh as much as 50, since pairs share errors.
 #pragma once
 
 #include <vector>
@@ -28,7 +29,8 @@ struct SurfaceMatches {
 };
 
 struct SurfaceRows {
-  FeatureRows rows;  ///< whitened and compressed to the relative pose's dimension; empty when too few pairs are left
+  FeatureRows rows;  ///< whitened and compressed to the dimension of relative pose and calibration; empty when too few
+                     ///< pairs are left
   int used = 0, gated = 0;
 };
 

@@ -1,5 +1,5 @@
 // A feature's position from its observations in the window: start from the median of the depth readings (robust against
-// readings across an edge) or, without depth, from the two most separated rays; then Gauss-Newton over pixels and
+// readings across an edge) or, without depth, from the least squares of all rays; then Gauss-Newton over pixels and
 // depths in the inverse-depth form (x/z, y/z, 1/z) of the first camera.
 #pragma once
 

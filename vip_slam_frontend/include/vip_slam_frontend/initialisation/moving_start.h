@@ -1,6 +1,6 @@
 // Visual-inertial alignment for a start in motion, with metric camera poses (their scale comes from depth):
-//   gyro bias:  J_k b_g = Log(dR_k^T R_0_k)
-//   p_k - p_0 = v_0 t_k - g t_k^2 / 2 + alpha_k + J_k b_a,  |g| known, all in the first IMU frame.
+//   gyro bias:  J_theta_bg b_g = Log(dR_k^T R_0_k)
+//   p_k - p_0 = v_0 t_k - g t_k^2 / 2 + alpha_k + J_alpha_ba b_a,  |g| known, all in the first IMU frame.
 #pragma once
 
 #include <string>

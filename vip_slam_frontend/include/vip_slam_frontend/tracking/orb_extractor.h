@@ -26,7 +26,4 @@ class OrbExtractor {
   cv::Ptr<cv::ORB> describer_, detector_;
 };
 
-/// Number of differing bits.
-int hammingDistance(const Descriptor& a, const Descriptor& b);
-
 }  // namespace vip_slam
