@@ -171,6 +171,27 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
   return out;
 }
 
+namespace {
+
+/// The rotation of given extrinsics against the motion's. Wrong ones are an error where they are what the system uses.
+Finding extrinsicsFinding(const Recording& r, const MotionEstimate& motion, const SE3& T_imu_cam, const char* source,
+                          bool used) {
+  const double angle = T_imu_cam.rotation().angularDistance(motion.R_imu_cam) * 180 / M_PI;
+  // Without depth a sideways translation looks like a rotation.
+  const double most = r.depths.empty() ? 15 : 5;
+  if (angle <= most)
+    return {Severity::kGood, "extrinsics", words("rotation of %s fits the motion (%.1f degrees)", source, angle), ""};
+  const Eigen::Matrix3d R = motion.R_imu_cam.toRotationMatrix();
+  std::string rows;
+  for (int i = 0; i < 3; ++i) rows += words("%s[%.3f, %.3f, %.3f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
+  return {used ? Severity::kError : Severity::kWarning, "extrinsics",
+          words("the motion contradicts %s by %.0f degrees", source, angle),
+          (used ? "" : "tf is used unless extrinsics is config; ") +
+              ("the rotation that fits the motion has rows " + rows)};
+}
+
+}  // namespace
+
 Findings checkMotion(const Recording& r) {
   Findings out;
   const MotionEstimate motion = estimateMotion(r);
@@ -196,19 +217,9 @@ Findings checkMotion(const Recording& r) {
     out.push_back({Severity::kNote, "extrinsics", "not checked: the sensor turns about one axis only", ""});
     return out;
   }
-  const double angle = r.sensor.T_imu_cam.rotation().angularDistance(motion.R_imu_cam) * 180 / M_PI;
-  // Without depth a sideways translation looks like a rotation.
-  const double most = r.depths.empty() ? 15 : 5;
-  if (angle > most) {
-    const Eigen::Matrix3d R = motion.R_imu_cam.toRotationMatrix();
-    std::string rows;
-    for (int i = 0; i < 3; ++i) rows += words("%s[%.3f, %.3f, %.3f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
-    out.push_back({Severity::kError, "extrinsics", words("the motion contradicts T_imu_cam by %.0f degrees", angle),
-                   "the rotation that fits the motion has rows " + rows});
-  } else {
-    out.push_back(
-        {Severity::kGood, "extrinsics", words("rotation of T_imu_cam fits the motion (%.1f degrees)", angle), ""});
-  }
+  const std::optional<SE3> of_tf = extrinsicsOfTf(r);
+  out.push_back(extrinsicsFinding(r, motion, r.sensor.T_imu_cam, "T_imu_cam", !of_tf));
+  if (of_tf) out.push_back(extrinsicsFinding(r, motion, *of_tf, "tf", true));
   return out;
 }
 

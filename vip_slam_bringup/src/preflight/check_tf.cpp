@@ -6,11 +6,33 @@
 #include "vip_slam_ros/tf_lookup.h"
 
 namespace vip_slam {
+namespace {
+
+struct Frames {
+  std::string camera, imu;
+};
+
+Frames framesOf(const Recording& r) {
+  return {bareFrame(r.color.frame_id), bareFrame(r.sensor.topics.imu.empty() ? r.gyro.frame_id : r.imu.frame_id)};
+}
+
+void fill(const Recording& r, tf2::BufferCore* tf) {
+  for (const auto& transform : r.tf) tf->setTransform(transform, "recording", true);
+}
+
+}  // namespace
+
+std::optional<SE3> extrinsicsOfTf(const Recording& r) {
+  const Frames frames = framesOf(r);
+  if (frames.camera.empty() || frames.imu.empty() || frames.camera == frames.imu) return std::nullopt;
+  tf2::BufferCore tf;
+  fill(r, &tf);
+  return lookUpExtrinsics(tf, frames.imu, frames.camera);
+}
 
 Findings checkTf(const Recording& r) {
   Findings out;
-  const std::string camera = bareFrame(r.color.frame_id);
-  const std::string imu = bareFrame(r.sensor.topics.imu.empty() ? r.gyro.frame_id : r.imu.frame_id);
+  const auto [camera, imu] = framesOf(r);
   if (r.color.stamps.empty() || r.gyro_samples.empty()) return out;
   for (const auto& [role, frame] : {std::make_pair("colour image", camera), std::make_pair("IMU", imu)})
     if (frame.empty())
@@ -23,7 +45,7 @@ Findings checkTf(const Recording& r) {
     return out;
   }
   tf2::BufferCore tf;
-  for (const auto& transform : r.tf) tf.setTransform(transform, "recording", true);
+  fill(r, &tf);
   const auto T_imu_cam = lookUpExtrinsics(tf, imu, camera);
   if (!T_imu_cam) {
     std::string missing;

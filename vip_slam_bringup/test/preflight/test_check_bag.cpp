@@ -170,6 +170,27 @@ TEST_F(CheckBag, ExtrinsicsThatContradictTheMotion) {
   EXPECT_LT(motion.R_imu_cam.angularDistance(Eigen::Quaterniond(R)), 0.006);
 }
 
+TEST_F(CheckBag, ExtrinsicsOfTfAreHeldAgainstTheMotionToo) {
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  options_.sensor.T_imu_cam = SE3(R, Eigen::Vector3d(0.02, 0, 0));  // tf has it, the sensor file does not
+  Findings findings = check();
+  expectFound(findings, Severity::kWarning, "extrinsics", "contradicts T_imu_cam by 1");
+  expectFound(findings, Severity::kGood, "extrinsics", "rotation of tf fits the motion");
+  expectNoErrorBut(findings, "");
+  // The other way about, what is used is wrong.
+  Recording recording = recordBag(path_, expected_, 60);
+  recording.sensor.T_imu_cam = options_.sensor.T_imu_cam;
+  for (auto& transform : recording.tf) {
+    auto& q = transform.transform.rotation;
+    q.x = q.y = q.z = 0;
+    q.w = 1;
+  }
+  findings = checkMotion(recording);
+  expectFound(findings, Severity::kGood, "extrinsics", "rotation of T_imu_cam fits the motion");
+  expectFound(findings, Severity::kError, "extrinsics", "the motion contradicts tf by 1");
+}
+
 TEST_F(CheckBag, FramesInTf) {
   options_.tf = false;
   expectFound(check(), Severity::kNote, "tf", "camera_color_optical_frame and camera_imu_optical_frame not in tf");

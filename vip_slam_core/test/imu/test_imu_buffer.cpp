@@ -82,7 +82,7 @@ TEST(ImuBufferTest, DisorderRepetitionAndNonsenseAreCounted) {
   EXPECT_EQ(buffer.counters().duplicate, 1u);
   EXPECT_EQ(buffer.counters().out_of_order, 1u);
   EXPECT_EQ(buffer.counters().not_finite, 2u);
-  EXPECT_EQ(buffer.size(), 2u);
+  EXPECT_EQ(buffer.size(), 3u);
 }
 
 TEST(ImuBufferTest, GapsAreCountedAndSeenFromInside) {
@@ -125,6 +125,25 @@ TEST(ImuBufferTest, ASampleStampedAheadIsDropped) {
   EXPECT_EQ(split.counters().ahead, 2u);
 }
 
+// So it is when it comes first: nothing but the second sample tells.
+TEST(ImuBufferTest, AFirstSampleStampedAheadIsDropped) {
+  ImuBuffer united(0.1), split(0.1);
+  for (int k = 0; k < 100; ++k) {
+    const double t = 0.005 * k;
+    ImuSample sample = at(t);
+    sample.t = k == 0 ? 500.0 : t;
+    EXPECT_TRUE(united.add(sample));
+    EXPECT_TRUE(split.addGyro(k == 0 ? 300.0 : t, sample.gyro));
+    EXPECT_TRUE(split.addAccel(k == 0 ? 400.0 : t, sample.accel));
+  }
+  for (const ImuBuffer* buffer : {&united, &split}) {
+    EXPECT_EQ(buffer->between(0.006, 0.494).size(), 99u);
+    EXPECT_EQ(buffer->counters().out_of_order, 0u);
+  }
+  EXPECT_EQ(united.counters().ahead, 1u);
+  EXPECT_EQ(split.counters().ahead, 2u);
+}
+
 // A true gap waits for one more sample; a stream that is slower than the gap does not, from its third sample on.
 TEST(ImuBufferTest, GapsAreNoWrongStamps) {
   ImuBuffer buffer(0.1);
@@ -140,7 +159,9 @@ TEST(ImuBufferTest, GapsAreNoWrongStamps) {
   ImuBuffer slow(0.01);
   for (int k = 0; k < 20; ++k) {
     EXPECT_TRUE(slow.add(at(0.02 * k)));
-    if (k > 1) EXPECT_DOUBLE_EQ(slow.newest(), 0.02 * k);
+    if (k > 1) {
+      EXPECT_DOUBLE_EQ(slow.newest(), 0.02 * k);
+    }
   }
 }
 
@@ -197,13 +218,16 @@ TEST(ImuBufferTest, AHoleInTheAccelerometerAloneIsAGap) {
 
 TEST(ImuBufferTest, SplitStreamsRefuseDisorderToo) {
   ImuBuffer buffer(0.2);
+  EXPECT_TRUE(buffer.addAccel(0.95, {0, 0, 9.81}));
   EXPECT_TRUE(buffer.addAccel(1.0, {0, 0, 9.81}));
   EXPECT_FALSE(buffer.addAccel(0.9, {0, 0, 9.81}));
   EXPECT_FALSE(buffer.addAccel(1.0, {0, 0, 9.81}));
   EXPECT_FALSE(buffer.addAccel(1.1, {0, 0, NAN}));
   EXPECT_TRUE(buffer.addAccel(1.1, {0, 0, 9.81}));
+  EXPECT_TRUE(buffer.addGyro(1.04, {0, 0, 0}));  // the first waits for the second
+  EXPECT_TRUE(buffer.empty());
   EXPECT_TRUE(buffer.addGyro(1.05, {0, 0, 0}));  // accelerometer samples on both sides: combined at once
-  EXPECT_EQ(buffer.size(), 1u);
+  EXPECT_EQ(buffer.size(), 2u);
   EXPECT_FALSE(buffer.addGyro(1.05, {0, 0, 0}));
   EXPECT_FALSE(buffer.addGyro(1.01, {0, 0, 0}));
   EXPECT_EQ(buffer.counters().out_of_order, 2u);

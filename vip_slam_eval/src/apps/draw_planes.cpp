@@ -14,8 +14,8 @@
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/output_folder.h"
-#include "vip_slam_eval/plane_heights.h"
-#include "vip_slam_eval/plane_picture.h"
+#include "vip_slam_eval/plane_benchmark/plane_heights.h"
+#include "vip_slam_eval/plane_benchmark/plane_picture.h"
 #include "vip_slam_ros/sensor_files.h"
 
 namespace {

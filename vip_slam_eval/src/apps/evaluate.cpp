@@ -3,8 +3,8 @@
 
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/command_line.h"
-#include "vip_slam_eval/evaluation.h"
-#include "vip_slam_eval/trajectory_source.h"
+#include "vip_slam_eval/io/trajectory_source.h"
+#include "vip_slam_eval/report/evaluation.h"
 
 int main(int argc, char** argv) {
   using namespace vip_slam;

@@ -15,8 +15,8 @@
 
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
-#include "vip_slam_eval/trajectory_consistency.h"
-#include "vip_slam_eval/trajectory_metrics.h"
+#include "vip_slam_eval/metrics/trajectory_consistency.h"
+#include "vip_slam_eval/metrics/trajectory_metrics.h"
 #include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_sim/sequence/sequence_renderer.h"

@@ -9,8 +9,8 @@
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/output_folder.h"
-#include "vip_slam_eval/plane_benchmark.h"
-#include "vip_slam_eval/plane_tables.h"
+#include "vip_slam_eval/plane_benchmark/plane_benchmark.h"
+#include "vip_slam_eval/report/plane_tables.h"
 
 namespace {
 

@@ -6,46 +6,24 @@
 #include <cstdio>
 #include <sstream>
 
-#include <Eigen/Dense>
-
 #include "vip_slam_backend/optimisation/problem_builder.h"
-#include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/statistics.h"
+#include "vip_slam_eval/metrics/trajectory_metrics.h"
 
 namespace vip_slam {
 
-double alignedRmse(const std::vector<Eigen::Vector3d>& truth, const std::vector<Eigen::Vector3d>& estimate) {
-  const std::size_t n = truth.size();
-  Eigen::Vector3d mean_t = Eigen::Vector3d::Zero(), mean_e = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < n; ++k) mean_t += truth[k], mean_e += estimate[k];
-  mean_t /= n;
-  mean_e /= n;
-  Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
-  for (std::size_t k = 0; k < n; ++k) C += (truth[k] - mean_t) * (estimate[k] - mean_e).transpose();
-  const Eigen::Matrix3d R = nearestRotation(C);
-  double sum = 0;
-  for (std::size_t k = 0; k < n; ++k) sum += (truth[k] - mean_t - R * (estimate[k] - mean_e)).squaredNorm();
-  return std::sqrt(sum / n);
-}
-
 namespace {
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 
 double msSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
 double rmseOf(const SimulatedMap& map, const BuiltProblem& built, const BaProblem& problem) {
-  std::vector<Eigen::Vector3d> truth, estimate;
-  for (std::size_t f = 0; f < built.frames.size(); ++f) {
-    if (built.frames[f] == 0) continue;
-    truth.push_back(map.truth.at(built.frames[f]).T_W_I.t());
-    estimate.push_back(problem.frames[f].state.T_W_I.t());
-  }
-  return alignedRmse(truth, estimate);
+  std::vector<PosePair> pairs;
+  for (std::size_t f = 0; f < built.frames.size(); ++f)
+    if (built.frames[f] != 0)
+      pairs.push_back({static_cast<double>(f), map.truth.at(built.frames[f]).T_W_I, problem.frames[f].state.T_W_I});
+  return absoluteError(pairs, Alignment::kSe3).position.rmse;
 }
 
 BuilderSettings builderSettings(const SimulatedMap& map, const GbaSetup& setup) {
@@ -94,8 +72,8 @@ struct Repeats {
   }
 
   GbaRun middle() {
-    run.build_ms = median(build);
-    run.store_ms = median(store);
+    run.build_ms = upperMedian(build);
+    run.store_ms = upperMedian(store);
     std::sort(summaries.begin(), summaries.end(),
               [](const SolverSummary& a, const SolverSummary& b) { return a.total_ms < b.total_ms; });
     run.summary = summaries[summaries.size() / 2];

@@ -4,7 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "vip_slam_eval/trajectory_source.h"
+#include "vip_slam_eval/io/trajectory_source.h"
 
 namespace vip_slam {
 

@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "vip_slam_core/util/atomic_file.h"
-#include "vip_slam_eval/association_metrics.h"
+#include "vip_slam_eval/metrics/association_metrics.h"
 
 namespace vip_slam {
 namespace {

@@ -1,4 +1,4 @@
-#include "vip_slam_eval/trajectory_source.h"
+#include "vip_slam_eval/io/trajectory_source.h"
 
 #include <cmath>
 #include <set>

@@ -1,9 +1,9 @@
-#include "vip_slam_eval/association_metrics.h"
+#include "vip_slam_eval/metrics/association_metrics.h"
 
 #include <cmath>
 #include <map>
 
-#include "vip_slam_eval/polygon_overlap.h"
+#include "vip_slam_eval/metrics/polygon_overlap.h"
 
 namespace vip_slam {
 namespace {

@@ -1,9 +1,9 @@
-#include "vip_slam_eval/plane_metrics.h"
+#include "vip_slam_eval/metrics/plane_metrics.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "vip_slam_eval/polygon_overlap.h"
+#include "vip_slam_eval/metrics/polygon_overlap.h"
 
 namespace vip_slam {
 namespace {

@@ -1,4 +1,4 @@
-#include "vip_slam_eval/polygon_overlap.h"
+#include "vip_slam_eval/metrics/polygon_overlap.h"
 
 #include <algorithm>
 #include <cmath>

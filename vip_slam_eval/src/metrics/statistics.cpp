@@ -1,4 +1,4 @@
-#include "vip_slam_eval/statistics.h"
+#include "vip_slam_eval/metrics/statistics.h"
 
 #include <algorithm>
 #include <cmath>

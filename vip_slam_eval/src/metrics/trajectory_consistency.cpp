@@ -1,4 +1,4 @@
-#include "vip_slam_eval/trajectory_consistency.h"
+#include "vip_slam_eval/metrics/trajectory_consistency.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "vip_slam_eval/trajectory_metrics.h"
+#include "vip_slam_eval/metrics/trajectory_metrics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "vip_slam_eval/trajectory_metrics.h"
+#include "vip_slam_eval/metrics/trajectory_metrics.h"
 
 namespace vip_slam {
 

@@ -1,4 +1,4 @@
-#include "vip_slam_eval/plane_benchmark.h"
+#include "vip_slam_eval/plane_benchmark/plane_benchmark.h"
 #include "vip_slam_core/util/progress_bar.h"
 
 #include <stdexcept>
@@ -6,7 +6,7 @@
 
 #include "plane_benchmark/true_map.h"
 #include "vip_slam_bringup/runner/bag_reader.h"
-#include "vip_slam_eval/plane_tables.h"
+#include "vip_slam_eval/report/plane_tables.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_ros/sensor_files.h"
 

@@ -1,4 +1,4 @@
-#include "vip_slam_eval/plane_heights.h"
+#include "vip_slam_eval/plane_benchmark/plane_heights.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "vip_slam_core/util/statistics.h"
-#include "vip_slam_eval/polygon_overlap.h"
+#include "vip_slam_eval/metrics/polygon_overlap.h"
 
 namespace vip_slam {
 

@@ -1,11 +1,11 @@
-#include "vip_slam_eval/plane_picture.h"
+#include "vip_slam_eval/plane_benchmark/plane_picture.h"
 
 #include <cmath>
 #include <string>
 
 #include <opencv2/imgproc.hpp>
 
-#include "vip_slam_eval/polygon_overlap.h"
+#include "vip_slam_eval/metrics/polygon_overlap.h"
 
 namespace vip_slam {
 namespace {

@@ -9,7 +9,7 @@
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/keyframe.h"
 #include "vip_slam_core/types/map_update.h"
-#include "vip_slam_eval/association_metrics.h"
+#include "vip_slam_eval/metrics/association_metrics.h"
 
 namespace vip_slam {
 

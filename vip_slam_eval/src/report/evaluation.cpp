@@ -1,4 +1,4 @@
-#include "vip_slam_eval/evaluation.h"
+#include "vip_slam_eval/report/evaluation.h"
 
 #include <cmath>
 #include <filesystem>
@@ -11,7 +11,7 @@
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/output_folder.h"
-#include "vip_slam_eval/plane_tables.h"
+#include "vip_slam_eval/report/plane_tables.h"
 
 namespace vip_slam {
 namespace {

@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "vip_slam_core/geometry/angle.h"
-#include "vip_slam_eval/evaluation.h"
-#include "vip_slam_eval/svg.h"
+#include "vip_slam_eval/report/evaluation.h"
+#include "vip_slam_eval/report/svg.h"
 
 namespace vip_slam {
 namespace {

@@ -1,4 +1,4 @@
-#include "vip_slam_eval/metric_table.h"
+#include "vip_slam_eval/report/metric_table.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "vip_slam_eval/plane_tables.h"
+#include "vip_slam_eval/report/plane_tables.h"
 
 #include <cmath>
 #include <locale>

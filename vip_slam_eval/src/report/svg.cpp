@@ -1,4 +1,4 @@
-#include "vip_slam_eval/svg.h"
+#include "vip_slam_eval/report/svg.h"
 
 #include <algorithm>
 #include <array>

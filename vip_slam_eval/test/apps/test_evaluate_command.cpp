@@ -13,7 +13,7 @@
 
 #include "vip_slam_core/testing/analytic_motion.h"
 #include "vip_slam_core/types/planes_yaml.h"
-#include "vip_slam_eval/trajectory_source.h"
+#include "vip_slam_eval/io/trajectory_source.h"
 
 namespace vip_slam {
 namespace {

@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <fstream>
 
-#include "vip_slam_eval/association_metrics.h"
-#include "vip_slam_eval/plane_metrics.h"
-#include "vip_slam_eval/polygon_overlap.h"
+#include "vip_slam_eval/metrics/association_metrics.h"
+#include "vip_slam_eval/metrics/plane_metrics.h"
+#include "vip_slam_eval/metrics/polygon_overlap.h"
 
 namespace vip_slam {
 namespace {

@@ -4,8 +4,8 @@
 #include <random>
 
 #include "vip_slam_core/testing/analytic_motion.h"
-#include "vip_slam_eval/trajectory_consistency.h"
-#include "vip_slam_eval/trajectory_metrics.h"
+#include "vip_slam_eval/metrics/trajectory_consistency.h"
+#include "vip_slam_eval/metrics/trajectory_metrics.h"
 
 namespace vip_slam {
 namespace {

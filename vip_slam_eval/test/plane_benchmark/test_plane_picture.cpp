@@ -1,7 +1,7 @@
 // Planes drawn over an image: where they are, and nowhere else.
 #include <gtest/gtest.h>
 
-#include "vip_slam_eval/plane_picture.h"
+#include "vip_slam_eval/plane_benchmark/plane_picture.h"
 
 namespace vip_slam {
 namespace {

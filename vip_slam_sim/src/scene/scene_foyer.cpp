@@ -49,7 +49,8 @@ Scene buildFoyer() {
   socket(&b, wall[10], 12.2);
   lightSwitch(&b, wall[0], 3.3);
 
-  // Along the south wall a ramp up to the landing, 0.30 m over 4.2 m, and steps down from it; a kerb stands at its edge.
+  // Along the south wall a ramp up to the landing, 0.30 m over 4.2 m, and steps down from it; a kerb stands at its
+  // edge.
   const double rise = 0.3, foot = 3.4, head = 7.6, end = 10.4, width = 1.7;
   const int slope = b.rectangle({foot, 0, 0}, {head - foot, 0, rise}, {0, width, 0}, p.carpet);
   for (int i = 0; i < 4; ++i) b.decal(slope, 0.5 + i, 0.05, 0.56 + i, width - 0.05, -1, rgb(0.68f, 0.66f, 0.35f));
@@ -60,7 +61,7 @@ Scene buildFoyer() {
     b.cylinder(uprightPose(foot + 0.3 + 1.6 * i, width + 0.04, rise + 0.12), 0.02, 0.55, p.metal, p.metal, 10);
 
   // A soffit that slopes by 6 degrees under the ceiling in the east, a platform one low step up beneath it.
-  b.rectangle({12.2, 7.0, 2.55}, {0, -4.6, 0}, {-0.0, 0, 0.12}, p.white);
+  b.rectangle({12.2, 7.0, 2.55}, {0, -4.6, 0}, {0, 0, 0.12}, p.white);
   b.rectangle({12.2, 7.0, 2.55}, {3.6, 0, 0.38}, {0, -4.6, 0}, p.ceiling);
   b.boxAt(13.8, 4.6, 0, 0.26, {2.6, 2.4, 0.10}, p.wood, p.wood);
 

@@ -64,7 +64,7 @@ TEST(Scenes, RayHitsAgreeWithTheRoomsWalls) {
 }
 
 TEST(Scenes, WallsAreWhiteButNotSaturated) {
-  for (const std::string name : {"01", "07", "stairs", "alias", "attic", "gallery", "workshop"}) {
+  for (const std::string name : {"01", "07", "stairs", "alias", "attic", "gallery", "workshop", "foyer"}) {
     SequenceRenderer s(loadSequence(name, libraryPath()), quickOptions());
     double white = 0, sum = 0;
     int n = 0;
@@ -136,7 +136,7 @@ TEST(Sequences, MotionThroughAWallIsRefused) {
 
 TEST(Sequences, PathsKeepClear) {
   for (const std::string name : {"01", "02", "03", "04", "05", "long_loop", "stairs", "alias", "attic", "attic_phone",
-                                 "gallery", "gallery_robot", "workshop"}) {
+                                 "gallery", "gallery_robot", "workshop", "foyer"}) {
     SequenceSpec spec = loadSequence(name, libraryPath());
     EXPECT_TRUE(spec.motion.check_collisions);
     EXPECT_NO_THROW(SequenceRenderer(spec,

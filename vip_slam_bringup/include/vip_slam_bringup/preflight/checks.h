@@ -1,6 +1,7 @@
 // The preflight checks: each tests one aspect of a recording and reports its findings in plain words.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,9 @@ Findings checkSkew(const Recording& recording);    ///< colour against depth sta
 Findings checkImu(const Recording& recording);     ///< gaps, units, gravity, values that never change
 Findings checkMotion(const Recording& recording);  ///< camera-IMU delay and rotation from the motion itself
 Findings checkTf(const Recording& recording);      ///< frames, and extrinsics against the sensor file
+
+/// T_imu_cam of the recording's tf, which the system prefers to the sensor file's; empty when tf does not have it.
+std::optional<SE3> extrinsicsOfTf(const Recording& recording);
 
 /// All of them in this order; the later ones only when their input is available.
 Findings checkAll(const Recording& recording);

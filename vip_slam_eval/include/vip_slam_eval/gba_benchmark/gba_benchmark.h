@@ -41,9 +41,6 @@ std::vector<GbaRun> runGba(const SimulatedMap& map, const std::vector<GbaSetup>&
 /// The map of the first `keyframes` keyframes.
 SimulatedMap prefix(const SimulatedMap& map, int keyframes);
 
-/// ATE RMSE of positions after rigid alignment (no scale), metres.
-double alignedRmse(const std::vector<Eigen::Vector3d>& truth, const std::vector<Eigen::Vector3d>& estimate);
-
 std::string gbaTableMarkdown(const std::vector<GbaRun>& runs);
 std::string gbaTableCsv(const std::vector<GbaRun>& runs);
 

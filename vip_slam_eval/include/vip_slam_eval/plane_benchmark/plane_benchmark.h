@@ -8,9 +8,9 @@
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/plane_map.h"
 #include "vip_slam_core/util/timing.h"
-#include "vip_slam_eval/association_metrics.h"
-#include "vip_slam_eval/metric_table.h"
-#include "vip_slam_eval/plane_metrics.h"
+#include "vip_slam_eval/metrics/association_metrics.h"
+#include "vip_slam_eval/metrics/plane_metrics.h"
+#include "vip_slam_eval/report/metric_table.h"
 #include "vip_slam_planes/plane_mapper.h"
 
 namespace vip_slam {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "vip_slam_eval/trajectory_consistency.h"
+#include "vip_slam_eval/metrics/trajectory_consistency.h"
 
 namespace vip_slam {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "vip_slam_core/types/plane_map.h"
-#include "vip_slam_eval/plane_metrics.h"
+#include "vip_slam_eval/metrics/plane_metrics.h"
 
 namespace vip_slam {
 

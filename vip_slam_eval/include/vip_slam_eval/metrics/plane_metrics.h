@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "vip_slam_core/types/plane_map.h"
-#include "vip_slam_eval/statistics.h"
+#include "vip_slam_eval/metrics/statistics.h"
 
 namespace vip_slam {
 

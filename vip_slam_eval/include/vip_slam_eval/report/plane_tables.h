@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "vip_slam_eval/association_metrics.h"
-#include "vip_slam_eval/metric_table.h"
-#include "vip_slam_eval/plane_metrics.h"
+#include "vip_slam_eval/metrics/association_metrics.h"
+#include "vip_slam_eval/metrics/plane_metrics.h"
+#include "vip_slam_eval/report/metric_table.h"
 
 namespace vip_slam {
 
