@@ -7,6 +7,7 @@ add_library(vip_slam_runner
   src/runner/mapping_thread.cpp
   src/runner/pipeline.cpp
   src/runner/plane_files.cpp
+  src/runner/plane_history.cpp
   src/runner/run_output.cpp
   src/runner/run_warnings.cpp
 )

@@ -214,18 +214,6 @@ constexpr const char* kFiles[] = {"trajectory.tum", "realtime.tum", "odometry.tu
                                   "floorplan.svg",  "map.vsm",      "timing.csv",   "summary.yaml",
                                   "report.html"};
 
-/// Parameters of each plane after each map update, to judge their stability.
-void writePlaneHistory(const std::string& path, const std::vector<PlaneRecord>& history) {
-  AtomicFile file(path);
-  file.stream() << "t,id,nx,ny,nz,d\n" << std::fixed;
-  for (const PlaneRecord& record : history) {
-    const Eigen::Vector3d& n = record.plane.n;
-    file.stream() << std::setprecision(9) << record.t << ',' << record.id << std::setprecision(6) << ',' << n.x() << ','
-                  << n.y() << ',' << n.z() << ',' << record.plane.d << '\n';
-  }
-  file.commit();
-}
-
 }  // namespace
 
 void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& pipeline, const BagReader& reader,

@@ -1,5 +1,5 @@
-// rosrun vip_slam_eval plane_benchmark BAG --sensor S --truth T.tum --planes-truth P.yaml [--out DIR]
-// Evaluates the plane module alone, with true poses.
+// rosrun vip_slam_eval plane_benchmark BAG --sensor S --truth T.tum [--planes-truth P.yaml] [--out DIR]
+// Evaluates the plane module alone, with true poses; of a real recording how steady its planes are.
 #include <filesystem>
 #include <iostream>
 
@@ -23,15 +23,18 @@ void writeText(const std::filesystem::path& path, const std::string& text) {
 }
 
 void write(const std::string& folder, const PlaneBenchmarkResult& result, const MetricTable& table,
-           const TimingLog& timing) {
+           const TimingLog& timing, bool judged) {
   const std::filesystem::path out(folder);
   std::ostringstream metrics;
   writeMetricsCsv(metrics, table);
   writeText(out / "metrics.csv", metrics.str());
-  writeText(out / "planes.csv", planeMatchesCsv(result.metrics));
-  writeText(out / "true_planes.csv", truePlanesCsv(result.metrics));
+  if (judged) {
+    writeText(out / "planes.csv", planeMatchesCsv(result.metrics));
+    writeText(out / "true_planes.csv", truePlanesCsv(result.metrics));
+    writeLabelledPoints((out / "points.csv").string(), result.points);
+  }
   writePlanesYaml((out / "planes.yaml").string(), result.planes);
-  writeLabelledPoints((out / "points.csv").string(), result.points);
+  writePlaneHistory((out / "plane_history.csv").string(), result.history);
   timing.writeCsv((out / "timing.csv").string());
 }
 
@@ -48,9 +51,10 @@ int main(int argc, char** argv) {
   line.required("sensor");
   line.option("truth", truth, "true trajectory of the IMU, TUM");
   line.required("truth");
-  line.option("planes-truth", true_planes, "true planes, YAML");
-  line.required("planes-truth");
-  line.option("out", out, "folder for metrics.csv, planes.csv, true_planes.csv, planes.yaml, points.csv, timing.csv");
+  line.option("planes-truth", true_planes, "true planes, YAML; without it planes are not judged");
+  line.option("out", out,
+              "folder for metrics.csv, planes.yaml, plane_history.csv, timing.csv, and where the true planes are known "
+              "planes.csv, true_planes.csv, points.csv");
   line.option("set", settings, "one option as group/key=value, as for run_bag; repeatable");
   line.option("start", input.start, "seconds to skip at the beginning", between(0.0, 1e6));
   line.option("duration", input.duration, "seconds to process; default: to the end", above(0.0));
@@ -59,13 +63,14 @@ int main(int argc, char** argv) {
   try {
     setOptions(input.options, splitSettings(settings));
     input.truth = readTum(truth);
-    input.true_planes = readPlanesYaml(true_planes);
+    const bool judged = !true_planes.empty();
+    if (judged) input.true_planes = readPlanesYaml(true_planes);
     if (!out.empty()) prepareOutputFolder(out);
     TimingLog timing;
     const PlaneBenchmarkResult result = runPlaneBenchmark(input, &timing);
-    const MetricTable table = metricsOf(result, timing);
+    const MetricTable table = metricsOf(result, timing, judged);
     printMetrics(std::cout, table);
-    if (!out.empty()) write(out, result, table, timing);
+    if (!out.empty()) write(out, result, table, timing, judged);
   } catch (const std::exception& error) {
     std::cerr << "plane_benchmark: " << error.what() << "\n";
     return 1;

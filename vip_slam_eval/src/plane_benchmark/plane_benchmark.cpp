@@ -43,6 +43,10 @@ class Bench {
     map_.apply(mapper_.applyMapUpdate({}));  // changes since the last keyframe
     result_.planes = mapper_.planes();
     result_.points = map_.points();
+    if (input.true_planes.empty()) {
+      result_.counters = mapper_.counters();
+      return result_;
+    }
     result_.metrics = planeMetrics(input.true_planes, result_.planes);
     result_.associations = associationMetrics(result_.points, input.true_planes, result_.metrics,
                                               input.options.planes.association.min_keyframes);
@@ -61,6 +65,8 @@ class Bench {
         mapper_.addKeyframe(keyframe);
         const MapUpdate placed = map_.addKeyframe(*keyframe);
         map_.apply(mapper_.applyMapUpdate(placed));
+        for (const PlaneEstimate& plane : mapper_.planes())
+          result_.history.push_back({keyframe->frame.t, plane.id, plane.plane});
       }
     }
     TrackedFrame frame = *output.frame;
@@ -99,15 +105,17 @@ PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingL
   return result;
 }
 
-MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing) {
+MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing, bool judged) {
   MetricTable table;
   table.push_back({"run", "images", double(result.images), ""});
   table.push_back({"run", "keyframes", double(result.keyframes), ""});
   table.push_back({"run", "planes started", double(result.counters.planes_started), ""});
   table.push_back({"run", "planes merged", double(result.counters.planes_merged), ""});
   table.push_back({"run", "planes removed", double(result.counters.planes_removed), ""});
-  appendPlaneMetrics(&table, result.metrics);
-  appendAssociationMetrics(&table, result.associations);
+  if (judged) {
+    appendPlaneMetrics(&table, result.metrics);
+    appendAssociationMetrics(&table, result.associations);
+  }
   using Clock = TimingLog::Clock;
   for (const auto& [stage, clock, name] : {std::tuple("planes.update", Clock::kElapsed, "keyframe"),
                                            std::tuple("planes.grow", Clock::kElapsed, "growth frame"),

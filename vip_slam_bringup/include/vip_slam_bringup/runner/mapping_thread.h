@@ -12,6 +12,7 @@
 #include "vip_slam_backend/back_end.h"
 #include "vip_slam_bringup/runner/channel.h"
 #include "vip_slam_bringup/runner/pipeline_options.h"
+#include "vip_slam_bringup/runner/plane_history.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/types/keyframe.h"
 #include "vip_slam_core/util/timing.h"
@@ -26,12 +27,6 @@ struct GlobalBaRecord {
 };
 
 /// A plane's parameters after a map update.
-struct PlaneRecord {
-  double t = 0;  ///< stamp of the newest keyframe
-  PlaneId id = 0;
-  Plane plane;  ///< in `map`
-};
-
 class MappingThread {
  public:
   /// `timing` may be null.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "vip_slam_bringup/runner/pipeline_options.h"
+#include "vip_slam_bringup/runner/plane_history.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/plane_map.h"
 #include "vip_slam_core/util/timing.h"
@@ -16,17 +17,18 @@
 namespace vip_slam {
 
 struct PlaneBenchmarkInput {
-  std::string bag, sensor;  ///< sensor: a shipped name or a file
-  Trajectory truth;         ///< of the IMU
-  std::vector<PlaneEstimate> true_planes;
-  PipelineOptions options;  ///< of front end and planes
-  double start = 0;         ///< seconds to skip
-  double duration = -1;     ///< seconds; negative: to the end
+  std::string bag, sensor;                 ///< sensor: a shipped name or a file
+  Trajectory truth;                        ///< of the IMU
+  std::vector<PlaneEstimate> true_planes;  ///< empty: not known, only the history and times are of use
+  PipelineOptions options;                 ///< of front end and planes
+  double start = 0;                        ///< seconds to skip
+  double duration = -1;                    ///< seconds; negative: to the end
 };
 
 struct PlaneBenchmarkResult {
   std::size_t images = 0, keyframes = 0;
   std::vector<PlaneEstimate> planes;
+  std::vector<PlaneRecord> history;  ///< after each keyframe
   std::vector<LabelledPoint> points;
   PlaneMetrics metrics;
   AssociationMetrics associations;
@@ -37,6 +39,7 @@ struct PlaneBenchmarkResult {
 /// std::runtime_error naming what cannot be read, or when the truth covers no keyframe.
 PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing);
 
-MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing);
+/// `judged`: the true planes were known.
+MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing, bool judged);
 
 }  // namespace vip_slam
