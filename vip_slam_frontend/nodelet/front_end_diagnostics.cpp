@@ -172,7 +172,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
     std::snprintf(words, sizeof words,
                   "%s (%.1f Hz) and %s (%.1f Hz) are not synchronised: newest stamps %.0f ms apart, pairs need %.0f ms",
                   sensor_.topics.color.c_str(), color_monitor_->report().rate, sensor_.topics.depth.c_str(),
-                  depth_monitor_->report().rate, 1e3 * skew, 1e3 * options_.pair_tolerance);
+                  depth_monitor_->report().rate, 1e3 * skew, 1e3 * options_.input.pair_tolerance);
     complaints += (complaints.empty() ? "" : "; ") + std::string(words);
   }
   if (empty_depth_ > 0 && complaints.empty()) complaints = depthAbsence(now);

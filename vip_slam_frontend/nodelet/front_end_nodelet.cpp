@@ -30,11 +30,11 @@ void FrontEndNodelet::onInit() {
   frames_.odom = options_.odom_frame;
   frames_.base = options_.base_frame;
   PairerOptions pairing;
-  pairing.tolerance = options_.pair_tolerance;
-  pairing.patience = sensor_.topics.depth.empty() ? -1.0 : options_.depth_patience;
+  pairing.tolerance = options_.input.pair_tolerance;
+  pairing.patience = sensor_.topics.depth.empty() ? -1.0 : options_.input.depth_patience;
   pairing.capacity = std::size_t(options_.image_queue);
   pairer_ = std::make_unique<ImagePairer>(pairing);
-  clock_ = std::make_unique<StreamClock>(kStreams, options_.time_jump);
+  clock_ = std::make_unique<StreamClock>(kStreams, options_.input.time_jump);
   tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
   tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   calibration_ = std::make_unique<CalibrationSource>(sensor_, options_, tf_buffer_);
@@ -160,7 +160,7 @@ void FrontEndNodelet::startWhenCalibrated() {
   if (!resolved) return;
   try {
     // clock_ has already filtered the stamps; those that pass are no jump.
-    auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.time_jump);
+    auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.input.time_jump);
     alignment_ = std::make_unique<DepthAlignment>(*resolved);
     front_end_ = std::move(front_end);
   } catch (const std::exception& error) {
@@ -201,7 +201,7 @@ double FrontEndNodelet::waitedFor(double t) const {
 void FrontEndNodelet::processReady() {
   if (!front_end_) return;
   while (const ImagePair* front = pairer_->front()) {
-    if (!front_end_->ready(front->t, front->depth_lag) && waitedFor(front->t) <= options_.imu_patience) return;
+    if (!front_end_->ready(front->t, front->depth_lag) && waitedFor(front->t) <= options_.input.imu_patience) return;
     // Removed before processing: an image that throws must not be tried again forever.
     const ImagePair pair = *front;
     pairer_->pop();

@@ -44,7 +44,7 @@ bool BackEnd::Impl::learnDepthCurve() {
     disparity = fitDisparityError(map, sensor.depth_noise, disparity_error != 0);
     if (disparity) found = disparityCurve(*disparity, sensor.depth_noise.max_range);
   } else {
-    found = fitDepthCurve(map, sensor.depth_noise);
+    found = fitDepthCurve(map, sensor.depth_noise, !camera_correction.curve.added.empty());
   }
   if (!found) return false;
   DepthCurve curve = chained(camera_correction.curve, *found);

@@ -18,9 +18,14 @@ constexpr double kBendSigma = 0.002;   // m, prior of an entry against the line 
 constexpr int kRounds = 3;             // of reweighting
 constexpr double kKnownSigma = 0.001;  // m: entries with a smaller sigma count as known
 constexpr int kMinKnown = 6;           // entries
-// The root mean square of the known entries must exceed kWorthwhile, m, and kSure sigmas; and the curves from two
-// halves of the planes must have at least this correlation.
-constexpr double kWorthwhile = 5e-4, kSure = 4.0, kMinCorrelation = 0.5;
+// The root mean square of the known entries must exceed so many m and so many sigmas. Once there is a curve the camera
+// is known to have one, and what it lacks may lie at few distances, those that were not seen before: less will do.
+struct Significance {
+  double size, sigmas;
+};
+constexpr Significance kFirstCurve{5e-4, 4.0}, kRefinement{3e-4, 2.0};
+// The curves from two halves of the planes must have at least this correlation.
+constexpr double kMinCorrelation = 0.5;
 
 constexpr float kWorthTelling = 0.002f;  // m
 
@@ -111,7 +116,7 @@ double correlation(const CurveEstimate& a, const CurveEstimate& b) {
 
 }  // namespace
 
-std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise) {
+std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise, bool refine) {
   const std::vector<const MapKeyframe*> keyframes = newestKeyframesOnPlanes(map);
   if (int(keyframes.size()) < kMinCurveKeyframes) return std::nullopt;
   const PlaneSet planes = allPlanes(map);
@@ -123,7 +128,8 @@ std::optional<DepthCurve> fitDepthCurve(const Map& map, const DepthNoise& noise)
     ratios += std::pow(found.value(i) / found.sigma(i), 2);
   }
   const auto n = static_cast<double>(found.known.size());
-  if (squares < n * kWorthwhile * kWorthwhile || ratios < n * kSure * kSure) return std::nullopt;
+  const Significance& least = refine ? kRefinement : kFirstCurve;
+  if (squares < n * least.size * least.size || ratios < n * least.sigmas * least.sigmas) return std::nullopt;
   // Surfaces that are not exactly planar distort the curve as well, but each plane differently.
   const auto [first, second] = halves(keyframes, planes);
   const double agree = correlation(estimateCurve(keyframes, first, noise), estimateCurve(keyframes, second, noise));

@@ -92,6 +92,7 @@ int run(const Arguments& arguments) {
   const vip_slam::PipelineOptions options = loadPipelineOptions(arguments);
   vip_slam::SensorConfig sensor = vip_slam::loadSensorConfig(vip_slam::resolveSensor(arguments.sensor));
   vip_slam::BagReaderOptions reading;
+  reading.input = options.input;
   reading.start = arguments.start;
   reading.duration = arguments.duration;
   reading.extrinsics = arguments.extrinsics;

@@ -30,6 +30,13 @@ StampedImage stampedImage(const rosbag::MessageInstance& message, const Decode& 
   throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
 }
 
+PairerOptions pairing(const InputOptions& input) {
+  PairerOptions options;
+  options.tolerance = input.pair_tolerance;
+  options.patience = input.depth_patience;
+  return options;
+}
+
 }  // namespace
 
 BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthRegistration* registration,
@@ -38,8 +45,8 @@ BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthRegistration* re
       registration_(registration),
       options_(options),
       sink_(std::move(sink)),
-      pairer_(options.pairing),
-      clock_(kStreams, options.time_jump) {}
+      pairer_(pairing(options.input)),
+      clock_(kStreams, options.input.time_jump) {}
 
 void BagDecoding::take(const rosbag::MessageInstance& message) {
   const std::string& topic = message.getTopic();
@@ -139,7 +146,7 @@ void BagDecoding::finish() {
   if (!depth_topic.empty() && pairs.without_depth > 5 && 20 * pairs.without_depth > pairs.pairs + pairs.without_depth)
     warnings_.push_back("topic " + depth_topic + ": " + std::to_string(pairs.without_depth) + " of " +
                         std::to_string(pairs.pairs + pairs.without_depth) + " colour images have no depth within " +
-                        std::to_string(std::lround(1e3 * options_.pairing.tolerance)) +
+                        std::to_string(std::lround(1e3 * options_.input.pair_tolerance)) +
                         " ms: switch on the driver's synchronisation, or equal rates; when check_bag finds "
                         "the depth elsewhere in the bag, sort that");
   if (2 * without_any_ > depth_images_) {

@@ -8,7 +8,8 @@
 namespace vip_slam {
 
 Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, TimingLog* timing)
-    : options_(options), front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing)) {
+    : options_(options),
+      front_end_(std::make_unique<FrontEnd>(options.frontend, sensor, timing, options.input.time_jump)) {
   if (options.mapping) mapping_ = std::make_unique<MappingThread>(options, sensor, timing);
 }
 
@@ -46,7 +47,7 @@ double Pipeline::waitedFor(double t) const {
 
 void Pipeline::processReady() {
   while (!waiting_.empty() && (front_end_->ready(waiting_.front().t, waiting_.front().depth_lag) ||
-                               waitedFor(waiting_.front().t) > options_.imu_patience)) {
+                               waitedFor(waiting_.front().t) > options_.input.imu_patience)) {
     process(waiting_.front());
     waiting_.pop_front();
   }

@@ -85,6 +85,7 @@ class Bench {
 PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing) {
   SensorConfig sensor = loadSensorConfig(resolveSensor(input.sensor));
   BagReaderOptions reading;
+  reading.input = input.options.input;
   reading.start = input.start;
   reading.duration = input.duration;
   BagReader reader(input.bag, sensor, reading);

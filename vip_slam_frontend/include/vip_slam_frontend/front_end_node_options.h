@@ -5,6 +5,7 @@
 
 #include "vip_slam_core/util/options.h"
 #include "vip_slam_frontend/front_end_options.h"
+#include "vip_slam_ros/input_options.h"
 
 namespace vip_slam {
 
@@ -17,11 +18,8 @@ struct FrontEndNodeOptions {
   double tf_patience = 2.0;
   bool publish_tf = true;
   bool imu_rate_odometry = false;
-  double pair_tolerance = 0.035;
-  double depth_patience = 0.15;
-  double imu_patience = 0.5;
+  InputOptions input;
   int image_queue = 20;
-  double time_jump = 1.0;
 
   void visit(OptionVisitor& v) {
     v.field("sensor", sensor, {}, "a shipped sensor or the path of a sensor YAML file");
@@ -32,14 +30,8 @@ struct FrontEndNodeOptions {
     v.field("tf_patience", tf_patience, 0.0, 60.0, "how long auto waits for tf, s");
     v.field("publish_tf", publish_tf, "publish odom -> base_link");
     v.field("imu_rate_odometry", imu_rate_odometry, "publish odom_imu_rate, predicted at each IMU sample");
-    v.field("pair_tolerance", pair_tolerance, 0.0, 0.5, "largest difference between colour and depth stamps, s");
-    v.field("depth_patience", depth_patience, 0.0, 5.0,
-            "a colour image waits for its depth until newer images are this far, s");
-    v.field("imu_patience", imu_patience, 0.01, 10.0,
-            "an image waits for the IMU to cover its stamp until other data is this much newer, s");
+    input.visit(v);
     v.field("image_queue", image_queue, 1, 200, "images that may wait; older ones are dropped and counted");
-    v.field("time_jump", time_jump, 0.1, 60.0,
-            "stamps this much older than the newest restart the odometry (looping bag), s");
     front_end.visit(v);
   }
 };

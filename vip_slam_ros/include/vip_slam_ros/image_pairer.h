@@ -9,6 +9,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "vip_slam_ros/input_options.h"
+
 namespace vip_slam {
 
 struct StampedImage {
@@ -26,8 +28,9 @@ struct ImagePair {
 };
 
 struct PairerOptions {
-  double tolerance = 0.035;  ///< largest difference between the stamps of a pair, seconds: one period at 30 Hz
-  double patience = 0.15;    ///< colour waits for its depth until any image is this much newer, seconds
+  double tolerance = InputOptions().pair_tolerance;  ///< largest difference between the stamps of a pair, seconds
+  double patience =
+      InputOptions().depth_patience;  ///< colour waits for its depth until any image is this much newer, seconds
   std::size_t capacity = 20;
 };
 

@@ -38,8 +38,7 @@ using SensorEvent = std::variant<ImuSample, GyroSample, AccelSample, ImagePair, 
 struct BagReaderOptions {
   double start = 0;      ///< seconds after the first message
   double duration = -1;  ///< seconds; negative: to the end
-  PairerOptions pairing;
-  double time_jump = 1.0;           ///< stamps run back by more than this, seconds: a TimeJump
+  InputOptions input;
   std::string extrinsics = "auto";  ///< "tf", "config" (the sensor file), or tf when the bag has it
   double tf_patience = 2.0;         ///< seconds of /tf that are read; /tf_static is used always
 };

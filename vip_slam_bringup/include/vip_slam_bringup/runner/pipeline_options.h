@@ -5,6 +5,7 @@
 #include "vip_slam_core/util/options.h"
 #include "vip_slam_frontend/front_end_options.h"
 #include "vip_slam_planes/plane_mapper_options.h"
+#include "vip_slam_ros/input_options.h"
 
 namespace vip_slam {
 
@@ -14,7 +15,7 @@ struct PipelineOptions {
   BackEndOptions backend;
   bool mapping = true;
   int lag = 3;
-  double imu_patience = 0.5;
+  InputOptions input;
 
   void visit(OptionVisitor& v) {
     v.group("frontend", frontend);
@@ -23,8 +24,7 @@ struct PipelineOptions {
     v.field("mapping", mapping, "run planes and back end; without them only the odometry is written");
     v.field("lag", lag, 0, 100,
             "images after a keyframe at which the front end hears of the map's answer; 0: waits for it at once");
-    v.field("imu_patience", imu_patience, 0.01, 10.0,
-            "an image waits for the IMU to cover its stamp until other data is this much newer, s");
+    input.visit(v);
   }
 };
 
