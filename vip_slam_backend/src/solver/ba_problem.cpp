@@ -64,7 +64,7 @@ std::string validateProblem(const BaProblem& problem) {
     if (!frameOk(f.frame) || !planeOk(f.plane) || !f.G.allFinite())
       return "a compressed point-to-plane factor without its frame or plane, or not finite";
   for (const BaPlaneSample& f : problem.plane_samples)
-    if (!frameOk(f.frame) || !planeOk(f.plane)) return "a plane point without its frame or plane";
+    if (!frameOk(f.frame) || !planeOk(f.plane)) return "a depth point on a plane without its frame or plane";
   for (const BaRelativePose& f : problem.relative_poses)
     if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !f.T_i_j.isFinite() || !f.sqrt_information.allFinite())
       return "a relative pose without its frames, or not finite";

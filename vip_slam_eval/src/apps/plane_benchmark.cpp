@@ -23,14 +23,14 @@ void writeText(const std::filesystem::path& path, const std::string& text) {
 }
 
 void write(const std::string& folder, const PlaneBenchmarkResult& result, const MetricTable& table,
-           const TimingLog& timing, bool judged) {
+           const TimingLog& timing) {
   const std::filesystem::path out(folder);
   std::ostringstream metrics;
   writeMetricsCsv(metrics, table);
   writeText(out / "metrics.csv", metrics.str());
-  if (judged) {
-    writeText(out / "planes.csv", planeMatchesCsv(result.metrics));
-    writeText(out / "true_planes.csv", truePlanesCsv(result.metrics));
+  if (result.metrics) {
+    writeText(out / "planes.csv", planeMatchesCsv(*result.metrics));
+    writeText(out / "true_planes.csv", truePlanesCsv(*result.metrics));
     writeLabelledPoints((out / "points.csv").string(), result.points);
   }
   writePlanesYaml((out / "planes.yaml").string(), result.planes);
@@ -63,14 +63,13 @@ int main(int argc, char** argv) {
   try {
     setOptions(input.options, splitSettings(settings));
     input.truth = readTum(truth);
-    const bool judged = !true_planes.empty();
-    if (judged) input.true_planes = readPlanesYaml(true_planes);
+    if (!true_planes.empty()) input.true_planes = readPlanesYaml(true_planes);
     if (!out.empty()) prepareOutputFolder(out);
     TimingLog timing;
     const PlaneBenchmarkResult result = runPlaneBenchmark(input, &timing);
-    const MetricTable table = metricsOf(result, timing, judged);
+    const MetricTable table = metricsOf(result, timing);
     printMetrics(std::cout, table);
-    if (!out.empty()) write(out, result, table, timing, judged);
+    if (!out.empty()) write(out, result, table, timing);
   } catch (const std::exception& error) {
     std::cerr << "plane_benchmark: " << error.what() << "\n";
     return 1;

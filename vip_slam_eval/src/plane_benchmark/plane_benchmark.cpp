@@ -43,13 +43,11 @@ class Bench {
     map_.apply(mapper_.applyMapUpdate({}));  // changes since the last keyframe
     result_.planes = mapper_.planes();
     result_.points = map_.points();
-    if (input.true_planes.empty()) {
-      result_.counters = mapper_.counters();
-      return result_;
+    if (input.true_planes) {
+      result_.metrics = planeMetrics(*input.true_planes, result_.planes);
+      result_.associations = associationMetrics(result_.points, *input.true_planes, *result_.metrics,
+                                                input.options.planes.association.min_keyframes);
     }
-    result_.metrics = planeMetrics(input.true_planes, result_.planes);
-    result_.associations = associationMetrics(result_.points, input.true_planes, result_.metrics,
-                                              input.options.planes.association.min_keyframes);
     result_.counters = mapper_.counters();
     return result_;
   }
@@ -106,17 +104,15 @@ PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingL
   return result;
 }
 
-MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing, bool judged) {
+MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing) {
   MetricTable table;
   table.push_back({"run", "images", double(result.images), ""});
   table.push_back({"run", "keyframes", double(result.keyframes), ""});
   table.push_back({"run", "planes started", double(result.counters.planes_started), ""});
   table.push_back({"run", "planes merged", double(result.counters.planes_merged), ""});
   table.push_back({"run", "planes removed", double(result.counters.planes_removed), ""});
-  if (judged) {
-    appendPlaneMetrics(&table, result.metrics);
-    appendAssociationMetrics(&table, result.associations);
-  }
+  if (result.metrics) appendPlaneMetrics(&table, *result.metrics);
+  if (result.associations) appendAssociationMetrics(&table, *result.associations);
   using Clock = TimingLog::Clock;
   for (const auto& [stage, clock, name] : {std::tuple("planes.update", Clock::kElapsed, "keyframe"),
                                            std::tuple("planes.grow", Clock::kElapsed, "growth frame"),

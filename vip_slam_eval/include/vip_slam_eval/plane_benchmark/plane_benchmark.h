@@ -1,6 +1,7 @@
 // Benchmark of the plane module alone: the front end tracks and selects keyframes, whose poses are the true ones.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,12 +18,12 @@
 namespace vip_slam {
 
 struct PlaneBenchmarkInput {
-  std::string bag, sensor;                 ///< sensor: a shipped name or a file
-  Trajectory truth;                        ///< of the IMU
-  std::vector<PlaneEstimate> true_planes;  ///< empty: not known, only the history and times are of use
-  PipelineOptions options;                 ///< of front end and planes
-  double start = 0;                        ///< seconds to skip
-  double duration = -1;                    ///< seconds; negative: to the end
+  std::string bag, sensor;                                ///< sensor: a shipped name or a file
+  Trajectory truth;                                       ///< of the IMU
+  std::optional<std::vector<PlaneEstimate>> true_planes;  ///< without them planes and points are not judged
+  PipelineOptions options;                                ///< of front end and planes
+  double start = 0;                                       ///< seconds to skip
+  double duration = -1;                                   ///< seconds; negative: to the end
 };
 
 struct PlaneBenchmarkResult {
@@ -30,8 +31,8 @@ struct PlaneBenchmarkResult {
   std::vector<PlaneEstimate> planes;
   std::vector<PlaneRecord> history;  ///< after each keyframe
   std::vector<LabelledPoint> points;
-  PlaneMetrics metrics;
-  AssociationMetrics associations;
+  std::optional<PlaneMetrics> metrics;  ///< with true planes only, like the next
+  std::optional<AssociationMetrics> associations;
   PlaneMapperCounters counters;
 };
 
@@ -39,7 +40,6 @@ struct PlaneBenchmarkResult {
 /// std::runtime_error naming what cannot be read, or when the truth covers no keyframe.
 PlaneBenchmarkResult runPlaneBenchmark(const PlaneBenchmarkInput& input, TimingLog* timing);
 
-/// `judged`: the true planes were known.
-MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing, bool judged);
+MetricTable metricsOf(const PlaneBenchmarkResult& result, const TimingLog& timing);
 
 }  // namespace vip_slam
