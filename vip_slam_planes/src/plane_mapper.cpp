@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "plane_mapper_impl.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/types/camera_correction.h"
 #include "vip_slam_planes/growth/other_layers.h"
 #include "vip_slam_planes/growth/see_through.h"
@@ -83,7 +84,7 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   const SE3 T_map_C = T_map_odom * frame.state.T_W_I * frame.T_I_C;
   const SE3 moved = grown_at_.inverse() * T_map_C;
   const bool still = has_grown_ && moved.t().norm() < options.growth.min_move &&
-                     logSO3(moved.rotation()).norm() < options.growth.min_turn_deg * M_PI / 180.0;
+                     logSO3(moved.rotation()).norm() < options.growth.min_turn_deg * kDegree;
   if (!usable || still || !T_map_C.isFinite()) {
     ++counters.frames_skipped;
     return;

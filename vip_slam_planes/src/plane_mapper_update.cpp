@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "plane_mapper_impl.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"
 #include "vip_slam_core/types/camera_correction.h"
 #include "vip_slam_planes/growth/moved_surface.h"
@@ -15,8 +16,8 @@ namespace {
 // Largest number of keyframes per update that are processed again after the map has moved their observations off
 // planes.
 constexpr std::size_t kMaxRenewed = 10;
-constexpr double kSureDirection = 2.0 * M_PI / 180.0;                  // largest sigma of a determined direction, rad
-constexpr double kMovedTurn = 0.5 * M_PI / 180.0, kMovedShift = 0.02;  // of a keyframe by one update, rad and m
+constexpr double kSureDirection = 2.0 * kDegree;                  // largest sigma of a determined direction, rad
+constexpr double kMovedTurn = 0.5 * kDegree, kMovedShift = 0.02;  // of a keyframe by one update, rad and m
 
 }  // namespace
 

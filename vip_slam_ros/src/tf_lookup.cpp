@@ -2,6 +2,7 @@
 
 #include <tf2/exceptions.h>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_ros/geometry_conversions.h"
 
 namespace vip_slam {
@@ -26,7 +27,7 @@ std::optional<SE3> lookUpExtrinsics(const tf2::BufferCore& buffer, const std::st
 
 ExtrinsicsGap extrinsicsGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b) {
   ExtrinsicsGap gap;
-  gap.degrees = T_imu_cam_a.rotation().angularDistance(T_imu_cam_b.rotation()) * 180 / M_PI;
+  gap.degrees = T_imu_cam_a.rotation().angularDistance(T_imu_cam_b.rotation()) / kDegree;
   gap.metres = (T_imu_cam_a.t() - T_imu_cam_b.t()).norm();
   return gap;
 }

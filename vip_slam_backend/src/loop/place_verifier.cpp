@@ -10,6 +10,7 @@
 #include "vip_slam_backend/loop/guided_matching.h"
 #include "vip_slam_backend/loop/place_matching.h"
 #include "vip_slam_backend/loop/scene_agreement.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
 namespace {
@@ -84,8 +85,8 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
   }
   const double tilt = std::acos(std::clamp((result->T_W_I.rotation().conjugate() * Eigen::Vector3d::UnitZ())
                                                .dot(T_G_I.rotation().conjugate() * Eigen::Vector3d::UnitZ()),
-                                           -1.0, 1.0)) *
-                      180.0 / M_PI;
+                                           -1.0, 1.0)) /
+                      kDegree;
   if (tilt > options_.max_gravity_deg) {
     result->reason = words("pose is tilted %.1f deg against gravity, at most %.1f", tilt, options_.max_gravity_deg);
     return;

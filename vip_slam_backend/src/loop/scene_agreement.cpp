@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 namespace {
 
@@ -85,7 +87,7 @@ DepthAgreement compareDepth(const DepthGrid& a, const DepthGrid& b, const SE3& T
 
 PlaneAgreement comparePlanes(const Map& map, const std::set<KeyframeId>& query, const std::set<KeyframeId>& match,
                              const SE3& T_W_W) {
-  constexpr double kAngle = 4.0 * M_PI / 180.0, kSame = 0.08, kContradiction = 0.6;
+  constexpr double kAngle = 4.0 * kDegree, kSame = 0.08, kContradiction = 0.6;
   PlaneAgreement result;
   const auto ours = patches(map, query, T_W_W), theirs = patches(map, match, SE3());
   for (const auto& a : ours) {

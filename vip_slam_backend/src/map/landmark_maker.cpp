@@ -4,6 +4,8 @@
 
 #include <Eigen/Dense>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 
 namespace {
@@ -91,7 +93,7 @@ bool LandmarkMaker::triangulate(const Map& map, const std::vector<MapObservation
   double smallest = 1;
   for (std::size_t i = 0; i < rays.size(); ++i)
     for (std::size_t j = i + 1; j < rays.size(); ++j) smallest = std::min(smallest, rays[i].dot(rays[j]));
-  if (smallest > std::cos(kMinParallax * M_PI / 180.0)) return false;
+  if (smallest > std::cos(kMinParallax * kDegree)) return false;
   *p_W = A.ldlt().solve(b);
   if (!p_W->allFinite()) return false;
   for (const MapObservation& o : views) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "back_end/back_end_runs.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/types/camera_correction.h"
 
 using namespace vip_slam;
@@ -47,7 +48,7 @@ double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& wor
   const Eigen::Quaterniond turn = expQuaternion({0, 0, yaw});
   for (const SnapshotKeyframe& kf : snapshot.keyframes) {
     const Eigen::Quaterniond left = world.truth(kf.t).T_W_I.rotation().conjugate() * (turn * kf.state.T_W_I.rotation());
-    worst = std::max(worst, logSO3(left).norm() * 180 / M_PI);
+    worst = std::max(worst, logSO3(left).norm() / kDegree);
   }
   return worst;
 }

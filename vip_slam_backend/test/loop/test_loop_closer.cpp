@@ -5,6 +5,7 @@
 #include "vip_slam_backend/loop/loop_closer.h"
 #include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_backend/relocalisation/relocaliser.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
 namespace {
@@ -71,7 +72,7 @@ TEST(LoopCloser, ALittleTiltMattersNoMoreFarFromTheOrigin) {
     RingWorld world;
     Map map;
     std::vector<SE3> truth;
-    world.walk(map, 1.1, 0.1, &truth, Eigen::Vector3d(away, 0, 0), 0.2 * M_PI / 180);
+    world.walk(map, 1.1, 0.1, &truth, Eigen::Vector3d(away, 0, 0), 0.2 * kDegree);
     world.addFloors(map, truth, 60);
     LoopCloser closer(LoopOptions(), world.camera());
     const auto loops = closeAll(closer, map);

@@ -11,6 +11,7 @@
 #include "vip_slam_bringup/preflight/gyro_integral.h"
 #include "vip_slam_bringup/preflight/readout.h"
 #include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/util/statistics.h"
 
@@ -176,7 +177,7 @@ namespace {
 /// The rotation of given extrinsics against the motion's. Wrong ones are an error where they are what the system uses.
 Finding extrinsicsFinding(const Recording& r, const MotionEstimate& motion, const SE3& T_imu_cam, const char* source,
                           bool used) {
-  const double angle = T_imu_cam.rotation().angularDistance(motion.R_imu_cam) * 180 / M_PI;
+  const double angle = T_imu_cam.rotation().angularDistance(motion.R_imu_cam) / kDegree;
   // Without depth a sideways translation looks like a rotation.
   const double most = r.depths.empty() ? 15 : 5;
   if (angle <= most)

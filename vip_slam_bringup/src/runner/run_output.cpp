@@ -11,6 +11,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "vip_slam_bringup/runner/plane_files.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
 
@@ -120,7 +121,7 @@ void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration
   yaml << YAML::Key << "calibration" << YAML::Value << YAML::BeginMap;
   rows("T_imu_cam", calibration.T_I_C.matrix());
   yaml << YAML::Key << "time_offset" << YAML::Value << calibration.time_offset;
-  list("sigma_rotation_deg", calibration.sigma_rotation * 180 / M_PI);
+  list("sigma_rotation_deg", calibration.sigma_rotation / kDegree);
   list("sigma_translation", calibration.sigma_translation);
   yaml << YAML::Key << "sigma_time_offset" << YAML::Value << calibration.sigma_time_offset;
   list("intrinsics", calibration.intrinsics);

@@ -11,6 +11,7 @@
 #include "driver_bag.h"
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/recorder.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace fs = std::filesystem;
 
@@ -136,7 +137,7 @@ TEST_F(CheckBag, UnitsOfTheImu) {
   options_.gravity = false;
   expectFound(check(), Severity::kError, "gravity", "taken out");
   options_.gravity = true;
-  options_.gyro_factor = 180 / M_PI;
+  options_.gyro_factor = 1 / kDegree;
   expectFound(check(), Severity::kError, "gyroscope", "degrees a second");
 }
 

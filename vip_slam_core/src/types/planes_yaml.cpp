@@ -83,10 +83,10 @@ std::string text(const Ring& ring) {
   return out + "]";
 }
 
-PlaneEstimate planeFrom(const YAML::Node& node) {
+TruePlane planeFrom(const YAML::Node& node) {
   refuseUnknown(node,
                 {"id", "kind", "normal", "distance", "area", "keyframes", "seen_seconds", "seen_area", "polygons"});
-  PlaneEstimate plane;
+  TruePlane plane;
   plane.id = valueOf<PlaneId>(node, "id");
   plane.kind = kindFromName(need(node, "kind").as<std::string>());
   const Eigen::Vector3d n = vectorFrom(need(node, "normal"), "normal");
@@ -108,9 +108,36 @@ PlaneEstimate planeFrom(const YAML::Node& node) {
   return plane;
 }
 
+void write(const PlaneEstimate& plane, std::ostream& out) {
+  out << "  - id: " << plane.id << "\n    kind: " << kindName(plane.kind) << "\n    normal: " << text(plane.plane.n)
+      << "\n    distance: " << formatDouble(plane.plane.d) << "\n    area: " << formatDouble(plane.area)
+      << "\n    keyframes: " << plane.keyframes;
+  out << "\n    polygons:" << (plane.polygons.empty() ? " []" : "") << "\n";
+  for (const PlanePolygon& polygon : plane.polygons) {
+    out << "      - outer: " << text(polygon.outer) << "\n        holes:" << (polygon.holes.empty() ? " []" : "")
+        << "\n";
+    for (const Ring& hole : polygon.holes) out << "          - " << text(hole) << "\n";
+  }
+}
+
+void write(const TruePlane& plane, std::ostream& out) {
+  write(static_cast<const PlaneEstimate&>(plane), out);
+  if (plane.seen_seconds >= 0) out << "    seen_seconds: " << formatDouble(plane.seen_seconds) << "\n";
+  if (plane.seen_area >= 0) out << "    seen_area: " << formatDouble(plane.seen_area) << "\n";
+}
+
+template <class P>
+void writeFile(const std::string& path, const std::vector<P>& planes) {
+  AtomicFile file(path);
+  std::ofstream& out = file.stream();
+  out << "planes:" << (planes.empty() ? " []" : "") << "\n";
+  for (const P& plane : planes) write(plane, out);
+  file.commit();
+}
+
 }  // namespace
 
-std::vector<PlaneEstimate> readPlanesYaml(const std::string& path) {
+std::vector<TruePlane> readTruePlanesYaml(const std::string& path) {
   YAML::Node root;
   try {
     root = YAML::LoadFile(path);
@@ -122,7 +149,7 @@ std::vector<PlaneEstimate> readPlanesYaml(const std::string& path) {
   if (!root.IsMap() || !root["planes"]) throw std::runtime_error(path + ": planes: missing, expected a list");
   // summary.yaml has a number there, which would be read as an empty list.
   if (!root["planes"].IsSequence()) throw std::runtime_error(path + ": planes: expected a list");
-  std::vector<PlaneEstimate> planes;
+  std::vector<TruePlane> planes;
   for (const YAML::Node& node : root["planes"]) {
     try {
       planes.push_back(planeFrom(node));
@@ -133,24 +160,13 @@ std::vector<PlaneEstimate> readPlanesYaml(const std::string& path) {
   return planes;
 }
 
-void writePlanesYaml(const std::string& path, const std::vector<PlaneEstimate>& planes) {
-  AtomicFile file(path);
-  std::ofstream& out = file.stream();
-  out << "planes:" << (planes.empty() ? " []" : "") << "\n";
-  for (const PlaneEstimate& plane : planes) {
-    out << "  - id: " << plane.id << "\n    kind: " << kindName(plane.kind) << "\n    normal: " << text(plane.plane.n)
-        << "\n    distance: " << formatDouble(plane.plane.d) << "\n    area: " << formatDouble(plane.area)
-        << "\n    keyframes: " << plane.keyframes;
-    if (plane.seen_seconds >= 0) out << "\n    seen_seconds: " << formatDouble(plane.seen_seconds);
-    if (plane.seen_area >= 0) out << "\n    seen_area: " << formatDouble(plane.seen_area);
-    out << "\n    polygons:" << (plane.polygons.empty() ? " []" : "") << "\n";
-    for (const PlanePolygon& polygon : plane.polygons) {
-      out << "      - outer: " << text(polygon.outer) << "\n        holes:" << (polygon.holes.empty() ? " []" : "")
-          << "\n";
-      for (const Ring& hole : polygon.holes) out << "          - " << text(hole) << "\n";
-    }
-  }
-  file.commit();
+std::vector<PlaneEstimate> readPlanesYaml(const std::string& path) {
+  const std::vector<TruePlane> planes = readTruePlanesYaml(path);
+  return {planes.begin(), planes.end()};
 }
+
+void writePlanesYaml(const std::string& path, const std::vector<PlaneEstimate>& planes) { writeFile(path, planes); }
+
+void writeTruePlanesYaml(const std::string& path, const std::vector<TruePlane>& planes) { writeFile(path, planes); }
 
 }  // namespace vip_slam

@@ -11,6 +11,7 @@
 
 #include <Eigen/QR>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/imu/imu_buffer.h"
 #include "vip_slam_core/imu/preintegration.h"
 
@@ -31,8 +32,6 @@ std::vector<std::vector<double>> readCsv(const std::string& path) {
 }
 
 Eigen::Vector3d vector(const std::vector<double>& row, int at) { return {row[at], row[at + 1], row[at + 2]}; }
-
-constexpr double kRadians = M_PI / 180.0;
 
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
@@ -63,7 +62,7 @@ struct Errors {
         "after %s, medians of %zu windows: position %.1f mm (start levelled: %.1f mm), velocity %.1f mm/s, "
         "rotation %.3f deg, of it heading %.3f deg\n",
         duration, position.size(), 1e3 * median(position), 1e3 * median(position_levelled), 1e3 * median(velocity),
-        median(rotation) / kRadians, median(heading) / kRadians);
+        median(rotation) / kDegree, median(heading) / kDegree);
   }
 };
 
@@ -117,7 +116,7 @@ TEST(RealImu, PreintegrationFollowsTheTruth) {
   brief.print("0.1 s");
   EXPECT_LT(median(brief.position), 0.001);
   EXPECT_LT(median(brief.velocity), 0.015);
-  EXPECT_LT(median(brief.rotation), 0.06 * kRadians);
+  EXPECT_LT(median(brief.rotation), 0.06 * kDegree);
   EXPECT_LT(median(brief.position_levelled), 0.0003);
 
   // Two seconds. Roll and pitch of this truth wander against the gyro by some tenths of a degree a second while its yaw
@@ -125,7 +124,7 @@ TEST(RealImu, PreintegrationFollowsTheTruth) {
   // hold as it is, and the position gain once the start's tilt has been fitted to the end's velocity.
   const Errors full = evaluate(400);
   full.print("2 s");
-  EXPECT_LT(median(full.heading), 0.15 * kRadians);
+  EXPECT_LT(median(full.heading), 0.15 * kDegree);
   EXPECT_LT(median(full.position_levelled), 0.5 * median(full.position));
   EXPECT_LT(median(full.position_levelled), 0.09);
 

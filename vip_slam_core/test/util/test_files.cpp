@@ -113,13 +113,13 @@ PlaneEstimate floorPlane() {
 }
 
 TEST_F(FileFormats, PlanesRoundTrip) {
-  PlaneEstimate truth = floorPlane();
+  TruePlane truth{floorPlane()};
   truth.id = 13;
   truth.kind = PlaneKind::kGeneral;
   truth.seen_seconds = 4.5;
   truth.seen_area = 2.5;
-  writePlanesYaml(path("p.yaml"), {floorPlane(), truth});
-  const auto back = readPlanesYaml(path("p.yaml"));
+  writeTruePlanesYaml(path("p.yaml"), {{floorPlane()}, truth});
+  const auto back = readTruePlanesYaml(path("p.yaml"));
   ASSERT_EQ(back.size(), 2u);
   EXPECT_EQ(back[0].id, 12u);
   EXPECT_EQ(back[0].kind, PlaneKind::kHorizontal);
@@ -134,6 +134,7 @@ TEST_F(FileFormats, PlanesRoundTrip) {
   EXPECT_EQ(back[1].seen_seconds, 4.5);
   EXPECT_EQ(back[1].seen_area, 2.5);
   EXPECT_EQ(back[1].kind, PlaneKind::kGeneral);
+  EXPECT_EQ(readPlanesYaml(path("p.yaml"))[1].id, 13u);
   writePlanesYaml(path("none.yaml"), {});
   EXPECT_TRUE(readPlanesYaml(path("none.yaml")).empty());
 }

@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
     input.truth = readTrajectory(truth, truth_topic);
     input.estimate = readTrajectory(estimate, estimate_topic, &input.covariances);
     if (!covariance.empty()) input.covariances = readCovariances(covariance, input.estimate);
-    if (!true_planes.empty()) input.true_planes = readPlanesYaml(true_planes);
+    if (!true_planes.empty()) input.true_planes = readTruePlanesYaml(true_planes);
     if (!planes.empty()) input.planes = readPlanesYaml(planes);
     if (!points.empty()) input.points = readLabelledPoints(points);
     const Evaluation evaluation = evaluate(input);

@@ -13,6 +13,7 @@
 #include <ros/package.h>
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_eval/metrics/trajectory_consistency.h"
@@ -90,7 +91,7 @@ void printDrift(const Trajectory& truth, const std::vector<PoseWithCovariance>& 
     farthest = std::max(farthest, (seemingly.t() - truly.t()).norm());
     turned = std::max(turned, logSO3(truly.rotation().conjugate() * seemingly.rotation()).norm());
   }
-  std::printf("  off at most %.2f mm, %.3f deg\n", 1000 * farthest, turned * 180 / M_PI);
+  std::printf("  off at most %.2f mm, %.3f deg\n", 1000 * farthest, turned / kDegree);
 }
 
 /// Errors and the sigmas reported by the filter, one line per image.

@@ -11,6 +11,7 @@
 #include "place_metrics/relocalisation_trials.h"
 #include "place_metrics/true_poses.h"
 #include "vip_slam_backend/map_io/map_file.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/util/command_line.h"
@@ -22,7 +23,7 @@ namespace {
 using namespace vip_slam;
 
 constexpr double kRevisitSeconds = 30;
-constexpr double kWrongMetres = 0.3, kWrongAngle = 5 * M_PI / 180;
+constexpr double kWrongMetres = 0.3, kWrongAngle = 5 * kDegree;
 
 /// A share in per cent; "-" when `all` is zero.
 std::string percent(int part, int all) {
@@ -50,7 +51,7 @@ void judgeLoops(const StoredMap& stored, const TruePoses& truth) {
     const bool bad = error.t().norm() > kWrongMetres || angle > kWrongAngle;
     wrong += bad;
     std::printf("loop %5lu -> %5lu  error %.3f m %.2f deg%s\n", static_cast<unsigned long>(loop.first),
-                static_cast<unsigned long>(loop.second), error.t().norm(), angle * 180 / M_PI, bad ? "  WRONG" : "");
+                static_cast<unsigned long>(loop.second), error.t().norm(), angle / kDegree, bad ? "  WRONG" : "");
   }
   std::printf("loops judged %d, wrong %d\n", judged, wrong);
 }

@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
   try {
     setOptions(input.options, splitSettings(settings));
     input.truth = readTum(truth);
-    if (!true_planes.empty()) input.true_planes = readPlanesYaml(true_planes);
+    if (!true_planes.empty()) input.true_planes = readTruePlanesYaml(true_planes);
     if (!out.empty()) prepareOutputFolder(out);
     TimingLog timing;
     const PlaneBenchmarkResult result = runPlaneBenchmark(input, &timing);

@@ -21,7 +21,7 @@ bool liesOn(const PlaneEstimate& plane, const FlatRegion& region, const Eigen::V
 
 }  // namespace
 
-AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<PlaneEstimate>& truth,
+AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<TruePlane>& truth,
                                       const PlaneMetrics& planes, int min_keyframes, double tolerance) {
   // One estimate may represent several coplanar true planes (tables of equal height): a point on any of them is
   // correct.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_eval/metrics/polygon_overlap.h"
 
 namespace vip_slam {
@@ -64,12 +65,12 @@ std::vector<PlaneEstimate> transformPlanes(const SE3& T_A_B, std::vector<PlaneEs
   return planes;
 }
 
-PlaneMetrics planeMetrics(const std::vector<PlaneEstimate>& truth, const std::vector<PlaneEstimate>& estimate,
+PlaneMetrics planeMetrics(const std::vector<TruePlane>& truth, const std::vector<PlaneEstimate>& estimate,
                           const PlaneMatchOptions& options) {
   PlaneMetrics result;
   std::vector<FlatRegion> regions;
   std::vector<double> areas;
-  for (const PlaneEstimate& plane : truth) {
+  for (const TruePlane& plane : truth) {
     regions.emplace_back(plane.polygons, plane.plane);
     areas.push_back(regions.back().area());
     TruePlaneResult row;
@@ -117,7 +118,7 @@ PlaneMetrics planeMetrics(const std::vector<PlaneEstimate>& truth, const std::ve
       match.overlap = best->overlap;
       match.normal_error = best->angle;
       match.distance_error = std::abs(truth[best->truth].plane.signedDistance(middleOf(plane)));
-      normal_errors.push_back(match.normal_error * 180.0 / M_PI);
+      normal_errors.push_back(match.normal_error / kDegree);
       distance_errors.push_back(match.distance_error);
     }
     result.matches.push_back(match);

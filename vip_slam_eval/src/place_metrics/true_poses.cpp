@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_eval/metrics/trajectory_metrics.h"
 
 namespace vip_slam {
@@ -30,7 +31,7 @@ SE3 alignMap(const Map& map, const TruePoses& truth) {
 }
 
 bool samePlace(const SE3& a, const SE3& b) {
-  return (a.t() - b.t()).norm() <= 2 && a.rotation().angularDistance(b.rotation()) <= 30 * M_PI / 180;
+  return (a.t() - b.t()).norm() <= 2 && a.rotation().angularDistance(b.rotation()) <= 30 * kDegree;
 }
 
 }  // namespace vip_slam

@@ -112,7 +112,7 @@ void drawTopView(SvgPage* page, const EvaluationInput& input, const Evaluation& 
   std::vector<PlaneEstimate> planes, seen;
   if (input.planes) planes = transformPlanes(evaluation.shown.T_W_M, *input.planes);
   if (input.true_planes) {
-    for (const PlaneEstimate& plane : *input.true_planes) {
+    for (const TruePlane& plane : *input.true_planes) {
       if (plane.seen_seconds != 0) seen.push_back(plane);
     }
   }

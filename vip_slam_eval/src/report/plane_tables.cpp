@@ -4,6 +4,8 @@
 #include <locale>
 #include <sstream>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 
 void appendPlaneMetrics(MetricTable* table, const PlaneMetrics& p) {
@@ -38,8 +40,8 @@ std::string planeMatchesCsv(const PlaneMetrics& planes) {
   out.imbue(std::locale::classic());
   out << "estimate,truth,normal_error_deg,distance_error_m,overlap_m2,area_m2\n";
   for (const PlaneMatch& m : planes.matches) {
-    out << m.estimate << ',' << (m.truth ? std::to_string(m.truth) : "none") << ',' << m.normal_error * 180.0 / M_PI
-        << ',' << m.distance_error << ',' << m.overlap << ',' << m.area << '\n';
+    out << m.estimate << ',' << (m.truth ? std::to_string(m.truth) : "none") << ',' << m.normal_error / kDegree << ','
+        << m.distance_error << ',' << m.overlap << ',' << m.area << '\n';
   }
   return out.str();
 }

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_eval/metrics/association_metrics.h"
 #include "vip_slam_eval/metrics/plane_metrics.h"
 #include "vip_slam_eval/metrics/polygon_overlap.h"
@@ -12,8 +13,8 @@ namespace vip_slam {
 namespace {
 
 // A rectangle on a plane with corner o and sides a, b; its normal is a x b.
-PlaneEstimate rectangle(PlaneId id, const Eigen::Vector3d& o, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  PlaneEstimate plane;
+TruePlane rectangle(PlaneId id, const Eigen::Vector3d& o, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  TruePlane plane;
   plane.id = id;
   plane.plane = Plane::fromPointNormal(o, a.cross(b));
   const double up = std::abs(plane.plane.n.z());
@@ -25,7 +26,7 @@ PlaneEstimate rectangle(PlaneId id, const Eigen::Vector3d& o, const Eigen::Vecto
 
 const Eigen::Vector3d X(1, 0, 0), Y(0, 1, 0), Z(0, 0, 1), O(0, 0, 0);
 
-std::vector<PlaneEstimate> room() {
+std::vector<TruePlane> room() {
   return {rectangle(1, O, 4 * X, 3 * Y),                                // floor
           rectangle(2, O, 3 * Y, 2.5 * Z),                              // wall x = 0, seen from +x
           rectangle(3, 3 * Y, 4 * X, 2.5 * Z),                          // wall y = 3, seen from -y
@@ -46,7 +47,8 @@ TEST(FlatRegionTest, AreasWithHoles) {
 }
 
 TEST(PlaneMetricsTest, TheTruthItselfIsPerfect) {
-  const PlaneMetrics m = planeMetrics(room(), room());
+  const auto truth = room();
+  const PlaneMetrics m = planeMetrics(truth, {truth.begin(), truth.end()});
   EXPECT_EQ(m.expected, 3u);  // the table is below 1 m^2
   EXPECT_EQ(m.found, 3u);
   EXPECT_EQ(m.recall, 1.0);
@@ -65,7 +67,7 @@ TEST(PlaneMetricsTest, ErrorsOfNormalAndDistanceAreMeasured) {
                     SE3(Eigen::Quaterniond::Identity(), {-2, -1.5, 0});
   m = planeMetrics(room(), transformPlanes(about, {rectangle(7, O, 4 * X, 3 * Y)}));
   ASSERT_EQ(m.matches[0].truth, 1u);
-  EXPECT_NEAR(m.normal.max, tilt * 180 / M_PI, 1e-6);
+  EXPECT_NEAR(m.normal.max, tilt / kDegree, 1e-6);
   EXPECT_LT(m.distance.max, 1e-6);
 }
 
@@ -87,7 +89,7 @@ TEST(PlaneMetricsTest, MissedDuplicatedAndInventedPlanes) {
 }
 
 TEST(PlaneMetricsTest, SlantedPlanesAreNotExpectedAndMustNotBeForced) {
-  const PlaneEstimate ramp = rectangle(5, {0, 0, 0}, {2, 0, 0.2}, 2 * Y);
+  const TruePlane ramp = rectangle(5, {0, 0, 0}, {2, 0, 0.2}, 2 * Y);
   EXPECT_EQ(planeMetrics({ramp}, {}).expected, 0u);
   PlaneMetrics m = planeMetrics({ramp}, {ramp});
   EXPECT_EQ(m.forced_planes, 0u);
@@ -111,7 +113,7 @@ TEST(PlaneMetricsTest, OppositeSidesAreDifferentPlanes) {
 }
 
 TEST(PlaneMetricsTest, OneEstimateMayStandForSeveralTrueOnesInItsPlane) {
-  const std::vector<PlaneEstimate> tables = {rectangle(1, O, 1.5 * X, 1.5 * Y), rectangle(2, 3 * X, 1.5 * X, 1.5 * Y)};
+  const std::vector<TruePlane> tables = {rectangle(1, O, 1.5 * X, 1.5 * Y), rectangle(2, 3 * X, 1.5 * X, 1.5 * Y)};
   PlaneEstimate both = tables[0];
   both.polygons.push_back(tables[1].polygons[0]);
   const PlaneMetrics m = planeMetrics(tables, {both});
@@ -121,7 +123,7 @@ TEST(PlaneMetricsTest, OneEstimateMayStandForSeveralTrueOnesInItsPlane) {
 }
 
 TEST(PlaneMetricsTest, OnlyWhatWasInViewIsExpected) {
-  std::vector<PlaneEstimate> truth = room();
+  std::vector<TruePlane> truth = room();
   truth[0].seen_seconds = 1.0;  // too short
   truth[0].seen_area = 10;
   truth[1].seen_seconds = 10;
@@ -133,7 +135,7 @@ TEST(PlaneMetricsTest, OnlyWhatWasInViewIsExpected) {
 }
 
 TEST(AssociationMetricsTest, PrecisionAndRecall) {
-  const std::vector<PlaneEstimate> truth = room();
+  const std::vector<TruePlane> truth = room();
   const PlaneMetrics planes = planeMetrics(truth, {rectangle(10, O, 4 * X, 3 * Y), rectangle(11, O, 3 * Y, 2.5 * Z)});
   const std::vector<LabelledPoint> points = {
       {1, {1, 1, 0.01}, 10, 4},  // right

@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/testing/analytic_motion.h"
 #include "vip_slam_eval/metrics/trajectory_consistency.h"
 #include "vip_slam_eval/metrics/trajectory_metrics.h"
@@ -99,7 +100,7 @@ TEST(AbsoluteErrorTest, AlternatingOffsetsGiveTheirSize) {
   const AbsoluteError error = absoluteError(associate(truth, moved(kTurned, estimate)), Alignment::kYaw);
   EXPECT_NEAR(error.position.rmse, 0.03, 1e-4);
   EXPECT_NEAR(error.position.max, 0.03, 1e-3);
-  EXPECT_NEAR(error.rotation.median, 0.02 * 180 / M_PI, 0.01);
+  EXPECT_NEAR(error.rotation.median, 0.02 / kDegree, 0.01);
 }
 
 TEST(Association, InterpolatesTheTruthAndRefusesGapsAndOffsets) {
@@ -144,7 +145,7 @@ TEST(RelativeErrorTest, YawDrift) {
   for (StampedPose& pose : estimate) {
     pose.T_W_B = SE3(expQuaternion({0, 0, 0.01 * pose.t}), Eigen::Vector3d::Zero()) * pose.T_W_B;
   }
-  EXPECT_NEAR(relativeErrorOverTime(associate(truth, estimate), 1.0).rotation.rmse, 0.01 * 180 / M_PI, 1e-6);
+  EXPECT_NEAR(relativeErrorOverTime(associate(truth, estimate), 1.0).rotation.rmse, 0.01 / kDegree, 1e-6);
 }
 
 TEST(CoverageTest, FindsHolesAndMissingEnds) {

@@ -4,12 +4,14 @@
 #include <cmath>
 #include <cstdio>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 namespace {
 
 constexpr double kSure = 5.0;  // sigmas
-constexpr double kMinTurn = 0.2 * M_PI / 180.0, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005,
-                 kMinBearing = 0.001, kMinGyroError = 0.002, kMinDepthShift = 0.001;
+constexpr double kMinTurn = 0.2 * kDegree, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005, kMinBearing = 0.001,
+                 kMinGyroError = 0.002, kMinDepthShift = 0.001;
 
 template <typename... Numbers>
 std::string sentence(const char* format, Numbers... numbers) {
@@ -33,7 +35,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
     all.push_back(
         sentence("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration; "
                  "the one that was found is used",
-                 turn.norm() * 180 / M_PI));
+                 turn.norm() / kDegree));
   }
   if (shift.norm() > kMinShift && sure(shift, found.sigma_translation)) {
     all.push_back(

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
@@ -20,7 +21,7 @@ std::string KeyframeSelector::decide(double t, const SE3& T_odom_C, const std::v
   if (still || t - t_ < options_.min_seconds) return "";
 
   const SE3 T_last_now = T_odom_C_.inverse() * T_odom_C;
-  if (logSO3(T_last_now.rotation()).norm() * 180.0 / M_PI > options_.max_rotation_deg) return "rotation";
+  if (logSO3(T_last_now.rotation()).norm() / kDegree > options_.max_rotation_deg) return "rotation";
   if (median_depth_ > 0 && T_last_now.t().norm() > options_.max_translation_ratio * median_depth_) {
     return "translation";
   }

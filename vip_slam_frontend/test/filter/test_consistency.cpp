@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "landmark_simulation.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::testing {
@@ -84,11 +85,11 @@ TEST(Consistency, TheCalibrationIsLearntHonestly) {
     turn += run.window.T_I_C.boxminus(LandmarkSimulation(simulation).T_I_C()).head<3>().norm() / kSeeds;
     delay += std::abs(run.window.time_offset - simulation.time_offset) / kSeeds;
   }
-  std::printf("NEES %.2f; after 30 s the calibration is off by %.3f degrees and %.3f ms\n", nees, turn * 180 / M_PI,
+  std::printf("NEES %.2f; after 30 s the calibration is off by %.3f degrees and %.3f ms\n", nees, turn / kDegree,
               1e3 * delay);
   EXPECT_GT(nees, chiSquareQuantile(0.025, 6 * kSeeds) / kSeeds);
   EXPECT_LT(nees, chiSquareQuantile(0.975, 6 * kSeeds) / kSeeds);
-  EXPECT_LT(turn * 180 / M_PI, 0.05);
+  EXPECT_LT(turn / kDegree, 0.05);
   EXPECT_LT(delay, 0.0005);
 }
 

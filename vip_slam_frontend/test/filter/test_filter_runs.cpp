@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "landmark_simulation.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam::testing {
 namespace {
@@ -195,9 +196,9 @@ TEST(StandingStill, FiveMinutesWithoutDrift) {
   simulation.speed = 0;
   simulation.image_rate = 15;
   const RunResult run = runFilter(simulation, singlePixels(), 300.0, true);
-  std::printf("five minutes: %.2f mm, %.3f deg\n", 1e3 * run.final_position, run.final_rotation * 180 / M_PI);
+  std::printf("five minutes: %.2f mm, %.3f deg\n", 1e3 * run.final_position, run.final_rotation / kDegree);
   EXPECT_LT(run.final_position, 0.005);
-  EXPECT_LT(run.final_rotation * 180 / M_PI, 0.2);  // includes the initial tilt error
+  EXPECT_LT(run.final_rotation / kDegree, 0.2);  // includes the initial tilt error
   EXPECT_LE(run.window.clones.size(), 3u);
 }
 

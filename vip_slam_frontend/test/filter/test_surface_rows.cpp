@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "test_camera.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_frontend/filter/square_root_filter.h"
 #include "vip_slam_frontend/filter/surface_rows.h"
 #include "vip_slam_frontend/filter/triangulation.h"
@@ -234,8 +235,8 @@ TEST(SurfaceTracker, PatchesLieOnTheWallsAndMatchesAgreeWithTheMotion) {
   for (const SurfacePatch& patch : tracker.patches(reference)) {
     const Eigen::Vector3d n_W = T_W_ref.R() * patch.n_C;
     // At worst the window contains a little of the adjacent wall.
-    EXPECT_GT(n_W.cwiseAbs().maxCoeff(), std::cos(6.0 * M_PI / 180));
-    tilted += n_W.cwiseAbs().maxCoeff() < std::cos(2.0 * M_PI / 180);
+    EXPECT_GT(n_W.cwiseAbs().maxCoeff(), std::cos(6.0 * kDegree));
+    tilted += n_W.cwiseAbs().maxCoeff() < std::cos(2.0 * kDegree);
     EXPECT_LT(patch.n_C.dot(patch.p_C), 0.0);  // towards the camera
   }
   EXPECT_EQ(tracker.reference(), 0u);
@@ -337,7 +338,7 @@ TEST(PatchGrouping, PatchesOfTheSameWallShareOneNormalAndLonersGo) {
   EXPECT_LE(shared.size(), on_walls);
   EXPECT_GT(shared.size(), on_walls * 8 / 10);
   for (const SurfacePatch& patch : shared) {
-    EXPECT_GT((T_W_ref.R() * patch.n_C).cwiseAbs().maxCoeff(), std::cos(0.3 * M_PI / 180));
+    EXPECT_GT((T_W_ref.R() * patch.n_C).cwiseAbs().maxCoeff(), std::cos(0.3 * kDegree));
     EXPECT_GT((patch.p_C - loner.p_C).norm(), 1e-9);
   }
 }
@@ -361,7 +362,7 @@ TEST(PatchGrouping, NoPlaneLeansAcrossAStep) {
     EXPECT_GT(shared.size(), patches.size() * 8 / 10) << edge;
     double most = 0;
     for (const SurfacePatch& patch : shared) most = std::max(most, std::acos(std::min(1.0, -patch.n_C.z())));
-    EXPECT_LT(most, 1.5 * M_PI / 180) << edge;
+    EXPECT_LT(most, 1.5 * kDegree) << edge;
   }
 }
 

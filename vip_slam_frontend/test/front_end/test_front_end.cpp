@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "vip_slam_core/depth/disparity_curve.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "wall_world.h"
 
 namespace vip_slam {
@@ -269,7 +270,7 @@ TEST_F(FrontEndTest, StandsStillForAMinuteUnderNoise) {
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking);
   EXPECT_TRUE(output.frame->zero_velocity);
   EXPECT_LT(output.frame->state.T_W_I.t().norm(), 0.005);
-  EXPECT_LT(std::abs(yawOf(output.frame->state.T_W_I.rotation())), 0.2 * M_PI / 180);
+  EXPECT_LT(std::abs(yawOf(output.frame->state.T_W_I.rotation())), 0.2 * kDegree);
   EXPECT_LE(keyframes, 3u);
 }
 

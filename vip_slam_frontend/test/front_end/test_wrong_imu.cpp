@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "corner_world.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_frontend/front_end.h"
 
 namespace vip_slam {
@@ -105,7 +106,7 @@ TEST(WrongImu, LeftHandedAxes) {
 
 TEST(WrongImu, DegreesPerSecond) {
   expectNotTracking([](ImuSample s) {
-    s.gyro *= 180 / M_PI;
+    s.gyro /= kDegree;
     return s;
   });
 }

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 
@@ -102,7 +103,7 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
   const double slack = 3.0 * (median + 0.3 * noise_.bias_floor) / spread / std::sqrt(double(kept.size()) / 9.0);
   const double turned = std::acos(std::min(1.0, std::abs(local.n.dot(n_C))));
   *points = std::move(kept);
-  return turned < 5.0 * M_PI / 180.0 + slack;
+  return turned < 5.0 * kDegree + slack;
 }
 
 void PlaneSampler::accumulate(const Eigen::Vector3d& n_C, PlaneObservation* observation) const {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "plane_extent.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
 namespace {
@@ -136,7 +137,7 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
                  const SceneView& view, const PlaneMergingOptions& options) {
   const CameraPoses& poses = view.poses;
   if (a.kind() != b.kind() || a.cells().empty() || b.cells().empty()) return false;
-  if (a.plane().n.dot(b.plane().n) < std::cos(options.angle_deg * M_PI / 180.0)) return false;
+  if (a.plane().n.dot(b.plane().n) < std::cos(options.angle_deg * kDegree)) return false;
   const bool a_is_small = a.area() < b.area();
   const PlaneTrack& small = a_is_small ? a : b;
   const PlaneTrack& large = a_is_small ? b : a;
@@ -145,7 +146,7 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const std::vector<con
   const Eigen::Vector3d middle = small.cellCentre({grid.x0() + grid.width() / 2, grid.y0() + grid.height() / 2});
   const double radius = 0.5 * small.cellSize() * std::hypot(grid.width(), grid.height());
   if (std::abs(large.plane().signedDistance(middle)) >
-      options.distance + radius * std::sin(options.angle_deg * M_PI / 180.0)) {
+      options.distance + radius * std::sin(options.angle_deg * kDegree)) {
     return false;
   }
   const double smaller = small.area();

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "vip_slam_core/depth/grid_spacing.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
 namespace {
@@ -58,8 +59,8 @@ DepthMeshBuilder::DepthMeshBuilder(const PlaneMeshOptions& options, std::shared_
     : options_(options),
       camera_(camera),
       noise_(noise),
-      least_facing_(std::cos(float(options.max_incidence_deg * M_PI / 180.0))),
-      least_level_facing_(std::cos(float(options.max_level_incidence_deg * M_PI / 180.0))),
+      least_facing_(std::cos(float(options.max_incidence_deg * kDegree))),
+      least_level_facing_(std::cos(float(options.max_level_incidence_deg * kDegree))),
       rays_(camera) {}
 
 double DepthMeshBuilder::spacing() const { return spacingOn(camera_->width(), camera_->height(), options_.spacing); }

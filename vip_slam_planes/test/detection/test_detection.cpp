@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "scene.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/detection/plane_detector.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
 #include "vip_slam_planes/detection/surface_shape.h"
@@ -39,7 +40,7 @@ TEST(Detection, RoomCorner) {
   for (const Plane& truth : {Plane({0, 0, 1}, 0), Plane({-1, 0, 0}, 3), Plane({0, -1, 0}, 3)}) {
     const DetectedPlane* p = find(planes, truth);
     ASSERT_TRUE(p);
-    EXPECT_LT(angleBetween(p->plane, truth), 0.05 * M_PI / 180);
+    EXPECT_LT(angleBetween(p->plane, truth), 0.05 * kDegree);
     EXPECT_NEAR(truth.d, p->plane.d, 0.002);
     EXPECT_GT(p->area, 1.0);
   }
@@ -75,7 +76,7 @@ TEST(Detection, DoorTwelveCentimetresBeforeTheWallStaysTwo) {
 
 TEST(Detection, WallsAtEveryAngleIncludingTheWrap) {
   for (double degrees : {180.0, 179.2, -179.2, 178.5, -178.5, 90.0, -90.0, 0.0, 45.0, -1.5}) {
-    const double a = degrees * M_PI / 180;
+    const double a = degrees * kDegree;
     const Eigen::Vector3d n(std::cos(a), std::sin(a), 0), along(-n.y(), n.x(), 0);
     Scene scene;
     scene.add(-2.0 * n - 3 * along, 6 * along, {0, 0, 2.5});
@@ -88,7 +89,7 @@ TEST(Detection, WallsAtEveryAngleIncludingTheWrap) {
 
 TEST(Detection, SlantedSurfacesAreLeftAloneUnlessAskedFor) {
   for (double degrees : {6.0, 12.0, 30.0, 60.0, 80.0}) {
-    const double a = degrees * M_PI / 180;
+    const double a = degrees * kDegree;
     Scene scene;
     scene.add({1, -1.5, 0.2}, {0, 3, 0}, Eigen::Vector3d(std::cos(a), 0, std::sin(a)) * 2.0);
     SceneCamera camera(testing::quietNoise(), 1.0);
@@ -99,7 +100,7 @@ TEST(Detection, SlantedSurfacesAreLeftAloneUnlessAskedFor) {
     const auto planes = detect(&camera, scene, view, options);
     ASSERT_EQ(1u, planes.size()) << degrees;
     EXPECT_EQ(PlaneKind::kGeneral, planes[0].kind);
-    EXPECT_NEAR(degrees, std::acos(std::abs(planes[0].plane.n.z())) * 180 / M_PI, 0.5);
+    EXPECT_NEAR(degrees, std::acos(std::abs(planes[0].plane.n.z())) / kDegree, 0.5);
   }
 }
 
@@ -152,7 +153,7 @@ TEST(Detection, WallAndDoorOfARecessAreNotOneSlantedPlane) {
     for (unsigned seed = 1; seed <= 5; ++seed) {
       SceneCamera camera(noise, 1.0, seed);
       for (const DetectedPlane& p : detect(&camera, scene, lookAt({x, 2.9, 1.4}, {4.5, 2.9, 1.2}))) {
-        EXPECT_LT(std::acos(-p.plane.n.x()) * 180 / M_PI, 2.5) << seed << ": " << p.area << " m^2";
+        EXPECT_LT(std::acos(-p.plane.n.x()) / kDegree, 2.5) << seed << ": " << p.area << " m^2";
         ++planes;
       }
     }

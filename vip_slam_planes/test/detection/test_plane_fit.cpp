@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 
 namespace vip_slam {
@@ -28,7 +29,7 @@ TEST(PlaneFit, WallThroughTheOrigin) {
   ASSERT_TRUE(fitPlaneRobust(points, std::vector<double>(points.size(), 1.0), 0.005, PlaneKind::kVertical, truth.n,
                              &plane, &rms));
   EXPECT_NEAR(0, plane.d, 0.002);
-  EXPECT_LT(angleBetween(truth, plane), 0.1 * M_PI / 180);
+  EXPECT_LT(angleBetween(truth, plane), 0.1 * kDegree);
   EXPECT_NEAR(0.01, rms, 0.002);
 }
 

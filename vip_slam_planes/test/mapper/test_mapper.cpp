@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "rig.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
 namespace {
@@ -19,7 +20,7 @@ TEST(Mapper, TurningInARoomFindsSixPlanesOnce) {
   Rig rig;
   const Scene scene = room();
   for (int i = 0; i < 14; ++i) {
-    const double a = i * 30 * M_PI / 180;
+    const double a = i * 30 * kDegree;
     rig.look(scene, {0.2 * std::cos(a), 0.1, 1.4}, {3 * std::cos(a), 3 * std::sin(a), i % 2 ? 0.6 : 2.2});
   }
   ASSERT_EQ(6u, rig.mapper.planes().size());
@@ -27,7 +28,7 @@ TEST(Mapper, TurningInARoomFindsSixPlanesOnce) {
                              Plane({0, 1, 0}, 2.5), Plane({0, -1, 0}, 2.5)}) {
     const PlaneEstimate* p = rig.find(truth, 0.003);
     ASSERT_TRUE(p) << truth.coefficients().transpose();
-    EXPECT_LT(angleBetween(truth, p->plane), 0.1 * M_PI / 180);
+    EXPECT_LT(angleBetween(truth, p->plane), 0.1 * kDegree);
     EXPECT_EQ(truth.n.z() != 0 ? PlaneKind::kHorizontal : PlaneKind::kVertical, p->kind);
     EXPECT_FALSE(p->polygons.empty());
     for (const PlanePolygon& polygon : p->polygons) {
@@ -45,7 +46,7 @@ TEST(Mapper, AFloorIsAsFarBelowTheOriginBeforeGravityIsKnown) {
   scene.add({-2, -3, -1.4}, {8, 0, 0}, {0, 6, 0});
   const SE3 T_W_C = lookAt({0, 0, 0}, {3.5, 0, -1.4});
   for (const double lean_deg : {0.0, 0.5, -0.5}) {
-    const Eigen::AngleAxisd lean(lean_deg * M_PI / 180, Eigen::Vector3d::UnitY());
+    const Eigen::AngleAxisd lean(lean_deg * kDegree, Eigen::Vector3d::UnitY());
     Rig rig;
     const auto keyframe = rig.camera.keyframe(scene, T_W_C);
     keyframe->frame.covariance.topLeftCorner<3, 3>() = 1e-4 * Eigen::Matrix3d::Identity();

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "rig.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
 namespace {
@@ -45,7 +46,7 @@ TEST(Mapper, KeyframesLookFromTheExtrinsicsThatAreKnownNow) {
   }
   const PlaneEstimate* wall = rig.find(Plane({-1, 0, 0}, 3), 0.003);
   ASSERT_TRUE(wall);
-  EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), wall->plane), 0.1 * M_PI / 180);
+  EXPECT_LT(angleBetween(Plane({-1, 0, 0}, 3), wall->plane), 0.1 * kDegree);
 }
 
 TEST(Mapper, DepthThatWasTooLongIsCorrectedInAllKeyframes) {

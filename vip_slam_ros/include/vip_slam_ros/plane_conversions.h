@@ -1,4 +1,4 @@
-// Planes: core types <-> messages, without loss but for what only the simulator knows (seen_seconds, seen_area).
+// Planes: core types <-> messages, without loss.
 #pragma once
 
 #include <string>

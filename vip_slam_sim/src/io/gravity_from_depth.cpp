@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_sim/io/rgbd_folder.h"
 
 namespace vip_slam {
@@ -53,7 +54,7 @@ Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
   // once the cone is below 20 degrees, wall normals (perpendicular to it) contribute.
   std::size_t used = 0;
   for (const double degrees : {35.0, 25.0, 15.0, 10.0, 7.0, 5.0, 5.0, 5.0}) {
-    const double c = std::cos(degrees * M_PI / 180), s = std::sin(degrees * M_PI / 180);
+    const double c = std::cos(degrees * kDegree), s = std::sin(degrees * kDegree);
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
     used = 0;
     for (const Eigen::Vector3d& n : normals) {

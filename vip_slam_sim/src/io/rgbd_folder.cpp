@@ -11,6 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/so3.h"
 
 namespace vip_slam {
@@ -52,7 +53,7 @@ void separateColour(RgbdFolder* folder) {
   folder->camera.cx = colour::kCentreX * scale;
   folder->camera.cy = colour::kCentreY * scale;
   folder->colour_readout = colour::kReadout;
-  const Eigen::Vector3d turn = Eigen::Vector3d(colour::kTurnDeg) * M_PI / 180;
+  const Eigen::Vector3d turn = Eigen::Vector3d(colour::kTurnDeg) * kDegree;
   folder->T_color_depth = SE3(expSO3(turn), Eigen::Vector3d(-colour::kBaseline, 0, 0));
   for (StampedPose& p : folder->T_W_C) p.T_W_B = p.T_W_B * folder->T_color_depth.inverse();
 }

@@ -35,8 +35,8 @@ SplineTrajectory makeOrbit(const MotionOptions& o, const SE3& T_imu_cam, int see
     const double phase = ramp * (x * x * x * x * (2.5 + x * (x - 3))) + std::max(0.0, m - ramp);
     View v;
     v.p = position(rate_p * phase);
-    v.yaw = o.yaw * kDeg + turning(rate_yaw * phase) - turning(0);
-    v.pitch = o.pitch * kDeg + 0.12 * o.max_rate * std::sin(0.9 * rate_yaw * phase);
+    v.yaw = o.yaw * kDegree + turning(rate_yaw * phase) - turning(0);
+    v.pitch = o.pitch * kDegree + 0.12 * o.max_rate * std::sin(0.9 * rate_yaw * phase);
     v.liveliness = smoothStep(m / 2);
     shake.apply(at, &v);
     return v;
@@ -51,8 +51,8 @@ SplineTrajectory makeRotate(const MotionOptions& o, const SE3& T_imu_cam) {
     v.p = Eigen::Vector3d(o.x, o.y, o.z);
     // The camera turns about itself: yaw to and fro over more than a full turn, with nodding.
     const double f = o.max_rate / (1.2 * M_PI);
-    v.yaw = o.yaw * kDeg + 1.2 * M_PI * (1 - std::cos(f * m));
-    v.pitch = o.pitch * kDeg + 0.25 * smoothStep(m / 2) * std::sin(0.9 * m);
+    v.yaw = o.yaw * kDegree + 1.2 * M_PI * (1 - std::cos(f * m));
+    v.pitch = o.pitch * kDegree + 0.25 * smoothStep(m / 2) * std::sin(0.9 * m);
     v.roll = 0.1 * smoothStep(m / 2) * std::sin(0.6 * m);
     return v;
   };
@@ -63,8 +63,8 @@ SplineTrajectory makeStill(const MotionOptions& o, const SE3& T_imu_cam) {
   const auto plan = [&](double) {
     View v;
     v.p = Eigen::Vector3d(o.x, o.y, o.z);
-    v.yaw = o.yaw * kDeg;
-    v.pitch = o.pitch * kDeg;
+    v.yaw = o.yaw * kDegree;
+    v.pitch = o.pitch * kDegree;
     return v;
   };
   return splineOf(plan, o.duration > 0 ? o.duration : 60, T_imu_cam);
@@ -72,9 +72,9 @@ SplineTrajectory makeStill(const MotionOptions& o, const SE3& T_imu_cam) {
 
 SplineTrajectory makeFromFile(const MotionOptions& o) {
   Trajectory poses = readPoseFile(o.file);
-  const SE3 place(Eigen::Quaterniond(Eigen::AngleAxisd(o.yaw * kDeg, Eigen::Vector3d::UnitZ())),
+  const SE3 place(Eigen::Quaterniond(Eigen::AngleAxisd(o.yaw * kDegree, Eigen::Vector3d::UnitZ())),
                   Eigen::Vector3d(o.x, o.y, o.z));
-  const SE3 roll(Eigen::Quaterniond(Eigen::AngleAxisd(o.file_roll * kDeg, Eigen::Vector3d::UnitZ())),
+  const SE3 roll(Eigen::Quaterniond(Eigen::AngleAxisd(o.file_roll * kDegree, Eigen::Vector3d::UnitZ())),
                  Eigen::Vector3d::Zero());
   Trajectory chosen;
   for (StampedPose& pose : poses) {

@@ -35,7 +35,7 @@ std::vector<Leg> parseWaypoints(const MotionOptions& o) {
       if (!(in >> value) || !started)
         fail("motion/waypoints: '" + item + "': expected '" + word + " NUMBER' after a point");
       if (word == "turn")
-        legs.push_back({Leg::kTurn, here, here, value * kDeg});
+        legs.push_back({Leg::kTurn, here, here, value * kDegree});
       else
         legs.push_back({Leg::kPause, here, here, value});
       continue;
@@ -77,7 +77,7 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
   const std::vector<Leg> legs = parseWaypoints(o);
   std::vector<Eigen::Vector3d> p;
   std::vector<double> heading, lively;
-  double yaw = o.yaw * kDeg;
+  double yaw = o.yaw * kDegree;
   for (const Leg& leg : legs)
     if (leg.kind == Leg::kMove) {
       yaw = std::atan2(leg.to.y() - leg.from.y(), leg.to.x() - leg.from.x());
@@ -92,7 +92,7 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
     if (leg.kind == Leg::kPause) {
       stay(leg.to, leg.amount, 0.15);
     } else if (leg.kind == Leg::kTurn) {
-      const int n = static_cast<int>(std::abs(leg.amount) / (o.turn_rate * kDeg) / kFine) + 1;
+      const int n = static_cast<int>(std::abs(leg.amount) / (o.turn_rate * kDegree) / kFine) + 1;
       const double from = yaw;
       for (int i = 1; i <= n; ++i) {
         yaw = from + leg.amount * i / n;
@@ -135,7 +135,7 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
     View v;
     v.p = p[i] * (1 - s) + p[i + 1] * s;
     v.yaw = heading[i] * (1 - s) + heading[i + 1] * s;
-    v.pitch = o.pitch * kDeg;
+    v.pitch = o.pitch * kDegree;
     // No shake during the hold, into which the moving average above leaks; it fades in over 1.5 s afterwards.
     v.liveliness = (lively[i] * (1 - s) + lively[i + 1] * s) * smoothStep((at - o.hold) / 1.5);
     shake.apply(at, &v);

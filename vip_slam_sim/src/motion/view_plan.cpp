@@ -38,7 +38,7 @@ double Wander::operator()(double t) const {
 
 Shake::Shake(const std::string& style, double yaw_swing, int seed)
     : style_(style),
-      swing_(yaw_swing * kDeg),
+      swing_(yaw_swing * kDegree),
       rng_(seed * 977 + 5),
       slow_yaw_(rng_, 0.12),
       slow_pitch_(rng_, 0.16),
@@ -59,15 +59,15 @@ void Shake::apply(double t, View* view) const {
     const double step = 2 * M_PI * 1.75 * t;
     view->p += e * (left * (0.014 * std::sin(step / 2) + 0.015 * y_(t)) + ahead * 0.008 * std::sin(step + 1));
     view->p.z() += e * (0.012 * std::sin(step) + 0.02 * z_(t));
-    view->pitch += e * kDeg * (3.5 * slow_pitch_(t) + 0.7 * std::sin(step + 0.6) + 0.4 * jitter_pitch_(t));
-    view->roll += e * kDeg * (1.2 * std::sin(step / 2 + 0.4) + 1.5 * roll_(t));
-    view->yaw += e * kDeg * (0.8 * std::sin(step / 2 + 2) + 0.5 * jitter_yaw_(t));
+    view->pitch += e * kDegree * (3.5 * slow_pitch_(t) + 0.7 * std::sin(step + 0.6) + 0.4 * jitter_pitch_(t));
+    view->roll += e * kDegree * (1.2 * std::sin(step / 2 + 0.4) + 1.5 * roll_(t));
+    view->yaw += e * kDegree * (0.8 * std::sin(step / 2 + 2) + 0.5 * jitter_yaw_(t));
   } else {
     view->p += e * (left * 0.03 * y_(t) + ahead * 0.03 * x_(t));
     view->p.z() += e * 0.05 * z_(t);
-    view->pitch += e * kDeg * (2.5 * slow_pitch_(t) + 0.5 * jitter_pitch_(t));
-    view->roll += e * kDeg * 2.0 * roll_(t);
-    view->yaw += e * kDeg * 0.6 * jitter_yaw_(t);
+    view->pitch += e * kDegree * (2.5 * slow_pitch_(t) + 0.5 * jitter_pitch_(t));
+    view->roll += e * kDegree * 2.0 * roll_(t);
+    view->yaw += e * kDegree * 0.6 * jitter_yaw_(t);
   }
 }
 

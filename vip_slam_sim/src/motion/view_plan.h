@@ -4,12 +4,11 @@
 #include <functional>
 #include <string>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_sim/motion/motion_generator.h"
 #include "vip_slam_sim/rng.h"
 
 namespace vip_slam {
-
-constexpr double kDeg = M_PI / 180;
 
 /// Position and viewing direction of the camera: yaw and pitch of its forward axis, roll about it (rad).
 struct View {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "scene_parts.h"
+#include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
 
@@ -73,8 +74,8 @@ Scene buildFoyer() {
     const int first = b.box(pose, {0.03, w, h}, p.white, p.white);
     hangPoster(&b, first, p, picture, w / 2, h / 2, 0.8);
   };
-  lean(8.6, 9.05, -M_PI / 2, 8 * M_PI / 180, 1.6, 1.7, 10);
-  lean(5.6, 5.9, 0.4, 15 * M_PI / 180, 1.3, 1.6, 11);
+  lean(8.6, 9.05, -M_PI / 2, 8 * kDegree, 1.6, 1.7, 10);
+  lean(5.6, 5.9, 0.4, 15 * kDegree, 1.3, 1.6, 11);
 
   // A counter with a bend, hexagonal columns of three boxes each, benches, a board 12 cm before the west wall.
   b.boxAt(9.6, 5.4, 0, 0.35, {0.6, 2.2, 1.05}, p.wood, p.white);

@@ -215,14 +215,14 @@ double VisibilityCounter::seenArea(int surface) const {
   return cells;
 }
 
-std::vector<PlaneEstimate> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area) {
-  std::vector<PlaneEstimate> planes;
+std::vector<TruePlane> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area) {
+  std::vector<TruePlane> planes;
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const Surface& s = scene.surfaces[i];
     if (s.area < min_area) continue;
     const std::vector<PlanePolygon> outline = surfaceOutline(scene, s);
     const Chart& f = scene.charts[s.frame_chart];
-    PlaneEstimate p;
+    TruePlane p;
     p.id = planes.size() + 1;
     p.plane = Plane::fromPointNormal(toEigen(f.o), toEigen(f.n));
     const double up = std::abs(p.plane.n.z());

@@ -206,6 +206,6 @@ void SequenceRenderer::render(const std::function<bool(const SimFrame&)>& take) 
   if (error) std::rethrow_exception(error);
 }
 
-std::vector<PlaneEstimate> SequenceRenderer::planes() const { return truthPlanes(*scene_, *visibility_); }
+std::vector<TruePlane> SequenceRenderer::planes() const { return truthPlanes(*scene_, *visibility_); }
 
 }  // namespace vip_slam

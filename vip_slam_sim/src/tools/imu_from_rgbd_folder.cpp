@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/output_folder.h"
@@ -46,7 +47,7 @@ PoseSigma reportFit(const SplineTrajectory& spline, const Trajectory& poses) {
   }
   const double n = static_cast<double>(poses.size());
   std::fprintf(stderr, "spline: %.1f mm and %.2f deg RMS from the given poses, %.1f mm at most\n",
-               1000 * std::sqrt(position / n), std::sqrt(angle / n) * 180 / M_PI, 1000 * worst);
+               1000 * std::sqrt(position / n), std::sqrt(angle / n) / kDegree, 1000 * worst);
   return {std::sqrt(angle / (3 * n)), std::sqrt(position / (3 * n))};
 }
 
@@ -63,7 +64,7 @@ ImuNoise coveringNoise(const ImuNoise& own, const PoseSigma& jitter, const RgbdF
                    d.lag);
     else
       std::fprintf(stderr, "poses against depth over %.2f s: %.1f mm and %.2f deg per axis (%d pairs)\n", d.lag,
-                   1000 * d.error.position, d.error.rotation * 180 / M_PI, d.pairs);
+                   1000 * d.error.position, d.error.rotation / kDegree, d.pairs);
   }
   const ImuNoise noise = noiseOfImuFromPoses(own, jitter, interval, drift);
   std::fprintf(stderr,
@@ -88,7 +89,7 @@ void refine(RgbdFolder* folder) {
     worst = std::max(worst, moved);
   }
   std::fprintf(stderr, "given poses against depth over %.2f s: %.1f mm and %.2f deg per axis\n", drift.lag,
-               1000 * drift.error.position, drift.error.rotation * 180 / M_PI);
+               1000 * drift.error.position, drift.error.rotation / kDegree);
   std::fprintf(stderr, "refined: poses moved by %.1f mm RMS, %.1f mm at most\n",
                1000 * std::sqrt(sum / static_cast<double>(folder->T_W_C.size())), 1000 * worst);
 }
@@ -171,7 +172,7 @@ int run(int argc, char** argv) {
   const PoseSigma jitter = poseJitter(body);
   if (s.spacing == 0) s.spacing = splineSpacing(body, jitter, s.iterations);
   std::fprintf(stderr, "jitter of the poses: %.2f mm and %.3f deg per axis; spline knots %.0f ms apart\n",
-               1000 * jitter.position, jitter.rotation * 180 / M_PI, 1000 * s.spacing);
+               1000 * jitter.position, jitter.rotation / kDegree, 1000 * s.spacing);
   const SplineTrajectory spline = SplineTrajectory::fit(body, s.spacing, s.iterations);
   const PoseSigma fit = reportFit(spline, body);
   const ImuLog imu = synthesiseImu(spline, s.imu, s.seed);

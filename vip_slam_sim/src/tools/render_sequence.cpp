@@ -129,7 +129,7 @@ int run(int argc, char** argv) {
   imuUntil(std::numeric_limits<std::int64_t>::max());
   if (writer) {
     saveSensorConfig(base + "_sensor.yaml", sequence.sensor());
-    writePlanesYaml(base + "_planes.yaml", sequence.planes());
+    writeTruePlanesYaml(base + "_planes.yaml", sequence.planes());
     writeTruth(sequence, base + "_truth.tum");
     writer->commit();
   }

@@ -14,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "test_support.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_sim/io/rgbd_folder.h"
 #include "vip_slam_sim/io/sequence_writer.h"
 
@@ -140,7 +141,7 @@ TEST(Folder, ReadsBackAsAnRgbdFolderAndKnowsUp) {
   const SE3 turn(expQuaternion(Eigen::Vector3d(1.1, -0.7, 0.4)), Eigen::Vector3d(1, 2, 3));
   for (StampedPose& p : folder.T_W_C) p.T_W_B = turn * p.T_W_B;
   const Eigen::Vector3d up = upFromDepth(folder), want = turn.rotation() * Eigen::Vector3d::UnitZ();
-  const double angle = std::acos(std::min(1.0, up.dot(want))) * 180 / M_PI;
+  const double angle = std::acos(std::min(1.0, up.dot(want))) / kDegree;
   std::printf("  up found to %.3f deg\n", angle);
   EXPECT_LT(angle, 0.3);
   // A camera that is upside down half of the time does not determine up.

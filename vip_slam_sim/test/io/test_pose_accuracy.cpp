@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "test_support.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_sim/io/pose_accuracy.h"
 #include "vip_slam_sim/io/sequence_writer.h"
 #include "vip_slam_sim/motion/motion_generator.h"
@@ -12,8 +13,6 @@
 
 namespace vip_slam {
 namespace {
-
-constexpr double kDegree = M_PI / 180;
 
 Trajectory handheld(double rate, double seconds) {
   const SequenceSpec spec = loadSequence("07", libraryPath());

@@ -19,9 +19,9 @@ TEST(Scenes, PlanesAreConsistentWithTheirPolygons) {
   for (const std::string& name : sceneNames()) {
     auto scene = std::make_shared<Scene>(buildScene(name));
     const VisibilityCounter nothing(scene);
-    const std::vector<PlaneEstimate> planes = truthPlanes(*scene, nothing);
+    const std::vector<TruePlane> planes = truthPlanes(*scene, nothing);
     EXPECT_GT(planes.size(), 5u) << name;
-    for (const PlaneEstimate& p : planes) {
+    for (const TruePlane& p : planes) {
       double area = 0;
       for (const PlanePolygon& polygon : p.polygons) {
         area += ringArea(polygon.outer, p.plane.n);
@@ -36,9 +36,9 @@ TEST(Scenes, PlanesAreConsistentWithTheirPolygons) {
 TEST(Scenes, OfficeIsLargeAndItsCorridorFloorIsOnePlane) {
   auto scene = std::make_shared<Scene>(buildScene("office"));
   const VisibilityCounter nothing(scene);
-  const std::vector<PlaneEstimate> planes = truthPlanes(*scene, nothing);
-  const PlaneEstimate* floor = nullptr;
-  for (const PlaneEstimate& p : planes)
+  const std::vector<TruePlane> planes = truthPlanes(*scene, nothing);
+  const TruePlane* floor = nullptr;
+  for (const TruePlane& p : planes)
     if (p.kind == PlaneKind::kHorizontal && p.plane.n.z() > 0 && (!floor || p.area > floor->area)) floor = &p;
   ASSERT_TRUE(floor);
   EXPECT_NEAR(floor->plane.d, 0, 1e-6);
@@ -90,7 +90,7 @@ TEST(Scenes, VisibilityCountsWhatTheCameraSaw) {
   s.render([](const SimFrame&) { return true; });
   double longest = 0, area = 0;
   int seen = 0;
-  for (const PlaneEstimate& p : s.planes()) {
+  for (const TruePlane& p : s.planes()) {
     if (p.seen_seconds > 0) ++seen;
     if (p.seen_seconds >= longest && p.seen_area > area) longest = p.seen_seconds, area = p.seen_area;
     EXPECT_LE(p.seen_area, p.area + 1e-9);

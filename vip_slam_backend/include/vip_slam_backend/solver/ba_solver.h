@@ -15,7 +15,7 @@ struct SolverOptions {
   int max_iterations = 10;
   double max_seconds = 0;  ///< 0: no limit
   int threads = 1;
-  double initial_radius = 1e4;       ///< trust region: damping is diag(J^T J) / radius
+  double initial_radius = 1e7;       ///< trust region: damping is diag(J^T J) / radius
   double function_tolerance = 1e-6;  ///< stop when the cost falls by less than this fraction
   double gradient_tolerance = 1e-10;
   double parameter_tolerance = 1e-8;

@@ -26,8 +26,6 @@ struct PlaneEstimate {
   std::vector<PlanePolygon> polygons;  ///< disjoint pieces
   double area = 0;                     ///< m^2
   std::uint32_t keyframes = 0;         ///< keyframes that saw it
-  double seen_seconds = -1;            ///< simulator's truth: time in view, s; -1: not known
-  double seen_area = -1;               ///< simulator's truth: area that was ever in view, m^2; -1: not known
 };
 
 /// Host keyframe of a plane of a loaded map: the plane's area moves with the oldest keyframe that saw it.

@@ -1,5 +1,4 @@
-// Plane maps as YAML: the simulator's truth and the system's result share one layout; the truth adds seen_seconds and
-// seen_area.
+// Plane maps as YAML: true and found planes share one layout, to which the truth adds seen_seconds and seen_area.
 //   planes: [{id, kind: horizontal|vertical|general, normal: [x,y,z], distance, area, polygons: [{outer: [[x,y,z],...],
 //   holes: [...]}]}]
 #pragma once
@@ -7,12 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/types/true_plane.h"
 
 namespace vip_slam {
 
-/// Throws std::runtime_error naming file, plane and key.
+/// Throw std::runtime_error naming file, plane and key. Either reads the other's files: what only the truth has is left
+/// out, or not known.
 std::vector<PlaneEstimate> readPlanesYaml(const std::string& path);
+std::vector<TruePlane> readTruePlanesYaml(const std::string& path);
 void writePlanesYaml(const std::string& path, const std::vector<PlaneEstimate>& planes);
+void writeTruePlanesYaml(const std::string& path, const std::vector<TruePlane>& planes);
 
 }  // namespace vip_slam

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/types/true_plane.h"
 #include "vip_slam_eval/metrics/plane_metrics.h"
 
 namespace vip_slam {
@@ -34,7 +34,7 @@ struct AssociationMetrics {
 /// `points` in the truth's world. A point is on a plane when it is within `tolerance` metres of it and inside its
 /// outline (or within `tolerance` of the inside). Points seen by fewer than `min_keyframes` keyframes cannot be tied to
 /// a plane yet, by the paper's rule, and do not count for recall; every wrongly tied point counts against precision.
-AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<PlaneEstimate>& truth,
+AssociationMetrics associationMetrics(const std::vector<LabelledPoint>& points, const std::vector<TruePlane>& truth,
                                       const PlaneMetrics& planes, int min_keyframes = 4, double tolerance = 0.05);
 
 }  // namespace vip_slam

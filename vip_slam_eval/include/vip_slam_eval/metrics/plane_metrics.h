@@ -5,18 +5,19 @@
 #include <cstddef>
 #include <vector>
 
-#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/types/true_plane.h"
 #include "vip_slam_eval/metrics/statistics.h"
 
 namespace vip_slam {
 
 struct PlaneMatchOptions {
-  double max_angle = 10.0 * M_PI / 180.0;  ///< radians, normals on the same side
-  double max_distance = 0.10;              ///< metres, mean over the estimated outline
-  double min_overlap = 0.25;               ///< fraction of the smaller of the two areas
-  double min_area = 1.0;                   ///< m^2 of a true plane that must be visible for it to count for recall
-  double min_seconds = 2.0;                ///< time in view needed to count for recall, where the truth states it
-  double false_area = 0.5;                 ///< m^2; a false plane above this counts as large
+  double max_angle = 10.0 * kDegree;  ///< radians, normals on the same side
+  double max_distance = 0.10;         ///< metres, mean over the estimated outline
+  double min_overlap = 0.25;          ///< fraction of the smaller of the two areas
+  double min_area = 1.0;              ///< m^2 of a true plane that must be visible for it to count for recall
+  double min_seconds = 2.0;           ///< time in view needed to count for recall, where the truth states it
+  double false_area = 0.5;            ///< m^2; a false plane above this counts as large
 };
 
 struct PlaneMatch {
@@ -53,7 +54,7 @@ struct PlaneMetrics {
 };
 
 /// Both must be in the same world frame: use transformPlanes() on the estimates first.
-PlaneMetrics planeMetrics(const std::vector<PlaneEstimate>& truth, const std::vector<PlaneEstimate>& estimate,
+PlaneMetrics planeMetrics(const std::vector<TruePlane>& truth, const std::vector<PlaneEstimate>& estimate,
                           const PlaneMatchOptions& options = {});
 
 /// Planes and polygons of B expressed in A.

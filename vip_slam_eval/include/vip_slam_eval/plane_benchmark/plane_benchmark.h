@@ -8,7 +8,7 @@
 #include "vip_slam_bringup/runner/pipeline_options.h"
 #include "vip_slam_bringup/runner/plane_history.h"
 #include "vip_slam_core/trajectory/tum_io.h"
-#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/types/true_plane.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_eval/metrics/association_metrics.h"
 #include "vip_slam_eval/metrics/plane_metrics.h"
@@ -18,12 +18,12 @@
 namespace vip_slam {
 
 struct PlaneBenchmarkInput {
-  std::string bag, sensor;                                ///< sensor: a shipped name or a file
-  Trajectory truth;                                       ///< of the IMU
-  std::optional<std::vector<PlaneEstimate>> true_planes;  ///< without them planes and points are not judged
-  PipelineOptions options;                                ///< of front end and planes
-  double start = 0;                                       ///< seconds to skip
-  double duration = -1;                                   ///< seconds; negative: to the end
+  std::string bag, sensor;                            ///< sensor: a shipped name or a file
+  Trajectory truth;                                   ///< of the IMU
+  std::optional<std::vector<TruePlane>> true_planes;  ///< without them planes and points are not judged
+  PipelineOptions options;                            ///< of front end and planes
+  double start = 0;                                   ///< seconds to skip
+  double duration = -1;                               ///< seconds; negative: to the end
 };
 
 struct PlaneBenchmarkResult {

@@ -17,7 +17,8 @@ struct EvaluationInput {
   std::string title;
   Trajectory truth, estimate;
   std::vector<PoseWithCovariance> covariances;  ///< empty: no NEES
-  std::optional<std::vector<PlaneEstimate>> true_planes, planes;
+  std::optional<std::vector<TruePlane>> true_planes;
+  std::optional<std::vector<PlaneEstimate>> planes;
   std::optional<std::vector<LabelledPoint>> points;
 
   Alignment alignment = Alignment::kYaw;  ///< used for the picture, the planes and the points

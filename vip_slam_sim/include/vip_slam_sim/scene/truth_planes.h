@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/types/true_plane.h"
 #include "vip_slam_sim/render/renderer.h"
 #include "vip_slam_sim/scene/scene.h"
 
@@ -36,6 +36,6 @@ class VisibilityCounter {
 
 /// Planes of at least `min_area` m^2, ids from 1, normals towards free space. seen_seconds counts frames of which the
 /// plane filled at least 0.5 % within depth range, seen_area the area that was ever in view.
-std::vector<PlaneEstimate> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area = 0.02);
+std::vector<TruePlane> truthPlanes(const Scene& scene, const VisibilityCounter& seen, double min_area = 0.02);
 
 }  // namespace vip_slam

@@ -12,7 +12,7 @@
 #include <opencv2/core.hpp>
 
 #include "vip_slam_core/imu/imu_types.h"
-#include "vip_slam_core/types/plane_map.h"
+#include "vip_slam_core/types/true_plane.h"
 #include "vip_slam_sim/motion/imu_synthesiser.h"
 #include "vip_slam_sim/motion/spline_trajectory.h"
 #include "vip_slam_sim/render/passers_by.h"
@@ -65,7 +65,7 @@ class SequenceRenderer {
   /// All frames in order on the calling thread; returning false stops. Visibility is counted on the way.
   void render(const std::function<bool(const SimFrame&)>& take);
   /// The true planes, with the time and area for which the frames rendered so far show them.
-  std::vector<PlaneEstimate> planes() const;
+  std::vector<TruePlane> planes() const;
   /// Least distance between camera and scene over the motion, and when.
   double leastClearance(double* when) const;
 
