@@ -107,7 +107,13 @@ void BackEndNodelet::subscribe() {
         }
       }));
   subscribers_.push_back(getMTNodeHandle().subscribe<vip_slam_msgs::TrackedFrame>(
-      "tracked_frame", 50, [this](const vip_slam_msgs::TrackedFrameConstPtr& m) { onFrame(*m); }));
+      "tracked_frame", 50, [this](const vip_slam_msgs::TrackedFrameConstPtr& m) {
+        try {
+          onFrame(*m);
+        } catch (const std::invalid_argument& error) {  // not on the owner thread, which would catch it
+          NODELET_ERROR_THROTTLE(1, "tracked frame: %s", error.what());
+        }
+      }));
 }
 
 void BackEndNodelet::onReconfigure(vip_slam_backend::BackEndConfig& config) {
@@ -184,7 +190,8 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_), back_end_->depthDifference(),
                                 back_end_->trackNoiseDifference()};
   }
-  reportRefusals();
+  report(back_end_->takeRefusals());
+  for (const std::string& what : back_end_->takeNotices()) NODELET_WARN_THROTTLE(1, "%s", what.c_str());
   distribute(update);
   startGlobalBa();
 }
@@ -202,12 +209,14 @@ void BackEndNodelet::applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg) {
   }
   if (planes_wanted_ != 0 && msg.restored != planes_wanted_) return;
   planes_wanted_ = 0;
-  back_end_->applyPlaneUpdate(fromMsg(msg));
-  reportRefusals();
+  std::vector<std::string> unreadable;
+  back_end_->applyPlaneUpdate(fromMsg(msg, &unreadable));
+  report(unreadable);
+  report(back_end_->takeRefusals());
 }
 
-void BackEndNodelet::reportRefusals() {
-  for (const std::string& reason : back_end_->takeRefusals()) {
+void BackEndNodelet::report(const std::vector<std::string>& refusals) {
+  for (const std::string& reason : refusals) {
     NODELET_WARN_THROTTLE(1, "refused: %s", reason.c_str());
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++refused_;

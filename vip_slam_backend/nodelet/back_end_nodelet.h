@@ -52,7 +52,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   void start(const vip_slam_msgs::Calibration& calibration);
   void addKeyframe(const vip_slam_msgs::Keyframe& msg);
   void applyPlaneUpdate(const vip_slam_msgs::PlaneUpdate& msg);
-  void reportRefusals();
+  void report(const std::vector<std::string>& refusals);
   void startGlobalBa();
   void distribute(const MapUpdate& update);
   void publishStatistics();

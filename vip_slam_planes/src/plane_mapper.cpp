@@ -147,7 +147,8 @@ void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, Keyframe
     next_plane_ = std::max(next_plane_, estimate.id + 1);
     const bool sound = !estimate.polygons.empty() && !estimate.polygons.front().outer.empty() &&
                        std::all_of(estimate.polygons.begin(), estimate.polygons.end(), isFinite) &&
-                       isSound(estimate.plane) && host.T_map_C.isFinite() && !tracks_.count(estimate.id);
+                       isSound(estimate.plane) && estimate.kind <= PlaneKind::kGeneral && host.T_map_C.isFinite() &&
+                       !tracks_.count(estimate.id);
     if (!sound) {
       if (!tracks_.count(estimate.id)) removed_.push_back(estimate.id);
       continue;

@@ -1,13 +1,20 @@
 #include "vip_slam_ros/geometry_conversions.h"
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 namespace vip_slam {
 namespace {
 
+// An orientation that is none must not pass for "no rotation".
 SE3 makeTransform(double qw, double qx, double qy, double qz, const Eigen::Vector3d& t) {
   const Eigen::Quaterniond q(qw, qx, qy, qz);
-  return SE3(q.squaredNorm() > 0 ? q : Eigen::Quaterniond::Identity(), t);
+  if (!(std::abs(q.norm() - 1) < 1e-2))
+    throw std::invalid_argument("orientation: (x, y, z, w) = (" + std::to_string(qx) + ", " + std::to_string(qy) +
+                                ", " + std::to_string(qz) + ", " + std::to_string(qw) +
+                                "), expected a unit quaternion");
+  return SE3(q, t);
 }
 
 template <class Message>

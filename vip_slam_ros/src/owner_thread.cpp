@@ -106,7 +106,7 @@ void OwnerThread::loop() {
     try {
       task.run();
     } catch (const std::exception& error) {
-      on_error_(error.what());
+      on_error_(lanes_[task.lane].name + ": " + error.what());
     }
   }
 }

@@ -41,19 +41,12 @@ vip_slam_msgs::Plane toMsg(const PlaneEstimate& plane) {
 }
 
 PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg) {
-  const std::string name = "Plane " + std::to_string(msg.id) + ".";
-  if (msg.kind > vip_slam_msgs::Plane::GENERAL) {
-    throw std::invalid_argument(name + "kind: " + std::to_string(msg.kind) + ", expected 0 to 2");
-  }
   PlaneEstimate plane;
   plane.id = msg.id;
   plane.kind = static_cast<PlaneKind>(msg.kind);
   // Assigned rather than normalised again, so that a round trip is bit-exact.
   plane.plane.n = fromMsg(msg.normal);
   plane.plane.d = msg.distance;
-  if (std::abs(plane.plane.n.norm() - 1.0) > 1e-6) {
-    throw std::invalid_argument(name + "normal: length " + std::to_string(plane.plane.n.norm()) + ", expected 1");
-  }
   for (const auto& piece : msg.polygons) {
     PlanePolygon polygon;
     polygon.outer = fromRingMsg(piece.outer);
@@ -76,8 +69,8 @@ vip_slam_msgs::PlaneHost toMsg(const PlaneHost& host) {
 std::vector<StoredPlane> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes,
                                  const std::vector<vip_slam_msgs::PlaneHost>& hosts) {
   if (hosts.size() != planes.size()) {
-    throw std::invalid_argument(std::to_string(hosts.size()) + " hosts for " + std::to_string(planes.size()) +
-                                " planes, expected one each");
+    throw std::invalid_argument("Control.hosts: " + std::to_string(hosts.size()) + ", expected one for each of the " +
+                                std::to_string(planes.size()) + " Control.planes");
   }
   std::vector<StoredPlane> result;
   result.reserve(planes.size());
@@ -106,8 +99,9 @@ vip_slam_msgs::PlaneObservation toMsg(const PlaneObservation& observation) {
 
 PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg) {
   if (msg.points.size() % 4 != 0) {
-    throw std::invalid_argument("PlaneObservation.points: " + std::to_string(msg.points.size()) +
-                                " values, expected four per point");
+    throw std::invalid_argument("plane " + std::to_string(msg.plane) + ", seen by keyframe " +
+                                std::to_string(msg.keyframe) + ": " + std::to_string(msg.points.size()) +
+                                " values of points, expected four per point");
   }
   PlaneObservation observation;
   observation.keyframe = msg.keyframe;
@@ -149,7 +143,7 @@ vip_slam_msgs::PlaneUpdate toMsg(const PlaneUpdate& update, const std::string& m
   return msg;
 }
 
-PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg) {
+PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg, std::vector<std::string>* refused) {
   PlaneUpdate update;
   update.t = msg.header.stamp.toSec();
   update.revision = msg.revision;
@@ -158,7 +152,13 @@ PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg) {
   update.planes.reserve(msg.planes.size());
   for (const auto& plane : msg.planes) update.planes.push_back(fromMsg(plane));
   update.observations.reserve(msg.observations.size());
-  for (const auto& observation : msg.observations) update.observations.push_back(fromMsg(observation));
+  for (const auto& observation : msg.observations) {
+    try {
+      update.observations.push_back(fromMsg(observation));
+    } catch (const std::invalid_argument& error) {
+      refused->push_back(error.what());
+    }
+  }
   for (const auto& pair : msg.associated) update.associated.emplace_back(pair.landmark, pair.plane);
   update.dissociated = msg.dissociated;
   return update;

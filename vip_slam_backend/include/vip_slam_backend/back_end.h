@@ -46,6 +46,8 @@ class BackEnd {
   const std::string& lastRefusal() const;
   /// Why keyframes, planes and observations were refused since the last call, oldest first, at most the last hundred.
   std::vector<std::string> takeRefusals();
+  /// What was bridged instead of refused since the last call, such as a hole in a keyframe's IMU samples; likewise.
+  std::vector<std::string> takeNotices();
   /// Applies the plane module's changes; they take effect with the next optimisation. Planes and observations that are
   /// unusable are refused one by one.
   void applyPlaneUpdate(const PlaneUpdate& update);

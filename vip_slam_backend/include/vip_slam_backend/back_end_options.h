@@ -80,7 +80,7 @@ struct GlobalBaOptions {
   bool middle_hosts = true;
 
   void visit(OptionVisitor& v) {
-    v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
+    v.field("max_iterations", max_iterations, 2, 1000, "Levenberg-Marquardt iterations, of both rounds together");
     v.field("max_seconds", max_seconds, 0.0, 600.0, "time limit; 0 or lockstep: none");
     v.field("at_end", at_end, "run one at the end of the data");
     v.field("shared_hosts", shared_hosts,

@@ -49,6 +49,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
     throw;
   }
   const MapKeyframe& inserted = map.keyframe(keyframe->id);
+  noteWeakness(inserted);
   if (inserted.previous != 0) {
     const double factor = imuNoiseFactor(map.keyframe(inserted.previous), inserted, settings.gravity);
     if (factor > 1) map.widenImuNoise(keyframe->id, factor, sensor.imu_noise);
@@ -67,6 +68,19 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   const ReobservationResult found = reobservation.process(keyframe->id, &map, in_part);
   statistics.reobserved += found.found;
   statistics.merged += found.merged;
+}
+
+void BackEnd::Impl::noteWeakness(const MapKeyframe& inserted) {
+  const Keyframe& data = *inserted.data;
+  const std::string name = "keyframe " + std::to_string(data.id) + ": ";
+  if (data.frame.features.empty()) keep(name + "without features: only its neighbours hold it", &notices);
+  if (data.previous == 0 || inserted.preintegration) return;
+  const std::string before = std::to_string(data.previous);
+  if (inserted.previous == 0) {
+    keep(name + "its previous keyframe " + before + " is not the last of the map's chain: no IMU factor", &notices);
+  } else {
+    keep(name + "its IMU samples do not tell the whole motion since keyframe " + before + ": no IMU factor", &notices);
+  }
 }
 
 // A front end that was restarted alone counts its epochs from 0. Its keyframes must not be taken for a continuation of
@@ -200,6 +214,7 @@ void BackEnd::Impl::reset() {
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   refusals.clear();
+  notices.clear();
   loops.clear();
   rejected_kept = 0;
   new_loops.clear();
@@ -213,6 +228,7 @@ BackEnd::~BackEnd() = default;
 MapUpdate BackEnd::addKeyframe(KeyframePtr keyframe) { return impl_->addKeyframe(keyframe); }
 const std::string& BackEnd::lastRefusal() const { return impl_->refusal; }
 std::vector<std::string> BackEnd::takeRefusals() { return std::exchange(impl_->refusals, {}); }
+std::vector<std::string> BackEnd::takeNotices() { return std::exchange(impl_->notices, {}); }
 void BackEnd::applyPlaneUpdate(const PlaneUpdate& update) { impl_->applyPlaneUpdate(update); }
 bool BackEnd::globalBaWanted() const { return impl_->global_wanted && !impl_->frozen(); }
 void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }

@@ -30,11 +30,15 @@ struct BackEnd::Impl {
   /// Inserts at the predicted pose and re-observes known landmarks; throws MapError when refused.
   void insert(const KeyframePtr& keyframe);
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
+  /// Notices what holds a keyframe less than usual.
+  void noteWeakness(const MapKeyframe& inserted);
   void refuseUnannouncedRestart(const Keyframe& keyframe);
   /// Localisation-only mode with a map, which must not change.
   bool frozen() const { return localisation_only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
-  void refuse(const std::string& reason);
+  void refuse(const std::string& reason) { keep(reason, &refusals); }
+  /// Adds a message to a bounded list, which nobody may ever take.
+  static void keep(const std::string& message, std::vector<std::string>* messages);
   void removeUnnamedPlanes(const PlaneUpdate& update);
   void applyHeldUpdates();
   MapSnapshot snapshot() const;
@@ -140,6 +144,7 @@ struct BackEnd::Impl {
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< reported with the newest keyframe
   std::string refusal;                                               ///< of the last keyframe
   std::vector<std::string> refusals;                                 ///< since takeRefusals()
+  std::vector<std::string> notices;                                  ///< since takeNotices()
   std::vector<LoopEvent> loops;      ///< all accepted so far, and the newest refused ones
   std::size_t rejected_kept = 0;     ///< number of refused ones in `loops`
   std::vector<LoopEvent> new_loops;  ///< since the last update

@@ -16,15 +16,16 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     return;
   }
   const ScopedTimer timer(log, "backend.planes", update.t);
-  for (const PlaneMerge& merge : update.merges) map.mergePlanes(merge.from, merge.into);
-  for (const PlaneId id : update.removed) map.removePlane(id);
-  for (const PlaneEstimate& plane : update.planes) {
+  const auto attempt = [this](auto&& change) {
     try {
-      map.setPlane(plane);
+      change();
     } catch (const MapError& e) {
       refuse(e.what());
     }
-  }
+  };
+  for (const PlaneMerge& merge : update.merges) attempt([&] { map.mergePlanes(merge.from, merge.into); });
+  for (const PlaneId id : update.removed) map.removePlane(id);
+  for (const PlaneEstimate& plane : update.planes) attempt([&] { map.setPlane(plane); });
   removeUnnamedPlanes(update);
   for (const PlaneObservation& observation : update.observations) {
     if (map.setPlaneObservation(observation)) continue;
@@ -41,10 +42,10 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
   }
 }
 
-void BackEnd::Impl::refuse(const std::string& reason) {
-  constexpr std::size_t kMostKept = 100;  // nobody may ever ask for them
-  refusals.push_back(reason);
-  if (refusals.size() > kMostKept) refusals.erase(refusals.begin());
+void BackEnd::Impl::keep(const std::string& message, std::vector<std::string>* messages) {
+  constexpr std::size_t kMostKept = 100;
+  messages->push_back(message);
+  if (messages->size() > kMostKept) messages->erase(messages->begin());
 }
 
 // An update lists all planes. A plane that it does not list was removed or merged in an update that was lost.

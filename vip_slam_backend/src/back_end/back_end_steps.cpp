@@ -44,8 +44,8 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   solver_options.function_tolerance = 1e-4;
   {
     const ScopedTimer solve_timer(log, "backend.lba_solve", t);
-    const SolverSummary summary = solver->solve(built.problem, solver_options);
-    if (!summary.usable) return;
+    const SolverSummary summary = solver->attempt(built.problem, solver_options);
+    if (!summary.usable) return refuse("result of the local adjustment: " + summary.message);
   }
   statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
@@ -182,6 +182,8 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
     }
     askForScale();
     return true;
+  } else if (result.solution) {
+    refuse("result of the global adjustment: " + result.solution->summary.message);
   }
   return false;
 }

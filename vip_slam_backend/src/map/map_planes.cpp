@@ -8,8 +8,12 @@
 namespace vip_slam {
 namespace {
 
-bool finite(const Plane& plane) {
-  return plane.n.allFinite() && std::isfinite(plane.d) && std::abs(plane.n.norm() - 1.0) < 1e-3;
+/// Empty when the parameters are those of a plane, else what is wrong with them.
+std::string validateParameters(const Plane& plane) {
+  if (!plane.n.allFinite() || !std::isfinite(plane.d)) return "parameters are not finite";
+  const double length = plane.n.norm();
+  if (std::abs(length - 1.0) > 1e-3) return "normal of length " + std::to_string(length) + ", expected 1";
+  return "";
 }
 
 }  // namespace
@@ -17,19 +21,24 @@ bool finite(const Plane& plane) {
 void Map::setPlane(const PlaneEstimate& estimate) {
   const std::string name = "plane " + std::to_string(estimate.id);
   if (estimate.id == 0) throw MapError("a plane needs an id");
-  if (!finite(estimate.plane)) throw MapError(name + ": parameters are not finite or its normal is not a unit vector");
+  const std::string bad = validateParameters(estimate.plane);
+  if (!bad.empty()) throw MapError(name + ": " + bad);
+  const int kind = static_cast<int>(estimate.kind);
+  if (kind < 0 || kind > static_cast<int>(PlaneKind::kGeneral))
+    throw MapError(name + ": kind " + std::to_string(kind) + ", expected 0 (horizontal), 1 (vertical) or 2 (general)");
   MapPlane& plane = planes_[estimate.id];
   const Plane optimised = plane.estimate.plane;
   plane.estimate = estimate;
-  const double length = estimate.plane.n.norm();
-  if (std::abs(length - 1.0) > map_limits::kUnitNormal) plane.estimate.plane.n /= length;
+  if (std::abs(estimate.plane.n.norm() - 1.0) > map_limits::kUnitNormal)
+    plane.estimate.plane = Plane(estimate.plane.n, estimate.plane.d);
   if (plane.optimised) plane.estimate.plane = optimised;
 }
 
 void Map::setPlaneParameters(PlaneId id, const Plane& parameters) {
   const auto it = planes_.find(id);
   if (it == planes_.end()) throw MapError("no plane " + std::to_string(id) + " in the map");
-  if (!finite(parameters)) throw MapError("plane " + std::to_string(id) + ": new parameters are not finite");
+  const std::string bad = validateParameters(parameters);
+  if (!bad.empty()) throw MapError("plane " + std::to_string(id) + ": new " + bad);
   it->second.estimate.plane = parameters;
   it->second.optimised = true;
 }
@@ -42,6 +51,7 @@ void Map::movePlane(PlaneId id, const SE3& motion) {
 
 void Map::mergePlanes(PlaneId from, PlaneId into) {
   if (from == into || !hasPlane(from)) return;
+  if (into == 0) throw MapError("plane " + std::to_string(from) + ": merged into plane 0, which stands for none");
   if (!hasPlane(into)) {
     MapPlane plane = planes_[from];
     plane.estimate.id = into;

@@ -1,5 +1,6 @@
 #include "vip_slam_backend/optimisation/global_ba.h"
 
+#include <algorithm>
 #include <set>
 
 namespace vip_slam {
@@ -9,15 +10,17 @@ GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job) {
   Map map = *job.map;
   const auto solver = makeSolver(job.solver);
   SolverOptions options;
-  options.max_iterations = job.options.max_iterations;
-  options.max_seconds = 0.5 * job.max_seconds;
   // Robust weights converge by a constant factor: twice the iterations would gain 1e-5 of the cost and no accuracy.
   options.function_tolerance = 1e-5;
   constexpr int kRounds = 2;
+  options.max_seconds = job.max_seconds / kRounds;
+  int iterations = job.options.max_iterations;  // of all rounds
   for (int round = 0; round < kRounds; ++round) {
+    options.max_iterations = std::max(1, iterations / (kRounds - round));
     solution.built = buildProblem(map, globalScope(map), job.settings);
-    solution.summary = solver->solve(solution.built.problem, options);
+    solution.summary = solver->attempt(solution.built.problem, options);
     if (!solution.summary.usable) return solution;
+    iterations -= solution.summary.iterations;
     storeProblem(solution.built, job.noise, &map);
     const double chi2 = job.settings.measurement.outlier_chi2;
     // The first round may have ended before the minimum, where good views look wrong: the last one decides.

@@ -31,6 +31,7 @@ std::string validateProblem(const BaProblem& problem) {
     const NavState& s = problem.frames[k].state;
     if (!s.T_W_I.isFinite() || !s.v_W.allFinite() || !s.bias_gyro.allFinite() || !s.bias_accel.allFinite())
       return "frame " + std::to_string(k) + ": state is not finite";
+    if (!problem.frames[k].T_I_C.isFinite()) return "frame " + std::to_string(k) + ": extrinsics are not finite";
   }
   int next = 0;
   for (std::size_t k = 0; k < problem.points.size(); ++k) {
@@ -49,29 +50,33 @@ std::string validateProblem(const BaProblem& problem) {
     }
   }
   if (next != static_cast<int>(problem.observations.size())) return "observations that belong to no point";
-  for (std::size_t k = 0; k < problem.planes.size(); ++k)
-    if (!problem.planes[k].plane.n.allFinite() || !std::isfinite(problem.planes[k].plane.d))
-      return "plane " + std::to_string(k) + ": parameters are not finite";
+  for (std::size_t k = 0; k < problem.planes.size(); ++k) {
+    const BaPlane& p = problem.planes[k];
+    if (!(std::abs(p.plane.n.norm() - 1) < 1e-3) || !std::isfinite(p.plane.d) || !std::isfinite(p.prior_weight))
+      return "plane " + std::to_string(k) + ": not finite, or its normal is no unit vector";
+  }
   for (const BaImu& f : problem.imu)
     if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !f.preintegration) return "an IMU factor without its frames";
   for (const BaHomography& f : problem.homographies)
     if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane) || !isFinite(f.sums))
       return "a compressed homography without its frames or plane, or not finite";
   for (const BaHomographyPair& f : problem.homography_pairs)
-    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane))
-      return "a homography pair without its frames or plane";
+    if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !planeOk(f.plane) || !homographyRows(f.pair).allFinite())
+      return "a homography pair without its frames or plane, or not finite";
   for (const BaPointToPlane& f : problem.point_to_plane)
     if (!frameOk(f.frame) || !planeOk(f.plane) || !f.G.allFinite())
       return "a compressed point-to-plane factor without its frame or plane, or not finite";
   for (const BaPlaneSample& f : problem.plane_samples)
-    if (!frameOk(f.frame) || !planeOk(f.plane)) return "a depth point on a plane without its frame or plane";
+    if (!frameOk(f.frame) || !planeOk(f.plane) || !f.p_C.allFinite() || !std::isfinite(f.weight))
+      return "a depth point on a plane without its frame or plane, or not finite";
   for (const BaRelativePose& f : problem.relative_poses)
     if (!frameOk(f.i) || !frameOk(f.j) || f.i == f.j || !f.T_i_j.isFinite() || !f.sqrt_information.allFinite())
       return "a relative pose without its frames, or not finite";
   for (const BaGauge& f : problem.gauges)
-    if (!frameOk(f.frame)) return "a gauge prior without its frame";
+    if (!frameOk(f.frame) || !f.prior.T_W_I.isFinite()) return "a gauge prior without its frame, or not finite";
   for (const BaMotionPrior& f : problem.motion_priors)
-    if (!frameOk(f.frame)) return "a motion prior without its frame";
+    if (!frameOk(f.frame) || !motionPriorResidual(f.prior, problem.frames[f.frame].state).allFinite())
+      return "a motion prior without its frame, or not finite";
   return "";
 }
 

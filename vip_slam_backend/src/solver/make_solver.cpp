@@ -11,4 +11,15 @@ std::unique_ptr<BaSolver> makeSolver(const std::string& name) {
   throw std::invalid_argument("solver: '" + name + "', expected structured or ceres");
 }
 
+SolverSummary BaSolver::attempt(BaProblem& problem, const SolverOptions& options) {
+  try {
+    return solve(problem, options);
+  } catch (const std::invalid_argument& error) {
+    SolverSummary summary;
+    summary.usable = false;
+    summary.message = error.what();
+    return summary;
+  }
+}
+
 }  // namespace vip_slam

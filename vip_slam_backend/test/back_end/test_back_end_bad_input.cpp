@@ -106,6 +106,34 @@ TEST(BackEnd, PartsOfAPlaneUpdateAreRefusedByName) {
   EXPECT_EQ(back_end.map().keyframe(first.keyframe).planes.count(first.plane), 1u);
 }
 
+TEST(BackEnd, PlanesAndMergesThatAreNoneAreRefusedByName) {
+  SimulatedKeyframes world(5);
+  BackEnd back_end(options("vip"), world.sensor());
+  for (int k = 0; k < 3; ++k) back_end.addKeyframe(world.next());
+  const PlaneUpdate good = world.planes();
+  back_end.applyPlaneUpdate(good);
+  const auto refusalOf = [&](const std::function<void(PlaneUpdate*)>& spoil) {
+    PlaneUpdate bad = good;
+    spoil(&bad);
+    back_end.takeRefusals();
+    back_end.applyPlaneUpdate(bad);
+    EXPECT_EQ(checkMap(back_end.map()), "");
+    EXPECT_FALSE(back_end.map().hasPlane(0));
+    const std::vector<std::string> reasons = back_end.takeRefusals();
+    return reasons.empty() ? "" : reasons.front();
+  };
+  EXPECT_NE(refusalOf([](PlaneUpdate* u) { u->planes[0].plane.n *= 1.1; }).find("normal of length 1.1"),
+            std::string::npos);
+  EXPECT_NE(refusalOf([](PlaneUpdate* u) { u->planes[0].kind = PlaneKind(7); }).find("kind 7"), std::string::npos);
+  EXPECT_TRUE(back_end.map().hasPlane(good.planes[0].id)) << "a plane that is named stays as it is";
+  EXPECT_NE(refusalOf([&](PlaneUpdate* u) {
+              u->merges.push_back({good.planes[1].id, 0});
+            }).find("into plane 0"),
+            std::string::npos);
+  EXPECT_TRUE(back_end.map().hasPlane(good.planes[1].id));
+  EXPECT_NE(refusalOf([](PlaneUpdate* u) { u->planes[1].id = 0; }).find("needs an id"), std::string::npos);
+}
+
 // The motion over a hole in the samples is unknown: the keyframe enters without an IMU factor.
 TEST(BackEnd, ImuWithAHoleMakesNoFactor) {
   const auto hole = [](Keyframe* kf) { kf->imu.erase(kf->imu.begin() + 2, kf->imu.end() - 2); };
@@ -121,6 +149,9 @@ TEST(BackEnd, ImuWithAHoleMakesNoFactor) {
     back_end.addKeyframe(std::make_shared<Keyframe>(kf));
     EXPECT_EQ(back_end.lastRefusal(), "");
     EXPECT_EQ(back_end.map().keyframe(kf.id).preintegration, nullptr) << inside;
+    const std::vector<std::string> notices = back_end.takeNotices();
+    ASSERT_EQ(notices.size(), 1u);
+    EXPECT_NE(notices[0].find("keyframe " + std::to_string(kf.id) + ": its IMU samples"), std::string::npos);
     EXPECT_EQ(checkMap(back_end.map()), "");
     const KeyframePtr next = world.next();
     back_end.addKeyframe(next);
@@ -139,6 +170,7 @@ TEST(BackEnd, SurvivesPoorKeyframes) {
     back_end.addKeyframe(std::make_shared<Keyframe>(kf));
     EXPECT_EQ(back_end.lastRefusal(), "") << k;
     EXPECT_EQ(checkMap(back_end.map()), "") << k;
+    EXPECT_EQ(back_end.takeNotices().size(), k == 9 ? 2u : k == 4 || k == 5 || k == 7 ? 1u : 0u) << k;
     PlaneUpdate planes = world.planes();
     if (k == 6) {
       PlaneEstimate through_origin;  // seen once, through the world origin

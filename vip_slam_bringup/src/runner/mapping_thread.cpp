@@ -87,7 +87,8 @@ void MappingThread::distribute(const MapUpdate& update) {
       plane_history_.push_back({update.t, estimate.id, estimate.plane});
     }
   }
-  for (const std::string& reason : back_end_->takeRefusals()) refusals_.push_back("refused: " + reason);
+  for (const std::string& reason : back_end_->takeRefusals()) warnings_.push_back("refused: " + reason);
+  for (const std::string& notice : back_end_->takeNotices()) warnings_.push_back(notice);
 }
 
 void MappingThread::finish() {

@@ -133,8 +133,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     }
     if (!pipeline.chain().empty() && anchorTrajectory(pipeline.chain(), anchorsOf(map)).empty())
       all.push_back("the stored map was not recognised: no image has a pose in it, trajectory.tum is empty");
-    const auto& refusals = pipeline.mapping()->refusals();
-    all.insert(all.end(), refusals.begin(), refusals.end());
+    const auto& refused = pipeline.mapping()->warnings();
+    all.insert(all.end(), refused.begin(), refused.end());
   }
   return all;
 }

@@ -22,7 +22,7 @@ geometry_msgs::Transform toTransformMsg(const SE3& T);
 
 Eigen::Vector3d fromMsg(const geometry_msgs::Point& p);
 Eigen::Vector3d fromMsg(const geometry_msgs::Vector3& v);
-/// A quaternion of zero length, as in an unset message, becomes the identity.
+/// Throw std::invalid_argument when the orientation is no unit quaternion (within 1 %): unset or not finite.
 SE3 fromMsg(const geometry_msgs::Pose& pose);
 SE3 fromMsg(const geometry_msgs::Transform& transform);
 

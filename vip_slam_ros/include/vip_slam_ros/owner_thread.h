@@ -17,7 +17,8 @@ namespace vip_slam {
 class OwnerThread {
  public:
   using Lane = std::size_t;
-  /// Called with what() of a std::exception thrown by a task. Any other exception of a task ends the process.
+  /// Called with the lane and what() of a std::exception thrown by a task. Any other exception of a task ends the
+  /// process.
   using ErrorHandler = std::function<void(const std::string&)>;
 
   explicit OwnerThread(ErrorHandler on_error);

@@ -21,12 +21,13 @@ vip_slam_msgs::PlaneUpdate toMsg(const PlaneUpdate& update, const std::string& m
 vip_slam_msgs::PlaneMap toPlaneMapMsg(const std::vector<PlaneEstimate>& planes, double t, std::uint64_t revision,
                                       const std::string& map_frame);
 
-/// All throw std::invalid_argument naming the field when a message is inconsistent (an unknown kind, a normal not
-/// of unit length, a number of point values that is not a multiple of four).
+/// Values are taken as they are: the map and the plane mapper refuse unusable planes one by one and by name.
 PlaneEstimate fromMsg(const vip_slam_msgs::Plane& msg);
+/// Throws std::invalid_argument naming plane and keyframe when its values of points are no multiple of four.
 PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg);
-PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg);
-/// Throws std::invalid_argument when there is not one host for each plane.
+/// Leaves out observations that cannot be read, and adds the reasons to `refused`.
+PlaneUpdate fromMsg(const vip_slam_msgs::PlaneUpdate& msg, std::vector<std::string>* refused);
+/// Throws std::invalid_argument when there is not one host for each plane, or on a pose that is none.
 std::vector<StoredPlane> fromMsg(const std::vector<vip_slam_msgs::Plane>& planes,
                                  const std::vector<vip_slam_msgs::PlaneHost>& hosts);
 

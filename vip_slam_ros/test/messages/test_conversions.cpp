@@ -1,4 +1,6 @@
 // Core types are unchanged after conversion to messages, serialisation and back.
+#include <array>
+#include <cmath>
 #include <random>
 #include <stdexcept>
 
@@ -196,7 +198,9 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   update.observations = {observation};
   update.associated = {{11, 2}, {12, 1}};
   update.dissociated = {13};
-  const PlaneUpdate back = fromMsg(throughBytes(toMsg(update, "map")));
+  std::vector<std::string> refused;
+  const PlaneUpdate back = fromMsg(throughBytes(toMsg(update, "map")), &refused);
+  EXPECT_TRUE(refused.empty());
   EXPECT_EQ(back.revision, update.revision);
   EXPECT_EQ(back.t, update.t);
   ASSERT_EQ(back.merges.size(), 1u);
@@ -216,6 +220,56 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   EXPECT_EQ(back.observations[0].points[1].sigma, observation.points[1].sigma);
   EXPECT_EQ(back.associated, update.associated);
   EXPECT_EQ(back.dissociated, update.dissociated);
+}
+
+TEST_F(Conversions, AnUnreadableObservationLeavesTheRestOfItsUpdate) {
+  PlaneUpdate update;
+  update.planes = {plane(1), plane(2)};
+  update.associated = {{11, 2}};
+  update.observations.resize(2);
+  for (int k = 0; k < 2; ++k) {
+    update.observations[k].keyframe = 3 + k;
+    update.observations[k].plane = 2;
+    update.observations[k].points = {{{1, 2, 3}, 0.01f}};
+  }
+  vip_slam_msgs::PlaneUpdate msg = toMsg(update, "map");
+  msg.observations[0].points.push_back(1);
+  msg.planes[0].kind = 9;  // the map refuses it, and must know that the plane is named
+  std::vector<std::string> refused;
+  const PlaneUpdate back = fromMsg(msg, &refused);
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_NE(refused[0].find("plane 2, seen by keyframe 3: 5 values"), std::string::npos) << refused[0];
+  EXPECT_EQ(back.planes.size(), 2u);
+  EXPECT_EQ(back.associated, update.associated);
+  ASSERT_EQ(back.observations.size(), 1u);
+  EXPECT_EQ(back.observations[0].keyframe, 4u);
+}
+
+// It must not pass for "no rotation".
+TEST_F(Conversions, AnOrientationThatIsNoneIsRefused) {
+  const double nan = std::nan("");
+  for (const std::array<double, 4>& q : {std::array<double, 4>{0, 0, 0, 0}, {nan, 0, 0, 1}, {0, 0, 0, 2}}) {
+    const auto spoil = [&q](auto& orientation) {
+      orientation.x = q[0], orientation.y = q[1], orientation.z = q[2], orientation.w = q[3];
+    };
+    Keyframe keyframe;
+    keyframe.frame = frame();
+    const vip_slam_msgs::Keyframe good = toMsg(keyframe, "odom");
+    EXPECT_NO_THROW(fromMsg(good));
+    vip_slam_msgs::Keyframe bad = good;
+    spoil(bad.frame.state.pose.orientation);
+    EXPECT_THROW(fromMsg(bad), std::invalid_argument);
+    bad = good;
+    spoil(bad.frame.imu_camera.orientation);
+    EXPECT_THROW(fromMsg(bad), std::invalid_argument);
+    bad = good;
+    spoil(bad.frame.chain_camera.orientation);
+    EXPECT_THROW(fromMsg(bad), std::invalid_argument);
+    vip_slam_msgs::MapUpdate update = toMsg(MapUpdate(), "map");
+    EXPECT_NO_THROW(fromMsg(update));
+    spoil(update.map_odom.orientation);
+    EXPECT_THROW(fromMsg(update), std::invalid_argument);
+  }
 }
 
 TEST_F(Conversions, PlanesOfALoadedMapComeWithTheirHosts) {
@@ -244,7 +298,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   update.depth_curve.added = {0.f, -0.001f, 0.004f};
   update.disparity_error = -0.0021;
   update.global = true;
-  update.keyframes = {{29, state(), pose(), {}}, {30, state(), pose(), {-0.004, {{0.f, 0.002f}}}}};
+  update.keyframes = {{29, state(), pose(), {}}, {30, state(), pose(), {-0.004, {{0.f, 0.002f}}, {}, {}}}};
   LandmarkEstimate landmark;
   landmark.id = 77;
   landmark.p_W = vector();
@@ -325,8 +379,6 @@ TEST_F(Conversions, ContradictoryMessagesAreNamed) {
   grid.rows = 2;
   grid.z = {1, 2, 3};
   EXPECT_THROW(fromMsg(grid), std::invalid_argument);
-  vip_slam_msgs::Plane unset;
-  EXPECT_THROW(fromMsg(unset), std::invalid_argument);
   vip_slam_msgs::PlaneObservation observation;
   observation.points = {1, 2, 3};
   EXPECT_THROW(fromMsg(observation), std::invalid_argument);

@@ -53,7 +53,7 @@ TEST(OwnerThread, ExceptionsReachWhoeverCares) {
   EXPECT_THROW(owner.call(
                    lane, [] { throw std::invalid_argument("asked"); }, 10),
                std::invalid_argument);
-  EXPECT_EQ(words, "spilt");
+  EXPECT_EQ(words, "work: spilt");
 }
 
 TEST(OwnerThread, ACallThatComesTooLateNeverRuns) {

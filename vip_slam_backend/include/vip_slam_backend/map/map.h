@@ -82,6 +82,7 @@ class Map {
   void setPlaneParameters(PlaneId id, const Plane& plane);
   /// Moves the plane by `motion`, new from old world, as the keyframes that see it were moved.
   void movePlane(PlaneId id, const SE3& motion);
+  /// `from` becomes part of `into`, with its observations and landmarks; nothing when `from` is unknown.
   void mergePlanes(PlaneId from, PlaneId into);
   void removePlane(PlaneId id);
   bool hasPlane(PlaneId id) const { return planes_.count(id) != 0; }

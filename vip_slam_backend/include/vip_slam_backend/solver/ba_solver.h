@@ -43,6 +43,8 @@ class BaSolver {
   virtual ~BaSolver() = default;
   /// Improves the variables in place. Throws std::invalid_argument with the message of validateProblem().
   virtual SolverSummary solve(BaProblem& problem, const SolverOptions& options) = 0;
+  /// As solve(), but an inconsistent problem gives an unusable summary that says why.
+  SolverSummary attempt(BaProblem& problem, const SolverOptions& options);
 };
 
 /// "structured" or "ceres"; throws std::invalid_argument on others. A structured solver keeps its symbolic

@@ -53,7 +53,8 @@ class MappingThread {
   const std::vector<GlobalBaRecord>& globalAdjustments() const { return adjustments_; }
   /// All planes after each map update, in order.
   const std::vector<PlaneRecord>& planeHistory() const { return plane_history_; }
-  const std::vector<std::string>& refusals() const { return refusals_; }
+  /// What the back end refused or bridged, and why.
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
   std::vector<MapUpdate> process(const KeyframePtr& keyframe);
@@ -67,7 +68,7 @@ class MappingThread {
   bool placed_ = false;
   std::vector<GlobalBaRecord> adjustments_;
   std::vector<PlaneRecord> plane_history_;
-  std::vector<std::string> refusals_;
+  std::vector<std::string> warnings_;
   std::exception_ptr failure_;  ///< exception of the thread, to be read after its end
   Channel<std::function<void()>> work_;
   std::thread thread_;
