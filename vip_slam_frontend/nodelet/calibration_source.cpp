@@ -56,7 +56,7 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     return std::nullopt;
   }
   if (!imu_seen_) {
-    waiting_for_ = "no IMU message yet";
+    waiting_for_ = "no IMU message on topic " + sensor_.topics.imu + " yet";
     return std::nullopt;
   }
   if (options_.extrinsics != "config") {
@@ -66,27 +66,21 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
       return std::nullopt;
     }
     if (!asked_since_ || t < *asked_since_) asked_since_ = t;
-    const bool one_frame = !imu_frame_.empty() && bareFrame(imu_frame_) == bareFrame(color_frame_);
     const auto T_imu_cam = lookUpExtrinsics(tf_, imu_frame_, color_frame_);
     const auto T_base_imu = lookUpTransform(tf_, options_.base_frame, imu_frame_);
     const bool patient = options_.extrinsics == "tf" || t - *asked_since_ < options_.tf_patience;
     if (!(T_imu_cam && T_base_imu) && patient) {
-      const std::string& target = T_imu_cam ? options_.base_frame : imu_frame_;
-      const std::string& source = T_imu_cam ? imu_frame_ : color_frame_;
-      waiting_for_ = "tf does not connect '" + source + "' to '" + target + "' yet";
-      if (!T_imu_cam && one_frame)
-        waiting_for_ = "image and IMU name the same frame, '" + source + "': tf cannot tell where they are";
+      waiting_for_ = T_imu_cam ? "tf does not connect '" + imu_frame_ + "' to '" + options_.base_frame + "'"
+                               : whyNoExtrinsics(imu_frame_, color_frame_);
       return std::nullopt;
     }
     if (T_imu_cam) sensor_.T_imu_cam = *T_imu_cam;
     if (T_base_imu) sensor_.T_base_imu = *T_base_imu;
-    const auto origin = [](bool from_tf, const std::string& target, const std::string& source) -> std::string {
-      if (!from_tf && bareFrame(target) == bareFrame(source) && !target.empty())
-        return "the sensor file's, image and IMU name the same frame, '" + source + "'";
-      return from_tf ? "from tf" : "the sensor file's, tf does not connect '" + source + "' to '" + target + "'";
-    };
-    origin_ = "T_imu_cam: " + origin(T_imu_cam.has_value(), imu_frame_, color_frame_) +
-              "; T_base_imu: " + origin(T_base_imu.has_value(), options_.base_frame, imu_frame_);
+    origin_ =
+        "T_imu_cam: " + (T_imu_cam ? "from tf" : "the sensor file's, " + whyNoExtrinsics(imu_frame_, color_frame_)) +
+        "; T_base_imu: " +
+        (T_base_imu ? "from tf"
+                    : "the sensor file's, tf does not connect '" + imu_frame_ + "' to '" + options_.base_frame + "'");
     tf_incomplete_ = !(T_imu_cam && T_base_imu);
   } else {
     origin_ = "T_imu_cam and T_base_imu: the sensor file's";

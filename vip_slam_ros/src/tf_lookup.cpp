@@ -25,6 +25,14 @@ std::optional<SE3> lookUpExtrinsics(const tf2::BufferCore& buffer, const std::st
   return lookUpTransform(buffer, imu_frame, camera_frame);
 }
 
+std::string whyNoExtrinsics(const std::string& imu_frame, const std::string& camera_frame) {
+  if (imu_frame.empty()) return "the IMU messages' frame_id is empty: tf cannot tell where the IMU is";
+  if (camera_frame.empty()) return "the images' frame_id is empty: tf cannot tell where the camera is";
+  if (bareFrame(imu_frame) == bareFrame(camera_frame))
+    return "image and IMU name the same frame, '" + camera_frame + "': tf cannot tell where they are";
+  return "tf does not connect '" + camera_frame + "' to '" + imu_frame + "'";
+}
+
 ExtrinsicsGap extrinsicsGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b) {
   ExtrinsicsGap gap;
   gap.degrees = T_imu_cam_a.rotation().angularDistance(T_imu_cam_b.rotation()) / kDegree;

@@ -107,7 +107,8 @@ BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagRea
   source_->end = all.getEndTime();
   if (options.duration >= 0) source_->end = std::min(source_->end, source_->begin + ros::Duration(options.duration));
   if (source_->begin > source_->end) {
-    throw std::runtime_error(path + ": --start lies behind the end of the bag, which lasts " +
+    throw std::runtime_error(path + ": --start " + std::to_string(options.start) +
+                             " s lies behind the end of the bag, which lasts " +
                              std::to_string((all.getEndTime() - all.getBeginTime()).toSec()) + " s");
   }
   if (options.extrinsics != "config") takeExtrinsics(&sensor);
@@ -118,8 +119,8 @@ void BagReader::takeExtrinsics(SensorConfig* sensor) {
   const BagExtrinsics found = extrinsicsInBag(source_->bag, sensor->topics, source_->begin, options_.tf_patience);
   if (!found.T_imu_cam) {
     if (options_.extrinsics != "tf") return;
-    throw std::runtime_error(source_->bag.getFileName() + ": tf does not connect '" + found.camera_frame + "' to '" +
-                             found.imu_frame + "'; record /tf_static, or use the sensor file's extrinsics");
+    throw std::runtime_error(source_->bag.getFileName() + ": " + whyNoExtrinsics(found.imu_frame, found.camera_frame) +
+                             "; record /tf_static, or use the sensor file's extrinsics");
   }
   extrinsics_source_ = "tf: " + found.camera_frame + " to " + found.imu_frame;
   const ExtrinsicsGap off = extrinsicsGap(sensor->T_imu_cam, *found.T_imu_cam);

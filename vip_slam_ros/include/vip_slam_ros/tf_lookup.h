@@ -21,6 +21,9 @@ std::optional<SE3> lookUpTransform(const tf2::BufferCore& buffer, const std::str
 std::optional<SE3> lookUpExtrinsics(const tf2::BufferCore& buffer, const std::string& imu_frame,
                                     const std::string& camera_frame);
 
+/// Why lookUpExtrinsics() is empty, in words.
+std::string whyNoExtrinsics(const std::string& imu_frame, const std::string& camera_frame);
+
 /// Difference of two camera-IMU extrinsics.
 struct ExtrinsicsGap {
   double degrees = 0, metres = 0;
