@@ -95,8 +95,15 @@ class SystemTest(unittest.TestCase):
             p = message.pose.pose.position
             stamps.append(message.header.stamp.to_sec())
             points.append([p.x, p.y, p.z])
-        speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(stamps)
-        self.assertLess(speed.max(), 2.0)
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        self.assertLess((steps / np.diff(stamps)).max(), 2.0)
+        # Each step is as long as the true one, while the map moves against the odometry by more than that.
+        truth = np.stack([np.interp(stamps, self.truth[:, 0], self.truth[:, k]) for k in (1, 2, 3)], axis=1)
+        error = np.abs(steps - np.linalg.norm(np.diff(truth, axis=0), axis=1))
+        corrections = [m.map_odom.position for m in self.updates.all() if m.header.stamp.to_sec() <= stamps[-1]]
+        moved = np.ptp([[p.x, p.y, p.z] for p in corrections], axis=0).max()
+        self.assertGreater(moved, 0)
+        self.assertLess(error[1:].max(), 0.003, 'map to odom moved by %.4f m' % moved)
 
     def test_05_covariances_are_filled(self):
         for message in self.odometry.all():
@@ -150,6 +157,13 @@ class SystemTest(unittest.TestCase):
         wait_for(lambda: sum(m.global_update for m in self.updates.all()) > before + 1, 20, 'two global map updates')
         self.assertTrue(self.call('pause', Pause, False)[0])
         self.frames.wait(10, 10, 'images after resuming')
+
+        def follows_the_map():
+            p = self.buffer.lookup_transform('map', 'odom', rospy.Time(0)).transform.translation
+            q = self.updates.last().map_odom.position
+            return abs(p.x - q.x) + abs(p.y - q.y) + abs(p.z - q.z) < 1e-6
+
+        wait_for(follows_the_map, 20, 'map to odom as in the newest map update')
 
     def test_10_save_and_load(self):
         path = os.path.join(self.folder, 'map.vsm')

@@ -160,6 +160,25 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
   EXPECT_LT(front_end_.calibration().depth_offset, -0.001);
 }
 
+// However far the map is moved against the odometry, the odometry goes on to the last bit.
+TEST_F(FrontEndTest, ACorrectionOfTheMapDoesNotMoveTheOdometry) {
+  FrontEnd untouched(options(), sensor());
+  for (double t = 0; t < 4.1; t += 0.005) untouched.addImu(World::imu(t));
+  MapUpdate update;
+  update.newest_keyframe = 1;
+  for (int k = 0; k < 80; ++k) {
+    const double t = 0.05 * k;
+    const FrameOutput output = step(t);
+    const FrameOutput expected = untouched.process({t, world_.image(t), World::depth(t)});
+    ASSERT_EQ(output.frame->state.T_W_I.matrix(), expected.frame->state.T_W_I.matrix()) << t;
+    EXPECT_EQ(output.frame->state.v_W, expected.frame->state.v_W) << t;
+    if (k < 40) continue;
+    update.epoch = output.frame->epoch;
+    update.T_map_odom = SE3(expQuaternion(Eigen::Vector3d(0, 0, 0.02 * k)), Eigen::Vector3d(0.1 * k, -1, 0.3));
+    front_end_.applyMapUpdate(update);
+  }
+}
+
 // A change of the depth calibration must not look like motion.
 TEST_F(FrontEndTest, ADepthCurveDoesNotMoveThePose) {
   FrameOutput output = run(0.0, 4.0);
