@@ -1,8 +1,9 @@
-// Homography of a plane between two keyframes (paper section "Compressed Homography Measurement", corrected):
+// Homography of a plane between two keyframes (paper section "Compressed Homography Measurement", equations 3 to 7,
+// corrected):
 //   H = R_j^T (I - a n^T / D) R_i,  a = t_i - t_j,  D = d + n^T t_i   (camera poses),  H p_i = (z_j / z_i) p_j.
 // One pair of observations gives C_l vec(H) = rho (p^_j - p_j) (rows of 9, row-major vec), weighted by
 // f / (sigma_px rho) with rho frozen, so that the cost is the reprojection cost. N pairs on one plane compress into
-// G_h = sum C^T C: cost 1/2 h^T G_h h, residual L^T h with G_h = L L^T.
+// G_h = sum C^T C: cost C^ch = 1/2 h^T G_h h, residual r^ch = L^T h with G_h = L L^T.
 #pragma once
 
 #include <array>

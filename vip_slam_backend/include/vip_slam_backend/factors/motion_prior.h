@@ -1,5 +1,5 @@
-// A weak prior on velocity and biases of one keyframe without an IMU factor from the keyframe before (first keyframe,
-// IMU gap).
+// A weak prior (not in the paper) on velocity and biases of one keyframe without an IMU factor from the keyframe before
+// (first keyframe, IMU gap).
 #pragma once
 
 #include <Eigen/Core>

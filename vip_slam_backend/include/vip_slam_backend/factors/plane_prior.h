@@ -1,5 +1,5 @@
-// Horizontal and vertical planes (paper: "prior plane" of the global bundle adjustment): horizontal r = (n_x,
-// n_y)/sigma, vertical r = n_z/sigma, sigma in radians. A general plane has no prior.
+// Horizontal and vertical planes (the paper's text on E_GBA, equation 11, names the prior, its sum lacks it):
+// horizontal r = (n_x, n_y)/sigma, vertical r = n_z/sigma, sigma in radians. A general plane has no prior.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,7 @@
-// Relative pose of two frames (first two sums of the paper's pose-plane graph, corrected: inverse instead of transpose,
-// rotation as a logarithm): with T_i_j measured,
+// Relative pose of two frames (first two sums of E_PPG, equation 10 of the paper, corrected: inverse instead of
+// transpose, rotation as a logarithm): with T_i_j measured,
 //   r_theta = Log(R_ij^T R_i^T R_j),  r_t = R_i^T (t_j - t_i) - t_ij.
+// The adjustments use it for the odometry's motion between keyframes as well, which the paper does not have.
 #pragma once
 
 #include <Eigen/Core>
