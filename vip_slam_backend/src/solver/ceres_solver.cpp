@@ -166,7 +166,7 @@ SolverSummary CeresSolver::solve(BaProblem& problem, const SolverOptions& option
   for (std::size_t k = 1; k < s.iterations.size(); ++k) {
     SolverIteration log;
     log.cost = s.iterations[k].cost;
-    log.radius = s.iterations[k].trust_region_radius;
+    log.radius = s.iterations[k - 1].trust_region_radius;  // Ceres gives that after the step
     log.step_norm = s.iterations[k].step_norm;
     log.accepted = s.iterations[k].step_is_successful;
     summary.log.push_back(log);

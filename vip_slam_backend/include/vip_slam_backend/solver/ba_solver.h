@@ -23,7 +23,9 @@ struct SolverOptions {
 };
 
 struct SolverIteration {
-  double cost = 0, radius = 0, step_norm = 0;
+  double cost = 0;    ///< after the step, accepted or not
+  double radius = 0;  ///< of the trust region that gave the step
+  double step_norm = 0;
   bool accepted = false;
 };
 
