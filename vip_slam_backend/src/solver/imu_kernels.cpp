@@ -8,9 +8,6 @@ namespace vip_slam {
 #define KERNEL_TABLE ImuKernels
 #include "kernel_builds.inc"
 
-const ImuKernels& imuKernels() {
-  static const ImuKernels& chosen = kernelsOf(fastestInstructionSet());
-  return chosen;
-}
+const ImuKernels& imuKernels(InstructionSet set) { return kernelsOf(set); }
 
 }  // namespace vip_slam

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "instruction_set.h"
 #include "kernel_lanes.h"
 
 namespace vip_slam {
@@ -51,6 +52,7 @@ struct ImuKernels {
   double (*cost)(const ImuKernelArguments& a, int count);
 };
 
-const ImuKernels& imuKernels();
+/// The build for an instruction set that this processor supports.
+const ImuKernels& imuKernels(InstructionSet set);
 
 }  // namespace vip_slam

@@ -56,7 +56,7 @@ double StructuredSolver::linearizeImu(const BaProblem& problem) {
   ImuKernelArguments a = imuArguments(problem);
   a.values = values_.data();
   a.gradient = full_gradient_.data();
-  return imuKernels().linearize(a, static_cast<int>(problem.imu.size()));
+  return imuKernels(instruction_set_).linearize(a, static_cast<int>(problem.imu.size()));
 }
 
 double StructuredSolver::linearizePlanes(const BaProblem& problem) {
@@ -75,8 +75,9 @@ double StructuredSolver::linearizePlanes(const BaProblem& problem) {
   HomographyKernelArguments a = homographyArguments();
   a.values = values_.data();
   a.gradient = full_gradient_.data();
-  double cost = homographyKernels().linearize(a, static_cast<int>(problem.homographies.size()));
-  cost += pointToPlaneKernels().linearize(pointToPlaneArguments(), static_cast<int>(problem.point_to_plane.size()));
+  double cost = homographyKernels(instruction_set_).linearize(a, static_cast<int>(problem.homographies.size()));
+  cost += pointToPlaneKernels(instruction_set_)
+              .linearize(pointToPlaneArguments(), static_cast<int>(problem.point_to_plane.size()));
   for (std::size_t k = 0; k < problem.homography_pairs.size(); ++k) {
     const BaHomographyPair& f = problem.homography_pairs[k];
     const Vector9d h =
@@ -159,8 +160,9 @@ double StructuredSolver::linearizePriors(const BaProblem& problem) {
 
 double StructuredSolver::factorCost(const BaProblem& problem) {
   double cost = 0;
-  cost += imuKernels().cost(imuArguments(problem), static_cast<int>(problem.imu.size()));
-  cost += homographyKernels().cost(homographyArguments(), static_cast<int>(problem.homographies.size()));
+  cost += imuKernels(instruction_set_).cost(imuArguments(problem), static_cast<int>(problem.imu.size()));
+  cost +=
+      homographyKernels(instruction_set_).cost(homographyArguments(), static_cast<int>(problem.homographies.size()));
   for (const BaHomographyPair& f : problem.homography_pairs)
     cost += (homographyRows(f.pair) * homographyVector(geometry_[f.i], geometry_[f.j], problem.planes[f.plane].plane))
                 .squaredNorm();

@@ -8,9 +8,6 @@ namespace vip_slam {
 #define KERNEL_TABLE HomographyKernels
 #include "kernel_builds.inc"
 
-const HomographyKernels& homographyKernels() {
-  static const HomographyKernels& chosen = kernelsOf(fastestInstructionSet());
-  return chosen;
-}
+const HomographyKernels& homographyKernels(InstructionSet set) { return kernelsOf(set); }
 
 }  // namespace vip_slam

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "instruction_set.h"
 #include "kernel_lanes.h"
 #include "point_kernels.h"
 
@@ -37,7 +38,8 @@ struct HomographyKernels {
   double (*cost)(const HomographyKernelArguments& a, int count);
 };
 
-const HomographyKernels& homographyKernels();
+/// The build for an instruction set that this processor supports.
+const HomographyKernels& homographyKernels(InstructionSet set);
 
 struct KernelPointToPlane {
   std::int32_t frame, plane;
@@ -59,6 +61,6 @@ struct PointToPlaneKernels {
   double (*linearize)(const PointToPlaneKernelArguments& a, int count);
 };
 
-const PointToPlaneKernels& pointToPlaneKernels();
+const PointToPlaneKernels& pointToPlaneKernels(InstructionSet set);
 
 }  // namespace vip_slam

@@ -9,9 +9,6 @@ namespace vip_slam {
 #define KERNEL_TABLE PointKernels
 #include "kernel_builds.inc"
 
-const PointKernels& pointKernels() {
-  static const PointKernels& chosen = kernelsOf(fastestInstructionSet());
-  return chosen;
-}
+const PointKernels& pointKernels(InstructionSet set) { return kernelsOf(set); }
 
 }  // namespace vip_slam

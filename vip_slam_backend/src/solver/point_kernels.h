@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "instruction_set.h"
 #include "vip_slam_backend/solver/ba_problem.h"
 
 namespace vip_slam {
@@ -57,6 +58,7 @@ struct PointKernels {
   void (*backSubstitute)(const PointKernelArguments& a, const double* step, double* point_step, int begin, int end);
 };
 
-const PointKernels& pointKernels();
+/// The build for an instruction set that this processor supports.
+const PointKernels& pointKernels(InstructionSet set);
 
 }  // namespace vip_slam

@@ -7,9 +7,6 @@ namespace vip_slam {
 #define KERNEL_TABLE PointToPlaneKernels
 #include "kernel_builds.inc"
 
-const PointToPlaneKernels& pointToPlaneKernels() {
-  static const PointToPlaneKernels& chosen = kernelsOf(fastestInstructionSet());
-  return chosen;
-}
+const PointToPlaneKernels& pointToPlaneKernels(InstructionSet set) { return kernelsOf(set); }
 
 }  // namespace vip_slam

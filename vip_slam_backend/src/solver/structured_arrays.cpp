@@ -137,7 +137,7 @@ void StructuredSolver::loadImu(const BaProblem& problem) {
     Eigen::Map<Eigen::Vector3d>(to + kImuStateBiasGyro) = state.bias_gyro;
     Eigen::Map<Eigen::Vector3d>(to + kImuStateBiasAccel) = state.bias_accel;
   }
-  imuKernels().load(imuArguments(problem), static_cast<int>(problem.imu.size()));
+  imuKernels(instruction_set_).load(imuArguments(problem), static_cast<int>(problem.imu.size()));
 }
 
 void StructuredSolver::loadFrames(const BaProblem& problem) {

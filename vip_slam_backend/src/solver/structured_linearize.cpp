@@ -35,7 +35,7 @@ void StructuredSolver::linearize(const BaProblem& problem, double radius, Worker
       part.later_begin = structure_.range_begin[range].data();
       part.later_end = structure_.range_begin[range + 1].data();
     }
-    pointKernels().eliminate(part, 0, structure_.part_begin[kPointParts]);
+    pointKernels(instruction_set_).eliminate(part, 0, structure_.part_begin[kPointParts]);
   });
   addPoints();
   damp(radius);
@@ -55,7 +55,7 @@ double StructuredSolver::linearizeFactors(const BaProblem& problem) {
 double StructuredSolver::linearizePoints(PointKernelArguments a, int part) {
   frame_sums_[part].fillZero();
   a.frame_sums = frame_sums_[part].data();
-  return pointKernels().linearize(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
+  return pointKernels(instruction_set_).linearize(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
 }
 
 void StructuredSolver::storeDiagonal() {

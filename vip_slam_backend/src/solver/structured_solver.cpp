@@ -27,8 +27,9 @@ double StructuredSolver::cost(const BaProblem& problem, bool ahead, Worker* work
     if (piece == 0)
       parts[piece] = ahead ? linearizeFactors(problem) : factorCost(problem);
     else
-      parts[piece] = ahead ? linearizePoints(a, part)
-                           : pointKernels().cost(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
+      parts[piece] =
+          ahead ? linearizePoints(a, part)
+                : pointKernels(instruction_set_).cost(a, structure_.part_begin[part], structure_.part_begin[part + 1]);
   });
   if (ahead) ahead_ms_ += ms(start, Clock::now());
   ahead_ = ahead;
@@ -44,8 +45,8 @@ bool StructuredSolver::solveStep(const BaProblem& problem, double radius, Worker
   const int points = static_cast<int>(points_.size() / 3);
   constexpr int kPieces = 8;
   worker->share(kPieces, [&](int piece) {
-    pointKernels().backSubstitute(a, step_.data(), point_step_.data(), points * piece / kPieces,
-                                  points * (piece + 1) / kPieces);
+    pointKernels(instruction_set_)
+        .backSubstitute(a, step_.data(), point_step_.data(), points * piece / kPieces, points * (piece + 1) / kPieces);
   });
   for (const double v : step_)
     if (!std::isfinite(v)) return false;
@@ -99,10 +100,14 @@ StructuredSolver::Step StructuredSolver::stepAt(const BaProblem& problem, double
   const auto copy = [](const std::vector<double>& v) {
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), v.size()));
   };
-  Eigen::VectorXd point_step(point_step_.size());
-  for (std::size_t k = 0; k < structure_.point_at.size(); ++k)
-    point_step.segment<3>(3 * structure_.point_at[k]) = Eigen::Map<const Eigen::Vector3d>(point_step_.data() + 3 * k);
-  return {copy(full_gradient_), copy(diagonal_), copy(step_), point_step};
+  // From the order of processing to the problem's.
+  const auto ofPoints = [this](const std::vector<double>& v) {
+    Eigen::VectorXd out(v.size());
+    for (std::size_t k = 0; k < structure_.point_at.size(); ++k)
+      out.segment<3>(3 * structure_.point_at[k]) = Eigen::Map<const Eigen::Vector3d>(v.data() + 3 * k);
+    return out;
+  };
+  return {copy(full_gradient_), copy(diagonal_), copy(step_), ofPoints(point_gradient_), ofPoints(point_step_)};
 }
 
 void StructuredSolver::TrustRegion::accept(double ratio) {

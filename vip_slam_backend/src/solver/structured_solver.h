@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "imu_kernels.h"
+#include "instruction_set.h"
 #include "plane_kernels.h"
 #include "point_kernels.h"
 #include "system_structure.h"
@@ -19,14 +20,17 @@ namespace vip_slam {
 
 class StructuredSolver : public BaSolver {
  public:
+  /// Kernels of points and factors for `set`, which this processor must support; another than the fastest is for tests.
+  explicit StructuredSolver(InstructionSet set = fastestInstructionSet()) : instruction_set_(set) {}
   SolverSummary solve(BaProblem& problem, const SolverOptions& options) override;
 
   /// For tests: the damped, reduced normal equations and the step at the problem's present state.
   struct Step {
-    Eigen::VectorXd gradient;    ///< J^T r of poses, motions, planes in node order, before elimination
-    Eigen::VectorXd diagonal;    ///< diag(J^T J) of the same
-    Eigen::VectorXd step;        ///< of the same
-    Eigen::VectorXd point_step;  ///< 3 per point
+    Eigen::VectorXd gradient;        ///< J^T r of poses, motions, planes in node order, before elimination
+    Eigen::VectorXd diagonal;        ///< diag(J^T J) of the same
+    Eigen::VectorXd step;            ///< of the same
+    Eigen::VectorXd point_gradient;  ///< J^T r, 3 per point
+    Eigen::VectorXd point_step;      ///< of the same
   };
   Step stepAt(const BaProblem& problem, double radius);
 
@@ -89,6 +93,7 @@ class StructuredSolver : public BaSolver {
   double linearizePriors(const BaProblem& problem);
   double factorCost(const BaProblem& problem);
 
+  const InstructionSet instruction_set_;
   std::unique_ptr<Worker> worker_;
   bool helper_ = false;  ///< whether the worker has a helper thread
   SystemStructure structure_;

@@ -18,8 +18,10 @@ struct SyntheticOptions {
   int free_points = 60, plane_points = 60;
   double keyframe_dt = 0.4;
   bool compressed = false, uncompressed = false, plane_point_states = true;
-  double noise = 1.0;     ///< factor on all measurement noise
-  double perturb = 0.02;  ///< perturbation of the initial values: metres and radians
+  bool different_cameras = false;  ///< each frame has a camera mounted in its own way
+  bool world_frame = false;        ///< a fixed frame at the origin, camera and IMU in one, that sees all planes
+  double noise = 1.0;              ///< factor on all measurement noise
+  double perturb = 0.02;           ///< perturbation of the initial values: metres and radians
   unsigned seed = 1;
 };
 
@@ -50,6 +52,46 @@ inline ImuSample syntheticImu(double t) {
   return s;
 }
 
+inline std::vector<BaFrame> syntheticFrames(const SyntheticOptions& options) {
+  std::mt19937 random(options.seed + 2000);
+  std::uniform_real_distribution<double> uniform(-0.15, 0.15);
+  const auto uniform3 = [&] { return Eigen::Vector3d(uniform(random), uniform(random), uniform(random)); };
+  Eigen::Matrix3d R_I_C;  // camera z along body x
+  R_I_C << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const SE3 T_I_C(R_I_C, Eigen::Vector3d(0.05, -0.02, 0.01));
+  std::vector<BaFrame> frames(options.frames);
+  for (int k = 0; k < options.frames; ++k) {
+    frames[k].state = syntheticState(k * options.keyframe_dt);
+    frames[k].T_I_C = options.different_cameras ? SE3(expQuaternion(uniform3()), uniform3()) * T_I_C : T_I_C;
+  }
+  return frames;
+}
+
+// Points of the planes as the back end gives those of keyframes outside its window.
+inline void addWorldFrame(const SyntheticOptions& options, BaProblem* p) {
+  std::mt19937 random(options.seed + 3000);
+  std::uniform_real_distribution<double> uniform(-3, 3);
+  std::normal_distribution<double> normal(0, 0.01 * options.noise);
+  BaFrame world;
+  world.fixed = true;
+  world.motion = false;
+  BaPointToPlane block;
+  block.frame = static_cast<int>(p->frames.size());
+  p->frames.push_back(world);
+  for (std::size_t w = 0; w < p->planes.size(); ++w) {
+    const Plane& plane = p->planes[w].plane;
+    block.plane = static_cast<int>(w);
+    block.points = 20;
+    block.G.setZero();
+    for (int k = 0; k < block.points; ++k) {
+      const Eigen::Vector3d x = plane.project({uniform(random), uniform(random), uniform(random)});
+      const Eigen::Vector4d weighted = 100 * (x + normal(random) * plane.n).homogeneous();
+      block.G += weighted * weighted.transpose();
+    }
+    p->point_to_plane.push_back(block);
+  }
+}
+
 inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem* truth = nullptr) {
   std::mt19937 random(options.seed);
   std::normal_distribution<double> normal;
@@ -58,15 +100,7 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
   const auto gauss3 = [&](double sigma) { return Eigen::Vector3d(gauss(sigma), gauss(sigma), gauss(sigma)); };
   const double focal = 500, sigma_px = 1.0;
   BaProblem p;
-  Eigen::Matrix3d R_I_C;  // camera z along body x
-  R_I_C << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  const SE3 T_I_C(R_I_C, Eigen::Vector3d(0.05, -0.02, 0.01));
-  for (int k = 0; k < options.frames; ++k) {
-    BaFrame f;
-    f.state = syntheticState(k * options.keyframe_dt);
-    f.T_I_C = T_I_C;
-    p.frames.push_back(f);
-  }
+  p.frames = syntheticFrames(options);
   ImuNoise noise;
   for (int k = 0; k + 1 < options.frames; ++k) {
     std::vector<ImuSample> samples;
@@ -195,8 +229,10 @@ inline BaProblem makeSyntheticProblem(const SyntheticOptions& options, BaProblem
   BaMotionPrior prior;
   prior.prior.v_W = p.frames[0].state.v_W;
   p.motion_priors.push_back(prior);
+  if (options.world_frame) addWorldFrame(options, &p);
   if (truth) *truth = p;
   for (std::size_t k = 0; k < p.frames.size(); ++k) {
+    if (p.frames[k].fixed) continue;
     NavState& s = p.frames[k].state;
     Vector6d d;
     d << gauss3(options.perturb), gauss3(options.perturb);
