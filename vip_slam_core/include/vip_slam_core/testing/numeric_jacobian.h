@@ -1,7 +1,7 @@
 // Central differences for the tests of analytic Jacobians.
 #pragma once
 
-#include <functional>
+#include <algorithm>
 
 #include <Eigen/Core>
 
@@ -24,9 +24,15 @@ Eigen::MatrixXd numericJacobian(F&& f, int dimension, double step = 1e-6) {
   return J;
 }
 
-/// max |a - b| / max(1, max |b|)
-inline double relativeError(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  return (a - b).cwiseAbs().maxCoeff() / std::max(1.0, b.cwiseAbs().maxCoeff());
+/// The largest error of a row relative to that row's largest entry in `b`, absolute where the row is zero: of stacked
+/// Jacobians whose rows have different units, a small row counts as much as a large one.
+inline double rowError(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  double largest = 0;
+  for (int r = 0; r < b.rows(); ++r) {
+    const double error = (a.row(r) - b.row(r)).cwiseAbs().maxCoeff(), size = b.row(r).cwiseAbs().maxCoeff();
+    largest = std::max(largest, size > 0 ? error / size : error);
+  }
+  return largest;
 }
 
 }  // namespace vip_slam::testing
