@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "map_validation.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map/map_limits.h"
 #include "vip_slam_core/imu/gyro_correction.h"
@@ -10,15 +11,10 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kMaxGyroCorrection = 0.5;  // each entry
-constexpr double kSameTime = 1e-6;          // s
+using ImuSamples = std::shared_ptr<const std::vector<ImuSample>>;
 
-bool finite(const NavState& s) {
-  return std::isfinite(s.t) && s.T_W_I.isFinite() && s.v_W.allFinite() && s.bias_gyro.allFinite() &&
-         s.bias_accel.allFinite();
-}
-
-std::shared_ptr<const Preintegration> integrate(const std::shared_ptr<const std::vector<ImuSample>>& imu,
+/// IMU factor into keyframe `id`. Throws MapError when numbers in range cannot be integrated together.
+std::shared_ptr<const Preintegration> integrate(KeyframeId id, const ImuSamples& imu,
                                                 const Eigen::Matrix3d& gyro_correction, const NavState& from,
                                                 const ImuNoise& noise, double noise_scale) {
   if (!imu || imu->size() < 2) return nullptr;
@@ -26,61 +22,26 @@ std::shared_ptr<const Preintegration> integrate(const std::shared_ptr<const std:
   for (double* density :
        {&scaled.gyro_noise_density, &scaled.gyro_random_walk, &scaled.accel_noise_density, &scaled.accel_random_walk})
     *density *= noise_scale;
-  return std::make_shared<Preintegration>(withGyroCorrection(*imu, gyro_correction), from.bias_gyro, from.bias_accel,
-                                          scaled);
+  const std::string name = "keyframe " + std::to_string(id) + ": IMU samples: ";
+  try {
+    const auto factor = std::make_shared<Preintegration>(withGyroCorrection(*imu, gyro_correction), from.bias_gyro,
+                                                         from.bias_accel, scaled);
+    if (!isFinite(*factor)) throw MapError(name + "their integral is not finite");
+    return factor;
+  } catch (const std::invalid_argument& e) {
+    throw MapError(name + e.what());
+  }
 }
 
-/// Whether samples tell the whole motion since `before`, the samples of the previous keyframe (null: none).
-bool tellMotion(const std::vector<ImuSample>& imu, const std::vector<ImuSample>* before) {
-  if (imu.size() < 2 || (before && imu.front().t > before->back().t + kSameTime)) return false;
+/// Whether samples tell the whole motion into `data` since `before`.
+bool tellMotion(const std::vector<ImuSample>& imu, const MapKeyframe& before, const Keyframe& data) {
+  if (imu.size() < 2 || !agreeInDuration(imu, before.data->frame, data.frame)) return false;
+  if (before.imu && !continues(imu, *before.imu)) return false;
   const auto gap = [](const ImuSample& a, const ImuSample& b) { return b.t - a.t > map_limits::kLongestImuStep; };
   return std::adjacent_find(imu.begin(), imu.end(), gap) == imu.end();
 }
 
 }  // namespace
-
-std::string validateKeyframe(const Keyframe& keyframe) {
-  const std::string name = "keyframe " + std::to_string(keyframe.id) + ": ";
-  if (keyframe.id == 0) return "keyframe without an id (0)";
-  if (!std::isfinite(keyframe.frame.t)) return name + "stamp is not finite";
-  if (!finite(keyframe.frame.state)) return name + "state is not finite";
-  if (!keyframe.frame.T_I_C.isFinite()) return name + "extrinsics are not finite";
-  if (!keyframe.frame.T_chain_C.isFinite()) return name + "chained pose is not finite";
-  if (!std::isfinite(keyframe.frame.time_offset)) return name + "the camera's delay is not finite";
-  const DepthGrid& grid = keyframe.frame.depth_grid;
-  if (!grid.empty() && grid.stride <= 0) return name + "depth grid without a stride";
-  const auto& features = keyframe.frame.features;
-  for (std::size_t k = 0; k < features.size(); ++k) {
-    const Feature& f = features[k];
-    if (!f.pixel.allFinite() || !f.xy.allFinite() || !std::isfinite(f.depth) || !std::isfinite(f.depth_sigma) ||
-        !std::isfinite(f.pixel_sigma) || !std::isfinite(f.angle))
-      return name + "feature " + std::to_string(k) + " is not finite";
-    if (f.depth < 0 || (f.depth > 0 && !(f.depth_sigma > 0)))
-      return name + "feature " + std::to_string(k) + " has depth " + std::to_string(f.depth) + " with sigma " +
-             std::to_string(f.depth_sigma);
-  }
-  for (std::size_t k = 0; k < keyframe.imu.size(); ++k) {
-    const ImuSample& s = keyframe.imu[k];
-    if (!std::isfinite(s.t) || !s.gyro.allFinite() || !s.accel.allFinite())
-      return name + "IMU sample " + std::to_string(k) + " is not finite";
-    if (k > 0 && !(s.t > keyframe.imu[k - 1].t))
-      return name + "IMU sample " + std::to_string(k) + " is not after the one before";
-    if (s.gyro.norm() > map_limits::kMaxRate || s.accel.norm() > map_limits::kMaxAcceleration)
-      return name + "IMU sample " + std::to_string(k) + " is out of any sensor's range";
-  }
-  if (!keyframe.imu.empty() && keyframe.imu.back().t - keyframe.imu.front().t > map_limits::kLongestImu)
-    return name + "its IMU samples span hours";
-  // The newest keyframe's camera correction is applied to all keyframes.
-  const std::string camera = validateCameraCorrection(keyframe.frame.camera_correction);
-  if (!camera.empty()) return name + "the camera's correction: " + camera;
-  if (!keyframe.gyro_correction.allFinite() || keyframe.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroCorrection)
-    return name + "the gyro's correction is not finite, or beyond what a gyro can be off by";
-  if (!(keyframe.imu_noise_scale > 0 && keyframe.imu_noise_scale <= map_limits::kMaxNoiseScale))
-    return name + "the scale of the IMU's noise is " + std::to_string(keyframe.imu_noise_scale);
-  if (keyframe.motion.known() && !keyframe.motion.isUsable())
-    return name + "the odometry's motion is not finite, or its covariance is none";
-  return "";
-}
 
 MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, const ImuNoise& noise) {
   if (!data) throw MapError("no keyframe given");
@@ -91,9 +52,9 @@ MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, co
     throw MapError(name + " is too far from the first one, " + std::to_string(keyframes_.begin()->first));
   const std::string bad = validateKeyframe(*data);
   if (!bad.empty()) throw MapError(bad);
-  if (!finite(state)) throw MapError(name + ": state in the map is not finite");
+  if (!isFinite(state)) throw MapError(name + ": state in the map is not finite");
   KeyframeId previous = 0;
-  std::shared_ptr<const std::vector<ImuSample>> imu;
+  ImuSamples imu;
   if (data->previous != 0 && !keyframes_.empty()) {
     // The front end's previous keyframe may have been refused or culled: then the chain is cut here.
     const auto it = keyframes_.find(data->previous);
@@ -102,16 +63,12 @@ MapKeyframe& Map::addKeyframe(const KeyframePtr& data, const NavState& state, co
         throw MapError(name + ": stamp is not after that of its previous keyframe " + std::to_string(data->previous));
       previous = data->previous;
       const auto& before = it->second.imu;
-      if (before && !data->imu.empty() && data->imu.front().t < before->back().t - kSameTime)
+      if (before && !data->imu.empty() && data->imu.front().t < before->back().t - map_limits::kSameTime)
         throw MapError(name + ": its IMU samples begin before those of its previous keyframe end");
-      if (tellMotion(data->imu, before.get())) imu = std::shared_ptr<const std::vector<ImuSample>>(data, &data->imu);
+      if (tellMotion(data->imu, it->second, *data)) imu = ImuSamples(data, &data->imu);
     }
   }
-  try {
-    return insert(data, state, previous, imu, noise);
-  } catch (const std::invalid_argument& e) {  // numbers in range that cannot be integrated together
-    throw MapError(name + ": IMU samples: " + e.what());
-  }
+  return insert(data, state, previous, imu, noise);
 }
 
 MapKeyframe& Map::restoreKeyframe(const KeyframePtr& data, const NavState& state, KeyframeId previous,
@@ -121,11 +78,18 @@ MapKeyframe& Map::restoreKeyframe(const KeyframePtr& data, const NavState& state
   if (hasKeyframe(data->id)) throw MapError(name + " exists already");
   const std::string bad = validateKeyframe(*data);
   if (!bad.empty()) throw MapError(bad);
-  if (!finite(state)) throw MapError(name + ": state in the map is not finite");
+  if (!isFinite(state)) throw MapError(name + ": state in the map is not finite");
   if (previous != 0 && (!hasKeyframe(previous) || keyframe(previous).next != 0))
     throw MapError(name + ": its previous keyframe " + std::to_string(previous) + " is missing or has a successor");
-  std::shared_ptr<const std::vector<ImuSample>> samples;
-  if (previous != 0 && imu.size() >= 2) samples = std::make_shared<const std::vector<ImuSample>>(imu);
+  if (const std::string wrong = validateImu(imu); !wrong.empty()) throw MapError(name + ": " + wrong);
+  ImuSamples samples;
+  if (previous != 0) {
+    const MapKeyframe& before = keyframe(previous);
+    if (before.data->frame.epoch != data->frame.epoch || !(data->frame.t > before.data->frame.t))
+      throw MapError(name + ": its previous keyframe " + std::to_string(previous) +
+                     " is of another odometry, or not before it");
+    if (tellMotion(imu, before, *data)) samples = std::make_shared<const std::vector<ImuSample>>(imu);
+  }
   MapKeyframe& restored = insert(data, state, previous, samples, noise);
   restored.stored = true;
   return restored;
@@ -144,7 +108,8 @@ MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, Keyfram
   if (previous != 0) {
     kf.motion = data->motion;
     kf.imu = imu;
-    kf.preintegration = integrate(imu, kf.gyro_correction, keyframe(previous).state, noise, kf.imu_noise_scale);
+    kf.preintegration =
+        integrate(data->id, imu, kf.gyro_correction, keyframe(previous).state, noise, kf.imu_noise_scale);
   }
   MapKeyframe& inserted = keyframes_.emplace(data->id, std::move(kf)).first->second;
   if (previous != 0) keyframe(previous).next = data->id;
@@ -152,6 +117,7 @@ MapKeyframe& Map::insert(const KeyframePtr& data, const NavState& state, Keyfram
 }
 
 void Map::adoptExtrinsics(const SE3& T_I_C) {
+  if (!T_I_C.isFinite()) throw MapError("new extrinsics are not finite");
   for (auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.T_I_C.matrix() == T_I_C.matrix()) continue;
     const SE3 T_now_then = T_I_C * kf.T_I_C.inverse();
@@ -162,6 +128,8 @@ void Map::adoptExtrinsics(const SE3& T_I_C) {
 }
 
 void Map::adoptCameraCorrection(const CameraCorrection& correction) {
+  const std::string bad = validateCameraCorrection(correction);
+  if (!bad.empty()) throw MapError("new correction of the camera: " + bad);
   for (auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.data->frame.camera_correction == correction) continue;
     const KeyframePtr corrected = withCameraCorrection(kf.data, correction);
@@ -173,52 +141,68 @@ void Map::adoptCameraCorrection(const CameraCorrection& correction) {
 }
 
 void Map::adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise& noise) {
-  std::vector<KeyframeId> others;
+  if (!isGyroCorrection(correction))
+    throw MapError("new correction of the gyro is not finite, or beyond what a gyro can be off by");
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  for (auto& [id, kf] : keyframes_) {
+  std::map<KeyframeId, NavState> states;  // with the biases of the corrected rates
+  for (const auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.gyro_correction == correction) continue;
     // The corrected rate of a body at rest must stay zero.
-    kf.state.bias_gyro = (I + correction) * (I + kf.gyro_correction).inverse() * kf.state.bias_gyro;
-    kf.gyro_correction = correction;
-    others.push_back(id);
+    states[id] = kf.state;
+    states[id].bias_gyro = (I + correction) * (I + kf.gyro_correction).inverse() * kf.state.bias_gyro;
+    if (!isFinite(states[id])) throw MapError("keyframe " + std::to_string(id) + ": corrected state is not finite");
   }
-  for (const KeyframeId id : others) {
-    MapKeyframe& kf = keyframe(id);
-    if (kf.preintegration)
-      kf.preintegration = integrate(kf.imu, correction, keyframe(kf.previous).state, noise, kf.imu_noise_scale);
+  std::map<KeyframeId, std::shared_ptr<const Preintegration>> factors;
+  for (const auto& [id, kf] : keyframes_) {
+    if (!kf.preintegration) continue;
+    const auto from = states.find(kf.previous);
+    const NavState& before = from != states.end() ? from->second : keyframe(kf.previous).state;
+    const bool corrected = states.count(id) != 0;
+    if (corrected || kf.preintegration->needsReintegration(before.bias_gyro, before.bias_accel))
+      factors[id] =
+          integrate(id, kf.imu, corrected ? correction : kf.gyro_correction, before, noise, kf.imu_noise_scale);
   }
+  for (const auto& [id, state] : states) {
+    keyframe(id).state = state;
+    keyframe(id).gyro_correction = correction;
+  }
+  for (auto& [id, factor] : factors) keyframe(id).preintegration = std::move(factor);
 }
 
 void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds) {
   MapKeyframe& kf = keyframe(id);
+  if (kf.next != 0)
+    joinOver(kf, noise, max_imu_seconds);
+  else if (kf.previous != 0)
+    keyframe(kf.previous).next = 0;
   for (const LandmarkId landmark : std::vector<LandmarkId>(kf.landmarks))
     if (landmark != kNoLandmark) removeObservation(landmark, id);
-  const KeyframeId previous = kf.previous, next = kf.next;
-  if (next != 0) {
-    MapKeyframe& n = keyframe(next);
-    std::shared_ptr<const std::vector<ImuSample>> joined;
-    std::shared_ptr<const Preintegration> preintegration;
-    KeyframeId chained = 0;
-    if (previous != 0 && kf.imu && n.imu && n.imu->back().t - kf.imu->front().t <= max_imu_seconds) {
-      auto samples = std::make_shared<std::vector<ImuSample>>(*kf.imu);
-      samples->insert(samples->end(), n.imu->begin() + 1, n.imu->end());
-      joined = samples;
-      const double scale = std::max(kf.imu_noise_scale, n.imu_noise_scale);
-      preintegration = integrate(joined, n.gyro_correction, keyframe(previous).state, noise, scale);
-      n.imu_noise_scale = scale;
-      chained = previous;
-    }
-    n.motion = chained ? compose(kf.motion, n.motion) : RelativeMotion();
-    n.previous = chained;
-    n.imu = joined;
-    n.preintegration = preintegration;
-    if (previous != 0) keyframe(previous).next = chained ? next : 0;
-  } else if (previous != 0) {
-    keyframe(previous).next = 0;
-  }
   keyframes_.erase(id);
   if (aliases_.crowded()) forgetAliases();
   changes_.removed_keyframes.push_back(id);
+}
+
+void Map::joinOver(const MapKeyframe& kf, const ImuNoise& noise, double max_imu_seconds) {
+  MapKeyframe& next = keyframe(kf.next);
+  ImuSamples joined;
+  std::shared_ptr<const Preintegration> preintegration;
+  double scale = next.imu_noise_scale;
+  if (kf.previous != 0 && kf.imu && next.imu && next.imu->back().t - kf.imu->front().t <= max_imu_seconds) {
+    auto samples = std::make_shared<std::vector<ImuSample>>(*kf.imu);
+    samples->insert(samples->end(), next.imu->begin() + 1, next.imu->end());
+    if (agreeInDuration(*samples, keyframe(kf.previous).data->frame, next.data->frame)) {
+      joined = samples;
+      scale = std::max(kf.imu_noise_scale, scale);
+      preintegration = integrate(next.id(), joined, next.gyro_correction, keyframe(kf.previous).state, noise, scale);
+    }
+  }
+  const KeyframeId chained = joined ? kf.previous : 0;
+  if (kf.previous != 0) keyframe(kf.previous).next = chained ? kf.next : 0;
+  next.motion = chained ? compose(kf.motion, next.motion) : RelativeMotion();
+  next.previous = chained;
+  next.imu = joined;
+  next.preintegration = preintegration;
+  next.imu_noise_scale = scale;
 }
 
 MapKeyframe& Map::keyframe(KeyframeId id) {
@@ -246,20 +230,24 @@ std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId id, int min_sh
 }
 
 void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) {
-  if (!finite(state)) throw MapError("keyframe " + std::to_string(id) + ": new state is not finite");
+  if (!isFinite(state)) throw MapError("keyframe " + std::to_string(id) + ": new state is not finite");
   MapKeyframe& kf = keyframe(id);
+  if (kf.next != 0) {
+    MapKeyframe& next = keyframe(kf.next);
+    if (next.preintegration && next.preintegration->needsReintegration(state.bias_gyro, state.bias_accel))
+      next.preintegration = integrate(kf.next, next.imu, next.gyro_correction, state, noise, next.imu_noise_scale);
+  }
   kf.state = state;
-  if (kf.next == 0) return;
-  MapKeyframe& next = keyframe(kf.next);
-  if (next.preintegration && next.preintegration->needsReintegration(state.bias_gyro, state.bias_accel))
-    next.preintegration = integrate(next.imu, next.gyro_correction, state, noise, next.imu_noise_scale);
 }
 
 void Map::widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise) {
   MapKeyframe& kf = keyframe(id);
-  kf.imu_noise_scale = std::min(factor * kf.imu_noise_scale, map_limits::kMaxNoiseScale);
+  const double scale = std::min(factor * kf.imu_noise_scale, map_limits::kMaxNoiseScale);
+  if (!isImuNoiseScale(scale))
+    throw MapError("keyframe " + std::to_string(id) + ": factor on the IMU's noise is " + std::to_string(factor));
   if (kf.preintegration)
-    kf.preintegration = integrate(kf.imu, kf.gyro_correction, keyframe(kf.previous).state, noise, kf.imu_noise_scale);
+    kf.preintegration = integrate(id, kf.imu, kf.gyro_correction, keyframe(kf.previous).state, noise, scale);
+  kf.imu_noise_scale = scale;
 }
 
 void Map::moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I) {

@@ -25,7 +25,8 @@ class Map {
   /// Inserts a keyframe at the end of the IMU chain. Refused: id not above all others, time not after the previous
   /// keyframe's, non-finite numbers in state, features or IMU, features without the camera's half space (NaN xy).
   MapKeyframe& addKeyframe(const KeyframePtr& data, const NavState& state, const ImuNoise& noise);
-  /// Inserts a keyframe of a stored map: any id not taken, no check of time; the chain is given by `previous`.
+  /// Inserts a keyframe of a stored map: any id not taken; the chain is given by `previous`, an earlier keyframe of the
+  /// same odometry.
   MapKeyframe& restoreKeyframe(const KeyframePtr& data, const NavState& state, KeyframeId previous,
                                const std::vector<ImuSample>& imu, const ImuNoise& noise);
   /// Sets newly estimated camera-IMU extrinsics in all keyframes but those of a stored map. The camera poses stay, so
@@ -105,6 +106,8 @@ class Map {
  private:
   MapKeyframe& insert(const KeyframePtr& data, const NavState& state, KeyframeId previous,
                       const std::shared_ptr<const std::vector<ImuSample>>& imu, const ImuNoise& noise);
+  /// Joins the IMU chain over a keyframe that is to be removed, or cuts it.
+  void joinOver(const MapKeyframe& keyframe, const ImuNoise& noise, double max_imu_seconds);
   void updateDescriptor(MapLandmark& landmark);
   /// Forgets those of tracks that no keyframe contains any more.
   void forgetAliases();

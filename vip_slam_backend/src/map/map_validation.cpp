@@ -1,0 +1,96 @@
+#include "map_validation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/map_limits.h"
+#include "vip_slam_core/types/camera_correction.h"
+
+namespace vip_slam {
+
+bool isFinite(const NavState& s) {
+  return std::isfinite(s.t) && s.T_W_I.isFinite() && s.v_W.allFinite() && s.bias_gyro.allFinite() &&
+         s.bias_accel.allFinite();
+}
+
+bool isFinite(const Preintegration& factor) {
+  return factor.deltaR().allFinite() && factor.alpha().allFinite() && factor.beta().allFinite() &&
+         factor.sqrtInformation().allFinite();
+}
+
+bool isGyroCorrection(const Eigen::Matrix3d& correction) {
+  return correction.allFinite() && correction.cwiseAbs().maxCoeff() <= map_limits::kMaxGyroCorrection;
+}
+
+bool isImuNoiseScale(double scale) { return scale > 0 && scale <= map_limits::kMaxNoiseScale; }
+
+std::string validateImu(const std::vector<ImuSample>& imu) {
+  for (std::size_t k = 0; k < imu.size(); ++k) {
+    const ImuSample& s = imu[k];
+    const auto bad = [k](const char* what) { return "IMU sample " + std::to_string(k) + what; };
+    if (!std::isfinite(s.t) || !s.gyro.allFinite() || !s.accel.allFinite()) return bad(" is not finite");
+    if (k > 0 && !(s.t > imu[k - 1].t)) return bad(" is not after the one before");
+    if (s.gyro.norm() > map_limits::kMaxRate || s.accel.norm() > map_limits::kMaxAcceleration)
+      return bad(" is out of any sensor's range");
+  }
+  if (!imu.empty() && imu.back().t - imu.front().t > map_limits::kLongestImu) return "its IMU samples span hours";
+  return "";
+}
+
+bool agreeInDuration(const std::vector<ImuSample>& imu, const TrackedFrame& from, const TrackedFrame& to) {
+  const double duration = (to.t + to.time_offset) - (from.t + from.time_offset);
+  return std::abs(imu.back().t - imu.front().t - duration) <= map_limits::kImuDuration;
+}
+
+bool continues(const std::vector<ImuSample>& imu, const std::vector<ImuSample>& before) {
+  const double end = before.back().t;
+  return std::abs(imu.front().t - end) <= map_limits::kSameTime && imu.at(1).t > end;
+}
+
+bool isAreaFinite(const PlaneEstimate& plane) {
+  const auto finite = [](const Ring& ring) {
+    return std::all_of(ring.begin(), ring.end(), [](const Eigen::Vector3d& p) { return p.allFinite(); });
+  };
+  return std::isfinite(plane.area) && std::all_of(plane.polygons.begin(), plane.polygons.end(), [&](const auto& piece) {
+           return finite(piece.outer) && std::all_of(piece.holes.begin(), piece.holes.end(), finite);
+         });
+}
+
+std::string validateKeyframe(const Keyframe& keyframe) {
+  const std::string name = "keyframe " + std::to_string(keyframe.id) + ": ";
+  if (keyframe.id == 0) return "keyframe without an id (0)";
+  if (!std::isfinite(keyframe.frame.t)) return name + "stamp is not finite";
+  if (!isFinite(keyframe.frame.state)) return name + "state is not finite";
+  if (!keyframe.frame.T_I_C.isFinite()) return name + "extrinsics are not finite";
+  if (!keyframe.frame.T_chain_C.isFinite()) return name + "chained pose is not finite";
+  if (!std::isfinite(keyframe.frame.time_offset)) return name + "the camera's delay is not finite";
+  const DepthGrid& grid = keyframe.frame.depth_grid;
+  if (!grid.empty() && grid.stride <= 0) return name + "depth grid without a stride";
+  if (grid.cols < 0 || grid.rows < 0 || grid.z.size() != std::size_t(grid.cols) * std::size_t(grid.rows))
+    return name + "depth grid of " + std::to_string(grid.z.size()) + " nodes, expected " + std::to_string(grid.cols) +
+           " x " + std::to_string(grid.rows);
+  const auto& features = keyframe.frame.features;
+  for (std::size_t k = 0; k < features.size(); ++k) {
+    const Feature& f = features[k];
+    if (!f.pixel.allFinite() || !f.xy.allFinite() || !std::isfinite(f.depth) || !std::isfinite(f.depth_sigma) ||
+        !std::isfinite(f.pixel_sigma) || !std::isfinite(f.angle))
+      return name + "feature " + std::to_string(k) + " is not finite";
+    if (f.depth < 0 || (f.depth > 0 && !(f.depth_sigma > 0)))
+      return name + "feature " + std::to_string(k) + " has depth " + std::to_string(f.depth) + " with sigma " +
+             std::to_string(f.depth_sigma);
+  }
+  if (const std::string imu = validateImu(keyframe.imu); !imu.empty()) return name + imu;
+  // The newest keyframe's camera correction is applied to all keyframes.
+  const std::string camera = validateCameraCorrection(keyframe.frame.camera_correction);
+  if (!camera.empty()) return name + "the camera's correction: " + camera;
+  if (!isGyroCorrection(keyframe.gyro_correction))
+    return name + "the gyro's correction is not finite, or beyond what a gyro can be off by";
+  if (!isImuNoiseScale(keyframe.imu_noise_scale))
+    return name + "the scale of the IMU's noise is " + std::to_string(keyframe.imu_noise_scale);
+  if (keyframe.motion.known() && !keyframe.motion.isUsable())
+    return name + "the odometry's motion is not finite, or its covariance is none";
+  return "";
+}
+
+}  // namespace vip_slam
