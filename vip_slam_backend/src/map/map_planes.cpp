@@ -1,6 +1,8 @@
 // Planes of the map: estimates, observations by keyframes, association of landmarks.
 #include <cmath>
 
+#include "map_validation.h"
+#include "vip_slam_backend/factors/point_to_plane.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map/map_limits.h"
 #include "vip_slam_core/types/camera_correction.h"
@@ -16,6 +18,11 @@ std::string validateParameters(const Plane& plane) {
   return "";
 }
 
+/// Its normal within the tolerance of files and checks, the same bits when it was already.
+Plane withUnitNormal(const Plane& plane) {
+  return std::abs(plane.n.norm() - 1.0) > map_limits::kUnitNormal ? Plane(plane.n, plane.d) : plane;
+}
+
 }  // namespace
 
 void Map::setPlane(const PlaneEstimate& estimate) {
@@ -26,12 +33,11 @@ void Map::setPlane(const PlaneEstimate& estimate) {
   const int kind = static_cast<int>(estimate.kind);
   if (kind < 0 || kind > static_cast<int>(PlaneKind::kGeneral))
     throw MapError(name + ": kind " + std::to_string(kind) + ", expected 0 (horizontal), 1 (vertical) or 2 (general)");
+  if (!isAreaFinite(estimate)) throw MapError(name + ": its area or outline is not finite");
   MapPlane& plane = planes_[estimate.id];
   const Plane optimised = plane.estimate.plane;
   plane.estimate = estimate;
-  if (std::abs(estimate.plane.n.norm() - 1.0) > map_limits::kUnitNormal)
-    plane.estimate.plane = Plane(estimate.plane.n, estimate.plane.d);
-  if (plane.optimised) plane.estimate.plane = optimised;
+  plane.estimate.plane = plane.optimised ? optimised : withUnitNormal(estimate.plane);
 }
 
 void Map::setPlaneParameters(PlaneId id, const Plane& parameters) {
@@ -39,13 +45,14 @@ void Map::setPlaneParameters(PlaneId id, const Plane& parameters) {
   if (it == planes_.end()) throw MapError("no plane " + std::to_string(id) + " in the map");
   const std::string bad = validateParameters(parameters);
   if (!bad.empty()) throw MapError("plane " + std::to_string(id) + ": new " + bad);
-  it->second.estimate.plane = parameters;
+  it->second.estimate.plane = withUnitNormal(parameters);
   it->second.optimised = true;
 }
 
 void Map::movePlane(PlaneId id, const SE3& motion) {
   const auto it = planes_.find(id);
   if (it == planes_.end()) throw MapError("no plane " + std::to_string(id) + " in the map");
+  if (!motion.isFinite()) throw MapError("plane " + std::to_string(id) + ": its motion is not finite");
   it->second.estimate.plane = transformPlane(motion, it->second.estimate.plane);
 }
 
@@ -92,6 +99,7 @@ std::string validateObservation(const PlaneObservation& observation) {
   const std::string name = "plane " + std::to_string(observation.plane) + ", seen by keyframe " +
                            std::to_string(observation.keyframe) + ": ";
   if (!observation.G.allFinite()) return name + "moments are not finite";
+  if (!isSumOfSquares(observation.G)) return name + "moments are no sum of squares";
   if (!(observation.weight_scale > 0) || !std::isfinite(observation.weight_scale))
     return name + "weight is " + std::to_string(observation.weight_scale);
   for (const PlaneSample& p : observation.points)

@@ -35,6 +35,10 @@ inline Eigen::Vector4d planeInCamera(const FrameGeometry& frame, const Plane& pl
   return u;
 }
 
+/// Whether a finite G is symmetric and positive semidefinite up to rounding. Else decomposePointToPlane(), which drops
+/// negative eigenvalues, would change its cost.
+bool isSumOfSquares(const Eigen::Matrix4d& G);
+
 /// Rows L^T with G = L L^T; eigenvalues below 1e-12 of the largest are dropped. Returns the number of rows.
 int decomposePointToPlane(const Eigen::Matrix4d& G, Eigen::Matrix4d* rows);
 
