@@ -1,39 +1,11 @@
 // The map's operations keep its invariants; operations that would break them are refused and change nothing.
 #include <gtest/gtest.h>
 
-#include "back_end/simulated_keyframes.h"
+#include "map/map_fixture.h"
 #include "vip_slam_backend/map/culling.h"
-#include "vip_slam_backend/map/landmark_maker.h"
-#include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_backend/map/reobservation.h"
 
 using namespace vip_slam;
-
-namespace {
-
-struct Fixture {
-  SimulatedKeyframes world{11};
-  Map map;
-  LandmarkMaker maker{500.0};
-  void add(int count) {
-    for (int k = 0; k < count; ++k) {
-      const KeyframePtr kf = world.next();
-      NavState state = world.truth(kf->frame.t);
-      map.addKeyframe(kf, state, ImuNoise());
-      maker.process(kf->id, &map);
-      ASSERT_EQ(checkMap(map), "");
-    }
-  }
-  /// A keyframe of another session.
-  KeyframePtr addStored() {
-    auto stored = std::make_shared<Keyframe>(*world.next());
-    stored->previous = 0;
-    map.restoreKeyframe(stored, world.truth(stored->frame.t), 0, {}, ImuNoise());
-    return stored;
-  }
-};
-
-}  // namespace
 
 TEST(Map, TracksBecomeLandmarks) {
   Fixture f;
@@ -332,25 +304,4 @@ TEST(Map, LandmarksOfManyViewsAreKeptHoweverOftenTheyAreHidden) {
   EXPECT_TRUE(f.map.hasLandmark(of_three));
   EXPECT_FALSE(f.map.hasLandmark(doubtful));
   EXPECT_EQ(checkMap(f.map), "");
-}
-
-TEST(Map, CheckerSeesDamage) {
-  Fixture f;
-  f.add(3);
-  const LandmarkId id = f.map.landmarkIds().front();
-  Map damaged = f.map;
-  damaged.landmark(id).observations.clear();
-  EXPECT_NE(checkMap(damaged), "");
-  damaged = f.map;
-  damaged.keyframe(2).next = 1;
-  EXPECT_NE(checkMap(damaged), "");
-  damaged = f.map;
-  damaged.keyframe(2).motion.covariance(4, 4) = -1;
-  EXPECT_NE(checkMap(damaged), "");
-  damaged = f.map;
-  damaged.landmark(id).plane = 9;
-  EXPECT_NE(checkMap(damaged), "");
-  damaged = f.map;
-  damaged.landmark(id).p_W.x() = std::nan("");
-  EXPECT_NE(checkMap(damaged), "");
 }

@@ -8,7 +8,9 @@
 namespace vip_slam {
 
 /// Empty when the map is consistent, else the first violation in words: two-way links between keyframes and landmarks,
-/// ascending observations, a chain of keyframes linked both ways, planes that exist, finite numbers.
+/// ascending observations, a chain of keyframes of one odometry linked both ways and ascending in time, IMU factors
+/// that fit their samples, stamps and biases, planes that exist, plane observations that are sums of squares, finite
+/// numbers.
 std::string checkMap(const Map& map);
 
 }  // namespace vip_slam
