@@ -7,9 +7,8 @@
 #include <map>
 #include <string>
 
+#include "back_end/checked_back_end.h"
 #include "back_end/simulated_keyframes.h"
-#include "vip_slam_backend/back_end.h"
-#include "vip_slam_backend/map/map_checker.h"
 
 namespace vip_slam {
 
@@ -24,8 +23,10 @@ inline BackEndOptions options(const std::string& variant) {
 /// Keyframes and the plane module's answer to each.
 inline void feed(SimulatedKeyframes* world, BackEnd* back_end, int keyframes) {
   for (int k = 0; k < keyframes; ++k) {
-    back_end->addKeyframe(world->next());
+    const MapUpdate update = back_end->addKeyframe(world->next());
+    ASSERT_EQ(checkMap(back_end->map()), "") << "after keyframe " << update.newest_keyframe;
     back_end->applyPlaneUpdate(world->planes());
+    ASSERT_EQ(checkMap(back_end->map()), "") << "after the planes of keyframe " << update.newest_keyframe;
   }
 }
 
@@ -36,7 +37,7 @@ struct RunResult {
 
 inline RunResult run(const BackEndOptions& o, int keyframes, unsigned seed, int points) {
   SimulatedKeyframes world(seed, points);
-  BackEnd back_end(o, world.sensor());
+  CheckedBackEnd back_end(o, world.sensor());
   std::map<KeyframeId, double> odometry_error;
   for (int k = 0; k < keyframes; ++k) {
     const KeyframePtr kf = world.next();
@@ -44,12 +45,9 @@ inline RunResult run(const BackEndOptions& o, int keyframes, unsigned seed, int 
     const MapUpdate update = back_end.addKeyframe(kf);
     EXPECT_EQ(back_end.lastRefusal(), "");
     EXPECT_EQ(update.newest_keyframe, kf->id);
-    EXPECT_EQ(checkMap(back_end.map()), "") << "after keyframe " << kf->id;
     back_end.applyPlaneUpdate(world.planes());
-    EXPECT_EQ(checkMap(back_end.map()), "") << "after the planes of keyframe " << kf->id;
   }
   back_end.finish();
-  EXPECT_EQ(checkMap(back_end.map()), "");
   RunResult result;
   result.snapshot = back_end.snapshot();
   for (const SnapshotKeyframe& kf : result.snapshot.keyframes) {

@@ -2,6 +2,8 @@
 // with walls, floor and free points; and the plane module's answers.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <functional>
 #include <map>
 #include <random>
@@ -9,7 +11,7 @@
 #include <vector>
 
 #include "solver/synthetic_problem.h"
-#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/types/keyframe.h"
@@ -186,7 +188,7 @@ class SimulatedKeyframes {
   int points_on_planes_ = 30;
 };
 
-/// The next keyframes at true poses, with the result of planes() after each.
+/// The next keyframes at true poses, with the result of planes() after each; checked.
 inline Map mapAtTruePoses(SimulatedKeyframes* world, int keyframes) {
   Map map;
   for (int k = 0; k < keyframes; ++k) {
@@ -195,6 +197,7 @@ inline Map mapAtTruePoses(SimulatedKeyframes* world, int keyframes) {
     const PlaneUpdate planes = world->planes();
     for (const PlaneEstimate& plane : planes.planes) map.setPlane(plane);
     for (const PlaneObservation& observation : planes.observations) map.setPlaneObservation(observation);
+    EXPECT_EQ(checkMap(map), "") << "after keyframe " << kf->id;
   }
   return map;
 }

@@ -33,11 +33,8 @@ TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
   BackEndOptions o = options("vip");
   o.culling.enabled = false;
   SimulatedKeyframes world(2, 300);
-  BackEnd back_end(o, world.sensor());
-  for (int k = 0; k < 90; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  CheckedBackEnd back_end(o, world.sensor());
+  feed(&world, &back_end, 90);
   CullingOptions culling;
   culling.above_covisible = 20;
   std::vector<KeyframeId> thinned;  // of one odometry
@@ -50,7 +47,12 @@ TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
     if (two_odometries) {
       auto other = std::make_shared<Keyframe>(*map.keyframe(90).data);
       other->frame.epoch = 7;
-      map.keyframe(90).data = other;
+      MapKeyframe& last = map.keyframe(90);
+      map.keyframe(89).next = last.previous = 0;
+      last.data = other;
+      last.imu = nullptr;
+      last.preintegration = nullptr;
+      last.motion = RelativeMotion();
     }
     std::vector<KeyframeId> removed;
     for (int k = 0; k < 40; ++k)
@@ -64,7 +66,7 @@ TEST(BackEnd, EndsOfLoopsCrowdOnlyWhereTheyTieParts) {
 }
 TEST(BackEnd, ARequestOutlivesAResultThatComesTooLate) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 4; ++k) back_end.addKeyframe(world.next());
   back_end.requestGlobalBa();
   GbaResult of_nothing;
@@ -76,7 +78,7 @@ TEST(BackEnd, ARequestOutlivesAResultThatComesTooLate) {
 // Also when a stored map has a keyframe with the same id as its predecessor.
 TEST(BackEnd, ANewOdometryBringsItsOwnBiases) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
   auto anew = std::make_shared<Keyframe>(*world.next());
   anew->frame.epoch = 1;
@@ -130,22 +132,15 @@ TEST(BackEnd, CeresRunsTheSameSystem) {
 
 TEST(BackEnd, GlobalAdjustmentMergesWithWhatCameMeanwhile) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
-  for (int k = 0; k < 15; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  CheckedBackEnd back_end(options("vip"), world.sensor());
+  feed(&world, &back_end, 15);
   back_end.requestGlobalBa();
   EXPECT_TRUE(back_end.globalBaWanted());
   const GbaJob job = back_end.startGlobalBa();
   EXPECT_FALSE(back_end.globalBaWanted());
-  for (int k = 0; k < 5; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &back_end, 5);
   const MapUpdate update = back_end.merge(back_end.run(job));
   EXPECT_TRUE(update.global);
-  EXPECT_EQ(checkMap(back_end.map()), "");
   EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
   for (const KeyframeEstimate& kf : update.keyframes)
     EXPECT_LT((kf.state.T_W_I.t() - world.truth((kf.id - 1) * world.interval()).T_W_I.t()).norm(), 0.03);
@@ -157,7 +152,7 @@ TEST(BackEnd, GlobalAdjustmentMergesWithWhatCameMeanwhile) {
 // What the global adjustment takes for an outlier in its copy does not stay in the map.
 TEST(BackEnd, GlobalAdjustmentRemovesOutliers) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   feed(&world, &back_end, 15);
   Map map = back_end.map();
   MapKeyframe& old = map.keyframe(4);

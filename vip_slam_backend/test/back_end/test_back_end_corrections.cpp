@@ -59,12 +59,11 @@ double worstDirection(const MapSnapshot& snapshot, const SimulatedKeyframes& wor
 // be applied to all: the first keyframes, long fixed, would stay turned by two degrees.
 TEST(BackEnd, ExtrinsicsLearntOnTheWayHoldForAllKeyframes) {
   SimulatedKeyframes world(5);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   Eigen::Vector3d turn(0.03, -0.02, 0.02);
   for (int k = 0; k < 40; ++k, turn *= 0.5) {
     back_end.addKeyframe(mountedWrongly(world.next(), SE3(expQuaternion(turn), Eigen::Vector3d::Zero())));
     EXPECT_EQ(back_end.lastRefusal(), "");
-    EXPECT_EQ(checkMap(back_end.map()), "");
     back_end.applyPlaneUpdate(world.planes());
   }
   back_end.finish();
@@ -73,7 +72,7 @@ TEST(BackEnd, ExtrinsicsLearntOnTheWayHoldForAllKeyframes) {
 
 TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackOldExtrinsics) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   const SE3 error(expQuaternion({0.02, 0.02, -0.02}), Eigen::Vector3d::Zero());
   for (int k = 0; k < 15; ++k) {
     back_end.addKeyframe(mountedWrongly(world.next(), error));
@@ -81,14 +80,10 @@ TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackOldExtrinsics) {
   }
   back_end.requestGlobalBa();
   const GbaResult solution = back_end.run(back_end.startGlobalBa());
-  for (int k = 0; k < 3; ++k) {
-    back_end.addKeyframe(world.next());
-    back_end.applyPlaneUpdate(world.planes());
-  }
+  feed(&world, &back_end, 3);
   const SE3 T_W_C = back_end.map().keyframe(5).T_W_C();
   const SE3 between = T_W_C.inverse() * back_end.map().keyframe(17).T_W_C();
   back_end.merge(solution);
-  EXPECT_EQ(checkMap(back_end.map()), "");
   // The correction keeps the adjusted camera poses, up to small changes.
   const SE3 after = back_end.map().keyframe(5).T_W_C().inverse() * back_end.map().keyframe(17).T_W_C();
   EXPECT_LT(after.boxminus(between).norm(), 0.01);
@@ -97,7 +92,7 @@ TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackOldExtrinsics) {
 // Depth reads 2 cm too long; the front end learns it at the 16th keyframe and refines it with each further one.
 TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
   SimulatedKeyframes world(4);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   std::map<KeyframeId, KeyframePtr> exact;
   double correction = 0;
   const auto worst = [&] {
@@ -120,7 +115,6 @@ TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
     if (k >= 15) correction = -0.0205 + 0.0001 * (k - 15) / 3;
     const MapUpdate update = back_end.addKeyframe(readTooLong(kf, 0.02, correction));
     ASSERT_EQ(back_end.lastRefusal(), "");
-    EXPECT_EQ(checkMap(back_end.map()), "");
     if (k == 14) EXPECT_NEAR(worst(), 0.02, 1e-4);
     if (knows_now) {
       EXPECT_TRUE(update.global);
@@ -158,13 +152,12 @@ KeyframePtr turningTooFast(const KeyframePtr& keyframe, double correction) {
 TEST(BackEnd, AGyroCorrectionHoldsForAllKeyframes) {
   const auto rmse = [](bool tells) {
     SimulatedKeyframes world(4);
-    BackEnd back_end(options("vip"), world.sensor());
+    CheckedBackEnd back_end(options("vip"), world.sensor());
     double correction = 0;
     for (int k = 0; k < 30; ++k) {
       if (tells && k >= 15) correction = 1 / 1.05 - 1 + 1e-5 * (k - 15);
       back_end.addKeyframe(turningTooFast(world.next(), correction));
       EXPECT_EQ(back_end.lastRefusal(), "");
-      EXPECT_EQ(checkMap(back_end.map()), "");
       EXPECT_EQ(back_end.globalBaWanted(), tells && k == 15) << k;
       if (back_end.globalBaWanted()) back_end.merge(back_end.run(back_end.startGlobalBa()));
       back_end.applyPlaneUpdate(world.planes());
@@ -189,7 +182,7 @@ TEST(BackEnd, AnImuThatTheOdometryContradictsDoesNotBendTheMap) {
   double square = 0, worst = 0;
   for (const unsigned seed : {4u, 5u, 6u}) {
     SimulatedKeyframes world(seed);
-    BackEnd back_end(options("vip"), world.sensor());
+    CheckedBackEnd back_end(options("vip"), world.sensor());
     for (int k = 0; k < 60; ++k) {
       auto kf = std::make_shared<Keyframe>(*world.next());
       if (k % 10 == 7)
@@ -213,7 +206,7 @@ TEST(BackEnd, AnImuThatTheOdometryContradictsDoesNotBendTheMap) {
 
 TEST(BackEnd, AKeyframeTellsHowNoisyItsImuIs) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 3; ++k) {
     auto kf = std::make_shared<Keyframe>(*world.next());
     if (k == 2) kf->imu_noise_scale = 4;
@@ -230,7 +223,7 @@ TEST(BackEnd, AKeyframeTellsHowNoisyItsImuIs) {
 
 TEST(BackEnd, AGlobalAdjustmentOfAGyroAsItMeasuredIsDoneAgain) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 12; ++k) back_end.addKeyframe(turningTooFast(world.next(), 0));
   const GbaResult before = back_end.run(back_end.startGlobalBa());
   back_end.addKeyframe(turningTooFast(world.next(), -0.048));
@@ -242,7 +235,7 @@ TEST(BackEnd, AGlobalAdjustmentOfAGyroAsItMeasuredIsDoneAgain) {
 // Focal lengths 0.4 % too long, principal point a pixel off; the front end knows from the 15th keyframe on.
 TEST(BackEnd, IntrinsicsThatAreKnownBetterHoldForAllKeyframes) {
   SimulatedKeyframes world(4);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   const BearingCorrection bearing{{0.004, 0.004, 0.002, -0.001}};
   std::map<KeyframeId, KeyframePtr> exact;
   const auto worst = [&] {
@@ -261,7 +254,6 @@ TEST(BackEnd, IntrinsicsThatAreKnownBetterHoldForAllKeyframes) {
     const MapUpdate update =
         back_end.addKeyframe(withCameraCorrection(seen, {0, {}, k >= 15 ? bearing : BearingCorrection()}));
     ASSERT_EQ(back_end.lastRefusal(), "");
-    EXPECT_EQ(checkMap(back_end.map()), "");
     if (k == 14) EXPECT_GT(worst(), 0.002);
     if (k != 15) continue;
     EXPECT_TRUE(update.global);
@@ -274,7 +266,7 @@ TEST(BackEnd, IntrinsicsThatAreKnownBetterHoldForAllKeyframes) {
 
 TEST(BackEnd, AGlobalAdjustmentOfDepthAsItWasReadIsDoneAgain) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 12; ++k) back_end.addKeyframe(readTooLong(world.next(), 0.02, 0));
   const GbaResult before = back_end.run(back_end.startGlobalBa());
   back_end.addKeyframe(readTooLong(world.next(), 0.02, -0.02));

@@ -20,7 +20,7 @@ std::uint32_t partOf(const MapUpdate& update, std::uint32_t epoch) {
 
 TEST(BackEndMaps, GlobalAdjustmentOfAMapThatIsNoMoreIsDropped) {
   SimulatedKeyframes world(3), other(9);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
   const GbaResult late = back_end.run(back_end.startGlobalBa());
   back_end.reset();
@@ -30,12 +30,11 @@ TEST(BackEndMaps, GlobalAdjustmentOfAMapThatIsNoMoreIsDropped) {
   EXPECT_FALSE(update.global);
   EXPECT_TRUE(back_end.globalBaWanted());
   EXPECT_EQ(back_end.map().keyframe(3).state.T_W_I.boxminus(before).norm(), 0.0);
-  EXPECT_EQ(checkMap(back_end.map()), "");
 }
 
 TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   SimulatedKeyframes world(3), other(9);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   back_end.applyPlaneUpdate(PlaneUpdate());  // before any map update
   PlaneUpdate late;
   for (int k = 0; k < 6; ++k) {
@@ -55,7 +54,7 @@ TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
   EXPECT_EQ(back_end.map().planes().size(), world.walls().size());
 
   const std::string path = ::testing::TempDir() + "no_planes.vsm";
-  BackEnd other_end(options("vip"), world.sensor());
+  CheckedBackEnd other_end(options("vip"), world.sensor());
   other_end.addKeyframe(SimulatedKeyframes(3).next());
   other_end.saveMap(path);
   const MapUpdate loaded = back_end.loadMap(path);
@@ -69,7 +68,7 @@ TEST(BackEndMaps, PlanesOfAMapThatIsNoMoreAreIgnored) {
 // The front end's tracks keep their ids.
 TEST(BackEndMaps, NoLandmarkOfAMapHasTheIdOfOneLoadedBefore) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 6; ++k) back_end.addKeyframe(world.next());
   const std::string path = ::testing::TempDir() + "loaded_again.vsm";
   back_end.saveMap(path);
@@ -78,14 +77,13 @@ TEST(BackEndMaps, NoLandmarkOfAMapHasTheIdOfOneLoadedBefore) {
     back_end.loadMap(path);
     ASSERT_GT(back_end.map().landmarks().size(), 20u);
     for (const auto& entry : back_end.map().landmarks()) EXPECT_TRUE(before.insert(entry.first).second) << entry.first;
-    EXPECT_EQ(checkMap(back_end.map()), "");
   }
 }
 
 TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
   const std::string path = ::testing::TempDir() + "waited_for.vsm";
   SimulatedKeyframes world(4), session(4);
-  BackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
+  CheckedBackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
   feed(&world, &mapper, 25);
   mapper.saveMap(path);
   back_end.loadMap(path);
@@ -104,7 +102,6 @@ TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
   }
   ASSERT_GT(waited, 15);
   EXPECT_GT(back_end.map().keyframes().size(), loaded + 15);
-  EXPECT_EQ(checkMap(back_end.map()), "");
   EXPECT_TRUE(update.global);
   EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
   EXPECT_TRUE(back_end.globalBaWanted());
@@ -112,7 +109,7 @@ TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
 
 TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {
   SimulatedKeyframes world(4);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   back_end.setLocalisationMode(true);
   for (int k = 0; k < 3; ++k) {
     const KeyframePtr keyframe = world.next();
@@ -130,7 +127,7 @@ TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {
 
 TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
   SimulatedKeyframes world(3);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 8; ++k) back_end.addKeyframe(world.next());
   const GbaResult late = back_end.run(back_end.startGlobalBa());
   ASSERT_TRUE(late.solution);
@@ -152,7 +149,7 @@ TEST(BackEndMaps, NothingChangesAMapThatIsOnlyLocalisedIn) {
 // Hours in a place that is not mapped: refused keyframes are not kept for ever.
 TEST(BackEndMaps, LookingInVainForLongKeepsTheNewestRefusalsOnly) {
   SimulatedKeyframes world(3), other(9);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   feed(&world, &back_end, 8);
   back_end.setLocalisationMode(true);
   for (int k = 0; k < 8; ++k) other.next();  // their ids are used by the map
@@ -173,7 +170,7 @@ TEST(BackEndMaps, LookingInVainForLongKeepsTheNewestRefusalsOnly) {
 TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
   const std::string path = ::testing::TempDir() + "localisation_only.vsm";
   SimulatedKeyframes world(4), session(4);
-  BackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
+  CheckedBackEnd mapper(options("vip"), world.sensor()), back_end(options("vip"), world.sensor());
   feed(&world, &mapper, 25);
   mapper.finish();
   mapper.saveMap(path);
@@ -207,7 +204,7 @@ TEST(BackEndMaps, LocalisationOnlyTellsWhereTheOdometryLiesInTheMap) {
 
 TEST(BackEndMaps, APartThatNothingTiesToTheMapIsNeitherPlacedNorLocalisedIn) {
   SimulatedKeyframes world(4), again(4), other(9), other_again(9);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   const auto anew = [&back_end](SimulatedKeyframes* place, std::uint32_t epoch, int count) {
     MapUpdate update;
     for (int k = 0; k < count; ++k) {
@@ -242,7 +239,7 @@ TEST(BackEndMaps, AnAdjustmentFromBeforeAFragmentCameToTheMapIsDropped) {
   SimulatedKeyframes world(4), again(4), other(9), other_again(9);
   BackEndOptions closing = options("vip");
   closing.loop_closing = true;
-  BackEnd back_end(closing, world.sensor());
+  CheckedBackEnd back_end(closing, world.sensor());
   const auto add = [&back_end](const KeyframePtr& given, std::uint32_t epoch, bool first) {
     auto kf = std::make_shared<Keyframe>(*given);
     kf->id += 1000 * epoch;
@@ -279,7 +276,7 @@ PlaneUpdate withoutTheFirst(const MapSnapshot& before) {
 // Results the plane module had pending when localisation was switched on are sent only once.
 TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
   SimulatedKeyframes world(4);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   feed(&world, &back_end, 10);
   const MapSnapshot before = back_end.snapshot();
   ASSERT_GT(before.planes.size(), 1u);
@@ -295,25 +292,24 @@ TEST(BackEndMaps, PlaneUpdatesThatCameLateAreNotLost) {
 
 TEST(BackEndMaps, PlanesThatALostUpdateRemovedGoWithTheNext) {
   SimulatedKeyframes world(4);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   feed(&world, &back_end, 10);
   const MapSnapshot before = back_end.snapshot();
   ASSERT_GT(before.planes.size(), 1u);
   back_end.applyPlaneUpdate(withoutTheFirst(before));
   EXPECT_EQ(back_end.snapshot().planes.size(), before.planes.size() - 1);
   EXPECT_FALSE(back_end.map().hasPlane(before.planes.front().id));
-  EXPECT_EQ(checkMap(back_end.map()), "");
 }
 
 TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
   const std::string path = ::testing::TempDir() + "mapped_on.vsm";
   SimulatedKeyframes world(4);
-  BackEnd mapper(options("vip"), world.sensor());
+  CheckedBackEnd mapper(options("vip"), world.sensor());
   feed(&world, &mapper, 25);
   mapper.saveMap(path);
   for (const double pause : {0.0, 60.0}) {  // seconds without localisation
     SimulatedKeyframes session(4);
-    BackEnd back_end(options("vip"), world.sensor());
+    CheckedBackEnd back_end(options("vip"), world.sensor());
     back_end.loadMap(path);
     back_end.setLocalisationMode(true);
     for (int k = 0; k < 20; ++k) {
@@ -339,7 +335,6 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
     bool meets = false;
     for (const auto& [id, shared] : back_end.map().covisible(1020)) meets = meets || id <= 25;
     EXPECT_EQ(meets, pause == 0);
-    EXPECT_EQ(checkMap(back_end.map()), "");
   }
 }
 
@@ -347,7 +342,7 @@ TEST(BackEndMaps, MappingAfterLocalisationIsTiedToTheMap) {
 TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
   const std::string path = ::testing::TempDir() + "two_parts.vsm";
   const SensorConfig sensor = SimulatedKeyframes(4).sensor();
-  BackEnd mapper(options("vip"), sensor), back_end(options("vip"), sensor);
+  CheckedBackEnd mapper(options("vip"), sensor), back_end(options("vip"), sensor);
   MapUpdate update;
   std::vector<PlaneEstimate> of_first_room;
   for (const std::uint32_t epoch : {0u, 1u}) {
@@ -402,7 +397,7 @@ TEST(BackEndMaps, StoredPlanesAreHostedByTheOldestKeyframeThatSawThem) {
 // After tracking loss four keyframes are mapped at a guessed pose; then the place is recognised, and mapping goes on.
 TEST(BackEndMaps, WhatWasMappedAtAGuessComesAlongWhenItsOdometryIsFound) {
   SimulatedKeyframes world(4), session(4);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   feed(&world, &back_end, 25);
   const SE3 T_other_odom(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {7, -3, 1});
   MapUpdate update;
@@ -433,13 +428,12 @@ TEST(BackEndMaps, WhatWasMappedAtAGuessComesAlongWhenItsOdometryIsFound) {
     return (kf.state.T_W_I.t() - world.truth(kf.data->frame.t).T_W_I.t()).norm();
   };
   for (const KeyframeId id : {1001, 1004, 1017, 1018}) EXPECT_LT(error(id), 0.05) << id;
-  EXPECT_EQ(checkMap(back_end.map()), "");
 }
 
 // The odometry has drifted by 0.5 m since its last keyframe in the map; an adjustment finishes before the next one.
 TEST(BackEndMaps, AnAdjustmentLeavesTheOdometryWhereItWasFound) {
   SimulatedKeyframes world(4), again(4);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   feed(&world, &back_end, 25);
   const SE3 drift(Eigen::Quaterniond::Identity(), {0.5, 0.2, 0});
   SE3 found;
@@ -465,7 +459,7 @@ TEST(BackEndMaps, AnAdjustmentLeavesTheOdometryWhereItWasFound) {
 
 TEST(BackEndMaps, AnOdometryUnderTheNumberOfAnOldOneIsRefusedByName) {
   SimulatedKeyframes world(4), again(9);
-  BackEnd back_end(options("vip"), world.sensor());
+  CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 8; ++k) back_end.addKeyframe(world.next());
   for (int k = 0; k < 4; ++k) {
     auto kf = std::make_shared<Keyframe>(*again.next());

@@ -2,11 +2,13 @@
 // tests.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <random>
 
 #include "place_recognition/synthetic_descriptors.h"
-#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_core/camera/camera_model.h"
 
 namespace vip_slam {
@@ -95,6 +97,7 @@ class RingWorld {
       addLandmarks(map, *linked);
       truths->push_back(T);
     }
+    EXPECT_EQ(checkMap(map), "") << "after the walk";
   }
 
   /// Adds each track of a keyframe as a landmark, at its position seen from the first keyframe.
@@ -138,6 +141,7 @@ class RingWorld {
       }
       map.setPlaneObservation(seen);
     }
+    EXPECT_EQ(checkMap(map), "") << "after adding the floors";
   }
 
  private:

@@ -18,7 +18,10 @@ std::vector<LoopEvent> closeAll(LoopCloser& closer, Map& map) {
   for (const KeyframeId id : ids) {
     closer.add(map, id);
     for (const LoopEvent& event : closer.close(map, id))
-      if (event.accepted) accepted.push_back(event);
+      if (event.accepted) {
+        accepted.push_back(event);
+        EXPECT_EQ(checkMap(map), "") << "after the loop from keyframe " << id;
+      }
   }
   return accepted;
 }
@@ -127,6 +130,7 @@ KeyframeId walkAnew(RingWorld& world, LoopCloser& closer, Map& map, KeyframeId f
     world.addLandmarks(map, *kf);
     closer.add(map, kf->id);
     closer.close(map, kf->id);
+    EXPECT_EQ(checkMap(map), "") << "after keyframe " << kf->id;
     T_map_odom = map.keyframe(kf->id).state.T_W_I * (guess * T).inverse();
   }
   return previous;
@@ -185,6 +189,7 @@ TEST(LoopCloser, AHoleInTheOdometryIsNoStiffEdge) {
   std::vector<SE3> truth;
   world.walk(map, 1.15, 0.32, &truth);
   for (KeyframeId id = 12; id < 88; ++id) map.removeKeyframe(id, ImuNoise(), 30.0);
+  EXPECT_EQ(checkMap(map), "");
   ASSERT_EQ(0u, map.keyframe(88).previous);
   LoopCloser closer(LoopOptions(), world.camera());
   EXPECT_FALSE(closeAll(closer, map).empty());

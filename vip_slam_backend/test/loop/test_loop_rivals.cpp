@@ -9,7 +9,7 @@
 
 #include "place_recognition/synthetic_descriptors.h"
 #include "vip_slam_backend/loop/loop_closer.h"
-#include "vip_slam_backend/map/map.h"
+#include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_core/camera/camera_model.h"
 
 namespace vip_slam {
@@ -136,11 +136,13 @@ Walk walkTwice(double period, double unique, double way, TrackingState state) {
     closer.add(map, kf->id);
     for (const LoopEvent& event : closer.close(map, kf->id)) {
       if (!event.accepted) continue;
+      EXPECT_EQ(checkMap(map), "") << "after the loop from keyframe " << kf->id;
       const SE3 truth = stops[event.match - 1].T_W_I.inverse() * T_W_I;
       ++((event.T_match_query.t() - truth.t()).norm() < 0.1 ? walk.right : walk.wrong);
     }
     T_map_odom = map.keyframe(kf->id).state.T_W_I * kf->frame.state.T_W_I.inverse();
   }
+  EXPECT_EQ(checkMap(map), "");
   return walk;
 }
 

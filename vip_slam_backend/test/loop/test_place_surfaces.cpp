@@ -3,6 +3,7 @@
 #include <map>
 
 #include "vip_slam_backend/loop/place_surfaces.h"
+#include "vip_slam_backend/map/map_checker.h"
 
 namespace vip_slam {
 namespace {
@@ -35,6 +36,7 @@ class PlaceSurfacesTest : public ::testing::Test {
       observation.points.push_back({Eigen::Vector3f(0, 0, 1), 0.01f});
       map_.setPlaneObservation(observation);
     }
+    ASSERT_EQ(checkMap(map_), "");
   }
   DepthGrid see(const SE3& T_W_C) const {
     DepthGrid grid;

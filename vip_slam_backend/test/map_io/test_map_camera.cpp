@@ -2,8 +2,8 @@
 
 #include <cstring>
 
+#include "back_end/checked_back_end.h"
 #include "map_io/synthetic_map.h"
-#include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/map_io/map_file.h"
 #include "vip_slam_backend/util/crc32.h"
 
@@ -99,11 +99,11 @@ TEST(MapCamera, NobodyLoadsAMapOfAnotherCamera) {
   SensorConfig sensor;
   sensor.camera = camera();
   saveMapFile(path, syntheticMap(3, 12, 100), {}, 1, sensor.camera);
-  BackEnd same(BackEndOptions(), sensor);
+  CheckedBackEnd same(BackEndOptions(), sensor);
   EXPECT_EQ(same.loadMap(path).keyframes.size(), 3u);
   same.saveMap(path);  // with its camera
   sensor.camera = camera().scaled(320, 240);
-  BackEnd other(BackEndOptions(), sensor);
+  CheckedBackEnd other(BackEndOptions(), sensor);
   try {
     other.loadMap(path);
     FAIL() << "taken";

@@ -5,8 +5,8 @@
 #include <set>
 #include <vector>
 
+#include "back_end/checked_back_end.h"
 #include "back_end/simulated_keyframes.h"
-#include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/optimisation/depth_curve_fit.h"
 
 namespace vip_slam {
@@ -110,7 +110,7 @@ TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
   BackEndOptions options;
   options.lockstep = true;
   options.loop_closing = false;
-  BackEnd back_end(options, world.sensor());
+  CheckedBackEnd back_end(options, world.sensor());
   MapUpdate update;
   std::set<LandmarkId> told;  // the landmarks known to a listener that receives all updates
   const auto hear = [&told, &update] {
@@ -148,7 +148,7 @@ TEST(DepthCurveFit, WhatTheBackEndLearnsHoldsForAllKeyframes) {
   options.depth_curve = false;
   SimulatedKeyframes again(6);
   again.setDepthCamera(wiggle, 0.004);
-  BackEnd believing(options, again.sensor());
+  CheckedBackEnd believing(options, again.sensor());
   for (int k = 0; k < 60; ++k) {
     believing.addKeyframe(again.next());
     believing.applyPlaneUpdate(again.planes());

@@ -5,8 +5,8 @@
 #include <functional>
 #include <utility>
 
+#include "back_end/checked_back_end.h"
 #include "back_end/simulated_keyframes.h"
-#include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/optimisation/disparity_fit.h"
 #include "vip_slam_core/depth/disparity_curve.h"
 #include "vip_slam_core/types/camera_correction.h"
@@ -136,7 +136,7 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   options.variant = "vi";  // so that plane factors do not pull the poses
   SensorConfig sensor = world.sensor();
   sensor.depth_noise.type = DepthSensorType::kStereo;
-  BackEnd back_end(options, sensor);
+  CheckedBackEnd back_end(options, sensor);
   MapUpdate update;
   int with_offset = 0;
   for (int k = 0; k < 60; ++k) {

@@ -1,6 +1,7 @@
 // Which frames of a problem are held, where parts of a map are tied by planes alone.
 #include <gtest/gtest.h>
 
+#include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
 #include "vip_slam_backend/solver/ba_solver.h"
 
@@ -41,6 +42,7 @@ struct TwoStretches {
       }
       for (int p = 0; p < planes; ++p) map.setPlaneObservation(seen(k, p, all[p]));
     }
+    EXPECT_EQ(checkMap(map), "");
   }
   static SE3 truth(int k) {
     return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * k, Eigen::Vector3d::UnitZ())),

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_backend/optimisation/inertial_scale.h"
 
 using namespace vip_slam;
@@ -97,6 +98,7 @@ Map walk(const Walk& w) {
       samples.push_back(sample);
     }
   }
+  EXPECT_EQ(checkMap(map), "");
   return map;
 }
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <set>
 
+#include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_backend/optimisation/problem_builder.h"
 #include "vip_slam_backend/solver/ba_solver.h"
 
@@ -58,6 +59,7 @@ struct Wall {
         map.addObservation(l + 1, {KeyframeId(k + 1), static_cast<std::uint32_t>(l)});
       map.associate(l + 1, 1);
     }
+    EXPECT_EQ(checkMap(map), "");
   }
   /// Assigns view `k` of a landmark to another track.
   void track(int k, LandmarkId landmark, LandmarkId track) {
@@ -109,13 +111,16 @@ TEST(PlaneFactors, AWrongViewNeitherPullsItsLandmarkNorStays) {
   Wall wall(5, [](int k) { return k == 6 ? 10.0 : 0.0; });  // the poses are true, so the solver need not run
   BuiltProblem built = buildProblem(wall.map, globalScope(wall.map), wall.settings);
   storeProblem(built, ImuNoise(), &wall.map);
+  EXPECT_EQ(checkMap(wall.map), "");
   EXPECT_LT((wall.map.landmark(5).p_W - Wall::point(4)).norm(), 0.003);  // the mean of all views would be 8 mm off
   EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map).size(), 1u);
+  EXPECT_EQ(checkMap(wall.map), "");
   for (const MapObservation& o : wall.map.landmark(5).observations) EXPECT_NE(o.keyframe, 7u);
   // A view that agrees with the optimised poses is no outlier.
   built.refused.front().observation.x -= 10.0 / kFocal;
   built.refused.front().keyframe = 6;
   EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map).size(), 0u);
+  EXPECT_EQ(checkMap(wall.map), "");
 }
 
 TEST(PlaneFactors, AWrongHostMakesItAPointOfItsOwn) {

@@ -33,6 +33,7 @@ TEST(ProblemStore, PlanesThatTheSolutionLacksMoveWithWhoSawThemLast) {
   solution.built.frames.push_back(1);
   solution.built.problem.frames.push_back(frame);
   mergeGlobalBa(solution, ImuNoise(), &map);
+  EXPECT_EQ(checkMap(map), "");
   for (PlaneId id = 101; id <= 103; ++id) EXPECT_NEAR(map.planes().at(id).estimate.plane.d, -3, 1e-9) << id;
   EXPECT_FALSE(map.planes().at(102).optimised);
 }
@@ -49,6 +50,7 @@ TEST(ProblemStore, APlaneThatNoFactorHoldsIsNotOptimised) {
   const int held = factors.front().plane;
   factors.resize(1);
   storeProblem(built, ImuNoise(), &map);
+  EXPECT_EQ(checkMap(map), "");
   for (std::size_t p = 0; p < built.planes.size(); ++p)
     EXPECT_EQ(map.planes().at(built.planes[p]).optimised, static_cast<int>(p) == held);
 }

@@ -31,11 +31,13 @@ Adjusted adjustedMap(double shift, int keyframes) {
     for (Feature& f : kf->frame.features) f.xy.x() += static_cast<float>((f.depth > 2.5 ? off : -off) / settings.focal);
     result.map.addKeyframe(kf, world.truth(kf->frame.t), ImuNoise());
     maker.process(kf->id, &result.map);
+    EXPECT_EQ(checkMap(result.map), "") << kf->id;
   }
   for (int round = 0; round < 2; ++round) {
     BuiltProblem problem = buildProblem(result.map, globalScope(result.map), settings);
     makeSolver("structured")->solve(problem.problem, SolverOptions());
     storeProblem(problem, ImuNoise(), &result.map);
+    EXPECT_EQ(checkMap(result.map), "") << "round " << round;
   }
   result.built = buildProblem(result.map, globalScope(result.map), settings);
   return result;
