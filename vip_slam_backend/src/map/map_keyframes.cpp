@@ -17,7 +17,7 @@ using ImuSamples = std::shared_ptr<const std::vector<ImuSample>>;
 std::shared_ptr<const Preintegration> integrate(KeyframeId id, const ImuSamples& imu,
                                                 const Eigen::Matrix3d& gyro_correction, const NavState& from,
                                                 const ImuNoise& noise, double noise_scale) {
-  if (!imu || imu->size() < 2) return nullptr;
+  if (!imu) return nullptr;
   ImuNoise scaled = noise;
   for (double* density :
        {&scaled.gyro_noise_density, &scaled.gyro_random_walk, &scaled.accel_noise_density, &scaled.accel_random_walk})

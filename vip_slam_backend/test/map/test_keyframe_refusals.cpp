@@ -20,6 +20,10 @@ struct BadKeyframe {
   std::function<void(Keyframe*)> spoil;
 };
 
+std::function<void(Keyframe*)> withGrid(const DepthGrid& grid) {
+  return [grid](Keyframe* kf) { kf->frame.depth_grid = grid; };
+}
+
 const std::vector<BadKeyframe>& badKeyframes() {
   static const std::vector<BadKeyframe> all = {
       {"stamp is not finite", [](Keyframe* kf) { kf->frame.t = kNan; }},
@@ -31,18 +35,10 @@ const std::vector<BadKeyframe>& badKeyframes() {
       {"extrinsics are not finite", [](Keyframe* kf) { kf->frame.T_I_C.t().y() = kNan; }},
       {"chained pose is not finite", [](Keyframe* kf) { kf->frame.T_chain_C.t().y() = kNan; }},
       {"the camera's delay is not finite", [](Keyframe* kf) { kf->frame.time_offset = kNan; }},
-      {"depth grid without a stride",
-       [](Keyframe* kf) {
-         kf->frame.depth_grid = {0, 0, 1, 1, {2.f}};
-       }},
-      {"depth grid of 3 nodes, expected 2 x 2",
-       [](Keyframe* kf) {
-         kf->frame.depth_grid = {8, 0, 2, 2, {1, 1, 1}};
-       }},
-      {"depth grid of 0 nodes",
-       [](Keyframe* kf) {
-         kf->frame.depth_grid = {8, 0, -1, 2, {}};
-       }},
+      {"depth grid without a stride", withGrid({0, 0, 1, 1, {2.f}})},
+      {"depth grid of 3 nodes, expected 2 x 2", withGrid({8, 0, 2, 2, {1.f, 1.f, 1.f}})},
+      {"depth grid of 0 nodes", withGrid({8, 0, -1, 0, {}})},
+      {"depth grid of 0 nodes", withGrid({8, 0, 0, -1, {}})},
       {"feature 3 is not finite", [](Keyframe* kf) { kf->frame.features[3].pixel.x() = kNanf; }},
       {"feature 3 is not finite", [](Keyframe* kf) { kf->frame.features[3].xy.y() = kNanf; }},
       {"feature 3 is not finite", [](Keyframe* kf) { kf->frame.features[3].depth = kNanf; }},
@@ -150,6 +146,20 @@ TEST(KeyframeRefusals, ImuOfAnotherDurationThanTheStampsMakesNoFactor) {
                     ImuNoise());
   EXPECT_NE(f.map.keyframe(4).preintegration, nullptr);
   EXPECT_EQ(checkMap(f.map), "");
+}
+
+// Each within the tolerance, but not both together.
+TEST(KeyframeRefusals, ImuThatDisagreesWithTheStampsIsNotJoined) {
+  for (const double longer : {0.01, 0.04}) {
+    Refusals f;
+    f.map.addKeyframe(f.spoilt([=](Keyframe* kf) { kf->frame.t += longer; }), f.state(), ImuNoise());
+    f.good = f.world.next();
+    f.map.addKeyframe(f.spoilt([=](Keyframe* kf) { kf->frame.t += 2 * longer; }), f.state(), ImuNoise());
+    ASSERT_NE(f.map.keyframe(5).preintegration, nullptr);
+    f.map.removeKeyframe(4, ImuNoise(), 10);
+    EXPECT_EQ(f.map.keyframe(5).previous, 2 * longer < map_limits::kImuDuration ? 3u : 0u);
+    EXPECT_EQ(checkMap(f.map), "") << longer;
+  }
 }
 
 TEST(KeyframeRefusals, AStoredKeyframeThatDoesNotFitTheMapIsNamed) {

@@ -49,6 +49,22 @@ TEST(Map, AGyroThatIsKnownBetterIsIntegratedAnew) {
   EXPECT_EQ(f.map.keyframe(5).gyro_correction, correction);
 }
 
+// The newest keyframe came with the correction, but its factor begins at a bias that the correction changes.
+TEST(Map, AFactorFollowsTheBiasThatAGyroCorrectionChanges) {
+  Fixture f;
+  f.add(3);
+  NavState biased = f.map.keyframe(3).state;
+  biased.bias_gyro.setConstant(0.05);
+  f.map.setState(3, biased, ImuNoise());
+  const Eigen::Matrix3d correction = 0.3 * Eigen::Matrix3d::Identity();
+  auto newest = std::make_shared<Keyframe>(*f.world.next());
+  newest->gyro_correction = correction;
+  f.map.addKeyframe(newest, f.world.truth(newest->frame.t), ImuNoise());
+  f.map.adoptGyroCorrection(correction, ImuNoise());
+  EXPECT_EQ(checkMap(f.map), "");
+  EXPECT_EQ(f.map.keyframe(4).preintegration->biasGyro(), f.map.keyframe(3).state.bias_gyro);
+}
+
 TEST(Map, ExtrinsicsThatAreKnownBetterTurnBodiesAboutTheirCameras) {
   Fixture f;
   f.add(4);

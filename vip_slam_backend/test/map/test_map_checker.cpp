@@ -78,6 +78,15 @@ std::function<void(Map*)> inObservation(const std::function<void(PlaneObservatio
   return inKeyframe(4, [=](MapKeyframe* kf) { change(&kf->planes.begin()->second); });
 }
 
+/// Takes the first view from a landmark; its keyframe keeps a link, from the feature with the number of the next view.
+void linkToTheNext(Map* map, LandmarkId id) {
+  const MapObservation first = map->landmark(id).observations[0], next = map->landmark(id).observations[1];
+  map->removeObservation(id, first.keyframe);
+  LandmarkId& link = map->keyframe(first.keyframe).landmarks.at(next.feature);
+  if (link != kNoLandmark) map->removeLandmark(LandmarkId(link));
+  link = id;
+}
+
 }  // namespace
 
 TEST(MapChecker, SeesDamagedKeyframes) {
@@ -156,6 +165,7 @@ TEST(MapChecker, SeesDamagedLinks) {
   whole.expectSeen({
       {"points to a landmark that is gone", [=](Map* map) { map->keyframe(2).landmarks[free.feature] = 987654; }},
       {"is unknown to its landmark", [=](Map* map) { map->keyframe(2).landmarks[free.feature] = often; }},
+      {"is unknown to its landmark", [=](Map* map) { linkToTheNext(map, often); }},
       {"does not link back", [=](Map* map) { map->keyframe(linked.keyframe).landmarks[linked.feature] = kNoLandmark; }},
       {"does not link back", [=](Map* map) { map->landmark(often).observations.front().feature = 100000; }},
       {"seen by a keyframe that is gone", [=](Map* map) { map->landmark(often).observations.back().keyframe = 99; }},

@@ -198,10 +198,10 @@ class RandomMap {
     return true;
   }
   bool mergePlanes() {
-    const PlaneId from = anyPlane();
-    if (from == 0) return false;
-    map_.mergePlanes(from, 1 + below(8));  // which need not be in the map
-    return true;
+    const PlaneId from = 1 + below(8), into = 1 + below(8);  // which need not be in the map
+    const bool effective = from != into && map_.hasPlane(from);
+    map_.mergePlanes(from, into);
+    return effective;
   }
   bool removePlane() {
     if (map_.planes().empty() || chance(2)) return false;

@@ -1,6 +1,7 @@
 // Operations on landmarks, planes and states that the map refuses, each with its reason; a refusal changes nothing.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <vector>
@@ -106,19 +107,29 @@ TEST(MapRefusals, OfStoredLandmarks) {
   EXPECT_EQ(checkMap(f.map), "");
 }
 
-// These say no by their result.
-TEST(MapRefusals, OfObservationsThatAreThereAlready) {
+// These say no by their result, or do nothing.
+TEST(MapRefusals, OfWhatIsThereAlreadyOrNotThere) {
   Populated f;
   const MapLandmark& often = f.map.landmark(f.often);
-  const LandmarkId other =
-      findLandmark(f.map, [&](const MapLandmark& l) { return l.id != f.often && l.host() == often.host(); });
-  ASSERT_NE(other, kNoLandmark);
+  const auto sees = [&](KeyframeId id) {
+    return std::any_of(often.observations.begin(), often.observations.end(),
+                       [id](const MapObservation& o) { return o.keyframe == id; });
+  };
+  const LandmarkId together =
+      findLandmark(f.map, [&](const MapLandmark& l) { return l.id != f.often && sees(l.host()); });
+  const LandmarkId elsewhere = findLandmark(f.map, [&](const MapLandmark& l) { return !sees(l.host()); });
+  ASSERT_NE(together, kNoLandmark);
+  ASSERT_NE(elsewhere, kNoLandmark);
   const std::string before = fingerprint(f.map);
   EXPECT_FALSE(f.map.addObservation(f.often, freeFeature(f.map, often.host()))) << "seen by that keyframe already";
-  EXPECT_FALSE(f.map.addObservation(f.often, f.map.landmark(other).observations.front())) << "another's feature";
-  EXPECT_FALSE(f.map.mergeLandmarks(f.often, other));
+  EXPECT_FALSE(f.map.addObservation(f.often, f.map.landmark(elsewhere).observations[0])) << "another's feature";
+  EXPECT_FALSE(f.map.mergeLandmarks(f.often, together)) << "both seen by one keyframe";
   EXPECT_FALSE(f.map.mergeLandmarks(f.often, f.often));
-  f.map.removeObservation(f.merged == kNoLandmark ? f.often : f.map.resolve(f.merged), 99);
+  f.map.removeObservation(f.often, 99);
+  f.map.mergePlanes(99, 1);
+  f.map.mergePlanes(99, 98);
+  f.map.mergePlanes(1, 1);
+  f.map.removePlane(99);
   EXPECT_TRUE(fingerprint(f.map) == before);
 }
 
@@ -180,9 +191,10 @@ TEST(MapRefusals, OfPlaneObservations) {
        [](PlaneObservation* o) { o->G = Eigen::Vector4d(4, 3, 2, -1e-6).asDiagonal(); }},
       {"weight is", [](PlaneObservation* o) { o->weight_scale = 0; }},
       {"weight is", [](PlaneObservation* o) { o->weight_scale = kNan; }},
-      {"weight is", [](PlaneObservation* o) { o->weight_scale = std::numeric_limits<double>::infinity(); }},
+      {"weight is", [](PlaneObservation* o) { o->weight_scale = HUGE_VAL; }},
       {"a point is not finite", [](PlaneObservation* o) { o->points[2].p_C.x() = std::nanf(""); }},
       {"a point is not finite", [](PlaneObservation* o) { o->points[2].sigma = std::nanf(""); }},
+      {"a point is not finite", [](PlaneObservation* o) { o->points[2].sigma = HUGE_VALF; }},
       {"a point is not finite", [](PlaneObservation* o) { o->points[2].sigma = 0; }},
       {"the camera's correction: depth offset", [](PlaneObservation* o) { o->camera_correction.offset = kNan; }},
   };
@@ -242,4 +254,9 @@ TEST(MapRefusals, OfStatesAndCorrections) {
       {"new correction of the gyro", [&] { map.adoptGyroCorrection(large, noise); }},
       {"no keyframe 99", [&] { map.covisible(99); }},
   });
+  // A correction that takes a direction away cannot be undone.
+  Eigen::Matrix3d flat = Eigen::Matrix3d::Zero();
+  flat.topLeftCorner<2, 2>().setConstant(-0.5);
+  map.adoptGyroCorrection(flat, noise);
+  f.expectRefusals({{"corrected state is not finite", [&] { map.adoptGyroCorrection(-flat, noise); }}});
 }
