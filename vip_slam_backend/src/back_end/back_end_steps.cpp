@@ -42,14 +42,17 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   solver_options.max_iterations = options.local_ba.max_iterations;
   solver_options.max_seconds = options.lockstep ? 0 : options.local_ba.max_seconds;
   solver_options.function_tolerance = 1e-4;
+  SolverSummary summary;
   {
     const ScopedTimer solve_timer(log, "backend.lba_solve", t);
-    const SolverSummary summary = solver->attempt(built.problem, solver_options);
+    summary = solver->attempt(built.problem, solver_options);
     if (!summary.usable) return refuse("result of the local adjustment: " + summary.message);
   }
   statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
-  statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
+  // Without any step, for want of time, good views may look wrong.
+  if (summary.iterations > 0)
+    statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
   followNewest();
 
   std::set<LandmarkId> landmarks;

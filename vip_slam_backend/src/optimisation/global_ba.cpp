@@ -23,9 +23,12 @@ GlobalBaSolution solveGlobalBa(const GlobalBaProblem& job) {
     iterations -= solution.summary.iterations;
     storeProblem(solution.built, job.noise, &map);
     const double chi2 = job.settings.measurement.outlier_chi2;
-    // The first round may have ended before the minimum, where good views look wrong: the last one decides.
-    solution.outliers = round + 1 < kRounds ? removeOutliers(solution.built, chi2, &map)
-                                            : stillOutliers(solution.built, solution.outliers, chi2, map);
+    // The first round may have ended before the minimum, where good views look wrong: the last one decides. Without any
+    // step, for want of time, it tells nothing.
+    if (round + 1 == kRounds)
+      solution.outliers = stillOutliers(solution.built, solution.outliers, chi2, map);
+    else if (solution.summary.iterations > 0)
+      solution.outliers = removeOutliers(solution.built, chi2, &map);
   }
   return solution;
 }

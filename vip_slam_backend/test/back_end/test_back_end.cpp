@@ -125,6 +125,22 @@ TEST(BackEnd, TwoRunsGiveTheSameBits) {
     EXPECT_EQ(a.snapshot.keyframes[k].state.T_W_I.matrix(), b.snapshot.keyframes[k].state.T_W_I.matrix());
 }
 
+// A machine too slow for a single step: the map follows the odometry and loses nothing. In lockstep time does not
+// count.
+TEST(BackEnd, WithoutTimeTheOdometryStays) {
+  BackEndOptions o = options("vip");
+  o.global_ba.at_end = false;
+  const RunResult unlimited = run(o, 25, 2, 300);
+  o.local_ba.max_seconds = 1e-9;
+  const RunResult lockstep = run(o, 25, 2, 300);
+  o.lockstep = false;
+  const RunResult late = run(o, 25, 2, 300);
+  EXPECT_EQ(lockstep.rmse, unlimited.rmse);
+  EXPECT_LT(unlimited.rmse, 0.5 * unlimited.odometry_rmse);
+  EXPECT_NEAR(late.rmse, late.odometry_rmse, 1e-9);
+  EXPECT_EQ(late.snapshot.statistics.outliers, 0u);
+}
+
 TEST(BackEnd, CeresRunsTheSameSystem) {
   const RunResult a = run("vip", 12), b = run("vip", 12, 1, "ceres");
   EXPECT_NEAR(a.rmse, b.rmse, 2e-3);
