@@ -126,6 +126,7 @@ bool PlaneFactorBuilder::collectPairs(const LandmarkViews& views, int landmark, 
     const Observer& observer = (*observers)[place];
     const Eigen::Vector3d p = transfer(observer.h, xy_i);
     const double rho = p.z();
+    // An observer may see the plane edge-on, unlike a host: the host's noise shrinks on the way there.
     if (!observer.usable || rho < kMinDepthRatio || rho > kMaxDepthRatio) {
       refused_.push_back(v);
       continue;
@@ -193,6 +194,8 @@ void PlaneFactorBuilder::storeGroup(int host, int plane, std::vector<Observer>* 
   std::sort(observers->begin(), observers->end(),
             [](const Observer& a, const Observer& b) { return a.frame < b.frame; });
   for (const Observer& o : *observers) {
+    // Any number of pairs will do: compressed or not they are two rows each. Nor does the baseline matter, without
+    // which they constrain the poses but not the plane.
     if (o.pairs == 0) continue;
     if (settings_.variant == Variant::kViP) {
       for (const HomographyPair& pair : o.uncompressed)

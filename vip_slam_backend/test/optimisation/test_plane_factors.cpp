@@ -3,99 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 
+#include "optimisation/wall.h"
 #include "vip_slam_backend/map/map_checker.h"
-#include "vip_slam_backend/optimisation/problem_builder.h"
 #include "vip_slam_backend/solver/ba_solver.h"
 
 using namespace vip_slam;
 
-namespace {
-
-constexpr double kFocal = 500;
-constexpr int kKeyframes = 8, kLandmarks = 12;
-
-// A wall at z = 3 before a camera that moves along x, without noise; `shift` pixels are added to one landmark's views.
-struct Wall {
-  Map map;
-  BuilderSettings settings;
-
-  explicit Wall(
-      LandmarkId odd = 0, const std::function<double(int)>& shift = [](int) { return 0.0; }) {
-    settings.focal = kFocal;
-    const ImuNoise noise;
-    for (int k = 0; k < kKeyframes; ++k) {
-      auto keyframe = std::make_shared<Keyframe>();
-      keyframe->id = k + 1;
-      keyframe->frame.t = 0.5 * k;
-      NavState state;
-      state.t = keyframe->frame.t;
-      state.T_W_I = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.1 * k, 0, 0));
-      keyframe->frame.state = state;
-      for (int l = 0; l < kLandmarks; ++l) {
-        const Eigen::Vector3d p = point(l) - state.T_W_I.t();
-        Feature f;
-        f.id = l + 1;
-        f.xy = Eigen::Vector2d(p.x() / p.z() + (f.id == odd ? shift(k) / kFocal : 0.0), p.y() / p.z()).cast<float>();
-        keyframe->frame.features.push_back(f);
-      }
-      map.addKeyframe(keyframe, state, noise);
-    }
-    PlaneEstimate wall;
-    wall.id = 1;
-    wall.plane = Plane(Eigen::Vector3d(0, 0, -1), 3);
-    map.setPlane(wall);
-    PlaneObservation seen;
-    seen.plane = 1;
-    seen.keyframe = 1;
-    seen.G = Eigen::Matrix4d::Identity();
-    seen.points.push_back({Eigen::Vector3f(0, 0, 3), 1.0f});
-    map.setPlaneObservation(seen);
-    for (int l = 0; l < kLandmarks; ++l) {
-      map.addLandmark(l + 1, point(l), {1, static_cast<std::uint32_t>(l)});
-      for (int k = 1; k < kKeyframes; ++k)
-        map.addObservation(l + 1, {KeyframeId(k + 1), static_cast<std::uint32_t>(l)});
-      map.associate(l + 1, 1);
-    }
-    EXPECT_EQ(checkMap(map), "");
-  }
-  /// Assigns view `k` of a landmark to another track.
-  void track(int k, LandmarkId landmark, LandmarkId track) {
-    auto data = std::make_shared<Keyframe>(*map.keyframe(k + 1).data);
-    data->frame.features[static_cast<std::size_t>(landmark - 1)].id = track;
-    map.keyframe(k + 1).data = data;
-  }
-  // Makes views of a landmark those of a track that began beyond the reach of the depth camera.
-  void slide(const std::vector<int>& views, LandmarkId landmark) {
-    for (const int k : views) {
-      auto data = std::make_shared<Keyframe>(*map.keyframe(k + 1).data);
-      data->frame.features[static_cast<std::size_t>(landmark - 1)].pixel_sigma = 0.6f;
-      map.keyframe(k + 1).data = data;
-    }
-  }
-  static Eigen::Vector3d point(int l) { return {0.3 * (l % 4) - 0.3, 0.4 * (l / 4) - 0.4, 3.0}; }
-
-  int pairs(bool shared) {
-    settings.shared_hosts = shared;
-    int sum = 0;
-    for (const BaHomography& h : buildProblem(map, globalScope(map), settings).problem.homographies) sum += h.pairs;
-    return sum;
-  }
-  bool isPoint(LandmarkId id, bool shared) {
-    settings.shared_hosts = shared;
-    const BuiltProblem built = buildProblem(map, globalScope(map), settings);
-    return std::count(built.points.begin(), built.points.end(), id) > 0;
-  }
-};
-
-}  // namespace
-
 TEST(PlaneFactors, EveryViewOfAPlanePointBecomesAPair) {
   for (const bool shared : {false, true}) {
     Wall wall;
-    EXPECT_EQ(wall.pairs(shared), kLandmarks * (kKeyframes - 1));
+    EXPECT_EQ(wall.pairs(shared), Wall::kLandmarks * (Wall::kKeyframes - 1));
     EXPECT_FALSE(wall.isPoint(5, shared));
   }
 }
@@ -103,7 +22,7 @@ TEST(PlaneFactors, EveryViewOfAPlanePointBecomesAPair) {
 TEST(PlaneFactors, AWrongViewIsLeftOut) {
   for (const bool shared : {false, true}) {
     Wall wall(5, [](int k) { return k == 6 ? 8.0 : 0.0; });
-    EXPECT_EQ(wall.pairs(shared), kLandmarks * (kKeyframes - 1) - 1);
+    EXPECT_EQ(wall.pairs(shared), Wall::kLandmarks * (Wall::kKeyframes - 1) - 1);
   }
 }
 
@@ -117,7 +36,7 @@ TEST(PlaneFactors, AWrongViewNeitherPullsItsLandmarkNorStays) {
   EXPECT_EQ(checkMap(wall.map), "");
   for (const MapObservation& o : wall.map.landmark(5).observations) EXPECT_NE(o.keyframe, 7u);
   // A view that agrees with the optimised poses is no outlier.
-  built.refused.front().observation.x -= 10.0 / kFocal;
+  built.refused.front().observation.x -= 10.0 / Wall::kFocal;
   built.refused.front().keyframe = 6;
   EXPECT_EQ(removeOutliers(built, wall.settings.measurement.outlier_chi2, &wall.map).size(), 0u);
   EXPECT_EQ(checkMap(wall.map), "");
@@ -126,7 +45,7 @@ TEST(PlaneFactors, AWrongViewNeitherPullsItsLandmarkNorStays) {
 TEST(PlaneFactors, AWrongHostMakesItAPointOfItsOwn) {
   Wall wall(5, [](int k) { return k == 0 ? 8.0 : 0.0; });
   EXPECT_TRUE(wall.isPoint(5, false));
-  EXPECT_EQ(wall.pairs(false), (kLandmarks - 1) * (kKeyframes - 1));
+  EXPECT_EQ(wall.pairs(false), (Wall::kLandmarks - 1) * (Wall::kKeyframes - 1));
 }
 
 TEST(PlaneFactors, ATrackThatDisagreesWithThePlaneEverywhereMakesItAPoint) {
@@ -140,13 +59,13 @@ TEST(PlaneFactors, SharedHostsGiveFewerFactors) {
   Wall wall;
   wall.settings.shared_hosts = true;
   const std::size_t shared = buildProblem(wall.map, globalScope(wall.map), wall.settings).problem.homographies.size();
-  EXPECT_EQ(shared, std::size_t(kKeyframes - 1));  // one keyframe hosts all
+  EXPECT_EQ(shared, std::size_t(Wall::kKeyframes - 1));  // one keyframe hosts all
 }
 
 // The first two and the last two of eight views are not hosts, in the second track of a landmark neither.
 TEST(PlaneFactors, HostsComeFromTheMiddleOfATrack) {
   Wall wall;
-  for (int k = 4; k < kKeyframes; ++k) wall.track(k, 5, 900);  // views 0 to 3 and 4 to 7
+  for (int k = 4; k < Wall::kKeyframes; ++k) wall.track(k, 5, 900);  // views 0 to 3 and 4 to 7
   wall.settings.shared_hosts = true;
   const auto hosts = [&wall](bool middle) {
     wall.settings.middle_hosts = middle;
@@ -157,7 +76,7 @@ TEST(PlaneFactors, HostsComeFromTheMiddleOfATrack) {
   };
   for (const int frame : hosts(true)) EXPECT_TRUE(frame >= 1 && frame <= 6) << frame;
   EXPECT_EQ(hosts(true).count(1) + hosts(true).count(2) > 0, true);
-  EXPECT_EQ(hosts(false).count(kKeyframes - 1), 1u);
+  EXPECT_EQ(hosts(false).count(Wall::kKeyframes - 1), 1u);
 }
 
 // The second half of one landmark's views belong to another track, that of a corner slightly offset from the first.
@@ -167,7 +86,7 @@ TEST(PlaneFactors, AnotherTrackIsAPointOfItsOwnTiedByOneView) {
     for (const Variant variant : {Variant::kVip, Variant::kVi}) {
       Wall wall(5, beside);
       Wall one(5, beside);
-      for (int k = 5; k < kKeyframes; ++k) wall.track(k, 5, 900);
+      for (int k = 5; k < Wall::kKeyframes; ++k) wall.track(k, 5, 900);
       wall.settings.variant = one.settings.variant = variant;
       wall.settings.shared_hosts = one.settings.shared_hosts = shared;
       // Without robust loss, which would change the costs compared here.
@@ -206,7 +125,7 @@ TEST(PlaneFactors, TracksThatSlideTellNothingAboutThePlane) {
   EXPECT_FALSE(wall.isPoint(5, true));
   Wall everywhere;
   everywhere.slide({0, 1, 2, 3, 4, 5, 6, 7}, 5);
-  EXPECT_EQ(everywhere.pairs(true), all - (kKeyframes - 1));
+  EXPECT_EQ(everywhere.pairs(true), all - (Wall::kKeyframes - 1));
 }
 
 // A view that is two pixels off gets almost no weight compared with the others, though it is no outlier yet.
@@ -219,9 +138,9 @@ TEST(PlaneFactors, PairsFarOffWeighLittle) {
       if (h.j == 6) sum += h.sums[5];  // of the squared weights
     return sum;
   };
-  const double one = information(0) / kLandmarks;
-  EXPECT_NEAR(information(2.0), (kLandmarks - 1) * one, 0.01 * one);
-  EXPECT_GT(information(0.05), (kLandmarks - 0.3) * one);
+  const double one = information(0) / Wall::kLandmarks;
+  EXPECT_NEAR(information(2.0), (Wall::kLandmarks - 1) * one, 0.01 * one);
+  EXPECT_GT(information(0.05), (Wall::kLandmarks - 0.3) * one);
 }
 
 // A track with wrong views gets less weight in its other views too, the less the more views are wrong.
@@ -234,7 +153,7 @@ TEST(PlaneFactors, ATrackCountsAsItsPairsAgree) {
       if (h.j == 1) sum += h.sums[5];  // of the squared weights
     return sum;
   };
-  const double all = information(0), one = all / kLandmarks;
+  const double all = information(0), one = all / Wall::kLandmarks;
   EXPECT_LT(information(1), all - 0.1 * one);
   EXPECT_LT(information(4), information(1) - 0.3 * one);
   EXPECT_GT(information(4), all - one);
@@ -244,7 +163,7 @@ TEST(PlaneFactors, ATrackCountsAsItsPairsAgree) {
 TEST(PlaneFactors, CornersOfTwoTracksLieFartherApartWhenSeenFromNearer) {
   const auto weight = [](double z) {  // of the tie
     Wall wall(0);
-    for (int k = 5; k < kKeyframes; ++k) {
+    for (int k = 5; k < Wall::kKeyframes; ++k) {
       wall.track(k, 5, 900);
       NavState state = wall.map.keyframe(k + 1).state;
       state.T_W_I = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.1 * k, 0, k == 5 ? 0 : 3.0 - z));
