@@ -93,3 +93,18 @@ TEST(Gauges, PlanesThatLeaveADirectionFreeDoNot) {
     EXPECT_EQ(problem.problem.gauges[1].frame, 3);
   }
 }
+
+// Gravity holds the tilt of the part that has an IMU.
+TEST(Gauges, OnlyThePartWithoutImuHoldsItsTilt) {
+  TwoStretches stretches(0, Eigen::Vector3d::Zero());
+  std::vector<ImuSample> at_rest(2);
+  at_rest[1].t = 0.005;
+  for (ImuSample& sample : at_rest) sample.accel = gravityVector();
+  stretches.map.keyframe(5).preintegration =
+      std::make_shared<Preintegration>(at_rest, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), ImuNoise());
+  const BaProblem problem = built(stretches.map).problem;
+  ASSERT_EQ(problem.gauges.size(), 2u);
+  EXPECT_TRUE(problem.gauges[0].prior.tilt);
+  EXPECT_FALSE(problem.gauges[1].prior.tilt);
+  EXPECT_EQ(problem.gauges[1].prior.T_W_I.matrix(), stretches.map.keyframe(4).state.T_W_I.matrix());
+}
