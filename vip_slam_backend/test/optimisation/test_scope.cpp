@@ -11,7 +11,7 @@ using namespace vip_slam;
 
 namespace {
 
-constexpr int kLength = 60;
+constexpr int kChain = 60;
 constexpr double kNoTime = 1e-9;  // s
 
 // Keyframe k of the older ones shares (7 k) % 11 landmarks with the window: none, or up to ten.
@@ -20,10 +20,10 @@ int sharedBy(KeyframeId k) { return static_cast<int>(7 * k % 11); }
 // Keyframes in a chain. The landmarks that older ones share with the newest `window` are seen by one to all of these.
 Map chain(int window) {
   Map map;
-  const KeyframeId oldest_free = kLength - window + 1;
+  const KeyframeId oldest_free = kChain - window + 1;
   int most = 0;
   for (KeyframeId k = 1; k < oldest_free; ++k) most += sharedBy(k);
-  for (KeyframeId k = 1; k <= kLength; ++k) {
+  for (KeyframeId k = 1; k <= kChain; ++k) {
     auto keyframe = std::make_shared<Keyframe>();
     keyframe->id = k;
     keyframe->previous = k - 1;
@@ -35,7 +35,7 @@ Map chain(int window) {
   for (KeyframeId k = 1; k < oldest_free; ++k)
     for (int n = 0; n < sharedBy(k); ++n, ++landmark) {
       map.addLandmark(landmark, Eigen::Vector3d(0, 0, 3), {k, static_cast<std::uint32_t>(n)});
-      for (KeyframeId f = oldest_free; f <= kLength - landmark % window; ++f)
+      for (KeyframeId f = oldest_free; f <= kChain - landmark % window; ++f)
         map.addObservation(landmark, {f, static_cast<std::uint32_t>(landmark)});
     }
   return map;
@@ -114,7 +114,7 @@ TEST(Scope, TheWindowCountsKeyframesNotIds) {
 
 TEST(Scope, FixedKeyframesDoNotMoveToTheLastBit) {
   SimulatedKeyframes world(2);
-  const Map map = mapOfOdometry(&world, kLength);
+  const Map map = mapOfOdometry(&world, kChain);
   const ProblemScope scope = localScope(map, LocalBaOptions());
   ASSERT_FALSE(scope.fixed.empty());
   for (const char* solver : {"structured", "ceres"}) {
@@ -139,7 +139,7 @@ TEST(Scope, FixedKeyframesDoNotMoveToTheLastBit) {
 
 TEST(Limits, IterationsOfTheLocalAdjustment) {
   SimulatedKeyframes world(2);
-  const Map map = mapOfOdometry(&world, kLength);
+  const Map map = mapOfOdometry(&world, kChain);
   const BuiltProblem start = buildProblem(map, localScope(map, LocalBaOptions()), builderSettings(world));
   for (const char* solver : {"structured", "ceres"})
     for (const int most : {1, 2, 4}) {
@@ -156,7 +156,7 @@ TEST(Limits, IterationsOfTheLocalAdjustment) {
 // However much time there is: the map stays valid and the cost does not rise.
 TEST(Limits, TimeOfTheLocalAdjustment) {
   SimulatedKeyframes world(2);
-  const Map map = mapOfOdometry(&world, kLength);
+  const Map map = mapOfOdometry(&world, kChain);
   const BuiltProblem start = buildProblem(map, localScope(map, LocalBaOptions()), builderSettings(world));
   const double before = evaluateCost(start.problem);
   for (const char* solver : {"structured", "ceres"})
@@ -183,7 +183,7 @@ TEST(Limits, TimeOfTheLocalAdjustment) {
 
 TEST(Limits, TimeOfTheGlobalAdjustment) {
   SimulatedKeyframes world(2);
-  const Map map = mapOfOdometry(&world, kLength);
+  const Map map = mapOfOdometry(&world, kChain);
   const double odometry = positionError(map, world);
   for (const char* solver : {"structured", "ceres"})
     for (const double seconds : {kNoTime, 1e-2, 0.0}) {
