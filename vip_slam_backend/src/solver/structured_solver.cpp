@@ -167,6 +167,7 @@ SolverSummary StructuredSolver::solve(BaProblem& problem, const SolverOptions& o
   summary.parameters = problem.parameters();
   summary.observations = problem.observations.size();
   prepare(problem);
+  summary.factor_size = structure_.cholesky.factorSize();
   ahead_ms_ = 0;
   State other{problem.frames, problem.points, problem.planes};
   // Adds the time since the last call to one part of the summary.

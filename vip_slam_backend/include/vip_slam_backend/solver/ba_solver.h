@@ -37,6 +37,7 @@ struct SolverSummary {
   double residual_ms = 0, jacobian_ms = 0, linear_ms = 0, preprocess_ms = 0, total_ms = 0;
   double postprocess_ms = 0;  ///< of Ceres; the structured solver's solution is in place as it ends
   std::size_t residual_blocks = 0, parameters = 0, observations = 0;
+  std::size_t factor_size = 0;  ///< numbers in the Cholesky factor without points; 0: not known (Ceres)
   std::vector<SolverIteration> log;
 };
 

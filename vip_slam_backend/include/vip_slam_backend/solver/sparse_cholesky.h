@@ -27,6 +27,8 @@ class SparseCholesky {
 
   int nodes() const { return static_cast<int>(sizes_.size()); }
   int dimension() const { return dimension_; }
+  /// Numbers in the factor, those that pad its fronts included.
+  std::size_t factorSize() const { return factor_size_; }
   /// First unknown of a node in vectors (nodes in the caller's order).
   int unknown(int node) const { return unknown_[node]; }
   /// Place of a node in the elimination order.
