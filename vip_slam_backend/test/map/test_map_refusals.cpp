@@ -149,7 +149,7 @@ TEST(MapRefusals, OfPlanes) {
       {"a plane needs an id", setting([](PlaneEstimate* e) { e->id = 0; })},
       {"plane 1: parameters", setting([](PlaneEstimate* e) { e->plane.n.z() = kNan; })},
       {"plane 1: parameters", setting([](PlaneEstimate* e) { e->plane.d = kNan; })},
-      {"not a unit vector", setting([](PlaneEstimate* e) { e->plane.n *= 1.01; })},
+      {"plane 1: normal of length 1.01", setting([](PlaneEstimate* e) { e->plane.n *= 1.01; })},
       {"plane 9: its area or outline", setting([](PlaneEstimate* e) { e->id = 9, e->area = kNan; })},
       {"plane 1: its area or outline", setting([](PlaneEstimate* e) {
          e->polygons = {{{kNanVector}, {}}};
@@ -158,7 +158,7 @@ TEST(MapRefusals, OfPlanes) {
          e->polygons = {{{}, {{kNanVector}}}};
        })},
       {"plane 1: new parameters", [&] { map.setPlaneParameters(1, far); }},
-      {"plane 1: new parameters", [&] { map.setPlaneParameters(1, none); }},
+      {"plane 1: new normal of length 1.01", [&] { map.setPlaneParameters(1, none); }},
       {"no plane 99", [&] { map.setPlaneParameters(99, good); }},
       {"plane 1: its motion", [&] { map.movePlane(1, kNanPose); }},
       {"no plane 99", [&] { map.movePlane(99, SE3()); }},
