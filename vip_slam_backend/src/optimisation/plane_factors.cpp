@@ -7,6 +7,7 @@
 
 #include "homography_hosts.h"
 #include "vip_slam_backend/solver/robust.h"
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"
 
 namespace vip_slam {
@@ -35,7 +36,7 @@ PlaneFactorBuilder::PlaneFactorBuilder(const Map& map, const ProblemScope& scope
     BaPlane variable;
     variable.plane = plane.estimate.plane;
     variable.kind = plane.estimate.kind;
-    variable.prior_weight = 180.0 / (M_PI * settings.measurement.plane_prior_deg);
+    variable.prior_weight = 1 / (settings.measurement.plane_prior_deg * kDegree);
     problem.planes.push_back(variable);
     built->planes.push_back(entry.first);
   }

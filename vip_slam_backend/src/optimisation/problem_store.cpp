@@ -1,5 +1,6 @@
 // From a solved problem back to the map.
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "plane_intersection.h"
@@ -60,14 +61,21 @@ bool isInlier(const FrameGeometry& frame, const BaObservation& b, const Eigen::V
   return reprojectionResidual(frame, p_W, Eigen::Vector2d(b.x, b.y), weight, &r) && r.squaredNorm() <= chi2;
 }
 
+// Without a way between the cameras a homography is the same for all planes.
+bool hasParallax(const BaProblem& problem, int i, int j, int plane) {
+  constexpr double kMinParallax = 0.01;  // of the plane's distance
+  const Eigen::Vector3d from = problem.frames[i].T_W_C().t(), to = problem.frames[j].T_W_C().t();
+  return (to - from).norm() > kMinParallax * std::abs(problem.planes[plane].plane.signedDistance(from));
+}
+
 }  // namespace
 
 std::vector<char> heldPlanes(const BaProblem& problem) {
   std::vector<char> held(problem.planes.size(), 0);
   for (const BaPointToPlane& f : problem.point_to_plane) held[f.plane] = 1;
   for (const BaPlaneSample& f : problem.plane_samples) held[f.plane] = 1;
-  for (const BaHomography& f : problem.homographies) held[f.plane] = 1;
-  for (const BaHomographyPair& f : problem.homography_pairs) held[f.plane] = 1;
+  for (const BaHomography& f : problem.homographies) held[f.plane] |= hasParallax(problem, f.i, f.j, f.plane);
+  for (const BaHomographyPair& f : problem.homography_pairs) held[f.plane] |= hasParallax(problem, f.i, f.j, f.plane);
   return held;
 }
 
