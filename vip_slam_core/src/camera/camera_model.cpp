@@ -7,6 +7,7 @@
 #include "camera/equidistant_camera.h"
 #include "camera/radtan_camera.h"
 #include "util/text.h"
+#include "vip_slam_core/util/size_text.h"
 
 namespace vip_slam {
 
@@ -33,7 +34,8 @@ std::string distortionModelName(DistortionModel model) {
 
 CameraIntrinsics CameraIntrinsics::scaled(int new_width, int new_height) const {
   if (new_width <= 0 || new_height <= 0 || width <= 0 || height <= 0) {
-    throw std::invalid_argument("camera scaling: sizes must be > 0");
+    throw std::invalid_argument("camera scaling: from " + sizeText({width, height}) + " to " +
+                                sizeText({new_width, new_height}) + ", expected sizes > 0");
   }
   const double sx = double(new_width) / width, sy = double(new_height) / height;
   CameraIntrinsics result = *this;

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -25,17 +26,14 @@ DepthCurve chained(const DepthCurve& first, const DepthCurve& then) {
 }
 
 std::string validateDepthCurve(const DepthCurve& curve) {
-  char words[120];
   for (std::size_t k = 0; k < curve.added.size(); ++k) {
     const double here = curve.added[k], z = DepthCurve::kStep * static_cast<double>(k);
     if (!(std::abs(here) <= DepthCurve::kMaxEntry)) {
-      std::snprintf(words, sizeof words, "%g m are added at %g m, expected at most %g", here, z, DepthCurve::kMaxEntry);
-      return words;
+      return formatted("%g m are added at %g m, expected at most %g", here, z, DepthCurve::kMaxEntry);
     }
     if (k > 0 && here - curve.added[k - 1] < -kSteepest * DepthCurve::kStep) {
-      std::snprintf(words, sizeof words, "falls by %g m up to %g m, expected at most %g from entry to entry",
-                    curve.added[k - 1] - here, z, kSteepest * DepthCurve::kStep);
-      return words;
+      return formatted("falls by %g m up to %g m, expected at most %g from entry to entry", curve.added[k - 1] - here,
+                       z, kSteepest * DepthCurve::kStep);
     }
   }
   return "";

@@ -181,7 +181,8 @@ void addOffset(double offset, cv::Mat* metres) {
 
 void requireFloatDepth(const cv::Mat& depth) {
   if (depth.type() != CV_32FC1) {
-    throw std::invalid_argument("depth image: type " + std::to_string(depth.type()) + ", expected CV_32FC1 in metres");
+    throw std::invalid_argument("depth image: type " + cv::typeToString(depth.type()) +
+                                ", expected CV_32FC1 in metres");
   }
 }
 

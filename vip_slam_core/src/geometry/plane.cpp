@@ -3,11 +3,15 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "vip_slam_core/util/formatted.h"
+
 namespace vip_slam {
 
 Plane::Plane(const Eigen::Vector3d& normal, double distance) {
   const double length = normal.norm();
-  if (!(length > 0)) throw std::invalid_argument("plane normal: is zero or not a number, expected a direction");
+  if (!(length > 0))
+    throw std::invalid_argument(
+        formatted("plane normal: is (%g, %g, %g), expected a direction", normal.x(), normal.y(), normal.z()));
   n = normal / length;
   d = distance / length;
 }
@@ -28,7 +32,9 @@ Plane Plane::flipped() const {
 Plane Plane::fromCp(const Eigen::Vector3d& eta) {
   const double distance = eta.norm();
   if (!(distance >= 1e-9)) {
-    throw std::invalid_argument("closest-point vector: is zero, expected a plane that does not contain the origin");
+    throw std::invalid_argument(
+        formatted("closest-point vector: is (%g, %g, %g), expected a plane that does not contain the origin", eta.x(),
+                  eta.y(), eta.z()));
   }
   return Plane(eta, distance * distance);
 }

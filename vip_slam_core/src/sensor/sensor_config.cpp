@@ -11,11 +11,13 @@
 #include "util/text.h"
 #include "util/yaml_section.h"
 #include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr double kMaxDepthShift = 50;  // px; a larger shift cannot be a registration error
+constexpr double kMaxGyroCorrection = 0.2;
 
 CameraIntrinsics cameraFrom(Section section) {
   CameraIntrinsics camera;
@@ -109,7 +111,8 @@ void readDepth(Section depth, SensorConfig* config) {
     throw std::runtime_error("depth/shift: " + std::to_string(shift.size()) + " numbers, expected two: right and down");
   if (!shift.empty()) config->depth_shift = {shift[0], shift[1]};
   if (!config->depth_shift.allFinite() || config->depth_shift.cwiseAbs().maxCoeff() > kMaxDepthShift)
-    throw std::runtime_error("depth/shift: expected at most " + formatDouble(kMaxDepthShift) + " pixels");
+    throw std::runtime_error(formatted("depth/shift: [%g, %g], expected at most %g pixels", config->depth_shift.x(),
+                                       config->depth_shift.y(), kMaxDepthShift));
   std::vector<double> added;
   depth.get("curve", added, false);
   config->depth_curve.added.assign(added.begin(), added.end());
@@ -151,8 +154,12 @@ void readImu(Section imu, SensorConfig* config) {
   imu.number("accel_noise_density", config->imu_noise.accel_noise_density, 1e-9, 10);
   imu.number("accel_random_walk", config->imu_noise.accel_random_walk, 1e-9, 10);
   imu.matrix("gyro_correction", config->gyro_correction, false);
-  if (!config->gyro_correction.allFinite() || config->gyro_correction.cwiseAbs().maxCoeff() > 0.2)
-    throw std::runtime_error("imu/gyro_correction: expected numbers from -0.2 to 0.2");
+  for (Eigen::Index k = 0; k < config->gyro_correction.size(); ++k) {
+    const double entry = config->gyro_correction.data()[k];
+    if (!(std::abs(entry) <= kMaxGyroCorrection))
+      throw std::runtime_error(formatted("imu/gyro_correction: has %g, expected numbers from %g to %g", entry,
+                                         -kMaxGyroCorrection, kMaxGyroCorrection));
+  }
   imu.number("gyro_correction_sigma", config->imu_noise.gyro_correction_sigma, 1e-6, 0.2, false);
   imu.number("gravity", config->gravity, 9.0, 10.5, false);
   imu.finish();

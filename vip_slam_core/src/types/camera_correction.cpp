@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "vip_slam_core/util/formatted.h"
+
 namespace vip_slam {
 namespace {
 
@@ -9,9 +11,12 @@ constexpr double kLargestOffset = 10;    // m
 constexpr double kLargestBearing = 0.2;  // share of the focal length
 constexpr double kLargestShift = 100;    // px
 
+/// "" when all values are within the limit; else what is wrong, with the first that is not.
 template <class Derived>
-bool within(const Eigen::MatrixBase<Derived>& values, double limit) {
-  return values.allFinite() && values.cwiseAbs().maxCoeff() <= limit;
+std::string beyond(const char* what, const Eigen::MatrixBase<Derived>& values, double limit, const char* unit) {
+  for (Eigen::Index k = 0; k < values.size(); ++k)
+    if (!(std::abs(values(k)) <= limit)) return formatted("%s %g%s, at most %g", what, values(k), unit, limit);
+  return "";
 }
 
 /// Maps (x, y, 1) with the bearing correction `from` to those with `to`.
@@ -30,12 +35,13 @@ Eigen::Matrix3f pointChange(const CameraCorrection& from, const CameraCorrection
 }  // namespace
 
 std::string validateCameraCorrection(const CameraCorrection& correction) {
-  if (!(std::abs(correction.offset) <= kLargestOffset))
-    return "depth offset of " + std::to_string(correction.offset) + " m";
-  if (!within(correction.bearing.value, kLargestBearing))
-    return "bearings are not finite, or changed by more than a fifth";
-  if (!within(correction.shift.px, kLargestShift) || !within(correction.shift.bearing, kLargestBearing))
-    return "the depth image's shift is not finite, or too large";
+  using Number = Eigen::Matrix<double, 1, 1>;
+  for (const std::string& problem :
+       {beyond("depth offset of", Number(correction.offset), kLargestOffset, " m"),
+        beyond("bearings changed by", correction.bearing.value, kLargestBearing, ""),
+        beyond("depth image shifted by", correction.shift.px, kLargestShift, " px"),
+        beyond("depth image shifted by", correction.shift.bearing, kLargestBearing, " of the focal length")})
+    if (!problem.empty()) return problem;
   const std::string curve = validateDepthCurve(correction.curve);
   return curve.empty() ? "" : "depth curve: " + curve;
 }

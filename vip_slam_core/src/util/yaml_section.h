@@ -12,6 +12,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "util/text.h"
+#include "vip_slam_core/geometry/rigid_check.h"
 #include "vip_slam_core/geometry/se3.h"
 
 namespace vip_slam {
@@ -20,7 +21,8 @@ namespace vip_slam {
 class Section {
  public:
   Section(YAML::Node node, std::string name) : node_(std::move(node)), name_(std::move(name)) {
-    if (!node_.IsMap()) throw std::runtime_error((name_.empty() ? "file" : name_) + ": expected a map");
+    if (!node_.IsMap())
+      throw std::runtime_error((name_.empty() ? "file" : name_) + ": " + shape(node_, "entries") + ", expected a map");
     std::set<std::string> keys;
     for (const auto& entry : node_) {
       if (!keys.insert(entry.first.Scalar()).second)
@@ -73,13 +75,17 @@ class Section {
     const YAML::Node node = need(key);
     const std::string n = std::to_string(N), numbers = "expected " + n + " numbers";
     if (!node.IsSequence() || node.size() != N)
-      throw std::runtime_error(full(key) + ": expected " + n + " rows of " + n + " numbers");
+      throw std::runtime_error(full(key) + ": " + shape(node, "rows") + ", expected " + n + " rows of " + n +
+                               " numbers");
     for (int r = 0; r < N; ++r) {
       const std::string row = full(key) + ": row " + std::to_string(r + 1) + ": ";
-      if (!node[r].IsSequence() || node[r].size() != N) throw std::runtime_error(row + numbers);
+      if (!node[r].IsSequence() || node[r].size() != N)
+        throw std::runtime_error(row + shape(node[r], "entries") + ", " + numbers);
       for (int c = 0; c < N; ++c) {
-        if (!node[r][c].IsScalar() || !parseDouble(node[r][c].Scalar(), &M(r, c)))
-          throw std::runtime_error(row + numbers);
+        if (!node[r][c].IsScalar())
+          throw std::runtime_error(row + "entry " + std::to_string(c + 1) + " is a list, " + numbers);
+        if (!parseDouble(node[r][c].Scalar(), &M(r, c)))
+          throw std::runtime_error(row + "'" + node[r][c].Scalar() + "', " + numbers);
       }
     }
   }
@@ -87,11 +93,9 @@ class Section {
     if (!required && !has(key)) return;
     Eigen::Matrix4d M;
     matrix(key, M);
-    const Eigen::Matrix3d R = M.topLeftCorner<3, 3>();
-    const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0;
-    if (!M.allFinite() || !rotation || (M.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-9)
-      throw std::runtime_error(full(key) + ": not a rigid transform (orthonormal rotation, last row 0 0 0 1 expected)");
-    T = SE3(R, M.topRightCorner<3, 1>());
+    const std::string problem = rigidProblem(M);
+    if (!problem.empty()) throw std::runtime_error(full(key) + ": not a rigid transform: " + problem);
+    T = SE3(M);
   }
   void finish() const {
     for (const auto& entry : node_)
@@ -107,6 +111,11 @@ class Section {
         return "; '" + full(other) + "' is no key, is it meant?";
     }
     return "";
+  }
+  /// What stands there instead of a list of `entries`.
+  static std::string shape(const YAML::Node& node, const std::string& entries) {
+    if (node.IsSequence()) return std::to_string(node.size()) + " " + entries;
+    return node.IsScalar() ? "'" + node.Scalar() + "'" : "a map";
   }
   static const char* expectedType(bool) { return "true or false"; }
   static const char* expectedType(int) { return "a whole number"; }

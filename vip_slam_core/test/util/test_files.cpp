@@ -310,19 +310,20 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("model: stereo", "model: sonar", "sonar");
   changed("min_range: 0.3", "min_range: 30", "depth_noise");
   changed("gravity: 9.807", "gravity: 1.6", "gravity");
-  changed("[0.01, 0.002, 0]", "[0.01, 0.002]", "imu/gyro_correction: row 1: expected 3 numbers");
-  changed("[0.01, 0.002, 0]", "[0.01, 0.9, 0]", "imu/gyro_correction: expected numbers from -0.2 to 0.2");
-  changed("[0.01, 0.002, 0]", "[0.01, .nan, 0]", "imu/gyro_correction: expected numbers from -0.2 to 0.2");
+  changed("[0.01, 0.002, 0]", "[0.01, 0.002]", "imu/gyro_correction: row 1: 2 entries, expected 3 numbers");
+  changed("[0.01, 0.002, 0]", "[0.01, 0.9, 0]", "imu/gyro_correction: has 0.9, expected numbers from -0.2 to 0.2");
+  changed("[0.01, 0.002, 0]", "[0.01, .nan, 0]", "imu/gyro_correction: has nan, expected numbers from -0.2 to 0.2");
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0", "imu/gyro_correction_sigma");
   changed("gyro_correction_sigma: 0.004", "gyro_correction_sigma: 0.3", "imu/gyro_correction_sigma");
   changed("scale: 0.0002", "scale: 0", "depth/scale");
   changed("shift: [1.75, -0.5]", "shift: [1.75]", "depth/shift: 1 numbers, expected two: right and down");
-  changed("shift: [1.75, -0.5]", "shift: [1.75, 90]", "depth/shift: expected at most 50 pixels");
+  changed("shift: [1.75, -0.5]", "shift: [1.75, 90]", "depth/shift: [1.75, 90], expected at most 50 pixels");
   changed("shift: [1.75, -0.5]", "shift: [.nan, 0]", "depth/shift");
   changed("curve: [0, 0.0031", "curve: [0, 1.31", "depth/curve: 1.31 m are added at 0.125 m, expected at most 1");
   changed("curve: [0, 0.0031", "curve: [0, here", "depth/curve: is 'a list', expected a list of numbers");
-  changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth");
-  changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam");
+  changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth: not a rigid transform: the last row is 0 0 0 2");
+  changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam: row 1: 5 entries, expected 4 numbers");
+  changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [x", "T_imu_cam: row 1: 'x");
   changed("gyro: \"/g\"", "gyro: \"\"", "topics/imu");
   changed("imu: \"\"", "imu: \"/i\"", "topics/gyro");  // both would be read, and mixed
   changed("encoding: bgr8", "encoding: rgb9", "color/encoding");

@@ -17,9 +17,10 @@
 namespace vip_slam {
 
 struct ImuBufferCounters {
-  std::size_t accepted = 0, out_of_order = 0, duplicate = 0, not_finite = 0, gaps = 0;
-  std::size_t ahead = 0;   ///< samples dropped because their stamp was later than those after them
-  std::size_t spikes = 0;  ///< samples replaced by interpolation between their neighbours
+  std::size_t accepted = 0, out_of_order = 0, duplicate = 0, gaps = 0;
+  std::size_t not_finite = 0;  ///< or all zero
+  std::size_t ahead = 0;       ///< samples dropped because their stamp was later than those after them
+  std::size_t spikes = 0;      ///< samples replaced by interpolation between their neighbours
 };
 
 class ImuBuffer {
@@ -27,10 +28,11 @@ class ImuBuffer {
   /// `gap_seconds`: a distance between samples above this counts as a gap. `capacity_seconds` bounds memory.
   explicit ImuBuffer(double gap_seconds = 0.05, double capacity_seconds = 30.0);
 
-  /// False (and counted) when the sample is not finite, repeats or precedes the newest stamp.
+  /// False (and counted) when the sample is not finite, all zero (a failing bus), or repeats or precedes the newest
+  /// stamp.
   bool add(const ImuSample& sample);
   /// Split streams: the accelerometer is interpolated to the gyro stamps; samples are available once both streams cover
-  /// them.
+  /// them. False likewise; zeros are refused of the accelerometer only, since a gyro at rest may read them.
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
 

@@ -9,13 +9,14 @@
 namespace vip_slam {
 
 struct StampedPose {
-  double t = 0;
-  SE3 T_W_B;
+  double t = 0;  ///< s
+  SE3 T_W_B;     ///< body in the world, m; the file says which frames these are
 };
 using Trajectory = std::vector<StampedPose>;
 
-/// Throws std::runtime_error "file:line: what, expected what" on a missing file, malformed line, non-finite number,
-/// zero quaternion, or stamps that repeat or run backwards.
+/// A pose that repeats the stamp of the one before is left out. Throws std::runtime_error "file:line: what, expected
+/// what" on a missing file, malformed line, non-finite number, a quaternion whose length is 5 % or more off 1, or
+/// stamps that run backwards.
 Trajectory readTum(const std::string& path);
 /// Stamps with 9 decimals, values with 9; whole or not at all.
 void writeTum(const std::string& path, const Trajectory& trajectory);

@@ -23,6 +23,11 @@ inline const char* trackingStateName(TrackingState state) {
   return "UNKNOWN";
 }
 
+/// Whether the pose is valid in this state.
+inline bool hasPose(TrackingState state) {
+  return state == TrackingState::kTracking || state == TrackingState::kDegraded;
+}
+
 struct TrackingStatus {
   TrackingState state = TrackingState::kWaiting;
   std::string reason;  ///< as text, empty while TRACKING
