@@ -50,4 +50,10 @@ void AtomicFile::commit() {
   synced(slash == std::string::npos ? "." : path_.substr(0, slash + 1));  // the new name, where supported
 }
 
+void writeText(const std::string& path, const std::string& text) {
+  AtomicFile file(path);
+  file.stream() << text;
+  file.commit();
+}
+
 }  // namespace vip_slam

@@ -8,6 +8,7 @@
 
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_eval/gba_benchmark/gba_benchmark.h"
 #include "vip_slam_eval/plot/line_plot.h"
@@ -19,12 +20,6 @@ namespace {
 constexpr Variant kVariants[] = {Variant::kVi, Variant::kViP, Variant::kViCp, Variant::kVip};
 constexpr int kMaxCeresRuns = 3;     // each takes a second
 constexpr int kMaxRunsOfFigure = 5;  // per point of the figures over keyframes
-
-void writeText(const std::string& path, const std::string& text) {
-  AtomicFile file(path);
-  file.stream() << text;
-  file.commit();
-}
 
 std::vector<GbaSetup> everyVariant(const std::string& solver, int threads) {
   std::vector<GbaSetup> setups;
@@ -83,10 +78,8 @@ std::vector<GbaRun> Benchmark::timed(const char* title, const std::vector<GbaSet
 }
 
 void Benchmark::ratio(const char* what, const GbaRun& slow, const GbaRun& fast, const char* aim) {
-  char row[200];
-  std::snprintf(row, sizeof(row), "| %s | %.2f | %.2f | %s |\n", what, slow.summary.total_ms / fast.summary.total_ms,
-                slow.wholeMs() / fast.wholeMs(), aim);
-  md_ << row;
+  md_ << formatted("| %s | %.2f | %.2f | %s |\n", what, slow.summary.total_ms / fast.summary.total_ms,
+                   slow.wholeMs() / fast.wholeMs(), aim);
 }
 
 void Benchmark::table() {
@@ -115,10 +108,7 @@ void Benchmark::table() {
   ratio("VIP on stock Ceres / VIP, structured", stock[3], own[3], "-");
   ratio("VI, one thread / two threads, structured", own[0], own2[0], "1");
   ratio("VIP, one thread / two threads, structured", own[3], own2[3], "1");
-  char rmse[80];
-  std::snprintf(rmse, sizeof(rmse), "\nRMSE of VIP / RMSE of VI: %.2f (paper 0.84, aim 1 or less)\n",
-                own[3].rmse / own[0].rmse);
-  md_ << rmse;
+  md_ << formatted("\nRMSE of VIP / RMSE of VI: %.2f (paper 0.84, aim 1 or less)\n", own[3].rmse / own[0].rmse);
 }
 
 void Benchmark::figures(const std::string& out) {
@@ -170,13 +160,11 @@ void Benchmark::overCorridor(const std::string& out, std::ostringstream* csv) {
       series[k].y.push_back(ms);
       *csv << "corridor," << n << ',' << variantName(runs[k].setup.variant) << ",structured," << ms << '\n';
     }
-    char row[200];
     const GbaRun& vip = runs[1];
     const SolverSummary& s = vip.summary;
-    std::snprintf(row, sizeof(row), "| %d | %.1f | %.1f | %.0f | %zu | %zu | %.1f | %.1f | %.1f | %.1f |\n", n,
-                  runs[0].summary.total_ms, s.total_ms, 1e3 * s.total_ms / n, vip.points, vip.homographies,
-                  s.residual_ms, s.jacobian_ms, s.linear_ms, s.preprocess_ms);
-    md_ << row;
+    md_ << formatted("| %d | %.1f | %.1f | %.0f | %zu | %zu | %.1f | %.1f | %.1f | %.1f |\n", n,
+                     runs[0].summary.total_ms, s.total_ms, 1e3 * s.total_ms / n, vip.points, vip.homographies,
+                     s.residual_ms, s.jacobian_ms, s.linear_ms, s.preprocess_ms);
   }
   writeLinePlot(out + "/time_over_corridor.png", "Global bundle adjustment along a corridor", "keyframes", "ms",
                 series);

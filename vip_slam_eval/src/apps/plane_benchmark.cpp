@@ -16,12 +16,6 @@ namespace {
 
 using namespace vip_slam;
 
-void writeText(const std::filesystem::path& path, const std::string& text) {
-  AtomicFile file(path.string());
-  file.stream() << text;
-  file.commit();
-}
-
 void write(const std::string& folder, const PlaneBenchmarkResult& result, const MetricTable& table,
            const TimingLog& timing) {
   const std::filesystem::path out(folder);

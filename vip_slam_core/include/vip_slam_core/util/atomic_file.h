@@ -24,4 +24,7 @@ class AtomicFile {
   bool committed_ = false;
 };
 
+/// A whole text file; throws as AtomicFile does.
+void writeText(const std::string& path, const std::string& text);
+
 }  // namespace vip_slam
