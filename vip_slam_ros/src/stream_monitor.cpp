@@ -1,7 +1,8 @@
 #include "vip_slam_ros/stream_monitor.h"
 
 #include <algorithm>
-#include <cstdio>
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -9,12 +10,6 @@ namespace {
 constexpr std::size_t kWindow = 100;  // stamps over which the rate is measured
 constexpr double kSilent = 2.0;       // seconds without a message
 constexpr std::size_t kUnusable = 5;  // messages in a row that could not be used
-
-std::string format(const char* pattern, double a, double b) {
-  char text[160];
-  std::snprintf(text, sizeof text, pattern, a, b);
-  return text;
-}
 
 }  // namespace
 
@@ -86,7 +81,7 @@ std::string StreamMonitor::silence(double now) const {
   const Report r = report();
   const double seconds = now - r.last_arrival;
   if (r.rejected_in_a_row >= kUnusable && seconds <= kSilent) return "topic " + r.topic + ": " + r.last_rejection;
-  return r.messages > 0 && seconds > kSilent ? "topic " + r.topic + ": " + format("silent for %.1f s", seconds, 0) : "";
+  return r.messages > 0 && seconds > kSilent ? "topic " + r.topic + ": " + formatted("silent for %.1f s", seconds) : "";
 }
 
 std::string StreamMonitor::absence(double now) const {
@@ -111,7 +106,7 @@ std::string StreamMonitor::complaint(double now) const {
   if (!fault_now.empty()) return fault_now;
   const Report r = report();
   if (r.nominal_rate > 0 && r.rate > 0 && r.rate < 0.7 * r.nominal_rate) {
-    return "topic " + r.topic + ": " + format("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
+    return "topic " + r.topic + ": " + formatted("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
   }
   return "";
 }
