@@ -1,7 +1,8 @@
 #include "depth_alignment.h"
 
-#include <cstdio>
 #include <exception>
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 
@@ -24,11 +25,9 @@ cv::Mat DepthAlignment::align(const cv::Mat& depth, const cv::Size& color, std::
     }
   }
   if (aligned.size() != color) {
-    char words[240];
-    std::snprintf(words, sizeof words,
-                  "%s is %dx%d, %s is %dx%d: depth is not used; switch on the driver's registration",
+    *problem =
+        formatted("%s is %dx%d, %s is %dx%d: depth is not used; switch on the driver's registration",
                   depth_topic_.c_str(), aligned.cols, aligned.rows, color_topic_.c_str(), color.width, color.height);
-    *problem = words;
   }
   return aligned;
 }

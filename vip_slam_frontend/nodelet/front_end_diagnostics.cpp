@@ -1,13 +1,16 @@
 // The front-end nodelet's /diagnostics.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include <vip_slam_msgs/TrackingStatus.h>
 
 #include "front_end_nodelet.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/frame_conversions.h"
 #include "vip_slam_ros/process_memory.h"
+#include "vip_slam_ros/stream_faults.h"
 #include "vip_slam_ros/topic_lookup.h"
 
 namespace vip_slam {
@@ -97,10 +100,7 @@ std::string FrontEndNodelet::depthAbsence(double now) const {
   const std::string absence = depth_monitor_->absence(now);
   constexpr int kLasting = 20;  // images; a hand in front of the camera is gone sooner
   if (!absence.empty() || empty_depth_ < kLasting) return absence;
-  char range[60];
-  std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);
-  return "topic " + sensor_.topics.depth + ": images hold nothing within " + range +
-         ", the sensor file's range: wrong depth/scale, emitter off, wrong topic?";
+  return "topic " + sensor_.topics.depth + ": images " + holdNoDepth(sensor_.depth_noise);
 }
 
 void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -168,12 +168,12 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   if (lately_paired_.size() > kLately) lately_paired_.pop_front();
   if (!sensor_.topics.depth.empty() && mostlyUnpaired(lately_paired_.front(), shown.pairs)) {
     const double skew = depth_monitor_->report().newest - color_monitor_->report().newest;
-    char words[240];
-    std::snprintf(words, sizeof words,
-                  "%s (%.1f Hz) and %s (%.1f Hz) are not synchronised: newest stamps %.0f ms apart, pairs need %.0f ms",
-                  sensor_.topics.color.c_str(), color_monitor_->report().rate, sensor_.topics.depth.c_str(),
-                  depth_monitor_->report().rate, 1e3 * skew, 1e3 * options_.input.pair_tolerance);
-    complaints += (complaints.empty() ? "" : "; ") + std::string(words);
+    complaints += (complaints.empty() ? "" : "; ") +
+                  formatted(
+                      "%s (%.1f Hz) and %s (%.1f Hz) are not synchronised: newest stamps %.0f ms apart, pairs "
+                      "need %.0f ms",
+                      sensor_.topics.color.c_str(), color_monitor_->report().rate, sensor_.topics.depth.c_str(),
+                      depth_monitor_->report().rate, 1e3 * std::abs(skew), 1e3 * options_.input.pair_tolerance);
   }
   if (empty_depth_ > 0 && complaints.empty()) complaints = depthAbsence(now);
   if (!shown.size_problem.empty()) complaints += (complaints.empty() ? "" : "; ") + shown.size_problem;

@@ -10,6 +10,7 @@
 #include "vip_slam_ros/map_conversions.h"
 #include "vip_slam_ros/parameters.h"
 #include "vip_slam_ros/sensor_files.h"
+#include "vip_slam_ros/stream_faults.h"
 
 namespace vip_slam {
 
@@ -105,9 +106,8 @@ bool FrontEndNodelet::noticeTime(double t, Stream stream) {
   if (paused_) return false;
   const StreamClock::Verdict verdict = clock_->notice(stream, t);
   if (verdict == StreamClock::Verdict::kJumpedBack) {
-    char words[120];
-    std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", clock_->lastJump());
-    NODELET_WARN("%s: the odometry starts anew, the map stays", words);
+    const std::string words = timeRanBack(clock_->lastJump());
+    NODELET_WARN("%s: the odometry starts anew, the map stays", words.c_str());
     pairer_->clear();
     early_.clear();
     for (auto* monitor : {color_monitor_.get(), depth_monitor_.get(), imu_monitor_.get(), accel_monitor_.get()}) {
@@ -148,8 +148,9 @@ void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const 
   if (front_end_->counters().imu_spikes > 0 && !told_of_spikes_) {
     told_of_spikes_ = true;
     NODELET_WARN(
-        "a single sample of the IMU was far off its neighbours and was replaced by them (errors on its bus?); "
-        "further ones are counted in /diagnostics");
+        "topic %s: a single sample just before %.3f s was far off its neighbours and was replaced by them (errors on "
+        "its bus?); further ones are counted in /diagnostics",
+        (gyro ? imu_monitor_ : accel_monitor_)->report().topic.c_str(), t);
   }
   processReady();
   if (gyro && imu_rate_odometry_) publishImuRate(t);

@@ -13,10 +13,6 @@
 namespace vip_slam {
 namespace {
 
-bool hasPose(const TrackedFrame& frame) {
-  return frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
-}
-
 /// Standard deviation of one gyro sample, rad/s.
 double gyroSigma(const SensorConfig& sensor) {
   return sensor.imu_noise.gyro_noise_density * std::sqrt(std::max(1.0, sensor.imu_rate));
@@ -26,7 +22,7 @@ double gyroSigma(const SensorConfig& sensor) {
 
 void FrontEndNodelet::publishPose(const ros::Time& stamp, const TrackedFrame& frame) {
   covariance_ = frame.covariance;
-  if (!hasPose(frame)) return;
+  if (!hasPose(frame.status.state)) return;
   posed_imu_t_ = frame.state.t;
   // A message that is published is shared with all receivers and never changed again.
   auto odometry = boost::make_shared<nav_msgs::Odometry>(

@@ -8,6 +8,8 @@
 #include "vip_slam_core/depth/grid_spacing.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
+#include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/size_text.h"
 
 #include "front_end_impl.h"
 
@@ -83,7 +85,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
 
 bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
   if (!(t < newest - clock_jump_)) return false;
-  clockRanBack(std::string(what) + " clock ran back by " + std::to_string(newest - t) + " s");
+  clockRanBack(formatted("%s clock ran back by %.3f s", what, newest - t));
   return true;
 }
 
@@ -134,16 +136,17 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* de
   noticeTimeJump(input.t, last_image_t_, "image");
   if (input.t <= last_image_t_) {
     ++counters_.bad_stamp;
-    return "image stamp repeats or runs backward";
+    return formatted("image stamp %.3f s does not follow %.3f s", input.t, last_image_t_);
   }
   if (input.gray.empty() || input.gray.type() != CV_8UC1) {
     ++counters_.bad_image;
-    return input.gray.empty() ? "image is empty" : "image is not 8-bit grey";
+    return input.gray.empty() ? "image is empty"
+                              : "image is " + cv::typeToString(input.gray.type()) + ", expected 8-bit grey";
   }
   if (input.gray.cols != camera_->width() || input.gray.rows != camera_->height()) {
     ++counters_.bad_image;
-    return "image is " + std::to_string(input.gray.cols) + "x" + std::to_string(input.gray.rows) + ", the camera is " +
-           std::to_string(camera_->width()) + "x" + std::to_string(camera_->height());
+    return "image is " + sizeText(input.gray.size()) + ", the camera is " +
+           sizeText(cv::Size(camera_->width(), camera_->height()));
   }
   if (input.depth.empty()) {
     ++counters_.no_depth;

@@ -4,6 +4,8 @@
 
 #include "front_end_impl.h"
 
+#include "vip_slam_core/util/formatted.h"
+
 namespace vip_slam {
 namespace {
 
@@ -28,7 +30,8 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
                  "depth right? "
                  "check_bag tells"};
     } else if (t + timeOffset() - cut_off_imu_t_ < kRangeShown) {
-      status_ = {TrackingState::kDegraded, "the gyroscope is at the end of its range"};
+      status_ = {TrackingState::kDegraded,
+                 formatted("the gyroscope is at the end of its range, %.2f rad/s", gyro_range_.end())};
     } else if (t - last_metric_t_ > kBetweenDepths && !still_) {
       status_ = {TrackingState::kDegraded, "no depth: visual-inertial only"};
     } else {
@@ -46,7 +49,7 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
   }
   if (phase_ == Phase::kLost) {
     const std::string missing = tracking.moves_by_itself ? "nothing that stands still" : "no features";
-    status_ = {TrackingState::kLost, missing + " for " + std::to_string(t - last_good_t_).substr(0, 4) + " s"};
+    status_ = {TrackingState::kLost, missing + formatted(" for %.2f s", t - last_good_t_)};
     return;
   }
   const std::string held = surfaces_hold              ? "held by depth surfaces and the IMU"

@@ -1,4 +1,6 @@
 // The steps of one image: check, predict, track, estimate, output.
+#include "vip_slam_core/util/formatted.h"
+
 #include "front_end_impl.h"
 
 namespace vip_slam {
@@ -9,6 +11,13 @@ namespace {
 constexpr int kGatedImages = 30;
 // Rate that a saturated gyro does not measure, one sigma, as a share of the limit of its range.
 constexpr double kBeyondRange = 0.3;
+
+/// Why the IMU does not cover an image at `t_imu`.
+std::string uncovered(const ImuBuffer& imu, double t_imu) {
+  if (imu.empty()) return "no IMU yet";
+  if (t_imu < imu.oldest()) return formatted("the IMU begins at %.3f s, the image needs %.3f s", imu.oldest(), t_imu);
+  return formatted("the IMU reaches to %.3f s, the image needs %.3f s", imu.newest(), t_imu);
+}
 
 }  // namespace
 
@@ -22,7 +31,7 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   const double t_imu = input.t + timeOffset();
   if (!imu_.covers(t_imu)) {
     ++counters_.imu_missing;
-    return unusable(input.t, imu_.empty() ? "no IMU yet" : "the IMU does not cover the image");
+    return unusable(input.t, uncovered(imu_, t_imu));
   }
   last_image_t_ = input.t;
   if (filter_.started() && repeatsLastImage(input.gray, t_imu)) return repeatedImage(input.t, t_imu);
@@ -41,7 +50,7 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   if (filter_.started()) {
     const double gap = t_imu - last_imu_t_;
     if (gap <= options_.recovery.max_image_gap) return trackImage(input.t, t_imu, gray, depth, on_pose);
-    reset("no image for " + std::to_string(gap).substr(0, 4) + " s");
+    reset(formatted("no image for %.2f s", gap));
   }
   return initialise(input.t, t_imu, gray, depth);
 }
@@ -85,8 +94,9 @@ StepReport FrontEnd::Impl::updateFilter(const Propagation& propagation, const cv
 
 std::string FrontEnd::Impl::divergence(const StepReport& report, const TrackingResult& tracked, double t) const {
   if (!report.healthy) return "the filter became singular";
-  if (filter_.nav().v_W.norm() > options_.recovery.max_speed) return "estimated speed is impossible";
-  if (gated_in_a_row_ >= kGatedImages) return "measurements contradict the estimate";
+  const double speed = filter_.nav().v_W.norm(), most = options_.recovery.max_speed;
+  if (speed > most) return formatted("estimated speed is %.1f m/s, at most %g (recovery/max_speed)", speed, most);
+  if (gated_in_a_row_ >= kGatedImages) return formatted("%d images in a row contradict the estimate", gated_in_a_row_);
   if (contradictedForLong(tracked, t)) return "what is seen contradicts the IMU";
   return "";
 }
@@ -129,17 +139,16 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     reset(reason);
     return initialise(t, t_imu, gray, depth_read);
   };
-  const auto seconds = [](double dt) { return std::to_string(dt).substr(0, 4) + " s"; };
   double max_gap = 0;
   const double from = filter_.nav().t;
   const std::vector<ImuSample> samples = imu_.between(from, t_imu, &max_gap);
   if (samples.size() < 2) return statusOnly(t, TrackingState::kDegraded, "no IMU between the images");
-  if (max_gap > longestImuGap()) return startAnew("IMU gap of " + seconds(max_gap));
+  if (max_gap > longestImuGap()) return startAnew(formatted("IMU gap of %.2f s", max_gap));
   Propagation propagation = filter_.predict(samples);
   const bool doubtful = admitDoubts(max_gap, from, t_imu, &propagation);
   // Without images the IMU propagates the pose, as in the dark, while the position's uncertainty stays within bounds.
   if (propagation.displacementSigma(filter_.covariance()) > options_.recovery.max_position_sigma)
-    return startAnew("no image for " + seconds(t_imu - from));
+    return startAnew(formatted("no image for %.2f s", t_imu - from));
   last_imu_t_ = t_imu;
 
   const SE3 T_odom_C = propagation.predicted.T_W_I * extrinsics();
@@ -151,7 +160,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const TrackingResult tracked =
       tracker_.track(gray, depth, prediction, !coasting, T_odom_C, colourRows(propagation.predicted), t);
   if (gap && !bridgesGap(tracked, tracks_before, prediction, t_imu - from))
-    return startAnew("IMU and images are missing for " + seconds(t_imu - from));
+    return startAnew(formatted("IMU and images are missing for %.2f s", t_imu - from));
   moving_ = tracked.regions;
   counters_.moving += tracked.moves_by_itself;
   admitShock(tracked, prediction, t_imu - from, &propagation);

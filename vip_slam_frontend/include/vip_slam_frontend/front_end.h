@@ -46,7 +46,7 @@ struct FrontEndCounters {
   std::uint64_t bad_stamp = 0;       ///< repeated, backward or non-finite image stamps
   std::uint64_t repeated_image = 0;  ///< new stamps on the pixels of the image before: not used
   std::uint64_t repeated_depth = 0;  ///< depth images with the pixels of the one before: left out
-  std::uint64_t imu_rejected = 0;    ///< non-finite, all zero, repeated or backward samples
+  std::uint64_t imu_rejected = 0;    ///< non-finite, all zero, repeated or backward samples, and those stamped too late
   std::uint64_t imu_gaps = 0;
   std::uint64_t imu_spikes = 0;        ///< single wrong samples, replaced
   std::uint64_t imu_shocks = 0;        ///< images that showed a velocity step which the IMU did not measure
@@ -78,7 +78,7 @@ class FrontEnd {
   FrontEnd(const FrontEnd&) = delete;
   FrontEnd& operator=(const FrontEnd&) = delete;
 
-  /// False (and counted) when the sample is not finite or not newer than the last.
+  /// False (and counted) when the sample is not finite, all zero, or not newer than the last; addGyro takes zeros.
   bool addImu(const ImuSample& sample);
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -13,16 +13,17 @@ constexpr double kSure = 5.0;  // sigmas
 constexpr double kMinTurn = 0.2 * kDegree, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005, kMinBearing = 0.001,
                  kMinGyroError = 0.002, kMinDepthShift = 0.001;
 
-template <typename... Numbers>
-std::string sentence(const char* format, Numbers... numbers) {
-  char text[512];
-  std::snprintf(text, sizeof text, format, numbers...);
-  return text;
-}
-
 /// Whether some component's difference is significant, above kSure sigmas.
 bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
   return sigma.minCoeff() > 0 && (difference.cwiseAbs().array() > kSure * sigma.array()).any();
+}
+
+/// As in a sensor file, precise enough to pass there for a rotation.
+std::string rowsOf(const SE3& T) {
+  const Eigen::Array44d M = (1e5 * T.matrix().array()).round() / 1e5 + 0.0;  // no minus before a zero
+  std::string rows;
+  for (int r = 0; r < 3; ++r) rows += formatted("[%.5f, %.5f, %.5f, %.5f], ", M(r, 0), M(r, 1), M(r, 2), M(r, 3));
+  return rows + "[0, 0, 0, 1]";
 }
 
 }  // namespace
@@ -33,23 +34,25 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   const Eigen::Vector3d turn = change.head<3>(), shift = change.tail<3>();
   if (turn.norm() > kMinTurn && sure(turn, found.sigma_rotation)) {
     all.push_back(
-        sentence("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration; "
-                 "the one that was found is used",
-                 turn.norm() / kDegree));
+        formatted("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration, which is "
+                  "corrected for; T_imu_cam should have the rows ",
+                  turn.norm() / kDegree) +
+        rowsOf(found.T_I_C));
   }
   if (shift.norm() > kMinShift && sure(shift, found.sigma_translation)) {
     all.push_back(
-        sentence("the camera sits %.1f mm beside where T_imu_cam of the sensor's configuration has it; "
-                 "the place that was found is used",
-                 1e3 * shift.norm()));
+        formatted("the camera sits %.1f mm beside where T_imu_cam of the sensor's configuration has it, which is "
+                  "corrected for; T_imu_cam should have the rows ",
+                  1e3 * shift.norm()) +
+        rowsOf(found.T_I_C));
   }
   const double delay = found.time_offset - given.time_offset;
   const double least_delay = std::max(kMinDelay, kSure * found.sigma_time_offset);
   if (found.sigma_time_offset > 0 && std::abs(delay) > least_delay) {
     all.push_back(
-        sentence("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration; "
-                 "the delay that was found is used",
-                 1e3 * found.time_offset, 1e3 * given.time_offset));
+        formatted("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration, which is "
+                  "corrected for; time_offset should be %.4f",
+                  1e3 * found.time_offset, 1e3 * given.time_offset, found.time_offset));
   }
   if (found.depth_contradicts) {
     all.push_back(
@@ -59,34 +62,34 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   const double depth = found.depth_offset - given.depth_offset;
   if (found.sigma_depth_offset > 0 && std::abs(depth) > std::max(kMinDepth, kSure * found.sigma_depth_offset)) {
     all.push_back(
-        sentence("depth reads %.1f mm too %s at all distances, which is corrected for; depth/offset in the sensor's "
-                 "configuration should be %.4f",
-                 1e3 * std::abs(depth), depth < 0 ? "long" : "short",
-                 1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
+        formatted("depth reads %.1f mm too %s at all distances, which is corrected for; depth/offset in the sensor's "
+                  "configuration should be %.4f",
+                  1e3 * std::abs(depth), depth < 0 ? "long" : "short",
+                  1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
   }
   const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();
   if ((beside_sigma > 0 && beside > (kSure * beside_sigma).cwiseMax(kMinDepthShift)).any()) {
     all.push_back(
-        sentence("the depth image lies beside the colour image, which is corrected for; depth/shift in the sensor's "
-                 "configuration should be [%.2f, %.2f] pixels",
-                 found.depth_shift_px.x(), found.depth_shift_px.y()));
+        formatted("the depth image lies beside the colour image, which is corrected for; depth/shift in the sensor's "
+                  "configuration should be [%.2f, %.2f] pixels",
+                  found.depth_shift_px.x(), found.depth_shift_px.y()));
   }
   const Eigen::Array4d bearing = (found.bearing.value - given.bearing.value).cwiseAbs();
   const Eigen::Array4d& bearing_sigma = found.sigma_bearing.array();
   if ((bearing_sigma > 0 && bearing > (kSure * bearing_sigma).cwiseMax(kMinBearing)).any()) {
     const Eigen::Vector4d& k = found.intrinsics;
     all.push_back(
-        sentence("focal length or principal point are off, which is corrected for; fx, fy, cx, cy in the sensor's "
-                 "configuration or camera_info should be %.1f, %.1f, %.1f, %.1f",
-                 k(0), k(1), k(2), k(3)));
+        formatted("focal length or principal point are off, which is corrected for; fx, fy, cx, cy in the sensor's "
+                  "configuration or camera_info should be %.1f, %.1f, %.1f, %.1f",
+                  k(0), k(1), k(2), k(3)));
   }
   const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
   const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();
   const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kMinGyroError)).select(gyro, 0.0);
   if (off.maxCoeff() > 0) {
     const Eigen::Matrix3d& C = found.gyro_correction;
-    all.push_back(sentence(
+    all.push_back(formatted(
         "scale or alignment of the gyro's axes is off by up to %.1f %%, which is corrected for; imu/gyro_correction "
         "in the sensor's configuration should have the rows [%.4f, %.4f, %.4f], [%.4f, %.4f, %.4f], "
         "[%.4f, %.4f, %.4f]",

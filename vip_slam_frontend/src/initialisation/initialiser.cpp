@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
 #include "vip_slam_frontend/initialisation/moving_start.h"
@@ -12,13 +12,14 @@
 namespace vip_slam {
 
 namespace {
-constexpr double kWatched = 0.5;        // share of the standing time that images have to cover
-constexpr double kMaxTurn = 0.3;        // rad/s, mean rate at rest that may be gyro bias
-constexpr double kMaxOffGravity = 1.5;  // m/s^2, deviation from gravity at rest that may be accelerometer bias
-constexpr int kFewestCommon = 5;        // features
-constexpr double kDepthMoved = 2.0;     // sigmas, and factor on the change between consecutive images
-constexpr double kBetweenTries = 0.2;   // s, between attempts of a start in motion
-constexpr double kBetweenPoses = 0.03;  // s, between the poses that a start in motion uses
+constexpr double kWatched = 0.5;            // share of the standing time that images have to cover
+constexpr double kMaxTurn = 0.3;            // rad/s, mean rate at rest that may be gyro bias
+constexpr double kMaxOffGravity = 1.5;      // m/s^2, deviation from gravity at rest that may be accelerometer bias
+constexpr int kFewestCommon = 5;            // features
+constexpr std::size_t kFewestSamples = 10;  // of the IMU in the standing time
+constexpr double kDepthMoved = 2.0;         // sigmas, and factor on the change between consecutive images
+constexpr double kBetweenTries = 0.2;       // s, between attempts of a start in motion
+constexpr double kBetweenPoses = 0.03;      // s, between the poses that a start in motion uses
 
 // Calls f(xy in a, xy in b) for the features common to both; returns their number.
 template <class F>
@@ -157,23 +158,22 @@ std::optional<FilterPrior> Initialiser::standing(const ImuBuffer& imu) {
     watches_rest_ =
         !imu.empty() &&
         imuSpread(imu.between(imu.oldest(), now), &noise_).quiet(options_.max_gyro_std, options_.max_accel_std);
-    reason_ = "gathering " + std::to_string(options_.standing_seconds).substr(0, 3) + " s of IMU";
+    reason_ = formatted("gathering %.1f s of IMU", options_.standing_seconds);
     return std::nullopt;
   }
   const std::vector<ImuSample> samples = imu.between(from, now);
   const ImuSpread spread = imuSpread(samples, &noise_);
-  if (samples.size() < 10) {
-    reason_ = "too few IMU samples";
+  if (samples.size() < kFewestSamples) {
+    reason_ =
+        formatted("%zu IMU samples in %.1f s, needs %zu", samples.size(), options_.standing_seconds, kFewestSamples);
     return std::nullopt;
   }
   const bool quiet = spread.quiet(options_.max_gyro_std, options_.max_accel_std);
   const double weight = spread.mean_accel.norm();
   weighs_wrong_ = quiet && std::abs(weight - gravity_) > kMaxOffGravity;
   if (weighs_wrong_) {
-    char words[120];
-    std::snprintf(words, sizeof words, "the accelerometer reads %.2f at rest, expected %.2f m/s^2: is its unit right?",
-                  weight, gravity_);
-    reason_ = words;
+    reason_ =
+        formatted("the accelerometer reads %.2f at rest, expected %.2f m/s^2: is its unit right?", weight, gravity_);
     return std::nullopt;
   }
   if (!quiet || spread.mean_gyro.norm() > kMaxTurn) {
@@ -244,8 +244,7 @@ bool Initialiser::chainPoses(std::vector<TimedCameraPose>* poses, std::size_t* b
       pairs = commonPoints(images_[base], images_[k]);
     }
     if (static_cast<int>(pairs.size()) < options_.min_tracks) {
-      reason_ = "start in motion needs " + std::to_string(options_.min_tracks) + " features with depth, has " +
-                std::to_string(pairs.size());
+      reason_ = formatted("start in motion needs %d features with depth, has %zu", options_.min_tracks, pairs.size());
       return false;
     }
     SE3 T_k_base = T_base_last.inverse();
@@ -275,7 +274,10 @@ std::optional<FilterPrior> Initialiser::moving(const ImuBuffer& imu) {
   }
   MovingStart start = solveMovingStart(poses, imu, T_I_C_, noise_, filter_, gravity_, gyro_correction_);
   if (!start.ok || start.gravity_error > options_.max_gravity_error) {
-    reason_ = start.ok ? "start in motion: gravity off by " + std::to_string(start.gravity_error) + " m/s^2"
+    reason_ = start.ok ? formatted(
+                             "start in motion: gravity off by %.2f m/s^2, at most %g "
+                             "(initialisation/max_gravity_error)",
+                             start.gravity_error, options_.max_gravity_error)
                        : "start in motion: " + start.reason;
     images_.pop_front();
     return std::nullopt;

@@ -8,6 +8,7 @@
 
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 
@@ -20,6 +21,7 @@ constexpr double kPositionSigma = 0.006;
 // rolling shutter of 20 ms passes in half of its attempts; with a person in front of the camera it is 7 to 100 mm and 4
 // to 100 mrad.
 constexpr double kWorstPosition = 0.008, kWorstRotation = 0.004;
+constexpr std::size_t kFewestPoses = 5;
 constexpr int kGravityRounds = 4;         // each turns gravity, of known length, in its tangent plane
 constexpr double kLargestGyroBias = 0.5;  // rad/s; no gyro that works is further off
 
@@ -157,13 +159,17 @@ MovingStart failure(const std::string& reason) {
 MovingStart solveMovingStart(const std::vector<TimedCameraPose>& poses, const ImuBuffer& imu, const SE3& T_I_C,
                              const ImuNoise& noise, const FilterOptions& options, double gravity,
                              const Eigen::Matrix3d& gyro_correction) {
-  if (poses.size() < 5) return failure("fewer than five camera poses");
+  if (poses.size() < kFewestPoses) return failure(formatted("%zu camera poses, needs %zu", poses.size(), kFewestPoses));
   Motion motion;
   const SE3 T_C_I = T_I_C.inverse();
   for (const TimedCameraPose& pose : poses) motion.T_0_k.push_back(T_I_C * pose.T_first_C * T_C_I);
   if (!integrate(poses, imu, noise, gyro_correction, &motion)) return failure("the IMU does not cover the images");
-  if (motion.bias_gyro.norm() > kLargestGyroBias || rmsRotation(motion) > kWorstRotation)
-    return failure("gyro and camera rotations disagree; does something move before the camera?");
+  const double bias = motion.bias_gyro.norm(), rms_rotation = rmsRotation(motion);
+  if (bias > kLargestGyroBias || rms_rotation > kWorstRotation)
+    return failure(
+        formatted("gyro and camera rotations disagree by %.1f mrad after a gyro bias of %.2f rad/s, at most "
+                  "%g and %g; does something move before the camera?",
+                  1e3 * rms_rotation, bias, 1e3 * kWorstRotation, kLargestGyroBias));
 
   // First with gravity free, then with its length known.
   std::optional<LinearStart> start = solveLinear(motion, options.sigma_bias_accel, nullptr);
@@ -177,7 +183,10 @@ MovingStart solveMovingStart(const std::vector<TimedCameraPose>& poses, const Im
   start->g *= gravity / start->g.norm();
   result.rms_position = rmsPosition(motion, *start);
   if (result.rms_position > kWorstPosition) {
-    result.reason = "camera and IMU motions disagree; does something move before the camera?";
+    result.reason = formatted(
+        "camera and IMU motions disagree by %.1f mm, at most %g; does something move before the "
+        "camera?",
+        1e3 * result.rms_position, 1e3 * kWorstPosition);
     return result;
   }
   result.prior = priorOf(motion, *start, poses.back().t_imu, result.rms_position, options, gravity);

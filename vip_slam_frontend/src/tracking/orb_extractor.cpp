@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "vip_slam_core/geometry/angle.h"
+
 namespace vip_slam {
 
 namespace {
@@ -27,7 +29,7 @@ float orientation(const cv::Mat& gray, float x, float y) {
       my += dy * row[u];
     }
   }
-  float degrees = static_cast<float>(std::atan2(static_cast<double>(my), static_cast<double>(mx)) * 180.0 / CV_PI);
+  float degrees = static_cast<float>(std::atan2(static_cast<double>(my), static_cast<double>(mx)) / kDegree);
   return degrees < 0 ? degrees + 360.0f : degrees;
 }
 
@@ -56,7 +58,7 @@ void OrbExtractor::describe(const cv::Mat& gray, std::vector<Feature>* features)
   describer_->compute(gray, keypoints, descriptors);
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     Feature& f = (*features)[keypoints[i].class_id];
-    f.angle = static_cast<float>(keypoints[i].angle * CV_PI / 180.0);
+    f.angle = static_cast<float>(keypoints[i].angle * kDegree);
     f.octave = 0;
     store(descriptors.row(static_cast<int>(i)), &f);
   }
@@ -94,7 +96,7 @@ std::vector<Feature> OrbExtractor::extract(const cv::Mat& gray, const std::vecto
   for (std::size_t i = 0; i < kept.size(); ++i) {
     Feature f;
     f.pixel = Eigen::Vector2f(kept[i].pt.x, kept[i].pt.y);
-    f.angle = static_cast<float>(kept[i].angle * CV_PI / 180.0);
+    f.angle = static_cast<float>(kept[i].angle * kDegree);
     f.octave = static_cast<std::uint8_t>(kept[i].octave);
     store(descriptors.row(static_cast<int>(i)), &f);
     result.push_back(f);

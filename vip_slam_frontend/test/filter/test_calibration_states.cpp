@@ -411,6 +411,12 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   EXPECT_NE(all[0].find("0.57 degrees"), std::string::npos) << all[0];
   EXPECT_NE(all[1].find("20.0 mm"), std::string::npos) << all[1];
   EXPECT_NE(all[2].find("4.0 ms"), std::string::npos) << all[2];
+  const std::string rows =
+      "T_imu_cam should have the rows [0.99995, 0.00000, 0.01000, 0.02000], [0.00000, 1.00000, 0.00000, 0.00000], "
+      "[-0.01000, 0.00000, 0.99995, 0.00000], [0, 0, 0, 1]";
+  EXPECT_NE(all[0].find(rows), std::string::npos) << all[0];
+  EXPECT_NE(all[1].find(rows), std::string::npos) << all[1];
+  EXPECT_NE(all[2].find("time_offset should be 0.0040"), std::string::npos) << all[2];
   EXPECT_NE(all[3].find("9.8 mm too long"), std::string::npos) << all[3];
   EXPECT_NE(all[3].find("depth/offset in the sensor's configuration should be -0.0098"), std::string::npos) << all[3];
   given.depth_offset = -0.005;  // applied already: 7 mm remain
