@@ -97,13 +97,18 @@ void BackEndNodelet::subscribe() {
   subscribers_.push_back(
       nh.subscribe<vip_slam_msgs::Keyframe>("keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
         if (!owner_->post(keyframe_lane_, [this, m] { addKeyframe(*m); })) {
-          NODELET_WARN_THROTTLE(5, "the back end is too slow: a keyframe was dropped");
+          NODELET_WARN_THROTTLE(5,
+                                "the back end is too slow: the oldest of %d waiting keyframes was dropped "
+                                "(keyframe_queue)",
+                                options_.keyframe_queue);
         }
       }));
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::PlaneUpdate>(
       "plane_update", kMaxPlaneUpdates, [this](const vip_slam_msgs::PlaneUpdateConstPtr& m) {
         if (!owner_->post(update_lane_, [this, m] { applyPlaneUpdate(*m); })) {
-          NODELET_WARN_THROTTLE(5, "the back end is too slow: an update of the planes was dropped");
+          NODELET_WARN_THROTTLE(5,
+                                "the back end is too slow: the oldest of %d waiting updates of the planes was dropped",
+                                kMaxPlaneUpdates);
         }
       }));
   subscribers_.push_back(getMTNodeHandle().subscribe<vip_slam_msgs::TrackedFrame>(
@@ -130,8 +135,7 @@ void BackEndNodelet::onReconfigure(vip_slam_backend::BackEndConfig& config) {
 
 void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
   barrier_.see(frame.header.stamp.toSec(), frame.epoch);
-  const auto state = TrackingState(frame.status.state);
-  if (state != TrackingState::kTracking && state != TrackingState::kDegraded) return;
+  if (!hasPose(TrackingState(frame.status.state))) return;
   const double t = frame.header.stamp.toSec();
   const SE3 T_odom_I = fromMsg(frame.state.pose);
   const std::optional<SE3> T_map_odom = pose_.add({t, frame.epoch, fromMsg(frame.chain_camera)});

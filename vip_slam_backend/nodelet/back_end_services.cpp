@@ -12,6 +12,7 @@
 #include <vip_slam_msgs/TriggerGlobalBa.h>
 
 #include "back_end_nodelet.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/plane_conversions.h"
 
 namespace vip_slam {
@@ -37,7 +38,7 @@ bool BackEndNodelet::askOwner(const std::function<std::string()>& work, std::str
     auto words = std::make_shared<std::string>();
     success = owner_->call(
         control_lane_, [words, work] { *words = work(); }, kPatience);
-    *message = success ? *words : "the back end was busy for too long; nothing was done";
+    *message = success ? *words : formatted("the back end was not free within %g s; nothing was done", kPatience);
   } catch (const std::exception& error) {
     *message = error.what();
   }

@@ -66,16 +66,27 @@ void PlanesNodelet::onInit() {
       [this](const vip_slam_msgs::CalibrationConstPtr& m) { owner_->post(control_lane_, [this, m] { start(*m); }); }));
   subscribers_.push_back(
       nh.subscribe<vip_slam_msgs::Keyframe>("keyframe", 50, [this](const vip_slam_msgs::KeyframeConstPtr& m) {
-        owner_->post(keyframe_lane_, [this, m] {
+        const bool kept = owner_->post(keyframe_lane_, [this, m] {
           if (mapper_) mapper_->addKeyframe(std::make_shared<const Keyframe>(fromMsg(*m)));
         });
+        if (!kept) {
+          NODELET_WARN_THROTTLE(5,
+                                "the planes are too slow: the oldest of %d waiting keyframes was dropped "
+                                "(keyframe_queue)",
+                                options_.keyframe_queue);
+        }
       }));
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::TrackedFrame>(
       "tracked_frame", 20,
       [this](const vip_slam_msgs::TrackedFrameConstPtr& m) { owner_->post(frame_lane_, [this, m] { grow(*m); }); }));
   subscribers_.push_back(
       nh.subscribe<vip_slam_msgs::MapUpdate>("map_update", 50, [this](const vip_slam_msgs::MapUpdateConstPtr& m) {
-        owner_->post(update_lane_, [this, m] { applyMapUpdate(*m); });
+        if (!owner_->post(update_lane_, [this, m] { applyMapUpdate(*m); })) {
+          NODELET_WARN_THROTTLE(5,
+                                "the planes are too slow: the oldest of %d waiting map updates was dropped "
+                                "(keyframe_queue)",
+                                options_.keyframe_queue);
+        }
       }));
   subscribers_.push_back(
       nh.subscribe<vip_slam_msgs::Control>("control", 20, [this](const vip_slam_msgs::ControlConstPtr& m) {
