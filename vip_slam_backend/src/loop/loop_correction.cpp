@@ -1,7 +1,6 @@
 // Correction of the map by an accepted place: plane check, pose-plane graph with its chi-square test, landmark fusion.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <set>
 
@@ -9,6 +8,7 @@
 #include "vip_slam_backend/loop/loop_closer.h"
 #include "vip_slam_backend/loop/loop_fusion.h"
 #include "vip_slam_backend/loop/scene_agreement.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -45,15 +45,13 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
   if (!place.accepted) return event;
   // Rotates about the keyframe, not about the map's origin: far from there any tilt would shift the planes.
   const SE3 correction = alignLevelled(place.T_W_I, kf.state.T_W_I);
-  char text[160];
 
   // Planes of the two ends must coincide or be distinct, but not be shifted copies. The newest keyframe's planes arrive
   // later, so use those of the keyframes before it.
   const PlaneAgreement planes =
       comparePlanes(map, withNeighbours(map, query, 5), around(map, place.match, 4), correction);
   if (planes.contradictions > static_cast<int>(planes.same.size())) {
-    std::snprintf(text, sizeof text, "%d planes contradict, %zu agree", planes.contradictions, planes.same.size());
-    event.reason = text;
+    event.reason = formatted("%d planes contradict, %zu agree", planes.contradictions, planes.same.size());
     return event;
   }
 
@@ -86,9 +84,8 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
                        loopSqrtInformation(place.information, T_W_match, place.T_W_I, kf.T_I_C, options_.graph)});
   const PosePlaneSolution solution = graph.solve(options_.graph.max_iterations);
   if (!solution.usable || solution.chi2 > options_.graph.max_chi2) {
-    std::snprintf(text, sizeof text, "closing it costs the graph chi2 %.1f, at most %.1f (moves %.3f m)", solution.chi2,
-                  options_.graph.max_chi2, correction.t().norm());
-    event.reason = text;
+    event.reason = formatted("closing it costs the graph chi2 %.1f, at most %.1f (moves %.3f m)", solution.chi2,
+                             options_.graph.max_chi2, correction.t().norm());
     return event;
   }
   map.moveKeyframes(solution.T_W_I);
@@ -104,9 +101,7 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
   map.keyframe(query).loop_keyframe = map.keyframe(place.match).loop_keyframe = true;
   loops_.emplace_back(query, place.match);
   recent_places_.clear();
-  std::snprintf(text, sizeof text, "%s, chi2 %.1f, %zu planes agree", place.reason.c_str(), solution.chi2,
-                planes.same.size());
-  event.reason = text;
+  event.reason = formatted("%s, chi2 %.1f, %zu planes agree", place.reason.c_str(), solution.chi2, planes.same.size());
   fuse(map, query, place);
   event.accepted = true;
   return event;

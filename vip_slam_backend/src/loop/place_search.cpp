@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <Eigen/LU>
 
 #include "vip_slam_backend/loop/guided_matching.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -22,13 +22,6 @@ bool sameView(const SE3& T_W_C_a, const SE3& T_W_C_b) {
 // Whether two poses are the same place, within the differences of two matches of it.
 bool samePlace(const SE3& a, const SE3& b) {
   return (a.t() - b.t()).norm() < 0.3 && a.rotation().angularDistance(b.rotation()) < 0.2;
-}
-
-template <class... Values>
-std::string words(const char* format, Values... values) {
-  char text[200];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
 }
 
 }  // namespace
@@ -184,24 +177,25 @@ PlaceVerification PlaceSearch::judge(const Scene& scene) const {
     for (const Feature& f : keyframe->frame.features) features += f.depth > 0;
   const double sigma = std::sqrt(Matrix6d(best.information.inverse()).bottomRightCorner<3, 3>().diagonal().maxCoeff());
   const double evidence = best.evidence(), covered = features ? static_cast<double>(best.covered) / features : 0;
-  result.reason = words("%d points, %d of %d landmarks and %.2f of the image in sight of the map, depth agreement %.2f",
-                        best.points, best.refound, best.established, best.explainedCells(), result.depth_agreement);
+  result.reason =
+      formatted("%d points, %d of %d landmarks and %.2f of the image in sight of the map, depth agreement %.2f",
+                best.points, best.refound, best.established, best.explainedCells(), result.depth_agreement);
   if (best.match == 0) {
     result.reason += "; the map has no view along the newest keyframe";
   } else if (best.points < options_.min_points) {
-    result.reason += words("; needs %d points", options_.min_points);
+    result.reason += formatted("; needs %d points", options_.min_points);
   } else if (evidence < options_.min_evidence) {
-    result.reason += words("; evidence %.0f, needs %.0f", evidence, options_.min_evidence);
+    result.reason += formatted("; evidence %.0f, needs %.0f", evidence, options_.min_evidence);
   } else if (covered < options_.min_covered) {
-    result.reason += words("; the map covers %.2f of the features, needs %.2f", covered, options_.min_covered);
+    result.reason += formatted("; the map covers %.2f of the features, needs %.2f", covered, options_.min_covered);
   } else if (!(sigma <= limits.max_sigma_position)) {
-    result.reason += words("; position is known to %.3f m only", sigma);
+    result.reason += formatted("; position is known to %.3f m only", sigma);
   } else if (best.depth.compared >= 100 && best.depth.agreement() < limits.min_depth_agreement) {
-    result.reason += words("; needs %.2f agreement", limits.min_depth_agreement);
+    result.reason += formatted("; needs %.2f agreement", limits.min_depth_agreement);
   } else if (best.depth.compared >= 100 && best.depth.seeThrough() > limits.max_see_through) {
-    result.reason += words("; %.2f of the surfaces are seen through", best.depth.seeThrough());
+    result.reason += formatted("; %.2f of the surfaces are seen through", best.depth.seeThrough());
   } else if (guesses_.size() > 1 && guesses_[1].support.evidence() > options_.ambiguity * evidence) {
-    result.reason += words("; evidence %.0f, for another place %.0f", evidence, guesses_[1].support.evidence());
+    result.reason += formatted("; evidence %.0f, for another place %.0f", evidence, guesses_[1].support.evidence());
   } else {
     result.accepted = true;
   }
@@ -215,12 +209,13 @@ std::vector<std::string> PlaceSearch::doubts() const {
   // that is really seen may have the same shape and not be in the map.
   int alike = 0;
   for (std::size_t g = 1; g < guesses_.size(); ++g) alike = std::max(alike, guesses_[g].support.points);
-  if (alike > options_.resemblance * best.points) doubts.push_back(words("another place has %d of such points", alike));
+  if (alike > options_.resemblance * best.points)
+    doubts.push_back(formatted("another place has %d of such points", alike));
   if (best.points < options_.sure_points || best.evidence() < options_.sure_evidence)
-    doubts.push_back(words("evidence %.0f of %d points is not sure", best.evidence(), best.points));
+    doubts.push_back(formatted("evidence %.0f of %d points is not sure", best.evidence(), best.points));
   // On a bare wall that resembles another one points fit by chance, but the established landmarks are missing there.
   if (best.refound == 0 && best.established >= kFewLandmarks)
-    doubts.push_back(words("none of %d landmarks that should be in sight is", best.established));
+    doubts.push_back(formatted("none of %d landmarks that should be in sight is", best.established));
   return doubts;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include <Eigen/LU>
@@ -11,15 +10,10 @@
 #include "vip_slam_backend/loop/place_matching.h"
 #include "vip_slam_backend/loop/scene_agreement.h"
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
-
-std::string words(const char* format, double a, double b) {
-  char text[128];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
 
 std::vector<KeyframeId> neighbourhood(const Map& map, KeyframeId match, int most,
                                       const std::function<bool(KeyframeId)>& allowed) {
@@ -59,11 +53,11 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
     result->inliers = static_cast<int>(pose.inliers.size());
     if (result->inliers < options_.min_ransac_inliers) {
       result->reason =
-          words("%.0f inliers of guided matching, needs %.0f", result->inliers, options_.min_ransac_inliers);
+          formatted("%d inliers of guided matching, needs %d", result->inliers, options_.min_ransac_inliers);
       return;
     }
     if (!pose.found) {
-      result->reason = words("%.0f of %.0f matches do not fix a pose", result->inliers, guided.matches.size());
+      result->reason = formatted("%d of %zu matches do not fix a pose", result->inliers, guided.matches.size());
       return;
     }
     T_W_C = pose.T_W_B;
@@ -73,14 +67,14 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
   for (const std::uint32_t k : pose.inliers)
     if (guided.source[k].second != kNoLandmark) result->landmarks.push_back(guided.source[k]);
   if (result->inliers < options_.min_inliers) {
-    result->reason = words("%.0f inliers after guided matching, needs %.0f", result->inliers, options_.min_inliers);
+    result->reason = formatted("%d inliers after guided matching, needs %d", result->inliers, options_.min_inliers);
     return;
   }
   // Position along the weakest direction, marginal over the angles.
   const Matrix6d covariance = result->information.inverse();
   const double sigma = std::sqrt(covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
   if (!(sigma <= options_.max_sigma_position)) {
-    result->reason = words("position is known to %.3f m only, needs %.3f", sigma, options_.max_sigma_position);
+    result->reason = formatted("position is known to %.3f m only, needs %.3f", sigma, options_.max_sigma_position);
     return;
   }
   const double tilt = std::acos(std::clamp((result->T_W_I.rotation().conjugate() * Eigen::Vector3d::UnitZ())
@@ -88,7 +82,7 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
                                            -1.0, 1.0)) /
                       kDegree;
   if (tilt > options_.max_gravity_deg) {
-    result->reason = words("pose is tilted %.1f deg against gravity, at most %.1f", tilt, options_.max_gravity_deg);
+    result->reason = formatted("pose is tilted %.1f deg against gravity, at most %.1f", tilt, options_.max_gravity_deg);
     return;
   }
   const MapKeyframe& match = map.keyframe(result->match);
@@ -98,17 +92,17 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
     result->depth_agreement = depth.agreement();
     if (depth.agreement() < options_.min_depth_agreement) {
       result->reason =
-          words("%.2f of the common depth agrees, needs %.2f", depth.agreement(), options_.min_depth_agreement);
+          formatted("%.2f of the common depth agrees, needs %.2f", depth.agreement(), options_.min_depth_agreement);
       return;
     }
     if (depth.seeThrough() > options_.max_see_through) {
-      result->reason =
-          words("%.2f of the surfaces are seen through, at most %.2f", depth.seeThrough(), options_.max_see_through);
+      result->reason = formatted("%.2f of the surfaces are seen through, at most %.2f", depth.seeThrough(),
+                                 options_.max_see_through);
       return;
     }
   }
   result->accepted = true;
-  result->reason = words("%.0f inliers, depth agreement %.2f", result->inliers, result->depth_agreement);
+  result->reason = formatted("%d inliers, depth agreement %.2f", result->inliers, result->depth_agreement);
 }
 
 // In poor texture few corners are detected again, so use the neighbouring keyframes' corners as well.
@@ -144,7 +138,7 @@ PlaceVerification PlaceVerifier::verify(const Map& map, const Keyframe& query, c
   result.match = match;
   const std::vector<PlaceMatch> matches = this->match(map, query, query_bow, match, database, allowed);
   if (static_cast<int>(matches.size()) < options_.min_matches) {
-    result.reason = words("%.0f descriptor matches, needs %.0f", matches.size(), options_.min_matches);
+    result.reason = formatted("%zu descriptor matches, needs %d", matches.size(), options_.min_matches);
     return result;
   }
   PlacePoseOptions pose_options = pose_options_;
@@ -153,7 +147,7 @@ PlaceVerification PlaceVerifier::verify(const Map& map, const Keyframe& query, c
       ransacPlacePose(matches, singleCamera(), T_G_I.rotation() * query.frame.T_I_C.rotation(), pose_options);
   result.inliers = static_cast<int>(pose.inliers.size());
   if (result.inliers < options_.min_ransac_inliers) {
-    result.reason = words("%.0f inliers of RANSAC, needs %.0f", result.inliers, options_.min_ransac_inliers);
+    result.reason = formatted("%d inliers of RANSAC, needs %d", result.inliers, options_.min_ransac_inliers);
     return result;
   }
   finish(map, query, T_G_I, pose.T_W_B, neighbourhood(map, match, options_.guided_keyframes, allowed), &result);

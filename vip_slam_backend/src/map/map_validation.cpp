@@ -6,6 +6,7 @@
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map/map_limits.h"
 #include "vip_slam_core/types/camera_correction.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 
@@ -28,13 +29,18 @@ bool isImuNoiseScale(double scale) { return scale > 0 && scale <= map_limits::kM
 std::string validateImu(const std::vector<ImuSample>& imu) {
   for (std::size_t k = 0; k < imu.size(); ++k) {
     const ImuSample& s = imu[k];
-    const auto bad = [k](const char* what) { return "IMU sample " + std::to_string(k) + what; };
-    if (!std::isfinite(s.t) || !s.gyro.allFinite() || !s.accel.allFinite()) return bad(" is not finite");
-    if (k > 0 && !(s.t > imu[k - 1].t)) return bad(" is not after the one before");
-    if (s.gyro.norm() > map_limits::kMaxRate || s.accel.norm() > map_limits::kMaxAcceleration)
-      return bad(" is out of any sensor's range");
+    if (!std::isfinite(s.t) || !s.gyro.allFinite() || !s.accel.allFinite())
+      return formatted("IMU sample %zu is not finite", k);
+    if (k > 0 && !(s.t > imu[k - 1].t))
+      return formatted("IMU sample %zu at %.6f s is not after the one before, at %.6f s", k, s.t, imu[k - 1].t);
+    if (s.gyro.norm() > map_limits::kMaxRate)
+      return formatted("IMU sample %zu turns by %g rad/s, at most %g", k, s.gyro.norm(), map_limits::kMaxRate);
+    if (s.accel.norm() > map_limits::kMaxAcceleration)
+      return formatted("IMU sample %zu reads %g m/s^2, at most %g", k, s.accel.norm(), map_limits::kMaxAcceleration);
   }
-  if (!imu.empty() && imu.back().t - imu.front().t > map_limits::kLongestImu) return "its IMU samples span hours";
+  const double span = imu.empty() ? 0.0 : imu.back().t - imu.front().t;
+  if (span > map_limits::kLongestImu)
+    return formatted("IMU samples span %.0f s, at most %.0f", span, map_limits::kLongestImu);
   return "";
 }
 
@@ -77,17 +83,18 @@ std::string validateKeyframe(const Keyframe& keyframe) {
         !std::isfinite(f.pixel_sigma) || !std::isfinite(f.angle))
       return name + "feature " + std::to_string(k) + " is not finite";
     if (f.depth < 0 || (f.depth > 0 && !(f.depth_sigma > 0)))
-      return name + "feature " + std::to_string(k) + " has depth " + std::to_string(f.depth) + " with sigma " +
-             std::to_string(f.depth_sigma);
+      return name + formatted("feature %zu has depth %g with sigma %g", k, f.depth, f.depth_sigma);
   }
   if (const std::string imu = validateImu(keyframe.imu); !imu.empty()) return name + imu;
   // The newest keyframe's camera correction is applied to all keyframes.
   const std::string camera = validateCameraCorrection(keyframe.frame.camera_correction);
   if (!camera.empty()) return name + "the camera's correction: " + camera;
   if (!isGyroCorrection(keyframe.gyro_correction))
-    return name + "the gyro's correction is not finite, or beyond what a gyro can be off by";
+    return name +
+           formatted("the gyro's correction is not finite, or has entries above %g", map_limits::kMaxGyroCorrection);
   if (!isImuNoiseScale(keyframe.imu_noise_scale))
-    return name + "the scale of the IMU's noise is " + std::to_string(keyframe.imu_noise_scale);
+    return name + formatted("the scale of the IMU's noise is %g, expected more than 0, at most %g",
+                            keyframe.imu_noise_scale, map_limits::kMaxNoiseScale);
   if (keyframe.motion.known() && !keyframe.motion.isUsable())
     return name + "the odometry's motion is not finite, or its covariance is none";
   return "";

@@ -1,10 +1,11 @@
 // Checks that a stored map fits the present camera.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 
 #include "vip_slam_backend/map_io/map_file.h"
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -17,10 +18,8 @@ bool differ(double a, double b) { return std::abs(a - b) > kMaxFocal * std::max(
 bool isFisheye(const CameraIntrinsics& camera) { return camera.model == DistortionModel::kEquidistant; }
 
 std::string describe(const CameraIntrinsics& camera) {
-  char text[160];
-  std::snprintf(text, sizeof text, "%d x %d pixels, fx %.1f, fy %.1f, cx %.1f, cy %.1f%s", camera.width, camera.height,
-                camera.fx, camera.fy, camera.cx, camera.cy, isFisheye(camera) ? ", fisheye" : "");
-  return text;
+  return formatted("%d x %d pixels, fx %.1f, fy %.1f, cx %.1f, cy %.1f%s", camera.width, camera.height, camera.fx,
+                   camera.fy, camera.cx, camera.cy, isFisheye(camera) ? ", fisheye" : "");
 }
 
 }  // namespace
@@ -34,7 +33,10 @@ void requireCamera(const StoredMap& stored, const CameraIntrinsics& camera, cons
       !differ(made.fy, camera.fy) && centre <= kMaxCentre * camera.width && isFisheye(made) == isFisheye(camera))
     return;
   throw std::runtime_error(path + ": made with images of " + describe(made) + ", but the camera now has " +
-                           describe(camera) + "; expected the same");
+                           describe(camera) +
+                           formatted("; expected the same size and lens, focal lengths within %g %% and the centre "
+                                     "within %g %% of the width",
+                                     100 * kMaxFocal, 100 * kMaxCentre));
 }
 
 }  // namespace vip_slam

@@ -1,5 +1,6 @@
 // The text vocabulary format of ORB-SLAM: a header "k L scoring weighting" and one line per node,
 // "parent is_leaf d0 ... d31 weight", nodes numbered from 1 in file order, node 0 being the root.
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -35,7 +36,7 @@ class TextReader {
     long value = 0;
     const auto r = std::from_chars(at_, end_, value);
     if (r.ec != std::errc() || value < min || value > max)
-      fail(std::string("bad ") + name + ", expected a number from " + std::to_string(min) + " to " +
+      fail(std::string("bad ") + name + word() + ", expected a number from " + std::to_string(min) + " to " +
            std::to_string(max));
     at_ = r.ptr;
     return value;
@@ -47,12 +48,19 @@ class TextReader {
     const std::string token(at_, room);
     char* stop = nullptr;
     const double value = std::strtod(token.c_str(), &stop);
-    if (stop == token.c_str() || !std::isfinite(value)) fail(std::string("bad ") + name + ", expected a number");
+    if (stop == token.c_str() || !std::isfinite(value))
+      fail(std::string("bad ") + name + word() + ", expected a number");
     at_ += stop - token.c_str();
     return static_cast<float>(value);
   }
 
  private:
+  /// What stands here, in quotes, to follow a name.
+  std::string word() const {
+    constexpr std::ptrdiff_t kMost = 20;
+    const char* stop = std::find_if(at_, std::min(end_, at_ + std::min(kMost, end_ - at_)), isSpace);
+    return " '" + std::string(at_, stop) + "'";
+  }
   static bool isSpace(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
   void step() {
     if (*at_ == '\n') ++line_;
@@ -76,7 +84,8 @@ Vocabulary parseTextVocabulary(const std::string& text, const std::string& sourc
   Vocabulary::Tree tree;
   tree.branching = static_cast<std::uint32_t>(in.integer("branching factor", 2, 255));
   tree.levels = static_cast<std::uint32_t>(in.integer("number of levels", 1, 20));
-  if (in.integer("scoring type", 0, 5) != 0) in.fail("scoring type is not 0, expected L1 scoring");
+  const long scoring = in.integer("scoring type", 0, 5);
+  if (scoring != 0) in.fail("scoring type is " + std::to_string(scoring) + ", expected 0 (L1)");
   in.integer("weighting type", 0, 3);
 
   std::vector<TextNode> nodes(1);

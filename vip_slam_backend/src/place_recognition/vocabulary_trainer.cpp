@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "vip_slam_backend/map/map.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -93,11 +94,13 @@ Clusters kMedians(const std::vector<Descriptor>& all, const Indices& members, co
 Vocabulary trainVocabulary(const std::vector<std::vector<Descriptor>>& images, const VocabularyTrainerOptions& options,
                            const std::function<void(double)>& progress) {
   if (options.branching < 2 || options.branching > 255 || options.levels < 1 || options.levels > 10)
-    throw std::invalid_argument("vocabulary: branching must be 2..255 and levels 1..10");
+    throw std::invalid_argument(formatted("vocabulary: branching is %d and levels %d, expected 2 to 255 and 1 to 10",
+                                          options.branching, options.levels));
   std::vector<Descriptor> all;
   for (const auto& image : images) all.insert(all.end(), image.begin(), image.end());
   if (all.size() < static_cast<std::size_t>(options.branching))
-    throw std::invalid_argument("vocabulary: " + std::to_string(all.size()) + " descriptors are too few to train on");
+    throw std::invalid_argument(formatted("vocabulary: %zu descriptors are too few to train on, expected at least %d",
+                                          all.size(), options.branching));
 
   struct Open {
     Indices members;
