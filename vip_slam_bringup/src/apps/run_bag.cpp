@@ -2,9 +2,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <stdexcept>
 
@@ -14,6 +16,7 @@
 #include "vip_slam_bringup/runner/pipeline.h"
 #include "vip_slam_bringup/runner/run_output.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_ros/sensor_files.h"
@@ -82,9 +85,12 @@ void makeReport(const std::string& folder) {
     _exit(127);
   }
   int status = 0;
-  if (child < 0 || waitpid(child, &status, 0) < 0 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    std::fprintf(stderr, "run_bag: no report: %s failed\n", script.c_str());
-  }
+  const bool ended = child > 0 && waitpid(child, &status, 0) == child;
+  if (ended && WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  const std::string why = !ended              ? std::string("could not be run: ") + std::strerror(errno)
+                          : WIFEXITED(status) ? "ended with status " + std::to_string(WEXITSTATUS(status))
+                                              : "ended by signal " + std::to_string(WTERMSIG(status));
+  std::fprintf(stderr, "run_bag: no report: %s %s\n", script.c_str(), why.c_str());
 }
 
 int run(const Arguments& arguments) {
@@ -126,13 +132,9 @@ int run(const Arguments& arguments) {
   facts.processing_time = seconds;
   vip_slam::writeRun(arguments.out, facts, pipeline, reader, timing);
   if (!arguments.no_report) makeReport(arguments.out);
-  char note[160];
-  std::snprintf(note, sizeof note, "%zu images in %.1f s%s, results in %s", pipeline.images(), seconds,
-                g_interrupted      ? " (interrupted)"
-                : reader.damaged() ? " (the bag is damaged)"
-                                   : "",
-                arguments.out.c_str());
-  progress.finish(note);
+  const char* const cut = g_interrupted ? " (interrupted)" : reader.damaged() ? " (the bag is damaged)" : "";
+  progress.finish(vip_slam::formatted("%zu images in %.1f s%s, results in %s", pipeline.images(), seconds, cut,
+                                      arguments.out.c_str()));
   const auto warnings = vip_slam::runWarnings(pipeline, reader);
   for (std::size_t i = 0; i < std::min<std::size_t>(warnings.size(), 8); ++i)
     std::fprintf(stderr, "run_bag: warning: %s\n", warnings[i].c_str());

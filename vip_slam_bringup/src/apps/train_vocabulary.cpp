@@ -15,6 +15,7 @@
 #include "vip_slam_backend/place_recognition/vocabulary_io.h"
 #include "vip_slam_backend/place_recognition/vocabulary_trainer.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_frontend/tracking/corner_detector.h"
@@ -56,6 +57,17 @@ bool isDepth(const sensor_msgs::Image& image) {
   return image.encoding == "16UC1" || image.encoding == "32FC1" || image.encoding == "mono16";
 }
 
+/// The message's image in grey; empty when it is none, or depth.
+cv::Mat colourOf(const rosbag::MessageInstance& message) {
+  if (const auto image = message.instantiate<sensor_msgs::Image>())
+    return isDepth(*image) ? cv::Mat() : vip_slam::decodeGray(*image);
+  const auto compressed = message.instantiate<sensor_msgs::CompressedImage>();
+  if (!compressed || compressed->format.find("16UC1") != std::string::npos ||
+      compressed->format.find("Depth") != std::string::npos)
+    return {};
+  return vip_slam::decodeGray(*compressed);
+}
+
 /// Uses the images of the colour topics that are at least `every` seconds after the one used before.
 void describeBag(const std::string& path, double every, const Describer& describe, Images* images) {
   rosbag::Bag bag;
@@ -66,12 +78,11 @@ void describeBag(const std::string& path, double every, const Describer& describ
     const auto before = last.find(message.getTopic());
     if (before != last.end() && t - before->second < every) continue;
     cv::Mat gray;
-    if (const auto image = message.instantiate<sensor_msgs::Image>()) {
-      if (!isDepth(*image)) gray = vip_slam::decodeGray(*image);
-    } else if (const auto compressed = message.instantiate<sensor_msgs::CompressedImage>()) {
-      if (compressed->format.find("16UC1") == std::string::npos &&
-          compressed->format.find("Depth") == std::string::npos)
-        gray = vip_slam::decodeGray(*compressed);
+    try {
+      gray = colourOf(message);
+    } catch (const std::invalid_argument& error) {
+      throw std::runtime_error(path + ": topic " + message.getTopic() + vip_slam::formatted(" at %.3f s: ", t) +
+                               error.what());
     }
     if (gray.empty()) continue;
     last[message.getTopic()] = t;

@@ -11,6 +11,8 @@
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_core/geometry/rigid_check.h"
+#include "vip_slam_core/util/size_text.h"
 
 namespace fs = std::filesystem;
 
@@ -38,13 +40,16 @@ YAML::Node loadYaml(const std::string& path) {
 
 std::vector<double> numbers(const YAML::Node& node, const std::string& path, const std::string& key,
                             std::size_t count) {
+  const std::string where = path + ": " + key + ": ", expected = ", expected " + std::to_string(count) + " numbers";
+  if (!node) throw std::runtime_error(where + "missing" + expected);
+  std::vector<double> values;
   try {
-    const auto values = node.as<std::vector<double>>();
-    if (values.size() == count) return values;
+    values = node.as<std::vector<double>>();
   } catch (const YAML::Exception&) {
-    // Falls through to the message below.
+    throw std::runtime_error(where + "not a list of numbers" + expected);
   }
-  throw std::runtime_error(path + ": " + key + ": expected " + std::to_string(count) + " numbers");
+  if (values.size() != count) throw std::runtime_error(where + std::to_string(values.size()) + " numbers" + expected);
+  return values;
 }
 
 void readCamera(const std::string& path, CameraIntrinsics* camera, SE3* T_imu_cam) {
@@ -59,10 +64,16 @@ void readCamera(const std::string& path, CameraIntrinsics* camera, SE3* T_imu_ca
   camera->cx = k[2];
   camera->cy = k[3];
   const std::string model = node["distortion_model"].as<std::string>("radial-tangential");
+  if (model != "radial-tangential" && model != "equidistant")
+    throw std::runtime_error(path + ": distortion_model: '" + model + "', expected radial-tangential or equidistant");
   camera->model = model == "equidistant" ? DistortionModel::kEquidistant : DistortionModel::kRadTan;
   camera->distortion = numbers(node["distortion_coefficients"], path, "distortion_coefficients", 4);
-  const auto T = numbers(node["T_BS"]["data"], path, "T_BS/data", 16);
-  *T_imu_cam = SE3(Eigen::Matrix4d(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(T.data())));
+  const YAML::Node pose = node["T_BS"];
+  const auto entries = numbers(pose ? pose["data"] : pose, path, "T_BS/data", 16);
+  const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(entries.data());
+  const std::string problem = rigidProblem(T);
+  if (!problem.empty()) throw std::runtime_error(path + ": T_BS/data: not a rigid transform: " + problem);
+  *T_imu_cam = SE3(T);
   const std::string wrong = camera->validate();
   if (!wrong.empty()) throw std::runtime_error(path + ": " + wrong);
 }
@@ -72,8 +83,7 @@ std::vector<StampedFile> readImages(const std::string& camera_folder) {
   std::vector<StampedFile> images;
   for (const TextRow& row : table.rows()) {
     StampedFile image{rosTime(table.nanoseconds(row, 0)), camera_folder + "/data/" + row.cells[1]};
-    if (!images.empty() && image.stamp <= images.back().stamp)
-      table.fail(row, "the stamp does not follow the one before");
+    if (!images.empty()) table.ascending(row, images.back().stamp, image.stamp);
     if (!fs::exists(image.path)) table.fail(row, "image " + image.path + " is not there");
     images.push_back(std::move(image));
   }
@@ -87,8 +97,7 @@ std::vector<sensor_msgs::Imu> readImu(const std::string& path) {
     sensor_msgs::Imu sample;
     sample.header.frame_id = "imu0";
     sample.header.stamp = rosTime(table.nanoseconds(row, 0));
-    if (!samples.empty() && sample.header.stamp <= samples.back().header.stamp)
-      table.fail(row, "the stamp does not follow the one before");
+    if (!samples.empty()) table.ascending(row, samples.back().header.stamp, sample.header.stamp);
     sample.orientation_covariance[0] = -1;
     sample.angular_velocity.x = table.number(row, 1, "gyro x");
     sample.angular_velocity.y = table.number(row, 2, "gyro y");
@@ -107,8 +116,7 @@ Trajectory readTruth(const std::string& path) {
   for (const TextRow& row : table.rows()) {
     double v[7];
     for (int i = 0; i < 7; ++i) v[i] = table.number(row, i + 1, "column " + std::to_string(i + 2));
-    const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
-    if (std::abs(q.norm() - 1.0) > 0.01) table.fail(row, "the quaternion (w, x, y, z) does not have length 1");
+    const Eigen::Quaterniond q = table.quaternion(row, v[3], v[4], v[5], v[6]);
     truth.push_back({1e-9 * static_cast<double>(table.nanoseconds(row, 0)), SE3(q, Eigen::Vector3d(v[0], v[1], v[2]))});
   }
   return truth;
@@ -118,9 +126,8 @@ cv::Mat readGray(const std::string& path, const CameraIntrinsics& camera) {
   const cv::Mat image = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (image.empty()) throw std::runtime_error(path + ": is not a readable image");
   if (image.cols != camera.width || image.rows != camera.height)
-    throw std::runtime_error(path + ": image is " + std::to_string(image.cols) + "x" + std::to_string(image.rows) +
-                             ", sensor.yaml says " + std::to_string(camera.width) + "x" +
-                             std::to_string(camera.height));
+    throw std::runtime_error(path + ": image is " + sizeText(image.size()) + ", sensor.yaml says " +
+                             sizeText({camera.width, camera.height}));
   return image;
 }
 
@@ -140,7 +147,8 @@ SensorConfig sensorOf(const StereoDepth& stereo, const std::string& imu_yaml, do
   sensor.T_imu_cam = stereo.T_imu_rectified();
   const YAML::Node imu = loadYaml(imu_yaml);
   const auto noise = [&](const char* key) {
-    return numbers(YAML::Load("[" + imu[key].as<std::string>("") + "]"), imu_yaml, key, 1)[0];
+    const YAML::Node value = imu[key];
+    return numbers(value ? YAML::Load("[" + value.as<std::string>("") + "]") : value, imu_yaml, key, 1)[0];
   };
   sensor.imu_noise.gyro_noise_density = noise("gyroscope_noise_density");
   sensor.imu_noise.gyro_random_walk = noise("gyroscope_random_walk");

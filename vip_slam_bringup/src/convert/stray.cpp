@@ -3,7 +3,6 @@
 // quaternion xyzw [, fx, fy, cx, cy]), camera_matrix.csv, imu.csv (stamp, accelerometer, gyro). One clock for all.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 
@@ -18,6 +17,7 @@
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace fs = std::filesystem;
@@ -57,9 +57,7 @@ std::vector<Row> readOdometry(const std::string& folder) {
     for (int i = 0; i < 9; ++i) v[i] = table.number(text, i, "column " + std::to_string(i + 1));
     row.t = v[0];
     row.frame = static_cast<int>(v[1]);
-    const Eigen::Quaterniond q(v[8], v[5], v[6], v[7]);
-    if (std::abs(q.norm() - 1.0) > 0.01) table.fail(text, "the quaternion (x, y, z, w) does not have length 1");
-    row.T_W_C = SE3(q, Eigen::Vector3d(v[2], v[3], v[4]));
+    row.T_W_C = SE3(table.quaternion(text, v[8], v[5], v[6], v[7]), Eigen::Vector3d(v[2], v[3], v[4]));
     const bool own = text.cells.size() >= 13 && !text.cells[9].empty();
     row.fx = own ? table.number(text, 9, "fx") : k[0];
     row.fy = own ? table.number(text, 10, "fy") : k[1];
@@ -67,7 +65,7 @@ std::vector<Row> readOdometry(const std::string& folder) {
     row.cy = own ? table.number(text, 12, "cy") : k[3];
     if (row.fx <= 0 || row.fy <= 0)
       table.fail(text, "no intrinsics: neither columns fx fy cx cy nor camera_matrix.csv");
-    if (!rows.empty() && row.t <= rows.back().t) table.fail(text, "the stamp does not follow the one before");
+    if (!rows.empty()) table.ascending(text, rows.back().t, row.t);
     rows.push_back(row);
   }
   return rows;
@@ -85,8 +83,7 @@ std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path) {
     sensor_msgs::Imu sample;
     sample.header.stamp.fromSec(v[0]);
     sample.header.frame_id = "phone_imu_frame";
-    if (!samples.empty() && sample.header.stamp <= samples.back().header.stamp)
-      table.fail(row, "the stamp does not follow the one before");
+    if (!samples.empty()) table.ascending(row, samples.back().header.stamp, sample.header.stamp);
     sample.orientation_covariance[0] = -1;
     sample.linear_acceleration.x = -v[1];
     sample.linear_acceleration.y = -v[2];
@@ -121,11 +118,7 @@ int countFrames(const std::string& path, cv::Size* size) {
   return frames;
 }
 
-std::string numbered(const std::string& folder, int frame) {
-  char name[32];
-  std::snprintf(name, sizeof(name), "/%06d.png", frame);
-  return folder + name;
-}
+std::string numbered(const std::string& folder, int frame) { return folder + formatted("/%06d.png", frame); }
 
 cv::Mat readDepth(const std::string& folder, int frame, int min_confidence, const cv::Size& size) {
   const std::string path = numbered(folder + "/depth", frame);

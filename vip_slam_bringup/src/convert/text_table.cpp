@@ -5,6 +5,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "vip_slam_core/util/formatted.h"
+
 namespace vip_slam {
 namespace {
 
@@ -67,6 +69,22 @@ long long TextTable::nanoseconds(const TextRow& row, std::size_t column) const {
   const long long value = std::strtoll(text.c_str(), &end, 10);
   if (text.empty() || *end != '\0' || value < 0) fail(row, "the stamp is '" + text + "', expected whole nanoseconds");
   return value;
+}
+
+void TextTable::ascending(const TextRow& row, double before, double t) const {
+  if (!(t > before)) fail(row, formatted("the stamp %.9f does not follow %.9f", t, before));
+}
+
+void TextTable::ascending(const TextRow& row, const ros::Time& before, const ros::Time& stamp) const {
+  if (stamp <= before)
+    fail(row, formatted("the stamp %u.%09u does not follow %u.%09u", stamp.sec, stamp.nsec, before.sec, before.nsec));
+}
+
+Eigen::Quaterniond TextTable::quaternion(const TextRow& row, double w, double x, double y, double z) const {
+  const Eigen::Quaterniond q(w, x, y, z);
+  if (!(std::abs(q.norm() - 1.0) <= 0.01))
+    fail(row, formatted("the quaternion (w %g, x %g, y %g, z %g) has length %.3f, expected 1", w, x, y, z, q.norm()));
+  return q;
 }
 
 void TextTable::fail(const TextRow& row, const std::string& message) const {

@@ -9,6 +9,7 @@
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_core/util/size_text.h"
 
 namespace fs = std::filesystem;
 
@@ -33,7 +34,7 @@ std::vector<ListedFile> readList(const std::string& folder, const std::string& n
   std::vector<ListedFile> files;
   for (const TextRow& row : table.rows()) {
     ListedFile file{table.number(row, 0, "the stamp"), folder + "/" + row.cells[1]};
-    if (!files.empty() && file.t <= files.back().t) table.fail(row, "the stamp does not follow the one before");
+    if (!files.empty()) table.ascending(row, files.back().t, file.t);
     if (!fs::exists(file.path)) table.fail(row, "image " + file.path + " is not there");
     files.push_back(std::move(file));
   }
@@ -89,8 +90,7 @@ std::vector<sensor_msgs::Imu> readInertial(const std::string& path, bool gyro) {
     sensor_msgs::Imu sample;
     sample.header.stamp.fromSec(table.number(row, 0, "the stamp"));
     sample.header.frame_id = gyro ? "camera_imu_optical_frame" : "camera_accel_optical_frame";
-    if (!samples.empty() && sample.header.stamp <= samples.back().header.stamp)
-      table.fail(row, "the stamp does not follow the one before");
+    if (!samples.empty()) table.ascending(row, samples.back().header.stamp, sample.header.stamp);
     sample.orientation_covariance[0] = -1;
     const std::size_t accel = gyro ? 4 : 1;
     if (gyro) {
@@ -114,8 +114,7 @@ Trajectory readGroundTruth(const std::string& path, const SE3& T_cam_imu) {
   for (const TextRow& row : table.rows()) {
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = table.number(row, i, "column " + std::to_string(i + 1));
-    const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
-    if (std::abs(q.norm() - 1.0) > 0.01) table.fail(row, "the quaternion (x, y, z, w) does not have length 1");
+    const Eigen::Quaterniond q = table.quaternion(row, v[7], v[4], v[5], v[6]);
     if (!truth.empty() && v[0] <= truth.back().t) continue;  // the public files repeat a few stamps
     truth.push_back({v[0], SE3(q, Eigen::Vector3d(v[1], v[2], v[3])) * T_cam_imu});
   }
@@ -158,9 +157,11 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
             cv::imread(file.path, is_color ? cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION : cv::IMREAD_UNCHANGED);
         if (image.empty()) throw std::runtime_error(file.path + ": is not a readable image");
         if (image.type() != (is_color ? CV_8UC3 : CV_16UC1))
-          throw std::runtime_error(file.path + ": expected " + (is_color ? "8-bit colour" : "16-bit depth"));
+          throw std::runtime_error(file.path + ": image is " + cv::typeToString(image.type()) + ", expected " +
+                                   (is_color ? "8-bit colour" : "16-bit depth"));
         if (image.cols != camera.width || image.rows != camera.height)
-          throw std::runtime_error(file.path + ": size differs from the first colour image");
+          throw std::runtime_error(file.path + ": image is " + sizeText(image.size()) + ", the first colour image is " +
+                                   sizeText({camera.width, camera.height}));
         std_msgs::Header header;
         header.stamp = stamp;
         header.frame_id = kFrame;

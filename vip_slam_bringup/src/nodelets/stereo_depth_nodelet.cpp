@@ -71,7 +71,8 @@ class StereoDepthNodelet : public nodelet::Nodelet {
       depth_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", header)));
       depth_info_publisher_.publish(info);
     } catch (const std::exception& e) {
-      NODELET_ERROR_THROTTLE(5.0, "Stereo depth: %s", e.what());
+      NODELET_ERROR_THROTTLE(5.0, "Stereo depth of %s and %s at %.3f s: %s", left_.getTopic().c_str(),
+                             right_.getTopic().c_str(), left->header.stamp.toSec(), e.what());
     }
   }
 

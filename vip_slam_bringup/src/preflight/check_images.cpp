@@ -3,22 +3,21 @@
 #include <cmath>
 
 #include "vip_slam_bringup/preflight/checks.h"
-#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/size_text.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/image_pairer.h"
 
 namespace vip_slam {
 namespace {
 
-std::string sizeText(const std::pair<int, int>& size) {
-  return std::to_string(size.first) + "x" + std::to_string(size.second);
-}
+std::string sizeText(const std::pair<int, int>& size) { return vip_slam::sizeText({size.first, size.second}); }
 
 void checkEncoding(const std::string& role, const StreamRecord& stream, const std::string& expected, Findings* out) {
   if (stream.stamps.empty()) return;
   if (stream.unusable > 0)
     out->push_back({stream.unusable * 2 > stream.stamps.size() ? Severity::kError : Severity::kWarning, role,
-                    words("%zu images could not be decoded: ", stream.unusable) + stream.unusable_reason,
+                    formatted("%zu images could not be decoded: ", stream.unusable) + stream.unusable_reason,
                     "record raw images, JPEG or PNG"});
   for (const std::string& encoding : stream.encodings) {
     const bool same = encoding == expected || (expected == "16UC1" && encoding == "mono16") ||
@@ -48,13 +47,13 @@ void checkCamera(const std::string& role, const StreamRecord& info, const Camera
          "the calibration belongs to another resolution"});
   else if (std::abs(camera.fx / camera.fy - 1) > 0.1 || camera.cx < 0.25 * camera.width ||
            camera.cx > 0.75 * camera.width)
-    out->push_back(
-        {Severity::kWarning, role,
-         words("unusual calibration: fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy),
-         "check it"});
+    out->push_back({Severity::kWarning, role,
+                    formatted("unusual calibration: fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy,
+                              camera.cx, camera.cy),
+                    "check it"});
   else
     out->push_back({Severity::kGood, role,
-                    words("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
+                    formatted("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
 }
 
 /// Compares the calibration of the sensor file with the images, and with camera_info where there is one.
@@ -70,9 +69,9 @@ void checkSensorFileCamera(const Recording& r, Findings* out) {
       (std::abs(info.fx / camera.fx - 1) > 0.02 || std::abs(info.fy / camera.fy - 1) > 0.02 ||
        std::abs(info.cx - camera.cx) > 0.02 * camera.width || std::abs(info.cy - camera.cy) > 0.02 * camera.width))
     out->push_back({Severity::kWarning, "camera",
-                    words("the sensor file says fx %.1f, fy %.1f, cx %.1f, cy %.1f, camera_info fx %.1f, fy %.1f, "
-                          "cx %.1f, cy %.1f",
-                          camera.fx, camera.fy, camera.cx, camera.cy, info.fx, info.fy, info.cx, info.cy),
+                    formatted("the sensor file says fx %.1f, fy %.1f, cx %.1f, cy %.1f, camera_info fx %.1f, fy %.1f, "
+                              "cx %.1f, cy %.1f",
+                              camera.fx, camera.fy, camera.cx, camera.cy, info.fx, info.fy, info.cx, info.cy),
                     "the sensor file's are used; set intrinsics_from_camera_info when the driver is calibrated"});
 }
 
@@ -81,7 +80,7 @@ void checkMask(const Recording& r, Findings* out) {
   const std::string problem = maskProblem(r.sensor, r.color.sizes.begin()->first, r.color.sizes.begin()->second);
   if (problem.empty()) {
     const double used = cv::countNonZero(r.sensor.mask) / double(r.sensor.mask.total());
-    out->push_back({Severity::kGood, "mask", words("leaves %.0f %% of the image", 100 * used), ""});
+    out->push_back({Severity::kGood, "mask", formatted("leaves %.0f %% of the image", 100 * used), ""});
   } else {
     out->push_back({Severity::kError, "mask", problem.substr(std::string("mask: ").size()),
                     "draw it on an image as the topic carries it"});
@@ -97,10 +96,10 @@ void checkBrightness(const std::vector<BrightnessSample>& samples, Findings* out
   }
   if (upperMedian(spread) < 2)
     out->push_back({Severity::kError, "colour image",
-                    words("shows nothing: all pixels about %.0f of 255", upperMedian(mean)),
+                    formatted("shows nothing: all pixels about %.0f of 255", upperMedian(mean)),
                     "lens cap, exposure, or a wrong encoding?"});
   else if (upperMedian(mean) < 15)
-    out->push_back({Severity::kWarning, "colour image", words("is dark: %.0f of 255 on average", upperMedian(mean)),
+    out->push_back({Severity::kWarning, "colour image", formatted("is dark: %.0f of 255 on average", upperMedian(mean)),
                     "more light or exposure"});
 }
 
@@ -108,13 +107,13 @@ void checkRepeats(const Recording& r, Findings* out) {
   constexpr double kShare = 0.01;  // of the images
   if (r.color.repeated > kShare * double(r.color.decoded))
     out->push_back({Severity::kWarning, "colour image",
-                    words("%zu of %zu images repeat the pixels of the one before while the camera moves",
-                          r.color.repeated, r.color.decoded),
+                    formatted("%zu of %zu images repeat the pixels of the one before while the camera moves",
+                              r.color.repeated, r.color.decoded),
                     "the camera is slower than its topic, or froze: the repeats are left out"});
   if (r.depth.repeated > kShare * double(r.depth.decoded))
     out->push_back(
         {Severity::kWarning, "depth image",
-         words("%zu of %zu images repeat the one before while the camera moves", r.depth.repeated, r.depth.decoded),
+         formatted("%zu of %zu images repeat the one before while the camera moves", r.depth.repeated, r.depth.decoded),
          "the depth camera is slower than its topic, or froze: the repeats are left out"});
 }
 
@@ -135,21 +134,21 @@ void checkDepth(const Recording& r, Findings* out) {
   }
   const double z = upperMedian(middle);
   if (z < 0.05 || z > 50)
-    out->push_back({Severity::kError, "depth image", words("median depth is %.4g m", z),
+    out->push_back({Severity::kError, "depth image", formatted("median depth is %.4g m", z),
                     "depth scale or encoding in the sensor file is wrong (millimetres against metres?)"});
   else if (upperMedian(usable) < 0.02)
     out->push_back(
         {Severity::kError, "depth image",
-         words("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range, noise.max_range),
+         formatted("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range, noise.max_range),
          "depth scale or depth_noise/max_range in the sensor file is wrong"});
   else if (upperMedian(spread) < 1e-6)
-    out->push_back({Severity::kError, "depth image", words("every pixel says %.4g m", z), "the driver is broken"});
+    out->push_back({Severity::kError, "depth image", formatted("every pixel says %.4g m", z), "the driver is broken"});
   else if (share < 0.3)
-    out->push_back({Severity::kWarning, "depth image", words("only %.0f %% of the pixels have depth", 100 * share),
+    out->push_back({Severity::kWarning, "depth image", formatted("only %.0f %% of the pixels have depth", 100 * share),
                     "glass, sunlight or range? planes and scale suffer"});
   else
-    out->push_back(
-        {Severity::kGood, "depth image", words("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
+    out->push_back({Severity::kGood, "depth image",
+                    formatted("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
 }
 
 }  // namespace
@@ -177,7 +176,7 @@ Findings checkImages(const Recording& r) {
     if (r.depth_camera.width > 0 && r.color_camera.width > 0 &&
         std::abs(r.depth_camera.fx / r.color_camera.fx - 1) > 0.01)
       out.push_back({Severity::kWarning, "depth camera_info",
-                     words("focal length is %.1f, that of colour %.1f", r.depth_camera.fx, r.color_camera.fx),
+                     formatted("focal length is %.1f, that of colour %.1f", r.depth_camera.fx, r.color_camera.fx),
                      "the depth image is not registered to colour"});
   }
   if (!r.depths.empty()) checkDepth(r, &out);
@@ -205,29 +204,29 @@ Findings checkSkew(const Recording& r) {
   if (all == 0) {
     out.push_back(
         {Severity::kError, "colour and depth",
-         words("do not overlap in time: depth begins %.1f s after colour", depth.front() - r.color.stamps.front()),
+         formatted("do not overlap in time: depth begins %.1f s after colour", depth.front() - r.color.stamps.front()),
          "the two streams use different clocks"});
     return out;
   }
   const double share = double(unmatched) / all;
   if (skew.empty() || share > 0.5)
     out.push_back({Severity::kError, "colour and depth",
-                   words("%.0f %% of the colour images have no depth within %.0f ms", 100 * share, 1e3 * tolerance),
+                   formatted("%.0f %% of the colour images have no depth within %.0f ms", 100 * share, 1e3 * tolerance),
                    "switch on the driver's synchronisation (enable_sync, enable_frame_sync), or equal rates"});
   else if (share > 0.05)
     out.push_back({Severity::kWarning, "colour and depth",
-                   words("%.0f %% of the colour images have no depth within %.0f ms", 100 * share, 1e3 * tolerance),
+                   formatted("%.0f %% of the colour images have no depth within %.0f ms", 100 * share, 1e3 * tolerance),
                    "these images are tracked without depth"});
   if (!skew.empty()) {
     const double early = quantile(skew, 0.05), late = quantile(skew, 0.95);
     const double most = std::max(std::abs(early), std::abs(late));
     if (most > 0.008)
       out.push_back({Severity::kNote, "colour and depth",
-                     words("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
+                     formatted("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
                      "the IMU carries depth over to the colour image, as far as these stamps are right; the driver's "
                      "synchronisation spares that"});
     else
-      out.push_back({Severity::kGood, "colour and depth", words("stamps agree within %.1f ms", 1e3 * most), ""});
+      out.push_back({Severity::kGood, "colour and depth", formatted("stamps agree within %.1f ms", 1e3 * most), ""});
   }
   return out;
 }

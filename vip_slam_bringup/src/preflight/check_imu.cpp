@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "vip_slam_bringup/preflight/checks.h"
-#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
@@ -74,14 +74,14 @@ void checkGaps(const std::string& role, const std::vector<StampedVector>& sample
   if (gaps > 0)
     out->push_back(
         {largest > 0.1 ? Severity::kError : Severity::kWarning, role,
-         words("%zu gaps, the largest %.0f ms at %.1f s", gaps, 1000 * largest, at),
+         formatted("%zu gaps, the largest %.0f ms at %.1f s", gaps, 1000 * largest, at),
          "the driver or the recording loses samples; the odometry bridges short gaps with more noise and starts "
          "anew after long ones"});
   else
-    out->push_back({Severity::kGood, role, words("no gaps, largest step %.1f ms", 1000 * largest), ""});
+    out->push_back({Severity::kGood, role, formatted("no gaps, largest step %.1f ms", 1000 * largest), ""});
   if (1.0 / period < 90)
-    out->push_back(
-        {Severity::kWarning, role, words("only %.0f Hz", 1.0 / period), "100 Hz or more is wanted, 200 Hz is good"});
+    out->push_back({Severity::kWarning, role, formatted("only %.0f Hz", 1.0 / period),
+                    "100 Hz or more is wanted, 200 Hz is good"});
 }
 
 }  // namespace
@@ -97,7 +97,7 @@ Findings checkImu(const Recording& r) {
     std::size_t bad = 0;
     for (const auto& s : *samples) bad += s.value.allFinite() ? 0 : 1;
     if (bad > 0) {
-      out.push_back({Severity::kError, role, words("%zu values are not numbers", bad), "the driver is broken"});
+      out.push_back({Severity::kError, role, formatted("%zu values are not numbers", bad), "the driver is broken"});
       return out;
     }
     if (spread(*samples, 0, samples->size()) < 1e-9)
@@ -109,13 +109,13 @@ Findings checkImu(const Recording& r) {
     double largest = 0;
     for (const auto& s : r.gyro_samples) largest = std::max(largest, s.value.stableNorm());
     if (largest > 40)
-      out.push_back({Severity::kError, "gyroscope", words("rates up to %.4g", largest),
+      out.push_back({Severity::kError, "gyroscope", formatted("rates up to %.4g", largest),
                      "degrees a second? radians a second are expected"});
   }
   if (r.gyro_range.samples() > 0)
     out.push_back({Severity::kWarning, "gyroscope",
-                   words("%zu samples at the end of its range, %.2f rad/s", std::size_t(r.gyro_range.samples()),
-                         r.gyro_range.end()),
+                   formatted("%zu samples at the end of its range, %.2f rad/s", std::size_t(r.gyro_range.samples()),
+                             r.gyro_range.end()),
                    "a larger range in the driver; how much faster it turned only images tell"});
   double least_spread = 0;
   const std::vector<Eigen::Vector3d> forces = quietForces(r.accel_samples, &least_spread);
@@ -124,16 +124,17 @@ Findings checkImu(const Recording& r) {
   for (const Eigen::Vector3d& force : forces) lengths.push_back(force.norm());
   const double g = upperMedian(lengths);
   if (g > 0.85 && g < 1.15)
-    out.push_back({Severity::kError, "gravity", words("%.2f when quiet: the accelerometer reports in g", g),
+    out.push_back({Severity::kError, "gravity", formatted("%.2f when quiet: the accelerometer reports in g", g),
                    "multiply by 9.81 in the driver; m/s^2 are expected"});
   else if (g < 2.0)
-    out.push_back({Severity::kError, "gravity", words("%.2f m/s^2 when quiet: gravity has been taken out", g),
+    out.push_back({Severity::kError, "gravity", formatted("%.2f m/s^2 when quiet: gravity has been taken out", g),
                    "publish the raw specific force, not the linear acceleration"});
   else if (std::abs(g - r.sensor.gravity) > (least_spread < 0.3 ? 0.35 : 1.2))
-    out.push_back({Severity::kWarning, "gravity", words("%.2f m/s^2 when quiet, expected %.2f", g, r.sensor.gravity),
+    out.push_back({Severity::kWarning, "gravity",
+                   formatted("%.2f m/s^2 when quiet, expected %.2f", g, r.sensor.gravity),
                    "calibrate the accelerometer (scale, bias)"});
   else
-    out.push_back({Severity::kGood, "gravity", words("%.2f m/s^2 when quiet", g), ""});
+    out.push_back({Severity::kGood, "gravity", formatted("%.2f m/s^2 when quiet", g), ""});
   if (g > 2.0) checkUpright(forces, r.sensor.T_imu_cam, &out);
   if (least_spread > 0.5)
     out.push_back({Severity::kNote, "start", "the sensor is never still",

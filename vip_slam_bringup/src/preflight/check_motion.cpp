@@ -10,9 +10,9 @@
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/gyro_integral.h"
 #include "vip_slam_bringup/preflight/readout.h"
-#include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
@@ -117,14 +117,14 @@ bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, do
 
 Finding readoutFinding(const Recording& r, const MotionEstimate& motion) {
   const std::string measured =
-      words("rows are read within %.1f ms (one sigma %.1f ms), the sensor file says %.1f ms", 1000 * motion.readout,
-            1000 * motion.readout_sigma, 1000 * r.sensor.rolling_shutter);
+      formatted("rows are read within %.1f ms (one sigma %.1f ms), the sensor file says %.1f ms", 1000 * motion.readout,
+                1000 * motion.readout_sigma, 1000 * r.sensor.rolling_shutter);
   if (std::abs(motion.readout - r.sensor.rolling_shutter) < std::max(0.003, 4 * motion.readout_sigma))
     return {Severity::kGood, "rolling shutter", measured, ""};
   if (motion.readout < 0)
     return {Severity::kWarning, "rolling shutter", measured, "the last row comes first: is the image turned round?"};
   return {Severity::kWarning, "rolling shutter", measured,
-          words("set color/rolling_shutter: %.4f in the sensor file", motion.readout)};
+          formatted("set color/rolling_shutter: %.4f in the sensor file", motion.readout)};
 }
 
 }  // namespace
@@ -153,7 +153,7 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
     return out;
   }
   if (out.scale < 5 && out.correlation < 0.6) {
-    out.why_not = words("image and gyro rotation do not agree (%.0f %% explained)", 100 * out.correlation);
+    out.why_not = formatted("image and gyro rotation do not agree (%.0f %% explained)", 100 * out.correlation);
     return out;
   }
   out.time_offset = fine.offset;
@@ -181,12 +181,13 @@ Finding extrinsicsFinding(const Recording& r, const MotionEstimate& motion, cons
   // Without depth a sideways translation looks like a rotation.
   const double most = r.depths.empty() ? 15 : 5;
   if (angle <= most)
-    return {Severity::kGood, "extrinsics", words("rotation of %s fits the motion (%.1f degrees)", source, angle), ""};
+    return {Severity::kGood, "extrinsics", formatted("rotation of %s fits the motion (%.1f degrees)", source, angle),
+            ""};
   const Eigen::Matrix3d R = motion.R_imu_cam.toRotationMatrix();
   std::string rows;
-  for (int i = 0; i < 3; ++i) rows += words("%s[%.3f, %.3f, %.3f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
+  for (int i = 0; i < 3; ++i) rows += formatted("%s[%.3f, %.3f, %.3f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
   return {used ? Severity::kError : Severity::kWarning, "extrinsics",
-          words("the motion contradicts %s by %.0f degrees", source, angle),
+          formatted("the motion contradicts %s by %.0f degrees", source, angle),
           (used ? "" : "tf is used unless extrinsics is config; ") +
               ("the rotation that fits the motion has rows " + rows)};
 }
@@ -197,7 +198,7 @@ Findings checkMotion(const Recording& r) {
   Findings out;
   const MotionEstimate motion = estimateMotion(r);
   if (motion.scale > 30 && motion.scale < 90)
-    out.push_back({Severity::kError, "gyroscope", words("turns %.0f times as fast as the images", motion.scale),
+    out.push_back({Severity::kError, "gyroscope", formatted("turns %.0f times as fast as the images", motion.scale),
                    "it reports degrees a second; radians a second are expected"});
   if (!motion.usable) {
     out.push_back({Severity::kNote, "camera-IMU delay", "not measured: " + motion.why_not,
@@ -206,11 +207,12 @@ Findings checkMotion(const Recording& r) {
   }
   if (motion.scale > 5) return out;
   const double difference = motion.time_offset - r.sensor.time_offset;
-  const std::string measured = words("%+.1f ms measured (one sigma %.1f ms), the sensor file says %+.1f ms",
-                                     1000 * motion.time_offset, 1000 * motion.time_sigma, 1000 * r.sensor.time_offset);
+  const std::string measured =
+      formatted("%+.1f ms measured (one sigma %.1f ms), the sensor file says %+.1f ms", 1000 * motion.time_offset,
+                1000 * motion.time_sigma, 1000 * r.sensor.time_offset);
   if (std::abs(difference) > std::max(0.006, 3 * motion.time_sigma))
     out.push_back({std::abs(difference) > 0.05 ? Severity::kError : Severity::kWarning, "camera-IMU delay", measured,
-                   words("set time_offset: %.4f in the sensor file", motion.time_offset)});
+                   formatted("set time_offset: %.4f in the sensor file", motion.time_offset)});
   else
     out.push_back({Severity::kGood, "camera-IMU delay", measured, ""});
   if (motion.readout_sigma > 0) out.push_back(readoutFinding(r, motion));

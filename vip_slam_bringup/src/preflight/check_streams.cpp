@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "vip_slam_bringup/preflight/checks.h"
-#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
@@ -97,7 +97,7 @@ void checkCoverage(const Recording& r, Findings* out) {
       if (role >= other || (span.first <= other_span.second && other_span.first <= span.second)) continue;
       const double apart = std::max(span.first - other_span.second, other_span.first - span.second);
       out->push_back({Severity::kError, role,
-                      words("has no time in common with the %s, %.1f s lie between them", other.c_str(), apart),
+                      formatted("has no time in common with the %s, %.1f s lie between them", other.c_str(), apart),
                       "the two streams use different clocks"});
       return;
     }
@@ -107,10 +107,10 @@ void checkCoverage(const Recording& r, Findings* out) {
     const double late = span.first - begin, early = end - span.second;
     const Severity severity = std::max(late, early) > 0.1 * (end - begin) ? Severity::kError : Severity::kWarning;
     if (late > kLate)
-      out->push_back({severity, role, words("begins %.1f s after the others", late),
+      out->push_back({severity, role, formatted("begins %.1f s after the others", late),
                       "started late, or stamped by another clock?"});
     if (early > kLate)
-      out->push_back({severity, role, words("ends %.1f s before the others", early),
+      out->push_back({severity, role, formatted("ends %.1f s before the others", early),
                       "did the driver stop, or the disk fill up? or is it stamped by another clock?"});
   }
 }
@@ -139,7 +139,7 @@ Findings checkTopics(const Recording& r) {
           {bad, w.role, "no message on " + w.topic, "is the driver running, and is this stream switched on?"});
     } else {
       out.push_back(
-          {Severity::kGood, w.role, words("%zu messages on %s", w.stream->stamps.size(), w.topic.c_str()), ""});
+          {Severity::kGood, w.role, formatted("%zu messages on %s", w.stream->stamps.size(), w.topic.c_str()), ""});
     }
   }
   return out;
@@ -166,11 +166,12 @@ void checkOrder(const Recording& r, Findings* out) {
     const bool depth = w.stream == &r.depth;
     if (depth ? std::abs(late) < kDepthWaits : late < kImuWaits && late > -kImuKept) continue;
     const std::string remedy = "sort the bag by header stamps";
-    out->push_back(
-        {Severity::kError, w.role,
-         words("lies %.1f s %s in the bag than the images of the same time", std::abs(late),
-               late > 0 ? "later" : "earlier"),
-         depth || late < 0 || late > 9 ? remedy : remedy + words(", or run_bag --set imu_patience=%.0f", late + 1)});
+    out->push_back({Severity::kError, w.role,
+                    formatted("lies %.1f s %s in the bag than the images of the same time", std::abs(late),
+                              late > 0 ? "later" : "earlier"),
+                    depth || late < 0 || late > 9
+                        ? remedy
+                        : remedy + formatted(", or run_bag --set imu_patience=%.0f", late + 1)});
   }
 }
 
@@ -183,7 +184,7 @@ Findings checkRates(const Recording& r) {
     if (w.role.find("camera_info") != std::string::npos || stamps.empty()) continue;
     if (stamps.size() < 3) {
       out.push_back({w.required ? Severity::kError : Severity::kNote, w.role,
-                     words("%zu messages in all", stamps.size()), "nothing can be told from so few"});
+                     formatted("%zu messages in all", stamps.size()), "nothing can be told from so few"});
       continue;
     }
     std::size_t backward = 0, repeated = 0, lost = 0;
@@ -213,35 +214,35 @@ Findings checkRates(const Recording& r) {
       out.push_back(
           {Severity::kWarning, w.role, "stamps begin at zero", "recorded without a clock? all streams must share one"});
     if (backward > 0)
-      out.push_back({Severity::kError, w.role, words("time runs backwards %zu times", backward),
+      out.push_back({Severity::kError, w.role, formatted("time runs backwards %zu times", backward),
                      "bag joined or played in a loop? messages out of order are dropped"});
     if (repeated > 0)
-      out.push_back({Severity::kWarning, w.role, words("%zu stamps repeat the one before", repeated),
+      out.push_back({Severity::kWarning, w.role, formatted("%zu stamps repeat the one before", repeated),
                      "repeated messages are dropped"});
     if (w.rate > 0 && std::abs(rate - w.rate) > 0.15 * w.rate) {
       const bool far = rate < 0.5 * w.rate;
       out.push_back({far ? Severity::kError : Severity::kWarning, w.role,
-                     words("%.1f Hz, the sensor file says %.0f Hz", rate, w.rate),
+                     formatted("%.1f Hz, the sensor file says %.0f Hz", rate, w.rate),
                      "set the driver's rate, or the rate in the sensor file when it is meant"});
     } else {
-      out.push_back({Severity::kGood, w.role, words("%.1f Hz", rate), ""});
+      out.push_back({Severity::kGood, w.role, formatted("%.1f Hz", rate), ""});
     }
     const double jitter = stampJitter(stamps, period);
     if (w.role == "colour image" && jitter > kLargeStampJitter)
-      out.push_back({Severity::kWarning, w.role, words("stamps jitter by %.1f ms", 1e3 * jitter),
+      out.push_back({Severity::kWarning, w.role, formatted("stamps jitter by %.1f ms", 1e3 * jitter),
                      "stamped on arrival? let the driver take the device's own time; poses lose accuracy in turns"});
     const double share = double(lost) / (stamps.size() + lost);
     if (share > 0.005 && lost > 1)
       out.push_back({share > 0.1 ? Severity::kError : Severity::kWarning, w.role,
-                     words("%.1f %% of the messages are missing, the largest hole is %.2f s at %.1f s", 100 * share,
-                           largest, largest_at),
+                     formatted("%.1f %% of the messages are missing, the largest hole is %.2f s at %.1f s", 100 * share,
+                               largest, largest_at),
                      "USB bandwidth, disk or CPU too slow? lower the resolution or record compressed"});
     const double delay = medianDelay(*w.stream);
     if (r.live && std::abs(delay) > 1.0)
-      out.push_back(
-          {Severity::kError, w.role,
-           words("stamps lie %.1f s %s the clock of this machine", std::abs(delay), delay > 0 ? "behind" : "ahead of"),
-           "the driver stamps with the device's clock: set it to system or global time"});
+      out.push_back({Severity::kError, w.role,
+                     formatted("stamps lie %.1f s %s the clock of this machine", std::abs(delay),
+                               delay > 0 ? "behind" : "ahead of"),
+                     "the driver stamps with the device's clock: set it to system or global time"});
   }
   checkOrder(r, &out);
   checkCoverage(r, &out);

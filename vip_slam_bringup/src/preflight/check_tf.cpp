@@ -2,7 +2,7 @@
 #include <tf2/buffer_core.h>
 
 #include "vip_slam_bringup/preflight/checks.h"
-#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/tf_lookup.h"
 
 namespace vip_slam {
@@ -59,13 +59,13 @@ Findings checkTf(const Recording& r) {
   const ExtrinsicsGap gap = extrinsicsGap(r.sensor.T_imu_cam, *T_imu_cam);
   if (gap.large())
     out.push_back({Severity::kWarning, "tf",
-                   words("%s to %s differs from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",
-                         camera.c_str(), imu.c_str(), gap.degrees, 100 * gap.metres),
+                   formatted("%s to %s differs from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",
+                             camera.c_str(), imu.c_str(), gap.degrees, 100 * gap.metres),
                    "one of them is wrong; tf is used unless extrinsics is config"});
   else
-    out.push_back({Severity::kGood, "tf",
-                   words("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", gap.degrees, 100 * gap.metres),
-                   ""});
+    out.push_back(
+        {Severity::kGood, "tf",
+         formatted("camera to IMU as in the sensor file (%.1f degrees, %.1f cm)", gap.degrees, 100 * gap.metres), ""});
   if (lookUpTransform(tf, "base_link", imu))
     out.push_back({Severity::kGood, "tf", "IMU is connected to base_link", ""});
   else

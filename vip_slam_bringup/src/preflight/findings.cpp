@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "vip_slam_bringup/preflight/checks.h"
-#include "vip_slam_bringup/preflight/words.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -70,10 +70,10 @@ std::string toText(const Findings& findings, bool color) {
     if (!f.advice.empty()) out += "           -> " + f.advice + "\n";
   }
   if (errors > 0)
-    out += words("Not ready: %zu error%s, %zu warning%s.\n", errors, errors == 1 ? "" : "s", warnings,
-                 warnings == 1 ? "" : "s");
+    out += formatted("Not ready: %zu error%s, %zu warning%s.\n", errors, errors == 1 ? "" : "s", warnings,
+                     warnings == 1 ? "" : "s");
   else if (warnings > 0)
-    out += words("Ready, with %zu warning%s.\n", warnings, warnings == 1 ? "" : "s");
+    out += formatted("Ready, with %zu warning%s.\n", warnings, warnings == 1 ? "" : "s");
   else
     out += "Ready.\n";
   return out;

@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {

@@ -4,8 +4,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {

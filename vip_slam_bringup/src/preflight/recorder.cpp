@@ -5,9 +5,9 @@
 
 #include <opencv2/core.hpp>
 
-#include "vip_slam_bringup/preflight/words.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/imu/gyro_correction.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/same_pixels.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/camera_info.h"

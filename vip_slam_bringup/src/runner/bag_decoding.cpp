@@ -1,7 +1,6 @@
 #include "bag_decoding.h"
 
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
@@ -10,15 +9,15 @@
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 
+#include "vip_slam_core/util/size_text.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/image_decoding.h"
+#include "vip_slam_ros/stream_faults.h"
 
 namespace vip_slam {
 namespace {
 
 enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
-
-std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
 
 /// `decode` gets the image, raw or compressed.
 template <class Decode>
@@ -149,13 +148,9 @@ void BagDecoding::finish() {
                         std::to_string(std::lround(1e3 * options_.input.pair_tolerance)) +
                         " ms: switch on the driver's synchronisation, or equal rates; when check_bag finds "
                         "the depth elsewhere in the bag, sort that");
-  if (2 * without_any_ > depth_images_) {
-    char range[60];
-    std::snprintf(range, sizeof range, "%g to %g m", sensor_.depth_noise.min_range, sensor_.depth_noise.max_range);
+  if (2 * without_any_ > depth_images_)
     warnings_.push_back("topic " + depth_topic + ": " + std::to_string(without_any_) + " of " +
-                        std::to_string(depth_images_) + " depth images hold nothing within " + range +
-                        ", the sensor file's range: wrong depth/scale, emitter off, wrong topic?");
-  }
+                        std::to_string(depth_images_) + " depth images " + holdNoDepth(sensor_.depth_noise));
   if (pairs.backward > 0)
     warnings_.push_back(std::to_string(pairs.backward) +
                         " images are left out: their stamps repeat or precede the one before");

@@ -1,7 +1,6 @@
 #include "vip_slam_bringup/runner/bag_reader.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <set>
 #include <stdexcept>
 
@@ -16,6 +15,7 @@
 #include "vip_slam_ros/tf_lookup.h"
 
 #include "bag_decoding.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -125,11 +125,10 @@ void BagReader::takeExtrinsics(SensorConfig* sensor) {
   extrinsics_source_ = "tf: " + found.camera_frame + " to " + found.imu_frame;
   const ExtrinsicsGap off = extrinsicsGap(sensor->T_imu_cam, *found.T_imu_cam);
   if (off.large()) {
-    char words[160];
-    std::snprintf(words, sizeof words, "differ from the sensor file's T_imu_cam by %.1f degrees and %.1f cm",
-                  off.degrees, 100 * off.metres);
-    warnings_.push_back("extrinsics (" + extrinsics_source_ + ") " + words +
-                        ": tf is used; --extrinsics config takes the file's");
+    warnings_.push_back(formatted(
+        "extrinsics (%s) differ from the sensor file's T_imu_cam by %.1f degrees and %.1f cm: tf is used; --extrinsics "
+        "config takes the file's",
+        extrinsics_source_.c_str(), off.degrees, 100 * off.metres));
   }
   sensor->T_imu_cam = *found.T_imu_cam;
 }

@@ -1,9 +1,10 @@
 #include "vip_slam_bringup/runner/pipeline.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
+
+#include "vip_slam_ros/stream_faults.h"
 
 namespace vip_slam {
 
@@ -16,7 +17,7 @@ Pipeline::Pipeline(const PipelineOptions& options, const SensorConfig& sensor, T
 Pipeline::~Pipeline() = default;
 
 void Pipeline::loadMap(const std::string& path, bool localise) {
-  if (!mapping_) throw std::invalid_argument("a map was given, but mapping is switched off");
+  if (!mapping_) throw std::invalid_argument(path + ": a map was given, but mapping is off, expected mapping: true");
   // Before the planes process the loaded map, since their updates would change it.
   if (localise) mapping_->localiseOnly();
   front_end_->applyMapUpdate(mapping_->loadMap(path));
@@ -65,9 +66,7 @@ void Pipeline::restart(double seconds) {
   duration_ = duration();
   oldest_taken_ = newest_taken_ = std::numeric_limits<double>::infinity();
   newest_image_ = newest_imu_ = -1e300;
-  char words[80];
-  std::snprintf(words, sizeof words, "time ran backwards by %.1f s (a bag that loops?)", seconds);
-  front_end_->clockRanBack(words);
+  front_end_->clockRanBack(timeRanBack(seconds));
 }
 
 void Pipeline::finish() {
@@ -105,8 +104,7 @@ void Pipeline::process(const ImagePair& pair) {
     states_.push_back({frame.t, frame.status});
   else if (frame.status.state == TrackingState::kInitialising)
     states_.back().status.reason = frame.status.reason;  // keep the newest reason for waiting
-  const bool posed = frame.status.state == TrackingState::kTracking || frame.status.state == TrackingState::kDegraded;
-  if (posed && passes_.take(frame.t)) {
+  if (hasPose(frame.status.state) && passes_.take(frame.t)) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
     chain_.push_back({frame.t, frame.epoch, frame.T_chain_C});
     covariances_.push_back({frame.t, poseCovariance(frame)});

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "vip_slam_core/geometry/polygon_triangulation.h"
 #include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/markers.h"
 
 namespace vip_slam {
@@ -32,16 +32,10 @@ struct Box {
   bool empty() const { return low.x() > high.x(); }
 };
 
-std::string format(const char* pattern, double a, double b) {
-  char text[80];
-  std::snprintf(text, sizeof text, pattern, a, b);
-  return text;
-}
-
 /// Points as an SVG path in drawing coordinates: x to the right, y (up) flipped to y down.
 std::string pathData(const std::vector<Eigen::Vector3d>& points, bool closed) {
   std::string data;
-  for (const auto& p : points) data += format(data.empty() ? "M%.3f %.3f" : "L%.3f %.3f", p.x(), -p.y());
+  for (const auto& p : points) data += formatted(data.empty() ? "M%.3f %.3f" : "L%.3f %.3f", p.x(), -p.y());
   return closed ? data + "Z" : data;
 }
 
@@ -87,11 +81,8 @@ void writePlanesPly(const std::string& path, const std::vector<PlaneEstimate>& p
          "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face "
       << triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
   for (const auto& [triangle, color] : triangles) {
-    for (const auto& p : triangle) {
-      char line[120];
-      std::snprintf(line, sizeof line, "%.4f %.4f %.4f %d %d %d\n", p.x(), p.y(), p.z(), color.r, color.g, color.b);
-      out << line;
-    }
+    for (const auto& p : triangle)
+      out << formatted("%.4f %.4f %.4f %d %d %d\n", p.x(), p.y(), p.z(), color.r, color.g, color.b);
   }
   for (std::size_t i = 0; i < triangles.size(); ++i)
     out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
@@ -130,7 +121,7 @@ void writeFloorPlan(const std::string& path, const std::vector<PlaneEstimate>& p
   if (!line.empty()) {
     drawing += "<path fill='none' stroke='#d5462f' stroke-width='0.04' d='" + pathData(line, false) + "'/>\n";
     drawing +=
-        "<circle r='0.1' fill='#d5462f'" + format(" cx='%.3f' cy='%.3f'/>\n", line.front().x(), -line.front().y());
+        "<circle r='0.1' fill='#d5462f'" + formatted(" cx='%.3f' cy='%.3f'/>\n", line.front().x(), -line.front().y());
   }
   if (box.empty()) {
     box.add({0, 0, 0});
@@ -146,13 +137,13 @@ void writeFloorPlan(const std::string& path, const std::vector<PlaneEstimate>& p
   AtomicFile file(path);
   auto& out = file.stream();
   out << "<svg xmlns='http://www.w3.org/2000/svg'"
-      << format(" width='%.0f' height='%.0f'", scale * width, scale * height)
-      << format(" viewBox='%.3f %.3f", left, top) << format(" %.3f %.3f'>\n", width, height) << "<rect"
-      << format(" x='%.3f' y='%.3f'", left, top) << format(" width='%.3f' height='%.3f'", width, height)
+      << formatted(" width='%.0f' height='%.0f'", scale * width, scale * height)
+      << formatted(" viewBox='%.3f %.3f", left, top) << formatted(" %.3f %.3f'>\n", width, height) << "<rect"
+      << formatted(" x='%.3f' y='%.3f'", left, top) << formatted(" width='%.3f' height='%.3f'", width, height)
       << " fill='white'/>\n"
       << drawing << "<path stroke='#2b2f36' stroke-width='0.04' d='" << pathData({{x, -y, 0}, {x + 1, -y, 0}}, false)
       << "'/>\n<text font-family='sans-serif' font-size='0.25' fill='#2b2f36'"
-      << format(" x='%.3f' y='%.3f'", x + 1.1, y + 0.08) << ">1 m</text>\n</svg>\n";
+      << formatted(" x='%.3f' y='%.3f'", x + 1.1, y + 0.08) << ">1 m</text>\n</svg>\n";
   file.commit();
 }
 

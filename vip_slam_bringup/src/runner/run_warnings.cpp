@@ -1,6 +1,5 @@
 // Warnings for the user after a successful run.
 #include <algorithm>
-#include <cstdio>
 #include <iterator>
 #include <string>
 #include <vector>
@@ -8,55 +7,48 @@
 #include "vip_slam_backend/optimisation/inertial_scale.h"
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/runner/run_output.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
 
-bool hasPose(const StateChange& change) {
-  return change.status.state == TrackingState::kTracking || change.status.state == TrackingState::kDegraded;
-}
+bool posed(const StateChange& change) { return hasPose(change.status.state); }
 
 /// Warning about a late first pose.
 std::string lateStart(const Pipeline& pipeline) {
   constexpr double kSoon = 3.0;  // s; standing for a second, or two tries in motion
   const std::vector<StateChange>& states = pipeline.states();
-  const auto first = std::find_if(states.begin(), states.end(), hasPose);
+  const auto first = std::find_if(states.begin(), states.end(), posed);
   if (states.empty() || first == states.begin()) return "";
   const bool never = first == states.end();
   const double seconds = never ? pipeline.duration() : first->t - states.front().t;
   if (seconds < kSoon) return "";
-  char words[300];
-  std::snprintf(words, sizeof words, "%s: %s; standing still for a second, in view of some texture, starts at once",
-                never ? "there is no pose at all" : "the first pose comes late",
-                std::prev(first)->status.reason.c_str());
-  char after[60] = "";
-  if (!never) std::snprintf(after, sizeof after, "%.1f s after the first image ", seconds);
-  return after + std::string(words);
+  const std::string late = never ? formatted("there is no pose at all in %.1f s", seconds)
+                                 : formatted("the first pose comes late, %.1f s after the first image", seconds);
+  return late + ": " + std::prev(first)->status.reason +
+         "; standing still for a second, in view of some texture, starts at once";
 }
 
 /// Warning about poses missing after the first one, for longer than a moment.
 std::string missingPoses(const Pipeline& pipeline) {
   constexpr double kMoment = 1.0;  // s
   const std::vector<StateChange>& states = pipeline.states();
-  const auto first = std::find_if(states.begin(), states.end(), hasPose);
+  const auto first = std::find_if(states.begin(), states.end(), posed);
   if (first == states.end()) return "";
   const double begin = states.front().t, end = begin + pipeline.duration();
   double longest = 0, missing = 0;
   const StateChange* worst = nullptr;
   for (auto it = first; it != states.end(); ++it) {
-    if (hasPose(*it)) continue;
+    if (posed(*it)) continue;
     // A clock that ran back ends a stretch without saying how long it was.
     const double seconds = std::max(0.0, (std::next(it) == states.end() ? end : std::next(it)->t) - it->t);
     missing += seconds;
     if (seconds > longest) longest = seconds, worst = &*it;
   }
   if (!worst || missing < kMoment) return "";
-  char words[300];
-  std::snprintf(
-      words, sizeof words,
+  return formatted(
       "%.1f of %.1f s have no pose, the longest stretch begins %.1f s after the first image and lasts %.1f s: %s",
       missing, pipeline.duration(), worst->t - begin, longest, worst->status.reason.c_str());
-  return words;
 }
 
 }  // namespace
@@ -64,13 +56,17 @@ std::string missingPoses(const Pipeline& pipeline) {
 std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader) {
   std::vector<std::string> all = reader.warnings();
   const FrontEndCounters& c = pipeline.frontEnd().counters();
-  if (c.imu_gaps > 0) all.push_back(std::to_string(c.imu_gaps) + " gaps in the IMU; a long one restarts the odometry");
+  if (c.imu_gaps > 0)
+    all.push_back(
+        formatted("%zu gaps of the IMU above %g s (frontend/recovery/max_imu_gap); one of five times as long "
+                  "restarts the odometry",
+                  static_cast<std::size_t>(c.imu_gaps), pipeline.options().frontend.recovery.max_imu_gap));
   if (c.imu_spikes > 0)
     all.push_back(
         std::to_string(c.imu_spikes) +
         " single samples of the IMU were far off their neighbours and were replaced by them: errors on its bus?");
   if (c.imu_shocks > 0)
-    all.push_back(std::to_string(c.imu_shocks) +
+    all.push_back(std::to_string(c.imu_shocks) + " of " + std::to_string(c.images) +
                   " images show a step of the velocity that the IMU has not: shocks beyond its range or rate?");
   if (c.repeated_image > 0)
     all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
@@ -79,16 +75,14 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   if (c.repeated_depth > 0)
     all.push_back(std::to_string(c.repeated_depth) + " of " + std::to_string(c.images) +
                   " depth images repeat the one before and are left out: has the depth camera frozen?");
-  if (c.gyro_cut_off > 0) {
-    char words[160];
-    std::snprintf(
-        words, sizeof words,
-        "%zu samples of the gyroscope are at the end of its range, %.2f rad/s: the body turned faster, by how "
-        "much only images tell",
-        static_cast<std::size_t>(c.gyro_cut_off), c.gyro_range);
-    all.push_back(words);
-  }
-  if (c.imu_missing > 0) all.push_back(std::to_string(c.imu_missing) + " images are not covered by the IMU");
+  if (c.gyro_cut_off > 0)
+    all.push_back(
+        formatted("%zu samples of the gyroscope are at the end of its range, %.2f rad/s: the body turned faster, by "
+                  "how much only images tell",
+                  static_cast<std::size_t>(c.gyro_cut_off), c.gyro_range));
+  if (c.imu_missing > 0)
+    all.push_back(std::to_string(c.imu_missing) + " of " + std::to_string(c.images) +
+                  " images are not covered by the IMU");
   if (c.imu_rejected > 0)
     all.push_back(std::to_string(c.imu_rejected) +
                   " IMU messages are left out: not finite, all zero, not newer than the one before, or stamped later "
@@ -100,13 +94,9 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
                   " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
                   "signs and units, T_imu_cam, the stamps and the scale of depth right? check_bag tells");
-  if (c.stamp_sigma > kLargeStampJitter) {
-    char words[120];
-    std::snprintf(words, sizeof words,
-                  "stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
-                  1e3 * c.stamp_sigma);
-    all.push_back(words);
-  }
+  if (c.stamp_sigma > kLargeStampJitter)
+    all.push_back(formatted("stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
+                            1e3 * c.stamp_sigma));
   // A calibration estimated with a wrong IMU is meaningless.
   if (10 * c.imu_contradicted < c.images) {
     for (const std::string& difference :
@@ -123,14 +113,11 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     const std::string missed = pipeline.mapping()->backEnd().trackNoiseDifference();
     if (!missed.empty()) all.push_back(missed);
     const MapSnapshot map = pipeline.mapping()->backEnd().snapshot();
-    for (const auto& [from, to] : guessedTimes(map)) {
-      char words[240];
-      std::snprintf(words, sizeof words,
-                    "keyframes from %.1f to %.1f s after the first image were never tied to the rest of the map: their "
+    for (const auto& [from, to] : guessedTimes(map))
+      all.push_back(
+          formatted("keyframes from %.1f to %.1f s after the first image were never tied to the rest of the map: their "
                     "place in trajectory.tum, planes and map is a guess, realtime.tum leaves them out",
-                    from - pipeline.chain().front().t, to - pipeline.chain().front().t);
-      all.push_back(words);
-    }
+                    from - pipeline.chain().front().t, to - pipeline.chain().front().t));
     if (!pipeline.chain().empty() && anchorTrajectory(pipeline.chain(), anchorsOf(map)).empty())
       all.push_back("the stored map was not recognised: no image has a pose in it, trajectory.tum is empty");
     const auto& refused = pipeline.mapping()->warnings();

@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vip_slam_bringup/stereo/disparity_refinement.h"
+#include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/size_text.h"
 
 namespace vip_slam {
 
@@ -14,6 +16,8 @@ struct StereoDepth::Maps {
 };
 
 namespace {
+
+constexpr double kLeastBaseline = 1e-3;  // m
 
 cv::Mat cameraMatrix(const CameraIntrinsics& c) {
   return (cv::Mat_<double>(3, 3) << c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1);
@@ -34,8 +38,6 @@ cv::Mat distortionOf(const CameraIntrinsics& c) {
   return out;
 }
 
-std::string sizeText(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
-
 }  // namespace
 
 StereoDepth::StereoDepth(const StereoCalibration& calibration, const StereoDepthOptions& options)
@@ -53,10 +55,14 @@ StereoDepth::StereoDepth(const StereoCalibration& calibration, const StereoDepth
     throw std::invalid_argument("stereo calibration: left is " + distortionModelName(left.model) + ", right is " +
                                 distortionModelName(right.model) + ", expected the same lens model");
   const SE3 T_right_left = calibration.T_left_right().inverse();
-  if (T_right_left.t().norm() < 1e-3)
-    throw std::invalid_argument("stereo calibration: the two cameras are less than 1 mm apart");
-  if (T_right_left.t().x() > 0)
-    throw std::invalid_argument("stereo calibration: the right camera lies left of the left one; swap them");
+  const double apart = T_right_left.t().norm(), to_the_left = T_right_left.t().x();
+  if (apart < kLeastBaseline)
+    throw std::invalid_argument(
+        formatted("stereo calibration: the two cameras are %g mm apart, expected at least %g mm", 1e3 * apart,
+                  1e3 * kLeastBaseline));
+  if (to_the_left > 0)
+    throw std::invalid_argument(formatted(
+        "stereo calibration: the right camera lies %.1f mm left of the left one; swap them", 1e3 * to_the_left));
 
   const cv::Mat K_left = cameraMatrix(left), K_right = cameraMatrix(right);
   const cv::Mat D_left = distortionOf(left), D_right = distortionOf(right);
@@ -92,7 +98,9 @@ StereoDepth::~StereoDepth() = default;
 
 StereoDepthFrame StereoDepth::compute(const cv::Mat& left, const cv::Mat& right) const {
   for (const cv::Mat* image : {&left, &right}) {
-    if (image->type() != CV_8UC1) throw std::invalid_argument("stereo pair: expected 8-bit grey images");
+    if (image->type() != CV_8UC1)
+      throw std::invalid_argument("stereo pair: an image is " + cv::typeToString(image->type()) +
+                                  ", expected 8-bit grey");
     if (image->size() != size_)
       throw std::invalid_argument("stereo pair: an image is " + sizeText(image->size()) + ", calibrated for " +
                                   sizeText(size_));

@@ -4,6 +4,9 @@
 #include <string>
 #include <vector>
 
+#include <ros/time.h>
+#include <Eigen/Geometry>
+
 namespace vip_slam {
 
 struct TextRow {
@@ -25,6 +28,12 @@ class TextTable {
   double number(const TextRow& row, std::size_t column, const std::string& what) const;
   /// The cell as whole nanoseconds.
   long long nanoseconds(const TextRow& row, std::size_t column) const;
+  /// Throws std::runtime_error "file:line: the stamp 1.500000000 does not follow 1.500000000" unless it is later.
+  void ascending(const TextRow& row, double before, double t) const;
+  void ascending(const TextRow& row, const ros::Time& before, const ros::Time& stamp) const;
+  /// Throws std::runtime_error "file:line: the quaternion (w, x, y, z) has length 1.2, expected 1" when it is off by
+  /// more than a hundredth.
+  Eigen::Quaterniond quaternion(const TextRow& row, double w, double x, double y, double z) const;
   /// Throws std::runtime_error "file:line: message".
   [[noreturn]] void fail(const TextRow& row, const std::string& message) const;
 

@@ -42,7 +42,7 @@ std::optional<SE3> extrinsicsOfTf(const Recording& recording);
 /// All of them in this order; the later ones only when their input is available.
 Findings checkAll(const Recording& recording);
 Severity worst(const Findings& findings);
-/// One line per finding, the worst first within each check, then the verdict; `color`: ANSI colours.
+/// One line per finding in the order given, then the verdict; `color`: ANSI colours.
 std::string toText(const Findings& findings, bool color);
 
 /// Camera-IMU delay and rotation estimated from gyro rates and image rotation.

@@ -26,7 +26,7 @@ struct GlobalBaRecord {
   double milliseconds = 0;
 };
 
-/// A plane's parameters after a map update.
+/// Back end and planes on a thread of their own; both are called in the order of the keyframes.
 class MappingThread {
  public:
   /// `timing` may be null.

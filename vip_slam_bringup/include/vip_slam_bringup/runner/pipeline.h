@@ -68,6 +68,7 @@ class Pipeline {
   const std::vector<StateChange>& states() const { return states_; }
   const TrackingStatus& status() const { return status_; }  ///< of the last image
   const Trajectory& realtime() const { return realtime_; }  ///< poses in map, as estimated at the time of each image
+  const PipelineOptions& options() const { return options_; }
   const FrontEnd& frontEnd() const { return *front_end_; }
   const MappingThread* mapping() const { return mapping_.get(); }  ///< null: odometry only. Read it after finish()
 
