@@ -1,7 +1,6 @@
 // rosrun vip_slam_eval draw_planes BAG --sensor S --trajectory T.tum --planes P.yaml --time SECONDS... --out DIR
 // [--heights]: draws the planes of a run over images of its bag; --heights measures how stable horizontal planes are.
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <sstream>
@@ -13,6 +12,7 @@
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_eval/plane_benchmark/plane_heights.h"
 #include "vip_slam_eval/plane_benchmark/plane_picture.h"
@@ -58,8 +58,7 @@ int draw(Arguments arguments) {
     }
     if (!due) continue;
     const cv::Mat picture = drawPlanes(pair->gray, pair->depth, *camera, T_map_I * sensor.T_imu_cam, planes);
-    char name[64];
-    std::snprintf(name, sizeof name, "planes_%07.2f.png", pair->t - reader.beginTime());
+    const std::string name = formatted("planes_%07.2f.png", pair->t - reader.beginTime());
     const std::string path = (std::filesystem::path(arguments.out) / name).string();
     writePicture(path, picture);
     std::cout << path << "\n";

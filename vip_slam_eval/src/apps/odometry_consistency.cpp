@@ -58,7 +58,7 @@ class Run {
       front_end_.addImu(imu_.samples[next_]);
     }
     const TrackedFramePtr tracked = front_end_.process({t, gray, depth}).frame;
-    if (tracked->status.state != TrackingState::kTracking && tracked->status.state != TrackingState::kDegraded) return;
+    if (!hasPose(tracked->status.state)) return;
     poses_.push_back({t, tracked->state.T_W_I, poseCovariance(*tracked)});
   }
   const std::vector<PoseWithCovariance>& poses() const { return poses_; }

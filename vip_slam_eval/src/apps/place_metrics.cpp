@@ -15,6 +15,7 @@
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/options.h"
 #include "vip_slam_ros/sensor_files.h"
 
@@ -26,11 +27,7 @@ constexpr double kRevisitSeconds = 30;
 constexpr double kWrongMetres = 0.3, kWrongAngle = 5 * kDegree;
 
 /// A share in per cent; "-" when `all` is zero.
-std::string percent(int part, int all) {
-  char text[16] = "-";
-  if (all > 0) std::snprintf(text, sizeof text, "%.1f %%", 100.0 * part / all);
-  return text;
-}
+std::string percent(int part, int all) { return all > 0 ? formatted("%.1f %%", 100.0 * part / all) : "-"; }
 
 TruePoses posesOf(const Map& map, const std::string& truth) {
   const TruePoses poses = truePoses(map, readTum(truth));
@@ -120,10 +117,9 @@ void judgeRelocalisation(const std::vector<RelocalisationTrial>& trials, bool li
                   trial.reason.c_str());
   }
   std::sort(errors.begin(), errors.end());
-  char median[32] = "-";
-  if (!errors.empty()) std::snprintf(median, sizeof median, "%.4f m", errors[errors.size() / 2]);
+  const std::string median = errors.empty() ? "-" : formatted("%.4f m", errors[errors.size() / 2]);
   std::printf("relocalisation: %zu trials, %d found, median error %s, wrong (> 0.3 m or 5 deg) %d\n", trials.size(),
-              found, median, wrong);
+              found, median.c_str(), wrong);
   std::printf("trials at mapped places %d, within 1 s and 3 cm %d (%s)\n", mapped, right,
               percent(right, mapped).c_str());
   std::printf("of these with %d corners of the map in view %d, within 1 s and 3 cm %d (%s)\n", kFewCorners, textured,

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <sstream>
 
 #include "vip_slam_backend/optimisation/problem_builder.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_eval/metrics/trajectory_metrics.h"
 
@@ -136,12 +136,6 @@ const Row kRows[] = {
     {"RMSE (m)", "%.4f", [](const GbaRun& r) { return r.rmse; }},
 };
 
-std::string format(const Row& row, const GbaRun& run) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof(buffer), row.format, row.value(run));
-  return buffer;
-}
-
 const char* hostsName(HomographyHosts hosts) {
   switch (hosts) {
     case HomographyHosts::kFirstViews:
@@ -165,7 +159,7 @@ std::string gbaTableMarkdown(const std::vector<GbaRun>& runs) {
   out << '\n';
   for (const Row& row : kRows) {
     out << "| " << row.name << " |";
-    for (const GbaRun& run : runs) out << ' ' << format(row, run) << " |";
+    for (const GbaRun& run : runs) out << ' ' << formatted(row.format, row.value(run)) << " |";
     out << '\n';
   }
   return out.str();
@@ -179,7 +173,7 @@ std::string gbaTableCsv(const std::vector<GbaRun>& runs) {
   for (const GbaRun& run : runs) {
     out << variantName(run.setup.variant) << ',' << run.setup.solver << ',' << run.setup.threads << ",\""
         << hostsName(run.setup.hosts) << '"';
-    for (const Row& row : kRows) out << ',' << format(row, run);
+    for (const Row& row : kRows) out << ',' << formatted(row.format, row.value(run));
     out << '\n';
   }
   return out.str();

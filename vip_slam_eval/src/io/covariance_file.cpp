@@ -6,6 +6,8 @@
 
 #include "vip_slam_eval/io/trajectory_source.h"
 
+#include "vip_slam_core/util/formatted.h"
+
 namespace vip_slam {
 
 std::vector<PoseWithCovariance> readCovariances(const std::string& path, const Trajectory& trajectory) {
@@ -19,7 +21,8 @@ std::vector<PoseWithCovariance> readCovariances(const std::string& path, const T
     if (!line.empty() && line.back() == '\r') line.pop_back();
     const std::string where = path + ":" + std::to_string(number) + ": ";
     if (number == 1) {
-      if (line.rfind("t,xx,xy,xz,", 0) != 0) throw std::runtime_error(where + "expected the header t,xx,xy,xz,...,cc");
+      if (line.rfind("t,xx,xy,xz,", 0) != 0)
+        throw std::runtime_error(where + "expected the header t,xx,xy,xz,...,cc, found '" + line + "'");
       continue;
     }
     if (line.empty()) continue;
@@ -38,11 +41,12 @@ std::vector<PoseWithCovariance> readCovariances(const std::string& path, const T
     }
     if (in.fail() || comma != ',' || in.peek() != std::istringstream::traits_type::eof() ||
         !sample.covariance.allFinite()) {
-      throw std::runtime_error(where + "expected a stamp and 21 finite numbers");
+      throw std::runtime_error(where + "expected a stamp and 21 finite numbers, found '" + line + "'");
     }
     while (pose != trajectory.end() && pose->t < sample.t - kSameStamp) ++pose;
     if (pose == trajectory.end() || std::abs(pose->t - sample.t) > kSameStamp) {
-      throw std::runtime_error(where + "no pose of the estimate has this stamp, expected the covariances of its poses");
+      throw std::runtime_error(where + "no pose of the estimate has this stamp, " + formatted("%.9f", sample.t) +
+                               ", expected the covariances of its poses");
     }
     sample.T_M_B = pose->T_W_B;
     samples.push_back(sample);

@@ -21,7 +21,7 @@ std::vector<LabelledPoint> readLabelledPoints(const std::string& path) {
   for (std::size_t number = 1; std::getline(file, line); ++number) {
     if (!line.empty() && line.back() == '\r') line.pop_back();
     if (number == 1) {
-      if (line != kHeader) throw std::runtime_error(path + ":1: expected the header " + kHeader);
+      if (line != kHeader) throw std::runtime_error(path + ":1: '" + line + "', expected the header " + kHeader);
       continue;
     }
     if (line.empty()) continue;

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -23,11 +24,7 @@ void text(cv::Mat& image, const std::string& s, cv::Point at, double scale = 0.5
   cv::putText(image, s, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(40, 40, 40), 1, cv::LINE_AA);
 }
 
-std::string number(double v) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof(buffer), "%g", v);
-  return buffer;
-}
+std::string number(double v) { return formatted("%g", v); }
 
 }  // namespace
 

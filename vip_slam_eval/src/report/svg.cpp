@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <iomanip>
 #include <locale>
 #include <sstream>
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -205,12 +206,10 @@ std::string colourScale(double s) {
       {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {243, 200, 30}}};
   const double x = std::clamp(s, 0.0, 1.0) * (kStops.size() - 1);
   const std::size_t k = std::min<std::size_t>(static_cast<std::size_t>(x), kStops.size() - 2);
-  char text[8];
   int rgb[3];
   for (int c = 0; c < 3; ++c)
     rgb[c] = static_cast<int>(kStops[k][c] + (x - k) * (kStops[k + 1][c] - kStops[k][c]) + 0.5);
-  std::snprintf(text, sizeof text, "#%02x%02x%02x", rgb[0] & 255, rgb[1] & 255, rgb[2] & 255);
-  return text;
+  return formatted("#%02x%02x%02x", rgb[0] & 255, rgb[1] & 255, rgb[2] & 255);
 }
 
 }  // namespace vip_slam

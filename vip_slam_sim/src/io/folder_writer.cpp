@@ -1,14 +1,17 @@
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "vip_slam_sim/io/sequence_writer.h"
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -16,10 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string secondsText(std::int64_t ns) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%lld.%09lld", static_cast<long long>(ns / 1000000000LL),
-                static_cast<long long>(ns % 1000000000LL));
-  return text;
+  return formatted("%lld.%09lld", static_cast<long long>(ns / 1000000000LL), static_cast<long long>(ns % 1000000000LL));
 }
 
 class FolderWriter : public SequenceWriter {
@@ -86,9 +86,9 @@ class FolderWriter : public SequenceWriter {
   }
 
   void commit() override {
-    for (std::ofstream* out : {&imu_, &truth_, &rgb_, &depth_, &both_, &poses_}) {
+    for (const auto& [out, name] : lists_) {
       out->close();
-      if (!*out) throw std::runtime_error(work_.string() + ": a list could not be written");
+      if (!*out) throw std::runtime_error((work_ / name).string() + ": cannot be written");
     }
     fs::rename(work_, target_);
     committed_ = true;
@@ -99,10 +99,12 @@ class FolderWriter : public SequenceWriter {
     out.open(work_ / name);
     if (!out) throw std::runtime_error((work_ / name).string() + ": cannot be written");
     out << header << '\n' << std::setprecision(12);
+    lists_.emplace_back(&out, name);
   }
 
   fs::path target_, work_;
   std::ofstream imu_, truth_, rgb_, depth_, both_, poses_;
+  std::vector<std::pair<std::ofstream*, std::string>> lists_;  ///< all of them, with their names in the folder
   bool committed_ = false;
 };
 

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_sim/io/rgbd_folder.h"
 
 namespace vip_slam {
@@ -11,6 +12,7 @@ namespace {
 
 constexpr int kNeighbour = 8;          ///< px from a point to its normal's neighbours: wide, as depth is quantised
 constexpr double kMinAgreement = 0.8;  ///< minimum length of the mean of the images' up directions
+constexpr std::size_t kFewestNormals = 500;
 
 /// Normals of locally flat patches, in the folder's world.
 void collectNormals(const RgbdFolder& folder, const RgbdFrame& frame, const SE3& T_W_D,
@@ -47,8 +49,13 @@ Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
     if (i % 8 == 0) collectNormals(folder, folder.frames[i], T_W_C * folder.T_color_depth, &normals);
   }
   // Cameras that roll or look at the floor give no reliable up direction: a wall could be mistaken for the floor.
-  if (up.norm() < kMinAgreement * static_cast<double>(posed))
-    throw std::runtime_error("gravity: the images do not agree on which side is up; give --up X Y Z");
+  const double agreement = posed == 0 ? 1.0 : up.norm() / static_cast<double>(posed);
+  if (agreement < kMinAgreement)
+    throw std::runtime_error(
+        formatted("gravity: the %zu images with a pose do not agree on which side is up; give --up X Y Z (their mean "
+                  "up has length "
+                  "%.2f, expected at least %g)",
+                  posed, agreement, kMinAgreement));
   up.normalize();
   // Cameras are only roughly level: narrow the cone of accepted normals in steps. Floor normals (parallel to up) and,
   // once the cone is below 20 degrees, wall normals (perpendicular to it) contribute.
@@ -62,8 +69,10 @@ Eigen::Vector3d upFromDepth(const RgbdFolder& folder) {
       if (d > c) M += n * n.transpose(), ++used;
       if (d < s && degrees < 20) M -= n * n.transpose(), ++used;
     }
-    if (used < 500)
-      throw std::runtime_error("gravity: too few floor and wall points in the depth images; give --up X Y Z");
+    if (used < kFewestNormals)
+      throw std::runtime_error(
+          formatted("gravity: %zu floor and wall points in the depth images, expected at least %zu; give --up X Y Z",
+                    used, kFewestNormals));
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(M);
     const Eigen::Vector3d next = eigen.eigenvectors().col(2);
     up = next.dot(up) < 0 ? Eigen::Vector3d(-next) : next;

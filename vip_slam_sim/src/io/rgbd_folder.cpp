@@ -1,7 +1,6 @@
 #include "vip_slam_sim/io/rgbd_folder.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -13,11 +12,15 @@
 
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/size_text.h"
 
 namespace vip_slam {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kMaxOffOrthonormal = 0.05;  // of a rotation that is written with few digits
 
 std::vector<double> numbersOf(const fs::path& path, std::size_t expected) {
   std::ifstream in(path);
@@ -70,18 +73,19 @@ RgbdFolder openSevenScenes(const fs::path& folder, double rate) {
   }
   std::sort(found.begin(), found.end());
   for (const auto& [n, colour] : found) {
-    char stem[32];
-    std::snprintf(stem, sizeof stem, "frame-%06ld", n);
+    const std::string stem = formatted("frame-%06ld", n);
     const double t = static_cast<double>(n - found.front().first) / rate;
-    const fs::path depth = folder / (std::string(stem) + ".depth.png"),
-                   pose = folder / (std::string(stem) + ".pose.txt");
+    const fs::path depth = folder / (stem + ".depth.png"), pose = folder / (stem + ".pose.txt");
     if (!fs::exists(depth)) throw std::runtime_error(depth.string() + ": missing");
     out.frames.push_back({t, t, colour.string(), depth.string()});
     const std::vector<double> m = numbersOf(pose, 16);
     const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
     const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-    if ((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() > 0.05)
-      throw std::runtime_error(pose.string() + ": expected a rotation in the first three columns");
+    const double off = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
+    if (off > kMaxOffOrthonormal)
+      throw std::runtime_error(pose.string() +
+                               formatted(": the first three columns are off a rotation by %.2g, expected at most %g",
+                                         off, kMaxOffOrthonormal));
     out.T_W_C.push_back({t, SE3(nearestRotation(R), T.topRightCorner<3, 1>())});
   }
   const std::vector<double> k = numbersOf(folder / "camera-intrinsics.txt", 9);
@@ -99,14 +103,14 @@ std::vector<std::pair<double, std::string>> readList(const fs::path& path) {
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
     if (line.empty() || line[0] == '#') continue;
+    const std::string where = path.string() + ":" + std::to_string(number) + ": ";
     std::stringstream s(line);
     double t;
     std::string file;
-    if (!(s >> t >> file))
-      throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": expected 'stamp file'");
+    if (!(s >> t >> file)) throw std::runtime_error(where + "'" + line + "', expected 'stamp file'");
     if (!out.empty() && t == out.back().first) continue;  // some public recordings repeat lines
     if (!out.empty() && t < out.back().first)
-      throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": stamp runs backwards");
+      throw std::runtime_error(where + formatted("stamp %.6f does not follow %.6f", t, out.back().first));
     out.emplace_back(t, file);
   }
   return out;
@@ -148,8 +152,12 @@ void loadRgbdFrame(const RgbdFolder& folder, const RgbdFrame& frame, cv::Mat* rg
   const cv::Mat bgr = cv::imread(frame.colour, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (bgr.empty()) throw std::runtime_error(frame.colour + ": not an image");
   const cv::Mat raw = cv::imread(frame.depth, cv::IMREAD_UNCHANGED);
-  if (raw.type() != CV_16UC1) throw std::runtime_error(frame.depth + ": expected a 16-bit grey image");
-  if (raw.size() != bgr.size()) throw std::runtime_error(frame.depth + ": expected the size of " + frame.colour);
+  if (raw.empty()) throw std::runtime_error(frame.depth + ": not an image");
+  if (raw.type() != CV_16UC1)
+    throw std::runtime_error(frame.depth + ": is " + cv::typeToString(raw.type()) + ", expected 16-bit grey");
+  if (raw.size() != bgr.size())
+    throw std::runtime_error(frame.depth + ": is " + sizeText(raw.size()) + ", expected " + sizeText(bgr.size()) +
+                             " as " + frame.colour);
   cv::cvtColor(bgr, *rgb, cv::COLOR_BGR2RGB);
   raw.convertTo(*depth_mm, CV_16U, folder.depth_scale * 1000);
   depth_mm->setTo(0, raw == 65535);

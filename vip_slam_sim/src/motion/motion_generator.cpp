@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "view_plan.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_sim/rng.h"
 
 namespace vip_slam {
@@ -76,6 +77,7 @@ SplineTrajectory makeFromFile(const MotionOptions& o) {
                   Eigen::Vector3d(o.x, o.y, o.z));
   const SE3 roll(Eigen::Quaterniond(Eigen::AngleAxisd(o.file_roll * kDegree, Eigen::Vector3d::UnitZ())),
                  Eigen::Vector3d::Zero());
+  const double length = poses.back().t;
   Trajectory chosen;
   for (StampedPose& pose : poses) {
     pose.t -= o.start_at;
@@ -83,7 +85,10 @@ SplineTrajectory makeFromFile(const MotionOptions& o) {
     chosen.push_back({pose.t, place * pose.T_W_B * roll});
   }
   if (chosen.size() < 2)
-    throw std::invalid_argument("motion/file: " + o.file + ": fewer than two poses between start_at and duration");
+    throw std::invalid_argument(formatted(
+        "motion/file: %s: %zu poses from start_at %g s on within duration %g s, expected at least two; the file "
+        "has %.3f s",
+        o.file.c_str(), chosen.size(), o.start_at, o.duration, length));
   const double first = chosen.front().t;
   for (StampedPose& pose : chosen) pose.t -= first;
   return SplineTrajectory::fit(chosen, 0.08, 6);

@@ -5,11 +5,13 @@
 #include <stdexcept>
 
 #include "view_plan.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kFine = 0.02;  ///< s between samples of the plan
+constexpr double kFine = 0.02;     ///< s between samples of the plan
+constexpr double kShortest = 0.5;  ///< s, of a motion
 
 [[noreturn]] void fail(const std::string& what) { throw std::invalid_argument(what); }
 
@@ -142,7 +144,9 @@ SplineTrajectory makePath(const MotionOptions& o, const SE3& T_imu_cam, int seed
     return v;
   };
   const double duration = o.duration > 0 ? std::min(o.duration, length - o.start_at) : length - o.start_at;
-  if (duration <= 0.5) fail("motion/start_at: leaves less than half a second of the path");
+  if (duration <= kShortest)
+    fail(formatted("motion/start_at: %g leaves %.2f s of the path, which takes %.2f s, expected more than %g s",
+                   o.start_at, duration, length, kShortest));
   return splineOf(plan, duration, T_imu_cam);
 }
 

@@ -5,6 +5,8 @@
 
 #include "vip_slam_sim/motion/motion_generator.h"
 
+#include "vip_slam_core/util/formatted.h"
+
 namespace vip_slam {
 namespace {
 
@@ -21,10 +23,12 @@ Trajectory readEuroc(const std::string& path) {
     double t, x, y, z, qw, qx, qy, qz;
     const std::string where = path + ":" + std::to_string(number) + ": ";
     if (!(s >> t >> x >> y >> z >> qw >> qx >> qy >> qz))
-      throw std::runtime_error(where + "expected 't[ns],px,py,pz,qw,qx,qy,qz,...'");
+      throw std::runtime_error(where + "'" + line + "', expected 't[ns],px,py,pz,qw,qx,qy,qz,...'");
     const Eigen::Quaterniond q(qw, qx, qy, qz);
-    if (!(std::abs(q.norm() - 1) < 0.05)) throw std::runtime_error(where + "expected a unit quaternion");
-    if (!out.empty() && t * 1e-9 <= out.back().t) throw std::runtime_error(where + "stamp repeats or runs backwards");
+    if (!(std::abs(q.norm() - 1) < 0.05))
+      throw std::runtime_error(where + formatted("quaternion of length %g, expected a unit quaternion", q.norm()));
+    if (!out.empty() && t * 1e-9 <= out.back().t)
+      throw std::runtime_error(where + formatted("stamp %.9f s does not follow %.9f s", t * 1e-9, out.back().t));
     out.push_back({t * 1e-9, SE3(q, Eigen::Vector3d(x, y, z))});
   }
   return out;
@@ -39,7 +43,7 @@ Trajectory readPoseFile(const std::string& path) {
   while (std::getline(in, line))
     if (!line.empty() && line[0] != '#') break;
   Trajectory out = line.find(',') != std::string::npos ? readEuroc(path) : readTum(path);
-  if (out.size() < 2) throw std::runtime_error(path + ": expected at least two poses");
+  if (out.size() < 2) throw std::runtime_error(path + formatted(": %zu poses, expected at least two", out.size()));
   const double first = out.front().t;
   for (StampedPose& p : out) p.t -= first;
   return out;

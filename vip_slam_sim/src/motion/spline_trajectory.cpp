@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "vip_slam_core/util/formatted.h"
+
 namespace vip_slam {
 namespace {
 
@@ -55,8 +57,11 @@ const Blending& blending() {
 
 SplineTrajectory::SplineTrajectory(double begin, double spacing, std::vector<SE3> control)
     : begin_(begin), spacing_(spacing), control_(std::move(control)) {
-  if (control_.size() < kOrder) throw std::invalid_argument("spline: needs at least 6 control poses");
-  if (!(spacing_ > 0)) throw std::invalid_argument("spline: spacing must be > 0");
+  if (control_.size() < kOrder)
+    throw std::invalid_argument(
+        formatted("spline: %zu control poses, expected at least %zu", control_.size(), std::size_t{kOrder}));
+  if (!(spacing_ > 0))
+    throw std::invalid_argument(formatted("spline: spacing is %g s, expected more than 0", spacing_));
   for (std::size_t i = 0; i + 1 < control_.size(); ++i)
     steps_.push_back(logSO3(control_[i].rotation().conjugate() * control_[i + 1].rotation()));
 }
@@ -99,7 +104,8 @@ MotionState SplineTrajectory::at(double t) const {
 }
 
 SplineTrajectory SplineTrajectory::fit(const Trajectory& poses, double spacing, int iterations) {
-  if (poses.size() < 2) throw std::invalid_argument("spline fit: needs at least 2 poses");
+  if (poses.size() < 2)
+    throw std::invalid_argument(formatted("spline fit: %zu poses, expected at least 2", poses.size()));
   const double t0 = poses.front().t, t1 = poses.back().t;
   const int spans = std::max(1, static_cast<int>(std::ceil((t1 - t0) / spacing - 1e-9)));
   const auto target = [&](double t) {

@@ -8,6 +8,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/util/size_text.h"
+
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
@@ -56,7 +58,8 @@ inline int floorInt(float x) {
 
 Texture::Texture(const cv::Mat& image, bool repeat) : repeat_(repeat) {
   if (image.empty() || (image.type() != CV_8UC3 && image.type() != CV_32FC3))
-    throw std::invalid_argument("texture: image must be 8UC3 or 32FC3 and not empty");
+    throw std::invalid_argument("texture: image is " + sizeText(image.size()) + " " + cv::typeToString(image.type()) +
+                                ", expected CV_8UC3 or CV_32FC3 that is not empty");
   if (repeat && (!powerOfTwo(image.cols) || !powerOfTwo(image.rows)))
     throw std::invalid_argument("texture: a repeating image needs power-of-two sides, has " +
                                 std::to_string(image.cols) + "x" + std::to_string(image.rows));

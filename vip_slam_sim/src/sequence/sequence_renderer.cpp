@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_sim/motion/motion_generator.h"
 #include "vip_slam_sim/render/light_baker.h"
 
@@ -55,7 +56,10 @@ SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions
   effects_ = std::make_unique<SensorEffects>(spec.effects, spec.depth, *camera_, spec.seed);
   visibility_ = std::make_unique<VisibilityCounter>(scene_);
   const double usable = trajectory_.end() - 2 * kMargin - std::abs(spec.imu.time_offset) - spec.effects.rolling_shutter;
-  if (usable <= 0) throw std::runtime_error("sequence '" + spec.name + "': motion: too short for a single image");
+  if (usable <= 0)
+    throw std::runtime_error(
+        formatted("sequence '%s': motion: takes %.2f s, expected more than %.2f s for a single image",
+                  spec.name.c_str(), trajectory_.end(), trajectory_.end() - usable));
   frame_count_ = static_cast<int>(usable * spec.camera.rate) + 1;
 }
 

@@ -17,6 +17,7 @@
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/output_folder.h"
 #include "vip_slam_core/util/progress_bar.h"
 #include "vip_slam_sim/io/sequence_writer.h"
@@ -116,9 +117,7 @@ int run(int argc, char** argv) {
     imuUntil(frame.stamp_ns);
     if (writer) writer->frame(frame);
     if (snapshot_every > 0 && frame.index % snapshot_every == 0) {
-      char number[16];
-      std::snprintf(number, sizeof number, "_%05d.png", frame.index);
-      saveSnapshot(frame, base + number);
+      saveSnapshot(frame, base + formatted("_%05d.png", frame.index));
     }
     ++done;
     bar.update(double(done) / frames, std::to_string(done) + "/" + std::to_string(frames));
