@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <vector>
 
 #include <Eigen/Cholesky>
 
 #include "curve_equations.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -148,12 +148,10 @@ std::string depthCurveDifference(const DepthCurve& found) {
   float most = 0;
   for (const float added : found.added) most = std::max(most, std::abs(added));
   if (most < kWorthTelling) return "";
-  char words[200];
-  std::snprintf(words, sizeof words,
-                "depth is off by up to %.1f mm, at some distances too long and at others too short, which is corrected "
-                "for; depth/curve in the sensor's configuration can have it from the start",
-                1e3 * double(most));
-  return words;
+  return formatted(
+      "depth is off by up to %.1f mm, at some distances too long and at others too short, which is corrected "
+      "for; depth/curve in the sensor's configuration can have it from the start",
+      1e3 * double(most));
 }
 
 }  // namespace vip_slam

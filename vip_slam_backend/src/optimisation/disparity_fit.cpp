@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <Eigen/Cholesky>
 
 #include "curve_equations.h"
 #include "vip_slam_core/depth/disparity_curve.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -76,15 +76,12 @@ std::optional<double> fitDisparityError(const Map& map, const DepthNoise& noise,
 
 std::string disparityDifference(double error) {
   if (error == 0) return "";
-  char words[320];
-  std::snprintf(
-      words, sizeof words,
+  return formatted(
       "depth reads too %s by more the farther, %.1f mm at 1 m and %.1f mm at 3 m, as with disparities that are all "
       "off by the same; it is corrected for, but the camera should be calibrated anew, or depth/curve in the "
       "sensor's configuration have it from the start",
       error < 0 ? "long" : "short", 1e3 * std::abs(addedForDisparity(error, 1)),
       1e3 * std::abs(addedForDisparity(error, 3)));
-  return words;
 }
 
 }  // namespace vip_slam

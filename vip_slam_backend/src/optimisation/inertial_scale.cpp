@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 #include <Eigen/Cholesky>
+
+#include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
 namespace {
@@ -215,18 +216,16 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
 std::string scaleDifference(const InertialScale& scale, const SensorConfig& sensor) {
   const double difference = scale.factor - 1;
   if (!(scale.sigma > 0) || std::abs(difference) < std::max(kMinDifference, kSure * scale.sigma)) return "";
-  char remedy[120] = "";
+  std::string remedy;
   if (sensor.depth_encoding != "32FC1") {
-    std::snprintf(remedy, sizeof remedy, ", and depth/scale in the sensor's configuration should be %.6g",
-                  sensor.depth_scale * scale.factor);
+    remedy =
+        formatted(", and depth/scale in the sensor's configuration should be %.6g", sensor.depth_scale * scale.factor);
   }
-  char text[320];
-  std::snprintf(text, sizeof text,
-                "distances are %.1f %% %s than the accelerometer says (one sigma %.2f %%): depth reads too %s%s, "
-                "unless the accelerometer is off by as much",
-                100 * std::abs(difference), difference < 0 ? "longer" : "shorter", 100 * scale.sigma,
-                difference < 0 ? "long" : "short", remedy);
-  return text;
+  return formatted(
+      "distances are %.1f %% %s than the accelerometer says (one sigma %.2f %%): depth reads too %s%s, "
+      "unless the accelerometer is off by as much",
+      100 * std::abs(difference), difference < 0 ? "longer" : "shorter", 100 * scale.sigma,
+      difference < 0 ? "long" : "short", remedy.c_str());
 }
 
 }  // namespace vip_slam

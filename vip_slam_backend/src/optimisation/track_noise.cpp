@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <Eigen/Cholesky>
 
 #include "vip_slam_backend/factors/reprojection.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
@@ -56,14 +56,11 @@ double trackNoiseFactor(const LandmarkViews& views, const std::vector<FrameGeome
 
 std::string trackNoiseDifference(double factor) {
   if (factor <= 1) return "";
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
+  return formatted(
       "pixels of tracks miss the map by %.1f times what their noise explains, and count for as much less: is the "
       "lens calibrated (camera/distortion), the readout known (color/rolling_shutter), colour registered with "
       "depth, and depth of the same moment? check_bag tells some of it",
       factor);
-  return text;
 }
 
 }  // namespace vip_slam
