@@ -240,6 +240,20 @@ TEST(Factors, PlanePriorJacobian) {
   EXPECT_NEAR(planePriorResidual(PlaneKind::kVertical, Plane(Eigen::Vector3d(0, 0, 1), 1), 50)(0), 50, 1e-12);
 }
 
+// Which way a wall faces, and where it stands, is not for its kind to say.
+TEST(Factors, PlanePriorKnowsNoYawAndNoPlace) {
+  Scene s;
+  for (const PlaneKind kind : {PlaneKind::kHorizontal, PlaneKind::kVertical})
+    for (int k = 0; k < 20; ++k) {
+      const Plane plane(s.gauss3(1), s.gauss(3));
+      const double cost = planePriorResidual(kind, plane, 50).norm();
+      const SE3 turn(expQuaternion(Eigen::Vector3d(0, 0, s.gauss(2))), s.gauss3(2));
+      EXPECT_NEAR(planePriorResidual(kind, transformPlane(turn, plane), 50).norm(), cost, 1e-9);
+      const SE3 tilt(expQuaternion(Eigen::Vector3d(0.3, 0.2, 0)), Eigen::Vector3d::Zero());
+      EXPECT_GT(std::abs(planePriorResidual(kind, transformPlane(tilt, plane), 50).norm() - cost), 1e-3);
+    }
+}
+
 TEST(Factors, GaugeHoldsPositionAndYawOnly) {
   Scene s;
   GaugePrior prior;
