@@ -56,7 +56,8 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     return std::nullopt;
   }
   if (!imu_seen_) {
-    waiting_for_ = "no IMU message on topic " + sensor_.topics.imu + " yet";
+    const SensorTopics& topics = sensor_.topics;
+    waiting_for_ = "no IMU message on topic " + (topics.imu.empty() ? topics.gyro : topics.imu) + " yet";
     return std::nullopt;
   }
   if (options_.extrinsics != "config") {

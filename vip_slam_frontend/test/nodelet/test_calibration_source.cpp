@@ -28,6 +28,19 @@ class CalibrationSourceTest : public ::testing::Test {
   tf2::BufferCore tf_;
 };
 
+TEST_F(CalibrationSourceTest, TheMissingTopicIsNamedForUnitedAndSplitStreams) {
+  SensorConfig united = sensor(), split = sensor();
+  united.topics.imu = "/camera/imu";
+  split.topics.imu.clear();
+  split.topics.gyro = "/camera/gyro";
+  for (const SensorConfig& each : {united, split}) {
+    CalibrationSource source(each, options_, tf_);
+    EXPECT_FALSE(source.resolve(0));
+    const std::string topic = each.topics.imu + each.topics.gyro;  // one of them is empty
+    EXPECT_NE(source.waitingFor().find("topic " + topic + " yet"), std::string::npos) << source.waitingFor();
+  }
+}
+
 TEST_F(CalibrationSourceTest, ACameraThatStartsLateStillGetsItsExtrinsicsFromTf) {
   connect(tf_, "base_link", "imu", 0.1);
   connect(tf_, "base_link", "camera", 0.3);

@@ -22,8 +22,9 @@ struct MapChanges {
 class Map {
  public:
   // ---- keyframes ----
-  /// Inserts a keyframe at the end of the IMU chain. Refused: id not above all others, time not after the previous
-  /// keyframe's, non-finite numbers in state, features or IMU, features without the camera's half space (NaN xy).
+  /// Inserts a keyframe at the end of the IMU chain. Refused: what validateKeyframe() refuses, an id not above all
+  /// others or too far from the first one, a state that is not finite, a stamp or IMU samples before the previous
+  /// keyframe's end. IMU samples that do not tell the whole motion since then make no factor.
   MapKeyframe& addKeyframe(const KeyframePtr& data, const NavState& state, const ImuNoise& noise);
   /// Inserts a keyframe of a stored map: any id not taken; the chain is given by `previous`, an earlier keyframe of the
   /// same odometry.
