@@ -101,11 +101,11 @@ class FrontEnd::Impl {
   /// The depth image as seen at the stamp of the colour image, when it has another stamp or a rolling shutter.
   cv::Mat depthAtStamp(const DepthReading& depth, const NavState& nav);
   std::vector<FilterMeasurement> measurements() const;
-  SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const;
+  SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t);
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
-  /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt it does not judge
-  /// the points.
+  /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt it does not
+  /// judge the points.
   PredictedMotion predictMotion(const Propagation& propagation, const SE3& T_odom_C, bool doubtful) const;
   /// Longest IMU gap that is bridged, s; a longer one restarts tracking.
   double longestImuGap() const { return 5.0 * options_.recovery.max_imu_gap; }

@@ -86,7 +86,7 @@ bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   return still;
 }
 
-SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) const {
+SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) {
   const int index = filter_.window().indexOf(surfaces_.reference());
   if (index < 0 || depth.empty() || !options_.filter.use_surfaces) return {};
   ScopedTimer timer(timing_, "frontend.surfaces", t);

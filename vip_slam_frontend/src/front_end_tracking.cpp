@@ -85,6 +85,8 @@ StepReport FrontEnd::Impl::updateFilter(const Propagation& propagation, const cv
   counters_.sigma_px = filter_.sigmaPx();
   counters_.imu_noise_scale = filter_.imuNoiseScale();
   counters_.stamp_sigma = filter_.stampSigma();
+  counters_.depth_white = surfaces_.learnt().white();
+  counters_.depth_shared = surfaces_.learnt().shared();
   counters_.imu_contradicted += imuIsContradicted();
   if (report.rows > 0) counters_.nis_per_dof = report.nis / report.rows;
   const bool all_gated = report.features_gated >= 5 && report.features_used * 5 < report.features_gated;

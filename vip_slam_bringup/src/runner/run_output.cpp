@@ -166,6 +166,8 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   put("distance", lengthOf(pipeline.odometry()));
   put("epochs", pipeline.frontEnd().counters().restarts + 1);
   put("stamp_jitter", pipeline.frontEnd().counters().stamp_sigma);
+  put("depth_noise_white", pipeline.frontEnd().counters().depth_white);
+  put("depth_noise_shared", pipeline.frontEnd().counters().depth_shared);
   emitMap(yaml, map, planes,
           pipeline.mapping() ? pipeline.mapping()->globalAdjustments() : std::vector<GlobalBaRecord>());
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());

@@ -37,7 +37,7 @@ struct FrameOutput {
   KeyframePtr keyframe;   ///< null: this image is none
 };
 
-/// What was counted since construction, and present values of what is learnt (the last five); for diagnostics.
+/// What was counted since construction, and present values of what is learnt (the last seven); for diagnostics.
 struct FrontEndCounters {
   std::uint64_t images = 0, keyframes = 0, restarts = 0;
   std::uint64_t bad_image = 0;       ///< wrong size or type, or empty
@@ -65,6 +65,8 @@ struct FrontEndCounters {
   double imu_noise_scale = 1;  ///< factor on the IMU's noise, see ImuNoiseMonitor
   double stamp_sigma = 0;      ///< learnt jitter of the image stamps, one sigma, s
   double nis_per_dof = 0;      ///< of the last update; about 1 when consistent
+  /// Learnt noise of depth on surfaces, as factors on the configured noise: of single patches, and common to a surface.
+  double depth_white = 1, depth_shared = 1;
 };
 
 class FrontEnd {

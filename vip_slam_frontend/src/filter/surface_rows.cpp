@@ -1,7 +1,11 @@
 #include "vip_slam_frontend/filter/surface_rows.h"
 
-#include <algorithm>
 #include <cmath>
+#include <map>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 
 #include "vip_slam_frontend/filter/qr.h"
 #include "vip_slam_frontend/filter/triangular_solve.h"
@@ -14,9 +18,6 @@ namespace {
 constexpr double kGateSigmas = 4.0;
 // With fewer surviving pairs outliers among them cannot be recognised.
 constexpr int kMinPairs = 20;
-// Pairs share errors (the reference's patches, the warp of the depth, the calibration): any number of them counts as at
-// most this many independent ones.
-constexpr double kMaxEffective = 50.0;
 
 /// Columns of the rows before compression: newest clone (theta, p), calibration of the camera, reference's clone
 /// (theta, p).
@@ -109,6 +110,38 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   return A;
 }
 
+/// Multiplies the rows of one surface (numbers in `rows`) by the inverse root of their covariance I + U U^T.
+void whitenShared(const std::vector<SurfacePair>& pairs, const std::vector<int>& rows, Eigen::MatrixXd* A) {
+  const int n = static_cast<int>(rows.size());
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (int row : rows) centre += pairs[row].p_ref / n;
+  // Coordinates along the surface, in standard deviations of its extent.
+  const Eigen::Vector3d normal = pairs[rows.front()].n_ref, e1 = normal.unitOrthogonal(), e2 = normal.cross(e1);
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  Eigen::MatrixXd U(n, 3);
+  for (int k = 0; k < n; ++k) {
+    const Eigen::Vector3d apart = pairs[rows[k]].p_ref - centre;
+    U.block<1, 2>(k, 1) << e1.dot(apart), e2.dot(apart);
+    spread += U.block<1, 2>(k, 1).transpose() * U.block<1, 2>(k, 1) / n;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> extent(spread);
+  const Eigen::Vector2d deviation = extent.eigenvalues().cwiseMax(1e-12).cwiseSqrt();
+  U.rightCols<2>() = (U.rightCols<2>() * extent.eigenvectors() * deviation.cwiseInverse().asDiagonal()).eval();
+  U.col(0).setOnes();
+  for (int k = 0; k < n; ++k) U.row(k) *= pairs[rows[k]].shared / pairs[rows[k]].sigma;
+
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(Eigen::Matrix3d(U.transpose() * U));
+  Eigen::MatrixXd of_surface(n, A->cols());
+  for (int k = 0; k < n; ++k) of_surface.row(k) = A->row(rows[k]);
+  for (int d = 0; d < 3; ++d) {
+    const double squared = solver.eigenvalues()(d);
+    if (!(squared > 1e-9)) continue;
+    const Eigen::VectorXd v = U * solver.eigenvectors().col(d) / std::sqrt(squared);
+    of_surface -= (1.0 - 1.0 / std::sqrt(1.0 + squared)) * v * (v.transpose() * of_surface).eval();
+  }
+  for (int k = 0; k < n; ++k) A->row(rows[k]) = of_surface.row(k);
+}
+
 }  // namespace
 
 SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, const SurfaceMatches& matches,
@@ -119,24 +152,33 @@ SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, con
   const Layout layout(window);
   Eigen::MatrixXd A = stackPairs(window, layout, a, b, matches.pairs);
 
-  // Variance of each whitened residual: the state's uncertainty plus one for its noise.
+  // Variance of each whitened residual: the state's uncertainty plus its noise.
   const Eigen::MatrixXd P = covarianceOf(window, layout, a, b, R);
-  int kept = 0;
+  std::map<int, std::vector<int>> surfaces;  // rows by surface
   for (int i = 0; i < A.rows(); ++i) {
     const auto h = A.row(i).head(layout.size());
-    const double variance = h * P * h.transpose() + 1.0;
+    const SurfacePair& pair = matches.pairs[i];
+    const double variance = h * P * h.transpose() + 1.0 + std::pow(pair.shared / pair.sigma, 2);
     const double relative = std::abs(A(i, layout.size())) / std::sqrt(variance);
     if (!(relative < kGateSigmas)) {
       ++result.gated;
       continue;
     }
-    A.row(kept++) = (relative > huber ? std::sqrt(huber / relative) : 1.0) * A.row(i);
+    if (relative > huber) A.row(i) *= std::sqrt(huber / relative);
+    surfaces[pair.surface].push_back(i);
+    ++result.used;
   }
-  if (kept < kMinPairs || kept < result.gated) return result;
-  result.used = kept;
-
-  A.conservativeResize(kept, Eigen::NoChange);
-  A *= std::sqrt(std::min(1.0, kMaxEffective / kept));
+  if (result.used < kMinPairs || result.used < result.gated) {
+    result.used = 0;
+    return result;
+  }
+  for (const auto& [surface, rows] : surfaces) whitenShared(matches.pairs, rows, &A);
+  int kept = 0;
+  Eigen::MatrixXd used(result.used, A.cols());
+  for (const auto& [surface, rows] : surfaces) {
+    for (int row : rows) used.row(kept++) = A.row(row);
+  }
+  A.swap(used);
   triangularise(A, layout.rank());
   const int rank = layout.rank();
   result.rows.H = Eigen::MatrixXd::Zero(rank, window.dimension());

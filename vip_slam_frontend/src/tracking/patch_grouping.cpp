@@ -23,10 +23,11 @@ struct PlaneFit {
   Eigen::Vector3d N = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal() const { return -N.normalized(); }  ///< towards the camera
 
+  double distance(const Eigen::Vector3d& p_C) const { return (N.dot(p_C) - 1.0) / N.norm(); }
+
   bool holds(const SurfacePatch& patch) const {
-    const double distance = (N.dot(patch.p_C) - 1.0) / N.norm();
     const double turned = normal().cross(patch.n_C).norm();
-    return std::abs(distance) < kSigmas * std::hypot(patch.sigma, kUneven) && normal().dot(patch.n_C) > 0 &&
+    return std::abs(distance(patch.p_C)) < kSigmas * std::hypot(patch.sigma, kUneven) && normal().dot(patch.n_C) > 0 &&
            turned < kSigmas * std::hypot(patch.sigma_normal, kTurned);
   }
 };
@@ -89,6 +90,7 @@ bool growPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>
 std::vector<SurfacePatch> shareNormals(std::vector<SurfacePatch> patches) {
   std::vector<SurfacePatch> result;
   std::vector<char> done(patches.size(), 0), member(patches.size());
+  int surfaces = 0;
   for (std::size_t seed = 0; seed < patches.size(); ++seed) {
     if (done[seed]) continue;
     PlaneFit plane;
@@ -101,7 +103,10 @@ std::vector<SurfacePatch> shareNormals(std::vector<SurfacePatch> patches) {
       done[i] = 1;
       result.push_back(patches[i]);
       result.back().n_C = plane.normal();
+      result.back().surface = surfaces;
+      result.back().deviation = plane.distance(patches[i].p_C);
     }
+    ++surfaces;
   }
   return result;
 }

@@ -17,15 +17,15 @@ constexpr int kMinSamples = 42;
 constexpr double kInlierSigmas = 3.5;
 constexpr double kMinCosine = 0.12;
 constexpr double kMaxTurned = 0.985;  // cosine between the normals of a pair
-// Neighbouring readings have correlated errors: a patch's sigma is at least this share of a single reading's.
-constexpr double kMinShare = 0.35;
-// Errors that averaging does not reduce (warped depth, skirting boards, doors slightly ajar), metres.
-constexpr double kFloor = 0.002;
+// What two images less than half a second apart see of a wall errs alike (correlation 0.5 to 0.9, measured on Kinect,
+// Xtion and a LiDAR phone): so much of their errors is left in the difference.
+constexpr double kApart = 0.7;
+constexpr double kForget = 0.1;  // share of the newest in the number of uses
 
 }  // namespace
 
-SurfaceTracker::SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise)
-    : camera_(std::move(camera)), noise_(noise) {
+SurfaceTracker::SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise, int window)
+    : camera_(std::move(camera)), noise_(noise), usual_uses_(window) {
   const CameraIntrinsics& k = camera_->intrinsics();
   if (k.model == DistortionModel::kNone) return;
   undistorted_.reserve(static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
@@ -97,8 +97,9 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   patch->n_C = -N.normalized();
   const double towards = -patch->n_C.dot(ray);  // d distance / d z
   if (towards < kMinCosine * ray.norm()) return false;
-  const double fitted = std::sqrt(covariance(0, 0)) / (c.x() * c.x());
-  patch->sigma = towards * std::max(fitted, kMinShare * noise_.sigma(1.0 / c.x()));
+  patch->reading = towards * noise_.sigma(1.0 / c.x());
+  const double fitted = towards * std::sqrt(covariance(0, 0)) / (c.x() * c.x());
+  patch->sigma = std::max(fitted, learnt_.white() * patch->reading);
   // Rotation of N by the gradient's errors; the camera's own magnification is left out.
   const double slope = std::sqrt(std::max(covariance(1, 1), covariance(2, 2))) / kSampleStep;
   patch->sigma_normal = slope * d_uv_xy.norm() / N.norm();
@@ -110,7 +111,9 @@ std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth, const Mo
   for (int v = kReach; v + kReach < depth.rows; v += kStride) {
     for (int u = kReach; u + kReach < depth.cols; u += kStride) {
       SurfacePatch patch;
-      if (fit(depth, u, v, &patch) && !moving.moves({u, v}, patch.p_C.z())) result.push_back(patch);
+      if (!fit(depth, u, v, &patch) || moving.moves({u, v}, patch.p_C.z())) continue;
+      patch.cell = {u / kStride, v / kStride};
+      result.push_back(patch);
     }
   }
   return result;
@@ -118,18 +121,28 @@ std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth, const Mo
 
 void SurfaceTracker::setReference(const cv::Mat& depth, CloneId clone, const MovingRegions& moving) {
   patches_ = shareNormals(patches(depth, moving));
+  learnt_.addImage(patches_);
+  if (uses_ > 0) usual_uses_ += kForget * (uses_ - usual_uses_);
+  uses_ = 0;
   reference_ = clone;
 }
 
 void SurfaceTracker::clear() {
   patches_.clear();
   reference_ = 0;
+  uses_ = 0;
 }
 
-SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref, const MovingRegions& moving) const {
+SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref, const MovingRegions& moving) {
   SurfaceMatches result;
   result.reference = reference_;
+  ++uses_;
+  // The filter takes the images for independent. But K of them meet the same errors of one reference, and what surfaces
+  // share hardly changes meanwhile: with K times these variances the K images together are worth what they should be.
+  const double repeated = std::sqrt(usual_uses_);
+  std::vector<frontend::SurfaceDifference> differences;
   const Eigen::Matrix3d R_cur_ref = T_cur_ref.R();
+  const SE3 T_ref_cur = T_cur_ref.inverse();
   for (const SurfacePatch& patch : patches_) {
     Eigen::Vector2d uv;
     SurfacePatch seen;
@@ -137,8 +150,12 @@ SurfaceMatches SurfaceTracker::match(const cv::Mat& depth, const SE3& T_cur_ref,
     if (!fit(depth, static_cast<int>(std::lround(uv.x())), static_cast<int>(std::lround(uv.y())), &seen)) continue;
     if (moving.moves(uv, seen.p_C.z())) continue;
     if (seen.n_C.dot(R_cur_ref * patch.n_C) < kMaxTurned) continue;
-    result.pairs.push_back({patch.p_C, patch.n_C, seen.p_C, std::hypot(std::hypot(patch.sigma, seen.sigma), kFloor)});
+    const double reading = std::hypot(patch.reading, seen.reading);
+    result.pairs.push_back({patch.p_C, patch.n_C, seen.p_C, std::hypot(repeated * patch.sigma, seen.sigma),
+                            repeated * kApart * learnt_.shared() * reading, patch.surface});
+    differences.push_back({patch.surface, patch.p_C, patch.n_C.dot(T_ref_cur * seen.p_C - patch.p_C), reading});
   }
+  learnt_.addDifferences(differences);
   return result;
 }
 

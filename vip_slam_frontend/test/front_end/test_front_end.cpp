@@ -86,12 +86,12 @@ TEST_F(FrontEndTest, DepthIsHandedOnAsWhatItMeans) {
   FrameOutput output;
   KeyframePtr keyframe;
   double t = 0;
-  for (int k = 0; k < 120; ++k) {
+  for (int k = 0; k < 400; ++k) {
     t = 0.05 * k;
     feedImu(t + 0.05);
     output = front_end_.process({t, world_.image(t), World::depth(t) + 0.015});
     if (output.keyframe) keyframe = output.keyframe;
-    if (output.keyframe && t > 4) break;
+    if (output.keyframe && output.frame->camera_correction.offset != 0) break;
   }
   ASSERT_TRUE(output.keyframe);
   const double offset = front_end_.calibration().depth_offset;

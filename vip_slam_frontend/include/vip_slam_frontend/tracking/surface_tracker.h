@@ -13,12 +13,14 @@
 #include "vip_slam_frontend/filter/surface_rows.h"
 #include "vip_slam_frontend/tracking/moving_regions.h"
 #include "vip_slam_frontend/tracking/patch_grouping.h"
+#include "vip_slam_frontend/tracking/surface_noise.h"
 
 namespace vip_slam {
 
 class SurfaceTracker {
  public:
-  SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
+  /// `window`: number of images for which a reference lasts at most.
+  SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise, int window);
 
   /// Patches of an image, at most one per cell of the raster; none where the surface is not flat, is seen too obliquely
   /// or belongs to a moving region.
@@ -30,7 +32,9 @@ class SurfaceTracker {
   std::size_t size() const { return patches_.size(); }
   /// Pairs of the reference's patches with patches of `depth`, looked up where `T_cur_ref` (cameras) puts them. Both
   /// are fitted in the same way, so that the fit's systematic errors from noise and curvature cancel.
-  SurfaceMatches match(const cv::Mat& depth, const SE3& T_cur_ref, const MovingRegions& moving = {}) const;
+  SurfaceMatches match(const cv::Mat& depth, const SE3& T_cur_ref, const MovingRegions& moving = {});
+  /// What the references so far have shown of the depth camera's noise; it outlives clear().
+  const frontend::SurfaceNoise& learnt() const { return learnt_; }
 
  private:
   bool fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch) const;
@@ -39,7 +43,10 @@ class SurfaceTracker {
   DepthNoise noise_;
   std::vector<Eigen::Vector2f> undistorted_;  ///< of every pixel, row by row, z = 1; empty for a pinhole
   std::vector<SurfacePatch> patches_;
+  frontend::SurfaceNoise learnt_;
   CloneId reference_ = 0;
+  int uses_ = 0;       ///< images matched with this reference
+  double usual_uses_;  ///< with earlier ones, moving average
 };
 
 }  // namespace vip_slam
