@@ -25,6 +25,7 @@ inline double exact(double) { return 0.0; }
 class SimulatedKeyframes {
  public:
   explicit SimulatedKeyframes(unsigned seed = 1, int points = 500) : random_(seed) {
+    sensor_.topics.imu = "/imu";
     sensor_.camera.width = 640;
     sensor_.camera.height = 480;
     sensor_.camera.fx = sensor_.camera.fy = 460;

@@ -98,6 +98,7 @@ TEST(MapCamera, AnotherOneIsRefusedByName) {
 TEST(MapCamera, NobodyLoadsAMapOfAnotherCamera) {
   const std::string path = ::testing::TempDir() + "another_camera.vsm";
   SensorConfig sensor;
+  sensor.topics.imu = "/imu";
   sensor.camera = camera();
   saveMapFile(path, syntheticMap(3, 12, 100), {}, 1, sensor.camera);
   CheckedBackEnd same(BackEndOptions(), sensor);

@@ -65,6 +65,21 @@ void writeCamera(std::ostream& out, const char* key, const CameraIntrinsics& cam
   out << "]\n";
 }
 
+void writeImu(std::ostream& out, const SensorConfig& config) {
+  const ImuNoise& noise = config.imu_noise;
+  out << "\nimu:\n  rate: " << formatDouble(config.imu_rate);
+  if (config.hasGyro())
+    out << "\n  gyro_noise_density: " << formatDouble(noise.gyro_noise_density)
+        << "\n  gyro_random_walk: " << formatDouble(noise.gyro_random_walk);
+  if (config.hasAccel())
+    out << "\n  accel_noise_density: " << formatDouble(noise.accel_noise_density)
+        << "\n  accel_random_walk: " << formatDouble(noise.accel_random_walk);
+  if (config.hasGyro())
+    out << "\n  gyro_correction:" << text(config.gyro_correction, "    ")
+        << "\n  gyro_correction_sigma: " << formatDouble(noise.gyro_correction_sigma);
+  out << "\n  gravity: " << formatDouble(config.gravity);
+}
+
 /// White: 255, black: 0.
 cv::Mat loadMask(const std::string& path) {
   if (!std::ifstream(path)) throw std::runtime_error("mask: " + path + " cannot be read");
@@ -81,13 +96,15 @@ void readTopics(Section topics, SensorTopics* config) {
   topics.get("color_info", config->color_info, false);
   topics.get("depth", config->depth, false);
   topics.get("depth_info", config->depth_info, false);
+  const bool said = topics.has("imu") || topics.has("gyro") || topics.has("accel");
   topics.get("imu", config->imu, false);
   topics.get("gyro", config->gyro, false);
   topics.get("accel", config->accel, false);
   topics.finish();
-  const bool split = !config->gyro.empty() && !config->accel.empty();
-  if (config->imu.empty() && !split)
-    throw std::runtime_error("topics/imu: expected one united topic, or both gyro and accel");
+  if (!said)
+    throw std::runtime_error(
+        "topics/imu: missing, expected the IMU's topic; for a camera without IMU write imu: \"\"; "
+        "gyro, accel or both are topics of their own");
   if (!config->imu.empty() && (!config->gyro.empty() || !config->accel.empty()))
     throw std::runtime_error(
         "topics/imu: there are topics/gyro or topics/accel beside it, expected one united topic or the two, not all: "
@@ -143,16 +160,18 @@ void readCameras(Section* root, SensorConfig* config) {
     const std::string depth_wrong = config->depth_registered ? "" : config->depth_camera.validate();
     if (!depth_wrong.empty()) throw std::runtime_error("depth_camera: " + depth_wrong);
   }
-  root->pose("T_imu_cam", config->T_imu_cam);
+  root->pose("T_imu_cam", config->T_imu_cam, config->topics.hasInertial());
   root->pose("T_base_imu", config->T_base_imu, false);
 }
 
+/// To be called after topics: figures of a stream that does not exist may be left out.
 void readImu(Section imu, SensorConfig* config) {
-  imu.number("rate", config->imu_rate, 1, 10000);
-  imu.number("gyro_noise_density", config->imu_noise.gyro_noise_density, 1e-9, 10);
-  imu.number("gyro_random_walk", config->imu_noise.gyro_random_walk, 1e-9, 10);
-  imu.number("accel_noise_density", config->imu_noise.accel_noise_density, 1e-9, 10);
-  imu.number("accel_random_walk", config->imu_noise.accel_random_walk, 1e-9, 10);
+  const bool gyro = config->hasGyro(), accel = config->hasAccel();
+  imu.number("rate", config->imu_rate, 1, 10000, gyro || accel);
+  imu.number("gyro_noise_density", config->imu_noise.gyro_noise_density, 1e-9, 10, gyro);
+  imu.number("gyro_random_walk", config->imu_noise.gyro_random_walk, 1e-9, 10, gyro);
+  imu.number("accel_noise_density", config->imu_noise.accel_noise_density, 1e-9, 10, accel);
+  imu.number("accel_random_walk", config->imu_noise.accel_random_walk, 1e-9, 10, accel);
   imu.matrix("gyro_correction", config->gyro_correction, false);
   for (Eigen::Index k = 0; k < config->gyro_correction.size(); ++k) {
     const double entry = config->gyro_correction.data()[k];
@@ -198,7 +217,7 @@ SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& fol
   readColor(root.section("color"), &config);
   readDepth(root.section("depth"), &config);
   readCameras(&root, &config);
-  readImu(root.section("imu"), &config);
+  if (config.topics.hasInertial() || root.has("imu")) readImu(root.section("imu"), &config);
   readDepthNoise(root.section("depth_noise"), &config.depth_noise);
   readMask(&root, folder, &config);
   root.number("time_offset", config.time_offset, -1, 1, false);
@@ -253,16 +272,9 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
     out << "T_color_depth:" << text(config.T_color_depth.matrix(), "  ") << "\n";
   }
   out << "T_imu_cam:" << text(config.T_imu_cam.matrix(), "  ")
-      << "\nT_base_imu:" << text(config.T_base_imu.matrix(), "  ")
-      << "\nimu:\n  rate: " << formatDouble(config.imu_rate)
-      << "\n  gyro_noise_density: " << formatDouble(config.imu_noise.gyro_noise_density)
-      << "\n  gyro_random_walk: " << formatDouble(config.imu_noise.gyro_random_walk)
-      << "\n  accel_noise_density: " << formatDouble(config.imu_noise.accel_noise_density)
-      << "\n  accel_random_walk: " << formatDouble(config.imu_noise.accel_random_walk)
-      << "\n  gyro_correction:" << text(config.gyro_correction, "    ")
-      << "\n  gyro_correction_sigma: " << formatDouble(config.imu_noise.gyro_correction_sigma)
-      << "\n  gravity: " << formatDouble(config.gravity)
-      << "\ndepth_noise:\n  model: " << depthSensorTypeName(config.depth_noise.type)
+      << "\nT_base_imu:" << text(config.T_base_imu.matrix(), "  ");
+  if (topics.hasInertial()) writeImu(out, config);
+  out << "\ndepth_noise:\n  model: " << depthSensorTypeName(config.depth_noise.type)
       << "\n  a: " << formatDouble(config.depth_noise.a) << "\n  b: " << formatDouble(config.depth_noise.b)
       << "\n  c: " << formatDouble(config.depth_noise.c)
       << "\n  min_range: " << formatDouble(config.depth_noise.min_range)

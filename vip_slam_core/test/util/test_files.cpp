@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <regex>
 #include <sstream>
 
 #include <opencv2/imgcodecs.hpp>
@@ -249,6 +250,42 @@ TEST_F(FileFormats, SensorRoundTrip) {
   EXPECT_EQ(back.topics.imu, "/imu");
 }
 
+TEST_F(FileFormats, SensorWithPartOfAnImu) {
+  SensorConfig part = sensor();
+  const auto saved = [&](const std::string& imu, const std::string& gyro, const std::string& accel) {
+    part.topics.imu = imu;
+    part.topics.gyro = gyro;
+    part.topics.accel = accel;
+    saveSensorConfig(path("s.yaml"), part);
+    return loadSensorConfig(path("s.yaml"));
+  };
+  const auto expectStreams = [](const SensorConfig& config, bool gyro, bool accel, const std::string& frame_of) {
+    EXPECT_EQ(config.hasGyro(), gyro);
+    EXPECT_EQ(config.hasAccel(), accel);
+    EXPECT_EQ(config.topics.inertial(), frame_of);
+  };
+  expectStreams(saved("/i", "", ""), true, true, "/i");
+  expectStreams(saved("", "/g", "/a"), true, true, "/g");
+  EXPECT_NE(text("s.yaml").find("gyro_noise_density"), std::string::npos);
+
+  expectStreams(saved("", "", "/a"), false, true, "/a");
+  EXPECT_EQ(text("s.yaml").find("gyro_"), std::string::npos);
+  EXPECT_EQ(loadSensorConfig(path("s.yaml")).imu_noise.accel_noise_density, part.imu_noise.accel_noise_density);
+  expectStreams(saved("", "/g", ""), true, false, "/g");
+  EXPECT_EQ(text("s.yaml").find("accel_"), std::string::npos);
+  EXPECT_EQ(loadSensorConfig(path("s.yaml")).gyro_correction, part.gyro_correction);
+
+  expectStreams(saved("", "", ""), false, false, "");
+  const std::string bare = text("s.yaml");
+  EXPECT_EQ(bare.find("imu:\n"), std::string::npos) << "a section for an IMU that does not exist";
+  const auto T_imu_cam = bare.find("T_imu_cam"), next = bare.find("T_base_imu");
+  write("s.yaml", bare.substr(0, T_imu_cam) + bare.substr(next));
+  EXPECT_LT(loadSensorConfig(path("s.yaml")).T_imu_cam.boxminus(SE3()).norm(), 1e-12);
+  // Said with imu: "", not by silence.
+  write("s.yaml", std::regex_replace(bare, std::regex("  (imu|gyro|accel): \"\"\n"), ""));
+  expectRefused([&] { loadSensorConfig(path("s.yaml")); }, "s.yaml", "topics/imu: missing");
+}
+
 TEST_F(FileFormats, SensorMask) {
   saveSensorConfig(path("plain.yaml"), sensor());
   EXPECT_TRUE(loadSensorConfig(path("plain.yaml")).mask.empty());
@@ -324,7 +361,6 @@ TEST_F(FileFormats, SensorErrorsNameFileAndKey) {
   changed("[0, 0, 0, 1]", "[0, 0, 0, 2]", "T_color_depth: not a rigid transform: the last row is 0 0 0 2");
   changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [9, ", "T_imu_cam: row 1: 5 entries, expected 4 numbers");
   changed("T_imu_cam:\n  - [", "T_imu_cam:\n  - [x", "T_imu_cam: row 1: 'x");
-  changed("gyro: \"/g\"", "gyro: \"\"", "topics/imu");
   changed("imu: \"\"", "imu: \"/i\"", "topics/gyro");  // both would be read, and mixed
   changed("encoding: bgr8", "encoding: rgb9", "color/encoding");
   changed("encoding: 32FC1", "encoding: 8UC1", "depth/encoding");

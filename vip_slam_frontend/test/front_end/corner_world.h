@@ -25,6 +25,7 @@ inline FrontEndOptions cornerOptions() {
 
 inline SensorConfig cornerSensor(double colour_readout, double depth_readout) {
   SensorConfig config;
+  config.topics.imu = "/imu";
   config.camera.width = 320;
   config.camera.height = 240;
   config.camera.fx = config.camera.fy = 250;

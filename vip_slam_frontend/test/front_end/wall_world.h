@@ -70,6 +70,7 @@ struct World {
 
 inline SensorConfig sensor() {
   SensorConfig config;
+  config.topics.imu = "/imu";
   config.camera.width = 320;
   config.camera.height = 240;
   config.camera.fx = config.camera.fy = kFocal;

@@ -16,8 +16,15 @@ namespace vip_slam {
 
 struct SensorTopics {
   std::string color, color_info, depth, depth_info;
-  std::string imu;          ///< united stream; empty when split
-  std::string gyro, accel;  ///< split streams; empty when united
+  std::string imu;          ///< gyroscope and accelerometer in one message; empty when they come apart, or not at all
+  std::string gyro, accel;  ///< streams of their own, both or one of them; empty when there is `imu`, or none
+
+  /// Which inertial streams there are. Neither: RGB-D alone, no inertial sample ever comes.
+  bool hasGyro() const { return !imu.empty() || !gyro.empty(); }
+  bool hasAccel() const { return !imu.empty() || !accel.empty(); }
+  bool hasInertial() const { return hasGyro() || hasAccel(); }
+  /// The stream whose frame is the IMU's: `imu`, else `gyro`, else `accel`; empty when there is none.
+  const std::string& inertial() const { return !imu.empty() ? imu : !gyro.empty() ? gyro : accel; }
 };
 
 struct SensorConfig {
@@ -40,7 +47,10 @@ struct SensorConfig {
   CameraIntrinsics depth_camera;            ///< only when not registered
   SE3 T_color_depth;                        ///< only when not registered
 
-  SE3 T_imu_cam;   ///< colour optical frame into IMU frame
+  bool hasGyro() const { return topics.hasGyro(); }
+  bool hasAccel() const { return topics.hasAccel(); }
+
+  SE3 T_imu_cam;   ///< colour optical frame into IMU frame; without any IMU the "IMU" frame is the body's, see README
   SE3 T_base_imu;  ///< IMU into base_link; identity unless the robot says otherwise
   ImuNoise imu_noise;
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
