@@ -3,11 +3,24 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 namespace vip_slam {
 namespace {
 constexpr std::size_t kIntervals = 10;      // colour intervals remembered, of which the shortest ignores lost images
+constexpr std::size_t kLags = 9;            // pairs of which the lag is remembered
 constexpr double kShortestInterval = 0.01;  // seconds; assumed until one is known
+
+void remember(double value, std::size_t count, std::deque<double>* last) {
+  last->push_back(value);
+  if (last->size() > count) last->pop_front();
+}
+
+double shortest(const std::deque<double>& intervals) {
+  const auto least = std::min_element(intervals.begin(), intervals.end());
+  return least == intervals.end() ? kShortestInterval : *least;
+}
+
 }  // namespace
 
 bool mostlyUnpaired(const PairerCounters& before, const PairerCounters& now) {
@@ -21,8 +34,7 @@ bool ImagePairer::addColor(double t, cv::Mat gray, std::uint64_t stamp) {
     ++counters_.backward;
     return false;
   }
-  if (newest_color_) color_intervals_.push_back(t - *newest_color_);
-  if (color_intervals_.size() > kIntervals) color_intervals_.pop_front();
+  if (newest_color_) remember(t - *newest_color_, kIntervals, &color_intervals_);
   newest_color_ = t;
   color_.push_back({t, std::move(gray), stamp});
   if (color_.size() > options_.capacity) {
@@ -37,6 +49,7 @@ bool ImagePairer::addDepth(double t, cv::Mat depth) {
     ++counters_.backward;
     return false;
   }
+  if (newest_depth_) remember(t - *newest_depth_, kIntervals, &depth_intervals_);
   newest_depth_ = t;
   depth_.push_back({t, std::move(depth), 0});
   if (depth_.size() > options_.capacity) {
@@ -53,15 +66,22 @@ void ImagePairer::popColor() {
   color_.pop_front();
 }
 
-double ImagePairer::colorInterval() const {
-  const auto shortest = std::min_element(color_intervals_.begin(), color_intervals_.end());
-  return shortest == color_intervals_.end() ? kShortestInterval : *shortest;
+double ImagePairer::usualLag() const {
+  constexpr std::size_t kEnough = 5;  // pairs
+  constexpr double kSteady = 0.5;     // of the interval; streams of different rates come with every lag in turn
+  constexpr double kFarthest = 0.7;   // of the interval; beyond, the neighbour is clearly the better partner
+  if (lags_.size() < kEnough) return 0;
+  std::vector<double> sorted(lags_.begin(), lags_.end());
+  std::sort(sorted.begin(), sorted.end());
+  const double median = sorted[sorted.size() / 2], interval = shortest(color_intervals_);
+  const bool steady = sorted.back() - sorted.front() < kSteady * interval;
+  return steady && std::abs(median) <= kFarthest * interval ? median : 0;
 }
 
-bool ImagePairer::belongsToFront(double t) const {
-  const double distance = std::abs(t - color_.front().t);
-  if (previous_color_ && std::abs(t - *previous_color_) < distance) return false;
-  return color_.size() < 2 || distance <= std::abs(t - color_[1].t);
+bool ImagePairer::belongsToFront(double t, double lag) const {
+  const double distance = std::abs(t - lag - color_.front().t);
+  if (previous_color_ && std::abs(t - lag - *previous_color_) < distance) return false;
+  return color_.size() < 2 || distance <= std::abs(t - lag - color_[1].t);
 }
 
 const ImagePair* ImagePairer::front() {
@@ -72,18 +92,27 @@ const ImagePair* ImagePairer::front() {
     depth_.pop_front();
     ++counters_.unused_depth;
   }
-  // The nearest depth image is known once one at or after t has arrived; an exact match needs no waiting.
-  const auto after = std::find_if(depth_.begin(), depth_.end(), [t](const StampedImage& d) { return d.t >= t; });
+  const double lag = usualLag(), expected = t + lag;
+  const auto usable = [&](const StampedImage& d) {
+    return std::abs(d.t - t) <= options_.tolerance && belongsToFront(d.t, lag);
+  };
+  const auto after =
+      std::find_if(depth_.begin(), depth_.end(), [expected](const StampedImage& d) { return d.t >= expected; });
   auto best = depth_.end();
-  if (after != depth_.end() && after->t <= t + options_.tolerance && belongsToFront(after->t)) best = after;
+  if (after != depth_.end() && usable(*after)) best = after;
   if (after != depth_.begin()) {
     const auto before = std::prev(after);
-    if (belongsToFront(before->t) && (best == depth_.end() || t - before->t < best->t - t)) best = before;
+    if (usable(*before) && (best == depth_.end() || expected - before->t < best->t - expected)) best = before;
   }
-  // A newer depth image may belong to the next colour image, which has not arrived yet.
+  // The nearest depth image is known once one at or after the expected stamp has arrived, or one so little before that
+  // the next cannot be nearer. A later one may belong to the next colour image, which has not arrived yet.
   constexpr double kSurelyNearer = 0.45;  // of the interval: less than half, since stamps jitter
-  const bool next_matters = best != depth_.end() && color_.size() < 2 && best->t - t > kSurelyNearer * colorInterval();
-  const bool decided = (after != depth_.end() && !next_matters) || newest() - t > options_.patience || ended_;
+  const bool next_depth_matters =
+      after == depth_.end() &&
+      (best == depth_.end() || expected - best->t > kSurelyNearer * shortest(depth_intervals_));
+  const bool next_color_matters =
+      best != depth_.end() && color_.size() < 2 && best->t - expected > kSurelyNearer * shortest(color_intervals_);
+  const bool decided = (!next_depth_matters && !next_color_matters) || newest() - t > options_.patience || ended_;
   if (!decided) return nullptr;
 
   front_ = ImagePair{t, std::move(color_.front().image), {}, 0, color_.front().stamp};
@@ -93,6 +122,7 @@ const ImagePair* ImagePairer::front() {
   } else {
     counters_.skew = front_->depth_lag = best->t - t;
     counters_.unused_depth += std::size_t(best - depth_.begin());
+    remember(best->t - t, kLags, &lags_);
     front_->depth = std::move(best->image);
     depth_.erase(depth_.begin(), best + 1);
     ++counters_.pairs;
@@ -106,6 +136,8 @@ void ImagePairer::clear() {
   color_.clear();
   depth_.clear();
   color_intervals_.clear();
+  depth_intervals_.clear();
+  lags_.clear();
   previous_color_.reset();
   newest_color_.reset();
   newest_depth_.reset();

@@ -54,9 +54,11 @@ class ImagePairer {
   bool addColor(double t, cv::Mat gray, std::uint64_t stamp = 0);
   bool addDepth(double t, cv::Mat depth);
 
-  /// The oldest colour image once its depth has arrived or can no longer arrive, with the depth of the nearest stamp.
-  /// A depth image is only paired with the colour image nearest to it. Between two colour images it waits for the later
-  /// one, unless the usual interval shows already that it is nearer to the earlier.
+  /// The oldest colour image once its depth has arrived or can no longer arrive, with the depth of the nearest stamp,
+  /// one to one and in order. A depth image is only paired with the colour image nearest to it. What may be nearer but
+  /// has not arrived yet is waited for, unless the usual interval shows that it cannot be.
+  /// "Near" is meant after the usual lag of depth behind colour is taken off: streams that are half an interval apart
+  /// would otherwise change partners with the jitter of their stamps, and lose an image each time.
   const ImagePair* front();
   void pop();
   /// No more images will come: front() returns the waiting ones with the depth available.
@@ -70,13 +72,14 @@ class ImagePairer {
  private:
   void popColor();
   /// Whether a depth image at `t` is not nearer to another colour image than to the oldest waiting one.
-  bool belongsToFront(double t) const;
-  double colorInterval() const;  ///< the shortest recent interval, seconds
+  bool belongsToFront(double t, double lag) const;
+  double usualLag() const;  ///< depth stamp - colour stamp of recent pairs, seconds; 0 when it is not steady
 
   PairerOptions options_;
   std::deque<StampedImage> color_, depth_;
-  std::deque<double> color_intervals_;    ///< of the last colour images, seconds
-  std::optional<double> previous_color_;  ///< stamp of the colour image before the oldest waiting one
+  std::deque<double> color_intervals_, depth_intervals_;  ///< of the last images, seconds
+  std::deque<double> lags_;                               ///< of the last pairs, seconds
+  std::optional<double> previous_color_;                  ///< stamp of the colour image before the oldest waiting one
   std::optional<double> newest_color_, newest_depth_;
   std::optional<ImagePair> front_;
   bool ended_ = false;

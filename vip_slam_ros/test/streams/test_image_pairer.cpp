@@ -167,6 +167,53 @@ TEST(ImagePairer, JitterLosesNoPair) {
   for (int i = 0; i < 119; ++i) EXPECT_EQ(got[std::size_t(i)], i);
 }
 
+// A Kinect's depth drifts against its colour: here from 5 to 20 ms behind it, at intervals of 33 ms, so that much of it
+// is nearer to the next colour image.
+TEST(ImagePairer, DepthThatDriftsPastHalfAnIntervalKeepsItsColour) {
+  for (const double sign : {1.0, -1.0}) {
+    const auto got = pairAll(700, 1 / 30.0, true, [sign](int i) {
+      return i / 30.0 + sign * (0.005 + 0.015 * i / 699 + 0.002 * std::sin(2.3 * i));
+    });
+    for (int i = 1; i < 699; ++i) EXPECT_EQ(got[std::size_t(i)], i) << sign;
+  }
+}
+
+// Farther off, a depth image is the next colour image's, and none is given away twice.
+TEST(ImagePairer, DepthThatDriftsOnGoesToTheNextColourOnce) {
+  const auto got = pairAll(900, 1 / 30.0, true, [](int i) { return i / 30.0 + 0.033 * i / 899; });
+  int alone = 0, last = -1;
+  for (int i = 0; i < 899; ++i) {
+    const int depth = got[std::size_t(i)];
+    alone += depth < 0;
+    if (depth < 0) continue;
+    EXPECT_GT(depth, last) << i;
+    EXPECT_LE(i - depth, 1) << i;
+    last = depth;
+  }
+  EXPECT_EQ(last, 897);
+  EXPECT_LE(alone, 2);
+}
+
+TEST(ImagePairer, ALostDepthImageShiftsNoOthersWhenDepthLags) {
+  const auto got = pairAll(120, 1 / 60.0, true,
+                           [](int i) { return i == 60 ? std::nullopt : std::optional<double>(i / 60.0 + 0.007); });
+  for (int i = 0; i < 119; ++i) EXPECT_EQ(got[std::size_t(i)], i == 60 ? -1 : i) << i;
+}
+
+// 25 depth images a second to 30 in colour: each has the nearest, since there is no usual lag.
+TEST(ImagePairer, RatesThatDifferPairTheNearest) {
+  const auto stamp = [](int i) { return i / 25.0 + 0.004; };
+  const auto got = pairAll(300, 1 / 30.0, true,
+                           [&](int i) { return stamp(i) < 10 ? std::optional<double>(stamp(i)) : std::nullopt; });
+  int pairs = 0;
+  for (int i = 0; i < 299; ++i) {
+    if (got[std::size_t(i)] < 0) continue;
+    ++pairs;
+    EXPECT_LE(std::abs(stamp(got[std::size_t(i)]) - i / 30.0), 0.5 / 30 + 1e-9) << i;
+  }
+  EXPECT_GE(pairs, 248);
+}
+
 TEST(ImagePairer, ANearerDepthDoesNotWaitForTheNextColour) {
   ImagePairer pairer;
   for (int i = 0; i < 4; ++i) {
@@ -188,7 +235,7 @@ TEST(ImagePairer, WhatWaitsAtTheEndIsHandedOut) {
   pairer.addColor(0.1, image(1));
   while (pairer.front() && valueOf(pairer.front()->gray) == 0) pairer.pop();
   EXPECT_EQ(pairer.front(), nullptr);
-  pairer.addDepth(0.09, image(1));
+  pairer.addDepth(0.07, image(1));
   pairer.addColor(0.2, image(2));
   EXPECT_EQ(pairer.front(), nullptr);
   pairer.end();
