@@ -82,8 +82,12 @@ class BagWriter : public SequenceWriter {
     depth_info_ = infoOf(sensor.depth_registered ? sensor.camera : sensor.depth_camera, depth_frame_);
     tf2_msgs::TFMessage tf;
     const ros::Time start = stampOf(start_ns);
-    tf.transforms.push_back(transformOf(sensor.T_base_imu, "base_link", kImuFrame, start));
-    tf.transforms.push_back(transformOf(sensor.T_imu_cam, kImuFrame, kColorFrame, start));
+    if (sensor.topics.hasInertial()) {
+      tf.transforms.push_back(transformOf(sensor.T_base_imu, "base_link", kImuFrame, start));
+      tf.transforms.push_back(transformOf(sensor.T_imu_cam, kImuFrame, kColorFrame, start));
+    } else {
+      tf.transforms.push_back(transformOf(sensor.T_base_imu * sensor.T_imu_cam, "base_link", kColorFrame, start));
+    }
     if (!sensor.depth_registered)
       tf.transforms.push_back(transformOf(sensor.T_color_depth, kColorFrame, kDepthFrame, start));
     auto latched = boost::make_shared<ros::M_string>();

@@ -20,6 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kMaxSkew = 0.02;            // s, between colour and depth of one frame
 constexpr double kMaxOffOrthonormal = 0.05;  // of a rotation that is written with few digits
 
 std::vector<double> numbersOf(const fs::path& path, std::size_t expected) {
@@ -116,22 +117,55 @@ std::vector<std::pair<double, std::string>> readList(const fs::path& path) {
   return out;
 }
 
+std::vector<double> stampsOf(const std::vector<std::pair<double, std::string>>& list) {
+  std::vector<double> stamps;
+  for (const auto& [t, file] : list) stamps.push_back(t);
+  return stamps;
+}
+
 RgbdFolder openTum(const fs::path& folder) {
   RgbdFolder out;
   out.T_W_C = readTum((folder / "groundtruth.txt").string());
   const auto colour = readList(folder / "rgb.txt"), depth = readList(folder / "depth.txt");
   if (depth.empty()) throw std::runtime_error((folder / "depth.txt").string() + ": no image");
-  std::size_t k = 0;
-  for (const auto& [t, file] : colour) {
-    while (k + 1 < depth.size() && std::abs(depth[k + 1].first - t) < std::abs(depth[k].first - t)) ++k;
-    if (std::abs(depth[k].first - t) > 0.02) continue;
-    out.frames.push_back({t, depth[k].first, (folder / file).string(), (folder / depth[k].second).string()});
-  }
+  for (const auto& [c, d] : pairInOrder(stampsOf(colour), stampsOf(depth), kMaxSkew))
+    out.frames.push_back(
+        {colour[c].first, depth[d].first, (folder / colour[c].second).string(), (folder / depth[d].second).string()});
   out.depth_scale = 1.0 / 5000;
   return out;
 }
 
 }  // namespace
+
+// Dynamic programming over both lists. A colour image that stays alone costs as much as a pair at the largest
+// difference, so that all are paired that can be, and then as closely as possible.
+std::vector<std::pair<std::size_t, std::size_t>> pairInOrder(const std::vector<double>& colour,
+                                                             const std::vector<double>& depth, double tolerance) {
+  enum Step : char { kAlone, kSkipDepth, kPair };
+  const std::size_t n = colour.size(), m = depth.size();
+  std::vector<std::vector<Step>> step(n + 1, std::vector<Step>(m + 1, kSkipDepth));
+  std::vector<double> before(m + 1, 0.0), cost(m + 1);
+  for (std::size_t i = 1; i <= n; ++i) {
+    for (std::size_t j = 0; j <= m; ++j) {
+      cost[j] = before[j] + tolerance * tolerance;
+      step[i][j] = kAlone;
+      if (j == 0) continue;
+      const double skew = depth[j - 1] - colour[i - 1], together = before[j - 1] + skew * skew;
+      if (std::abs(skew) <= tolerance && together <= cost[j]) cost[j] = together, step[i][j] = kPair;
+      if (cost[j - 1] <= cost[j]) cost[j] = cost[j - 1], step[i][j] = kSkipDepth;
+    }
+    std::swap(before, cost);
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t i = n, j = m; i > 0;) {
+    const Step s = step[i][j];
+    if (s == kPair) pairs.emplace_back(i - 1, j - 1);
+    i -= s != kSkipDepth;
+    j -= s != kAlone;
+  }
+  std::reverse(pairs.begin(), pairs.end());
+  return pairs;
+}
 
 RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registered) {
   if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": no such directory");

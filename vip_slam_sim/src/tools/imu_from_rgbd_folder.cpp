@@ -1,4 +1,5 @@
-// imu_from_rgbd_folder FOLDER --out DIR: real RGB-D images with poses become a bag with a synthetic IMU.
+// imu_from_rgbd_folder FOLDER --out DIR: real RGB-D images with poses become a bag with a synthetic IMU, or without
+// any.
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -30,7 +31,7 @@ struct Settings {
   bool registered = false;
   double rate = 30, spacing = 0;
   int iterations = 20, seed = 1;
-  bool nominal_noise = false, refine = false;
+  bool nominal_noise = false, refine = false, no_imu = false;
   ImuOptions imu;
 };
 
@@ -107,6 +108,45 @@ SensorConfig sensorOf(const Settings& s, const RgbdFolder& folder, const Sequenc
   return sensor;
 }
 
+void catchInterrupts() {
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+}
+
+/// The folder as an RGB-D camera without IMU: the body is the colour camera, and the truth are the poses as they are.
+void writeWithoutImu(const Settings& s, const RgbdFolder& folder) {
+  if (s.format != "bag") throw std::runtime_error("--no-imu: is for bags, expected --format bag");
+  SequenceSpec rig;
+  rig.depth.registered = folder.depth_registered;
+  SensorConfig sensor = sensorOf(s, folder, rig);
+  sensor.topics.imu.clear();
+  sensor.T_imu_cam = SE3();
+  const double begin = folder.frames.front().t;
+  const auto start_ns = std::llround(rig.start_time) * 1000000000LL;
+  const auto stamp = [&](double t) { return start_ns + std::llround((t - begin) * 1e9); };
+  prepareOutputFolder(s.out);
+  const std::string base = (fs::path(s.out) / s.name).string();
+  const auto writer = makeBagWriter(base + ".bag", sensor, start_ns);
+  catchInterrupts();
+  ProgressBar bar(s.name);
+  for (std::size_t i = 0; i < folder.frames.size(); ++i) {
+    if (interrupted) throw std::runtime_error("interrupted, nothing is left behind");
+    SimFrame frame;
+    frame.index = static_cast<int>(i);
+    frame.stamp_ns = stamp(folder.frames[i].t);
+    frame.depth_stamp_ns = stamp(folder.frames[i].t_depth);
+    loadRgbdFrame(folder, folder.frames[i], &frame.rgb, &frame.depth);
+    writer->frame(frame);
+    bar.update(double(i + 1) / double(folder.frames.size()));
+  }
+  bar.finish(std::to_string(folder.frames.size()) + " images");
+  Trajectory truth = folder.T_W_C;
+  for (StampedPose& p : truth) p.t = static_cast<double>(stamp(p.t)) * 1e-9;
+  saveSensorConfig(base + "_sensor.yaml", sensor);
+  writeTum(base + "_truth.tum", truth);
+  writer->commit();
+}
+
 int run(int argc, char** argv) {
   Settings s;
   CommandLine line("imu_from_rgbd_folder", "Gives a folder of RGB-D images with poses an IMU, and writes a bag.");
@@ -130,6 +170,7 @@ int run(int argc, char** argv) {
             "mend the poses by registering the depth images; NAME_given.tum keeps those of the folder");
   line.flag("nominal-noise", s.nominal_noise,
             "the sensor file states the IMU's own noise, not what the poses' errors add to it");
+  line.flag("no-imu", s.no_imu, "make no IMU: a bag of an RGB-D camera alone, with the colour camera's poses as truth");
   line.option("format", s.format, "bag or folder", oneOf("bag, folder"));
   if (const auto status = line.parse(argc, argv)) return *status;
   if (s.name.empty())
@@ -151,6 +192,10 @@ int run(int argc, char** argv) {
     throw std::runtime_error(s.folder + ": " + folder.camera.validate() + "; give --intrinsics FX FY CX CY");
   const Trajectory given = folder.T_W_C;
   if (s.refine) refine(&folder);
+  if (s.no_imu) {
+    writeWithoutImu(s, folder);
+    return 0;
+  }
   const Eigen::Vector3d up = s.up.empty() ? upFromDepth(folder) : Eigen::Vector3d(s.up[0], s.up[1], s.up[2]);
   if (!(up.norm() > 1e-6)) throw std::runtime_error("--up: expected a vector that is not zero");
   std::fprintf(stderr, "up in the folder's world: %.4f %.4f %.4f\n", up.x() / up.norm(), up.y() / up.norm(),
@@ -202,8 +247,7 @@ int run(int argc, char** argv) {
       truth.push_back({static_cast<double>(stamp(imu.samples[next].t)) * 1e-9, m.T_W_I});
     }
   };
-  std::signal(SIGINT, [](int) { interrupted = 1; });
-  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  catchInterrupts();
   ProgressBar bar(s.name);
   for (std::size_t i = 0; i < folder.frames.size(); ++i) {
     if (interrupted) throw std::runtime_error("interrupted, nothing is left behind");

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -30,6 +31,12 @@ struct RgbdFolder {
   double colour_readout = 0;      ///< s, of a rolling shutter, from first to last row; the stamp is the middle row's
   double depth_scale = 0.001;
 };
+
+/// Colour and depth images, by their ascending stamps in seconds, as pairs (index, index): each image once at most, both
+/// in order, within `tolerance`, with the least sum of squared differences; a colour image that stays alone counts like
+/// a pair at the tolerance.
+std::vector<std::pair<std::size_t, std::size_t>> pairInOrder(const std::vector<double>& colour,
+                                                             const std::vector<double>& depth, double tolerance);
 
 /// `rate`: images per second where the folder has no stamps. `registered`: a folder in 7-Scenes layout whose depth was
 /// registered to the colour camera. Throws std::runtime_error naming the file (and line).
