@@ -277,7 +277,7 @@ TEST_F(FileFormats, SensorWithPartOfAnImu) {
 
   expectStreams(saved("", "", ""), false, false, "");
   const std::string bare = text("s.yaml");
-  EXPECT_EQ(bare.find("imu:\n"), std::string::npos) << "a section for an IMU that does not exist";
+  EXPECT_EQ(bare.find("\nimu:\n"), std::string::npos) << "a section for an IMU that does not exist";
   const auto T_imu_cam = bare.find("T_imu_cam"), next = bare.find("T_base_imu");
   write("s.yaml", bare.substr(0, T_imu_cam) + bare.substr(next));
   EXPECT_LT(loadSensorConfig(path("s.yaml")).T_imu_cam.boxminus(SE3()).norm(), 1e-12);
