@@ -45,11 +45,15 @@ int convertEuroc(int argc, char** argv) {
 
 int convertTumRgbd(int argc, char** argv) {
   vip_slam::CommandLine line("convert_to_bag tum_rgbd",
-                             "Converts a TUM RGB-D folder (rgb.txt, depth.txt, imu.txt) into a bag.");
+                             "Converts a TUM RGB-D folder (rgb.txt, depth.txt; imu.txt or accelerometer.txt when "
+                             "there) into a bag.");
   vip_slam::TumRgbdOptions tum;
   std::vector<double> camera;
   addCommon(line, &tum);
   line.option("camera", camera, "fx fy cx cy [k1 k2 p1 p2 [k3]]", vip_slam::count<double>(4, 9));
+  line.option("rolling-shutter", tum.rolling_shutter,
+              "seconds from the colour image's first row to its last; a Kinect v1's: 0.02 to 0.03",
+              vip_slam::between(0.0, 0.1));
   line.option("depth-factor", tum.depth_factor, "depth units per metre", vip_slam::above(0.0));
   if (const auto status = line.parse(argc, argv)) return *status;
   if (!camera.empty()) {

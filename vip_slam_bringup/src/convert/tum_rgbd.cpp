@@ -23,6 +23,8 @@ const char* const kDepthInfo = "/camera/depth_registered/camera_info";
 const char* const kImu = "/camera/imu";
 const char* const kAccel = "/camera/accel/sample";
 const char* const kFrame = "camera_rgb_optical_frame";
+// m/s^2/sqrt(Hz): 750 micro-g by the data sheet of the KXSD9, the Kinect's accelerometer, and as much for its 12 bits.
+constexpr double kKinectNoise = 1.5e-2;
 
 struct ListedFile {
   double t;
@@ -89,19 +91,20 @@ std::vector<sensor_msgs::Imu> readInertial(const std::string& path, bool gyro) {
   for (const TextRow& row : table.rows()) {
     sensor_msgs::Imu sample;
     sample.header.stamp.fromSec(table.number(row, 0, "the stamp"));
-    sample.header.frame_id = gyro ? "camera_imu_optical_frame" : "camera_accel_optical_frame";
+    sample.header.frame_id = gyro ? "camera_imu_optical_frame" : kFrame;
     if (!samples.empty()) table.ascending(row, samples.back().header.stamp, sample.header.stamp);
     sample.orientation_covariance[0] = -1;
     const std::size_t accel = gyro ? 4 : 1;
+    const double to_camera = gyro ? 1 : -1;  // a Kinect's accelerometer has the axes -x -y z of its camera
     if (gyro) {
       sample.angular_velocity.x = table.number(row, 1, "gyro x");
       sample.angular_velocity.y = table.number(row, 2, "gyro y");
       sample.angular_velocity.z = table.number(row, 3, "gyro z");
     } else {
-      sample.angular_velocity_covariance[0] = -1;
+      sample.angular_velocity_covariance[0] = -1;  // not measured
     }
-    sample.linear_acceleration.x = table.number(row, accel, "accelerometer x");
-    sample.linear_acceleration.y = table.number(row, accel + 1, "accelerometer y");
+    sample.linear_acceleration.x = to_camera * table.number(row, accel, "accelerometer x");
+    sample.linear_acceleration.y = to_camera * table.number(row, accel + 1, "accelerometer y");
     sample.linear_acceleration.z = table.number(row, accel + 2, "accelerometer z");
     samples.push_back(sample);
   }
@@ -133,20 +136,15 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   const cv::Mat first = cv::imread(color.front().path, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (first.empty()) throw std::runtime_error(color.front().path + ": is not a readable image");
   const CameraIntrinsics camera = findCamera(options, first.size());
-  const bool gyro = fs::exists(options.folder + "/imu.txt");
-  const std::string inertial = options.folder + (gyro ? "/imu.txt" : "/accelerometer.txt");
+  const bool gyro = fs::exists(options.folder + "/imu.txt"), accel = fs::exists(options.folder + "/accelerometer.txt");
   std::vector<sensor_msgs::Imu> imu;
-  if (fs::exists(inertial)) imu = readInertial(inertial, gyro);
+  if (gyro || accel) imu = readInertial(options.folder + (gyro ? "/imu.txt" : "/accelerometer.txt"), gyro);
+  const SE3 T_imu_cam = gyro ? options.T_imu_cam : SE3();
   Trajectory truth;
   if (fs::exists(options.folder + "/groundtruth.txt"))
-    truth = readGroundTruth(options.folder + "/groundtruth.txt", options.T_imu_cam.inverse());
+    truth = readGroundTruth(options.folder + "/groundtruth.txt", T_imu_cam.inverse());
 
   ConversionReport report;
-  if (imu.empty())
-    report.warnings.push_back("no imu.txt: the bag has images only, and the odometry needs an IMU");
-  else if (!gyro)
-    report.warnings.push_back(
-        "accelerometer.txt has no gyroscope: the odometry needs one (imu.txt: stamp gx gy gz ax ay az)");
   BagOutput bag(options.bag, options.overwrite);
   const auto addImages = [&](const std::vector<ListedFile>& files, const std::string& topic, const std::string& info,
                              bool is_color) {
@@ -184,7 +182,10 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   sensor.topics.color_info = kColorInfo;
   sensor.topics.depth = kDepth;
   sensor.topics.depth_info = kDepthInfo;
-  sensor.topics.imu = kImu;
+  if (gyro)
+    sensor.topics.imu = kImu;
+  else if (accel)
+    sensor.topics.accel = kAccel;
   sensor.color_encoding = "bgr8";
   sensor.depth_encoding = "16UC1";
   sensor.depth_scale = 1.0 / options.depth_factor;
@@ -194,8 +195,10 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
     const double seconds = (imu.back().header.stamp - imu.front().header.stamp).toSec();
     if (seconds > 0) sensor.imu_rate = std::round((imu.size() - 1) / seconds);
   }
+  if (!gyro) sensor.imu_noise.accel_noise_density = kKinectNoise;
+  sensor.rolling_shutter = options.rolling_shutter;
   sensor.camera = camera;
-  sensor.T_imu_cam = options.T_imu_cam;
+  sensor.T_imu_cam = T_imu_cam;
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStructuredLight);
   finishConversion(options, sensor, truth, &bag, &report);
   return report;

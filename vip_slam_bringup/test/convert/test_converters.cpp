@@ -235,13 +235,17 @@ class TumConverter : public Converters {
   TumRgbdOptions options_;
 };
 
-TEST_F(TumConverter, DepthKeepsItsUnitAndTheGyroIsMissed) {
+TEST_F(TumConverter, WithoutAnImuTheBagHasImagesAndTheSensorFileSaysSo) {
   makeFolder("rgbd_dataset_freiburg1_xyz");
-  write("rgbd_dataset_freiburg1_xyz/accelerometer.txt", "# t ax ay az\n1305031102.1 0 9.8 0\n1305031102.2 0 9.8 0\n");
+  options_.rolling_shutter = 0.024;
   const ConversionReport report = convertTumRgbd(options_);
-  ASSERT_EQ(report.warnings.size(), 1u);
-  EXPECT_NE(report.warnings[0].find("gyroscope"), std::string::npos);
+  EXPECT_TRUE(report.warnings.empty());
+  EXPECT_EQ(report.messages.size(), 4u);  // images and their calibrations
   const SensorConfig sensor = loadSensorConfig((root_ / "out_sensor.yaml").string());
+  EXPECT_FALSE(sensor.hasGyro());
+  EXPECT_FALSE(sensor.hasAccel());
+  EXPECT_EQ(sensor.rolling_shutter, 0.024);
+  EXPECT_LT(sensor.T_imu_cam.boxminus(SE3()).norm(), 1e-12);  // so that the truth is the colour camera's
   EXPECT_NEAR(sensor.camera.fx, 517.3, 1e-9);
   const auto depth = read<sensor_msgs::Image>(sensor.topics.depth);
   ASSERT_EQ(depth.size(), 4u);
@@ -251,6 +255,25 @@ TEST_F(TumConverter, DepthKeepsItsUnitAndTheGyroIsMissed) {
   EXPECT_EQ(color[0]->encoding, sensor.color_encoding);
   EXPECT_EQ(color[0]->data[0], 10);
   EXPECT_EQ(readTum((root_ / "out_truth.tum").string()).size(), 2u);
+}
+
+TEST_F(TumConverter, TheKinectsAccelerometerComesInTheCamerasAxes) {
+  makeFolder("rgbd_dataset_freiburg1_xyz");
+  // The camera looks down by half a right angle: up lies along -y and -z of its own axes.
+  write("rgbd_dataset_freiburg1_xyz/accelerometer.txt", "# t ax ay az\n1305031102.1 0.5 7 -7\n1305031102.2 0 7 -7\n");
+  EXPECT_TRUE(convertTumRgbd(options_).warnings.empty());
+  const SensorConfig sensor = loadSensorConfig((root_ / "out_sensor.yaml").string());
+  EXPECT_FALSE(sensor.hasGyro());
+  EXPECT_TRUE(sensor.hasAccel());
+  EXPECT_EQ(sensor.imu_rate, 10);
+  EXPECT_LT(sensor.T_imu_cam.boxminus(SE3()).norm(), 1e-12);
+  const auto samples = read<sensor_msgs::Imu>(sensor.topics.accel);
+  ASSERT_EQ(samples.size(), 2u);
+  EXPECT_EQ(samples[0]->angular_velocity_covariance[0], -1);  // not measured
+  EXPECT_EQ(samples[0]->linear_acceleration.x, -0.5);
+  EXPECT_EQ(samples[0]->linear_acceleration.y, -7);
+  EXPECT_EQ(samples[0]->linear_acceleration.z, -7);
+  EXPECT_EQ(samples[0]->header.frame_id, read<sensor_msgs::Image>(sensor.topics.color)[0]->header.frame_id);
 }
 
 TEST_F(TumConverter, ABagThatReplacesAnotherLeavesNoTruthOfThat) {
@@ -296,6 +319,7 @@ TEST_F(TumConverter, UnknownCameraAndBadRowsAreNamed) {
       << error;
   write("kitchen/imu.txt", "1305031102.1 0 0 0 0 9.8 0\n1305031102.11 0.1 0 0 0 9.8 0\n");
   EXPECT_TRUE(convertTumRgbd(options_).warnings.empty());
+  EXPECT_EQ(loadSensorConfig((root_ / "out_sensor.yaml").string()).topics.imu, "/camera/imu");
   EXPECT_EQ(read<sensor_msgs::Imu>("/camera/imu").size(), 2u);
 }
 

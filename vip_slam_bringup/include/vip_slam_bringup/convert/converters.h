@@ -42,10 +42,12 @@ ConversionReport convertEuroc(const EurocOptions& options);
 struct TumRgbdOptions : ConversionOptions {
   std::optional<CameraIntrinsics> camera;  ///< else calibration.txt, else from "freiburg1..3" in the folder's name
   double depth_factor = 5000;              ///< depth units per metre
+  double rolling_shutter = 0;              ///< of the colour camera, s, as in a sensor file
   SE3 T_imu_cam;                           ///< identity unless the folder's imu.txt has other axes
 };
-/// TUM RGB-D folder: rgb.txt, depth.txt, optional groundtruth.txt, and inertial data from imu.txt (stamp, gyro, accel)
-/// or accelerometer.txt (no gyro: warned, since the odometry needs one).
+/// TUM RGB-D folder: rgb.txt, depth.txt, optional groundtruth.txt, and inertial data from imu.txt (stamp, gyro, accel),
+/// else from accelerometer.txt (stamp, accel, in the axes of a Kinect's: -x -y z of its camera; written in the
+/// camera's). The sensor file names the streams that there are. Without imu.txt the body is the colour camera.
 ConversionReport convertTumRgbd(const TumRgbdOptions& options);
 
 struct StrayOptions : ConversionOptions {
