@@ -55,9 +55,9 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     waiting_for_ = problem_.empty() ? "no camera_info on topic " + topic + " yet" : problem_;
     return std::nullopt;
   }
-  if (!imu_seen_) {
-    const SensorTopics& topics = sensor_.topics;
-    waiting_for_ = "no IMU message on topic " + (topics.imu.empty() ? topics.gyro : topics.imu) + " yet";
+  const bool inertial = sensor_.topics.hasInertial();
+  if (inertial && !imu_seen_) {
+    waiting_for_ = "no IMU message on topic " + sensor_.topics.inertial() + " yet";
     return std::nullopt;
   }
   if (options_.extrinsics != "config") {
@@ -67,21 +67,24 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
       return std::nullopt;
     }
     if (!asked_since_ || t < *asked_since_) asked_since_ = t;
-    const auto T_imu_cam = lookUpExtrinsics(tf_, imu_frame_, color_frame_);
-    const auto T_base_imu = lookUpTransform(tf_, options_.base_frame, imu_frame_);
+    // Without an IMU the body is where the sensor file puts it, seen from the camera: tf has only the base to tell.
+    const std::optional<SE3> T_imu_cam =
+        inertial ? lookUpExtrinsics(tf_, imu_frame_, color_frame_) : sensor_.T_imu_cam;
+    const std::string& frame = inertial ? imu_frame_ : color_frame_;
+    auto T_base_imu = lookUpTransform(tf_, options_.base_frame, frame);
+    if (T_base_imu && !inertial) T_base_imu = *T_base_imu * sensor_.T_imu_cam.inverse();
     const bool patient = options_.extrinsics == "tf" || t - *asked_since_ < options_.tf_patience;
+    const std::string no_base = "tf does not connect '" + frame + "' to '" + options_.base_frame + "'";
     if (!(T_imu_cam && T_base_imu) && patient) {
-      waiting_for_ = T_imu_cam ? "tf does not connect '" + imu_frame_ + "' to '" + options_.base_frame + "'"
-                               : whyNoExtrinsics(imu_frame_, color_frame_);
+      waiting_for_ = T_imu_cam ? no_base : whyNoExtrinsics(imu_frame_, color_frame_);
       return std::nullopt;
     }
     if (T_imu_cam) sensor_.T_imu_cam = *T_imu_cam;
     if (T_base_imu) sensor_.T_base_imu = *T_base_imu;
-    origin_ =
-        "T_imu_cam: " + (T_imu_cam ? "from tf" : "the sensor file's, " + whyNoExtrinsics(imu_frame_, color_frame_)) +
-        "; T_base_imu: " +
-        (T_base_imu ? "from tf"
-                    : "the sensor file's, tf does not connect '" + imu_frame_ + "' to '" + options_.base_frame + "'");
+    origin_ = !inertial   ? "T_imu_cam: the sensor file's, there is no IMU"
+              : T_imu_cam ? "T_imu_cam: from tf"
+                          : "T_imu_cam: the sensor file's, " + whyNoExtrinsics(imu_frame_, color_frame_);
+    origin_ += "; T_base_imu: " + (T_base_imu ? "from tf" : "the sensor file's, " + no_base);
     tf_incomplete_ = !(T_imu_cam && T_base_imu);
   } else {
     origin_ = "T_imu_cam and T_base_imu: the sensor file's";

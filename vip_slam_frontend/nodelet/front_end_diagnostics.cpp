@@ -31,8 +31,8 @@ std::vector<FrontEndNodelet::Input> FrontEndNodelet::inputs() const {
   };
   std::vector<Input> all = {{color_monitor_.get(), image(sensor_.color_encoding)}};
   if (!sensor_.topics.depth.empty()) all.push_back({depth_monitor_.get(), image(sensor_.depth_encoding)});
-  all.push_back({imu_monitor_.get(), "sensor_msgs/Imu"});
-  if (!sensor_.topics.accel.empty()) all.push_back({accel_monitor_.get(), "sensor_msgs/Imu"});
+  if (sensor_.topics.hasInertial()) all.push_back({imu_monitor_.get(), "sensor_msgs/Imu"});
+  if (splitImu()) all.push_back({accel_monitor_.get(), "sensor_msgs/Imu"});
   return all;
 }
 
@@ -71,15 +71,17 @@ void FrontEndNodelet::tick() {
   } else if (started) {
     waiting.reason = color_monitor_->silence(now);
   } else {
+    const bool imu = sensor_.topics.hasInertial();
     // A rate that differs from the configured one does no harm by itself: it is reported last.
     waiting.reason = color_monitor_->fault(now);
-    if (waiting.reason.empty()) waiting.reason = imu_monitor_->fault(now);
-    if (waiting.reason.empty() && !sensor_.topics.accel.empty()) waiting.reason = accel_monitor_->absence(now);
+    if (waiting.reason.empty() && imu) waiting.reason = imu_monitor_->fault(now);
+    if (waiting.reason.empty() && splitImu()) waiting.reason = accel_monitor_->absence(now);
     if (waiting.reason.empty()) waiting.reason = calibration_->waitingFor();
     if (waiting.reason.empty()) waiting.reason = start_problem;
     if (waiting.reason.empty()) waiting.reason = color_monitor_->complaint(now);
-    if (waiting.reason.empty()) waiting.reason = imu_monitor_->complaint(now);
-    if (waiting.reason.empty()) waiting.reason = "the first image waits for its depth and the IMU";
+    if (waiting.reason.empty() && imu) waiting.reason = imu_monitor_->complaint(now);
+    if (waiting.reason.empty())
+      waiting.reason = std::string("the first image waits for its depth") + (imu ? " and the IMU" : "");
   }
   if (!waiting.reason.empty()) {
     status_pub_.publish(toMsg(waiting));

@@ -10,7 +10,7 @@ void FrontEndNodelet::subscribe() {
   const SensorTopics& topics = sensor_.topics;
   color_monitor_ = std::make_unique<StreamMonitor>(topics.color, sensor_.color_rate);
   depth_monitor_ = std::make_unique<StreamMonitor>(topics.depth, sensor_.depth_rate);
-  imu_monitor_ = std::make_unique<StreamMonitor>(topics.imu.empty() ? topics.gyro : topics.imu, sensor_.imu_rate);
+  imu_monitor_ = std::make_unique<StreamMonitor>(topics.inertial(), sensor_.imu_rate);
   accel_monitor_ = std::make_unique<StreamMonitor>(topics.accel, 0);
 
   ros::NodeHandle& nh = getMTNodeHandle();
@@ -116,7 +116,8 @@ void FrontEndNodelet::onGyro(const sensor_msgs::ImuConstPtr& msg) {
 
 void FrontEndNodelet::onAccel(const sensor_msgs::ImuConstPtr& msg) {
   const double t = msg->header.stamp.toSec();
-  watch(*accel_monitor_, t);
+  watch(accelMonitor(), t);
+  if (!sensor_.hasGyro()) calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d accel = fromMsg(msg->linear_acceleration);
   owner_->post(imu_lane_, [this, t, accel] { addInertial(t, nullptr, &accel); });
 }

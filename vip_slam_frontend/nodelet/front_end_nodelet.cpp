@@ -150,11 +150,13 @@ void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const 
     NODELET_WARN(
         "topic %s: a single sample just before %.3f s was far off its neighbours and was replaced by them (errors on "
         "its bus?); further ones are counted in /diagnostics",
-        (gyro ? imu_monitor_ : accel_monitor_)->report().topic.c_str(), t);
+        (gyro ? *imu_monitor_ : accelMonitor()).report().topic.c_str(), t);
   }
   processReady();
   if (gyro && imu_rate_odometry_) publishImuRate(t);
 }
+
+StreamMonitor& FrontEndNodelet::accelMonitor() { return sensor_.hasGyro() ? *accel_monitor_ : *imu_monitor_; }
 
 void FrontEndNodelet::startWhenCalibrated() {
   const std::optional<SensorConfig> resolved = calibration_->resolve(clock_->newest());
@@ -200,6 +202,7 @@ double FrontEndNodelet::waitedFor(double t) const {
 }
 
 void FrontEndNodelet::processReady() {
+  if (!front_end_) startWhenCalibrated();
   if (!front_end_) return;
   while (const ImagePair* front = pairer_->front()) {
     if (!front_end_->ready(front->t, front->depth_lag) && waitedFor(front->t) <= options_.input.imu_patience) return;

@@ -66,6 +66,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void feedInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);  ///< with an estimator
   enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
   bool noticeTime(double t, Stream stream);  ///< false: leave the message out
+  StreamMonitor& accelMonitor();
   void startWhenCalibrated();
   void processReady();
   /// Time by which other streams have advanced past an image at `t`, each by its own stamps; seconds.
@@ -86,6 +87,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
     std::string type;
   };
   std::vector<Input> inputs() const;
+  bool splitImu() const { return !sensor_.topics.gyro.empty() && !sensor_.topics.accel.empty(); }
   void explainAbsences();
   std::string depthAbsence(double now) const;  ///< empty while usable depth comes, and for sensors without
   void reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -100,6 +102,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   std::unique_ptr<CalibrationSource> calibration_;
 
+  /// imu_monitor_: of topics.inertial(); accel_monitor_: of an accelerometer beside a gyroscope of its own.
   std::unique_ptr<StreamMonitor> color_monitor_, depth_monitor_, imu_monitor_, accel_monitor_;
 
   // Owned by the thread.

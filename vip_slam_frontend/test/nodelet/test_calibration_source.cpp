@@ -9,6 +9,7 @@ namespace {
 SensorConfig sensor() {
   SensorConfig config;
   config.topics.color = "/camera/color";
+  config.topics.imu = "/camera/imu";
   config.intrinsics_from_camera_info = false;
   return config;
 }
@@ -57,6 +58,30 @@ TEST_F(CalibrationSourceTest, ACameraThatStartsLateStillGetsItsExtrinsicsFromTf)
   EXPECT_NEAR(found->T_base_imu.t().x(), 0.1, 1e-12);
   EXPECT_FALSE(source.tfIsIncomplete());
   EXPECT_EQ(source.extrinsicsOrigin(), "T_imu_cam: from tf; T_base_imu: from tf");
+}
+
+TEST_F(CalibrationSourceTest, WithoutAnImuTheCameraAloneIsWaitedFor) {
+  connect(tf_, "base_link", "camera", 0.3);
+  SensorConfig alone = sensor();
+  alone.topics.imu.clear();
+  alone.T_imu_cam.t().x() = 0.1;  // of a body that the file puts elsewhere
+  CalibrationSource source(alone, options_, tf_);
+  EXPECT_FALSE(source.resolve(0));
+  EXPECT_NE(source.waitingFor().find("/camera/color"), std::string::npos) << source.waitingFor();
+  source.addColorFrame("camera");
+  const auto found = source.resolve(0);
+  ASSERT_TRUE(found) << source.waitingFor();
+  EXPECT_DOUBLE_EQ(found->T_imu_cam.t().x(), 0.1);
+  EXPECT_NEAR(found->T_base_imu.t().x(), 0.2, 1e-12);
+  EXPECT_FALSE(source.tfIsIncomplete());
+  EXPECT_EQ(source.extrinsicsOrigin(), "T_imu_cam: the sensor file's, there is no IMU; T_base_imu: from tf");
+
+  tf_.clear();
+  CalibrationSource unconnected(alone, options_, tf_);
+  unconnected.addColorFrame("camera");
+  EXPECT_FALSE(unconnected.resolve(0));
+  EXPECT_NE(unconnected.waitingFor().find("'camera' to 'base_link'"), std::string::npos) << unconnected.waitingFor();
+  EXPECT_TRUE(unconnected.resolve(2 * options_.tf_patience));
 }
 
 // tf answers with the identity for any frame and itself, also for one that it never heard of.
