@@ -88,9 +88,9 @@ void checkGaps(const std::string& role, const std::vector<StampedVector>& sample
 
 Findings checkImu(const Recording& r) {
   Findings out;
-  const bool split = r.sensor.topics.imu.empty();
-  checkGaps(split ? "gyroscope" : "IMU", r.gyro_samples, &out);
-  if (split) checkGaps("accelerometer", r.accel_samples, &out);
+  const bool united = !r.sensor.topics.imu.empty();
+  checkGaps(united ? "IMU" : "gyroscope", r.gyro_samples, &out);
+  if (!united) checkGaps("accelerometer", r.accel_samples, &out);
   for (const auto* samples : {&r.gyro_samples, &r.accel_samples}) {
     const std::string role = samples == &r.gyro_samples ? "gyroscope" : "accelerometer";
     if (samples->size() < 20) continue;
@@ -136,7 +136,7 @@ Findings checkImu(const Recording& r) {
   else
     out.push_back({Severity::kGood, "gravity", formatted("%.2f m/s^2 when quiet", g), ""});
   if (g > 2.0) checkUpright(forces, r.sensor.T_imu_cam, &out);
-  if (least_spread > 0.5)
+  if (least_spread > 0.5 && r.sensor.hasGyro())
     out.push_back({Severity::kNote, "start", "the sensor is never still",
                    "a second of standing still at the start helps the initialisation"});
   return out;

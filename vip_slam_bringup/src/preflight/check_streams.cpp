@@ -30,12 +30,10 @@ std::vector<Wanted> wanted(const Recording& r) {
       {"colour camera_info", t.color_info, info, &r.color_info, r.sensor.color_rate,
        r.sensor.intrinsics_from_camera_info},
       {"depth camera_info", t.depth_info, info, &r.depth_info, r.sensor.depth_rate, false}};
-  if (!t.imu.empty()) {
-    out.push_back({"IMU", t.imu, imu, &r.imu, r.sensor.imu_rate, true});
-  } else {
-    out.push_back({"gyroscope", t.gyro, imu, &r.gyro, r.sensor.imu_rate, true});
-    out.push_back({"accelerometer", t.accel, imu, &r.accel, 0.0, true});
-  }
+  // The rate in the sensor file is the gyroscope's where there is one.
+  out.push_back({"IMU", t.imu, imu, &r.imu, r.sensor.imu_rate, !t.imu.empty()});
+  out.push_back({"gyroscope", t.gyro, imu, &r.gyro, r.sensor.imu_rate, !t.gyro.empty()});
+  out.push_back({"accelerometer", t.accel, imu, &r.accel, t.gyro.empty() ? r.sensor.imu_rate : 0.0, !t.accel.empty()});
   out.erase(std::remove_if(out.begin(), out.end(), [](const Wanted& w) { return w.topic.empty() && !w.required; }),
             out.end());
   return out;
@@ -115,10 +113,27 @@ void checkCoverage(const Recording& r, Findings* out) {
   }
 }
 
+/// What the sensor file leaves out of an IMU, and what follows; empty text when it is whole.
+Finding missingInertial(const SensorTopics& topics) {
+  if (!topics.hasInertial())
+    return {Severity::kNote, "IMU", "the sensor file names no topic: an RGB-D camera alone",
+            "not checked for want of a gyroscope: the delay of the images, the readout of a rolling shutter, extrinsics, "
+            "images that repeat; nothing bridges what the camera cannot see"};
+  if (!topics.hasGyro())
+    return {Severity::kNote, "gyroscope", "the sensor file names no topic: an accelerometer alone, for gravity",
+            "not checked for want of it: the delay of the images, the readout of a rolling shutter, extrinsics, images "
+            "that repeat"};
+  if (!topics.hasAccel())
+    return {Severity::kNote, "accelerometer", "the sensor file names no topic: a gyroscope alone",
+            "not checked for want of it: gravity and its units; what is level is a guess"};
+  return {};
+}
+
 }  // namespace
 
 Findings checkTopics(const Recording& r) {
   Findings out;
+  if (const Finding imu = missingInertial(r.sensor.topics); !imu.text.empty()) out.push_back(imu);
   if (r.sensor.topics.depth.empty())
     out.push_back({Severity::kNote, "depth image", "the sensor file names no topic",
                    "visual-inertial only, without planes; distances come from the IMU alone"});

@@ -13,7 +13,9 @@ struct Frames {
 };
 
 Frames framesOf(const Recording& r) {
-  return {bareFrame(r.color.frame_id), bareFrame(r.sensor.topics.imu.empty() ? r.gyro.frame_id : r.imu.frame_id)};
+  const SensorTopics& topics = r.sensor.topics;
+  const StreamRecord& inertial = !topics.imu.empty() ? r.imu : !topics.gyro.empty() ? r.gyro : r.accel;
+  return {bareFrame(r.color.frame_id), bareFrame(inertial.frame_id)};
 }
 
 void fill(const Recording& r, tf2::BufferCore* tf) {
@@ -33,7 +35,19 @@ std::optional<SE3> extrinsicsOfTf(const Recording& r) {
 Findings checkTf(const Recording& r) {
   Findings out;
   const auto [camera, imu] = framesOf(r);
-  if (r.color.stamps.empty() || r.gyro_samples.empty()) return out;
+  if (r.color.stamps.empty()) return out;
+  if (!r.sensor.topics.hasInertial()) {
+    if (camera.empty()) return out;
+    tf2::BufferCore tf;
+    fill(r, &tf);
+    if (lookUpTransform(tf, "base_link", camera))
+      out.push_back({Severity::kGood, "tf", "the camera is connected to base_link", ""});
+    else
+      out.push_back({Severity::kNote, "tf", "base_link is not connected to the camera",
+                     "the sensor file's T_base_imu is used"});
+    return out;
+  }
+  if (r.gyro_samples.empty() && r.accel_samples.empty()) return out;
   for (const auto& [role, frame] : {std::make_pair("colour image", camera), std::make_pair("IMU", imu)})
     if (frame.empty())
       out.push_back({Severity::kNote, role, "messages have an empty frame_id",

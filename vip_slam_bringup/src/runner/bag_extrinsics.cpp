@@ -36,7 +36,7 @@ BagExtrinsics extrinsicsInBag(const rosbag::Bag& bag, const SensorTopics& topics
                               double patience) {
   BagExtrinsics out;
   out.camera_frame = firstFrame(bag, topics.color, begin);
-  out.imu_frame = firstFrame(bag, topics.imu.empty() ? topics.gyro : topics.imu, begin);
+  out.imu_frame = firstFrame(bag, topics.inertial(), begin);
   tf2::BufferCore tf;
   addAll(rosbag::View(bag, rosbag::TopicQuery("/tf"), begin, begin + ros::Duration(patience)), false, &tf);
   addAll(rosbag::View(bag, rosbag::TopicQuery("/tf_static")), true, &tf);

@@ -111,7 +111,7 @@ BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagRea
                              " s lies behind the end of the bag, which lasts " +
                              std::to_string((all.getEndTime() - all.getBeginTime()).toSec()) + " s");
   }
-  if (options.extrinsics != "config") takeExtrinsics(&sensor);
+  if (options.extrinsics != "config" && sensor.topics.hasInertial()) takeExtrinsics(&sensor);
   sensor_ = sensor;
 }
 

@@ -80,7 +80,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
         formatted("%zu samples of the gyroscope are at the end of its range, %.2f rad/s: the body turned faster, by "
                   "how much only images tell",
                   static_cast<std::size_t>(c.gyro_cut_off), c.gyro_range));
-  if (c.imu_missing > 0)
+  if (c.imu_missing > 0 && reader.sensor().topics.hasInertial())
     all.push_back(std::to_string(c.imu_missing) + " of " + std::to_string(c.images) +
                   " images are not covered by the IMU");
   if (c.imu_rejected > 0)

@@ -266,6 +266,28 @@ TEST_F(CheckBag, WithoutDepthItIsSaidAndNoError) {
   expectNoErrorBut(findings, "");
 }
 
+TEST_F(CheckBag, WithoutAnImuItIsSaidAndNoError) {
+  const std::string united = expected_.topics.imu;
+  expected_.topics.imu.clear();
+  Findings findings = check();
+  expectFound(findings, Severity::kNote, "IMU", "an RGB-D camera alone");
+  expectFound(findings, Severity::kNote, "IMU", "not checked for want of a gyroscope");
+  expectFound(findings, Severity::kGood, "tf", "the camera is connected to base_link");
+  EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
+
+  expected_.topics.accel = united;
+  findings = check();
+  expectFound(findings, Severity::kNote, "gyroscope", "an accelerometer alone");
+  expectFound(findings, Severity::kGood, "gravity", "when quiet");
+  EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
+
+  std::swap(expected_.topics.accel, expected_.topics.gyro);
+  findings = check();
+  expectFound(findings, Severity::kNote, "accelerometer", "a gyroscope alone");
+  expectFound(findings, Severity::kGood, "camera-IMU delay", "measured");
+  EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
+}
+
 TEST_F(CheckBag, ImagesThatComeAgain) {
   options_.repeat_every = 5;
   expectFound(check(), Severity::kWarning, "colour image", "repeat the pixels of the one before");
