@@ -74,7 +74,8 @@ void BackEnd::Impl::noteWeakness(const MapKeyframe& inserted) {
   const Keyframe& data = *inserted.data;
   const std::string name = "keyframe " + std::to_string(data.id) + ": ";
   if (data.frame.features.empty()) keep(name + "without features: only its neighbours hold it", &notices);
-  if (data.previous == 0 || inserted.preintegration) return;
+  const bool whole_imu = sensor.hasGyro() && sensor.hasAccel();
+  if (!whole_imu || data.previous == 0 || inserted.preintegration) return;
   const std::string before = std::to_string(data.previous);
   if (inserted.previous == 0) {
     keep(name + "its previous keyframe " + before + " is not the last of the map's chain: no IMU factor", &notices);

@@ -107,7 +107,7 @@ std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window,
   std::size_t out_of_crowds = 0;
   for (const KeyframeId id : candidates(*map, window)) {
     const MapKeyframe& kf = map->keyframe(id);
-    if (kf.previous == 0 || kf.next == 0 || !kf.imu || !map->keyframe(kf.next).imu) continue;
+    if (!map->joinable(kf)) continue;
     // Number of covisible keyframes relative to the limit.
     const double crowd =
         crowds ? static_cast<double>(map->covisible(id).size()) / static_cast<double>(options.above_covisible) : 0.0;
@@ -118,7 +118,7 @@ std::vector<KeyframeId> cullKeyframes(const CullingOptions& options, int window,
     // With a fixed limit on the IMU factor a room's keyframes would grow with the time spent there. The limit rises
     // steeply, so that keyframes outside crowds keep their IMU factors.
     const double longest = options.max_imu_seconds * std::clamp(crowd * crowd * crowd, 1.0, kLongest);
-    if (map->keyframe(kf.next).imu->back().t - kf.imu->front().t > longest) continue;
+    if (map->joinedSeconds(kf) > longest) continue;
     // In a crowd a landmark that only few keyframes saw is a mismatch or has moved.
     if (!isRedundant(kf, *map, options.redundancy, crowd > 1 ? kSeenElsewhere : 1)) continue;
     map->removeKeyframe(id, noise, longest);

@@ -182,21 +182,36 @@ void Map::removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_se
   changes_.removed_keyframes.push_back(id);
 }
 
+bool Map::joinable(const MapKeyframe& kf) const {
+  if (kf.previous == 0 || kf.next == 0) return false;
+  const MapKeyframe& next = keyframe(kf.next);
+  if (kf.imu && next.imu) return true;
+  return !kf.imu && !next.imu && kf.motion.known() && next.motion.known();
+}
+
+double Map::joinedSeconds(const MapKeyframe& kf) const {
+  const MapKeyframe& next = keyframe(kf.next);
+  if (kf.imu) return next.imu->back().t - kf.imu->front().t;
+  return next.data->frame.t - keyframe(kf.previous).data->frame.t;
+}
+
 void Map::joinOver(const MapKeyframe& kf, const ImuNoise& noise, double max_imu_seconds) {
   MapKeyframe& next = keyframe(kf.next);
   ImuSamples joined;
   std::shared_ptr<const Preintegration> preintegration;
   double scale = next.imu_noise_scale;
-  if (kf.previous != 0 && kf.imu && next.imu && next.imu->back().t - kf.imu->front().t <= max_imu_seconds) {
+  bool chain = joinable(kf) && joinedSeconds(kf) <= max_imu_seconds;
+  if (chain && kf.imu) {
     auto samples = std::make_shared<std::vector<ImuSample>>(*kf.imu);
     samples->insert(samples->end(), next.imu->begin() + 1, next.imu->end());
-    if (agreeInDuration(*samples, keyframe(kf.previous).data->frame, next.data->frame)) {
+    chain = agreeInDuration(*samples, keyframe(kf.previous).data->frame, next.data->frame);
+    if (chain) {
       joined = samples;
       scale = std::max(kf.imu_noise_scale, scale);
       preintegration = integrate(next.id(), joined, next.gyro_correction, keyframe(kf.previous).state, noise, scale);
     }
   }
-  const KeyframeId chained = joined ? kf.previous : 0;
+  const KeyframeId chained = chain ? kf.previous : 0;
   if (kf.previous != 0) keyframe(kf.previous).next = chained ? kf.next : 0;
   next.motion = chained ? compose(kf.motion, next.motion) : RelativeMotion();
   next.previous = chained;

@@ -51,6 +51,8 @@ class SimulatedKeyframes {
     }
   }
 
+  /// From now on keyframes have no IMU samples.
+  void takeAwayImu() { sensor_.topics.imu.clear(); }
   const SensorConfig& sensor() const { return sensor_; }
   NavState truth(double t) const { return syntheticState(t); }
   double interval() const { return 0.3; }
@@ -73,7 +75,7 @@ class SimulatedKeyframes {
       for (int k = 0; k < 6; ++k) d(k) = gauss(k < 3 ? 1e-3 : 2e-3);
       kf->motion.T_a_b = kf->motion.T_a_b.boxplus(d);
       kf->motion.covariance.diagonal() << 1e-6, 1e-6, 1e-6, 4e-6, 4e-6, 4e-6;
-      for (int s = 0; s <= 60; ++s) {
+      for (int s = 0; s <= 60 && sensor_.topics.hasInertial(); ++s) {
         ImuSample m = syntheticImu(t - interval() + s * interval() / 60);
         m.gyro += Eigen::Vector3d(gauss(.014), gauss(.014), gauss(.014));
         m.accel += Eigen::Vector3d(gauss(.14), gauss(.14), gauss(.14));

@@ -39,8 +39,13 @@ class Map {
   /// Applies a newly estimated gyro correction: the IMU factors of all keyframes but those of a stored map are
   /// integrated again.
   void adoptGyroCorrection(const Eigen::Matrix3d& correction, const ImuNoise& noise);
-  /// Removes it with its observations; landmarks left without observation go too. The IMU chain is joined over the gap
-  /// while the joined factor stays below `max_imu_seconds`, else it is cut.
+  /// Whether the links of the chain before and after a keyframe can become one without it: both with IMU samples, or,
+  /// without any IMU, both by the odometry's motion.
+  bool joinable(const MapKeyframe& keyframe) const;
+  /// How long that link would be, seconds.
+  double joinedSeconds(const MapKeyframe& keyframe) const;
+  /// Removes it with its observations; landmarks left without observation go too. The chain is joined over the gap
+  /// when that is possible and the joined link stays below `max_imu_seconds`, else it is cut.
   void removeKeyframe(KeyframeId id, const ImuNoise& noise, double max_imu_seconds);
 
   bool hasKeyframe(KeyframeId id) const { return keyframes_.count(id) != 0; }

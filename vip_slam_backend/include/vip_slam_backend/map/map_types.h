@@ -33,9 +33,10 @@ struct MapKeyframe {
   bool stored = false;  ///< from a stored map: the present camera's calibration does not apply to it
   /// Landmark of each feature, kNoLandmark when none; same length as data->frame.features.
   std::vector<LandmarkId> landmarks;
-  /// Neighbours on the IMU chain (0: none). They skip keyframes that were culled.
+  /// Neighbours on the chain of one odometry (0: none). They skip keyframes that were culled.
   KeyframeId previous = 0, next = 0;
-  /// Measured samples, and IMU factor, from `previous`; null when there is none or a gap made it useless.
+  /// Measured samples, and IMU factor, from `previous`; null when there is none, since the
+  /// sensor has no IMU or a gap made it useless.
   std::shared_ptr<const std::vector<ImuSample>> imu;
   std::shared_ptr<const Preintegration> preintegration;
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< applied in the factor, see Keyframe
