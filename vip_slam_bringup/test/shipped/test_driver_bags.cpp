@@ -58,9 +58,38 @@ TEST_P(DriverBags, IsReadyAndTracks) {
   EXPECT_LT(moved.rotation().angularDistance(moved_true.rotation()), 0.03);
 }
 
+class DriverBagsWithoutImu : public testing::TestWithParam<const char*> {};
+
+TEST_P(DriverBagsWithoutImu, IsReady) {
+  const std::string bag =
+      (fs::temp_directory_path() / ("vip_slam_driver_" + std::string(GetParam()) + std::to_string(::getpid()) + ".bag"))
+          .string();
+  test_support::DriverBagOptions options;
+  options.sensor = loadSensorConfig(std::string(CONFIG_DIR "/sensors/") + GetParam() + ".yaml");
+  test_support::writeDriverBag(bag, options);
+  const Findings findings = checkAll(recordBag(bag, options.sensor, 60));
+  EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
+  EXPECT_NE(toText(findings, false).find("an RGB-D camera alone"), std::string::npos) << toText(findings, false);
+
+  SensorConfig sensor = options.sensor;
+  BagReader reader(bag, sensor);
+  reader.start();
+  std::size_t images = 0, others = 0;
+  while (const auto event = reader.next()) ++(std::holds_alternative<ImagePair>(*event) ? images : others);
+  fs::remove(bag);
+  EXPECT_TRUE(reader.warnings().empty()) << reader.warnings().front();
+  EXPECT_GT(images, 70u);
+  EXPECT_EQ(others, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, DriverBagsWithoutImu,
+                         testing::Values("d435", "xtion", "kinect_v1", "kinect_v2", "astra"),
+                         [](const auto& info) { return std::string(info.param); });
+
 INSTANTIATE_TEST_SUITE_P(Shipped, DriverBags,
                          testing::Values("d435i", "d435i_split", "d455", "d455_split", "l515", "l515_split",
-                                         "azure_kinect", "orbbec_femto", "oak_d", "phone", "euroc", "simulator"),
+                                         "azure_kinect", "orbbec_femto", "oak_d", "phone", "euroc", "simulator",
+                                         "rgbd_imu"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
