@@ -136,7 +136,8 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   const cv::Mat first = cv::imread(color.front().path, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (first.empty()) throw std::runtime_error(color.front().path + ": is not a readable image");
   const CameraIntrinsics camera = findCamera(options, first.size());
-  const bool gyro = fs::exists(options.folder + "/imu.txt"), accel = fs::exists(options.folder + "/accelerometer.txt");
+  const auto inertial = [&](const char* name) { return !options.no_imu && fs::exists(options.folder + name); };
+  const bool gyro = inertial("/imu.txt"), accel = inertial("/accelerometer.txt");
   std::vector<sensor_msgs::Imu> imu;
   if (gyro || accel) imu = readInertial(options.folder + (gyro ? "/imu.txt" : "/accelerometer.txt"), gyro);
   const SE3 T_imu_cam = gyro ? options.T_imu_cam : SE3();

@@ -274,6 +274,9 @@ TEST_F(TumConverter, TheKinectsAccelerometerComesInTheCamerasAxes) {
   EXPECT_EQ(samples[0]->linear_acceleration.y, -7);
   EXPECT_EQ(samples[0]->linear_acceleration.z, -7);
   EXPECT_EQ(samples[0]->header.frame_id, read<sensor_msgs::Image>(sensor.topics.color)[0]->header.frame_id);
+  options_.no_imu = options_.overwrite = true;
+  EXPECT_EQ(convertTumRgbd(options_).messages.size(), 4u);
+  EXPECT_FALSE(loadSensorConfig((root_ / "out_sensor.yaml").string()).hasAccel());
 }
 
 TEST_F(TumConverter, ABagThatReplacesAnotherLeavesNoTruthOfThat) {

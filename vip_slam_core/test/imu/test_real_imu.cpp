@@ -1,4 +1,4 @@
-// The real IMU of EuRoC V1_01 with its ground truth, when the data are there: VIP_SLAM_TEST_DATA names the folder that
+// The real IMU of EuRoC V1_01 with its ground truth, when the data are there: VIP_SLAM_REAL_DATA names the folder that
 // holds euroc_v101/{imu,truth}.csv.
 #include <gtest/gtest.h>
 
@@ -67,8 +67,8 @@ struct Errors {
 };
 
 TEST(RealImu, PreintegrationFollowsTheTruth) {
-  const char* folder = std::getenv("VIP_SLAM_TEST_DATA");
-  if (!folder) GTEST_SKIP() << "VIP_SLAM_TEST_DATA is not set";
+  const char* folder = std::getenv("VIP_SLAM_REAL_DATA");
+  if (!folder) GTEST_SKIP() << "VIP_SLAM_REAL_DATA is not set";
   const auto imu = readCsv(std::string(folder) + "/euroc_v101/imu.csv");
   const auto truth = readCsv(std::string(folder) + "/euroc_v101/truth.csv");
   if (imu.empty() || truth.empty()) GTEST_SKIP() << folder << " holds no euroc_v101";

@@ -43,6 +43,7 @@ struct TumRgbdOptions : ConversionOptions {
   std::optional<CameraIntrinsics> camera;  ///< else calibration.txt, else from "freiburg1..3" in the folder's name
   double depth_factor = 5000;              ///< depth units per metre
   double rolling_shutter = 0;              ///< of the colour camera, s, as in a sensor file
+  bool no_imu = false;                     ///< leave out imu.txt and accelerometer.txt
   SE3 T_imu_cam;                           ///< identity unless the folder's imu.txt has other axes
 };
 /// TUM RGB-D folder: rgb.txt, depth.txt, optional groundtruth.txt, and inertial data from imu.txt (stamp, gyro, accel),
