@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -85,6 +86,23 @@ CameraIntrinsics findCamera(const TumRgbdOptions& options, const cv::Size& size)
   return camera;
 }
 
+/// The Kinect's accelerometer is read more often than it measures: a reading that repeats the one before is that one.
+bool repeats(const sensor_msgs::Imu& sample, const sensor_msgs::Imu& before) {
+  constexpr double kLongest = 0.02;  // s, between measurements; a sensor at rest may read the same again
+  const auto &a = sample.linear_acceleration, &b = before.linear_acceleration;
+  return a.x == b.x && a.y == b.y && a.z == b.z && (sample.header.stamp - before.header.stamp).toSec() < kLongest;
+}
+
+/// Leaves out what was measured long before the first image or after the last.
+void keepDuring(const std::vector<ListedFile>& images, std::vector<sensor_msgs::Imu>* samples) {
+  constexpr double kAround = 1.0;  // s
+  const auto apart = [&](const sensor_msgs::Imu& sample) {
+    const double t = sample.header.stamp.toSec();
+    return t < images.front().t - kAround || t > images.back().t + kAround;
+  };
+  samples->erase(std::remove_if(samples->begin(), samples->end(), apart), samples->end());
+}
+
 std::vector<sensor_msgs::Imu> readInertial(const std::string& path, bool gyro) {
   const TextTable table(path, " \t,", gyro ? 7 : 4);
   std::vector<sensor_msgs::Imu> samples;
@@ -106,6 +124,7 @@ std::vector<sensor_msgs::Imu> readInertial(const std::string& path, bool gyro) {
     sample.linear_acceleration.x = to_camera * table.number(row, accel, "accelerometer x");
     sample.linear_acceleration.y = to_camera * table.number(row, accel + 1, "accelerometer y");
     sample.linear_acceleration.z = table.number(row, accel + 2, "accelerometer z");
+    if (!gyro && !samples.empty() && repeats(sample, samples.back())) continue;
     samples.push_back(sample);
   }
   return samples;
@@ -140,6 +159,7 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   const bool gyro = inertial("/imu.txt"), accel = inertial("/accelerometer.txt");
   std::vector<sensor_msgs::Imu> imu;
   if (gyro || accel) imu = readInertial(options.folder + (gyro ? "/imu.txt" : "/accelerometer.txt"), gyro);
+  keepDuring(color, &imu);
   const SE3 T_imu_cam = gyro ? options.T_imu_cam : SE3();
   Trajectory truth;
   if (fs::exists(options.folder + "/groundtruth.txt"))

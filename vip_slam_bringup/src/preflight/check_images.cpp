@@ -223,7 +223,7 @@ Findings checkSkew(const Recording& r) {
     if (most > 0.008)
       out.push_back({Severity::kNote, "colour and depth",
                      formatted("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
-                     "the IMU carries depth over to the colour image, as far as these stamps are right; the driver's "
+                     "the motion carries depth over to the colour image, as far as these stamps are right; the driver's "
                      "synchronisation spares that"});
     else
       out.push_back({Severity::kGood, "colour and depth", formatted("stamps agree within %.1f ms", 1e3 * most), ""});

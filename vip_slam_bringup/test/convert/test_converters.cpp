@@ -260,7 +260,8 @@ TEST_F(TumConverter, WithoutAnImuTheBagHasImagesAndTheSensorFileSaysSo) {
 TEST_F(TumConverter, TheKinectsAccelerometerComesInTheCamerasAxes) {
   makeFolder("rgbd_dataset_freiburg1_xyz");
   // The camera looks down by half a right angle: up lies along -y and -z of its own axes.
-  write("rgbd_dataset_freiburg1_xyz/accelerometer.txt", "# t ax ay az\n1305031102.1 0.5 7 -7\n1305031102.2 0 7 -7\n");
+  write("rgbd_dataset_freiburg1_xyz/accelerometer.txt",
+        "# t ax ay az\n1305031090 0 0 9.8\n1305031102.1 0.5 7 -7\n1305031102.102 0.5 7 -7\n1305031102.2 0 7 -7\n");
   EXPECT_TRUE(convertTumRgbd(options_).warnings.empty());
   const SensorConfig sensor = loadSensorConfig((root_ / "out_sensor.yaml").string());
   EXPECT_FALSE(sensor.hasGyro());
@@ -268,7 +269,7 @@ TEST_F(TumConverter, TheKinectsAccelerometerComesInTheCamerasAxes) {
   EXPECT_EQ(sensor.imu_rate, 10);
   EXPECT_LT(sensor.T_imu_cam.boxminus(SE3()).norm(), 1e-12);
   const auto samples = read<sensor_msgs::Imu>(sensor.topics.accel);
-  ASSERT_EQ(samples.size(), 2u);
+  ASSERT_EQ(samples.size(), 2u);  // without the one long before the images, and the one that was read again
   EXPECT_EQ(samples[0]->angular_velocity_covariance[0], -1);  // not measured
   EXPECT_EQ(samples[0]->linear_acceleration.x, -0.5);
   EXPECT_EQ(samples[0]->linear_acceleration.y, -7);
