@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
@@ -183,6 +186,31 @@ TEST(Folder, SevenScenesHaveADepthCameraOfTheirOwn) {
   EXPECT_EQ(registered.camera.fx, 585);
   EXPECT_EQ(registered.colour_readout, 0);
   EXPECT_NEAR((registered.T_W_C.front().T_W_B.t() - Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-12);
+}
+
+using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
+
+TEST(Folder, EveryImageIsPairedOnceAndInOrder) {
+  // The depth image at 0.03 is the nearest of two colour images.
+  EXPECT_EQ(pairInOrder({0.00, 0.02, 0.038, 0.07}, {0.001, 0.03, 0.071}, 0.02), (Pairs{{0, 0}, {2, 1}, {3, 2}}));
+  // With one more before it both have one, if not the nearest.
+  EXPECT_EQ(pairInOrder({0.00, 0.02, 0.038, 0.07}, {0.001, 0.029, 0.03, 0.071}, 0.02),
+            (Pairs{{0, 0}, {1, 1}, {2, 2}, {3, 3}}));
+  // A lost depth image leaves one colour image alone and shifts no others.
+  EXPECT_EQ(pairInOrder({0.0, 0.03, 0.06, 0.09}, {0.0, 0.06, 0.09}, 0.02), (Pairs{{0, 0}, {2, 1}, {3, 2}}));
+  EXPECT_EQ(pairInOrder({0.0, 0.03}, {0.06}, 0.02), Pairs());
+  EXPECT_EQ(pairInOrder({}, {0.06}, 0.02), Pairs());
+}
+
+TEST(Folder, DepthPastHalfAnIntervalStaysWithItsColour) {
+  std::vector<double> colour, depth;
+  Pairs own;
+  for (std::size_t i = 0; i < 400; ++i) {
+    colour.push_back(static_cast<double>(i) / 30);
+    depth.push_back(colour.back() + 0.016 + 0.003 * std::sin(2.3 * static_cast<double>(i)));
+    own.emplace_back(i, i);
+  }
+  EXPECT_EQ(pairInOrder(colour, depth, 0.02), own);
 }
 
 TEST(Folder, ErrorsNameTheFile) {
