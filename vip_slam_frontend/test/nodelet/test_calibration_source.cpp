@@ -76,8 +76,8 @@ TEST_F(CalibrationSourceTest, WithoutAnImuTheCameraAloneIsWaitedFor) {
   EXPECT_FALSE(source.tfIsIncomplete());
   EXPECT_EQ(source.extrinsicsOrigin(), "T_imu_cam: the sensor file's, there is no IMU; T_base_imu: from tf");
 
-  tf_.clear();
-  CalibrationSource unconnected(alone, options_, tf_);
+  const tf2::BufferCore empty;
+  CalibrationSource unconnected(alone, options_, empty);
   unconnected.addColorFrame("camera");
   EXPECT_FALSE(unconnected.resolve(0));
   EXPECT_NE(unconnected.waitingFor().find("'camera' to 'base_link'"), std::string::npos) << unconnected.waitingFor();
