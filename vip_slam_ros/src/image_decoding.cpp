@@ -43,7 +43,8 @@ cv::Mat toMono8(const sensor_msgs::Image& image, const MessageOwner& owner) {
   const std::string& e = image.encoding;
   if (e == encodings::MONO8 || e == encodings::TYPE_8UC1)
     return owner ? withOwner(shared->image, owner) : shared->image.clone();
-  if (e != encodings::TYPE_8UC3 && e != encodings::TYPE_8UC4) return cv_bridge::cvtColor(shared, encodings::MONO8)->image;
+  if (e != encodings::TYPE_8UC3 && e != encodings::TYPE_8UC4)
+    return cv_bridge::cvtColor(shared, encodings::MONO8)->image;
   const std::string order = e == encodings::TYPE_8UC3 ? encodings::BGR8 : encodings::BGRA8;
   const auto named = boost::make_shared<cv_bridge::CvImage>(image.header, order, shared->image);
   return cv_bridge::cvtColor(named, encodings::MONO8)->image;
