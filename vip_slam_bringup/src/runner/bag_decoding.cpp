@@ -69,8 +69,9 @@ void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
 }
 
 void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
-  auto [t, depth, stamp] =
-      stampedImage(message, [&](const auto& m, const auto&...) { return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset); });
+  auto [t, depth, stamp] = stampedImage(message, [&](const auto& m, const auto&...) {
+    return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset);
+  });
   if (registration_) depth = (*registration_)(depth);
   if (!color_size_.empty() && depth.size() != color_size_)
     complain("sizes", "topic " + message.getTopic() + ": depth is " + sizeText(depth.size()) +
