@@ -2,6 +2,7 @@
 find_package(catkin REQUIRED COMPONENTS
   diagnostic_updater dynamic_reconfigure geometry_msgs nav_msgs nodelet pluginlib roscpp sensor_msgs std_srvs tf2_ros
   visualization_msgs vip_slam_core vip_slam_msgs vip_slam_ros)
+find_package(PCL REQUIRED COMPONENTS common)
 
 add_library(vip_slam_backend_nodelets
   nodelet/back_end_nodelet.cpp
@@ -11,7 +12,7 @@ add_library(vip_slam_backend_nodelets
   nodelet/pose_in_map.cpp
 )
 target_include_directories(vip_slam_backend_nodelets PRIVATE nodelet)
-target_include_directories(vip_slam_backend_nodelets SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+target_include_directories(vip_slam_backend_nodelets SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${PCL_INCLUDE_DIRS})
 target_compile_options(vip_slam_backend_nodelets PRIVATE -Wall -Wextra)
 target_link_libraries(vip_slam_backend_nodelets PRIVATE vip_slam_backend ${catkin_LIBRARIES})
 add_dependencies(vip_slam_backend_nodelets vip_slam_backend_gencfg ${catkin_EXPORTED_TARGETS})
