@@ -2,7 +2,6 @@
 find_package(catkin REQUIRED COMPONENTS
   diagnostic_updater dynamic_reconfigure geometry_msgs nav_msgs nodelet pluginlib roscpp sensor_msgs std_srvs tf2_ros
   visualization_msgs vip_slam_core vip_slam_msgs vip_slam_ros)
-find_package(PCL REQUIRED COMPONENTS common)
 
 add_library(vip_slam_backend_nodelets
   nodelet/back_end_nodelet.cpp

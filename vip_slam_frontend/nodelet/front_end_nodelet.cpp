@@ -74,6 +74,7 @@ void FrontEndNodelet::advertise() {
   diagnostics_->add("tracking", this, &FrontEndNodelet::reportTracking);
   diagnostics_->add("input", this, &FrontEndNodelet::reportInput);
   diagnostics_->add("queues", this, &FrontEndNodelet::reportQueues);
+  odometry_monitor_ = std::make_unique<OutputMonitor>("odom", sensor_.color_rate, diagnostics_.get());
 
   // The parameters given at the start are the initial values; dynamic_reconfigure would overwrite them by its defaults.
   ros::NodeHandle& private_nh = getPrivateNodeHandle();

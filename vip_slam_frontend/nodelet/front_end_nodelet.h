@@ -32,6 +32,7 @@
 #include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/image_pairer.h"
 #include "vip_slam_ros/image_subscriber.h"
+#include "vip_slam_ros/output_monitor.h"
 #include "vip_slam_ros/owner_thread.h"
 #include "vip_slam_ros/stream_clock.h"
 #include "vip_slam_ros/stream_monitor.h"
@@ -146,6 +147,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<ImageSubscriber> color_images_, depth_images_;
   std::vector<ros::Subscriber> subscribers_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  std::unique_ptr<OutputMonitor> odometry_monitor_;
   std::unique_ptr<dynamic_reconfigure::Server<vip_slam_frontend::FrontEndConfig>> reconfigure_;
   ros::WallTimer timer_;
   std::unique_ptr<OwnerThread> owner_;  ///< last member: stops before anything it uses is destroyed

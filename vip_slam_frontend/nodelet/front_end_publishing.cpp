@@ -31,6 +31,7 @@ void FrontEndNodelet::publishPose(const ros::Time& stamp, const TrackedFrame& fr
       toOdometry(stamp, frame.state, frame.covariance, front_end_->gyro(frame.state.t), gyroSigma(sensor_), frames_));
   if (publish_tf_) tf_broadcaster_->sendTransform(toTransform(*odometry));
   odometry_pub_.publish(odometry);
+  odometry_monitor_->published(stamp);
 }
 
 void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, double milliseconds) {
