@@ -55,9 +55,7 @@ geometry_msgs::Transform toTransformMsg(const SE3& T) {
 Eigen::Vector3d fromMsg(const geometry_msgs::Point& p) { return toEigen(p); }
 Eigen::Vector3d fromMsg(const geometry_msgs::Vector3& v) { return toEigen(v); }
 
-SE3 fromMsg(const geometry_msgs::Pose& pose) {
-  return makeTransform(pose.orientation, fromMsg(pose.position));
-}
+SE3 fromMsg(const geometry_msgs::Pose& pose) { return makeTransform(pose.orientation, fromMsg(pose.position)); }
 
 SE3 fromMsg(const geometry_msgs::Transform& transform) {
   return makeTransform(transform.rotation, fromMsg(transform.translation));

@@ -9,8 +9,8 @@ namespace vip_slam {
 
 class OutputMonitor {
  public:
-  /// `rate`: that of the images, Hz. Below 0.7 times it or above 1.3 the status warns; without a message it is an error,
-  /// and stamps more than 5 s behind ROS time, or 1 s ahead, are named. `updater` must outlive this.
+  /// `rate`: that of the images, Hz. Below 0.7 times it or above 1.3 the status warns; without a message it is an
+  /// error, and stamps more than 5 s behind ROS time, or 1 s ahead, are named. `updater` must outlive this.
   OutputMonitor(const std::string& topic, double rate, diagnostic_updater::Updater* updater)
       : rate_(rate),
         status_(topic, *updater, {&rate_, &rate_, kTolerance, kSeconds},

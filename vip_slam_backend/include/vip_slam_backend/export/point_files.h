@@ -16,8 +16,9 @@ struct PointFilter {
   double voxel = 0;     ///< one point in each cube of this side, m (pcl::VoxelGrid); 0: all
 };
 
-/// ASCII files `stem`.ply and `stem`.pcd with x y z label. How many points they have; no files when there are none. Each
-/// file whole or not at all; throws std::runtime_error naming the path, or the cube when it is too small for the map.
+/// ASCII files `stem`.ply and `stem`.pcd with x y z label. How many points they have; no files when there are none.
+/// Each file whole or not at all; throws std::runtime_error naming the path, or the cube when it is too small for the
+/// map.
 std::size_t writePoints(const std::string& stem, const Map& map, const PointFilter& filter = {});
 
 }  // namespace vip_slam
