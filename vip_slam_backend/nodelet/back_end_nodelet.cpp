@@ -83,6 +83,7 @@ void BackEndNodelet::advertise() {
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
   diagnostics_->setHardwareID(sensor_.name);
   diagnostics_->add("map", this, &BackEndNodelet::report);
+  pose_monitor_ = std::make_unique<OutputMonitor>("pose", sensor_.color_rate, diagnostics_.get());
   getPrivateNodeHandle().setParam("localisation_mode", options_.localisation_mode);
   reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>>(reconfigure_mutex_,
                                                                                                 getPrivateNodeHandle());
@@ -154,6 +155,7 @@ void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
       pose_.message(t, *T_map_odom, T_odom_I, covariance, options_.map_frame));
   pose->header.stamp = frame.header.stamp;  // exact, unlike the double t
   pose_pub_.publish(pose);
+  pose_monitor_->published(frame.header.stamp);
 }
 
 void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {

@@ -31,6 +31,7 @@
 #include "vip_slam_backend/back_end_node_options.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_ros/drop_watch.h"
+#include "vip_slam_ros/output_monitor.h"
 #include "vip_slam_ros/owner_thread.h"
 
 namespace vip_slam {
@@ -109,6 +110,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  std::unique_ptr<OutputMonitor> pose_monitor_;
   boost::recursive_mutex reconfigure_mutex_;  ///< a service changes the configuration as well
   std::unique_ptr<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>> reconfigure_;
   ros::WallTimer timer_;

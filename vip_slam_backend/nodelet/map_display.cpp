@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/markers.h"
 #include "vip_slam_ros/point_cloud.h"
@@ -100,12 +103,11 @@ visualization_msgs::MarkerArray MapDisplay::markers(const std_msgs::Header& head
 }
 
 sensor_msgs::PointCloud2 MapDisplay::landmarks(const std_msgs::Header& header) const {
-  std::vector<ColoredPoint> points;
+  ColoredCloud points;
   points.reserve(landmarks_.size());
   const auto grey = makeColor(0.75, 0.75, 0.75);
-  for (const auto& [id, landmark] : landmarks_) {
-    points.push_back({landmark.p, landmark.plane == 0 ? grey : colorOfId(landmark.plane)});
-  }
+  for (const auto& [id, landmark] : landmarks_)
+    addPoint(landmark.p, landmark.plane == 0 ? grey : colorOfId(landmark.plane), &points);
   return toPointCloud(points, header);
 }
 

@@ -11,7 +11,7 @@ add_library(vip_slam_backend_nodelets
   nodelet/pose_in_map.cpp
 )
 target_include_directories(vip_slam_backend_nodelets PRIVATE nodelet)
-target_include_directories(vip_slam_backend_nodelets SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+target_include_directories(vip_slam_backend_nodelets SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${PCL_INCLUDE_DIRS})
 target_compile_options(vip_slam_backend_nodelets PRIVATE -Wall -Wextra)
 target_link_libraries(vip_slam_backend_nodelets PRIVATE vip_slam_backend ${catkin_LIBRARIES})
 add_dependencies(vip_slam_backend_nodelets vip_slam_backend_gencfg ${catkin_EXPORTED_TARGETS})

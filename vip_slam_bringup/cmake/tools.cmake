@@ -23,7 +23,8 @@ add_library(vip_slam_bringup
   src/stereo/stereo_calibration.cpp
   src/stereo/stereo_depth.cpp
 )
-target_link_libraries(vip_slam_bringup ${catkin_LIBRARIES} ${OpenCV_LIBS} yaml-cpp)
+target_link_options(vip_slam_bringup PRIVATE LINKER:--as-needed)
+target_link_libraries(vip_slam_bringup PUBLIC ${catkin_LIBRARIES} ${OpenCV_LIBS} yaml-cpp PRIVATE ${cv_bridge_LIBRARIES})
 
 add_library(vip_slam_bringup_nodelets src/nodelets/stereo_depth_nodelet.cpp)
 target_link_libraries(vip_slam_bringup_nodelets vip_slam_bringup ${catkin_LIBRARIES})

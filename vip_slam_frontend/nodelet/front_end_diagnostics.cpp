@@ -26,11 +26,8 @@ double quantileOf(const std::deque<double>& values, double q) {
 }  // namespace
 
 std::vector<FrontEndNodelet::Input> FrontEndNodelet::inputs() const {
-  const auto image = [](const std::string& encoding) {
-    return encoding == "compressed" ? "sensor_msgs/CompressedImage" : "sensor_msgs/Image";
-  };
-  std::vector<Input> all = {{color_monitor_.get(), image(sensor_.color_encoding)}};
-  if (!sensor_.topics.depth.empty()) all.push_back({depth_monitor_.get(), image(sensor_.depth_encoding)});
+  std::vector<Input> all = {{color_monitor_.get(), color_source_.type()}};
+  if (!sensor_.topics.depth.empty()) all.push_back({depth_monitor_.get(), depth_source_.type()});
   if (sensor_.topics.hasInertial()) all.push_back({imu_monitor_.get(), "sensor_msgs/Imu"});
   if (splitImu()) all.push_back({accel_monitor_.get(), "sensor_msgs/Imu"});
   return all;
@@ -102,7 +99,7 @@ std::string FrontEndNodelet::depthAbsence(double now) const {
   const std::string absence = depth_monitor_->absence(now);
   constexpr int kLasting = 20;  // images; a hand in front of the camera is gone sooner
   if (!absence.empty() || empty_depth_ < kLasting) return absence;
-  return "topic " + sensor_.topics.depth + ": images " + holdNoDepth(sensor_.depth_noise);
+  return "topic " + depth_source_.topic + ": images " + holdNoDepth(sensor_.depth_noise);
 }
 
 void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -175,7 +172,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
                   formatted(
                       "%s (%.1f Hz) and %s (%.1f Hz) are not synchronised: newest stamps %.0f ms apart, pairs "
                       "need %.0f ms",
-                      sensor_.topics.color.c_str(), color_monitor_->report().rate, sensor_.topics.depth.c_str(),
+                      color_source_.topic.c_str(), color_monitor_->report().rate, depth_source_.topic.c_str(),
                       depth_monitor_->report().rate, 1e3 * std::abs(skew), 1e3 * options_.input.pair_tolerance);
   }
   if (empty_depth_ > 0 && complaints.empty()) complaints = depthAbsence(now);

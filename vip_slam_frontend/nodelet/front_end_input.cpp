@@ -8,8 +8,8 @@ namespace vip_slam {
 
 void FrontEndNodelet::subscribe() {
   const SensorTopics& topics = sensor_.topics;
-  color_monitor_ = std::make_unique<StreamMonitor>(topics.color, sensor_.color_rate);
-  depth_monitor_ = std::make_unique<StreamMonitor>(topics.depth, sensor_.depth_rate);
+  color_monitor_ = std::make_unique<StreamMonitor>(color_source_.topic, sensor_.color_rate);
+  depth_monitor_ = std::make_unique<StreamMonitor>(depth_source_.topic, sensor_.depth_rate);
   imu_monitor_ = std::make_unique<StreamMonitor>(topics.inertial(), sensor_.imu_rate);
   accel_monitor_ = std::make_unique<StreamMonitor>(topics.accel, 0);
 
@@ -23,20 +23,18 @@ void FrontEndNodelet::subscribe() {
           topics.depth_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { calibration_->addDepthInfo(*m); }));
     }
   }
-  subscribeImage(
-      topics.color, sensor_.color_encoding,
-      [this](const sensor_msgs::ImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m); }); },
+  // Capacity of a topic's queue: images that come while one is being decoded. Each topic keeps its order.
+  const auto queue = std::uint32_t(options_.image_queue);
+  color_images_ = std::make_unique<ImageSubscriber>(
+      nh, color_source_, queue,
+      [this](const sensor_msgs::ImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m, m); }); },
       [this](const sensor_msgs::CompressedImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m); }); });
   if (!topics.depth.empty()) {
     const double scale = sensor_.depth_scale, offset = sensor_.depth_offset;
-    subscribeImage(
-        topics.depth, sensor_.depth_encoding,
-        [this, scale, offset](const sensor_msgs::ImageConstPtr& m) {
-          onDepth(m->header.stamp.toSec(), [m, scale, offset] { return decodeDepth(*m, scale, offset); });
-        },
-        [this, scale, offset](const sensor_msgs::CompressedImageConstPtr& m) {
-          onDepth(m->header.stamp.toSec(), [m, scale, offset] { return decodeDepth(*m, scale, offset); });
-        });
+    const auto take = [this, scale, offset](const auto& m) {
+      onDepth(m->header.stamp.toSec(), [m, scale, offset] { return decodeDepth(*m, scale, offset); });
+    };
+    depth_images_ = std::make_unique<ImageSubscriber>(nh, depth_source_, queue, take, take);
   }
   // One ordered queue for small and frequent messages; images are decoded in other threads.
   ros::NodeHandle& ordered = getNodeHandle();
@@ -48,21 +46,6 @@ void FrontEndNodelet::subscribe() {
   imu(topics.accel, &FrontEndNodelet::onAccel);
   subscribers_.push_back(ordered.subscribe("map_update", 20, &FrontEndNodelet::onMapUpdate, this));
   subscribers_.push_back(ordered.subscribe("control", 20, &FrontEndNodelet::onControl, this));
-}
-
-void FrontEndNodelet::subscribeImage(
-    const std::string& topic, const std::string& encoding,
-    const std::function<void(const sensor_msgs::ImageConstPtr&)>& raw,
-    const std::function<void(const sensor_msgs::CompressedImageConstPtr&)>& compressed) {
-  // Capacity of the topic's queue: images that come while one is being decoded. Each topic keeps its order.
-  ros::NodeHandle& nh = getMTNodeHandle();
-  const auto hints = ros::TransportHints().tcpNoDelay();
-  const auto size = std::uint32_t(options_.image_queue);
-  if (encoding == "compressed") {
-    subscribers_.push_back(nh.subscribe<sensor_msgs::CompressedImage>(topic, size, compressed, nullptr, hints));
-  } else {
-    subscribers_.push_back(nh.subscribe<sensor_msgs::Image>(topic, size, raw, nullptr, hints));
-  }
 }
 
 void FrontEndNodelet::watch(StreamMonitor& monitor, double t) { monitor.add(t, ros::Time::now().toSec()); }
@@ -79,7 +62,7 @@ void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::functio
     });
   } catch (const std::exception& error) {
     color_monitor_->reject(error.what());
-    NODELET_WARN_THROTTLE(10, "topic %s: %s", sensor_.topics.color.c_str(), error.what());
+    NODELET_WARN_THROTTLE(10, "topic %s: %s", color_source_.topic.c_str(), error.what());
   }
 }
 
@@ -94,7 +77,7 @@ void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) 
     });
   } catch (const std::exception& error) {
     depth_monitor_->reject(error.what());
-    NODELET_WARN_THROTTLE(10, "topic %s: %s", sensor_.topics.depth.c_str(), error.what());
+    NODELET_WARN_THROTTLE(10, "topic %s: %s", depth_source_.topic.c_str(), error.what());
   }
 }
 

@@ -1,5 +1,6 @@
 #include "front_end_nodelet.h"
 
+#include <image_transport/image_transport.h>
 #include <vip_slam_msgs/Calibration.h>
 #include <vip_slam_msgs/Keyframe.h>
 #include <vip_slam_msgs/TrackedFrame.h>
@@ -16,6 +17,8 @@ namespace vip_slam {
 
 FrontEndNodelet::~FrontEndNodelet() {
   timer_.stop();
+  color_images_.reset();
+  depth_images_.reset();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
   if (owner_) owner_->stop();
 }
@@ -24,6 +27,11 @@ void FrontEndNodelet::onInit() {
   try {
     loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"feature_image_rate", "diagnostic_period"});
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
+    const std::vector<std::string> installed = installedTransports(getNodeHandle());
+    color_source_ =
+        chooseTransport(sensor_.topics.color, sensor_.color_encoding, options_.image_transport, false, installed);
+    depth_source_ =
+        chooseTransport(sensor_.topics.depth, sensor_.depth_encoding, options_.depth_image_transport, true, installed);
   } catch (const std::exception& error) {
     NODELET_FATAL("%s", error.what());
     throw;
@@ -58,7 +66,7 @@ void FrontEndNodelet::advertise() {
   frame_pub_ = nh.advertise<vip_slam_msgs::TrackedFrame>("tracked_frame", 20);
   keyframe_pub_ = nh.advertise<vip_slam_msgs::Keyframe>("keyframe", 20);
   status_pub_ = nh.advertise<vip_slam_msgs::TrackingStatus>("tracking_status", 5, true);
-  feature_image_pub_ = nh.advertise<sensor_msgs::Image>("feature_image", 2);
+  feature_image_pub_ = image_transport::ImageTransport(nh).advertise("feature_image", 2);
   calibration_pub_ = nh.advertise<vip_slam_msgs::Calibration>("calibration", 1, true);
 
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
@@ -66,6 +74,7 @@ void FrontEndNodelet::advertise() {
   diagnostics_->add("tracking", this, &FrontEndNodelet::reportTracking);
   diagnostics_->add("input", this, &FrontEndNodelet::reportInput);
   diagnostics_->add("queues", this, &FrontEndNodelet::reportQueues);
+  odometry_monitor_ = std::make_unique<OutputMonitor>("odom", sensor_.color_rate, diagnostics_.get());
 
   // The parameters given at the start are the initial values; dynamic_reconfigure would overwrite them by its defaults.
   ros::NodeHandle& private_nh = getPrivateNodeHandle();

@@ -11,11 +11,10 @@
 
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <dynamic_reconfigure/server.h>
+#include <image_transport/publisher.h>
 #include <nodelet/nodelet.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/CompressedImage.h>
-#include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 #include <std_msgs/Header.h>
 #include <tf2_ros/buffer.h>
@@ -32,6 +31,8 @@
 #include "vip_slam_frontend/front_end_node_options.h"
 #include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/image_pairer.h"
+#include "vip_slam_ros/image_subscriber.h"
+#include "vip_slam_ros/output_monitor.h"
 #include "vip_slam_ros/owner_thread.h"
 #include "vip_slam_ros/stream_clock.h"
 #include "vip_slam_ros/stream_monitor.h"
@@ -57,9 +58,6 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void onControl(const vip_slam_msgs::ControlConstPtr& msg);
   void onReconfigure(vip_slam_frontend::FrontEndConfig& config);
   void watch(StreamMonitor& monitor, double t);
-  void subscribeImage(const std::string& topic, const std::string& encoding,
-                      const std::function<void(const sensor_msgs::ImageConstPtr&)>& raw,
-                      const std::function<void(const sensor_msgs::CompressedImageConstPtr&)>& compressed);
 
   // In the owner thread.
   void addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
@@ -146,10 +144,13 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::atomic<double> feature_image_rate_{15.0};
 
   OwnerThread::Lane imu_lane_ = 0, image_lane_ = 0, depth_lane_ = 0, control_lane_ = 0;
-  ros::Publisher odometry_pub_, imu_rate_pub_, frame_pub_, keyframe_pub_, status_pub_, feature_image_pub_,
-      calibration_pub_;
+  ros::Publisher odometry_pub_, imu_rate_pub_, frame_pub_, keyframe_pub_, status_pub_, calibration_pub_;
+  image_transport::Publisher feature_image_pub_;
+  ImageSource color_source_, depth_source_;
+  std::unique_ptr<ImageSubscriber> color_images_, depth_images_;
   std::vector<ros::Subscriber> subscribers_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  std::unique_ptr<OutputMonitor> odometry_monitor_;
   std::unique_ptr<dynamic_reconfigure::Server<vip_slam_frontend::FrontEndConfig>> reconfigure_;
   ros::WallTimer timer_;
   std::unique_ptr<OwnerThread> owner_;  ///< last member: stops before anything it uses is destroyed

@@ -1,4 +1,6 @@
 // What the front-end nodelet publishes.
+#include <cv_bridge/cv_bridge.h>
+#include <sensor_msgs/image_encodings.h>
 #include <vip_slam_msgs/Calibration.h>
 #include <vip_slam_msgs/Keyframe.h>
 #include <vip_slam_msgs/TrackedFrame.h>
@@ -29,6 +31,7 @@ void FrontEndNodelet::publishPose(const ros::Time& stamp, const TrackedFrame& fr
       toOdometry(stamp, frame.state, frame.covariance, front_end_->gyro(frame.state.t), gyroSigma(sensor_), frames_));
   if (publish_tf_) tf_broadcaster_->sendTransform(toTransform(*odometry));
   odometry_pub_.publish(odometry);
+  odometry_monitor_->published(stamp);
 }
 
 void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, double milliseconds) {
@@ -57,16 +60,11 @@ void FrontEndNodelet::publishFeatureImage(const ImagePair& pair, const TrackedFr
   if (feature_image_pub_.getNumSubscribers() == 0 || pair.gray.empty() || pair.gray.type() != CV_8UC1) return;
   if (pair.t - last_feature_image_ < 1.0 / feature_image_rate_ - 1e-3) return;
   last_feature_image_ = pair.t;
-  const cv::Mat picture = drawFeatureImage(pair.gray, frame);
-  auto image = boost::make_shared<sensor_msgs::Image>();
-  image->header.stamp.fromNSec(pair.stamp);
-  image->header.frame_id = calibration_->colorFrame();
-  image->width = std::uint32_t(picture.cols);
-  image->height = std::uint32_t(picture.rows);
-  image->encoding = "bgr8";
-  image->step = std::uint32_t(picture.cols * 3);
-  image->data.assign(picture.data, picture.data + std::size_t(image->step) * image->height);
-  feature_image_pub_.publish(image);
+  std_msgs::Header header;
+  header.stamp.fromNSec(pair.stamp);
+  header.frame_id = calibration_->colorFrame();
+  const cv_bridge::CvImage picture(header, sensor_msgs::image_encodings::BGR8, drawFeatureImage(pair.gray, frame));
+  feature_image_pub_.publish(picture.toImageMsg());
 }
 
 void FrontEndNodelet::publishImuRate(double t) {

@@ -1,7 +1,9 @@
 # The front end as a nodelet. Included last: ROS stays out of the library above.
 find_package(catkin REQUIRED COMPONENTS
-  diagnostic_updater dynamic_reconfigure geometry_msgs nav_msgs nodelet pluginlib roscpp sensor_msgs tf2_ros
+  diagnostic_updater dynamic_reconfigure geometry_msgs image_transport nav_msgs nodelet pluginlib roscpp sensor_msgs
+  tf2_ros
   vip_slam_core vip_slam_msgs vip_slam_ros)
+find_package(cv_bridge REQUIRED)  # apart: its list of libraries is all of OpenCV, most of which nobody needs
 find_package(OpenCV REQUIRED COMPONENTS core imgproc)
 
 add_library(vip_slam_frontend_nodelets
@@ -17,7 +19,9 @@ add_library(vip_slam_frontend_nodelets
 target_include_directories(vip_slam_frontend_nodelets PRIVATE nodelet)
 target_include_directories(vip_slam_frontend_nodelets SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
 target_compile_options(vip_slam_frontend_nodelets PRIVATE -Wall -Wextra)
-target_link_libraries(vip_slam_frontend_nodelets vip_slam_frontend ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
+target_link_options(vip_slam_frontend_nodelets PRIVATE LINKER:--as-needed)
+target_link_libraries(vip_slam_frontend_nodelets PRIVATE vip_slam_frontend ${catkin_LIBRARIES} ${cv_bridge_LIBRARIES}
+  ${OpenCV_LIBRARIES})
 add_dependencies(vip_slam_frontend_nodelets vip_slam_frontend_gencfg ${catkin_EXPORTED_TARGETS})
 
 install(TARGETS vip_slam_frontend_nodelets LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
@@ -28,5 +32,5 @@ if(CATKIN_ENABLE_TESTING)
   catkin_add_gtest(test_nodelet ${sources})
   target_include_directories(test_nodelet PRIVATE nodelet)
   target_include_directories(test_nodelet SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
-  target_link_libraries(test_nodelet vip_slam_frontend_nodelets gtest_main ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
+  target_link_libraries(test_nodelet vip_slam_frontend_nodelets vip_slam_frontend gtest_main ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
 endif()

@@ -1,5 +1,8 @@
 #include "plane_display.h"
 
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
 #include "vip_slam_core/geometry/polygon_triangulation.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/markers.h"
@@ -85,18 +88,22 @@ void PlaneDisplay::apply(const PlaneUpdate& update) {
   }
 }
 
-sensor_msgs::PointCloud2 PlaneDisplay::cloud(const std_msgs::Header& header) const {
-  std::vector<ColoredPoint> all;
+sensor_msgs::PointCloud2 PlaneDisplay::cloud(const std_msgs::Header& header, double voxel) const {
+  ColoredCloud all;
   all.reserve(points());
   for (const auto& [plane, observations] : points_) {
+    ColoredCloud one;
     const std_msgs::ColorRGBA color = colorOf(plane, horizontal_.count(plane) > 0, 1.0);
     for (const auto& [keyframe, points] : observations) {
       const auto pose = keyframes_.find(keyframe);
       if (pose == keyframes_.end()) continue;
       const Eigen::Matrix3f R = pose->second.R().cast<float>();
       const Eigen::Vector3f t = pose->second.t().cast<float>();
-      for (const auto& p : points) all.push_back({R * p + t, color});
+      for (const auto& p : points) addPoint(R * p + t, color, &one);
     }
+    // Each plane by itself: its colour stays its own at corners, and the cubes of one plane are few enough to count.
+    if (voxel > 0) thin(voxel, &one);
+    all += one;
   }
   return toPointCloud(all, header);
 }

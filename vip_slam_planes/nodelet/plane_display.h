@@ -26,8 +26,9 @@ class PlaneDisplay {
   /// Stores the poses and points needed to draw the depth points on planes.
   void apply(const MapUpdate& update);
   void apply(const PlaneUpdate& update);
-  /// The depth points on planes, in the colours of the planes.
-  sensor_msgs::PointCloud2 cloud(const std_msgs::Header& header) const;
+  /// The depth points on planes, in the colours of the planes; the mean of each plane's points in a cube of side
+  /// `voxel`, metres (0: all points).
+  sensor_msgs::PointCloud2 cloud(const std_msgs::Header& header, double voxel) const;
   std::size_t points() const;
   void clear();
 

@@ -29,7 +29,8 @@ PlanesNodelet::~PlanesNodelet() {
 
 void PlanesNodelet::onInit() {
   try {
-    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"opacity", "display_rate", "diagnostic_period"});
+    loadOptionsFromParameters(options_, getPrivateNodeHandle(),
+                              {"opacity", "cloud_voxel", "display_rate", "diagnostic_period"});
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
   } catch (const std::exception& error) {
     NODELET_FATAL("%s", error.what());
@@ -106,6 +107,7 @@ void PlanesNodelet::onInit() {
 
 void PlanesNodelet::onReconfigure(vip_slam_planes::PlanesConfig& config) {
   opacity_ = config.opacity;
+  cloud_voxel_ = config.cloud_voxel;
   display_rate_ = config.display_rate;
 }
 
@@ -182,7 +184,7 @@ void PlanesNodelet::publishMap(double t, bool now) {
         boost::make_shared<visualization_msgs::MarkerArray>(display_.markers(mapper_->planes(), header, opacity_)));
   }
   if (cloud_pub_.getNumSubscribers() > 0) {
-    cloud_pub_.publish(boost::make_shared<sensor_msgs::PointCloud2>(display_.cloud(header)));
+    cloud_pub_.publish(boost::make_shared<sensor_msgs::PointCloud2>(display_.cloud(header, cloud_voxel_)));
   }
 }
 

@@ -68,7 +68,7 @@ class PlanesNodelet : public nodelet::Nodelet {
   mutable std::mutex shown_mutex_;
   Shown shown_;
 
-  std::atomic<double> opacity_{0.45}, display_rate_{2.0};
+  std::atomic<double> opacity_{0.45}, cloud_voxel_{0.03}, display_rate_{2.0};
   OwnerThread::Lane frame_lane_ = 0, keyframe_lane_ = 0, update_lane_ = 0, control_lane_ = 0;
   ros::Publisher update_pub_, map_pub_, markers_pub_, cloud_pub_;
   std::vector<ros::Subscriber> subscribers_;

@@ -4,70 +4,61 @@
 #include <stdexcept>
 #include <string>
 
+#include <tf2_eigen/tf2_eigen.h>
+
 namespace vip_slam {
 namespace {
 
 // An orientation that is none must not pass for "no rotation".
-SE3 makeTransform(double qw, double qx, double qy, double qz, const Eigen::Vector3d& t) {
-  const Eigen::Quaterniond q(qw, qx, qy, qz);
+SE3 makeTransform(const geometry_msgs::Quaternion& rotation, const Eigen::Vector3d& t) {
+  Eigen::Quaterniond q;
+  tf2::fromMsg(rotation, q);
   if (!(std::abs(q.norm() - 1) < 1e-2))
-    throw std::invalid_argument("orientation: (x, y, z, w) = (" + std::to_string(qx) + ", " + std::to_string(qy) +
-                                ", " + std::to_string(qz) + ", " + std::to_string(qw) +
+    throw std::invalid_argument("orientation: (x, y, z, w) = (" + std::to_string(q.x()) + ", " + std::to_string(q.y()) +
+                                ", " + std::to_string(q.z()) + ", " + std::to_string(q.w()) +
                                 "), expected a unit quaternion");
   return SE3(q, t);
 }
 
 template <class Message>
-void setQuaternion(const SE3& T, Message& q) {
-  q.w = T.rotation().w();
-  q.x = T.rotation().x();
-  q.y = T.rotation().y();
-  q.z = T.rotation().z();
+Eigen::Vector3d toEigen(const Message& msg) {
+  Eigen::Vector3d v;
+  tf2::fromMsg(msg, v);
+  return v;
 }
 
 }  // namespace
 
-geometry_msgs::Point toPointMsg(const Eigen::Vector3d& p) {
-  geometry_msgs::Point msg;
-  msg.x = p.x();
-  msg.y = p.y();
-  msg.z = p.z();
-  return msg;
-}
+// Of tf2_eigen the vectors and quaternions: its poses go by way of a rotation matrix and would not come back the same.
+
+geometry_msgs::Point toPointMsg(const Eigen::Vector3d& p) { return tf2::toMsg(p); }
 
 geometry_msgs::Vector3 toVectorMsg(const Eigen::Vector3d& v) {
   geometry_msgs::Vector3 msg;
-  msg.x = v.x();
-  msg.y = v.y();
-  msg.z = v.z();
-  return msg;
+  return tf2::toMsg(v, msg);
 }
 
 geometry_msgs::Pose toPoseMsg(const SE3& T) {
   geometry_msgs::Pose msg;
   msg.position = toPointMsg(T.t());
-  setQuaternion(T, msg.orientation);
+  msg.orientation = tf2::toMsg(T.rotation());
   return msg;
 }
 
 geometry_msgs::Transform toTransformMsg(const SE3& T) {
   geometry_msgs::Transform msg;
   msg.translation = toVectorMsg(T.t());
-  setQuaternion(T, msg.rotation);
+  msg.rotation = tf2::toMsg(T.rotation());
   return msg;
 }
 
-Eigen::Vector3d fromMsg(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
-Eigen::Vector3d fromMsg(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.z}; }
+Eigen::Vector3d fromMsg(const geometry_msgs::Point& p) { return toEigen(p); }
+Eigen::Vector3d fromMsg(const geometry_msgs::Vector3& v) { return toEigen(v); }
 
-SE3 fromMsg(const geometry_msgs::Pose& pose) {
-  const auto& q = pose.orientation;
-  return makeTransform(q.w, q.x, q.y, q.z, fromMsg(pose.position));
-}
+SE3 fromMsg(const geometry_msgs::Pose& pose) { return makeTransform(pose.orientation, fromMsg(pose.position)); }
 
 SE3 fromMsg(const geometry_msgs::Transform& transform) {
-  const auto& q = transform.rotation;
-  return makeTransform(q.w, q.x, q.y, q.z, fromMsg(transform.translation));
+  return makeTransform(transform.rotation, fromMsg(transform.translation));
 }
 
 boost::array<double, 4> toArray(const BearingCorrection& bearing) {

@@ -6,10 +6,13 @@
 #include <stdexcept>
 #include <string>
 
+#include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>
+#include <boost/make_shared.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "message_pixels.h"
 #include "vip_slam_core/depth/depth_image.h"
 
 namespace vip_slam {
@@ -17,34 +20,45 @@ namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
 
-/// A view of the message's pixels without copying, with its size checked.
-cv::Mat view(const sensor_msgs::Image& image, int type) {
-  const std::size_t row = std::size_t(image.width) * CV_ELEM_SIZE(type);
-  if (image.width == 0 || image.height == 0 || image.step < row ||
-      image.data.size() < std::size_t(image.step) * image.height) {
-    throw std::invalid_argument("image of " + std::to_string(image.width) + " x " + std::to_string(image.height) + " " +
-                                image.encoding + " with step " + std::to_string(image.step) + " and " +
-                                std::to_string(image.data.size()) + " bytes, expected step >= " + std::to_string(row) +
-                                " and step x height bytes");
-  }
-  return cv::Mat(int(image.height), int(image.width), type, const_cast<std::uint8_t*>(image.data.data()), image.step);
+std::string describe(const sensor_msgs::Image& image) {
+  return "image of " + std::to_string(image.width) + " x " + std::to_string(image.height) + ", encoding '" +
+         image.encoding + "', step " + std::to_string(image.step) + ", " + std::to_string(image.data.size()) +
+         " bytes: ";
 }
 
-cv::Mat convert(const cv::Mat& source, int code) {
+/// The message's pixels; copied only when their bytes are in the other order.
+cv_bridge::CvImageConstPtr share(const sensor_msgs::Image& image, const MessageOwner& owner) {
+  if (image.width == 0 || image.height == 0) throw std::invalid_argument(describe(image) + "expected pixels");
+  const cv_bridge::CvImageConstPtr shared = cv_bridge::toCvShare(image, owner);
+  const int type = cv_bridge::getCvType(image.encoding);
+  if (shared->image.type() == type) return shared;
+  // cv_bridge up to 1.16 puts the bytes of the other order right, but leaves each a channel of its own.
+  const cv::Mat& bytes = shared->image;
+  const cv::Mat values(bytes.rows, bytes.cols, type, bytes.data, bytes.step);
+  return boost::make_shared<cv_bridge::CvImage>(image.header, image.encoding, values.clone());
+}
+
+cv::Mat toMono8(const sensor_msgs::Image& image, const MessageOwner& owner) {
+  const cv_bridge::CvImageConstPtr shared = share(image, owner);
+  const std::string& e = image.encoding;
+  if (e == encodings::MONO8 || e == encodings::TYPE_8UC1)
+    return owner ? withOwner(shared->image, owner) : shared->image.clone();
+  if (e != encodings::TYPE_8UC3 && e != encodings::TYPE_8UC4)
+    return cv_bridge::cvtColor(shared, encodings::MONO8)->image;
+  const std::string order = e == encodings::TYPE_8UC3 ? encodings::BGR8 : encodings::BGRA8;
+  const auto named = boost::make_shared<cv_bridge::CvImage>(image.header, order, shared->image);
+  return cv_bridge::cvtColor(named, encodings::MONO8)->image;
+}
+
+/// Unknown to cv_bridge.
+cv::Mat yuy2ToMono8(const sensor_msgs::Image& image) {
+  if (image.width == 0 || image.step < 2 * image.width || image.data.size() < std::size_t(image.step) * image.height)
+    throw std::invalid_argument(describe(image) + "expected two bytes a pixel, and step x height bytes");
+  const cv::Mat pixels(int(image.height), int(image.width), CV_8UC2, const_cast<std::uint8_t*>(image.data.data()),
+                       image.step);
   cv::Mat gray;
-  cv::cvtColor(source, gray, code);
+  cv::cvtColor(pixels, gray, cv::COLOR_YUV2GRAY_YUY2);
   return gray;
-}
-
-/// Sixteen-bit values in this machine's byte order.
-cv::Mat view16(const sensor_msgs::Image& image) {
-  cv::Mat values = view(image, CV_16UC1);
-  const std::uint16_t one = 1;
-  const bool machine_is_big = *reinterpret_cast<const std::uint8_t*>(&one) == 0;
-  if (bool(image.is_bigendian) == machine_is_big) return values;
-  values = values.clone();
-  values.forEach<std::uint16_t>([](std::uint16_t& v, const int*) { v = std::uint16_t((v << 8) | (v >> 8)); });
-  return values;
 }
 
 bool isPng(const std::vector<std::uint8_t>& data, std::size_t at) {
@@ -69,27 +83,15 @@ cv::Mat inverseDepth(const cv::Mat& values, float a, float b, double offset) {
 
 }  // namespace
 
-cv::Mat decodeGray(const sensor_msgs::Image& image) {
-  const std::string& e = image.encoding;
-  if (e == encodings::MONO8 || e == encodings::TYPE_8UC1) return view(image, CV_8UC1).clone();
-  if (e == encodings::RGB8) return convert(view(image, CV_8UC3), cv::COLOR_RGB2GRAY);
-  if (e == encodings::BGR8 || e == encodings::TYPE_8UC3) return convert(view(image, CV_8UC3), cv::COLOR_BGR2GRAY);
-  if (e == encodings::RGBA8) return convert(view(image, CV_8UC4), cv::COLOR_RGBA2GRAY);
-  if (e == encodings::BGRA8 || e == encodings::TYPE_8UC4) return convert(view(image, CV_8UC4), cv::COLOR_BGRA2GRAY);
-  if (e == encodings::YUV422) return convert(view(image, CV_8UC2), cv::COLOR_YUV2GRAY_UYVY);
-  if (e == "yuv422_yuy2") return convert(view(image, CV_8UC2), cv::COLOR_YUV2GRAY_YUY2);
-  if (e == encodings::BAYER_RGGB8) return convert(view(image, CV_8UC1), cv::COLOR_BayerBG2GRAY);
-  if (e == encodings::BAYER_BGGR8) return convert(view(image, CV_8UC1), cv::COLOR_BayerRG2GRAY);
-  if (e == encodings::BAYER_GBRG8) return convert(view(image, CV_8UC1), cv::COLOR_BayerGR2GRAY);
-  if (e == encodings::BAYER_GRBG8) return convert(view(image, CV_8UC1), cv::COLOR_BayerGB2GRAY);
-  if (e == encodings::MONO16) {
-    cv::Mat gray;
-    view16(image).convertTo(gray, CV_8UC1, 1.0 / 256.0);
-    return gray;
+cv::Mat decodeGray(const sensor_msgs::Image& image, const MessageOwner& owner) {
+  try {
+    return image.encoding == "yuv422_yuy2" ? yuy2ToMono8(image) : toMono8(image, owner);
+  } catch (const cv_bridge::Exception& error) {
+    throw std::invalid_argument(describe(image) + error.what() +
+                                "; expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, yuv422, yuv422_yuy2 or Bayer");
+  } catch (const cv::Exception& error) {  // what cv_bridge lets through, such as yuv422 of an odd width
+    throw std::invalid_argument(describe(image) + error.what());
   }
-  throw std::invalid_argument("image encoding '" + e +
-                              "', expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, yuv422, "
-                              "yuv422_yuy2 or an 8-bit Bayer pattern");
 }
 
 cv::Mat decodeGray(const sensor_msgs::CompressedImage& image) {
@@ -102,12 +104,14 @@ cv::Mat decodeGray(const sensor_msgs::CompressedImage& image) {
 
 cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset) {
   const std::string& e = image.encoding;
-  if (e == encodings::TYPE_16UC1 || e == encodings::MONO16) return depthToMetres(view16(image), scale, offset);
-  if (e == encodings::TYPE_32FC1) {
-    if (image.is_bigendian) throw std::invalid_argument("32FC1 depth in big-endian order, expected little-endian");
-    return depthToMetres(view(image, CV_32FC1), 1.0, offset);
+  const bool metres = e == encodings::TYPE_32FC1;
+  if (!metres && e != encodings::TYPE_16UC1 && e != encodings::MONO16)
+    throw std::invalid_argument("depth encoding '" + e + "', expected 16UC1 or 32FC1");
+  try {
+    return depthToMetres(share(image, {})->image, metres ? 1.0 : scale, offset);
+  } catch (const cv_bridge::Exception& error) {
+    throw std::invalid_argument(describe(image) + error.what());
   }
-  throw std::invalid_argument("depth encoding '" + e + "', expected 16UC1 or 32FC1");
 }
 
 cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, double offset) {

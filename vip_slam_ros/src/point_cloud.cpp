@@ -2,46 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+
+// The filter is compiled here: for one template libpcl_filters would load 30 MB of libraries into every program.
+#define PCL_NO_PRECOMPILE
+#include <pcl/filters/voxel_grid.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+#include <pcl_conversions/pcl_conversions.h>
 
 namespace vip_slam {
-namespace {
 
-constexpr std::uint32_t kStep = 16;
-
-std::uint32_t pack(const std_msgs::ColorRGBA& c) {
-  const auto byte = [](float v) { return std::uint32_t(std::lround(255.0f * std::min(1.0f, std::max(0.0f, v)))); };
-  return byte(c.r) << 16 | byte(c.g) << 8 | byte(c.b);
+void addPoint(const Eigen::Vector3f& p, const std_msgs::ColorRGBA& color, ColoredCloud* cloud) {
+  const auto byte = [](float v) { return std::uint8_t(std::lround(255.0f * std::clamp(v, 0.0f, 1.0f))); };
+  pcl::PointXYZRGB point;
+  point.getVector3fMap() = p;
+  point.r = byte(color.r);
+  point.g = byte(color.g);
+  point.b = byte(color.b);
+  cloud->push_back(point);
 }
 
-}  // namespace
+void thin(double voxel, ColoredCloud* cloud) {
+  pcl::VoxelGrid<pcl::PointXYZRGB> grid;
+  grid.setInputCloud(cloud->makeShared());
+  grid.setLeafSize(float(voxel), float(voxel), float(voxel));
+  grid.filter(*cloud);
+}
 
-sensor_msgs::PointCloud2 toPointCloud(const std::vector<ColoredPoint>& points, const std_msgs::Header& header) {
-  sensor_msgs::PointCloud2 cloud;
-  cloud.header = header;
-  cloud.height = 1;
-  cloud.width = std::uint32_t(points.size());
-  cloud.is_dense = true;
-  cloud.point_step = kStep;
-  cloud.row_step = kStep * cloud.width;
-  const char* names[] = {"x", "y", "z", "rgb"};
-  for (std::uint32_t i = 0; i < 4; ++i) {
-    sensor_msgs::PointField field;
-    field.name = names[i];
-    field.offset = 4 * i;
-    field.datatype = sensor_msgs::PointField::FLOAT32;
-    field.count = 1;
-    cloud.fields.push_back(field);
-  }
-  cloud.data.resize(cloud.row_step);
-  std::uint8_t* out = cloud.data.data();
-  for (const ColoredPoint& point : points) {
-    const std::uint32_t rgb = pack(point.color);
-    std::memcpy(out, point.p.data(), 12);
-    std::memcpy(out + 12, &rgb, 4);
-    out += kStep;
-  }
-  return cloud;
+sensor_msgs::PointCloud2 toPointCloud(const ColoredCloud& cloud, const std_msgs::Header& header) {
+  sensor_msgs::PointCloud2 message;
+  pcl::toROSMsg(cloud, message);
+  message.header = header;
+  return message;
 }
 
 }  // namespace vip_slam

@@ -1,10 +1,10 @@
-// rosrun vip_slam_backend export_map MAP.vsm --out DIR: keyframe trajectory (TUM), planes (YAML), points (PLY and PCD).
+// rosrun vip_slam_backend export_map MAP.vsm --out DIR: keyframe trajectory (TUM), planes (YAML), points (PLY, PCD).
 #include <algorithm>
 #include <cstdio>
 #include <string>
 
+#include "vip_slam_backend/export/point_files.h"
 #include "vip_slam_backend/map_io/map_file.h"
-#include "vip_slam_backend/map_io/point_files.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/command_line.h"
@@ -26,17 +26,16 @@ Trajectory keyframePoses(const Map& map) {
   return poses;
 }
 
-void exportMap(const std::string& file, const std::string& folder) {
+void exportMap(const std::string& file, const std::string& folder, const PointFilter& filter) {
   const StoredMap stored = loadMapFile(file, ImuNoise());
   prepareOutputFolder(folder);
   writeTum(folder + "/keyframes.tum", keyframePoses(stored.map));
   std::vector<PlaneEstimate> planes;
   for (const auto& entry : stored.map.planes()) planes.push_back(entry.second.estimate);
   writePlanesYaml(folder + "/planes.yaml", planes);
-  writePointsPly(folder + "/points.ply", stored.map);
-  writePointsPcd(folder + "/points.pcd", stored.map);
-  std::printf("%zu keyframes, %zu planes, %zu points in %s\n", stored.map.keyframes().size(), planes.size(),
-              stored.map.landmarks().size(), folder.c_str());
+  const std::size_t points = writePoints(folder + "/points", stored.map, filter);
+  std::printf("%zu keyframes, %zu planes, %zu of %zu points in %s\n", stored.map.keyframes().size(), planes.size(),
+              points, stored.map.landmarks().size(), folder.c_str());
 }
 
 }  // namespace
@@ -49,9 +48,14 @@ int main(int argc, char** argv) {
   line.argument("map", map, "map.vsm of a run");
   line.option("out", out, "folder for the files; made when it does not exist");
   line.required("out");
+  vip_slam::PointFilter filter;
+  line.option("outliers", filter.outliers,
+              "leave out points so many standard deviations farther from their neighbours than is usual; 0: none",
+              vip_slam::between(0.0, 100.0));
+  line.option("voxel", filter.voxel, "one point in each cube of this side, m; 0: all", vip_slam::between(0.0, 100.0));
   if (const auto status = line.parse(argc, argv)) return *status;
   try {
-    exportMap(map, out);
+    exportMap(map, out, filter);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "export_map: %s\n", error.what());
     return 1;

@@ -11,7 +11,6 @@
 #include "map_io/synthetic_map.h"
 #include "vip_slam_backend/map/map_checker.h"
 #include "vip_slam_backend/map_io/map_file.h"
-#include "vip_slam_backend/map_io/point_files.h"
 #include "vip_slam_backend/util/crc32.h"
 
 namespace vip_slam {
@@ -218,25 +217,6 @@ TEST(MapFile, ForeignAndNewerFilesAreNamed) {
     EXPECT_NE(std::string(e.what()).find("/nonexistent/map.vsm"), std::string::npos);
   }
   EXPECT_THROW(saveMapFile("/nonexistent/map.vsm", Map(), {}, 1), std::runtime_error);
-}
-
-TEST(PointFiles, OneRowPerPoint) {
-  const Map map = syntheticMap(4, 30, 100);
-  const std::string path = "/tmp/vip_slam_points_" + std::to_string(::getpid());
-  writePointsPly(path + ".ply", map);
-  writePointsPcd(path + ".pcd", map);
-  for (const char* end : {".ply", ".pcd"}) {
-    std::ifstream in(path + end);
-    std::string line;
-    std::size_t rows = 0;
-    bool data = false;
-    while (std::getline(in, line)) {
-      rows += data;
-      data |= line == "end_header" || line == "DATA ascii";
-    }
-    EXPECT_EQ(rows, map.landmarks().size()) << end;
-    std::remove((path + end).c_str());
-  }
 }
 
 TEST(MapFile, AnEmptyMapIsAMap) {

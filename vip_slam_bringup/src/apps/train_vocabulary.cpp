@@ -60,7 +60,7 @@ bool isDepth(const sensor_msgs::Image& image) {
 /// The message's image in grey; empty when it is none, or depth.
 cv::Mat colourOf(const rosbag::MessageInstance& message) {
   if (const auto image = message.instantiate<sensor_msgs::Image>())
-    return isDepth(*image) ? cv::Mat() : vip_slam::decodeGray(*image);
+    return isDepth(*image) ? cv::Mat() : vip_slam::decodeGray(*image, image);
   const auto compressed = message.instantiate<sensor_msgs::CompressedImage>();
   if (!compressed || compressed->format.find("16UC1") != std::string::npos ||
       compressed->format.find("Depth") != std::string::npos)

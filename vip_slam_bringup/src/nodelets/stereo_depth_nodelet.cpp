@@ -2,9 +2,10 @@
 //   subscribes  left/image_raw, right/image_raw  (mono8 or colour)
 //   publishes   rectified/image, depth/image (32FC1 metres), rectified/camera_info, depth/camera_info
 //   tf          <frame of the left image> -> <...>_rectified, which the images are stamped with (static)
-//   parameters  ~calibration (file, required), ~max_skew (s), the fields of StereoDepthOptions
+//   parameters  ~calibration (file, required), ~max_skew (s), ~image_transport, the fields of StereoDepthOptions
 #include <geometry_msgs/TransformStamped.h>
-#include <message_filters/subscriber.h>
+#include <image_transport/image_transport.h>
+#include <image_transport/subscriber_filter.h>
 #include <message_filters/sync_policies/approximate_time.h>
 #include <message_filters/synchronizer.h>
 #include <nodelet/nodelet.h>
@@ -17,6 +18,7 @@
 
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/stereo/stereo_depth.h"
+#include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/parameters.h"
 
@@ -32,19 +34,19 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     try {
       if (calibration.empty()) throw std::runtime_error(parameters.resolveName("calibration") + ": not set");
       StereoDepthOptions options;
-      loadOptionsFromParameters(options, parameters, {"calibration", "max_skew"});
+      loadOptionsFromParameters(options, parameters, {"calibration", "max_skew", "image_transport"});
       stereo_ = std::make_unique<StereoDepth>(loadStereoCalibration(calibration), options);
     } catch (const std::exception& e) {
       NODELET_FATAL("Stereo depth does not start: %s", e.what());
       throw;
     }
-    image_publisher_ = nh.advertise<sensor_msgs::Image>("rectified/image", 5);
-    image_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("rectified/camera_info", 5);
-    depth_publisher_ = nh.advertise<sensor_msgs::Image>("depth/image", 5);
-    depth_info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("depth/camera_info", 5);
+    image_transport::ImageTransport transport(nh);
+    image_publisher_ = transport.advertiseCamera("rectified/image", 5);
+    depth_publisher_ = transport.advertiseCamera("depth/image", 5);
     // Short queues: when matching is too slow for the rate, images are dropped instead of increasing the latency.
-    left_.subscribe(nh, "left/image_raw", 3);
-    right_.subscribe(nh, "right/image_raw", 3);
+    const image_transport::TransportHints hints("raw", ros::TransportHints(), parameters);
+    left_.subscribe(transport, "left/image_raw", 3, hints);
+    right_.subscribe(transport, "right/image_raw", 3, hints);
     sync_ = std::make_unique<message_filters::Synchronizer<Policy>>(Policy(3), left_, right_);
     sync_->setMaxIntervalDuration(ros::Duration(parameters.param("max_skew", 0.005)));
     sync_->registerCallback(&StereoDepthNodelet::onPair, this);
@@ -58,18 +60,17 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     ++pairs_;
     try {
       const ros::WallTime begin = ros::WallTime::now();
-      const StereoDepthFrame frame = stereo_->compute(decodeGray(*left), decodeGray(*right));
+      const StereoDepthFrame frame = stereo_->compute(decodeGray(*left, left), decodeGray(*right, right));
       const double taken = (ros::WallTime::now() - begin).toSec(), gap = (left->header.stamp - last_).toSec();
       if (!last_.isZero() && gap > 0 && taken > gap)
         NODELET_WARN_THROTTLE(10.0, "Stereo depth takes %.0f ms, pairs come every %.0f ms: some are left out",
                               1e3 * taken, 1e3 * gap);
       last_ = left->header.stamp;
       const std_msgs::Header header = rectifiedHeader(left->header);
-      const sensor_msgs::CameraInfo info = cameraInfo(stereo_->rectified(), header);
-      image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", header)));
-      image_info_publisher_.publish(info);
-      depth_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", header)));
-      depth_info_publisher_.publish(info);
+      const auto info = boost::make_shared<sensor_msgs::CameraInfo>(cameraInfo(stereo_->rectified(), header));
+      image_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.gray, "mono8", header)), info);
+      depth_publisher_.publish(boost::make_shared<sensor_msgs::Image>(imageMessage(frame.depth, "32FC1", header)),
+                               info);
     } catch (const std::exception& e) {
       NODELET_ERROR_THROTTLE(5.0, "Stereo depth of %s and %s at %.3f s: %s", left_.getTopic().c_str(),
                              right_.getTopic().c_str(), left->header.stamp.toSec(), e.what());
@@ -87,11 +88,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     transform.header.stamp = header.stamp;
     transform.header.frame_id = raw;
     transform.child_frame_id = header.frame_id;
-    const Eigen::Quaterniond q = stereo_->T_left_rectified().rotation();
-    transform.transform.rotation.x = q.x();
-    transform.transform.rotation.y = q.y();
-    transform.transform.rotation.z = q.z();
-    transform.transform.rotation.w = q.w();
+    transform.transform = toTransformMsg(stereo_->T_left_rectified());
     tf_.sendTransform(transform);
     return header;
   }
@@ -106,9 +103,9 @@ class StereoDepthNodelet : public nodelet::Nodelet {
   std::unique_ptr<StereoDepth> stereo_;
   ros::Time last_;  ///< stamp of the last pair
   tf2_ros::StaticTransformBroadcaster tf_;
-  std::string raw_frame_;  ///< frame whose rectified one was sent to tf
-  ros::Publisher image_publisher_, image_info_publisher_, depth_publisher_, depth_info_publisher_;
-  message_filters::Subscriber<sensor_msgs::Image> left_, right_;
+  std::string raw_frame_;                                               ///< frame whose rectified one was sent to tf
+  image_transport::CameraPublisher image_publisher_, depth_publisher_;  ///< each with its camera_info
+  image_transport::SubscriberFilter left_, right_;
   std::unique_ptr<message_filters::Synchronizer<Policy>> sync_;
   ros::Timer watchdog_;
   std::size_t pairs_ = 0, pairs_seen_ = 0;

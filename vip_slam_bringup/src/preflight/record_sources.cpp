@@ -16,7 +16,7 @@ template <class Source>
 void dispatch(Recorder* recorder, const std::string& topic, double arrival, const Source& source) {
   const std::string type = source.getDataType();
   if (type == "sensor_msgs/Image") {
-    if (const auto m = source.template instantiate<sensor_msgs::Image>()) recorder->add(topic, arrival, *m);
+    if (const auto m = source.template instantiate<sensor_msgs::Image>()) recorder->add(topic, arrival, *m, m);
   } else if (type == "sensor_msgs/CompressedImage") {
     if (const auto m = source.template instantiate<sensor_msgs::CompressedImage>()) recorder->add(topic, arrival, *m);
   } else if (type == "sensor_msgs/CameraInfo") {

@@ -11,7 +11,6 @@
 #include "vip_slam_core/util/same_pixels.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/camera_info.h"
-#include "vip_slam_ros/image_decoding.h"
 
 namespace vip_slam {
 namespace {
@@ -36,17 +35,18 @@ void Recorder::startRotation(const CameraIntrinsics& camera) {
   rotation_size_ = cv::Size(camera.width, camera.height);
 }
 
-void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message) {
-  addImage(topic, arrival, message, message.encoding);
+void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message,
+                   const MessageOwner& owner) {
+  addImage(topic, arrival, message, message.encoding, [&] { return decodeGray(message, owner); });
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CompressedImage& message) {
-  addImage(topic, arrival, message, "compressed (" + message.format + ")");
+  addImage(topic, arrival, message, "compressed (" + message.format + ")", [&] { return decodeGray(message); });
 }
 
-template <class ImageMessage>
+template <class ImageMessage, class Gray>
 void Recorder::addImage(const std::string& topic, double arrival, const ImageMessage& message,
-                        const std::string& encoding) {
+                        const std::string& encoding, const Gray& gray) {
   const bool is_color = topic == recording_.sensor.topics.color;
   if (!is_color && topic != recording_.sensor.topics.depth) return;
   StreamRecord& stream = is_color ? recording_.color : recording_.depth;
@@ -57,8 +57,7 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
   if (arrival - first_image_ > image_seconds_) return;
   try {
     const SensorConfig& sensor = recording_.sensor;
-    const cv::Mat image =
-        is_color ? decodeGray(message) : decodeDepth(message, sensor.depth_scale, sensor.depth_offset);
+    const cv::Mat image = is_color ? gray() : decodeDepth(message, sensor.depth_scale, sensor.depth_offset);
     stream.sizes.emplace(image.cols, image.rows);
     if (is_color)
       addGray(t, image);

@@ -19,11 +19,11 @@ namespace {
 
 enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
 
-/// `decode` gets the image, raw or compressed.
+/// `decode` gets the image, raw with its owner or compressed.
 template <class Decode>
 StampedImage stampedImage(const rosbag::MessageInstance& message, const Decode& decode) {
   if (const auto image = message.instantiate<sensor_msgs::Image>())
-    return {image->header.stamp.toSec(), decode(*image), 0};
+    return {image->header.stamp.toSec(), decode(*image, image), 0};
   if (const auto image = message.instantiate<sensor_msgs::CompressedImage>())
     return {image->header.stamp.toSec(), decode(*image), 0};
   throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
@@ -59,7 +59,7 @@ void BagDecoding::take(const rosbag::MessageInstance& message) {
 }
 
 void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
-  const auto [t, image, stamp] = stampedImage(message, [](const auto& m) { return decodeGray(m); });
+  const auto [t, image, stamp] = stampedImage(message, [](const auto&... m) { return decodeGray(m...); });
   color_size_ = image.size();
   const cv::Size calibrated(sensor_.camera.width, sensor_.camera.height);
   if (color_size_ != calibrated && ++counters_["images_of_wrong_size"] == 1)
@@ -69,8 +69,9 @@ void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
 }
 
 void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
-  auto [t, depth, stamp] =
-      stampedImage(message, [&](const auto& m) { return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset); });
+  auto [t, depth, stamp] = stampedImage(message, [&](const auto& m, const auto&...) {
+    return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset);
+  });
   if (registration_) depth = (*registration_)(depth);
   if (!color_size_.empty() && depth.size() != color_size_)
     complain("sizes", "topic " + message.getTopic() + ": depth is " + sizeText(depth.size()) +

@@ -14,8 +14,9 @@ import rospy
 import rostest
 import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry, Path
-from sensor_msgs.msg import CameraInfo, PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
 from vip_slam_msgs.msg import MapUpdate, TrackedFrame, TrackingStatus
@@ -38,6 +39,8 @@ class SystemTest(unittest.TestCase):
         cls.frames = Listener(NS + 'tracked_frame', TrackedFrame)
         cls.images = Listener('/camera/color/camera_info', CameraInfo)  # lighter than the images, of the same stamps
         cls.updates = Listener(NS + 'map_update', MapUpdate)
+        cls.diagnostics = Listener('/diagnostics', DiagnosticArray)
+        cls.pictures = Listener(NS + 'feature_image', Image)
         cls.buffer = tf2_ros.Buffer(rospy.Duration(1000))
         cls.listener = tf2_ros.TransformListener(cls.buffer)
         cls.folder = tempfile.mkdtemp()
@@ -69,6 +72,22 @@ class SystemTest(unittest.TestCase):
         for topic in (self.frames, self.odometry):
             inexact = [m for m in topic.all() if m.header.stamp not in images]
             self.assertLess(len(inexact), 0.1 * len(topic.all()))
+
+    def test_02b_rates_of_the_outputs_are_reported(self):
+        for topic in ('odom', 'pose'):
+            told = [s for m in self.diagnostics.all() for s in m.status if s.name.endswith(topic + ' topic status')]
+            self.assertIn(DiagnosticStatus.ERROR, [s.level for s in told], 'before the first ' + topic)
+            good = [s for s in told if s.level == DiagnosticStatus.OK]
+            self.assertGreater(len(good), 2, {s.message for s in told})
+            rate = {v.key: v.value for v in good[-1].values}['Actual frequency (Hz)']
+            self.assertLess(abs(float(rate) - 20), 4, topic)
+
+    def test_02c_the_feature_image_is_drawn(self):
+        picture = self.pictures.last()
+        self.assertEqual((picture.encoding, picture.width, picture.height, len(picture.data)),
+                         ('bgr8', 640, 480, 3 * 640 * 480))
+        self.assertTrue(picture.header.frame_id)
+        self.assertIn(picture.header.stamp, {m.header.stamp for m in self.frames.all()})
 
     def test_03_frames_as_rep_105(self):
         odometry = self.odometry.all()[len(self.odometry.all()) // 2]

@@ -12,6 +12,8 @@ namespace vip_slam {
 struct FrontEndNodeOptions {
   FrontEndOptions front_end;
   std::string sensor;
+  std::string image_transport;
+  std::string depth_image_transport;
   std::string odom_frame = "odom";
   std::string base_frame = "base_link";
   std::string extrinsics = "auto";
@@ -23,6 +25,11 @@ struct FrontEndNodeOptions {
 
   void visit(OptionVisitor& v) {
     v.field("sensor", sensor, {}, "a shipped sensor or the path of a sensor YAML file");
+    v.field("image_transport", image_transport, {},
+            "image_transport of the colour images: raw, compressed, or what is installed; empty: by the sensor file's "
+            "topic");
+    v.field("depth_image_transport", depth_image_transport, {},
+            "likewise of the depth images: raw, compressedDepth, compressed (16-bit PNG)");
     v.field("odom_frame", odom_frame, {}, "tf frame of the odometry");
     v.field("base_frame", base_frame, {}, "tf frame of the robot; the IMU itself when nothing connects the two");
     v.field("extrinsics", extrinsics, {"auto", "tf", "config"},

@@ -1,9 +1,13 @@
 // What rviz is told about planes: colours, translucency, deletions, depth points.
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <cmath>
 #include <map>
 #include <string>
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+#include <pcl_conversions/pcl_conversions.h>
 
 #include "plane_display.h"
 
@@ -85,20 +89,14 @@ TEST(PlaneDisplay, DepthPointsHaveThePlanesColoursAndMoveWithTheirKeyframes) {
   display.apply(map);
   display.apply(update);
   EXPECT_EQ(display.points(), 2u);
-  const sensor_msgs::PointCloud2 cloud = display.cloud(header);
-  ASSERT_EQ(cloud.width * cloud.height, 2u);
-  const auto value = [&cloud](std::size_t point, const std::string& field, void* out) {
-    for (const auto& f : cloud.fields)
-      if (f.name == field) std::memcpy(out, cloud.data.data() + point * cloud.point_step + f.offset, 4);
-  };
-  for (std::size_t k = 0; k < 2; ++k) {
-    float x = 0, z = 0;
-    std::uint32_t rgb = 0;
-    value(k, "x", &x), value(k, "z", &z), value(k, "rgb", &rgb);
-    EXPECT_FLOAT_EQ(x, 1);
+  pcl::PointCloud<pcl::PointXYZRGB> cloud;
+  pcl::fromROSMsg(display.cloud(header, 0), cloud);
+  ASSERT_EQ(cloud.size(), 2u);
+  for (const auto& point : cloud) {
+    EXPECT_FLOAT_EQ(point.x, 1);
     std_msgs::ColorRGBA color;
-    color.r = ((rgb >> 16) & 255) / 255.f, color.g = ((rgb >> 8) & 255) / 255.f, color.b = (rgb & 255) / 255.f;
-    EXPECT_EQ(isGrey(color), z == 1.0f);
+    color.r = point.r / 255.f, color.g = point.g / 255.f, color.b = point.b / 255.f;
+    EXPECT_EQ(isGrey(color), point.z == 1.0f);
   }
   update.observations.clear();
   update.removed = {1};
@@ -109,6 +107,43 @@ TEST(PlaneDisplay, DepthPointsHaveThePlanesColoursAndMoveWithTheirKeyframes) {
   map.removed_keyframes = {5};
   display.apply(map);
   EXPECT_EQ(display.points(), 0u);
+}
+
+// Two planes that meet: each keeps its points and its colour, one in a cube, the mean of those in it.
+TEST(PlaneDisplay, TheCloudIsThinnedPlaneByPlane) {
+  PlaneDisplay display;
+  MapUpdate map;
+  KeyframeEstimate keyframe;
+  keyframe.id = 5;
+  map.keyframes.push_back(keyframe);
+  PlaneUpdate update;
+  update.planes = {square(1, PlaneKind::kHorizontal), square(2, PlaneKind::kVertical)};
+  for (const PlaneId plane : {1, 2}) {
+    PlaneObservation seen;
+    seen.keyframe = 5;
+    seen.plane = plane;
+    for (int i = 0; i < 40; ++i)
+      seen.points.push_back({Eigen::Vector3f(0.005f + 0.01f * float(i), 0.05f, 0.05f), 0.01f});
+    update.observations.push_back(seen);
+  }
+  display.apply(map);
+  display.apply(update);
+  std_msgs::Header header;
+  header.frame_id = "map";
+  header.stamp.fromNSec(1700000000123456789);
+  const sensor_msgs::PointCloud2 message = display.cloud(header, 0.1);
+  EXPECT_EQ(message.header, header) << "to the nanosecond";
+  pcl::PointCloud<pcl::PointXYZRGB> cloud;
+  pcl::fromROSMsg(message, cloud);
+  ASSERT_EQ(cloud.size(), 8u);
+  std::size_t grey = 0;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    EXPECT_NEAR(std::fmod(cloud[i].x, 0.1f), 0.05f, 1e-4f);
+    grey += std::abs(cloud[i].r - cloud[i].g) < 12 && std::abs(cloud[i].g - cloud[i].b) < 12;
+  }
+  EXPECT_EQ(grey, 4u);
+  pcl::fromROSMsg(display.cloud(header, 0), cloud);
+  EXPECT_EQ(cloud.size(), 80u);
 }
 
 }  // namespace

@@ -3,15 +3,21 @@
 
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
+#include <boost/shared_ptr.hpp>
 #include <opencv2/core.hpp>
 
 #include "vip_slam_core/depth/depth_noise.h"
 
 namespace vip_slam {
 
-/// 8UC1 with its own memory. Accepts mono8, 8UC1, mono16, rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, yuv422, yuv422_yuy2 and
-/// 8-bit Bayer. All decoders throw std::invalid_argument naming the encoding or size found and what was expected.
-cv::Mat decodeGray(const sensor_msgs::Image& image);
+/// What keeps a message alive, such as its ConstPtr.
+using MessageOwner = boost::shared_ptr<const void>;
+
+/// 8UC1. Accepts what cv_bridge makes mono8 of (mono8, mono16, rgb8, bgr8, rgba8, bgra8, yuv422, Bayer), also 8UC1,
+/// 8UC3 and 8UC4 (taken for mono8, bgr8, bgra8) and yuv422_yuy2. With an `owner` of the message an image that is grey
+/// already is not copied: the result keeps the owner, and its pixels, which others may read too, must not be written.
+/// All decoders throw std::invalid_argument naming the encoding or size found and what was expected.
+cv::Mat decodeGray(const sensor_msgs::Image& image, const MessageOwner& owner = {});
 /// JPEG or PNG.
 cv::Mat decodeGray(const sensor_msgs::CompressedImage& image);
 

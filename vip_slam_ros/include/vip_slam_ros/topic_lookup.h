@@ -8,7 +8,7 @@
 namespace vip_slam {
 
 /// Text for StreamMonitor::explainAbsence(): nobody publishes `topic` (resolved name), its type is not `type`
-/// ("sensor_msgs/Image"), or it is published but no message has arrived.
+/// ("sensor_msgs/Image"; empty: any), or it is published but no message has arrived.
 std::string whyNoMessage(const std::string& topic, const std::string& type, const ros::master::V_TopicInfo& published);
 
 }  // namespace vip_slam

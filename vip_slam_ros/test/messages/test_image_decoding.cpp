@@ -3,6 +3,8 @@
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+#include <boost/make_shared.hpp>
+#include <boost/weak_ptr.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -55,8 +57,45 @@ TEST(DecodeGray, ColourEncodingsAgree) {
   EXPECT_EQ(difference(decodeGray(toImage(bgra, "bgra8")), gray), 0);
   EXPECT_EQ(difference(decodeGray(toImage(gray, "mono8")), gray), 0);
   cv::Mat deep;
-  gray.convertTo(deep, CV_16UC1, 256);
+  gray.convertTo(deep, CV_16UC1, 257);  // white is 65535
   EXPECT_EQ(difference(decodeGray(toImage(deep, "mono16")), gray), 0);
+}
+
+TEST(DecodeGray, UnnamedChannelsAreTakenForBlueGreenRed) {
+  const cv::Mat bgr = picture();
+  cv::Mat gray, bgra;
+  cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(bgr, bgra, cv::COLOR_BGR2BGRA);
+  EXPECT_EQ(difference(decodeGray(toImage(gray, "8UC1")), gray), 0);
+  EXPECT_EQ(difference(decodeGray(toImage(bgr, "8UC3")), gray), 0);
+  EXPECT_EQ(difference(decodeGray(toImage(bgra, "8UC4")), gray), 0);
+}
+
+// The image of a camera that sends grey is the message's memory, and keeps it for as long as anybody has the image.
+TEST(DecodeGray, AGreyMessageIsSharedAndKept) {
+  cv::Mat gray;
+  cv::cvtColor(picture(), gray, cv::COLOR_BGR2GRAY);
+  auto message = boost::make_shared<const sensor_msgs::Image>(toImage(gray, "mono8"));
+  const boost::weak_ptr<const sensor_msgs::Image> watch = message;
+  cv::Mat image = decodeGray(*message, message), second = image;
+  EXPECT_EQ(image.data, message->data.data());
+  message.reset();
+  image.release();
+  ASSERT_FALSE(watch.expired());
+  EXPECT_EQ(difference(second, gray), 0);
+  cv::Mat part = second.rowRange(0, 4);
+  second = cv::Mat();
+  EXPECT_FALSE(watch.expired());
+  part.create(100, 100, CV_8UC1);  // memory of its own: the last one lets go of the message
+  part.setTo(7);
+  EXPECT_TRUE(watch.expired());
+}
+
+TEST(DecodeGray, WithoutAnOwnerTheImageIsACopy) {
+  sensor_msgs::Image message = toImage(cv::Mat(4, 4, CV_8UC1, cv::Scalar(9)), "mono8");
+  const cv::Mat image = decodeGray(message);
+  message.data.assign(message.data.size(), 0);
+  EXPECT_EQ(image.at<uchar>(3, 3), 9);
 }
 
 TEST(DecodeGray, YuvKeepsTheLuminance) {
@@ -154,6 +193,15 @@ TEST(DecodeDepth, OtherByteOrder) {
   for (std::size_t i = 0; i + 1 < swapped.data.size(); i += 2) std::swap(swapped.data[i], swapped.data[i + 1]);
   swapped.is_bigendian = 1;
   EXPECT_EQ(difference(decodeDepth(swapped, 0.001), decodeDepth(toImage(units, "16UC1"), 0.001)), 0);
+  cv::Mat metres;
+  units.convertTo(metres, CV_32FC1, 0.001);
+  sensor_msgs::Image floats = toImage(metres, "32FC1");
+  for (std::size_t i = 0; i + 3 < floats.data.size(); i += 4) {
+    std::swap(floats.data[i], floats.data[i + 3]);
+    std::swap(floats.data[i + 1], floats.data[i + 2]);
+  }
+  floats.is_bigendian = 1;
+  EXPECT_EQ(difference(decodeDepth(floats, 0.001), decodeDepth(toImage(metres, "32FC1"), 0.001)), 0);
 }
 
 TEST(DecodeDepth, QuantisedInverseDepth) {
@@ -199,6 +247,12 @@ TEST(Decode, UnusableImagesAreNamed) {
   cut.data.resize(100);
   expectNamed([&] { decodeGray(cut); }, "100 bytes");
   expectNamed([] { decodeGray(sensor_msgs::Image()); }, "encoding");
+  expectNamed([] { decodeGray(toImage(depthUnits(), "16UC1")); }, "16UC1");
+  cut.encoding = "yuv422_yuy2";
+  expectNamed([&] { decodeGray(cut); }, "100 bytes");
+  sensor_msgs::Image short_rows = toImage(depthUnits(), "16UC1");
+  short_rows.step = 3;
+  expectNamed([&] { decodeDepth(short_rows, 1); }, "step 3");
   sensor_msgs::CompressedImage garbage;
   garbage.format = "jpeg";
   garbage.data = {1, 2, 3};

@@ -13,6 +13,7 @@
 #include "vip_slam_bringup/preflight/image_rotation.h"
 #include "vip_slam_bringup/preflight/recording.h"
 #include "vip_slam_frontend/tracking/frozen_depth.h"
+#include "vip_slam_ros/image_decoding.h"
 
 namespace vip_slam {
 
@@ -21,7 +22,8 @@ class Recorder {
   /// Images are decoded for the first `image_seconds` of the recording only; stamps are kept throughout.
   Recorder(const SensorConfig& sensor, bool live, double image_seconds);
 
-  void add(const std::string& topic, double arrival, const sensor_msgs::Image& message);
+  /// With the `owner` of the message a grey image is kept without a copy.
+  void add(const std::string& topic, double arrival, const sensor_msgs::Image& message, const MessageOwner& owner = {});
   void add(const std::string& topic, double arrival, const sensor_msgs::CompressedImage& message);
   void add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message);
   void add(const std::string& topic, double arrival, const sensor_msgs::Imu& message);
@@ -34,8 +36,9 @@ class Recorder {
   const Recording& recording() const { return recording_; }
 
  private:
-  template <class ImageMessage>
-  void addImage(const std::string& topic, double arrival, const ImageMessage& message, const std::string& encoding);
+  template <class ImageMessage, class Gray>
+  void addImage(const std::string& topic, double arrival, const ImageMessage& message, const std::string& encoding,
+                const Gray& gray);
   void addDepth(double t, const cv::Mat& depth);
   void addGray(double t, const cv::Mat& gray);
   bool turns() const;

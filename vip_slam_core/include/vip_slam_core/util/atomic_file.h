@@ -15,6 +15,8 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
   std::ofstream& stream() { return stream_; }
+  /// For writers that open files themselves: they write this one, nothing goes to stream().
+  const std::string& temporary() const { return temporary_; }
   /// Flushes and renames. Throws std::runtime_error naming the path on a failed write.
   void commit();
 
