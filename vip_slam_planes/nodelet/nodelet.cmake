@@ -2,7 +2,7 @@
 find_package(catkin REQUIRED COMPONENTS
   diagnostic_updater dynamic_reconfigure nodelet pluginlib roscpp sensor_msgs visualization_msgs
   vip_slam_core vip_slam_msgs vip_slam_ros)
-find_package(PCL REQUIRED COMPONENTS common)
+find_package(PCL QUIET REQUIRED COMPONENTS common)
 find_package(pcl_conversions REQUIRED)  # headers alone: its list of libraries has VTK and Qt
 
 add_library(vip_slam_planes_nodelets nodelet/plane_display.cpp nodelet/planes_nodelet.cpp)

@@ -1,16 +1,15 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
 
+#include <cv_bridge/cv_bridge.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <rosbag/bag.h>
 #include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 #include <tf2_msgs/TFMessage.h>
 
@@ -175,18 +174,11 @@ class BagWriter : public SequenceWriter {
 
   void write(const std::string& topic, const cv::Mat& image, const std::string& encoding, const std::string& frame,
              const ros::Time& stamp, std::uint32_t seq) {
-    sensor_msgs::Image m;
-    m.header.seq = seq;
-    m.header.stamp = stamp;
-    m.header.frame_id = frame;
-    m.width = image.cols;
-    m.height = image.rows;
-    m.encoding = encoding;
-    m.step = static_cast<std::uint32_t>(image.cols * image.elemSize());
-    m.data.resize(static_cast<std::size_t>(m.step) * m.height);
-    for (int v = 0; v < image.rows; ++v)
-      std::memcpy(m.data.data() + static_cast<std::size_t>(v) * m.step, image.ptr(v), m.step);
-    put(topic, stamp, m);
+    std_msgs::Header header;
+    header.seq = seq;
+    header.stamp = stamp;
+    header.frame_id = frame;
+    put(topic, stamp, *cv_bridge::CvImage(header, encoding, image).toImageMsg());
   }
 
   std::string path_, part_;
