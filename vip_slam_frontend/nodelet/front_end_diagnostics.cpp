@@ -193,7 +193,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("IMU samples refused", c.imu_rejected);
   status.add("IMU gaps", c.imu_gaps);
   status.add("IMU samples far off their neighbours, replaced", c.imu_spikes);
-  status.add("shocks that the IMU has missed", c.imu_shocks);
+  status.add("images before which the IMU was at fault", c.imu_faults);
   status.add("times that time ran backwards", shown.time_jumps);
 }
 

@@ -1,4 +1,4 @@
-// Contradictions between images and IMU: repeated images, shocks that the IMU missed, bodies that move independently of
+// Contradictions between images and IMU: repeated images, faults of the IMU, bodies that move independently of
 // the camera, an IMU that is wrong or missing.
 #include <algorithm>
 #include <cmath>
@@ -30,17 +30,14 @@ constexpr double kImplausibleNoise = 10.0;
 // An image may repeat the one before while the IMU is at rest and predicts less image motion than this, px: a standing
 // camera that is simulated without noise renders equal images.
 constexpr double kStandsPx = 0.5;
-// Limit on the distance between the measured and the predicted translation, in sigmas; beyond, the IMU has missed a
-// shock. Ordinary images reach four. One sigma of unmodelled errors (rolling shutter, delay) is speed * dt + length,
-// m/s and m.
-constexpr double kShockSigmas = 6.0, kUntoldSpeed = 0.0125, kUntoldLength = 2.5e-4;
+// Errors of the prediction that no covariance has (rolling shutter, delay, extrinsics), one sigma: a share of the turn
+// and an angle, rad; by the time and a length, m/s and m.
+constexpr double kUnmodelledTurn = 0.05, kUnmodelledAngle = 1e-3;
+constexpr double kUnmodelledSpeed = 0.0125, kUnmodelledLength = 2.5e-4;
 // Repeated images are reported as a fault only after this time, s.
 constexpr double kFrozen = 0.3;
-// A shock needs at least this many tracked points, and at most one outlier per kShockOutliers of them.
-constexpr int kShockTracks = 30, kShockOutliers = 20;
-// A shock is sudden: for kCalm s before it deviations stayed below the share kDoubt of kShockSigmas, whereas a wrong
-// IMU or velocity drifts off gradually. It lasts at most kShockLasts, s.
-constexpr double kCalm = 0.5, kDoubt = 0.7, kShockLasts = 0.1;
+// Images agree among themselves with at least this many points with depth, and one outlier per kAgreeingOutliers.
+constexpr int kAgreeing = 30, kAgreeingOutliers = 10;
 // Time without images after which the camera may look elsewhere, s. After twice that time a rotation further than
 // kFarTurn, rad, from the predicted one is too far from the filter's linearisation point.
 constexpr double kLongUnseen = 0.2, kFarTurn = 0.05;
@@ -94,11 +91,11 @@ void FrontEnd::Impl::noteAgreement(const TrackingResult& tracking, double t) {
 
 bool FrontEnd::Impl::movesByImu(double t_imu, const SE3& T_odom_C_then) const {
   const ZuptOptions& rest = options_.filter.zupt;
-  const double since = std::max(imu_.oldest(), std::min(t_imu - rest.window, filter_.nav().t));
-  if (!imuSpread(imu_.between(since, t_imu), &sensor_.imu_noise).quiet(rest.max_gyro_std, rest.max_accel_std)) {
+  const double since = std::max(inertial_.oldest(), std::min(t_imu - rest.window, filter_.nav().t));
+  if (!imuSpread(inertial_.between(since, t_imu), &sensor_.imu_noise).quiet(rest.max_gyro_std, rest.max_accel_std)) {
     return true;
   }
-  const std::vector<ImuSample> samples = imu_.between(filter_.nav().t, t_imu);
+  const std::vector<ImuSample> samples = inertial_.between(filter_.nav().t, t_imu);
   if (samples.size() < 2) return true;
   const SE3 T_now_then = (filter_.predict(samples).predicted.T_W_I * extrinsics()).inverse() * T_odom_C_then;
   std::vector<double> moved;
@@ -123,27 +120,31 @@ FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {
   return unusable(t, "the image repeats the one before: has the camera frozen?");
 }
 
-void FrontEnd::Impl::admitShock(const TrackingResult& tracking, const PredictedMotion& prediction, double dt,
-                                Propagation* propagation) {
-  const double t = propagation->predicted.t;
-  const bool told = prediction.judges && !prediction.wary && !tracking.moves_by_itself && tracking.step.ok &&
-                    tracking.tracked >= kShockTracks && kShockOutliers * tracking.lost_outlier <= tracking.tracked;
-  const Eigen::Vector3d apart = tracking.step.t - prediction.T_current_previous.t();
-  const double length = kUntoldSpeed * dt + kUntoldLength;
-  const Eigen::Matrix3d C =
-      tracking.step.covariance + (std::pow(prediction.sigma, 2) + std::pow(length, 2)) * Eigen::Matrix3d::Identity();
-  const double sigmas = told ? std::sqrt(apart.dot(C.inverse() * apart)) : 0.0;
-  const bool doubtful = sigmas > kDoubt * kShockSigmas;
-  if (!told || doubtful) {
-    if (t - doubt_imu_t_ > kCalm) shock_imu_t_ = t;
-    doubt_imu_t_ = t;
+bool FrontEnd::Impl::imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction,
+                                  const Propagation& propagation) {
+  frontend::MotionEvidence evidence;
+  evidence.t = propagation.predicted.t;
+  evidence.interval = prediction.interval;
+  evidence.images_agree = !prediction.turn_unknown && options_.tracking.leave_out_moving && !prediction.wary &&
+                          !tracking.moves_by_itself && tracking.motion.ok && tracking.motion.pairs >= kAgreeing &&
+                          kAgreeingOutliers * tracking.lost_outlier <= tracking.tracked;
+  if (evidence.images_agree) {
+    const Matrix15d P = filter_.covariance();
+    const Eigen::Matrix3d R_C_I = extrinsics().R().transpose();
+    const Eigen::Matrix3d R_C_W = R_C_I * propagation.predicted.T_W_I.R().transpose();
+    Matrix6d covariance = tracking.motion.covariance;
+    covariance.topLeftCorner<3, 3>() += R_C_I * propagation.turnCovariance(P) * R_C_I.transpose();
+    covariance.bottomRightCorner<3, 3>() += R_C_W * propagation.displacementCovariance(P) * R_C_W.transpose();
+    const double turn = kUnmodelledTurn * propagation.omega_I.norm() * prediction.interval + kUnmodelledAngle;
+    const double length = kUnmodelledSpeed * prediction.interval + kUnmodelledLength;
+    covariance.diagonal().head<3>().array() += turn * turn;
+    covariance.diagonal().tail<3>().array() += length * length;
+    evidence.sigmas =
+        frontend::motionDifference(tracking.motion.T_current_previous, prediction.T_current_previous, covariance);
   }
-  // A shock may begin at the end of one interval and show in the next one.
-  const bool begins = doubtful && shock_imu_t_ == t;
-  const bool goes_on = sigmas > kShockSigmas && t - shock_imu_t_ <= std::max(kShockLasts, 1.5 * dt);
-  if (!told || !(begins || goes_on)) return;
-  counters_.imu_shocks += sigmas > kShockSigmas;
-  propagation->admitStep(apart.norm() / dt, dt);
+  const bool fault = faults_.add(evidence);
+  counters_.imu_faults += fault;
+  return fault;
 }
 
 }  // namespace vip_slam

@@ -5,13 +5,14 @@
 #include <optional>
 #include <utility>
 
-#include "vip_slam_core/imu/gyro_range.h"
-#include "vip_slam_core/imu/imu_buffer.h"
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
 #include "vip_slam_frontend/front_end.h"
+#include "vip_slam_frontend/inertial/fault_detection.h"
+#include "vip_slam_frontend/inertial/inertial_input.h"
 #include "vip_slam_frontend/initialisation/initialiser.h"
 #include "vip_slam_frontend/keyframes/keyframe_selector.h"
+#include "vip_slam_frontend/tracking/dense_alignment.h"
 #include "vip_slam_frontend/tracking/depth_rows.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/frozen_depth.h"
@@ -31,7 +32,7 @@ class FrontEnd::Impl {
   bool addAccel(double t, const Eigen::Vector3d& accel);
   bool ready(double t_image, double depth_lag) const {
     const double last = std::max(0.5 * sensor_.rolling_shutter, depth_lag + 0.5 * sensor_.depth_rolling_shutter);
-    return imu_.covers(t_image + timeOffset() + last);
+    return inertial_.covers(t_image + timeOffset() + last);
   }
   FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);
   void applyMapUpdate(const MapUpdate& update);
@@ -89,6 +90,9 @@ class FrontEnd::Impl {
   std::string keyframeReason(const TrackingResult& tracking, bool has_depth, bool surfaces_hold, double t);
   /// Rotation of the camera between two IMU times by the gyro alone.
   SE3 gyroRotation(double t0, double t1) const;
+  /// Gives the interval between two images stand-ins for the inertial channels that there are not, or for `both`: the
+  /// turn between the images, and a constant velocity of `state`.
+  void substitute(double t0, double t1, const SE3& T_current_previous, const NavState& state, bool both);
   /// Tracked points in the camera frame, m; points without depth are put at the depth camera's maximum range.
   std::vector<Eigen::Vector3d> trackedPoints() const;
   /// Whether the body stands still at this image; times of the last image and of this one on the IMU clock, s.
@@ -101,7 +105,8 @@ class FrontEnd::Impl {
   /// The depth image as seen at the stamp of the colour image, when it has another stamp or a rolling shutter.
   cv::Mat depthAtStamp(const DepthReading& depth, const NavState& nav);
   std::vector<FilterMeasurement> measurements() const;
-  SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t);
+  /// `turned`: rotation during the depth image's lag behind the colour image, rad.
+  SurfaceMatches matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double turned, double t);
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);
   /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt it does not
@@ -125,10 +130,11 @@ class FrontEnd::Impl {
   /// Whether the IMU predicts visible image motion between the camera pose T_odom_C_then and the image at t_imu.
   bool movesByImu(double t_imu, const SE3& T_odom_C_then) const;
   FrameOutput repeatedImage(double t, double t_imu);
-  /// A shock that clips the accelerometer or falls between its samples leaves a lasting velocity error. All points show
-  /// it together at once, while each alone would be gated: then `propagation` admits a velocity step.
-  void admitShock(const TrackingResult& tracking, const PredictedMotion& prediction, double dt,
-                  Propagation* propagation);
+  /// Whether the IMU is at fault in the interval before this image (fault_detection.h).
+  bool imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction, const Propagation& propagation);
+  /// Stand-ins for the IMU over the interval since the last image by the motion of the camera that images show, and the
+  /// prediction with them. `motion`: by points; `aligned`: T_current_previous by all pixels.
+  Propagation predictByImages(double t_imu, const MotionFit& motion, const SE3& aligned);
   /// `metric`: depth took part, by features or surfaces.
   void judge(const TrackingResult& tracking, bool metric, bool surfaces_hold, double t);
   /// Growth of the position's one sigma since the last image with enough features, m.
@@ -155,8 +161,9 @@ class FrontEnd::Impl {
   TimingLog* timing_;
   const double clock_jump_;
   std::shared_ptr<const CameraModel> camera_;
-  ImuBuffer imu_;
-  GyroRange gyro_range_;
+  frontend::InertialInput inertial_;
+  frontend::DenseAlignment dense_;  ///< where no gyro tells the turn, and at the start
+  frontend::FaultDetection faults_;
   FrozenDepth frozen_depth_;
   bool same_depth_ = false;                   ///< the newest depth image repeats the one before
   SE3 T_odom_depth_;                          ///< camera pose at the last image that brought new depth ...
@@ -164,6 +171,7 @@ class FrontEnd::Impl {
   cv::Mat masked_;                            ///< not zero where depth is to be left out; empty: nowhere
   std::unique_ptr<DepthRows> depth_rows_;     ///< null until a depth image has to be warped to the stamp
   FeatureTracker tracker_;
+  SE3 last_motion_;               ///< camera motion between the last two images, T_current_previous
   MovingRegions moving_;          ///< of the newest image
   double moving_imu_t_ = -1e300;  ///< IMU time of the last image with moving regions
   SurfaceTracker surfaces_;
@@ -193,8 +201,7 @@ class FrontEnd::Impl {
   double last_points_t_ = 0;          ///< last image with enough points that have depth
   double last_agreed_t_ = 0;          ///< last image whose points agreed with the IMU
   double cut_off_imu_t_ = -1e300;     ///< last image before which the gyro reached the limit of its range
-  double doubt_imu_t_ = 0;            ///< last image whose points deviated slightly from the IMU or gave no test
-  double shock_imu_t_ = -1e300;       ///< first such image after a calm time: a shock may begin there
+  double fault_t_ = -1e300;           ///< last image before which the IMU was at fault
   int gated_in_a_row_ = 0;
   bool still_ = false;
   SE3 T_map_odom_;

@@ -19,6 +19,8 @@ namespace {
 
 // Depth with a smaller lag than this counts as taken with the colour image, seconds: half a millimetre at 1 m/s.
 constexpr double kSameInstant = 5e-4;
+// Longest prediction beyond the newest image, s.
+constexpr double kPredicted = 5.0;
 
 SensorConfig checked(const SensorConfig& sensor) {
   const std::string problem = sensor.camera.validate();
@@ -29,11 +31,17 @@ SensorConfig checked(const SensorConfig& sensor) {
 }
 
 /// Intrinsics are estimated only with registered depth and no fisheye: a separate depth camera has intrinsics of its
-/// own, and the error of a fisheye's focal length is not proportional to the bearing.
+/// own, and the error of a fisheye's focal length is not proportional to the bearing. Without a gyro, whose turns hold
+/// the focal length, it would be depth's errors that decide.
 FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& sensor) {
   FilterOptions filter = options.filter;
-  filter.calibration.intrinsics =
-      filter.calibration.intrinsics && sensor.depth_registered && sensor.camera.model != DistortionModel::kEquidistant;
+  filter.calibration.intrinsics = filter.calibration.intrinsics && sensor.depth_registered && sensor.hasGyro() &&
+                                  sensor.camera.model != DistortionModel::kEquidistant;
+  // A camera's rotation, delay and scale of rates against an IMU need one.
+  filter.calibration.rotation = filter.calibration.rotation && sensor.hasGyro();
+  filter.calibration.time_offset = filter.calibration.time_offset && sensor.hasGyro();
+  filter.calibration.gyro_scale = filter.calibration.gyro_scale && sensor.hasGyro();
+  filter.calibration.gyro_misalignment = filter.calibration.gyro_misalignment && sensor.hasGyro();
   filter.calibration.depth_shift =
       filter.calibration.depth_shift && sensor.camera.model != DistortionModel::kEquidistant;
   return filter;
@@ -67,7 +75,8 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       timing_(timing),
       clock_jump_(clock_jump),
       camera_(makeCamera(sensor_.camera)),
-      imu_(options.recovery.max_imu_gap, 30.0),
+      inertial_(sensor_, options.recovery.max_imu_gap),
+      dense_(camera_, sensor_.depth_noise),
       masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
       tracker_(options_.tracking, camera_, sensor_.depth_noise, timing,
                featureMask(sensor_.mask, options_.tracking.border)),
@@ -76,8 +85,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       orb_(options.tracking.keyframe_corners),
       filter_(filterOptions(options, sensor_), sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset,
               camera_->focal(), sensor_.gravity),
-      initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, camera_->focal(),
-                   sensor_.gravity, sensor_.depth_noise),
+      initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, sensor_.gravity),
       stillness_(options.filter.zupt),
       selector_(options.keyframes) {
   counters_.sigma_px = filter_.sigmaPx();
@@ -90,7 +98,7 @@ bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
 }
 
 void FrontEnd::Impl::clockRanBack(const std::string& reason) {
-  imu_.clear();
+  inertial_.clear();
   last_image_t_ = last_imu_t_ = -1e300;
   // Stamps are ordered only within an epoch, so the clock's jump back needs a new one.
   if (phase_ == Phase::kWaiting) ++epoch_;
@@ -98,32 +106,30 @@ void FrontEnd::Impl::clockRanBack(const std::string& reason) {
 }
 
 void FrontEnd::Impl::countImu() {
-  const ImuBufferCounters& c = imu_.counters();
+  const ImuBufferCounters& c = inertial_.counters();
   counters_.imu_rejected = c.out_of_order + c.ahead + c.duplicate + c.not_finite;
   counters_.imu_gaps = c.gaps;
   counters_.imu_spikes = c.spikes;
-  counters_.gyro_cut_off = gyro_range_.samples();
-  counters_.gyro_range = gyro_range_.end();
+  counters_.gyro_cut_off = inertial_.range().samples();
+  counters_.gyro_range = inertial_.range().end();
 }
 
 bool FrontEnd::Impl::addImu(const ImuSample& sample) {
-  if (!imu_.empty() && std::isfinite(sample.t)) noticeTimeJump(sample.t, imu_.newest(), "IMU");
-  const bool accepted = imu_.add({sample.t, correctedRate(sample.gyro, sensor_.gyro_correction), sample.accel});
-  if (accepted) gyro_range_.add(sample.t, sample.gyro);
+  if (std::isfinite(sample.t)) noticeTimeJump(sample.t, inertial_.newestMeasured(), "IMU");
+  const bool accepted = inertial_.addImu(sample);
   countImu();
   return accepted;
 }
 
 bool FrontEnd::Impl::addGyro(double t, const Eigen::Vector3d& gyro) {
-  if (!imu_.empty() && std::isfinite(t)) noticeTimeJump(t, imu_.newest(), "gyro");
-  const bool accepted = imu_.addGyro(t, correctedRate(gyro, sensor_.gyro_correction));
-  if (accepted) gyro_range_.add(t, gyro);
+  if (std::isfinite(t)) noticeTimeJump(t, inertial_.newestMeasured(), "gyro");
+  const bool accepted = inertial_.addGyro(t, gyro);
   countImu();
   return accepted;
 }
 
 bool FrontEnd::Impl::addAccel(double t, const Eigen::Vector3d& accel) {
-  const bool accepted = imu_.addAccel(t, accel);
+  const bool accepted = inertial_.addAccel(t, accel);
   countImu();
   return accepted;
 }
@@ -195,9 +201,9 @@ void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
 std::optional<NavState> FrontEnd::Impl::predict(double t) const {
   if (!filter_.started()) return std::nullopt;
   NavState state = filter_.nav();
-  if (imu_.empty() || !std::isfinite(t)) return state;
-  const double until = std::min(t, imu_.newest());
-  const std::vector<ImuSample> samples = imu_.between(state.t, until);
+  if (!std::isfinite(t)) return state;
+  const double until = std::min({t, inertial_.newest(), state.t + kPredicted});
+  const std::vector<ImuSample> samples = inertial_.between(state.t, until);
   if (samples.size() < 2) return state;
   const Preintegration pre(withGyroCorrection(samples, filter_.window().gyro_correction), state.bias_gyro,
                            state.bias_accel, sensor_.imu_noise);
@@ -207,8 +213,8 @@ std::optional<NavState> FrontEnd::Impl::predict(double t) const {
 }
 
 Eigen::Vector3d FrontEnd::Impl::gyro(double t) const {
-  if (imu_.empty()) return Eigen::Vector3d::Zero();
-  const auto sample = imu_.at(std::clamp(t, imu_.oldest(), imu_.newest()));
+  if (!(inertial_.oldest() <= inertial_.newest())) return Eigen::Vector3d::Zero();
+  const auto sample = inertial_.at(std::clamp(t, inertial_.oldest(), inertial_.newest()));
   return sample ? correctedRate(sample->gyro, filter_.window().gyro_correction) : Eigen::Vector3d::Zero();
 }
 
@@ -223,8 +229,7 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   landmarks_.forgetPatches();
   surfaces_.clear();
   moving_ = {};
-  moving_imu_t_ = last_depth_t_ = cut_off_imu_t_ = -1e300;  // the clock may have run back
-  gyro_range_.forgetTimes();
+  moving_imu_t_ = last_depth_t_ = cut_off_imu_t_ = fault_t_ = -1e300;  // the clock may have run back
   filter_.stop();
   initialiser_.reset();
   stillness_.reset();

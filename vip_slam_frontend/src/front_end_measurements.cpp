@@ -1,5 +1,6 @@
 // What one image gives to the filter: rolling-shutter poses, depth at the stamp, features, stillness, surfaces.
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "vip_slam_core/imu/gyro_correction.h"
@@ -10,10 +11,17 @@
 
 namespace vip_slam {
 
+namespace {
+
+constexpr double kOfLag = 0.5;  // one sigma of the lag between depth and colour, as a share of it
+
+}  // namespace
+
 std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(const Readout& readout, const NavState& nav) const {
   if (readout.instant()) return nullptr;
-  const std::vector<ImuSample> around = imu_.between(std::max(imu_.oldest(), nav.t + std::min(readout.first, 0.0)),
-                                                     std::min(imu_.newest(), nav.t + std::max(readout.last, 0.0)));
+  const std::vector<ImuSample> around =
+      inertial_.between(std::max(inertial_.oldest(), nav.t + std::min(readout.first, 0.0)),
+                        std::min(inertial_.newest(), nav.t + std::max(readout.last, 0.0)));
   if (around.empty()) return nullptr;
   return std::make_shared<RowPoses>(readout, nav, withGyroCorrection(around, filter_.window().gyro_correction),
                                     extrinsics(), sensor_.gravity);
@@ -68,8 +76,11 @@ bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   };
   StillnessCues cues;
   // Back to the last image at least: in a longer gap between images the camera may have moved and stopped again.
-  const double since = std::min(t_imu - options.window, previous_t_imu);
-  cues.imu = imuSpread(imu_.between(std::max(imu_.oldest(), since), t_imu), &sensor_.imu_noise);
+  double since = std::min(t_imu - options.window, previous_t_imu);
+  since = std::max(inertial_.oldest(), since);
+  // An image alone does not tell standing from a wall that moves along.
+  if (!inertial_.measured(since, t_imu)) return false;
+  cues.imu = imuSpread(inertial_.between(since, t_imu), &sensor_.imu_noise);
   cues.tracks = image_counts ? static_cast<int>(now.size()) : 0;
   cues.speed = filter_.nav().v_W.norm();
   cues.px_per_metre = leastImageMotion(trackedPoints(), camera_->focal());
@@ -86,12 +97,15 @@ bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
   return still;
 }
 
-SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double t) {
+SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double turned, double t) {
   const int index = filter_.window().indexOf(surfaces_.reference());
   if (index < 0 || depth.empty() || !options_.filter.use_surfaces) return {};
   ScopedTimer timer(timing_, "frontend.surfaces", t);
   const SE3 T_odom_ref = cameraPose(filter_.window(), filter_.window().clones[index]);
-  return surfaces_.match(depth, T_odom_C.inverse() * T_odom_ref, moving_);
+  SurfaceMatches matches = surfaces_.match(depth, T_odom_C.inverse() * T_odom_ref, moving_);
+  // Colour and depth that are not taken together: their stamps, and so the warp to the colour image's, are unsure.
+  for (SurfacePair& pair : matches.pairs) pair.shared = std::hypot(pair.shared, kOfLag * turned * pair.q_cur.norm());
+  return matches;
 }
 
 void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, double t) {

@@ -89,11 +89,12 @@ SE3 FrontEnd::Impl::chainedCamera(const SE3& T_odom_I) const {
 FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std::string& reason) const {
   std::shared_ptr<TrackedFrame> frame = makeFrame(t, false);
   frame->status = {state, reason};
-  if (filter_.started() && !imu_.empty() && std::isfinite(t)) {
+  if (filter_.started() && std::isfinite(t)) {
     const double t_imu = t + timeOffset();
-    const std::vector<ImuSample> samples = imu_.between(filter_.nav().t, std::min(t_imu, imu_.newest()));
+    const std::vector<ImuSample> samples =
+        inertial_.between(filter_.nav().t, std::min({t_imu, inertial_.newest(), filter_.nav().t + longestImuGap()}));
     if (samples.size() > 1) {
-      const Propagation to = filter_.predict(samples);
+      const Propagation to = filter_.predict(samples, inertial_.noise(samples.front().t, samples.back().t));
       frame->state = to.predicted;
       frame->covariance = to.Phi * frame->covariance * to.Phi.transpose() + to.Q;
     }
@@ -109,7 +110,7 @@ FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
   if (!filter_.started()) return statusOnly(t, TrackingState::kWaiting, why);
   // Without IMU nothing propagates the pose: after a gap longer than this tracking restarts in any case.
   const double t_imu = t + timeOffset();
-  const bool imu_ended = imu_.empty() || t_imu - imu_.newest() > longestImuGap();
+  const bool imu_ended = t_imu - inertial_.newest() > longestImuGap();
   if (phase_ != Phase::kLost && (imu_ended || t_imu - filter_.nav().t > options_.recovery.coast_seconds)) {
     phase_ = Phase::kLost;
     status_ = {TrackingState::kLost, why};  // also reported for the next images, until the state is re-evaluated
@@ -186,7 +187,7 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   output.frame = frame;
   const double horizon =
       std::max({2.0, options_.initialisation.standing_seconds + 0.5, options_.filter.zupt.window + 0.5});
-  imu_.dropBefore(last_keyframe_ != 0 ? std::min(last_keyframe_imu_t_, t_imu - horizon) : t_imu - horizon);
+  inertial_.dropBefore(last_keyframe_ != 0 ? std::min(last_keyframe_imu_t_, t_imu - horizon) : t_imu - horizon);
   return output;
 }
 
@@ -219,7 +220,8 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
   if (!tracker_.depth().empty()) {
     keyframe->frame.depth_grid = depthGrid(options_.keyframe_grid_stride);
   }
-  if (last_keyframe_ != 0 && !keyframe_imu_broken_) keyframe->imu = imu_.between(last_keyframe_imu_t_, t_imu);
+  if (last_keyframe_ != 0 && !keyframe_imu_broken_ && inertial_.measured(last_keyframe_imu_t_, t_imu))
+    keyframe->imu = inertial_.between(last_keyframe_imu_t_, t_imu);
   keyframe->gyro_correction = filter_.gyroCorrection();
   keyframe->imu_noise_scale = filter_.imuNoiseScale();
 

@@ -29,9 +29,11 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
                  "the images contradict the IMU: are its axes, signs and units, T_imu_cam, the stamps and the scale of "
                  "depth right? "
                  "check_bag tells"};
+    } else if (t + timeOffset() - fault_t_ < kRangeShown) {
+      status_ = {TrackingState::kDegraded, "the IMU contradicts what is seen: held by images and depth"};
     } else if (t + timeOffset() - cut_off_imu_t_ < kRangeShown) {
       status_ = {TrackingState::kDegraded,
-                 formatted("the gyroscope is at the end of its range, %.2f rad/s", gyro_range_.end())};
+                 formatted("the gyroscope is at the end of its range, %.2f rad/s", inertial_.range().end())};
     } else if (t - last_metric_t_ > kBetweenDepths && !still_) {
       status_ = {TrackingState::kDegraded, "no depth: visual-inertial only"};
     } else {

@@ -1,6 +1,8 @@
 // The steps of one image: check, predict, track, estimate, output.
 #include "vip_slam_core/util/formatted.h"
 
+#include <Eigen/LU>
+
 #include "front_end_impl.h"
 
 namespace vip_slam {
@@ -11,10 +13,14 @@ namespace {
 constexpr int kGatedImages = 30;
 // Rate that a saturated gyro does not measure, one sigma, as a share of the limit of its range.
 constexpr double kBeyondRange = 0.3;
+// One sigma of the motion between two images by dense alignment, rad and m; floor of that by points. Points have the
+// same pixels as the filter's tracks, which it takes for independent: factor on their variance.
+constexpr double kAlignedTurn = 0.01, kAlignedStep = 0.01, kAlignedLeast = 1e-3, kSharedByTracks = 9.0;
+constexpr double kAlignedGate = 4.0;  // sigmas, between the two
 
 /// Why the IMU does not cover an image at `t_imu`.
-std::string uncovered(const ImuBuffer& imu, double t_imu) {
-  if (imu.empty()) return "no IMU yet";
+std::string uncovered(const frontend::InertialInput& imu, double t_imu) {
+  if (imu.newest() < imu.oldest()) return "no IMU yet";
   if (t_imu < imu.oldest()) return formatted("the IMU begins at %.3f s, the image needs %.3f s", imu.oldest(), t_imu);
   return formatted("the IMU reaches to %.3f s, the image needs %.3f s", imu.newest(), t_imu);
 }
@@ -29,9 +35,9 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   const std::string problem = checkInput(input, &depth);
   if (!problem.empty()) return unusable(input.t, problem);
   const double t_imu = input.t + timeOffset();
-  if (!imu_.covers(t_imu)) {
+  if (inertial_.complete() && !inertial_.covers(t_imu)) {
     ++counters_.imu_missing;
-    return unusable(input.t, uncovered(imu_, t_imu));
+    return unusable(input.t, uncovered(inertial_, t_imu));
   }
   last_image_t_ = input.t;
   if (filter_.started() && repeatsLastImage(input.gray, t_imu)) return repeatedImage(input.t, t_imu);
@@ -57,7 +63,7 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
 
 bool FrontEnd::Impl::admitDoubts(double max_gap, double from, double t_imu, Propagation* propagation) {
   const bool gap = max_gap > options_.recovery.max_imu_gap;
-  const double cut_off = gyro_range_.cutOff(from, t_imu);
+  const double cut_off = inertial_.range().cutOff(from, t_imu);
   if (gap) propagation->admitGap(max_gap, t_imu - from);
   if (cut_off > 0) {
     propagation->admitRate(kBeyondRange * cut_off, t_imu - from);
@@ -65,6 +71,39 @@ bool FrontEnd::Impl::admitDoubts(double max_gap, double from, double t_imu, Prop
   }
   keyframe_imu_broken_ = keyframe_imu_broken_ || gap || cut_off > 0;
   return gap || cut_off > 0;
+}
+
+Propagation FrontEnd::Impl::predictByImages(double t_imu, const MotionFit& motion, const SE3& aligned) {
+  const NavState from = filter_.nav();
+  const bool fault = inertial_.complete();
+  SE3 T_cur_prev = aligned;
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal() << Eigen::Vector3d::Constant(kAlignedTurn * kAlignedTurn),
+      Eigen::Vector3d::Constant(kAlignedStep * kAlignedStep);
+  if (motion.ok) {
+    // Few points that agree by chance promise more than they hold: all pixels together gate them.
+    Matrix6d of_points = kSharedByTracks * motion.covariance;
+    of_points.diagonal().array() += kAlignedLeast * kAlignedLeast;
+    const Matrix6d gain = covariance * (covariance + of_points).inverse();
+    if (frontend::motionDifference(motion.T_current_previous, aligned, covariance + of_points) < kAlignedGate) {
+      T_cur_prev = aligned.boxplus(gain * motion.T_current_previous.boxminus(aligned));
+      covariance -= gain * covariance;
+    }
+  }
+  substitute(from.t, t_imu, T_cur_prev, from, fault);
+  // Both the camera's motion and the body's, by the lever arm: R_C of the motion's end, t of its beginning.
+  const SE3 T_I_C = extrinsics(), T_prev_cur = T_cur_prev.inverse(), T_I0_I1 = T_I_C * T_prev_cur * T_I_C.inverse();
+  // Of T_cur_prev (theta by R exp, t) to that of the body's motion: the turn by -R_I_C, the displacement by
+  // -R_prev_cur.
+  Matrix6d J = Matrix6d::Zero();
+  const Eigen::Matrix3d R_I_C = T_I_C.R();
+  J.topLeftCorner<3, 3>() = -T_I0_I1.R().transpose() * R_I_C;
+  J.bottomLeftCorner<3, 3>() = R_I_C * hat(T_prev_cur.t());
+  J.bottomRightCorner<3, 3>() = -R_I_C * T_prev_cur.R();
+  Propagation propagation = filter_.predict(T_I0_I1, J * covariance * J.transpose(), t_imu - from.t);
+  propagation.open = fault;
+  if (fault) fault_t_ = t_imu;
+  return propagation;
 }
 
 StepReport FrontEnd::Impl::updateFilter(const Propagation& propagation, const cv::Mat& depth,
@@ -143,32 +182,54 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   };
   double max_gap = 0;
   const double from = filter_.nav().t;
-  const std::vector<ImuSample> samples = imu_.between(from, t_imu, &max_gap);
+  // Where no sound gyro tells the turn, images and depth do, before tracking.
+  const bool by_images = !inertial_.hasGyro() || (inertial_.complete() && faults_.suspects(t_imu));
+  SE3 moved = last_motion_;
+  if (by_images) {
+    ScopedTimer timer(timing_, "frontend.align", t);
+    moved = dense_.motion(tracker_.gray(), tracker_.depth(), gray, depth_read.image, last_motion_).value_or(moved);
+  }
+  if (!inertial_.complete()) substitute(from, t_imu, moved, filter_.nav(), false);
+  const std::vector<ImuSample> samples = inertial_.between(from, t_imu, &max_gap);
   if (samples.size() < 2) return statusOnly(t, TrackingState::kDegraded, "no IMU between the images");
   if (max_gap > longestImuGap()) return startAnew(formatted("IMU gap of %.2f s", max_gap));
-  Propagation propagation = filter_.predict(samples);
-  const bool doubtful = admitDoubts(max_gap, from, t_imu, &propagation);
+  Propagation propagation = filter_.predict(samples, inertial_.noise(from, t_imu));
+  const bool doubtful = admitDoubts(max_gap, from, t_imu, &propagation) || !inertial_.complete();
   // Without images the IMU propagates the pose, as in the dark, while the position's uncertainty stays within bounds.
   if (propagation.displacementSigma(filter_.covariance()) > options_.recovery.max_position_sigma)
     return startAnew(formatted("no image for %.2f s", t_imu - from));
   last_imu_t_ = t_imu;
 
-  const SE3 T_odom_C = propagation.predicted.T_W_I * extrinsics();
+  const SE3 T_odom_previous = filter_.nav().T_W_I * extrinsics();
+  SE3 T_odom_C = propagation.predicted.T_W_I * extrinsics();
   const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
   const bool gap = max_gap > options_.recovery.max_imu_gap;
-  const PredictedMotion prediction = predictMotion(propagation, T_odom_C, doubtful);
+  const PredictedMotion by_imu = predictMotion(propagation, T_odom_C, doubtful);
+  PredictedMotion prediction = by_imu;
+  if (by_images) {
+    prediction.T_current_previous = moved;
+    prediction.turn_unknown = true;
+    prediction.judges = false;
+    T_odom_C = T_odom_previous * moved.inverse();
+  }
   const std::size_t tracks_before = tracker_.tracks().size();
   const TrackingResult tracked =
       tracker_.track(gray, depth, prediction, !coasting, T_odom_C, colourRows(propagation.predicted), t);
   if (gap && !bridgesGap(tracked, tracks_before, prediction, t_imu - from))
     return startAnew(formatted("IMU and images are missing for %.2f s", t_imu - from));
+  last_motion_ = tracked.motion.ok ? tracked.motion.T_current_previous : prediction.T_current_previous;
   moving_ = tracked.regions;
   counters_.moving += tracked.moves_by_itself;
-  admitShock(tracked, prediction, t_imu - from, &propagation);
+  if (!inertial_.complete() || imuIsAtFault(tracked, by_imu, propagation)) {
+    if (!by_images) moved = last_motion_;
+    propagation = predictByImages(t_imu, tracked.motion, moved);
+    T_odom_C = propagation.predicted.T_W_I * extrinsics();
+  }
   for (const Track& track : tracker_.ended()) landmarks_.retire(track);
 
-  const StepReport report = updateFilter(propagation, depth, matchSurfaces(depth, T_odom_C, t), from, t);
+  const double turned = propagation.omega_I.norm() * std::abs(depth_read.lag);
+  const StepReport report = updateFilter(propagation, depth, matchSurfaces(depth, T_odom_C, turned, t), from, t);
   noteAgreement(tracked, t);
   const std::string failure = divergence(report, tracked, t);
   if (!failure.empty()) return startAnew(failure);

@@ -44,7 +44,7 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
                                                              {"gyro_cut_off", c.gyro_cut_off},
                                                              {"imu_gaps", c.imu_gaps},
                                                              {"imu_spikes", c.imu_spikes},
-                                                             {"imu_shocks", c.imu_shocks},
+                                                             {"imu_faults", c.imu_faults},
                                                              {"imu_missing", c.imu_missing},
                                                              {"zero_velocity", c.zero_velocity},
                                                              {"coasting", c.coasting},

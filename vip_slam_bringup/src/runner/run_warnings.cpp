@@ -65,9 +65,10 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(
         std::to_string(c.imu_spikes) +
         " single samples of the IMU were far off their neighbours and were replaced by them: errors on its bus?");
-  if (c.imu_shocks > 0)
-    all.push_back(std::to_string(c.imu_shocks) + " of " + std::to_string(c.images) +
-                  " images show a step of the velocity that the IMU has not: shocks beyond its range or rate?");
+  if (c.imu_faults > 0)
+    all.push_back(std::to_string(c.imu_faults) + " of " + std::to_string(c.images) +
+                  " images show a motion that the IMU contradicts, and were tracked without it: shocks, shaking, saturation, or "
+                  "axes, signs or units that are wrong?");
   if (c.repeated_image > 0)
     all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
                   " images repeat the pixels of the one before under a new stamp and are left out: a camera slower "

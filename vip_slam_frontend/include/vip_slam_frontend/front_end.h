@@ -49,7 +49,7 @@ struct FrontEndCounters {
   std::uint64_t imu_rejected = 0;    ///< non-finite, all zero, repeated or backward samples, and those stamped too late
   std::uint64_t imu_gaps = 0;
   std::uint64_t imu_spikes = 0;        ///< single wrong samples, replaced
-  std::uint64_t imu_shocks = 0;        ///< images that showed a velocity step which the IMU did not measure
+  std::uint64_t imu_faults = 0;        ///< images before which the IMU contradicted what is seen and was left out
   std::uint64_t gyro_cut_off = 0;      ///< samples at the limit of the gyro's range
   std::uint64_t imu_missing = 0;       ///< images not covered by the IMU
   std::uint64_t zero_velocity = 0;     ///< images taken standing still

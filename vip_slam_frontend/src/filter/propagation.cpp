@@ -52,36 +52,64 @@ void Propagation::admitRate(double rate, double dt) {
   W = whitening(Q);
 }
 
-void Propagation::admitStep(double dv, double dt) {
-  // At s after the first image, s uniform: dp = dv (dt - s), so E[dp^2] = dv^2 dt^2 / 3 and E[dp dv] = dv^2 dt / 2.
-  const double variance = dv * dv;
-  for (int axis = 0; axis < 3; ++axis) {
-    Q(3 + axis, 3 + axis) += variance * dt * dt / 3.0;
-    Q(6 + axis, 6 + axis) += variance;
-    Q(3 + axis, 6 + axis) += 0.5 * variance * dt;
-    Q(6 + axis, 3 + axis) += 0.5 * variance * dt;
-  }
-  W = whitening(Q);
-  step_admitted = true;
+Eigen::Matrix3d Propagation::displacementCovariance(const Matrix15d& P) const {
+  Eigen::Matrix<double, 3, 15> J = Phi.middleRows<3>(3);
+  J.middleCols<3>(3).setZero();  // the position's own error is the same at both ends
+  return J * P * J.transpose() + Q.block<3, 3>(3, 3);
 }
 
 double Propagation::displacementSigma(const Matrix15d& P) const {
-  Eigen::Matrix<double, 3, 15> J = Phi.middleRows<3>(3);
-  J.middleCols<3>(3).setZero();  // the position's own error is the same at both ends
-  const Eigen::Matrix3d covariance = J * P * J.transpose() + Q.block<3, 3>(3, 3);
-  return std::sqrt(std::max(0.0, covariance.diagonal().maxCoeff()));
+  return std::sqrt(std::max(0.0, displacementCovariance(P).diagonal().maxCoeff()));
+}
+
+Eigen::Matrix3d Propagation::turnCovariance(const Matrix15d& P) const {
+  const Eigen::Matrix3d J = Phi.block<3, 3>(0, 9);
+  return J * P.block<3, 3>(9, 9) * J.transpose() + Q.block<3, 3>(0, 0);
+}
+
+Propagation propagateByMotion(const WindowState& window, const SE3& T_I0_I1, const Matrix6d& covariance, double dt,
+                              const ImuNoise& noise) {
+  Propagation result;
+  const NavState from = window.nav();
+  result.predicted = from;
+  result.predicted.t = from.t + dt;
+  result.predicted.T_W_I = from.T_W_I * T_I0_I1;
+  result.predicted.v_W = (result.predicted.T_W_I.t() - from.T_W_I.t()) / dt;
+  result.omega_I = logSO3(T_I0_I1.R()) / dt;
+  result.rates = window.rates;
+
+  const Clone& last = window.clones.back();
+  const Eigen::Matrix3d R_fej = last.T_W_I_fej.R(), I = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d dp = result.predicted.T_W_I.t() - last.T_W_I_fej.t();
+  Matrix15d& Phi = result.Phi;
+  Phi.block<3, 3>(0, 0) = result.predicted.T_W_I.R().transpose() * R_fej;
+  Phi.block<3, 3>(3, 0) = -hat(dp) * R_fej;
+  Phi.block<3, 3>(6, 0) = -hat(dp) * R_fej / dt;
+  Phi.block<3, 3>(6, 6).setZero();
+
+  const Eigen::Matrix3d R_W_I0 = from.T_W_I.R();
+  Matrix6d turn = Matrix6d::Identity();
+  turn.bottomRightCorner<3, 3>() = R_W_I0;
+  const Matrix6d pose = turn * covariance * turn.transpose();
+  Matrix15d& Q = result.Q;
+  Q.setZero();
+  Q.topLeftCorner<6, 6>() = pose;
+  Q.block<6, 3>(0, 6) = pose.rightCols<3>() / dt;
+  Q.block<3, 6>(6, 0) = Q.block<6, 3>(0, 6).transpose();
+  // The velocity at the end differs from the mean one by half of what the acceleration adds.
+  Q.block<3, 3>(6, 6) = pose.bottomRightCorner<3, 3>() / (dt * dt) + std::pow(0.5 * kAcceleration * dt, 2) * I;
+  Q.block<3, 3>(9, 9) = noise.gyro_random_walk * noise.gyro_random_walk * dt * I;
+  Q.block<3, 3>(12, 12) = noise.accel_random_walk * noise.accel_random_walk * dt * I;
+  Q.diagonal() += noiseFloor().cwiseAbs2();
+  result.W = whitening(Q);
+  return result;
 }
 
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
-                      const Eigen::Vector3d& G, double noise_scale, double stamp_sigma) {
+                      const Eigen::Vector3d& G, double stamp_sigma) {
   Propagation result;
-  ImuNoise scaled = noise;
-  scaled.gyro_noise_density *= noise_scale;
-  scaled.accel_noise_density *= noise_scale;
-  scaled.gyro_random_walk *= noise_scale;
-  scaled.accel_random_walk *= noise_scale;
   const Preintegration pre(withGyroCorrection(samples, window.gyro_correction), window.bias_gyro, window.bias_accel,
-                           scaled);
+                           noise);
   const NavState from = window.nav();
   result.predicted = pre.predict(from, G);
   result.predicted.t = samples.back().t;

@@ -49,7 +49,7 @@ void VioFilter::stop() {
   stamp_monitor_.reset();
   imu_monitor_.reset();
   still_images_ = 0;
-  after_step_ = false;
+  after_open_ = false;
   delay_before_.reset();
   mark_ = 0;
 }
@@ -123,9 +123,18 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   started_ = true;
 }
 
-Propagation VioFilter::predict(const std::vector<ImuSample>& samples) const {
+Propagation VioFilter::predict(const SE3& T_I0_I1, const Matrix6d& covariance, double dt) const {
+  return propagateByMotion(filter_.window(), T_I0_I1, covariance, dt, imu_noise_);
+}
+
+Propagation VioFilter::predict(const std::vector<ImuSample>& samples, const frontend::ChannelNoise& noise) const {
   const double scale = options_.imu_noise_inflation * imu_monitor_.scale();
-  return propagate(filter_.window(), samples, imu_noise_, G_, scale, stamp_monitor_.sigma());
+  ImuNoise scaled = imu_noise_;
+  scaled.gyro_noise_density *= scale * noise.gyro;
+  scaled.accel_noise_density *= scale * noise.accel;
+  scaled.gyro_random_walk *= scale;
+  scaled.accel_random_walk *= scale;
+  return propagate(filter_.window(), samples, scaled, G_, stamp_monitor_.sigma());
 }
 
 void VioFilter::forgetClone(CloneId id) {
@@ -229,9 +238,10 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const NavState predicted = nav();
   const Matrix15d P_predicted = covariance();
   const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
-  // After a velocity step only images can measure the velocity: the first image after it updates with all tracks.
-  const bool all = after_step_ && !propagation.step_admitted;
-  after_step_ = propagation.step_admitted;
+  // After an interval that left the motion open only images can measure the velocity: the first image after it updates
+  // with all tracks.
+  const bool all = after_open_ && !propagation.open;
+  after_open_ = propagation.open;
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full, all);
   if (!candidates.empty()) updateWithFeatures(candidates, all, &report);
   if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);

@@ -26,6 +26,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
                                      bool has_translation, const SE3& T_odom_C,
                                      const std::shared_ptr<const RowPoses>& rows, double t) {
   TrackingResult result;
+  SE3 T_odom_here = T_odom_C;
   view_ = RowCamera(camera_, rows);
   ++image_count_;
   std::vector<cv::Point2f> next;
@@ -56,15 +57,19 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   result.lost_outlier = static_cast<int>(pairs.size()) - model.inliers;
   result.pose_ok = model.ok && model.with_depth;
   result.T_current_previous = model.T_current_previous;
-  if (result.pose_ok && !model.free_rotation) {
-    result.step = fitTranslation(pairs, model.inlier, predicted.T_current_previous.R(), model.t_given_rotation,
-                                 0.5 * ransac.threshold);
+  if (result.pose_ok) {
+    result.motion = fitMotion(pairs, model.inlier, model.T_current_previous, 0.5 * ransac.threshold);
+    // Aligned patches are warped by the prediction: where no IMU gives it, by what the points show.
+    if (predicted.turn_unknown && result.motion.ok) {
+      const SE3 T_odom_previous = T_odom_C * predicted.T_current_previous;
+      T_odom_here = T_odom_previous * result.motion.T_current_previous.inverse();
+    }
   }
   for (std::size_t k = 0; k < index.size() && predicted.judges; ++k) {
     result.regions.add({next[index[k]].x, next[index[k]].y}, pairs[k].depth_previous, model.inlier[k]);
   }
   keepInliers(index, model.inlier, next, predicted.T_current_previous);
-  if (options_.refine_against_reference) alignWithReferences(T_odom_C);
+  if (options_.refine_against_reference) alignWithReferences(T_odom_here);
   for (Track& track : tracks_) measure(&track);
   result.tracked = static_cast<int>(tracks_.size());
   return result;

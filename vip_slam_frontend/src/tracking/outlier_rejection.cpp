@@ -91,36 +91,30 @@ bool refinePose(const std::vector<PointPair>& pairs, const std::vector<char>& us
   return true;
 }
 
-TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::vector<char>& use,
-                              const Eigen::Matrix3d& R_current_previous, const Eigen::Vector3d& start, double huber) {
-  constexpr int kRounds = 4, kMinPairs = 8;
-  TranslationFit fit;
-  fit.t = start;
-  Eigen::Matrix3d A;
+MotionFit fitMotion(const std::vector<PointPair>& pairs, const std::vector<char>& use, const SE3& start, double huber) {
+  constexpr int kMinPairs = 8;
+  MotionFit fit;
+  fit.T_current_previous = start;
+  if (!refinePose(pairs, use, huber, &fit.T_current_previous)) return fit;
+  Matrix6d A = Matrix6d::Zero();
   double squares = 0;
-  int n = 0;
-  for (int round = 0; round <= kRounds; ++round) {  // the last round only computes the residuals
-    A.setZero();
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();
-    squares = 0, n = 0;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (!use[i] || pairs[i].depth_previous <= 0) continue;
-      Eigen::Vector2d r;
-      Eigen::Matrix<double, 2, 3> J;
-      if (!reprojectionOf(pairs[i], R_current_previous, fit.t, &r, &J)) continue;
-      const double w = huberWeight(r.norm(), huber);
-      A += w * J.transpose() * J;
-      b += w * J.transpose() * r;
-      squares += w * r.squaredNorm();
-      ++n;
-    }
-    if (n < kMinPairs) return fit;
-    const Eigen::LDLT<Eigen::Matrix3d> ldlt(A);
-    if (ldlt.vectorD().minCoeff() < 1e-9) return fit;
-    if (round < kRounds) fit.t += ldlt.solve(b);
+  const Eigen::Matrix3d R = fit.T_current_previous.R();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!use[i] || pairs[i].depth_previous <= 0) continue;
+    Eigen::Vector2d r;
+    Eigen::Matrix<double, 2, 3> J_p;
+    if (!reprojectionOf(pairs[i], R, fit.T_current_previous.t(), &r, &J_p)) continue;
+    Eigen::Matrix<double, 2, 6> J;
+    J.leftCols<3>() = -J_p * R * hat(Eigen::Vector3d(bearing(pairs[i].xy_previous) * pairs[i].depth_previous));
+    J.rightCols<3>() = J_p;
+    const double w = huberWeight(r.norm(), huber);
+    A += w * J.transpose() * J;
+    squares += w * r.squaredNorm();
+    ++fit.pairs;
   }
-  fit.covariance = squares / (2.0 * n - 3.0) * A.inverse();
-  fit.ok = fit.t.allFinite() && fit.covariance.allFinite();
+  if (fit.pairs < kMinPairs) return fit;
+  fit.covariance = squares / (2.0 * fit.pairs - 6.0) * A.inverse();
+  fit.ok = fit.T_current_previous.isFinite() && fit.covariance.allFinite();
   return fit;
 }
 

@@ -14,6 +14,7 @@ constexpr int kHalf = 3;        // samples to each side of the centre
 constexpr int kReach = kHalf * kSampleStep;
 constexpr int kSamples = (2 * kHalf + 1) * (2 * kHalf + 1);
 constexpr int kMinSamples = 42;
+constexpr std::size_t kMinPatches = 40;
 constexpr double kInlierSigmas = 3.5;
 constexpr double kMinCosine = 0.12;
 constexpr double kMaxTurned = 0.985;  // cosine between the normals of a pair
@@ -118,6 +119,8 @@ std::vector<SurfacePatch> SurfaceTracker::patches(const cv::Mat& depth, const Mo
   }
   return result;
 }
+
+bool SurfaceTracker::sees(const cv::Mat& depth) const { return shareNormals(patches(depth, {})).size() >= kMinPatches; }
 
 void SurfaceTracker::setReference(const cv::Mat& depth, CloneId clone, const MovingRegions& moving) {
   patches_ = shareNormals(patches(depth, moving));

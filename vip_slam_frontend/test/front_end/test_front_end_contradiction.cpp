@@ -106,7 +106,7 @@ TEST_F(ContradictionTest, ABlowThatTheImuHasOtherwiseIsSeen) {
     EXPECT_LT(error(output), 0.03) << k;
     EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << k << ' ' << output.frame->status.reason;
   }
-  EXPECT_LE(front_end_.counters().imu_shocks, 2u);
+  EXPECT_LE(front_end_.counters().imu_faults, 2u);
 }
 
 }  // namespace

@@ -21,22 +21,28 @@ struct Propagation {
   /// One sigma, along the least certain axis, of the displacement since the newest clone, m; `P` is the covariance of
   /// the state there.
   double displacementSigma(const Matrix15d& P) const;
-  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< bias-corrected rate at the end
-  RateHistory rates;                                  ///< the window's, extended to the end
+  Eigen::Matrix3d displacementCovariance(const Matrix15d& P) const;  ///< of the displacement, world axes, m^2
+  Eigen::Matrix3d turnCovariance(const Matrix15d& P) const;          ///< of the rotation, axes at the end, rad^2
+  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();                 ///< bias-corrected rate at the end
+  bool open =
+      false;  ///< a stand-in took the IMU's place over this interval alone: the motion before and after is measured
+  RateHistory rates;  ///< the window's, extended to the end
   /// Adds to Q the error of linear interpolation between two samples that are `gap` seconds apart, for the `dt` seconds
   /// of this interval, all of which may lie in the gap.
   void admitGap(double gap, double dt);
   /// Adds to Q a rotation at an unmeasured rate of one sigma `rate`, rad/s, for `dt` seconds.
   void admitRate(double rate, double dt);
-  /// Adds to Q a velocity step of `dv` (one sigma of each axis, m/s) at an unknown moment of the `dt` seconds.
-  void admitStep(double dv, double dt);
-  bool step_admitted = false;  ///< admitStep() was called
 };
 
 /// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.
-/// `noise_scale` multiplies all noise densities; `stamp_sigma`: jitter of both images' stamps, one sigma, s. The window
-/// is not changed.
+/// `stamp_sigma`: jitter of both images' stamps, one sigma, s. The window is not changed.
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
-                      const Eigen::Vector3d& G, double noise_scale = 1.0, double stamp_sigma = 0.0);
+                      const Eigen::Vector3d& G, double stamp_sigma = 0.0);
+
+/// The body's motion since the newest clone as another source than the IMU saw it, for `dt` seconds: T_I0_I1, and its
+/// covariance (theta in the axes at the end, p in those at the beginning). The velocity becomes the mean one over the
+/// interval; of the biases `noise` gives the walk. The velocity before has no influence.
+Propagation propagateByMotion(const WindowState& window, const SE3& T_I0_I1, const Matrix6d& covariance, double dt,
+                              const ImuNoise& noise);
 
 }  // namespace vip_slam

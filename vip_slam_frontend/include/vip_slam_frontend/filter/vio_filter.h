@@ -18,6 +18,7 @@
 #include "vip_slam_frontend/filter/surface_rows.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
+#include "vip_slam_frontend/inertial/inertial_input.h"
 
 namespace vip_slam {
 
@@ -69,7 +70,10 @@ class VioFilter {
   void restartDepthOffset(bool none);
 
   /// Prediction from the newest clone over `samples` (first at its time); does not change the filter.
-  Propagation predict(const std::vector<ImuSample>& samples) const;
+  /// `noise`: of these samples, as factors on the configured densities.
+  Propagation predict(const std::vector<ImuSample>& samples, const frontend::ChannelNoise& noise = {}) const;
+  /// Likewise by the motion that another source saw, see propagateByMotion().
+  Propagation predict(const SE3& T_I0_I1, const Matrix6d& covariance, double dt) const;
   /// One image: `propagation` from predict(). Without measurements this coasts. `surfaces` (may be null) ties the new
   /// image's depth to that of an earlier clone. `residual_motion`: see StillnessDetector; empty when the body moves.
   StepReport step(const Propagation& propagation, CloneId id, const std::vector<FilterMeasurement>& measurements,
@@ -198,7 +202,7 @@ class VioFilter {
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
   bool depth_contradicts_ = false;     ///< its offset became implausibly large
   int still_images_ = 0;               ///< images since standing still began; 0 when moving
-  bool after_step_ = false;            ///< the propagation before admitted a velocity step
+  bool after_open_ = false;            ///< the propagation before left the motion open
   std::optional<Delay> delay_before_;  ///< the value held; empty while the delay is estimated
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none

@@ -55,7 +55,7 @@ struct TrackingResult {
   int lost_outlier = 0;
   bool pose_ok = false;  ///< RANSAC gave a metric pose
   SE3 T_current_previous;
-  TranslationFit step;  ///< translation between the images, given the predicted rotation
+  MotionFit motion;  ///< between the images, by the points with depth that agree
   /// Most of the view moves independently of the camera: only points that agree with the IMU were kept.
   bool moves_by_itself = false;
   MovingRegions regions;

@@ -49,14 +49,14 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
 bool refinePose(const std::vector<PointPair>& pairs, const std::vector<char>& use, double huber,
                 SE3* T_current_previous);
 
-/// The best translation, metres, for a given rotation, and its covariance from the pairs.
-struct TranslationFit {
+/// The motion that the points with depth show, and its covariance in SE3::boxplus' order, by the scatter of the pairs.
+struct MotionFit {
   bool ok = false;
-  Eigen::Vector3d t = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  SE3 T_current_previous;
+  Matrix6d covariance = Matrix6d::Zero();
+  int pairs = 0;
 };
-/// Huber-weighted at `huber` over the pairs with depth in `use`; the noise is estimated from their residuals.
-TranslationFit fitTranslation(const std::vector<PointPair>& pairs, const std::vector<char>& use,
-                              const Eigen::Matrix3d& R_current_previous, const Eigen::Vector3d& start, double huber);
+/// refinePose() over the pairs in `use`, from `start`.
+MotionFit fitMotion(const std::vector<PointPair>& pairs, const std::vector<char>& use, const SE3& start, double huber);
 
 }  // namespace vip_slam

@@ -25,6 +25,8 @@ class SurfaceTracker {
   /// Patches of an image, at most one per cell of the raster; none where the surface is not flat, is seen too obliquely
   /// or belongs to a moving region.
   std::vector<SurfacePatch> patches(const cv::Mat& depth, const MovingRegions& moving = {}) const;
+  /// Whether a depth image shows enough flat patches for matches to hold a motion.
+  bool sees(const cv::Mat& depth) const;
   /// The image of `clone` becomes the reference, with those of its patches that lie on planes.
   void setReference(const cv::Mat& depth, CloneId clone, const MovingRegions& moving = {});
   void clear();

@@ -1,0 +1,46 @@
+// Fault detection and isolation of the IMU. Each interval between two images has two witnesses of the camera's motion:
+// the IMU, and the points with depth in the images. Their difference, in sigmas of both, is tested. The images are only
+// heard when they agree among themselves: most points follow one motion, and nothing in view has moved by itself
+// lately. Then the IMU is at fault in an interval
+// - that contradicts them all of a sudden, after a time of agreement (a shock, saturation, shaking), and in those after
+//   it for as long as they contradict, or
+// - when most of the last second does (axes, signs or units).
+// A body that fills the view contradicts the IMU gradually, while parts of the view still agree with it: neither rule
+// takes it for a fault of the IMU.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam::frontend {
+
+struct MotionEvidence {
+  double t = 0;               ///< end of the interval, IMU clock, s
+  double interval = 0;        ///< s
+  bool images_agree = false;  ///< among themselves
+  double sigmas = 0;          ///< difference between the two motions
+};
+
+class FaultDetection {
+ public:
+  /// Adds one interval; whether the IMU is at fault in it.
+  bool add(const MotionEvidence& evidence);
+  /// Whether the IMU was at fault a moment before `t`: the images' prediction is the better one then.
+  bool suspects(double t) const { return t - last_fault_t_ < kSuspicion; }
+  /// A start: no agreement has been seen yet.
+  void reset(double t);
+
+ private:
+  static constexpr double kSuspicion = 0.3;  ///< s
+
+  double last_fault_t_ = -1e300;
+  double doubt_t_ = -1e300;  ///< last interval that deviated, or that gave no test
+  double began_t_ = -1e300;  ///< first such interval after agreement: a fault may begin there
+  double contradicted_ = 0;  ///< share of the last second
+};
+
+/// Squared difference of two motions, T_current_previous, over their covariances (theta, t), as a number of sigmas.
+double motionDifference(const SE3& a, const SE3& b, const Matrix6d& covariance);
+
+}  // namespace vip_slam::frontend
