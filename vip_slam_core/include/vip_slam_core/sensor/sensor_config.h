@@ -37,6 +37,8 @@ struct SensorConfig {
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();    ///< px, see depth_shift.h
   DepthCurve depth_curve;                                   ///< distance-dependent correction, applied after that
   bool depth_registered = true;                             ///< depth pixels belong to the colour camera
+  /// Registered depth lies in the colour camera's image without distortion, though the colour image has some.
+  bool depth_undistorted = false;
   double color_rate = 30, depth_rate = 30, imu_rate = 200;  ///< Hz, nominal; for checks and messages
 
   double rolling_shutter = 0;  ///< colour: seconds from first to last row, stamp at the middle row; 0: global shutter
