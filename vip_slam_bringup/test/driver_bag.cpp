@@ -193,8 +193,8 @@ void writeImu(Writer* out, const DriverBagOptions& o, const Motion& motion, doub
     }
     return m;
   };
-  const auto stream = [&](const std::string& topic, double rate, double phase, const std::string& frame,
-                          bool gyro, bool accel) {
+  const auto stream = [&](const std::string& topic, double rate, double phase, const std::string& frame, bool gyro,
+                          bool accel) {
     if (topic.empty()) return;
     for (int k = 0; k < end * rate; ++k) {
       const double t = phase + k / rate;
@@ -226,8 +226,7 @@ void writeTf(Writer* out, const DriverBagOptions& o) {
   if (o.edges.empty()) {
     edge("base_link", "camera_link", SE3());
     edge("camera_link", o.frames.color, SE3());
-    for (const std::string& imu : {o.frames.imu, o.frames.gyro})
-      edge("camera_link", imu, o.sensor.T_imu_cam.inverse());
+    for (const std::string& imu : {o.frames.imu, o.frames.gyro}) edge("camera_link", imu, o.sensor.T_imu_cam.inverse());
   }
   out->write("/tf_static", 0, message);
 }

@@ -186,7 +186,8 @@ LaunchInclude readLaunch(const std::string& path, const DriverLaunch& driver) {
   const std::size_t end = text.find("</include>", begin);
   const std::string before = text.substr(0, begin), block = text.substr(begin, end - begin);
   Strings ours;
-  const std::regex declared("<arg name=\"([^\"]+)\" default=\"([^\"]*)\""), given("<arg name=\"([^\"]+)\" value=\"([^\"]*)\"");
+  const std::regex declared("<arg name=\"([^\"]+)\" default=\"([^\"]*)\""),
+      given("<arg name=\"([^\"]+)\" value=\"([^\"]*)\"");
   for (std::sregex_iterator it(before.begin(), before.end(), declared), last; it != last; ++it)
     ours[(*it)[1]] = (*it)[2];
   LaunchInclude out;

@@ -26,7 +26,7 @@ struct DriverCamera {
   SensorConfig published;                    ///< topics, encodings, rates, lens, extrinsics, delay; the rest is default
   std::vector<std::string> types;            ///< ROS types of colour, depth and IMU messages
   BagFrames frames;
-  std::vector<TfEdge> edges;         ///< of the driver's tf
+  std::vector<TfEdge> edges;            ///< of the driver's tf
   std::vector<std::string> all_frames;  ///< of these, and those of messages
   double accel_rate = 250;
 

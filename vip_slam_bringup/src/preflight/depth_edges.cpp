@@ -30,8 +30,7 @@ bool jumps(float a, float b) { return a > 0 && b > 0 && std::abs(a - b) > kJump 
 }  // namespace
 
 DepthEdges::DepthEdges(const CameraIntrinsics& colour)
-    : distorted_(colour.height, colour.width, CV_32FC2,
-                 cv::Scalar::all(std::numeric_limits<double>::quiet_NaN())) {
+    : distorted_(colour.height, colour.width, CV_32FC2, cv::Scalar::all(std::numeric_limits<double>::quiet_NaN())) {
   if (largestDistortion(colour) < kMoved) return;
   const auto lens = makeCamera(colour), pinhole = makeCamera(pinholeOf(colour));
   for (int v = 0; v < colour.height; ++v) {

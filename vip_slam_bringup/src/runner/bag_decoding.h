@@ -22,8 +22,7 @@ class BagDecoding {
   /// Receives the events in order; returns false to stop.
   using Sink = std::function<bool(SensorEvent&&)>;
   /// `to_colour` and `sensor` must outlive this.
-  BagDecoding(const SensorConfig& sensor, const DepthToColour& to_colour, const BagReaderOptions& options,
-              Sink sink);
+  BagDecoding(const SensorConfig& sensor, const DepthToColour& to_colour, const BagReaderOptions& options, Sink sink);
 
   /// Throws ros::Exception when the message cannot be read from the bag.
   void take(const rosbag::MessageInstance& message);

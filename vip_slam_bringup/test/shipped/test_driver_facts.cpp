@@ -61,14 +61,14 @@ TEST_P(DriverFacts, FramesNamedInTheSensorFileExist) {
 
 TEST_P(DriverFacts, TheLaunchFilePassesWhatTheDriverHas) {
   const DriverCamera& camera = GetParam();
-  const auto include =
-      test_support::readLaunch(CONFIG_DIR "/../launch/" + camera.name + ".launch", camera.launch);
+  const auto include = test_support::readLaunch(CONFIG_DIR "/../launch/" + camera.name + ".launch", camera.launch);
   EXPECT_EQ(include.sensor, camera.sensor);
   EXPECT_EQ(include.ns, camera.ns);
   ASSERT_FALSE(camera.launch.branches.empty());
   for (const auto& [branch, arguments] : camera.launch.branches) {
     for (const auto& [name, value] : include.passed)
-      EXPECT_TRUE(arguments.count(name)) << camera.launch.file << " has no argument " << name << " on branch " << branch;
+      EXPECT_TRUE(arguments.count(name)) << camera.launch.file << " has no argument " << name << " on branch "
+                                         << branch;
     for (const auto& [name, value] : camera.needs) {
       const auto passed = include.passed.find(name);
       const auto standard = arguments.find(name);

@@ -43,9 +43,10 @@ TEST(SensorFiles, AllSensorsAreThere) {
   std::set<std::string> names;
   for (const auto& path : shipped()) names.insert(path.stem().string());
   for (const char* name :
-       {"d435i", "d435i_split", "d455", "d455_split", "l515", "l515_split", "azure_kinect", "orbbec_femto", "oak_d",
-        "phone", "euroc", "simulator", "d435", "xtion", "kinect_v1", "kinect_v2", "astra", "rgbd_imu", "d456", "d457",
-        "orbbec_femto_split", "gemini_330", "zed2", "zed2i", "zedm"})
+       {"d435i",        "d435i_split", "d455",  "d455_split", "l515",      "l515_split", "azure_kinect",
+        "orbbec_femto", "oak_d",       "phone", "euroc",      "simulator", "d435",       "xtion",
+        "kinect_v1",    "kinect_v2",   "astra", "rgbd_imu",   "d456",      "d457",       "orbbec_femto_split",
+        "gemini_330",   "zed2",        "zed2i", "zedm"})
     EXPECT_TRUE(names.count(name)) << name;
 }
 

@@ -64,16 +64,16 @@ CameraIntrinsics pinholeOf(const CameraIntrinsics& camera) {
 }
 
 double largestDistortion(const CameraIntrinsics& camera) {
-  const bool plain =
-      camera.model == DistortionModel::kNone ||
-      (camera.model == DistortionModel::kRadTan &&
-       std::all_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d == 0; }));
+  const bool plain = camera.model == DistortionModel::kNone ||
+                     (camera.model == DistortionModel::kRadTan &&
+                      std::all_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d == 0; }));
   if (plain || !camera.validate().empty()) return 0;
   const auto model = makeCamera(camera);
   double largest = 0;
   const auto look = [&](double u, double v) {
     Eigen::Vector2d xy;
-    if (model->undistort({u, v}, &xy)) largest = std::max(largest, (pinholePixel(camera, xy) - Eigen::Vector2d(u, v)).norm());
+    if (model->undistort({u, v}, &xy))
+      largest = std::max(largest, (pinholePixel(camera, xy) - Eigen::Vector2d(u, v)).norm());
   };
   for (int u = 0; u < camera.width; ++u)
     for (const int v : {0, camera.height - 1}) look(u, v);

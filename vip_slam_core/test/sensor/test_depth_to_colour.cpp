@@ -69,7 +69,7 @@ TEST(DepthToColour, UndistortedDepthIsBroughtToTheLens) {
       wrong += !like;
     }
   EXPECT_EQ(wrong, 0);
-  EXPECT_GT(as_published, 5000);       // the lens matters here
+  EXPECT_GT(as_published, 5000);        // the lens matters here
   EXPECT_GT(inside, 0.85 * 640 * 480);  // a barrel sees more than the camera without its lens
   EXPECT_EQ(inside + outside, 640 * 480);
 }

@@ -26,7 +26,8 @@ class DepthToColour {
 
  private:
   std::optional<DepthRegistration> registration_;  ///< depth/registered is false
-  cv::Mat source_;  ///< depth/undistorted is true: 32SC1, index of each colour pixel's depth pixel, row-major; -1 without one
+  cv::Mat source_;  ///< depth/undistorted is true: 32SC1, index of each colour pixel's depth pixel, row-major; -1
+                    ///< without one
 };
 
 /// The camera without its lens: the same focal lengths and principal point, no distortion.
