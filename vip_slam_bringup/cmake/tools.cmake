@@ -9,11 +9,13 @@ add_library(vip_slam_bringup
   src/convert/text_table.cpp
   src/convert/tum_rgbd.cpp
   src/parameter_reference.cpp
+  src/preflight/check_depth_geometry.cpp
   src/preflight/check_images.cpp
   src/preflight/check_imu.cpp
   src/preflight/check_motion.cpp
   src/preflight/check_streams.cpp
   src/preflight/check_tf.cpp
+  src/preflight/depth_edges.cpp
   src/preflight/findings.cpp
   src/preflight/image_rotation.cpp
   src/preflight/readout.cpp
@@ -48,8 +50,10 @@ install(DIRECTORY config launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 
 if(CATKIN_ENABLE_TESTING)
-  add_library(${PROJECT_NAME}_driver_bag test/driver_bag.cpp)
-  target_link_libraries(${PROJECT_NAME}_driver_bag vip_slam_bringup)
+  add_library(${PROJECT_NAME}_driver_bag test/driver_bag.cpp test/driver_facts.cpp)
+  target_link_libraries(${PROJECT_NAME}_driver_bag vip_slam_bringup yaml-cpp)
+  target_compile_definitions(${PROJECT_NAME}_driver_bag PRIVATE
+    DRIVER_TABLES="${CMAKE_CURRENT_SOURCE_DIR}/test/drivers")
   vip_slam_add_test_folders(${PROJECT_NAME}_driver_bag vip_slam_bringup vip_slam_runner)
   foreach(test ${vip_slam_test_programs})
     target_compile_definitions(${test} PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config"

@@ -13,6 +13,7 @@
 
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_core/geometry/so3.h"
+#include "vip_slam_core/sensor/depth_to_colour.h"
 
 namespace vip_slam::test_support {
 namespace {
@@ -89,13 +90,23 @@ class Room {
   cv::Mat noise_;
 };
 
-void render(const Room& room, const SE3& T_W_C, const CameraIntrinsics& camera, cv::Mat* grey, cv::Mat* depth) {
-  grey->create(camera.height, camera.width, CV_8UC1);
-  depth->create(camera.height, camera.width, CV_32FC1);
-  for (int v = 0; v < camera.height; ++v)
-    for (int u = 0; u < camera.width; ++u)
-      room.look(T_W_C, Eigen::Vector3d((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1),
-                &grey->at<std::uint8_t>(v, u), &depth->at<float>(v, u));
+/// Directions (x, y, 1) of all pixels.
+std::vector<Eigen::Vector3d> raysOf(const CameraIntrinsics& intrinsics) {
+  const auto camera = makeCamera(intrinsics);
+  std::vector<Eigen::Vector3d> rays;
+  for (int v = 0; v < intrinsics.height; ++v)
+    for (int u = 0; u < intrinsics.width; ++u) {
+      Eigen::Vector2d xy;
+      camera->undistort(Eigen::Vector2d(u, v), &xy);
+      rays.emplace_back(xy.x(), xy.y(), 1);
+    }
+  return rays;
+}
+
+void render(const Room& room, const SE3& T_W_C, const std::vector<Eigen::Vector3d>& rays, cv::Mat* grey,
+            cv::Mat* depth) {
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    room.look(T_W_C, rays[i], grey->ptr<std::uint8_t>() + i, depth->ptr<float>() + i);
 }
 
 class Writer {
@@ -123,7 +134,7 @@ class Writer {
 
 void writeColor(Writer* out, const DriverBagOptions& o, double t, const cv::Mat& grey) {
   const std::string encoding = o.other_encoding.empty() ? o.sensor.color_encoding : o.other_encoding;
-  const auto header = out->header(t, "camera_color_optical_frame");
+  const auto header = out->header(t, o.frames.color);
   cv::Mat bgr, image = grey;
   cv::cvtColor(grey, bgr, cv::COLOR_GRAY2BGR);
   if (encoding == "compressed") {
@@ -143,7 +154,7 @@ void writeColor(Writer* out, const DriverBagOptions& o, double t, const cv::Mat&
 
 void writeDepth(Writer* out, const DriverBagOptions& o, double t, const cv::Mat& metres) {
   const double stamp = t + o.depth_skew;
-  const auto header = out->header(stamp, "camera_color_optical_frame");
+  const auto header = out->header(stamp, o.frames.depth);
   cv::Mat depth = o.depth_unit_factor * metres, small;
   if (o.depth_divisor > 1) {
     cv::resize(depth, small, depth.size() / o.depth_divisor, 0, 0, cv::INTER_NEAREST);
@@ -165,7 +176,7 @@ void writeDepth(Writer* out, const DriverBagOptions& o, double t, const cv::Mat&
 }
 
 void writeImu(Writer* out, const DriverBagOptions& o, const Motion& motion, double end) {
-  const auto message = [&](double t, const char* frame, bool gyro, bool accel) {
+  const auto message = [&](double t, const std::string& frame, bool gyro, bool accel) {
     const ImuSample s = motion.sampleAt(t, o.gravity);
     sensor_msgs::Imu m;
     m.header = out->header(t, frame);
@@ -182,7 +193,7 @@ void writeImu(Writer* out, const DriverBagOptions& o, const Motion& motion, doub
     }
     return m;
   };
-  const auto stream = [&](const std::string& topic, double rate, double phase, const char* frame, bool gyro,
+  const auto stream = [&](const std::string& topic, double rate, double phase, const std::string& frame, bool gyro,
                           bool accel) {
     if (topic.empty()) return;
     for (int k = 0; k < end * rate; ++k) {
@@ -191,9 +202,9 @@ void writeImu(Writer* out, const DriverBagOptions& o, const Motion& motion, doub
       out->write(topic, t, message(t, frame, gyro, accel));
     }
   };
-  stream(o.sensor.topics.imu, o.sensor.imu_rate, 0, "camera_imu_optical_frame", true, true);
-  stream(o.sensor.topics.gyro, o.sensor.imu_rate, 0, "camera_gyro_optical_frame", true, false);
-  stream(o.sensor.topics.accel, 250, 0.0013, "camera_accel_optical_frame", false, true);
+  stream(o.sensor.topics.imu, o.sensor.imu_rate, 0, o.frames.imu, true, true);
+  stream(o.sensor.topics.gyro, o.sensor.imu_rate, 0, o.frames.gyro, true, false);
+  stream(o.sensor.topics.accel, o.accel_rate, 0.0013, o.frames.accel, false, true);
 }
 
 void writeTf(Writer* out, const DriverBagOptions& o) {
@@ -211,10 +222,12 @@ void writeTf(Writer* out, const DriverBagOptions& o) {
     t.transform.rotation.z = T.rotation().z();
     message.transforms.push_back(t);
   };
-  edge("base_link", "camera_link", SE3());
-  edge("camera_link", "camera_color_optical_frame", SE3());
-  for (const char* imu : {"camera_imu_optical_frame", "camera_gyro_optical_frame"})
-    edge("camera_link", imu, o.sensor.T_imu_cam.inverse());
+  for (const TfEdge& e : o.edges) edge(e.parent, e.child, e.T_parent_child);
+  if (o.edges.empty()) {
+    edge("base_link", "camera_link", SE3());
+    edge("camera_link", o.frames.color, SE3());
+    for (const std::string& imu : {o.frames.imu, o.frames.gyro}) edge("camera_link", imu, o.sensor.T_imu_cam.inverse());
+  }
   out->write("/tf_static", 0, message);
 }
 
@@ -234,23 +247,37 @@ Trajectory writeDriverBag(const std::string& path, const DriverBagOptions& o) {
   const CameraIntrinsics rendered = half ? camera.scaled(camera.width / 2, camera.height / 2) : camera;
   Trajectory truth;
   const double rate = o.sensor.color_rate * o.image_rate_factor;
+  const bool own_depth = o.sensor.depth_undistorted;
+  const std::vector<Eigen::Vector3d> rays = raysOf(rendered),
+                                     depth_rays = own_depth ? raysOf(pinholeOf(rendered)) : rays;
   cv::Mat grey, depth;
   for (int k = 0; k < end * rate; ++k) {
     const double t = 0.02 + k / rate, t_imu = t + o.sensor.time_offset;
     if (t > end) break;
     const bool again = o.repeat_every > 0 && k % o.repeat_every == o.repeat_every - 1;
-    if (!again) render(room, motion.cameraAt(t_imu), rendered, &grey, &depth);
+    if (!again) {
+      grey.create(rendered.height, rendered.width, CV_8UC1);
+      depth.create(rendered.height, rendered.width, CV_32FC1);
+      render(room, motion.cameraAt(t_imu), rays, &grey, &depth);
+      cv::Mat unused(grey.size(), CV_8UC1);
+      if (own_depth) render(room, motion.cameraAt(t_imu), depth_rays, &unused, &depth);
+    }
     if (half && !again) {
       cv::resize(grey, grey, {camera.width, camera.height}, 0, 0, cv::INTER_LINEAR);
       cv::resize(depth, depth, {camera.width, camera.height}, 0, 0, cv::INTER_LINEAR);
     }
     writeColor(&out, o, t, grey);
     writeDepth(&out, o, t, depth);
-    sensor_msgs::CameraInfo info = cameraInfo(camera, out.header(t, "camera_color_optical_frame"));
-    if (!o.calibrated) info.K.fill(0.0);
-    out.write(o.sensor.topics.color_info, t, info);
-    info.header = out.header(t + o.depth_skew, "camera_color_optical_frame");
-    out.write(o.sensor.topics.depth_info, t + o.depth_skew, info);
+    const auto writeInfo = [&](const std::string& topic, const CameraIntrinsics& of, double stamp,
+                               const std::string& frame) {
+      sensor_msgs::CameraInfo info = cameraInfo(of, out.header(stamp, frame));
+      if (!o.calibrated) info.K.fill(0.0);
+      out.write(topic, stamp, info);
+    };
+    const SensorTopics& topics = o.sensor.topics;
+    writeInfo(topics.color_info, camera, t, o.frames.color);
+    if (topics.depth_info != topics.color_info)
+      writeInfo(topics.depth_info, own_depth ? pinholeOf(camera) : camera, t + o.depth_skew, o.frames.depth);
     truth.push_back({kStart + t, motion.imuAt(t_imu)});
   }
   return truth;

@@ -4,14 +4,33 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
+#include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 
 namespace vip_slam::test_support {
 
+/// Frames of the messages.
+struct BagFrames {
+  std::string color = "camera_color_optical_frame", depth = "camera_color_optical_frame";
+  std::string imu = "camera_imu_optical_frame", gyro = "camera_gyro_optical_frame",
+              accel = "camera_accel_optical_frame";
+};
+
+struct TfEdge {
+  std::string parent, child;
+  SE3 T_parent_child;
+};
+
 struct DriverBagOptions {
-  SensorConfig sensor;        ///< topics, encodings, rates and extrinsics of the bag
+  /// Topics, encodings, rates, extrinsics, lens of the bag; with depth_undistorted the depth image is rendered without
+  /// the lens, and its camera_info has no distortion.
+  SensorConfig sensor;
+  BagFrames frames;
+  std::vector<TfEdge> edges;  ///< of /tf_static; empty: the extrinsics below camera_link
+  double accel_rate = 250;    ///< Hz, of a stream of its own
   double still = 0.6;         ///< seconds at the start
   double moving = 2.0;        ///< seconds after it
   int width = 0, height = 0;  ///< of the images; 0: as the sensor file's camera

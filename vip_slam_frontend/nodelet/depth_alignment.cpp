@@ -7,22 +7,17 @@
 namespace vip_slam {
 
 DepthAlignment::DepthAlignment(const SensorConfig& sensor)
-    : color_topic_(sensor.topics.color), depth_topic_(sensor.topics.depth) {
-  if (sensor.depth_registered) return;
-  registration_.emplace(makeCamera(sensor.depth_camera), makeCamera(sensor.camera), sensor.T_color_depth.matrix());
-}
+    : color_topic_(sensor.topics.color), depth_topic_(sensor.topics.depth), to_colour_(sensor) {}
 
 cv::Mat DepthAlignment::align(const cv::Mat& depth, const cv::Size& color, std::string* problem) const {
   problem->clear();
   if (depth.empty()) return depth;
-  cv::Mat aligned = depth;
-  if (registration_) {
-    try {
-      aligned = (*registration_)(depth);
-    } catch (const std::exception& error) {
-      *problem = depth_topic_ + ": " + error.what() + ": depth is not used";
-      return {};
-    }
+  cv::Mat aligned;
+  try {
+    aligned = to_colour_(depth);
+  } catch (const std::exception& error) {
+    *problem = depth_topic_ + ": " + error.what() + ": depth is not used";
+    return {};
   }
   if (aligned.size() != color) {
     *problem =

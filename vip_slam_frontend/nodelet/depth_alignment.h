@@ -2,28 +2,26 @@
 // wrongly configured camera costs the depth and not the odometry.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include <opencv2/core.hpp>
 
-#include "vip_slam_core/depth/depth_image.h"
-#include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/sensor/depth_to_colour.h"
 
 namespace vip_slam {
 
 class DepthAlignment {
  public:
-  /// Throws std::invalid_argument when depth is to be registered and a camera is unusable.
+  /// Throws std::invalid_argument when depth is to be registered or distorted and a camera is unusable.
   explicit DepthAlignment(const SensorConfig& sensor);
 
-  /// `depth`: metres, may be empty. Without registration it is returned unchanged, also when it does not fit; else
-  /// registered, or empty. `problem`: what does not fit, in words; empty when all fits.
+  /// `depth`: metres, may be empty. Depth that is as the colour image already is returned unchanged, also when it does
+  /// not fit; else aligned, or empty. `problem`: what does not fit, in words; empty when all fits.
   cv::Mat align(const cv::Mat& depth, const cv::Size& color, std::string* problem) const;
 
  private:
   std::string color_topic_, depth_topic_;
-  std::optional<DepthRegistration> registration_;  ///< empty: the driver registers
+  DepthToColour to_colour_;
 };
 
 }  // namespace vip_slam

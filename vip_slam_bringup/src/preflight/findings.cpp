@@ -39,7 +39,7 @@ const char* paint(Severity severity) {
 
 Findings checkAll(const Recording& r) {
   Findings out;
-  for (const auto check : {checkTopics, checkRates, checkImages, checkSkew, checkImu}) {
+  for (const auto check : {checkTopics, checkRates, checkImages, checkDepthGeometry, checkSkew, checkImu}) {
     const Findings found = check(r);
     out.insert(out.end(), found.begin(), found.end());
   }

@@ -33,6 +33,16 @@ Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds) 
 void Recorder::startRotation(const CameraIntrinsics& camera) {
   rotation_ = std::make_unique<ImageRotation>(makeCamera(camera), recording_.sensor.mask);
   rotation_size_ = cv::Size(camera.width, camera.height);
+  if (!recording_.sensor.depth_registered) return;
+  SensorConfig resolved = recording_.sensor;
+  resolved.camera = camera;
+  to_colour_ = std::make_unique<DepthToColour>(resolved);
+  depth_edges_ = std::make_unique<DepthEdges>(camera);
+}
+
+void Recorder::finish() {
+  flushGray(true);
+  if (depth_edges_) recording_.depth_edges = depth_edges_->record();
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message,
@@ -179,9 +189,11 @@ void Recorder::flushGray(bool all) {
     for (const Stamped& d : recent_depth_)
       if (std::abs(d.t - gray.t) < 0.02 && d.image.size() == gray.image.size()) depth = &d.image;
     if (!depth && !all && waiting_gray_.size() < 4) return;
-    if (rotation_ && gray.image.size() == rotation_size_)
-      if (const auto step = rotation_->add(gray.t, gray.image, depth ? *depth : cv::Mat()))
-        recording_.rotations.push_back(*step);
+    if (rotation_ && gray.image.size() == rotation_size_) {
+      if (depth && depth_edges_) depth_edges_->add(gray.image, *depth);
+      const cv::Mat aligned = !depth ? cv::Mat() : to_colour_ ? (*to_colour_)(*depth) : *depth;
+      if (const auto step = rotation_->add(gray.t, gray.image, aligned)) recording_.rotations.push_back(*step);
+    }
     waiting_gray_.erase(waiting_gray_.begin());
   }
 }

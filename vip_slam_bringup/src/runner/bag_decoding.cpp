@@ -38,10 +38,10 @@ PairerOptions pairing(const InputOptions& input) {
 
 }  // namespace
 
-BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthRegistration* registration,
-                         const BagReaderOptions& options, Sink sink)
+BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthToColour& to_colour, const BagReaderOptions& options,
+                         Sink sink)
     : sensor_(sensor),
-      registration_(registration),
+      to_colour_(to_colour),
       options_(options),
       sink_(std::move(sink)),
       pairer_(pairing(options.input)),
@@ -72,7 +72,7 @@ void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
   auto [t, depth, stamp] = stampedImage(message, [&](const auto& m, const auto&...) {
     return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset);
   });
-  if (registration_) depth = (*registration_)(depth);
+  depth = to_colour_(depth);
   if (!color_size_.empty() && depth.size() != color_size_)
     complain("sizes", "topic " + message.getTopic() + ": depth is " + sizeText(depth.size()) +
                           ", the colour images are " + sizeText(color_size_) +

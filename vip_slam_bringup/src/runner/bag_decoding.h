@@ -12,7 +12,7 @@
 #include <rosbag/message_instance.h>
 
 #include "vip_slam_bringup/runner/bag_reader.h"
-#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/sensor/depth_to_colour.h"
 #include "vip_slam_ros/stream_clock.h"
 
 namespace vip_slam {
@@ -21,9 +21,8 @@ class BagDecoding {
  public:
   /// Receives the events in order; returns false to stop.
   using Sink = std::function<bool(SensorEvent&&)>;
-  /// `registration` may be null: depth is registered already. It and `sensor` must outlive this.
-  BagDecoding(const SensorConfig& sensor, const DepthRegistration* registration, const BagReaderOptions& options,
-              Sink sink);
+  /// `to_colour` and `sensor` must outlive this.
+  BagDecoding(const SensorConfig& sensor, const DepthToColour& to_colour, const BagReaderOptions& options, Sink sink);
 
   /// Throws ros::Exception when the message cannot be read from the bag.
   void take(const rosbag::MessageInstance& message);
@@ -48,7 +47,7 @@ class BagDecoding {
   void complain(const std::string& about, const std::string& words);
 
   const SensorConfig& sensor_;
-  const DepthRegistration* registration_;
+  const DepthToColour& to_colour_;
   const BagReaderOptions options_;
   Sink sink_;
   ImagePairer pairer_;

@@ -9,7 +9,7 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include "vip_slam_bringup/runner/bag_extrinsics.h"
-#include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/sensor/depth_to_colour.h"
 #include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/tf_lookup.h"
@@ -33,7 +33,7 @@ std::string join(const std::set<std::string>& names) {
 struct BagReader::Source {
   rosbag::Bag bag;
   ros::Time begin, end;
-  std::unique_ptr<const DepthRegistration> registration;  // only for depth that is not registered
+  std::unique_ptr<const DepthToColour> to_colour;
 
   void open(const std::string& path) {
     openBag(path, &bag);
@@ -97,10 +97,7 @@ BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagRea
       sensor.depth_camera = source_->cameraInfo(sensor.topics.depth_info, sensor.topics.depth);
     }
   }
-  if (!sensor.depth_registered) {
-    source_->registration = std::make_unique<DepthRegistration>(
-        makeCamera(sensor.depth_camera), makeCamera(sensor.camera), sensor.T_color_depth.matrix());
-  }
+  source_->to_colour = std::make_unique<DepthToColour>(sensor);
 
   rosbag::View all(source_->bag);
   source_->begin = all.getBeginTime() + ros::Duration(std::max(0.0, options.start));
@@ -164,7 +161,7 @@ void BagReader::read() {
   for (const auto& name : {topics.color, topics.depth, topics.imu, topics.gyro, topics.accel}) {
     if (!name.empty()) names.push_back(name);
   }
-  BagDecoding decoding(sensor_, source_->registration.get(), options_,
+  BagDecoding decoding(sensor_, *source_->to_colour, options_,
                        [this](SensorEvent&& event) { return channel_.push(std::move(event)); });
   const auto report = [&] {
     counters_ = decoding.counters();

@@ -288,6 +288,17 @@ TEST_F(CheckBag, WithoutAnImuItIsSaidAndNoError) {
   EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
 }
 
+TEST_F(CheckBag, RegisteredDepthWithoutTheLensIsNamed) {
+  options_.sensor.camera.distortion = {-0.12, 0.02, 0.0, 0.0, 0.0};
+  options_.sensor.depth_undistorted = true;
+  const Findings findings = check();
+  expectFound(findings, Severity::kWarning, "depth camera_info", "has no distortion, that of colour has up to");
+  expectNoErrorBut(findings, "");
+  expected_.depth_undistorted = true;
+  for (const Finding& f : check())
+    EXPECT_FALSE(f.about == "depth camera_info" && f.severity == Severity::kWarning) << f.text;
+}
+
 TEST_F(CheckBag, ImagesThatComeAgain) {
   options_.repeat_every = 5;
   expectFound(check(), Severity::kWarning, "colour image", "repeat the pixels of the one before");

@@ -101,6 +101,41 @@ TEST_F(BagReaderTest, OfTimesThatComeTwiceTheFirstPassCounts) {
   EXPECT_GT(pipeline.images(), 1.5 * odometry.size());
 }
 
+TEST_F(BagReaderTest, DepthWithoutTheLensIsBroughtToTheColourImage) {
+  options_.still = 0.2;
+  options_.moving = 0.6;
+  options_.sensor.camera.model = DistortionModel::kRadTan;
+  options_.sensor.camera.distortion = {-0.12, 0.02, 0.0, 0.0, 0.0};
+  const auto depths = [&](bool published_without_lens, bool sensor_file_says_so) {
+    options_.sensor.depth_undistorted = published_without_lens;
+    test_support::writeDriverBag(bag_, options_);
+    SensorConfig sensor = options_.sensor;
+    sensor.depth_undistorted = sensor_file_says_so;
+    BagReader reader(bag_, sensor);
+    std::vector<cv::Mat> out;
+    reader.start();
+    while (const auto event = reader.next())
+      if (const auto* pair = std::get_if<ImagePair>(&*event)) out.push_back(pair->depth);
+    return out;
+  };
+  // Share of the pixels that are off by more than neighbouring pixels of these slanted walls are.
+  const auto wrong = [](const std::vector<cv::Mat>& seen, const std::vector<cv::Mat>& truth) {
+    double off = 0, all = 0;
+    for (std::size_t i = 0; i < std::min(seen.size(), truth.size()); ++i) {
+      if (seen[i].empty()) continue;
+      const cv::Mat valid = seen[i] > 0;
+      all += cv::countNonZero(valid);
+      off += cv::countNonZero((cv::abs(seen[i] - truth[i]) > 0.02f * truth[i]) & valid);
+    }
+    return off / all;
+  };
+  const std::vector<cv::Mat> truth = depths(false, false), brought = depths(true, true), left = depths(true, false);
+  ASSERT_GT(truth.size(), 15u);
+  ASSERT_EQ(brought.size(), truth.size());
+  EXPECT_LT(wrong(brought, truth), 0.001);
+  EXPECT_GT(wrong(left, truth), 0.02);
+}
+
 TEST_F(BagReaderTest, OfADamagedBagTheRestIsRead) {
   test_support::writeDriverBag(bag_, options_);
   std::string sound;

@@ -43,8 +43,10 @@ TEST(SensorFiles, AllSensorsAreThere) {
   std::set<std::string> names;
   for (const auto& path : shipped()) names.insert(path.stem().string());
   for (const char* name :
-       {"d435i", "d435i_split", "d455", "d455_split", "l515", "l515_split", "azure_kinect", "orbbec_femto", "oak_d",
-        "phone", "euroc", "simulator", "d435", "xtion", "kinect_v1", "kinect_v2", "astra", "rgbd_imu"})
+       {"d435i",        "d435i_split", "d455",  "d455_split", "l515",      "l515_split", "azure_kinect",
+        "orbbec_femto", "oak_d",       "phone", "euroc",      "simulator", "d435",       "xtion",
+        "kinect_v1",    "kinect_v2",   "astra", "rgbd_imu",   "d456",      "d457",       "orbbec_femto_split",
+        "gemini_330",   "zed2",        "zed2i", "zedm"})
     EXPECT_TRUE(names.count(name)) << name;
 }
 
@@ -105,6 +107,7 @@ TEST(SensorFiles, SavingAndLoadingChangesNothing) {
     const SensorConfig again = loadSensorConfig(copy);
     EXPECT_EQ(again.topics.color, sensor.topics.color);
     EXPECT_EQ(again.depth_encoding, sensor.depth_encoding);
+    EXPECT_EQ(again.depth_undistorted, sensor.depth_undistorted);
     EXPECT_LT((again.T_imu_cam.matrix() - sensor.T_imu_cam.matrix()).norm(), 1e-12);
     EXPECT_EQ(again.depth_noise.c, sensor.depth_noise.c);
     EXPECT_EQ(keysOf(YAML::LoadFile(copy)), keysOf(YAML::LoadFile(path.string())));

@@ -137,6 +137,11 @@ void readDepth(Section depth, SensorConfig* config) {
   if (!bent.empty()) throw std::runtime_error("depth/curve: " + bent);
   depth.number("rate", config->depth_rate, 0.1, 1000);
   depth.get("registered", config->depth_registered);
+  depth.get("undistorted", config->depth_undistorted, false);
+  if (config->depth_undistorted && !config->depth_registered)
+    throw std::runtime_error(
+        "depth/undistorted: is true though depth/registered is false, expected false: depth_camera says how the depth "
+        "image is distorted");
   depth.number("rolling_shutter", config->depth_rolling_shutter, 0, 0.1, false);
   depth.finish();
 }
@@ -264,6 +269,7 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << ", " << formatDouble(config.depth_shift.y()) << "]\n  curve: " << list(config.depth_curve.added)
       << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
+      << "\n  undistorted: " << (config.depth_undistorted ? "true" : "false")
       << "\n  rolling_shutter: " << formatDouble(config.depth_rolling_shutter)
       << "\nintrinsics_from_camera_info: " << (config.intrinsics_from_camera_info ? "true" : "false") << "\n";
   if (config.camera.width > 0) writeCamera(out, "camera", config.camera);

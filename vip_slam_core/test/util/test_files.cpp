@@ -239,6 +239,7 @@ TEST_F(FileFormats, SensorRoundTrip) {
 
   SensorConfig plain = sensor();
   plain.depth_registered = true;
+  plain.depth_undistorted = true;
   plain.intrinsics_from_camera_info = true;
   plain.camera = CameraIntrinsics();
   plain.topics.imu = "/imu";
@@ -246,6 +247,7 @@ TEST_F(FileFormats, SensorRoundTrip) {
   saveSensorConfig(path("s2.yaml"), plain);
   const SensorConfig back = loadSensorConfig(path("s2.yaml"));
   EXPECT_TRUE(back.depth_registered);
+  EXPECT_TRUE(back.depth_undistorted);
   EXPECT_TRUE(back.intrinsics_from_camera_info);
   EXPECT_EQ(back.topics.imu, "/imu");
 }

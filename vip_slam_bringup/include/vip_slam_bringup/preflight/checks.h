@@ -31,10 +31,11 @@ using Findings = std::vector<Finding>;
 Findings checkTopics(const Recording& recording);  ///< topics exist, have the right type, have messages
 Findings checkRates(const Recording& recording);   ///< rates, missing messages, order of stamps, stamps against clock
 Findings checkImages(const Recording& recording);  ///< encodings, sizes, camera_info, depth values
-Findings checkSkew(const Recording& recording);    ///< colour against depth stamps
-Findings checkImu(const Recording& recording);     ///< gaps, units, gravity, values that never change
-Findings checkMotion(const Recording& recording);  ///< camera-IMU delay and rotation from the motion itself
-Findings checkTf(const Recording& recording);      ///< frames, and extrinsics against the sensor file
+Findings checkDepthGeometry(const Recording& recording);  ///< depth with or without the lens of the colour camera
+Findings checkSkew(const Recording& recording);           ///< colour against depth stamps
+Findings checkImu(const Recording& recording);            ///< gaps, units, gravity, values that never change
+Findings checkMotion(const Recording& recording);         ///< camera-IMU delay and rotation from the motion itself
+Findings checkTf(const Recording& recording);             ///< frames, and extrinsics against the sensor file
 
 /// T_imu_cam of the recording's tf, which the system prefers to the sensor file's; empty when tf does not have it.
 std::optional<SE3> extrinsicsOfTf(const Recording& recording);

@@ -10,8 +10,10 @@
 #include <sensor_msgs/Imu.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include "vip_slam_bringup/preflight/depth_edges.h"
 #include "vip_slam_bringup/preflight/image_rotation.h"
 #include "vip_slam_bringup/preflight/recording.h"
+#include "vip_slam_core/sensor/depth_to_colour.h"
 #include "vip_slam_frontend/tracking/frozen_depth.h"
 #include "vip_slam_ros/image_decoding.h"
 
@@ -32,7 +34,7 @@ class Recorder {
   void setTopics(std::map<std::string, std::string> topics) { recording_.topics = std::move(topics); }
 
   /// After the last message.
-  void finish() { flushGray(true); }
+  void finish();
   const Recording& recording() const { return recording_; }
 
  private:
@@ -43,13 +45,16 @@ class Recorder {
   void addGray(double t, const cv::Mat& gray);
   bool turns() const;
   void flushGray(bool all);
+  /// From when the colour camera is known.
   void startRotation(const CameraIntrinsics& camera);
 
   Recording recording_;
   const double image_seconds_;
   double first_image_ = -1;
   std::unique_ptr<ImageRotation> rotation_;
-  cv::Size rotation_size_;  ///< image size of rotation_'s camera
+  cv::Size rotation_size_;                    ///< image size of rotation_'s camera
+  std::unique_ptr<DepthToColour> to_colour_;  ///< of registered depth; null: depth is taken as it comes
+  std::unique_ptr<DepthEdges> depth_edges_;   ///< null: depth is not registered
   struct Stamped {
     double t;
     cv::Mat image;

@@ -60,6 +60,12 @@ struct BrightnessSample {
   double spread = 0;  ///< one sigma of the pixels, grey levels
 };
 
+/// Strength of the image's edges at depth edges, grey levels, one mean per image (depth_edges.h).
+struct DepthEdgeRecord {
+  std::size_t edges = 0;                          ///< pixels in all
+  std::vector<double> as_colour, as_undistorted;  ///< taking depth pixels for those of the image; of one without lens
+};
+
 struct Recording {
   SensorConfig sensor;  ///< the expected configuration
   bool live = false;
@@ -71,6 +77,7 @@ struct Recording {
   GyroRange gyro_range;
   std::vector<RotationStep> rotations;
   std::vector<DepthSample> depths;
+  DepthEdgeRecord depth_edges;                      ///< of registered depth
   std::vector<BrightnessSample> brightness;         ///< of some colour images
   std::vector<geometry_msgs::TransformStamped> tf;  ///< newest transform of each edge
 };

@@ -35,9 +35,11 @@ struct SensorConfig {
   std::string depth_encoding = "16UC1";  ///< 16UC1, 32FC1 or "compressed" (16-bit PNG, also compressedDepth)
   double depth_scale = 0.001;            ///< metres per unit of 16UC1
   double depth_offset = 0;               ///< metres to be added to every reading
-  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();    ///< px, see depth_shift.h
-  DepthCurve depth_curve;                                   ///< distance-dependent correction, applied after that
-  bool depth_registered = true;                             ///< depth pixels belong to the colour camera
+  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();  ///< px, see depth_shift.h
+  DepthCurve depth_curve;                                 ///< distance-dependent correction, applied after that
+  bool depth_registered = true;                           ///< depth pixels belong to the colour camera
+  /// Registered depth lies in the colour camera's image without distortion, though the colour image has some.
+  bool depth_undistorted = false;
   double color_rate = 30, depth_rate = 30, imu_rate = 200;  ///< Hz, nominal; for checks and messages
 
   double rolling_shutter = 0;  ///< colour: seconds from first to last row, stamp at the middle row; 0: global shutter
