@@ -9,3 +9,9 @@ target_link_libraries(phone_stand_in ${catkin_LIBRARIES} ${OpenCV_LIBRARIES} Boo
   Threads::Threads ZLIB::ZLIB)
 add_dependencies(phone_stand_in ${catkin_EXPORTED_TARGETS})
 install(TARGETS phone_stand_in RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+
+# The nodelet against the stand-in.
+if(CATKIN_ENABLE_TESTING)
+  find_package(rostest REQUIRED)
+  add_rostest(test/live/phone.test DEPENDENCIES phone_stand_in vip_slam_phone_nodelets)
+endif()
