@@ -8,7 +8,8 @@ std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& 
   std::vector<std::string> words;
   const auto stream = [&](const char* what, const StreamStatus& s, const char* remedy) {
     if (!s.connected)
-      words.push_back(std::string("no ") + what + " (" + (s.problem.empty() ? "connecting" : s.problem) + "): " + remedy);
+      words.push_back(std::string("no ") + what + " (" + (s.problem.empty() ? "connecting" : s.problem) +
+                      "): " + remedy);
     else if (!s.problem.empty())
       words.push_back(std::string(what) + ": " + s.problem);
   };

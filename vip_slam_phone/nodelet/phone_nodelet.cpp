@@ -59,9 +59,8 @@ class PhoneNodelet : public nodelet::Nodelet {
     last_look_ = ros::SteadyTime::now();
     client_ = std::make_unique<PhoneClient>(
         options, [] { return ros::Time::now().toSec(); }, [this](const Assembled& out) { publish(out); });
-    timer_ = nh.createSteadyTimer(ros::WallDuration(2.0), [this](const ros::SteadyTimerEvent&) {
-      updater_->force_update();
-    });
+    timer_ = nh.createSteadyTimer(ros::WallDuration(2.0),
+                                  [this](const ros::SteadyTimerEvent&) { updater_->force_update(); });
     NODELET_INFO("The phone at %s: video, IMU and depth on ports %d, %d, %d", options.host.c_str(), options.rtsp_port,
                  options.record_port, options.depth_port);
   }
@@ -172,9 +171,9 @@ class PhoneNodelet : public nodelet::Nodelet {
     status.add("depth images lost", now.depth.lost);
     status.add("records lost", now.assembly.imu_lost);
     status.add("images left out", now.assembly.dropped);
-    status.add("connections of video, records, depth",
-               std::to_string(now.video.connections) + ", " + std::to_string(now.records.connections) + ", " +
-                   std::to_string(now.depth.connections));
+    status.add("connections of video, records, depth", std::to_string(now.video.connections) + ", " +
+                                                           std::to_string(now.records.connections) + ", " +
+                                                           std::to_string(now.depth.connections));
     status.addf("clock offset, s", "%.4f", now.clock_offset);
     status.addf("clock slew, ppm", "%.1f", 1e6 * now.clock_slew);
     status.addf("focal length against the constant one", "%.4f", now.breathing);

@@ -34,7 +34,7 @@ PhoneStatus PhoneClient::status() const {
   return status;
 }
 
-void PhoneClient::keep(StreamStatus PhoneStatus::* stream, const std::function<void()>& receive) {
+void PhoneClient::keep(StreamStatus PhoneStatus::*stream, const std::function<void()>& receive) {
   while (!stop_) {
     std::string problem;
     try {

@@ -51,7 +51,7 @@ class PhoneClient {
   PhoneStatus status() const;
 
  private:
-  void keep(StreamStatus PhoneStatus::* stream, const std::function<void()>& receive);
+  void keep(StreamStatus PhoneStatus::*stream, const std::function<void()>& receive);
   void receiveRecords();
   void receiveVideo();
   void receiveDepth();

@@ -7,8 +7,8 @@
 namespace vip_slam::phone {
 namespace {
 
-constexpr double kSameImage = 0.002;    // s: RTP counts 90000 a second, the clocks are one
-constexpr double kWait = 0.25;          // s for an image's own camera
+constexpr double kSameImage = 0.002;     // s: RTP counts 90000 a second, the clocks are one
+constexpr double kWait = 0.25;           // s for an image's own camera
 constexpr std::size_t kMaxWaiting = 30;  // images
 constexpr std::size_t kMaxCameras = 300;
 
@@ -134,7 +134,8 @@ void Assembler::release(std::deque<Waiting>* waiting, bool depth, Assembled* out
     }
     last = stamp;
     (depth ? out->depth : out->color)
-        .push_back({stamp, depth ? warpDepth(image, from, *constant_) : warpColor(image, from, *constant_), *constant_});
+        .push_back(
+            {stamp, depth ? warpDepth(image, from, *constant_) : warpColor(image, from, *constant_), *constant_});
   }
 }
 

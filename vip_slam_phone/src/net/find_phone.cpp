@@ -25,7 +25,8 @@ std::string addressIn(const std::string& browse_output) {
 }
 
 std::string findPhone() {
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen("timeout 10 avahi-browse -prt _irtsp-imu._tcp 2>&1", "r"), pclose);
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen("timeout 10 avahi-browse -prt _irtsp-imu._tcp 2>&1", "r"),
+                                                   pclose);
   if (!pipe) throw std::runtime_error("avahi-browse does not start: give the phone's address (host:=IP)");
   std::string output;
   char buffer[1024];
@@ -33,8 +34,10 @@ std::string findPhone() {
   const std::string address = addressIn(output);
   if (!address.empty()) return address;
   if (output.find("avahi-browse") != std::string::npos || output.find("aemon") != std::string::npos)
-    throw std::runtime_error("avahi is not here or does not run (package avahi-utils): give the phone's address (host:=IP)");
-  throw std::runtime_error("no phone announces its IMU in this network: is the app streaming, with the IMU switched on?");
+    throw std::runtime_error(
+        "avahi is not here or does not run (package avahi-utils): give the phone's address (host:=IP)");
+  throw std::runtime_error(
+      "no phone announces its IMU in this network: is the app streaming, with the IMU switched on?");
 }
 
 }  // namespace vip_slam::phone

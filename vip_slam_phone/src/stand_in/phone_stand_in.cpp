@@ -1,6 +1,6 @@
-// Plays a rendered bag as a phone with the app would, on the loopback interface only: for tests and for trying the system
-// without a phone. The clock is a day ahead and drifts, the focus breathes, the exposure changes, RTP and sequence
-// numbers wrap. Images of the bag are stamped at mid-exposure.
+// Plays a rendered bag as a phone with the app would, on the loopback interface only: for tests and for trying the
+// system without a phone. The clock is a day ahead and drifts, the focus breathes, the exposure changes, RTP and
+// sequence numbers wrap. Images of the bag are stamped at mid-exposure.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -76,9 +76,7 @@ std::vector<std::uint8_t> depthMessage(const cv::Mat& metres, std::uint16_t sequ
   return out;
 }
 
-double wallTime() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
+double wallTime() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
 struct Options {
   std::string bag, sensor;
@@ -136,7 +134,8 @@ class StandIn {
     }
     // The last of it is still under way.
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    std::cout << "sent " << images_ << " images, " << depths_ << " depth images, " << imus_ << " IMU samples" << std::endl;
+    std::cout << "sent " << images_ << " images, " << depths_ << " depth images, " << imus_ << " IMU samples"
+              << std::endl;
   }
 
  private:
@@ -176,8 +175,8 @@ class StandIn {
   void sendColor(const sensor_msgs::Image& message) {
     const double t = message.header.stamp.toSec() - first_, end = message.header.stamp.toSec() + 0.5 * exposure(t);
     const cv::Mat stored(static_cast<int>(message.height), static_cast<int>(message.width),
-                         message.encoding == "mono8" ? CV_8UC1 : CV_8UC3, const_cast<std::uint8_t*>(message.data.data()),
-                         message.step);
+                         message.encoding == "mono8" ? CV_8UC1 : CV_8UC3,
+                         const_cast<std::uint8_t*>(message.data.data()), message.step);
     cv::Mat bgr = stored;
     if (message.encoding == "mono8") cv::cvtColor(stored, bgr, cv::COLOR_GRAY2BGR);
     if (message.encoding == "rgb8") cv::cvtColor(stored, bgr, cv::COLOR_RGB2BGR);
@@ -187,7 +186,8 @@ class StandIn {
       encoder_ = std::make_unique<VideoEncoder>(seen.size(), static_cast<int>(std::lround(sensor_.color_rate)),
                                                 static_cast<int>(1e6 * options_.mbit));
     auto out = record(5, host(end), unixOf(end));
-    const float k[6] = {float(own.fx), float(own.fy), float(own.cx), float(own.cy), float(own.width), float(own.height)};
+    const float k[6] = {float(own.fx), float(own.fy),    float(own.cx),
+                        float(own.cy), float(own.width), float(own.height)};
     std::memcpy(out.data() + 24, k, sizeof(k));
     put(&out, 60, static_cast<std::uint32_t>(std::lround(1e6 * exposure(t))));
     records_.send(out, options_.piece);

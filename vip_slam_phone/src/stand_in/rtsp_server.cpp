@@ -1,8 +1,8 @@
 #include "rtsp_server.h"
 
 #include <sys/socket.h>
-#include <cerrno>
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 
@@ -69,9 +69,10 @@ bool RtspServer::answer(int client, const std::string& request) {
   std::string body;
   if (request.rfind("OPTIONS", 0) == 0) text += "Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN\r\n";
   if (request.rfind("DESCRIBE", 0) == 0) {
-    body = "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=stand-in\r\nt=0 0\r\nm=audio 0 RTP/AVP 97\r\n"
-           "a=rtpmap:97 MPEG4-GENERIC/48000/1\r\na=control:trackID=1\r\nm=video 0 RTP/AVP 96\r\n"
-           "a=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1\r\na=control:trackID=0\r\n";
+    body =
+        "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=stand-in\r\nt=0 0\r\nm=audio 0 RTP/AVP 97\r\n"
+        "a=rtpmap:97 MPEG4-GENERIC/48000/1\r\na=control:trackID=1\r\nm=video 0 RTP/AVP 96\r\n"
+        "a=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1\r\na=control:trackID=0\r\n";
     text += "Content-Type: application/sdp\r\nContent-Length: " + std::to_string(body.size()) + "\r\n";
   }
   if (request.rfind("SETUP", 0) == 0) {
@@ -130,9 +131,9 @@ void RtspServer::send(const std::vector<std::vector<std::uint8_t>>& units, doubl
     }
     for (std::size_t at = 1; at < unit.size(); at += kPacket) {
       const std::size_t end = std::min(at + kPacket, unit.size());
-      std::vector<std::uint8_t> payload = {static_cast<std::uint8_t>((unit[0] & 0xe0) | 28),
-                                           static_cast<std::uint8_t>((at == 1 ? 0x80 : 0) |
-                                                                     (end == unit.size() ? 0x40 : 0) | (unit[0] & 0x1f))};
+      std::vector<std::uint8_t> payload = {
+          static_cast<std::uint8_t>((unit[0] & 0xe0) | 28),
+          static_cast<std::uint8_t>((at == 1 ? 0x80 : 0) | (end == unit.size() ? 0x40 : 0) | (unit[0] & 0x1f))};
       payload.insert(payload.end(), unit.begin() + at, unit.begin() + end);
       packet(std::move(payload), last && end == unit.size());
     }

@@ -24,7 +24,7 @@ class RtspServer {
   void listenOn(int client);
   void report(double unix_time, std::uint32_t rtp);
   std::atomic<std::uint8_t> channel_{0};  ///< of the video, as the client wants it
-  std::uint16_t sequence_ = 65000;  ///< wraps soon
+  std::uint16_t sequence_ = 65000;        ///< wraps soon
   double first_ = -1, last_report_ = 0;
   std::unique_ptr<Port> port_;
 };

@@ -47,8 +47,8 @@ VideoEncoder::VideoEncoder(cv::Size size, int rate, int bits_per_second) : impl_
   f->height = size.height;
   if (av_frame_get_buffer(f, 0) < 0) throw std::runtime_error("no memory for an image");
   f->pts = -1;
-  impl_->scaler = sws_getContext(size.width, size.height, AV_PIX_FMT_BGR24, size.width, size.height,
-                                 AV_PIX_FMT_YUV420P, SWS_BILINEAR, nullptr, nullptr, nullptr);
+  impl_->scaler = sws_getContext(size.width, size.height, AV_PIX_FMT_BGR24, size.width, size.height, AV_PIX_FMT_YUV420P,
+                                 SWS_BILINEAR, nullptr, nullptr, nullptr);
 }
 
 VideoEncoder::~VideoEncoder() = default;

@@ -13,7 +13,8 @@ RtspSession::RtspSession(TcpStream* stream, const std::string& url, const Creden
   const std::string transport = set.answer.field("transport");
   if (const auto at = transport.find("interleaved="); at != std::string::npos) {
     unsigned media = 0, control = 1;
-    if (std::sscanf(transport.c_str() + at, "interleaved=%u-%u", &media, &control) == 2 && media < 256 && control < 256) {
+    if (std::sscanf(transport.c_str() + at, "interleaved=%u-%u", &media, &control) == 2 && media < 256 &&
+        control < 256) {
       media_channel_ = static_cast<std::uint8_t>(media);
       control_channel_ = static_cast<std::uint8_t>(control);
     }

@@ -43,7 +43,8 @@ VideoTrack videoOf(const std::string& sdp) {
         track.codec = Codec::kHevc;
       else
         throw WireError("SDP: video coded as '" + name.substr(0, 40) + "', expected H264 or H265");
-      if (coding.substr(name.size()) != "/90000") throw WireError("SDP: '" + coding.substr(0, 40) + "', expected 90000 Hz");
+      if (coding.substr(name.size()) != "/90000")
+        throw WireError("SDP: '" + coding.substr(0, 40) + "', expected 90000 Hz");
       mapped = true;
     }
     if (line.rfind("a=fmtp:", 0) == 0) {

@@ -35,7 +35,8 @@ VideoDecoder::VideoDecoder(Codec codec) : impl_(std::make_unique<Impl>()) {
   impl_->context->flags |= AV_CODEC_FLAG_LOW_DELAY;
   impl_->context->thread_type = FF_THREAD_SLICE;
   impl_->context->thread_count = 2;
-  if (avcodec_open2(impl_->context, decoder, nullptr) < 0) throw std::runtime_error("libavcodec's decoder does not open");
+  if (avcodec_open2(impl_->context, decoder, nullptr) < 0)
+    throw std::runtime_error("libavcodec's decoder does not open");
 }
 
 VideoDecoder::~VideoDecoder() = default;

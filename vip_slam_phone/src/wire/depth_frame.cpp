@@ -20,8 +20,7 @@ std::vector<std::uint8_t> inflateRaw(const Bytes& packed, std::size_t expected) 
   const int status = inflate(&stream, Z_FINISH);
   const bool whole = status == Z_STREAM_END && stream.avail_out == 0;
   inflateEnd(&stream);
-  if (!whole)
-    throw WireError("depth: the compressed image does not give " + std::to_string(expected) + " bytes");
+  if (!whole) throw WireError("depth: the compressed image does not give " + std::to_string(expected) + " bytes");
   return out;
 }
 

@@ -12,8 +12,18 @@ namespace vip_slam::phone {
 namespace {
 
 Raw rtp(std::uint16_t sequence, std::uint32_t time, bool marker, const Raw& payload) {
-  Raw bytes = {0x80, static_cast<std::uint8_t>(marker ? 0xe0 : 0x60), static_cast<std::uint8_t>(sequence >> 8),
-               static_cast<std::uint8_t>(sequence), 0, 0, 0, 0, 1, 2, 3, 4};
+  Raw bytes = {0x80,
+               static_cast<std::uint8_t>(marker ? 0xe0 : 0x60),
+               static_cast<std::uint8_t>(sequence >> 8),
+               static_cast<std::uint8_t>(sequence),
+               0,
+               0,
+               0,
+               0,
+               1,
+               2,
+               3,
+               4};
   for (int i = 0; i < 4; ++i) bytes[4 + i] = static_cast<std::uint8_t>(time >> (24 - 8 * i));
   bytes.insert(bytes.end(), payload.begin(), payload.end());
   return bytes;
@@ -86,8 +96,8 @@ TEST(PhoneVideo, AggregatesOfBothCodecs) {
 
 TEST(PhoneVideo, SenderReportBehindAnotherPacket) {
   Raw bytes = {0x80, 201, 0, 1, 0, 0, 0, 0};
-  const Raw report = {0x80, 200, 0, 6, 0, 0, 0, 1, 0x83, 0xaa, 0x7e, 0x81, 0x80, 0, 0, 0, 0, 0, 0, 9,
-                      0,    0,   0, 0, 0, 0, 0, 0};
+  const Raw report = {0x80, 200, 0, 6, 0, 0, 0, 1, 0x83, 0xaa, 0x7e, 0x81, 0x80, 0,
+                      0,    0,   0, 0, 0, 9, 0, 0, 0,    0,    0,    0,    0,    0};
   bytes.insert(bytes.end(), report.begin(), report.end());
   const auto parsed = parseSenderReport(bytes);
   ASSERT_TRUE(parsed);
@@ -97,7 +107,8 @@ TEST(PhoneVideo, SenderReportBehindAnotherPacket) {
 
 const char* const kSdp =
     "v=0\r\nm=audio 0 RTP/AVP 97\r\na=rtpmap:97 MPEG4-GENERIC/48000\r\na=control:trackID=1\r\nm=video 0 RTP/AVP 96\r\n"
-    "a=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1; sprop-parameter-sets=Z0I=,aM4=\r\na=control:trackID=0\r\n";
+    "a=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1; "
+    "sprop-parameter-sets=Z0I=,aM4=\r\na=control:trackID=0\r\n";
 
 TEST(PhoneVideo, TheVideoIsChosenFromTheDescription) {
   const VideoTrack track = videoOf(kSdp);
@@ -114,9 +125,9 @@ TEST(PhoneVideo, DigestAndBasic) {
     return parseAnswer("RTSP/1.0 401 Unauthorized\r\nWWW-Authenticate: " + challenge + "\r\n\r\n");
   };
   const Credentials mufasa{"Mufasa", "Circle Of Life"};
-  const std::string digest = authorisation(
-      asked("Digest realm=\"testrealm@host.com\", nonce=\"dcd98b7102dd2f0e8b11d0f600bfb0c093\""), mufasa, "GET",
-      "/dir/index.html");
+  const std::string digest =
+      authorisation(asked("Digest realm=\"testrealm@host.com\", nonce=\"dcd98b7102dd2f0e8b11d0f600bfb0c093\""), mufasa,
+                    "GET", "/dir/index.html");
   EXPECT_NE(digest.find("response=\"670fd8c2df070c60b045671b8b24ff02\""), std::string::npos) << digest;
   EXPECT_EQ(authorisation(asked("Basic realm=\"x\""), {"Aladdin", "open sesame"}, "GET", "/"),
             "Basic QWxhZGRpbjpvcGVuIHNlc2FtZQ==");
@@ -146,7 +157,8 @@ TEST(PhoneVideoFuzz, DamagedPacketsAndTextsAreErrorsAtMost) {
       } catch (const WireError&) {
       }
       try {
-        parseSenderReport(damaged({0x80, 200, 0, 6, 0, 0, 0, 1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 9, 0, 0, 0, 0, 0}, &random));
+        parseSenderReport(
+            damaged({0x80, 200, 0, 6, 0, 0, 0, 1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 9, 0, 0, 0, 0, 0}, &random));
       } catch (const WireError&) {
       }
       if (i % 10) continue;

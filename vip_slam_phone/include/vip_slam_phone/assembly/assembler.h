@@ -37,9 +37,9 @@ struct Assembled {
 };
 
 struct AssemblyCounts {
-  std::size_t imu_lost = 0;       ///< gaps in the sequence of records
-  std::size_t dropped = 0;        ///< images that came before the clock and their camera were known, or waited too long
-  std::size_t portrait = 0;       ///< images higher than wide
+  std::size_t imu_lost = 0;  ///< gaps in the sequence of records
+  std::size_t dropped = 0;   ///< images that came before the clock and their camera were known, or waited too long
+  std::size_t portrait = 0;  ///< images higher than wide
 };
 
 class Assembler {
@@ -83,7 +83,7 @@ class Assembler {
   std::map<double, Camera> cameras_;  ///< by the phone's time of their images, the last seconds
   double newest_record_ = 0;          ///< the phone's time
   std::deque<Waiting> color_, depth_;
-  double last_color_ = 0, last_depth_ = 0, last_imu_ = 0;  ///< ours; what comes out ascends
+  double last_color_ = 0, last_depth_ = 0, last_imu_ = 0;        ///< ours; what comes out ascends
   std::deque<std::pair<double, Eigen::Vector3d>> gyro_, accel_;  ///< raw mode: until both are there
   std::optional<CameraIntrinsics> constant_;
   double breathing_ = 1;

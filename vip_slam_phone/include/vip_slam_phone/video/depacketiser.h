@@ -1,5 +1,5 @@
-// RTP packets to the pictures of a video: H.264 (RFC 6184, single units, STAP-A, FU-A) and HEVC (RFC 7798, single units,
-// aggregation, fragments).
+// RTP packets to the pictures of a video: H.264 (RFC 6184, single units, STAP-A, FU-A) and HEVC (RFC 7798, single
+// units, aggregation, fragments).
 #pragma once
 
 #include <map>
@@ -32,8 +32,8 @@ class Depacketiser {
   std::size_t lost() const { return lost_; }
   std::size_t reordered() const { return reordered_; }
 
-  static constexpr std::size_t kReorder = 16;             ///< packets
-  static constexpr std::size_t kMaxPicture = 8u << 20;    ///< bytes
+  static constexpr std::size_t kReorder = 16;           ///< packets
+  static constexpr std::size_t kMaxPicture = 8u << 20;  ///< bytes
 
  private:
   struct Held {
@@ -53,7 +53,7 @@ class Depacketiser {
 
   Codec codec_;
   bool started_ = false;
-  std::uint16_t next_ = 0;                ///< sequence number that follows
+  std::uint16_t next_ = 0;                 ///< sequence number that follows
   std::map<std::uint16_t, Held> waiting_;  ///< by distance from `next_` when looked at; ahead of it
   AccessUnit current_;
   bool in_fragment_ = false;

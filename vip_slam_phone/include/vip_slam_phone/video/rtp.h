@@ -20,9 +20,7 @@ struct SenderReport {
   double unix_time = 0;        ///< s
   std::uint32_t rtp_time = 0;  ///< the same instant
   /// Time of another RTP stamp of the stream: within 6.6 hours of the report.
-  double timeOf(std::uint32_t rtp) const {
-    return unix_time + static_cast<std::int32_t>(rtp - rtp_time) / 90000.0;
-  }
+  double timeOf(std::uint32_t rtp) const { return unix_time + static_cast<std::int32_t>(rtp - rtp_time) / 90000.0; }
 };
 /// The sender report in a compound RTCP packet; empty when it holds none.
 std::optional<SenderReport> parseSenderReport(const Bytes& bytes);

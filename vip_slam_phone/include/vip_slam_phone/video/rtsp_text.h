@@ -9,7 +9,7 @@ namespace vip_slam::phone {
 struct RtspAnswer {
   int status = 0;
   std::string reason;
-  std::multimap<std::string, std::string> fields;  ///< names in lower case
+  std::multimap<std::string, std::string> fields;    ///< names in lower case
   std::string field(const std::string& name) const;  ///< first of that name, or empty
 };
 

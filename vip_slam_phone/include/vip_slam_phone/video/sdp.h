@@ -11,7 +11,7 @@ namespace vip_slam::phone {
 struct VideoTrack {
   Codec codec = Codec::kH264;
   int payload_type = 96;
-  std::string control;                        ///< address of the track, may be relative
+  std::string control;                       ///< address of the track, may be relative
   std::vector<std::uint8_t> parameter_sets;  ///< behind start codes; may be empty
 };
 
