@@ -231,9 +231,9 @@ int main(int argc, char** argv) {
     ("record-port", po::value(&options.record_port)->default_value(options.record_port), "IMU and intrinsics")
     ("depth-port", po::value(&options.depth_port)->default_value(options.depth_port), "depth")
     ("mbit", po::value(&options.mbit)->default_value(options.mbit), "of the video, Mbit/s")
-    ("breathing", po::value(&options.breathing)->default_value(options.breathing), "of the focal length, ratio")
+    ("breathing", po::value(&options.breathing)->default_value(options.breathing), "of the focal length")
     ("wait", po::value(&options.wait)->default_value(options.wait), "s before it plays")
-    ("reconnect", po::value(&options.reconnect)->default_value(options.reconnect), "s after which all connections break")
+    ("reconnect", po::value(&options.reconnect)->default_value(options.reconnect), "s after which connections break")
     ("piece", po::value(&options.piece)->default_value(options.piece), "longest write, bytes; 0: any")
     ("lose", po::value(&options.lose)->default_value(options.lose), "a packet of every so many images is lost; 0: none");
   // clang-format on
