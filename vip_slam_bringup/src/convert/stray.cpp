@@ -17,6 +17,8 @@
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_core/camera/constant_camera.h"
+#include "vip_slam_core/sensor/phone_geometry.h"
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
 
@@ -120,7 +122,7 @@ int countFrames(const std::string& path, cv::Size* size) {
 
 std::string numbered(const std::string& folder, int frame) { return folder + formatted("/%06d.png", frame); }
 
-cv::Mat readDepth(const std::string& folder, int frame, int min_confidence, const cv::Size& size) {
+cv::Mat readDepth(const std::string& folder, int frame, int min_confidence) {
   const std::string path = numbered(folder + "/depth", frame);
   cv::Mat depth = cv::imread(path, cv::IMREAD_UNCHANGED);
   if (depth.empty()) throw std::runtime_error(path + ": is not a readable image");
@@ -132,9 +134,24 @@ cv::Mat readDepth(const std::string& folder, int frame, int min_confidence, cons
       throw std::runtime_error(confidence_path + ": size differs from the depth image");
     depth.setTo(0, confidence < min_confidence);
   }
-  cv::Mat out;
-  cv::resize(depth, out, size, 0, 0, cv::INTER_NEAREST);
-  return out;
+  return depth;
+}
+
+CameraIntrinsics cameraOf(const Row& row, const cv::Size& size) {
+  CameraIntrinsics camera;
+  camera.width = size.width;
+  camera.height = size.height;
+  camera.fx = row.fx;
+  camera.fy = row.fy;
+  camera.cx = row.cx;
+  camera.cy = row.cy;
+  return camera;
+}
+
+/// The one camera that all images are made to look like: the longest focal length, so that each of them fills it.
+CameraIntrinsics constantCamera(const std::vector<Row>& rows, const cv::Size& video, const cv::Size& size) {
+  const auto shorter = [](const Row& a, const Row& b) { return a.fx < b.fx; };
+  return cameraOf(*std::max_element(rows.begin(), rows.end(), shorter), video).scaled(size.width, size.height);
 }
 
 sensor_msgs::CompressedImage compressed(const cv::Mat& image, const char* ending, const char* format,
@@ -144,13 +161,6 @@ sensor_msgs::CompressedImage compressed(const cv::Mat& image, const char* ending
   message.format = format;
   cv::imencode(ending, image, message.data, parameters);
   return message;
-}
-
-/// Optical axes in the axes of CoreMotion: the image's x points down the upright phone, its y to the phone's left.
-SE3 cameraInImu() {
-  Eigen::Matrix3d R;
-  R << 0, -1, 0, -1, 0, 0, 0, 0, -1;
-  return SE3(R, Eigen::Vector3d::Zero());
 }
 
 }  // namespace
@@ -184,10 +194,9 @@ ConversionReport convertStray(const StrayOptions& options) {
     throw std::runtime_error(options.folder + "/depth: no NNNNNN.png for any row");
   if (!without_depth.empty()) report.warnings.push_back(std::to_string(without_depth.size()) + " images have no depth");
 
-  const SE3 T_imu_cam = cameraInImu();
-  // ARKit's world has y up; ours has z up.
-  const SE3 T_zup_yup(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX())),
-                      Eigen::Vector3d::Zero());
+  const CameraIntrinsics constant = constantCamera(rows, video_size, size);
+  const SE3 T_imu_cam = phoneCameraInImu();
+  const SE3 T_zup_yup = arkitWorldZUp();
   Trajectory truth;
   auto video = std::make_shared<cv::VideoCapture>(options.folder + "/rgb.mp4");
   BagOutput bag(options.bag, options.overwrite);
@@ -196,27 +205,22 @@ ConversionReport convertStray(const StrayOptions& options) {
     const bool has_depth = !std::binary_search(without_depth.begin(), without_depth.end(), row.frame);
     const ros::Time stamp(row.t);
     bag.add(stamp, [=](rosbag::Bag& out) {
-      cv::Mat frame, image;
+      cv::Mat frame;
       if (!video->read(frame))
         throw std::runtime_error(options.folder + "/rgb.mp4: ends before frame " + std::to_string(row.frame));
-      cv::resize(frame, image, size, 0, 0, cv::INTER_AREA);
+      const CameraIntrinsics own = cameraOf(row, video_size);
+      const cv::Mat image = warpColor(frame, own, constant);
       std_msgs::Header header;
       header.stamp = stamp;
       header.frame_id = kFrame;
-      CameraIntrinsics full;
-      full.width = video_size.width;
-      full.height = video_size.height;
-      full.fx = row.fx;
-      full.fy = row.fy;
-      full.cx = row.cx;
-      full.cy = row.cy;
-      const auto info = cameraInfo(full.scaled(size.width, size.height), header);
+      const auto info = cameraInfo(constant, header);
       out.write(kColor, stamp,
                 compressed(image, ".jpg", "bgr8; jpeg compressed bgr8",
                            {cv::IMWRITE_JPEG_QUALITY, options.jpeg_quality}, header));
       out.write(kColorInfo, stamp, info);
       if (!has_depth) return;
-      const cv::Mat depth = readDepth(options.folder, row.frame, options.min_confidence, size);
+      const cv::Mat read = readDepth(options.folder, row.frame, options.min_confidence);
+      const cv::Mat depth = warpDepth(read, own.scaled(read.cols, read.rows), constant);
       out.write(kDepth, stamp,
                 compressed(depth, ".png", "16UC1; png compressed ", {cv::IMWRITE_PNG_COMPRESSION, 3}, header));
       out.write(kDepthInfo, stamp, info);

@@ -1,0 +1,38 @@
+// A TCP connection that gives up in time and can be told to stop from another thread.
+#pragma once
+
+#include <atomic>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace vip_slam::phone {
+
+/// Cannot connect, was closed, or nothing came in time; the message names address and cause.
+struct ConnectionError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+class TcpStream {
+ public:
+  /// Connects within `timeout` seconds, which is also how long a read or write waits. `stop` outlives the stream; once
+  /// it is set, all that waits ends with ConnectionError within a tenth of a second.
+  TcpStream(const std::string& host, int port, double timeout, const std::atomic<bool>& stop);
+  ~TcpStream();
+  TcpStream(const TcpStream&) = delete;
+  TcpStream& operator=(const TcpStream&) = delete;
+
+  /// Exactly `size` bytes.
+  void read(void* data, std::size_t size);
+  std::vector<std::uint8_t> read(std::size_t size);
+  void write(const void* data, std::size_t size);
+
+ private:
+  void await(short events);
+  std::string name_;
+  double timeout_;
+  const std::atomic<bool>& stop_;
+  int socket_ = -1;
+};
+
+}  // namespace vip_slam::phone

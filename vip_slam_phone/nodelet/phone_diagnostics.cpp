@@ -1,0 +1,42 @@
+#include "phone_diagnostics.h"
+
+#include "vip_slam_core/util/formatted.h"
+
+namespace vip_slam::phone {
+
+std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& now, double seconds) {
+  std::vector<std::string> words;
+  const auto stream = [&](const char* what, const StreamStatus& s, const char* remedy) {
+    if (!s.connected)
+      words.push_back(std::string("no ") + what + " (" + (s.problem.empty() ? "connecting" : s.problem) +
+                      "): " + remedy);
+    else if (!s.problem.empty())
+      words.push_back(std::string(what) + ": " + s.problem);
+  };
+  const bool asleep = !now.records.connected && !now.video.connected && !now.depth.connected;
+  if (asleep) {
+    words.push_back("the phone does not answer (" + now.video.problem +
+                    "): is its screen on, the app streaming, and the address right? Trying again; the map stays");
+    return words;
+  }
+  stream("video", now.video, "is the app streaming? Trying again; the map stays");
+  stream("IMU", now.records, "switch on the IMU in the app. Trying again; the map stays");
+  stream("depth", now.depth, "switch on depth in the app; until then it goes on visual-inertially");
+  words.insert(words.end(), now.complaints.begin(), now.complaints.end());
+  if (now.video.connected && !now.sender_report)
+    words.push_back("no RTCP sender report yet: the time of the images is not known");
+  const double imu = (now.imu - before.imu) / seconds;
+  if (now.records.connected && before.clock_ready && imu < 90)
+    words.push_back(formatted("%.0f IMU samples a second, expected about 100", imu));
+  if (now.assembly.portrait > before.assembly.portrait)
+    words.push_back("images are upright: run the app's ARKit pose, whose images are landscape as the sensor is");
+  if (const std::size_t lost = now.video.lost - before.video.lost)
+    words.push_back(std::to_string(lost) + " packets of the video were lost: the network is too slow or too busy");
+  if (const std::size_t lost = now.depth.lost - before.depth.lost)
+    words.push_back(std::to_string(lost) + " depth images were lost: the network is too slow or too busy");
+  if (const std::size_t lost = now.assembly.imu_lost - before.assembly.imu_lost)
+    words.push_back(std::to_string(lost) + " records were lost: the network is too slow or too busy");
+  return words;
+}
+
+}  // namespace vip_slam::phone

@@ -1,0 +1,32 @@
+// The video port of the stand-in: RTSP 1.0 with interleaved RTP.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server.h"
+
+namespace vip_slam::phone {
+
+class RtspServer {
+ public:
+  explicit RtspServer(int port);
+  /// A coded picture at `unix_time` s of the phone's clock, in writes of at most `piece` bytes (0: any); without its
+  /// last packet when `lose_one`.
+  void send(const std::vector<std::vector<std::uint8_t>>& units, double unix_time, std::size_t piece, bool lose_one);
+  void disconnect() { port_->disconnect(); }
+
+ private:
+  bool greet(int client);
+  bool answer(int client, const std::string& request);
+  void listenOn(int client);
+  void report(double unix_time, std::uint32_t rtp);
+  std::atomic<std::uint8_t> channel_{0};  ///< of the video, as the client wants it
+  std::uint16_t sequence_ = 65000;        ///< wraps soon
+  double first_ = -1, last_report_ = 0;
+  std::unique_ptr<Port> port_;
+};
+
+}  // namespace vip_slam::phone
