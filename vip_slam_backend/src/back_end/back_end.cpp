@@ -33,6 +33,7 @@ BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l
   settings.variant = variantFromName(o.variant);
   settings.measurement = o.measurement;
   settings.focal = camera->focal();
+  settings.depth_noise = s.depth_noise;
   settings.gravity = gravityVector(s.gravity);
 }
 
