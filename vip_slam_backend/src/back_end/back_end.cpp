@@ -210,6 +210,7 @@ void BackEnd::Impl::reset() {
   global_wanted = false;
   last_global = -1e300;
   camera_correction = {};
+  keyframes_at_correction = 0;
   newest_depth_offset = disparity_error = 0;
   newest_bearing = {};
   newest_depth_shift = {};
