@@ -171,7 +171,8 @@ void PlaneMapper::Impl::judgeAgreement() {
       const auto pose = poses_.find(keyframe);
       if (pose == poses_.end()) continue;
       const Plane plane_C = transformPlane(pose->second.inverse(), track.plane());
-      const double misfit = planeMisfit(observation.G, plane_C.coefficients()), weight = observation.G(3, 3);
+      const Eigen::Matrix4d G = viewMoments(observation).M;
+      const double misfit = planeMisfit(G, plane_C.coefficients()), weight = G(3, 3);
       misfits.push_back({static_cast<int>(index), misfit, weight > 0 ? misfit / weight : 0.0});
     }
     ++index;

@@ -33,6 +33,7 @@ BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l
   settings.variant = variantFromName(o.variant);
   settings.measurement = o.measurement;
   settings.focal = camera->focal();
+  settings.depth_noise = s.depth_noise;
   settings.gravity = gravityVector(s.gravity);
 }
 
@@ -209,6 +210,7 @@ void BackEnd::Impl::reset() {
   global_wanted = false;
   last_global = -1e300;
   camera_correction = {};
+  keyframes_at_correction = 0;
   newest_depth_offset = disparity_error = 0;
   newest_bearing = {};
   newest_depth_shift = {};

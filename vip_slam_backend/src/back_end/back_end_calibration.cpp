@@ -1,4 +1,5 @@
 // Applies corrections of camera and gyro estimated by the front end and from the map to all keyframes of the session.
+#include <algorithm>
 #include <cmath>
 
 #include "back_end_impl.h"
@@ -14,6 +15,7 @@ namespace {
 constexpr double kNewDepthOffset = 0.001;    // m
 constexpr double kNewBearing = 1e-4;         // per entry of the matrix, normalised coordinates
 constexpr double kNewDepthShift = 0.02;      // px
+constexpr std::uint64_t kLeastWait = 4;      // keyframes
 constexpr double kNewGyroCorrection = 5e-4;  // per entry of the matrix
 
 }  // namespace
@@ -23,10 +25,15 @@ void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
   newest_depth_offset = newest.offset;
   newest_bearing = newest.bearing;
   newest_depth_shift = newest.shift;
+  // The front end's values move with every second of data, the first ones most. An adjustment to new ones is due with
+  // half as many keyframes again.
+  const std::uint64_t wait = std::max(kLeastWait, keyframes_at_correction / 2);
+  if (keyframes_at_correction > 0 && statistics.keyframes_received < keyframes_at_correction + wait) return;
   if (std::abs(newest.offset - camera_correction.offset) < kNewDepthOffset &&
       (newest.bearing.value - camera_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing &&
       (newest.shift.px - camera_correction.shift.px).cwiseAbs().maxCoeff() < kNewDepthShift)
     return;
+  keyframes_at_correction = statistics.keyframes_received;
   camera_correction.offset = newest.offset;
   camera_correction.bearing = newest.bearing;
   camera_correction.shift = newest.shift;

@@ -136,6 +136,7 @@ struct BackEnd::Impl {
   bool global_wanted = false;
   double last_global = -1e300;                                       ///< stamp of the last one requested by a loop
   CameraCorrection camera_correction;                                ///< applied to all keyframes of this session
+  std::uint64_t keyframes_at_correction = 0;                         ///< received when it last changed by much
   double newest_depth_offset = 0;                                    ///< m, reported with the newest keyframe
   BearingCorrection newest_bearing;                                  ///< likewise
   DepthShift newest_depth_shift;                                     ///< likewise

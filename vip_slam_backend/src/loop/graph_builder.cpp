@@ -13,20 +13,46 @@
 namespace vip_slam {
 namespace {
 
-// Odometry between neighbours: drift grows with the square root of the distance; ten times as much where it was
-// not tracking, or only just (without depth, say).
-Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, const PoseGraphOptions& options) {
+// The odometry's covariance between two keyframes is that of independent errors; what it errs in one motion it errs in
+// the next, too. The adjustments use the same factor (measurement/odometry_inflation).
+constexpr double kInflation = 2.0;
+
+// Metres between neighbours. A rotation in place drifts too: a full turn counts as two metres of travel.
+double wayBetween(const MapKeyframe& a, const MapKeyframe& b) {
   const double turned = a.state.T_W_I.rotation().angularDistance(b.state.T_W_I.rotation());
-  // A rotation in place drifts too: a full turn counts as two metres of travel.
-  double way = (a.state.T_W_I.t() - b.state.T_W_I.t()).norm() + turned / M_PI;
+  const double way = (a.state.T_W_I.t() - b.state.T_W_I.t()).norm() + turned / M_PI;
   // With keyframes missing in between, as after localisation-only mode, the distance travelled is not known.
   constexpr double kWayPerSecond = 0.5;  // m
-  if (b.previous != a.id()) way = std::max(way, kWayPerSecond * std::abs(b.data->frame.t - a.data->frame.t));
+  return b.previous == a.id() ? way : std::max(way, kWayPerSecond * std::abs(b.data->frame.t - a.data->frame.t));
+}
+
+// Odometry between neighbours: a random walk along the way, and what the front end says of this motion, which is much
+// over a gap without images. Where it was not tracking, or only just, and says nothing, the walk is ten times as large.
+Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, double drift,
+                             const PoseGraphOptions& options) {
+  const double way = std::max(0.02, wayBetween(a, b));
+  const double angle = options.odometry_sigma_yaw_deg * kDegree, position = options.odometry_sigma_position;
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal().head<3>().setConstant(angle * angle * way);
+  covariance.diagonal().tail<3>().setConstant(position * position * way);
   const bool weak =
       a.data->frame.status.state != TrackingState::kTracking || b.data->frame.status.state != TrackingState::kTracking;
-  const double factor = std::sqrt(std::max(0.02, way)) * (weak ? 10.0 : 1.0);
-  return diagonalSqrtInformation(options.odometry_sigma_yaw_deg * kDegree * factor,
-                                 options.odometry_sigma_position * factor);
+  if (b.previous == a.id() && b.motion.known())
+    covariance += kInflation * kInflation * b.motion.covariance;
+  else if (weak)
+    covariance *= 100;
+  return (drift * covariance).inverse().llt().matrixU();
+}
+
+// Factor on the variances of all odometry for a drift that is common to the whole way that a loop closes. Over w metres
+// a walk has the variance s^2 w and the drift (d w)^2: as if each variance counted 1 + (d / s)^2 w times.
+double commonDrift(const Map& map, const std::pair<KeyframeId, KeyframeId>& closing, const PoseGraphOptions& options) {
+  const auto [first, last] = std::minmax(closing.first, closing.second);
+  double way = 0;
+  for (const auto& [id, kf] : map.keyframes())
+    if (id > first && id <= last && map.hasKeyframe(kf.previous)) way += wayBetween(map.keyframe(kf.previous), kf);
+  const double ratio = options.odometry_drift / options.odometry_sigma_position;
+  return 1 + ratio * ratio * way;
 }
 
 std::map<std::uint32_t, std::uint32_t> epochGroups(const Map& map,
@@ -119,7 +145,8 @@ std::set<KeyframeId> referencePart(const Map& map, const std::vector<std::pair<K
 }
 
 PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
-                                   const std::vector<std::pair<PlaneId, PlaneId>>& same_planes, double min_seconds,
+                                   const std::vector<std::pair<PlaneId, PlaneId>>& same_planes,
+                                   const std::pair<KeyframeId, KeyframeId>& closing, double min_seconds,
                                    const PoseGraphOptions& options) {
   PosePlaneGraph graph;
   std::map<PlaneId, PlaneId> into;
@@ -137,13 +164,14 @@ PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<K
   };
   const Matrix6d loop_information =
       diagonalSqrtInformation(options.loop_sigma_angle_deg * kDegree, options.loop_sigma_position);
+  const double drift = commonDrift(map, closing, options);
   std::map<std::uint32_t, KeyframeId> last;  // per epoch
   for (const auto& entry : map.keyframes()) {
     const MapKeyframe& kf = entry.second;
     const auto before = last.find(kf.data->frame.epoch);
     if (before != last.end())
       graph.addEdge(RelativePoseEdge{before->second, entry.first, relative(before->second, entry.first),
-                                     odometryInformation(map.keyframe(before->second), kf, options)});
+                                     odometryInformation(map.keyframe(before->second), kf, drift, options)});
     last[kf.data->frame.epoch] = entry.first;
     for (const auto& neighbour : map.covisible(entry.first, options.covisible_edge)) {
       const MapKeyframe& other = map.keyframe(neighbour.first);

@@ -69,7 +69,7 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     start[id] = tied ? map.keyframe(id).state.T_W_I : move * map.keyframe(id).state.T_W_I;
 
   PosePlaneGraph graph = buildPosePlaneGraph(map, loops_, tied ? planes.same : decltype(planes.same)(),
-                                             options_.min_seconds, options_.graph);
+                                             {query, place.match}, options_.min_seconds, options_.graph);
   if (!tied) {
     for (const auto& pose : start) graph.addPose(pose.first, pose.second);
     for (const auto& plane : map.planes()) {

@@ -75,12 +75,7 @@ void Map::mergePlanes(PlaneId from, PlaneId into) {
     if (other == observations.end()) {
       observations.emplace(into, std::move(moved));
     } else {
-      // Two pieces of one wall in one keyframe: their blocks add (each keeps its own scale inside G).
-      other->second.G += moved.G;
-      for (PlaneSample p : moved.points) {
-        p.sigma *= static_cast<float>(std::sqrt(other->second.weight_scale / moved.weight_scale));
-        other->second.points.push_back(p);
-      }
+      addPiece(moved, &other->second);
     }
   }
   for (auto& entry : landmarks_)

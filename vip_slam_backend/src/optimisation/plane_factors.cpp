@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "homography_hosts.h"
+#include "shared_depth.h"
 #include "vip_slam_backend/solver/robust.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"
@@ -224,31 +225,57 @@ std::vector<PlaneFactorBuilder::DepthBlock> PlaneFactorBuilder::collectDepthBloc
       const Eigen::Vector4d plane_C = T_W_C.transpose() * parameters.coefficients();
       PlaneGate gate(observation.second, plane_C);
       if (!gate.all() && gate.kept().empty()) continue;
-      const Eigen::Matrix4d G = gate.G();
-      blocks.push_back({constant ? -1 : frame->second, plane->second, T_W_C, G, planeMisfit(G, plane_C),
-                        &observation.second, std::move(gate)});
+      DepthBlock block{constant ? -1 : frame->second, plane->second, &entry.second, &observation.second,
+                       std::move(gate), plane_C, 1, Eigen::Matrix4d::Identity(), 0};
+      blocks.push_back(std::move(block));
     }
   }
   return blocks;
 }
 
+// Of n keyframes that share their error each one's shared variance counts n times, so that they are worth one.
+void PlaneFactorBuilder::findTogether(std::vector<DepthBlock>* blocks) {
+  std::map<int, std::vector<DepthBlock*>> of_plane;  // ascending in time within each odometry
+  for (DepthBlock& block : *blocks) of_plane[block.plane].push_back(&block);
+  for (auto& entry : of_plane) {
+    std::vector<DepthBlock*>& list = entry.second;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      for (std::size_t j = i + 1; j < list.size(); ++j) {
+        const TrackedFrame &a = list[i]->keyframe->data->frame, &b = list[j]->keyframe->data->frame;
+        const double correlation = sharedDepth(b.t - a.t);
+        if (!(correlation > 0) || a.epoch != b.epoch) break;
+        list[i]->together += correlation;
+        list[j]->together += correlation;
+      }
+    }
+  }
+}
+
 void PlaneFactorBuilder::addDepthBlocks() {
   if (planes_.empty()) return;
   BaProblem& problem = built_->problem;
-  const std::vector<DepthBlock> blocks = collectDepthBlocks();
+  std::vector<DepthBlock> blocks = collectDepthBlocks();
+  findTogether(&blocks);
+  const DepthNoiseParts& noise = built_->depth_noise;
   std::vector<PlaneMisfit> misfits;
   misfits.reserve(blocks.size());
-  for (const DepthBlock& block : blocks) misfits.push_back({block.plane, block.misfit});
-  const double map_scale = planeInformationScale(misfits);
+  for (DepthBlock& block : blocks) {
+    const Eigen::Matrix4d G = block.gate.G() / (block.observation->weight_scale * noise.white);
+    block.T = sharedErrorShrinkage(G, noise.shared * block.together * sharedVariance(*block.observation));
+    block.misfit = planeMisfit(block.T * G * block.T.transpose(), block.plane_C);
+    misfits.push_back({block.plane, block.misfit});
+  }
   const std::vector<double> weights = planeWeights(misfits, problem.planes.size());
   // Constant keyframes: their points form one block per plane in world coordinates, of a fixed frame at the origin.
   std::map<int, BaPointToPlane> outside;
   for (const DepthBlock& block : blocks) {
     const PlaneObservation& o = *block.observation;
-    const double scale = map_scale * weights[block.plane];
+    const double scale = weights[block.plane] / (noise.white * o.weight_scale);
+    const Eigen::Matrix4d G = scale * block.T * block.gate.G() * block.T.transpose();
     if (block.frame < 0) {
+      const Eigen::Matrix4d T_W_C = block.keyframe->T_W_C().matrix();
       BaPointToPlane& sum = outside[block.plane];
-      sum.G += scale * block.T_W_C * block.G * block.T_W_C.transpose();
+      sum.G += T_W_C * G * T_W_C.transpose();
       ++sum.points;
     } else if (settings_.variant == Variant::kViP) {
       for (int k = 0; k < block.gate.points(); ++k) {
@@ -256,15 +283,16 @@ void PlaneFactorBuilder::addDepthBlocks() {
         BaPlaneSample factor;
         factor.frame = block.frame;
         factor.plane = block.plane;
-        factor.p_C = p.p_C.cast<double>();
-        factor.weight = std::sqrt(scale * o.weight_scale) / p.sigma;
+        const Eigen::Vector4d shrunk = block.T * p.p_C.cast<double>().homogeneous();
+        factor.p_C = shrunk.hnormalized();
+        factor.weight = shrunk(3) * std::sqrt(weights[block.plane] / noise.white) / p.sigma;
         problem.plane_samples.push_back(factor);
       }
     } else {
       BaPointToPlane factor;
       factor.frame = block.frame;
       factor.plane = block.plane;
-      factor.G = scale * block.G;
+      factor.G = G;
       factor.points = block.gate.points();
       problem.point_to_plane.push_back(factor);
     }

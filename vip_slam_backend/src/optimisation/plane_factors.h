@@ -30,12 +30,17 @@ class PlaneFactorBuilder {
   // Depth points of one keyframe on one plane, after gating.
   struct DepthBlock {
     int frame, plane;  // frame -1: the keyframe is constant
-    Eigen::Matrix4d T_W_C, G;
-    double misfit;
+    const MapKeyframe* keyframe;
     const PlaneObservation* observation;
     PlaneGate gate;
+    Eigen::Vector4d plane_C;
+    double together;    // keyframes whose depth errs alike, this one included
+    Eigen::Matrix4d T;  // shrinkage of the points by what they share
+    double misfit;
   };
   std::vector<DepthBlock> collectDepthBlocks() const;
+  /// Finds out how many keyframes share each block's error.
+  static void findTogether(std::vector<DepthBlock>* blocks);
   void storeGroup(int host, int plane, std::vector<Observer>* observers, std::vector<int>* slot);
 
   const Map& map_;

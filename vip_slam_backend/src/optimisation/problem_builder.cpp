@@ -9,9 +9,23 @@
 #include "odometry_factors.h"
 #include "pixel_noise.h"
 #include "plane_factors.h"
+#include "shared_depth.h"
 #include "track_noise.h"
+#include "vip_slam_core/types/depth_noise_parts.h"
 
 namespace vip_slam {
+namespace {
+
+DepthNoiseParts noiseOfThisSession(const Map& map) {
+  std::vector<const PlaneObservation*> newest_first;
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it)
+    if (!it->second.stored)
+      for (const auto& seen : it->second.planes) newest_first.push_back(&seen.second);
+  return depthNoiseParts(newest_first);
+}
+
+}  // namespace
+
 BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const BuilderSettings& settings) {
   BuiltProblem built;
   BaProblem& problem = built.problem;
@@ -58,6 +72,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
   LandmarkViews views(map, scope, built.frames, noise);
   built.track_noise_factor = trackNoiseFactor(views, frameGeometry(problem));
   if (built.track_noise_factor > 1) views.inflate(built.track_noise_factor);
+  built.depth_noise = noiseOfThisSession(map);
   PlaneFactorBuilder planes(map, scope, settings, &built);
   const std::vector<char> on_plane = planes.addHomographies(views);
   for (int l = 0; l < views.size(); ++l) {
@@ -94,6 +109,9 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
     problem.points.push_back(point);
     built.points.push_back(landmark.id);
   }
+  std::vector<double> times;
+  for (const KeyframeId id : built.frames) times.push_back(map.keyframe(id).data->frame.t);
+  shareDepthErrors(settings.depth_noise, built.depth_noise, times, &problem);
   planes.addDepthBlocks();
   addGauges(&problem);
   addMotionPriors(&problem);

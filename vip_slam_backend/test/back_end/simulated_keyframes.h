@@ -151,7 +151,11 @@ class SimulatedKeyframes {
         const Eigen::Vector4d x = p.p_C.cast<double>().homogeneous();
         o.G += x * x.transpose() / (p.sigma * p.sigma);
       }
-      if (o.points.size() > 5) update.observations.push_back(o);
+      if (o.points.size() <= 5) continue;
+      // As the plane module states it before it has seen anything: what the points share is as large as their noise.
+      o.weight_scale = 1 / (1 + o.G(3, 3) * sigma_on_planes_ * sigma_on_planes_);
+      o.G *= o.weight_scale;
+      update.observations.push_back(o);
     }
     for (const Point& p : points_)
       if (p.track != kNoLandmark && p.wall >= 0) update.associated.emplace_back(p.track, p.wall + 1);

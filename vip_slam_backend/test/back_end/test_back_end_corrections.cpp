@@ -264,6 +264,26 @@ TEST(BackEnd, IntrinsicsThatAreKnownBetterHoldForAllKeyframes) {
   EXPECT_LT(worst(), 1e-6);
 }
 
+// On real images the intrinsics that the front end tells wander with every keyframe.
+TEST(BackEnd, AWanderingCorrectionAsksForFewAdjustments) {
+  SimulatedKeyframes world(4);
+  CheckedBackEnd back_end(options("vip"), world.sensor());
+  int adjustments = 0;
+  BearingCorrection bearing;
+  for (int k = 0; k < 57; ++k) {
+    bearing.value.setConstant(k % 2 ? 0.001 : 0.0005);
+    back_end.addKeyframe(withCameraCorrection(world.next(), {0, {}, bearing}));
+    ASSERT_EQ(back_end.lastRefusal(), "");
+    if (!back_end.globalBaWanted()) continue;
+    ++adjustments;
+    back_end.merge(back_end.run(back_end.startGlobalBa()));
+  }
+  EXPECT_GE(adjustments, 4);
+  EXPECT_LE(adjustments, 8);
+  back_end.finish();  // adopts the newest
+  for (const auto& [id, kf] : back_end.map().keyframes()) EXPECT_EQ(kf.data->frame.camera_correction.bearing, bearing);
+}
+
 TEST(BackEnd, AGlobalAdjustmentOfDepthAsItWasReadIsDoneAgain) {
   SimulatedKeyframes world(3);
   CheckedBackEnd back_end(options("vip"), world.sensor());

@@ -1,6 +1,7 @@
 #include "vip_slam_core/geometry/plane_noise.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -12,9 +13,8 @@ namespace {
 
 constexpr std::size_t kMinObservations = 30;
 constexpr double kMedian = 2.366;  // of a chi square with three degrees of freedom
-// A sigma is reduced to a fifth at most: planes and poses are fitted to the same points, so that the residuals of a map
-// with few planes are too small. It is not increased: with a camera whose depth is warped that would remove the
-// constraints that hold the map.
+// The typical misfit is at least a twenty-fifth of the noise model's: planes and poses are fitted to the same points, so
+// that the residuals of a map with few planes are too small.
 constexpr double kMaxReduction = 25.0;
 // Prior degrees of freedom of a plane's variance: as if four observations had confirmed that it is one surface.
 constexpr double kPlaneFreedom = 12.0;
@@ -39,6 +39,21 @@ double typicalMisfit(const std::vector<PlaneMisfit>& misfits) {
 
 }  // namespace
 
+Eigen::Matrix4d sharedErrorShrinkage(const Eigen::Matrix4d& G, double shared) {
+  const double weight = G(3, 3);
+  if (!(weight > 0)) return Eigen::Matrix4d::Identity();
+  const Eigen::Vector3d centre = G.topRightCorner<3, 1>() / weight;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(Eigen::Matrix3d(G.topLeftCorner<3, 3>() - weight * centre * centre.transpose()));
+  const Eigen::Vector3d n = eigen.eigenvectors().col(0);
+  const double distance = 1 / std::sqrt(1 + weight * shared), turn = 1 / std::sqrt(1 + weight * shared / 3);
+  Eigen::Matrix4d T = Eigen::Matrix4d::Zero();
+  T.topLeftCorner<3, 3>() = turn * (Eigen::Matrix3d::Identity() - n * n.transpose());
+  T.topRightCorner<3, 1>() = distance * centre - T.topLeftCorner<3, 3>() * centre;
+  T(3, 3) = distance;
+  return T;
+}
+
 double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C) {
   const double weight = G(3, 3);
   if (!(weight > 0)) return 0;
@@ -49,10 +64,6 @@ double planeMisfit(const Eigen::Matrix4d& G, const Eigen::Vector4d& plane_C) {
   const Eigen::Vector3d n = plane_C.head<3>();
   const double distance = n.dot(centre) + plane_C(3), tilt = n.dot(scatter * n) - eigen.eigenvalues()(0);
   return weight * distance * distance + std::max(0.0, tilt);
-}
-
-double planeInformationScale(const std::vector<PlaneMisfit>& misfits) {
-  return misfits.size() < kMinObservations ? 1.0 : std::max(1.0, 1.0 / typicalMisfit(misfits));
 }
 
 std::vector<double> planeWeights(const std::vector<PlaneMisfit>& misfits, std::size_t planes) {

@@ -1,7 +1,11 @@
 // Weights of depth points on planes, from their agreement with the planes.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "vip_slam_core/geometry/plane_noise.h"
 
@@ -45,29 +49,60 @@ TEST(PlaneNoise, MisfitIsDistanceAndTiltWithoutScatter) {
   EXPECT_NEAR(sum / kDraws, 3.0, 0.5);
 }
 
-TEST(PlaneNoise, WeightsFollowTheAgreement) {
-  std::mt19937 random(2);
-  const auto scaleOf = [&](double scatter, int observations) {
-    std::vector<PlaneMisfit> misfits;
-    for (int k = 0; k < observations; ++k)
-      misfits.push_back({0, planeMisfit(observation(0, 0, scatter, &random), kAhead)});
-    return planeInformationScale(misfits);
-  };
-  EXPECT_NEAR(scaleOf(kSigma / 3, 1000), 9.0, 1.0);
-  EXPECT_NEAR(scaleOf(kSigma, 1000), 1.0, 0.15);
-  EXPECT_EQ(scaleOf(5 * kSigma, 1000), 1.0);      // never less than the noise model says
-  EXPECT_EQ(scaleOf(kSigma / 1000, 1000), 25.0);  // nor more than a fifth of its sigma
-  EXPECT_EQ(scaleOf(kSigma / 3, 10), 1.0);        // too few to tell
+// The information of the shrunk points against that of the dense covariance of all residuals.
+TEST(PlaneNoise, SharedErrorsAreMarginalisedExactly) {
+  for (const double shared : {0.0, 0.002, 0.01, 0.05}) {
+    Eigen::MatrixX4d P(kPoints, 4);
+    Eigen::MatrixX3d moves(kPoints, 3);  // of the points along the normal, by the shared errors
+    const Eigen::Quaterniond R(Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 0.5).normalized()));
+    for (int k = 0; k < kPoints; ++k) {
+      // A centred grid, uneven in its two directions.
+      const double x = 0.2 * (k % 10) - 0.9, y = 0.15 * (k / 10) - 0.3;
+      P.row(k).head<3>() = R * Eigen::Vector3d(x, y, 0) + Eigen::Vector3d(0.3, -0.2, 2.5);
+      P(k, 3) = 1;
+      moves.row(k) << 1, x / std::sqrt(0.33), y / std::sqrt(0.045);  // over the root mean squares
+    }
+    const Eigen::MatrixXd noise = kSigma * kSigma * Eigen::MatrixXd::Identity(kPoints, kPoints);
+    const Eigen::Vector3d variances = shared * shared * Eigen::Vector3d(1, 1 / 3.0, 1 / 3.0);
+    const Eigen::MatrixXd covariance = noise + moves * variances.asDiagonal() * moves.transpose();
+    const Eigen::Matrix4d dense = P.transpose() * covariance.ldlt().solve(P);
+    const Eigen::Matrix4d G = P.transpose() * P / (kSigma * kSigma);
+    const Eigen::Matrix4d T = sharedErrorShrinkage(G, shared * shared);
+    EXPECT_LT((T * G * T.transpose() - dense).norm(), 1e-6 * dense.norm()) << shared;
+    // The same for points one by one, as the uncompressed variant uses them.
+    const Eigen::MatrixX4d shrunk = P * T.transpose() / kSigma;
+    EXPECT_LT((shrunk.transpose() * shrunk - dense).norm(), 1e-6 * dense.norm()) << shared;
+    EXPECT_GT(shrunk.col(3).minCoeff(), 0);
+  }
 }
 
-TEST(PlaneNoise, AFifthOfWrongObservationsChangesLittle) {
+TEST(PlaneNoise, ManyCorrelatedReadingsAreNotWorthMany) {
+  std::mt19937 random(2);
+  const Eigen::Matrix4d G = observation(0, 0, kSigma, &random);
+  const double shared = 0.01;
+  for (const double readings : {1.0, 100.0, 1e6}) {  // times as many
+    const Eigen::Matrix4d T = sharedErrorShrinkage(readings * G, shared * shared);
+    const double weight = (readings * T * G * T.transpose())(3, 3);
+    EXPECT_NEAR(1 / weight, shared * shared + kSigma * kSigma / (kPoints * readings), 1e-9 / weight) << readings;
+  }
+  EXPECT_TRUE(sharedErrorShrinkage(Eigen::Matrix4d::Zero(), 1).isIdentity(0));
+}
+
+// Misfits of points whose errors are as the model says, shared ones included, are a chi square's.
+TEST(PlaneNoise, MisfitsKnowWhatIsShared) {
   std::mt19937 random(3);
-  std::vector<PlaneMisfit> misfits;
-  for (int k = 0; k < 1000; ++k)
-    misfits.push_back({0, planeMisfit(observation(k % 5 ? 0 : 0.03, 0, kSigma / 3, &random), kAhead)});
-  const double scale = planeInformationScale(misfits);
-  EXPECT_GT(scale, 5.0);
-  EXPECT_LT(scale, 9.0);
+  std::normal_distribution<double> normal;
+  const double shared = 0.008, extent = std::sqrt(0.33);
+  double sum = 0;
+  constexpr int kDraws = 2000;
+  for (int k = 0; k < kDraws; ++k) {
+    const Eigen::Matrix4d G =
+        observation(shared * normal(random), shared / std::sqrt(3.0) / extent * normal(random), kSigma, &random);
+    const Eigen::Matrix4d T = sharedErrorShrinkage(G, shared * shared);
+    sum += planeMisfit(T * G * T.transpose(), kAhead);
+  }
+  // Distance and the turn about y err as said, that about x by the white part alone.
+  EXPECT_NEAR(sum / kDraws, 2.0, 0.2);
 }
 
 // With poses as good as the points, everything else agrees far better than the noise model expects.

@@ -109,15 +109,12 @@ struct PlaneMergingOptions {
 struct PlaneObservationOptions {
   double voxel = 0.12;
   int max_points = 200;
-  double effective_points = 50.0;
   int min_points = 12;
   double inlier_sigmas = 3.0;
 
   void visit(OptionVisitor& v) {
     v.field("voxel", voxel, 0.01, 1.0, "samples of one keyframe on one plane are this far apart, m");
     v.field("max_points", max_points, 20, 5000, "samples kept per keyframe and plane");
-    v.field("effective_points", effective_points, 1.0, 5000.0,
-            "independent points that one keyframe's samples on one plane count for; pixels are correlated");
     v.field("min_points", min_points, 3, 1000, "fewer samples make no observation");
     v.field("inlier_sigmas", inlier_sigmas, 1.0, 10.0, "samples further off the local surface are left out, sigmas");
   }

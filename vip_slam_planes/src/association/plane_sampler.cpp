@@ -114,7 +114,9 @@ void PlaneSampler::accumulate(const Eigen::Vector3d& n_C, PlaneObservation* obse
     point.sigma = float(sigma);
     moments.add(p, 1.0 / (double(point.sigma) * double(point.sigma)));
   }
-  observation->weight_scale = std::min(1.0, options_.effective_points / double(observation->points.size()));
+  const Eigen::Vector3d centre = moments.centroid();
+  const double shared = noise_.shared(centre.z()) * std::abs(n_C.dot(centre)) / centre.z();
+  observation->weight_scale = 1 / (1 + moments.weight() * shared * shared);
   observation->G = observation->weight_scale * moments.M;
 }
 

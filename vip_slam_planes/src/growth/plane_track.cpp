@@ -8,6 +8,9 @@ namespace {
 
 constexpr double kMinTurn = 1e-3, kMinShift = 1e-3;  // radians, metres; smaller changes are ignored
 constexpr double kLargeTurn = 0.3;  // radians; an adjustment turns hosts by less, a loop that joins parts by any angle
+// Points of one view that count when planes are fitted and compared. What all of a view's points share says nothing of
+// whether two surfaces are one, and views of a new plane are too few to learn it from.
+constexpr double kIndependent = 50.0;
 
 }  // namespace
 
@@ -215,13 +218,7 @@ void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
     PlaneObservation& mine = it->second;
     mine.plane = id_;
     if (fresh) continue;
-    // Both saw parts of the same plane: the samples are joined, and the effective count is capped as each was.
-    const double n1 = double(mine.points.size()), n2 = double(theirs.points.size());
-    const double effective = std::max(mine.weight_scale * n1, theirs.weight_scale * n2);
-    const Eigen::Matrix4d sum = mine.G / mine.weight_scale + theirs.G / theirs.weight_scale;
-    mine.points.insert(mine.points.end(), theirs.points.begin(), theirs.points.end());
-    mine.weight_scale = std::min(1.0, effective / (n1 + n2));
-    mine.G = mine.weight_scale * sum;
+    addPiece(theirs, &mine);
   }
   keyframes_seen = std::max<int>(keyframes_seen, static_cast<int>(observations_.size()));
   stored = stored || other.stored;
@@ -229,11 +226,16 @@ void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
   determined = determined || other.determined;
 }
 
+PlaneMoments viewMoments(const PlaneObservation& observation) {
+  const double counted = std::min(1.0, kIndependent / double(std::max<std::size_t>(1, observation.points.size())));
+  return {counted / observation.weight_scale * observation.G};
+}
+
 PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {
   PlaneMoments sum;
   for (const auto& [keyframe, observation] : observations_) {
     const auto it = poses.find(keyframe);
-    if (it != poses.end()) sum.M += PlaneMoments{observation.G}.transformed(it->second).M;
+    if (it != poses.end()) sum.M += viewMoments(observation).transformed(it->second).M;
   }
   return sum;
 }

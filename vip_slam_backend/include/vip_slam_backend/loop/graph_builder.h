@@ -23,10 +23,12 @@ Matrix6d loopSqrtInformation(const Matrix6d& camera_information, const SE3& T_W_
                              const SE3& T_I_C, const PoseGraphOptions& options);
 
 /// All measurements equal the present estimates, so the graph is at its minimum until the caller adds an edge. `loops`:
-/// accepted ones (query, match); `same_planes`: (from, into) are one surface; `min_seconds`: keyframes nearer in time
+/// accepted ones (query, match); `same_planes`: (from, into) are one surface; `closing`: the two ends of the loop that the
+/// caller will add, over whose way the odometry's common drift adds up; `min_seconds`: keyframes nearer in time
 /// are joined by odometry alone.
 PosePlaneGraph buildPosePlaneGraph(const Map& map, const std::vector<std::pair<KeyframeId, KeyframeId>>& loops,
-                                   const std::vector<std::pair<PlaneId, PlaneId>>& same_planes, double min_seconds,
+                                   const std::vector<std::pair<PlaneId, PlaneId>>& same_planes,
+                                   const std::pair<KeyframeId, KeyframeId>& closing, double min_seconds,
                                    const PoseGraphOptions& options);
 
 /// Parts of the map: epochs that loops tie together, directly or via other epochs.

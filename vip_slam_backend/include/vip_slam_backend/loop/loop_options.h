@@ -50,6 +50,7 @@ struct PlaceVerificationOptions {
 struct PoseGraphOptions {
   double odometry_sigma_position = 0.015;
   double odometry_sigma_yaw_deg = 0.10;
+  double odometry_drift = 0.005;
   double loop_sigma_position = 0.02;
   double loop_sigma_angle_deg = 0.3;
   int covisible_edge = 60;
@@ -61,6 +62,8 @@ struct PoseGraphOptions {
             "drift of position, m per square root of metre");
     v.field("odometry_sigma_yaw_deg", odometry_sigma_yaw_deg, 1e-3, 10.0,
             "drift of yaw, degrees per square root of metre");
+    v.field("odometry_drift", odometry_drift, 0.0, 0.1,
+            "one sigma of the drift that is common to the whole way of a loop, as a share of the way");
     v.field("loop_sigma_position", loop_sigma_position, 1e-4, 1.0, "smallest one-sigma of a loop edge's position, m");
     v.field("loop_sigma_angle_deg", loop_sigma_angle_deg, 1e-3, 10.0,
             "smallest one-sigma of a loop edge's angles, degrees");

@@ -9,6 +9,7 @@
 #include "vip_slam_backend/back_end_options.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/solver/ba_problem.h"
+#include "vip_slam_core/depth/depth_noise.h"
 
 namespace vip_slam {
 
@@ -40,6 +41,7 @@ struct BuiltProblem {
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
   double track_noise_factor = 1;  ///< on the sigmas of all pixels, estimated in src/optimisation/track_noise.h
+  DepthNoiseParts depth_noise;    ///< of the recording, see types/depth_noise_parts.h
   double gate_weight = 0;         ///< largest weight, focal / sigma, with which outliers are judged
 };
 
@@ -49,6 +51,7 @@ struct BuilderSettings {
   bool shared_hosts = true;   ///< of homographies: few hosts for many landmarks, instead of first views
   bool middle_hosts = false;  ///< shared ones from the middle of the landmarks' tracks only
   double focal = 500;         ///< px
+  DepthNoise depth_noise;
   Eigen::Vector3d gravity = gravityVector();
 };
 

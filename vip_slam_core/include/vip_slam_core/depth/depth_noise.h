@@ -1,6 +1,7 @@
 // Depth noise of RGB-D cameras: one-sigma error of the measured z as a function of z.
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 namespace vip_slam {
@@ -20,9 +21,12 @@ struct DepthNoise {
   double c = 0.0;
   double min_range = 0.2;  ///< metres; readings outside [min, max] are invalid
   double max_range = 10.0;
-  double bias_floor = 0.005;  ///< systematic error floor, metres, for measurements that pool many pixels
+  double bias_floor = 0.005;  ///< least error that the pixels of one surface in one image share, metres
 
   double sigma(double z) const { return a + (b + c * z) * z; }
+  /// One sigma of the error that all pixels of one surface in one image share, so that no average removes it. Mean
+  /// depth of planes in single images errs by about the sigma of a single pixel on structured light and time of flight.
+  double shared(double z) const { return std::max(bias_floor, sigma(z)); }
   bool inRange(double z) const { return z >= min_range && z <= max_range; }
   /// Depth up to which hardly any noisy reading falls outside the range, m. Farther off mainly readings that noise
   /// makes too short remain, and their mean is biased.
@@ -30,6 +34,11 @@ struct DepthNoise {
   /// Defaults of a type: structured light after Khoshelham & Elberink 2012; stereo and ToF from data sheets.
   static DepthNoise preset(DepthSensorType type);
   std::string validate() const;
+};
+
+/// Factors on the variances of a recording's depth noise: of the white part, sigma(z), and of shared(z).
+struct DepthNoiseParts {
+  double white = 1, shared = 1;
 };
 
 }  // namespace vip_slam

@@ -1,4 +1,15 @@
-// Agreement of the keyframes' depth points with their planes, compared with their noise model.
+// What one keyframe's depth points on a plane are worth, and how they agree with their plane.
+//
+// The points' errors along the plane's normal have two parts: white ones, and one that the whole surface shares in that
+// keyframe (depth cameras err by millimetres over patches of many degrees). With points p~_i = (p_i, 1), whitened by
+// their sigmas, a plane u = (n, d) in the camera has the residuals P u + P B s + white. The columns of B move the
+// surface as a whole: along its normal, and by a turn about each of its two axes; s ~ N(0, S) are the shared errors.
+// Without s the information on u is, by Woodbury,
+//   G' = P^T (I + P B S B^T P^T)^-1 P = G - G B (S^-1 + B^T G B)^-1 B^T G,   G = P^T P = sum p~ p~^T / sigma^2.
+// About the centroid, and with turns scaled by the points' extent along the axes, B^T G B = w I, w = G(3, 3). So the
+// three directions separate: the variance of the distance is 1/w + shared^2, of each turn (1/w + shared^2 / 3) over the
+// extent squared; the third makes an error at the border of a uniform surface that is as large as the shared one. N
+// readings are not worth N.
 #pragma once
 
 #include <vector>
@@ -6,6 +17,11 @@
 #include <Eigen/Core>
 
 namespace vip_slam {
+
+/// The map of homogeneous points p~ for which G' = T G T^T: the centroid's weight and the extent shrink, and the points
+/// move onto their own plane, since their scatter about it tells nothing of where it is. `shared`: variance, m^2.
+/// Identity when G is zero.
+Eigen::Matrix4d sharedErrorShrinkage(const Eigen::Matrix4d& G, double shared);
 
 /// Chi-square of the distance and tilt (three degrees of freedom) between the plane (n, d) in the observation's camera
 /// and the best plane through the points of G, without the points' own scatter.
@@ -18,13 +34,7 @@ struct PlaneMisfit {
   double square = 0;  ///< the same per point, m^2: mean squared distance from the plane
 };
 
-/// Factor, at least 1, on the information of all point-to-plane blocks. The configured floor of systematic depth error
-/// is far too large for many cameras, and it does not average out, since the points of one image share it. So it is
-/// estimated from the map: the factor brings the median of the observations' misfits up to that of a chi-square with
-/// three degrees of freedom. 1 with too few observations, and where the floor is too small.
-double planeInformationScale(const std::vector<PlaneMisfit>& misfits);
-
-/// Additional factors on the information of single planes. One plane may represent several surfaces: fronts of boxes
+/// Factors on the information of single planes. One plane may represent several surfaces: fronts of boxes
 /// on a shelf, offset by a hand's breadth, turned by a few degrees. Each keyframe sees other parts of it, and the error
 /// is common to most of its observations. So its variance, in units of the map's typical misfit, is unknown with a
 /// prior, which makes its misfits jointly Student's t. By index of plane; 1 for planes without observations, and for

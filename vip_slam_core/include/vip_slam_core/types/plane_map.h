@@ -40,7 +40,7 @@ struct StoredPlane {
   PlaneHost host;
 };
 
-/// A depth point on a plane, in the keyframe's camera frame, with the one-sigma distance error used as its weight.
+/// A depth point on a plane, in the keyframe's camera frame, with one sigma of its own distance error.
 struct PlaneSample {
   Eigen::Vector3f p_C;
   float sigma;  ///< metres along the plane normal
@@ -50,12 +50,19 @@ struct PlaneSample {
 struct PlaneObservation {
   KeyframeId keyframe = 0;
   PlaneId plane = 0;
-  /// G_p = sum w [p_C;1][p_C;1]^T, w = 1/sigma^2 scaled so that the sum of effective points is capped.
+  /// G_p = weight_scale * sum 1/sigma^2 [p_C;1][p_C;1]^T over `points`.
   Eigen::Matrix4d G = Eigen::Matrix4d::Zero();
-  double weight_scale = 1.0;           ///< G = weight_scale * sum 1/sigma^2 p~ p~^T over `points`
+  /// 1 / (1 + w shared^2) with the points' weight w = sum 1/sigma^2: 1/G(3,3) = 1/w + shared^2 is the variance of the
+  /// surface's distance, with the error that its points share.
+  double weight_scale = 1.0;
   std::vector<PlaneSample> points;     ///< the samples behind G
   CameraCorrection camera_correction;  ///< applied to their readings, see TrackedFrame
 };
+
+/// Variance of the error that all points share along the normal, m^2, as the observation was made with.
+double sharedVariance(const PlaneObservation& observation);
+/// Adds the points of another piece of the same plane in the same keyframe, which share that error.
+void addPiece(const PlaneObservation& piece, PlaneObservation* observation);
 
 struct PlaneMerge {
   PlaneId from = 0, into = 0;  ///< `into` is the older id

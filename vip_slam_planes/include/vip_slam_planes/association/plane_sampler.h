@@ -1,5 +1,5 @@
 // The compressed point-to-plane measurement of one keyframe on one plane (paper section "Compressed Point-to-Plane
-// Measurement"): samples spread evenly in 3D, G = s * sum p~ p~^T / sigma^2.
+// Measurement"): samples spread evenly in 3D, G = s * sum p~ p~^T / sigma^2, with s for the error that they share.
 // A wrong sample cannot be removed once it is summed, so the selection is strict: nodes one stride inside the surface's
 // image region, near the plane at the corrected pose, and on the surface fitted to these nodes alone. The last test
 // does not depend on the pose, so that it does not hide the pose error which the measurement has to correct.

@@ -25,6 +25,9 @@ namespace vip_slam {
 /// Camera poses T_map_C of placed keyframes.
 using CameraPoses = std::unordered_map<KeyframeId, SE3>;
 
+/// Moments of a view's points, in its camera, with the weights for fits: at most so many points count.
+PlaneMoments viewMoments(const PlaneObservation& observation);
+
 class PlaneTrack {
  public:
   PlaneTrack(PlaneId id, PlaneKind kind, const Plane& plane, const Eigen::Vector3d& origin, double cell);

@@ -1,0 +1,68 @@
+// How stiff the pose-plane graph takes the odometry between the ends of a loop.
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "vip_slam_backend/loop/graph_builder.h"
+
+namespace vip_slam {
+namespace {
+
+/// Keyframes a metre apart on a line. Over the step to keyframe `gap` the odometry says it is 0.9 m uncertain.
+Map walk(int keyframes, KeyframeId gap = 0) {
+  Map map;
+  for (int k = 0; k < keyframes; ++k) {
+    auto keyframe = std::make_shared<Keyframe>();
+    keyframe->id = k + 1;
+    keyframe->previous = k;
+    keyframe->frame.t = 0.5 * k;
+    keyframe->frame.status.state = TrackingState::kTracking;
+    if (k > 0) {
+      const double sigma = keyframe->id == gap ? 0.9 : 0.001;
+      keyframe->motion.T_a_b = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 0, 0));
+      keyframe->motion.covariance.diagonal() << Eigen::Vector3d::Constant(1e-8), Eigen::Vector3d::Constant(sigma * sigma);
+    }
+    NavState state;
+    state.t = keyframe->frame.t;
+    state.T_W_I = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(k, 0, 0));
+    keyframe->frame.state = state;
+    map.addKeyframe(keyframe, state, ImuNoise());
+  }
+  return map;
+}
+
+/// What it costs to close a loop between the ends of the walk that is off by so much along the way.
+double chi2(const Map& map, double off) {
+  const PoseGraphOptions options;
+  const auto last = static_cast<KeyframeId>(map.keyframes().size());
+  PosePlaneGraph graph = buildPosePlaneGraph(map, {}, {}, {last, 1}, 10, options);
+  const double length = map.keyframe(last).state.T_W_I.t().x();
+  graph.addEdge(RelativePoseEdge{1, last, SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(length + off, 0, 0)),
+                                 diagonalSqrtInformation(0.005, 0.02)});
+  return graph.solve(options.max_iterations).chi2;
+}
+
+TEST(GraphBuilder, AGapIsAsLooseAsTheOdometrySays) {
+  const double most = PoseGraphOptions().max_chi2;
+  EXPECT_GT(chi2(walk(12), 0.6), most);
+  EXPECT_LT(chi2(walk(12, 6), 0.6), 1);
+  EXPECT_GT(chi2(walk(12, 6), 20), most);
+  // The step over the gap takes up what the loop says.
+  const Map map = walk(12, 6);
+  PosePlaneGraph graph = buildPosePlaneGraph(map, {}, {}, {12, 1}, 10, PoseGraphOptions());
+  graph.addEdge(RelativePoseEdge{1, 12, SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(11.4, 0, 0)),
+                                 diagonalSqrtInformation(0.005, 0.02)});
+  const PosePlaneSolution solution = graph.solve(50);
+  EXPECT_NEAR(solution.T_W_I.at(5).t().x(), 4.0, 0.01);
+  EXPECT_NEAR(solution.T_W_I.at(6).t().x(), 5.4, 0.01);
+}
+
+// An odometry that is off by the same share everywhere: one per cent of a hundred metres, but not ten of five.
+TEST(GraphBuilder, ADriftAddsUpOverTheWay) {
+  const double most = PoseGraphOptions().max_chi2;
+  EXPECT_LT(chi2(walk(100), 1.0), most);
+  EXPECT_GT(chi2(walk(6), 0.5), most);
+}
+
+}  // namespace
+}  // namespace vip_slam
