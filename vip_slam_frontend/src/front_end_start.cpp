@@ -71,6 +71,9 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   const std::optional<ImuSample> here = inertial_.at(t_imu);
   const Eigen::Vector3d omega = here ? Eigen::Vector3d(here->gyro - prior->state.bias_gyro) : Eigen::Vector3d::Zero();
   filter_.start(*prior, next_clone_++, omega);
+  if (prior->at_rest) {
+    stillness_.begin(imuSpread(inertial_.between(t_imu - options_.initialisation.standing_seconds, t_imu)));
+  }
   initialiser_.reset();
   phase_ = Phase::kTracking;
   started_imu_t_ = t_imu;

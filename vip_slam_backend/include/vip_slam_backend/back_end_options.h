@@ -134,6 +134,7 @@ struct BackEndOptions {
   std::string solver = "structured";
   bool loop_closing = true;
   bool depth_curve = true;
+  bool disparity = false;
   bool lockstep = false;
   MeasurementOptions measurement;
   LocalBaOptions local_ba;
@@ -149,6 +150,9 @@ struct BackEndOptions {
     v.field("loop_closing", loop_closing, "recognise places and close loops");
     v.field("depth_curve", depth_curve,
             "find out from planes seen from near and far what the depth camera reads wrong at which distance");
+    v.field("disparity", disparity,
+            "likewise of a stereo or structured-light camera, whose disparities may all be off; with depth errors that "
+            "surfaces share it finds errors that are not there");
     v.field("lockstep", lockstep, "ignore time limits so that two runs give the same bits");
     v.group("measurement", measurement);
     v.group("local_ba", local_ba);

@@ -48,6 +48,7 @@ bool BackEnd::Impl::learnDepthCurve() {
   std::optional<double> disparity;
   std::optional<DepthCurve> found;
   if (measuresDisparity(sensor.depth_noise.type)) {
+    if (!options.disparity) return false;
     disparity = fitDisparityError(map, sensor.depth_noise, disparity_error != 0);
     if (disparity) found = disparityCurve(*disparity, sensor.depth_noise.max_range);
   } else {

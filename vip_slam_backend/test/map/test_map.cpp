@@ -235,11 +235,16 @@ TEST(Map, PlanesMergeAndGo) {
   const PlaneId a = update.observations[0].plane, b = update.observations[1].plane;
   const LandmarkId landmark = f.map.landmarkIds().front();
   f.map.associate(landmark, b);
-  const Eigen::Matrix4d sum = f.map.keyframe(3).planes.at(a).G + f.map.keyframe(3).planes.at(b).G;
+  // The points' own moments add; what the readings share is counted once.
+  const auto own = [](const PlaneObservation& o) { return Eigen::Matrix4d(o.G / o.weight_scale); };
+  const PlaneObservation one = f.map.keyframe(3).planes.at(a), other = f.map.keyframe(3).planes.at(b);
+  const Eigen::Matrix4d sum = own(one) + own(other);
   f.map.mergePlanes(b, a);
   EXPECT_EQ(checkMap(f.map), "");
   EXPECT_EQ(f.map.landmark(landmark).plane, a);
-  EXPECT_LT((f.map.keyframe(3).planes.at(a).G - sum).norm(), 1e-9 * sum.norm());
+  const PlaneObservation& joint = f.map.keyframe(3).planes.at(a);
+  EXPECT_LT((own(joint) - sum).norm(), 1e-9 * sum.norm());
+  EXPECT_LT(joint.weight_scale, std::min(one.weight_scale, other.weight_scale) + 1e-12);
   f.map.removePlane(a);
   EXPECT_EQ(checkMap(f.map), "");
   EXPECT_EQ(f.map.landmark(landmark).plane, 0u);

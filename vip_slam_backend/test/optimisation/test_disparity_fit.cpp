@@ -131,6 +131,7 @@ TEST(DisparityFit, WhatTheBackEndLearnsTakesThePlaceOfTheOffset) {
   SimulatedKeyframes world(6);
   world.setDepthCamera(tooLong, 0.004);
   BackEndOptions options;
+  options.disparity = true;
   options.lockstep = true;
   options.loop_closing = false;
   options.variant = "vi";  // so that plane factors do not pull the poses

@@ -49,7 +49,7 @@ std::optional<FilterPrior> Initialiser::standing(double t, const frontend::Inert
   if (!spread.quiet(options_.max_gyro_std, options_.max_accel_std) || spread.mean_gyro.norm() > kMaxTurn)
     return std::nullopt;
   FilterPrior prior;
-  prior.standing = true;
+  prior.standing = prior.at_rest = true;
   prior.state.t = t;
   prior.state.T_W_I = SE3(gravityAlignedRotation(spread.mean_accel), Eigen::Vector3d::Zero());
   prior.state.bias_gyro = spread.mean_gyro;

@@ -14,10 +14,12 @@ namespace {
 
 TEST_F(FrontEndTest, WholeRunFollowsAndHandsOnKeyframes) {
   EXPECT_FALSE(front_end_.ready(0.5));
-  FrameOutput output = run(0.0, 0.5);
+  FrameOutput output = run(0.0, 0.1);
   EXPECT_EQ(output.frame->status.state, TrackingState::kInitialising);
   EXPECT_FALSE(output.frame->status.reason.empty());
-  EXPECT_FALSE(front_end_.predict(0.5));
+  EXPECT_FALSE(front_end_.predict(0.1));
+  output = run(0.1, 0.5);
+  EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
   output = run(0.5, 6.0);
   EXPECT_TRUE(front_end_.ready(5.95));
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;

@@ -14,8 +14,9 @@ namespace {
 using Fault = std::function<ImuSample(ImuSample)>;
 
 struct Verdict {
-  std::uint64_t contradicted = 0;
-  int named = 0, silent = 0;  ///< images after 3 s of motion: with the reason given; as TRACKING
+  std::uint64_t contradicted = 0;  ///< images before which the IMU was at fault, or that contradict it for good
+  double farthest = 0;             ///< of the poses from the true ones, m
+  int named = 0, silent = 0;       ///< images after 3 s of motion: with the reason given; as TRACKING
 };
 
 Verdict judge(const Fault& fault, const SensorConfig& sensor) {
@@ -29,12 +30,14 @@ Verdict judge(const Fault& fault, const SensorConfig& sensor) {
     FrameInput input;
     input.t = t;
     world.look(t, 0, &input.gray, &input.depth);
-    const TrackingStatus status = front_end.process(input).frame->status;
+    const TrackedFramePtr frame = front_end.process(input).frame;
+    const TrackingStatus status = frame->status;
     if (t < kStill + 3) continue;
+    verdict.farthest = std::max(verdict.farthest, (frame->state.T_W_I.t() - CornerWorld::pose(t).t()).norm());
     verdict.named += status.reason.find("contradict") != std::string::npos;
     verdict.silent += status.state == TrackingState::kTracking;
   }
-  verdict.contradicted = front_end.counters().imu_contradicted;
+  verdict.contradicted = front_end.counters().imu_contradicted + front_end.counters().imu_faults;
   return verdict;
 }
 
@@ -69,6 +72,7 @@ void expectNamed(const Fault& fault) {
   EXPECT_GT(verdict.contradicted, 20u);
   EXPECT_GT(verdict.named, 20);
   EXPECT_LT(verdict.silent, 8);
+  EXPECT_LT(verdict.farthest, 1.5);  // in five seconds; the fault is found while its errors are integrated
 }
 
 /// Faults with which tracking itself fails: LOST, coasting, or a rejected initialisation, each with its own reason.

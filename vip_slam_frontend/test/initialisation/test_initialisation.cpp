@@ -1,4 +1,4 @@
-// Initialisation at rest and in motion on the landmark simulation; stillness; keyframe selection.
+// Starts at rest and in motion on the landmark simulation; stillness; keyframe selection.
 #include <cmath>
 #include <random>
 
@@ -18,36 +18,47 @@ struct Start {
   std::string reason;
 };
 
-/// `scene`: the scene moves with the camera by this share of its motion. `gyro`: scale factor of the gyro. `turned`:
-/// error of the configured extrinsic rotation, rad. `learnt`: both are already known.
-Start start(double speed, bool depth, double accel_unit = 1, double scene = 0, double gyro = 1, double turned = 0,
-            bool learnt = false, double standing_seconds = 1.0) {
+struct StartOptions {
+  double speed = 1;  ///< m/s; 0: at rest
+  int points = 50;   ///< with depth
+  bool surfaces = false;
+  bool motion = true;     ///< images tell the motion between them
+  double accel_unit = 1;  ///< m/s^2 of what the accelerometer calls one
+  double gyro_bias = 0;   ///< rad/s, beyond the simulation's, about x
+  bool gyro = true, accel = true;
+};
+
+Start start(const StartOptions& o) {
   SimulationOptions options;
-  options.speed = speed;
-  options.depth = depth;
+  options.speed = o.speed;
   options.seed = 9;
   LandmarkSimulation simulation(options);
   simulation.generateImu(6.0);
-  options.speed = (1 - scene) * speed;
-  LandmarkSimulation seen(options);
-  seen.generateImu(6.0);
-  ImuBuffer imu;
-  const SE3 T_I_C = simulation.T_I_C(), given(T_I_C.rotation() * expQuaternion({turned, 0, turned}), T_I_C.t());
-  InitialisationOptions initialisation;
-  initialisation.standing_seconds = standing_seconds;
-  Initialiser initialiser(initialisation, FilterOptions(), options.noise, given, options.focal, 9.81);
-  if (learnt) initialiser.setCalibration(T_I_C, (1 / gyro - 1) * Eigen::Matrix3d::Identity());
+  SensorConfig sensor;
+  sensor.topics.imu = o.gyro && o.accel ? "imu" : "";
+  sensor.topics.gyro = o.gyro && !o.accel ? "gyro" : "";
+  sensor.topics.accel = o.accel && !o.gyro ? "accel" : "";
+  frontend::InertialInput inertial(sensor, 0.1);
+  const SE3 T_I_C = simulation.T_I_C();
+  Initialiser initialiser(InitialisationOptions(), FilterOptions(), options.noise, T_I_C, 9.81);
   std::size_t next = 0;
   Start result;
+  std::optional<SE3> T_W_C_before;
   for (int k = 0; k < 80 && !result.prior; ++k) {
     result.t = 1.0 + 0.05 * k;
     for (; simulation.imu()[next].t < result.t + 0.01; ++next) {
       ImuSample sample = simulation.imu()[next];
-      sample.accel /= accel_unit;
-      sample.gyro *= gyro;
-      imu.add(sample);
+      sample.accel /= o.accel_unit;
+      sample.gyro.x() += o.gyro_bias;
+      if (o.gyro && o.accel) inertial.addImu(sample);
+      if (o.gyro && !o.accel) inertial.addGyro(sample.t, sample.gyro);
+      if (o.accel && !o.gyro) inertial.addAccel(sample.t, sample.accel);
     }
-    result.prior = initialiser.add({result.t, seen.sight(result.t, 200)}, imu);
+    InitialisationInput image{result.t, o.points, o.surfaces, std::nullopt};
+    const SE3 T_W_C = simulation.stateAt(result.t).T_W_I * T_I_C;
+    if (o.motion && T_W_C_before) image.T_current_previous = T_W_C.inverse() * *T_W_C_before;
+    T_W_C_before = T_W_C;
+    result.prior = initialiser.add(image, inertial);
     result.reason = initialiser.reason();
   }
   return result;
@@ -68,27 +79,87 @@ NavState truthOf(double speed, double t) {
   return simulation.stateAt(t);
 }
 
-TEST(Initialiser, StandingLevelsAndFindsTheGyroBias) {
-  const Start s = start(0.0, true);
-  ASSERT_TRUE(s.prior);
-  EXPECT_LT(s.t, 2.2);
-  const NavState truth = truthOf(0.0, s.t);
-  EXPECT_TRUE(s.prior->standing);
-  EXPECT_LT(tiltError(*s.prior, truth), 0.02);  // an accelerometer bias of 0.04 m/s^2 tilts by 4 mrad per axis
-  EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.005);
-  EXPECT_LT(s.prior->state.v_W.norm(), 1e-9);
+/// Error of the velocity in the body frame, m/s: yaw is free.
+double velocityError(const FilterPrior& prior, const NavState& truth) {
+  return (prior.state.T_W_I.R().transpose() * prior.state.v_W - truth.T_W_I.R().transpose() * truth.v_W).norm();
 }
 
-TEST(Initialiser, ALongerRestIsWaitedFor) {
-  for (const bool depth : {true, false}) {
-    const Start s = start(0.0, depth, 1, 0, 1, 0, false, 3.0);
-    ASSERT_TRUE(s.prior) << depth << ' ' << s.reason;
-    EXPECT_TRUE(s.prior->standing) << depth;
-    EXPECT_GE(s.t, 2.9) << depth;
+TEST(Initialiser, StartsWithinHalfASecondMovingOrStillWithSigmasThatHold) {
+  for (const double speed : {0.0, 1.0}) {
+    for (const bool surfaces : {false, true}) {
+      StartOptions options;
+      options.speed = speed;
+      options.surfaces = surfaces;
+      options.points = surfaces ? 0 : 8;
+      const Start s = start(options);
+      ASSERT_TRUE(s.prior) << speed << ' ' << s.reason;
+      EXPECT_LT(s.t, 1.3);
+      const NavState truth = truthOf(speed, s.t);
+      // Level by the mean force: its error over gravity is the tilt's.
+      const double sigma_tilt = std::hypot(s.prior->sigma_mean_accel, s.prior->sigma_bias_accel) / 9.81;
+      EXPECT_LT(tiltError(*s.prior, truth), 3 * sigma_tilt);
+      EXPECT_LT(velocityError(*s.prior, truth), 3 * s.prior->sigma_velocity);
+      EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 3 * s.prior->sigma_bias_gyro);
+      EXPECT_FALSE(s.prior->at_rest);
+    }
   }
-  const Start moving = start(1.0, true, 1, 0, 1, 0, false, 3.0);  // no rest in the data: it does not wait
-  ASSERT_TRUE(moving.prior) << moving.reason;
-  EXPECT_LT(moving.t, 2.5);
+}
+
+TEST(Initialiser, AVelocityThatNothingTellsIsWide) {
+  StartOptions options;
+  options.motion = false;
+  const Start s = start(options);
+  ASSERT_TRUE(s.prior) << s.reason;
+  EXPECT_LT(velocityError(*s.prior, truthOf(1.0, s.t)), 3 * s.prior->sigma_velocity);
+}
+
+TEST(Initialiser, AGyroBiasBeyondItsPriorShowsAgainstTheImages) {
+  StartOptions options;
+  options.speed = 0.3;
+  options.gyro_bias = 0.15;
+  const Start s = start(options);
+  ASSERT_TRUE(s.prior) << s.reason;
+  const Eigen::Vector3d truth = truthOf(0.3, s.t).bias_gyro + Eigen::Vector3d(0.15, 0, 0);
+  EXPECT_LT((s.prior->state.bias_gyro - truth).norm(), 3 * s.prior->sigma_bias_gyro);
+}
+
+TEST(Initialiser, WithoutAnAccelerometerTheCameraIsLevel) {
+  for (const bool gyro : {false, true}) {
+    StartOptions options;
+    options.accel = false;
+    options.gyro = gyro;
+    const Start s = start(options);
+    ASSERT_TRUE(s.prior) << s.reason;
+    SimulationOptions simulated;
+    const Eigen::Vector3d down_I = LandmarkSimulation(simulated).T_I_C().R() * Eigen::Vector3d::UnitY();
+    EXPECT_LT((s.prior->state.T_W_I.rotation() * down_I + Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+    EXPECT_LT(s.prior->sigma_tilt, 0.001);  // part of the gauge
+  }
+}
+
+TEST(Initialiser, AnAccelerometerAloneLevels) {
+  StartOptions options;
+  options.gyro = false;
+  options.speed = 0;
+  const Start s = start(options);
+  ASSERT_TRUE(s.prior) << s.reason;
+  EXPECT_LT(tiltError(*s.prior, truthOf(0, s.t)), 0.03);
+}
+
+TEST(Initialiser, BlindItStartsAtRestOnly) {
+  StartOptions options;
+  options.points = 3;
+  options.motion = false;
+  options.speed = 0;
+  const Start rest = start(options);
+  ASSERT_TRUE(rest.prior) << rest.reason;
+  EXPECT_TRUE(rest.prior->at_rest);
+  EXPECT_LT(tiltError(*rest.prior, truthOf(0.0, rest.t)), 0.02);
+  options.speed = 1;
+  const Start moving = start(options);
+  EXPECT_FALSE(moving.prior);
+  EXPECT_NE(moving.reason.find("sees 3 points with depth and no surfaces, needs 8"), std::string::npos)
+      << moving.reason;
 }
 
 TEST(Initialiser, TheRobotBeginsAtTheOriginHeadingAlongX) {
@@ -107,132 +178,13 @@ TEST(Initialiser, TheRobotBeginsAtTheOriginHeadingAlongX) {
 }
 
 TEST(Initialiser, AnAccelerometerInUnitsOfGravityIsNamed) {
-  const Start s = start(0.0, true, 9.80665);
+  StartOptions options;
+  options.speed = 0;
+  options.accel_unit = 9.80665;
+  const Start s = start(options);
   EXPECT_FALSE(s.prior);
   EXPECT_NE(s.reason.find("reads 1.0"), std::string::npos) << s.reason;
   EXPECT_NE(s.reason.find("unit"), std::string::npos) << s.reason;
-}
-
-TEST(Initialiser, MovingFindsVelocityAndGravity) {
-  const Start s = start(1.0, true);
-  ASSERT_TRUE(s.prior) << s.reason;
-  EXPECT_LT(s.t, 3.5);
-  const NavState truth = truthOf(1.0, s.t);
-  EXPECT_FALSE(s.prior->standing);
-  EXPECT_LT(tiltError(*s.prior, truth), 3.0 * s.prior->sigma_tilt);
-  EXPECT_LT(tiltError(*s.prior, truth), 0.06);
-  // Velocity in the body frame: yaw is free.
-  const Eigen::Vector3d estimated = s.prior->state.T_W_I.R().transpose() * s.prior->state.v_W;
-  const Eigen::Vector3d expected = truth.T_W_I.R().transpose() * truth.v_W;
-  EXPECT_LT((estimated - expected).norm(), 3.0 * s.prior->sigma_velocity);
-  EXPECT_LT((estimated - expected).norm(), 0.15);
-  EXPECT_LT((s.prior->state.bias_gyro - truth.bias_gyro).norm(), 0.01);
-}
-
-// As after a restart in motion: the gyro and extrinsics errors already learnt must not be estimated again as a bias.
-TEST(Initialiser, AStartInMotionKnowsWhatWasLearnt) {
-  for (const bool learnt : {false, true}) {
-    const Start s = start(1.0, true, 1, 0, 1.05, 0.02, learnt);
-    if (!learnt && !s.prior) continue;  // rejected: gyro and camera disagree
-    ASSERT_TRUE(s.prior) << s.reason;
-    const double off = (s.prior->state.bias_gyro - truthOf(1.0, s.t).bias_gyro).norm();
-    EXPECT_EQ(learnt, off < 0.01) << off;
-  }
-}
-
-TEST(Initialiser, WhatMovesBeforeTheCameraIsNoStart) {
-  for (const double share : {0.1, 0.2, 0.4}) {
-    const Start s = start(1.0, true, 1, share);
-    EXPECT_FALSE(s.prior) << share;
-    EXPECT_NE(s.reason.find("does something move"), std::string::npos) << s.reason;
-  }
-}
-
-TEST(Initialiser, MovingWithoutDepthSaysWhyItWaits) {
-  const Start s = start(1.0, false);
-  EXPECT_FALSE(s.prior);
-  EXPECT_NE(s.reason.find("features with depth"), std::string::npos) << s.reason;
-}
-
-// During a steady motion the IMU is quiet; when the view changes completely within a second, no feature is shared with
-// the oldest image.
-TEST(Initialiser, ASteadyMotionIsNoRestHoweverSoonTheViewHasTurnedOver) {
-  ImuNoise noise;
-  for (const double speed : {0.0, 0.04}) {  // image motion per image, normalised
-    ImuBuffer imu;
-    Initialiser initialiser(InitialisationOptions(), FilterOptions(), noise, SE3(), 480, 9.81, DepthNoise());
-    std::optional<FilterPrior> prior;
-    double t = 0;
-    for (int k = 0; k < 40 && !prior; ++k) {
-      for (; t <= 0.05 * k + 0.01; t += 0.005) imu.add({t, {0, 0, 0}, {0, -9.81, 0}});
-      InitialisationInput image{0.05 * k, {}};
-      for (int i = 0; i < 100; ++i) {
-        FilterMeasurement m;
-        m.id = 1000 * (k / 8) + i + 1;  // all tracks are new every 0.4 s
-        m.xy = Eigen::Vector2d(0.01 * (i % 10) + speed * (k % 8), 0.01 * (i / 10));
-        image.features.push_back(m);
-      }
-      prior = initialiser.add(image, imu);
-    }
-    EXPECT_EQ(prior.has_value(), speed == 0.0);
-    if (prior) EXPECT_TRUE(prior->standing);
-  }
-}
-
-// In the dark corners are noise: they last for one image only, or jump at random.
-TEST(Initialiser, NoiseIsNoMotion) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> u(-0.3, 0.3), jump(-0.01, 0.01);
-  ImuNoise noise;
-  for (const int lasts : {1, 4}) {
-    ImuBuffer imu;
-    Initialiser initialiser(InitialisationOptions(), FilterOptions(), noise, SE3(), 480, 9.81, DepthNoise());
-    std::optional<FilterPrior> prior;
-    std::vector<FilterMeasurement> corners(80);
-    double t = 0;
-    for (int k = 0; k < 80 && !prior; ++k) {
-      for (; t <= 0.05 * k + 0.01; t += 0.005) imu.add({t, {0, 0, 0}, {0, -9.81, 0}});
-      InitialisationInput image{0.05 * k, {}};
-      for (int i = 0; i < 80; ++i) {
-        const bool fresh = k % lasts == 0;
-        corners[i].id = 1 + i + 100 * (k / lasts);
-        corners[i].xy = fresh ? Eigen::Vector2d(u(random), u(random))
-                              : Eigen::Vector2d(corners[i].xy + Eigen::Vector2d(jump(random), jump(random)));
-      }
-      image.features = corners;
-      prior = initialiser.add(image, imu);
-    }
-    EXPECT_TRUE(prior && prior->standing) << lasts << ": " << initialiser.reason();
-  }
-}
-
-// During a slow steady rotation the IMU is quiet, and a bare wall has no features to show the rotation.
-TEST(Initialiser, BeforeABareWallTheDepthTellsWhetherItStands) {
-  ImuNoise noise;
-  for (const double rate : {0.0, 0.05}) {
-    std::mt19937 random(3);
-    std::normal_distribution<double> normal;
-    ImuBuffer imu;
-    Initialiser initialiser(InitialisationOptions(), FilterOptions(), noise, SE3(), 480, 9.81, DepthNoise());
-    std::optional<FilterPrior> prior;
-    double t = 0;
-    for (int k = 0; k < 60 && !prior; ++k) {
-      for (; t <= 0.05 * k + 0.01; t += 0.005) imu.add({t, {0, rate, 0}, {0, -9.81, 0}});
-      InitialisationInput image{0.05 * k, {}};
-      image.depth.stride = 16;
-      image.depth.cols = 40;
-      image.depth.rows = 30;
-      const double yaw = rate * image.t_imu;
-      for (int i = 0; i < 1200; ++i) {
-        const double x = (i % 40 - 19.5) * 16 / 480;
-        const double z = 1.0 / (std::cos(yaw) + std::sin(yaw) * x);  // a wall 1 m away
-        image.depth.z.push_back(static_cast<float>(z + DepthNoise().sigma(z) * normal(random)));
-      }
-      prior = initialiser.add(image, imu);
-    }
-    EXPECT_EQ(prior.has_value(), rate == 0.0);
-    if (!prior) EXPECT_NE(initialiser.reason().find("start in motion"), std::string::npos) << initialiser.reason();
-  }
 }
 
 StillnessCues quiet() {

@@ -16,8 +16,7 @@ namespace vip_slam {
 
 struct SensorTopics {
   std::string color, color_info, depth, depth_info;
-  /// Gyroscope and accelerometer in one message; empty when they come apart, or not at all.
-  std::string imu = "imu";
+  std::string imu;          ///< gyroscope and accelerometer in one message; empty when they come apart, or not at all
   std::string gyro, accel;  ///< streams of their own, both or one of them; empty when there is `imu`, or none
 
   /// Which inertial streams there are. Neither: RGB-D alone, no inertial sample ever comes.

@@ -44,6 +44,7 @@ struct FilterPrior {
   /// accelerometer bias, whose errors are not independent then.
   bool standing = false;
   double sigma_mean_accel = 0.01;  ///< m/s^2, of that mean
+  bool at_rest = false;            ///< the body stands still, by the IMU
 };
 
 struct StepReport {

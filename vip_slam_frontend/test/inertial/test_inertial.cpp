@@ -1,0 +1,198 @@
+// Inertial channels with stand-ins, fault detection, and the propagation by another source's motion.
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <Eigen/LU>
+
+#include "vip_slam_frontend/filter/propagation.h"
+#include "vip_slam_frontend/inertial/fault_detection.h"
+#include "vip_slam_frontend/inertial/inertial_input.h"
+
+namespace vip_slam::frontend {
+namespace {
+
+SensorConfig sensorWith(bool gyro, bool accel) {
+  SensorConfig sensor;
+  sensor.topics.imu = gyro && accel ? "imu" : "";
+  sensor.topics.gyro = gyro && !accel ? "gyro" : "";
+  sensor.topics.accel = accel && !gyro ? "accel" : "";
+  return sensor;
+}
+
+const Eigen::Vector3d kRate(0.1, -0.2, 0.3), kForce(0.5, 9.7, 1.0), kOther(1, 2, 3);
+
+TEST(InertialInput, ACompleteImuIsHandedOnAsMeasured) {
+  InertialInput input(sensorWith(true, true), 0.1);
+  EXPECT_FALSE(input.covers(0));
+  for (int k = 0; k <= 100; ++k) EXPECT_TRUE(input.addImu({0.01 * k, kRate, kForce}));
+  EXPECT_TRUE(input.covers(0.5));
+  EXPECT_FALSE(input.covers(1.5));
+  EXPECT_TRUE(input.measured(0.1, 0.2));
+  EXPECT_EQ(input.noise(0.1, 0.2).gyro, 1);
+  for (const ImuSample& s : input.between(0.105, 0.195))
+    EXPECT_LT((s.gyro - kRate).norm() + (s.accel - kForce).norm(), 1e-12);
+}
+
+TEST(InertialInput, WithoutAnyChannelStandInsAreAllThereIs) {
+  InertialInput input(sensorWith(false, false), 0.1);
+  EXPECT_TRUE(input.covers(1e9));
+  input.substitute({1.0, 1.1, kRate, kForce});
+  input.substitute({1.1, 1.2, kOther, kForce});
+  const auto first = input.between(1.0, 1.1), second = input.between(1.1, 1.2), beyond = input.between(1.15, 1.4);
+  ASSERT_GT(first.size(), 10u);
+  EXPECT_EQ(first.front().t, 1.0);
+  EXPECT_EQ(first.back().t, 1.1);
+  for (const ImuSample& s : first) EXPECT_EQ(s.gyro, kRate);
+  for (const ImuSample& s : second) EXPECT_EQ(s.gyro, kOther);
+  for (const ImuSample& s : beyond) EXPECT_EQ(s.gyro, kOther);  // goes on as it was
+  EXPECT_FALSE(input.measured(1.0, 1.1));
+  EXPECT_GT(input.noise(1.0, 1.1).gyro, 100);
+  EXPECT_GT(input.noise(1.0, 1.1).accel, 100);
+}
+
+TEST(InertialInput, ALoneChannelIsMeasuredTheOtherStoodInFor) {
+  for (const bool gyro : {true, false}) {
+    InertialInput input(sensorWith(gyro, !gyro), 0.1);
+    for (int k = 0; k <= 100; ++k) {
+      EXPECT_TRUE(gyro ? input.addGyro(0.01 * k, kRate) : input.addAccel(0.01 * k, kForce));
+    }
+    EXPECT_FALSE(gyro ? input.addGyro(0.5, kRate) : input.addAccel(0.5, kForce));  // runs back
+    EXPECT_TRUE(input.covers(0.9));
+    EXPECT_FALSE(input.covers(1.1));
+    Substitute s{0.4, 0.5, std::nullopt, std::nullopt};
+    (gyro ? s.accel : s.gyro) = kOther;
+    input.substitute(s);
+    for (const ImuSample& sample : input.between(0.4, 0.5)) {
+      EXPECT_LT((sample.gyro - (gyro ? kRate : kOther)).norm(), 1e-12);
+      EXPECT_LT((sample.accel - (gyro ? kOther : kForce)).norm(), 1e-12);
+    }
+    EXPECT_EQ(input.noise(0.4, 0.5).gyro > 1, !gyro);
+    EXPECT_EQ(input.noise(0.4, 0.5).accel > 1, gyro);
+  }
+}
+
+TEST(InertialInput, AStandInReplacesAFaultyIntervalAndNoOther) {
+  InertialInput input(sensorWith(true, true), 0.1);
+  for (int k = 0; k <= 100; ++k) input.addImu({0.01 * k, kRate, kForce});
+  input.substitute({0.4, 0.5, kOther, kForce});
+  for (const ImuSample& s : input.between(0.3, 0.4)) EXPECT_LT((s.gyro - kRate).norm(), 1e-12);
+  for (const ImuSample& s : input.between(0.4, 0.5)) EXPECT_EQ(s.gyro, kOther);
+  for (const ImuSample& s : input.between(0.5, 0.6)) EXPECT_LT((s.gyro - kRate).norm(), 1e-12);
+  EXPECT_FALSE(input.measured(0.35, 0.45));
+  EXPECT_TRUE(input.measured(0.5, 0.6));
+  EXPECT_EQ(input.noise(0.5, 0.6).gyro, 1);
+}
+
+/// Runs a detector over 30 images a second; `sigmas` and `agree` by time. Images at fault.
+template <class Sigmas, class Agree>
+std::vector<double> faults(double seconds, Sigmas sigmas, Agree agree) {
+  FaultDetection detection;
+  detection.reset(0);
+  std::vector<double> result;
+  for (int k = 1; k / 30.0 < seconds; ++k) {
+    const double t = k / 30.0;
+    if (detection.add({t, 1 / 30.0, agree(t), sigmas(t)})) result.push_back(t);
+  }
+  return result;
+}
+
+const auto kAlways = [](double) { return true; };
+
+TEST(FaultDetection, ASoundImuIsNeverAtFault) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  EXPECT_TRUE(faults(
+                  600,
+                  [&](double) {
+                    double squared = 0;
+                    for (int d = 0; d < 6; ++d) squared += std::pow(normal(random), 2);
+                    return std::sqrt(squared);
+                  },
+                  kAlways)
+                  .empty());
+}
+
+TEST(FaultDetection, ShakingIsFoundFromItsFirstImageToItsLast) {
+  const auto shaken = [](double t) { return t > 5 && t < 6 ? 40.0 : 2.0; };
+  const std::vector<double> found = faults(10, shaken, kAlways);
+  ASSERT_FALSE(found.empty());
+  EXPECT_LT(found.front(), 5.05);
+  EXPECT_GT(found.back(), 5.95);
+  EXPECT_LT(found.back(), 6.0);
+  EXPECT_NEAR(found.size(), 30, 1);
+}
+
+TEST(FaultDetection, AWrongImuIsFoundWithinTwoSecondsOfMotion) {
+  const std::vector<double> found = faults(
+      10, [](double) { return 30.0; }, kAlways);
+  ASSERT_FALSE(found.empty());
+  EXPECT_LT(found.front(), 2);
+  EXPECT_GT(found.size(), 230u);
+}
+
+// What fills the view moves: while it comes into view images do not agree among themselves, then they contradict.
+TEST(FaultDetection, ABodyThatFillsTheViewForAMomentIsNoFaultOfTheImu) {
+  const auto body = [](double t) { return t > 5 && t < 5.6 ? 30.0 : 2.0; };
+  EXPECT_TRUE(faults(10, body, [](double t) { return t < 4.9 || t > 5.1; }).empty());
+}
+
+TEST(MotionDifference, CountsSigmas) {
+  const Matrix6d covariance = 1e-4 * Matrix6d::Identity();
+  Vector6d d = Vector6d::Zero();
+  d(4) = 0.03;
+  const SE3 a(expSO3(Eigen::Vector3d(0.1, 0.2, -0.1)), {1, 2, 3});
+  EXPECT_NEAR(motionDifference(a.boxplus(d), a, covariance), 3, 1e-9);
+  d.setZero();
+  d(0) = -0.05;
+  EXPECT_NEAR(motionDifference(a.boxplus(d), a, covariance), 5, 1e-9);
+}
+
+TEST(PropagateByMotion, PhiAndNoiseAreTheDerivativesOfThePrediction) {
+  WindowState window;
+  Clone clone;
+  clone.id = 1;
+  clone.t = 3;
+  clone.T_W_I = clone.T_W_I_fej = SE3(expSO3(Eigen::Vector3d(0.3, -0.2, 0.8)), {1, -2, 0.5});
+  window.clones.push_back(clone);
+  window.v_W = window.v_W_fej = Eigen::Vector3d(0.4, 0.1, -0.2);
+  const SE3 motion(expSO3(Eigen::Vector3d(0.02, 0.05, -0.01)), {0.03, -0.01, 0.02});
+  const double dt = 0.05;
+  const ImuNoise noise;
+  const Matrix6d covariance = 1e-4 * Matrix6d::Identity();
+  const Propagation p = propagateByMotion(window, motion, covariance, dt, noise);
+  const auto state = [](const NavState& s, const NavState& nominal) {
+    Eigen::Matrix<double, 9, 1> x;
+    x << s.T_W_I.boxminus(nominal.T_W_I), s.v_W - nominal.v_W;
+    return x;
+  };
+  const double h = 1e-6;
+  for (int c = 0; c < 9; ++c) {
+    WindowState plus = window, minus = window;
+    Vector6d pose = Vector6d::Zero();
+    if (c < 6) pose(c) = h;
+    plus.clones[0].T_W_I = window.clones[0].T_W_I.boxplus(pose);
+    minus.clones[0].T_W_I = window.clones[0].T_W_I.boxplus(-pose);
+    if (c >= 6) plus.v_W(c - 6) += h, minus.v_W(c - 6) -= h;
+    const auto numeric = (state(propagateByMotion(plus, motion, covariance, dt, noise).predicted, p.predicted) -
+                          state(propagateByMotion(minus, motion, covariance, dt, noise).predicted, p.predicted)) /
+                         (2 * h);
+    EXPECT_LT((p.Phi.block<9, 1>(0, c) - numeric).norm(), 1e-6) << "column " << c;
+  }
+  Eigen::Matrix<double, 9, 6> G;
+  for (int c = 0; c < 6; ++c) {
+    // The motion's error: theta at its end, p at its beginning.
+    Vector6d e = Vector6d::Zero();
+    e(c) = h;
+    G.col(c) = (state(propagateByMotion(window, motion.boxplus(e), covariance, dt, noise).predicted, p.predicted) -
+                state(propagateByMotion(window, motion.boxplus(-e), covariance, dt, noise).predicted, p.predicted)) /
+               (2 * h);
+  }
+  const Eigen::Matrix<double, 9, 9> Q = G * covariance * G.transpose();
+  EXPECT_LT((p.Q.topLeftCorner<6, 6>() - Q.topLeftCorner<6, 6>()).norm(), 1e-8);
+  EXPECT_LT((p.Q.block<6, 3>(0, 6) - Q.topRightCorner<6, 3>()).norm(), 1e-7);
+  EXPECT_LT((p.W.transpose() * p.W * p.Q - Matrix15d::Identity()).norm(), 1e-5);
+}
+
+}  // namespace
+}  // namespace vip_slam::frontend
