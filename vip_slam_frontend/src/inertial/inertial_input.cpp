@@ -154,27 +154,6 @@ bool InertialInput::measured(double t0, double t1) const {
                       [&](const Substitute& s) { return s.to > t0 && s.from < t1; });
 }
 
-std::optional<Eigen::Vector3d> InertialInput::meanForce(double t0, double t1) const {
-  if (!has_accel_) return std::nullopt;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  int count = 0;
-  if (complete()) {
-    if (buffer_.empty()) return std::nullopt;
-    for (const ImuSample& s : buffer_.between(std::max(t0, buffer_.oldest()), std::min(t1, buffer_.newest()))) {
-      sum += s.accel;
-      ++count;
-    }
-  } else {
-    for (const Single& s : lone_) {
-      if (s.t < t0 || s.t > t1) continue;
-      sum += s.value;
-      ++count;
-    }
-  }
-  if (count == 0) return std::nullopt;
-  return Eigen::Vector3d(sum / count);
-}
-
 void InertialInput::dropBefore(double t) {
   buffer_.dropBefore(t);
   while (lone_.size() > 1 && lone_[1].t < t) lone_.pop_front();

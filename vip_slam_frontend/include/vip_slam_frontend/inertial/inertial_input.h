@@ -57,8 +57,6 @@ class InertialInput {
   ChannelNoise noise(double t0, double t1) const;
   /// Whether both channels were measured, and believed, all over [t0, t1].
   bool measured(double t0, double t1) const;
-  /// Mean specific force over [t0, t1], where it was measured.
-  std::optional<Eigen::Vector3d> meanForce(double t0, double t1) const;
 
   void dropBefore(double t);
   /// Forgets all samples; what is known of the gyro's range stays.
