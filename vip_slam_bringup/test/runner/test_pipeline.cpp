@@ -17,6 +17,7 @@ namespace {
 class RunnerTest : public testing::Test {
  protected:
   RunnerTest() {
+    sensor_.topics.imu = "imu";
     sensor_.camera.width = 64;
     sensor_.camera.height = 48;
     sensor_.camera.fx = sensor_.camera.fy = 60;
