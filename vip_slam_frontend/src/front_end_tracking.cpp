@@ -16,6 +16,8 @@ constexpr double kBeyondRange = 0.3;
 // One sigma of the motion between two images by dense alignment, rad and m; floor of that by points. Points have the
 // same pixels as the filter's tracks, which it takes for independent: factor on their variance.
 constexpr double kAlignedTurn = 0.01, kAlignedStep = 0.01, kAlignedLeast = 1e-3, kSharedByTracks = 9.0;
+// A turn between images that optical flow need not follow, and how far from it dense alignment sees another one, rad.
+constexpr double kBeyondFlow = 0.1, kTurnsApart = 0.05;
 constexpr double kAlignedGate = 4.0;  // sigmas, between the two
 
 /// Why the IMU does not cover an image at `t_imu`.
@@ -183,7 +185,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   double max_gap = 0;
   const double from = filter_.nav().t;
   // Where no sound gyro tells the turn, images and depth do, before tracking.
-  const bool by_images = !inertial_.hasGyro() || (inertial_.complete() && faults_.suspects(t_imu));
+  bool by_images = !inertial_.hasGyro() || (inertial_.complete() && faults_.suspects(t_imu));
   SE3 moved = last_motion_;
   if (by_images) {
     ScopedTimer timer(timing_, "frontend.align", t);
@@ -207,6 +209,15 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const bool gap = max_gap > options_.recovery.max_imu_gap;
   const PredictedMotion by_imu = predictMotion(propagation, T_odom_C, doubtful);
   PredictedMotion prediction = by_imu;
+  // A turn beyond the reach of optical flow has to be seen by the images as a whole: from a wrong one nothing is
+  // tracked, and the points could not contradict it.
+  if (!by_images && logSO3(by_imu.T_current_previous.R()).norm() > kBeyondFlow) {
+    ScopedTimer timer(timing_, "frontend.align", t);
+    const std::optional<SE3> seen =
+        dense_.motion(tracker_.gray(), tracker_.depth(), gray, depth_read.image, last_motion_);
+    by_images = seen && logSO3((seen->inverse() * by_imu.T_current_previous).R()).norm() > kTurnsApart;
+    if (by_images) moved = *seen;
+  }
   if (by_images) {
     prediction.T_current_previous = moved;
     prediction.turn_unknown = true;

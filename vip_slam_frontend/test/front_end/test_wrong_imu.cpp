@@ -108,6 +108,18 @@ TEST(WrongImu, LeftHandedAxes) {
   });
 }
 
+// A driver that changes its unit on the way: the images carry the pose on from the first image.
+TEST(WrongImu, DegreesPerSecondFromTheMiddleOn) {
+  const Verdict verdict = judge(
+      [](ImuSample s) {
+        if (s.t > 5) s.gyro /= kDegree;
+        return s;
+      },
+      cornerSensor(0, 0));
+  EXPECT_GT(verdict.named, 40);
+  EXPECT_LT(verdict.farthest, 0.05);
+}
+
 TEST(WrongImu, DegreesPerSecond) {
   expectNotTracking([](ImuSample s) {
     s.gyro /= kDegree;
