@@ -133,8 +133,11 @@ class FrontEnd::Impl {
   /// Whether the IMU is at fault in the interval before this image (fault_detection.h).
   bool imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction, const Propagation& propagation);
   /// Stand-ins for the IMU over the interval since the last image by the motion of the camera that images show, and the
-  /// prediction with them. `motion`: by points; `aligned`: T_current_previous by all pixels.
-  Propagation predictByImages(double t_imu, const MotionFit& motion, const SE3& aligned);
+  /// prediction with them. `motion`: by points; `aligned`: by all pixels.
+  Propagation predictByImages(double t_imu, const MotionFit& motion, const frontend::AlignedMotion& aligned);
+  /// The motion since the tracker's images, `seconds` before this one, by all pixels.
+  std::optional<frontend::AlignedMotion> align(const cv::Mat& gray, const DepthReading& depth, double seconds,
+                                               double t);
   /// `metric`: depth took part, by features or surfaces.
   void judge(const TrackingResult& tracking, bool metric, bool surfaces_hold, double t);
   /// Growth of the position's one sigma since the last image with enough features, m.

@@ -35,8 +35,9 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   const bool first = phase_ == Phase::kWaiting;
   phase_ = Phase::kInitialising;
   // Images and depth tell the motion between images; the gyro the rotation, where there is one.
-  const std::optional<SE3> moved =
-      dense_.motion(tracker_.gray(), tracker_.depth(), gray, depth_read.image, last_motion_);
+  const std::optional<frontend::AlignedMotion> aligned = align(gray, depth_read, first ? 0.0 : t_imu - last_imu_t_, t);
+  std::optional<SE3> moved;
+  if (aligned) moved = aligned->T_current_previous;
   SE3 rotation;
   if (!first) rotation = inertial_.hasGyro() ? gyroRotation(last_imu_t_, t_imu) : moved.value_or(SE3());
   rotation.t().setZero();

@@ -13,9 +13,12 @@ namespace {
 constexpr int kGatedImages = 30;
 // Rate that a saturated gyro does not measure, one sigma, as a share of the limit of its range.
 constexpr double kBeyondRange = 0.3;
-// One sigma of the motion between two images by dense alignment, rad and m; floor of that by points. Points have the
-// same pixels as the filter's tracks, which it takes for independent: factor on their variance.
-constexpr double kAlignedTurn = 0.01, kAlignedStep = 0.01, kAlignedLeast = 1e-3, kSharedByTracks = 9.0;
+// One sigma of the motion between two images where they cannot be aligned, rad and m; floor of that by points. Points
+// have the same pixels as the filter's tracks, which it takes for independent: factor on their variance.
+constexpr double kUnknownTurn = 0.02, kUnknownStep = 0.02, kPointsLeast = 1e-3, kSharedByTracks = 9.0;
+// What one alignment errs, the next one does too: in each direction, one sigma in rad and m, and as a share of the
+// motion. Judged on real recordings of a Kinect and an Xtion.
+constexpr double kAlignedLeast = 2e-3, kAlignedShare = 0.05;
 // A turn between images that optical flow need not follow, and how far from it dense alignment sees another one, rad.
 constexpr double kBeyondFlow = 0.1, kTurnsApart = 0.05;
 constexpr double kAlignedGate = 4.0;  // sigmas, between the two
@@ -25,6 +28,20 @@ std::string uncovered(const frontend::InertialInput& imu, double t_imu) {
   if (imu.newest() < imu.oldest()) return "no IMU yet";
   if (t_imu < imu.oldest()) return formatted("the IMU begins at %.3f s, the image needs %.3f s", imu.oldest(), t_imu);
   return formatted("the IMU reaches to %.3f s, the image needs %.3f s", imu.newest(), t_imu);
+}
+
+/// Of the errors that alignments in a row share, for a turn (rad) or a displacement (m) of this size.
+double commonVariance(double motion) {
+  const double share = kAlignedShare * motion;
+  return kAlignedLeast * kAlignedLeast + share * share;
+}
+
+/// Where the images cannot be aligned: the motion that goes on.
+frontend::AlignedMotion unaligned(const SE3& motion) {
+  frontend::AlignedMotion unknown{motion, Matrix6d::Zero()};
+  unknown.covariance.diagonal() << Eigen::Vector3d::Constant(kUnknownTurn * kUnknownTurn),
+      Eigen::Vector3d::Constant(kUnknownStep * kUnknownStep);
+  return unknown;
 }
 
 }  // namespace
@@ -75,20 +92,28 @@ bool FrontEnd::Impl::admitDoubts(double max_gap, double from, double t_imu, Prop
   return gap || cut_off > 0;
 }
 
-Propagation FrontEnd::Impl::predictByImages(double t_imu, const MotionFit& motion, const SE3& aligned) {
+std::optional<frontend::AlignedMotion> FrontEnd::Impl::align(const cv::Mat& gray, const DepthReading& depth,
+                                                             double seconds, double t) {
+  ScopedTimer timer(timing_, "frontend.align", t);
+  const double depth_share = seconds > 0 ? 1 + depth.lag / seconds : 1.0;
+  return dense_.motion(tracker_.gray(), tracker_.depth(), gray, depth.image, depth_share, last_motion_);
+}
+
+Propagation FrontEnd::Impl::predictByImages(double t_imu, const MotionFit& motion,
+                                            const frontend::AlignedMotion& aligned) {
   const NavState from = filter_.nav();
   const bool fault = inertial_.complete();
-  SE3 T_cur_prev = aligned;
-  Matrix6d covariance = Matrix6d::Zero();
-  covariance.diagonal() << Eigen::Vector3d::Constant(kAlignedTurn * kAlignedTurn),
-      Eigen::Vector3d::Constant(kAlignedStep * kAlignedStep);
+  SE3 T_cur_prev = aligned.T_current_previous;
+  Matrix6d covariance = aligned.covariance;
+  covariance.diagonal().head<3>().array() += commonVariance(logSO3(T_cur_prev.R()).norm());
+  covariance.diagonal().tail<3>().array() += commonVariance(T_cur_prev.t().norm());
   if (motion.ok) {
     // Few points that agree by chance promise more than they hold: all pixels together gate them.
     Matrix6d of_points = kSharedByTracks * motion.covariance;
-    of_points.diagonal().array() += kAlignedLeast * kAlignedLeast;
+    of_points.diagonal().array() += kPointsLeast * kPointsLeast;
     const Matrix6d gain = covariance * (covariance + of_points).inverse();
-    if (frontend::motionDifference(motion.T_current_previous, aligned, covariance + of_points) < kAlignedGate) {
-      T_cur_prev = aligned.boxplus(gain * motion.T_current_previous.boxminus(aligned));
+    if (frontend::motionDifference(motion.T_current_previous, T_cur_prev, covariance + of_points) < kAlignedGate) {
+      T_cur_prev = T_cur_prev.boxplus(gain * motion.T_current_previous.boxminus(T_cur_prev));
       covariance -= gain * covariance;
     }
   }
@@ -186,12 +211,9 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   const double from = filter_.nav().t;
   // Where no sound gyro tells the turn, images and depth do, before tracking.
   bool by_images = !inertial_.hasGyro() || (inertial_.complete() && faults_.suspects(t_imu));
-  SE3 moved = last_motion_;
-  if (by_images) {
-    ScopedTimer timer(timing_, "frontend.align", t);
-    moved = dense_.motion(tracker_.gray(), tracker_.depth(), gray, depth_read.image, last_motion_).value_or(moved);
-  }
-  if (!inertial_.complete()) substitute(from, t_imu, moved, filter_.nav(), false);
+  frontend::AlignedMotion moved = unaligned(last_motion_);
+  if (by_images) moved = align(gray, depth_read, t_imu - from, t).value_or(moved);
+  if (!inertial_.complete()) substitute(from, t_imu, moved.T_current_previous, filter_.nav(), false);
   const std::vector<ImuSample> samples = inertial_.between(from, t_imu, &max_gap);
   if (samples.size() < 2) return statusOnly(t, TrackingState::kDegraded, "no IMU between the images");
   if (max_gap > longestImuGap()) return startAnew(formatted("IMU gap of %.2f s", max_gap));
@@ -212,17 +234,16 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   // A turn beyond the reach of optical flow has to be seen by the images as a whole: from a wrong one nothing is
   // tracked, and the points could not contradict it.
   if (!by_images && logSO3(by_imu.T_current_previous.R()).norm() > kBeyondFlow) {
-    ScopedTimer timer(timing_, "frontend.align", t);
-    const std::optional<SE3> seen =
-        dense_.motion(tracker_.gray(), tracker_.depth(), gray, depth_read.image, last_motion_);
-    by_images = seen && logSO3((seen->inverse() * by_imu.T_current_previous).R()).norm() > kTurnsApart;
+    const std::optional<frontend::AlignedMotion> seen = align(gray, depth_read, t_imu - from, t);
+    by_images =
+        seen && logSO3((seen->T_current_previous.inverse() * by_imu.T_current_previous).R()).norm() > kTurnsApart;
     if (by_images) moved = *seen;
   }
   if (by_images) {
-    prediction.T_current_previous = moved;
+    prediction.T_current_previous = moved.T_current_previous;
     prediction.turn_unknown = true;
     prediction.judges = false;
-    T_odom_C = T_odom_previous * moved.inverse();
+    T_odom_C = T_odom_previous * moved.T_current_previous.inverse();
   }
   const std::size_t tracks_before = tracker_.tracks().size();
   const TrackingResult tracked =
@@ -233,7 +254,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   moving_ = tracked.regions;
   counters_.moving += tracked.moves_by_itself;
   if (!inertial_.complete() || imuIsAtFault(tracked, by_imu, propagation)) {
-    if (!by_images) moved = last_motion_;
+    if (!by_images) moved = unaligned(last_motion_);
     propagation = predictByImages(t_imu, tracked.motion, moved);
     T_odom_C = propagation.predicted.T_W_I * extrinsics();
   }

@@ -16,17 +16,25 @@ namespace {
 
 constexpr std::array<int, 3> kWidths{40, 80, 160};  // px, of the levels
 constexpr std::array<int, 3> kIterations{12, 8, 5};
+constexpr std::array<int, 3> kReach{1, 2, 4};   // of the window of a depth gradient, px
+constexpr std::array<int, 3> kStride{1, 1, 2};  // of the pixels taken along rows and columns
 // One sigma of the motion between two images, rad and m: keeps directions that the images leave open near the start.
 constexpr double kTurn = 0.2, kStep = 0.1;
-// A pixel without depth shows the rotation as a far one does, m.
-constexpr double kFar = 20.0;
+// Where less than this share of the pixels has depth, the others show the rotation as far ones do, m. Otherwise they
+// take no part: those of a near surface would turn a displacement into a turn.
+constexpr double kFewWithDepth = 0.1, kFar = 20.0;
+constexpr double kNearest = 0.05;  // m, of points that are compared
 // Fewest pixels of the coarsest level that must agree, and the smallest (quantisation) and largest difference
 // of grey values that counts.
 constexpr int kFewest = 100;
+constexpr double kConverged = 1e-4;  // rad and m, of a step
 constexpr double kLeastGrey = 2.0, kLargestGrey = 60.0;
-// Depth that differs by more belongs to another surface, sigmas. Its errors are shared by surfaces: the many readings
-// count as if each had this many times its sigma.
-constexpr double kOtherSurface = 10.0, kSharedDepth = 4.0;
+// Depth that differs by more belongs to another surface, sigmas; so does what a window of depth spans, as a share of
+// it.
+constexpr double kOtherSurface = 10.0, kSteepest = 0.15;
+// The many pixels share errors: of depth by surfaces, of grey values by the lens, by light that moves with the camera
+// and by blur. Each counts as if it had this many times its sigma.
+constexpr double kSharedDepth = 4.0, kSharedGrey = 5.0;
 
 /// Bilinear value and gradient; false outside.
 bool lookUp(const cv::Mat& image, double u, double v, double* value, Eigen::RowVector2d* gradient) {
@@ -40,19 +48,53 @@ bool lookUp(const cv::Mat& image, double u, double v, double* value, Eigen::RowV
   return true;
 }
 
+/// Gradient of the depth image per pixel by least squares over a window; NaN where readings are missing or belong to
+/// several surfaces. Differences of neighbours would be mostly noise, which looks like information on the motion.
+cv::Mat depthSlopes(const cv::Mat& depth, const DepthNoise& noise, int reach) {
+  const int side = 2 * reach + 1;
+  cv::Mat across(1, side, CV_32F), ones = cv::Mat::ones(side, 1, CV_32F);
+  for (int k = 0; k < side; ++k) across.at<float>(k) = static_cast<float>(k - reach);
+  const double squares = side * cv::norm(across, cv::NORM_L2SQR);
+  cv::Mat slope[2], slopes, least, largest;
+  cv::sepFilter2D(depth, slope[0], CV_32F, across, ones.t(), {-1, -1}, 0, cv::BORDER_CONSTANT);
+  cv::sepFilter2D(depth, slope[1], CV_32F, ones.t(), across, {-1, -1}, 0, cv::BORDER_CONSTANT);
+  cv::merge(slope, 2, slopes);
+  slopes /= squares;
+  const cv::Mat window = cv::Mat::ones(side, side, CV_8U);
+  // Outside of the image there is no reading.
+  cv::erode(depth, least, window, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar::all(0));
+  cv::dilate(depth, largest, window);
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u) {
+      const float z = depth.at<float>(v, u), low = least.at<float>(v, u), high = largest.at<float>(v, u);
+      const bool whole = noise.inRange(low) && noise.inRange(high) && std::max(high - z, z - low) < kSteepest * z;
+      if (!whole) slopes.at<cv::Vec2f>(v, u) = cv::Vec2f::all(std::nanf(""));
+    }
+  }
+  return slopes;
+}
+
 double huberWeight(double standardised) {
   const double e = std::abs(standardised);
   return e > 1.345 ? 1.345 / e : 1.0;
 }
 
-struct Residual {
-  double grey = 0;
-  Vector6d J_grey;
-  double depth = 0;  ///< standardised; NaN: none
-  Vector6d J_depth;
-};
-
 }  // namespace
+
+/// Sums of the normal equations.
+struct DenseAlignment::Normal {
+  Matrix6d A = Matrix6d::Zero();  ///< upper triangle
+  Vector6d b = Vector6d::Zero();
+
+  /// Residual e in sigmas of a point `turned` by R and moved, and its derivative by the point's position. One at
+  /// infinity does not move.
+  void add(double e, const Eigen::Vector3d& turned, const Eigen::Vector3d& by_point, double weight, bool moves = true) {
+    Vector6d J;
+    J << turned.cross(by_point), moves ? by_point : Eigen::Vector3d(Eigen::Vector3d::Zero());
+    A.selfadjointView<Eigen::Upper>().rankUpdate(J, weight);
+    b += weight * e * J;
+  }
+};
 
 DenseAlignment::DenseAlignment(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise)
     : camera_(std::move(camera)), noise_(noise) {
@@ -82,110 +124,122 @@ std::vector<DenseAlignment::Level> DenseAlignment::pyramid(const cv::Mat& gray, 
     small.convertTo(level.gray, CV_32F);
     // Readings are taken, not averaged: a mean over an edge is no surface.
     if (!depth.empty()) cv::resize(depth, level.depth, size, 0, 0, cv::INTER_NEAREST);
+    if (!depth.empty()) level.slopes = depthSlopes(level.depth, noise_, kReach[levels.size()]);
     levels.push_back(level);
   }
   return levels;
 }
 
+void DenseAlignment::compareDepth(const Level& to, const Eigen::Vector3d& turned, const Eigen::Vector3d& t,
+                                  double depth_share, Normal* normal) const {
+  const Eigen::Vector3d p = turned + t;
+  Eigen::Vector2d uv;
+  Eigen::Matrix<double, 2, 3> J_project;
+  if (p.z() < kNearest || !camera_->project(p, &uv, &J_project)) return;
+  const double scale = static_cast<double>(camera_->width()) / to.depth.cols;
+  uv = ((uv.array() + 0.5) / scale - 0.5).matrix();
+  const int u = static_cast<int>(std::lround(uv.x())), v = static_cast<int>(std::lround(uv.y()));
+  if (u < 0 || v < 0 || u >= to.depth.cols || v >= to.depth.rows) return;
+  const cv::Vec2f& slopes = to.slopes.at<cv::Vec2f>(v, u);
+  if (!std::isfinite(slopes[0])) return;
+  const Eigen::RowVector2d slope(slopes[0], slopes[1]);
+  const double there = to.depth.at<float>(v, u) + slope * (uv - Eigen::Vector2d(u, v));
+  const double sigma = kSharedDepth * std::hypot(noise_.sigma(p.z()), noise_.bias_floor), e = (there - p.z()) / sigma;
+  if (std::abs(e) > kOtherSurface) return;
+  Eigen::Vector3d by_point = (depth_share / (scale * sigma)) * (slope * J_project).transpose();
+  by_point.z() -= depth_share / sigma;
+  normal->add(e, turned, by_point, huberWeight(e));
+}
+
 DenseAlignment::Fit DenseAlignment::align(const Level& from, const Level& to, int level, const SE3& start,
-                                          int iterations) const {
+                                          double depth_share, int iterations) const {
   const std::vector<Eigen::Vector2d>& rays = rays_[static_cast<std::size_t>(level)];
   const double scale = static_cast<double>(camera_->width()) / from.gray.cols;
+  const int stride = kStride[static_cast<std::size_t>(level)];
+  const bool far = from.depth.empty() || cv::countNonZero(from.depth) < kFewWithDepth * from.gray.total();
   Fit fit;
   fit.T_current_previous = start;
-  std::vector<Residual> residuals;
-  for (int iteration = 0; iteration <= iterations; ++iteration) {
-    residuals.clear();
-    std::vector<double> sizes;
+  // Common change of brightness, which is exposure and no motion, and one sigma of what is left, by the pass before.
+  double shift = 0, grey = kLeastGrey;
+  std::vector<float> differences;
+  for (int iteration = -1; iteration <= iterations; ++iteration) {
+    const bool only_grey = iteration < 0;  // the first pass
+    differences.clear();
+    Normal normal;
+    double cost = 0;
     const Eigen::Matrix3d R = fit.T_current_previous.R();
     const Eigen::Vector3d t = fit.T_current_previous.t();
-    for (int v = 0; v < from.gray.rows; ++v) {
-      for (int u = 0; u < from.gray.cols; ++u) {
+    // The motion until the depth image was read.
+    const Eigen::Matrix3d R_depth = R * expSO3(Eigen::Vector3d((depth_share - 1) * logSO3(R)));
+    const Eigen::Vector3d t_depth = depth_share * t;
+    for (int v = 0; v < from.gray.rows; v += stride) {
+      for (int u = 0; u < from.gray.cols; u += stride) {
         const Eigen::Vector2d& ray = rays[static_cast<std::size_t>(v * from.gray.cols + u)];
         if (!std::isfinite(ray.x())) continue;
         const float reading = from.depth.empty() ? 0.0f : from.depth.at<float>(v, u);
         const bool near = noise_.inRange(reading);
-        const Eigen::Vector3d turned = R * ray.homogeneous() * (near ? reading : kFar);
+        if (!near && !far) continue;
+        const double z = near ? reading : kFar;
+        const Eigen::Vector3d point(z * ray.x(), z * ray.y(), z), turned = R * point;
         const Eigen::Vector3d p = near ? Eigen::Vector3d(turned + t) : turned;
         Eigen::Vector2d uv;
         Eigen::Matrix<double, 2, 3> J_project;
-        if (p.z() < 0.05 || !camera_->project(p, &uv, &J_project)) continue;
+        if (p.z() < kNearest || !camera_->project(p, &uv, &J_project)) continue;
         uv = ((uv.array() + 0.5) / scale - 0.5).matrix();
-        Residual r;
         double seen;
         Eigen::RowVector2d gradient;
         if (!lookUp(to.gray, uv.x(), uv.y(), &seen, &gradient)) continue;
-        Eigen::Matrix<double, 3, 6> J_p = Eigen::Matrix<double, 3, 6>::Zero();
-        J_p.leftCols<3>() = -hat(turned);
-        if (near) J_p.rightCols<3>().setIdentity();
-        const Eigen::Matrix<double, 2, 6> J_uv = J_project * J_p / scale;
-        r.grey = seen - from.gray.at<float>(v, u);
-        r.J_grey = (gradient * J_uv).transpose();
-        r.depth = std::nan("");
-        if (near && !to.depth.empty()) {
-          const float z = to.depth.at<float>(std::clamp(static_cast<int>(std::lround(uv.y())), 0, to.depth.rows - 1),
-                                             std::clamp(static_cast<int>(std::lround(uv.x())), 0, to.depth.cols - 1));
-          double there;
-          Eigen::RowVector2d slope;
-          const double sigma = kSharedDepth * std::hypot(noise_.sigma(p.z()), noise_.bias_floor);
-          if (noise_.inRange(z) && std::abs(z - p.z()) < kOtherSurface * sigma &&
-              lookUp(to.depth, uv.x(), uv.y(), &there, &slope) && std::abs(there - z) < kOtherSurface * sigma) {
-            r.depth = (there - p.z()) / sigma;
-            r.J_depth = ((slope * J_uv - J_p.row(2)) / sigma).transpose();
-          }
-        }
-        sizes.push_back(r.grey);
-        residuals.push_back(r);
+        const double difference = seen - from.gray.at<float>(v, u), left = difference - shift;
+        differences.push_back(static_cast<float>(difference));
+        if (only_grey) continue;
+        cost += std::min(std::abs(left), kLargestGrey);
+        const double sigma = kSharedGrey * grey;
+        const Eigen::Vector3d by_point = (gradient * J_project).transpose() / (scale * sigma);
+        normal.add(left / sigma, turned, by_point, huberWeight(left / grey), near);
+        if (near && !to.depth.empty()) compareDepth(to, R_depth * point, t_depth, depth_share, &normal);
       }
     }
-    fit.used = static_cast<int>(residuals.size());
+    fit.used = static_cast<int>(differences.size());
     if (fit.used < kFewest) return fit;
-    // Exposure: the common change of brightness is no motion.
-    const double shift = upperMedian(sizes);
-    for (double& size : sizes) size = std::abs(size - shift);
-    const double grey = std::max(kLeastGrey, 1.4826 * upperMedian(std::move(sizes)));
-    Matrix6d A = Matrix6d::Zero();
-    Vector6d b = Vector6d::Zero();
-    double cost = 0;
-    for (const Residual& r : residuals) {
-      const double e = (r.grey - shift) / grey, w = huberWeight(e);
-      A.noalias() += (w / (grey * grey)) * r.J_grey * r.J_grey.transpose();
-      b -= (w * e / grey) * r.J_grey;
-      cost += std::min(std::abs(r.grey - shift), kLargestGrey);
-      if (!std::isfinite(r.depth)) continue;
-      const double wd = huberWeight(r.depth);
-      A.noalias() += wd * r.J_depth * r.J_depth.transpose();
-      b -= wd * r.depth * r.J_depth;
-    }
+    shift = upperMedian(differences);
+    for (float& difference : differences) difference = std::abs(difference - static_cast<float>(shift));
+    grey = std::max(kLeastGrey, 1.4826 * upperMedian(differences));
+    if (only_grey) continue;
     fit.cost = cost / fit.used;
+    fit.information = normal.A.selfadjointView<Eigen::Upper>();
+    fit.information.diagonal().head<3>().array() += 1.0 / (kTurn * kTurn);
+    fit.information.diagonal().tail<3>().array() += 1.0 / (kStep * kStep);
     if (iteration == iterations) break;
-    A.diagonal().head<3>().array() += 1.0 / (kTurn * kTurn);
-    A.diagonal().tail<3>().array() += 1.0 / (kStep * kStep);
-    const Vector6d step = A.ldlt().solve(b);
+    const Vector6d step = fit.information.ldlt().solve(-normal.b);
     if (!step.allFinite()) break;
     const Eigen::Matrix3d turn = expSO3(Eigen::Vector3d(step.head<3>()));
     fit.T_current_previous = SE3(Eigen::Matrix3d(turn * R), t + step.tail<3>());
-    if (step.head<3>().norm() < 1e-5 && step.tail<3>().norm() < 1e-5) iteration = iterations - 1;
+    if (step.cwiseAbs().maxCoeff() < kConverged) iteration = iterations - 1;
   }
   return fit;
 }
 
-std::optional<SE3> DenseAlignment::motion(const cv::Mat& gray_previous, const cv::Mat& depth_previous,
-                                          const cv::Mat& gray, const cv::Mat& depth, const SE3& guess) const {
+std::optional<AlignedMotion> DenseAlignment::motion(const cv::Mat& gray_previous, const cv::Mat& depth_previous,
+                                                    const cv::Mat& gray, const cv::Mat& depth, double depth_share,
+                                                    const SE3& guess) const {
   if (gray_previous.empty() || gray.empty()) return std::nullopt;
   const std::vector<Level> then = pyramid(gray_previous, depth_previous), now = pyramid(gray, depth);
   Fit best;
   best.cost = std::numeric_limits<double>::infinity();
   for (const SE3& start : {guess, SE3()}) {
-    const Fit fit = align(then[0], now[0], 0, start, kIterations[0]);
+    const Fit fit = align(then[0], now[0], 0, start, depth_share, kIterations[0]);
     if (fit.used >= kFewest && fit.cost < best.cost) best = fit;
   }
   if (!std::isfinite(best.cost)) return std::nullopt;
   for (std::size_t level = 1; level < now.size(); ++level) {
-    best = align(then[level], now[level], static_cast<int>(level), best.T_current_previous, kIterations[level]);
+    best = align(then[level], now[level], static_cast<int>(level), best.T_current_previous, depth_share,
+                 kIterations[level]);
   }
   if (best.used < kFewest || !best.T_current_previous.isFinite()) return std::nullopt;
-  return best.T_current_previous;
+  // From the turn on the left to boxplus' on the right.
+  Matrix6d J = Matrix6d::Identity();
+  J.topLeftCorner<3, 3>() = best.T_current_previous.R().transpose();
+  return AlignedMotion{best.T_current_previous, J * best.information.inverse() * J.transpose()};
 }
 
 }  // namespace vip_slam::frontend

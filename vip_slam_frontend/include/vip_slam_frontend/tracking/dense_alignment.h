@@ -17,28 +17,40 @@
 
 namespace vip_slam::frontend {
 
+struct AlignedMotion {
+  SE3 T_current_previous;  ///< metres
+  Matrix6d covariance;     ///< of boxplus: theta by R exp(theta) (rad), then t (m)
+};
+
 class DenseAlignment {
  public:
   DenseAlignment(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
 
-  /// T_current_previous, metres. `gray`: 8UC1, of the camera's size; `depth`: 32FC1, metres, 0 invalid, may be empty.
-  /// `guess`: an alternative to standing still, such as the motion before. Empty when too few pixels agree.
-  std::optional<SE3> motion(const cv::Mat& gray_previous, const cv::Mat& depth_previous, const cv::Mat& gray,
-                            const cv::Mat& depth, const SE3& guess) const;
+  /// `gray`: 8UC1, of the camera's size; `depth`: 32FC1, metres, 0 invalid, may be empty. The earlier depth image is of
+  /// the moment of its grey image; the later one was read when this share of the time between the grey images had
+  /// passed. `guess`: an alternative to standing still, such as the motion before. Empty when too few pixels agree.
+  std::optional<AlignedMotion> motion(const cv::Mat& gray_previous, const cv::Mat& depth_previous, const cv::Mat& gray,
+                                      const cv::Mat& depth, double depth_share, const SE3& guess) const;
 
  private:
+  struct Normal;
   struct Level {
-    cv::Mat gray;   ///< 32FC1
-    cv::Mat depth;  ///< 32FC1, 0: none
+    cv::Mat gray;    ///< 32FC1
+    cv::Mat depth;   ///< 32FC1, 0: none
+    cv::Mat slopes;  ///< 32FC2, gradient of the depth per pixel; NaN: none
   };
   struct Fit {
     SE3 T_current_previous;
-    double cost = 0;  ///< mean robust cost per pixel in view
-    int used = 0;     ///< pixels
+    Matrix6d information = Matrix6d::Zero();  ///< theta on the left of R, t
+    double cost = 0;                          ///< mean robust cost per pixel in view
+    int used = 0;                             ///< pixels
   };
   std::vector<Level> pyramid(const cv::Mat& gray, const cv::Mat& depth) const;
   /// Gauss-Newton on one level, 0 being the coarsest.
-  Fit align(const Level& from, const Level& to, int level, const SE3& start, int iterations) const;
+  Fit align(const Level& from, const Level& to, int level, const SE3& start, double depth_share, int iterations) const;
+  /// Adds what the later depth image has to say on a point of the earlier one: `turned` by R, to be moved by t.
+  void compareDepth(const Level& to, const Eigen::Vector3d& turned, const Eigen::Vector3d& t, double depth_share,
+                    Normal* normal) const;
 
   std::shared_ptr<const CameraModel> camera_;
   DepthNoise noise_;
