@@ -112,7 +112,7 @@ class FrontEnd::Impl {
   /// The camera's motion since the last image as predicted by the IMU. While the prediction is in doubt it does not
   /// judge the points.
   PredictedMotion predictMotion(const Propagation& propagation, const SE3& T_odom_C, bool doubtful) const;
-  /// Longest IMU gap that is bridged, s; a longer one restarts tracking.
+  /// Longest IMU gap over which the IMU is believed, s; in a longer one images and depth carry the pose.
   double longestImuGap() const { return 5.0 * options_.recovery.max_imu_gap; }
   /// Whether the image after an IMU gap shows the motion during the gap. Images taken inside the gap follow each other
   /// closely; when they are missing as well, enough tracks must survive and the rotation must be near the predicted
@@ -204,6 +204,7 @@ class FrontEnd::Impl {
   double last_points_t_ = 0;          ///< last image with enough points that have depth
   double last_agreed_t_ = 0;          ///< last image whose points agreed with the IMU
   double cut_off_imu_t_ = -1e300;     ///< last image before which the gyro reached the limit of its range
+  double silent_imu_t_ = -1e300;      ///< last image before which there were no IMU samples
   double fault_t_ = -1e300;           ///< last image before which the IMU was at fault
   int gated_in_a_row_ = 0;
   bool still_ = false;

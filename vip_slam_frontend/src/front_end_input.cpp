@@ -229,7 +229,7 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   landmarks_.forgetPatches();
   surfaces_.clear();
   moving_ = {};
-  moving_imu_t_ = last_depth_t_ = cut_off_imu_t_ = fault_t_ = -1e300;  // the clock may have run back
+  moving_imu_t_ = last_depth_t_ = cut_off_imu_t_ = silent_imu_t_ = fault_t_ = -1e300;  // the clock may have run back
   filter_.stop();
   initialiser_.reset();
   stillness_.reset();

@@ -98,7 +98,7 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
       frame->state = to.predicted;
       frame->covariance = to.Phi * frame->covariance * to.Phi.transpose() + to.Q;
     }
-    // The pose is published with the image's stamp, so extrapolate it to that time. After a longer IMU gap it is LOST.
+    // The pose is published with the image's stamp, so extrapolate it to that time; after longer it is LOST.
     const double untold = std::min(t_imu - frame->state.t, longestImuGap());
     if (untold > 0) carryOn(gyro(frame->state.t) - frame->state.bias_gyro, untold, &frame->state, &frame->covariance);
     frame->T_chain_C = chainedCamera(frame->state.T_W_I);
@@ -108,7 +108,7 @@ FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std:
 
 FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
   if (!filter_.started()) return statusOnly(t, TrackingState::kWaiting, why);
-  // Without IMU nothing propagates the pose: after a gap longer than this tracking restarts in any case.
+  // Without a usable image and without the IMU nothing carries the pose on.
   const double t_imu = t + timeOffset();
   const bool imu_ended = t_imu - inertial_.newest() > longestImuGap();
   if (phase_ != Phase::kLost && (imu_ended || t_imu - filter_.nav().t > options_.recovery.coast_seconds)) {

@@ -29,6 +29,8 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
                  "the images contradict the IMU: are its axes, signs and units, T_imu_cam, the stamps and the scale of "
                  "depth right? "
                  "check_bag tells"};
+    } else if (t + timeOffset() - silent_imu_t_ < kRangeShown) {
+      status_ = {TrackingState::kDegraded, "no IMU samples: held by images and depth"};
     } else if (t + timeOffset() - fault_t_ < kRangeShown) {
       status_ = {TrackingState::kDegraded, "the IMU contradicts what is seen: held by images and depth"};
     } else if (t + timeOffset() - cut_off_imu_t_ < kRangeShown) {
@@ -44,8 +46,10 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
   if (surfaces_hold && phase_ != Phase::kLost) last_held_t_ = t;
   counters_.coasting += !surfaces_hold;
   const double seconds = t - last_held_t_;
-  if (phase_ != Phase::kLost &&
-      (seconds > options_.recovery.coast_seconds || coastedSigma() > options_.recovery.max_position_sigma)) {
+  // Neither images nor an IMU tell the motion.
+  const bool blind = !inertial_.complete() || silent_imu_t_ == last_imu_t_;
+  const double patience = blind ? longestImuGap() : options_.recovery.coast_seconds;
+  if (phase_ != Phase::kLost && (seconds > patience || coastedSigma() > options_.recovery.max_position_sigma)) {
     phase_ = Phase::kLost;
     ++counters_.lost;
   }
@@ -54,9 +58,10 @@ void FrontEnd::Impl::judge(const TrackingResult& tracking, bool metric, bool sur
     status_ = {TrackingState::kLost, missing + formatted(" for %.2f s", t - last_good_t_)};
     return;
   }
-  const std::string held = surfaces_hold              ? "held by depth surfaces and the IMU"
-                           : tracking.moves_by_itself ? "what fills the view moves: coasting on the IMU"
-                                                      : "coasting on the IMU";
+  const std::string coasting = blind ? "coasting at the last velocity" : "coasting on the IMU";
+  const std::string held = surfaces_hold ? blind ? "held by depth surfaces" : "held by depth surfaces and the IMU"
+                           : tracking.moves_by_itself ? "what fills the view moves: " + coasting
+                                                      : coasting;
   status_ = {TrackingState::kDegraded, held + " with " + std::to_string(tracking.tracked) + " features"};
 }
 

@@ -56,7 +56,7 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   const double t_imu = input.t + timeOffset();
   if (inertial_.complete() && !inertial_.covers(t_imu)) {
     ++counters_.imu_missing;
-    return unusable(input.t, uncovered(inertial_, t_imu));
+    if (!filter_.started()) return unusable(input.t, uncovered(inertial_, t_imu));
   }
   last_image_t_ = input.t;
   if (filter_.started() && repeatsLastImage(input.gray, t_imu)) return repeatedImage(input.t, t_imu);
@@ -210,15 +210,22 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   double max_gap = 0;
   const double from = filter_.nav().t;
   // Where no sound gyro tells the turn, images and depth do, before tracking.
-  bool by_images = !inertial_.hasGyro() || (inertial_.complete() && faults_.suspects(t_imu));
+  std::vector<ImuSample> samples = inertial_.between(from, t_imu, &max_gap);
+  const bool silent = inertial_.complete() && (samples.size() < 2 || max_gap > longestImuGap());
+  bool by_images = !inertial_.hasGyro() || silent || (inertial_.complete() && faults_.suspects(t_imu));
   frontend::AlignedMotion moved = unaligned(last_motion_);
-  if (by_images) moved = align(gray, depth_read, t_imu - from, t).value_or(moved);
-  if (!inertial_.complete()) substitute(from, t_imu, moved.T_current_previous, filter_.nav(), false);
-  const std::vector<ImuSample> samples = inertial_.between(from, t_imu, &max_gap);
-  if (samples.size() < 2) return statusOnly(t, TrackingState::kDegraded, "no IMU between the images");
-  if (max_gap > longestImuGap()) return startAnew(formatted("IMU gap of %.2f s", max_gap));
+  if (by_images) {
+    const std::optional<frontend::AlignedMotion> aligned = align(gray, depth_read, t_imu - from, t);
+    if (silent && !aligned) return unusable(t, uncovered(inertial_, t_imu));
+    moved = aligned.value_or(moved);
+  }
+  if (silent || !inertial_.complete()) {
+    substitute(from, t_imu, moved.T_current_previous, filter_.nav(), silent);
+    samples = inertial_.between(from, t_imu, &max_gap);
+    if (silent) silent_imu_t_ = t_imu;
+  }
   Propagation propagation = filter_.predict(samples, inertial_.noise(from, t_imu));
-  const bool doubtful = admitDoubts(max_gap, from, t_imu, &propagation) || !inertial_.complete();
+  const bool doubtful = admitDoubts(max_gap, from, t_imu, &propagation) || silent || !inertial_.complete();
   // Without images the IMU propagates the pose, as in the dark, while the position's uncertainty stays within bounds.
   if (propagation.displacementSigma(filter_.covariance()) > options_.recovery.max_position_sigma)
     return startAnew(formatted("no image for %.2f s", t_imu - from));
@@ -228,7 +235,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   SE3 T_odom_C = propagation.predicted.T_W_I * extrinsics();
   const cv::Mat depth = depthAtStamp(depth_read, propagation.predicted);
   const bool coasting = phase_ == Phase::kLost || t - last_good_t_ > 0.5;
-  const bool gap = max_gap > options_.recovery.max_imu_gap;
+  const bool gap = silent || max_gap > options_.recovery.max_imu_gap;
   const PredictedMotion by_imu = predictMotion(propagation, T_odom_C, doubtful);
   PredictedMotion prediction = by_imu;
   // A turn beyond the reach of optical flow has to be seen by the images as a whole: from a wrong one nothing is
@@ -253,7 +260,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   last_motion_ = tracked.motion.ok ? tracked.motion.T_current_previous : prediction.T_current_previous;
   moving_ = tracked.regions;
   counters_.moving += tracked.moves_by_itself;
-  if (!inertial_.complete() || imuIsAtFault(tracked, by_imu, propagation)) {
+  if (!inertial_.complete() || silent || imuIsAtFault(tracked, by_imu, propagation)) {
     if (!by_images) moved = unaligned(last_motion_);
     propagation = predictByImages(t_imu, tracked.motion, moved);
     T_odom_C = propagation.predicted.T_W_I * extrinsics();

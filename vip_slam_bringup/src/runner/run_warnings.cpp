@@ -58,17 +58,18 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   const FrontEndCounters& c = pipeline.frontEnd().counters();
   if (c.imu_gaps > 0)
     all.push_back(
-        formatted("%zu gaps of the IMU above %g s (frontend/recovery/max_imu_gap); one of five times as long "
-                  "restarts the odometry",
+        formatted("%zu gaps of the IMU above %g s (frontend/recovery/max_imu_gap); in those of five times "
+                  "as long images and depth carry the pose",
                   static_cast<std::size_t>(c.imu_gaps), pipeline.options().frontend.recovery.max_imu_gap));
   if (c.imu_spikes > 0)
     all.push_back(
         std::to_string(c.imu_spikes) +
         " single samples of the IMU were far off their neighbours and were replaced by them: errors on its bus?");
   if (c.imu_faults > 0)
-    all.push_back(std::to_string(c.imu_faults) + " of " + std::to_string(c.images) +
-                  " images show a motion that the IMU contradicts, and were tracked without it: shocks, shaking, saturation, or "
-                  "axes, signs or units that are wrong?");
+    all.push_back(
+        std::to_string(c.imu_faults) + " of " + std::to_string(c.images) +
+        " images show a motion that the IMU contradicts, and were tracked without it: shocks, shaking, saturation, or "
+        "axes, signs or units that are wrong?");
   if (c.repeated_image > 0)
     all.push_back(std::to_string(c.repeated_image) + " of " + std::to_string(c.images) +
                   " images repeat the pixels of the one before under a new stamp and are left out: a camera slower "
@@ -83,7 +84,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
                   static_cast<std::size_t>(c.gyro_cut_off), c.gyro_range));
   if (c.imu_missing > 0 && reader.sensor().topics.hasInertial())
     all.push_back(std::to_string(c.imu_missing) + " of " + std::to_string(c.images) +
-                  " images are not covered by the IMU");
+                  " images are not covered by the IMU: images and depth carry the pose there");
   if (c.imu_rejected > 0)
     all.push_back(std::to_string(c.imu_rejected) +
                   " IMU messages are left out: not finite, all zero, not newer than the one before, or stamped later "

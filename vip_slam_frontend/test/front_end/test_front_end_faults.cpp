@@ -24,10 +24,8 @@ TEST_F(FrontEndTest, BadInputIsCountedNamedAndSurvived) {
   EXPECT_EQ(reason({2.95, world_.image(2.95), World::depth(2.95)}), "image stamp 2.950 s does not follow 2.950 s");
   EXPECT_EQ(reason({2.5, world_.image(2.5), World::depth(2.5)}), "image stamp 2.500 s does not follow 2.950 s");
   EXPECT_NE(reason({nan, world_.image(3.0), World::depth(3.0)}).find("finite"), std::string::npos);
-  EXPECT_EQ(reason({3.5, world_.image(3.5), World::depth(3.5)}), "the IMU reaches to 3.120 s, the image needs 3.500 s");
   EXPECT_EQ(front_end_.counters().bad_image, 3u);
   EXPECT_EQ(front_end_.counters().bad_stamp, 3u);
-  EXPECT_EQ(front_end_.counters().imu_missing, 1u);
   EXPECT_FALSE(front_end_.addImu({3.2, Eigen::Vector3d(nan, 0, 0), gravityVector()}));
   EXPECT_FALSE(front_end_.addImu(World::imu(3.0)));
   EXPECT_GE(front_end_.counters().imu_rejected, 2u);
@@ -213,21 +211,16 @@ TEST_F(FrontEndTest, WhatIsSaidIsLostAsLongAsNoKeyframesCome) {
   }
 }
 
-TEST_F(FrontEndTest, WhereTheImuEndsThePoseGoesOnSteadilyAndIsTrustedLess) {
+TEST_F(FrontEndTest, AnImageLongAfterTheImusEndIsFoundByItsOwnPixels) {
   // At 3.5 s it moves at more than 0.5 m/s.
   const FrameOutput before = run(0.0, 3.5);
-  const double last = before.frame->t, newest = imu_t_ - 0.005, t = last + 0.4;
+  const double t = before.frame->t + 0.4;
   const FrameOutput output = front_end_.process({t, world_.image(t), World::depth(t)});
   EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
   EXPECT_NEAR(output.frame->state.t, t, 1e-2);
-  const Eigen::Vector3d way = output.frame->state.T_W_I.t() - before.frame->state.T_W_I.t();
-  const Eigen::Vector3d steady = 0.4 * before.frame->state.v_W;
-  ASSERT_GT(steady.norm(), 0.1);
-  EXPECT_LT((way - steady).norm(), 0.1 * steady.norm());
-  const double blind = t - newest, sigma = std::sqrt(output.frame->covariance(4, 4));
-  EXPECT_GT(sigma, blind * blind);  // covers an unmeasured acceleration of 2 m/s^2
-  EXPECT_LT(error(output), 3 * sigma);
-  EXPECT_GT(std::sqrt(output.frame->covariance(0, 0)), 2 * blind * blind);
+  ASSERT_GT((output.frame->state.T_W_I.t() - before.frame->state.T_W_I.t()).norm(), 0.1);
+  EXPECT_LT(error(output), 0.03);
+  EXPECT_LT(error(output), 3 * std::sqrt(output.frame->covariance.block<3, 3>(3, 3).trace()));
 }
 
 TEST_F(FrontEndTest, AnIntervalOfOneUlpIsNone) {
@@ -318,20 +311,32 @@ TEST_F(FrontEndTest, WhoStandsBeforeAndAfterAHoleInTheImagesMayHaveMovedInIt) {
   EXPECT_NEAR(output.frame->state.T_W_I.t().y(), 0.26, 0.05);
 }
 
-TEST_F(FrontEndTest, AnImuThatStopsEndsInLost) {
-  // A driver that died: a frozen pose must not be published as valid for ever.
+TEST_F(FrontEndTest, AnImuThatStopsLeavesThePoseToImagesAndDepth) {
   FrameOutput output = run(0.0, 3.0);
-  const auto imageAt = [&](double t) { return front_end_.process({t, world_.image(t), World::depth(t)}); };
-  output = imageAt(3.2);
-  EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded);
-  for (int k = 65; k < 100; ++k) output = imageAt(0.05 * k);
-  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
-  EXPECT_NE(output.frame->status.reason.find("IMU"), std::string::npos) << output.frame->status.reason;
-  EXPECT_EQ(front_end_.counters().lost, 1u);
+  for (int k = 60; k < 120; ++k) {
+    const double t = 0.05 * k;
+    output = front_end_.process({t, world_.image(t), World::depth(t)});
+    EXPECT_LT(error(output), 3 * std::sqrt(output.frame->covariance.block<3, 3>(3, 3).trace()) + 1e-3) << t;
+    if (k < 65) continue;
+    EXPECT_EQ(output.frame->status.state, TrackingState::kDegraded) << t;
+    EXPECT_NE(output.frame->status.reason.find("IMU"), std::string::npos) << output.frame->status.reason;
+  }
+  EXPECT_LT(error(output), 0.05);
+  EXPECT_GE(front_end_.counters().imu_missing, 55u);
+  // It comes back.
   imu_t_ = 6.0;
   output = run(6.0, 9.0);
   EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << output.frame->status.reason;
-  EXPECT_EQ(output.frame->epoch, 1u);
+  EXPECT_EQ(output.frame->epoch, 0u);
+  EXPECT_LT(error(output), 0.05);
+}
+
+TEST_F(FrontEndTest, WithoutImuAndLightItIsLost) {
+  // A driver that died: a frozen pose must not be published as valid for ever.
+  run(0.0, 3.0);
+  FrameOutput output;
+  for (int k = 60; k < 120; ++k) output = front_end_.process({0.05 * k, cv::Mat(240, 320, CV_8U, cv::Scalar(3)), {}});
+  EXPECT_EQ(output.frame->status.state, TrackingState::kLost);
 }
 
 TEST_F(FrontEndTest, ImagesThatCannotBeUsedLeaveThePoseToTheImuAndItsGrowingCovariance) {
@@ -379,12 +384,12 @@ TEST_F(FrontEndTest, AFirstSampleFarAheadDoesNotEndASplitImu) {
   EXPECT_TRUE(front_end_.ready(0.9));
 }
 
-TEST_F(FrontEndTest, LongImuGapRestartsWithItsReason) {
+TEST_F(FrontEndTest, LongGapOfImuAndImagesRestartsWithItsReason) {
   run(0.0, 3.0);
   imu_t_ = 3.8;
   const FrameOutput output = step(3.9);
   EXPECT_EQ(output.frame->status.state, TrackingState::kInitialising);
-  EXPECT_NE(output.frame->status.reason.find("gap"), std::string::npos) << output.frame->status.reason;
+  EXPECT_NE(output.frame->status.reason.find("no image for 0.95 s"), std::string::npos) << output.frame->status.reason;
   EXPECT_EQ(front_end_.counters().restarts, 1u);
 }
 
@@ -406,7 +411,7 @@ TEST_F(FrontEndTest, ImagesWithinAnImuGapStopNothing) {
     }
     EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << gap << ' ' << output.frame->status.reason;
     EXPECT_EQ(front_end.counters().imu_gaps, 1u);
-    EXPECT_EQ(front_end.counters().restarts, gap < 0.5 ? 0u : 1u);
+    EXPECT_EQ(front_end.counters().restarts, 0u);
   }
 }
 
