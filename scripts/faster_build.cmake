@@ -21,7 +21,7 @@ function(vip_slam_faster_build)
           set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
         endif()
       endforeach()
-    elseif(type STREQUAL "EXECUTABLE" AND target MATCHES "^test_")
+    elseif(type STREQUAL "EXECUTABLE" AND target MATCHES "(^|_)test_")
       set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
       target_compile_options(${target} PRIVATE -O1)  # follows the build type's -O3 and wins
     endif()

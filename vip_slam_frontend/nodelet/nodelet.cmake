@@ -29,8 +29,8 @@ install(FILES nodelet/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DES
 
 if(CATKIN_ENABLE_TESTING)
   file(GLOB sources CONFIGURE_DEPENDS test/nodelet/test_*.cpp)
-  catkin_add_gtest(test_nodelet ${sources})
-  target_include_directories(test_nodelet PRIVATE nodelet)
-  target_include_directories(test_nodelet SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
-  target_link_libraries(test_nodelet vip_slam_frontend_nodelets vip_slam_frontend gtest_main ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
+  catkin_add_gtest(${PROJECT_NAME}_test_nodelet ${sources})
+  target_include_directories(${PROJECT_NAME}_test_nodelet PRIVATE nodelet)
+  target_include_directories(${PROJECT_NAME}_test_nodelet SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
+  target_link_libraries(${PROJECT_NAME}_test_nodelet vip_slam_frontend_nodelets vip_slam_frontend gtest_main ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
 endif()

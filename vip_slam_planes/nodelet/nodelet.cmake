@@ -15,9 +15,9 @@ add_dependencies(vip_slam_planes_nodelets vip_slam_planes_gencfg ${catkin_EXPORT
 install(TARGETS vip_slam_planes_nodelets LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
 install(FILES nodelet/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/nodelet)
 
-if(TARGET test_nodelet)
-  target_include_directories(test_nodelet PRIVATE nodelet)
-  target_include_directories(test_nodelet SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${PCL_INCLUDE_DIRS}
+if(TARGET ${PROJECT_NAME}_test_nodelet)
+  target_include_directories(${PROJECT_NAME}_test_nodelet PRIVATE nodelet)
+  target_include_directories(${PROJECT_NAME}_test_nodelet SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${PCL_INCLUDE_DIRS}
     ${pcl_conversions_INCLUDE_DIRS})
-  target_link_libraries(test_nodelet vip_slam_planes_nodelets ${PCL_COMMON_LIBRARIES})
+  target_link_libraries(${PROJECT_NAME}_test_nodelet vip_slam_planes_nodelets ${PCL_COMMON_LIBRARIES})
 endif()

@@ -1,5 +1,6 @@
 #include "pose_plane_costs.h"
 
+#include "../solver/ceres_factors.h"
 #include "vip_slam_backend/factors/pose_plane.h"
 #include "vip_slam_backend/factors/relative_pose.h"
 
@@ -81,8 +82,12 @@ ceres::CostFunction* makeEdgeCost(const PosePlaneEdge& edge, const Eigen::Quater
   return new PosePlaneCost(edge, R);
 }
 
-ceres::Manifold* makePlaneManifold() {
+CeresManifold* makePlaneManifold() {
+#if VIP_SLAM_CERES_MANIFOLDS
   return new ceres::ProductManifold<ceres::SphereManifold<3>, ceres::EuclideanManifold<1>>;
+#else
+  return new PlaneManifold;
+#endif
 }
 
 }  // namespace vip_slam

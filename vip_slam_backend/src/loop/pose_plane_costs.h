@@ -4,6 +4,7 @@
 
 #include <ceres/ceres.h>
 
+#include "../solver/ceres_manifold.h"
 #include "vip_slam_backend/loop/pose_plane_graph.h"
 
 namespace vip_slam {
@@ -18,6 +19,6 @@ ceres::CostFunction* makeEdgeCost(const RelativePoseEdge& edge, const Eigen::Qua
 ceres::CostFunction* makeEdgeCost(const PosePlaneEdge& edge, const Eigen::Quaterniond& R);
 
 /// Of a plane's block; Plane::boxplus has another tangent basis.
-ceres::Manifold* makePlaneManifold();
+CeresManifold* makePlaneManifold();
 
 }  // namespace vip_slam

@@ -57,7 +57,7 @@ PosePlaneSolution PosePlaneGraph::solve(int max_iterations) const {
     parts.join(pose_part[e.i], plane_part[e.plane]);
   }
   for (auto& p : y)
-    if (problem.HasParameterBlock(p.second.data())) problem.SetManifold(p.second.data(), makePlaneManifold());
+    if (problem.HasParameterBlock(p.second.data())) setManifold(&problem, p.second.data(), makePlaneManifold());
   // Keyframes come first in `parts`, so a part's root is its lowest keyframe.
   for (auto& p : x)
     if (problem.HasParameterBlock(p.second.data()) && parts.find(pose_part[p.first]) == pose_part[p.first])

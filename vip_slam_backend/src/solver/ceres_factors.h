@@ -8,12 +8,13 @@
 
 #include <ceres/ceres.h>
 
+#include "ceres_manifold.h"
 #include "vip_slam_backend/solver/ba_problem.h"
 
 namespace vip_slam {
 
 /// Pose: R <- R Exp(dtheta), t <- t + dt on (qx qy qz qw tx ty tz).
-class PoseManifold : public ceres::Manifold {
+class PoseManifold : public CeresManifold {
  public:
   int AmbientSize() const override { return 7; }
   int TangentSize() const override { return 6; }
@@ -24,7 +25,7 @@ class PoseManifold : public ceres::Manifold {
 };
 
 /// Plane on S^2 x R as Plane::boxplus.
-class PlaneManifold : public ceres::Manifold {
+class PlaneManifold : public CeresManifold {
  public:
   int AmbientSize() const override { return 4; }
   int TangentSize() const override { return 3; }

@@ -9,13 +9,14 @@
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>
 
+#include "../../src/solver/ceres_manifold.h"
 #include "vip_slam_core/testing/numeric_jacobian.h"
 
 namespace vip_slam {
 
 struct CostBlock {
   Eigen::VectorXd x;
-  const ceres::Manifold* manifold = nullptr;  ///< null: Euclidean
+  const CeresManifold* manifold = nullptr;  ///< null: Euclidean
 
   int tangentSize() const { return manifold ? manifold->TangentSize() : static_cast<int>(x.size()); }
   Eigen::VectorXd plus(const Eigen::VectorXd& delta) const {

@@ -23,7 +23,7 @@ class PosePlaneCosts : public ::testing::Test {
  private:
   std::mt19937 random_{5};
   std::normal_distribution<double> normal_;
-  const std::unique_ptr<ceres::Manifold> manifold_{makePlaneManifold()};
+  const std::unique_ptr<CeresManifold> manifold_{makePlaneManifold()};
 };
 
 TEST_F(PosePlaneCosts, RelativePoseJacobians) {

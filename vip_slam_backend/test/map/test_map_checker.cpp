@@ -201,7 +201,9 @@ TEST(MapChecker, SeesDamagedPlanes) {
   whole.expectSeen({
       {"no or another id", inPlane([](MapPlane* plane) { plane->estimate.id = 9; })},
       {"no or another id",
-       [](Map* map) { const_cast<std::map<PlaneId, MapPlane>&>(map->planes())[0].estimate.plane.n.setUnit(2); }},
+       [](Map* map) {
+         const_cast<std::map<PlaneId, MapPlane>&>(map->planes())[0].estimate.plane.n = Eigen::Vector3d::UnitZ();
+       }},
       {"not a unit normal", inPlane([](MapPlane* plane) { plane->estimate.plane.n *= 1.00001; })},
       {"not a unit normal", inPlane([](MapPlane* plane) { plane->estimate.plane.n.x() = kNan; })},
       {"finite distance", inPlane([](MapPlane* plane) { plane->estimate.plane.d = kNan; })},

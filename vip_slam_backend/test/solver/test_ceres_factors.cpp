@@ -59,7 +59,7 @@ class Factory {
   const PlaneManifold plane_manifold_;
 };
 
-Eigen::VectorXd minus(const ceres::Manifold& manifold, const Eigen::VectorXd& y, const Eigen::VectorXd& x) {
+Eigen::VectorXd minus(const CeresManifold& manifold, const Eigen::VectorXd& y, const Eigen::VectorXd& x) {
   Eigen::VectorXd out(manifold.TangentSize());
   EXPECT_TRUE(manifold.Minus(y.data(), x.data(), out.data()));
   return out;

@@ -118,7 +118,10 @@ void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration
   };
   const auto rows = [&yaml](const char* key, const Eigen::MatrixXd& M) {
     yaml << YAML::Key << key << YAML::Value << YAML::BeginSeq;
-    for (const auto& row : M.rowwise()) yaml << YAML::Flow << std::vector<double>(row.begin(), row.end());
+    for (int r = 0; r < M.rows(); ++r) {
+      const Eigen::VectorXd row = M.row(r);
+      yaml << YAML::Flow << std::vector<double>(row.data(), row.data() + row.size());
+    }
     yaml << YAML::EndSeq;
   };
   yaml << YAML::Key << "calibration" << YAML::Value << YAML::BeginMap;

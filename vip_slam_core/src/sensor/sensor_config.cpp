@@ -1,8 +1,9 @@
 #include "vip_slam_core/sensor/sensor_config.h"
 
-#include <charconv>
 #include <filesystem>
 #include <fstream>
+#include <locale>
+#include <sstream>
 #include <stdexcept>
 
 #include <yaml-cpp/yaml.h>
@@ -38,9 +39,18 @@ CameraIntrinsics cameraFrom(Section section) {
 std::string list(const std::vector<float>& numbers) {
   std::string out = "[";
   for (const float number : numbers) {
-    char digits[32];  // shortest text that reads back as the same float
-    out += out.size() > 1 ? ", " : "";
-    out.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
+    // The shortest text that reads back as the same float; std::to_chars of floats needs GCC 11.
+    std::string digits;
+    double back = 0;
+    for (int precision = 6; precision <= 9; ++precision) {
+      std::ostringstream text;
+      text.imbue(std::locale::classic());
+      text.precision(precision);
+      text << number;
+      digits = text.str();
+      if (parseDouble(digits, &back) && static_cast<float>(back) == number) break;
+    }
+    out += (out.size() > 1 ? ", " : "") + digits;
   }
   return out + "]";
 }

@@ -114,12 +114,13 @@ PlaneEstimate floorPlane() {
 }
 
 TEST_F(FileFormats, PlanesRoundTrip) {
-  TruePlane truth{floorPlane()};
+  const PlaneEstimate floor = floorPlane();  // GCC 9 cannot make the base out of a temporary
+  TruePlane truth{floor};
   truth.id = 13;
   truth.kind = PlaneKind::kGeneral;
   truth.seen_seconds = 4.5;
   truth.seen_area = 2.5;
-  writeTruePlanesYaml(path("p.yaml"), {{floorPlane()}, truth});
+  writeTruePlanesYaml(path("p.yaml"), {{floor}, truth});
   const auto back = readTruePlanesYaml(path("p.yaml"));
   ASSERT_EQ(back.size(), 2u);
   EXPECT_EQ(back[0].id, 12u);

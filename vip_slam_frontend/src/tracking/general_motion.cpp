@@ -106,7 +106,11 @@ GeneralMotion fundamentalOrHomography(const std::vector<PointPair>& pairs, const
     b.emplace_back(kScale * pair.xy_current.x(), kScale * pair.xy_current.y());
   }
   const int iterations = 10 * options.iterations;  // samples of four to eight need more than those of two
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 3)
   const cv::Mat F = cv::findFundamentalMat(a, b, cv::FM_RANSAC, kScale * options.threshold, 0.99, iterations);
+#else  // at most 1000 iterations
+  const cv::Mat F = cv::findFundamentalMat(a, b, cv::FM_RANSAC, kScale * options.threshold, 0.99);
+#endif
   const cv::Mat H = cv::findHomography(a, b, cv::RANSAC, kScale * options.threshold, cv::noArray(), iterations, 0.99);
   const Eigen::Matrix3d S = Eigen::Vector3d(kScale, kScale, 1.0).asDiagonal();
   const double sigma = options.threshold / kThresholdSigmas;

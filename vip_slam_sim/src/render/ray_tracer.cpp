@@ -4,34 +4,58 @@
 #include <stdexcept>
 #include <string>
 
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 namespace vip_slam {
 namespace {
+
+#if RTC_VERSION_MAJOR >= 4
+using Query = RTCIntersectArguments;
+
+Query makeQuery(bool coherent) {
+  Query query;
+  rtcInitIntersectArguments(&query);
+  query.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  return query;
+}
+#define VIP_SLAM_INTERSECT(n) rtcIntersect##n(valid, scene, hit, query)
+#else
+using Query = RTCIntersectContext;
+
+Query makeQuery(bool coherent) {
+  Query query;
+  rtcInitIntersectContext(&query);
+  query.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  return query;
+}
+#define VIP_SLAM_INTERSECT(n) rtcIntersect##n(valid, scene, query, hit)
+#endif
 
 template <int N>
 struct Packet;
 template <>
 struct Packet<4> {
   using Type = RTCRayHit4;
-  static void call(const int* valid, RTCScene s, RTCIntersectContext* c, Type* r) { rtcIntersect4(valid, s, c, r); }
+  static void call(const int* valid, RTCScene scene, Query* query, Type* hit) { VIP_SLAM_INTERSECT(4); }
 };
 template <>
 struct Packet<8> {
   using Type = RTCRayHit8;
-  static void call(const int* valid, RTCScene s, RTCIntersectContext* c, Type* r) { rtcIntersect8(valid, s, c, r); }
+  static void call(const int* valid, RTCScene scene, Query* query, Type* hit) { VIP_SLAM_INTERSECT(8); }
 };
 template <>
 struct Packet<16> {
   using Type = RTCRayHit16;
-  static void call(const int* valid, RTCScene s, RTCIntersectContext* c, Type* r) { rtcIntersect16(valid, s, c, r); }
+  static void call(const int* valid, RTCScene scene, Query* query, Type* hit) { VIP_SLAM_INTERSECT(16); }
 };
 
 template <int N>
 void trace(RTCScene scene, RayBatch* rays, std::size_t n, float near, bool coherent) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  Query query = makeQuery(coherent);
   typename Packet<N>::Type packet;
   alignas(64) int valid[N];
   for (std::size_t i = 0; i < n; i += N) {
@@ -54,7 +78,7 @@ void trace(RTCScene scene, RayBatch* rays, std::size_t n, float near, bool coher
       packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
       packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
     }
-    Packet<N>::call(valid, scene, &context, &packet);
+    Packet<N>::call(valid, scene, &query, &packet);
     for (int k = 0; k < count; ++k) {
       rays->t[i + k] = packet.ray.tfar[k];
       rays->piece[i + k] =
