@@ -186,6 +186,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("images of wrong size or type", c.bad_image);
   status.add("depth of wrong size or type", c.bad_depth);
   status.add("images out of order", shown.pairs.backward + c.bad_stamp);
+  status.add("images stamped ahead", shown.pairs.ahead);
   status.add("images that repeat the one before", c.repeated_image);
   status.add("depth images that repeat the one before", c.repeated_depth);
   status.add("gyro samples at the end of its range", c.gyro_cut_off);

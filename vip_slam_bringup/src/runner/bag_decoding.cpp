@@ -152,6 +152,9 @@ void BagDecoding::finish() {
   if (2 * without_any_ > depth_images_)
     warnings_.push_back("topic " + depth_topic + ": " + std::to_string(without_any_) + " of " +
                         std::to_string(depth_images_) + " depth images " + holdNoDepth(sensor_.depth_noise));
+  if (pairs.ahead > 0)
+    warnings_.push_back(std::to_string(pairs.ahead) +
+                        " images are left out: their stamps are later than those of the next image");
   if (pairs.backward > 0)
     warnings_.push_back(std::to_string(pairs.backward) +
                         " images are left out: their stamps repeat or precede the one before");
@@ -164,6 +167,7 @@ void BagDecoding::finish() {
   counters_["images_without_depth"] = pairs.without_depth;
   counters_["unused_depth_images"] = pairs.unused_depth;
   counters_["images_out_of_order"] = pairs.backward;
+  counters_["images_ahead"] = pairs.ahead;
 }
 
 }  // namespace vip_slam
