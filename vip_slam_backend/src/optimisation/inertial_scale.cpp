@@ -22,6 +22,8 @@ constexpr double kBiasSigma = 0.5;       // prior at the beginning of each chain
 // With a larger sigma of the scale the motion is not informative enough: it is reported as unknown.
 constexpr double kLargestSigma = 0.01;
 constexpr double kSure = 5.0, kMinDifference = 0.005;
+// Beyond this share the estimate is linearised too far away to be entered anywhere.
+constexpr double kLargeDifference = 0.05;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -123,7 +125,9 @@ class ScaleFit {
     const Eigen::Vector4d x = ldlt.solve(b_.head<kShared>());
     misfit_ = (c_ - b_.head<kShared>().dot(x)) / (rows_ - kShared);
     const double variance = ldlt.solve(Eigen::Vector4d::Unit(0))(0) * std::max(1.0, misfit_);
-    if (!std::isfinite(x(0)) || !(variance > 0) || variance > kLargestSigma * kLargestSigma) return false;
+    // A scale that is wrong by much makes a large misfit of its own: then its sigma may be larger too.
+    const double largest = std::max(kLargestSigma, std::abs(x(0)) / kSure);
+    if (!std::isfinite(x(0)) || !(variance > 0) || variance > largest * largest) return false;
     scale_.factor = 1 + x(0);
     scale_.sigma = std::sqrt(variance);
     return true;
@@ -213,9 +217,21 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
   return fitWith(low).scale();
 }
 
+bool isLarge(const InertialScale& scale) {
+  const double difference = std::abs(scale.factor - 1);
+  return scale.sigma > 0 && difference > kLargeDifference && difference > kSure * scale.sigma;
+}
+
 std::string scaleDifference(const InertialScale& scale, const SensorConfig& sensor) {
   const double difference = scale.factor - 1;
   if (!(scale.sigma > 0) || std::abs(difference) < std::max(kMinDifference, kSure * scale.sigma)) return "";
+  if (isLarge(scale)) {
+    return formatted(
+        "distances are %s than the accelerometer says, by some %.0f %%: is the unit of depth (depth/scale: %.6g) "
+        "right, "
+        "and the accelerometer's? what else was learnt of the calibration is not to be trusted",
+        difference < 0 ? "longer" : "shorter", 100 * std::abs(difference), sensor.depth_scale);
+  }
   std::string remedy;
   if (sensor.depth_encoding != "32FC1") {
     remedy =

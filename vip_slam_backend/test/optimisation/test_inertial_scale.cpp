@@ -170,5 +170,10 @@ TEST(InertialScale, SaysNothingUnlessSureAndLargeEnough) {
   EXPECT_EQ(scaleDifference({0.99, 0.0025}, SensorConfig()), "");   // four sigmas
   EXPECT_EQ(scaleDifference({0.996, 0.0002}, SensorConfig()), "");  // twenty, but within any camera's accuracy
   EXPECT_EQ(scaleDifference({0.98, 0}, SensorConfig()), "");        // sigma zero: not known
+  // A wrong unit is named, without a number to enter.
+  const std::string unit = scaleDifference({1.3, 0.02}, SensorConfig());
+  EXPECT_NE(unit.find("shorter"), std::string::npos) << unit;
+  EXPECT_NE(unit.find("unit of depth"), std::string::npos) << unit;
+  EXPECT_EQ(unit.find("should be"), std::string::npos) << unit;
   EXPECT_NE(scaleDifference({0.99, 0.0015}, SensorConfig()), "");
 }

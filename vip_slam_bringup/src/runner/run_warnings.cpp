@@ -99,15 +99,15 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   if (c.stamp_sigma > kLargeStampJitter)
     all.push_back(formatted("stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
                             1e3 * c.stamp_sigma));
-  // A calibration estimated with a wrong IMU is meaningless.
-  if (10 * c.imu_contradicted < c.images) {
+  const InertialScale scale = pipeline.mapping() ? pipeline.mapping()->backEnd().scale() : InertialScale();
+  // A calibration estimated with a wrong IMU, or with depth in a wrong unit, is meaningless.
+  if (10 * c.imu_contradicted < c.images && !isLarge(scale)) {
     for (const std::string& difference :
          calibrationDifferences(pipeline.frontEnd().givenCalibration(), pipeline.frontEnd().calibration())) {
       all.push_back(difference + " (summary.yaml: calibration)");
     }
   }
   if (pipeline.mapping()) {
-    const InertialScale scale = pipeline.mapping()->backEnd().scale();
     const std::string difference = scaleDifference(scale, reader.sensor());
     if (!difference.empty()) all.push_back(difference);
     const std::string bent = pipeline.mapping()->backEnd().depthDifference();

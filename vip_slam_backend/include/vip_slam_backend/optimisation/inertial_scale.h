@@ -13,8 +13,13 @@
 namespace vip_slam {
 
 /// From all keyframes on the IMU chain but those of stored maps. `gravity`, m/s^2, has a prior sigma of 0.2 %, its
-/// variation between places. Unknown with less than ten seconds of IMU, or when the sigma is above one per cent.
+/// variation between places. Unknown with less than ten seconds of IMU, or when the sigma is above one per cent and
+/// above a fifth of the difference: a scale that is wrong by much makes a large misfit of its own.
 InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& noise);
+
+/// Whether the scale is off by so much that it is no matter of calibration, but of a wrong unit: significantly (five
+/// sigmas) and by more than five per cent.
+bool isLarge(const InertialScale& scale);
 
 /// Message to the user when depth and accelerometer contradict each other significantly (five sigmas) and by enough to
 /// matter (half a percent); empty otherwise. `sensor` has the depth scale in use; depth in 32FC1 has none.
