@@ -12,6 +12,7 @@
 #include <vip_slam_msgs/TriggerGlobalBa.h>
 
 #include "back_end_nodelet.h"
+#include "vip_slam_backend/map/map.h"
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/plane_conversions.h"
 

@@ -4,6 +4,10 @@
 #include <cmath>
 #include <stdexcept>
 
+#include <Eigen/LU>
+
+#include "vip_slam_core/util/formatted.h"
+
 #include "camera/equidistant_camera.h"
 #include "camera/radtan_camera.h"
 #include "util/text.h"
@@ -97,15 +101,57 @@ bool CameraModel::inImage(const Eigen::Vector2d& uv, double margin) const {
          uv.y() <= intrinsics_.height - 1 - margin;
 }
 
+namespace {
+
+/// Share of the image whose pixels no ray reaches, or only beyond a fold of the distortion.
+double foldedShare(const CameraModel& camera) {
+  constexpr int kColumns = 16, kRows = 12, kSteps = 8;
+  int folded = 0;
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      const Eigen::Vector2d uv((column + 0.5) * camera.width() / kColumns - 0.5,
+                               (row + 0.5) * camera.height() / kRows - 0.5);
+      Eigen::Vector2d xy;
+      bool one_to_one = camera.undistort(uv, &xy);
+      for (int step = 1; one_to_one && step <= kSteps; ++step) {
+        Eigen::Matrix2d J;
+        camera.distort(xy * step / kSteps, &J);
+        one_to_one = J.determinant() > 0;
+      }
+      folded += !one_to_one;
+    }
+  }
+  return static_cast<double>(folded) / (kColumns * kRows);
+}
+
+// Polynomials that were fitted to the middle of the image may fold in its corners, where no feature is taken then.
+constexpr double kMostFolded = 0.5;
+
+std::shared_ptr<const CameraModel> refuseFolded(std::shared_ptr<const CameraModel> camera) {
+  const double folded = foldedShare(*camera);
+  if (folded <= kMostFolded) return camera;
+  const CameraIntrinsics& k = camera->intrinsics();
+  std::string numbers;
+  for (const double d : k.distortion) numbers += (numbers.empty() ? "" : ", ") + formatted("%g", d);
+  const bool part = k.model == DistortionModel::kRadTan && k.distortion.size() == 5;
+  throw std::invalid_argument(
+      formatted("camera: the distortion [%s] (%s) folds %.0f %% of the image over; ", numbers.c_str(),
+                distortionModelName(k.model).c_str(), 100 * folded) +
+      (part ? "are these the first five of eight coefficients of rational_polynomial, or those of another model?"
+            : "are the coefficients those of this model, in its order, and is the focal length right?"));
+}
+
+}  // namespace
+
 std::shared_ptr<const CameraModel> makeCamera(const CameraIntrinsics& intrinsics) {
   const std::string problem = intrinsics.validate();
   if (!problem.empty()) throw std::invalid_argument("camera: " + problem);
   switch (intrinsics.model) {
     case DistortionModel::kEquidistant:
-      return std::make_shared<EquidistantCamera>(intrinsics);
+      return refuseFolded(std::make_shared<EquidistantCamera>(intrinsics));
     case DistortionModel::kRadTan:
       if (std::any_of(intrinsics.distortion.begin(), intrinsics.distortion.end(), [](double k) { return k != 0; })) {
-        return std::make_shared<RadTanCamera>(intrinsics);
+        return refuseFolded(std::make_shared<RadTanCamera>(intrinsics));
       }
       break;
     case DistortionModel::kNone:

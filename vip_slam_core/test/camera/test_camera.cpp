@@ -118,6 +118,27 @@ TEST(CameraFold, StrongBarrelDistortionIsNotFoldedBack) {
   EXPECT_TRUE(xy.allFinite());
 }
 
+TEST(CameraFold, ModelsThatFoldTheImageOverAreRefused) {
+  CameraIntrinsics k;
+  k.width = 320, k.height = 240;
+  k.fx = k.fy = 240;
+  k.cx = 159.5, k.cy = 119.5;
+  k.model = DistortionModel::kRadTan;
+  k.distortion = {16.1704, 8.44953, 5.9e-05, -1.5e-05, 0.324469, 16.4805, 13.9441, 1.99604};
+  EXPECT_NO_THROW(makeCamera(k));
+  for (const std::vector<double>& wrong :
+       {std::vector<double>{39.368, -99.463, 102.637, 39.186, -99.016}, {-3.0, 0, 0, 0, 0}}) {
+    k.distortion = wrong;
+    try {
+      makeCamera(k);
+      ADD_FAILURE() << wrong[0];
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find("folds"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("rational_polynomial"), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST(CameraIntrinsicsTest, NamesAndMistakes) {
   EXPECT_EQ(distortionModelFromName("plumb_bob"), DistortionModel::kRadTan);
   EXPECT_EQ(distortionModelFromName("rational_polynomial"), DistortionModel::kRadTan);

@@ -59,7 +59,8 @@ class CameraModel {
   double max_radius2_ = std::numeric_limits<double>::infinity();
 };
 
-/// Throws std::invalid_argument with the message of intrinsics.validate() when unusable.
+/// Throws std::invalid_argument with the message of intrinsics.validate() when unusable, and when the distortion folds
+/// most of the image over.
 std::shared_ptr<const CameraModel> makeCamera(const CameraIntrinsics& intrinsics);
 
 }  // namespace vip_slam
