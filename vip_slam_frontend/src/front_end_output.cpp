@@ -224,6 +224,7 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
     keyframe->imu = inertial_.between(last_keyframe_imu_t_, t_imu);
   keyframe->gyro_correction = filter_.gyroCorrection();
   keyframe->imu_noise_scale = filter_.imuNoiseScale();
+  keyframe->depth_noise = surfaces_.learnt().parts();
 
   if (const RelativeMotion motion = filter_.motionSinceMark(); last_keyframe_ != 0 && motion.isUsable())
     keyframe->motion = motion;

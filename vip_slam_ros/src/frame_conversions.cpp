@@ -166,6 +166,8 @@ vip_slam_msgs::Keyframe toMsg(const Keyframe& keyframe, const std::string& odom_
   for (const ImuSample& sample : keyframe.imu) msg.imu.push_back(toMsg(sample));
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(msg.gyro_correction.data()) = keyframe.gyro_correction;
   msg.imu_noise_scale = keyframe.imu_noise_scale;
+  msg.depth_noise_white = keyframe.depth_noise.white;
+  msg.depth_noise_shared = keyframe.depth_noise.shared;
   msg.motion = toPoseMsg(keyframe.motion.T_a_b);
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(msg.motion_covariance.data()) = keyframe.motion.covariance;
   return msg;
@@ -180,6 +182,7 @@ Keyframe fromMsg(const vip_slam_msgs::Keyframe& msg) {
   for (const auto& sample : msg.imu) keyframe.imu.push_back(fromMsg(sample));
   keyframe.gyro_correction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(msg.gyro_correction.data());
   keyframe.imu_noise_scale = msg.imu_noise_scale;
+  keyframe.depth_noise = {msg.depth_noise_white, msg.depth_noise_shared};
   keyframe.motion.T_a_b = fromMsg(msg.motion);
   keyframe.motion.covariance =
       Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(msg.motion_covariance.data());

@@ -49,7 +49,6 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
     if (!summary.usable) return refuse("result of the local adjustment: " + summary.message);
   }
   statistics.track_noise_factor = built.track_noise_factor;
-  statistics.depth_noise = built.depth_noise;
   storeProblem(built, sensor.imu_noise, &map);
   // Without any step, for want of time, good views may look wrong.
   if (summary.iterations > 0)
@@ -178,7 +177,6 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     statistics.outliers += result.solution->outliers.size();
     statistics.track_noise_factor = result.solution->built.track_noise_factor;
-    statistics.depth_noise = result.solution->built.depth_noise;
     if (found) {
       // The newest keyframe is older than the localisation, and the odometry has drifted since.
       T_map_odom = alignLevelled(map.keyframe(last_found->match).state.T_W_I, match_before) * T_map_odom;

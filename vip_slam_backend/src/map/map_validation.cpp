@@ -95,6 +95,9 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   if (!isImuNoiseScale(keyframe.imu_noise_scale))
     return name + formatted("the scale of the IMU's noise is %g, expected more than 0, at most %g",
                             keyframe.imu_noise_scale, map_limits::kMaxNoiseScale);
+  if (!keyframe.depth_noise.isUsable())
+    return name + formatted("the parts of the depth noise are %g (white) and %g (shared), expected variances",
+                            keyframe.depth_noise.white, keyframe.depth_noise.shared);
   if (keyframe.motion.known() && !keyframe.motion.isUsable())
     return name + "the odometry's motion is not finite, or its covariance is none";
   return "";

@@ -226,7 +226,7 @@ std::vector<PlaneFactorBuilder::DepthBlock> PlaneFactorBuilder::collectDepthBloc
       PlaneGate gate(observation.second, plane_C);
       if (!gate.all() && gate.kept().empty()) continue;
       DepthBlock block{constant ? -1 : frame->second, plane->second, &entry.second, &observation.second,
-                       std::move(gate), plane_C, 1, Eigen::Matrix4d::Identity(), 0};
+                       std::move(gate), plane_C, 1, 1, Eigen::Matrix4d::Identity(), 0};
       blocks.push_back(std::move(block));
     }
   }
@@ -251,6 +251,15 @@ void PlaneFactorBuilder::findTogether(std::vector<DepthBlock>* blocks) {
   }
 }
 
+// Of a single reading at the surface's centre, along its normal; 0: not known.
+double PlaneFactorBuilder::readingVariance(const DepthBlock& block) const {
+  const Eigen::Matrix4d& G = block.observation->G;
+  const Eigen::Vector3d centre = G.topRightCorner<3, 1>() / G(3, 3);
+  if (block.observation->points.empty() || !(centre.z() > 0)) return 0;
+  const double sigma = settings_.depth_noise.sigma(centre.z()) * block.plane_C.head<3>().dot(centre) / centre.z();
+  return sigma * sigma;
+}
+
 void PlaneFactorBuilder::addDepthBlocks() {
   if (planes_.empty()) return;
   BaProblem& problem = built_->problem;
@@ -260,8 +269,13 @@ void PlaneFactorBuilder::addDepthBlocks() {
   std::vector<PlaneMisfit> misfits;
   misfits.reserve(blocks.size());
   for (DepthBlock& block : blocks) {
-    const Eigen::Matrix4d G = block.gate.G() / (block.observation->weight_scale * noise.white);
-    block.T = sharedErrorShrinkage(G, noise.shared * block.together * sharedVariance(*block.observation));
+    const double reading = readingVariance(block);
+    // The samples' own variance, on average, is their number over the sum of their weights.
+    if (reading > 0)
+      block.white = noise.white * reading * block.observation->G(3, 3) /
+                    (block.observation->weight_scale * static_cast<double>(block.observation->points.size()));
+    const Eigen::Matrix4d G = block.gate.G() / (block.observation->weight_scale * block.white);
+    block.T = sharedErrorShrinkage(G, noise.shared * block.together * reading);
     block.misfit = planeMisfit(block.T * G * block.T.transpose(), block.plane_C);
     misfits.push_back({block.plane, block.misfit});
   }
@@ -270,7 +284,7 @@ void PlaneFactorBuilder::addDepthBlocks() {
   std::map<int, BaPointToPlane> outside;
   for (const DepthBlock& block : blocks) {
     const PlaneObservation& o = *block.observation;
-    const double scale = weights[block.plane] / (noise.white * o.weight_scale);
+    const double scale = weights[block.plane] / (block.white * o.weight_scale);
     const Eigen::Matrix4d G = scale * block.T * block.gate.G() * block.T.transpose();
     if (block.frame < 0) {
       const Eigen::Matrix4d T_W_C = block.keyframe->T_W_C().matrix();
@@ -285,7 +299,7 @@ void PlaneFactorBuilder::addDepthBlocks() {
         factor.plane = block.plane;
         const Eigen::Vector4d shrunk = block.T * p.p_C.cast<double>().homogeneous();
         factor.p_C = shrunk.hnormalized();
-        factor.weight = shrunk(3) * std::sqrt(weights[block.plane] / noise.white) / p.sigma;
+        factor.weight = shrunk(3) * std::sqrt(weights[block.plane] / block.white) / p.sigma;
         problem.plane_samples.push_back(factor);
       }
     } else {

@@ -35,10 +35,12 @@ class PlaneFactorBuilder {
     PlaneGate gate;
     Eigen::Vector4d plane_C;
     double together;    // keyframes whose depth errs alike, this one included
+    double white;       // variance of the samples' own errors, relative to what they were made with
     Eigen::Matrix4d T;  // shrinkage of the points by what they share
     double misfit;
   };
   std::vector<DepthBlock> collectDepthBlocks() const;
+  double readingVariance(const DepthBlock& block) const;
   /// Finds out how many keyframes share each block's error.
   static void findTogether(std::vector<DepthBlock>* blocks);
   void storeGroup(int host, int plane, std::vector<Observer>* observers, std::vector<int>* slot);

@@ -11,17 +11,15 @@
 #include "plane_factors.h"
 #include "shared_depth.h"
 #include "track_noise.h"
-#include "vip_slam_core/types/depth_noise_parts.h"
 
 namespace vip_slam {
 namespace {
 
+/// As learnt last; a poor camera's for a map that was only loaded.
 DepthNoiseParts noiseOfThisSession(const Map& map) {
-  std::vector<const PlaneObservation*> newest_first;
   for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it)
-    if (!it->second.stored)
-      for (const auto& seen : it->second.planes) newest_first.push_back(&seen.second);
-  return depthNoiseParts(newest_first);
+    if (!it->second.stored) return it->second.data->depth_noise;
+  return {};
 }
 
 }  // namespace

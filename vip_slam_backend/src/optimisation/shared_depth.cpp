@@ -50,7 +50,7 @@ void shareDepthErrors(const DepthNoise& model, const DepthNoiseParts& noise, con
         const BaObservation& other = problem->observations[j];
         if (other.depth_weight > 0) together += sharedDepth(times[other.frame] - times[observation.frame]);
       }
-      const double shared = model.shared(observation.depth), white = 1 / observation.depth_weight;
+      const double shared = model.sigma(observation.depth), white = 1 / observation.depth_weight;
       observation.depth_weight = 1 / std::sqrt(white * white + noise.shared * beside[i] * together * shared * shared);
     }
   }

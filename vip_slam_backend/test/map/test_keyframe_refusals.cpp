@@ -64,6 +64,8 @@ const std::vector<BadKeyframe>& badKeyframes() {
       {"the scale of the IMU's noise is 0", [](Keyframe* kf) { kf->imu_noise_scale = 0; }},
       {"the scale of the IMU's noise is nan", [](Keyframe* kf) { kf->imu_noise_scale = kNan; }},
       {"the scale of the IMU's noise is", [](Keyframe* kf) { kf->imu_noise_scale = 1.1 * map_limits::kMaxNoiseScale; }},
+      {"the parts of the depth noise are nan", [](Keyframe* kf) { kf->depth_noise.white = kNan; }},
+      {"(white) and -1 (shared)", [](Keyframe* kf) { kf->depth_noise.shared = -1; }},
       {"the odometry's motion is not finite", [](Keyframe* kf) { kf->motion.T_a_b.t().x() = kNan; }},
       {"its covariance is none", [](Keyframe* kf) { kf->motion.covariance(2, 2) = -1e-6; }},
       {"keyframe without an id", [](Keyframe* kf) { kf->id = 0; }},

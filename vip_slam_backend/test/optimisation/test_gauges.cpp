@@ -10,12 +10,12 @@ using namespace vip_slam;
 namespace {
 
 // Two stretches of three keyframes with neither landmarks nor motion in common: the second one is `shift` off. They see
-// the first `planes` of a wall ahead, a wall to the left and the floor.
+// the first `planes` of two walls and the ceiling, which the cameras look at (z is up).
 struct TwoStretches {
   Map map;
 
   TwoStretches(int planes, const Eigen::Vector3d& shift) {
-    const std::vector<Plane> all = {Plane({-1, 0, 0}, 3), Plane({0, -1, 0}, 2), Plane({0, 0, 1}, 1.5)};
+    const std::vector<Plane> all = {Plane({-1, 0, 0}, 3), Plane({0, -1, 0}, 2), Plane({0, 0, -1}, 1.5)};
     for (int p = 0; p < planes; ++p) {
       PlaneEstimate estimate;
       estimate.id = static_cast<PlaneId>(p + 1);
@@ -55,7 +55,8 @@ struct TwoStretches {
     const Eigen::Vector3d u = plane.n.unitOrthogonal(), v = plane.n.cross(u);
     for (int i = -2; i <= 2; ++i)
       for (int j = -2; j <= 2; ++j) {
-        const Eigen::Vector3d p_W = -plane.d * plane.n + 0.3 * i * u + 0.3 * j * v;
+        const Eigen::Vector3d centre = -plane.d * plane.n + (p < 2 ? 2 : 0) * Eigen::Vector3d::UnitZ();
+        const Eigen::Vector3d p_W = centre + 0.3 * i * u + 0.3 * j * v;
         const Eigen::Vector3d p_C = truth(k).inverse() * p_W;
         observation.points.push_back({p_C.cast<float>(), 0.02f});
         const Eigen::Vector4d h = p_C.homogeneous();

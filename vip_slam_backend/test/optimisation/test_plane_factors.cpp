@@ -215,3 +215,29 @@ TEST(PlaneFactors, DepthPointsBesideThePlaneAreLeftOut) {
     }
   }
 }
+
+// Whatever a plane was sampled with: its distance has the variance that the front end learnt, white^2 / N + shared^2.
+TEST(PlaneFactors, DepthIsWorthWhatTheFrontEndLearnt) {
+  for (const DepthNoiseParts& parts : {DepthNoiseParts{0.04, 0.0}, DepthNoiseParts{0.25, 0.5}}) {
+    for (const double scale : {1.0, 0.1}) {
+      Wall wall(0, [](int) { return 0.0; }, parts);
+      PlaneObservation seen;
+      seen.plane = 1;
+      seen.keyframe = 2;
+      seen.weight_scale = scale;
+      for (int k = 0; k < 20; ++k) {
+        seen.points.push_back({Eigen::Vector3f(0.1f * float(k % 5), 0.1f * float(k / 5), 3.0f), 0.01f});
+        const Eigen::Vector4d p = seen.points.back().p_C.cast<double>().homogeneous();
+        seen.G += scale * p * p.transpose() / (0.01 * 0.01);
+      }
+      ASSERT_TRUE(wall.map.setPlaneObservation(seen));
+      const BaProblem problem = buildProblem(wall.map, globalScope(wall.map), wall.settings).problem;
+      double information = 0;
+      for (const BaPointToPlane& f : problem.point_to_plane)
+        if (f.frame == 1) information += f.G(3, 3);
+      // Another keyframe sees the wall half a second before: half of the shared error is the same.
+      const double variance = 0.005 * 0.005 * (parts.white / 20 + 1.5 * parts.shared);
+      EXPECT_NEAR(information * variance, 1, 1e-3) << parts.shared << ' ' << scale;
+    }
+  }
+}

@@ -21,13 +21,18 @@ struct Wall {
   Map map;
   BuilderSettings settings;
 
+  /// A reading's sigma is 5 mm, of which `parts` are the parts.
   explicit Wall(
-      LandmarkId odd = 0, const std::function<double(int)>& shift = [](int) { return 0.0; }) {
+      LandmarkId odd = 0, const std::function<double(int)>& shift = [](int) { return 0.0; },
+      const DepthNoiseParts& parts = {1, 0}) {
     settings.focal = kFocal;
+    settings.depth_noise.a = 0.005;
+    settings.depth_noise.b = 0;
     const ImuNoise noise;
     for (int k = 0; k < kKeyframes; ++k) {
       auto keyframe = std::make_shared<Keyframe>();
       keyframe->id = k + 1;
+      keyframe->depth_noise = parts;
       keyframe->frame.t = 0.5 * k;
       NavState state;
       state.t = keyframe->frame.t;

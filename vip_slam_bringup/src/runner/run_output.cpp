@@ -5,7 +5,6 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
@@ -82,8 +81,6 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   put("landmarks_merged", map.statistics.merged);
   put("outliers_removed", map.statistics.outliers);
   put("track_noise_factor", map.statistics.track_noise_factor);
-  put("map_depth_noise_white", std::sqrt(map.statistics.depth_noise.white));
-  put("map_depth_noise_shared", std::sqrt(map.statistics.depth_noise.shared));
   yaml << YAML::Key << "loops" << YAML::Value << YAML::BeginSeq;
   for (const LoopEvent& loop : map.loops) {
     yaml << YAML::Flow << YAML::BeginMap;

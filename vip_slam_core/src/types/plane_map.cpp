@@ -2,11 +2,6 @@
 
 namespace vip_slam {
 
-double sharedVariance(const PlaneObservation& observation) {
-  const double weight = observation.G(3, 3);
-  return weight > 0 && observation.weight_scale < 1 ? (1 - observation.weight_scale) / weight : 0.0;
-}
-
 void addPiece(const PlaneObservation& piece, PlaneObservation* observation) {
   const Eigen::Matrix4d sum = observation->G / observation->weight_scale + piece.G / piece.weight_scale;
   observation->points.insert(observation->points.end(), piece.points.begin(), piece.points.end());

@@ -452,6 +452,7 @@ TEST(SurfaceNoise, WhiteDepthIsLearntToBeWhite) {
     tracker.setReference(noisyWall(noise, 1.0, 0.0, 1, i), i + 1);
   }
   EXPECT_LT(tracker.learnt().shared(), 0.1);
+  EXPECT_LT(tracker.learnt().parts().shared, 0.02);  // nor does the map believe otherwise
   EXPECT_LT(tracker.learnt().white(), 0.3);  // of 49 readings a patch has a seventh, and a little for its tilt
 }
 
@@ -463,6 +464,8 @@ TEST(SurfaceNoise, CorrelatedDepthIsLearntToBeShared) {
   const double learnt = tracker.learnt().shared();
   EXPECT_GT(learnt, 0.9);
   EXPECT_LT(learnt, 1.5);
+  // With what the fit takes up, all of the correlated part.
+  EXPECT_NEAR(std::sqrt(tracker.learnt().parts().shared), 1.5, 0.4);
   tracker.clear();
   EXPECT_EQ(tracker.learnt().shared(), learnt);  // it belongs to the sensor
 }

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/trajectory/anchored_trajectory.h"
 #include "vip_slam_core/types/map_update.h"
 #include "vip_slam_core/types/plane_map.h"
@@ -36,7 +35,6 @@ struct BackEndStatistics {
   std::uint64_t merged = 0;       ///< duplicate tracks joined
   std::uint64_t outliers = 0;     ///< observations removed by residual
   double track_noise_factor = 1;  ///< see optimisation/problem_builder.h; of the last adjustment, local or global
-  DepthNoiseParts depth_noise;    ///< likewise
   InertialScale scale;            ///< of the last global adjustment, or from some keyframes ago
 };
 

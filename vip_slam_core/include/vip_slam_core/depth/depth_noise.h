@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 namespace vip_slam {
@@ -36,9 +37,13 @@ struct DepthNoise {
   std::string validate() const;
 };
 
-/// Factors on the variances of a recording's depth noise: of the white part, sigma(z), and of shared(z).
+/// The two parts of a recording's depth noise, as factors on the variance sigma(z)^2 of a single reading. At first a
+/// poor camera is assumed.
 struct DepthNoiseParts {
-  double white = 1, shared = 1;
+  double white = 0.25;  ///< of the mean of a patch of a surface, some fifteen pixels wide; averages out over patches
+  double shared = 1;    ///< of what all readings of a surface have in common in one image
+
+  bool isUsable() const { return white > 0 && std::isfinite(white) && shared >= 0 && std::isfinite(shared); }
 };
 
 }  // namespace vip_slam

@@ -7,6 +7,7 @@
 
 #include "vip_slam_core/depth/depth_curve.h"
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/geometry/relative_motion.h"
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/types/feature.h"
@@ -54,6 +55,7 @@ struct Keyframe {
   /// Present estimate of the gyro's correction, which is not applied to the rates in `imu`: see gyro_correction.h.
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();
   double imu_noise_scale = 1;  ///< factor on the configured IMU noise, estimated by the front end
+  DepthNoiseParts depth_noise;  ///< of the recording, learnt by the front end up to here
   /// The odometry's motion since the previous keyframe; unknown when previous == 0 or when tracking was interrupted.
   /// Not the difference of the two published states, which were corrected in between.
   RelativeMotion motion;

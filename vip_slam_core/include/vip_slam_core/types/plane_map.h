@@ -59,8 +59,6 @@ struct PlaneObservation {
   CameraCorrection camera_correction;  ///< applied to their readings, see TrackedFrame
 };
 
-/// Variance of the error that all points share along the normal, m^2, as the observation was made with.
-double sharedVariance(const PlaneObservation& observation);
 /// Adds the points of another piece of the same plane in the same keyframe, which share that error.
 void addPiece(const PlaneObservation& piece, PlaneObservation* observation);
 

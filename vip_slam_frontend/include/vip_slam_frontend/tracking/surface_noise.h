@@ -13,6 +13,7 @@
 
 #include <Eigen/Core>
 
+#include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_frontend/tracking/patch_grouping.h"
 
 namespace vip_slam::frontend {
@@ -36,6 +37,9 @@ class SurfaceNoise {
   /// One sigma of the error that all readings of a surface in one image share, in the same unit; for its offset, and
   /// for its tilt at one standard deviation of the surface's extent.
   double shared() const { return std::sqrt(std::max(0.0, shared_.value)); }
+  /// Both as variances. All that a reading shares with its surface is what is seen to vary within the surface, and as
+  /// much again that moves and turns the surface as a whole.
+  DepthNoiseParts parts() const { return {white_.value, 2 * std::max(0.0, shared_.value)}; }
 
  private:
   /// Mean over the last few thousand items.
