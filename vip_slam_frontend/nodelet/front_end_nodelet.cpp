@@ -114,6 +114,7 @@ void FrontEndNodelet::onReconfigure(vip_slam_frontend::FrontEndConfig& config) {
 bool FrontEndNodelet::noticeTime(double t, Stream stream) {
   if (paused_) return false;
   const StreamClock::Verdict verdict = clock_->notice(stream, t);
+  if (verdict == StreamClock::Verdict::kSetBack) NODELET_WARN("%s", clockSetBack(clock_->lastJump(), t).c_str());
   if (verdict == StreamClock::Verdict::kJumpedBack) {
     const std::string words = timeRanBack(clock_->lastJump());
     NODELET_WARN("%s: the odometry starts anew, the map stays", words.c_str());

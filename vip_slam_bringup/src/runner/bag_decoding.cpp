@@ -103,6 +103,8 @@ void BagDecoding::takeImu(const rosbag::MessageInstance& message) {
 bool BagDecoding::inTime(int stream, double t) {
   const StreamClock::Verdict verdict = clock_.notice(stream, t);
   if (verdict == StreamClock::Verdict::kStray) ++counters_["stray_messages"];
+  if (verdict == StreamClock::Verdict::kSetBack && ++counters_["clock_steps"] == 1)
+    warnings_.push_back(clockSetBack(clock_.lastJump(), t));
   if (verdict == StreamClock::Verdict::kJumpedBack) {
     ++counters_["time_jumps"];
     pairer_.end();

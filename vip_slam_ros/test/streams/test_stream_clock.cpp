@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "vip_slam_ros/stream_clock.h"
@@ -88,6 +91,42 @@ TEST(StreamClock, AStreamThatNeverJumpsIsBelievedInTheEnd) {
   for (int i = 0; i < 1000; ++i) left_out += clock.notice(1, 50 + 0.01 * i) == Verdict::kStray;
   EXPECT_GT(left_out, 0);
   EXPECT_LT(left_out, 300);
+}
+
+/// An IMU at 200 Hz, colour at 30 and depth at 15 Hz, whose stamps change by `step` from 3 s on where `steps` has their
+/// number. Returns the sizes of the steps of the clock that were found.
+std::vector<double> stepsOfClock(double step, const std::vector<std::size_t>& steps, bool only_once = false) {
+  StreamClock clock(3, 1.0);
+  std::vector<double> jumps;
+  bool stepped[3] = {};
+  for (int i = 0; i < 1200; ++i) {
+    const double t = 0.005 * i;
+    for (std::size_t stream = 0; stream < 3; ++stream) {
+      const int every[] = {1, 7, 14};
+      if (i % every[stream] != 0) continue;
+      const bool shifted =
+          t > 3 && std::find(steps.begin(), steps.end(), stream) != steps.end() && !(only_once && stepped[stream]);
+      stepped[stream] = stepped[stream] || shifted;
+      if (clock.notice(stream, 100 + t + (shifted ? step : 0)) == Verdict::kSetBack) jumps.push_back(clock.lastJump());
+    }
+  }
+  return jumps;
+}
+
+TEST(StreamClock, AStepBackThatAllStreamsMakeTogetherIsAClockThatWasSet) {
+  for (const double step : {-0.06, -0.1, -0.4, -0.9}) {
+    const std::vector<double> jumps = stepsOfClock(step, {0, 1, 2});
+    ASSERT_EQ(jumps.size(), 1u) << step;
+    EXPECT_NEAR(jumps[0], -step, 0.01) << step;
+  }
+}
+
+TEST(StreamClock, AStepOfOneStreamOrOfOneStampIsNoClockThatWasSet) {
+  for (const double step : {-0.4, -0.1, 0.08, 0.5}) {
+    EXPECT_TRUE(stepsOfClock(step, {0}).empty()) << step;
+    EXPECT_TRUE(stepsOfClock(step, {1, 2}).empty()) << step;
+  }
+  for (const double ahead : {0.08, 0.5}) EXPECT_TRUE(stepsOfClock(ahead, {0, 1, 2}, true).empty()) << ahead;
 }
 
 }  // namespace
