@@ -224,6 +224,8 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
     samples = inertial_.between(from, t_imu, &max_gap);
     if (silent) silent_imu_t_ = t_imu;
   }
+  // As when the delay that is estimated moves an image before the last one.
+  if (samples.size() < 2) return statusOnly(t, TrackingState::kDegraded, "no time between the images");
   Propagation propagation = filter_.predict(samples, inertial_.noise(from, t_imu));
   const bool doubtful = admitDoubts(max_gap, from, t_imu, &propagation) || silent || !inertial_.complete();
   // Without images the IMU propagates the pose, as in the dark, while the position's uncertainty stays within bounds.
