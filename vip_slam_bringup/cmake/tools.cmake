@@ -62,7 +62,7 @@ if(CATKIN_ENABLE_TESTING)
 
   # Talks to running nodes.
   find_package(rostest REQUIRED)
-  add_rostest_gtest(test_live_tools test/live_tools.test test/test_live_tools.cpp)
-  target_link_libraries(test_live_tools ${PROJECT_NAME}_driver_bag vip_slam_bringup)
-  target_compile_definitions(test_live_tools PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
+  add_rostest_gtest(${PROJECT_NAME}_test_live_tools test/live_tools.test test/test_live_tools.cpp)
+  target_link_libraries(${PROJECT_NAME}_test_live_tools ${PROJECT_NAME}_driver_bag vip_slam_bringup)
+  target_compile_definitions(${PROJECT_NAME}_test_live_tools PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
 endif()

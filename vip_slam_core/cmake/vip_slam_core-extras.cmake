@@ -1,8 +1,8 @@
 # For packages that find vip_slam_core.
 
-# vip_slam_add_test_folders(LIBRARY... [EXCEPT FOLDER...])   makes one test program per folder below test/: test_FOLDER of
-# its test_*.cpp, linked with the given libraries, where tests are enabled. Sets vip_slam_test_programs to their names.
-# Files may include what lies in test/.
+# vip_slam_add_test_folders(LIBRARY... [EXCEPT FOLDER...])   makes one test program per folder below test/:
+# PACKAGE_test_FOLDER of its test_*.cpp, linked with the given libraries, where tests are enabled. Sets
+# vip_slam_test_programs to their names. Files may include what lies in test/.
 function(vip_slam_add_test_folders)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "" "EXCEPT")
   set(programs)
