@@ -1,5 +1,11 @@
 # For packages that find vip_slam_core.
 
+# dynamic_reconfigure looks for PythonInterp, which catkin of Debian 13 does not cache: in one CMake project, as of
+# catkin_make, it is found for the first package only.
+if(PYTHON_EXECUTABLE AND NOT "$CACHE{PYTHON_EXECUTABLE}")
+  set(PYTHON_EXECUTABLE "${PYTHON_EXECUTABLE}" CACHE FILEPATH "The Python that catkin found" FORCE)
+endif()
+
 # vip_slam_add_test_folders(LIBRARY... [EXCEPT FOLDER...])   makes one test program per folder below test/:
 # PACKAGE_test_FOLDER of its test_*.cpp, linked with the given libraries, where tests are enabled. Sets
 # vip_slam_test_programs to their names. Files may include what lies in test/.
