@@ -189,6 +189,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("images stamped ahead", shown.pairs.ahead);
   status.add("images that repeat the one before", c.repeated_image);
   status.add("depth images that repeat the one before", c.repeated_depth);
+  status.add("changes of the unit of depth, followed", c.depth_unit_changes);
   status.add("gyro samples at the end of its range", c.gyro_cut_off);
   status.add("images without IMU", c.imu_missing);
   status.add("IMU samples refused", c.imu_rejected);

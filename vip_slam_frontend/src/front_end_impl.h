@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "vip_slam_core/depth/missing_reading.h"
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
 #include "vip_slam_frontend/front_end.h"
@@ -14,6 +15,7 @@
 #include "vip_slam_frontend/keyframes/keyframe_selector.h"
 #include "vip_slam_frontend/tracking/dense_alignment.h"
 #include "vip_slam_frontend/tracking/depth_rows.h"
+#include "vip_slam_frontend/tracking/depth_unit.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/frozen_depth.h"
 #include "vip_slam_frontend/tracking/landmark_matcher.h"
@@ -67,6 +69,8 @@ class FrontEnd::Impl {
 
   /// Applies the filter's estimate of the depth image's shift to the depth images to come.
   void followDepthShift();
+  /// Brings the readings to the unit of the first ones when it changes with this image.
+  void followDepthUnit(double t, double t_imu, DepthReading* depth);
   /// Empty when the input is usable, else what is wrong. Fills `depth` with the corrected and masked depth image.
   std::string checkInput(const FrameInput& input, DepthReading* depth);
   bool noticeTimeJump(double t, double newest, const char* what);
@@ -167,6 +171,8 @@ class FrontEnd::Impl {
   frontend::InertialInput inertial_;
   frontend::DenseAlignment dense_;  ///< where no gyro tells the turn, and at the start
   frontend::FaultDetection faults_;
+  frontend::DepthUnit depth_unit_;
+  MissingReading missing_reading_;
   FrozenDepth frozen_depth_;
   bool same_depth_ = false;                   ///< the newest depth image repeats the one before
   SE3 T_odom_depth_;                          ///< camera pose at the last image that brought new depth ...

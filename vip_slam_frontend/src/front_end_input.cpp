@@ -77,6 +77,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       camera_(makeCamera(sensor_.camera)),
       inertial_(sensor_, options.recovery.max_imu_gap),
       dense_(camera_, sensor_.depth_noise),
+      depth_unit_(camera_, sensor_.depth_noise),
       masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
       tracker_(options_.tracking, camera_, sensor_.depth_noise, timing,
                featureMask(sensor_.mask, options_.tracking.border)),
@@ -160,17 +161,36 @@ std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* de
     ++counters_.bad_depth;
   } else {
     depth->image = input.depth;
+    missing_reading_.look(input.depth);
+    if (missing_reading_.value() > 0) {
+      depth->image = input.depth.clone();
+      depth->image.setTo(0, input.depth == missing_reading_.value());
+      counters_.missing_reading = missing_reading_.value();
+    }
+    if (depth_unit_.factor() != 1) depth->image = depth->image * depth_unit_.factor();
+    const bool own = depth->image.data != input.depth.data;
     depth->lag = std::abs(input.depth_lag) >= kSameInstant ? input.depth_lag : 0.0;
     const DepthCurve curve = chained(sensor_.depth_curve, depth_curve_);
     const Eigen::Vector2d shift = sensor_.depth_shift + depth_shift_.px;
     const bool shifted = !shift.isZero();
-    if (shifted) depth->image = shiftedDepth(input.depth, shift);
+    if (shifted) depth->image = shiftedDepth(depth->image, shift);
     // The caller's image must stay unchanged.
-    if (!shifted && (!masked_.empty() || !curve.empty())) depth->image = input.depth.clone();
+    if (!shifted && !own && (!masked_.empty() || !curve.empty())) depth->image = input.depth.clone();
     if (!masked_.empty()) depth->image.setTo(0, masked_);
     applyDepthCurve(curve, &depth->image);
   }
   return "";
+}
+
+void FrontEnd::Impl::followDepthUnit(double t, double t_imu, DepthReading* depth) {
+  const std::optional<NavState> predicted = inertial_.complete() ? predict(t_imu) : std::nullopt;
+  const SE3 T_odom_C = predicted ? predicted->T_W_I * extrinsics()
+                                 : filter_.nav().T_W_I * extrinsics() * last_motion_.inverse();
+  const double before = depth_unit_.factor();
+  if (!depth_unit_.changes(depth->image, T_odom_C, t)) return;
+  depth->image = depth->image * (depth_unit_.factor() / before);
+  ++counters_.depth_unit_changes;
+  counters_.depth_unit = depth_unit_.factor();
 }
 
 void FrontEnd::Impl::followDepthShift() {
@@ -228,6 +248,7 @@ void FrontEnd::Impl::reset(const std::string& reason) {
   tracker_.clear();
   landmarks_.forgetPatches();
   surfaces_.clear();
+  depth_unit_.forget();
   moving_ = {};
   moving_imu_t_ = last_depth_t_ = cut_off_imu_t_ = silent_imu_t_ = fault_t_ = -1e300;  // the clock may have run back
   filter_.stop();

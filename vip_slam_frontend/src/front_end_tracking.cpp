@@ -74,6 +74,7 @@ FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::Pos
   const cv::Mat gray = input.gray.clone();
   if (filter_.started()) {
     const double gap = t_imu - last_imu_t_;
+    followDepthUnit(input.t, t_imu, &depth);
     if (gap <= options_.recovery.max_image_gap) return trackImage(input.t, t_imu, gray, depth, on_pose);
     reset(formatted("no image for %.2f s", gap));
   }
@@ -276,6 +277,7 @@ FrameOutput FrontEnd::Impl::trackImage(double t, double t_imu, const cv::Mat& gr
   if (!failure.empty()) return startAnew(failure);
   const bool surfaces_hold = report.surfaces_used > 0;
   if (!resume(tracked, surfaces_hold, t)) return startAnew("features are back after LOST");
+  depth_unit_.remember(depth, filter_.nav().T_W_I * extrinsics(), t);
   if (on_pose) on_pose(*makeFrame(t, false));
   return makeOutput(t, t_imu, keyframeReason(tracked, !depth.empty(), surfaces_hold, t));
 }

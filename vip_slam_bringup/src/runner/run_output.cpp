@@ -40,6 +40,7 @@ void emitCounters(YAML::Emitter& yaml, const FrontEndCounters& c, const std::map
                                                              {"bad_stamp", c.bad_stamp},
                                                              {"repeated_image", c.repeated_image},
                                                              {"repeated_depth", c.repeated_depth},
+                                                             {"depth_unit_changes", c.depth_unit_changes},
                                                              {"imu_rejected", c.imu_rejected},
                                                              {"gyro_cut_off", c.gyro_cut_off},
                                                              {"imu_gaps", c.imu_gaps},

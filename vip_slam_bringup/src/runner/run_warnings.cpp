@@ -77,6 +77,17 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
   if (c.repeated_depth > 0)
     all.push_back(std::to_string(c.repeated_depth) + " of " + std::to_string(c.images) +
                   " depth images repeat the one before and are left out: has the depth camera frozen?");
+  if (c.depth_unit_changes > 0)
+    all.push_back(
+        formatted("all readings of depth changed by one factor at once, %zu times: the unit of depth was set "
+                  "anew while recording. It was followed (by a factor of %.3f at the end), the unit at the "
+                  "start is taken for the right one",
+                  static_cast<std::size_t>(c.depth_unit_changes), c.depth_unit));
+  if (c.missing_reading > 0)
+    all.push_back(
+        formatted("depth of exactly %.3f m stands apart from the surfaces around it: taken for \"no reading\", "
+                  "which should be 0 (or NaN)",
+                  c.missing_reading));
   if (c.gyro_cut_off > 0)
     all.push_back(
         formatted("%zu samples of the gyroscope are at the end of its range, %.2f rad/s: the body turned faster, by "

@@ -37,16 +37,17 @@ struct FrameOutput {
   KeyframePtr keyframe;   ///< null: this image is none
 };
 
-/// What was counted since construction, and present values of what is learnt (the last seven); for diagnostics.
+/// What was counted since construction, and present values of what is learnt (the last nine); for diagnostics.
 struct FrontEndCounters {
   std::uint64_t images = 0, keyframes = 0, restarts = 0;
-  std::uint64_t bad_image = 0;       ///< wrong size or type, or empty
-  std::uint64_t bad_depth = 0;       ///< depth of wrong size or type: treated as none
-  std::uint64_t no_depth = 0;        ///< images without depth
-  std::uint64_t bad_stamp = 0;       ///< repeated, backward or non-finite image stamps
-  std::uint64_t repeated_image = 0;  ///< new stamps on the pixels of the image before: not used
-  std::uint64_t repeated_depth = 0;  ///< depth images with the pixels of the one before: left out
-  std::uint64_t imu_rejected = 0;    ///< non-finite, all zero, repeated or backward samples, and those stamped too late
+  std::uint64_t bad_image = 0;           ///< wrong size or type, or empty
+  std::uint64_t bad_depth = 0;           ///< depth of wrong size or type: treated as none
+  std::uint64_t no_depth = 0;            ///< images without depth
+  std::uint64_t bad_stamp = 0;           ///< repeated, backward or non-finite image stamps
+  std::uint64_t repeated_image = 0;      ///< new stamps on the pixels of the image before: not used
+  std::uint64_t repeated_depth = 0;      ///< depth images with the pixels of the one before: left out
+  std::uint64_t depth_unit_changes = 0;  ///< times that all readings changed by one factor: they are changed back
+  std::uint64_t imu_rejected = 0;  ///< non-finite, all zero, repeated or backward samples, and those stamped too late
   std::uint64_t imu_gaps = 0;
   std::uint64_t imu_spikes = 0;        ///< single wrong samples, replaced
   std::uint64_t imu_faults = 0;        ///< images before which the IMU contradicted what is seen and was left out
@@ -60,6 +61,8 @@ struct FrontEndCounters {
   std::uint64_t features_used = 0, features_gated = 0;
   std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
+  double depth_unit = 1;       ///< factor that brings readings to the unit of the first ones
+  double missing_reading = 0;  ///< value of depth that stands for "no reading" beside 0, m; 0: none seen
   double sigma_px = 0;         ///< adapted pixel noise
   double gyro_range = 0;       ///< limit of the gyro's range, rad/s; 0: never reached
   double imu_noise_scale = 1;  ///< factor on the IMU's noise, see ImuNoiseMonitor

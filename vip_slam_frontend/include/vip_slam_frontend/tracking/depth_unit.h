@@ -1,0 +1,44 @@
+// Detects that the unit of depth changes between two images, as when a driver's depth units are set anew at run time.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_noise.h"
+#include "vip_slam_core/geometry/se3.h"
+
+namespace vip_slam::frontend {
+
+/// From one image to the next nothing in view comes nearer by a share of its distance that is the same near and far: a
+/// motion changes distances by metres, a body only its own. Where all readings do, their unit has changed.
+class DepthUnit {
+ public:
+  DepthUnit(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
+
+  /// Times which readings have the unit of the first ones.
+  double factor() const { return factor_; }
+
+  /// Whether the unit changes with this image (32FC1, m, 0 = invalid, times factor()), taken at t (s) from about
+  /// T_odom_C; factor() is another one then. A view that does not show it, as a single wall at one distance, is passed
+  /// over, and the next one is compared.
+  bool changes(const cv::Mat& depth, const SE3& T_odom_C, double t);
+
+  /// The next image is compared with this one, in the unit of the first ones and with its estimated pose.
+  void remember(const cv::Mat& depth, const SE3& T_odom_C, double t);
+
+  /// A new epoch: poses have another frame. The unit stays.
+  void forget() { points_.clear(); }
+
+ private:
+  std::shared_ptr<const CameraModel> camera_;
+  DepthNoise noise_;
+  double factor_ = 1;
+  std::vector<Eigen::Vector3d> points_;  ///< of the last image, in odom, m
+  double t_ = 0;                         ///< its time, s
+  bool open_ = false;                    ///< readings may have changed since: that image stays the one to compare with
+};
+
+}  // namespace vip_slam::frontend

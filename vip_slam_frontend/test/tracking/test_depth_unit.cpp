@@ -1,0 +1,81 @@
+// The unit of depth that changes while recording, and what must not pass for it.
+#include <gtest/gtest.h>
+
+#include "test_camera.h"
+#include "vip_slam_frontend/tracking/depth_unit.h"
+
+namespace vip_slam::frontend {
+namespace {
+
+constexpr double kFar = 2.5, kRight = 1.0;  // m, two walls
+
+cv::Mat look(const SE3& T_W_C, double body = 0, double far = kFar, double right = kRight) {
+  cv::Mat depth(480, 640, CV_32F);
+  cv::RNG random(3);
+  for (int v = 0; v < 480; ++v) {
+    for (int u = 0; u < 640; ++u) {
+      const Eigen::Vector3d ray = T_W_C.R() * Eigen::Vector3d((u - kCx) / kFocal, (v - kCy) / kFocal, 1);
+      const double ahead = ray.z() > 0 ? (far - T_W_C.t().z()) / ray.z() : 1e9;
+      const double aside = ray.x() > 0 ? (right - T_W_C.t().x()) / ray.x() : 1e9;
+      const double z = body > 0 && u < 256 ? body : std::min(ahead, aside);
+      depth.at<float>(v, u) = static_cast<float>(z + random.gaussian(0.003 * z));
+    }
+  }
+  return depth;
+}
+
+class DepthUnitTest : public testing::Test {
+ protected:
+  const SE3 then_{SE3()}, now_{SE3(expSO3(Eigen::Vector3d(0.01, 0.03, -0.02)), {0.03, 0.01, -0.04})};
+  DepthUnit unit_{testCamera(), DepthNoise()};
+};
+
+TEST_F(DepthUnitTest, AnUnitThatIsSetAnewIsFollowedThereAndBack) {
+  for (const double factor : {2.0, 0.5, 0.9}) {
+    DepthUnit unit(testCamera(), DepthNoise());
+    unit.remember(look(then_), then_, 1.0);
+    EXPECT_FALSE(unit.changes(look(now_), now_, 1.033));
+    EXPECT_DOUBLE_EQ(unit.factor(), 1.0);
+    ASSERT_TRUE(unit.changes(factor * look(now_), now_, 1.033)) << factor;
+    EXPECT_NEAR(unit.factor(), 1 / factor, 0.005 / factor);
+    unit.remember(look(now_), now_, 1.033);
+    EXPECT_FALSE(unit.changes(unit.factor() * factor * look(then_), then_, 1.066));
+    ASSERT_TRUE(unit.changes(unit.factor() * look(then_), then_, 1.066)) << factor;
+    EXPECT_NEAR(unit.factor(), 1.0, 0.01);
+  }
+}
+
+// A motion that nobody predicts brings the near wall nearer by a larger share than the far one.
+TEST_F(DepthUnitTest, AMotionIsNoUnit) {
+  unit_.remember(look(then_), then_, 1.0);
+  for (const double step : {-0.3, -0.2, 0.2, 0.3}) {
+    EXPECT_FALSE(unit_.changes(look(SE3(Eigen::Matrix3d::Identity(), {0, 0, step})), then_, 1.033)) << step;
+    // Away from the edge of the two walls both are farther by one share.
+    EXPECT_FALSE(unit_.changes(look(SE3(Eigen::Matrix3d::Identity(), {0.4 * step, 0, step})), then_, 1.2)) << step;
+    EXPECT_DOUBLE_EQ(unit_.factor(), 1.0);
+  }
+}
+
+TEST_F(DepthUnitTest, ABodyThatComesIntoViewIsNoUnit) {
+  unit_.remember(look(then_), then_, 1.0);
+  EXPECT_FALSE(unit_.changes(look(now_, 0.8), now_, 1.033));
+  EXPECT_DOUBLE_EQ(unit_.factor(), 1.0);
+}
+
+// A single wall may as well have come nearer. What shows it later is compared with the image before.
+TEST_F(DepthUnitTest, ASingleWallDecidesNothing) {
+  unit_.remember(look(then_, 0, kFar, 1e6), then_, 1.0);
+  EXPECT_FALSE(unit_.changes(2 * look(then_, 0, kFar, 1e6), then_, 1.033));
+  EXPECT_DOUBLE_EQ(unit_.factor(), 1.0);
+
+  unit_.remember(look(then_), then_, 1.066);  // passed over: the question is open
+  EXPECT_FALSE(unit_.changes(cv::Mat(), then_, 1.1));
+}
+
+TEST_F(DepthUnitTest, AfterALongTimeNothingIsCompared) {
+  unit_.remember(look(then_), then_, 1.0);
+  EXPECT_FALSE(unit_.changes(2 * look(then_), then_, 3.0));
+}
+
+}  // namespace
+}  // namespace vip_slam::frontend
