@@ -47,6 +47,7 @@ struct DriverBagOptions {
   double imu_hole_at = -1, imu_hole = 0;  ///< seconds after the start; length
   double late_jump = 0;                   ///< stamps of the second half are moved by this
   bool tf = true;
+  bool second_camera = false;  ///< another camera publishes on the image topics, 12 ms after; its frames are "back_..."
   int repeat_every = 0;        ///< n: every n-th image repeats the pixels of the one before; 0: none
   std::string other_encoding;  ///< of the colour image, "" as the sensor file
 };
