@@ -25,7 +25,7 @@ FrontEndNodelet::~FrontEndNodelet() {
 
 void FrontEndNodelet::onInit() {
   try {
-    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"feature_image_rate", "diagnostic_period"});
+    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"feature_image_rate", "diagnostic_period", "session"});
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
     const std::vector<std::string> installed = installedTransports(getNodeHandle());
     color_source_ =
@@ -36,6 +36,11 @@ void FrontEndNodelet::onInit() {
     NODELET_FATAL("%s", error.what());
     throw;
   }
+  // A nodelet that is unloaded and comes back finds what the one before has left on the parameter server.
+  getPrivateNodeHandle().param("session", session_, 0);
+  getPrivateNodeHandle().setParam("session", session_ + 1);
+  if (session_ > 0)
+    NODELET_WARN("the front end is started again: of a map that the back end still has its odometry is a new part");
   frames_.odom = options_.odom_frame;
   frames_.base = options_.base_frame;
   PairerOptions pairing;
@@ -173,7 +178,8 @@ void FrontEndNodelet::startWhenCalibrated() {
   if (!resolved) return;
   try {
     // clock_ has already filtered the stamps; those that pass are no jump.
-    auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.input.time_jump);
+    auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.input.time_jump,
+                                                std::uint32_t(session_));
     alignment_ = std::make_unique<DepthAlignment>(*resolved);
     front_end_ = std::move(front_end);
   } catch (const std::exception& error) {

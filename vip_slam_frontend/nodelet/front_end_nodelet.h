@@ -93,6 +93,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void reportQueues(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   FrontEndNodeOptions options_;
+  int session_ = 0;  ///< earlier starts of this nodelet, see firstNumbers()
   SensorConfig sensor_;
   OdometryFrames frames_;
   tf2_ros::Buffer tf_buffer_;
