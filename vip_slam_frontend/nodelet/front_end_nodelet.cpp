@@ -17,6 +17,7 @@ namespace vip_slam {
 
 FrontEndNodelet::~FrontEndNodelet() {
   timer_.stop();
+  rivals_.reset();
   color_images_.reset();
   depth_images_.reset();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
@@ -51,7 +52,8 @@ void FrontEndNodelet::onInit() {
   clock_ = std::make_unique<StreamClock>(kStreams, options_.input.time_jump);
   tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
   tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
-  calibration_ = std::make_unique<CalibrationSource>(sensor_, options_, tf_buffer_);
+  calibration_ = std::make_unique<CalibrationSource>(withResolvedTopics(), options_, tf_buffer_);
+  rivals_ = std::make_unique<TfRivals>(options_.odom_frame, options_.base_frame, ros::this_node::getName());
 
   owner_ = std::make_unique<OwnerThread>([this](const std::string& what) { NODELET_ERROR("%s", what.c_str()); });
   imu_lane_ = owner_->addLane("imu", 4000);
@@ -79,6 +81,7 @@ void FrontEndNodelet::advertise() {
   diagnostics_->add("tracking", this, &FrontEndNodelet::reportTracking);
   diagnostics_->add("input", this, &FrontEndNodelet::reportInput);
   diagnostics_->add("queues", this, &FrontEndNodelet::reportQueues);
+  diagnostics_->add("tf", this, &FrontEndNodelet::reportTf);
   odometry_monitor_ = std::make_unique<OutputMonitor>("odom", sensor_.color_rate, diagnostics_.get());
 
   // The parameters given at the start are the initial values; dynamic_reconfigure would overwrite them by its defaults.

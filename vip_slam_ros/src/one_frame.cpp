@@ -19,9 +19,10 @@ bool OneFrame::admits(const std::string& frame_id) {
 
 std::string OneFrame::words() const {
   if (left_out_ == 0) return "";
-  return formatted("%zu of %zu messages have frame_id '%s' instead of '%s' as the first one, and are left out: two "
-                   "drivers under one name? give each a namespace of its own",
-                   left_out_, left_out_ + admitted_, other_.c_str(), first_.c_str());
+  return formatted(
+      "%zu of %zu messages have frame_id '%s' instead of '%s' as the first one, and are left out: two "
+      "drivers under one name? give each a namespace of its own",
+      left_out_, left_out_ + admitted_, other_.c_str(), first_.c_str());
 }
 
 }  // namespace vip_slam

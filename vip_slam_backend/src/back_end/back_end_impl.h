@@ -109,7 +109,7 @@ struct BackEnd::Impl {
   std::unique_ptr<BaSolver> solver;
   LoopCloser loop_closer;
   Relocaliser relocaliser;
-  bool searching = false;                 ///< a loaded map is not recognised yet
+  bool searching = false;  ///< a loaded map is not recognised yet
   bool localisation_only = false;
   std::vector<PlaneUpdate> held_updates;  ///< received while frozen(), applied when mapping goes on
   std::deque<KeyframePtr> held;           ///< received while searching, inserted once the map is recognised
