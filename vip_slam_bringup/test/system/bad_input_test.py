@@ -256,6 +256,17 @@ class BadInputTest(unittest.TestCase):
             launch.terminate()
             launch.wait(30)
 
+    def test_06c_exit_at_end_waits_for_what_was_played(self):
+        frames = Listener('/vip_slam/tracked_frame', TrackedFrame)
+        subprocess.run(['roslaunch', 'vip_slam_bringup', 'bag.launch', 'sensor:=' +
+                        os.path.join(self.data, 'smoke_sensor.yaml'), 'rviz:=false', 'exit_at_end:=true',
+                        'bag:=' + os.path.join(self.data, 'smoke.bag')], stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL, timeout=120)
+        with rosbag.Bag(os.path.join(self.data, 'smoke.bag')) as recorded:
+            stamps = [m.header.stamp.to_sec() for _, m, _ in recorded.read_messages(topics=['/camera/color/image_raw'])]
+        # The last image waits for the IMU samples that the bag does not have.
+        self.assertGreaterEqual(frames.last().header.stamp.to_sec(), stamps[-3])
+
     def test_07_a_bag_that_is_not_there_ends_the_launch(self):
         for more in ('exit_at_end:=false', 'exit_at_end:=true'):
             done = subprocess.run(['roslaunch', 'vip_slam_bringup', 'bag.launch', 'bag:=/nowhere/none.bag', 'sensor:=' +
