@@ -280,6 +280,11 @@ Trajectory writeDriverBag(const std::string& path, const DriverBagOptions& o) {
                                const std::string& frame) {
       sensor_msgs::CameraInfo info = cameraInfo(of, out.header(stamp, frame));
       if (!o.calibrated) info.K.fill(0.0);
+      if (k < o.empty_infos) {
+        info.K.fill(0.0);
+        info.P.fill(0.0);
+        info.width = info.height = 0;
+      }
       out.write(topic, stamp, info);
     };
     const SensorTopics& topics = o.sensor.topics;

@@ -85,7 +85,8 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message) {
   const auto take = [&](StreamRecord* stream, const std::string& image_topic, CameraIntrinsics* camera,
                         std::string* error) {
-    if (!note(stream, arrival, message) || stream->stamps.size() > 1) return;
+    if (!note(stream, arrival, message) || camera->width > 0) return;  // the first that can be used, as live
+    error->clear();
     try {
       *camera = intrinsicsFromCameraInfo(message, image_topic);
       const std::string wrong = camera->validate();
