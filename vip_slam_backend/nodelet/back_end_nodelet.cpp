@@ -23,6 +23,7 @@ constexpr int kMaxPlaneUpdates = 1000;
 
 BackEndNodelet::~BackEndNodelet() {
   timer_.stop();
+  rivals_.reset();
   for (auto& service : services_) service.shutdown();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
   // Their callbacks use the owner thread too.
@@ -45,6 +46,7 @@ void BackEndNodelet::onInit() {
   }
   publish_tf_ = options_.publish_tf;
   tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
+  rivals_ = std::make_unique<TfRivals>(options_.map_frame, options_.odom_frame, ros::this_node::getName());
   owner_ = std::make_unique<OwnerThread>([this](const std::string& what) {
     NODELET_ERROR("%s", what.c_str());
     std::lock_guard<std::mutex> lock(shown_mutex_);
@@ -59,8 +61,10 @@ void BackEndNodelet::onInit() {
   owner_->start(kMappingNiceness);
   advertiseServices();
   subscribe();
-  timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0),
-                                             [this](const ros::WallTimerEvent&) { diagnostics_->force_update(); });
+  timer_ = getMTNodeHandle().createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) {
+    if (const std::string rival = tfRival(); !rival.empty()) NODELET_WARN_THROTTLE(10, "tf: %s", rival.c_str());
+    diagnostics_->force_update();
+  });
 }
 
 void BackEndNodelet::advertise() {
@@ -83,6 +87,11 @@ void BackEndNodelet::advertise() {
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, getPrivateNodeHandle(), getName());
   diagnostics_->setHardwareID(sensor_.name);
   diagnostics_->add("map", this, &BackEndNodelet::report);
+  diagnostics_->add("tf", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+    const std::string rival = tfRival();
+    status.summary(rival.empty() ? diagnostic_msgs::DiagnosticStatus::OK : diagnostic_msgs::DiagnosticStatus::WARN,
+                   rival.empty() ? "no other source of '" + options_.odom_frame + "'" : rival);
+  });
   pose_monitor_ = std::make_unique<OutputMonitor>("pose", sensor_.color_rate, diagnostics_.get());
   getPrivateNodeHandle().setParam("localisation_mode", options_.localisation_mode);
   reconfigure_ = std::make_unique<dynamic_reconfigure::Server<vip_slam_backend::BackEndConfig>>(reconfigure_mutex_,
@@ -90,8 +99,11 @@ void BackEndNodelet::advertise() {
   reconfigure_->setCallback([this](vip_slam_backend::BackEndConfig& config, std::uint32_t) { onReconfigure(config); });
 }
 
+std::string BackEndNodelet::tfRival() const { return publish_tf_ ? rivals_->words(ros::WallTime::now().toSec()) : ""; }
+
 void BackEndNodelet::subscribe() {
   ros::NodeHandle& nh = getNodeHandle();
+  rivals_->listen(nh);
   subscribers_.push_back(nh.subscribe<vip_slam_msgs::Calibration>(
       "calibration", 1,
       [this](const vip_slam_msgs::CalibrationConstPtr& m) { owner_->post(control_lane_, [this, m] { start(*m); }); }));

@@ -33,6 +33,7 @@
 #include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/output_monitor.h"
 #include "vip_slam_ros/owner_thread.h"
+#include "vip_slam_ros/tf_rivals.h"
 
 namespace vip_slam {
 
@@ -75,6 +76,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   BackEnd& backEnd();  ///< throws while there is none
 
   void report(diagnostic_updater::DiagnosticStatusWrapper& status);
+  std::string tfRival() const;  ///< who else publishes map -> odom; empty when nobody, or when we do not
 
   BackEndNodeOptions options_;
   SensorConfig sensor_;
@@ -91,6 +93,7 @@ class BackEndNodelet : public nodelet::Nodelet {
   bool adjusting_ = false;        ///< a global adjustment is under way
   std::thread adjustment_;
 
+  std::unique_ptr<TfRivals> rivals_;
   DropWatch drops_, refusals_;  ///< used by diagnostics only
   mutable std::mutex shown_mutex_;
   vip_slam_msgs::BackEndStatistics shown_;

@@ -15,16 +15,6 @@ class ResetBarrier {
   void see(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
     take(t, epoch);
-    if (epoch >= epoch_) {
-      behind_ = 0;
-    } else if (++behind_ >= kBehind) {
-      // Too many for late messages: a front end that was reloaded counts its epochs from the beginning. Only frames are
-      // counted here, since keyframes may wait in a queue.
-      t_ = t;
-      epoch_ = epoch;
-      has_keyframe_ = raised_ = false;
-      behind_ = 0;
-    }
   }
   void seeKeyframe(double t, std::uint32_t epoch) {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -58,8 +48,6 @@ class ResetBarrier {
   }
 
  private:
-  static constexpr int kBehind = 5;
-
   void take(double t, std::uint32_t epoch) {
     if (!seen_ || epoch > epoch_) {
       t_ = t;  // stamps of the epoch before are not comparable: the clock may have run back
@@ -75,7 +63,6 @@ class ResetBarrier {
   bool seen_ = false, raised_ = false;
   bool has_keyframe_ = false;     ///< of epoch_
   bool epoch_ends_ = false;       ///< barrier_epoch_ had keyframes
-  int behind_ = 0;                ///< consecutive frames of an earlier epoch than epoch_
   double t_ = 0, barrier_t_ = 0;  ///< t_ of epoch_
   std::uint32_t epoch_ = 0, barrier_epoch_ = 0;
 };

@@ -250,6 +250,8 @@ Trajectory writeDriverBag(const std::string& path, const DriverBagOptions& o) {
   const bool own_depth = o.sensor.depth_undistorted;
   const std::vector<Eigen::Vector3d> rays = raysOf(rendered),
                                      depth_rays = own_depth ? raysOf(pinholeOf(rendered)) : rays;
+  DriverBagOptions other = o;
+  for (std::string* frame : {&other.frames.color, &other.frames.depth}) *frame = "back_" + *frame;
   cv::Mat grey, depth;
   for (int k = 0; k < end * rate; ++k) {
     const double t = 0.02 + k / rate, t_imu = t + o.sensor.time_offset;
@@ -268,10 +270,21 @@ Trajectory writeDriverBag(const std::string& path, const DriverBagOptions& o) {
     }
     writeColor(&out, o, t, grey);
     writeDepth(&out, o, t, depth);
+    if (o.second_camera && t > 0.3) {
+      cv::Mat other_grey, other_depth = 0.5 * depth;
+      cv::flip(grey, other_grey, 1);
+      writeColor(&out, other, t + 0.012, other_grey);
+      writeDepth(&out, other, t + 0.012, other_depth);
+    }
     const auto writeInfo = [&](const std::string& topic, const CameraIntrinsics& of, double stamp,
                                const std::string& frame) {
       sensor_msgs::CameraInfo info = cameraInfo(of, out.header(stamp, frame));
       if (!o.calibrated) info.K.fill(0.0);
+      if (k < o.empty_infos) {
+        info.K.fill(0.0);
+        info.P.fill(0.0);
+        info.width = info.height = 0;
+      }
       out.write(topic, stamp, info);
     };
     const SensorTopics& topics = o.sensor.topics;

@@ -41,12 +41,14 @@ struct DriverBagOptions {
   double depth_unit_factor = 1;
   int depth_divisor = 1;   ///< depth image smaller than colour by this
   bool calibrated = true;  ///< false: camera_info has an empty K
+  int empty_infos = 0;     ///< so many images at the beginning have an empty camera_info
   double accel_factor = 1;
   bool gravity = true;
   double gyro_factor = 1;
   double imu_hole_at = -1, imu_hole = 0;  ///< seconds after the start; length
   double late_jump = 0;                   ///< stamps of the second half are moved by this
   bool tf = true;
+  bool second_camera = false;  ///< another camera publishes on the image topics, 12 ms after; its frames are "back_..."
   int repeat_every = 0;        ///< n: every n-th image repeats the pixels of the one before; 0: none
   std::string other_encoding;  ///< of the colour image, "" as the sensor file
 };

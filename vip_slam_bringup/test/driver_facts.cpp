@@ -109,9 +109,10 @@ void readStreams(const YAML::Node& node, DriverCamera* camera) {
   const YAML::Node imu = stream("imu", &s.topics.imu, &camera->frames.imu),
                    gyro = stream("gyro", &s.topics.gyro, &camera->frames.gyro),
                    accel = stream("accel", &s.topics.accel, &camera->frames.accel);
-  const YAML::Node clock = imu ? imu : gyro;
-  s.imu_rate = clock["rate"].as<double>();
-  s.time_offset = clock["stamp_late"].as<double>(0.0);
+  if (const YAML::Node clock = imu ? imu : gyro) {
+    s.imu_rate = clock["rate"].as<double>();
+    s.time_offset = clock["stamp_late"].as<double>(0.0);
+  }
   if (accel) camera->accel_rate = accel["rate"].as<double>();
 }
 
@@ -125,6 +126,7 @@ void readTf(const YAML::Node& tf, DriverCamera* camera) {
     if (row["published"].as<bool>(true)) camera->edges.push_back(all.back());
     for (const std::string& frame : {all.back().parent, all.back().child}) camera->all_frames.push_back(frame);
   }
+  if (!camera->published.topics.hasInertial()) return;  // the body that is tracked is the colour camera
   const std::string imu = camera->published.topics.imu.empty() ? camera->frames.gyro : camera->frames.imu;
   camera->published.T_imu_cam = chain(all, imu, camera->frames.color);
 }

@@ -1,5 +1,6 @@
 #include "calibration_source.h"
 
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/tf_lookup.h"
 
@@ -68,10 +69,11 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     }
     if (!asked_since_ || t < *asked_since_) asked_since_ = t;
     // Without an IMU the body is where the sensor file puts it, seen from the camera: tf has only the base to tell.
-    const std::optional<SE3> T_imu_cam =
-        inertial ? lookUpExtrinsics(tf_, imu_frame_, color_frame_) : sensor_.T_imu_cam;
+    const std::optional<SE3> T_imu_cam = inertial ? lookUpExtrinsics(tf_, imu_frame_, color_frame_) : sensor_.T_imu_cam;
     const std::string& frame = inertial ? imu_frame_ : color_frame_;
     auto T_base_imu = lookUpTransform(tf_, options_.base_frame, frame);
+    T_base_body_read_ = T_base_imu;
+    if (inertial) T_imu_cam_read_ = T_imu_cam;
     if (T_base_imu && !inertial) T_base_imu = *T_base_imu * sensor_.T_imu_cam.inverse();
     const bool patient = options_.extrinsics == "tf" || t - *asked_since_ < options_.tf_patience;
     const std::string no_base = "tf does not connect '" + frame + "' to '" + options_.base_frame + "'";
@@ -106,6 +108,23 @@ bool CalibrationSource::tfIsIncomplete() const {
 std::string CalibrationSource::waitingFor() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return waiting_for_;
+}
+
+std::string CalibrationSource::movedInTf() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const auto moved = [&](const std::optional<SE3>& read, const std::string& target, const std::string& source) {
+    const std::optional<SE3> now = read ? lookUpTransform(tf_, target, source) : std::nullopt;
+    if (!now) return std::string();
+    const ExtrinsicsGap gap = extrinsicsGap(*read, *now);
+    if (!gap.large()) return std::string();
+    return formatted(
+        "tf has moved '%s' against '%s' by %.1f degrees and %.1f cm since it was read: on a moving part, as a "
+        "pan head? poses are of '%s' as it was then; name a base_frame that is fixed to the camera",
+        source.c_str(), target.c_str(), gap.degrees, 100 * gap.metres, target.c_str());
+  };
+  const std::string& body = sensor_.topics.hasInertial() ? imu_frame_ : color_frame_;
+  const std::string camera = moved(T_imu_cam_read_, imu_frame_, color_frame_);
+  return camera.empty() ? moved(T_base_body_read_, options_.base_frame, body) : camera;
 }
 
 std::string CalibrationSource::colorFrame() const {

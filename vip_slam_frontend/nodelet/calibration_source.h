@@ -33,6 +33,9 @@ class CalibrationSource {
   /// What is missing, or what is wrong with the camera_info received, as a sentence.
   std::string waitingFor() const;
   std::string colorFrame() const;
+  /// How far tf has moved camera, IMU and base against each other since resolve() read it, in words; empty while they
+  /// are where they were, or did not come from tf.
+  std::string movedInTf() const;
 
  private:
   void take(const sensor_msgs::CameraInfo& info, const std::string& topic, const std::string& image_topic,
@@ -46,7 +49,8 @@ class CalibrationSource {
   bool color_info_ = false, depth_info_ = false, color_seen_ = false, imu_seen_ = false;
   std::string color_frame_, imu_frame_, problem_, waiting_for_, origin_;
   bool tf_incomplete_ = false;
-  std::optional<double> asked_since_;  ///< time when both frame names were first known, s
+  std::optional<SE3> T_imu_cam_read_, T_base_body_read_;  ///< from tf; of the latter the IMU, or the camera without one
+  std::optional<double> asked_since_;                     ///< time when both frame names were first known, s
 };
 
 }  // namespace vip_slam

@@ -33,20 +33,25 @@ std::vector<FrontEndNodelet::Input> FrontEndNodelet::inputs() const {
   return all;
 }
 
-// The ROS master is asked only while a topic is missing.
-void FrontEndNodelet::explainAbsences() {
+void FrontEndNodelet::lookUpTopics() {
+  Publishers publishers = publishersOfTopics();
   ros::master::V_TopicInfo published;
   for (const Input& input : inputs()) {
     const StreamMonitor::Report r = input.monitor->report();
+    const std::vector<std::string>& nodes = publishers[r.topic];
+    input.monitor->setPublishers(nodes);
     if (r.messages > 0 || r.rejected > 0) continue;
     if (published.empty() && !ros::master::getTopics(published)) return;
-    input.monitor->explainAbsence(whyNoMessage(getNodeHandle().resolveName(r.topic), input.type, published));
+    std::string why = whyNoMessage(r.topic, input.type, published);
+    for (const std::string& node : nodes)
+      if (const std::string unreachable = whyUnreachable(node); !unreachable.empty()) why = unreachable;
+    input.monitor->explainAbsence(why);
   }
 }
 
 void FrontEndNodelet::tick() {
   constexpr int kLookup = 5;  // ticks
-  if (ticks_++ % kLookup == kLookup - 1) explainAbsences();
+  if (ticks_++ % kLookup == kLookup - 1) lookUpTopics();
   // A status is published only with images: before the first one, and when images stop, this is the only report why
   // there is no pose.
   bool started;
@@ -91,7 +96,22 @@ void FrontEndNodelet::tick() {
   } else if (const std::string depth = depthAbsence(now); !depth.empty()) {
     NODELET_WARN_THROTTLE(10, "no depth, no planes: %s", depth.c_str());
   }
+  for (const Input& input : inputs())
+    if (const std::string rivalry = input.monitor->rivalry(now); !rivalry.empty())
+      NODELET_WARN_THROTTLE(10, "topic %s: %s", input.monitor->report().topic.c_str(), rivalry.c_str());
+  if (const std::string moved = calibration_->movedInTf(); !moved.empty())
+    NODELET_ERROR_THROTTLE(10, "%s", moved.c_str());
+  if (const std::string rival = tfRival(); !rival.empty()) NODELET_WARN_THROTTLE(10, "tf: %s", rival.c_str());
   diagnostics_->force_update();
+}
+
+std::string FrontEndNodelet::tfRival() const { return publish_tf_ ? rivals_->words(ros::WallTime::now().toSec()) : ""; }
+
+void FrontEndNodelet::reportTf(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const std::string moved = calibration_->movedInTf(), rival = tfRival();
+  status.summary(DiagnosticStatus::OK, "no other source of '" + options_.base_frame + "'");
+  if (!rival.empty()) status.mergeSummary(DiagnosticStatus::WARN, rival);
+  if (!moved.empty()) status.mergeSummary(DiagnosticStatus::ERROR, moved);
 }
 
 std::string FrontEndNodelet::depthAbsence(double now) const {
@@ -99,7 +119,7 @@ std::string FrontEndNodelet::depthAbsence(double now) const {
   const std::string absence = depth_monitor_->absence(now);
   constexpr int kLasting = 20;  // images; a hand in front of the camera is gone sooner
   if (!absence.empty() || empty_depth_ < kLasting) return absence;
-  return "topic " + depth_source_.topic + ": images " + holdNoDepth(sensor_.depth_noise);
+  return "topic " + depth_monitor_->report().topic + ": images " + holdNoDepth(sensor_.depth_noise);
 }
 
 void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -161,6 +181,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
     status.add(name + "repeated stamps", r.repeated);
     status.add(name + "backward stamps", r.backward);
     status.add(name + "unusable messages", r.rejected);
+    status.add(name + "messages of another frame", r.of_other_frame);
     if (!r.last_rejection.empty()) status.add(name + "last unusable", r.last_rejection);
   }
   constexpr std::size_t kLately = 10;  // reports, one a second
@@ -172,8 +193,9 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
                   formatted(
                       "%s (%.1f Hz) and %s (%.1f Hz) are not synchronised: newest stamps %.0f ms apart, pairs "
                       "need %.0f ms",
-                      color_source_.topic.c_str(), color_monitor_->report().rate, depth_source_.topic.c_str(),
-                      depth_monitor_->report().rate, 1e3 * std::abs(skew), 1e3 * options_.input.pair_tolerance);
+                      color_monitor_->report().topic.c_str(), color_monitor_->report().rate,
+                      depth_monitor_->report().topic.c_str(), depth_monitor_->report().rate, 1e3 * std::abs(skew),
+                      1e3 * options_.input.pair_tolerance);
   }
   if (empty_depth_ > 0 && complaints.empty()) complaints = depthAbsence(now);
   if (!shown.size_problem.empty()) complaints += (complaints.empty() ? "" : "; ") + shown.size_problem;

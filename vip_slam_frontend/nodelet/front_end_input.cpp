@@ -6,14 +6,27 @@
 
 namespace vip_slam {
 
+std::string FrontEndNodelet::resolved(const std::string& topic) const {
+  return topic.empty() ? "" : getNodeHandle().resolveName(topic);
+}
+
+SensorConfig FrontEndNodelet::withResolvedTopics() const {
+  SensorConfig sensor = sensor_;
+  SensorTopics& t = sensor.topics;
+  for (std::string* topic : {&t.color, &t.color_info, &t.depth, &t.depth_info, &t.imu, &t.gyro, &t.accel})
+    *topic = resolved(*topic);
+  return sensor;
+}
+
 void FrontEndNodelet::subscribe() {
   const SensorTopics& topics = sensor_.topics;
-  color_monitor_ = std::make_unique<StreamMonitor>(color_source_.topic, sensor_.color_rate);
-  depth_monitor_ = std::make_unique<StreamMonitor>(depth_source_.topic, sensor_.depth_rate);
-  imu_monitor_ = std::make_unique<StreamMonitor>(topics.inertial(), sensor_.imu_rate);
-  accel_monitor_ = std::make_unique<StreamMonitor>(topics.accel, 0);
-
   ros::NodeHandle& nh = getMTNodeHandle();
+  color_monitor_ = std::make_unique<StreamMonitor>(resolvedTopic(nh, color_source_), sensor_.color_rate);
+  depth_monitor_ =
+      std::make_unique<StreamMonitor>(topics.depth.empty() ? "" : resolvedTopic(nh, depth_source_), sensor_.depth_rate);
+  imu_monitor_ = std::make_unique<StreamMonitor>(resolved(topics.inertial()), sensor_.imu_rate);
+  accel_monitor_ = std::make_unique<StreamMonitor>(resolved(topics.accel), 0);
+
   const auto hints = ros::TransportHints().tcpNoDelay();
   if (sensor_.intrinsics_from_camera_info) {
     subscribers_.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
@@ -32,7 +45,7 @@ void FrontEndNodelet::subscribe() {
   if (!topics.depth.empty()) {
     const double scale = sensor_.depth_scale, offset = sensor_.depth_offset;
     const auto take = [this, scale, offset](const auto& m) {
-      onDepth(m->header.stamp.toSec(), [m, scale, offset] { return decodeDepth(*m, scale, offset); });
+      onDepth(m->header, [m, scale, offset] { return decodeDepth(*m, scale, offset); });
     };
     depth_images_ = std::make_unique<ImageSubscriber>(nh, depth_source_, queue, take, take);
   }
@@ -46,13 +59,19 @@ void FrontEndNodelet::subscribe() {
   imu(topics.accel, &FrontEndNodelet::onAccel);
   subscribers_.push_back(ordered.subscribe("map_update", 20, &FrontEndNodelet::onMapUpdate, this));
   subscribers_.push_back(ordered.subscribe("control", 20, &FrontEndNodelet::onControl, this));
+  rivals_->listen(ordered);
 }
 
-void FrontEndNodelet::watch(StreamMonitor& monitor, double t) { monitor.add(t, ros::Time::now().toSec()); }
+bool FrontEndNodelet::watch(StreamMonitor& monitor, const std_msgs::Header& header) {
+  const double now = ros::Time::now().toSec();
+  if (!monitor.admits(header.frame_id, now)) return false;
+  monitor.add(header.stamp.toSec(), now);
+  return true;
+}
 
 void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {
+  if (!watch(*color_monitor_, header)) return;
   const double t = header.stamp.toSec();
-  watch(*color_monitor_, t);
   calibration_->addColorFrame(header.frame_id);
   try {
     cv::Mat gray = decode();
@@ -62,12 +81,13 @@ void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::functio
     });
   } catch (const std::exception& error) {
     color_monitor_->reject(error.what());
-    NODELET_WARN_THROTTLE(10, "topic %s: %s", color_source_.topic.c_str(), error.what());
+    NODELET_WARN_THROTTLE(10, "topic %s: %s", color_monitor_->report().topic.c_str(), error.what());
   }
 }
 
-void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) {
-  watch(*depth_monitor_, t);
+void FrontEndNodelet::onDepth(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {
+  if (!watch(*depth_monitor_, header)) return;
+  const double t = header.stamp.toSec();
   try {
     cv::Mat depth = decode();
     empty_depth_ = holdsNoDepth(depth, sensor_.depth_noise) ? empty_depth_ + 1 : 0;
@@ -77,29 +97,29 @@ void FrontEndNodelet::onDepth(double t, const std::function<cv::Mat()>& decode) 
     });
   } catch (const std::exception& error) {
     depth_monitor_->reject(error.what());
-    NODELET_WARN_THROTTLE(10, "topic %s: %s", depth_source_.topic.c_str(), error.what());
+    NODELET_WARN_THROTTLE(10, "topic %s: %s", depth_monitor_->report().topic.c_str(), error.what());
   }
 }
 
 void FrontEndNodelet::onImu(const sensor_msgs::ImuConstPtr& msg) {
+  if (!watch(*imu_monitor_, msg->header)) return;
   const double t = msg->header.stamp.toSec();
-  watch(*imu_monitor_, t);
   calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity), accel = fromMsg(msg->linear_acceleration);
   owner_->post(imu_lane_, [this, t, gyro, accel] { addInertial(t, &gyro, &accel); });
 }
 
 void FrontEndNodelet::onGyro(const sensor_msgs::ImuConstPtr& msg) {
+  if (!watch(*imu_monitor_, msg->header)) return;
   const double t = msg->header.stamp.toSec();
-  watch(*imu_monitor_, t);
   calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity);
   owner_->post(imu_lane_, [this, t, gyro] { addInertial(t, &gyro, nullptr); });
 }
 
 void FrontEndNodelet::onAccel(const sensor_msgs::ImuConstPtr& msg) {
+  if (!watch(accelMonitor(), msg->header)) return;
   const double t = msg->header.stamp.toSec();
-  watch(accelMonitor(), t);
   if (!sensor_.hasGyro()) calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d accel = fromMsg(msg->linear_acceleration);
   owner_->post(imu_lane_, [this, t, accel] { addInertial(t, nullptr, &accel); });

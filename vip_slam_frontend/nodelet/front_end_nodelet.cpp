@@ -17,6 +17,7 @@ namespace vip_slam {
 
 FrontEndNodelet::~FrontEndNodelet() {
   timer_.stop();
+  rivals_.reset();
   color_images_.reset();
   depth_images_.reset();
   for (auto& subscriber : subscribers_) subscriber.shutdown();
@@ -25,7 +26,7 @@ FrontEndNodelet::~FrontEndNodelet() {
 
 void FrontEndNodelet::onInit() {
   try {
-    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"feature_image_rate", "diagnostic_period"});
+    loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"feature_image_rate", "diagnostic_period", "session"});
     sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
     const std::vector<std::string> installed = installedTransports(getNodeHandle());
     color_source_ =
@@ -36,6 +37,11 @@ void FrontEndNodelet::onInit() {
     NODELET_FATAL("%s", error.what());
     throw;
   }
+  // A nodelet that is unloaded and comes back finds what the one before has left on the parameter server.
+  getPrivateNodeHandle().param("session", session_, 0);
+  getPrivateNodeHandle().setParam("session", session_ + 1);
+  if (session_ > 0)
+    NODELET_WARN("the front end is started again: of a map that the back end still has its odometry is a new part");
   frames_.odom = options_.odom_frame;
   frames_.base = options_.base_frame;
   PairerOptions pairing;
@@ -46,7 +52,8 @@ void FrontEndNodelet::onInit() {
   clock_ = std::make_unique<StreamClock>(kStreams, options_.input.time_jump);
   tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
   tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
-  calibration_ = std::make_unique<CalibrationSource>(sensor_, options_, tf_buffer_);
+  calibration_ = std::make_unique<CalibrationSource>(withResolvedTopics(), options_, tf_buffer_);
+  rivals_ = std::make_unique<TfRivals>(options_.odom_frame, options_.base_frame, ros::this_node::getName());
 
   owner_ = std::make_unique<OwnerThread>([this](const std::string& what) { NODELET_ERROR("%s", what.c_str()); });
   imu_lane_ = owner_->addLane("imu", 4000);
@@ -74,6 +81,7 @@ void FrontEndNodelet::advertise() {
   diagnostics_->add("tracking", this, &FrontEndNodelet::reportTracking);
   diagnostics_->add("input", this, &FrontEndNodelet::reportInput);
   diagnostics_->add("queues", this, &FrontEndNodelet::reportQueues);
+  diagnostics_->add("tf", this, &FrontEndNodelet::reportTf);
   odometry_monitor_ = std::make_unique<OutputMonitor>("odom", sensor_.color_rate, diagnostics_.get());
 
   // The parameters given at the start are the initial values; dynamic_reconfigure would overwrite them by its defaults.
@@ -173,7 +181,8 @@ void FrontEndNodelet::startWhenCalibrated() {
   if (!resolved) return;
   try {
     // clock_ has already filtered the stamps; those that pass are no jump.
-    auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.input.time_jump);
+    auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.input.time_jump,
+                                                std::uint32_t(session_));
     alignment_ = std::make_unique<DepthAlignment>(*resolved);
     front_end_ = std::move(front_end);
   } catch (const std::exception& error) {

@@ -36,6 +36,7 @@
 #include "vip_slam_ros/owner_thread.h"
 #include "vip_slam_ros/stream_clock.h"
 #include "vip_slam_ros/stream_monitor.h"
+#include "vip_slam_ros/tf_rivals.h"
 
 namespace vip_slam {
 
@@ -47,17 +48,19 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void onInit() override;
   void advertise();
   void subscribe();
+  std::string resolved(const std::string& topic) const;  ///< by the remappings of the node; empty stays empty
+  SensorConfig withResolvedTopics() const;               ///< sensor_, with the names that a user sees in the graph
 
   // In the callback threads: decoding, stream monitoring, queuing.
   void onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode);
-  void onDepth(double t, const std::function<cv::Mat()>& decode);
+  void onDepth(const std_msgs::Header& header, const std::function<cv::Mat()>& decode);
   void onImu(const sensor_msgs::ImuConstPtr& msg);
   void onGyro(const sensor_msgs::ImuConstPtr& msg);
   void onAccel(const sensor_msgs::ImuConstPtr& msg);
   void onMapUpdate(const vip_slam_msgs::MapUpdateConstPtr& msg);
   void onControl(const vip_slam_msgs::ControlConstPtr& msg);
   void onReconfigure(vip_slam_frontend::FrontEndConfig& config);
-  void watch(StreamMonitor& monitor, double t);
+  bool watch(StreamMonitor& monitor, const std_msgs::Header& header);  ///< false: leave the message out
 
   // In the owner thread.
   void addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
@@ -86,19 +89,23 @@ class FrontEndNodelet : public nodelet::Nodelet {
   };
   std::vector<Input> inputs() const;
   bool splitImu() const { return !sensor_.topics.gyro.empty() && !sensor_.topics.accel.empty(); }
-  void explainAbsences();
+  void lookUpTopics();          ///< asks the ROS master why topics have no messages, and who publishes them
+  std::string tfRival() const;  ///< who else publishes odom -> base_link; empty when nobody, or when we do not
   std::string depthAbsence(double now) const;  ///< empty while usable depth comes, and for sensors without
   void reportTracking(diagnostic_updater::DiagnosticStatusWrapper& status);
   void reportInput(diagnostic_updater::DiagnosticStatusWrapper& status);
   void reportQueues(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void reportTf(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   FrontEndNodeOptions options_;
+  int session_ = 0;  ///< earlier starts of this nodelet, see firstNumbers()
   SensorConfig sensor_;
   OdometryFrames frames_;
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   std::unique_ptr<CalibrationSource> calibration_;
+  std::unique_ptr<TfRivals> rivals_;
 
   /// imu_monitor_: of topics.inertial(); accel_monitor_: of an accelerometer beside a gyroscope of its own.
   std::unique_ptr<StreamMonitor> color_monitor_, depth_monitor_, imu_monitor_, accel_monitor_;

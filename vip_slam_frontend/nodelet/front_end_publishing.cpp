@@ -48,10 +48,11 @@ void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, 
   tracked->processing_ms = milliseconds;
   frame_pub_.publish(tracked);
   TrackingStatus status = frame.status;
-  if (status.state == TrackingState::kDegraded) {
-    const std::string depth = depthAbsence(ros::Time::now().toSec());
-    if (!depth.empty()) status.reason += " (" + depth + ")";
-  }
+  const double now = ros::Time::now().toSec();
+  std::string cause;
+  if (status.state == TrackingState::kDegraded) cause = depthAbsence(now);
+  if (!hasPose(status.state) && sensor_.topics.hasInertial()) cause = imu_monitor_->fault(now);
+  if (!cause.empty()) status.reason += " (" + cause + ")";
   status_pub_.publish(boost::make_shared<vip_slam_msgs::TrackingStatus>(toMsg(status)));
   publishFeatureImage(pair, frame);
 }

@@ -4,8 +4,9 @@
 
 namespace vip_slam {
 
-FrontEnd::FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump)
-    : impl_(std::make_unique<Impl>(options, sensor, timing, clock_jump)) {}
+FrontEnd::FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump,
+                   std::uint32_t session)
+    : impl_(std::make_unique<Impl>(options, sensor, timing, clock_jump, firstNumbers(session))) {}
 FrontEnd::~FrontEnd() = default;
 
 bool FrontEnd::addImu(const ImuSample& sample) { return impl_->addImu(sample); }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "vip_slam_core/depth/missing_reading.h"
+#include "vip_slam_core/types/session_numbers.h"
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/filter/zero_velocity.h"
 #include "vip_slam_frontend/front_end.h"
@@ -27,7 +28,8 @@ namespace vip_slam {
 
 class FrontEnd::Impl {
  public:
-  Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump);
+  Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump,
+       const SessionNumbers& first);
 
   bool addImu(const ImuSample& sample);
   bool addGyro(double t, const Eigen::Vector3d& gyro);
@@ -193,11 +195,11 @@ class FrontEnd::Impl {
 
   Phase phase_ = Phase::kWaiting;
   TrackingStatus status_{TrackingState::kWaiting, "waiting for the first image"};
-  std::uint32_t epoch_ = 0;
+  std::uint32_t epoch_;
   double last_image_t_ = -1e300;  ///< image clock
   double last_imu_t_ = -1e300;    ///< IMU time of the newest image
   CloneId next_clone_ = 1;
-  KeyframeId next_keyframe_ = 1, last_keyframe_ = 0, newest_keyframe_ = 0;
+  KeyframeId next_keyframe_, last_keyframe_ = 0, newest_keyframe_ = 0;
   SE3 T_odom_keyframe_, T_chain_keyframe_;  ///< body and camera pose of the last keyframe
   double last_keyframe_imu_t_ = 0;
   bool keyframe_imu_broken_ = false;  ///< IMU gap or gyro saturation since the last keyframe

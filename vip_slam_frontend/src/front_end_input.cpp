@@ -69,7 +69,8 @@ FrontEndOptions forSize(FrontEndOptions options, int width, int height) {
 
 }  // namespace
 
-FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump)
+FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing, double clock_jump,
+                     const SessionNumbers& first)
     : options_(forSize(options, sensor.camera.width, sensor.camera.height)),
       sensor_(checked(sensor)),
       timing_(timing),
@@ -80,7 +81,7 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
       depth_unit_(camera_, sensor_.depth_noise),
       masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
       tracker_(options_.tracking, camera_, sensor_.depth_noise, timing,
-               featureMask(sensor_.mask, options_.tracking.border)),
+               featureMask(sensor_.mask, options_.tracking.border), first.landmark),
       surfaces_(camera_, sensor_.depth_noise, options.filter.window),
       landmarks_(options_.tracking, camera_),
       orb_(options.tracking.keyframe_corners),
@@ -88,7 +89,9 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
               camera_->focal(), sensor_.gravity),
       initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, sensor_.gravity),
       stillness_(options.filter.zupt),
-      selector_(options.keyframes) {
+      selector_(options.keyframes),
+      epoch_(first.epoch),
+      next_keyframe_(first.keyframe) {
   counters_.sigma_px = filter_.sigmaPx();
 }
 

@@ -53,6 +53,13 @@ ImageSource chooseTransport(const std::string& topic, const std::string& encodin
   return source;
 }
 
+std::string resolvedTopic(const ros::NodeHandle& nh, const ImageSource& source) {
+  if (source.topic.compare(0, source.base.size(), source.base) != 0) return nh.resolveName(source.topic);
+  // As image_transport does: the base is remapped, and what lies below it follows.
+  const std::string base = nh.resolveName(source.base), below = source.topic.substr(source.base.size());
+  return below.empty() ? base : nh.resolveName(base + below);
+}
+
 std::vector<std::string> installedTransports(const ros::NodeHandle& nh) {
   std::vector<std::string> names = image_transport::ImageTransport(nh).getLoadableTransports();
   for (std::string& name : names)
@@ -66,7 +73,8 @@ ImageSubscriber::ImageSubscriber(const ros::NodeHandle& nh, const ImageSource& s
   if (!source.plugin) {
     ros::NodeHandle handle(nh);
     compressed_.registerCallback(boost::function<void(const sensor_msgs::CompressedImageConstPtr&)>(compressed));
-    compressed_.subscribe(handle, source.topic, queue, hints);
+    const std::string topic = source.topic == source.base ? source.topic : resolvedTopic(nh, source);
+    compressed_.subscribe(handle, topic, queue, hints);
     return;
   }
   transport_ = std::make_unique<image_transport::ImageTransport>(nh);

@@ -63,6 +63,30 @@ void StreamMonitor::reject(const std::string& why) {
   report_.last_rejection = why;
 }
 
+bool StreamMonitor::admits(const std::string& frame_id, double arrival) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (frame_.admits(frame_id)) return true;
+  last_other_ = arrival;
+  return false;
+}
+
+void StreamMonitor::setPublishers(std::vector<std::string> nodes) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  publishers_ = std::move(nodes);
+}
+
+std::string StreamMonitor::rivalry(double now) const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  std::string words;
+  if (now - last_other_ <= kSilent) words = frame_.words();
+  if (publishers_.size() > 1) {
+    std::string names;
+    for (const std::string& node : publishers_) names += (names.empty() ? "" : ", ") + node;
+    words += (words.empty() ? "" : "; ") + ("published by " + std::to_string(publishers_.size()) + " nodes: " + names);
+  }
+  return words;
+}
+
 void StreamMonitor::explainAbsence(const std::string& why) {
   std::lock_guard<std::mutex> lock(mutex_);
   absence_ = why;
@@ -71,6 +95,7 @@ void StreamMonitor::explainAbsence(const std::string& why) {
 StreamMonitor::Report StreamMonitor::report() const {
   std::lock_guard<std::mutex> lock(mutex_);
   Report report = report_;
+  report.of_other_frame = frame_.leftOut();
   if (stamps_.size() > 1 && stamps_.back() > stamps_.front()) {
     report.rate = double(stamps_.size() - 1) / (stamps_.back() - stamps_.front());
   }
@@ -81,7 +106,9 @@ std::string StreamMonitor::silence(double now) const {
   const Report r = report();
   const double seconds = now - r.last_arrival;
   if (r.rejected_in_a_row >= kUnusable && seconds <= kSilent) return "topic " + r.topic + ": " + r.last_rejection;
-  return r.messages > 0 && seconds > kSilent ? "topic " + r.topic + ": " + formatted("silent for %.1f s", seconds) : "";
+  if (r.messages == 0 || seconds <= kSilent) return "";
+  const std::string others = rivalry(now);
+  return "topic " + r.topic + ": " + formatted("silent for %.1f s", seconds) + (others.empty() ? "" : "; " + others);
 }
 
 std::string StreamMonitor::absence(double now) const {
@@ -105,6 +132,7 @@ std::string StreamMonitor::complaint(double now) const {
   const std::string fault_now = fault(now);
   if (!fault_now.empty()) return fault_now;
   const Report r = report();
+  if (const std::string others = rivalry(now); !others.empty()) return "topic " + r.topic + ": " + others;
   if (r.nominal_rate > 0 && r.rate > 0 && r.rate < 0.7 * r.nominal_rate) {
     return "topic " + r.topic + ": " + formatted("%.1f Hz, the sensor configuration says %.1f", r.rate, r.nominal_rate);
   }

@@ -85,22 +85,6 @@ void BackEnd::Impl::noteWeakness(const MapKeyframe& inserted) {
   }
 }
 
-// A front end that was restarted alone counts its epochs from 0. Its keyframes must not be taken for a continuation of
-// the old odometry with that number, so they are refused.
-void BackEnd::Impl::refuseUnannouncedRestart(const Keyframe& keyframe) {
-  const std::uint32_t theirs = keyframe.frame.epoch;
-  const auto of_theirs = [theirs](const auto& entry) {
-    return !entry.second.stored && entry.second.data->frame.epoch == theirs;
-  };
-  const auto waits = [theirs](const KeyframePtr& waiting) { return waiting->frame.epoch == theirs; };
-  if (keyframe.previous == 0 && (std::any_of(map.keyframes().begin(), map.keyframes().end(), of_theirs) ||
-                                 std::any_of(held.begin(), held.end(), waits)))
-    restarted_epoch = theirs;
-  if (restarted_epoch == theirs)
-    throw MapError("the odometry began anew under the number of an old one (" + std::to_string(theirs) +
-                   "), as after a restart of the front end alone: call reset");
-}
-
 MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   refusal.clear();
   ++statistics.keyframes_received;
@@ -118,7 +102,6 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (keyframe->id <= map.newestKeyframe())
       throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
                      std::to_string(map.newestKeyframe()) + " of the map");
-    refuseUnannouncedRestart(*keyframe);
     if (frozen()) {
       localise(keyframe);
       finishUpdate(&update);
@@ -201,7 +184,6 @@ void BackEnd::Impl::reset() {
   localised.clear();
   held_updates.clear();
   last_found.reset();
-  restarted_epoch.reset();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;

@@ -32,7 +32,6 @@ struct BackEnd::Impl {
   MapUpdate addKeyframe(const KeyframePtr& keyframe);
   /// Notices what holds a keyframe less than usual.
   void noteWeakness(const MapKeyframe& inserted);
-  void refuseUnannouncedRestart(const Keyframe& keyframe);
   /// Localisation-only mode with a map, which must not change.
   bool frozen() const { return localisation_only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
@@ -110,8 +109,7 @@ struct BackEnd::Impl {
   std::unique_ptr<BaSolver> solver;
   LoopCloser loop_closer;
   Relocaliser relocaliser;
-  std::optional<std::uint32_t> restarted_epoch;  ///< of a new odometry with the epoch number of an old one
-  bool searching = false;                        ///< a loaded map is not recognised yet
+  bool searching = false;  ///< a loaded map is not recognised yet
   bool localisation_only = false;
   std::vector<PlaneUpdate> held_updates;  ///< received while frozen(), applied when mapping goes on
   std::deque<KeyframePtr> held;           ///< received while searching, inserted once the map is recognised

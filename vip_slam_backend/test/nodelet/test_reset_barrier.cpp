@@ -63,21 +63,5 @@ TEST(ResetBarrier, AResetBeforeAnythingCameHoldsNothingBack) {
   EXPECT_TRUE(barrier.passes(-5.0, 0));
 }
 
-// A reloaded front end counts its epochs from zero.
-TEST(ResetBarrier, AFrontEndThatBeganAnewIsNotKeptOut) {
-  for (const bool reset_at_once : {false, true}) {
-    ResetBarrier barrier;
-    barrier.seeKeyframe(10, 2);
-    if (reset_at_once) barrier.raise();
-    barrier.see(10.1, 1);  // a late frame
-    barrier.see(10.2, 2);
-    EXPECT_EQ(!reset_at_once, barrier.passes(10.2, 2));
-    for (int i = 0; i < 10; ++i) barrier.see(20 + 0.05 * i, 0);
-    if (!reset_at_once) barrier.raise();
-    EXPECT_TRUE(barrier.passes(21, 0));
-    EXPECT_TRUE(barrier.passes(22, 1));
-  }
-}
-
 }  // namespace
 }  // namespace vip_slam

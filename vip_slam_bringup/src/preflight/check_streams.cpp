@@ -155,6 +155,8 @@ Findings checkTopics(const Recording& r) {
     } else {
       out.push_back(
           {Severity::kGood, w.role, formatted("%zu messages on %s", w.stream->stamps.size(), w.topic.c_str()), ""});
+      if (const std::string others = w.stream->one_frame.words(); !others.empty())
+        out.push_back({Severity::kWarning, w.role, "topic " + w.topic + ": " + others, ""});
     }
   }
   return out;

@@ -15,11 +15,14 @@
 namespace vip_slam {
 namespace {
 
+/// False: the message is another sensor's.
 template <class Message>
-void note(StreamRecord* stream, double arrival, const Message& message) {
+bool note(StreamRecord* stream, double arrival, const Message& message) {
+  if (!stream->one_frame.admits(message.header.frame_id)) return false;
   stream->stamps.push_back(message.header.stamp.toSec());
   stream->arrivals.push_back(arrival);
   stream->frame_id = message.header.frame_id;
+  return true;
 }
 
 }  // namespace
@@ -60,7 +63,7 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
   const bool is_color = topic == recording_.sensor.topics.color;
   if (!is_color && topic != recording_.sensor.topics.depth) return;
   StreamRecord& stream = is_color ? recording_.color : recording_.depth;
-  note(&stream, arrival, message);
+  if (!note(&stream, arrival, message)) return;
   stream.encodings.insert(encoding);
   const double t = message.header.stamp.toSec();
   if (first_image_ < 0) first_image_ = arrival;
@@ -82,8 +85,8 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message) {
   const auto take = [&](StreamRecord* stream, const std::string& image_topic, CameraIntrinsics* camera,
                         std::string* error) {
-    note(stream, arrival, message);
-    if (stream->stamps.size() > 1) return;
+    if (!note(stream, arrival, message) || camera->width > 0) return;  // the first that can be used, as live
+    error->clear();
     try {
       *camera = intrinsicsFromCameraInfo(message, image_topic);
       const std::string wrong = camera->validate();
@@ -107,9 +110,10 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   const double t = message.header.stamp.toSec();
   const auto& w = message.angular_velocity;
   const auto& a = message.linear_acceleration;
-  if (topic == topics.imu) note(&recording_.imu, arrival, message);
-  if (topic == topics.gyro) note(&recording_.gyro, arrival, message);
-  if (topic == topics.accel) note(&recording_.accel, arrival, message);
+  StreamRecord& stream = topic == topics.imu    ? recording_.imu
+                         : topic == topics.gyro ? recording_.gyro
+                                                : recording_.accel;
+  if (!note(&stream, arrival, message)) return;
   if (topic == topics.imu || topic == topics.gyro) {
     const Eigen::Matrix3d& correction = recording_.sensor.gyro_correction;
     recording_.gyro_range.add(t, {w.x, w.y, w.z});

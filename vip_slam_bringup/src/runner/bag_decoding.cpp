@@ -1,6 +1,7 @@
 #include "bag_decoding.h"
 
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -19,13 +20,18 @@ namespace {
 
 enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
 
-/// `decode` gets the image, raw with its owner or compressed.
+/// `decode` gets the image, raw with its owner or compressed. Empty: the image is of another frame.
 template <class Decode>
-StampedImage stampedImage(const rosbag::MessageInstance& message, const Decode& decode) {
-  if (const auto image = message.instantiate<sensor_msgs::Image>())
-    return {image->header.stamp.toSec(), decode(*image, image), 0};
-  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>())
-    return {image->header.stamp.toSec(), decode(*image), 0};
+std::optional<StampedImage> stampedImage(const rosbag::MessageInstance& message, OneFrame* frame,
+                                         const Decode& decode) {
+  if (const auto image = message.instantiate<sensor_msgs::Image>()) {
+    if (!frame->admits(image->header.frame_id)) return std::nullopt;
+    return StampedImage{image->header.stamp.toSec(), decode(*image, image), 0};
+  }
+  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) {
+    if (!frame->admits(image->header.frame_id)) return std::nullopt;
+    return StampedImage{image->header.stamp.toSec(), decode(*image), 0};
+  }
   throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
 }
 
@@ -59,7 +65,10 @@ void BagDecoding::take(const rosbag::MessageInstance& message) {
 }
 
 void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
-  const auto [t, image, stamp] = stampedImage(message, [](const auto&... m) { return decodeGray(m...); });
+  const auto taken =
+      stampedImage(message, &frames_[message.getTopic()], [](const auto&... m) { return decodeGray(m...); });
+  if (!taken) return;
+  const auto& [t, image, stamp] = *taken;
   color_size_ = image.size();
   const cv::Size calibrated(sensor_.camera.width, sensor_.camera.height);
   if (color_size_ != calibrated && ++counters_["images_of_wrong_size"] == 1)
@@ -69,10 +78,12 @@ void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
 }
 
 void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
-  auto [t, depth, stamp] = stampedImage(message, [&](const auto& m, const auto&...) {
+  const auto taken = stampedImage(message, &frames_[message.getTopic()], [&](const auto& m, const auto&...) {
     return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset);
   });
-  depth = to_colour_(depth);
+  if (!taken) return;
+  const double t = taken->t;
+  const cv::Mat depth = to_colour_(taken->image);
   if (!color_size_.empty() && depth.size() != color_size_)
     complain("sizes", "topic " + message.getTopic() + ": depth is " + sizeText(depth.size()) +
                           ", the colour images are " + sizeText(color_size_) +
@@ -91,6 +102,7 @@ void BagDecoding::takeImu(const rosbag::MessageInstance& message) {
     complain(topic, "topic " + topic + ": type " + message.getDataType() + ", expected sensor_msgs/Imu");
     return;
   }
+  if (!frames_[topic].admits(imu->header.frame_id)) return;
   const double t = imu->header.stamp.toSec();
   const Eigen::Vector3d gyro = fromMsg(imu->angular_velocity), accel = fromMsg(imu->linear_acceleration);
   if (!inTime(topic == sensor_.topics.accel ? kAccel : kGyro, t)) return;
@@ -154,6 +166,11 @@ void BagDecoding::finish() {
   if (2 * without_any_ > depth_images_)
     warnings_.push_back("topic " + depth_topic + ": " + std::to_string(without_any_) + " of " +
                         std::to_string(depth_images_) + " depth images " + holdNoDepth(sensor_.depth_noise));
+  for (const auto& [topic, frame] : frames_) {
+    if (frame.leftOut() == 0) continue;
+    counters_["messages_of_another_frame"] += frame.leftOut();
+    warnings_.push_back("topic " + topic + ": " + frame.words());
+  }
   if (pairs.ahead > 0)
     warnings_.push_back(std::to_string(pairs.ahead) +
                         " images are left out: their stamps are later than those of the next image");

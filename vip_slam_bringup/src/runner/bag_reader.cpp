@@ -67,8 +67,10 @@ struct BagReader::Source {
     }
   }
 
+  /// The first one that can be used, as live: drivers send empty ones until they have read the device.
   CameraIntrinsics cameraInfo(const std::string& topic, const std::string& image_topic) {
     rosbag::View view(bag, rosbag::TopicQuery(topic));
+    std::string problem;
     for (const auto& message : view) {
       const auto info = message.instantiate<sensor_msgs::CameraInfo>();
       if (!info) {
@@ -78,9 +80,10 @@ struct BagReader::Source {
       try {
         return intrinsicsFromCameraInfo(*info, image_topic);
       } catch (const std::exception& error) {
-        throw std::runtime_error(bag.getFileName() + ": topic " + topic + ": " + error.what());
+        problem = error.what();
       }
     }
+    if (!problem.empty()) throw std::runtime_error(bag.getFileName() + ": topic " + topic + ": " + problem);
     throw std::runtime_error(bag.getFileName() + ": topic " + topic +
                              ": no camera_info in the bag; name the right topic " +
                              "or put the intrinsics into the sensor configuration");

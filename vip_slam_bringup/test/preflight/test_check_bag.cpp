@@ -59,6 +59,22 @@ TEST_F(CheckBag, AGoodBagIsReady) {
   EXPECT_NE(toText(findings, false).find("Ready.\n"), std::string::npos);
 }
 
+TEST_F(CheckBag, CameraInfosThatAreEmptyAtFirstAreWaitedOver) {
+  options_.empty_infos = 6;
+  const Findings findings = check();
+  EXPECT_LT(static_cast<int>(worst(findings)), static_cast<int>(Severity::kWarning)) << toText(findings, false);
+}
+
+TEST_F(CheckBag, ASecondCameraOnTheSameTopicsIsTheOneCause) {
+  options_.second_camera = true;
+  const Findings findings = check();
+  expectFound(findings, Severity::kWarning, "colour image", "two drivers under one name");
+  expectFound(findings, Severity::kWarning, "depth image", "'back_camera_color_optical_frame'");
+  for (const Finding& f : findings)
+    EXPECT_TRUE(f.severity < Severity::kWarning || f.text.find("back_") != std::string::npos)
+        << f.about << ": " << f.text;
+}
+
 TEST_F(CheckBag, AMaskOfAnotherSizeIsNamed) {
   expected_.mask_file = "/rig/bumper.png";
   expected_.mask = cv::Mat(240, 320, CV_8U, cv::Scalar(255));

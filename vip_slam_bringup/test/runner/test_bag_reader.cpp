@@ -73,6 +73,41 @@ TEST_F(BagReaderTest, WhereTheClockRanBackTheOdometryStartsAnewAndTheMapGoesOn) 
   for (std::size_t i = 0; i < odometry.size(); ++i) EXPECT_EQ(pipeline.covariances()[i].t, odometry[i].t);
 }
 
+TEST_F(BagReaderTest, ASecondCameraOnTheSameTopicsIsNamedAndLeftOut) {
+  const auto odometry = [&](bool second_camera) {
+    options_.second_camera = second_camera;
+    test_support::writeDriverBag(bag_, options_);
+    SensorConfig sensor = options_.sensor;
+    BagReader reader(bag_, sensor);
+    Pipeline pipeline(pipeline_options_, sensor, nullptr);
+    run(&pipeline, &reader);
+    EXPECT_EQ(warned(reader, "'back_camera_color_optical_frame' instead of 'camera_color_optical_frame'"),
+              second_camera);
+    EXPECT_EQ(reader.counters().count("messages_of_another_frame"), second_camera ? 1u : 0u);
+    return pipeline.odometry();
+  };
+  const auto alone = odometry(false), disturbed = odometry(true);
+  ASSERT_EQ(alone.size(), disturbed.size());
+  ASSERT_FALSE(alone.empty());
+  EXPECT_EQ(alone.back().T_odom_I.t(), disturbed.back().T_odom_I.t());  // bit for bit
+}
+
+TEST_F(BagReaderTest, CameraInfosThatAreEmptyAtFirstAreWaitedOver) {
+  options_.sensor.intrinsics_from_camera_info = true;
+  options_.empty_infos = 6;
+  test_support::writeDriverBag(bag_, options_);
+  SensorConfig sensor = options_.sensor;
+  sensor.camera = CameraIntrinsics();
+  BagReader reader(bag_, sensor);
+  EXPECT_EQ(sensor.camera.fx, options_.sensor.camera.fx);
+  EXPECT_EQ(sensor.camera.width, options_.sensor.camera.width);
+
+  options_.calibrated = false;
+  options_.empty_infos = 0;
+  test_support::writeDriverBag(bag_, options_);
+  EXPECT_THROW(BagReader(bag_, sensor), std::runtime_error);
+}
+
 TEST_F(BagReaderTest, ATopicOfAnotherTypeIsNamedAtOnce) {
   test_support::writeDriverBag(bag_, options_);
   SensorConfig sensor = options_.sensor;

@@ -12,12 +12,15 @@ import unittest
 
 import numpy as np
 import rosbag
+import rosgraph
 import rospy
 import rostest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image
+from tf2_msgs.msg import TFMessage
 from vip_slam_msgs.msg import TrackedFrame, TrackingStatus
 from vip_slam_msgs.srv import SaveMap, SaveTrajectory
 
@@ -115,6 +118,26 @@ class BadInputTest(unittest.TestCase):
             words, _ = launch.communicate(timeout=30)
         self.assertIn('no depth, no planes: topic /nowhere/depth', words)
 
+    def test_02c_the_topic_after_remapping_and_an_unknown_host_are_named(self):
+        launch_file = os.path.join(self.folder, 'remapped.launch')
+        with open(launch_file, 'w') as file:
+            file.write('<launch><remap from="/camera/color/image_raw" to="/elsewhere/image"/><include file="$(find '
+                       'vip_slam_bringup)/launch/vip_slam.launch"><arg name="sensor" value="%s"/></include></launch>'
+                       % os.path.join(self.data, 'smoke_sensor.yaml'))
+        status = Listener('/vip_slam/tracking_status', TrackingStatus)
+        ghost, uri = rosgraph.Master('/ghost'), 'http://no-such-host.invalid:5/'
+        ghost.registerPublisher('/elsewhere/image', 'sensor_msgs/Image', uri)
+        launch = subprocess.Popen(['roslaunch', launch_file], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            wait_for(lambda: any('/elsewhere/image: no message so far' in s.reason for s in status.all()), 30,
+                     'the topic that is listened to')
+            wait_for(lambda: any("/ghost runs on host 'no-such-host.invalid', whose name cannot be resolved" in s.reason
+                                 for s in status.all()), 40, 'the host')
+        finally:
+            ghost.unregisterPublisher('/elsewhere/image', uri)
+            launch.terminate()
+            launch.wait(30)
+
     def test_03_wrong_parameter_ends_the_launch(self):
         # What one of these launches leaves on the server is not the next one's.
         sensor = os.path.join(self.data, 'smoke_sensor.yaml')
@@ -182,6 +205,67 @@ class BadInputTest(unittest.TestCase):
         finally:
             launch.terminate()
             launch.wait(30)
+
+    def test_06b_rivals_and_moving_parts_are_named(self):
+        # A second camera under the same name, another odometry, and a tf that turns the IMU after it was read.
+        bag = os.path.join(self.data, 'smoke.bag')
+        images, diagnostics = [], Listener('/diagnostics', DiagnosticArray)
+        with rosbag.Bag(bag) as recorded:
+            fixed = next(m for _, m, _ in recorded.read_messages(topics=['/tf_static']))
+            images = [m for _, (_, m, _) in zip(range(30), recorded.read_messages(topics=['/camera/color/image_raw']))]
+            imu = next(m for _, m, _ in recorded.read_messages(topics=['/camera/imu'])).header.frame_id
+        frames = Listener('/vip_slam/odom', Odometry)
+        launch = subprocess.Popen(['roslaunch', 'vip_slam_bringup', 'bag.launch', 'sensor:=' +
+                                   os.path.join(self.data, 'smoke_sensor.yaml'), 'rviz:=false', 'bag:=' + bag,
+                                   'loop_playback:=true'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+        def said(*words):
+            return any(all(w in s.message for w in words) for m in diagnostics.all() for s in m.status)
+        camera = rospy.Publisher('/camera/color/image_raw', Image, queue_size=5)
+        tf = rospy.Publisher('/tf', TFMessage, queue_size=5)
+        tf_static = rospy.Publisher('/tf_static', TFMessage, queue_size=5)
+        turned = [t for t in fixed.transforms if t.child_frame_id == imu]
+        self.assertTrue(turned, 'the IMU is in tf')
+        turned[0].transform.rotation.x += 0.3
+        norm = np.sqrt(sum(getattr(turned[0].transform.rotation, k) ** 2 for k in 'xyzw'))
+        for k in 'xyzw':
+            setattr(turned[0].transform.rotation, k, getattr(turned[0].transform.rotation, k) / norm)
+        other = TransformStamped()
+        other.header.frame_id, other.child_frame_id, other.transform.rotation.w = 'odom', 'base_link', 1
+        try:
+            frames.wait(20, 40, 'odometry')
+            me = rospy.get_name()
+            end = time.time() + 40
+            while time.time() < end:
+                image = images[int(10 * time.time()) % len(images)]
+                image.header.frame_id = 'back_camera'
+                camera.publish(image)
+                tf.publish(TFMessage([other]))
+                tf_static.publish(TFMessage(turned[:1]))
+                time.sleep(0.1)
+                if (said("frame_id 'back_camera' instead of") and said('published by 2 nodes', me) and
+                        said(me + " publishes 'odom' -> 'base_link' too") and said('tf has moved')):
+                    break
+            self.assertTrue(said('color/image_raw', "frame_id 'back_camera' instead of"))
+            self.assertTrue(said('color/image_raw', 'published by 2 nodes', me))
+            self.assertTrue(said(me + " publishes 'odom' -> 'base_link' too"))
+            self.assertTrue(said('tf has moved', 'since it was read'))
+        finally:
+            for publisher in (camera, tf, tf_static):
+                publisher.unregister()
+            launch.terminate()
+            launch.wait(30)
+
+    def test_06c_exit_at_end_waits_for_what_was_played(self):
+        frames = Listener('/vip_slam/tracked_frame', TrackedFrame)
+        subprocess.run(['roslaunch', 'vip_slam_bringup', 'bag.launch', 'sensor:=' +
+                        os.path.join(self.data, 'smoke_sensor.yaml'), 'rviz:=false', 'exit_at_end:=true',
+                        'bag:=' + os.path.join(self.data, 'smoke.bag')], stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL, timeout=120)
+        with rosbag.Bag(os.path.join(self.data, 'smoke.bag')) as recorded:
+            stamps = [m.header.stamp.to_sec() for _, m, _ in recorded.read_messages(topics=['/camera/color/image_raw'])]
+        # The last image waits for the IMU samples that the bag does not have.
+        self.assertGreaterEqual(frames.last().header.stamp.to_sec(), stamps[-3])
 
     def test_07_a_bag_that_is_not_there_ends_the_launch(self):
         for more in ('exit_at_end:=false', 'exit_at_end:=true'):

@@ -76,9 +76,9 @@ class FrontEnd {
  public:
   /// Throws std::invalid_argument when sensor.camera is unusable or the mask does not fit it. `timing` may be null and
   /// must outlive this. A stamp that is more than `clock_jump` seconds back means a looped bag or a restarted clock,
-  /// less a message out of order.
+  /// less a message out of order. `session`: see firstNumbers().
   FrontEnd(const FrontEndOptions& options, const SensorConfig& sensor, TimingLog* timing = nullptr,
-           double clock_jump = 1.0);
+           double clock_jump = 1.0, std::uint32_t session = 0);
   ~FrontEnd();
   FrontEnd(const FrontEnd&) = delete;
   FrontEnd& operator=(const FrontEnd&) = delete;

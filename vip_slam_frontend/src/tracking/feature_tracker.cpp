@@ -10,8 +10,14 @@
 namespace vip_slam {
 
 FeatureTracker::FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera,
-                               const DepthNoise& noise, TimingLog* timing, const cv::Mat& mask)
-    : options_(options), camera_(std::move(camera)), view_(camera_), noise_(noise), timing_(timing), mask_(mask) {}
+                               const DepthNoise& noise, TimingLog* timing, const cv::Mat& mask, LandmarkId first_id)
+    : options_(options),
+      camera_(std::move(camera)),
+      view_(camera_),
+      noise_(noise),
+      timing_(timing),
+      mask_(mask),
+      next_id_(first_id) {}
 
 void FeatureTracker::clear() {
   tracks_.clear();

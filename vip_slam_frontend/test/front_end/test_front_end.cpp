@@ -7,6 +7,7 @@
 
 #include "vip_slam_core/depth/disparity_curve.h"
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/types/session_numbers.h"
 #include "wall_world.h"
 
 namespace vip_slam {
@@ -261,6 +262,26 @@ TEST_F(FrontEndTest, TwoRunsAgreeBitByBit) {
   }
   EXPECT_EQ(a.frame->state.T_W_I.t(), b.frame->state.T_W_I.t());
   EXPECT_EQ(a.frame->covariance, b.frame->covariance);
+}
+
+TEST_F(FrontEndTest, ALaterStartOfItHasNumbersOfItsOwn) {
+  const SessionNumbers first = firstNumbers(1), next = firstNumbers(2);
+  FrontEnd second(options(), sensor(), nullptr, 1.0, 1);
+  double imu_t = 0;
+  std::size_t features = 0;
+  std::vector<KeyframePtr> keyframes;
+  for (int k = 0; k < 60; ++k) {
+    for (; imu_t < 0.05 * k + 0.02; imu_t += 0.005) second.addImu(World::imu(imu_t));
+    const FrameOutput output = second.process({0.05 * k, world_.image(0.05 * k), World::depth(0.05 * k)});
+    EXPECT_EQ(output.frame->epoch, first.epoch);
+    features += output.frame->features.size();
+    for (const Feature& f : output.frame->features) EXPECT_TRUE(f.id >= first.landmark && f.id < next.landmark) << f.id;
+    if (output.keyframe) keyframes.push_back(output.keyframe);
+  }
+  EXPECT_GT(features, 0u);
+  ASSERT_FALSE(keyframes.empty());
+  EXPECT_EQ(keyframes.front()->id, first.keyframe);
+  EXPECT_EQ(keyframes.front()->previous, 0u);
 }
 
 TEST_F(FrontEndTest, StandsStillForAMinuteUnderNoise) {

@@ -35,6 +35,9 @@ struct ImageSource {
 ImageSource chooseTransport(const std::string& topic, const std::string& encoding, const std::string& transport,
                             bool depth, const std::vector<std::string>& installed);
 
+/// Full name of the topic that messages come from, by the remappings of the node.
+std::string resolvedTopic(const ros::NodeHandle& nh, const ImageSource& source);
+
 /// Transports that image_transport can load here, without its own name: "raw" always.
 std::vector<std::string> installedTransports(const ros::NodeHandle& nh);
 

@@ -6,6 +6,9 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
+
+#include "vip_slam_ros/one_frame.h"
 
 namespace vip_slam {
 
@@ -18,6 +21,10 @@ class StreamMonitor {
   /// `t`: header stamp, `arrival`: time of arrival (same clock), seconds. Thread-safe, as all of this class.
   Step add(double t, double arrival);
   void reject(const std::string& why);  ///< a message that could not be used
+  /// Whether a message is of the frame that the topic began with. Else leave it out: add() it not.
+  bool admits(const std::string& frame_id, double arrival);
+  /// Names of the nodes that publish the topic; more than one is complained of.
+  void setPublishers(std::vector<std::string> nodes);
   /// Sets the explanation of a topic without messages so far, for the text of complaint().
   void explainAbsence(const std::string& why);
 
@@ -26,6 +33,7 @@ class StreamMonitor {
     std::size_t messages = 0, gaps = 0, repeated = 0, backward = 0, rejected = 0;
     std::size_t rejected_in_a_row = 0;  ///< number of newest messages that were all rejected
     std::string last_rejection;
+    std::size_t of_other_frame = 0;  ///< not among `messages`
     double nominal_rate = 0;
     double rate = 0;         ///< Hz, over the last stamps
     double largest_gap = 0;  ///< seconds
@@ -43,6 +51,8 @@ class StreamMonitor {
   std::string silence(double now) const;
   /// Why there is no data of a stream: no message so far, or silence().
   std::string absence(double now) const;
+  /// What is wrong with who publishes the topic; empty when one node does, with one frame_id. Part of complaint().
+  std::string rivalry(double now) const;
   /// To be called after time ran backwards: the next stamp may have any value.
   void restart();
 
@@ -54,6 +64,9 @@ class StreamMonitor {
   std::optional<double> backward_;  ///< the newest stamp, when it is older than those in stamps_
   std::string absence_ = "is the name right, and the driver running?";
   bool newest_rejected_ = false;
+  OneFrame frame_;
+  double last_other_ = -1e300;  ///< arrival of the last message of another frame, seconds
+  std::vector<std::string> publishers_;
 };
 
 }  // namespace vip_slam

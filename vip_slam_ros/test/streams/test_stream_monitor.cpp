@@ -88,5 +88,34 @@ TEST(StreamMonitor, AnotherRateIsOddButNoFault) {
   EXPECT_NE(monitor.complaint(3.0).find("20.0 Hz"), std::string::npos);
 }
 
+TEST(StreamMonitor, NamesWhoElsePublishes) {
+  StreamMonitor monitor("/color", 30);
+  for (int i = 0; i < 60; ++i) {
+    ASSERT_TRUE(monitor.admits("front", i / 30.0));
+    monitor.add(i / 30.0, i / 30.0);
+    if (i >= 30) {
+      ASSERT_FALSE(monitor.admits("back", i / 30.0 + 0.01));
+    }
+  }
+  EXPECT_NEAR(monitor.report().rate, 30, 1e-6);  // of the one camera
+  EXPECT_EQ(monitor.report().messages, 60u);
+  EXPECT_EQ(monitor.report().of_other_frame, 30u);
+  EXPECT_NE(monitor.complaint(2).find("topic /color: 30 of 90 messages have frame_id 'back'"), std::string::npos)
+      << monitor.complaint(2);
+  EXPECT_EQ(monitor.silence(2), "");  // images come
+  EXPECT_EQ(monitor.fault(2), "");
+  for (int i = 60; i < 150; ++i) monitor.admits("back", i / 30.0);
+  EXPECT_NE(monitor.silence(5).find("silent for 3.0 s; 120 of 180 messages"), std::string::npos) << monitor.silence(5);
+  for (int i = 150; i < 300; ++i) {
+    ASSERT_TRUE(monitor.admits("front", i / 30.0));
+    monitor.add(i / 30.0, i / 30.0);
+  }
+  EXPECT_EQ(monitor.complaint(10), "");  // the other one has ended
+  monitor.setPublishers({"/camera", "/player"});
+  EXPECT_NE(monitor.complaint(10).find("published by 2 nodes: /camera, /player"), std::string::npos);
+  monitor.setPublishers({"/camera"});
+  EXPECT_EQ(monitor.complaint(10), "");
+}
+
 }  // namespace
 }  // namespace vip_slam

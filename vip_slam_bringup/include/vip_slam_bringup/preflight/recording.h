@@ -13,6 +13,7 @@
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/imu/gyro_range.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_ros/one_frame.h"
 
 namespace vip_slam {
 
@@ -22,7 +23,8 @@ struct StreamRecord {
   std::string type;              ///< ROS type of the messages, "sensor_msgs/Image"
   std::set<std::string> encodings;
   std::set<std::pair<int, int>> sizes;  ///< (width, height)
-  std::string frame_id;                 ///< of the last message
+  std::string frame_id;                 ///< of the first message
+  OneFrame one_frame;                   ///< what has another frame_id is in no other member
   std::size_t unusable = 0;             ///< messages that could not be decoded
   std::string unusable_reason;
   std::size_t decoded = 0;   ///< messages whose pixels were decoded

@@ -63,9 +63,9 @@ struct TrackingResult {
 
 class FeatureTracker {
  public:
-  /// No features where `mask` is zero; empty: anywhere.
+  /// No features where `mask` is zero; empty: anywhere. `first_id`: of the first track.
   FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
-                 TimingLog* timing, const cv::Mat& mask = cv::Mat());
+                 TimingLog* timing, const cv::Mat& mask = cv::Mat(), LandmarkId first_id = 1);
 
   /// Tracks into `gray`. `predicted` is the camera motion since the last image, `T_odom_C` the predicted pose of this
   /// one; when the translation is unknown give only a rotation and `has_translation` false. Unless it `judges`,
@@ -148,7 +148,7 @@ class FeatureTracker {
   std::vector<Track> tracks_, ended_;
   std::vector<cv::Mat> pyramid_, last_pyramid_;
   cv::Mat gray_, depth_, mask_;
-  LandmarkId next_id_ = 1;
+  LandmarkId next_id_;
   std::uint32_t image_count_ = 0;
 };
 
