@@ -156,6 +156,7 @@ void checkDepth(const Recording& r, Findings* out) {
 Findings checkImages(const Recording& r) {
   Findings out;
   checkEncoding("colour image", r.color, r.sensor.color_encoding, &out);
+  if (!r.gray_note.empty()) out.push_back({Severity::kNote, "colour image", r.gray_note, ""});
   checkEncoding("depth image", r.depth, r.sensor.depth_encoding, &out);
   if (r.sensor.intrinsics_from_camera_info)
     checkCamera("colour camera_info", r.color_info, r.color_camera, r.color_camera_error, r.color, true, &out);

@@ -41,17 +41,18 @@ void Recorder::startRotation(const CameraIntrinsics& camera) {
 }
 
 void Recorder::finish() {
+  recording_.gray_note = gray_.note();
   flushGray(true);
   if (depth_edges_) recording_.depth_edges = depth_edges_->record();
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message,
                    const MessageOwner& owner) {
-  addImage(topic, arrival, message, message.encoding, [&] { return decodeGray(message, owner); });
+  addImage(topic, arrival, message, message.encoding, [&] { return gray_(message, owner); });
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CompressedImage& message) {
-  addImage(topic, arrival, message, "compressed (" + message.format + ")", [&] { return decodeGray(message); });
+  addImage(topic, arrival, message, "compressed (" + message.format + ")", [&] { return gray_(message); });
 }
 
 template <class ImageMessage, class Gray>

@@ -59,7 +59,7 @@ void BagDecoding::take(const rosbag::MessageInstance& message) {
 }
 
 void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
-  const auto [t, image, stamp] = stampedImage(message, [](const auto&... m) { return decodeGray(m...); });
+  const auto [t, image, stamp] = stampedImage(message, [this](const auto&... m) { return gray_(m...); });
   color_size_ = image.size();
   const cv::Size calibrated(sensor_.camera.width, sensor_.camera.height);
   if (color_size_ != calibrated && ++counters_["images_of_wrong_size"] == 1)
@@ -143,6 +143,7 @@ void BagDecoding::countUnreadable(const std::string& why) {
 void BagDecoding::finish() {
   pairer_.end();
   handOut();
+  if (!gray_.note().empty()) warnings_.push_back("topic " + sensor_.topics.color + ": " + gray_.note());
   const std::string& depth_topic = sensor_.topics.depth;
   const auto& pairs = pairer_.counters();
   if (!depth_topic.empty() && pairs.without_depth > 5 && 20 * pairs.without_depth > pairs.pairs + pairs.without_depth)

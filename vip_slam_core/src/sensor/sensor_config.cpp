@@ -122,7 +122,8 @@ void readTopics(Section topics, SensorTopics* config) {
 }
 
 void readColor(Section color, SensorConfig* config) {
-  color.choice("encoding", config->color_encoding, {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
+  color.choice("encoding", config->color_encoding,
+               {"rgb8", "bgr8", "mono8", "mono16", "rgba8", "bgra8", "yuv422", "compressed"});
   color.number("rate", config->color_rate, 0.1, 1000);
   color.number("rolling_shutter", config->rolling_shutter, 0, 0.1, false);
   color.finish();

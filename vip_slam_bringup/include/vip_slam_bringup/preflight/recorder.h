@@ -50,6 +50,7 @@ class Recorder {
 
   Recording recording_;
   const double image_seconds_;
+  GrayDecoder gray_;
   double first_image_ = -1;
   std::unique_ptr<ImageRotation> rotation_;
   cv::Size rotation_size_;                    ///< image size of rotation_'s camera

@@ -79,6 +79,7 @@ struct Recording {
   std::vector<DepthSample> depths;
   DepthEdgeRecord depth_edges;                      ///< of registered depth
   std::vector<BrightnessSample> brightness;         ///< of some colour images
+  std::string gray_note;                            ///< of 16-bit grey that does not fill 16 bits
   std::vector<geometry_msgs::TransformStamped> tf;  ///< newest transform of each edge
 };
 

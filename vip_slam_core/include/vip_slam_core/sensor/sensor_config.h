@@ -30,7 +30,7 @@ struct SensorTopics {
 struct SensorConfig {
   std::string name;
   SensorTopics topics;
-  std::string color_encoding = "rgb8";   ///< rgb8, bgr8, mono8, rgba8, bgra8, yuv422 or "compressed" (JPEG/PNG)
+  std::string color_encoding = "rgb8";   ///< rgb8, bgr8, mono8, mono16, rgba8, bgra8, yuv422 or "compressed" (JPEG/PNG)
   std::string depth_encoding = "16UC1";  ///< 16UC1, 32FC1 or "compressed" (16-bit PNG, also compressedDepth)
   double depth_scale = 0.001;            ///< metres per unit of 16UC1
   double depth_offset = 0;               ///< metres to be added to every reading
