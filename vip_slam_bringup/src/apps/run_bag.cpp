@@ -96,7 +96,9 @@ void makeReport(const std::string& folder) {
 int run(const Arguments& arguments) {
   using Clock = std::chrono::steady_clock;
   const vip_slam::PipelineOptions options = loadPipelineOptions(arguments);
-  vip_slam::SensorConfig sensor = vip_slam::loadSensorConfig(vip_slam::resolveSensor(arguments.sensor));
+  std::vector<std::string> notes;
+  vip_slam::SensorConfig sensor = vip_slam::loadSensorConfig(vip_slam::resolveSensor(arguments.sensor), &notes);
+  for (const std::string& note : notes) std::fprintf(stderr, "run_bag: note: %s\n", note.c_str());
   vip_slam::BagReaderOptions reading;
   reading.input = options.input;
   reading.start = arguments.start;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -70,6 +71,8 @@ std::string maskProblem(const SensorConfig& config, int width, int height);
 
 /// Throws std::runtime_error "file: key: what, expected what" on a missing file, unknown or missing key, bad value.
 SensorConfig loadSensorConfig(const std::string& path);
+/// `notes` receives "file: key: what" for what was not taken as it stands there: a rounded rotation is made exact.
+SensorConfig loadSensorConfig(const std::string& path, std::vector<std::string>* notes);
 void saveSensorConfig(const std::string& path, const SensorConfig& config);
 
 }  // namespace vip_slam
