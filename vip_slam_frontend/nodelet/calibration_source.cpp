@@ -1,5 +1,7 @@
 #include "calibration_source.h"
 
+#include <ros/console.h>
+
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/tf_lookup.h"
 
@@ -26,6 +28,8 @@ void CalibrationSource::take(const sensor_msgs::CameraInfo& info, const std::str
     *camera = intrinsicsFromCameraInfo(info, image_topic);
     *known = true;
     problem_.clear();
+    const std::string note = cameraInfoNote(info);
+    if (!note.empty()) ROS_WARN("topic %s: %s", topic.c_str(), note.c_str());
   } catch (const std::exception& error) {
     problem_ = "topic " + topic + ": " + error.what();
   }
@@ -68,8 +72,7 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     }
     if (!asked_since_ || t < *asked_since_) asked_since_ = t;
     // Without an IMU the body is where the sensor file puts it, seen from the camera: tf has only the base to tell.
-    const std::optional<SE3> T_imu_cam =
-        inertial ? lookUpExtrinsics(tf_, imu_frame_, color_frame_) : sensor_.T_imu_cam;
+    const std::optional<SE3> T_imu_cam = inertial ? lookUpExtrinsics(tf_, imu_frame_, color_frame_) : sensor_.T_imu_cam;
     const std::string& frame = inertial ? imu_frame_ : color_frame_;
     auto T_base_imu = lookUpTransform(tf_, options_.base_frame, frame);
     if (T_base_imu && !inertial) T_base_imu = *T_base_imu * sensor_.T_imu_cam.inverse();
@@ -88,6 +91,11 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     tf_incomplete_ = !(T_imu_cam && T_base_imu);
   } else {
     origin_ = "T_imu_cam and T_base_imu: the sensor file's";
+  }
+  const std::string wrong = inertial ? leverArmProblem(sensor_.T_imu_cam, options_.input.max_lever_arm) : "";
+  if (!wrong.empty()) {
+    waiting_for_ = "T_imu_cam: " + wrong + " (" + origin_ + ")";
+    return std::nullopt;
   }
   waiting_for_.clear();
   return sensor_;

@@ -97,6 +97,7 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   const SensorTopics& topics = recording_.sensor.topics;
   if (topic == topics.color_info) {
     take(&recording_.color_info, topics.color, &recording_.color_camera, &recording_.color_camera_error);
+    if (recording_.color_info.stamps.size() == 1) recording_.color_camera_note = cameraInfoNote(message);
     if (!rotation_ && recording_.color_camera.width > 0) startRotation(recording_.color_camera);
   }
   if (topic == topics.depth_info)
