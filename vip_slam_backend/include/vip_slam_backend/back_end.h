@@ -66,9 +66,10 @@ class BackEnd {
   /// corrected, loaded or reset since the job was copied.
   MapUpdate merge(const GbaResult& result);
   /// Keyframes that wait for a loaded map to be recognised are made a part of the map of its own, at a guessed place,
-  /// which a loop may tie to the rest later. None when no keyframe waits, or in localisation-only mode.
+  /// which a loop may tie to the rest later; to be called before the map is saved or finish() ends it. None when no
+  /// keyframe waits, or in localisation-only mode.
   std::optional<MapUpdate> mapWaiting();
-  /// End of the data: mapWaiting(), and a last global bundle adjustment when options.global_ba.at_end.
+  /// End of the data: a last global bundle adjustment when options.global_ba.at_end.
   MapUpdate finish();
 
   MapSnapshot snapshot() const;

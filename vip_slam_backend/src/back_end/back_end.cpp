@@ -264,9 +264,8 @@ std::optional<MapUpdate> BackEnd::mapWaiting() {
 }
 
 MapUpdate BackEnd::finish() {
-  bool moved = impl_->mapHeld();
-  if (!impl_->options.global_ba.at_end || impl_->frozen()) return impl_->globalUpdate(moved);
-  moved = impl_->takeGlobal(run(startGlobalBa())) || moved;
+  if (!impl_->options.global_ba.at_end || impl_->frozen()) return impl_->globalUpdate(false);
+  bool moved = impl_->takeGlobal(run(startGlobalBa()));
   for (int k = 1; k < kAdjustmentsAtEnd && impl_->learnDepthCurve(); ++k) {
     moved = impl_->takeGlobal(run(startGlobalBa())) || moved;
   }

@@ -1,6 +1,8 @@
 // The back end when its map is reset, loaded, or used for localisation only.
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "back_end/back_end_runs.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map_io/map_file.h"
@@ -127,8 +129,10 @@ TEST(BackEndMaps, ASessionThatDoesNotFindTheLoadedMapBecomesAPartOfIt) {
       EXPECT_FALSE(back_end.addKeyframe(kf).placed);
     }
     EXPECT_EQ(back_end.map().keyframes().size(), loaded);
-    const MapUpdate update = at_end ? back_end.finish() : *back_end.mapWaiting();
+    const std::optional<MapUpdate> waited = back_end.mapWaiting();
+    ASSERT_TRUE(waited);
     EXPECT_FALSE(back_end.mapWaiting()) << "once";
+    const MapUpdate update = at_end ? back_end.finish() : *waited;
     EXPECT_EQ(back_end.map().keyframes().size(), loaded + 20);
     EXPECT_TRUE(update.global);
     EXPECT_FALSE(update.placed) << "nothing ties it to the stored map";
