@@ -149,6 +149,8 @@ std::string BackEndNodelet::reset(bool keep_map) {
 
 std::string BackEndNodelet::saveMap(const std::string& path) {
   const std::string file = absolutePath(path);
+  // What waits for a loaded map to be recognised is saved with it, as a part of its own.
+  if (const std::optional<MapUpdate> waited = backEnd().mapWaiting()) distribute(*waited);
   backEnd().saveMap(file);
   return "map of " + std::to_string(display_.keyframeCount()) + " keyframes written to " + file;
 }

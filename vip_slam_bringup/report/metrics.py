@@ -27,15 +27,35 @@ def interpolate_poses(truth, times, max_gap=0.1):
     return ok, p, q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
+def nearest_rotation(M):
+    U, _, Vt = np.linalg.svd(M)
+    return U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
+
+
 def rigid_alignment(source, target):
     """4x4 T with target ~ T source, least squares, no scale."""
     mean_s, mean_t = source.mean(0), target.mean(0)
-    U, _, Vt = np.linalg.svd((target - mean_t).T @ (source - mean_s))
-    D = np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))])
     T = np.eye(4)
-    T[:3, :3] = U @ D @ Vt
+    T[:3, :3] = nearest_rotation((target - mean_t).T @ (source - mean_s))
     T[:3, 3] = mean_t - T[:3, :3] @ mean_s
     return T
+
+
+def rotation_for_orientations(T, position_rmse, p_est, p_true, R_est, R_true):
+    """The rotation between the two worlds by which orientations are compared, and how it is found. Positions leave the
+    turn about a straight path to their own errors: rmse over the second largest spread, as an angle. There yaw alone is
+    aligned, or, where the worlds are not level with each other (no IMU), the orientations themselves."""
+    straight, level = 10.0, np.cos(np.radians(5.0))
+    spread = np.sqrt(np.linalg.svd(np.cov(p_true.T, bias=True), compute_uv=False)[1])
+    if spread > straight * position_rmse:
+        return T[:3, :3], 'positions'
+    by_orientations = nearest_rotation(np.einsum('nij,nkj->ik', R_true, R_est))
+    if by_orientations[2, 2] < level:
+        return by_orientations, 'orientations'
+    M = (p_true - p_true.mean(0)).T @ (p_est - p_est.mean(0))
+    yaw = np.arctan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), 'yaw'
 
 
 def trajectory_error(estimate, truth, time_offset=0.0):
@@ -48,11 +68,13 @@ def trajectory_error(estimate, truth, time_offset=0.0):
     estimate, p_true, q_true = estimate[ok], p_true[ok], q_true[ok]
     T = rigid_alignment(estimate[:, 1:4], p_true)
     position = np.linalg.norm(estimate[:, 1:4] @ T[:3, :3].T + T[:3, 3] - p_true, axis=1)
-    R_est = T[:3, :3] @ rotation_matrices(estimate[:, 4:8])
-    trace = np.einsum('nij,nij->n', R_est, rotation_matrices(q_true))
+    ate = float(np.sqrt(np.mean(position ** 2)))
+    R_est, R_true = rotation_matrices(estimate[:, 4:8]), rotation_matrices(q_true)
+    R_truth_map, aligned_by = rotation_for_orientations(T, ate, estimate[:, 1:4], p_true, R_est, R_true)
+    trace = np.einsum('nij,nij->n', R_truth_map @ R_est, R_true)
     rotation = np.degrees(np.arccos(np.clip((trace - 1) / 2, -1, 1)))
     return {'t': estimate[:, 0], 'position': position, 'rotation': rotation, 'T_truth_map': T,
-            'ate': float(np.sqrt(np.mean(position ** 2))), 'median': float(np.median(position)),
+            'rotation_aligned_by': aligned_by, 'ate': ate, 'median': float(np.median(position)),
             'max': float(position.max()), 'rotation_rmse': float(np.sqrt(np.mean(rotation ** 2))),
             'count': int(len(position))}
 

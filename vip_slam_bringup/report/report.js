@@ -121,7 +121,8 @@ function details(data) {
     if (data.error) {
       el('error-card').hidden = false;
       const e = data.error, marks = loops.filter(l => l.accepted).map(l => ({t: l.t, color: css('loop'), text: 'loop accepted'}));
-      el('error-note').textContent = `${e.count} of ${e.images} poses have truth; one rigid alignment, no scale. RMSE ${number(100 * e.ate, 2)} cm, median ${number(100 * e.median, 2)} cm, largest ${number(100 * e.max, 2)} cm.`;
+      el('error-note').textContent = `${e.count} of ${e.images} poses have truth; one rigid alignment, no scale. RMSE ${number(100 * e.ate, 2)} cm, median ${number(100 * e.median, 2)} cm, largest ${number(100 * e.max, 2)} cm.` +
+        (e.rotation_aligned_by === 'positions' ? '' : ` The path is too straight to align orientations by it: these are compared after ${e.rotation_aligned_by === 'yaw' ? 'yaw alone was aligned' : 'they were aligned themselves'}.`);
       timeChart(el('error-position'), {t: e.t, y: e.position.map(v => 100 * v), end: data.t_end, unit: 'cm', least: 0.1, label: 'position, cm', color: css('estimate'), marks});
       timeChart(el('error-rotation'), {t: e.t, y: e.rotation, end: data.t_end, unit: '°', least: 0.1, label: 'rotation, °', color: css('odometry'), marks});
     }

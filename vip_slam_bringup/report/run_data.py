@@ -161,6 +161,7 @@ def load(folder, truth_path=None, planes_truth_path=None, time_offset=0.0):
                       'rotation': rounded(result['rotation'][keep], 4)}
             data['error'] = dict(errors, ate=result['ate'], median=result['median'], max=result['max'],
                                  rotation_rmse=result['rotation_rmse'], count=result['count'],
+                                 rotation_aligned_by=result['rotation_aligned_by'],
                                  images=len(trajectory))
             # The truth is shown in the run's own map frame.
             R, p = T_truth_map[:3, :3].T, T_truth_map[:3, 3]

@@ -1,5 +1,7 @@
 #include "calibration_source.h"
 
+#include <ros/console.h>
+
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/tf_lookup.h"
@@ -27,6 +29,8 @@ void CalibrationSource::take(const sensor_msgs::CameraInfo& info, const std::str
     *camera = intrinsicsFromCameraInfo(info, image_topic);
     *known = true;
     problem_.clear();
+    const std::string note = cameraInfoNote(info);
+    if (!note.empty()) ROS_WARN("topic %s: %s", topic.c_str(), note.c_str());
   } catch (const std::exception& error) {
     problem_ = "topic " + topic + ": " + error.what();
   }
@@ -90,6 +94,11 @@ std::optional<SensorConfig> CalibrationSource::resolve(double t) {
     tf_incomplete_ = !(T_imu_cam && T_base_imu);
   } else {
     origin_ = "T_imu_cam and T_base_imu: the sensor file's";
+  }
+  const std::string wrong = inertial ? leverArmProblem(sensor_.T_imu_cam, options_.input.max_lever_arm) : "";
+  if (!wrong.empty()) {
+    waiting_for_ = "T_imu_cam: " + wrong + " (" + origin_ + ")";
+    return std::nullopt;
   }
   waiting_for_.clear();
   return sensor_;

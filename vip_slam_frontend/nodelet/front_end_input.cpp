@@ -40,8 +40,8 @@ void FrontEndNodelet::subscribe() {
   const auto queue = std::uint32_t(options_.image_queue);
   color_images_ = std::make_unique<ImageSubscriber>(
       nh, color_source_, queue,
-      [this](const sensor_msgs::ImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m, m); }); },
-      [this](const sensor_msgs::CompressedImageConstPtr& m) { onColor(m->header, [m] { return decodeGray(*m); }); });
+      [this](const sensor_msgs::ImageConstPtr& m) { onColor(m->header, [this, m] { return gray_(*m, m); }); },
+      [this](const sensor_msgs::CompressedImageConstPtr& m) { onColor(m->header, [this, m] { return gray_(*m); }); });
   if (!topics.depth.empty()) {
     const double scale = sensor_.depth_scale, offset = sensor_.depth_offset;
     const auto take = [this, scale, offset](const auto& m) {
@@ -75,6 +75,7 @@ void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::functio
   calibration_->addColorFrame(header.frame_id);
   try {
     cv::Mat gray = decode();
+    if (!gray_.note().empty()) NODELET_WARN_ONCE("topic %s: %s", color_source_.topic.c_str(), gray_.note().c_str());
     owner_->post(image_lane_, [this, t, gray, stamp = header.stamp.toNSec()] {
       if (noticeTime(t, kColor)) pairer_->addColor(t, gray, stamp);
       processReady();

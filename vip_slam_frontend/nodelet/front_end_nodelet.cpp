@@ -27,7 +27,9 @@ FrontEndNodelet::~FrontEndNodelet() {
 void FrontEndNodelet::onInit() {
   try {
     loadOptionsFromParameters(options_, getPrivateNodeHandle(), {"feature_image_rate", "diagnostic_period", "session"});
-    sensor_ = loadSensorConfig(resolveSensor(options_.sensor));
+    std::vector<std::string> notes;
+    sensor_ = loadSensorConfig(resolveSensor(options_.sensor), &notes);
+    for (const std::string& note : notes) NODELET_WARN("%s", note.c_str());
     const std::vector<std::string> installed = installedTransports(getNodeHandle());
     color_source_ =
         chooseTransport(sensor_.topics.color, sensor_.color_encoding, options_.image_transport, false, installed);

@@ -30,6 +30,7 @@
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_node_options.h"
 #include "vip_slam_ros/drop_watch.h"
+#include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/image_pairer.h"
 #include "vip_slam_ros/image_subscriber.h"
 #include "vip_slam_ros/output_monitor.h"
@@ -154,6 +155,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   ros::Publisher odometry_pub_, imu_rate_pub_, frame_pub_, keyframe_pub_, status_pub_, calibration_pub_;
   image_transport::Publisher feature_image_pub_;
   ImageSource color_source_, depth_source_;
+  GrayDecoder gray_;
   std::unique_ptr<ImageSubscriber> color_images_, depth_images_;
   std::vector<ros::Subscriber> subscribers_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;

@@ -25,23 +25,31 @@ void dropTrailingZeros(std::size_t least, std::vector<double>* coefficients) {
   while (coefficients->size() > least && coefficients->back() == 0) coefficients->pop_back();
 }
 
+bool onlyProjection(const sensor_msgs::CameraInfo& info) {
+  return info.K[0] == 0 && info.K[4] == 0 && info.P[0] > 0 && info.P[5] > 0;
+}
+
 }  // namespace
+
+std::string cameraInfoNote(const sensor_msgs::CameraInfo& info) {
+  if (!onlyProjection(info)) return "";
+  const bool straight = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
+  return std::string("K is zero, P is used instead") +
+         (straight ? "" : ", though D has a distortion, and P need not be of the distorted image then");
+}
 
 CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info, const std::string& image_topic) {
   CameraIntrinsics intrinsics;
   intrinsics.width = int(info.width);
   intrinsics.height = int(info.height);
-  intrinsics.fx = info.K[0];
-  intrinsics.cx = info.K[2];
-  intrinsics.fy = info.K[4];
-  intrinsics.cy = info.K[5];
-  if (image_topic.find("image_rect") != std::string::npos) {
-    if (info.P[0] > 0) {  // some drivers leave it empty
-      intrinsics.fx = info.P[0];
-      intrinsics.cx = info.P[2];
-      intrinsics.fy = info.P[5];
-      intrinsics.cy = info.P[6];
-    }
+  // Some drivers leave K empty, some P.
+  const bool rectified = image_topic.find("image_rect") != std::string::npos;
+  const bool projection = (rectified && info.P[0] > 0) || onlyProjection(info);
+  intrinsics.fx = projection ? info.P[0] : info.K[0];
+  intrinsics.cx = projection ? info.P[2] : info.K[2];
+  intrinsics.fy = projection ? info.P[5] : info.K[4];
+  intrinsics.cy = projection ? info.P[6] : info.K[5];
+  if (rectified) {
     const std::string wrong = intrinsics.validate();
     if (!wrong.empty()) throw std::invalid_argument("camera_info: " + wrong);
     return ofTheImages(intrinsics, info);

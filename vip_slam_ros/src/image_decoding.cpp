@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -14,6 +15,7 @@
 
 #include "message_pixels.h"
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/depth/rvl.h"
 
 namespace vip_slam {
 namespace {
@@ -81,10 +83,39 @@ cv::Mat inverseDepth(const cv::Mat& values, float a, float b, double offset) {
   return depthToMetres(depth, 1.0, offset);
 }
 
+/// The pixels behind `at`: columns and rows as int32, then RVL.
+cv::Mat rvlValues(const sensor_msgs::CompressedImage& image, std::size_t at) {
+  constexpr std::int32_t kLargest = 1 << 14;  // px
+  std::int32_t size[2] = {0, 0};
+  if (image.data.size() >= at + sizeof size) std::memcpy(size, image.data.data() + at, sizeof size);
+  for (const std::int32_t n : size)
+    if (n <= 0 || n > kLargest)
+      throw std::invalid_argument(describe(image) + ": no size before the RVL data, expected columns and rows");
+  try {
+    return decodeRvl(image.data.data() + at + sizeof size, image.data.size() - at - sizeof size, {size[0], size[1]});
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(describe(image) + ": " + error.what());
+  }
+}
+
+/// The 16-bit pixels of a PNG that begins at `at`.
+cv::Mat pngValues(const sensor_msgs::CompressedImage& image, std::size_t at) {
+  if (!isPng(image.data, at))
+    throw std::invalid_argument(describe(image) +
+                                ": neither PNG nor RVL, expected a 16-bit PNG or compressedDepth of these");
+  const cv::Mat encoded(1, int(image.data.size() - at), CV_8UC1, const_cast<std::uint8_t*>(image.data.data()) + at);
+  const cv::Mat values = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
+  if (values.empty() || values.type() != CV_16UC1)
+    throw std::invalid_argument(describe(image) + ": " + (values.empty() ? "a damaged PNG" : "not one 16-bit channel") +
+                                ", expected a 16-bit PNG");
+  return values;
+}
+
 }  // namespace
 
-cv::Mat decodeGray(const sensor_msgs::Image& image, const MessageOwner& owner) {
+cv::Mat GrayDecoder::operator()(const sensor_msgs::Image& image, const MessageOwner& owner) {
   try {
+    if (image.encoding == encodings::MONO16) return narrowed(share(image, owner)->image);
     return image.encoding == "yuv422_yuy2" ? yuy2ToMono8(image) : toMono8(image, owner);
   } catch (const cv_bridge::Exception& error) {
     throw std::invalid_argument(describe(image) + error.what() +
@@ -94,13 +125,37 @@ cv::Mat decodeGray(const sensor_msgs::Image& image, const MessageOwner& owner) {
   }
 }
 
-cv::Mat decodeGray(const sensor_msgs::CompressedImage& image) {
+cv::Mat GrayDecoder::operator()(const sensor_msgs::CompressedImage& image) {
   cv::Mat gray;
   // An image rotated by its EXIF tag would no longer fit the calibration; IMREAD_UNCHANGED never rotates.
-  if (!image.data.empty()) gray = cv::imdecode(image.data, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+  const int as_it_is = cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
+  if (!image.data.empty()) gray = cv::imdecode(image.data, as_it_is);
   if (gray.empty()) throw std::invalid_argument(describe(image) + ": cannot be decoded, expected JPEG or PNG");
+  return gray.type() == CV_16UC1 ? narrowed(gray) : gray;
+}
+
+cv::Mat GrayDecoder::narrowed(const cv::Mat& gray16) {
+  double most = 0;
+  cv::minMaxLoc(gray16, nullptr, &most);
+  int needed = 8;
+  while (needed < 16 && most >= 1 << needed) needed += 2;
+  int bits = bits_;
+  while (bits < needed && !bits_.compare_exchange_weak(bits, needed)) continue;
+  bits = std::max(bits, needed);
+  cv::Mat gray;
+  gray16.convertTo(gray, CV_8U, 255.0 / ((1 << bits) - 1));
   return gray;
 }
+
+std::string GrayDecoder::note() const {
+  const int bits = bits_;
+  if (bits == 0 || bits == 16) return "";
+  return "16-bit grey fills " + std::to_string(bits) + " bits, which are taken for the whole range";
+}
+
+cv::Mat decodeGray(const sensor_msgs::Image& image, const MessageOwner& owner) { return GrayDecoder()(image, owner); }
+
+cv::Mat decodeGray(const sensor_msgs::CompressedImage& image) { return GrayDecoder()(image); }
 
 cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset) {
   const std::string& e = image.encoding;
@@ -117,16 +172,8 @@ cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset
 cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, double offset) {
   constexpr std::size_t kHeader = 12;  // int32 kind, float a, float b: compressed_depth_image_transport
   const std::size_t begin = isPng(image.data, 0) ? 0 : kHeader;
-  if (!isPng(image.data, begin)) {
-    throw std::invalid_argument(describe(image) + ": no PNG in it, expected a 16-bit PNG or compressedDepth with PNG");
-  }
-  const cv::Mat encoded(1, int(image.data.size() - begin), CV_8UC1,
-                        const_cast<std::uint8_t*>(image.data.data()) + begin);
-  const cv::Mat values = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
-  if (values.empty() || values.type() != CV_16UC1) {
-    throw std::invalid_argument(describe(image) + ": " + (values.empty() ? "a damaged PNG" : "not one 16-bit channel") +
-                                ", expected a 16-bit PNG");
-  }
+  const bool rvl = begin != 0 && image.format.find("compressedDepth rvl") != std::string::npos;
+  const cv::Mat values = rvl ? rvlValues(image, begin) : pngValues(image, begin);
   const bool quantised = begin != 0 && image.format.find(encodings::TYPE_32FC1) != std::string::npos;
   if (!quantised) return depthToMetres(values, scale, offset);
   float parameters[2];

@@ -3,6 +3,7 @@
 #include <tf2/exceptions.h>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/geometry_conversions.h"
 
 namespace vip_slam {
@@ -31,6 +32,13 @@ std::string whyNoExtrinsics(const std::string& imu_frame, const std::string& cam
   if (bareFrame(imu_frame) == bareFrame(camera_frame))
     return "image and IMU name the same frame, '" + camera_frame + "': tf cannot tell where they are";
   return "tf does not connect '" + camera_frame + "' to '" + imu_frame + "'";
+}
+
+std::string leverArmProblem(const SE3& T_imu_cam, double most) {
+  const double arm = T_imu_cam.t().norm();
+  if (arm <= most) return "";
+  return formatted("the camera is %.2f m from the IMU, expected %g m at most (max_lever_arm): %s", arm, most,
+                   arm > 5 ? "in millimetres instead of metres?" : "is that right?");
 }
 
 ExtrinsicsGap extrinsicsGap(const SE3& T_imu_cam_a, const SE3& T_imu_cam_b) {

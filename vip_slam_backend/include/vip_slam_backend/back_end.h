@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,10 @@ class BackEnd {
   /// Merges the result with what has changed in the map meanwhile. Discarded, and requested again, when the map was
   /// corrected, loaded or reset since the job was copied.
   MapUpdate merge(const GbaResult& result);
+  /// Keyframes that wait for a loaded map to be recognised are made a part of the map of its own, at a guessed place,
+  /// which a loop may tie to the rest later; to be called before the map is saved or finish() ends it. None when no
+  /// keyframe waits, or in localisation-only mode.
+  std::optional<MapUpdate> mapWaiting();
   /// End of the data: a last global bundle adjustment when options.global_ba.at_end.
   MapUpdate finish();
 
@@ -79,7 +84,7 @@ class BackEnd {
   /// 1/m: common disparity error that is part of the curve, see disparity_curve.h; 0: none.
   double disparityError() const;
   const Map& map() const;
-  /// Throws std::runtime_error naming the path when the file cannot be written.
+  /// Without what mapWaiting() would add. Throws std::runtime_error naming the path when the file cannot be written.
   void saveMap(const std::string& path) const;
   /// Replaces the map; keyframes enter it once it is recognised. Throws std::runtime_error, the map unchanged, on a bad
   /// file or a map made with another camera.

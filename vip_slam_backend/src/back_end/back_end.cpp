@@ -240,6 +240,11 @@ GbaResult BackEnd::run(const GbaJob& job) const {
 
 MapUpdate BackEnd::merge(const GbaResult& result) { return impl_->globalUpdate(impl_->takeGlobal(result)); }
 
+std::optional<MapUpdate> BackEnd::mapWaiting() {
+  if (!impl_->mapHeld()) return std::nullopt;
+  return impl_->globalUpdate(true);
+}
+
 MapUpdate BackEnd::finish() {
   if (!impl_->options.global_ba.at_end || impl_->frozen()) return impl_->globalUpdate(false);
   bool moved = impl_->takeGlobal(run(startGlobalBa()));

@@ -82,8 +82,13 @@ struct BackEnd::Impl {
   /// Predicate of the keyframes that others may be localised at.
   std::function<bool(KeyframeId)> inReferencePart() const;
   bool findInMap(const KeyframePtr& keyframe, Relocalisation* found);
-  /// Relocalises in the loaded map; on success the keyframe and those held before it are inserted.
+  /// Relocalises in the loaded map; on success the keyframe and those held before it are inserted. When as many as may
+  /// be held are, they are mapped without.
   bool enterLoadedMap(const KeyframePtr& keyframe);
+  /// Makes what waits for the loaded map to be recognised a part of the map of its own, at a guessed place as after a
+  /// restart of the odometry, which a loop may tie to the rest later. False when nothing waits.
+  bool mapHeld();
+  void insertHeld(const std::deque<KeyframePtr>& keyframes);
   /// Localisation-only mode: updates T_map_odom, leaves the map unchanged.
   void localise(const KeyframePtr& keyframe);
   /// Whether localisation-only mode has found the odometry of this keyframe in the map within the last seconds.

@@ -1,4 +1,5 @@
 // Stored maps within the back end: saving, loading, relocalisation in a loaded map, localisation without mapping.
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -79,8 +80,8 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found
 bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
   if (!findInMap(keyframe, &found)) {
+    if (held.size() == kMaxWaitingKeyframes) return mapHeld();  // this keyframe is then inserted as any other
     held.push_back(keyframe);
-    if (held.size() > kMaxWaitingKeyframes) held.pop_front();
     return false;
   }
   searching = false;
@@ -89,8 +90,29 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   // Keyframes from before the recognition are inserted as well, unless the odometry has restarted since.
   std::deque<KeyframePtr> before;
   before.swap(held);
-  for (const KeyframePtr& kf : before) {
-    if (kf->frame.epoch != epoch || kf->id >= keyframe->id) continue;
+  before.erase(
+      std::remove_if(before.begin(), before.end(),
+                     [&](const KeyframePtr& kf) { return kf->frame.epoch != epoch || kf->id >= keyframe->id; }),
+      before.end());
+  insertHeld(before);
+  T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
+  insert(keyframe);
+  loop_closer.tie(map, keyframe->id, found.match);
+  fuseLandmarks(map, keyframe->id, found.landmarks);
+  return true;
+}
+
+bool BackEnd::Impl::mapHeld() {
+  if (!searching || held.empty() || frozen()) return false;
+  searching = false;
+  std::deque<KeyframePtr> unplaced;
+  unplaced.swap(held);
+  insertHeld(unplaced);
+  return true;
+}
+
+void BackEnd::Impl::insertHeld(const std::deque<KeyframePtr>& keyframes) {
+  for (const KeyframePtr& kf : keyframes) {
     try {
       insert(kf);
     } catch (const MapError& e) {  // the others are inserted nevertheless
@@ -101,11 +123,6 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
     loop_closer.add(map, kf->id);
     global_wanted = true;  // most of them lie beyond the local window
   }
-  T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
-  insert(keyframe);
-  loop_closer.tie(map, keyframe->id, found.match);
-  fuseLandmarks(map, keyframe->id, found.landmarks);
-  return true;
 }
 
 void BackEnd::Impl::localise(const KeyframePtr& keyframe) {

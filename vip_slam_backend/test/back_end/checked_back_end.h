@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -22,6 +23,7 @@ class CheckedBackEnd : public BackEnd {
   }
   GbaJob startGlobalBa() { return checked(BackEnd::startGlobalBa(), "start of a global adjustment"); }
   MapUpdate merge(const GbaResult& result) { return checked(BackEnd::merge(result), "global adjustment"); }
+  std::optional<MapUpdate> mapWaiting() { return checked(BackEnd::mapWaiting(), "end of waiting"); }
   MapUpdate finish() { return checked(BackEnd::finish(), "end"); }
   MapUpdate loadMap(const std::string& path) { return checked(BackEnd::loadMap(path), "loading"); }
   void reset() {

@@ -1,6 +1,8 @@
 // The back end when its map is reset, loaded, or used for localisation only.
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "back_end/back_end_runs.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/map_io/map_file.h"
@@ -106,6 +108,87 @@ TEST(BackEndMaps, KeyframesThatWaitedForALoadedMapEnterItAsAWhole) {
   EXPECT_TRUE(update.global);
   EXPECT_EQ(update.keyframes.size(), back_end.map().keyframes().size());
   EXPECT_TRUE(back_end.globalBaWanted());
+}
+
+// A session in another room than the loaded map's is not lost: it is saved as a part of its own, and a loop ties it to
+// the stored part when the place is seen later.
+TEST(BackEndMaps, ASessionThatDoesNotFindTheLoadedMapBecomesAPartOfIt) {
+  const std::string path = ::testing::TempDir() + "other_room.vsm", both = ::testing::TempDir() + "both_rooms.vsm";
+  SimulatedKeyframes world(4), other(9), again(4);
+  CheckedBackEnd mapper(options("vip"), world.sensor());
+  feed(&world, &mapper, 25);
+  mapper.saveMap(path);
+  for (const bool at_end : {true, false}) {
+    SimulatedKeyframes session(9);
+    CheckedBackEnd back_end(options("vip"), world.sensor());
+    back_end.loadMap(path);
+    const std::size_t loaded = back_end.map().keyframes().size();
+    for (int k = 0; k < 20; ++k) {
+      auto kf = std::make_shared<Keyframe>(*session.next());
+      kf->id += 1000;
+      kf->previous = k == 0 ? 0 : kf->id - 1;
+      EXPECT_FALSE(back_end.addKeyframe(kf).placed);
+    }
+    EXPECT_EQ(back_end.map().keyframes().size(), loaded);
+    const std::optional<MapUpdate> waited = back_end.mapWaiting();
+    ASSERT_TRUE(waited);
+    EXPECT_FALSE(back_end.mapWaiting()) << "once";
+    const MapUpdate update = at_end ? back_end.finish() : *waited;
+    EXPECT_EQ(back_end.map().keyframes().size(), loaded + 20);
+    EXPECT_TRUE(update.global);
+    EXPECT_FALSE(update.placed) << "nothing ties it to the stored map";
+    EXPECT_EQ(update.keyframes.size(), loaded + 20);
+    const auto guessed = guessedTimes(back_end.snapshot());
+    ASSERT_EQ(guessed.size(), 1u);
+    EXPECT_EQ(guessed.front().first, back_end.map().keyframe(1001).data->frame.t);
+    // It fits itself, whatever its place.
+    const SE3 moved = back_end.map().keyframe(1001).state.T_W_I *
+                      session.truth(back_end.map().keyframe(1001).data->frame.t).T_W_I.inverse();
+    for (KeyframeId id = 1001; id <= 1020; ++id) {
+      const MapKeyframe& kf = back_end.map().keyframe(id);
+      EXPECT_LT((kf.state.T_W_I.t() - moved * session.truth(kf.data->frame.t).T_W_I.t()).norm(), 0.1) << id;
+    }
+    back_end.saveMap(both);
+    CheckedBackEnd loaded_both(options("vip"), world.sensor());
+    loaded_both.loadMap(both);
+    EXPECT_EQ(loaded_both.map().keyframes().size(), loaded + 20);
+  }
+
+  // Mapping goes on in the part; the stored place is recognised in the end.
+  CheckedBackEnd back_end(options("vip"), world.sensor());
+  back_end.loadMap(path);
+  const std::size_t loaded = back_end.map().keyframes().size();
+  const auto add = [&back_end](SimulatedKeyframes* place, int count, std::uint32_t epoch) {
+    MapUpdate update;
+    for (int k = 0; k < count; ++k) {
+      auto kf = std::make_shared<Keyframe>(*place->next());
+      kf->id += 1000 * (epoch + 1);
+      kf->previous = k == 0 ? 0 : kf->id - 1;
+      kf->frame.epoch = epoch;
+      for (Feature& f : kf->frame.features) f.id += 1000000 * LandmarkId(epoch);
+      update = back_end.addKeyframe(kf);
+      EXPECT_EQ(back_end.lastRefusal(), "");
+    }
+    return update;
+  };
+  EXPECT_FALSE(add(&other, 12, 0).placed);
+  ASSERT_TRUE(back_end.mapWaiting());
+  EXPECT_TRUE(add(&again, 25, 1).placed) << "recognised by a loop";
+  EXPECT_EQ(back_end.map().keyframes().size(), loaded + 37);
+  // With localisation alone nothing is mapped.
+  CheckedBackEnd localiser(options("vip"), world.sensor());
+  localiser.loadMap(path);
+  localiser.setLocalisationMode(true);
+  SimulatedKeyframes session(9);
+  for (int k = 0; k < 5; ++k) {
+    auto kf = std::make_shared<Keyframe>(*session.next());
+    kf->id += 1000;
+    kf->previous = k == 0 ? 0 : kf->id - 1;
+    localiser.addKeyframe(kf);
+  }
+  EXPECT_FALSE(localiser.mapWaiting());
+  localiser.finish();
+  EXPECT_EQ(localiser.map().keyframes().size(), loaded);
 }
 
 TEST(BackEndMaps, LocalisationWithoutAMapMapsNothing) {

@@ -29,6 +29,7 @@ void addCommon(vip_slam::CommandLine& line, vip_slam::ConversionOptions* options
 
 int printReport(const vip_slam::ConversionReport& report) {
   for (const auto& [topic, count] : report.messages) std::printf("%8zu  %s\n", count, topic.c_str());
+  for (const auto& note : report.notes) std::printf("%s\n", note.c_str());
   for (const auto& warning : report.warnings) std::printf("warning: %s\n", warning.c_str());
   for (const auto& file : report.files) std::printf("wrote %s\n", file.c_str());
   return 0;
@@ -49,14 +50,17 @@ int convertTumRgbd(int argc, char** argv) {
                              "there) into a bag.");
   vip_slam::TumRgbdOptions tum;
   std::vector<double> camera;
+  double depth_factor = 0;
   addCommon(line, &tum);
   line.option("camera", camera, "fx fy cx cy [k1 k2 p1 p2 [k3]]", vip_slam::count<double>(4, 9));
   line.flag("no-imu", tum.no_imu, "leave out imu.txt and accelerometer.txt");
   line.option("rolling-shutter", tum.rolling_shutter,
               "seconds from the colour image's first row to its last; a Kinect v1's: 0.02 to 0.03",
               vip_slam::between(0.0, 0.1));
-  line.option("depth-factor", tum.depth_factor, "depth units per metre", vip_slam::above(0.0));
+  line.option("depth-factor", depth_factor, "depth units per metre; 0: 1000 or 5000, as the images tell",
+              vip_slam::between(0.0, 1e6));
   if (const auto status = line.parse(argc, argv)) return *status;
+  if (depth_factor > 0) tum.depth_factor = depth_factor;
   if (!camera.empty()) {
     vip_slam::CameraIntrinsics intrinsics;
     intrinsics.fx = camera[0];

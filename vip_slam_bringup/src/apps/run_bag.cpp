@@ -1,4 +1,4 @@
-// run_bag BAG --sensor NAME_OR_YAML --out DIR: the whole system over a recorded bag, in lock-step.
+// run_bag BAG... --sensor NAME_OR_YAML --out DIR: the whole system over a recording, in lock-step.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -26,7 +26,8 @@ namespace {
 volatile std::sig_atomic_t g_interrupted = 0;
 
 struct Arguments {
-  std::string bag, sensor, out, parameters, variant, loop, map;
+  std::vector<std::string> bags;
+  std::string sensor, out, parameters, variant, loop, map;
   bool localise = false;
   bool no_report = false;
   std::vector<std::string> settings;
@@ -35,7 +36,8 @@ struct Arguments {
 };
 
 void addArguments(vip_slam::CommandLine& line, Arguments& arguments) {
-  line.argument("bag", arguments.bag, "the recording");
+  line.argument("bag", arguments.bags,
+                "the recording: a bag, several in any order, a folder of them or a pattern ('run_*.bag')");
   line.option("sensor", arguments.sensor, "a shipped sensor or a sensor YAML file");
   line.required("sensor");
   line.option("out", arguments.out, "folder for the results; made when it does not exist");
@@ -96,13 +98,16 @@ void makeReport(const std::string& folder) {
 int run(const Arguments& arguments) {
   using Clock = std::chrono::steady_clock;
   const vip_slam::PipelineOptions options = loadPipelineOptions(arguments);
-  vip_slam::SensorConfig sensor = vip_slam::loadSensorConfig(vip_slam::resolveSensor(arguments.sensor));
+  std::vector<std::string> notes;
+  vip_slam::SensorConfig sensor = vip_slam::loadSensorConfig(vip_slam::resolveSensor(arguments.sensor), &notes);
+  for (const std::string& note : notes) std::fprintf(stderr, "run_bag: note: %s\n", note.c_str());
   vip_slam::BagReaderOptions reading;
   reading.input = options.input;
   reading.start = arguments.start;
   reading.duration = arguments.duration;
   reading.extrinsics = arguments.extrinsics;
-  vip_slam::BagReader reader(arguments.bag, sensor, reading);
+  vip_slam::BagReader reader(vip_slam::BagSet(arguments.bags), sensor, reading);
+  if (reader.bags().size() > 1) std::fprintf(stderr, "run_bag: %s\n", reader.bags().description().c_str());
   vip_slam::prepareOutputFolder(arguments.out);
 
   vip_slam::TimingLog timing;
@@ -124,7 +129,7 @@ int run(const Arguments& arguments) {
   const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 
   vip_slam::RunFacts facts;
-  facts.bag = arguments.bag;
+  facts.bag = reader.bags().paths();
   facts.sensor = sensor.name;
   facts.variant = options.backend.variant;
   facts.loop_closing = options.backend.loop_closing;

@@ -71,9 +71,9 @@ void readCamera(const std::string& path, CameraIntrinsics* camera, SE3* T_imu_ca
   const YAML::Node pose = node["T_BS"];
   const auto entries = numbers(pose ? pose["data"] : pose, path, "T_BS/data", 16);
   const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(entries.data());
-  const std::string problem = rigidProblem(T);
-  if (!problem.empty()) throw std::runtime_error(path + ": T_BS/data: not a rigid transform: " + problem);
-  *T_imu_cam = SE3(T);
+  const RigidTransform rigid = rigidTransform(T);
+  if (!rigid.problem.empty()) throw std::runtime_error(path + ": T_BS/data: not a rigid transform: " + rigid.problem);
+  *T_imu_cam = rigid.T;
   const std::string wrong = camera->validate();
   if (!wrong.empty()) throw std::runtime_error(path + ": " + wrong);
 }

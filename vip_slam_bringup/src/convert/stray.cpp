@@ -20,6 +20,7 @@
 #include "vip_slam_core/camera/constant_camera.h"
 #include "vip_slam_core/sensor/phone_geometry.h"
 #include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/size_text.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace fs = std::filesystem;
@@ -55,9 +56,9 @@ std::vector<Row> readOdometry(const std::string& folder) {
   std::vector<Row> rows;
   for (const TextRow& text : table.rows()) {
     Row row;
-    double v[9];
-    for (int i = 0; i < 9; ++i) v[i] = table.number(text, i, "column " + std::to_string(i + 1));
-    row.t = v[0];
+    double v[9];  // the first is the stamp
+    for (int i = 1; i < 9; ++i) v[i] = table.number(text, i, "column " + std::to_string(i + 1));
+    row.t = table.seconds(text);
     row.frame = static_cast<int>(v[1]);
     row.T_W_C = SE3(table.quaternion(text, v[8], v[5], v[6], v[7]), Eigen::Vector3d(v[2], v[3], v[4]));
     const bool own = text.cells.size() >= 13 && !text.cells[9].empty();
@@ -75,17 +76,21 @@ std::vector<Row> readOdometry(const std::string& folder) {
 
 /// CoreMotion reports minus the specific force, older versions of the app in m/s^2, newer ones in g: distinguished by
 /// the median length. IMU axes: x right, y up, z out of the screen, phone upright.
-std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path) {
+/// Rows that the app wrote out of order are sorted, repeated stamps left out; both are counted.
+std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path, ConversionReport* report) {
   const TextTable table(path, ",", 7);
   std::vector<double> length;
   std::vector<sensor_msgs::Imu> samples;
+  ros::Time newest;
+  std::size_t late = 0;
   for (const TextRow& row : table.rows()) {
-    double v[7];
-    for (int i = 0; i < 7; ++i) v[i] = table.number(row, i, i < 1 ? "the stamp" : i < 4 ? "accelerometer" : "gyro");
+    double v[7];  // the first is the stamp
+    for (int i = 1; i < 7; ++i) v[i] = table.number(row, i, i < 4 ? "accelerometer" : "gyro");
     sensor_msgs::Imu sample;
-    sample.header.stamp.fromSec(v[0]);
+    sample.header.stamp.fromSec(table.seconds(row));
     sample.header.frame_id = "phone_imu_frame";
-    if (!samples.empty()) table.ascending(row, samples.back().header.stamp, sample.header.stamp);
+    newest = std::max(newest, sample.header.stamp);
+    late += sample.header.stamp < newest;
     sample.orientation_covariance[0] = -1;
     sample.linear_acceleration.x = -v[1];
     sample.linear_acceleration.y = -v[2];
@@ -96,6 +101,16 @@ std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path) {
     samples.push_back(sample);
     length.push_back(std::sqrt(v[1] * v[1] + v[2] * v[2] + v[3] * v[3]));
   }
+  const auto earlier = [](const auto& a, const auto& b) { return a.header.stamp < b.header.stamp; };
+  const auto same = [](const auto& a, const auto& b) { return a.header.stamp == b.header.stamp; };
+  std::stable_sort(samples.begin(), samples.end(), earlier);
+  const std::size_t all = samples.size();
+  samples.erase(std::unique(samples.begin(), samples.end(), same), samples.end());
+  if (late > 0)
+    report->warnings.push_back(formatted("%s: %zu of %zu rows come late and are sorted", path.c_str(), late, all));
+  if (samples.size() < all)
+    report->warnings.push_back(
+        formatted("%s: %zu of %zu rows repeat a stamp and are left out", path.c_str(), all - samples.size(), all));
   const double median = upperMedian(std::move(length));
   if (median < 0.5 || (median > 2.0 && (median < 8.0 || median > 12.0)))
     throw std::runtime_error(path + ": median acceleration is " + std::to_string(median) +
@@ -110,14 +125,49 @@ std::vector<sensor_msgs::Imu> readStrayImu(const std::string& path) {
   return samples;
 }
 
-int countFrames(const std::string& path, cv::Size* size) {
+struct VideoFacts {
+  int frames = 0;
+  cv::Size size;
+  int rotate_flag = 0;  ///< degrees by which a player is told to turn the picture
+};
+
+// cv::CAP_PROP_ORIENTATION_META and _AUTO, which OpenCV has since 4.5; before, it neither knew the flag nor turned.
+constexpr int kOrientationMeta = 48, kOrientationAuto = 49;
+
+/// Pictures come as they are stored, as the depth images are, whatever turn the file tells a player.
+cv::VideoCapture openVideo(const std::string& path) {
   cv::VideoCapture video(path);
   if (!video.isOpened()) throw std::runtime_error(path + ": is not a readable video");
-  *size = cv::Size(static_cast<int>(video.get(cv::CAP_PROP_FRAME_WIDTH)),
-                   static_cast<int>(video.get(cv::CAP_PROP_FRAME_HEIGHT)));
-  int frames = 0;
-  while (video.grab()) ++frames;
-  return frames;
+  video.set(kOrientationAuto, 0);
+  return video;
+}
+
+VideoFacts factsOf(const std::string& path) {
+  cv::VideoCapture video = openVideo(path);
+  VideoFacts facts;
+  facts.rotate_flag = static_cast<int>(std::lround(video.get(kOrientationMeta)));
+  cv::Mat frame;
+  if (!video.read(frame)) throw std::runtime_error(path + ": is a video without a picture");
+  facts.size = frame.size();
+  for (facts.frames = 1; video.grab(); ++facts.frames) continue;
+  return facts;
+}
+
+/// Throws unless the video has the shape of the depth images and the size that the intrinsics are for.
+void checkShape(const std::string& path, const cv::Size& video, const cv::Size& depth, const Row& row) {
+  constexpr double kShape = 0.02;   // of the ratio of width to height
+  constexpr double kCentre = 0.15;  // of the size, from the middle to the principal point
+  const double shape = double(video.width) / video.height, depth_shape = double(depth.width) / depth.height;
+  if (std::abs(shape / depth_shape - 1) > kShape)
+    throw std::runtime_error(path + ": pictures of " + sizeText(video) +
+                             " have another shape than the depth images of " + sizeText(depth) +
+                             ": turned or cropped? Expected the app's own file");
+  const double x = (row.cx + 0.5) / video.width, y = (row.cy + 0.5) / video.height;
+  if (std::abs(x - 0.5) < kCentre && std::abs(y - 0.5) < kCentre) return;
+  throw std::runtime_error(
+      path + formatted(": pictures of %s, but the intrinsics (principal point %.0f, %.0f) are for pictures of about "
+                       "%.0fx%.0f: resized by hand? Expected the app's own file",
+                       sizeText(video).c_str(), row.cx, row.cy, 2 * row.cx + 1, 2 * row.cy + 1));
 }
 
 std::string numbered(const std::string& folder, int frame) { return folder + formatted("/%06d.png", frame); }
@@ -169,11 +219,17 @@ ConversionReport convertStray(const StrayOptions& options) {
   for (const char* needed : {"rgb.mp4", "odometry.csv", "imu.csv"})
     if (!fs::exists(options.folder + "/" + needed))
       throw std::runtime_error(options.folder + "/" + needed + ": is not there; expected a Stray Scanner recording");
-  std::vector<Row> rows = readOdometry(options.folder);
-  const auto imu = readStrayImu(options.folder + "/imu.csv");
-  cv::Size video_size;
-  const int frames = countFrames(options.folder + "/rgb.mp4", &video_size);
   ConversionReport report;
+  std::vector<Row> rows = readOdometry(options.folder);
+  const auto imu = readStrayImu(options.folder + "/imu.csv", &report);
+  const VideoFacts facts = factsOf(options.folder + "/rgb.mp4");
+  const int frames = facts.frames;
+  const cv::Size video_size = facts.size;
+  if (facts.rotate_flag % 360 != 0)
+    report.warnings.push_back(
+        formatted("rgb.mp4 tells players to turn it by %d degrees: its pictures are taken as they "
+                  "are stored, as depth and intrinsics are for",
+                  facts.rotate_flag));
   // The app's edit list hides the first frames from most decoders: then the video's frames belong to the last rows.
   std::size_t skip = 0;
   if (frames < static_cast<int>(rows.size())) {
@@ -194,11 +250,16 @@ ConversionReport convertStray(const StrayOptions& options) {
     throw std::runtime_error(options.folder + "/depth: no NNNNNN.png for any row");
   if (!without_depth.empty()) report.warnings.push_back(std::to_string(without_depth.size()) + " images have no depth");
 
+  const auto with_depth = std::find_if(rows.begin(), rows.end(), [&](const Row& row) {
+    return !std::binary_search(without_depth.begin(), without_depth.end(), row.frame);
+  });
+  checkShape(options.folder + "/rgb.mp4", video_size, readDepth(options.folder, with_depth->frame, 0).size(),
+             *with_depth);
   const CameraIntrinsics constant = constantCamera(rows, video_size, size);
   const SE3 T_imu_cam = phoneCameraInImu();
   const SE3 T_zup_yup = arkitWorldZUp();
   Trajectory truth;
-  auto video = std::make_shared<cv::VideoCapture>(options.folder + "/rgb.mp4");
+  auto video = std::make_shared<cv::VideoCapture>(openVideo(options.folder + "/rgb.mp4"));
   BagOutput bag(options.bag, options.overwrite);
   for (const Row& row : rows) {
     truth.push_back({row.t, T_zup_yup * row.T_W_C * T_imu_cam.inverse()});

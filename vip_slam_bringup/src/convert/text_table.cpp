@@ -1,11 +1,14 @@
 #include "vip_slam_bringup/convert/text_table.h"
 
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <stdexcept>
 
 #include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/stamp_unit.h"
 
 namespace vip_slam {
 namespace {
@@ -55,6 +58,9 @@ TextTable::TextTable(const std::string& path, const std::string& separators, std
   }
   if (rows_.empty())
     throw std::runtime_error(path + ": no data, expected rows of " + std::to_string(min_columns) + " columns");
+  const std::string &first = rows_.front().cells[0], &last = rows_.back().cells[0];
+  if (isNumber(first) && isNumber(last))
+    unit_ = secondsPerUnit(std::strtod(first.c_str(), nullptr), std::strtod(last.c_str(), nullptr), rows_.size());
 }
 
 double TextTable::number(const TextRow& row, std::size_t column, const std::string& what) const {
@@ -63,11 +69,21 @@ double TextTable::number(const TextRow& row, std::size_t column, const std::stri
   return std::strtod(row.cells[column].c_str(), nullptr);
 }
 
+double TextTable::seconds(const TextRow& row) const {
+  const double t = unit_ * number(row, 0, "the stamp");
+  constexpr double kEnd = std::numeric_limits<std::uint32_t>::max();
+  if (!(t >= 0 && t < kEnd))
+    fail(row, formatted("the stamp is %.9g s, expected 0 to %.0f, as a bag can hold", t, kEnd));
+  return t;
+}
+
 long long TextTable::nanoseconds(const TextRow& row, std::size_t column) const {
   const std::string& text = row.cells.at(column);
   char* end = nullptr;
   const long long value = std::strtoll(text.c_str(), &end, 10);
   if (text.empty() || *end != '\0' || value < 0) fail(row, "the stamp is '" + text + "', expected whole nanoseconds");
+  if (value / 1000000000 > std::numeric_limits<std::uint32_t>::max())
+    fail(row, "the stamp is " + text + " ns, which is more than a bag can hold (4294967295 s)");
   return value;
 }
 

@@ -10,6 +10,8 @@
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_core/depth/depth_factor.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/size_text.h"
 
 namespace fs = std::filesystem;
@@ -36,7 +38,9 @@ std::vector<ListedFile> readList(const std::string& folder, const std::string& n
   const TextTable table(folder + "/" + name, " \t", 2);
   std::vector<ListedFile> files;
   for (const TextRow& row : table.rows()) {
-    ListedFile file{table.number(row, 0, "the stamp"), folder + "/" + row.cells[1]};
+    ListedFile file{table.seconds(row), folder + "/" + row.cells[1]};
+    // Some public recordings repeat lines.
+    if (!files.empty() && files.back().t == file.t && files.back().path == file.path) continue;
     if (!files.empty()) table.ascending(row, files.back().t, file.t);
     if (!fs::exists(file.path)) table.fail(row, "image " + file.path + " is not there");
     files.push_back(std::move(file));
@@ -57,11 +61,15 @@ CameraIntrinsics freiburg(double fx, double fy, double cx, double cy, std::vecto
   return camera;
 }
 
+std::string folderName(const std::string& folder) {
+  return fs::absolute(folder + "/.").lexically_normal().parent_path().filename().string();
+}
+
 /// The given one, else calibration.txt (fx fy cx cy), else the published calibration of the three Freiburg cameras.
 CameraIntrinsics findCamera(const TumRgbdOptions& options, const cv::Size& size) {
   CameraIntrinsics camera;
   const std::string file = options.folder + "/calibration.txt";
-  const std::string name = fs::absolute(options.folder + "/.").lexically_normal().parent_path().filename().string();
+  const std::string name = folderName(options.folder);
   if (options.camera) {
     camera = *options.camera;
   } else if (fs::exists(file)) {
@@ -108,7 +116,7 @@ std::vector<sensor_msgs::Imu> readInertial(const std::string& path, bool gyro) {
   std::vector<sensor_msgs::Imu> samples;
   for (const TextRow& row : table.rows()) {
     sensor_msgs::Imu sample;
-    sample.header.stamp.fromSec(table.number(row, 0, "the stamp"));
+    sample.header.stamp.fromSec(table.seconds(row));
     sample.header.frame_id = gyro ? "camera_imu_optical_frame" : kFrame;
     if (!samples.empty()) table.ascending(row, samples.back().header.stamp, sample.header.stamp);
     sample.orientation_covariance[0] = -1;
@@ -135,7 +143,8 @@ Trajectory readGroundTruth(const std::string& path, const SE3& T_cam_imu) {
   Trajectory truth;
   for (const TextRow& row : table.rows()) {
     double v[8];
-    for (int i = 0; i < 8; ++i) v[i] = table.number(row, i, "column " + std::to_string(i + 1));
+    v[0] = table.seconds(row);
+    for (int i = 1; i < 8; ++i) v[i] = table.number(row, i, "column " + std::to_string(i + 1));
     const Eigen::Quaterniond q = table.quaternion(row, v[7], v[4], v[5], v[6]);
     if (!truth.empty() && v[0] <= truth.back().t) continue;  // the public files repeat a few stamps
     truth.push_back({v[0], SE3(q, Eigen::Vector3d(v[1], v[2], v[3])) * T_cam_imu});
@@ -146,6 +155,23 @@ Trajectory readGroundTruth(const std::string& path, const SE3& T_cam_imu) {
 double rateOf(const std::vector<ListedFile>& files) {
   const double seconds = files.back().t - files.front().t;
   return seconds > 0 ? (files.size() - 1) / seconds : 30.0;
+}
+
+/// Depth units per metre: as given, else the data set's own for its recordings, else as the images tell.
+double depthFactor(const TumRgbdOptions& options, const std::vector<ListedFile>& depth, ConversionReport* report) {
+  constexpr std::size_t kLookedAt = 12;
+  if (options.depth_factor) return *options.depth_factor;
+  if (folderName(options.folder).find("freiburg") != std::string::npos) return 5000;
+  std::vector<cv::Mat> images;
+  for (std::size_t i = 0; i < depth.size(); i += std::max<std::size_t>(1, depth.size() / kLookedAt)) {
+    const cv::Mat image = cv::imread(depth[i].path, cv::IMREAD_UNCHANGED);
+    if (image.type() == CV_16UC1) images.push_back(image);  // others are named when they are written
+  }
+  const DepthFactor guess = guessDepthFactor(images);
+  const std::string words = formatted("depth: %g units per metre are guessed: %s (--depth-factor says otherwise)",
+                                      guess.units_per_metre, guess.reason.c_str());
+  (guess.certain ? report->notes : report->warnings).push_back(words);
+  return guess.units_per_metre;
 }
 
 }  // namespace
@@ -166,6 +192,7 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
     truth = readGroundTruth(options.folder + "/groundtruth.txt", T_imu_cam.inverse());
 
   ConversionReport report;
+  const double depth_factor = depthFactor(options, depth, &report);
   BagOutput bag(options.bag, options.overwrite);
   const auto addImages = [&](const std::vector<ListedFile>& files, const std::string& topic, const std::string& info,
                              bool is_color) {
@@ -209,7 +236,7 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
     sensor.topics.accel = kAccel;
   sensor.color_encoding = "bgr8";
   sensor.depth_encoding = "16UC1";
-  sensor.depth_scale = 1.0 / options.depth_factor;
+  sensor.depth_scale = 1.0 / depth_factor;
   sensor.color_rate = std::round(rateOf(color));
   sensor.depth_rate = std::round(rateOf(depth));
   if (imu.size() > 1) {

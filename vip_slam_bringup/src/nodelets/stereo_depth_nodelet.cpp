@@ -60,7 +60,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
     ++pairs_;
     try {
       const ros::WallTime begin = ros::WallTime::now();
-      const StereoDepthFrame frame = stereo_->compute(decodeGray(*left, left), decodeGray(*right, right));
+      const StereoDepthFrame frame = stereo_->compute(left_gray_(*left, left), right_gray_(*right, right));
       const double taken = (ros::WallTime::now() - begin).toSec(), gap = (left->header.stamp - last_).toSec();
       if (!last_.isZero() && gap > 0 && taken > gap)
         NODELET_WARN_THROTTLE(10.0, "Stereo depth takes %.0f ms, pairs come every %.0f ms: some are left out",
@@ -101,6 +101,7 @@ class StereoDepthNodelet : public nodelet::Nodelet {
   }
 
   std::unique_ptr<StereoDepth> stereo_;
+  GrayDecoder left_gray_, right_gray_;
   ros::Time last_;  ///< stamp of the last pair
   tf2_ros::StaticTransformBroadcaster tf_;
   std::string raw_frame_;                                               ///< frame whose rectified one was sent to tf

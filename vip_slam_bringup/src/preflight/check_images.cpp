@@ -156,11 +156,13 @@ void checkDepth(const Recording& r, Findings* out) {
 Findings checkImages(const Recording& r) {
   Findings out;
   checkEncoding("colour image", r.color, r.sensor.color_encoding, &out);
+  if (!r.gray_note.empty()) out.push_back({Severity::kNote, "colour image", r.gray_note, ""});
   checkEncoding("depth image", r.depth, r.sensor.depth_encoding, &out);
   if (r.sensor.intrinsics_from_camera_info)
     checkCamera("colour camera_info", r.color_info, r.color_camera, r.color_camera_error, r.color, true, &out);
   else
     checkSensorFileCamera(r, &out);
+  if (!r.color_camera_note.empty()) out.push_back({Severity::kNote, "colour camera_info", r.color_camera_note, ""});
   checkMask(r, &out);
   checkBrightness(r.brightness, &out);
   checkRepeats(r, &out);
@@ -221,10 +223,11 @@ Findings checkSkew(const Recording& r) {
     const double early = quantile(skew, 0.05), late = quantile(skew, 0.95);
     const double most = std::max(std::abs(early), std::abs(late));
     if (most > 0.008)
-      out.push_back({Severity::kNote, "colour and depth",
-                     formatted("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
-                     "the motion carries depth over to the colour image, as far as these stamps are right; the driver's "
-                     "synchronisation spares that"});
+      out.push_back(
+          {Severity::kNote, "colour and depth",
+           formatted("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
+           "the motion carries depth over to the colour image, as far as these stamps are right; the driver's "
+           "synchronisation spares that"});
     else
       out.push_back({Severity::kGood, "colour and depth", formatted("stamps agree within %.1f ms", 1e3 * most), ""});
   }

@@ -185,7 +185,7 @@ Finding extrinsicsFinding(const Recording& r, const MotionEstimate& motion, cons
             ""};
   const Eigen::Matrix3d R = motion.R_imu_cam.toRotationMatrix();
   std::string rows;
-  for (int i = 0; i < 3; ++i) rows += formatted("%s[%.3f, %.3f, %.3f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
+  for (int i = 0; i < 3; ++i) rows += formatted("%s[%.6f, %.6f, %.6f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
   return {used ? Severity::kError : Severity::kWarning, "extrinsics",
           formatted("the motion contradicts %s by %.0f degrees", source, angle),
           (used ? "" : "tf is used unless extrinsics is config; ") +

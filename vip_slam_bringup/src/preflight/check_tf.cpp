@@ -3,6 +3,7 @@
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_core/util/formatted.h"
+#include "vip_slam_ros/input_options.h"
 #include "vip_slam_ros/tf_lookup.h"
 
 namespace vip_slam {
@@ -34,6 +35,12 @@ std::optional<SE3> extrinsicsOfTf(const Recording& r) {
 
 Findings checkTf(const Recording& r) {
   Findings out;
+  if (r.sensor.topics.hasInertial()) {
+    const std::optional<SE3> of_tf = extrinsicsOfTf(r);
+    const std::string wrong = leverArmProblem(of_tf.value_or(r.sensor.T_imu_cam), InputOptions().max_lever_arm);
+    if (!wrong.empty())
+      out.push_back({Severity::kError, "extrinsics", std::string(of_tf ? "tf: " : "T_imu_cam: ") + wrong, ""});
+  }
   const auto [camera, imu] = framesOf(r);
   if (r.color.stamps.empty()) return out;
   if (!r.sensor.topics.hasInertial()) {
@@ -43,8 +50,8 @@ Findings checkTf(const Recording& r) {
     if (lookUpTransform(tf, "base_link", camera))
       out.push_back({Severity::kGood, "tf", "the camera is connected to base_link", ""});
     else
-      out.push_back({Severity::kNote, "tf", "base_link is not connected to the camera",
-                     "the sensor file's T_base_imu is used"});
+      out.push_back(
+          {Severity::kNote, "tf", "base_link is not connected to the camera", "the sensor file's T_base_imu is used"});
     return out;
   }
   if (r.gyro_samples.empty() && r.accel_samples.empty()) return out;

@@ -1,12 +1,9 @@
 // Recordings from a bag and from live topics.
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <topic_tools/shape_shifter.h>
 
 #include "vip_slam_bringup/preflight/recorder.h"
-#include "vip_slam_ros/bag_files.h"
 
 namespace vip_slam {
 namespace {
@@ -38,21 +35,20 @@ std::vector<std::string> topicsOf(const SensorConfig& sensor) {
 
 }  // namespace
 
-Recording recordBag(const std::string& path, const SensorConfig& sensor, double image_seconds) {
+Recording recordBag(const BagSet& bags, const SensorConfig& sensor, double image_seconds) {
   try {
-    rosbag::Bag bag;
-    openBag(path, &bag);
     Recorder recorder(sensor, false, image_seconds);
     std::map<std::string, std::string> topics;
-    for (const rosbag::ConnectionInfo* connection : rosbag::View(bag).getConnections())
+    for (const rosbag::ConnectionInfo* connection : bags.view()->getConnections())
       topics[connection->topic] = connection->datatype;
     recorder.setTopics(topics);
-    for (const rosbag::MessageInstance& message : rosbag::View(bag, rosbag::TopicQuery(topicsOf(sensor))))
+    const auto view = bags.view(topicsOf(sensor));
+    for (const rosbag::MessageInstance& message : *view)
       dispatch(&recorder, message.getTopic(), message.getTime().toSec(), message);
     recorder.finish();
     return recorder.recording();
   } catch (const ros::Exception& e) {
-    throw std::runtime_error(path + ": the bag breaks off: " + e.what() + "; rosbag reindex may mend it");
+    throw std::runtime_error(bags.name() + ": the bag breaks off: " + e.what() + "; rosbag reindex may mend it");
   }
 }
 

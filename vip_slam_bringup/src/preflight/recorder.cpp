@@ -44,17 +44,18 @@ void Recorder::startRotation(const CameraIntrinsics& camera) {
 }
 
 void Recorder::finish() {
+  recording_.gray_note = gray_.note();
   flushGray(true);
   if (depth_edges_) recording_.depth_edges = depth_edges_->record();
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message,
                    const MessageOwner& owner) {
-  addImage(topic, arrival, message, message.encoding, [&] { return decodeGray(message, owner); });
+  addImage(topic, arrival, message, message.encoding, [&] { return gray_(message, owner); });
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CompressedImage& message) {
-  addImage(topic, arrival, message, "compressed (" + message.format + ")", [&] { return decodeGray(message); });
+  addImage(topic, arrival, message, "compressed (" + message.format + ")", [&] { return gray_(message); });
 }
 
 template <class ImageMessage, class Gray>
@@ -99,6 +100,7 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   const SensorTopics& topics = recording_.sensor.topics;
   if (topic == topics.color_info) {
     take(&recording_.color_info, topics.color, &recording_.color_camera, &recording_.color_camera_error);
+    if (recording_.color_info.stamps.size() == 1) recording_.color_camera_note = cameraInfoNote(message);
     if (!rotation_ && recording_.color_camera.width > 0) startRotation(recording_.color_camera);
   }
   if (topic == topics.depth_info)

@@ -66,7 +66,7 @@ void BagDecoding::take(const rosbag::MessageInstance& message) {
 
 void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
   const auto taken =
-      stampedImage(message, &frames_[message.getTopic()], [](const auto&... m) { return decodeGray(m...); });
+      stampedImage(message, &frames_[message.getTopic()], [this](const auto&... m) { return gray_(m...); });
   if (!taken) return;
   const auto& [t, image, stamp] = *taken;
   color_size_ = image.size();
@@ -155,6 +155,7 @@ void BagDecoding::countUnreadable(const std::string& why) {
 void BagDecoding::finish() {
   pairer_.end();
   handOut();
+  if (!gray_.note().empty()) warnings_.push_back("topic " + sensor_.topics.color + ": " + gray_.note());
   const std::string& depth_topic = sensor_.topics.depth;
   const auto& pairs = pairer_.counters();
   if (!depth_topic.empty() && pairs.without_depth > 5 && 20 * pairs.without_depth > pairs.pairs + pairs.without_depth)

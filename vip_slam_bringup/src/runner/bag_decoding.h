@@ -13,6 +13,7 @@
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
+#include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/one_frame.h"
 #include "vip_slam_ros/stream_clock.h"
 
@@ -54,6 +55,7 @@ class BagDecoding {
   ImagePairer pairer_;
   StreamClock clock_;
   std::map<std::string, OneFrame> frames_;  ///< of each topic
+  GrayDecoder gray_;
   bool open_ = true;
   cv::Size color_size_;
   std::size_t depth_images_ = 0, without_any_ = 0;  ///< depth images; those without a reading within the range

@@ -1,6 +1,5 @@
 #include "vip_slam_bringup/runner/bag_extrinsics.h"
 
-#include <rosbag/view.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
@@ -12,8 +11,9 @@
 namespace vip_slam {
 namespace {
 
-std::string firstFrame(const rosbag::Bag& bag, const std::string& topic, const ros::Time& begin) {
-  for (const auto& message : rosbag::View(bag, rosbag::TopicQuery(topic), begin)) {
+std::string firstFrame(const BagSet& bags, const std::string& topic, const ros::Time& begin) {
+  const auto view = bags.view({topic}, begin);
+  for (const auto& message : *view) {
     if (const auto image = message.instantiate<sensor_msgs::Image>()) return image->header.frame_id;
     if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) return image->header.frame_id;
     if (const auto imu = message.instantiate<sensor_msgs::Imu>()) return imu->header.frame_id;
@@ -22,7 +22,7 @@ std::string firstFrame(const rosbag::Bag& bag, const std::string& topic, const r
   return "";
 }
 
-void addAll(rosbag::View&& view, bool are_static, tf2::BufferCore* tf) {
+void addAll(rosbag::View& view, bool are_static, tf2::BufferCore* tf) {
   for (const auto& message : view) {
     const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
     if (!transforms) continue;
@@ -32,14 +32,13 @@ void addAll(rosbag::View&& view, bool are_static, tf2::BufferCore* tf) {
 
 }  // namespace
 
-BagExtrinsics extrinsicsInBag(const rosbag::Bag& bag, const SensorTopics& topics, const ros::Time& begin,
-                              double patience) {
+BagExtrinsics extrinsicsInBag(const BagSet& bags, const SensorTopics& topics, const ros::Time& begin, double patience) {
   BagExtrinsics out;
-  out.camera_frame = firstFrame(bag, topics.color, begin);
-  out.imu_frame = firstFrame(bag, topics.inertial(), begin);
+  out.camera_frame = firstFrame(bags, topics.color, begin);
+  out.imu_frame = firstFrame(bags, topics.inertial(), begin);
   tf2::BufferCore tf;
-  addAll(rosbag::View(bag, rosbag::TopicQuery("/tf"), begin, begin + ros::Duration(patience)), false, &tf);
-  addAll(rosbag::View(bag, rosbag::TopicQuery("/tf_static")), true, &tf);
+  addAll(*bags.view({"/tf"}, begin, begin + ros::Duration(patience)), false, &tf);
+  addAll(*bags.view({"/tf_static"}), true, &tf);
   out.T_imu_cam = lookUpExtrinsics(tf, out.imu_frame, out.camera_frame);
   return out;
 }

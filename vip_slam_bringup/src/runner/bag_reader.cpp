@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
 
 #include "vip_slam_bringup/runner/bag_extrinsics.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
-#include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/tf_lookup.h"
 
@@ -31,21 +29,18 @@ std::string join(const std::set<std::string>& names) {
 }  // namespace
 
 struct BagReader::Source {
-  rosbag::Bag bag;
+  explicit Source(BagSet set) : bags(std::move(set)) {}
+
+  const BagSet bags;
   ros::Time begin, end;
   std::unique_ptr<const DepthToColour> to_colour;
-
-  void open(const std::string& path) {
-    openBag(path, &bag);
-    if (rosbag::View(bag).size() == 0) throw std::runtime_error(path + ": an empty bag");
-  }
 
   void checkTopics(const SensorConfig& sensor) {
     const SensorTopics& topics = sensor.topics;
     std::map<std::string, std::string> there;  // with their types
     std::set<std::string> names, missing;
-    rosbag::View view(bag);
-    for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+    const auto view = bags.view();
+    for (const rosbag::ConnectionInfo* connection : view->getConnections()) {
       there[connection->topic] = connection->datatype;
       names.insert(connection->topic);
     }
@@ -55,71 +50,76 @@ struct BagReader::Source {
       if (found == there.end())
         missing.insert(topic);
       else if (types.count(found->second) == 0)
-        throw std::runtime_error(bag.getFileName() + ": topic " + topic + " is " + found->second + ", expected " +
+        throw std::runtime_error(bags.name() + ": topic " + topic + " is " + found->second + ", expected " +
                                  join(types) + "; is it the right topic in sensor '" + sensor.name + "'?");
     };
     for (const std::string& topic : {topics.color, topics.depth})
       check(topic, {"sensor_msgs/Image", "sensor_msgs/CompressedImage"});
     for (const std::string& topic : {topics.imu, topics.gyro, topics.accel}) check(topic, {"sensor_msgs/Imu"});
     if (!missing.empty()) {
-      throw std::runtime_error(bag.getFileName() + ": no topic " + join(missing) + ", which sensor '" + sensor.name +
+      throw std::runtime_error(bags.name() + ": no topic " + join(missing) + ", which sensor '" + sensor.name +
                                "' names; in the bag are: " + join(names));
     }
   }
 
   /// The first one that can be used, as live: drivers send empty ones until they have read the device.
-  CameraIntrinsics cameraInfo(const std::string& topic, const std::string& image_topic) {
-    rosbag::View view(bag, rosbag::TopicQuery(topic));
+  CameraIntrinsics cameraInfo(const std::string& topic, const std::string& image_topic,
+                              std::vector<std::string>* warnings) {
+    const auto view = bags.view({topic});
     std::string problem;
-    for (const auto& message : view) {
+    for (const auto& message : *view) {
       const auto info = message.instantiate<sensor_msgs::CameraInfo>();
       if (!info) {
-        throw std::runtime_error(bag.getFileName() + ": topic " + topic + " is " + message.getDataType() +
+        throw std::runtime_error(bags.name() + ": topic " + topic + " is " + message.getDataType() +
                                  ", expected sensor_msgs/CameraInfo");
       }
       try {
-        return intrinsicsFromCameraInfo(*info, image_topic);
+        const CameraIntrinsics camera = intrinsicsFromCameraInfo(*info, image_topic);
+        const std::string note = cameraInfoNote(*info);
+        if (!note.empty()) warnings->push_back("topic " + topic + ": " + note);
+        return camera;
       } catch (const std::exception& error) {
         problem = error.what();
       }
     }
-    if (!problem.empty()) throw std::runtime_error(bag.getFileName() + ": topic " + topic + ": " + problem);
-    throw std::runtime_error(bag.getFileName() + ": topic " + topic +
-                             ": no camera_info in the bag; name the right topic " +
+    if (!problem.empty()) throw std::runtime_error(bags.name() + ": topic " + topic + ": " + problem);
+    throw std::runtime_error(bags.name() + ": topic " + topic + ": no camera_info in the bag; name the right topic " +
                              "or put the intrinsics into the sensor configuration");
   }
 };
 
-BagReader::BagReader(const std::string& path, SensorConfig& sensor, const BagReaderOptions& options)
-    : source_(std::make_unique<Source>()), options_(options), channel_(kAhead) {
-  source_->open(path);
+BagReader::BagReader(BagSet bags, SensorConfig& sensor, const BagReaderOptions& options)
+    : source_(std::make_unique<Source>(std::move(bags))), options_(options), channel_(kAhead) {
   source_->checkTopics(sensor);
   if (sensor.intrinsics_from_camera_info) {
-    sensor.camera = source_->cameraInfo(sensor.topics.color_info, sensor.topics.color);
+    sensor.camera = source_->cameraInfo(sensor.topics.color_info, sensor.topics.color, &warnings_);
     if (!sensor.depth_registered) {
-      sensor.depth_camera = source_->cameraInfo(sensor.topics.depth_info, sensor.topics.depth);
+      sensor.depth_camera = source_->cameraInfo(sensor.topics.depth_info, sensor.topics.depth, &warnings_);
     }
   }
   source_->to_colour = std::make_unique<DepthToColour>(sensor);
 
-  rosbag::View all(source_->bag);
-  source_->begin = all.getBeginTime() + ros::Duration(std::max(0.0, options.start));
-  source_->end = all.getEndTime();
+  const auto all = source_->bags.view();
+  source_->begin = all->getBeginTime() + ros::Duration(std::max(0.0, options.start));
+  source_->end = all->getEndTime();
   if (options.duration >= 0) source_->end = std::min(source_->end, source_->begin + ros::Duration(options.duration));
   if (source_->begin > source_->end) {
-    throw std::runtime_error(path + ": --start " + std::to_string(options.start) +
+    throw std::runtime_error(source_->bags.name() + ": --start " + std::to_string(options.start) +
                              " s lies behind the end of the bag, which lasts " +
-                             std::to_string((all.getEndTime() - all.getBeginTime()).toSec()) + " s");
+                             std::to_string((all->getEndTime() - all->getBeginTime()).toSec()) + " s");
   }
   if (options.extrinsics != "config" && sensor.topics.hasInertial()) takeExtrinsics(&sensor);
+  const std::string wrong = leverArmProblem(sensor.T_imu_cam, options.input.max_lever_arm);
+  if (!wrong.empty())
+    throw std::runtime_error(source_->bags.name() + ": T_imu_cam (" + extrinsics_source_ + "): " + wrong);
   sensor_ = sensor;
 }
 
 void BagReader::takeExtrinsics(SensorConfig* sensor) {
-  const BagExtrinsics found = extrinsicsInBag(source_->bag, sensor->topics, source_->begin, options_.tf_patience);
+  const BagExtrinsics found = extrinsicsInBag(source_->bags, sensor->topics, source_->begin, options_.tf_patience);
   if (!found.T_imu_cam) {
     if (options_.extrinsics != "tf") return;
-    throw std::runtime_error(source_->bag.getFileName() + ": " + whyNoExtrinsics(found.imu_frame, found.camera_frame) +
+    throw std::runtime_error(source_->bags.name() + ": " + whyNoExtrinsics(found.imu_frame, found.camera_frame) +
                              "; record /tf_static, or use the sensor file's extrinsics");
   }
   extrinsics_source_ = "tf: " + found.camera_frame + " to " + found.imu_frame;
@@ -141,6 +141,7 @@ void BagReader::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
+const BagSet& BagReader::bags() const { return source_->bags; }
 double BagReader::beginTime() const { return source_->begin.toSec(); }
 double BagReader::endTime() const { return source_->end.toSec(); }
 
@@ -171,8 +172,8 @@ void BagReader::read() {
     warnings_.insert(warnings_.end(), decoding.warnings().begin(), decoding.warnings().end());
   };
   try {
-    rosbag::View view(source_->bag, rosbag::TopicQuery(names), source_->begin, source_->end);
-    for (const auto& message : view) {
+    const auto view = source_->bags.view(names, source_->begin, source_->end);
+    for (const auto& message : *view) {
       if (stop_ || !decoding.open()) break;
       try {
         decoding.take(message);

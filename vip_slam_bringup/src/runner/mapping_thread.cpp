@@ -1,5 +1,6 @@
 #include "vip_slam_bringup/runner/mapping_thread.h"
 
+#include <optional>
 #include <utility>
 
 namespace vip_slam {
@@ -95,6 +96,8 @@ void MappingThread::finish() {
   work_.push([this] {
     const double t = back_end_->snapshot().keyframes.empty() ? 0 : back_end_->snapshot().keyframes.back().t;
     ScopedTimer timer(timing_, "mapping.finish", t);
+    // With their planes, which the last adjustment then uses.
+    if (const std::optional<MapUpdate> waited = back_end_->mapWaiting()) distribute(*waited);
     const MapUpdate update = back_end_->finish();
     distribute(update);
     if (update.global) adjustments_.push_back({t, update.keyframes.size(), timer.milliseconds()});

@@ -102,7 +102,9 @@ void Pipeline::process(const ImagePair& pair) {
   status_ = frame.status;
   if (states_.empty() || states_.back().status.state != frame.status.state)
     states_.push_back({frame.t, frame.status});
-  else if (frame.status.state == TrackingState::kInitialising)
+  else
+    ++states_.back().images;
+  if (frame.status.state == TrackingState::kInitialising)
     states_.back().status.reason = frame.status.reason;  // keep the newest reason for waiting
   if (hasPose(frame.status.state) && passes_.take(frame.t)) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});

@@ -1,6 +1,7 @@
 // Warnings for the user after a successful run.
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,33 @@ std::string missingPoses(const Pipeline& pipeline) {
 
 }  // namespace
 
+std::string otherStates(const std::vector<StateChange>& states) {
+  constexpr double kFew = 0.02;
+  const auto first = std::find_if(states.begin(), states.end(), posed);
+  std::map<TrackingState, std::size_t> images;
+  std::size_t all = 0;
+  const StateChange* worst = nullptr;
+  for (auto it = first; it != states.end(); ++it) {
+    all += it->images;
+    if (it->status.state == TrackingState::kTracking) continue;
+    images[it->status.state] += it->images;
+    if (!worst || it->images > worst->images) worst = &*it;
+  }
+  std::size_t others = 0;
+  std::string names;
+  for (const auto& [state, count] : images) {
+    others += count;
+    names += formatted("%s%s %.1f %%", names.empty() ? "" : ", ", trackingStateName(state),
+                       100.0 * double(count) / double(all));
+  }
+  if (double(others) <= kFew * double(all)) return "";
+  return formatted(
+      "%zu of %zu images after the first pose are not TRACKING: %s; the longest stretch begins %.1f s after "
+      "the first image (%s: %s)",
+      others, all, names.c_str(), worst->t - states.front().t, trackingStateName(worst->status.state),
+      worst->status.reason.c_str());
+}
+
 std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader) {
   std::vector<std::string> all = reader.warnings();
   const FrontEndCounters& c = pipeline.frontEnd().counters();
@@ -101,7 +129,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
                   " IMU messages are left out: not finite, all zero, not newer than the one before, or stamped later "
                   "than the next");
   if (pipeline.images() == 0) all.push_back("no image could be used");
-  for (const std::string& missing : {lateStart(pipeline), missingPoses(pipeline)})
+  for (const std::string& missing : {lateStart(pipeline), missingPoses(pipeline), otherStates(pipeline.states())})
     if (!missing.empty()) all.push_back(missing);
   if (c.imu_contradicted > 0)
     all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +

@@ -1,9 +1,12 @@
 // Converters on tiny generated folders: the bag's content, and the errors for unreadable folders.
 #include <unistd.h>
 
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
@@ -18,6 +21,7 @@
 
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_core/util/formatted.h"
 
 namespace fs = std::filesystem;
 
@@ -232,6 +236,7 @@ class TumConverter : public Converters {
     options_.folder = (root_ / name).string();
     options_.bag = bag_;
   }
+  std::string words_, warning_;  ///< of a conversion, the first each
   TumRgbdOptions options_;
 };
 
@@ -312,6 +317,58 @@ TEST_F(TumConverter, TheExifOrientationTurnsNothing) {
   EXPECT_EQ(color[0]->width, 640u);
 }
 
+TEST_F(TumConverter, TheUnitOfDepthIsGuessedAndNamed) {
+  makeFolder("room");
+  write("room/calibration.txt", "525 525 320 240\n");
+  const auto scaleOf = [&](double near, double far, double factor) {
+    cv::Mat depth(480, 640, CV_16UC1);
+    for (int v = 0; v < depth.rows; ++v)
+      depth.row(v).setTo(std::lround((near + (far - near) * v / depth.rows) * 1000) * (factor / 1000));
+    for (int i = 0; i < 4; ++i) writeImage("room/depth/" + std::to_string(i) + ".png", depth);
+    return [this] {
+      options_.overwrite = true;
+      const ConversionReport report = convertTumRgbd(options_);
+      words_ = report.notes.empty() ? "" : report.notes[0];
+      warning_ = report.warnings.empty() ? "" : report.warnings[0];
+      return 1 / loadSensorConfig((root_ / "out_sensor.yaml").string()).depth_scale;
+    }();
+  };
+  EXPECT_NEAR(scaleOf(0.5, 2, 1000), 1000, 1e-6);
+  EXPECT_NE(words_.find("depth: 1000 units per metre are guessed"), std::string::npos) << words_;
+  EXPECT_NEAR(scaleOf(0.5, 2, 5000), 5000, 1e-6);
+  EXPECT_NE(words_.find("depth: 5000 units per metre are guessed: the values are multiples of 5"), std::string::npos);
+  EXPECT_EQ(warning_, "");
+  EXPECT_NEAR(scaleOf(1, 5, 1000), 1000, 1e-6);
+  EXPECT_NE(warning_.find("--depth-factor says otherwise"), std::string::npos) << "not certain";
+  options_.depth_factor = 2000;
+  EXPECT_NEAR(scaleOf(1, 5, 1000), 2000, 1e-6);
+  EXPECT_EQ(words_ + warning_, "") << "as given";
+}
+
+TEST_F(TumConverter, StampsInNanosecondsAreReadAndOthersNameTheirLine) {
+  makeFolder("room");
+  write("room/calibration.txt", "525 525 320 240\n");
+  std::string rgb, depth;
+  for (int i = 0; i < 4; ++i) {
+    rgb += std::to_string(1403636579763555584LL + i * 33000000LL) + " rgb/" + std::to_string(i) + ".png\n";
+    depth += std::to_string(1403636579763555584LL + i * 33000000LL) + " depth/" + std::to_string(i) + ".png\n";
+  }
+  write("room/rgb.txt", rgb + rgb.substr(rgb.rfind("1403636")));  // public recordings repeat lines
+  write("room/depth.txt", depth);
+  write("room/groundtruth.txt", "1403636579763555584 0 0 0 0 0 0 1\n1403636579863555584 0 0 0 0 0 0 1\n");
+  write("room/imu.txt", "1403636579763555584 0 0 0 0 9.8 0\n1403636579768555584 0 0 0 0 9.8 0\n");
+  convertTumRgbd(options_);
+  const auto color = read<sensor_msgs::Image>("/camera/rgb/image_color");
+  ASSERT_EQ(color.size(), 4u);
+  EXPECT_NEAR(color[2]->header.stamp.toSec(), 1403636579.829555584, 1e-6);
+  EXPECT_NEAR(read<sensor_msgs::Imu>("/camera/imu")[1]->header.stamp.toSec(), 1403636579.768555584, 1e-6);
+  EXPECT_NEAR(readTum((root_ / "out_truth.tum").string())[1].t, 1403636579.863555584, 1e-6);
+  for (const char* file : {"out.bag", "out_sensor.yaml", "out_truth.tum"}) fs::remove(root_ / file);
+  write("room/rgb.txt", "-3 rgb/0.png\n1 rgb/1.png\n");
+  EXPECT_NE(errorOf([&] { convertTumRgbd(options_); }).find("rgb.txt:1: the stamp is -3 s, expected 0 to 4294967295"),
+            std::string::npos);
+}
+
 TEST_F(TumConverter, UnknownCameraAndBadRowsAreNamed) {
   makeFolder("kitchen");
   EXPECT_NE(errorOf([&] { convertTumRgbd(options_); }).find("no calibration"), std::string::npos);
@@ -322,6 +379,7 @@ TEST_F(TumConverter, UnknownCameraAndBadRowsAreNamed) {
             std::string::npos)
       << error;
   write("kitchen/imu.txt", "1305031102.1 0 0 0 0 9.8 0\n1305031102.11 0.1 0 0 0 9.8 0\n");
+  options_.depth_factor = 5000;
   EXPECT_TRUE(convertTumRgbd(options_).warnings.empty());
   EXPECT_EQ(loadSensorConfig((root_ / "out_sensor.yaml").string()).topics.imu, "/camera/imu");
   EXPECT_EQ(read<sensor_msgs::Imu>("/camera/imu").size(), 2u);
@@ -395,6 +453,98 @@ TEST_F(StrayConverter, ColourDepthAndSpecificForce) {
     // ARKit's up is y, ours is z.
     const Trajectory truth = readTum((root_ / "out_truth.tum").string());
     EXPECT_NEAR(truth.back().T_W_B.t().z() - truth.front().T_W_B.t().z(), 0.3, 1e-6);
+  }
+}
+
+/// Tells players to turn the video of an MP4 file by a quarter: the matrix of its track header.
+void setRotateFlag(const fs::path& path) {
+  std::string bytes;
+  {
+    std::ifstream in(path, std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  const auto header = bytes.find("tkhd");
+  ASSERT_NE(header, std::string::npos);
+  ASSERT_EQ(bytes[header + 4], 0) << "another version of the track header";
+  const std::int32_t one = 1 << 16, matrix[9] = {0, one, 0, -one, 0, 0, 240 * one, 0, 1 << 30};
+  for (int i = 0; i < 9; ++i)
+    for (int b = 0; b < 4; ++b)
+      bytes[header + 44 + 4 * i + b] = static_cast<char>(static_cast<std::uint32_t>(matrix[i]) >> (24 - 8 * b));
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+TEST_F(StrayConverter, AVideoWithARotateFlagIsTakenAsItIsStored) {
+  makeFolder(4, 1.0);
+  setRotateFlag(root_ / "rec/rgb.mp4");
+  cv::Mat turned;
+  ASSERT_TRUE(cv::VideoCapture((root_ / "rec/rgb.mp4").string()).read(turned));
+  if (turned.size() != cv::Size(240, 320)) GTEST_SKIP() << "this OpenCV does not know the flag";
+  const ConversionReport report = convertStray(options_);
+  ASSERT_EQ(report.warnings.size(), 1u);
+  EXPECT_NE(report.warnings[0].find("tells players to turn it by"), std::string::npos) << report.warnings[0];
+  const auto color = read<sensor_msgs::CompressedImage>("/phone/color/image_raw/compressed");
+  ASSERT_EQ(color.size(), 4u);
+  EXPECT_EQ(cv::imdecode(color[3]->data, cv::IMREAD_COLOR).size(), cv::Size(160, 120));
+}
+
+TEST_F(StrayConverter, AVideoOfAnotherShapeOrSizeIsNamed) {
+  makeFolder(4, 1.0);
+  write("rec/camera_matrix.csv", "500.0, 0.0, 319.5\n0.0, 500.0, 239.5\n0.0, 0.0, 1.0\n");
+  const std::string resized = errorOf([&] { convertStray(options_); });
+  EXPECT_NE(resized.find("pictures of 320x240, but the intrinsics (principal point 320, 240) are for pictures of about "
+                         "640x480: resized by hand?"),
+            std::string::npos)
+      << resized;
+  makeFolder(4, 1.0);
+  for (int i = 0; i < 4; ++i) writeImage(formatted("rec/depth/%06d.png", i), cv::Mat(32, 24, CV_16UC1, cv::Scalar(9)));
+  const std::string turned = errorOf([&] { convertStray(options_); });
+  EXPECT_NE(turned.find("pictures of 320x240 have another shape than the depth images of 24x32"), std::string::npos)
+      << turned;
+}
+
+TEST_F(StrayConverter, ImuRowsOutOfOrderAreSortedAndCounted) {
+  makeFolder(4, 1.0);
+  std::string imu = "timestamp, a_x, a_y, a_z, alpha_x, alpha_y, alpha_z\n";
+  for (const double t : {100.00, 100.02, 100.01, 100.03, 100.03, 100.04})
+    imu += formatted("%.6f, 0.0, -1.0, 0.0, %f, 0.02, 0.03\n", t, t - 100);
+  write("rec/imu.csv", imu);
+  const ConversionReport report = convertStray(options_);
+  ASSERT_EQ(report.warnings.size(), 2u);
+  EXPECT_NE(report.warnings[0].find("imu.csv: 1 of 6 rows come late and are sorted"), std::string::npos);
+  EXPECT_NE(report.warnings[1].find("imu.csv: 1 of 6 rows repeat a stamp and are left out"), std::string::npos);
+  const auto samples = read<sensor_msgs::Imu>("/phone/imu");
+  ASSERT_EQ(samples.size(), 5u);
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(samples[i]->angular_velocity.x, 0.01 * i, 1e-6);
+}
+
+TEST_F(StrayConverter, FocalLengthsDifferFromRowToRow) {
+  makeFolder(4, 1.0);
+  // A bright square at about the same bearing in all pictures, while the focal length grows.
+  cv::VideoWriter video((root_ / "rec/rgb.mp4").string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 30, {320, 240});
+  std::string odometry = "timestamp, frame, x, y, z, qx, qy, qz, qw, fx, fy, cx, cy\n";
+  std::vector<Eigen::Vector2d> bearings;
+  for (int i = 0; i < 4; ++i) {
+    const double f = 250 + 5 * i;
+    cv::Mat picture(240, 320, CV_8UC3, cv::Scalar(20, 20, 20));
+    const int u = static_cast<int>(std::lround(159.5 + 0.4 * f)), v = static_cast<int>(std::lround(119.5 - 0.2 * f));
+    picture(cv::Rect(u - 8, v - 8, 17, 17)).setTo(cv::Scalar(230, 230, 230));
+    video.write(picture);
+    bearings.emplace_back((u - 159.5) / f, (v - 119.5) / f);
+    odometry += formatted("%.6f, %06d, 0, 0, 0, 0, 0, 0, 1, %f, %f, 159.5, 119.5\n", 100 + i / 30.0, i, f, f);
+  }
+  video.release();
+  write("rec/odometry.csv", odometry);
+  options_.width = 320;
+  convertStray(options_);
+  const auto infos = read<sensor_msgs::CameraInfo>("/phone/color/camera_info");
+  const auto pictures = read<sensor_msgs::CompressedImage>("/phone/color/image_raw/compressed");
+  ASSERT_EQ(infos.size(), 4u);
+  ASSERT_EQ(pictures.size(), 4u);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(infos[i]->K[0], 265, 1e-6);  // the longest
+    const cv::Moments m = cv::moments(cv::imdecode(pictures[i]->data, cv::IMREAD_GRAYSCALE) > 128, true);
+    EXPECT_NEAR(m.m10 / m.m00, 159.5 + 265 * bearings[i].x(), 0.6) << i;
+    EXPECT_NEAR(m.m01 / m.m00, 119.5 + 265 * bearings[i].y(), 0.6) << i;
   }
 }
 

@@ -156,6 +156,37 @@ class Report : public testing::Test {
   double rmse_ = 0;
 };
 
+/// Along a straight line with errors of 5 mm across it the positions say nothing of the turn about the line.
+TEST_F(Report, OrientationsOnAStraightPathAreComparedByYaw) {
+  const auto rotationOf = [&](double wobble, double tilt, std::string* aligned_by) {
+    std::ofstream trajectory(dir_ / "trajectory.tum"), truth(dir_ / "truth.tum");
+    char line[200];
+    for (int i = 0; i < 400; ++i) {
+      const double t = 1000 + 0.05 * i, x = 0.01 * i, side = wobble * std::sin(0.5 * i),
+                   turn = 0.0087;  // half a degree
+      std::snprintf(line, sizeof line, "%.3f %.9f 0 1 0 0 0 1\n", t, x);
+      truth << line;
+      // Half a degree off about z, for half of the way to either side; the world is tilted about x.
+      const double yaw = i < 200 ? turn : -turn;
+      std::snprintf(line, sizeof line, "%.3f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", t, x, side * std::cos(0.3 * i),
+                    1 + side, std::sin(tilt / 2) * std::cos(yaw / 2), -std::sin(tilt / 2) * std::sin(yaw / 2),
+                    std::cos(tilt / 2) * std::sin(yaw / 2), std::cos(tilt / 2) * std::cos(yaw / 2));
+      trajectory << line;
+    }
+    trajectory.close(), truth.close();
+    const Outcome outcome = run("--out-dir " + dir_.string() + " --truth " + (dir_ / "truth.tum").string());
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    const YAML::Node data = dataOf(slurp(dir_ / "report.html"));
+    *aligned_by = data["error"]["rotation_aligned_by"].as<std::string>();
+    return data["error"]["rotation_rmse"].as<double>();
+  };
+  std::string aligned_by;
+  EXPECT_NEAR(rotationOf(0.005, 0, &aligned_by), 0.5, 0.05);
+  EXPECT_EQ(aligned_by, "yaw");
+  EXPECT_NEAR(rotationOf(0.005, 0.4, &aligned_by), 0.5, 0.05) << "worlds that are not level with each other";
+  EXPECT_EQ(aligned_by, "orientations");
+}
+
 TEST_F(Report, HoldsTheRunsNumbersInOneFile) {
   const Outcome outcome = run("--out-dir " + dir_.string() + " --truth " + (dir_ / "truth.tum").string() +
                               " --planes-truth " + (dir_ / "planes_truth.yaml").string());
@@ -167,6 +198,7 @@ TEST_F(Report, HoldsTheRunsNumbersInOneFile) {
   const YAML::Node data = dataOf(html);
   EXPECT_NEAR(data["error"]["ate"].as<double>(), rmse_, 2e-4);
   EXPECT_LT(data["error"]["rotation_rmse"].as<double>(), 0.5);
+  EXPECT_EQ(data["error"]["rotation_aligned_by"].as<std::string>(), "positions");
   EXPECT_EQ(data["error"]["count"].as<int>(), 1200);
   EXPECT_EQ(data["plane_report"]["matched"].as<int>(), 6);
   EXPECT_EQ(data["plane_report"]["true_count"].as<int>(), 7);

@@ -53,6 +53,40 @@ class BagReaderTest : public testing::Test {
       (fs::temp_directory_path() / ("vip_slam_bag_reader_" + std::to_string(::getpid()) + ".bag")).string();
 };
 
+TEST_F(BagReaderTest, ARecordingSplitOverBagsGivesTheSameEvents) {
+  test_support::writeDriverBag(bag_, options_);
+  const std::string parts[] = {bag_ + "_0.bag", bag_ + "_1.bag", bag_ + "_2.bag"};
+  {
+    const BagSet whole({bag_});
+    rosbag::Bag early(parts[0], rosbag::bagmode::Write), imu(parts[1], rosbag::bagmode::Write),
+        late(parts[2], rosbag::bagmode::Write);
+    const auto view = whole.view();
+    const ros::Time half = view->getBeginTime() + ros::Duration(2.5);
+    for (const auto& message : *view) {
+      rosbag::Bag& part = message.getTime() < half                           ? early
+                          : message.getTopic() == options_.sensor.topics.imu ? imu
+                                                                             : late;
+      part.write(message.getTopic(), message.getTime(), message);
+    }
+  }
+  const auto stampsOf = [&](const std::vector<std::string>& bags) {
+    SensorConfig sensor = options_.sensor;
+    BagReader reader(BagSet(bags), sensor);
+    std::vector<double> stamps;
+    reader.start();
+    while (const auto event = reader.next()) {
+      if (const auto* pair = std::get_if<ImagePair>(&*event)) stamps.push_back(pair->t);
+      if (const auto* sample = std::get_if<ImuSample>(&*event)) stamps.push_back(sample->t);
+    }
+    return stamps;
+  };
+  const std::vector<double> whole = stampsOf({bag_});
+  EXPECT_GT(whole.size(), 100u);
+  EXPECT_EQ(stampsOf({parts[2], parts[0], parts[1]}), whole);
+  EXPECT_EQ(stampsOf({bag_ + "_?.bag"}), whole);
+  for (const std::string& part : parts) fs::remove(part);
+}
+
 TEST_F(BagReaderTest, WhereTheClockRanBackTheOdometryStartsAnewAndTheMapGoesOn) {
   options_.late_jump = -100;  // a second recording, joined to the first
   test_support::writeDriverBag(bag_, options_);

@@ -122,7 +122,8 @@ void readTopics(Section topics, SensorTopics* config) {
 }
 
 void readColor(Section color, SensorConfig* config) {
-  color.choice("encoding", config->color_encoding, {"rgb8", "bgr8", "mono8", "rgba8", "bgra8", "yuv422", "compressed"});
+  color.choice("encoding", config->color_encoding,
+               {"rgb8", "bgr8", "mono8", "mono16", "rgba8", "bgra8", "yuv422", "compressed"});
   color.number("rate", config->color_rate, 0.1, 1000);
   color.number("rolling_shutter", config->rolling_shutter, 0, 0.1, false);
   color.finish();
@@ -157,11 +158,11 @@ void readDepth(Section depth, SensorConfig* config) {
 }
 
 /// To be called after topics and depth, which determine the keys required here.
-void readCameras(Section* root, SensorConfig* config) {
+void readCameras(Section* root, SensorConfig* config, std::vector<std::string>* notes) {
   root->get("intrinsics_from_camera_info", config->intrinsics_from_camera_info);
   if (root->has("camera")) config->camera = cameraFrom(root->section("camera"));
   if (root->has("depth_camera")) config->depth_camera = cameraFrom(root->section("depth_camera"));
-  root->pose("T_color_depth", config->T_color_depth, !config->depth_registered);
+  root->pose("T_color_depth", config->T_color_depth, notes, !config->depth_registered);
   const bool own_depth = !config->depth_registered && !config->topics.depth.empty();
   if (config->intrinsics_from_camera_info) {
     if (config->topics.color_info.empty())
@@ -175,8 +176,8 @@ void readCameras(Section* root, SensorConfig* config) {
     const std::string depth_wrong = config->depth_registered ? "" : config->depth_camera.validate();
     if (!depth_wrong.empty()) throw std::runtime_error("depth_camera: " + depth_wrong);
   }
-  root->pose("T_imu_cam", config->T_imu_cam, config->topics.hasInertial());
-  root->pose("T_base_imu", config->T_base_imu, false);
+  root->pose("T_imu_cam", config->T_imu_cam, notes, config->topics.hasInertial());
+  root->pose("T_base_imu", config->T_base_imu, notes, false);
 }
 
 /// To be called after topics: figures of a stream that does not exist may be left out.
@@ -224,14 +225,14 @@ void readMask(Section* root, const std::filesystem::path& folder, SensorConfig* 
   if (!config->intrinsics_from_camera_info && !problem.empty()) throw std::runtime_error(problem);
 }
 
-SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& folder) {
+SensorConfig configFrom(const YAML::Node& node, const std::filesystem::path& folder, std::vector<std::string>* notes) {
   SensorConfig config;
   Section root(node, "");
   root.get("name", config.name);
   readTopics(root.section("topics"), &config.topics);
   readColor(root.section("color"), &config);
   readDepth(root.section("depth"), &config);
-  readCameras(&root, &config);
+  readCameras(&root, &config, notes);
   if (config.topics.hasInertial() || root.has("imu")) readImu(root.section("imu"), &config);
   readDepthNoise(root.section("depth_noise"), &config.depth_noise);
   readMask(&root, folder, &config);
@@ -250,6 +251,11 @@ std::string maskProblem(const SensorConfig& config, int width, int height) {
 }
 
 SensorConfig loadSensorConfig(const std::string& path) {
+  std::vector<std::string> unused;
+  return loadSensorConfig(path, &unused);
+}
+
+SensorConfig loadSensorConfig(const std::string& path, std::vector<std::string>* notes) {
   YAML::Node root;
   try {
     root = YAML::LoadFile(path);
@@ -259,7 +265,10 @@ SensorConfig loadSensorConfig(const std::string& path) {
     throw std::runtime_error(path + ": line " + std::to_string(error.mark.line + 1) + ": " + error.msg);
   }
   try {
-    return configFrom(root, std::filesystem::path(path).parent_path());
+    std::vector<std::string> found;
+    const SensorConfig config = configFrom(root, std::filesystem::path(path).parent_path(), &found);
+    for (const std::string& note : found) notes->push_back(path + ": " + note);
+    return config;
   } catch (const std::exception& error) {
     throw std::runtime_error(path + ": " + error.what());
   }

@@ -9,6 +9,7 @@
 
 #include "util/text.h"
 #include "vip_slam_core/util/atomic_file.h"
+#include "vip_slam_core/util/stamp_unit.h"
 
 namespace vip_slam {
 namespace {
@@ -51,6 +52,11 @@ Trajectory readTum(const std::string& path) {
                                formatDouble(trajectory.back().t) + ", expected ascending times");
     }
     trajectory.push_back(pose);
+  }
+  if (!trajectory.empty()) {
+    const double unit = secondsPerUnit(trajectory.front().t, trajectory.back().t, trajectory.size());
+    if (unit != 1.0)
+      for (StampedPose& pose : trajectory) pose.t *= unit;
   }
   if (file.bad()) throw std::runtime_error(path + ": reading failed, expected a text file");
   return trajectory;

@@ -89,13 +89,15 @@ class Section {
       }
     }
   }
-  void pose(const std::string& key, SE3& T, bool required = true) {
+  /// `notes` receives that a rounded rotation was made exact.
+  void pose(const std::string& key, SE3& T, std::vector<std::string>* notes, bool required = true) {
     if (!required && !has(key)) return;
     Eigen::Matrix4d M;
     matrix(key, M);
-    const std::string problem = rigidProblem(M);
-    if (!problem.empty()) throw std::runtime_error(full(key) + ": not a rigid transform: " + problem);
-    T = SE3(M);
+    const RigidTransform rigid = rigidTransform(M);
+    if (!rigid.problem.empty()) throw std::runtime_error(full(key) + ": not a rigid transform: " + rigid.problem);
+    if (!rigid.note.empty()) notes->push_back(full(key) + ": " + rigid.note);
+    T = rigid.T;
   }
   void finish() const {
     for (const auto& entry : node_)

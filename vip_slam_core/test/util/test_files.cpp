@@ -65,6 +65,21 @@ TEST_F(FileFormats, TumRoundTrip) {
   EXPECT_EQ(readTum(path("spaces.tum")).size(), 2u);
 }
 
+TEST_F(FileFormats, TumStampsInOtherUnitsAreSeconds) {
+  const auto second = [&](const std::string& a, const std::string& b) {
+    write("units.tum", a + " 1 2 3 0 0 0 1\n" + b + " 1 2 3 0 0 0 1\n");
+    const Trajectory read = readTum(path("units.tum"));
+    EXPECT_EQ(read.size(), 2u);
+    return read.back().t;
+  };
+  EXPECT_NEAR(second("1403636579763555584", "1403636579863555584"), 1403636579.863555584, 1e-6);
+  EXPECT_NEAR(second("1403636579763555", "1403636579863555"), 1403636579.863555, 1e-6);
+  EXPECT_NEAR(second("1403636579763", "1403636579863"), 1403636579.863, 1e-6);
+  EXPECT_EQ(second("1403636579.5", "1403636580.25"), 1403636580.25);
+  EXPECT_NEAR(second("0", "33000000"), 0.033, 1e-12);  // from the start of the recording
+  EXPECT_EQ(second("0", "600"), 600);
+}
+
 TEST_F(FileFormats, TumErrorsNameTheLine) {
   const auto refused = [&](const std::string& content, const std::string& what) {
     write("bad.tum", content);

@@ -1,20 +1,46 @@
 // rosrun vip_slam_eval evaluate --truth T.tum --estimate E.tum [--planes-truth TP.yaml --planes P.yaml] [--out DIR]
 #include <iostream>
 
+#include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_core/util/command_line.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_eval/io/trajectory_source.h"
+#include "vip_slam_eval/io/trajectory_text.h"
 #include "vip_slam_eval/report/evaluation.h"
+
+namespace {
+
+/// A truth whose quaternions stand in the other order than its format's is read again in that order, and named.
+void mendQuaternions(const std::string& path, vip_slam::EvaluationInput* input) {
+  using vip_slam::kDegree;
+  const auto scalar_first = vip_slam::scalarFirst(path);
+  if (!scalar_first) return;
+  const vip_slam::Trajectory reread = vip_slam::rereadQuaternions(input->truth, !*scalar_first);
+  const vip_slam::QuaternionOrder order =
+      vip_slam::quaternionOrder(input->truth, reread, input->estimate, input->time_offset, input->max_gap);
+  if (!order.swapped) return;
+  input->truth = reread;
+  std::cerr << vip_slam::formatted(
+      "evaluate: warning: %s: quaternions are read as %s, not as %s as its format has them: turns of %.1f degrees fit "
+      "the estimate's to %.1f degrees then, otherwise to %.1f (the same is seen when the estimate's are in the wrong "
+      "order)\n",
+      path.c_str(), *scalar_first ? "qx qy qz qw" : "qw qx qy qz", *scalar_first ? "qw qx qy qz" : "qx qy qz qw",
+      order.turning / kDegree, order.misfit_swapped / kDegree, order.misfit / kDegree);
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace vip_slam;
   CommandLine line("evaluate", "Judges a trajectory, and a plane map, against ground truth.");
   EvaluationInput input;
-  std::string truth, truth_topic, estimate, estimate_topic, covariance, true_planes, planes, points, out;
+  std::string truth, truth_topic, truth_times, estimate, estimate_topic, covariance, true_planes, planes, points, out;
   std::string alignment = "yaw";
-  line.option("truth", truth, "true trajectory: TUM file or bag");
+  line.option("truth", truth, "true trajectory: TUM, EuRoC's csv, KITTI's poses (with --truth-times) or bag");
   line.required("truth");
   line.option("truth-topic", truth_topic, "topic of the truth in a bag with several");
+  line.option("truth-times", truth_times, "stamps in seconds, one in a line for each of KITTI's poses");
   line.option("estimate", estimate, "estimated trajectory: TUM file or bag");
   line.required("estimate");
   line.option("estimate-topic", estimate_topic, "topic of the estimate in a bag with several");
@@ -38,8 +64,9 @@ int main(int argc, char** argv) {
   try {
     input.alignment = alignmentFromName(alignment);
     if (input.title.empty()) input.title = estimate;
-    input.truth = readTrajectory(truth, truth_topic);
+    input.truth = readTrajectory(truth, truth_topic, nullptr, truth_times);
     input.estimate = readTrajectory(estimate, estimate_topic, &input.covariances);
+    mendQuaternions(truth, &input);
     if (!covariance.empty()) input.covariances = readCovariances(covariance, input.estimate);
     if (!true_planes.empty()) input.true_planes = readTruePlanesYaml(true_planes);
     if (!planes.empty()) input.planes = readPlanesYaml(planes);

@@ -10,6 +10,7 @@
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 
+#include "vip_slam_eval/io/trajectory_text.h"
 #include "vip_slam_ros/bag_files.h"
 
 namespace vip_slam {
@@ -91,11 +92,11 @@ Trajectory readBag(const std::string& path, const std::string& wanted, std::vect
 }  // namespace
 
 Trajectory readTrajectory(const std::string& path, const std::string& topic,
-                          std::vector<PoseWithCovariance>* covariances) {
+                          std::vector<PoseWithCovariance>* covariances, const std::string& times) {
   const bool is_bag = path.size() > 4 && path.compare(path.size() - 4, 4, ".bag") == 0;
   Trajectory trajectory;
   if (!is_bag) {
-    trajectory = readTum(path);
+    trajectory = readTextTrajectory(path, times);
   } else {
     try {
       trajectory = readBag(path, topic, covariances);

@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <sstream>
 
 #include <nav_msgs/Odometry.h>
@@ -14,6 +16,7 @@
 #include "vip_slam_core/testing/analytic_motion.h"
 #include "vip_slam_core/types/planes_yaml.h"
 #include "vip_slam_eval/io/trajectory_source.h"
+#include "vip_slam_eval/io/trajectory_text.h"
 
 namespace vip_slam {
 namespace {
@@ -159,6 +162,80 @@ TEST_F(EvaluateCommand, ReadsBagsWithCovariances) {
 
   fs::resize_file(path("run.bag"), fs::file_size(path("run.bag")) / 2);
   expectRefused("--truth " + path("truth.tum") + " --estimate " + path("run.bag"), "run.bag");
+}
+
+TEST_F(EvaluateCommand, ReadsEurocAndKittiTruth) {
+  std::ofstream csv(path("data.csv")), kitti(path("poses.txt")), times(path("times.txt"));
+  csv << "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n";
+  for (const StampedPose& pose : truth_) {
+    const Eigen::Vector3d& p = pose.T_W_B.t();
+    const Eigen::Quaterniond& q = pose.T_W_B.rotation();
+    csv << std::llround((pose.t + 1.4e9) * 1e9) << std::setprecision(12) << "," << p.x() << "," << p.y() << "," << p.z()
+        << "," << q.w() << "," << q.x() << "," << q.y() << "," << q.z() << ",0,0,0\n";
+    const Eigen::Matrix<double, 3, 4> T = pose.T_W_B.matrix().topRows<3>();
+    kitti << std::setprecision(7);
+    for (int k = 0; k < 12; ++k) kitti << (k ? " " : "") << T(k / 4, k % 4);
+    kitti << "\n";
+    times << std::setprecision(12) << pose.t << "\n";
+  }
+  csv.close(), kitti.close(), times.close();
+  const std::string estimate = " --estimate " + path("estimate.tum");
+  const std::string expected = "\"ATE, position and yaw aligned\",position rmse,0.01999";
+  ASSERT_EQ(run("--truth " + path("data.csv") + estimate + " --time-offset 1.4e9 --out " + path("a")), 0) << error_;
+  EXPECT_NE(text(path("a/metrics.csv")).find(expected), std::string::npos) << text(path("a/metrics.csv"));
+  EXPECT_EQ(error_, "") << "the order is right";
+  ASSERT_EQ(
+      run("--truth " + path("poses.txt") + " --truth-times " + path("times.txt") + estimate + " --out " + path("b")), 0)
+      << error_;
+  EXPECT_NE(text(path("b/metrics.csv")).find(expected), std::string::npos) << text(path("b/metrics.csv"));
+  EXPECT_EQ(error_, "");
+
+  expectRefused("--truth " + path("poses.txt") + estimate, "poses.txt: KITTI poses have no stamps");
+  expectRefused("--truth " + path("truth.tum") + " --truth-times " + path("times.txt") + estimate, "times.txt");
+  std::ofstream(path("times.txt"), std::ios::app) << "1e6\n";
+  expectRefused("--truth " + path("poses.txt") + " --truth-times " + path("times.txt") + estimate,
+                "times.txt: 2002 stamps, expected 2001");
+  std::ofstream(path("seven.txt")) << "# t\n1 0 0 0 0 0 0\n";
+  expectRefused("--truth " + path("seven.txt") + estimate, "seven.txt:2: 7 numbers between blanks, expected 8");
+  std::ofstream(path("short.csv")) << "1403636579763555584,0,0,0,1,0,0,0\n1403636579763555584,0,0,0,1,0,0,0\n";
+  expectRefused("--truth " + path("short.csv") + estimate, "short.csv:2: the stamp");
+  std::ofstream(path("skewed.txt")) << "1 0 0 0 0 1 0.5 0 0 0 1 0\n";
+  std::ofstream(path("one.txt")) << "1\n";
+  expectRefused("--truth " + path("skewed.txt") + " --truth-times " + path("one.txt") + estimate,
+                "skewed.txt:1: its first three columns are no rotation");
+}
+
+TEST_F(EvaluateCommand, QuaternionsInTheOtherOrderAreReadSoAndNamed) {
+  std::ofstream tum(path("w_first.tum")), csv(path("w_last.csv"));
+  tum << std::setprecision(12), csv << std::setprecision(12);
+  for (const StampedPose& pose : truth_) {
+    const Eigen::Vector3d& p = pose.T_W_B.t();
+    const Eigen::Quaterniond& q = pose.T_W_B.rotation();
+    tum << pose.t << " " << p.transpose() << " " << q.w() << " " << q.x() << " " << q.y() << " " << q.z() << "\n";
+    csv << pose.t << "," << p.x() << "," << p.y() << "," << p.z() << "," << q.x() << "," << q.y() << "," << q.z() << ","
+        << q.w() << "\n";
+  }
+  tum.close(), csv.close();
+  // The estimate's body is another one, turned against the truth's.
+  Trajectory turned = estimate_;
+  for (StampedPose& pose : turned)
+    pose.T_W_B = pose.T_W_B * SE3(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d::Zero());
+  writeTum(path("turned.tum"), turned);
+  for (const std::string estimate : {"estimate.tum", "turned.tum"}) {
+    ASSERT_EQ(run("--truth " + path("w_first.tum") + " --estimate " + path(estimate)), 0) << error_;
+    EXPECT_NE(error_.find("w_first.tum: quaternions are read as qw qx qy qz"), std::string::npos) << error_;
+    ASSERT_EQ(run("--truth " + path("w_last.csv") + " --estimate " + path(estimate)), 0) << error_;
+    EXPECT_NE(error_.find("w_last.csv: quaternions are read as qx qy qz qw"), std::string::npos) << error_;
+    ASSERT_EQ(run("--truth " + path("truth.tum") + " --estimate " + path(estimate)), 0) << error_;
+    EXPECT_EQ(error_, "");
+  }
+  const Trajectory read = rereadQuaternions(readTextTrajectory(path("w_first.tum")), true);
+  const Trajectory last = rereadQuaternions(readTextTrajectory(path("w_last.csv")), false);
+  ASSERT_EQ(read.size(), truth_.size());
+  for (std::size_t k = 0; k < truth_.size(); k += 100) {
+    EXPECT_LT(read[k].T_W_B.boxminus(truth_[k].T_W_B).norm(), 1e-9);
+    EXPECT_LT(last[k].T_W_B.boxminus(truth_[k].T_W_B).norm(), 1e-9);
+  }
 }
 
 TEST_F(EvaluateCommand, RefusesBadInputInOneLine) {

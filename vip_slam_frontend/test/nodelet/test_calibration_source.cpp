@@ -106,6 +106,32 @@ TEST_F(CalibrationSourceTest, OneFrameForImageAndImuSaysNothingOfTheirPlaces) {
   EXPECT_FALSE(demanding.resolve(100));
 }
 
+TEST_F(CalibrationSourceTest, ACameraFarFromItsImuIsAnErrorWhereverItIsSaid) {
+  connect(tf_, "base_link", "imu", 0.1);
+  connect(tf_, "base_link", "camera", 25.1);  // millimetres
+  const auto resolve = [&](const SensorConfig& given, std::string* why) {
+    CalibrationSource source(given, options_, tf_);
+    source.addImuFrame("imu");
+    source.addColorFrame("camera");
+    const bool resolved = bool(source.resolve(100));
+    *why = source.waitingFor();
+    return resolved;
+  };
+  std::string why;
+  EXPECT_FALSE(resolve(sensor(), &why));
+  EXPECT_NE(why.find("the camera is 25.00 m from the IMU, expected 1 m at most (max_lever_arm)"), std::string::npos)
+      << why;
+  options_.input.max_lever_arm = 30;
+  EXPECT_TRUE(resolve(sensor(), &why));
+  options_ = FrontEndNodeOptions();
+  options_.extrinsics = "config";
+  SensorConfig far = sensor();
+  EXPECT_TRUE(resolve(far, &why));
+  far.T_imu_cam.t().x() = 1.2;
+  EXPECT_FALSE(resolve(far, &why));
+  EXPECT_NE(why.find("the camera is 1.20 m from the IMU"), std::string::npos) << why;
+}
+
 TEST_F(CalibrationSourceTest, TfMayComeALittleAfterTheFrames) {
   CalibrationSource source(sensor(), options_, tf_);
   source.addImuFrame("imu");

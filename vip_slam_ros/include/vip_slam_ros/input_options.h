@@ -10,6 +10,7 @@ struct InputOptions {
   double depth_patience = 0.15;
   double imu_patience = 0.5;
   double time_jump = 1.0;
+  double max_lever_arm = 1.0;
 
   void visit(OptionVisitor& v) {
     v.field("pair_tolerance", pair_tolerance, 0.0, 0.5, "largest difference between colour and depth stamps, s");
@@ -19,6 +20,8 @@ struct InputOptions {
             "an image waits for the IMU to cover its stamp until other data is this much newer, s");
     v.field("time_jump", time_jump, 0.1, 60.0,
             "stamps this much older than the newest restart the odometry (looping bag), s");
+    v.field("max_lever_arm", max_lever_arm, 0.01, 100.0,
+            "a camera farther than this from the IMU is an error of the extrinsics, m");
   }
 };
 

@@ -24,6 +24,9 @@ std::optional<SE3> lookUpExtrinsics(const tf2::BufferCore& buffer, const std::st
 /// Why lookUpExtrinsics() is empty, in words.
 std::string whyNoExtrinsics(const std::string& imu_frame, const std::string& camera_frame);
 
+/// Why a camera that far from its IMU is not believed, in words; empty when it is within `most` metres.
+std::string leverArmProblem(const SE3& T_imu_cam, double most);
+
 /// Difference of two camera-IMU extrinsics.
 struct ExtrinsicsGap {
   double degrees = 0, metres = 0;

@@ -32,6 +32,28 @@ TEST(CameraInfo, BothWays) {
   EXPECT_EQ(back.distortion, intrinsics.distortion);
 }
 
+TEST(CameraInfo, WhereKIsZeroPIsUsedAndSaid) {
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  EXPECT_THROW(intrinsicsFromCameraInfo(info), std::invalid_argument);
+  EXPECT_EQ(cameraInfoNote(info), "");
+  info.P = {500, 0, 321, 0, 0, 501, 239, 0, 0, 0, 1, 0};
+  const CameraIntrinsics camera = intrinsicsFromCameraInfo(info, "/camera/image_raw");
+  EXPECT_EQ(camera.fx, 500);
+  EXPECT_EQ(camera.cx, 321);
+  EXPECT_EQ(camera.fy, 501);
+  EXPECT_EQ(camera.cy, 239);
+  EXPECT_EQ(cameraInfoNote(info), "K is zero, P is used instead");
+  info.distortion_model = "plumb_bob";
+  info.D = {0.1, 0, 0, 0, 0};
+  EXPECT_EQ(intrinsicsFromCameraInfo(info).distortion.front(), 0.1);
+  EXPECT_NE(cameraInfoNote(info).find("though D has a distortion"), std::string::npos);
+  info.K = {600, 0, 320, 0, 600, 240, 0, 0, 1};
+  EXPECT_EQ(intrinsicsFromCameraInfo(info).fx, 600);
+  EXPECT_EQ(cameraInfoNote(info), "");
+}
+
 TEST(CameraInfo, ZeroCoefficientsLeaveAFisheyeAFisheye) {
   sensor_msgs::CameraInfo info;
   info.width = 640;

@@ -1,4 +1,5 @@
 // Every encoding that a driver may send gives the same gray or depth image; unreadable ones are named in the error.
+#include <cstdint>
 #include <cstring>
 #include <stdexcept>
 
@@ -9,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_core/depth/rvl.h"
 #include "vip_slam_ros/image_decoding.h"
 
 namespace vip_slam {
@@ -59,6 +61,34 @@ TEST(DecodeGray, ColourEncodingsAgree) {
   cv::Mat deep;
   gray.convertTo(deep, CV_16UC1, 257);  // white is 65535
   EXPECT_EQ(difference(decodeGray(toImage(deep, "mono16")), gray), 0);
+}
+
+TEST(DecodeGray, SixteenBitGreyIsScaledByWhatItFills) {
+  cv::Mat gray;
+  cv::cvtColor(picture(), gray, cv::COLOR_BGR2GRAY);
+  gray.at<std::uint8_t>(0, 0) = 255;
+  for (const int bits : {8, 10, 12, 14, 16}) {
+    cv::Mat deep;
+    gray.convertTo(deep, CV_16UC1, ((1 << bits) - 1) / 255.0);
+    GrayDecoder decoder;
+    EXPECT_LE(difference(decoder(toImage(deep, "mono16")), gray), 1) << bits;
+    EXPECT_EQ(decoder.bits(), bits);
+    EXPECT_EQ(decoder.note().empty(), bits == 16) << decoder.note();
+    sensor_msgs::CompressedImage png;
+    png.format = "mono16; png compressed ";
+    cv::imencode(".png", deep, png.data);
+    EXPECT_LE(difference(GrayDecoder()(png), gray), 1) << bits;
+  }
+  // A darker image after that keeps the scale: its greys are not stretched.
+  cv::Mat deep;
+  gray.convertTo(deep, CV_16UC1, 1023 / 255.0);
+  GrayDecoder decoder;
+  decoder(toImage(deep, "mono16"));
+  EXPECT_LE(difference(decoder(toImage(cv::Mat(deep / 8), "mono16")), gray / 8), 1);
+  EXPECT_EQ(decoder.bits(), 10);
+  decoder(toImage(gray, "mono8"));
+  EXPECT_EQ(decoder.note(), "16-bit grey fills 10 bits, which are taken for the whole range");
+  EXPECT_EQ(GrayDecoder().note(), "");
 }
 
 TEST(DecodeGray, UnnamedChannelsAreTakenForBlueGreenRed) {
@@ -220,6 +250,52 @@ TEST(DecodeDepth, QuantisedInverseDepth) {
   image.data.insert(image.data.end(), png.begin(), png.end());
   const cv::Mat depth = decodeDepth(image, 0.001);
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(depth.at<float>(i / 2, i % 2), z[i], 1e-4);
+}
+
+/// As compressed_depth_image_transport sends it: its header, then columns and rows, then the pixels.
+sensor_msgs::CompressedImage rvlImage(const cv::Mat& values, const std::string& encoding, float a, float b) {
+  sensor_msgs::CompressedImage image;
+  image.format = encoding + "; compressedDepth rvl";
+  image.data.assign(20, 0);
+  const std::int32_t size[2] = {values.cols, values.rows};
+  std::memcpy(&image.data[4], &a, 4);
+  std::memcpy(&image.data[8], &b, 4);
+  std::memcpy(&image.data[12], size, 8);
+  const std::vector<std::uint8_t> pixels = encodeRvl(values);
+  image.data.insert(image.data.end(), pixels.begin(), pixels.end());
+  return image;
+}
+
+TEST(DecodeDepth, RvlIsReadAsPngIs) {
+  const cv::Mat units = depthUnits();
+  cv::Mat metres;
+  units.convertTo(metres, CV_32FC1, 0.001);
+  EXPECT_LT(difference(decodeDepth(rvlImage(units, "16UC1", 0, 0), 0.001), metres), 1e-6);
+  EXPECT_LT(difference(decodeDepth(rvlImage(units, "16UC1", 0, 0), 0.001, 0.02), depthToMetres(units, 0.001, 0.02)),
+            1e-6);
+  const float a = 1000, b = 20;
+  const cv::Mat values = (cv::Mat_<std::uint16_t>(2, 2) << 1020, 520, 270, 0);
+  const cv::Mat depth = decodeDepth(rvlImage(values, "32FC1", a, b), 0.001);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(depth.at<float>(i / 2, i % 2), i < 3 ? 1 << i : 0, 1e-4);
+
+  const auto refused = [](sensor_msgs::CompressedImage image, const std::string& words) {
+    try {
+      decodeDepth(image, 0.001);
+      ADD_FAILURE() << words;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  };
+  sensor_msgs::CompressedImage image = rvlImage(units, "16UC1", 0, 0);
+  image.data.resize(image.data.size() / 2);
+  refused(image, "the data end early");
+  image.data.resize(15);
+  refused(image, "no size before the RVL data");
+  image = rvlImage(units, "16UC1", 0, 0);
+  image.data[15] = 0x7f;  // two thousand million columns
+  refused(image, "no size before the RVL data");
+  image.format = "16UC1; compressedDepth";
+  refused(image, "neither PNG nor RVL");
 }
 
 TEST(DecodeDepth, NotANumberIsInvalid) {

@@ -1,6 +1,8 @@
 #include "vip_slam_sim/io/rgbd_folder.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -14,6 +16,7 @@
 #include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/size_text.h"
+#include "vip_slam_core/util/stamp_unit.h"
 
 namespace vip_slam {
 namespace {
@@ -27,9 +30,17 @@ std::vector<double> numbersOf(const fs::path& path, std::size_t expected) {
   std::ifstream in(path);
   if (!in) throw std::runtime_error(path.string() + ": cannot be read");
   std::vector<double> values;
-  for (double v; in >> v;) values.push_back(v);
-  if (values.size() != expected ||
-      !std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    std::istringstream words(line);
+    for (std::string word; words >> word;) {
+      char* end = nullptr;
+      values.push_back(std::strtod(word.c_str(), &end));
+      if (*end != '\0' || !std::isfinite(values.back()))
+        throw std::runtime_error(path.string() + ":" + std::to_string(number) + ": '" + word + "', expected a number");
+    }
+  }
+  if (values.size() != expected)
     throw std::runtime_error(path.string() + ": expected " + std::to_string(expected) + " numbers, found " +
                              std::to_string(values.size()));
   return values;
@@ -112,7 +123,12 @@ std::vector<std::pair<double, std::string>> readList(const fs::path& path) {
     if (!out.empty() && t == out.back().first) continue;  // some public recordings repeat lines
     if (!out.empty() && t < out.back().first)
       throw std::runtime_error(where + formatted("stamp %.6f does not follow %.6f", t, out.back().first));
+    if (!std::isfinite(t)) throw std::runtime_error(where + "the stamp is not finite");
     out.emplace_back(t, file);
+  }
+  if (!out.empty()) {
+    const double unit = secondsPerUnit(out.front().first, out.back().first, out.size());
+    for (auto& [t, file] : out) t *= unit;
   }
   return out;
 }
@@ -131,7 +147,6 @@ RgbdFolder openTum(const fs::path& folder) {
   for (const auto& [c, d] : pairInOrder(stampsOf(colour), stampsOf(depth), kMaxSkew))
     out.frames.push_back(
         {colour[c].first, depth[d].first, (folder / colour[c].second).string(), (folder / depth[d].second).string()});
-  out.depth_scale = 1.0 / 5000;
   return out;
 }
 
@@ -167,7 +182,25 @@ std::vector<std::pair<std::size_t, std::size_t>> pairInOrder(const std::vector<d
   return pairs;
 }
 
-RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registered) {
+namespace {
+
+/// The images of a TUM layout tell their unit; its own recordings have the data set's.
+DepthFactor factorOf(const RgbdFolder& folder, const std::string& path) {
+  constexpr std::size_t kLookedAt = 12;
+  if (fs::absolute(path + "/.").lexically_normal().parent_path().filename().string().find("freiburg") !=
+      std::string::npos)
+    return {5000, true, "the data set's own"};
+  std::vector<cv::Mat> images;
+  for (std::size_t i = 0; i < folder.frames.size(); i += std::max<std::size_t>(1, folder.frames.size() / kLookedAt)) {
+    const cv::Mat image = cv::imread(folder.frames[i].depth, cv::IMREAD_UNCHANGED);
+    if (image.type() == CV_16UC1) images.push_back(image);
+  }
+  return guessDepthFactor(images);
+}
+
+}  // namespace
+
+RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registered, double depth_factor) {
   if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": no such directory");
   const bool tum = fs::exists(fs::path(folder) / "rgb.txt");
   RgbdFolder out = tum ? openTum(folder) : openSevenScenes(folder, rate);
@@ -178,6 +211,12 @@ RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registere
   if (first.empty()) throw std::runtime_error(out.frames.front().colour + ": not an image");
   out.camera.width = first.cols;
   out.camera.height = first.rows;
+  if (depth_factor > 0) {
+    out.depth_scale = 1.0 / depth_factor;
+  } else if (tum) {
+    out.depth_guess = factorOf(out, folder);
+    out.depth_scale = 1.0 / out.depth_guess->units_per_metre;
+  }
   if (!tum && !registered) separateColour(&out);
   return out;
 }

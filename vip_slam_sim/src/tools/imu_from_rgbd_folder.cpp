@@ -29,7 +29,7 @@ struct Settings {
   std::vector<double> up;  ///< in the folder's world; empty: from the depth images
   std::vector<double> intrinsics;
   bool registered = false;
-  double rate = 30, spacing = 0;
+  double rate = 30, spacing = 0, depth_factor = 0;
   int iterations = 20, seed = 1;
   bool nominal_noise = false, refine = false, no_imu = false;
   ImuOptions imu;
@@ -159,6 +159,9 @@ int run(int argc, char** argv) {
   line.option("intrinsics", s.intrinsics, "fx fy cx cy [k1 k2 p1 p2 [k3]] of the colour camera", count<double>(4, 9));
   line.flag("registered", s.registered,
             "7-Scenes layout: depth, intrinsics and poses belong to the colour camera, not to one of its own");
+  line.option("depth-factor", s.depth_factor,
+              "depth units per metre; 0: 1000 in the 7-Scenes layout, 1000 or 5000 in TUM's, as the images tell",
+              between(0.0, 1e6));
   line.option("rate", s.rate, "images per second, where the folder has no stamps", between(1.0, 120.0));
   line.option("spacing", s.spacing,
               "seconds between spline knots; default: the widest that stays within the poses' jitter",
@@ -176,7 +179,11 @@ int run(int argc, char** argv) {
   if (s.name.empty())
     s.name = fs::path(s.folder).filename().empty() ? fs::path(s.folder).parent_path().filename().string()
                                                    : fs::path(s.folder).filename().string();
-  RgbdFolder folder = openRgbdFolder(s.folder, s.rate, s.registered);
+  RgbdFolder folder = openRgbdFolder(s.folder, s.rate, s.registered, s.depth_factor);
+  if (folder.depth_guess)
+    std::fprintf(stderr, "depth: %g units per metre are guessed%s: %s (--depth-factor says otherwise)\n",
+                 folder.depth_guess->units_per_metre, folder.depth_guess->certain ? "" : ", not for certain",
+                 folder.depth_guess->reason.c_str());
   if (!s.intrinsics.empty()) {
     if (s.intrinsics.size() != 4 && s.intrinsics.size() != 8 && s.intrinsics.size() != 9)
       throw std::runtime_error("--intrinsics: " + std::to_string(s.intrinsics.size()) +

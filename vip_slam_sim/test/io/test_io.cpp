@@ -213,6 +213,31 @@ TEST(Folder, DepthPastHalfAnIntervalStaysWithItsColour) {
   EXPECT_EQ(pairInOrder(colour, depth, 0.02), own);
 }
 
+TEST(Folder, TumStampsAndDepthAreInWhateverUnitTheFilesHave) {
+  const std::string path = scratch("units");
+  fs::create_directories(path);
+  cv::Mat depth(480, 640, CV_16UC1);
+  for (int v = 0; v < depth.rows; ++v) depth.row(v).setTo(500 + 2 * v);  // millimetres
+  cv::imwrite(path + "/d.png", depth);
+  cv::imwrite(path + "/c.png", cv::Mat(480, 640, CV_8UC3, cv::Scalar(9, 9, 9)));
+  std::ofstream(path + "/rgb.txt") << "1403636579763555584 c.png\n1403636579796555584 c.png\n";
+  std::ofstream(path + "/depth.txt") << "1403636579763555584 d.png\n1403636579796555584 d.png\n";
+  std::ofstream(path + "/groundtruth.txt") << "1403636579763555584 0 0 0 0 0 0 1\n1403636579796555584 0 0 0 0 0 0 1\n";
+  RgbdFolder folder = openRgbdFolder(path, 30);
+  ASSERT_EQ(folder.frames.size(), 2u);
+  EXPECT_NEAR(folder.frames[1].t - folder.frames[0].t, 0.033, 1e-6);
+  EXPECT_NEAR(folder.frames[1].t, 1403636579.796555584, 1e-6);
+  EXPECT_NEAR(folder.T_W_C[1].t, 1403636579.796555584, 1e-6);
+  EXPECT_DOUBLE_EQ(folder.depth_scale, 0.001);
+  ASSERT_TRUE(folder.depth_guess);
+  cv::Mat rgb, read;
+  loadRgbdFrame(folder, folder.frames[0], &rgb, &read);
+  EXPECT_EQ(cv::norm(depth, read, cv::NORM_INF), 0);
+  folder = openRgbdFolder(path, 30, false, 2500);
+  EXPECT_DOUBLE_EQ(folder.depth_scale, 1.0 / 2500);
+  EXPECT_FALSE(folder.depth_guess);
+}
+
 TEST(Folder, ErrorsNameTheFile) {
   const auto messageOf = [](const std::string& folder) -> std::string {
     try {
@@ -233,6 +258,10 @@ TEST(Folder, ErrorsNameTheFile) {
   fs::create_directories(seven);
   std::ofstream(seven + "/frame-000000.color.png") << "x";
   EXPECT_NE(messageOf(seven).find("frame-000000.depth.png"), std::string::npos) << messageOf(seven);
+  std::ofstream(seven + "/frame-000000.depth.png") << "x";
+  std::ofstream(seven + "/frame-000000.pose.txt") << "1 0 0 0\n0 1 0 abc\n0 0 1 0\n0 0 0 1\n";
+  EXPECT_NE(messageOf(seven).find("frame-000000.pose.txt:2: 'abc', expected a number"), std::string::npos)
+      << messageOf(seven);
 }
 
 }  // namespace

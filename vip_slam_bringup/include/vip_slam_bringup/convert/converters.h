@@ -21,6 +21,7 @@ class BagOutput;
 struct ConversionReport {
   std::map<std::string, std::size_t> messages;  ///< per topic
   std::vector<std::string> files;               ///< written
+  std::vector<std::string> notes;               ///< what was found out, and holds if the user says nothing else
   std::vector<std::string> warnings;
 };
 
@@ -41,7 +42,7 @@ ConversionReport convertEuroc(const EurocOptions& options);
 
 struct TumRgbdOptions : ConversionOptions {
   std::optional<CameraIntrinsics> camera;  ///< else calibration.txt, else from "freiburg1..3" in the folder's name
-  double depth_factor = 5000;              ///< depth units per metre
+  std::optional<double> depth_factor;      ///< depth units per metre; else guessed from the images
   double rolling_shutter = 0;              ///< of the colour camera, s, as in a sensor file
   bool no_imu = false;                     ///< leave out imu.txt and accelerometer.txt
   SE3 T_imu_cam;                           ///< identity unless the folder's imu.txt has other axes

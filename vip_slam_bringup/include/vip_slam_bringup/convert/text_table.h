@@ -26,7 +26,10 @@ class TextTable {
 
   /// The cell as a finite number; throws std::runtime_error "file:line: gyro x is 'abc', expected a number".
   double number(const TextRow& row, std::size_t column, const std::string& what) const;
-  /// The cell as whole nanoseconds.
+  /// The first cell as a stamp in seconds, whose unit secondsPerUnit tells from the first and the last row. Throws when
+  /// it is not from 0 to what a bag can hold.
+  double seconds(const TextRow& row) const;
+  /// The cell as whole nanoseconds, as far as a bag can hold them.
   long long nanoseconds(const TextRow& row, std::size_t column) const;
   /// Throws std::runtime_error "file:line: the stamp 1.500000000 does not follow 1.500000000" unless it is later.
   void ascending(const TextRow& row, double before, double t) const;
@@ -40,6 +43,7 @@ class TextTable {
  private:
   std::string path_;
   std::vector<TextRow> rows_;
+  double unit_ = 1;  ///< seconds in one unit of the first column, where that is a stamp
 };
 
 }  // namespace vip_slam

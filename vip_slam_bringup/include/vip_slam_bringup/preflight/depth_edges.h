@@ -23,6 +23,7 @@ class DepthEdges {
 
  private:
   cv::Mat distorted_;  ///< 32FC2: where a pixel of the camera without lens lies in the image; NaN where it hardly moves
+  bool moves_ = false;  ///< whether any pixel does
   DepthEdgeRecord record_;
 };
 

@@ -15,6 +15,7 @@
 #include "vip_slam_bringup/preflight/recording.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
 #include "vip_slam_frontend/tracking/frozen_depth.h"
+#include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/image_decoding.h"
 
 namespace vip_slam {
@@ -49,6 +50,7 @@ class Recorder {
   void startRotation(const CameraIntrinsics& camera);
 
   Recording recording_;
+  GrayDecoder gray_;
   const double image_seconds_;
   double first_image_ = -1;
   std::unique_ptr<ImageRotation> rotation_;
@@ -64,8 +66,8 @@ class Recorder {
   std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour images wait a moment for their depth
 };
 
-/// Reads a bag. Throws std::runtime_error naming the file when it cannot be read.
-Recording recordBag(const std::string& path, const SensorConfig& sensor, double image_seconds);
+/// Reads the bags of a recording. Throws std::runtime_error naming the file when they cannot be read.
+Recording recordBag(const BagSet& bags, const SensorConfig& sensor, double image_seconds);
 /// Listens to the sensor's topics for `seconds`. Needs ros::init(); throws std::runtime_error without a master.
 Recording recordLive(const SensorConfig& sensor, double seconds);
 

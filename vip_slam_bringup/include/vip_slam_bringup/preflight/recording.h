@@ -75,11 +75,13 @@ struct Recording {
   StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
   CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
   std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable
+  std::string color_camera_note;                           ///< what is unusual in it
   std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
   GyroRange gyro_range;
   std::vector<RotationStep> rotations;
   std::vector<DepthSample> depths;
   DepthEdgeRecord depth_edges;                      ///< of registered depth
+  std::string gray_note;                            ///< of 16-bit grey that does not fill 16 bits
   std::vector<BrightnessSample> brightness;         ///< of some colour images
   std::vector<geometry_msgs::TransformStamped> tf;  ///< newest transform of each edge
 };

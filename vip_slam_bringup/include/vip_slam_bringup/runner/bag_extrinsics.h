@@ -5,9 +5,8 @@
 #include <optional>
 #include <string>
 
-#include <rosbag/bag.h>
-
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_ros/bag_files.h"
 
 namespace vip_slam {
 
@@ -18,7 +17,6 @@ struct BagExtrinsics {
 };
 
 /// /tf is read for `patience` seconds from `begin` on.
-BagExtrinsics extrinsicsInBag(const rosbag::Bag& bag, const SensorTopics& topics, const ros::Time& begin,
-                              double patience);
+BagExtrinsics extrinsicsInBag(const BagSet& bags, const SensorTopics& topics, const ros::Time& begin, double patience);
 
 }  // namespace vip_slam

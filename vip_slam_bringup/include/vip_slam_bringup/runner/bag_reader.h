@@ -1,5 +1,5 @@
-// A bag as a sequence of decoded sensor data: IMU samples and paired images, in the order of the bag. Reading, decoding
-// and pairing run ahead in their own thread; the output does not depend on its speed.
+// The bags of a recording as a sequence of decoded sensor data: IMU samples and paired images, in the order they were
+// recorded. Reading, decoding and pairing run ahead in their own thread; the output does not depend on its speed.
 #pragma once
 
 #include <atomic>
@@ -17,6 +17,7 @@
 #include "vip_slam_bringup/runner/channel.h"
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/image_pairer.h"
 
 namespace vip_slam {
@@ -45,10 +46,10 @@ struct BagReaderOptions {
 
 class BagReader {
  public:
-  /// Opens the bag and finds the sensor's topics; fills `sensor.camera` from camera_info when the sensor file says so,
-  /// and `sensor.T_imu_cam` from tf. Throws std::runtime_error naming the file, the missing and the existing topics, or
-  /// the frames that tf should connect and does not.
-  BagReader(const std::string& path, SensorConfig& sensor, const BagReaderOptions& options = {});
+  /// Finds the topics of the sensor; fills `sensor.camera` from camera_info when the sensor file
+  /// says so, and `sensor.T_imu_cam` from tf. Throws std::runtime_error naming the file, the missing and the existing
+  /// topics, or the frames that tf should connect and does not.
+  BagReader(BagSet bags, SensorConfig& sensor, const BagReaderOptions& options = {});
   ~BagReader();
   BagReader(const BagReader&) = delete;
   BagReader& operator=(const BagReader&) = delete;
@@ -60,6 +61,7 @@ class BagReader {
   /// The next event; empty at the end. Unreadable parts of a damaged bag are skipped, with a warning.
   std::optional<SensorEvent> next();
 
+  const BagSet& bags() const;
   double beginTime() const;  ///< seconds, of the part that is read
   double endTime() const;
   /// Where `sensor.T_imu_cam` comes from: "sensor file", or "tf" with the frames that it connects.

@@ -28,6 +28,7 @@ namespace vip_slam {
 struct StateChange {
   double t;
   TrackingStatus status;
+  std::size_t images = 1;  ///< from this one on, until the state changes
 };
 
 /// An image's pose as published by the front end.

@@ -18,6 +18,9 @@ struct RunFacts {
 };
 
 /// Warnings for the user after a run, one sentence each.
+/// The share of the images after the first pose in any state but TRACKING, by states, and the longest stretch of these
+/// with its reason; empty up to 2 %.
+std::string otherStates(const std::vector<StateChange>& states);
 std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader);
 
 /// Throws std::runtime_error naming the file that cannot be written.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -30,7 +31,7 @@ struct SensorTopics {
 struct SensorConfig {
   std::string name;
   SensorTopics topics;
-  std::string color_encoding = "rgb8";   ///< rgb8, bgr8, mono8, rgba8, bgra8, yuv422 or "compressed" (JPEG/PNG)
+  std::string color_encoding = "rgb8";   ///< rgb8, bgr8, mono8, mono16, rgba8, bgra8, yuv422 or "compressed" (JPEG/PNG)
   std::string depth_encoding = "16UC1";  ///< 16UC1, 32FC1 or "compressed" (16-bit PNG, also compressedDepth)
   double depth_scale = 0.001;            ///< metres per unit of 16UC1
   double depth_offset = 0;               ///< metres to be added to every reading
@@ -70,6 +71,8 @@ std::string maskProblem(const SensorConfig& config, int width, int height);
 
 /// Throws std::runtime_error "file: key: what, expected what" on a missing file, unknown or missing key, bad value.
 SensorConfig loadSensorConfig(const std::string& path);
+/// `notes` receives "file: key: what" for what was not taken as it stands there: a rounded rotation is made exact.
+SensorConfig loadSensorConfig(const std::string& path, std::vector<std::string>* notes);
 void saveSensorConfig(const std::string& path, const SensorConfig& config);
 
 }  // namespace vip_slam

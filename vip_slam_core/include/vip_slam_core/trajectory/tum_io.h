@@ -14,7 +14,8 @@ struct StampedPose {
 };
 using Trajectory = std::vector<StampedPose>;
 
-/// A pose that repeats the stamp of the one before is left out. Throws std::runtime_error "file:line: what, expected
+/// Stamps may also be in milliseconds, microseconds or nanoseconds (stamp_unit.h). A pose that repeats the stamp of the
+/// one before is left out. Throws std::runtime_error "file:line: what, expected
 /// what" on a missing file, malformed line, non-finite number, a quaternion whose length is 5 % or more off 1, or
 /// stamps that run backwards.
 Trajectory readTum(const std::string& path);

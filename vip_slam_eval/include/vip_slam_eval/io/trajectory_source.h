@@ -1,4 +1,4 @@
-// Trajectories from TUM files or from bags.
+// Trajectories from text files or from bags.
 #pragma once
 
 #include <string>
@@ -8,12 +8,13 @@
 
 namespace vip_slam {
 
-/// A bag when `path` ends in .bag, else TUM. From a bag: nav_msgs/Odometry, geometry_msgs/PoseStamped or
-/// geometry_msgs/PoseWithCovarianceStamped of `topic` (empty: the only such topic). Throws std::runtime_error naming
-/// the file, the topic and what was expected: no or several such topics, repeated or unordered stamps, a damaged bag.
-/// `covariances`, when given, receives the poses whose covariance is not all zero.
+/// A bag when `path` ends in .bag, else a text file (trajectory_text.h, which explains `times`). From a bag:
+/// nav_msgs/Odometry, geometry_msgs/PoseStamped or geometry_msgs/PoseWithCovarianceStamped of `topic` (empty: the only
+/// such topic). Throws std::runtime_error naming the file, the topic and what was expected: no or several such topics,
+/// repeated or unordered stamps, a damaged bag. `covariances`, when given, receives the poses whose covariance is not
+/// all zero.
 Trajectory readTrajectory(const std::string& path, const std::string& topic = "",
-                          std::vector<PoseWithCovariance>* covariances = nullptr);
+                          std::vector<PoseWithCovariance>* covariances = nullptr, const std::string& times = "");
 
 /// The covariances of `odometry_covariance.csv`, each with the pose of `trajectory` that has its stamp. Throws
 /// std::runtime_error naming the file and line: unreadable numbers, a stamp without a pose, unordered stamps.

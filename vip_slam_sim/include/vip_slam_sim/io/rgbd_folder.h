@@ -1,9 +1,10 @@
 // Folders of real RGB-D images with poses: 7-Scenes layout (frame-N.color.*, frame-N.depth.png, frame-N.pose.txt,
 // camera-intrinsics.txt) or TUM layout (rgb.txt, depth.txt, groundtruth.txt).
-// In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the folder does not calibrate the colour
-// camera, a separate one: it gets what was measured on that data set's frames.
+// In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the folder does not calibrate the
+// colour camera, a separate one: it gets what was measured on that data set's frames.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include <opencv2/core.hpp>
 
 #include "vip_slam_core/camera/camera_model.h"
+#include "vip_slam_core/depth/depth_factor.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 
 namespace vip_slam {
@@ -29,18 +31,20 @@ struct RgbdFolder {
   CameraIntrinsics depth_camera;  ///< only when not registered
   SE3 T_color_depth;              ///< only when not registered; else identity
   double colour_readout = 0;      ///< s, of a rolling shutter, from first to last row; the stamp is the middle row's
-  double depth_scale = 0.001;
+  double depth_scale = 0.001;     ///< metres in one unit of the depth images
+  std::optional<DepthFactor> depth_guess;  ///< how depth_scale was found, where it was neither given nor the layout's
 };
 
-/// Colour and depth images, by their ascending stamps in seconds, as pairs (index, index): each image once at most, both
-/// in order, within `tolerance`, with the least sum of squared differences; a colour image that stays alone counts like
-/// a pair at the tolerance.
+/// Colour and depth images, by their ascending stamps in seconds, as pairs (index, index): each image once at most,
+/// both in order, within `tolerance`, with the least sum of squared differences; a colour image that stays alone counts
+/// like a pair at the tolerance.
 std::vector<std::pair<std::size_t, std::size_t>> pairInOrder(const std::vector<double>& colour,
                                                              const std::vector<double>& depth, double tolerance);
 
 /// `rate`: images per second where the folder has no stamps. `registered`: a folder in 7-Scenes layout whose depth was
-/// registered to the colour camera. Throws std::runtime_error naming the file (and line).
-RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registered = false);
+/// registered to the colour camera. `depth_factor`: units per metre; 0: in 7-Scenes layout millimetres, in TUM layout
+/// as the images tell. Throws std::runtime_error naming the file (and line).
+RgbdFolder openRgbdFolder(const std::string& folder, double rate, bool registered = false, double depth_factor = 0);
 
 /// RGB image and depth in 16UC1 millimetres (0 = invalid). Throws std::runtime_error naming the file.
 void loadRgbdFrame(const RgbdFolder& folder, const RgbdFrame& frame, cv::Mat* rgb, cv::Mat* depth_mm);
