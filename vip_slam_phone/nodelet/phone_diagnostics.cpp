@@ -24,7 +24,8 @@ std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& 
   stream("depth", now.depth, "switch on depth in the app; until then it goes on visual-inertially");
   words.insert(words.end(), now.complaints.begin(), now.complaints.end());
   if (now.video.connected && !now.sender_report)
-    words.push_back("no RTCP sender report yet: the time of the images is not known");
+    words.push_back("no RTCP sender report yet: the time of the images is not known, " + std::to_string(now.untimed) +
+                    " were left out");
   const double imu = (now.imu - before.imu) / seconds;
   if (now.records.connected && before.clock_ready && imu < 90)
     words.push_back(formatted("%.0f IMU samples a second, expected about 100", imu));

@@ -170,6 +170,7 @@ class PhoneNodelet : public nodelet::Nodelet {
     status.add("video packets lost", now.video.lost);
     status.add("depth images lost", now.depth.lost);
     status.add("records lost", now.assembly.imu_lost);
+    status.add("images before the first sender report", now.untimed);
     status.add("images left out", now.assembly.dropped);
     status.add("connections of video, records, depth", std::to_string(now.video.connections) + ", " +
                                                            std::to_string(now.records.connections) + ", " +

@@ -6,7 +6,7 @@
 
 #include "vip_slam_phone/net/tcp_stream.h"
 #include "vip_slam_phone/video/rtsp_session.h"
-#include "vip_slam_phone/video/video_decoder.h"
+#include "vip_slam_phone/video/video_stream.h"
 
 namespace vip_slam::phone {
 
@@ -147,9 +147,7 @@ void PhoneClient::receiveVideo() {
   TcpStream stream(options_.host, options_.rtsp_port, options_.timeout, stop_);
   const std::string url = "rtsp://" + options_.host + ":" + std::to_string(options_.rtsp_port) + options_.path;
   RtspSession session(&stream, url, options_.credentials);
-  const VideoTrack& track = session.track();
-  Depacketiser depacketiser(track.codec);
-  VideoDecoder decoder(track.codec);
+  VideoStream video(session.track());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.video.connected = true;
@@ -157,43 +155,27 @@ void PhoneClient::receiveVideo() {
     ++status_.video.connections;
     status_.sender_report = false;
   }
-  std::optional<SenderReport> report;
-  std::vector<std::uint8_t> ahead = track.parameter_sets;
-  bool whole = false;  // no picture was lost since the last key picture
-  std::size_t lost_before = 0;
+  VideoCounts before;
   for (;;) {
     const RtspSession::Packet packet = session.next();
-    std::vector<AccessUnit> pictures;
+    std::vector<TimedImage> images;
+    std::string wrong;
     try {
-      if (packet.control) {
-        if (const auto newer = parseSenderReport(packet.data)) report = newer;
-      } else {
-        const RtpPacket rtp = parseRtp(packet.data);
-        if (rtp.payload_type == track.payload_type) pictures = depacketiser.add(rtp);
-      }
+      images = video.add(packet.control, packet.data);
     } catch (const WireError& e) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      status_.video.problem = e.what();
+      wrong = e.what();
     }
-    std::vector<DecodedImage> images;
-    for (AccessUnit& picture : pictures) {
-      // What leans on a lost picture decodes to smears: nothing until the next key picture.
-      whole = !picture.damaged && (whole || picture.key);
-      if (!whole) continue;
-      picture.data.insert(picture.data.begin(), ahead.begin(), ahead.end());
-      ahead.clear();
-      for (DecodedImage& image : decoder.decode(picture.data, picture.rtp_time)) images.push_back(std::move(image));
-    }
+    const VideoCounts& counts = video.counts();
     const std::lock_guard<std::mutex> lock(mutex_);
-    status_.sender_report = report.has_value();
-    status_.video.received += pictures.size();
-    status_.video.lost += depacketiser.lost() - lost_before;
-    lost_before = depacketiser.lost();
-    if (!images.empty()) status_.video.problem.clear();
-    for (DecodedImage& image : images) {
-      if (!report) continue;  // its time is not known; the first report comes within a second
+    status_.sender_report = video.reported();
+    status_.video.received += counts.pictures - before.pictures;
+    status_.video.lost += counts.lost - before.lost;
+    status_.untimed += counts.untimed - before.untimed;
+    before = counts;
+    if (!wrong.empty() || !images.empty()) status_.video.problem = wrong;
+    for (TimedImage& image : images) {
       Assembled out;
-      assembler_.addColor(report->timeOf(image.rtp_time), std::move(image.bgr), &out);
+      assembler_.addColor(image.unix_time, std::move(image.bgr), &out);
       deliver(out);
     }
   }

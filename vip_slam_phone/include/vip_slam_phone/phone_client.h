@@ -36,6 +36,7 @@ struct PhoneStatus {
   StreamStatus records, video, depth;
   AssemblyCounts assembly;
   std::size_t imu = 0, color = 0, depth_images = 0;  ///< given out
+  std::size_t untimed = 0;                           ///< images left out: before the first sender report
   bool sender_report = false, clock_ready = false;
   double clock_offset = 0, clock_slew = 0;  ///< s, s/s
   double breathing = 1;
