@@ -37,6 +37,11 @@ std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& 
     words.push_back(std::to_string(lost) + " depth images were lost: the network is too slow or too busy");
   if (const std::size_t lost = now.assembly.imu_lost - before.assembly.imu_lost)
     words.push_back(std::to_string(lost) + " records were lost: the network is too slow or too busy");
+  const std::size_t images = now.left_out.images - before.left_out.images;
+  const std::size_t samples = now.left_out.samples - before.left_out.samples;
+  if (images + samples > 0)
+    words.push_back(std::to_string(images) + " images and " + std::to_string(samples) +
+                    " samples were left out: publishing is too slow; is the computer too busy?");
   return words;
 }
 

@@ -172,6 +172,8 @@ class PhoneNodelet : public nodelet::Nodelet {
     status.add("records lost", now.assembly.imu_lost);
     status.add("images before the first sender report", now.untimed);
     status.add("images left out", now.assembly.dropped);
+    status.add("images, samples not published in time",
+               std::to_string(now.left_out.images) + ", " + std::to_string(now.left_out.samples));
     status.add("connections of video, records, depth", std::to_string(now.video.connections) + ", " +
                                                            std::to_string(now.records.connections) + ", " +
                                                            std::to_string(now.depth.connections));

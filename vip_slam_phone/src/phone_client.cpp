@@ -12,7 +12,7 @@ namespace vip_slam::phone {
 
 PhoneClient::PhoneClient(const PhoneOptions& options, std::function<double()> now,
                          std::function<void(const Assembled&)> deliver)
-    : options_(options), now_(std::move(now)), deliver_(std::move(deliver)), assembler_(options.width) {
+    : options_(options), now_(std::move(now)), assembler_(options.width), outbox_(std::move(deliver)) {
   threads_.emplace_back([this] { keep(&PhoneStatus::records, [this] { receiveRecords(); }); });
   threads_.emplace_back([this] { keep(&PhoneStatus::video, [this] { receiveVideo(); }); });
   threads_.emplace_back([this] { keep(&PhoneStatus::depth, [this] { receiveDepth(); }); });
@@ -27,6 +27,7 @@ PhoneStatus PhoneClient::status() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   PhoneStatus status = status_;
   status.assembly = assembler_.counts();
+  status.left_out = outbox_.leftOut();
   status.clock_ready = assembler_.clock().ready();
   status.clock_offset = assembler_.clock().offsetAt(1e18);
   status.clock_slew = assembler_.clock().slew();
@@ -51,11 +52,11 @@ void PhoneClient::keep(StreamStatus PhoneStatus::*stream, const std::function<vo
   }
 }
 
-void PhoneClient::deliver(const Assembled& out) {
+void PhoneClient::handOn(Assembled&& out) {
   status_.imu += out.imu.size();
   status_.color += out.color.size();
   status_.depth_images += out.depth.size();
-  if (!out.imu.empty() || !out.color.empty() || !out.depth.empty() || !out.pose.empty()) deliver_(out);
+  outbox_.add(std::move(out));
 }
 
 Handshake PhoneClient::readHandshake(TcpStream* stream, const std::string& protocol) {
@@ -101,7 +102,7 @@ void PhoneClient::receiveRecords() {
     host_minus_unix_ = anchor;
     Assembled out;
     assembler_.addRecord(record, arrival, &out);
-    deliver(out);
+    handOn(std::move(out));
   }
 }
 
@@ -139,7 +140,7 @@ void PhoneClient::receiveDepth() {
     sequence = frame.sequence;
     Assembled out;
     assembler_.addDepth(std::move(frame), &out);
-    deliver(out);
+    handOn(std::move(out));
   }
 }
 
@@ -176,7 +177,7 @@ void PhoneClient::receiveVideo() {
     for (TimedImage& image : images) {
       Assembled out;
       assembler_.addColor(image.unix_time, std::move(image.bgr), &out);
-      deliver(out);
+      handOn(std::move(out));
     }
   }
 }
