@@ -17,9 +17,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "phone_diagnostics.h"
 #include "vip_slam_core/sensor/phone_geometry.h"
 #include "vip_slam_phone/net/find_phone.h"
+#include "vip_slam_phone/troubles.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/geometry_conversions.h"
 

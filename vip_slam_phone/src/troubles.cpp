@@ -1,4 +1,4 @@
-#include "phone_diagnostics.h"
+#include "vip_slam_phone/troubles.h"
 
 #include "vip_slam_core/util/formatted.h"
 
