@@ -60,9 +60,7 @@ void PhoneClient::handOn(Assembled&& out) {
 }
 
 Handshake PhoneClient::readHandshake(TcpStream* stream, const std::string& protocol) {
-  const auto size = Bytes(stream->read(4)).little<std::uint32_t>(0);
-  if (size > kMaxHandshake) throw WireError("handshake of " + std::to_string(size) + " bytes: is this port the app's?");
-  const auto text = stream->read(size);
+  const auto text = stream->readMessage(2, kMaxHandshake, "handshake");
   const Handshake handshake = parseHandshake(std::string(text.begin(), text.end()));
   if (handshake.protocol != protocol)
     throw WireError("the port speaks '" + handshake.protocol.substr(0, 40) + "', expected '" + protocol + "'");
@@ -121,9 +119,7 @@ void PhoneClient::receiveDepth() {
   }
   std::optional<std::uint16_t> sequence;
   for (;;) {
-    const auto size = Bytes(stream.read(4)).little<std::uint32_t>(0);
-    if (size > kMaxDepthMessage || size < 32) throw WireError("depth: message of " + std::to_string(size) + " bytes");
-    const auto message = stream.read(size);
+    const auto message = stream.readMessage(kDepthHeader, kMaxDepthMessage, "depth image");
     DepthFrame frame;
     std::string wrong;
     try {
@@ -146,7 +142,7 @@ void PhoneClient::receiveDepth() {
 
 void PhoneClient::receiveVideo() {
   TcpStream stream(options_.host, options_.rtsp_port, options_.timeout, stop_);
-  const std::string url = "rtsp://" + options_.host + ":" + std::to_string(options_.rtsp_port) + options_.path;
+  const std::string url = "rtsp://" + hostAndPort(options_.host, options_.rtsp_port) + options_.path;
   RtspSession session(&stream, url, options_.credentials);
   VideoStream video(session.track());
   {

@@ -28,7 +28,7 @@ std::vector<std::uint8_t> inflateRaw(const Bytes& packed, std::size_t expected) 
 
 DepthFrame parseDepthFrame(const Bytes& message) {
   if (message[0] != 10) throw WireError("depth: message of type " + std::to_string(message[0]) + ", expected 10");
-  const Bytes payload = message.from(32);
+  const Bytes payload = message.from(kDepthHeader);
   DepthFrame out;
   out.sequence = message.little<std::uint16_t>(2);
   out.host_time = message.little<double>(8);

@@ -1,4 +1,7 @@
 // RTP, the pictures in it, and the text of RTSP.
+#include <algorithm>
+#include <cctype>
+
 #include <gtest/gtest.h>
 
 #include "vip_slam_phone/net/find_phone.h"
@@ -78,7 +81,9 @@ TEST(PhoneVideo, OutOfOrderIsPutRightAndLossMarksItsPicture) {
   EXPECT_EQ(depacketiser.lost(), 1u);
   for (std::size_t i = 0; i < units.size(); ++i) {
     EXPECT_EQ(units[i].damaged, i == 10) << i;
-    if (i != 10) EXPECT_EQ(units[i].data, picture(i));
+    if (i != 10) {
+      EXPECT_EQ(units[i].data, picture(i));
+    }
   }
 }
 
@@ -140,6 +145,62 @@ TEST(PhoneVideo, TheAddressAmongWhatIsAnnounced) {
                       "=;eth0;IPv4;Phone;_irtsp-imu._tcp;local;p.local;192.0.2.7;8555;\"\"\n"),
             "192.0.2.7");
   EXPECT_EQ(addressIn("Failed to create client object: Daemon not running\n"), "");
+}
+
+TEST(PhoneVideo, OnlyAnAddressIsAnAddress) {
+  const auto line = [](const std::string& protocol, const std::string& address) {
+    return "=;eth0;" + protocol + ";Phone;_irtsp-imu._tcp;local;p.local;" + address + ";8555;\"\"\n";
+  };
+  EXPECT_EQ(addressIn(""), "");
+  EXPECT_EQ(addressIn("=;eth0;IPv4;Phone\n=;;;;;;;;;\n"), "");
+  EXPECT_EQ(addressIn(line("IPv4", "")), "");
+  EXPECT_EQ(addressIn(line("IPv4", "p.local")), "");
+  EXPECT_EQ(addressIn(line("IPv4", "192.0.2.700")), "");
+  EXPECT_EQ(addressIn(line("IPv6", "fe80::1")), "") << "of the link alone";
+  EXPECT_EQ(addressIn(line("IPv6", "2001:db8::7")), "2001:db8::7");
+  EXPECT_EQ(addressIn(line("IPv6", "2001:db8::7") + line("IPv4", "192.0.2.7")), "192.0.2.7");
+  // A name with a separator, as avahi writes it.
+  EXPECT_EQ(addressIn("=;eth0;IPv4;My\\032Phone\\059\\0321;_irtsp-imu._tcp;local;p.local;192.0.2.7;8555;\n"),
+            "192.0.2.7");
+}
+
+TEST(PhoneVideoFuzz, WhateverIsAnnouncedAnAddressComesOutOrNothing) {
+  std::mt19937 random(9);
+  const std::string good =
+      "+;eth0;IPv4;Phone;_irtsp-imu._tcp;local\n"
+      "=;eth0;IPv4;Phone;_irtsp-imu._tcp;local;p.local;192.0.2.7;8555;\"\"\n";
+  int found = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Raw broken = damaged(Raw(good.begin(), good.end()), &random);
+    const std::string address = addressIn({broken.begin(), broken.end()});
+    found += !address.empty();
+    EXPECT_EQ(address.find_first_not_of("0123456789abcdefABCDEF.:"), std::string::npos) << address;
+  }
+  EXPECT_GT(found, 5000);
+  EXPECT_LT(found, 19000);
+}
+
+TEST(PhoneVideoFuzz, WhateverIsAskedTheAnswerIsOneLine) {
+  std::mt19937 random(8);
+  int refused = 0;
+  for (const std::string& challenge :
+       {std::string("Digest realm=\"r\", nonce=\"n\", qop=\"auth\", opaque=\"o\""), std::string("Basic realm=\"r\""),
+        std::string("Digest realm=\"open, nonce=,qop=auth"), std::string("Digest"), std::string("Digest realm=")}) {
+    const std::string head = "RTSP/1.0 401 Unauthorized\r\nWWW-Authenticate: " + challenge + "\r\n\r\n";
+    for (int i = 0; i < 4000; ++i) {
+      const Raw broken = damaged(Raw(head.begin(), head.end()), &random);
+      try {
+        const std::string value =
+            authorisation(parseAnswer({broken.begin(), broken.end()}), {"me", "secret"}, "SETUP", "rtsp://p/live");
+        EXPECT_TRUE(value.rfind("Digest ", 0) == 0 || value.rfind("Basic ", 0) == 0);
+        EXPECT_TRUE(std::none_of(value.begin(), value.end(), [](unsigned char c) { return std::iscntrl(c); }));
+        EXPECT_EQ(value.find("secret"), std::string::npos);
+      } catch (const WireError&) {
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GT(refused, 1000);
 }
 
 TEST(PhoneVideoFuzz, DamagedPacketsAndTextsAreErrorsAtMost) {
