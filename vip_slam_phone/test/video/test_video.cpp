@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "vip_slam_phone/net/find_phone.h"
 #include "vip_slam_phone/video/depacketiser.h"
 #include "vip_slam_phone/video/rtsp_text.h"
 #include "vip_slam_phone/video/sdp.h"
@@ -137,47 +136,6 @@ TEST(PhoneVideo, DigestAndBasic) {
   EXPECT_EQ(authorisation(asked("Basic realm=\"x\""), {"Aladdin", "open sesame"}, "GET", "/"),
             "Basic QWxhZGRpbjpvcGVuIHNlc2FtZQ==");
   EXPECT_THROW(authorisation(asked("Bearer"), mufasa, "GET", "/"), WireError);
-}
-
-TEST(PhoneVideo, TheAddressAmongWhatIsAnnounced) {
-  EXPECT_EQ(addressIn("+;eth0;IPv4;Phone;_irtsp-imu._tcp;local\n"
-                      "=;eth0;IPv6;Phone;_irtsp-imu._tcp;local;p.local;fe80::1;8555;\"\"\n"
-                      "=;eth0;IPv4;Phone;_irtsp-imu._tcp;local;p.local;192.0.2.7;8555;\"\"\n"),
-            "192.0.2.7");
-  EXPECT_EQ(addressIn("Failed to create client object: Daemon not running\n"), "");
-}
-
-TEST(PhoneVideo, OnlyAnAddressIsAnAddress) {
-  const auto line = [](const std::string& protocol, const std::string& address) {
-    return "=;eth0;" + protocol + ";Phone;_irtsp-imu._tcp;local;p.local;" + address + ";8555;\"\"\n";
-  };
-  EXPECT_EQ(addressIn(""), "");
-  EXPECT_EQ(addressIn("=;eth0;IPv4;Phone\n=;;;;;;;;;\n"), "");
-  EXPECT_EQ(addressIn(line("IPv4", "")), "");
-  EXPECT_EQ(addressIn(line("IPv4", "p.local")), "");
-  EXPECT_EQ(addressIn(line("IPv4", "192.0.2.700")), "");
-  EXPECT_EQ(addressIn(line("IPv6", "fe80::1")), "") << "of the link alone";
-  EXPECT_EQ(addressIn(line("IPv6", "2001:db8::7")), "2001:db8::7");
-  EXPECT_EQ(addressIn(line("IPv6", "2001:db8::7") + line("IPv4", "192.0.2.7")), "192.0.2.7");
-  // A name with a separator, as avahi writes it.
-  EXPECT_EQ(addressIn("=;eth0;IPv4;My\\032Phone\\059\\0321;_irtsp-imu._tcp;local;p.local;192.0.2.7;8555;\n"),
-            "192.0.2.7");
-}
-
-TEST(PhoneVideoFuzz, WhateverIsAnnouncedAnAddressComesOutOrNothing) {
-  std::mt19937 random(9);
-  const std::string good =
-      "+;eth0;IPv4;Phone;_irtsp-imu._tcp;local\n"
-      "=;eth0;IPv4;Phone;_irtsp-imu._tcp;local;p.local;192.0.2.7;8555;\"\"\n";
-  int found = 0;
-  for (int i = 0; i < 20000; ++i) {
-    const Raw broken = damaged(Raw(good.begin(), good.end()), &random);
-    const std::string address = addressIn({broken.begin(), broken.end()});
-    found += !address.empty();
-    EXPECT_EQ(address.find_first_not_of("0123456789abcdefABCDEF.:"), std::string::npos) << address;
-  }
-  EXPECT_GT(found, 5000);
-  EXPECT_LT(found, 19000);
 }
 
 TEST(PhoneVideoFuzz, WhateverIsAskedTheAnswerIsOneLine) {
