@@ -27,7 +27,8 @@ std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& 
     words.push_back("no RTCP sender report yet: the time of the images is not known, " + std::to_string(now.untimed) +
                     " were left out");
   const double imu = (now.imu - before.imu) / seconds;
-  if (now.records.connected && before.clock_ready && imu < 90)
+  const bool all_the_time = now.records.connected && now.records.connections == before.records.connections;
+  if (all_the_time && before.clock_ready && imu < 90)
     words.push_back(formatted("%.0f IMU samples a second, expected about 100", imu));
   if (now.assembly.portrait > before.assembly.portrait)
     words.push_back("images are upright: run the app's ARKit pose, whose images are landscape as the sensor is");

@@ -253,6 +253,8 @@ int main(int argc, char** argv) {
     }
     if (options.coding != "h264" && options.coding != "hevc")
       throw po::error("--codec " + options.coding + ": expected h264 or hevc");
+    if (!vip_slam::phone::VideoEncoder::available(options.codec()))
+      throw po::error("--codec " + options.coding + ": libavcodec has no encoder for it");
     if (options.bag.empty() || options.sensor.empty()) throw po::error("a bag and --sensor are needed");
   } catch (const po::error& e) {
     std::cerr << e.what() << "\n";

@@ -1,5 +1,6 @@
 #include "vip_slam_phone/wire/depth_frame.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <zlib.h>
@@ -72,8 +73,9 @@ DepthFrame parseDepthFrame(const Bytes& message) {
 
 std::vector<std::uint8_t> askForDeflate() {
   const std::string json = "{\"compression\":\"zlib\"}";
-  std::vector<std::uint8_t> out = {static_cast<std::uint8_t>(json.size()), 0, 0, 0};
-  out.insert(out.end(), json.begin(), json.end());
+  std::vector<std::uint8_t> out(4 + json.size());
+  out[0] = static_cast<std::uint8_t>(json.size());
+  std::copy(json.begin(), json.end(), out.begin() + 4);
   return out;
 }
 

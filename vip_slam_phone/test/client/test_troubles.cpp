@@ -113,7 +113,12 @@ TEST(PhoneTroubles, UprightImages) {
 TEST(PhoneTroubles, TooFewImuSamples) {
   EXPECT_TRUE(after([](Looks* l) { l->now.imu = 900; }).empty());
   expectOne(after([](Looks* l) { l->now.imu = 890; }), "89 IMU samples a second, expected about 100");
-  // While the clock is being found none come out.
+  // Not of a connection that is new, ...
+  EXPECT_TRUE(after([](Looks* l) {
+                l->now.records.connections = 2;
+                l->now.imu = 500;
+              }).empty());
+  // ... nor while the clock is being found: none come out.
   EXPECT_TRUE(after([](Looks* l) {
                 l->before.clock_ready = false;
                 l->now.imu = 500;
