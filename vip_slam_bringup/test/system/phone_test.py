@@ -17,7 +17,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo
-from vip_slam_msgs.msg import PlaneUpdate, TrackingStatus
+from vip_slam_msgs.msg import MapUpdate, PlaneUpdate, TrackingStatus
+from vip_slam_msgs.srv import SaveTrajectory, TriggerGlobalBa
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from live import Listener, alignment, load_tum, position_error, positions_at, tracking, wait_for  # noqa: E402
@@ -72,6 +73,7 @@ class PhoneTest(unittest.TestCase):
         cls.pose = Listener(NS + 'pose', PoseWithCovarianceStamped)
         cls.status = Listener(NS + 'tracking_status', TrackingStatus)
         cls.planes = Listener(NS + 'plane_update', PlaneUpdate)
+        cls.updates = Listener(NS + 'map_update', MapUpdate)
         cls.images = Timed('/phone/color/camera_info', CameraInfo)
         cls.diagnostics = Listener('/diagnostics', DiagnosticArray)
         sensor = sensor_of_the_phone(cls.data, cls.folder)
@@ -108,6 +110,19 @@ class PhoneTest(unittest.TestCase):
                 for m in listener.all()]
         return np.array([r for r in rows if self.truth[0, 0] <= r[0] <= self.truth[-1, 0]])
 
+    def call(self, name, kind, *arguments):
+        answer = rospy.ServiceProxy(NS + name, kind)(*arguments)
+        self.assertTrue(answer.success, answer.message)
+
+    def error_of_the_map(self, ahead):
+        """After a last adjustment, as scripts/play_sequence judges a bag."""
+        path = os.path.join(self.folder, 'trajectory.tum')
+        before = self.updates.count()
+        self.call('trigger_global_ba', TriggerGlobalBa)
+        wait_for(lambda: any(m.global_update for m in self.updates.all()[before:]), 20, 'an adjusted map')
+        self.call('save_trajectory', SaveTrajectory, path)
+        return position_error(self.truth + np.array([ahead] + 7 * [0]), load_tum(path))
+
     def test_1_follows_the_truth_and_loses_nothing(self):
         wait_for(lambda: 'the phone does not answer' in self.words(), 30, 'words about a phone that is not there')
         ahead = self.play()
@@ -120,10 +135,12 @@ class PhoneTest(unittest.TestCase):
         images = {m.header.stamp for m in self.images.all()}
         self.assertEqual({m.header.stamp for m in self.odometry.all()} - images, set())
         error = position_error(self.truth, odometry)
-        print('error of the odometry: %.4f m, %d poses' % (error, len(odometry)))
+        map_error = self.error_of_the_map(ahead)
+        print('error of the odometry: %.4f m, of the map: %.4f m, %d poses' % (error, map_error, len(odometry)))
         print('from mid-exposure to the received image: %s; to the odometry: %s; load average %.1f' %
               (self.images.told(), self.odometry.told(), os.getloadavg()[0]))
         self.assertLess(error, 0.01)
+        self.assertLess(map_error, 0.01)
 
     def test_2_the_manager_takes_raw_images(self):
         subscribers = dict(rosgraph.Master('/phone_test').getSystemState()[1])
