@@ -16,7 +16,7 @@ elseif(CATKIN_ENABLE_TESTING)
   target_link_libraries(render_euroc_folder vip_slam_bringup ${vip_slam_sim_LIBRARIES})
   target_compile_definitions(render_euroc_folder PRIVATE CONFIG_DIR="${CMAKE_CURRENT_SOURCE_DIR}/config")
   add_dependencies(tests render_euroc_folder)
-  foreach(test system restart bad_input compressed offline euroc rviz)
+  foreach(test system restart bad_input compressed offline euroc rviz phone)
     add_rostest(test/system/${test}.test ARGS data:=${test_data} DEPENDENCIES vip_slam_bringup_test_data)
   endforeach()
   # In one CMake project with the simulator, as of catkin_make, the program has to be there first.

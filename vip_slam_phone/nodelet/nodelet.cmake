@@ -3,8 +3,7 @@ find_package(catkin REQUIRED COMPONENTS
   diagnostic_updater nav_msgs nodelet pluginlib roscpp sensor_msgs tf2_ros vip_slam_core vip_slam_ros)
 find_package(OpenCV REQUIRED COMPONENTS core imgcodecs)
 
-add_library(vip_slam_phone_nodelets nodelet/phone_diagnostics.cpp nodelet/phone_nodelet.cpp)
-target_include_directories(vip_slam_phone_nodelets PRIVATE nodelet)
+add_library(vip_slam_phone_nodelets nodelet/phone_nodelet.cpp)
 target_include_directories(vip_slam_phone_nodelets SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(vip_slam_phone_nodelets vip_slam_phone ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
 add_dependencies(vip_slam_phone_nodelets ${catkin_EXPORTED_TARGETS})

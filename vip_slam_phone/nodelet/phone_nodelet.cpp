@@ -17,9 +17,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "phone_diagnostics.h"
 #include "vip_slam_core/sensor/phone_geometry.h"
 #include "vip_slam_phone/net/find_phone.h"
+#include "vip_slam_phone/troubles.h"
 #include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/geometry_conversions.h"
 
@@ -170,7 +170,10 @@ class PhoneNodelet : public nodelet::Nodelet {
     status.add("video packets lost", now.video.lost);
     status.add("depth images lost", now.depth.lost);
     status.add("records lost", now.assembly.imu_lost);
+    status.add("images before the first sender report", now.untimed);
     status.add("images left out", now.assembly.dropped);
+    status.add("images, samples not published in time",
+               std::to_string(now.left_out.images) + ", " + std::to_string(now.left_out.samples));
     status.add("connections of video, records, depth", std::to_string(now.video.connections) + ", " +
                                                            std::to_string(now.records.connections) + ", " +
                                                            std::to_string(now.depth.connections));

@@ -6,13 +6,13 @@
 
 #include "vip_slam_phone/net/tcp_stream.h"
 #include "vip_slam_phone/video/rtsp_session.h"
-#include "vip_slam_phone/video/video_decoder.h"
+#include "vip_slam_phone/video/video_stream.h"
 
 namespace vip_slam::phone {
 
 PhoneClient::PhoneClient(const PhoneOptions& options, std::function<double()> now,
                          std::function<void(const Assembled&)> deliver)
-    : options_(options), now_(std::move(now)), deliver_(std::move(deliver)), assembler_(options.width) {
+    : options_(options), now_(std::move(now)), assembler_(options.width), outbox_(std::move(deliver)) {
   threads_.emplace_back([this] { keep(&PhoneStatus::records, [this] { receiveRecords(); }); });
   threads_.emplace_back([this] { keep(&PhoneStatus::video, [this] { receiveVideo(); }); });
   threads_.emplace_back([this] { keep(&PhoneStatus::depth, [this] { receiveDepth(); }); });
@@ -27,6 +27,7 @@ PhoneStatus PhoneClient::status() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   PhoneStatus status = status_;
   status.assembly = assembler_.counts();
+  status.left_out = outbox_.leftOut();
   status.clock_ready = assembler_.clock().ready();
   status.clock_offset = assembler_.clock().offsetAt(1e18);
   status.clock_slew = assembler_.clock().slew();
@@ -51,17 +52,15 @@ void PhoneClient::keep(StreamStatus PhoneStatus::*stream, const std::function<vo
   }
 }
 
-void PhoneClient::deliver(const Assembled& out) {
+void PhoneClient::handOn(Assembled&& out) {
   status_.imu += out.imu.size();
   status_.color += out.color.size();
   status_.depth_images += out.depth.size();
-  if (!out.imu.empty() || !out.color.empty() || !out.depth.empty() || !out.pose.empty()) deliver_(out);
+  outbox_.add(std::move(out));
 }
 
 Handshake PhoneClient::readHandshake(TcpStream* stream, const std::string& protocol) {
-  const auto size = Bytes(stream->read(4)).little<std::uint32_t>(0);
-  if (size > kMaxHandshake) throw WireError("handshake of " + std::to_string(size) + " bytes: is this port the app's?");
-  const auto text = stream->read(size);
+  const auto text = stream->readMessage(2, kMaxHandshake, "handshake");
   const Handshake handshake = parseHandshake(std::string(text.begin(), text.end()));
   if (handshake.protocol != protocol)
     throw WireError("the port speaks '" + handshake.protocol.substr(0, 40) + "', expected '" + protocol + "'");
@@ -101,7 +100,7 @@ void PhoneClient::receiveRecords() {
     host_minus_unix_ = anchor;
     Assembled out;
     assembler_.addRecord(record, arrival, &out);
-    deliver(out);
+    handOn(std::move(out));
   }
 }
 
@@ -120,9 +119,7 @@ void PhoneClient::receiveDepth() {
   }
   std::optional<std::uint16_t> sequence;
   for (;;) {
-    const auto size = Bytes(stream.read(4)).little<std::uint32_t>(0);
-    if (size > kMaxDepthMessage || size < 32) throw WireError("depth: message of " + std::to_string(size) + " bytes");
-    const auto message = stream.read(size);
+    const auto message = stream.readMessage(kDepthHeader, kMaxDepthMessage, "depth image");
     DepthFrame frame;
     std::string wrong;
     try {
@@ -139,17 +136,15 @@ void PhoneClient::receiveDepth() {
     sequence = frame.sequence;
     Assembled out;
     assembler_.addDepth(std::move(frame), &out);
-    deliver(out);
+    handOn(std::move(out));
   }
 }
 
 void PhoneClient::receiveVideo() {
   TcpStream stream(options_.host, options_.rtsp_port, options_.timeout, stop_);
-  const std::string url = "rtsp://" + options_.host + ":" + std::to_string(options_.rtsp_port) + options_.path;
+  const std::string url = "rtsp://" + hostAndPort(options_.host, options_.rtsp_port) + options_.path;
   RtspSession session(&stream, url, options_.credentials);
-  const VideoTrack& track = session.track();
-  Depacketiser depacketiser(track.codec);
-  VideoDecoder decoder(track.codec);
+  VideoStream video(session.track());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.video.connected = true;
@@ -157,44 +152,28 @@ void PhoneClient::receiveVideo() {
     ++status_.video.connections;
     status_.sender_report = false;
   }
-  std::optional<SenderReport> report;
-  std::vector<std::uint8_t> ahead = track.parameter_sets;
-  bool whole = false;  // no picture was lost since the last key picture
-  std::size_t lost_before = 0;
+  VideoCounts before;
   for (;;) {
     const RtspSession::Packet packet = session.next();
-    std::vector<AccessUnit> pictures;
+    std::vector<TimedImage> images;
+    std::string wrong;
     try {
-      if (packet.control) {
-        if (const auto newer = parseSenderReport(packet.data)) report = newer;
-      } else {
-        const RtpPacket rtp = parseRtp(packet.data);
-        if (rtp.payload_type == track.payload_type) pictures = depacketiser.add(rtp);
-      }
+      images = video.add(packet.control, packet.data);
     } catch (const WireError& e) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      status_.video.problem = e.what();
+      wrong = e.what();
     }
-    std::vector<DecodedImage> images;
-    for (AccessUnit& picture : pictures) {
-      // What leans on a lost picture decodes to smears: nothing until the next key picture.
-      whole = !picture.damaged && (whole || picture.key);
-      if (!whole) continue;
-      picture.data.insert(picture.data.begin(), ahead.begin(), ahead.end());
-      ahead.clear();
-      for (DecodedImage& image : decoder.decode(picture.data, picture.rtp_time)) images.push_back(std::move(image));
-    }
+    const VideoCounts& counts = video.counts();
     const std::lock_guard<std::mutex> lock(mutex_);
-    status_.sender_report = report.has_value();
-    status_.video.received += pictures.size();
-    status_.video.lost += depacketiser.lost() - lost_before;
-    lost_before = depacketiser.lost();
-    if (!images.empty()) status_.video.problem.clear();
-    for (DecodedImage& image : images) {
-      if (!report) continue;  // its time is not known; the first report comes within a second
+    status_.sender_report = video.reported();
+    status_.video.received += counts.pictures - before.pictures;
+    status_.video.lost += counts.lost - before.lost;
+    status_.untimed += counts.untimed - before.untimed;
+    before = counts;
+    if (!wrong.empty() || !images.empty()) status_.video.problem = wrong;
+    for (TimedImage& image : images) {
       Assembled out;
-      assembler_.addColor(report->timeOf(image.rtp_time), std::move(image.bgr), &out);
-      deliver(out);
+      assembler_.addColor(image.unix_time, std::move(image.bgr), &out);
+      handOn(std::move(out));
     }
   }
 }

@@ -26,15 +26,23 @@ def load_tum(path):
     return np.atleast_2d(np.loadtxt(path))
 
 
+def positions_at(truth, times):
+    return np.stack([np.interp(times, truth[:, 0], truth[:, k]) for k in (1, 2, 3)], 1)
+
+
+def alignment(points, onto):
+    """Rotation and translation, the best rigid ones."""
+    p0, q0 = onto.mean(0), points.mean(0)
+    u, _, vt = np.linalg.svd((points - q0).T @ (onto - p0))
+    R = vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+    return R, p0 - R @ q0
+
+
 def position_error(truth, estimate):
     """Root mean square after the best rigid alignment, metres."""
-    t = estimate[:, 0]
-    p = np.stack([np.interp(t, truth[:, 0], truth[:, k]) for k in (1, 2, 3)], 1)
-    q = estimate[:, 1:4]
-    p0, q0 = p.mean(0), q.mean(0)
-    u, _, vt = np.linalg.svd((q - q0).T @ (p - p0))
-    d = np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))])
-    return np.sqrt((((p - p0) - (q - q0) @ (vt.T @ d @ u.T).T) ** 2).sum(1).mean())
+    onto, points = positions_at(truth, estimate[:, 0]), estimate[:, 1:4]
+    R, t = alignment(points, onto)
+    return np.sqrt(((points @ R.T + t - onto) ** 2).sum(1).mean())
 
 
 class Listener:

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "vip_slam_phone/assembly/assembler.h"
+#include "vip_slam_phone/assembly/outbox.h"
 #include "vip_slam_phone/video/rtsp_text.h"
 #include "vip_slam_phone/wire/handshake.h"
 
@@ -35,7 +36,9 @@ struct StreamStatus {
 struct PhoneStatus {
   StreamStatus records, video, depth;
   AssemblyCounts assembly;
-  std::size_t imu = 0, color = 0, depth_images = 0;  ///< given out
+  OutboxCounts left_out;
+  std::size_t imu = 0, color = 0, depth_images = 0;  ///< assembled
+  std::size_t untimed = 0;                           ///< images left out: before the first sender report
   bool sender_report = false, clock_ready = false;
   double clock_offset = 0, clock_slew = 0;  ///< s, s/s
   double breathing = 1;
@@ -44,7 +47,8 @@ struct PhoneStatus {
 
 class PhoneClient {
  public:
-  /// `now` is our clock in s. `deliver` is called from the client's threads, one at a time, and must be quick.
+  /// `now` is our clock in s. `deliver` is called from a thread of its own: what it does not take in time is left out
+  /// and counted, and the streams are read all the same.
   PhoneClient(const PhoneOptions& options, std::function<double()> now, std::function<void(const Assembled&)> deliver);
   ~PhoneClient();
 
@@ -56,16 +60,16 @@ class PhoneClient {
   void receiveVideo();
   void receiveDepth();
   Handshake readHandshake(class TcpStream* stream, const std::string& protocol);
-  void deliver(const Assembled& out);
+  void handOn(Assembled&& out);  ///< under the mutex
 
   const PhoneOptions options_;
   const std::function<double()> now_;
-  const std::function<void(const Assembled&)> deliver_;
   std::atomic<bool> stop_{false};
   mutable std::mutex mutex_;  ///< guards what follows
   Assembler assembler_;
   PhoneStatus status_;
   double host_minus_unix_ = 0;  ///< of the session: another value is another session
+  Outbox outbox_;
   std::vector<std::thread> threads_;
 };
 

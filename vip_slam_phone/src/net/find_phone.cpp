@@ -1,5 +1,7 @@
 #include "vip_slam_phone/net/find_phone.h"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <cstdio>
 #include <memory>
 #include <sstream>
@@ -7,6 +9,14 @@
 #include <vector>
 
 namespace vip_slam::phone {
+namespace {
+
+bool isAddress(int family, const std::string& text) {
+  unsigned char bytes[sizeof(in6_addr)];
+  return text.find('\0') == std::string::npos && inet_pton(family, text.c_str(), bytes) == 1;
+}
+
+}  // namespace
 
 std::string addressIn(const std::string& browse_output) {
   // =;interface;protocol;name;type;domain;host;address;port;text   (';' within a name is escaped)
@@ -17,9 +27,11 @@ std::string addressIn(const std::string& browse_output) {
     std::vector<std::string> cells;
     std::istringstream text(line);
     for (std::string cell; std::getline(text, cell, ';');) cells.push_back(cell);
-    if (cells.size() < 9 || cells[7].empty()) continue;
-    if (cells[2] == "IPv4") return cells[7];
-    if (found.empty() && cells[7].rfind("fe80", 0) != 0) found = cells[7];
+    if (cells.size() < 9) continue;
+    const std::string& address = cells[7];
+    if (isAddress(AF_INET, address)) return address;
+    // An address of the link alone would need the interface's name with it.
+    if (found.empty() && isAddress(AF_INET6, address) && address.rfind("fe80", 0) != 0) found = address;
   }
   return found;
 }

@@ -11,11 +11,17 @@
 #include <memory>
 
 #include "vip_slam_core/util/formatted.h"
+#include "vip_slam_phone/wire/bytes.h"
 
 namespace vip_slam::phone {
 
+std::string hostAndPort(const std::string& host, int port) {
+  const bool v6 = host.find(':') != std::string::npos;
+  return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+}
+
 TcpStream::TcpStream(const std::string& host, int port, double timeout, const std::atomic<bool>& stop)
-    : name_(host + ":" + std::to_string(port)), timeout_(timeout), stop_(stop) {
+    : name_(hostAndPort(host, port)), timeout_(timeout), stop_(stop) {
   addrinfo hints{}, *list = nullptr;
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_STREAM;
@@ -83,6 +89,14 @@ std::vector<std::uint8_t> TcpStream::read(std::size_t size) {
   std::vector<std::uint8_t> out(size);
   read(out.data(), size);
   return out;
+}
+
+std::vector<std::uint8_t> TcpStream::readMessage(std::size_t shortest, std::size_t longest, const std::string& what) {
+  const auto size = Bytes(read(4)).little<std::uint32_t>(0);
+  if (size < shortest || size > longest)
+    throw WireError(name_ + ": " + what + " of " + std::to_string(size) + " bytes, expected " +
+                    std::to_string(shortest) + " to " + std::to_string(longest) + ": is this port the app's?");
+  return read(size);
 }
 
 void TcpStream::write(const void* data, std::size_t size) {

@@ -79,10 +79,12 @@ std::vector<std::uint8_t> depthMessage(const cv::Mat& metres, std::uint16_t sequ
 double wallTime() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
 struct Options {
-  std::string bag, sensor;
+  std::string bag, sensor, coding = "h264";
   int rtsp_port = 8554, record_port = 8555, depth_port = 8556;
   double mbit = 8, breathing = 0.03, reconnect = 0, wait = 0;
   int piece = 0, lose = 0;
+
+  Codec codec() const { return coding == "hevc" ? Codec::kHevc : Codec::kH264; }
 };
 
 class StandIn {
@@ -90,7 +92,7 @@ class StandIn {
   explicit StandIn(const Options& options)
       : options_(options),
         sensor_(loadSensorConfig(options.sensor)),
-        rtsp_(options.rtsp_port),
+        rtsp_(options.rtsp_port, options.codec()),
         records_(options.record_port,
                  [](int client) {
                    return greetBy(client, R"({"protocol":"irtsp-imu","version":2,"revision":6,"endianness":"little",)"
@@ -183,7 +185,8 @@ class StandIn {
     const CameraIntrinsics own = camera(t);
     const cv::Mat seen = warpColor(bgr, sensor_.camera, own);
     if (!encoder_)
-      encoder_ = std::make_unique<VideoEncoder>(seen.size(), static_cast<int>(std::lround(sensor_.color_rate)),
+      encoder_ = std::make_unique<VideoEncoder>(options_.codec(), seen.size(),
+                                                static_cast<int>(std::lround(sensor_.color_rate)),
                                                 static_cast<int>(1e6 * options_.mbit));
     auto out = record(5, host(end), unixOf(end));
     const float k[6] = {float(own.fx), float(own.fy),    float(own.cx),
@@ -231,6 +234,7 @@ int main(int argc, char** argv) {
     ("record-port", po::value(&options.record_port)->default_value(options.record_port), "IMU and intrinsics")
     ("depth-port", po::value(&options.depth_port)->default_value(options.depth_port), "depth")
     ("mbit", po::value(&options.mbit)->default_value(options.mbit), "of the video, Mbit/s")
+    ("codec", po::value(&options.coding)->default_value(options.coding), "of the video: h264 or hevc")
     ("breathing", po::value(&options.breathing)->default_value(options.breathing), "of the focal length")
     ("wait", po::value(&options.wait)->default_value(options.wait), "s before it plays")
     ("reconnect", po::value(&options.reconnect)->default_value(options.reconnect), "s after which connections break")
@@ -247,6 +251,10 @@ int main(int argc, char** argv) {
       std::cout << described;
       return 0;
     }
+    if (options.coding != "h264" && options.coding != "hevc")
+      throw po::error("--codec " + options.coding + ": expected h264 or hevc");
+    if (!vip_slam::phone::VideoEncoder::available(options.codec()))
+      throw po::error("--codec " + options.coding + ": libavcodec has no encoder for it");
     if (options.bag.empty() || options.sensor.empty()) throw po::error("a bag and --sensor are needed");
   } catch (const po::error& e) {
     std::cerr << e.what() << "\n";

@@ -1,7 +1,6 @@
 #include "rtsp_server.h"
 
 #include <sys/socket.h>
-#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -10,10 +9,13 @@ namespace vip_slam::phone {
 namespace {
 
 constexpr std::uint32_t kFirstRtp = 0xfff00000u;  // wraps after 11 s
-constexpr std::size_t kPacket = 1400;
 
-void big(std::vector<std::uint8_t>* out, std::uint32_t value, int bytes) {
-  for (int shift = 8 * (bytes - 1); shift >= 0; shift -= 8) out->push_back(static_cast<std::uint8_t>(value >> shift));
+/// A packet as it is interleaved with the answers (RFC 2326, 10.12).
+std::vector<std::uint8_t> interleaved(std::uint8_t channel, const std::vector<std::uint8_t>& packet) {
+  std::vector<std::uint8_t> out = {'$', channel, static_cast<std::uint8_t>(packet.size() >> 8),
+                                   static_cast<std::uint8_t>(packet.size())};
+  out.insert(out.end(), packet.begin(), packet.end());
+  return out;
 }
 
 /// A whole request's head; empty at the end of the connection. A second without one is none: "\n" is returned.
@@ -38,8 +40,10 @@ std::string readRequest(int client) {
 
 }  // namespace
 
-RtspServer::RtspServer(int port)
-    : port_(std::make_unique<Port>(
+RtspServer::RtspServer(int port, Codec codec)
+    : codec_(codec),
+      writer_(codec),
+      port_(std::make_unique<Port>(
           port, [this](int client) { return greet(client); }, [this](int client) { listenOn(client); })) {}
 
 bool RtspServer::greet(int client) {
@@ -72,7 +76,9 @@ bool RtspServer::answer(int client, const std::string& request) {
     body =
         "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=stand-in\r\nt=0 0\r\nm=audio 0 RTP/AVP 97\r\n"
         "a=rtpmap:97 MPEG4-GENERIC/48000/1\r\na=control:trackID=1\r\nm=video 0 RTP/AVP 96\r\n"
-        "a=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1\r\na=control:trackID=0\r\n";
+        "a=rtpmap:96 ";
+    body += codec_ == Codec::kH264 ? "H264/90000\r\na=fmtp:96 packetization-mode=1\r\n" : "H265/90000\r\n";
+    body += "a=control:trackID=0\r\n";
     text += "Content-Type: application/sdp\r\nContent-Length: " + std::to_string(body.size()) + "\r\n";
   }
   if (request.rfind("SETUP", 0) == 0) {
@@ -92,52 +98,17 @@ bool RtspServer::answer(int client, const std::string& request) {
   return sendAll(client, text.data(), text.size());
 }
 
-void RtspServer::report(double unix_time, std::uint32_t rtp) {
-  std::vector<std::uint8_t> out = {'$', static_cast<std::uint8_t>(channel_ + 1), 0, 28, 0x80, 200, 0, 6, 1, 2, 3, 4};
-  const double ntp = unix_time + 2208988800.0;
-  big(&out, static_cast<std::uint32_t>(ntp), 4);
-  big(&out, static_cast<std::uint32_t>((ntp - std::floor(ntp)) * 4294967296.0), 4);
-  big(&out, rtp, 4);
-  big(&out, 0, 4);
-  big(&out, 0, 4);
-  port_->send(out);
-  last_report_ = unix_time;
-}
-
 void RtspServer::send(const std::vector<std::vector<std::uint8_t>>& units, double unix_time, std::size_t piece,
                       bool lose_one) {
   if (first_ < 0) first_ = unix_time;
   const auto rtp = kFirstRtp + static_cast<std::uint32_t>(std::llround((unix_time - first_) * 90000));
-  if (port_->fresh() || unix_time - last_report_ > 1) report(unix_time, rtp);
-  const auto packet = [&](std::vector<std::uint8_t> payload, bool last) {
-    const std::uint16_t sequence = sequence_++;
-    if (lose_one && last) return;
-    std::vector<std::uint8_t> out = {'$', channel_};
-    big(&out, static_cast<std::uint32_t>(12 + payload.size()), 2);
-    out.push_back(0x80);
-    out.push_back(last ? 0xe0 : 0x60);
-    big(&out, sequence, 2);
-    big(&out, rtp, 4);
-    big(&out, 0x01020304, 4);
-    out.insert(out.end(), payload.begin(), payload.end());
-    port_->send(out, piece);
-  };
-  for (std::size_t k = 0; k < units.size(); ++k) {
-    const auto& unit = units[k];
-    const bool last = k + 1 == units.size();
-    if (unit.size() <= kPacket) {
-      packet(unit, last);
-      continue;
-    }
-    for (std::size_t at = 1; at < unit.size(); at += kPacket) {
-      const std::size_t end = std::min(at + kPacket, unit.size());
-      std::vector<std::uint8_t> payload = {
-          static_cast<std::uint8_t>((unit[0] & 0xe0) | 28),
-          static_cast<std::uint8_t>((at == 1 ? 0x80 : 0) | (end == unit.size() ? 0x40 : 0) | (unit[0] & 0x1f))};
-      payload.insert(payload.end(), unit.begin() + at, unit.begin() + end);
-      packet(std::move(payload), last && end == unit.size());
-    }
+  if (port_->fresh() || unix_time - last_report_ > 1) {
+    port_->send(interleaved(static_cast<std::uint8_t>(channel_ + 1), RtpWriter::report(unix_time, rtp)));
+    last_report_ = unix_time;
   }
+  std::vector<std::vector<std::uint8_t>> packets = writer_.packets(units, rtp);
+  if (lose_one && !packets.empty()) packets.pop_back();
+  for (const auto& packet : packets) port_->send(interleaved(channel_, packet), piece);
 }
 
 }  // namespace vip_slam::phone

@@ -6,13 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "rtp_writer.h"
 #include "server.h"
 
 namespace vip_slam::phone {
 
 class RtspServer {
  public:
-  explicit RtspServer(int port);
+  RtspServer(int port, Codec codec);
   /// A coded picture at `unix_time` s of the phone's clock, in writes of at most `piece` bytes (0: any); without its
   /// last packet when `lose_one`.
   void send(const std::vector<std::vector<std::uint8_t>>& units, double unix_time, std::size_t piece, bool lose_one);
@@ -22,9 +23,9 @@ class RtspServer {
   bool greet(int client);
   bool answer(int client, const std::string& request);
   void listenOn(int client);
-  void report(double unix_time, std::uint32_t rtp);
+  Codec codec_;
+  RtpWriter writer_;
   std::atomic<std::uint8_t> channel_{0};  ///< of the video, as the client wants it
-  std::uint16_t sequence_ = 65000;        ///< wraps soon
   double first_ = -1, last_report_ = 0;
   std::unique_ptr<Port> port_;
 };

@@ -3,30 +3,27 @@
 #include <stdexcept>
 
 extern "C" {
-#include <libavcodec/avcodec.h>
 #include <libavutil/opt.h>
-#include <libswscale/swscale.h>
 }
 
+#include "av_parts.h"
+
 namespace vip_slam::phone {
+namespace {
 
-struct VideoEncoder::Impl {
-  AVCodecContext* context = nullptr;
-  AVFrame* frame = nullptr;
-  AVPacket* packet = nullptr;
-  SwsContext* scaler = nullptr;
-  ~Impl() {
-    sws_freeContext(scaler);
-    av_packet_free(&packet);
-    av_frame_free(&frame);
-    avcodec_free_context(&context);
-  }
-};
+const char* nameOf(Codec codec) { return codec == Codec::kH264 ? "libx264" : "libx265"; }
 
-VideoEncoder::VideoEncoder(cv::Size size, int rate, int bits_per_second) : impl_(std::make_unique<Impl>()) {
+}  // namespace
+
+struct VideoEncoder::Impl : AvParts {};
+
+bool VideoEncoder::available(Codec codec) { return avcodec_find_encoder_by_name(nameOf(codec)); }
+
+VideoEncoder::VideoEncoder(Codec kind, cv::Size size, int rate, int bits_per_second)
+    : impl_(std::make_unique<Impl>()), name_(nameOf(kind)) {
   av_log_set_level(AV_LOG_ERROR);
-  const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
-  if (!codec) throw std::runtime_error("libavcodec has no libx264");
+  const AVCodec* codec = avcodec_find_encoder_by_name(name_.c_str());
+  if (!codec) throw std::runtime_error("libavcodec has no " + name_);
   AVCodecContext* c = impl_->context = avcodec_alloc_context3(codec);
   c->width = size.width;
   c->height = size.height;
@@ -37,9 +34,10 @@ VideoEncoder::VideoEncoder(cv::Size size, int rate, int bits_per_second) : impl_
   c->gop_size = rate;
   c->max_b_frames = 0;
   c->thread_count = 1;
-  av_opt_set(c->priv_data, "preset", "superfast", 0);
+  av_opt_set(c->priv_data, "preset", kind == Codec::kH264 ? "superfast" : "ultrafast", 0);
   av_opt_set(c->priv_data, "tune", "zerolatency", 0);
-  if (avcodec_open2(c, codec, nullptr) < 0) throw std::runtime_error("libx264 does not open");
+  if (kind == Codec::kHevc) av_opt_set(c->priv_data, "x265-params", "log-level=error:pools=none", 0);
+  if (avcodec_open2(c, codec, nullptr) < 0) throw std::runtime_error(name_ + " does not open");
   impl_->packet = av_packet_alloc();
   AVFrame* f = impl_->frame = av_frame_alloc();
   f->format = c->pix_fmt;
@@ -61,7 +59,7 @@ std::vector<std::vector<std::uint8_t>> VideoEncoder::encode(const cv::Mat& bgr) 
   sws_scale(av.scaler, planes, strides, 0, bgr.rows, av.frame->data, av.frame->linesize);
   ++av.frame->pts;
   std::vector<std::vector<std::uint8_t>> units;
-  if (avcodec_send_frame(av.context, av.frame) < 0) throw std::runtime_error("libx264 refuses an image");
+  if (avcodec_send_frame(av.context, av.frame) < 0) throw std::runtime_error(name_ + " refuses an image");
   while (avcodec_receive_packet(av.context, av.packet) == 0) {
     const std::uint8_t *begin = av.packet->data, *end = begin + av.packet->size;
     const auto start_code = [&](const std::uint8_t* p) {

@@ -57,8 +57,11 @@ void Depacketiser::take(const Held& packet, std::vector<AccessUnit>* out) {
 }
 
 void Depacketiser::finish(std::vector<AccessUnit>* out) {
+  // Of a picture that lost its beginning nothing may be left: the next one leans on it all the same.
+  const bool gone = current_.damaged && current_.data.empty();
   if (!current_.data.empty()) out->push_back(std::move(current_));
   current_ = {};
+  current_.damaged = gone;
   in_fragment_ = false;
 }
 

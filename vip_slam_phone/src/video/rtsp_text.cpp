@@ -1,6 +1,7 @@
 #include "vip_slam_phone/video/rtsp_text.h"
 
 #include <algorithm>
+#include <cctype>
 #include <sstream>
 
 extern "C" {
@@ -61,7 +62,8 @@ RtspAnswer parseAnswer(const std::string& head) {
   std::getline(first >> std::ws, answer.reason);
   if (!answer.reason.empty() && answer.reason.back() == '\r') answer.reason.pop_back();
   while (std::getline(lines, line)) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
+    // Of what comes back in our requests: a control character in it would end a line of ours.
+    line.erase(std::remove_if(line.begin(), line.end(), [](unsigned char c) { return std::iscntrl(c); }), line.end());
     const auto colon = line.find(':');
     if (colon == std::string::npos) continue;
     const auto begin = line.find_first_not_of(' ', colon + 1);

@@ -2,25 +2,11 @@
 
 #include <stdexcept>
 
-extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libswscale/swscale.h>
-}
+#include "av_parts.h"
 
 namespace vip_slam::phone {
 
-struct VideoDecoder::Impl {
-  AVCodecContext* context = nullptr;
-  AVFrame* frame = nullptr;
-  AVPacket* packet = nullptr;
-  SwsContext* scaler = nullptr;
-  ~Impl() {
-    sws_freeContext(scaler);
-    av_packet_free(&packet);
-    av_frame_free(&frame);
-    avcodec_free_context(&context);
-  }
-};
+struct VideoDecoder::Impl : AvParts {};
 
 VideoDecoder::VideoDecoder(Codec codec) : impl_(std::make_unique<Impl>()) {
   av_log_set_level(AV_LOG_FATAL);  // losses are counted and told by us

@@ -1,5 +1,6 @@
 #include "vip_slam_phone/wire/depth_frame.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <zlib.h>
@@ -28,7 +29,7 @@ std::vector<std::uint8_t> inflateRaw(const Bytes& packed, std::size_t expected) 
 
 DepthFrame parseDepthFrame(const Bytes& message) {
   if (message[0] != 10) throw WireError("depth: message of type " + std::to_string(message[0]) + ", expected 10");
-  const Bytes payload = message.from(32);
+  const Bytes payload = message.from(kDepthHeader);
   DepthFrame out;
   out.sequence = message.little<std::uint16_t>(2);
   out.host_time = message.little<double>(8);
@@ -72,8 +73,9 @@ DepthFrame parseDepthFrame(const Bytes& message) {
 
 std::vector<std::uint8_t> askForDeflate() {
   const std::string json = "{\"compression\":\"zlib\"}";
-  std::vector<std::uint8_t> out = {static_cast<std::uint8_t>(json.size()), 0, 0, 0};
-  out.insert(out.end(), json.begin(), json.end());
+  std::vector<std::uint8_t> out(4 + json.size());
+  out[0] = static_cast<std::uint8_t>(json.size());
+  std::copy(json.begin(), json.end(), out.begin() + 4);
   return out;
 }
 

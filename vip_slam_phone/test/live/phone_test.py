@@ -140,6 +140,15 @@ class PhoneTest(unittest.TestCase):
             subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=30).stdout))
         self.assertIn('h264,320', seen[0])
 
+    def test_04_hevc(self):
+        said = subprocess.run(['rosrun', 'vip_slam_phone', 'phone_stand_in', '--codec', 'hevc'], stderr=subprocess.PIPE,
+                              text=True).stderr
+        if 'no encoder' in said:
+            self.skipTest('libavcodec has no libx265')
+        stamps = self.check_stamps(self.color, self.play('--codec', 'hevc'))
+        self.assertGreater(len(stamps), (SECONDS - 1.5) * RATE)
+        self.assertLess(np.diff(stamps).max(), 1.5 / RATE, 'an image is lost')
+
 
 if __name__ == '__main__':
     rostest.rosrun('vip_slam_phone', 'phone', PhoneTest)

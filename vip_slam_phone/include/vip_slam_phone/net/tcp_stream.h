@@ -13,6 +13,9 @@ struct ConnectionError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// As in an URL: an address of IPv6 has brackets around it.
+std::string hostAndPort(const std::string& host, int port);
+
 class TcpStream {
  public:
   /// Connects within `timeout` seconds, which is also how long a read or write waits. `stop` outlives the stream; once
@@ -25,6 +28,9 @@ class TcpStream {
   /// Exactly `size` bytes.
   void read(void* data, std::size_t size);
   std::vector<std::uint8_t> read(std::size_t size);
+  /// What follows a little-endian length of 4 bytes. Throws WireError, before anything of it is read, when that is not
+  /// from `shortest` to `longest`; `what` names it.
+  std::vector<std::uint8_t> readMessage(std::size_t shortest, std::size_t longest, const std::string& what);
   void write(const void* data, std::size_t size);
 
  private:

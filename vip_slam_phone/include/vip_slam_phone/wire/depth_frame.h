@@ -13,8 +13,9 @@ struct DepthFrame {
   cv::Mat metres;                       ///< 32FC1, along the optical axis, 0 = invalid
 };
 
+constexpr std::size_t kDepthHeader = 32;
 /// Longest message that is believed: 1024 x 1024 floats and the header.
-constexpr std::size_t kMaxDepthMessage = (1 << 22) + 32;
+constexpr std::size_t kMaxDepthMessage = (1 << 22) + kDepthHeader;
 
 /// A header of 32 bytes and the map: half or single floats, raw or DEFLATE. Throws WireError on anything else; of LZFSE
 /// it says that it is not supported.

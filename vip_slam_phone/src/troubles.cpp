@@ -1,4 +1,4 @@
-#include "phone_diagnostics.h"
+#include "vip_slam_phone/troubles.h"
 
 #include "vip_slam_core/util/formatted.h"
 
@@ -24,9 +24,11 @@ std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& 
   stream("depth", now.depth, "switch on depth in the app; until then it goes on visual-inertially");
   words.insert(words.end(), now.complaints.begin(), now.complaints.end());
   if (now.video.connected && !now.sender_report)
-    words.push_back("no RTCP sender report yet: the time of the images is not known");
+    words.push_back("no RTCP sender report yet: the time of the images is not known, " + std::to_string(now.untimed) +
+                    " were left out");
   const double imu = (now.imu - before.imu) / seconds;
-  if (now.records.connected && before.clock_ready && imu < 90)
+  const bool all_the_time = now.records.connected && now.records.connections == before.records.connections;
+  if (all_the_time && before.clock_ready && imu < 90)
     words.push_back(formatted("%.0f IMU samples a second, expected about 100", imu));
   if (now.assembly.portrait > before.assembly.portrait)
     words.push_back("images are upright: run the app's ARKit pose, whose images are landscape as the sensor is");
@@ -36,6 +38,11 @@ std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& 
     words.push_back(std::to_string(lost) + " depth images were lost: the network is too slow or too busy");
   if (const std::size_t lost = now.assembly.imu_lost - before.assembly.imu_lost)
     words.push_back(std::to_string(lost) + " records were lost: the network is too slow or too busy");
+  const std::size_t images = now.left_out.images - before.left_out.images;
+  const std::size_t samples = now.left_out.samples - before.left_out.samples;
+  if (images + samples > 0)
+    words.push_back(std::to_string(images) + " images and " + std::to_string(samples) +
+                    " samples were left out: publishing is too slow; is the computer too busy?");
   return words;
 }
 
