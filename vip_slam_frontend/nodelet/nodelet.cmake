@@ -31,6 +31,8 @@ if(CATKIN_ENABLE_TESTING)
   file(GLOB sources CONFIGURE_DEPENDS test/nodelet/test_*.cpp)
   catkin_add_gtest(${PROJECT_NAME}_test_nodelet ${sources})
   target_include_directories(${PROJECT_NAME}_test_nodelet PRIVATE nodelet)
+  target_compile_options(${PROJECT_NAME}_test_nodelet PRIVATE $<$<CONFIG:Release>:-O1>)  # as other tests
   target_include_directories(${PROJECT_NAME}_test_nodelet SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
-  target_link_libraries(${PROJECT_NAME}_test_nodelet vip_slam_frontend_nodelets vip_slam_frontend gtest_main ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
+  target_link_libraries(${PROJECT_NAME}_test_nodelet vip_slam_frontend_nodelets vip_slam_frontend GTest::Main
+    ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
 endif()
