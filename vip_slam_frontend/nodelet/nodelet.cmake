@@ -1,7 +1,8 @@
 # The front end as a nodelet. Included last: ROS stays out of the library above.
+#catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS
   diagnostic_updater dynamic_reconfigure geometry_msgs image_transport nav_msgs nodelet pluginlib roscpp sensor_msgs
-  tf2_ros
+  std_msgs tf2 tf2_ros
   vip_slam_core vip_slam_msgs vip_slam_ros)
 find_package(cv_bridge REQUIRED)  # apart: its list of libraries is all of OpenCV, most of which nobody needs
 find_package(OpenCV REQUIRED COMPONENTS core imgproc)

@@ -1,4 +1,5 @@
 # A program that plays a bag as the phone would.
+#catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS rosbag roscpp sensor_msgs vip_slam_core vip_slam_ros)
 find_package(Boost REQUIRED COMPONENTS program_options)
 
