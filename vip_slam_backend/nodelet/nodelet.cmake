@@ -1,7 +1,8 @@
 # The back end as a nodelet. Included last: ROS stays out of the library above.
+#catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS
-  diagnostic_updater dynamic_reconfigure geometry_msgs nav_msgs nodelet pluginlib roscpp sensor_msgs std_srvs tf2_ros
-  visualization_msgs vip_slam_core vip_slam_msgs vip_slam_ros)
+  diagnostic_updater dynamic_reconfigure geometry_msgs nav_msgs nodelet pluginlib roscpp sensor_msgs std_msgs std_srvs
+  tf2_ros visualization_msgs vip_slam_core vip_slam_msgs vip_slam_ros)
 
 add_library(vip_slam_backend_nodelets
   nodelet/back_end_nodelet.cpp

@@ -6,9 +6,19 @@ if(PYTHON_EXECUTABLE AND NOT "$CACHE{PYTHON_EXECUTABLE}")
   set(PYTHON_EXECUTABLE "${PYTHON_EXECUTABLE}" CACHE FILEPATH "The Python that catkin found" FORCE)
 endif()
 
+# Tests are linked with the installed GoogleTest, as CMake finds it. Catkin of Debian 11 finds another below /usr/src by
+# GMockConfig of cmake-extras, whose targets work in the first package of a CMake project only.
+if(CATKIN_ENABLE_TESTING)
+  find_package(GTest MODULE QUIET)
+  if(TARGET GTest::GTest)
+    set(GTEST_LIBRARIES GTest::GTest)
+  endif()
+endif()
+
 # vip_slam_add_test_folders(LIBRARY... [EXCEPT FOLDER...])   makes one test program per folder below test/:
 # PACKAGE_test_FOLDER of its test_*.cpp, linked with the given libraries, where tests are enabled. Sets
-# vip_slam_test_programs to their names. Files may include what lies in test/.
+# vip_slam_test_programs to their names. Files may include what lies in test/. Release builds compile tests without most
+# of the optimisation: they run as long as before, their time goes into the libraries.
 function(vip_slam_add_test_folders)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "" "EXCEPT")
   set(programs)
@@ -21,7 +31,8 @@ function(vip_slam_add_test_folders)
     endif()
     if(TARGET ${PROJECT_NAME}_test_${folder})  # not without gtest
       target_include_directories(${PROJECT_NAME}_test_${folder} PRIVATE test)
-      target_link_libraries(${PROJECT_NAME}_test_${folder} ${arg_UNPARSED_ARGUMENTS} gtest_main)
+      target_link_libraries(${PROJECT_NAME}_test_${folder} ${arg_UNPARSED_ARGUMENTS} GTest::Main)
+      target_compile_options(${PROJECT_NAME}_test_${folder} PRIVATE $<$<CONFIG:Release>:-O1>)  # follows -O3 and wins
       list(APPEND programs ${PROJECT_NAME}_test_${folder})
     endif()
   endforeach()

@@ -1,7 +1,8 @@
 # The front end as a nodelet. Included last: ROS stays out of the library above.
+#catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS
   diagnostic_updater dynamic_reconfigure geometry_msgs image_transport nav_msgs nodelet pluginlib roscpp sensor_msgs
-  tf2_ros
+  std_msgs tf2 tf2_ros
   vip_slam_core vip_slam_msgs vip_slam_ros)
 find_package(cv_bridge REQUIRED)  # apart: its list of libraries is all of OpenCV, most of which nobody needs
 find_package(OpenCV REQUIRED COMPONENTS core imgproc)
@@ -31,6 +32,8 @@ if(CATKIN_ENABLE_TESTING)
   file(GLOB sources CONFIGURE_DEPENDS test/nodelet/test_*.cpp)
   catkin_add_gtest(${PROJECT_NAME}_test_nodelet ${sources})
   target_include_directories(${PROJECT_NAME}_test_nodelet PRIVATE nodelet)
+  target_compile_options(${PROJECT_NAME}_test_nodelet PRIVATE $<$<CONFIG:Release>:-O1>)  # as other tests
   target_include_directories(${PROJECT_NAME}_test_nodelet SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
-  target_link_libraries(${PROJECT_NAME}_test_nodelet vip_slam_frontend_nodelets vip_slam_frontend gtest_main ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
+  target_link_libraries(${PROJECT_NAME}_test_nodelet vip_slam_frontend_nodelets vip_slam_frontend GTest::Main
+    ${catkin_LIBRARIES} ${OpenCV_LIBRARIES})
 endif()

@@ -4,6 +4,7 @@ add_library(${PROJECT_NAME}_sending STATIC src/stand_in/rtp_writer.cpp src/stand
 target_include_directories(${PROJECT_NAME}_sending PUBLIC src/stand_in PRIVATE src/video)
 target_link_libraries(${PROJECT_NAME}_sending ${PROJECT_NAME} ${OpenCV_LIBRARIES} PkgConfig::AV Threads::Threads)
 
+#catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS rosbag roscpp sensor_msgs vip_slam_core vip_slam_ros)
 find_package(Boost REQUIRED COMPONENTS program_options)
 

@@ -1,6 +1,7 @@
 # The phone as a nodelet. Included last: ROS stays out of the library above.
+#catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS
-  diagnostic_updater nav_msgs nodelet pluginlib roscpp sensor_msgs tf2_ros vip_slam_core vip_slam_ros)
+  diagnostic_msgs diagnostic_updater nav_msgs nodelet pluginlib roscpp sensor_msgs tf2_ros vip_slam_core vip_slam_ros)
 find_package(OpenCV REQUIRED COMPONENTS core imgcodecs)
 
 add_library(vip_slam_phone_nodelets nodelet/phone_nodelet.cpp)

@@ -1,6 +1,7 @@
 # The plane module as a nodelet. Included last: ROS stays out of the library above.
+#catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS
-  diagnostic_updater dynamic_reconfigure nodelet pluginlib roscpp sensor_msgs visualization_msgs
+  diagnostic_updater dynamic_reconfigure nodelet pluginlib roscpp sensor_msgs std_msgs visualization_msgs
   vip_slam_core vip_slam_msgs vip_slam_ros)
 find_package(PCL QUIET REQUIRED COMPONENTS common)
 find_package(pcl_conversions REQUIRED)  # headers alone: its list of libraries has VTK and Qt
