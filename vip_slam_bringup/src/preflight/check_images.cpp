@@ -56,6 +56,17 @@ void checkCamera(const std::string& role, const StreamRecord& info, const Camera
                     formatted("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
 }
 
+/// A lens that focuses changes its focal length; the first camera_info holds for all images.
+void checkFocus(const Recording& r, Findings* out) {
+  constexpr double kMatters = 0.002, kTooMuch = 0.01;
+  const double change = r.color_focal_to / std::max(r.color_focal_from, 1e-9) - 1;
+  if (r.color_focal_to == 0 || change < kMatters) return;
+  out->push_back({change > kTooMuch ? Severity::kError : Severity::kWarning, "colour camera_info",
+                  formatted("K changes: fx from %.2f to %.2f, by %.1f %%; one K is taken for all images",
+                            r.color_focal_from, r.color_focal_to, 100 * change),
+                  "switch off autofocus, zoom and stabilisation, or warp the images to one K"});
+}
+
 /// Compares the calibration of the sensor file with the images, and with camera_info where there is one.
 void checkSensorFileCamera(const Recording& r, Findings* out) {
   const CameraIntrinsics& camera = r.sensor.camera;
@@ -161,6 +172,7 @@ Findings checkImages(const Recording& r) {
     checkCamera("colour camera_info", r.color_info, r.color_camera, r.color_camera_error, r.color, true, &out);
   else
     checkSensorFileCamera(r, &out);
+  checkFocus(r, &out);
   checkMask(r, &out);
   checkBrightness(r.brightness, &out);
   checkRepeats(r, &out);
@@ -221,10 +233,11 @@ Findings checkSkew(const Recording& r) {
     const double early = quantile(skew, 0.05), late = quantile(skew, 0.95);
     const double most = std::max(std::abs(early), std::abs(late));
     if (most > 0.008)
-      out.push_back({Severity::kNote, "colour and depth",
-                     formatted("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
-                     "the motion carries depth over to the colour image, as far as these stamps are right; the driver's "
-                     "synchronisation spares that"});
+      out.push_back(
+          {Severity::kNote, "colour and depth",
+           formatted("depth is stamped %.1f to %.1f ms after colour", 1e3 * early, 1e3 * late),
+           "the motion carries depth over to the colour image, as far as these stamps are right; the driver's "
+           "synchronisation spares that"});
     else
       out.push_back({Severity::kGood, "colour and depth", formatted("stamps agree within %.1f ms", 1e3 * most), ""});
   }

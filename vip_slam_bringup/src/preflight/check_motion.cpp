@@ -129,20 +129,20 @@ Finding readoutFinding(const Recording& r, const MotionEstimate& motion) {
 
 }  // namespace
 
-MotionEstimate estimateMotion(const Recording& r, double max_offset) {
+MotionEstimate estimateMotion(const Recording& r, const std::vector<RotationStep>& steps, double max_offset) {
   MotionEstimate out;
-  if (r.rotations.size() < 40 || r.gyro_samples.size() < 100) {
+  if (steps.size() < 40 || r.gyro_samples.size() < 100) {
     out.why_not = "too few images with enough texture";
     return out;
   }
   const GyroIntegral gyro(r.gyro_samples);
   Search coarse;
-  if (!search(r.rotations, gyro, 0, max_offset, {0.1, 0.5}, &coarse)) {
+  if (!search(steps, gyro, 0, max_offset, {0.1, 0.5}, &coarse)) {
     out.why_not = "images and gyroscope do not overlap in time";
     return out;
   }
   Search fine = coarse;
-  if (!search(r.rotations, gyro, coarse.offset, 0.02, {std::max(0.01, 3 * coarse.fit.median_error), 0.0}, &fine))
+  if (!search(steps, gyro, coarse.offset, 0.02, {std::max(0.01, 3 * coarse.fit.median_error), 0.0}, &fine))
     fine = coarse;
   const Fit& fit = fine.fit;
   out.scale = fit.scale;
@@ -161,13 +161,20 @@ MotionEstimate estimateMotion(const Recording& r, double max_offset) {
   // The rotation is observable once there is motion about a second axis, 0.05 rad/s.
   out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
   out.usable = true;
-  const auto rows = estimateReadout(r.rotations, gyro, {fine.offset, 0.0, out.R_imu_cam});
+  const auto rows = estimateReadout(steps, gyro, {fine.offset, 0.0, out.R_imu_cam});
   if (rows && rows->readout_sigma < kUsefulReadout) {
     // With a rolling shutter the delay estimated without rows does not refer to a definite row.
     out.time_offset = rows->time_offset;
     out.time_sigma = rows->time_sigma;
     out.readout = rows->readout;
     out.readout_sigma = rows->readout_sigma;
+  }
+  if (rows) {
+    std::vector<double> errors;
+    for (const StepFit& fit : rows->fits) errors.push_back(fit.error);
+    out.misfit = quantile(errors, 0.75);
+    const Eigen::Vector3d arm = extrinsicsOfTf(r).value_or(r.sensor.T_imu_cam).t();
+    out.inertial = fitInertialMotion(*rows, r.gyro_samples, r.accel_samples, arm);
   }
   return out;
 }
@@ -196,7 +203,8 @@ Finding extrinsicsFinding(const Recording& r, const MotionEstimate& motion, cons
 
 Findings checkMotion(const Recording& r) {
   Findings out;
-  const MotionEstimate motion = estimateMotion(r);
+  const MotionEstimate motion = estimateMotion(r, r.rotations);
+  if (const auto wrong = cameraFinding(r, motion)) return {*wrong};  // what else the motion says follows from it
   if (motion.scale > 30 && motion.scale < 90)
     out.push_back({Severity::kError, "gyroscope", formatted("turns %.0f times as fast as the images", motion.scale),
                    "it reports degrees a second; radians a second are expected"});
@@ -206,6 +214,10 @@ Findings checkMotion(const Recording& r) {
     return out;
   }
   if (motion.scale > 5) return out;
+  if (const auto cause = inertialFinding(r, motion)) {
+    out.push_back(*cause);
+    if (cause->severity == Severity::kError) return out;  // what else the motion says follows from it
+  }
   const double difference = motion.time_offset - r.sensor.time_offset;
   const std::string measured =
       formatted("%+.1f ms measured (one sigma %.1f ms), the sensor file says %+.1f ms", 1000 * motion.time_offset,

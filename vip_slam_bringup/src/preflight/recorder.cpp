@@ -5,6 +5,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "vip_slam_bringup/preflight/camera_readings.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/util/formatted.h"
@@ -27,15 +28,17 @@ bool note(StreamRecord* stream, double arrival, const Message& message) {
 
 }  // namespace
 
-Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds) : image_seconds_(image_seconds) {
+Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds)
+    : image_seconds_(image_seconds), rotation_(sensor.mask) {
   recording_.sensor = sensor;
   recording_.live = live;
-  if (!sensor.intrinsics_from_camera_info) startRotation(sensor.camera);
+  if (sensor.intrinsics_from_camera_info) return;
+  startRotation(sensor.camera);
+  recording_.camera_readings = otherReadings(sensor.camera);
 }
 
 void Recorder::startRotation(const CameraIntrinsics& camera) {
-  rotation_ = std::make_unique<ImageRotation>(makeCamera(camera), recording_.sensor.mask);
-  rotation_size_ = cv::Size(camera.width, camera.height);
+  camera_ = makeCamera(camera);
   if (!recording_.sensor.depth_registered) return;
   SensorConfig resolved = recording_.sensor;
   resolved.camera = camera;
@@ -99,7 +102,16 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   const SensorTopics& topics = recording_.sensor.topics;
   if (topic == topics.color_info) {
     take(&recording_.color_info, topics.color, &recording_.color_camera, &recording_.color_camera_error);
-    if (!rotation_ && recording_.color_camera.width > 0) startRotation(recording_.color_camera);
+    const double focal = message.K[0];
+    if (focal > 0) {
+      const bool first = recording_.color_focal_to == 0;
+      recording_.color_focal_from = first ? focal : std::min(recording_.color_focal_from, focal);
+      recording_.color_focal_to = std::max(recording_.color_focal_to, focal);
+    }
+    if (!camera_ && recording_.color_camera.width > 0) {
+      startRotation(recording_.color_camera);
+      recording_.camera_readings = otherReadings(recording_.color_camera, message);
+    }
   }
   if (topic == topics.depth_info)
     take(&recording_.depth_info, topics.depth, &recording_.depth_camera, &recording_.depth_camera_error);
@@ -193,10 +205,13 @@ void Recorder::flushGray(bool all) {
     for (const Stamped& d : recent_depth_)
       if (std::abs(d.t - gray.t) < 0.02 && d.image.size() == gray.image.size()) depth = &d.image;
     if (!depth && !all && waiting_gray_.size() < 4) return;
-    if (rotation_ && gray.image.size() == rotation_size_) {
+    if (camera_ && gray.image.size() == cv::Size(camera_->width(), camera_->height())) {
       if (depth && depth_edges_) depth_edges_->add(gray.image, *depth);
       const cv::Mat aligned = !depth ? cv::Mat() : to_colour_ ? (*to_colour_)(*depth) : *depth;
-      if (const auto step = rotation_->add(gray.t, gray.image, aligned)) recording_.rotations.push_back(*step);
+      if (const auto step = rotation_.add(gray.t, gray.image, aligned)) {
+        recording_.pixel_steps.push_back(*step);
+        if (const auto seen = seenBy(*camera_, *step)) recording_.rotations.push_back(*seen);
+      }
     }
     waiting_gray_.erase(waiting_gray_.begin());
   }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "vip_slam_bringup/preflight/inertial_motion.h"
 #include "vip_slam_bringup/preflight/recording.h"
 
 namespace vip_slam {
@@ -53,12 +54,24 @@ struct MotionEstimate {
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
   double time_sigma = 0;   ///< one sigma of it, seconds
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
-  bool rotation_known = false;  ///< rotated about two axes at least
-  double correlation = 0;       ///< share of the gyro's variance that the images explain, 0..1
-  double scale = 1;             ///< gyro rate over image rate
-  double readout = 0;           ///< seconds from the first row of an image to its last
-  double readout_sigma = 0;     ///< one sigma of it; 0: not known
+  bool rotation_known = false;             ///< rotated about two axes at least
+  double correlation = 0;                  ///< share of the gyro's variance that the images explain, 0..1
+  double scale = 1;                        ///< gyro rate over image rate
+  double readout = 0;                      ///< seconds from the first row of an image to its last
+  double readout_sigma = 0;                ///< one sigma of it; 0: not known
+  double misfit = 0;                       ///< of corners between images, normalised coordinates; 0: not known
+  std::optional<InertialMotion> inertial;  ///< against the accelerometer; empty: not known
 };
-MotionEstimate estimateMotion(const Recording& recording, double max_offset = 0.2);
+/// `steps`: the recording's rotations, or those of another reading of its camera.
+MotionEstimate estimateMotion(const Recording& recording, const std::vector<RotationStep>& steps,
+                              double max_offset = 0.2);
+
+/// Another reading of the camera's calibration under which pixels, depth and gyroscope fit far better, or coefficients
+/// that no reading makes fit. Empty when the calibration fits or when it is not known.
+std::optional<Finding> cameraFinding(const Recording& recording, const MotionEstimate& motion);
+
+/// What accelerometer, gyroscope, depth and images say of the same motion: axes that are not as configured, mirrored
+/// pictures, a wrong unit of depth. At most one finding, the cause; empty when they fit or when it is not known.
+std::optional<Finding> inertialFinding(const Recording& recording, const MotionEstimate& motion);
 
 }  // namespace vip_slam

@@ -51,10 +51,10 @@ class Recorder {
   Recording recording_;
   const double image_seconds_;
   double first_image_ = -1;
-  std::unique_ptr<ImageRotation> rotation_;
-  cv::Size rotation_size_;                    ///< image size of rotation_'s camera
-  std::unique_ptr<DepthToColour> to_colour_;  ///< of registered depth; null: depth is taken as it comes
-  std::unique_ptr<DepthEdges> depth_edges_;   ///< null: depth is not registered
+  ImageRotation rotation_;
+  std::shared_ptr<const CameraModel> camera_;  ///< null: not known yet
+  std::unique_ptr<DepthToColour> to_colour_;   ///< of registered depth; null: depth is taken as it comes
+  std::unique_ptr<DepthEdges> depth_edges_;    ///< null: depth is not registered
   struct Stamped {
     double t;
     cv::Mat image;

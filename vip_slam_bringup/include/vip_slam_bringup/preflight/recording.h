@@ -36,7 +36,17 @@ struct StampedVector {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
 };
 
-/// A corner seen in two successive images.
+/// A corner seen in two successive images, in pixels: whatever the camera is taken to be.
+struct PixelTrack {
+  Eigen::Vector2f from, to;
+  float z = 0;  ///< metres, depth at its pixel of the first image; 0: none
+};
+struct PixelStep {
+  double t0 = 0, t1 = 0;
+  std::vector<PixelTrack> tracks;
+};
+
+/// The same with a camera.
 struct CornerTrack {
   Eigen::Vector3f point;   ///< metres, in the colour camera when its row of the first image was read
   Eigen::Vector2f image;   ///< normalised coordinates in the second image
@@ -48,6 +58,12 @@ struct RotationStep {
   double t0 = 0, t1 = 0;
   Eigen::Vector3d rate_C = Eigen::Vector3d::Zero();  ///< mean rotation rate, rad/s, in the colour optical frame
   std::vector<CornerTrack> tracks;                   ///< corners with depth
+};
+
+/// What the colour camera might be instead of what is taken for it.
+struct CameraReading {
+  CameraIntrinsics camera;
+  std::string what;  ///< "its coefficients are those of equidistant"
 };
 
 struct DepthSample {
@@ -74,10 +90,13 @@ struct Recording {
   std::map<std::string, std::string> topics;  ///< all existing topics: topic -> type
   StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
   CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
+  double color_focal_from = 0, color_focal_to = 0;         ///< least and largest fx of all camera_info, px
   std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable
   std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
   GyroRange gyro_range;
-  std::vector<RotationStep> rotations;
+  std::vector<PixelStep> pixel_steps;
+  std::vector<RotationStep> rotations;         ///< of pixel_steps, with the camera as configured
+  std::vector<CameraReading> camera_readings;  ///< others of the same camera_info or sensor file
   std::vector<DepthSample> depths;
   DepthEdgeRecord depth_edges;                      ///< of registered depth
   std::vector<BrightnessSample> brightness;         ///< of some colour images
