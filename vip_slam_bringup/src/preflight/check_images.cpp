@@ -18,8 +18,11 @@ void checkEncoding(const std::string& role, const StreamRecord& stream, const st
   if (stream.unusable > 0)
     out->push_back({stream.unusable * 2 > stream.stamps.size() ? Severity::kError : Severity::kWarning, role,
                     formatted("%zu images could not be decoded: ", stream.unusable) + stream.unusable_reason,
-                    "record raw images, JPEG or PNG"});
+                    role == "depth image" ? "record depth as the driver has it, 16UC1 or 32FC1, or as compressedDepth; "
+                                            "grey levels and JPEG have lost it"
+                                          : "record raw images, JPEG or PNG"});
   for (const std::string& encoding : stream.encodings) {
+    if (stream.unusable * 2 > stream.stamps.size()) break;  // the cause is named
     const bool same = encoding == expected || (expected == "16UC1" && encoding == "mono16") ||
                       (expected == "mono8" && encoding == "8UC1");
     if (expected == "compressed" || same)
@@ -144,10 +147,15 @@ void checkDepth(const Recording& r, Findings* out) {
     return;
   }
   const double z = upperMedian(middle);
-  if (z < 0.05 || z > 50)
+  const auto swapped = std::count_if(r.depths.begin(), r.depths.end(), [](const DepthSample& d) { return d.swapped; });
+  if (2 * swapped > std::ptrdiff_t(r.depths.size()))
+    out->push_back({Severity::kError, "depth image",
+                    formatted("the two bytes of each value are changed over (median %.4g m): is_bigendian is wrong", z),
+                    "set is_bigendian in the driver as the values are"});
+  else if (z < 0.05 || z > 50)
     out->push_back({Severity::kError, "depth image", formatted("median depth is %.4g m", z),
                     "depth scale or encoding in the sensor file is wrong (millimetres against metres?)"});
-  else if (upperMedian(usable) < 0.02)
+  else if (upperMedian(usable) < 0.02 || z > noise.max_range)
     out->push_back(
         {Severity::kError, "depth image",
          formatted("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range, noise.max_range),

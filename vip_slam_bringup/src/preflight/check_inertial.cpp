@@ -88,7 +88,10 @@ std::optional<Finding> scaleFinding(const Recording& r, const InertialMotion& mo
 std::optional<Finding> inertialFinding(const Recording& r, const MotionEstimate& motion) {
   if (!motion.inertial) return std::nullopt;
   if (motion.inertial->axes_known && !motion.inertial->axes.isIdentity()) return axesFinding(r, motion);
-  return scaleFinding(r, *motion.inertial);
+  // An IMU that is smoothed, or of a wrong scale, would make depth look wrong.
+  const double gain = std::abs(motion.gain_fast - 1);
+  const auto scale = scaleFinding(r, *motion.inertial);
+  return scale && std::abs(motion.inertial->scale - 1) > 4 * gain ? scale : std::nullopt;
 }
 
 }  // namespace vip_slam

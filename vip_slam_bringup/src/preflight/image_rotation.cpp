@@ -15,6 +15,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kMinCorners = 15;
+constexpr int kMaxColumns = 800;  // of the image in which corners are followed
 
 /// Rotation with to ~ R from, by Kabsch with two rounds of trimming.
 std::optional<Eigen::Matrix3d> alignBearings(const std::vector<Eigen::Vector3d>& from,
@@ -78,22 +79,32 @@ std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& poi
 
 }  // namespace
 
-std::optional<PixelStep> ImageRotation::add(double t, const cv::Mat& gray, const cv::Mat& depth) {
+std::optional<PixelStep> ImageRotation::add(double t, const cv::Mat& image, const cv::Mat& depth) {
+  // A large image is followed in a smaller one: its corners are as exact as those of a small camera.
+  const int shrink = (image.cols + kMaxColumns - 1) / kMaxColumns;
+  cv::Mat gray = image;
+  if (shrink > 1) cv::resize(image, gray, image.size() / shrink, 0, 0, cv::INTER_AREA);
+  const Eigen::Vector2f times(float(image.cols) / float(gray.cols), float(image.rows) / float(gray.rows));
+  const auto inImage = [&](const cv::Point2f& p) {
+    return Eigen::Vector2f((p.x + 0.5f) * times.x() - 0.5f, (p.y + 0.5f) * times.y() - 0.5f);
+  };
   PixelStep step{t_, t, {}};
   if (!gray_.empty() && t > t_ && t - t_ < 0.2) {
+    cv::Mat mask;
+    if (mask_.size() == image.size()) cv::resize(mask_, mask, gray.size(), 0, 0, cv::INTER_NEAREST);
     std::vector<cv::Point2f> before, after;
-    cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0,
-                            mask_.size() == gray_.size() ? mask_ : cv::Mat());
+    cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0, mask);
     std::vector<unsigned char> found;
     std::vector<float> error;
     if (before.size() >= kMinCorners)
       cv::calcOpticalFlowPyrLK(gray_, gray, before, after, found, error, cv::Size(21, 21), 4);
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (!found[i]) continue;
-      const int u = cvRound(before[i].x), v = cvRound(before[i].y);
+      const Eigen::Vector2f from = inImage(before[i]);
+      const int u = cvRound(from.x()), v = cvRound(from.y());
       const bool inside = u >= 0 && v >= 0 && u < depth_.cols && v < depth_.rows;
       const float z = inside ? depth_.at<float>(v, u) : 0;
-      step.tracks.push_back({{before[i].x, before[i].y}, {after[i].x, after[i].y}, z >= 0.1f && z <= 20.f ? z : 0.f});
+      step.tracks.push_back({from, inImage(after[i]), z >= 0.1f && z <= 20.f ? z : 0.f});
     }
   }
   t_ = t;

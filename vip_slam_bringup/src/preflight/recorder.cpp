@@ -26,6 +26,24 @@ bool note(StreamRecord* stream, double arrival, const Message& message) {
   return true;
 }
 
+/// Whether neighbours are far more alike with the two bytes of each value changed over. `unit`: metres.
+bool smootherSwapped(const cv::Mat& depth, double unit) {
+  double as_is = 0, swapped = 0;
+  const auto raw = [&](int v, int u) {
+    const float z = depth.at<float>(v, u);
+    return z > 0 && std::isfinite(z) ? std::uint16_t(std::min(65535.0, std::round(z / unit))) : std::uint16_t(0);
+  };
+  const auto swap = [](std::uint16_t x) { return std::uint16_t(x << 8 | x >> 8); };
+  for (int v = 0; v < depth.rows; v += 8)
+    for (int u = 0; u + 1 < depth.cols; u += 8) {
+      const std::uint16_t a = raw(v, u), b = raw(v, u + 1);
+      if (a == 0 || b == 0) continue;
+      as_is += std::abs(a - b);
+      swapped += std::abs(swap(a) - swap(b));
+    }
+  return swapped < 0.2 * as_is;
+}
+
 }  // namespace
 
 Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds)
@@ -49,6 +67,7 @@ void Recorder::startRotation(const CameraIntrinsics& camera) {
 void Recorder::finish() {
   flushGray(true);
   if (depth_edges_) recording_.depth_edges = depth_edges_->record();
+  recording_.edge_shifts = edge_shifts_.record();
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message,
@@ -167,6 +186,9 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
       const auto [nearest, farthest] = std::minmax_element(values.begin(), values.end());
       sample.spread = *farthest - *nearest;
       sample.median = upperMedian(values);
+      const SensorConfig& sensor = recording_.sensor;
+      const bool plain = sensor.depth_encoding == "16UC1" && sensor.depth_offset == 0;
+      sample.swapped = plain && smootherSwapped(depth, sensor.depth_scale);
     }
     recording_.depths.push_back(sample);
   }
@@ -208,6 +230,7 @@ void Recorder::flushGray(bool all) {
     if (camera_ && gray.image.size() == cv::Size(camera_->width(), camera_->height())) {
       if (depth && depth_edges_) depth_edges_->add(gray.image, *depth);
       const cv::Mat aligned = !depth ? cv::Mat() : to_colour_ ? (*to_colour_)(*depth) : *depth;
+      if (depth && to_colour_) edge_shifts_.add(gray.t, gray.image, aligned);
       if (const auto step = rotation_.add(gray.t, gray.image, aligned)) {
         recording_.pixel_steps.push_back(*step);
         if (const auto seen = seenBy(*camera_, *step)) recording_.rotations.push_back(*seen);

@@ -2,6 +2,7 @@
 // found from the motion of a rendered bag whose recording is changed accordingly.
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -152,6 +153,82 @@ TEST_F(MotionCause, BinningThatKHasAlready) {
   for (const PixelStep& step : r.pixel_steps)
     if (const auto seen = seenBy(*wrong, step)) r.rotations.push_back(*seen);
   expectOnlyError(r, "colour camera_info", "K is that of the images already");
+}
+
+TEST(Smoothed, AnImuThatLosesFastTurnsOnlyIsNamed) {
+  // Slow turns and a hand's tremble of 2.5 Hz; the filter has one pole, at `cut_off`.
+  const auto rate = [](double t) {
+    const auto sway = [&](double slow, double fast, double phase) {
+      return 0.5 * std::sin(slow * t + phase) + 0.4 * std::sin(2 * M_PI * fast * t + phase);
+    };
+    return Eigen::Vector3d(sway(1.1, 2.5, 0), sway(0.7, 2.2, 1), sway(0.9, 2.8, 2));
+  };
+  for (const double cut_off : {6.0, 200.0}) {
+    Recording r;
+    r.sensor.T_imu_cam = SE3();
+    Eigen::Vector3d state = rate(0);
+    for (double t = 0; t < 20; t += 0.002) {
+      state += (1 - std::exp(-2 * M_PI * cut_off * 0.002)) * (rate(t) - state);
+      r.gyro_samples.push_back({t, state + Eigen::Vector3d(0.02, -0.01, 0.03)});
+    }
+    for (double t = 0.5; t < 19; t += 0.05) {
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (int i = 0; i < 10; ++i) mean += 0.1 * rate(t + 0.005 * i + 0.0025);
+      r.rotations.push_back({t, t + 0.05, mean, {}});
+    }
+    bool named = false;
+    for (const Finding& f : checkMotion(r)) named |= f.about == "IMU" && f.text.find("smoothed") != std::string::npos;
+    EXPECT_EQ(named, cut_off < 100) << toText(checkMotion(r), false);
+  }
+}
+
+TEST_F(MotionCause, ADelayThatIsNotTheSameInBothHalvesIsNotAdvised) {
+  Recording r = *sound_;
+  const double middle = r.rotations[r.rotations.size() / 2].t0;
+  for (RotationStep& s : r.rotations)
+    if (s.t0 >= middle) s.t0 += 0.02, s.t1 += 0.02;
+  bool named = false;
+  for (const Finding& f : checkMotion(r)) {
+    EXPECT_EQ(f.advice.find("set time_offset"), std::string::npos) << f.advice;
+    named |= f.text.find("in the first half") != std::string::npos;
+  }
+  EXPECT_TRUE(named);
+}
+
+TEST_F(MotionCause, WithoutDepthTheDelayIsNotAsSure) {
+  Recording r = *sound_;
+  const double sure = estimateMotion(r, r.rotations).time_sigma;
+  for (RotationStep& s : r.rotations) s.tracks.clear();
+  EXPECT_GT(estimateMotion(r, r.rotations).time_sigma, std::max(0.009, sure));
+}
+
+TEST_F(MotionCause, CornersThatStandStillWhileTheGyroscopeTurns) {
+  Recording r = *sound_;
+  r.rotations.clear();
+  const auto camera = makeCamera(r.color_camera);
+  for (PixelStep& step : r.pixel_steps) {
+    for (std::size_t i = 0; i < step.tracks.size(); ++i)
+      if (i % 8 != 0) step.tracks[i].to = step.tracks[i].from;
+    if (const auto seen = seenBy(*camera, step)) r.rotations.push_back(*seen);
+  }
+  const Findings findings = checkMotion(r);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].about, "colour image");
+  EXPECT_NE(findings[0].advice.find("emitter"), std::string::npos) << toText(findings, false);
+}
+
+TEST_F(MotionCause, ShakingWhileTheImagesStandStill) {
+  Recording r = *sound_;
+  EXPECT_TRUE(checkShaking(r).empty());
+  for (PixelStep& step : r.pixel_steps)
+    for (PixelTrack& track : step.tracks) track.to = track.from;
+  for (StampedVector& s : r.accel_samples) s.value = Eigen::Vector3d(4 * std::sin(2 * M_PI * 31 * s.t), -9.8, 0);
+  for (StampedVector& s : r.gyro_samples) s.value = Eigen::Vector3d(0, 0.2 * std::sin(2 * M_PI * 29 * s.t), 0);
+  const Findings findings = checkShaking(r);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].severity, Severity::kError);
+  EXPECT_NE(findings[0].text.find("by 1.6"), std::string::npos) << findings[0].text;  // 4 / sqrt(2 * 3)
+  EXPECT_NE(findings[0].advice.find("set imu/accel_noise_density: 0."), std::string::npos) << findings[0].advice;
 }
 
 }  // namespace

@@ -35,6 +35,7 @@ Findings checkImages(const Recording& recording);  ///< encodings, sizes, camera
 Findings checkDepthGeometry(const Recording& recording);  ///< depth with or without the lens of the colour camera
 Findings checkSkew(const Recording& recording);           ///< colour against depth stamps
 Findings checkImu(const Recording& recording);            ///< gaps, units, gravity, values that never change
+Findings checkShaking(const Recording& recording);        ///< what the IMU measures while the images stand still
 Findings checkMotion(const Recording& recording);         ///< camera-IMU delay and rotation from the motion itself
 Findings checkTf(const Recording& recording);             ///< frames, and extrinsics against the sensor file
 
@@ -54,11 +55,15 @@ struct MotionEstimate {
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
   double time_sigma = 0;   ///< one sigma of it, seconds
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
-  bool rotation_known = false;             ///< rotated about two axes at least
-  double correlation = 0;                  ///< share of the gyro's variance that the images explain, 0..1
-  double scale = 1;                        ///< gyro rate over image rate
-  double readout = 0;                      ///< seconds from the first row of an image to its last
-  double readout_sigma = 0;                ///< one sigma of it; 0: not known
+  bool rotation_known = false;  ///< rotated about two axes at least
+  double correlation = 0;       ///< share of the gyro's variance that the images explain, 0..1
+  double scale = 1;             ///< gyro rate over image rate
+  double readout = 0;           ///< seconds from the first row of an image to its last
+  double readout_sigma = 0;     ///< one sigma of it; 0: not known
+  bool contradicts = false;     ///< not usable since images and gyro turn differently
+  /// Gyro rate over image rate, and one sigma of it (0: not known): of turns that take half a second and more, and of
+  /// faster ones, which are less when the gyro is smoothed.
+  double gain_slow = 1, gain_slow_sigma = 0, gain_fast = 1, gain_fast_sigma = 0;
   double misfit = 0;                       ///< of corners between images, normalised coordinates; 0: not known
   std::optional<InertialMotion> inertial;  ///< against the accelerometer; empty: not known
 };

@@ -67,10 +67,11 @@ struct CameraReading {
 };
 
 struct DepthSample {
-  double valid = 0;   ///< share of pixels with a value
-  double usable = 0;  ///< share of pixels within the sensor file's range
-  double median = 0;  ///< metres, of those with a value
-  double spread = 0;  ///< metres, farthest minus nearest of those
+  double valid = 0;      ///< share of pixels with a value
+  double usable = 0;     ///< share of pixels within the sensor file's range
+  double median = 0;     ///< metres, of those with a value
+  double spread = 0;     ///< metres, farthest minus nearest of those
+  bool swapped = false;  ///< neighbours are far more alike with the two bytes of each value changed over
 };
 
 struct BrightnessSample {
@@ -82,6 +83,20 @@ struct BrightnessSample {
 struct DepthEdgeRecord {
   std::size_t edges = 0;                          ///< pixels in all
   std::vector<double> as_colour, as_undistorted;  ///< taking depth pixels for those of the image; of one without lens
+};
+
+/// Where the image's edges lie beside those of depth (edge_shift.h).
+struct EdgeShift {
+  double t = 0;                                     ///< of the first image, seconds
+  int images = 0;                                   ///< 0: nothing is known
+  Eigen::Vector2d shift = Eigen::Vector2d::Zero();  ///< right and down, px, that the two fit best with
+  double sigmas = 0;                                ///< height of that fit above those of all shifts
+  double unmoved = 1;                               ///< fit without a shift, as a share of the best
+};
+struct EdgeShiftRecord {
+  std::vector<EdgeShift> seconds;  ///< one a second
+  EdgeShift all, near, far;        ///< of all edges, of the nearer half and of the farther half
+  double nearer = 1;               ///< inverse depth of the nearer half over that of the farther
 };
 
 struct Recording {
@@ -99,6 +114,7 @@ struct Recording {
   std::vector<CameraReading> camera_readings;  ///< others of the same camera_info or sensor file
   std::vector<DepthSample> depths;
   DepthEdgeRecord depth_edges;                      ///< of registered depth
+  EdgeShiftRecord edge_shifts;                      ///< the same
   std::vector<BrightnessSample> brightness;         ///< of some colour images
   std::vector<geometry_msgs::TransformStamped> tf;  ///< newest transform of each edge
 };
