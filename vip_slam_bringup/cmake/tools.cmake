@@ -9,15 +9,22 @@ add_library(vip_slam_bringup
   src/convert/text_table.cpp
   src/convert/tum_rgbd.cpp
   src/parameter_reference.cpp
+  src/preflight/camera_readings.cpp
+  src/preflight/check_camera.cpp
   src/preflight/check_depth_geometry.cpp
   src/preflight/check_images.cpp
   src/preflight/check_imu.cpp
+  src/preflight/check_inertial.cpp
   src/preflight/check_motion.cpp
+  src/preflight/check_shaking.cpp
   src/preflight/check_streams.cpp
   src/preflight/check_tf.cpp
   src/preflight/depth_edges.cpp
+  src/preflight/edge_shift.cpp
   src/preflight/findings.cpp
   src/preflight/image_rotation.cpp
+  src/preflight/inertial_motion.cpp
+  src/preflight/motion_estimate.cpp
   src/preflight/readout.cpp
   src/preflight/record_sources.cpp
   src/preflight/recorder.cpp

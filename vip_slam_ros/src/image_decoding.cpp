@@ -183,15 +183,17 @@ cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, dou
 
 bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise) {
   constexpr int kStep = 8;
-  constexpr double kNothing = 0.01;
-  std::size_t all = 0, inside = 0;
+  constexpr double kNothing = 0.01, kOfReadings = 0.25;
+  std::size_t all = 0, readings = 0, inside = 0;
   for (int v = 0; v < metres.rows; v += kStep) {
     for (int u = 0; u < metres.cols; u += kStep) {
+      const float z = metres.at<float>(v, u);
       ++all;
-      inside += noise.inRange(metres.at<float>(v, u));
+      readings += z > 0;
+      inside += noise.inRange(z);
     }
   }
-  return double(inside) < kNothing * double(all);
+  return double(inside) < kNothing * double(all) || double(inside) < kOfReadings * double(readings);
 }
 
 }  // namespace vip_slam

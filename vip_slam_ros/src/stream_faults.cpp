@@ -17,7 +17,8 @@ std::string clockSetBack(double seconds, double t) {
 
 std::string holdNoDepth(const DepthNoise& noise) {
   return formatted(
-      "hold nothing within %g to %g m, the sensor file's range: wrong depth/scale, emitter off, wrong topic?",
+      "hold little or nothing within %g to %g m, the sensor file's range: wrong depth/scale or is_bigendian, emitter "
+      "off, wrong topic?",
       noise.min_range, noise.max_range);
 }
 

@@ -18,8 +18,11 @@ void checkEncoding(const std::string& role, const StreamRecord& stream, const st
   if (stream.unusable > 0)
     out->push_back({stream.unusable * 2 > stream.stamps.size() ? Severity::kError : Severity::kWarning, role,
                     formatted("%zu images could not be decoded: ", stream.unusable) + stream.unusable_reason,
-                    "record raw images, JPEG or PNG"});
+                    role == "depth image" ? "record depth as the driver has it, 16UC1 or 32FC1, or as compressedDepth; "
+                                            "grey levels and JPEG have lost it"
+                                          : "record raw images, JPEG or PNG"});
   for (const std::string& encoding : stream.encodings) {
+    if (stream.unusable * 2 > stream.stamps.size()) break;  // the cause is named
     const bool same = encoding == expected || (expected == "16UC1" && encoding == "mono16") ||
                       (expected == "mono8" && encoding == "8UC1");
     if (expected == "compressed" || same)
@@ -54,6 +57,17 @@ void checkCamera(const std::string& role, const StreamRecord& info, const Camera
   else
     out->push_back({Severity::kGood, role,
                     formatted("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
+}
+
+/// A lens that focuses changes its focal length; the first camera_info holds for all images.
+void checkFocus(const Recording& r, Findings* out) {
+  constexpr double kMatters = 0.002, kTooMuch = 0.01;
+  const double change = r.color_focal_to / std::max(r.color_focal_from, 1e-9) - 1;
+  if (r.color_focal_to == 0 || change < kMatters) return;
+  out->push_back({change > kTooMuch ? Severity::kError : Severity::kWarning, "colour camera_info",
+                  formatted("K changes: fx from %.2f to %.2f, by %.1f %%; one K is taken for all images",
+                            r.color_focal_from, r.color_focal_to, 100 * change),
+                  "switch off autofocus, zoom and stabilisation, or warp the images to one K"});
 }
 
 /// Compares the calibration of the sensor file with the images, and with camera_info where there is one.
@@ -133,10 +147,15 @@ void checkDepth(const Recording& r, Findings* out) {
     return;
   }
   const double z = upperMedian(middle);
-  if (z < 0.05 || z > 50)
+  const auto swapped = std::count_if(r.depths.begin(), r.depths.end(), [](const DepthSample& d) { return d.swapped; });
+  if (2 * swapped > std::ptrdiff_t(r.depths.size()))
+    out->push_back({Severity::kError, "depth image",
+                    formatted("the two bytes of each value are changed over (median %.4g m): is_bigendian is wrong", z),
+                    "set is_bigendian in the driver as the values are"});
+  else if (z < 0.05 || z > 50)
     out->push_back({Severity::kError, "depth image", formatted("median depth is %.4g m", z),
                     "depth scale or encoding in the sensor file is wrong (millimetres against metres?)"});
-  else if (upperMedian(usable) < 0.02)
+  else if (upperMedian(usable) < 0.02 || z > noise.max_range)
     out->push_back(
         {Severity::kError, "depth image",
          formatted("median depth is %.4g m, the sensor file uses %g to %g m", z, noise.min_range, noise.max_range),
@@ -163,6 +182,7 @@ Findings checkImages(const Recording& r) {
   else
     checkSensorFileCamera(r, &out);
   if (!r.color_camera_note.empty()) out.push_back({Severity::kNote, "colour camera_info", r.color_camera_note, ""});
+  checkFocus(r, &out);
   checkMask(r, &out);
   checkBrightness(r.brightness, &out);
   checkRepeats(r, &out);

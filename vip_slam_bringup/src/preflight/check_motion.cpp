@@ -1,119 +1,13 @@
-// Camera-IMU delay and rotation from the motion: the gyro and the images see the same rotation.
-//   gyro(t + td) = R_I_C rate_C(t) + b
-// For each delay in a grid, R and b by orthogonal Procrustes; the delay with the smallest residual is taken. Two
-// rounds: with wide bounds on the error of a step, then with bounds from the errors of the first round.
-#include <algorithm>
+// What the motion says of delay, rolling shutter, extrinsics and the IMU (motion_estimate.cpp), as findings.
 #include <cmath>
-
-#include <Eigen/SVD>
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/gyro_integral.h"
-#include "vip_slam_bringup/preflight/readout.h"
 #include "vip_slam_core/geometry/angle.h"
-#include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/util/formatted.h"
-#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
-
-struct Fit {
-  double residual = 0, variance = 0, scale = 1;  ///< residual and variance: mean squares of the gyro side
-  double median_error = 0;                       ///< rad/s
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d camera_variances = Eigen::Vector3d::Zero();  ///< descending
-  std::size_t count = 0;
-};
-
-/// A step with an error above `floor + share * its rate` is due to blur, a moving object or a mismatch: its error is
-/// capped at that bound, and later rounds fit without it. The bound hardly depends on the delay, so that residuals of
-/// different delays are comparable.
-struct Bound {
-  double floor, share;  ///< rad/s, -
-};
-
-Fit fitRotation(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, double offset, const Bound& limit) {
-  std::vector<Eigen::Vector3d> imu, camera;
-  for (const RotationStep& s : steps) {
-    if (!gyro.covers(s.t0 + offset) || !gyro.covers(s.t1 + offset)) continue;
-    imu.push_back((gyro.at(s.t1 + offset) - gyro.at(s.t0 + offset)) / (s.t1 - s.t0));
-    camera.push_back(s.rate_C);
-  }
-  Fit fit;
-  fit.count = imu.size();
-  if (imu.size() < 20) return fit;
-  std::vector<bool> use(imu.size(), true);
-  for (int round = 0; round < 3; ++round) {
-    Eigen::Vector3d mean_imu = Eigen::Vector3d::Zero(), mean_camera = Eigen::Vector3d::Zero();
-    double n = 0;
-    for (std::size_t i = 0; i < imu.size(); ++i) {
-      if (!use[i]) continue;
-      mean_imu += imu[i];
-      mean_camera += camera[i];
-      n += 1;
-    }
-    mean_imu /= n;
-    mean_camera /= n;
-    Eigen::Matrix3d cross = Eigen::Matrix3d::Zero(), spread = Eigen::Matrix3d::Zero();
-    double variance = 0;
-    for (std::size_t i = 0; i < imu.size(); ++i) {
-      if (!use[i]) continue;
-      const Eigen::Vector3d a = imu[i] - mean_imu, b = camera[i] - mean_camera;
-      cross += a * b.transpose() / n;
-      spread += b * b.transpose() / n;
-      variance += a.squaredNorm() / n;
-    }
-    fit.R = nearestRotation(cross);
-    fit.camera_variances = Eigen::JacobiSVD<Eigen::Matrix3d>(spread).singularValues();
-    fit.scale = fit.camera_variances.sum() > 0 ? std::sqrt(variance / fit.camera_variances.sum()) : 1;
-    fit.variance = variance;
-    fit.residual = 0;
-    std::vector<double> errors;
-    for (std::size_t i = 0; i < imu.size(); ++i) {
-      errors.push_back((imu[i] - mean_imu - fit.R * (camera[i] - mean_camera)).norm());
-      const double bound = limit.floor + limit.share * (imu[i] - mean_imu).norm();
-      use[i] = errors.back() <= bound;
-      fit.residual += std::min(errors.back(), bound) * std::min(errors.back(), bound) / double(imu.size());
-    }
-    fit.median_error = upperMedian(errors);
-    if (std::count(use.begin(), use.end(), true) < 10) break;
-  }
-  return fit;
-}
-
-constexpr double kUsefulReadout = 0.003;  // largest sigma of a readout that is used, seconds
-constexpr double kStep = 0.002;           // of the grid of delays, seconds
-
-struct Search {
-  Fit fit;
-  double offset = 0;
-  double sigma = 0;  ///< of the offset, from the curvature of the residual; seconds
-};
-
-/// The best delay within `range` of `middle`; false when gyro and images never overlap.
-bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, double middle, double range,
-            const Bound& limit, Search* out) {
-  const int half = static_cast<int>(std::lround(range / kStep));
-  std::vector<Fit> fits;
-  for (int i = -half; i <= half; ++i) fits.push_back(fitRotation(steps, gyro, middle + i * kStep, limit));
-  int best = -1;
-  for (int i = 0; i < static_cast<int>(fits.size()); ++i)
-    if (fits[i].count >= 40 && (best < 0 || fits[i].residual < fits[best].residual)) best = i;
-  if (best < 0) return false;
-  out->fit = fits[best];
-  out->offset = middle + (best - half) * kStep;
-  if (best > 0 && best + 1 < static_cast<int>(fits.size())) {
-    const double a = fits[best - 1].residual, b = out->fit.residual, c = fits[best + 1].residual, curve = a - 2 * b + c;
-    if (curve > 0) {
-      out->offset += kStep * 0.5 * (a - c) / curve;
-      // The residual is a mean over n steps of three components: the variance of one component is b / 3, and the second
-      // derivative of the residual is twice the mean square of the change per second of delay.
-      out->sigma = std::sqrt(2.0 / 3.0 * b * kStep * kStep / (curve * double(out->fit.count)));
-    }
-  }
-  return true;
-}
 
 Finding readoutFinding(const Recording& r, const MotionEstimate& motion) {
   const std::string measured =
@@ -127,52 +21,63 @@ Finding readoutFinding(const Recording& r, const MotionEstimate& motion) {
           formatted("set color/rolling_shutter: %.4f in the sensor file", motion.readout)};
 }
 
-}  // namespace
-
-MotionEstimate estimateMotion(const Recording& r, double max_offset) {
-  MotionEstimate out;
-  if (r.rotations.size() < 40 || r.gyro_samples.size() < 100) {
-    out.why_not = "too few images with enough texture";
-    return out;
-  }
+/// Share of the corners that stand still in the image while the gyro turns the camera by several pixels.
+double standingShare(const Recording& r) {
+  constexpr double kTurns = 3, kStands = 0.15;  // px, share of that
+  const CameraIntrinsics& camera = r.sensor.intrinsics_from_camera_info ? r.color_camera : r.sensor.camera;
   const GyroIntegral gyro(r.gyro_samples);
-  Search coarse;
-  if (!search(r.rotations, gyro, 0, max_offset, {0.1, 0.5}, &coarse)) {
-    out.why_not = "images and gyroscope do not overlap in time";
-    return out;
+  double all = 0, standing = 0;
+  for (const PixelStep& step : r.pixel_steps) {
+    if (!gyro.covers(step.t0) || !gyro.covers(step.t1)) continue;
+    const double turn = (gyro.at(step.t1) - gyro.at(step.t0)).norm() * 0.5 * (camera.fx + camera.fy);
+    if (turn < kTurns) continue;
+    for (const PixelTrack& track : step.tracks) all += 1, standing += (track.to - track.from).norm() < kStands * turn;
   }
-  Search fine = coarse;
-  if (!search(r.rotations, gyro, coarse.offset, 0.02, {std::max(0.01, 3 * coarse.fit.median_error), 0.0}, &fine))
-    fine = coarse;
-  const Fit& fit = fine.fit;
-  out.scale = fit.scale;
-  out.correlation = fit.variance > 0 ? std::max(0.0, 1 - fit.residual / fit.variance) : 0;
-  out.R_imu_cam = Eigen::Quaterniond(fit.R);
-  if (fit.camera_variances.sum() < 0.05 * 0.05) {
-    out.why_not = "the sensor hardly rotates";
-    return out;
-  }
-  if (out.scale < 5 && out.correlation < 0.6) {
-    out.why_not = formatted("image and gyro rotation do not agree (%.0f %% explained)", 100 * out.correlation);
-    return out;
-  }
-  out.time_offset = fine.offset;
-  out.time_sigma = fine.sigma;
-  // The rotation is observable once there is motion about a second axis, 0.05 rad/s.
-  out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
-  out.usable = true;
-  const auto rows = estimateReadout(r.rotations, gyro, {fine.offset, 0.0, out.R_imu_cam});
-  if (rows && rows->readout_sigma < kUsefulReadout) {
-    // With a rolling shutter the delay estimated without rows does not refer to a definite row.
-    out.time_offset = rows->time_offset;
-    out.time_sigma = rows->time_sigma;
-    out.readout = rows->readout;
-    out.readout_sigma = rows->readout_sigma;
-  }
-  return out;
+  return all > 0 ? standing / all : 0;
 }
 
-namespace {
+Finding contradictionFinding(const Recording& r, const MotionEstimate& motion) {
+  constexpr double kMany = 0.3;
+  const double standing = standingShare(r);
+  if (standing > kMany)
+    return {Severity::kWarning, "colour image",
+            formatted("%.0f %% of its corners stand still while the gyroscope turns", 100 * standing),
+            "the projector's dots in an infrared image? switch the emitter off, or take the colour image; else an "
+            "overlay, dirt, or a frozen picture"};
+  return {Severity::kError, "images and gyroscope",
+          formatted("do not turn alike (%.0f %% explained), why is not known", 100 * motion.correlation),
+          "are both of one device and clock, is the scene textured and at rest?"};
+}
+
+/// The IMU is low-passed: fast turns are smaller than the images say, slow ones are not.
+std::optional<Finding> smoothedFinding(const MotionEstimate& motion) {
+  constexpr double kLoss = 0.01, kSureOfLoss = 4, kSpoils = 0.03;  // -, sigmas, -
+  const double loss = 1 - motion.gain_fast, slow_loss = 1 - motion.gain_slow;
+  if (loss < std::max(kLoss, kSureOfLoss * motion.gain_fast_sigma) ||
+      std::abs(slow_loss) > std::max(0.5 * loss, 3 * motion.gain_slow_sigma))
+    return std::nullopt;
+  return Finding{loss > kSpoils ? Severity::kWarning : Severity::kNote, "IMU",
+                 formatted("is smoothed: it shows %.1f %% of fast turns (one sigma %.1f) and %.1f %% of slow ones",
+                           100 * motion.gain_fast, 100 * motion.gain_fast_sigma, 100 * motion.gain_slow),
+                 "raise its rate and the cut-off of its low-pass filter in the driver; scale errors of gyroscope and "
+                 "depth that are advised otherwise are not real"};
+}
+
+/// The delay in both halves of the recording, when they differ by more than their sigmas explain: then there is no one
+/// delay to advise.
+std::optional<Finding> unsteadyDelay(const Recording& r) {
+  const auto middle = r.rotations.begin() + std::ptrdiff_t(r.rotations.size() / 2);
+  const MotionEstimate first = estimateMotion(r, {r.rotations.begin(), middle});
+  const MotionEstimate second = estimateMotion(r, {middle, r.rotations.end()});
+  if (!first.usable || !second.usable) return std::nullopt;
+  const double apart = std::abs(first.time_offset - second.time_offset);
+  if (apart < std::max(0.004, 4 * std::hypot(first.time_sigma, second.time_sigma))) return std::nullopt;
+  return Finding{Severity::kWarning, "camera-IMU delay",
+                 formatted("%+.1f ms in the first half, %+.1f ms in the second", 1000 * first.time_offset,
+                           1000 * second.time_offset),
+                 "the clocks of images and IMU drift or step against each other: stamp both by one clock; no "
+                 "time_offset holds for all"};
+}
 
 /// The rotation of given extrinsics against the motion's. Wrong ones are an error where they are what the system uses.
 Finding extrinsicsFinding(const Recording& r, const MotionEstimate& motion, const SE3& T_imu_cam, const char* source,
@@ -183,34 +88,53 @@ Finding extrinsicsFinding(const Recording& r, const MotionEstimate& motion, cons
   if (angle <= most)
     return {Severity::kGood, "extrinsics", formatted("rotation of %s fits the motion (%.1f degrees)", source, angle),
             ""};
+  // As it is typed into a sensor file; five decimals are enough to pass there for a rotation.
   const Eigen::Matrix3d R = motion.R_imu_cam.toRotationMatrix();
+  const Eigen::Vector3d t = T_imu_cam.t();
   std::string rows;
-  for (int i = 0; i < 3; ++i) rows += formatted("%s[%.6f, %.6f, %.6f]", i ? ", " : "", R(i, 0), R(i, 1), R(i, 2));
-  return {used ? Severity::kError : Severity::kWarning, "extrinsics",
-          formatted("the motion contradicts %s by %.0f degrees", source, angle),
-          (used ? "" : "tf is used unless extrinsics is config; ") +
-              ("the rotation that fits the motion has rows " + rows)};
+  for (int i = 0; i < 3; ++i) rows += formatted("[%.5f, %.5f, %.5f, %.5f], ", R(i, 0), R(i, 1), R(i, 2), t(i));
+  rows = "[" + rows + "[0, 0, 0, 1]]";
+  return {
+      used ? Severity::kError : Severity::kWarning, "extrinsics",
+      formatted("the motion contradicts %s by %.0f degrees", source, angle),
+      used && r.sensor.T_imu_cam.rotation().angularDistance(motion.R_imu_cam) < most * kDegree
+          ? "correct it, or use the sensor file's: extrinsics config"
+          : std::string(used ? "" : "tf is used unless extrinsics is config; ") + "the motion fits T_imu_cam: " + rows};
 }
 
 }  // namespace
 
 Findings checkMotion(const Recording& r) {
   Findings out;
-  const MotionEstimate motion = estimateMotion(r);
+  const MotionEstimate motion = estimateMotion(r, r.rotations);
+  if (const auto wrong = cameraFinding(r, motion)) return {*wrong};  // what else the motion says follows from it
   if (motion.scale > 30 && motion.scale < 90)
     out.push_back({Severity::kError, "gyroscope", formatted("turns %.0f times as fast as the images", motion.scale),
                    "it reports degrees a second; radians a second are expected"});
+  if (motion.contradicts) {
+    out.push_back(contradictionFinding(r, motion));
+    return out;
+  }
   if (!motion.usable) {
     out.push_back({Severity::kNote, "camera-IMU delay", "not measured: " + motion.why_not,
                    "turn the sensor about two axes in front of a textured scene"});
     return out;
   }
   if (motion.scale > 5) return out;
+  if (const auto cause = inertialFinding(r, motion)) {
+    out.push_back(*cause);
+    if (cause->severity == Severity::kError) return out;  // what else the motion says follows from it
+  }
+  if (const auto smoothed = smoothedFinding(motion)) out.push_back(*smoothed);
   const double difference = motion.time_offset - r.sensor.time_offset;
   const std::string measured =
       formatted("%+.1f ms measured (one sigma %.1f ms), the sensor file says %+.1f ms", 1000 * motion.time_offset,
                 1000 * motion.time_sigma, 1000 * r.sensor.time_offset);
-  if (std::abs(difference) > std::max(0.006, 3 * motion.time_sigma))
+  const bool differs = std::abs(difference) > std::max(0.006, 3 * motion.time_sigma);
+  const auto unsteady = differs ? unsteadyDelay(r) : std::nullopt;
+  if (unsteady)
+    out.push_back(*unsteady);
+  else if (differs)
     out.push_back({std::abs(difference) > 0.05 ? Severity::kError : Severity::kWarning, "camera-IMU delay", measured,
                    formatted("set time_offset: %.4f in the sensor file", motion.time_offset)});
   else

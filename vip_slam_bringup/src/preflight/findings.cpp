@@ -39,14 +39,20 @@ const char* paint(Severity severity) {
 
 Findings checkAll(const Recording& r) {
   Findings out;
+  bool images_fit = true;  // else what motion they show follows from the error that is named
   for (const auto check : {checkTopics, checkRates, checkImages, checkDepthGeometry, checkSkew, checkImu}) {
     const Findings found = check(r);
+    if (check == checkImages || check == checkDepthGeometry) images_fit &= worst(found) < Severity::kError;
     out.insert(out.end(), found.begin(), found.end());
   }
-  const bool motion = !r.color.stamps.empty() && !r.gyro_samples.empty() && r.color_camera_error.empty();
-  if (motion) {
-    const Findings found = checkMotion(r);
-    out.insert(out.end(), found.begin(), found.end());
+  if (!r.color.stamps.empty() && !r.gyro_samples.empty() && r.color_camera_error.empty()) {
+    for (const auto check : {checkShaking, checkMotion}) {
+      if (!images_fit) continue;
+      const Findings found = check(r);
+      out.insert(out.end(), found.begin(), found.end());
+    }
+    if (!images_fit)
+      out.push_back({Severity::kNote, "camera-IMU delay", "not measured: the images have an error, see above", ""});
   }
   const Findings tf = checkTf(r);
   out.insert(out.end(), tf.begin(), tf.end());

@@ -15,6 +15,7 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kMinCorners = 15;
+constexpr int kMaxColumns = 800;  // of the image in which corners are followed
 
 /// Rotation with to ~ R from, by Kabsch with two rounds of trimming.
 std::optional<Eigen::Matrix3d> alignBearings(const std::vector<Eigen::Vector3d>& from,
@@ -78,53 +79,65 @@ std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& poi
 
 }  // namespace
 
-std::optional<RotationStep> ImageRotation::add(double t, const cv::Mat& gray, const cv::Mat& depth) {
-  std::optional<RotationStep> step;
+std::optional<PixelStep> ImageRotation::add(double t, const cv::Mat& image, const cv::Mat& depth) {
+  // A large image is followed in a smaller one: its corners are as exact as those of a small camera.
+  const int shrink = (image.cols + kMaxColumns - 1) / kMaxColumns;
+  cv::Mat gray = image;
+  if (shrink > 1) cv::resize(image, gray, image.size() / shrink, 0, 0, cv::INTER_AREA);
+  const Eigen::Vector2f times(float(image.cols) / float(gray.cols), float(image.rows) / float(gray.rows));
+  const auto inImage = [&](const cv::Point2f& p) {
+    return Eigen::Vector2f((p.x + 0.5f) * times.x() - 0.5f, (p.y + 0.5f) * times.y() - 0.5f);
+  };
+  PixelStep step{t_, t, {}};
   if (!gray_.empty() && t > t_ && t - t_ < 0.2) {
-    std::vector<CornerTrack> tracks;
-    if (const auto R_now_before = rotationTo(gray, &tracks)) {
-      // For a camera rotating by w dt the scene rotates by -w dt.
-      const Eigen::Vector3d angle = logSO3(Eigen::Matrix3d(R_now_before->transpose()));
-      step = RotationStep{t_, t, angle / (t - t_), std::move(tracks)};
+    cv::Mat mask;
+    if (mask_.size() == image.size()) cv::resize(mask_, mask, gray.size(), 0, 0, cv::INTER_NEAREST);
+    std::vector<cv::Point2f> before, after;
+    cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0, mask);
+    std::vector<unsigned char> found;
+    std::vector<float> error;
+    if (before.size() >= kMinCorners)
+      cv::calcOpticalFlowPyrLK(gray_, gray, before, after, found, error, cv::Size(21, 21), 4);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (!found[i]) continue;
+      const Eigen::Vector2f from = inImage(before[i]);
+      const int u = cvRound(from.x()), v = cvRound(from.y());
+      const bool inside = u >= 0 && v >= 0 && u < depth_.cols && v < depth_.rows;
+      const float z = inside ? depth_.at<float>(v, u) : 0;
+      step.tracks.push_back({from, inImage(after[i]), z >= 0.1f && z <= 20.f ? z : 0.f});
     }
   }
   t_ = t;
   gray_ = gray.clone();
   depth_ = depth.empty() ? cv::Mat() : depth.clone();
+  if (step.tracks.size() < kMinCorners) return std::nullopt;
   return step;
 }
 
-std::optional<Eigen::Matrix3d> ImageRotation::rotationTo(const cv::Mat& gray, std::vector<CornerTrack>* tracks) const {
-  std::vector<cv::Point2f> before, after;
-  cv::goodFeaturesToTrack(gray_, before, 150, 0.01, gray_.cols / 32.0,
-                          mask_.size() == gray_.size() ? mask_ : cv::Mat());
-  if (before.size() < kMinCorners) return std::nullopt;
-  std::vector<unsigned char> found;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(gray_, gray, before, after, found, error, cv::Size(21, 21), 4);
+std::optional<RotationStep> seenBy(const CameraModel& camera, const PixelStep& step) {
   std::vector<Eigen::Vector3d> from, to;
   std::vector<cv::Point3f> points;
   std::vector<cv::Point2f> images;
-  for (std::size_t i = 0; i < before.size(); ++i) {
+  RotationStep out{step.t0, step.t1, Eigen::Vector3d::Zero(), {}};
+  for (const PixelTrack& track : step.tracks) {
     Eigen::Vector2d a, b;
-    if (!found[i] || !camera_->undistort({before[i].x, before[i].y}, &a) ||
-        !camera_->undistort({after[i].x, after[i].y}, &b))
-      continue;
+    if (!camera.undistort(track.from.cast<double>(), &a) || !camera.undistort(track.to.cast<double>(), &b)) continue;
     from.push_back(a.homogeneous().normalized());
     to.push_back(b.homogeneous().normalized());
-    const int u = cvRound(before[i].x), v = cvRound(before[i].y);
-    if (depth_.empty() || u < 0 || v < 0 || u >= depth_.cols || v >= depth_.rows) continue;
-    const float z = depth_.at<float>(v, u);
-    if (z < 0.1f || z > 20.f) continue;
-    points.emplace_back(a.x() * z, a.y() * z, z);
+    if (!(track.z > 0)) continue;
+    points.emplace_back(a.x() * track.z, a.y() * track.z, track.z);
     images.emplace_back(b.x(), b.y());
-    const auto rowOf = [&](float y) { return (y + 0.5f) / static_cast<float>(gray.rows) - 0.5f; };
-    tracks->push_back({{points.back().x, points.back().y, z}, b.cast<float>(), rowOf(before[i].y), rowOf(after[i].y)});
+    const auto rowOf = [&](float y) { return (y + 0.5f) / static_cast<float>(camera.height()) - 0.5f; };
+    out.tracks.push_back(
+        {{points.back().x, points.back().y, track.z}, b.cast<float>(), rowOf(track.from.y()), rowOf(track.to.y())});
   }
-  if (points.size() >= kMinCorners) {
-    if (const auto R = rotationByPnp(points, images, 1.0 / camera_->focal())) return R;
-  }
-  return alignBearings(from, to);
+  std::optional<Eigen::Matrix3d> R_now_before;
+  if (points.size() >= kMinCorners) R_now_before = rotationByPnp(points, images, 1.0 / camera.focal());
+  if (!R_now_before) R_now_before = alignBearings(from, to);
+  if (!R_now_before) return std::nullopt;
+  // For a camera rotating by w dt the scene rotates by -w dt.
+  out.rate_C = logSO3(Eigen::Matrix3d(R_now_before->transpose())) / (step.t1 - step.t0);
+  return out;
 }
 
 }  // namespace vip_slam

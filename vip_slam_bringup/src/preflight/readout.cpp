@@ -63,12 +63,17 @@ Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const Sta
   return p;
 }
 
+std::vector<double> errorsOf(const Eigen::VectorXd& residual) {
+  std::vector<double> errors;
+  for (int i = 0; i < residual.size() / 2; ++i) errors.push_back(residual.segment<2>(2 * i).norm());
+  return errors;
+}
+
 /// Weights of the corners' rows: inverse of the step's typical error, with Huber weights at twice the median, so that a
 /// blurred pair of images has little weight.
 Eigen::VectorXd weightsOf(const Eigen::VectorXd& residual) {
   constexpr double kMinError = 1e-4;  // a twentieth of a pixel
-  std::vector<double> errors;
-  for (int i = 0; i < residual.size() / 2; ++i) errors.push_back(residual.segment<2>(2 * i).norm());
+  const std::vector<double> errors = errorsOf(residual);
   const double typical = upperMedian(errors) + kMinError;
   Eigen::VectorXd weights(residual.size());
   for (std::size_t i = 0; i < errors.size(); ++i)
@@ -163,6 +168,10 @@ std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& 
   ReadoutEstimate out{x.time_offset, x.readout, Eigen::Quaterniond(x.R_imu_cam)};
   out.time_sigma = std::sqrt(covariance(0, 0));
   out.readout_sigma = std::sqrt(covariance(1, 1));
+  out.gyro_bias = x.bias;
+  for (std::size_t k = 0; k < used.size(); ++k)
+    out.fits.push_back({used[k]->t0 + x.time_offset, used[k]->t1 + x.time_offset, courses[k].speed,
+                        upperMedian(errorsOf(predict(*used[k], gyro, x, courses[k]).residual))});
   return out;
 }
 

@@ -5,6 +5,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "vip_slam_bringup/preflight/camera_readings.h"
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/util/formatted.h"
@@ -25,17 +26,37 @@ bool note(StreamRecord* stream, double arrival, const Message& message) {
   return true;
 }
 
+/// Whether neighbours are far more alike with the two bytes of each value changed over. `unit`: metres.
+bool smootherSwapped(const cv::Mat& depth, double unit) {
+  double as_is = 0, swapped = 0;
+  const auto raw = [&](int v, int u) {
+    const float z = depth.at<float>(v, u);
+    return z > 0 && std::isfinite(z) ? std::uint16_t(std::min(65535.0, std::round(z / unit))) : std::uint16_t(0);
+  };
+  const auto swap = [](std::uint16_t x) { return std::uint16_t(x << 8 | x >> 8); };
+  for (int v = 0; v < depth.rows; v += 8)
+    for (int u = 0; u + 1 < depth.cols; u += 8) {
+      const std::uint16_t a = raw(v, u), b = raw(v, u + 1);
+      if (a == 0 || b == 0) continue;
+      as_is += std::abs(a - b);
+      swapped += std::abs(swap(a) - swap(b));
+    }
+  return swapped < 0.2 * as_is;
+}
+
 }  // namespace
 
-Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds) : image_seconds_(image_seconds) {
+Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds)
+    : image_seconds_(image_seconds), rotation_(sensor.mask) {
   recording_.sensor = sensor;
   recording_.live = live;
-  if (!sensor.intrinsics_from_camera_info) startRotation(sensor.camera);
+  if (sensor.intrinsics_from_camera_info) return;
+  startRotation(sensor.camera);
+  recording_.camera_readings = otherReadings(sensor.camera);
 }
 
 void Recorder::startRotation(const CameraIntrinsics& camera) {
-  rotation_ = std::make_unique<ImageRotation>(makeCamera(camera), recording_.sensor.mask);
-  rotation_size_ = cv::Size(camera.width, camera.height);
+  camera_ = makeCamera(camera);
   if (!recording_.sensor.depth_registered) return;
   SensorConfig resolved = recording_.sensor;
   resolved.camera = camera;
@@ -47,6 +68,7 @@ void Recorder::finish() {
   recording_.gray_note = gray_.note();
   flushGray(true);
   if (depth_edges_) recording_.depth_edges = depth_edges_->record();
+  recording_.edge_shifts = edge_shifts_.record();
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Image& message,
@@ -101,7 +123,16 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   if (topic == topics.color_info) {
     take(&recording_.color_info, topics.color, &recording_.color_camera, &recording_.color_camera_error);
     if (recording_.color_info.stamps.size() == 1) recording_.color_camera_note = cameraInfoNote(message);
-    if (!rotation_ && recording_.color_camera.width > 0) startRotation(recording_.color_camera);
+    const double focal = message.K[0];
+    if (focal > 0) {
+      const bool first = recording_.color_focal_to == 0;
+      recording_.color_focal_from = first ? focal : std::min(recording_.color_focal_from, focal);
+      recording_.color_focal_to = std::max(recording_.color_focal_to, focal);
+    }
+    if (!camera_ && recording_.color_camera.width > 0) {
+      startRotation(recording_.color_camera);
+      recording_.camera_readings = otherReadings(recording_.color_camera, message);
+    }
   }
   if (topic == topics.depth_info)
     take(&recording_.depth_info, topics.depth, &recording_.depth_camera, &recording_.depth_camera_error);
@@ -157,6 +188,9 @@ void Recorder::addDepth(double t, const cv::Mat& depth) {
       const auto [nearest, farthest] = std::minmax_element(values.begin(), values.end());
       sample.spread = *farthest - *nearest;
       sample.median = upperMedian(values);
+      const SensorConfig& sensor = recording_.sensor;
+      const bool plain = sensor.depth_encoding == "16UC1" && sensor.depth_offset == 0;
+      sample.swapped = plain && smootherSwapped(depth, sensor.depth_scale);
     }
     recording_.depths.push_back(sample);
   }
@@ -195,10 +229,14 @@ void Recorder::flushGray(bool all) {
     for (const Stamped& d : recent_depth_)
       if (std::abs(d.t - gray.t) < 0.02 && d.image.size() == gray.image.size()) depth = &d.image;
     if (!depth && !all && waiting_gray_.size() < 4) return;
-    if (rotation_ && gray.image.size() == rotation_size_) {
+    if (camera_ && gray.image.size() == cv::Size(camera_->width(), camera_->height())) {
       if (depth && depth_edges_) depth_edges_->add(gray.image, *depth);
       const cv::Mat aligned = !depth ? cv::Mat() : to_colour_ ? (*to_colour_)(*depth) : *depth;
-      if (const auto step = rotation_->add(gray.t, gray.image, aligned)) recording_.rotations.push_back(*step);
+      if (depth && to_colour_) edge_shifts_.add(gray.t, gray.image, aligned);
+      if (const auto step = rotation_.add(gray.t, gray.image, aligned)) {
+        recording_.pixel_steps.push_back(*step);
+        if (const auto seen = seenBy(*camera_, *step)) recording_.rotations.push_back(*seen);
+      }
     }
     waiting_gray_.erase(waiting_gray_.begin());
   }

@@ -158,7 +158,9 @@ void BagDecoding::finish() {
   if (!gray_.note().empty()) warnings_.push_back("topic " + sensor_.topics.color + ": " + gray_.note());
   const std::string& depth_topic = sensor_.topics.depth;
   const auto& pairs = pairer_.counters();
-  if (!depth_topic.empty() && pairs.without_depth > 5 && 20 * pairs.without_depth > pairs.pairs + pairs.without_depth)
+  const bool cause_known = complained_.count(depth_topic) > 0;  // it cannot be decoded
+  if (!depth_topic.empty() && !cause_known && pairs.without_depth > 5 &&
+      20 * pairs.without_depth > pairs.pairs + pairs.without_depth)
     warnings_.push_back("topic " + depth_topic + ": " + std::to_string(pairs.without_depth) + " of " +
                         std::to_string(pairs.pairs + pairs.without_depth) + " colour images have no depth within " +
                         std::to_string(std::lround(1e3 * options_.input.pair_tolerance)) +

@@ -162,7 +162,7 @@ TEST_F(CheckBag, DelayBetweenCameraAndImu) {
     options_.sensor.time_offset = offset;
     test_support::writeDriverBag(path_, options_);
     const Recording recording = recordBag(path_, expected_, 60);
-    const MotionEstimate motion = estimateMotion(recording);
+    const MotionEstimate motion = estimateMotion(recording, recording.rotations);
     ASSERT_TRUE(motion.usable) << motion.why_not;
     EXPECT_NEAR(motion.time_offset, offset, 0.001);
     EXPECT_LT(motion.time_sigma, 0.001);
@@ -183,7 +183,8 @@ TEST_F(CheckBag, ExtrinsicsThatContradictTheMotion) {
   const Findings findings = check();
   expectFound(findings, Severity::kError, "extrinsics", "contradicts T_imu_cam by 1");
   expectNoErrorBut(findings, "extrinsics");
-  const MotionEstimate motion = estimateMotion(recordBag(path_, expected_, 60));
+  const Recording recording = recordBag(path_, expected_, 60);
+  const MotionEstimate motion = estimateMotion(recording, recording.rotations);
   EXPECT_LT(motion.R_imu_cam.angularDistance(Eigen::Quaterniond(R)), 0.006);
 }
 
@@ -333,7 +334,7 @@ TEST_F(CheckBag, ValuesThatAreNoNumbersAreNotTakenForADelay) {
   Recording recording = recordBag(path_, expected_, 60);
   for (std::size_t k = 0; k < recording.gyro_samples.size(); k += 7) recording.gyro_samples[k].value.x() = std::nan("");
   expectFound(checkImu(recording), Severity::kError, "gyroscope", "not numbers");
-  EXPECT_NEAR(estimateMotion(recording).time_offset, expected_.time_offset, 0.002);
+  EXPECT_NEAR(estimateMotion(recording, recording.rotations).time_offset, expected_.time_offset, 0.002);
 }
 
 TEST_F(CheckBag, TheEndOfTheGyrosRangeAndDepthThatRepeatsAreNamed) {

@@ -51,8 +51,8 @@ cv::Mat decodeDepth(const sensor_msgs::Image& image, double scale, double offset
 /// and rows ("compressedDepth rvl" in the format); 16UC1, or 32FC1 quantised as inverse depth.
 cv::Mat decodeDepth(const sensor_msgs::CompressedImage& image, double scale, double offset = 0);
 
-/// Whether a depth image (32FC1 metres) has hardly any values within the sensor's range, judged on a sample of its
-/// pixels: a wrong scale, another topic, an emitter that is off.
+/// Whether a depth image (32FC1 metres) has hardly any values within the sensor's range, or most of them outside of it,
+/// judged on a sample of its pixels: a wrong scale or order of bytes, another topic, an emitter that is off.
 bool holdsNoDepth(const cv::Mat& metres, const DepthNoise& noise);
 
 }  // namespace vip_slam

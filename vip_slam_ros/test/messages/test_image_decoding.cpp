@@ -347,5 +347,25 @@ TEST(Decode, DepthOutsideOfTheSensorsRangeIsNone) {
   EXPECT_TRUE(holdsNoDepth(cv::Mat(480, 640, CV_32FC1, cv::Scalar(0)), noise));
 }
 
+TEST(Decode, DepthWhoseBytesAreChangedOverIsNone) {
+  DepthNoise noise;
+  noise.min_range = 0.3, noise.max_range = 6;
+  cv::Mat wall(480, 640, CV_16UC1), swapped(480, 640, CV_16UC1);
+  for (int v = 0; v < wall.rows; ++v) {
+    for (int u = 0; u < wall.cols; ++u) {
+      const int z = 2000 + 3 * u + 2 * v + (u * 7 + v * 5) % 11;  // mm: slanting, with some noise
+      wall.at<std::uint16_t>(v, u) = std::uint16_t(z);
+      swapped.at<std::uint16_t>(v, u) = std::uint16_t(z << 8 | z >> 8);
+    }
+  }
+  const auto metres = [](const cv::Mat& raw) {
+    cv::Mat out;
+    raw.convertTo(out, CV_32F, 0.001);
+    return out;
+  };
+  EXPECT_FALSE(holdsNoDepth(metres(wall), noise));
+  EXPECT_TRUE(holdsNoDepth(metres(swapped), noise));
+}
+
 }  // namespace
 }  // namespace vip_slam

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "vip_slam_bringup/preflight/inertial_motion.h"
 #include "vip_slam_bringup/preflight/recording.h"
 
 namespace vip_slam {
@@ -34,6 +35,7 @@ Findings checkImages(const Recording& recording);  ///< encodings, sizes, camera
 Findings checkDepthGeometry(const Recording& recording);  ///< depth with or without the lens of the colour camera
 Findings checkSkew(const Recording& recording);           ///< colour against depth stamps
 Findings checkImu(const Recording& recording);            ///< gaps, units, gravity, values that never change
+Findings checkShaking(const Recording& recording);        ///< what the IMU measures while the images stand still
 Findings checkMotion(const Recording& recording);         ///< camera-IMU delay and rotation from the motion itself
 Findings checkTf(const Recording& recording);             ///< frames, and extrinsics against the sensor file
 
@@ -58,7 +60,23 @@ struct MotionEstimate {
   double scale = 1;             ///< gyro rate over image rate
   double readout = 0;           ///< seconds from the first row of an image to its last
   double readout_sigma = 0;     ///< one sigma of it; 0: not known
+  bool contradicts = false;     ///< not usable since images and gyro turn differently
+  /// Gyro rate over image rate, and one sigma of it (0: not known): of turns that take half a second and more, and of
+  /// faster ones, which are less when the gyro is smoothed.
+  double gain_slow = 1, gain_slow_sigma = 0, gain_fast = 1, gain_fast_sigma = 0;
+  double misfit = 0;                       ///< of corners between images, normalised coordinates; 0: not known
+  std::optional<InertialMotion> inertial;  ///< against the accelerometer; empty: not known
 };
-MotionEstimate estimateMotion(const Recording& recording, double max_offset = 0.2);
+/// `steps`: the recording's rotations, or those of another reading of its camera.
+MotionEstimate estimateMotion(const Recording& recording, const std::vector<RotationStep>& steps,
+                              double max_offset = 0.2);
+
+/// Another reading of the camera's calibration under which pixels, depth and gyroscope fit far better, or coefficients
+/// that no reading makes fit. Empty when the calibration fits or when it is not known.
+std::optional<Finding> cameraFinding(const Recording& recording, const MotionEstimate& motion);
+
+/// What accelerometer, gyroscope, depth and images say of the same motion: axes that are not as configured, mirrored
+/// pictures, a wrong unit of depth. At most one finding, the cause; empty when they fit or when it is not known.
+std::optional<Finding> inertialFinding(const Recording& recording, const MotionEstimate& motion);
 
 }  // namespace vip_slam

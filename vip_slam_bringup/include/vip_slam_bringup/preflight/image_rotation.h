@@ -2,7 +2,6 @@
 // PnP (accounts for parallax), else by aligning the bearing vectors.
 #pragma once
 
-#include <memory>
 #include <optional>
 
 #include <opencv2/core.hpp>
@@ -12,23 +11,22 @@
 
 namespace vip_slam {
 
+/// Corners followed from image to image.
 class ImageRotation {
  public:
   /// Corners are used where `mask` is not zero; empty: anywhere.
-  explicit ImageRotation(std::shared_ptr<const CameraModel> camera, const cv::Mat& mask = cv::Mat())
-      : camera_(std::move(camera)), mask_(mask) {}
-  /// `gray` 8UC1 of the camera's size, `depth` 32FC1 metres of the same size or empty. Returns a step when the last two
-  /// images are less than 0.2 s apart and enough corners agree on the motion.
-  std::optional<RotationStep> add(double t, const cv::Mat& gray, const cv::Mat& depth);
+  explicit ImageRotation(const cv::Mat& mask = cv::Mat()) : mask_(mask) {}
+  /// `image` 8UC1, `depth` 32FC1 metres of the same size or empty. Returns a step when the last two images are less
+  /// than 0.2 s apart and there are enough corners.
+  std::optional<PixelStep> add(double t, const cv::Mat& image, const cv::Mat& depth);
 
  private:
-  /// R_now_before, and the corners with depth.
-  std::optional<Eigen::Matrix3d> rotationTo(const cv::Mat& gray, std::vector<CornerTrack>* tracks) const;
-
-  std::shared_ptr<const CameraModel> camera_;
   double t_ = 0;
   cv::Mat gray_, depth_;
   cv::Mat mask_;
 };
+
+/// The step as the camera sees it; empty when too few corners agree on the motion.
+std::optional<RotationStep> seenBy(const CameraModel& camera, const PixelStep& step);
 
 }  // namespace vip_slam

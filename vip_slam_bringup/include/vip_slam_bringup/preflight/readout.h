@@ -16,11 +16,20 @@
 
 namespace vip_slam {
 
+/// Motion of the camera between two images, from its corners with depth and the gyro's rotation.
+struct StepFit {
+  double t0 = 0, t1 = 0;                            ///< of the images' middle rows, seconds on the IMU's clock
+  Eigen::Vector3d speed = Eigen::Vector3d::Zero();  ///< mean velocity, m/s, in the colour optical frame at t0
+  double error = 0;  ///< of the step's corners in the second image, median, normalised coordinates
+};
+
 struct ReadoutEstimate {
   double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset for the middle row
   double readout = 0;      ///< seconds; negative: the last row is read first
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
-  double time_sigma = 0, readout_sigma = 0;  ///< one sigma, seconds, from the scatter between images
+  double time_sigma = 0, readout_sigma = 0;             ///< one sigma, seconds, from the scatter between images
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();  ///< rad/s
+  std::vector<StepFit> fits;                            ///< of the steps with enough corners with depth
 };
 
 /// `start`: initial values. Empty when there are too few corners with depth or the fit is not determined.

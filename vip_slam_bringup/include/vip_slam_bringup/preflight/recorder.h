@@ -11,6 +11,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "vip_slam_bringup/preflight/depth_edges.h"
+#include "vip_slam_bringup/preflight/edge_shift.h"
 #include "vip_slam_bringup/preflight/image_rotation.h"
 #include "vip_slam_bringup/preflight/recording.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
@@ -53,10 +54,11 @@ class Recorder {
   GrayDecoder gray_;
   const double image_seconds_;
   double first_image_ = -1;
-  std::unique_ptr<ImageRotation> rotation_;
-  cv::Size rotation_size_;                    ///< image size of rotation_'s camera
-  std::unique_ptr<DepthToColour> to_colour_;  ///< of registered depth; null: depth is taken as it comes
-  std::unique_ptr<DepthEdges> depth_edges_;   ///< null: depth is not registered
+  ImageRotation rotation_;
+  std::shared_ptr<const CameraModel> camera_;  ///< null: not known yet
+  std::unique_ptr<DepthToColour> to_colour_;   ///< of registered depth; null: depth is taken as it comes
+  std::unique_ptr<DepthEdges> depth_edges_;    ///< null: depth is not registered
+  EdgeShifts edge_shifts_;
   struct Stamped {
     double t;
     cv::Mat image;

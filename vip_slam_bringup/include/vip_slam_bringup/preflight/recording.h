@@ -36,7 +36,17 @@ struct StampedVector {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
 };
 
-/// A corner seen in two successive images.
+/// A corner seen in two successive images, in pixels: whatever the camera is taken to be.
+struct PixelTrack {
+  Eigen::Vector2f from, to;
+  float z = 0;  ///< metres, depth at its pixel of the first image; 0: none
+};
+struct PixelStep {
+  double t0 = 0, t1 = 0;
+  std::vector<PixelTrack> tracks;
+};
+
+/// The same with a camera.
 struct CornerTrack {
   Eigen::Vector3f point;   ///< metres, in the colour camera when its row of the first image was read
   Eigen::Vector2f image;   ///< normalised coordinates in the second image
@@ -50,11 +60,18 @@ struct RotationStep {
   std::vector<CornerTrack> tracks;                   ///< corners with depth
 };
 
+/// What the colour camera might be instead of what is taken for it.
+struct CameraReading {
+  CameraIntrinsics camera;
+  std::string what;  ///< "its coefficients are those of equidistant"
+};
+
 struct DepthSample {
-  double valid = 0;   ///< share of pixels with a value
-  double usable = 0;  ///< share of pixels within the sensor file's range
-  double median = 0;  ///< metres, of those with a value
-  double spread = 0;  ///< metres, farthest minus nearest of those
+  double valid = 0;      ///< share of pixels with a value
+  double usable = 0;     ///< share of pixels within the sensor file's range
+  double median = 0;     ///< metres, of those with a value
+  double spread = 0;     ///< metres, farthest minus nearest of those
+  bool swapped = false;  ///< neighbours are far more alike with the two bytes of each value changed over
 };
 
 struct BrightnessSample {
@@ -68,19 +85,37 @@ struct DepthEdgeRecord {
   std::vector<double> as_colour, as_undistorted;  ///< taking depth pixels for those of the image; of one without lens
 };
 
+/// Where the image's edges lie beside those of depth (edge_shift.h).
+struct EdgeShift {
+  double t = 0;                                     ///< of the first image, seconds
+  int images = 0;                                   ///< 0: nothing is known
+  Eigen::Vector2d shift = Eigen::Vector2d::Zero();  ///< right and down, px, that the two fit best with
+  double sigmas = 0;                                ///< height of that fit above those of all shifts
+  double unmoved = 1;                               ///< fit without a shift, as a share of the best
+};
+struct EdgeShiftRecord {
+  std::vector<EdgeShift> seconds;  ///< one a second
+  EdgeShift all, near, far;        ///< of all edges, of the nearer half and of the farther half
+  double nearer = 1;               ///< inverse depth of the nearer half over that of the farther
+};
+
 struct Recording {
   SensorConfig sensor;  ///< the expected configuration
   bool live = false;
   std::map<std::string, std::string> topics;  ///< all existing topics: topic -> type
   StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
   CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
+  double color_focal_from = 0, color_focal_to = 0;         ///< least and largest fx of all camera_info, px
   std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable
   std::string color_camera_note;                           ///< what is unusual in it
   std::vector<StampedVector> gyro_samples, accel_samples;  ///< united and split streams alike
   GyroRange gyro_range;
-  std::vector<RotationStep> rotations;
+  std::vector<PixelStep> pixel_steps;
+  std::vector<RotationStep> rotations;         ///< of pixel_steps, with the camera as configured
+  std::vector<CameraReading> camera_readings;  ///< others of the same camera_info or sensor file
   std::vector<DepthSample> depths;
   DepthEdgeRecord depth_edges;                      ///< of registered depth
+  EdgeShiftRecord edge_shifts;                      ///< the same
   std::string gray_note;                            ///< of 16-bit grey that does not fill 16 bits
   std::vector<BrightnessSample> brightness;         ///< of some colour images
   std::vector<geometry_msgs::TransformStamped> tf;  ///< newest transform of each edge
