@@ -1,6 +1,7 @@
 // Sensor input: images are decoded in the callback threads, then all is passed to the thread that owns the estimator.
 #include "front_end_nodelet.h"
 
+#include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/image_decoding.h"
 
@@ -30,7 +31,7 @@ void FrontEndNodelet::subscribe() {
   const auto hints = ros::TransportHints().tcpNoDelay();
   if (sensor_.intrinsics_from_camera_info) {
     subscribers_.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
-        topics.color_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { calibration_->addColorInfo(*m); }));
+        topics.color_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { onColorInfo(m); }));
     if (!sensor_.depth_registered) {
       subscribers_.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
           topics.depth_info, 5, [this](const sensor_msgs::CameraInfoConstPtr& m) { calibration_->addDepthInfo(*m); }));
@@ -67,6 +68,16 @@ bool FrontEndNodelet::watch(StreamMonitor& monitor, const std_msgs::Header& head
   if (!monitor.admits(header.frame_id, now)) return false;
   monitor.add(header.stamp.toSec(), now);
   return true;
+}
+
+void FrontEndNodelet::onColorInfo(const sensor_msgs::CameraInfoConstPtr& msg) {
+  calibration_->addColorInfo(*msg);
+  try {
+    const CameraIntrinsics camera = intrinsicsFromCameraInfo(*msg, sensor_.topics.color);
+    owner_->post(info_lane_, [this, t = msg->header.stamp.toSec(), camera] { focus_.add(t, camera); });
+  } catch (const std::invalid_argument&) {
+    // The calibration says what is wrong with it.
+  }
 }
 
 void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {

@@ -59,6 +59,7 @@ void FrontEndNodelet::onInit() {
 
   owner_ = std::make_unique<OwnerThread>([this](const std::string& what) { NODELET_ERROR("%s", what.c_str()); });
   imu_lane_ = owner_->addLane("imu", 4000);
+  info_lane_ = owner_->addLane("camera_info", 1000);
   image_lane_ = owner_->addLane("color", std::size_t(options_.image_queue));
   depth_lane_ = owner_->addLane("depth", std::size_t(options_.image_queue));
   control_lane_ = owner_->addLane("control", 1000);
@@ -186,6 +187,7 @@ void FrontEndNodelet::startWhenCalibrated() {
     auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.input.time_jump,
                                                 std::uint32_t(session_));
     alignment_ = std::make_unique<DepthAlignment>(*resolved);
+    focus_.start(resolved->camera);
     front_end_ = std::move(front_end);
   } catch (const std::exception& error) {
     const std::string problem = "sensor '" + sensor_.name + "': " + error.what();
@@ -228,13 +230,15 @@ void FrontEndNodelet::processReady() {
   while (const ImagePair* front = pairer_->front()) {
     if (!front_end_->ready(front->t, front->depth_lag) && waitedFor(front->t) <= options_.input.imu_patience) return;
     // Removed before processing: an image that throws must not be tried again forever.
-    const ImagePair pair = *front;
+    ImagePair pair = *front;
     pairer_->pop();
-    process(pair);
+    process(std::move(pair));
   }
 }
 
-void FrontEndNodelet::process(const ImagePair& pair) {
+void FrontEndNodelet::process(ImagePair pair) {
+  focus_.apply(sensor_.depth_registered, &pair);
+  if (focus_.warped() > 0) NODELET_WARN_ONCE("topic %s: %s", sensor_.topics.color_info.c_str(), focus_.words().c_str());
   std::string size_problem;
   const FrameInput input{pair.t, pair.gray, alignment_->align(pair.depth, pair.gray.size(), &size_problem),
                          pair.depth_lag};

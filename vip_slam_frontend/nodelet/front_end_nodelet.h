@@ -29,6 +29,7 @@
 #include "vip_slam_frontend/FrontEndConfig.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_node_options.h"
+#include "vip_slam_ros/constant_focus.h"
 #include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/image_pairer.h"
@@ -61,6 +62,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void onMapUpdate(const vip_slam_msgs::MapUpdateConstPtr& msg);
   void onControl(const vip_slam_msgs::ControlConstPtr& msg);
   void onReconfigure(vip_slam_frontend::FrontEndConfig& config);
+  void onColorInfo(const sensor_msgs::CameraInfoConstPtr& msg);
   bool watch(StreamMonitor& monitor, const std_msgs::Header& header);  ///< false: leave the message out
 
   // In the owner thread.
@@ -73,7 +75,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void processReady();
   /// Time by which other streams have advanced past an image at `t`, each by its own stamps; seconds.
   double waitedFor(double t) const;
-  void process(const ImagePair& pair);
+  void process(ImagePair pair);
   /// Odometry and tf of a frame that has a pose.
   void publishPose(const ros::Time& stamp, const TrackedFrame& frame);
   void publish(const ImagePair& pair, const FrameOutput& output, double milliseconds);
@@ -115,6 +117,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<FrontEnd> front_end_;
   std::unique_ptr<DepthAlignment> alignment_;
   std::unique_ptr<ImagePairer> pairer_;
+  ConstantFocus focus_;
   std::deque<std::function<void()>> early_;  ///< IMU samples received before the calibration is complete
   std::unique_ptr<StreamClock> clock_;
   bool told_of_spikes_ = false;
@@ -151,7 +154,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::atomic<bool> publish_tf_{true}, imu_rate_odometry_{false};
   std::atomic<double> feature_image_rate_{15.0};
 
-  OwnerThread::Lane imu_lane_ = 0, image_lane_ = 0, depth_lane_ = 0, control_lane_ = 0;
+  OwnerThread::Lane imu_lane_ = 0, info_lane_ = 0, image_lane_ = 0, depth_lane_ = 0, control_lane_ = 0;
   ros::Publisher odometry_pub_, imu_rate_pub_, frame_pub_, keyframe_pub_, status_pub_, calibration_pub_;
   image_transport::Publisher feature_image_pub_;
   ImageSource color_source_, depth_source_;

@@ -59,15 +59,19 @@ void checkCamera(const std::string& role, const StreamRecord& info, const Camera
                     formatted("fx %.1f, fy %.1f, cx %.1f, cy %.1f", camera.fx, camera.fy, camera.cx, camera.cy), ""});
 }
 
-/// A lens that focuses changes its focal length; the first camera_info holds for all images.
+/// A lens that focuses changes its focal length.
 void checkFocus(const Recording& r, Findings* out) {
-  constexpr double kMatters = 0.002, kTooMuch = 0.01;
+  constexpr double kMatters = 0.002;
   const double change = r.color_focal_to / std::max(r.color_focal_from, 1e-9) - 1;
   if (r.color_focal_to == 0 || change < kMatters) return;
-  out->push_back({change > kTooMuch ? Severity::kError : Severity::kWarning, "colour camera_info",
-                  formatted("K changes: fx from %.2f to %.2f, by %.1f %%; one K is taken for all images",
-                            r.color_focal_from, r.color_focal_to, 100 * change),
-                  "switch off autofocus, zoom and stabilisation, or warp the images to one K"});
+  const std::string what =
+      formatted("K changes: fx from %.2f to %.2f, by %.1f %%", r.color_focal_from, r.color_focal_to, 100 * change);
+  if (r.sensor.intrinsics_from_camera_info)
+    out->push_back({Severity::kNote, "colour camera_info", what + "; images and depth are brought to one K", ""});
+  else
+    out->push_back(
+        {Severity::kError, "colour camera_info", what + "; the sensor file's is taken for all images",
+         "intrinsics_from_camera_info: true, so that each image has its own, or switch off autofocus and zoom"});
 }
 
 /// Compares the calibration of the sensor file with the images, and with camera_info where there is one.

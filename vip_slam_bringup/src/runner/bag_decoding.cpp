@@ -6,11 +6,13 @@
 #include <utility>
 
 #include <rosbag/exceptions.h>
+#include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 
 #include "vip_slam_core/util/size_text.h"
+#include "vip_slam_ros/camera_info.h"
 #include "vip_slam_ros/geometry_conversions.h"
 #include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/stream_faults.h"
@@ -51,7 +53,9 @@ BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthToColour& to_col
       options_(options),
       sink_(std::move(sink)),
       pairer_(pairing(options.input)),
-      clock_(kStreams, options.input.time_jump) {}
+      clock_(kStreams, options.input.time_jump) {
+  focus_.start(sensor.camera);
+}
 
 void BagDecoding::take(const rosbag::MessageInstance& message) {
   const std::string& topic = message.getTopic();
@@ -59,6 +63,8 @@ void BagDecoding::take(const rosbag::MessageInstance& message) {
     decode(message, [&] { takeColor(message); });
   else if (topic == sensor_.topics.depth)
     decode(message, [&] { takeDepth(message); });
+  else if (topic == sensor_.topics.color_info)
+    takeInfo(message);
   else
     takeImu(message);
   handOut();
@@ -75,6 +81,16 @@ void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
     warnings_.push_back("topic " + message.getTopic() + ": images are " + sizeText(color_size_) +
                         ", the calibration is for " + sizeText(calibrated) + ": they cannot be used");
   if (inTime(kColor, t)) pairer_.addColor(t, image);
+}
+
+void BagDecoding::takeInfo(const rosbag::MessageInstance& message) {
+  const auto info = message.instantiate<sensor_msgs::CameraInfo>();
+  if (!info) return;
+  try {
+    focus_.add(info->header.stamp.toSec(), intrinsicsFromCameraInfo(*info, sensor_.topics.color));
+  } catch (const std::invalid_argument&) {
+    // Empty ones come first with some drivers; the reader has found one that can be used.
+  }
 }
 
 void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
@@ -128,7 +144,11 @@ bool BagDecoding::inTime(int stream, double t) {
 }
 
 void BagDecoding::handOut() {
-  for (; open_ && pairer_.front(); pairer_.pop()) open_ = sink_(*pairer_.front());
+  for (; open_ && pairer_.front(); pairer_.pop()) {
+    ImagePair pair = *pairer_.front();
+    focus_.apply(sensor_.depth_registered, &pair);
+    open_ = sink_(std::move(pair));
+  }
 }
 
 void BagDecoding::decode(const rosbag::MessageInstance& message, const std::function<void()>& use) {
@@ -155,6 +175,7 @@ void BagDecoding::countUnreadable(const std::string& why) {
 void BagDecoding::finish() {
   pairer_.end();
   handOut();
+  if (!focus_.words().empty()) warnings_.push_back(focus_.words());
   if (!gray_.note().empty()) warnings_.push_back("topic " + sensor_.topics.color + ": " + gray_.note());
   const std::string& depth_topic = sensor_.topics.depth;
   const auto& pairs = pairer_.counters();

@@ -13,6 +13,7 @@
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
+#include "vip_slam_ros/constant_focus.h"
 #include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/one_frame.h"
 #include "vip_slam_ros/stream_clock.h"
@@ -38,6 +39,7 @@ class BagDecoding {
 
  private:
   void takeColor(const rosbag::MessageInstance& message);
+  void takeInfo(const rosbag::MessageInstance& message);
   void takeDepth(const rosbag::MessageInstance& message);
   void takeImu(const rosbag::MessageInstance& message);
   /// Whether the message may be used. Messages before and after a jump of the clock are not paired with each other.
@@ -56,6 +58,7 @@ class BagDecoding {
   StreamClock clock_;
   std::map<std::string, OneFrame> frames_;  ///< of each topic
   GrayDecoder gray_;
+  ConstantFocus focus_;
   bool open_ = true;
   cv::Size color_size_;
   std::size_t depth_images_ = 0, without_any_ = 0;  ///< depth images; those without a reading within the range

@@ -165,6 +165,7 @@ void BagReader::read() {
   for (const auto& name : {topics.color, topics.depth, topics.imu, topics.gyro, topics.accel}) {
     if (!name.empty()) names.push_back(name);
   }
+  if (sensor_.intrinsics_from_camera_info) names.push_back(topics.color_info);
   BagDecoding decoding(sensor_, *source_->to_colour, options_,
                        [this](SensorEvent&& event) { return channel_.push(std::move(event)); });
   const auto report = [&] {
