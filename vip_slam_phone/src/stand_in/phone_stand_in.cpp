@@ -1,6 +1,7 @@
 // Plays a rendered bag as a phone with the app would, on the loopback interface only: for tests and for trying the
 // system without a phone. The clock is a day ahead and drifts, the focus breathes, the exposure changes, RTP and
 // sequence numbers wrap. Images of the bag are stamped at mid-exposure.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -22,6 +23,7 @@
 #include "vip_slam_core/camera/constant_camera.h"
 #include "vip_slam_core/sensor/phone_geometry.h"
 #include "vip_slam_core/sensor/sensor_config.h"
+#include "vip_slam_core/util/formatted.h"
 #include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/image_decoding.h"
 
@@ -29,6 +31,7 @@ namespace vip_slam::phone {
 namespace {
 
 constexpr double kGravity = 9.80665, kDay = 86400, kDrift = 20e-6;
+constexpr double kSettled = 3;  // s, until a receiver has found the clock
 
 std::atomic<bool> stop{false};
 
@@ -136,8 +139,13 @@ class StandIn {
     }
     // The last of it is still under way.
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    std::cout << "sent " << images_ << " images, " << depths_ << " depth images, " << imus_ << " IMU samples"
-              << std::endl;
+    std::cout << "sent " << images_ << " images, " << depths_ << " depth images, " << imus_ << " IMU samples\n";
+    // What of a latency is not the receiver's: coding, and waiting for a core.
+    std::sort(ages_.begin(), ages_.end());
+    if (!ages_.empty())
+      std::cout << formatted("images had left, after mid-exposure: median %.1f ms, 99 %% within %.1f ms",
+                             1e3 * ages_[ages_.size() / 2], 1e3 * ages_[ages_.size() * 99 / 100])
+                << std::endl;
   }
 
  private:
@@ -196,6 +204,7 @@ class StandIn {
     records_.send(out, options_.piece);
     ++images_;
     rtsp_.send(encoder_->encode(seen), unixOf(end), options_.piece, options_.lose > 0 && images_ % options_.lose == 0);
+    if (t > kSettled) ages_.push_back(wallTime() - begin_ - t);
   }
 
   void sendDepth(const sensor_msgs::Image& message) {
@@ -216,6 +225,7 @@ class StandIn {
   double begin_ = 0, first_ = 0;  ///< s: of playing, by this clock; of the bag, by its own
   std::uint16_t sequence_ = 65000, depth_sequence_ = 65500;
   std::size_t images_ = 0, depths_ = 0, imus_ = 0;
+  std::vector<double> ages_;  ///< of images, s from mid-exposure until they had left
 };
 
 }  // namespace
