@@ -121,7 +121,8 @@ class BadInputTest(unittest.TestCase):
     def test_02c_the_topic_after_remapping_and_an_unknown_host_are_named(self):
         launch_file = os.path.join(self.folder, 'remapped.launch')
         with open(launch_file, 'w') as file:
-            file.write('<launch><remap from="/camera/color/image_raw" to="/elsewhere/image"/><include file="$(find '
+            file.write('<launch><param name="/use_sim_time" value="false"/>'
+                       '<remap from="/camera/color/image_raw" to="/elsewhere/image"/><include file="$(find '
                        'vip_slam_bringup)/launch/vip_slam.launch"><arg name="sensor" value="%s"/></include></launch>'
                        % os.path.join(self.data, 'smoke_sensor.yaml'))
         status = Listener('/vip_slam/tracking_status', TrackingStatus)
