@@ -279,7 +279,7 @@ Trajectory writeDriverBag(const std::string& path, const DriverBagOptions& o) {
     const auto writeInfo = [&](const std::string& topic, const CameraIntrinsics& of, double stamp,
                                const std::string& frame) {
       sensor_msgs::CameraInfo info = cameraInfo(of, out.header(stamp, frame));
-      if (!o.calibrated) info.K.fill(0.0);
+      if (!o.calibrated) info.K.fill(0.0), info.P.fill(0.0);
       if (k < o.empty_infos) {
         info.K.fill(0.0);
         info.P.fill(0.0);

@@ -40,7 +40,7 @@ struct DriverBagOptions {
   double depth_skew = 0;  ///< seconds that depth is stamped later than colour
   double depth_unit_factor = 1;
   int depth_divisor = 1;   ///< depth image smaller than colour by this
-  bool calibrated = true;  ///< false: camera_info has an empty K
+  bool calibrated = true;  ///< false: camera_info has empty K and P
   int empty_infos = 0;     ///< so many images at the beginning have an empty camera_info
   double accel_factor = 1;
   bool gravity = true;

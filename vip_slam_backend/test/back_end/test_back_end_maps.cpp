@@ -155,7 +155,9 @@ TEST(BackEndMaps, ASessionThatDoesNotFindTheLoadedMapBecomesAPartOfIt) {
   }
 
   // Mapping goes on in the part; the stored place is recognised in the end.
-  CheckedBackEnd back_end(options("vip"), world.sensor());
+  BackEndOptions closing = options("vip");
+  closing.loop_closing = true;
+  CheckedBackEnd back_end(closing, world.sensor());
   back_end.loadMap(path);
   const std::size_t loaded = back_end.map().keyframes().size();
   const auto add = [&back_end](SimulatedKeyframes* place, int count, std::uint32_t epoch) {

@@ -55,8 +55,10 @@ std::vector<CameraReading> otherReadings(const CameraIntrinsics& used) {
 std::vector<CameraReading> otherReadings(const CameraIntrinsics& used, const sensor_msgs::CameraInfo& info) {
   std::vector<CameraReading> out = otherReadings(used);
   CameraIntrinsics other = used;
-  other.fx = info.K[0], other.fy = info.K[4], other.cx = info.K[2], other.cy = info.K[5];
-  add(used, other, "K is that of the images already, without roi and binning", &out);
+  if (info.K[0] > 0) {
+    other.fx = info.K[0], other.fy = info.K[4], other.cx = info.K[2], other.cy = info.K[5];
+    add(used, other, "K is that of the images already, without roi and binning", &out);
+  }
   if (info.P[0] > 0) {
     other.fx = info.P[0], other.fy = info.P[5], other.cx = info.P[2], other.cy = info.P[6];
     other.model = DistortionModel::kNone;

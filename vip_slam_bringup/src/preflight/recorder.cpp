@@ -122,7 +122,7 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   const SensorTopics& topics = recording_.sensor.topics;
   if (topic == topics.color_info) {
     take(&recording_.color_info, topics.color, &recording_.color_camera, &recording_.color_camera_error);
-    if (recording_.color_info.stamps.size() == 1) recording_.color_camera_note = cameraInfoNote(message);
+    if (recording_.color_camera_note.empty()) recording_.color_camera_note = cameraInfoNote(message);
     const double focal = message.K[0];
     if (focal > 0) {
       const bool first = recording_.color_focal_to == 0;
