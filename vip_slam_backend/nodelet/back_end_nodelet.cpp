@@ -151,7 +151,10 @@ void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
   if (!hasPose(TrackingState(frame.status.state))) return;
   const double t = frame.header.stamp.toSec();
   const SE3 T_odom_I = fromMsg(frame.state.pose);
-  const std::optional<SE3> T_map_odom = pose_.add({t, frame.epoch, fromMsg(frame.chain_camera)});
+  const Matrix15d covariance =
+      Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(frame.covariance.data());
+  const std::optional<SE3> T_map_odom =
+      pose_.add({t, frame.epoch, fromMsg(frame.chain_camera), velocitySigma(covariance)});
   if (!T_map_odom) return;
   if (publish_tf_) {
     geometry_msgs::TransformStamped transform;
@@ -161,8 +164,6 @@ void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
     transform.transform = toTransformMsg(*T_map_odom);
     tf_broadcaster_->sendTransform(transform);
   }
-  const Matrix15d covariance =
-      Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(frame.covariance.data());
   auto pose = boost::make_shared<geometry_msgs::PoseWithCovarianceStamped>(
       pose_.message(t, *T_map_odom, T_odom_I, covariance, options_.map_frame));
   pose->header.stamp = frame.header.stamp;  // exact, unlike the double t

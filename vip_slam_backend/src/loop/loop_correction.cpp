@@ -1,11 +1,16 @@
-// Correction of the map by an accepted place: plane check, pose-plane graph with its chi-square test, landmark fusion.
+// Correction of the map by an accepted place: plane check, pose-plane graph, evidence for the loop, landmark fusion.
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/loop/loop_closer.h"
+#include "vip_slam_backend/loop/loop_evidence.h"
 #include "vip_slam_backend/loop/loop_fusion.h"
 #include "vip_slam_backend/loop/scene_agreement.h"
 #include "vip_slam_core/util/formatted.h"
@@ -14,6 +19,7 @@ namespace vip_slam {
 namespace {
 
 constexpr int kFusedNeighbours = 8;
+constexpr double kSight = 3.0;  // m: a view shows a place that far from the camera
 
 std::set<KeyframeId> withNeighbours(const Map& map, KeyframeId id, std::size_t most) {
   std::set<KeyframeId> result{id};
@@ -27,6 +33,13 @@ std::set<KeyframeId> around(const Map& map, KeyframeId id, std::size_t most) {
   for (KeyframeId k = map.keyframe(id).next; k != 0 && result.size() < 2 * most; k = map.keyframe(k).next)
     result.insert(k);
   return result;
+}
+
+// Metres over which the places of some keyframes lie.
+double extentOf(const Map& map, const std::set<KeyframeId>& part) {
+  Eigen::AlignedBox3d box;
+  for (const KeyframeId id : part) box.extend(map.keyframe(id).state.T_W_I.t());
+  return box.diagonal().norm() + 2 * kSight;
 }
 
 }  // namespace
@@ -78,15 +91,30 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
       if (moves) graph.addPlane(plane.first, transformPlane(move, plane.second.estimate.plane));
     }
   }
-  const SE3& T_W_match = map.keyframe(place.match).state.T_W_I;
-  graph.addEdge(
-      RelativePoseEdge{place.match, query, T_match_query,
-                       loopSqrtInformation(place.information, T_W_match, place.T_W_I, kf.T_I_C, options_.graph)});
+  const Matrix6d loop_information = loopSqrtInformation(place.information, map.keyframe(place.match).state.T_W_I,
+                                                        place.T_W_I, kf.T_I_C, options_.graph);
+  std::optional<Eigen::Matrix3d> known;
+  if (tied) known = graph.positionCovariance(place.match, query);
+  graph.addEdge(RelativePoseEdge{place.match, query, T_match_query, loop_information});
   const PosePlaneSolution solution = graph.solve(options_.graph.max_iterations);
-  if (!solution.usable || solution.chi2 > options_.graph.max_chi2) {
-    event.reason = formatted("closing it costs the graph chi2 %.1f, at most %.1f (moves %.3f m)", solution.chi2,
-                             options_.graph.max_chi2, correction.t().norm());
+  if (!solution.usable) {
+    event.reason = "the pose-plane graph has no solution";
     return event;
+  }
+  if (known) {
+    const Matrix6d loop_covariance = (loop_information.transpose() * loop_information).inverse();
+    const double pose =
+        poseEvidence(solution.chi2, *known + loop_covariance.bottomRightCorner<3, 3>(), extentOf(map, part));
+    const double matches = matchEvidence(place.coverage);
+    if (matches + pose < options_.graph.min_log_odds) {
+      event.reason = formatted(
+          "log odds %.1f, needs %.1f: %.1f for %d inliers in %d of %d cells of the image, %.1f for the pose (chi2 "
+          "%.1f, "
+          "moves %.3f m)",
+          matches + pose, options_.graph.min_log_odds, matches, place.inliers, place.coverage.explained_cells,
+          place.coverage.cells, pose, solution.chi2, correction.t().norm());
+      return event;
+    }
   }
   map.moveKeyframes(solution.T_W_I);
   // Planes that no keyframe observes had no edges in the graph: they keep their parameters.

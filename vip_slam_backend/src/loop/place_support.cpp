@@ -6,39 +6,21 @@
 #include <set>
 
 #include "vip_slam_backend/loop/guided_matching.h"
+#include "vip_slam_backend/loop/place_coverage.h"
 #include "vip_slam_backend/loop/place_surfaces.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr std::size_t kViews = 15, kCoveringViews = 5;
+constexpr std::size_t kViews = 15;
 constexpr double kPointSize = 0.05;   // metres
 constexpr double kTiltSigma = 0.003;  // radians: tilt of the odometry and of the map against gravity
 constexpr double kMinContradiction = 0.005, kUnknownContradiction = 0.05;  // of depth
 constexpr double kOccludedWeight = 0.25;
 constexpr std::size_t kEstablishedViews = 4;
 constexpr int kFewDepths = 100;
-constexpr double kDepthSlack = 0.1, kDepthSlackPerMetre = 0.05;
 
 SE3 cameraInOdom(const Keyframe& keyframe) { return keyframe.frame.state.T_W_I * keyframe.frame.T_I_C; }
-
-// Whether a view shows what lies at p_V (its camera's frame): in its image and not behind a nearer surface.
-bool shows(const DepthGrid& grid, const Eigen::Vector3d& p_V, const CameraModel& camera) {
-  Eigen::Vector2d uv;
-  if (p_V.z() < 0.2 || !camera.project(p_V, &uv) || !camera.inImage(uv, 10)) return false;
-  if (grid.empty()) return true;
-  const int c = static_cast<int>(std::lround((uv.x() - grid.offset) / grid.stride));
-  const int r = static_cast<int>(std::lround((uv.y() - grid.offset) / grid.stride));
-  if (c < 0 || r < 0 || c >= grid.cols || r >= grid.rows) return false;
-  const double z = grid.at(c, r);
-  return z <= 0 || z > p_V.z() - kDepthSlack - kDepthSlackPerMetre * p_V.z();
-}
-
-// Cell of the image, an eighth of the width by a sixth of the height.
-int cellOf(const Feature& feature, const CameraModel& camera) {
-  return static_cast<int>(feature.pixel.x() * 8 / camera.width()) * 6 +
-         static_cast<int>(feature.pixel.y() * 6 / camera.height());
-}
 
 }  // namespace
 
@@ -125,21 +107,10 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const SE3 T_W_C = support.T_W_C * rig[c];
     const TrackedFrame& frame = keyframes[c]->frame;
-    std::vector<SE3> T_V_C;
-    for (std::size_t v = 0; v < std::min(kCoveringViews, views[c].size()); ++v)
-      T_V_C.push_back(map.keyframe(views[c][v]).T_W_C().inverse() * T_W_C);
-    std::set<int> covered_cells, inlier_cells;
-    for (std::size_t f = 0; f < frame.features.size(); ++f) {
-      const Feature& feature = frame.features[f];
-      if (inlier[c][f]) inlier_cells.insert(cellOf(feature, verifier.camera()));
-      if (feature.depth <= 0) continue;
-      const Eigen::Vector3d p_C = feature.depth * Eigen::Vector3d(feature.xy.x(), feature.xy.y(), 1.0);
-      bool shown = false;
-      for (std::size_t v = 0; v < T_V_C.size() && !shown; ++v)
-        shown = shows(map.keyframe(views[c][v]).data->frame.depth_grid, T_V_C[v] * p_C, verifier.camera());
-      support.covered += shown;
-      if (shown) covered_cells.insert(cellOf(feature, verifier.camera()));
-    }
+    const PlaceCoverage coverage = placeCoverage(map, frame.features, inlier[c], T_W_C, views[c], verifier.camera());
+    support.covered += coverage.features;
+    support.covered_cells += coverage.cells;
+    support.explained_cells += coverage.explained_cells;
     for (const MapPoint& point : points[c]) {
       const MapLandmark* landmark = map.findLandmark(point.landmark);
       if (!landmark || landmark->observations.size() < kEstablishedViews) continue;
@@ -147,12 +118,10 @@ PlaceSupport placeSupport(const Map& map, const std::vector<KeyframePtr>& keyfra
       ++support.established;
       support.refound += found.count({static_cast<std::uint32_t>(c), point.landmark}) != 0;
     }
-    support.covered_cells += static_cast<int>(covered_cells.size());
-    for (const int cell : covered_cells) support.explained_cells += static_cast<int>(inlier_cells.count(cell));
     if (views[c].empty()) continue;
     const MapKeyframe& nearest = map.keyframe(views[c].front());
-    const DepthAgreement depth =
-        compareDepth(nearest.data->frame.depth_grid, frame.depth_grid, T_V_C.front(), verifier.camera());
+    const DepthAgreement depth = compareDepth(nearest.data->frame.depth_grid, frame.depth_grid,
+                                              nearest.T_W_C().inverse() * T_W_C, verifier.camera());
     support.depth.compared += depth.compared;
     support.depth.agree += depth.agree;
     support.depth.see_through += depth.see_through;

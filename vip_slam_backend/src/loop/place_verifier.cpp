@@ -66,10 +66,9 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
   result->information = pose.information;
   for (const std::uint32_t k : pose.inliers)
     if (guided.source[k].second != kNoLandmark) result->landmarks.push_back(guided.source[k]);
-  if (result->inliers < options_.min_inliers) {
-    result->reason = formatted("%d inliers after guided matching, needs %d", result->inliers, options_.min_inliers);
-    return;
-  }
+  std::vector<bool> inlier(query.frame.features.size(), false);
+  for (const std::uint32_t k : pose.inliers) inlier[guided.source[k].first] = true;
+  result->coverage = placeCoverage(map, query.frame.features, inlier, T_W_C, around, *camera_);
   // Position along the weakest direction, marginal over the angles.
   const Matrix6d covariance = result->information.inverse();
   const double sigma = std::sqrt(covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
@@ -102,7 +101,8 @@ void PlaceVerifier::finish(const Map& map, const Keyframe& query, const SE3& T_G
     }
   }
   result->accepted = true;
-  result->reason = formatted("%d inliers, depth agreement %.2f", result->inliers, result->depth_agreement);
+  result->reason = formatted("%d inliers in %d of %d cells of the image, depth agreement %.2f", result->inliers,
+                             result->coverage.explained_cells, result->coverage.cells, result->depth_agreement);
 }
 
 // In poor texture few corners are detected again, so use the neighbouring keyframes' corners as well.

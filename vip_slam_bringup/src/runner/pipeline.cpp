@@ -108,7 +108,7 @@ void Pipeline::process(const ImagePair& pair) {
     states_.back().status.reason = frame.status.reason;  // keep the newest reason for waiting
   if (hasPose(frame.status.state) && passes_.take(frame.t)) {
     odometry_.push_back({frame.t, frame.epoch, frame.state.T_W_I});
-    chain_.push_back({frame.t, frame.epoch, frame.T_chain_C});
+    chain_.push_back({frame.t, frame.epoch, frame.T_chain_C, velocitySigma(frame.covariance)});
     covariances_.push_back({frame.t, poseCovariance(frame)});
     if (placed_ && epoch_ == frame.epoch) realtime_.push_back({frame.t, T_map_odom_ * frame.state.T_W_I});
   }

@@ -1,4 +1,7 @@
 // Every image's pose follows the final keyframes.
+#include <algorithm>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "vip_slam_core/trajectory/anchored_trajectory.h"
@@ -36,6 +39,23 @@ TEST(AnchorTrajectory, BlendsBetweenKeyframesFarFromTheOrigin) {
   EXPECT_LT(trajectory.back().T_W_B.boxminus(at(101, 0.4)).norm(), 1e-12);
   for (int i = 0; i <= 10; ++i) EXPECT_LT((trajectory[i].T_W_B.t() - chain[i].T_chain_C.t()).norm(), 0.2) << i;
   EXPECT_NEAR(yawOf(trajectory[5].T_W_B.rotation()), 0.2, 1e-9);
+}
+
+TEST(AnchorTrajectory, ACorrectionGoesWhereTheChainMayHaveGoneWrong) {
+  // Two seconds of tracking, eight without images, in which a wrong acceleration of 0.03 m/s^2 makes an error of its
+  // square, two of tracking. The last keyframe knows where it is.
+  const auto wrong = [](double t) { return 0.015 * std::pow(std::clamp(t - 2.0, 0.0, 8.0), 2); };
+  std::vector<ChainedPose> chain;
+  for (int i = 0; i <= 120; ++i) {
+    const double t = 0.1 * i;
+    const double sigma = t > 2 && t < 10 ? 0.05 * (t - 2) : 0.002;
+    chain.push_back({t, 1, at(0.4 * t + wrong(t)), sigma});
+  }
+  const std::vector<Anchor> anchors = {{0, 1, at(0), at(0), {}}, {12, 1, chain.back().T_chain_C, at(4.8), {}}};
+  const Trajectory trajectory = anchorTrajectory(chain, anchors);
+  ASSERT_EQ(trajectory.size(), chain.size());
+  EXPECT_NEAR(wrong(12), 0.96, 1e-9);
+  for (const StampedPose& pose : trajectory) EXPECT_NEAR(pose.T_W_B.t().x(), 0.4 * pose.t, 0.02) << pose.t;
 }
 
 TEST(AnchorTrajectory, TheBodyFollowsTheCameraByTheExtrinsicsKnownNow) {

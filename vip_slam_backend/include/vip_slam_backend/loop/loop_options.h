@@ -20,7 +20,6 @@ struct PlaceVerificationOptions {
   int guided_keyframes = 10;
   double guided_radius = 10.0;
   double inlier_px = 3.0;
-  int min_inliers = 25;
   double max_sigma_position = 0.05;
   double max_gravity_deg = 2.0;
   double min_depth_agreement = 0.6;
@@ -38,7 +37,6 @@ struct PlaceVerificationOptions {
     v.field("guided_keyframes", guided_keyframes, 1, 100, "keyframes around the match whose landmarks are looked for");
     v.field("guided_radius", guided_radius, 1.0, 50.0, "search radius around a projected landmark, px");
     v.field("inlier_px", inlier_px, 0.5, 20.0, "largest reprojection error of a final inlier, px per octave scale");
-    v.field("min_inliers", min_inliers, 6, 500, "final inliers needed");
     v.field("max_sigma_position", max_sigma_position, 0.001, 1.0, "largest one-sigma of the relative position, m");
     v.field("max_gravity_deg", max_gravity_deg, 0.1, 45.0, "largest tilt between the found pose and gravity, degrees");
     v.field("min_depth_agreement", min_depth_agreement, 0.0, 1.0, "fraction of common depth that must agree");
@@ -50,11 +48,11 @@ struct PlaceVerificationOptions {
 struct PoseGraphOptions {
   double odometry_sigma_position = 0.015;
   double odometry_sigma_yaw_deg = 0.10;
-  double odometry_drift = 0.005;
+  double odometry_drift = 0.01;
   double loop_sigma_position = 0.02;
   double loop_sigma_angle_deg = 0.3;
   int covisible_edge = 60;
-  double max_chi2 = 40.0;
+  double min_log_odds = 2.3;
   int max_iterations = 50;
 
   void visit(OptionVisitor& v) {
@@ -68,7 +66,8 @@ struct PoseGraphOptions {
     v.field("loop_sigma_angle_deg", loop_sigma_angle_deg, 1e-3, 10.0,
             "smallest one-sigma of a loop edge's angles, degrees");
     v.field("covisible_edge", covisible_edge, 10, 1000, "shared landmarks that make an edge between two keyframes");
-    v.field("max_chi2", max_chi2, 5.0, 10000.0, "a loop that costs the graph more than this is rejected");
+    v.field("min_log_odds", min_log_odds, -20.0, 100.0,
+            "natural logarithm of how much more probable a loop must be than a place that looks alike");
     v.field("max_iterations", max_iterations, 1, 1000, "Levenberg-Marquardt iterations");
   }
 };

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "vip_slam_backend/loop/loop_options.h"
+#include "vip_slam_backend/loop/place_coverage.h"
 #include "vip_slam_backend/loop/place_pose.h"
 #include "vip_slam_backend/map/map.h"
 #include "vip_slam_backend/place_recognition/keyframe_database.h"
@@ -24,6 +25,7 @@ struct PlaceVerification {
   SE3 T_W_I;                                ///< the query's pose in the map, from the matched landmarks
   Matrix6d information = Matrix6d::Zero();  ///< of the perturbation (theta, t) of the query's camera pose
   int inliers = 0;              ///< matches that agree with the pose; of a PlaceSearch, distinct points of the map
+  PlaceCoverage coverage;       ///< not of a PlaceSearch
   double depth_agreement = -1;  ///< -1: no depth to compare
   std::vector<std::pair<std::uint32_t, LandmarkId>> landmarks;  ///< inliers: feature of the query, landmark of the map
 };

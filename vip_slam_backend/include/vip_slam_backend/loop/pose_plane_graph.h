@@ -4,6 +4,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "vip_slam_core/geometry/plane.h"
@@ -43,6 +44,9 @@ class PosePlaneGraph {
 
   /// Optimises from the poses given; the lowest id of each connected part is fixed.
   PosePlaneSolution solve(int max_iterations) const;
+  /// Covariance of the position of `to` in the frame of `from`, m^2, along the edges between poses that know it best:
+  /// an upper bound of that of the whole graph. Roll and pitch are known. Nothing when no edges lead there.
+  std::optional<Eigen::Matrix3d> positionCovariance(KeyframeId from, KeyframeId to) const;
 
  private:
   std::map<KeyframeId, SE3> poses_;
