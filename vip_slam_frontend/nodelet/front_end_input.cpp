@@ -82,13 +82,13 @@ void FrontEndNodelet::onColorInfo(const sensor_msgs::CameraInfoConstPtr& msg) {
 
 void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {
   if (!watch(*color_monitor_, header)) return;
-  const double t = header.stamp.toSec();
+  const double t = header.stamp.toSec(), arrival = ros::Time::now().toSec();
   calibration_->addColorFrame(header.frame_id);
   try {
     cv::Mat gray = decode();
     if (!gray_.note().empty()) NODELET_WARN_ONCE("topic %s: %s", color_source_.topic.c_str(), gray_.note().c_str());
-    owner_->post(image_lane_, [this, t, gray, stamp = header.stamp.toNSec()] {
-      if (noticeTime(t, kColor)) pairer_->addColor(t, gray, stamp);
+    owner_->post(image_lane_, [this, t, arrival, gray, stamp = header.stamp.toNSec()] {
+      if (const auto at = noticeTime(t, arrival, kColor)) pairer_->addColor(*at, gray, stamp);
       processReady();
     });
   } catch (const std::exception& error) {
@@ -99,12 +99,12 @@ void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::functio
 
 void FrontEndNodelet::onDepth(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {
   if (!watch(*depth_monitor_, header)) return;
-  const double t = header.stamp.toSec();
+  const double t = header.stamp.toSec(), arrival = ros::Time::now().toSec();
   try {
     cv::Mat depth = decode();
     empty_depth_ = holdsNoDepth(depth, sensor_.depth_noise) ? empty_depth_ + 1 : 0;
-    owner_->post(depth_lane_, [this, t, depth] {
-      if (noticeTime(t, kDepth)) pairer_->addDepth(t, depth);
+    owner_->post(depth_lane_, [this, t, arrival, depth] {
+      if (const auto at = noticeTime(t, arrival, kDepth)) pairer_->addDepth(*at, depth);
       processReady();
     });
   } catch (const std::exception& error) {
@@ -115,26 +115,26 @@ void FrontEndNodelet::onDepth(const std_msgs::Header& header, const std::functio
 
 void FrontEndNodelet::onImu(const sensor_msgs::ImuConstPtr& msg) {
   if (!watch(*imu_monitor_, msg->header)) return;
-  const double t = msg->header.stamp.toSec();
+  const double t = msg->header.stamp.toSec(), arrival = ros::Time::now().toSec();
   calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity), accel = fromMsg(msg->linear_acceleration);
-  owner_->post(imu_lane_, [this, t, gyro, accel] { addInertial(t, &gyro, &accel); });
+  owner_->post(imu_lane_, [this, t, arrival, gyro, accel] { addInertial(t, arrival, &gyro, &accel); });
 }
 
 void FrontEndNodelet::onGyro(const sensor_msgs::ImuConstPtr& msg) {
   if (!watch(*imu_monitor_, msg->header)) return;
-  const double t = msg->header.stamp.toSec();
+  const double t = msg->header.stamp.toSec(), arrival = ros::Time::now().toSec();
   calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity);
-  owner_->post(imu_lane_, [this, t, gyro] { addInertial(t, &gyro, nullptr); });
+  owner_->post(imu_lane_, [this, t, arrival, gyro] { addInertial(t, arrival, &gyro, nullptr); });
 }
 
 void FrontEndNodelet::onAccel(const sensor_msgs::ImuConstPtr& msg) {
   if (!watch(accelMonitor(), msg->header)) return;
-  const double t = msg->header.stamp.toSec();
+  const double t = msg->header.stamp.toSec(), arrival = ros::Time::now().toSec();
   if (!sensor_.hasGyro()) calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d accel = fromMsg(msg->linear_acceleration);
-  owner_->post(imu_lane_, [this, t, accel] { addInertial(t, nullptr, &accel); });
+  owner_->post(imu_lane_, [this, t, arrival, accel] { addInertial(t, arrival, nullptr, &accel); });
 }
 
 }  // namespace vip_slam

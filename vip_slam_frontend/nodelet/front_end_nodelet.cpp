@@ -51,6 +51,7 @@ void FrontEndNodelet::onInit() {
   pairing.patience = sensor_.topics.depth.empty() ? -1.0 : options_.input.depth_patience;
   pairing.capacity = std::size_t(options_.image_queue);
   pairer_ = std::make_unique<ImagePairer>(pairing);
+  clock_steps_ = std::make_unique<ClockSteps>(kStreams, options_.input.time_jump);
   clock_ = std::make_unique<StreamClock>(kStreams, options_.input.time_jump);
   tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
   tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
@@ -122,13 +123,25 @@ void FrontEndNodelet::onReconfigure(vip_slam_frontend::FrontEndConfig& config) {
   feature_image_rate_ = config.feature_image_rate;
 }
 
-bool FrontEndNodelet::noticeTime(double t, Stream stream) {
-  if (paused_) return false;
+std::optional<double> FrontEndNodelet::noticeTime(double stamp, double arrival, Stream stream) {
+  if (paused_) return std::nullopt;
+  const std::size_t steps = clock_steps_->steps().size();
+  const std::optional<double> followed = clock_steps_->follow(stream, stamp, arrival);
+  if (clock_steps_->steps().size() > steps) {
+    const StreamMonitor& monitor = stream == kColor   ? *color_monitor_
+                                   : stream == kDepth ? *depth_monitor_
+                                   : stream == kGyro  ? *imu_monitor_
+                                                      : accelMonitor();
+    NODELET_WARN("%s", clockStepped(clock_steps_->steps().back(), monitor.report().topic).c_str());
+  }
+  if (!followed) return std::nullopt;
+  const double t = *followed;
   const StreamClock::Verdict verdict = clock_->notice(stream, t);
   if (verdict == StreamClock::Verdict::kSetBack) NODELET_WARN("%s", clockSetBack(clock_->lastJump(), t).c_str());
   if (verdict == StreamClock::Verdict::kJumpedBack) {
     const std::string words = timeRanBack(clock_->lastJump());
     NODELET_WARN("%s: the odometry starts anew, the map stays", words.c_str());
+    clock_steps_->restart();
     pairer_->clear();
     early_.clear();
     for (auto* monitor : {color_monitor_.get(), depth_monitor_.get(), imu_monitor_.get(), accel_monitor_.get()}) {
@@ -139,11 +152,14 @@ bool FrontEndNodelet::noticeTime(double t, Stream stream) {
     std::lock_guard<std::mutex> lock(shown_mutex_);
     ++shown_.time_jumps;
   }
-  return verdict != StreamClock::Verdict::kStray;
+  return verdict != StreamClock::Verdict::kStray ? followed : std::nullopt;
 }
 
-void FrontEndNodelet::addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel) {
-  if (!noticeTime(t, gyro ? kGyro : kAccel)) return;
+void FrontEndNodelet::addInertial(double stamp, double arrival, const Eigen::Vector3d* gyro,
+                                  const Eigen::Vector3d* accel) {
+  const std::optional<double> followed = noticeTime(stamp, arrival, gyro ? kGyro : kAccel);
+  if (!followed) return;
+  const double t = *followed;
   if (!front_end_) {
     constexpr std::size_t kEarly = 4000;
     const Eigen::Vector3d g = gyro ? *gyro : Eigen::Vector3d::Zero(), a = accel ? *accel : Eigen::Vector3d::Zero();

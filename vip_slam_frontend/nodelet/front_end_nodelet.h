@@ -29,6 +29,7 @@
 #include "vip_slam_frontend/FrontEndConfig.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_node_options.h"
+#include "vip_slam_ros/clock_steps.h"
 #include "vip_slam_ros/constant_focus.h"
 #include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/image_decoding.h"
@@ -66,10 +67,11 @@ class FrontEndNodelet : public nodelet::Nodelet {
   bool watch(StreamMonitor& monitor, const std_msgs::Header& header);  ///< false: leave the message out
 
   // In the owner thread.
-  void addInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
+  void addInertial(double stamp, double arrival, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
   void feedInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);  ///< with an estimator
   enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
-  bool noticeTime(double t, Stream stream);  ///< false: leave the message out
+  /// Stamp on the clock that the stream began with; empty: leave the message out. `arrival`: when it was received, s.
+  std::optional<double> noticeTime(double stamp, double arrival, Stream stream);
   StreamMonitor& accelMonitor();
   void startWhenCalibrated();
   void processReady();
@@ -119,6 +121,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<ImagePairer> pairer_;
   ConstantFocus focus_;
   std::deque<std::function<void()>> early_;  ///< IMU samples received before the calibration is complete
+  std::unique_ptr<ClockSteps> clock_steps_;
   std::unique_ptr<StreamClock> clock_;
   bool told_of_spikes_ = false;
   double posed_imu_t_ = -1e300;               ///< of the newest image with a pose

@@ -53,6 +53,7 @@ BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthToColour& to_col
       options_(options),
       sink_(std::move(sink)),
       pairer_(pairing(options.input)),
+      clock_steps_(kStreams, options.input.time_jump),
       clock_(kStreams, options.input.time_jump) {
   focus_.start(sensor.camera);
 }
@@ -80,7 +81,7 @@ void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
   if (color_size_ != calibrated && ++counters_["images_of_wrong_size"] == 1)
     warnings_.push_back("topic " + message.getTopic() + ": images are " + sizeText(color_size_) +
                         ", the calibration is for " + sizeText(calibrated) + ": they cannot be used");
-  if (inTime(kColor, t)) pairer_.addColor(t, image);
+  if (const auto at = inTime(kColor, t, message)) pairer_.addColor(*at, image);
 }
 
 void BagDecoding::takeInfo(const rosbag::MessageInstance& message) {
@@ -107,7 +108,7 @@ void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
                           "depth/registered: false with the depth camera's calibration");
   ++depth_images_;
   without_any_ += holdsNoDepth(depth, sensor_.depth_noise);
-  if (inTime(kDepth, t)) pairer_.addDepth(t, depth);
+  if (const auto at = inTime(kDepth, t, message)) pairer_.addDepth(*at, depth);
 }
 
 void BagDecoding::takeImu(const rosbag::MessageInstance& message) {
@@ -119,28 +120,42 @@ void BagDecoding::takeImu(const rosbag::MessageInstance& message) {
     return;
   }
   if (!frames_[topic].admits(imu->header.frame_id)) return;
-  const double t = imu->header.stamp.toSec();
+  const std::optional<double> at =
+      inTime(topic == sensor_.topics.accel ? kAccel : kGyro, imu->header.stamp.toSec(), message);
+  if (!at) return;
+  const double t = *at;
   const Eigen::Vector3d gyro = fromMsg(imu->angular_velocity), accel = fromMsg(imu->linear_acceleration);
-  if (!inTime(topic == sensor_.topics.accel ? kAccel : kGyro, t)) return;
   SensorEvent event = ImuSample{t, gyro, accel};
   if (topic == sensor_.topics.gyro) event = GyroSample{t, gyro};
   if (topic == sensor_.topics.accel) event = AccelSample{t, accel};
   open_ = sink_(std::move(event));
 }
 
-bool BagDecoding::inTime(int stream, double t) {
+std::optional<double> BagDecoding::inTime(int stream, double stamp, const rosbag::MessageInstance& message) {
+  const std::size_t steps = clock_steps_.steps().size();
+  const std::optional<double> followed = clock_steps_.follow(std::size_t(stream), stamp, message.getTime().toSec());
+  if (clock_steps_.steps().size() > steps) {
+    ++counters_["clock_steps"];
+    complain("step of " + message.getTopic(), clockStepped(clock_steps_.steps().back(), message.getTopic()));
+  }
+  if (!followed) {
+    ++counters_["stray_messages"];
+    return std::nullopt;
+  }
+  const double t = *followed;
   const StreamClock::Verdict verdict = clock_.notice(stream, t);
   if (verdict == StreamClock::Verdict::kStray) ++counters_["stray_messages"];
   if (verdict == StreamClock::Verdict::kSetBack && ++counters_["clock_steps"] == 1)
     warnings_.push_back(clockSetBack(clock_.lastJump(), t));
   if (verdict == StreamClock::Verdict::kJumpedBack) {
     ++counters_["time_jumps"];
+    clock_steps_.restart();
     pairer_.end();
     handOut();
     pairer_.clear();
     if (open_) open_ = sink_(TimeJump{clock_.lastJump()});
   }
-  return open_ && verdict != StreamClock::Verdict::kStray;
+  return open_ && verdict != StreamClock::Verdict::kStray ? followed : std::nullopt;
 }
 
 void BagDecoding::handOut() {

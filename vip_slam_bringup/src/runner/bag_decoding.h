@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
+#include "vip_slam_ros/clock_steps.h"
 #include "vip_slam_ros/constant_focus.h"
 #include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/one_frame.h"
@@ -42,8 +44,9 @@ class BagDecoding {
   void takeInfo(const rosbag::MessageInstance& message);
   void takeDepth(const rosbag::MessageInstance& message);
   void takeImu(const rosbag::MessageInstance& message);
-  /// Whether the message may be used. Messages before and after a jump of the clock are not paired with each other.
-  bool inTime(int stream, double t);
+  /// Stamp of a message that may be used, on the clock that its stream began with. Messages before and after a jump of
+  /// the clock are not paired with each other.
+  std::optional<double> inTime(int stream, double t, const rosbag::MessageInstance& message);
   void handOut();
   /// Counts an image that `use` cannot decode and warns once per topic.
   void decode(const rosbag::MessageInstance& message, const std::function<void()>& use);
@@ -55,6 +58,7 @@ class BagDecoding {
   const BagReaderOptions options_;
   Sink sink_;
   ImagePairer pairer_;
+  ClockSteps clock_steps_;
   StreamClock clock_;
   std::map<std::string, OneFrame> frames_;  ///< of each topic
   GrayDecoder gray_;
