@@ -128,7 +128,7 @@ class PhoneTest(unittest.TestCase):
         return position_error(self.truth + np.array([ahead] + 7 * [0]), load_tum(path))
 
     def test_1_follows_the_truth_and_loses_nothing(self):
-        wait_for(lambda: 'the phone does not answer' in self.words(), 30, 'words about a phone that is not there')
+        wait_for(lambda: 'the phone does not answer' in self.words(), 60, 'words about a phone that is not there')
         ahead = self.play()
         type(self).first = ahead
         self.assertTrue(tracking(self.status.last()))
