@@ -13,10 +13,10 @@ struct PlaceVerificationOptions {
   int max_hamming = 64;
   double ratio = 0.85;
   int matched_keyframes = 5;
-  int min_matches = 12;
+  int min_matches = 6;
   int ransac_iterations = 400;
   double ransac_px = 4.0;
-  int min_ransac_inliers = 10;
+  int min_ransac_inliers = 6;
   int guided_keyframes = 10;
   double guided_radius = 10.0;
   double inlier_px = 3.0;
