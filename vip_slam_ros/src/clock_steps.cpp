@@ -4,22 +4,21 @@
 #include <cmath>
 
 #include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kLeast = 0.03;       // s; smaller steps are an error of the delay, which the filter estimates
-constexpr std::size_t kHistory = 60;  // seconds in which the least delay is looked for
-constexpr std::size_t kKnown = 5;     // seconds after which it is known
-constexpr std::size_t kIntervals = 9;
-constexpr double kConfirm = 0.05;       // s of messages that confirm a step ...
-constexpr int kFewest = 2, kMost = 10;  // ... at least and at most
-constexpr double kRunning = 1.0;        // s without a message after which a stream is not asked
+constexpr double kLeastStep = 0.03;       // s; smaller steps are an error of the delay, which the filter estimates
+constexpr std::size_t kSecondsKept = 60;  // seconds in which the least delay is looked for
+constexpr std::size_t kSecondsKnown = 5;  // seconds after which it is known
+constexpr std::size_t kIntervalsKept = 9;
+constexpr double kConfirmed = 0.05;                   // s of messages that confirm a step ...
+constexpr int kFewestConfirm = 2, kMostConfirm = 10;  // ... at least and at most
+constexpr double kStillRunning = 1.0;                 // s without a message after which a stream is not asked
 
-double usual(std::deque<double> intervals) {
-  const auto middle = intervals.begin() + std::ptrdiff_t(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+double usualInterval(const std::deque<double>& intervals) {
+  return upperMedian(std::vector<double>(intervals.begin(), intervals.end()));
 }
 
 }  // namespace
@@ -32,7 +31,7 @@ void ClockSteps::pass(Stream* own, double t, double arrival) {
   learn(own, t);
   if (own->arrived > -1e300 && t > own->last) {
     own->intervals.push_back(t - own->last);
-    if (own->intervals.size() > kIntervals) own->intervals.pop_front();
+    if (own->intervals.size() > kIntervalsKept) own->intervals.pop_front();
   }
   own->last = t;
   own->arrived = arrival;
@@ -41,32 +40,33 @@ void ClockSteps::pass(Stream* own, double t, double arrival) {
 
 void ClockSteps::learn(Stream* own, double t) const {
   // Only what the next message confirms: a single wrong stamp would show a delay that nothing has.
-  if (!(own->arrived > -1e300) || t <= own->last || t - own->last > kRunning) return;
+  if (!(own->arrived > -1e300) || t <= own->last || t - own->last > kStillRunning) return;
   if (own->ahead.empty() || own->arrived - own->second >= 1 || own->arrived < own->second) {
     own->second = own->arrived;
     own->ahead.push_back(own->last - own->arrived);
-    if (own->ahead.size() > kHistory) own->ahead.pop_front();
+    if (own->ahead.size() > kSecondsKept) own->ahead.pop_front();
   }
   own->ahead.back() = std::max(own->ahead.back(), own->last - own->arrived);
 }
 
 bool ClockSteps::begins(const Stream& own, double t, double arrival) const {
-  if (own.ahead.size() <= kKnown || own.intervals.size() < kIntervals) return false;
-  const double interval = usual(own.intervals);
+  if (own.ahead.size() <= kSecondsKnown || own.intervals.size() < kIntervalsKept) return false;
+  const double interval = usualInterval(own.intervals);
   const double step = (t - arrival) - leastDelay(own);
   if (std::abs(step) > longest_) return false;
   // Forward a message would have arrived before it was sent: no delay does that. Back its stamp repeats time: a delay
   // does not either.
-  return step > kLeast ? t > own.last + interval + kLeast : step < -kLeast && t < own.last + interval - kLeast;
+  return step > kLeastStep ? t > own.last + interval + kLeastStep
+                           : step < -kLeastStep && t < own.last + interval - kLeastStep;
 }
 
 std::optional<bool> ClockSteps::alone(const Stream& own, double arrival) const {
   bool others = false;
   for (const Stream& s : streams_) {
-    if (&s == &own || arrival - std::max(s.arrived, s.first_arrival) > kRunning) continue;
+    if (&s == &own || arrival - std::max(s.arrived, s.first_arrival) > kStillRunning) continue;
     if (s.pending > 0) continue;  // of the same device, or of all
     // A message on its way when the clock was set shows nothing.
-    if (s.last <= own.last || s.arrived <= own.first_arrival + (s.intervals.empty() ? 0 : usual(s.intervals)))
+    if (s.last <= own.last || s.arrived <= own.first_arrival + (s.intervals.empty() ? 0 : usualInterval(s.intervals)))
       return std::nullopt;
     others = true;
   }
@@ -80,8 +80,8 @@ std::optional<double> ClockSteps::follow(std::size_t stream, double t, double ar
   if (own.pending > 0) {
     // It is none when stamps go on from before it, the first having been wrong alone, or when one arrives as before.
     const bool back = own.first - own.first_arrival < leastDelay(own);
-    const bool as_before = back ? shifted - arrival > leastDelay(own) - kLeast : shifted < own.first;
-    open = !as_before && arrival - own.first_arrival < kRunning;
+    const bool as_before = back ? shifted - arrival > leastDelay(own) - kLeastStep : shifted < own.first;
+    open = !as_before && arrival - own.first_arrival < kStillRunning;
   }
   if (!open) {
     pass(&own, shifted, arrival);
@@ -94,8 +94,9 @@ std::optional<double> ClockSteps::follow(std::size_t stream, double t, double ar
     own.best = shifted - arrival;
   }
   own.best = std::max(own.best, shifted - arrival);
-  const double interval = usual(own.intervals);
-  const int needed = std::clamp(static_cast<int>(std::lround(kConfirm / std::max(interval, 1e-3))), kFewest, kMost);
+  const double interval = usualInterval(own.intervals);
+  const int needed =
+      std::clamp(static_cast<int>(std::lround(kConfirmed / std::max(interval, 1e-3))), kFewestConfirm, kMostConfirm);
   if (own.pending < needed) return std::nullopt;
   const std::optional<bool> single = alone(own, arrival);
   if (!single) return std::nullopt;
@@ -112,7 +113,7 @@ std::optional<double> ClockSteps::follow(std::size_t stream, double t, double ar
   const double since = own.first - own.last;
   const double intervals = std::max(1.0, std::round((since - by_delay) / interval));
   const double step = since - intervals * interval;
-  if (std::abs(step) < kLeast) {
+  if (std::abs(step) < kLeastStep) {
     pass(&own, shifted, arrival);
     return shifted;
   }

@@ -9,12 +9,12 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kSameStamp = 5e-4;       // s, between an image and its camera_info
-constexpr double kUnseen = 1e-4;          // share of the focal length and of the width that is no change
-constexpr std::size_t kRemembered = 600;  // changes: twenty seconds of images
+constexpr double kStampOfInfo = 5e-4;      // s, between an image and its camera_info
+constexpr double kNoChange = 1e-4;         // share of the focal length and of the width that is no change
+constexpr std::size_t kChangesKept = 600;  // changes: twenty seconds of images
 
-bool differ(const CameraIntrinsics& a, const CameraIntrinsics& b) {
-  const double f = kUnseen * b.fx, c = kUnseen * b.width;
+bool focusDiffers(const CameraIntrinsics& a, const CameraIntrinsics& b) {
+  const double f = kNoChange * b.fx, c = kNoChange * b.width;
   return std::abs(a.fx - b.fx) > f || std::abs(a.fy - b.fy) > f || std::abs(a.cx - b.cx) > c ||
          std::abs(a.cy - b.cy) > c;
 }
@@ -23,25 +23,25 @@ bool differ(const CameraIntrinsics& a, const CameraIntrinsics& b) {
 
 void ConstantFocus::add(double t, const CameraIntrinsics& camera) {
   if (!std::isfinite(t) || !camera.validate().empty()) return;
-  if (!changes_.empty() && (t < changes_.back().t || !differ(camera, changes_.back().camera))) {
+  if (!changes_.empty() && (t < changes_.back().t || !focusDiffers(camera, changes_.back().camera))) {
     if (t < changes_.back().t - 1)
       changes_.clear();  // the clock was set back
     else
       return;
   }
   changes_.push_back({t, camera});
-  if (changes_.size() > kRemembered) changes_.pop_front();
+  if (changes_.size() > kChangesKept) changes_.pop_front();
   least_ = least_ > 0 ? std::min(least_, camera.fx) : camera.fx;
   largest_ = std::max(largest_, camera.fx);
 }
 
 const CameraIntrinsics* ConstantFocus::at(double t) const {
-  const auto next = std::upper_bound(changes_.begin(), changes_.end(), t + kSameStamp,
+  const auto next = std::upper_bound(changes_.begin(), changes_.end(), t + kStampOfInfo,
                                      [](double stamp, const Stamped& change) { return stamp < change.t; });
   if (next == changes_.begin()) return nullptr;
   const CameraIntrinsics& camera = std::prev(next)->camera;
   const bool same_size = camera.width == constant_.width && camera.height == constant_.height;
-  return same_size && differ(camera, constant_) ? &camera : nullptr;
+  return same_size && focusDiffers(camera, constant_) ? &camera : nullptr;
 }
 
 void ConstantFocus::apply(bool registered, ImagePair* pair) {
