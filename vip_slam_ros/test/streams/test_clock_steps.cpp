@@ -8,10 +8,10 @@
 
 #include "vip_slam_ros/clock_steps.h"
 
-namespace vip_slam {
+namespace vip_slam::clock_steps_test {
 namespace {
 
-enum { kImages, kImu };
+enum { kCamera, kImu };
 
 struct Message {
   int stream;
@@ -28,7 +28,7 @@ std::vector<Message> messages(const std::function<void(Message*)>& change) {
     change(&m);
     if (m.stamp >= 0) all.push_back(m);
   };
-  for (int k = 0; k < 600; ++k) add(kImages, k / 30.0, 0.02);
+  for (int k = 0; k < 600; ++k) add(kCamera, k / 30.0, 0.02);
   for (int k = 0; k < 4000; ++k) add(kImu, k / 200.0, 0.001);
   // Messages of a stream keep their order.
   double newest[2] = {0, 0};
@@ -66,7 +66,7 @@ TEST(ClockSteps, TheImusClockThatIsSetAloneIsFollowed) {
     ASSERT_EQ(r.steps, 1u) << step;
     EXPECT_NEAR(r.seconds, step, 1e-9);
     EXPECT_LT(r.largest[kImu], 1e-9) << step;
-    EXPECT_LT(r.largest[kImages], 1e-9) << step;
+    EXPECT_LT(r.largest[kCamera], 1e-9) << step;
     EXPECT_LE(r.left_out, 20u) << step;
   }
 }
@@ -74,11 +74,11 @@ TEST(ClockSteps, TheImusClockThatIsSetAloneIsFollowed) {
 TEST(ClockSteps, SoIsTheCameras) {
   for (const double step : {-0.3, 0.3}) {
     const Result r = run([step](Message* m) {
-      if (m->stream == kImages && m->sent > 10) m->stamp += step;
+      if (m->stream == kCamera && m->sent > 10) m->stamp += step;
     });
     ASSERT_EQ(r.steps, 1u) << step;
     EXPECT_NEAR(r.seconds, step, 1e-9);
-    EXPECT_LT(r.largest[kImages], 1e-9) << step;
+    EXPECT_LT(r.largest[kCamera], 1e-9) << step;
     EXPECT_LE(r.left_out, 3u) << step;
   }
 }
@@ -114,7 +114,7 @@ TEST(ClockSteps, DelaysAndLossesAreNoSteps) {
 TEST(ClockSteps, ASingleStampAheadIsNoStep) {
   int k = 0;
   const Result r = run([&k](Message* m) {
-    if (m->stream == kImages && ++k % 40 == 0) m->stamp += 0.5;
+    if (m->stream == kCamera && ++k % 40 == 0) m->stamp += 0.5;
   });
   EXPECT_EQ(r.steps, 0u);
   EXPECT_LT(r.largest[kImu], 1e-9);
@@ -130,4 +130,4 @@ TEST(ClockSteps, WithoutAnArrivalNothingIsFollowed) {
 }
 
 }  // namespace
-}  // namespace vip_slam
+}  // namespace vip_slam::clock_steps_test

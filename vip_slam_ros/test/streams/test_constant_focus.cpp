@@ -3,7 +3,7 @@
 
 #include "vip_slam_ros/constant_focus.h"
 
-namespace vip_slam {
+namespace vip_slam::constant_focus_test {
 namespace {
 
 CameraIntrinsics camera(double focal) {
@@ -95,4 +95,4 @@ TEST(ConstantFocus, AConstantCameraCostsNothing) {
 }
 
 }  // namespace
-}  // namespace vip_slam
+}  // namespace vip_slam::constant_focus_test
