@@ -142,6 +142,7 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("latency, stamp to odometry (ms)", 1e3 * shown.latency);
   status.add("depth surfaces used", c.surfaces_used);
   status.add("NIS per degree of freedom", c.nis_per_dof);
+  status.add("vertical by", frontend::levelName(c.level));
   status.add("pixel sigma in use", c.sigma_px);
   status.add("IMU noise in use, times the configured", c.imu_noise_scale);
   status.add("jitter of image stamps in use (ms)", 1e3 * c.stamp_sigma);

@@ -59,8 +59,10 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   const auto points =
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.feature.depth > 0; });
   const bool surfaces = !depth.empty() && options_.filter.use_surfaces && surfaces_.sees(depth);
+  std::optional<Eigen::Vector3d> up;
+  if (!depth.empty() && !inertial_.hasAccel()) up = frontend::upByFloor(shareNormals(surfaces_.patches(depth)));
   std::optional<FilterPrior> prior =
-      initialiser_.add({t_imu, static_cast<int>(points), surfaces, first ? std::nullopt : moved}, inertial_);
+      initialiser_.add({t_imu, static_cast<int>(points), surfaces, up, first ? std::nullopt : moved}, inertial_);
   if (!prior) {
     const std::string why = status_.state == TrackingState::kInitialising && !status_.reason.empty() && first
                                 ? status_.reason + "; " + initialiser_.reason()
@@ -75,6 +77,7 @@ FrameOutput FrontEnd::Impl::initialise(double t, double t_imu, const cv::Mat& gr
   if (prior->at_rest) {
     stillness_.begin(imuSpread(inertial_.between(t_imu - options_.initialisation.standing_seconds, t_imu)));
   }
+  counters_.level = initialiser_.level();
   initialiser_.reset();
   phase_ = Phase::kTracking;
   started_imu_t_ = t_imu;

@@ -135,6 +135,10 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(std::to_string(c.imu_contradicted) + " of " + std::to_string(c.images) +
                   " images contradict the IMU by more than any noise: poses are not to be trusted there; are its axes, "
                   "signs and units, T_imu_cam, the stamps and the scale of depth right? check_bag tells");
+  if (c.level != frontend::Level::kAccelerometer && pipeline.images() > 0)
+    all.push_back(
+        formatted("without an accelerometer the vertical is that of %s%s", frontend::levelName(c.level),
+                  c.level == frontend::Level::kCamera ? ": hold it upright, or begin with a floor in view" : ""));
   if (c.stamp_sigma > kLargeStampJitter)
     all.push_back(formatted("stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
                             1e3 * c.stamp_sigma));

@@ -20,6 +20,7 @@
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/filter/calibration_estimate.h"
 #include "vip_slam_frontend/front_end_options.h"
+#include "vip_slam_frontend/initialisation/floor_level.h"
 
 namespace vip_slam {
 
@@ -37,7 +38,7 @@ struct FrameOutput {
   KeyframePtr keyframe;   ///< null: this image is none
 };
 
-/// What was counted since construction, and present values of what is learnt (the last nine); for diagnostics.
+/// What was counted since construction, and present values of what is learnt (the last ten); for diagnostics.
 struct FrontEndCounters {
   std::uint64_t images = 0, keyframes = 0, restarts = 0;
   std::uint64_t bad_image = 0;           ///< wrong size or type, or empty
@@ -61,6 +62,7 @@ struct FrontEndCounters {
   std::uint64_t features_used = 0, features_gated = 0;
   std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
+  frontend::Level level = frontend::Level::kAccelerometer;  ///< what the vertical of the last start was taken from
   double depth_unit = 1;       ///< factor that brings readings to the unit of the first ones
   double missing_reading = 0;  ///< value of depth that stands for "no reading" beside 0, m; 0: none seen
   double sigma_px = 0;         ///< adapted pixel noise

@@ -48,6 +48,7 @@ std::optional<FilterPrior> Initialiser::standing(double t, const frontend::Inert
   const ImuSpread spread = imuSpread(samples, &noise_);
   if (!spread.quiet(options_.max_gyro_std, options_.max_accel_std) || spread.mean_gyro.norm() > kMaxTurn)
     return std::nullopt;
+  level_ = frontend::Level::kAccelerometer;
   FilterPrior prior;
   prior.standing = prior.at_rest = true;
   prior.state.t = t;
@@ -99,7 +100,10 @@ std::optional<FilterPrior> Initialiser::add(const InitialisationInput& image, co
   FilterPrior prior;
   prior.state.t = t;
   // Level: up is where the specific force points, in the body as it is oriented now.
-  Eigen::Vector3d up = T_I_C_.R() * -Eigen::Vector3d::UnitY();
+  level_ = inertial.hasAccel() ? frontend::Level::kAccelerometer
+           : image.up          ? frontend::Level::kFloor
+                               : frontend::Level::kCamera;
+  Eigen::Vector3d up = T_I_C_.R() * image.up.value_or(-Eigen::Vector3d::UnitY());
   prior.sigma_tilt = prior.sigma_position;  // without an accelerometer part of the gauge
   if (inertial.hasAccel()) {
     const ImuSpread spread = imuSpread(samples, &noise_);

@@ -1,6 +1,9 @@
 // Starts at rest and in motion on the landmark simulation; stillness; keyframe selection.
 #include <cmath>
+#include <optional>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -26,6 +29,7 @@ struct StartOptions {
   double accel_unit = 1;  ///< m/s^2 of what the accelerometer calls one
   double gyro_bias = 0;   ///< rad/s, beyond the simulation's, about x
   bool gyro = true, accel = true;
+  std::optional<Eigen::Vector3d> up;  ///< by a floor, in the camera
 };
 
 Start start(const StartOptions& o) {
@@ -54,7 +58,7 @@ Start start(const StartOptions& o) {
       if (o.gyro && !o.accel) inertial.addGyro(sample.t, sample.gyro);
       if (o.accel && !o.gyro) inertial.addAccel(sample.t, sample.accel);
     }
-    InitialisationInput image{result.t, o.points, o.surfaces, std::nullopt};
+    InitialisationInput image{result.t, o.points, o.surfaces, o.up, std::nullopt};
     const SE3 T_W_C = simulation.stateAt(result.t).T_W_I * T_I_C;
     if (o.motion && T_W_C_before) image.T_current_previous = T_W_C.inverse() * *T_W_C_before;
     T_W_C_before = T_W_C;
@@ -135,6 +139,36 @@ TEST(Initialiser, WithoutAnAccelerometerTheCameraIsLevel) {
     EXPECT_LT((s.prior->state.T_W_I.rotation() * down_I + Eigen::Vector3d::UnitZ()).norm(), 1e-9);
     EXPECT_LT(s.prior->sigma_tilt, 0.001);  // part of the gauge
   }
+}
+
+// Patches of planes as the camera sees them, `count` of each.
+std::vector<SurfacePatch> planes(const std::vector<std::pair<Eigen::Vector3d, int>>& normals) {
+  std::vector<SurfacePatch> all;
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    SurfacePatch patch;
+    patch.n_C = normals[k].first.normalized();
+    patch.surface = static_cast<int>(k);
+    all.insert(all.end(), static_cast<std::size_t>(normals[k].second), patch);
+  }
+  return all;
+}
+
+TEST(Initialiser, AFloorInViewIsLevel) {
+  const Eigen::Vector3d floor = Eigen::Vector3d(0.1, -0.7, -0.7).normalized(), wall(0.1, 0.5, -0.85);
+  const auto up = frontend::upByFloor(planes({{wall, 200}, {floor, 60}, {floor + Eigen::Vector3d(0, 0, 0.2), 30}}));
+  ASSERT_TRUE(up);
+  EXPECT_LT((*up - floor).norm(), 1e-12);
+  EXPECT_FALSE(frontend::upByFloor(planes({{wall, 200}, {floor, 10}})));   // too small
+  EXPECT_FALSE(frontend::upByFloor(planes({{wall, 200}, {-floor, 60}})));  // a ceiling may be a wall
+  EXPECT_FALSE(frontend::upByFloor({}));
+
+  StartOptions options;
+  options.accel = options.gyro = false;
+  options.up = up;
+  const Start s = start(options);
+  ASSERT_TRUE(s.prior) << s.reason;
+  const Eigen::Vector3d up_I = LandmarkSimulation(SimulationOptions()).T_I_C().R() * floor;
+  EXPECT_LT((s.prior->state.T_W_I.rotation() * up_I - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
 }
 
 TEST(Initialiser, AnAccelerometerAloneLevels) {

@@ -1,7 +1,7 @@
 // The start: the filter's first state from the first usable images, moving or still, with sigmas wide enough for what a
-// fraction of a second cannot tell; the filter itself sharpens them. Level: by the mean specific force, else as the
-// camera's axes are. Velocity and rate: by the motion between the images (dense_alignment.h). No misfit refuses a
-// start. Without any usable image (darkness) a body that rests by its IMU starts as well.
+// fraction of a second cannot tell; the filter itself sharpens them. Level: by the mean specific force, else by a
+// floor, else as the camera's axes are. Velocity and rate: by the motion between the images (dense_alignment.h). No
+// misfit refuses a start. Without any usable image (darkness) a body that rests by its IMU starts as well.
 #pragma once
 
 #include <deque>
@@ -11,6 +11,7 @@
 
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/inertial/inertial_input.h"
+#include "vip_slam_frontend/initialisation/floor_level.h"
 #include "vip_slam_frontend/initialisation/initialisation_options.h"
 
 namespace vip_slam {
@@ -19,6 +20,7 @@ struct InitialisationInput {
   double t_imu = 0;
   int points = 0;                         ///< tracked points with depth
   bool surfaces = false;                  ///< enough flat patches in the depth image
+  std::optional<Eigen::Vector3d> up;      ///< in the camera, by a floor in view; only asked without an accelerometer
   std::optional<SE3> T_current_previous;  ///< camera motion since the image before, where the images tell it
 };
 
@@ -29,6 +31,8 @@ class Initialiser {
 
   /// Adds one image. Returns the filter's prior at that image's time once there is enough data.
   std::optional<FilterPrior> add(const InitialisationInput& image, const frontend::InertialInput& inertial);
+  /// What the last prior's vertical is taken from.
+  frontend::Level level() const { return level_; }
   /// Why it is still waiting.
   const std::string& reason() const { return reason_; }
   /// Extrinsics as estimated so far, instead of the configured ones.
@@ -45,6 +49,7 @@ class Initialiser {
   SE3 T_I_C_;
   double gravity_;
   std::deque<InitialisationInput> images_;  ///< usable ones in a row
+  frontend::Level level_ = frontend::Level::kAccelerometer;
   std::string reason_ = "waiting for images and IMU";
 };
 
