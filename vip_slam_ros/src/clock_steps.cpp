@@ -51,6 +51,10 @@ void ClockSteps::learn(Stream* own, double t) const {
 
 bool ClockSteps::begins(const Stream& own, double t, double arrival) const {
   if (own.ahead.size() <= kSecondsKnown || own.intervals.size() < kIntervalsKept) return false;
+  // Played at another rate, or on a machine that is too busy, arrival does not tell.
+  const auto [low, high] =
+      std::minmax_element(own.ahead.end() - 1 - std::ptrdiff_t(kSecondsKnown), own.ahead.end() - 1);
+  if (*high - *low > kLeastStep) return false;
   const double interval = usualInterval(own.intervals);
   const double step = (t - arrival) - leastDelay(own);
   if (std::abs(step) > longest_) return false;

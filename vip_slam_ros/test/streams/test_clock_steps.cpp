@@ -120,6 +120,15 @@ TEST(ClockSteps, ASingleStampAheadIsNoStep) {
   EXPECT_LT(r.largest[kImu], 1e-9);
 }
 
+TEST(ClockSteps, AtAnotherRateNothingIsFollowed) {
+  const Result r = run([](Message* m) {
+    m->arrival *= 0.5;
+    if (m->sent > 12 && m->sent < 12.5) m->stamp = -1;
+  });
+  EXPECT_EQ(r.steps, 0u);
+  EXPECT_EQ(r.left_out, 0u);
+}
+
 // Recordings whose messages were filed by their stamps know nothing of arrival.
 TEST(ClockSteps, WithoutAnArrivalNothingIsFollowed) {
   const Result r = run([](Message* m) {
