@@ -174,9 +174,10 @@ TEST(PropagateByMotion, PhiAndNoiseAreTheDerivativesOfThePrediction) {
     plus.clones[0].T_W_I = window.clones[0].T_W_I.boxplus(pose);
     minus.clones[0].T_W_I = window.clones[0].T_W_I.boxplus(-pose);
     if (c >= 6) plus.v_W(c - 6) += h, minus.v_W(c - 6) -= h;
-    const auto numeric = (state(propagateByMotion(plus, motion, covariance, dt, noise).predicted, p.predicted) -
-                          state(propagateByMotion(minus, motion, covariance, dt, noise).predicted, p.predicted)) /
-                         (2 * h);
+    const Eigen::Matrix<double, 9, 1> numeric =
+        (state(propagateByMotion(plus, motion, covariance, dt, noise).predicted, p.predicted) -
+         state(propagateByMotion(minus, motion, covariance, dt, noise).predicted, p.predicted)) /
+        (2 * h);
     EXPECT_LT((p.Phi.block<9, 1>(0, c) - numeric).norm(), 1e-6) << "column " << c;
   }
   Eigen::Matrix<double, 9, 6> G;
