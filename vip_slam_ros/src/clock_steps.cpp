@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include "vip_slam_core/util/formatted.h"
-#include "vip_slam_core/util/statistics.h"
+
+#include "usual_interval.h"
 
 namespace vip_slam {
 namespace {
@@ -16,10 +17,6 @@ constexpr std::size_t kIntervalsKept = 9;
 constexpr double kConfirmed = 0.05;                   // s of messages that confirm a step ...
 constexpr int kFewestConfirm = 2, kMostConfirm = 10;  // ... at least and at most
 constexpr double kStillRunning = 1.0;                 // s without a message after which a stream is not asked
-
-double usualInterval(const std::deque<double>& intervals) {
-  return upperMedian(std::vector<double>(intervals.begin(), intervals.end()));
-}
 
 }  // namespace
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "usual_interval.h"
+
 namespace vip_slam {
 namespace {
 // Largest number of late messages per stream, more than any subscriber queue holds; beyond, the stream's time is taken
@@ -17,12 +19,6 @@ constexpr double kTogether = 0.5;                   // seconds between the strea
 constexpr double kRunning = 1.0;                    // a stream silent for longer than this, seconds, is not asked
 // Steps agree within this part of the longer interval (a message may be lost in the step), and kJitter seconds.
 constexpr double kAgree = 1.1, kJitter = 0.01;
-
-double usual(std::deque<double> intervals) {
-  const auto middle = intervals.begin() + std::ptrdiff_t(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
-}
 }  // namespace
 
 StreamClock::StreamClock(std::size_t streams, double jump) : streams_(streams), jump_(jump) {}
@@ -74,7 +70,7 @@ StreamClock::Verdict StreamClock::notice(std::size_t stream, double t) {
 void StreamClock::followStep(Stream* own, double t) const {
   if (own->before_last > kNever && own->intervals.size() >= kEnough) {
     // After a single stamp that was ahead the next one lies back of it, but not of the one before.
-    const double interval = usual(own->intervals);
+    const double interval = usualInterval(own->intervals);
     const double back = std::min(own->last + interval, own->before_last + 2 * interval) - t;
     if (back > std::max(kSmallestStep, kLeastOfInterval * interval)) {
       own->step = back;
@@ -100,7 +96,7 @@ bool StreamClock::steppedTogether(double t) const {
     backward = backward || s.backward;
     least = std::min(least, s.step);
     most = std::max(most, s.step);
-    longest = std::max(longest, usual(s.intervals));
+    longest = std::max(longest, usualInterval(s.intervals));
   }
   return running >= 2 && backward && most - least <= kAgree * longest + kJitter;
 }

@@ -109,8 +109,7 @@ LoopEvent LoopCloser::correct(Map& map, KeyframeId query, const PlaceVerificatio
     if (matches + pose < options_.graph.min_log_odds) {
       event.reason = formatted(
           "log odds %.1f, needs %.1f: %.1f for %d inliers in %d of %d cells of the image, %.1f for the pose (chi2 "
-          "%.1f, "
-          "moves %.3f m)",
+          "%.1f, moves %.3f m)",
           matches + pose, options_.graph.min_log_odds, matches, place.inliers, place.coverage.explained_cells,
           place.coverage.cells, pose, solution.chi2, correction.t().norm());
       return event;

@@ -10,7 +10,7 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kAcross = 100;      // samples along a row
+constexpr int kAcross = 50;       // samples along a row
 constexpr double kShare = 0.01;   // of the samples, that have the value
 constexpr int kAround = 5;        // values of the image on either side, whose distances tell how coarse they are
 constexpr double kNear = 0.05;    // of the distance: neighbours on one surface

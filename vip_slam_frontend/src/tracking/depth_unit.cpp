@@ -22,7 +22,15 @@ constexpr double kShare = 0.7;        // of the view that must agree, near and f
 }  // namespace
 
 DepthUnit::DepthUnit(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise)
-    : camera_(std::move(camera)), noise_(noise) {}
+    : camera_(std::move(camera)), noise_(noise) {
+  const int step = std::max(1, camera_->width() / kAcross);
+  for (int v = step / 2; v < camera_->height(); v += step) {
+    for (int u = step / 2; u < camera_->width(); u += step) {
+      Eigen::Vector2d xy;
+      if (camera_->undistort({u, v}, &xy)) rays_.emplace_back(cv::Point(u, v), xy.homogeneous());
+    }
+  }
+}
 
 bool DepthUnit::changes(const cv::Mat& depth, const SE3& T_odom_C, double t) {
   open_ = false;
@@ -67,14 +75,9 @@ void DepthUnit::remember(const cv::Mat& depth, const SE3& T_odom_C, double t) {
   if (depth.empty() || open_) return;
   points_.clear();
   t_ = t;
-  const int step = std::max(1, depth.cols / kAcross);
-  for (int v = step / 2; v < depth.rows; v += step) {
-    for (int u = step / 2; u < depth.cols; u += step) {
-      const float z = depth.at<float>(v, u);
-      Eigen::Vector2d xy;
-      if (noise_.inRange(z) && camera_->undistort({u, v}, &xy))
-        points_.push_back(T_odom_C * Eigen::Vector3d(z * xy.x(), z * xy.y(), z));
-    }
+  for (const auto& [pixel, ray] : rays_) {
+    const float z = depth.at<float>(pixel);
+    if (noise_.inRange(z)) points_.push_back(T_odom_C * Eigen::Vector3d(z * ray));
   }
 }
 

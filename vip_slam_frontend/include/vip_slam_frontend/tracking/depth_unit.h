@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -35,6 +36,7 @@ class DepthUnit {
  private:
   std::shared_ptr<const CameraModel> camera_;
   DepthNoise noise_;
+  std::vector<std::pair<cv::Point, Eigen::Vector3d>> rays_;  ///< pixels that are looked at, with z = 1
   double factor_ = 1;
   std::vector<Eigen::Vector3d> points_;  ///< of the last image, in odom, m
   double t_ = 0;                         ///< its time, s
