@@ -151,32 +151,14 @@ TEST(SurfaceRows, WhiteAndSharedNoiseEqualTheDenseCovariance) {
       H.row(i) = svd.matrixU().col(0).transpose() * rows.rows.H.middleCols<6>(newest);
       r(i) = svd.matrixU().col(0).dot(rows.rows.r);
     }
-    // Offset and tilt of each surface, at one standard deviation of its extent.
+    // The residual's sign is that of its row, which the singular vectors leave open.
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(m, m);
-    for (int s = 0; s < static_cast<int>(kRoom.size()); ++s) {
-      std::vector<int> rows;
-      for (int i = 0; i < m; ++i) {
-        if (matches.pairs[i].surface == s) rows.push_back(i);
-      }
-      Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-      for (int i : rows) centre += matches.pairs[i].p_ref / static_cast<double>(rows.size());
-      Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-      for (int i : rows) {
-        const Eigen::Vector3d apart = matches.pairs[i].p_ref - centre;
-        spread += apart * apart.transpose() / static_cast<double>(rows.size());
-      }
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> extent(spread);
-      for (int i : rows) {
-        for (int j : rows) {
-          double common = 1;  // the direction of no extent is the normal
-          for (int d = 1; d < 3; ++d) {
-            const Eigen::Vector3d e = extent.eigenvectors().col(d);
-            common += e.dot(matches.pairs[i].p_ref - centre) * e.dot(matches.pairs[j].p_ref - centre) /
-                      extent.eigenvalues()(d);
-          }
-          covariance(i, j) = shared * shared * common;
-          // The residual's sign is that of its row, which the singular vectors leave open.
-        }
+    for (int i = 0; i < m; ++i) {
+      for (int j = 0; j < m; ++j) {
+        const SurfacePair &a = matches.pairs[i], &b = matches.pairs[j];
+        const double apart = std::hypot(a.p_ref.x() / a.p_ref.z() - b.p_ref.x() / b.p_ref.z(),
+                                        a.p_ref.y() / a.p_ref.z() - b.p_ref.y() / b.p_ref.z());
+        if (a.surface == b.surface) covariance(i, j) = shared * shared * std::exp(-apart / 0.12);
       }
     }
     // Signs: the row of a pair is n_ref^T R_ref_cur (...) in the position; fix them by the reference's normal.
@@ -195,17 +177,18 @@ TEST(SurfaceRows, WhiteAndSharedNoiseEqualTheDenseCovariance) {
   }
 }
 
-// A wall straight ahead: its distance is never known better than what all readings of it share.
+// A wall straight ahead: its distance is never known better than what its readings share.
 TEST(SurfaceRows, CorrelatedReadingsAreNotWorthTheirNumber) {
   WindowState window = makeWindow(33, {});
   for (Clone& clone : window.clones) clone.T_W_I = clone.T_W_I_fej = SE3();
   window.T_I_C = SE3();
-  const auto sigmaOfDistance = [&](int side, double shared) {
+  const auto sigmaOfDistance = [&](int side, double half, double shared) {
     SurfaceMatches matches;
     matches.reference = window.clones[1].id;
     for (int i = 0; i < side * side; ++i) {
       SurfacePair pair;
-      pair.p_ref = pair.q_cur = {(i % side) * 2.0 / (side - 1) - 1.0, (i / side) * 2.0 / (side - 1) - 1.0, 2.0};
+      const double x = 2.0 * (i % side) / (side - 1) - 1.0, y = 2.0 * (i / side) / (side - 1) - 1.0;
+      pair.p_ref = pair.q_cur = {half * x, half * y, 2.0};
       pair.n_ref = -Eigen::Vector3d::UnitZ();
       pair.sigma = 0.01;
       pair.shared = shared;
@@ -213,10 +196,14 @@ TEST(SurfaceRows, CorrelatedReadingsAreNotWorthTheirNumber) {
     }
     return 1.0 / std::sqrt(informationOnNewest(window, matches)(5, 5));
   };
-  EXPECT_NEAR(sigmaOfDistance(10, 0), 0.001, 1e-9);
-  EXPECT_NEAR(sigmaOfDistance(40, 0), 0.00025, 1e-9);
-  EXPECT_NEAR(sigmaOfDistance(10, 0.004), std::hypot(0.004, 0.001), 1e-9);
-  EXPECT_NEAR(sigmaOfDistance(40, 0.004), std::hypot(0.004, 0.00025), 1e-9);
+  EXPECT_NEAR(sigmaOfDistance(8, 1.0, 0), 0.01 / 8, 1e-9);
+  EXPECT_NEAR(sigmaOfDistance(16, 1.0, 0), 0.01 / 16, 1e-9);
+  // Much smaller than the correlation reaches: one shared error.
+  EXPECT_NEAR(sigmaOfDistance(8, 0.001, 0.004), std::hypot(0.004, 0.01 / 8), 1e-5);
+  EXPECT_NEAR(sigmaOfDistance(16, 0.001, 0.004), std::hypot(0.004, 0.01 / 16), 1e-5);
+  // Four times the readings of a wall are worth hardly more, a wall of four times the area is.
+  EXPECT_GT(sigmaOfDistance(16, 1.0, 0.02), 0.9 * sigmaOfDistance(8, 1.0, 0.02));
+  EXPECT_LT(sigmaOfDistance(16, 1.0, 0.02), 0.7 * sigmaOfDistance(16, 0.5, 0.02));
 }
 
 TEST(SurfaceRows, PositionAndYawStayUnobservable) {
@@ -460,12 +447,10 @@ TEST(SurfaceNoise, CorrelatedDepthIsLearntToBeShared) {
   const DepthNoise noise;
   SurfaceTracker tracker(camera(), noise, kWindow);
   for (unsigned i = 0; i < 30; ++i) tracker.setReference(noisyWall(noise, 0.5, 1.5, 96, i), i + 1);
-  // Neighbours correlate by 0.9 there, and the plane's fit takes up a part.
   const double learnt = tracker.learnt().shared();
-  EXPECT_GT(learnt, 0.9);
-  EXPECT_LT(learnt, 1.5);
   // With what the fit takes up, all of the correlated part.
-  EXPECT_NEAR(std::sqrt(tracker.learnt().parts().shared), 1.5, 0.4);
+  EXPECT_NEAR(learnt, 1.5, 0.4);
+  EXPECT_NEAR(std::sqrt(tracker.learnt().parts().shared), learnt, 1e-9);
   tracker.clear();
   EXPECT_EQ(tracker.learnt().shared(), learnt);  // it belongs to the sensor
 }

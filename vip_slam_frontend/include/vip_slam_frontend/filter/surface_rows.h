@@ -5,10 +5,10 @@
 // The rows depend on the relative pose of two clones and on the camera's calibration only: position and yaw of the
 // window stay unobservable.
 //
-// Their noise has two parts: white, of each pair, and one that all pairs of a surface share, an offset along the normal
-// and a tilt about its middle. The covariance of a surface's whitened rows is I + U U^T, a column of U for the offset
-// and two for the tilt; multiplying by (I + U U^T)^-1/2 = I - V diag(1 - 1 / sqrt(1 + s^2)) V^T, with U = V diag(s)
-// W^T, whitens them. So a surface is never worth more than its shared part, however many pairs it has.
+// Their noise has two parts: white, of each pair, and one that the pairs of a surface share the more the nearer they are
+// in the image: the correlation falls to 1 / e over a tenth of bearing. A surface's rows are multiplied by the inverse Cholesky factor of their
+// covariance, so that a small surface is worth no more than its shared part, however many pairs it has, and a large one
+// as much as the independent errors on it allow.
 #pragma once
 
 #include <vector>
@@ -26,8 +26,8 @@ struct SurfacePair {
   Eigen::Vector3d n_ref = Eigen::Vector3d::Zero();  ///< unit normal, same frame
   Eigen::Vector3d q_cur = Eigen::Vector3d::Zero();  ///< in the newest camera, metres
   double sigma = 0.01;                              ///< one sigma of the distance along the normal, metres: white part
-  double shared = 0;                                ///< likewise, of the part that all pairs of the surface share
-  int surface = 0;                                  ///< pairs of the same number share it
+  double shared = 0;                                ///< likewise, of the part that pairs near each other share
+  int surface = 0;                                  ///< pairs of different numbers share nothing
 };
 
 struct SurfaceMatches {

@@ -34,12 +34,11 @@ class SurfaceNoise {
 
   /// One sigma of a patch's own error, as a factor on that of a single reading.
   double white() const { return std::sqrt(white_.value); }
-  /// One sigma of the error that all readings of a surface in one image share, in the same unit; for its offset, and
-  /// for its tilt at one standard deviation of the surface's extent.
-  double shared() const { return std::sqrt(std::max(0.0, shared_.value)); }
-  /// Both as variances. All that a reading shares with its surface is what is seen to vary within the surface, and as
-  /// much again that moves and turns the surface as a whole.
-  DepthNoiseParts parts() const { return {white_.value, 2 * std::max(0.0, shared_.value)}; }
+  /// One sigma of the error that neighbouring readings of a surface in one image share, in the same unit: what is seen
+  /// to vary within surfaces, and as much again that the plane's fit takes up.
+  double shared() const { return std::sqrt(2 * std::max(0.0, shared_.value)); }
+  /// Both as variances.
+  DepthNoiseParts parts() const { return {white_.value, shared() * shared()}; }
 
  private:
   /// Mean over the last few thousand items.
