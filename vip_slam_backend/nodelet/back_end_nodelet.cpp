@@ -147,9 +147,9 @@ void BackEndNodelet::onReconfigure(vip_slam_backend::BackEndConfig& config) {
 }
 
 void BackEndNodelet::onFrame(const vip_slam_msgs::TrackedFrame& frame) {
-  barrier_.see(frame.header.stamp.toSec(), frame.epoch);
+  const double t = timeOf(frame);
+  barrier_.see(t, frame.epoch);
   if (!hasPose(TrackingState(frame.status.state))) return;
-  const double t = frame.header.stamp.toSec();
   const SE3 T_odom_I = fromMsg(frame.state.pose);
   const Matrix15d covariance =
       Eigen::Map<const Eigen::Matrix<double, 15, 15, Eigen::RowMajor>>(frame.covariance.data());
@@ -190,7 +190,7 @@ void BackEndNodelet::start(const vip_slam_msgs::Calibration& calibration) {
 }
 
 void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
-  const double t = msg.frame.header.stamp.toSec();
+  const double t = timeOf(msg.frame);
   barrier_.seeKeyframe(t, msg.frame.epoch);
   if (!back_end_ || !barrier_.passes(t, msg.frame.epoch)) return;
   const auto keyframe = std::make_shared<const Keyframe>(fromMsg(msg));

@@ -209,7 +209,8 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("images of wrong size or type", c.bad_image);
   status.add("depth of wrong size or type", c.bad_depth);
   status.add("images out of order", shown.pairs.backward + c.bad_stamp);
-  status.add("images stamped ahead", shown.pairs.ahead);
+  status.add("messages stamped ahead", shown.ahead);
+  status.add("messages from before time ran backwards", shown.stray);
   status.add("images that repeat the one before", c.repeated_image);
   status.add("depth images that repeat the one before", c.repeated_depth);
   status.add("changes of the unit of depth, followed", c.depth_unit_changes);
@@ -219,6 +220,7 @@ void FrontEndNodelet::reportInput(diagnostic_updater::DiagnosticStatusWrapper& s
   status.add("IMU gaps", c.imu_gaps);
   status.add("IMU samples far off their neighbours, replaced", c.imu_spikes);
   status.add("images before which the IMU was at fault", c.imu_faults);
+  status.add("times that a clock was set", shown.clock_steps);
   status.add("times that time ran backwards", shown.time_jumps);
 }
 

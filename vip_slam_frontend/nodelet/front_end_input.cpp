@@ -70,6 +70,16 @@ bool FrontEndNodelet::watch(StreamMonitor& monitor, const std_msgs::Header& head
   return true;
 }
 
+void FrontEndNodelet::post(OwnerThread::Lane lane, Stream stream, const std_msgs::Header& header,
+                           StreamTime::Deliver deliver) {
+  // Arrival is told by a clock that nobody sets; with the time of a bag that is played, by that.
+  const double arrival = ros::Time::isSimTime() ? ros::Time::now().toSec() : ros::SteadyTime::now().toSec();
+  owner_->post(lane, [this, stream, stamp = header.stamp.toSec(), arrival, deliver = std::move(deliver)] {
+    if (!paused_) time_->take(stream, stamp, arrival, deliver);
+    processReady();
+  });
+}
+
 void FrontEndNodelet::onColorInfo(const sensor_msgs::CameraInfoConstPtr& msg) {
   calibration_->addColorInfo(*msg);
   try {
@@ -82,15 +92,12 @@ void FrontEndNodelet::onColorInfo(const sensor_msgs::CameraInfoConstPtr& msg) {
 
 void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {
   if (!watch(*color_monitor_, header)) return;
-  const double t = header.stamp.toSec(), arrival = ros::Time::now().toSec();
   calibration_->addColorFrame(header.frame_id);
   try {
     cv::Mat gray = decode();
     if (!gray_.note().empty()) NODELET_WARN_ONCE("topic %s: %s", color_source_.topic.c_str(), gray_.note().c_str());
-    owner_->post(image_lane_, [this, t, arrival, gray, stamp = header.stamp.toNSec()] {
-      if (const auto at = noticeTime(t, arrival, kColor)) pairer_->addColor(*at, gray, stamp);
-      processReady();
-    });
+    post(image_lane_, kColor, header,
+         [this, gray, stamp = header.stamp.toNSec()](double t) { pairer_->addColor(t, gray, stamp); });
   } catch (const std::exception& error) {
     color_monitor_->reject(error.what());
     NODELET_WARN_THROTTLE(10, "topic %s: %s", color_monitor_->report().topic.c_str(), error.what());
@@ -99,14 +106,10 @@ void FrontEndNodelet::onColor(const std_msgs::Header& header, const std::functio
 
 void FrontEndNodelet::onDepth(const std_msgs::Header& header, const std::function<cv::Mat()>& decode) {
   if (!watch(*depth_monitor_, header)) return;
-  const double t = header.stamp.toSec(), arrival = ros::Time::now().toSec();
   try {
     cv::Mat depth = decode();
     empty_depth_ = holdsNoDepth(depth, sensor_.depth_noise) ? empty_depth_ + 1 : 0;
-    owner_->post(depth_lane_, [this, t, arrival, depth] {
-      if (const auto at = noticeTime(t, arrival, kDepth)) pairer_->addDepth(*at, depth);
-      processReady();
-    });
+    post(depth_lane_, kDepth, header, [this, depth](double t) { pairer_->addDepth(t, depth); });
   } catch (const std::exception& error) {
     depth_monitor_->reject(error.what());
     NODELET_WARN_THROTTLE(10, "topic %s: %s", depth_monitor_->report().topic.c_str(), error.what());
@@ -115,26 +118,23 @@ void FrontEndNodelet::onDepth(const std_msgs::Header& header, const std::functio
 
 void FrontEndNodelet::onImu(const sensor_msgs::ImuConstPtr& msg) {
   if (!watch(*imu_monitor_, msg->header)) return;
-  const double t = msg->header.stamp.toSec(), arrival = ros::Time::now().toSec();
   calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity), accel = fromMsg(msg->linear_acceleration);
-  owner_->post(imu_lane_, [this, t, arrival, gyro, accel] { addInertial(t, arrival, &gyro, &accel); });
+  post(imu_lane_, kGyro, msg->header, [this, gyro, accel](double t) { addInertial(t, gyro, accel); });
 }
 
 void FrontEndNodelet::onGyro(const sensor_msgs::ImuConstPtr& msg) {
   if (!watch(*imu_monitor_, msg->header)) return;
-  const double t = msg->header.stamp.toSec(), arrival = ros::Time::now().toSec();
   calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d gyro = fromMsg(msg->angular_velocity);
-  owner_->post(imu_lane_, [this, t, arrival, gyro] { addInertial(t, arrival, &gyro, nullptr); });
+  post(imu_lane_, kGyro, msg->header, [this, gyro](double t) { addInertial(t, gyro, std::nullopt); });
 }
 
 void FrontEndNodelet::onAccel(const sensor_msgs::ImuConstPtr& msg) {
-  if (!watch(accelMonitor(), msg->header)) return;
-  const double t = msg->header.stamp.toSec(), arrival = ros::Time::now().toSec();
+  if (!watch(sensor_.hasGyro() ? *accel_monitor_ : *imu_monitor_, msg->header)) return;
   if (!sensor_.hasGyro()) calibration_->addImuFrame(msg->header.frame_id);
   const Eigen::Vector3d accel = fromMsg(msg->linear_acceleration);
-  owner_->post(imu_lane_, [this, t, arrival, accel] { addInertial(t, arrival, nullptr, &accel); });
+  post(imu_lane_, kAccel, msg->header, [this, accel](double t) { addInertial(t, std::nullopt, accel); });
 }
 
 }  // namespace vip_slam

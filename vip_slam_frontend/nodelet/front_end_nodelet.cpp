@@ -51,8 +51,9 @@ void FrontEndNodelet::onInit() {
   pairing.patience = sensor_.topics.depth.empty() ? -1.0 : options_.input.depth_patience;
   pairing.capacity = std::size_t(options_.image_queue);
   pairer_ = std::make_unique<ImagePairer>(pairing);
-  clock_steps_ = std::make_unique<ClockSteps>(kStreams, options_.input.time_jump);
-  clock_ = std::make_unique<StreamClock>(kStreams, options_.input.time_jump);
+  time_ = std::make_unique<StreamTime>(kStreams, options_.input.time_jump,
+                                       StreamTime::Listener{[this](const ClockStep& step) { clockWasSet(step); },
+                                                            [this](double seconds) { timeRanBack(seconds); }});
   tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
   tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   calibration_ = std::make_unique<CalibrationSource>(withResolvedTopics(), options_, tf_buffer_);
@@ -123,58 +124,36 @@ void FrontEndNodelet::onReconfigure(vip_slam_frontend::FrontEndConfig& config) {
   feature_image_rate_ = config.feature_image_rate;
 }
 
-std::optional<double> FrontEndNodelet::noticeTime(double stamp, double arrival, Stream stream) {
-  if (paused_) return std::nullopt;
-  const std::size_t steps = clock_steps_->steps().size();
-  const std::optional<double> followed = clock_steps_->follow(stream, stamp, arrival);
-  if (clock_steps_->steps().size() > steps) {
-    const StreamMonitor& monitor = stream == kColor   ? *color_monitor_
-                                   : stream == kDepth ? *depth_monitor_
-                                   : stream == kGyro  ? *imu_monitor_
-                                                      : accelMonitor();
-    NODELET_WARN("%s", clockStepped(clock_steps_->steps().back(), monitor.report().topic).c_str());
-  }
-  if (!followed) return std::nullopt;
-  const double t = *followed;
-  const StreamClock::Verdict verdict = clock_->notice(stream, t);
-  if (verdict == StreamClock::Verdict::kSetBack) NODELET_WARN("%s", clockSetBack(clock_->lastJump(), t).c_str());
-  if (verdict == StreamClock::Verdict::kJumpedBack) {
-    const std::string words = timeRanBack(clock_->lastJump());
-    NODELET_WARN("%s: the odometry starts anew, the map stays", words.c_str());
-    clock_steps_->restart();
-    pairer_->clear();
-    early_.clear();
-    for (auto* monitor : {color_monitor_.get(), depth_monitor_.get(), imu_monitor_.get(), accel_monitor_.get()}) {
-      monitor->restart();
-    }
-    if (front_end_) front_end_->clockRanBack(words);
-    last_feature_image_ = posed_imu_t_ = predicted_imu_t_ = -1e300;
-    std::lock_guard<std::mutex> lock(shown_mutex_);
-    ++shown_.time_jumps;
-  }
-  return verdict != StreamClock::Verdict::kStray ? followed : std::nullopt;
+void FrontEndNodelet::clockWasSet(const ClockStep& step) {
+  NODELET_WARN("%s", vip_slam::clockWasSet(step, step.stream ? monitor(*step.stream).report().topic : "").c_str());
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  ++shown_.clock_steps;
 }
 
-void FrontEndNodelet::addInertial(double stamp, double arrival, const Eigen::Vector3d* gyro,
-                                  const Eigen::Vector3d* accel) {
-  const std::optional<double> followed = noticeTime(stamp, arrival, gyro ? kGyro : kAccel);
-  if (!followed) return;
-  const double t = *followed;
-  if (!front_end_) {
-    constexpr std::size_t kEarly = 4000;
-    const Eigen::Vector3d g = gyro ? *gyro : Eigen::Vector3d::Zero(), a = accel ? *accel : Eigen::Vector3d::Zero();
-    const bool has_gyro = gyro != nullptr, has_accel = accel != nullptr;
-    // Their stamps have been checked already: when replayed later they must not count as a jump back.
-    early_.push_back(
-        [this, t, g, a, has_gyro, has_accel] { feedInertial(t, has_gyro ? &g : nullptr, has_accel ? &a : nullptr); });
-    if (early_.size() > kEarly) early_.pop_front();
-    startWhenCalibrated();
-    return;
+void FrontEndNodelet::timeRanBack(double seconds) {
+  const std::string words = vip_slam::timeRanBack(seconds);
+  NODELET_WARN("%s: the odometry starts anew, the map stays", words.c_str());
+  pairer_->clear();
+  early_.clear();
+  for (auto* monitor : {color_monitor_.get(), depth_monitor_.get(), imu_monitor_.get(), accel_monitor_.get()}) {
+    monitor->restart();
   }
-  feedInertial(t, gyro, accel);
+  if (front_end_) front_end_->clockRanBack(words);
+  last_feature_image_ = posed_imu_t_ = predicted_imu_t_ = -1e300;
+  std::lock_guard<std::mutex> lock(shown_mutex_);
+  ++shown_.time_jumps;
 }
 
-void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel) {
+void FrontEndNodelet::addInertial(double t, const Vector& gyro, const Vector& accel) {
+  if (front_end_) return feedInertial(t, gyro, accel);
+  constexpr std::size_t kEarly = 4000;
+  // Their times have been settled already: when replayed later they must not count as a jump back.
+  early_.push_back([this, t, gyro, accel] { feedInertial(t, gyro, accel); });
+  if (early_.size() > kEarly) early_.pop_front();
+  startWhenCalibrated();
+}
+
+void FrontEndNodelet::feedInertial(double t, const Vector& gyro, const Vector& accel) {
   if (gyro && accel) {
     front_end_->addImu({t, *gyro, *accel});
   } else if (gyro) {
@@ -187,19 +166,23 @@ void FrontEndNodelet::feedInertial(double t, const Eigen::Vector3d* gyro, const 
     NODELET_WARN(
         "topic %s: a single sample just before %.3f s was far off its neighbours and was replaced by them (errors on "
         "its bus?); further ones are counted in /diagnostics",
-        (gyro ? *imu_monitor_ : accelMonitor()).report().topic.c_str(), t);
+        monitor(gyro ? kGyro : kAccel).report().topic.c_str(), t);
   }
   processReady();
   if (gyro && imu_rate_odometry_) publishImuRate(t);
 }
 
-StreamMonitor& FrontEndNodelet::accelMonitor() { return sensor_.hasGyro() ? *accel_monitor_ : *imu_monitor_; }
+const StreamMonitor& FrontEndNodelet::monitor(std::size_t stream) const {
+  if (stream == kColor) return *color_monitor_;
+  if (stream == kDepth) return *depth_monitor_;
+  return stream == kGyro || !sensor_.hasGyro() ? *imu_monitor_ : *accel_monitor_;
+}
 
 void FrontEndNodelet::startWhenCalibrated() {
-  const std::optional<SensorConfig> resolved = calibration_->resolve(clock_->newest());
+  const std::optional<SensorConfig> resolved = calibration_->resolve(time_->newest());
   if (!resolved) return;
   try {
-    // clock_ has already filtered the stamps; those that pass are no jump.
+    // time_ has already settled the stamps; those that pass are no jump.
     auto front_end = std::make_unique<FrontEnd>(options_.front_end, *resolved, nullptr, options_.input.time_jump,
                                                 std::uint32_t(session_));
     alignment_ = std::make_unique<DepthAlignment>(*resolved);
@@ -235,8 +218,8 @@ void FrontEndNodelet::startWhenCalibrated() {
 }
 
 double FrontEndNodelet::waitedFor(double t) const {
-  const double images = std::max(clock_->newest(kColor), clock_->newest(kDepth));
-  const double imu = std::max(clock_->newest(kGyro), clock_->newest(kAccel));
+  const double images = std::max(time_->newest(kColor), time_->newest(kDepth));
+  const double imu = std::max(time_->newest(kGyro), time_->newest(kAccel));
   return std::max(images - t, imu - (t + front_end_->timeOffset()));
 }
 
@@ -283,8 +266,13 @@ void FrontEndNodelet::process(ImagePair pair) {
   shown_.status = output.frame->status;
   shown_.counters = front_end_->counters();
   shown_.pairs = pairer_->counters();
+  shown_.ahead = shown_.stray = 0;
+  for (std::size_t stream = 0; stream < kStreams; ++stream) {
+    shown_.ahead += time_->leftOut(stream).ahead;
+    shown_.stray += time_->leftOut(stream).stray;
+  }
   shown_.features = output.frame->features.size();
-  shown_.latency = ros::Time::now().toSec() - pair.t;
+  shown_.latency = (ros::Time::now() - stamp).toSec();
   shown_.processing = milliseconds;
   constexpr std::size_t kRecent = 1200;
   shown_.recent.push_back(milliseconds);

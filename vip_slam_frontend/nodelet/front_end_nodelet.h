@@ -29,7 +29,6 @@
 #include "vip_slam_frontend/FrontEndConfig.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_node_options.h"
-#include "vip_slam_ros/clock_steps.h"
 #include "vip_slam_ros/constant_focus.h"
 #include "vip_slam_ros/drop_watch.h"
 #include "vip_slam_ros/image_decoding.h"
@@ -37,8 +36,8 @@
 #include "vip_slam_ros/image_subscriber.h"
 #include "vip_slam_ros/output_monitor.h"
 #include "vip_slam_ros/owner_thread.h"
-#include "vip_slam_ros/stream_clock.h"
 #include "vip_slam_ros/stream_monitor.h"
+#include "vip_slam_ros/stream_time/stream_time.h"
 #include "vip_slam_ros/tf_rivals.h"
 
 namespace vip_slam {
@@ -65,14 +64,17 @@ class FrontEndNodelet : public nodelet::Nodelet {
   void onReconfigure(vip_slam_frontend::FrontEndConfig& config);
   void onColorInfo(const sensor_msgs::CameraInfoConstPtr& msg);
   bool watch(StreamMonitor& monitor, const std_msgs::Header& header);  ///< false: leave the message out
+  enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
+  /// Has a message wait in its lane until the owner's thread takes it with its time.
+  void post(OwnerThread::Lane lane, Stream stream, const std_msgs::Header& header, StreamTime::Deliver deliver);
 
   // In the owner thread.
-  void addInertial(double stamp, double arrival, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);
-  void feedInertial(double t, const Eigen::Vector3d* gyro, const Eigen::Vector3d* accel);  ///< with an estimator
-  enum Stream { kColor, kDepth, kGyro, kAccel, kStreams };
-  /// Stamp on the clock that the stream began with; empty: leave the message out. `arrival`: when it was received, s.
-  std::optional<double> noticeTime(double stamp, double arrival, Stream stream);
-  StreamMonitor& accelMonitor();
+  using Vector = std::optional<Eigen::Vector3d>;
+  void addInertial(double t, const Vector& gyro, const Vector& accel);
+  void feedInertial(double t, const Vector& gyro, const Vector& accel);  ///< with an estimator
+  void clockWasSet(const ClockStep& step);
+  void timeRanBack(double seconds);
+  const StreamMonitor& monitor(std::size_t stream) const;
   void startWhenCalibrated();
   void processReady();
   /// Time by which other streams have advanced past an image at `t`, each by its own stamps; seconds.
@@ -121,8 +123,7 @@ class FrontEndNodelet : public nodelet::Nodelet {
   std::unique_ptr<ImagePairer> pairer_;
   ConstantFocus focus_;
   std::deque<std::function<void()>> early_;  ///< IMU samples received before the calibration is complete
-  std::unique_ptr<ClockSteps> clock_steps_;
-  std::unique_ptr<StreamClock> clock_;
+  std::unique_ptr<StreamTime> time_;
   bool told_of_spikes_ = false;
   double posed_imu_t_ = -1e300;               ///< of the newest image with a pose
   double predicted_imu_t_ = -1e300;           ///< of the newest prediction between images
@@ -140,10 +141,11 @@ class FrontEndNodelet : public nodelet::Nodelet {
     double latency = 0;         ///< stamp to publishing, seconds (by ROS time)
     double processing = 0;      ///< last image, ms
     std::deque<double> recent;  ///< processing of the last images (a minute of them at 20 Hz), ms
-    std::size_t time_jumps = 0;
-    std::string start_problem;  ///< why the front end cannot start with the given sensor configuration
-    std::string extrinsics;     ///< source of the extrinsics
-    std::string size_problem;   ///< depth that does not fit the colour image, in words
+    std::size_t time_jumps = 0, clock_steps = 0;
+    std::size_t ahead = 0, stray = 0;  ///< messages left out, see StreamTime
+    std::string start_problem;         ///< why the front end cannot start with the given sensor configuration
+    std::string extrinsics;            ///< source of the extrinsics
+    std::string size_problem;          ///< depth that does not fit the colour image, in words
   };
   DropWatch drops_;       ///< used by diagnostics only
   int ticks_ = 0;         ///< likewise

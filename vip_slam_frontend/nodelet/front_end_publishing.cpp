@@ -37,14 +37,17 @@ void FrontEndNodelet::publishPose(const ros::Time& stamp, const TrackedFrame& fr
 void FrontEndNodelet::publish(const ImagePair& pair, const FrameOutput& output, double milliseconds) {
   const TrackedFrame& frame = *output.frame;
   const ros::Time stamp = ros::Time().fromNSec(pair.stamp);
+  const double clock_set = stamp.toSec() - pair.t;
   // Planes and back end get the keyframe before the frame that belongs to it, as in the offline runner.
   if (output.keyframe) {
     auto keyframe = boost::make_shared<vip_slam_msgs::Keyframe>(toMsg(*output.keyframe, frames_.odom));
     keyframe->frame.header.stamp = stamp;
+    keyframe->frame.clock_set = clock_set;
     keyframe_pub_.publish(keyframe);
   }
   auto tracked = boost::make_shared<vip_slam_msgs::TrackedFrame>(toMsg(frame, frames_.odom));
   tracked->header.stamp = stamp;
+  tracked->clock_set = clock_set;
   tracked->processing_ms = milliseconds;
   frame_pub_.publish(tracked);
   TrackingStatus status = frame.status;
@@ -76,14 +79,14 @@ void FrontEndNodelet::publishImuRate(double t) {
   // With a separate accelerometer the state may lag behind the gyro's sample.
   if (!state || state->t <= predicted_imu_t_) return;
   predicted_imu_t_ = state->t;
-  const ros::Time stamp = toStamp(state->t - front_end_->timeOffset());
+  const ros::Time stamp = toStamp(time_->onMachineClock(state->t - front_end_->timeOffset()));
   imu_rate_pub_.publish(boost::make_shared<nav_msgs::Odometry>(
       toOdometry(stamp, *state, covariance_, front_end_->gyro(state->t), gyroSigma(sensor_), frames_)));
 }
 
 void FrontEndNodelet::publishCalibration() {
   calibration_pub_.publish(boost::make_shared<vip_slam_msgs::Calibration>(
-      toCalibrationMsg(sensor_, clock_->newest(), calibration_->colorFrame())));
+      toCalibrationMsg(sensor_, time_->newest(), calibration_->colorFrame())));
 }
 
 }  // namespace vip_slam

@@ -111,7 +111,7 @@ void FrontEnd::Impl::clockRanBack(const std::string& reason) {
 
 void FrontEnd::Impl::countImu() {
   const ImuBufferCounters& c = inertial_.counters();
-  counters_.imu_rejected = c.out_of_order + c.ahead + c.duplicate + c.not_finite;
+  counters_.imu_rejected = c.out_of_order + c.duplicate + c.not_finite;
   counters_.imu_gaps = c.gaps;
   counters_.imu_spikes = c.spikes;
   counters_.gyro_cut_off = inertial_.range().samples();

@@ -52,12 +52,13 @@ void ConstantFocus::apply(bool registered, ImagePair* pair) {
     camera.distortion.clear();
     return camera;
   };
-  const CameraIntrinsics* camera = at(pair->t);
+  const double stamp = 1e-9 * double(pair->stamp);
+  const CameraIntrinsics* camera = at(stamp);
   if (camera && pair->gray.size() == size) {
     pair->gray = warpColor(pair->gray, pinhole(*camera), pinhole(constant_));
     ++warped_;
   }
-  const CameraIntrinsics* then = registered ? at(pair->t + pair->depth_lag) : nullptr;
+  const CameraIntrinsics* then = registered ? at(stamp + pair->depth_lag) : nullptr;
   if (then && pair->depth.size() == size) pair->depth = warpDepth(pair->depth, pinhole(*then), pinhole(constant_));
 }
 

@@ -135,9 +135,11 @@ vip_slam_msgs::TrackedFrame toMsg(const TrackedFrame& frame, const std::string& 
   return msg;
 }
 
+double timeOf(const vip_slam_msgs::TrackedFrame& msg) { return msg.header.stamp.toSec() - msg.clock_set; }
+
 TrackedFrame fromMsg(const vip_slam_msgs::TrackedFrame& msg) {
   TrackedFrame frame;
-  frame.t = msg.header.stamp.toSec();
+  frame.t = timeOf(msg);
   frame.epoch = msg.epoch;
   frame.status = fromMsg(msg.status);
   frame.state = fromMsg(msg.state);

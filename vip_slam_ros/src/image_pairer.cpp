@@ -10,7 +10,6 @@ namespace {
 constexpr std::size_t kIntervals = 10;      // colour intervals remembered, of which the shortest ignores lost images
 constexpr std::size_t kLags = 9;            // pairs of which the lag is remembered
 constexpr double kShortestInterval = 0.01;  // seconds; assumed until one is known
-constexpr double kLeap = 2.2;               // of the longest interval lately: two lost images make no leap
 
 void remember(double value, std::size_t count, std::deque<double>* last) {
   last->push_back(value);
@@ -22,18 +21,6 @@ double shortest(const std::deque<double>& intervals) {
   return least == intervals.end() ? kShortestInterval : *least;
 }
 
-/// Takes back the newest image of a stream when `t` is older than it but not than the one before: its stamp was wrong.
-bool takeBackOneAhead(double t, std::optional<double> before, std::deque<StampedImage>* waiting,
-                      std::optional<double>* newest, std::deque<double>* intervals) {
-  if (waiting->empty() || !*newest || t >= **newest || waiting->back().t != **newest) return false;
-  if (waiting->size() > 1) before = (*waiting)[waiting->size() - 2].t;
-  if (!before || t <= *before) return false;
-  waiting->pop_back();
-  *newest = before;
-  if (!intervals->empty()) intervals->pop_back();
-  return true;
-}
-
 }  // namespace
 
 bool mostlyUnpaired(const PairerCounters& before, const PairerCounters& now) {
@@ -43,7 +30,6 @@ bool mostlyUnpaired(const PairerCounters& before, const PairerCounters& now) {
 }
 
 bool ImagePairer::addColor(double t, cv::Mat gray, std::uint64_t stamp) {
-  counters_.ahead += takeBackOneAhead(t, previous_color_, &color_, &newest_color_, &color_intervals_);
   if (!std::isfinite(t) || (newest_color_ && t <= *newest_color_)) {
     ++counters_.backward;
     return false;
@@ -59,8 +45,6 @@ bool ImagePairer::addColor(double t, cv::Mat gray, std::uint64_t stamp) {
 }
 
 bool ImagePairer::addDepth(double t, cv::Mat depth) {
-  counters_.ahead += takeBackOneAhead(t, previous_depth_, &depth_, &newest_depth_, &depth_intervals_);
-  if (newest_depth_) previous_depth_ = newest_depth_;
   if (!std::isfinite(t) || (newest_depth_ && t <= *newest_depth_)) {
     ++counters_.backward;
     return false;
@@ -80,13 +64,6 @@ double ImagePairer::newest() const { return std::max(newest_color_.value_or(-1e3
 void ImagePairer::popColor() {
   previous_color_ = color_.front().t;
   color_.pop_front();
-}
-
-bool ImagePairer::leapsAhead() const {
-  if (color_.size() != 1 || !previous_color_ || color_intervals_.size() < 3) return false;
-  // The last interval is that of this image.
-  const double longest = *std::max_element(color_intervals_.begin(), std::prev(color_intervals_.end()));
-  return color_.front().t - *previous_color_ > kLeap * longest;
 }
 
 double ImagePairer::usualLag() const {
@@ -135,7 +112,7 @@ const ImagePair* ImagePairer::front() {
       (best == depth_.end() || expected - best->t > kSurelyNearer * shortest(depth_intervals_));
   const bool next_color_matters =
       best != depth_.end() && color_.size() < 2 && best->t - expected > kSurelyNearer * shortest(color_intervals_);
-  const bool waits = next_depth_matters || next_color_matters || leapsAhead();
+  const bool waits = next_depth_matters || next_color_matters;
   const bool decided = !waits || newest() - t > options_.patience || ended_;
   if (!decided) return nullptr;
 
@@ -163,7 +140,6 @@ void ImagePairer::clear() {
   depth_intervals_.clear();
   lags_.clear();
   previous_color_.reset();
-  previous_depth_.reset();
   newest_color_.reset();
   newest_depth_.reset();
   front_.reset();

@@ -1,5 +1,7 @@
 #include "vip_slam_ros/stream_faults.h"
 
+#include <cmath>
+
 #include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
@@ -8,11 +10,21 @@ std::string timeRanBack(double seconds) {
   return formatted("time ran backwards by %.1f s (a bag that loops?)", seconds);
 }
 
-std::string clockSetBack(double seconds, double t) {
+std::string clockWasSet(const ClockStep& step, const std::string& topic) {
+  const char* direction = step.seconds < 0 ? "back" : "forward";
+  if (!step.stream)
+    return formatted(
+        "the clock was set %s by %.3f s at stamp %.3f s (NTP?): all streams stepped together, and time goes on from "
+        "before",
+        direction, std::abs(step.seconds), step.t);
   return formatted(
-      "the clock was set back by %.2f s at %.3f s (NTP?): all streams stepped together; what repeats stamps is left "
-      "out",
-      seconds, t);
+      "topic %s: its clock was set %s by %.3f s at stamp %.3f s, alone, as the arrival of its messages "
+      "shows: later stamps are taken on its clock before",
+      topic.c_str(), direction, std::abs(step.seconds), step.t);
+}
+
+std::string stampedAhead(std::size_t messages) {
+  return formatted("%zu messages are left out: their stamps are later than those of the next message", messages);
 }
 
 std::string holdNoDepth(const DepthNoise& noise) {

@@ -6,6 +6,7 @@
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_ros/stream_faults.h"
 
 namespace vip_slam {
 namespace {
@@ -116,9 +117,10 @@ void checkCoverage(const Recording& r, Findings* out) {
 /// What the sensor file leaves out of an IMU, and what follows; empty text when it is whole.
 Finding missingInertial(const SensorTopics& topics) {
   if (!topics.hasInertial())
-    return {Severity::kNote, "IMU", "the sensor file names no topic: an RGB-D camera alone",
-            "not checked for want of a gyroscope: the delay of the images, the readout of a rolling shutter, extrinsics, "
-            "images that repeat; nothing bridges what the camera cannot see"};
+    return {
+        Severity::kNote, "IMU", "the sensor file names no topic: an RGB-D camera alone",
+        "not checked for want of a gyroscope: the delay of the images, the readout of a rolling shutter, extrinsics, "
+        "images that repeat; nothing bridges what the camera cannot see"};
   if (!topics.hasGyro())
     return {Severity::kNote, "gyroscope", "the sensor file names no topic: an accelerometer alone, for gravity",
             "not checked for want of it: the delay of the images, the readout of a rolling shutter, extrinsics, images "
@@ -192,10 +194,21 @@ void checkOrder(const Recording& r, Findings* out) {
   }
 }
 
+/// Clocks that were set, whose stamps are followed.
+void checkClocks(const Recording& r, Findings* out) {
+  for (const ClockStep& step : r.clock_steps) {
+    const std::string topics[] = {r.sensor.topics.color, r.sensor.topics.depth, r.sensor.topics.inertial(),
+                                  r.sensor.topics.accel};
+    out->push_back({Severity::kWarning, "clock", clockWasSet(step, step.stream ? topics[*step.stream] : ""),
+                    "it is followed; let the time service slew the clock instead of setting it"});
+  }
+}
+
 }  // namespace
 
 Findings checkRates(const Recording& r) {
   Findings out;
+  checkClocks(r, &out);
   for (const Wanted& w : wanted(r)) {
     const auto& stamps = w.stream->stamps;
     if (w.role.find("camera_info") != std::string::npos || stamps.empty()) continue;
@@ -227,6 +240,9 @@ Findings checkRates(const Recording& r) {
     const double period = upperMedian(steps), rate = 1.0 / period;
     for (const double step : steps)
       if (step > 1.7 * period) lost += static_cast<std::size_t>(std::lround(step / period)) - 1;
+    lost -= std::min(lost, w.stream->ahead);
+    if (w.stream->ahead > 0)
+      out.push_back({Severity::kWarning, w.role, stampedAhead(w.stream->ahead), "a fault of the driver's stamps"});
     if (stamps.front() < 1.0 && !r.live)
       out.push_back(
           {Severity::kWarning, w.role, "stamps begin at zero", "recorded without a clock? all streams must share one"});

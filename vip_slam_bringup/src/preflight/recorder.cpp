@@ -12,19 +12,11 @@
 #include "vip_slam_core/util/same_pixels.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_ros/camera_info.h"
+#include "vip_slam_ros/geometry_conversions.h"
+#include "vip_slam_ros/input_options.h"
 
 namespace vip_slam {
 namespace {
-
-/// False: the message is another sensor's.
-template <class Message>
-bool note(StreamRecord* stream, double arrival, const Message& message) {
-  if (!stream->one_frame.admits(message.header.frame_id)) return false;
-  stream->stamps.push_back(message.header.stamp.toSec());
-  stream->arrivals.push_back(arrival);
-  stream->frame_id = message.header.frame_id;
-  return true;
-}
 
 /// Whether neighbours are far more alike with the two bytes of each value changed over. `unit`: metres.
 bool smootherSwapped(const cv::Mat& depth, double unit) {
@@ -47,7 +39,10 @@ bool smootherSwapped(const cv::Mat& depth, double unit) {
 }  // namespace
 
 Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds)
-    : image_seconds_(image_seconds), rotation_(sensor.mask) {
+    : image_seconds_(image_seconds),
+      time_(kStreams, InputOptions().time_jump,
+            {[this](const ClockStep& step) { recording_.clock_steps.push_back(step); }, [](double) {}}),
+      rotation_(sensor.mask) {
   recording_.sensor = sensor;
   recording_.live = live;
   if (sensor.intrinsics_from_camera_info) return;
@@ -64,7 +59,32 @@ void Recorder::startRotation(const CameraIntrinsics& camera) {
   depth_edges_ = std::make_unique<DepthEdges>(camera);
 }
 
+void Recorder::take(Stream stream, double arrival, const std_msgs::Header& header, StreamTime::Deliver deliver) {
+  StreamRecord& record = recordOf(stream);
+  record.frame_id = header.frame_id;
+  time_.take(stream, header.stamp.toSec(), arrival, [&record, arrival, deliver = std::move(deliver)](double t) {
+    record.stamps.push_back(t);
+    record.arrivals.push_back(arrival);
+    deliver(t);
+  });
+  record.ahead = time_.leftOut(stream).ahead;
+}
+
+StreamRecord& Recorder::recordOf(Stream stream) {
+  switch (stream) {
+    case kColor:
+      return recording_.color;
+    case kDepth:
+      return recording_.depth;
+    case kAccel:
+      return recording_.accel;
+    default:
+      return recording_.sensor.topics.imu.empty() ? recording_.gyro : recording_.imu;
+  }
+}
+
 void Recorder::finish() {
+  time_.end();
   recording_.gray_note = gray_.note();
   flushGray(true);
   if (depth_edges_) recording_.depth_edges = depth_edges_->record();
@@ -86,29 +106,37 @@ void Recorder::addImage(const std::string& topic, double arrival, const ImageMes
   const bool is_color = topic == recording_.sensor.topics.color;
   if (!is_color && topic != recording_.sensor.topics.depth) return;
   StreamRecord& stream = is_color ? recording_.color : recording_.depth;
-  if (!note(&stream, arrival, message)) return;
-  stream.encodings.insert(encoding);
-  const double t = message.header.stamp.toSec();
+  if (!stream.one_frame.admits(message.header.frame_id)) return;
   if (first_image_ < 0) first_image_ = arrival;
-  if (arrival - first_image_ > image_seconds_) return;
-  try {
-    const SensorConfig& sensor = recording_.sensor;
-    const cv::Mat image = is_color ? gray() : decodeDepth(message, sensor.depth_scale, sensor.depth_offset);
-    stream.sizes.emplace(image.cols, image.rows);
+  cv::Mat image;
+  if (arrival - first_image_ <= image_seconds_) {
+    try {
+      const SensorConfig& sensor = recording_.sensor;
+      image = is_color ? gray() : decodeDepth(message, sensor.depth_scale, sensor.depth_offset);
+      stream.sizes.emplace(image.cols, image.rows);
+    } catch (const std::exception& e) {
+      ++stream.unusable;
+      stream.unusable_reason = e.what();
+    }
+  }
+  take(is_color ? kColor : kDepth, arrival, message.header, [this, is_color, encoding, image](double t) {
+    (is_color ? recording_.color : recording_.depth).encodings.insert(encoding);
+    if (image.empty()) return;
     if (is_color)
       addGray(t, image);
     else
       addDepth(t, image);
-  } catch (const std::exception& e) {
-    ++stream.unusable;
-    stream.unusable_reason = e.what();
-  }
+  });
 }
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::CameraInfo& message) {
   const auto take = [&](StreamRecord* stream, const std::string& image_topic, CameraIntrinsics* camera,
                         std::string* error) {
-    if (!note(stream, arrival, message) || camera->width > 0) return;  // the first that can be used, as live
+    if (!stream->one_frame.admits(message.header.frame_id)) return;
+    stream->stamps.push_back(message.header.stamp.toSec());
+    stream->arrivals.push_back(arrival);
+    stream->frame_id = message.header.frame_id;
+    if (camera->width > 0) return;  // the first that can be used, as live
     error->clear();
     try {
       *camera = intrinsicsFromCameraInfo(message, image_topic);
@@ -140,19 +168,18 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
 
 void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::Imu& message) {
   const SensorTopics& topics = recording_.sensor.topics;
-  const double t = message.header.stamp.toSec();
-  const auto& w = message.angular_velocity;
-  const auto& a = message.linear_acceleration;
-  StreamRecord& stream = topic == topics.imu    ? recording_.imu
-                         : topic == topics.gyro ? recording_.gyro
-                                                : recording_.accel;
-  if (!note(&stream, arrival, message)) return;
-  if (topic == topics.imu || topic == topics.gyro) {
-    const Eigen::Matrix3d& correction = recording_.sensor.gyro_correction;
-    recording_.gyro_range.add(t, {w.x, w.y, w.z});
-    recording_.gyro_samples.push_back({t, correctedRate({w.x, w.y, w.z}, correction)});
-  }
-  if (topic == topics.imu || topic == topics.accel) recording_.accel_samples.push_back({t, {a.x, a.y, a.z}});
+  const Eigen::Vector3d w = fromMsg(message.angular_velocity), a = fromMsg(message.linear_acceleration);
+  const bool has_gyro = topic == topics.imu || topic == topics.gyro;
+  const bool has_accel = topic == topics.imu || topic == topics.accel;
+  const Stream stream = has_gyro ? kInertial : kAccel;
+  if (!recordOf(stream).one_frame.admits(message.header.frame_id)) return;
+  take(stream, arrival, message.header, [this, w, a, has_gyro, has_accel](double t) {
+    if (has_gyro) {
+      recording_.gyro_range.add(t, w);
+      recording_.gyro_samples.push_back({t, correctedRate(w, recording_.sensor.gyro_correction)});
+    }
+    if (has_accel) recording_.accel_samples.push_back({t, a});
+  });
 }
 
 void Recorder::add(const tf2_msgs::TFMessage& message) {

@@ -28,11 +28,11 @@ std::optional<StampedImage> stampedImage(const rosbag::MessageInstance& message,
                                          const Decode& decode) {
   if (const auto image = message.instantiate<sensor_msgs::Image>()) {
     if (!frame->admits(image->header.frame_id)) return std::nullopt;
-    return StampedImage{image->header.stamp.toSec(), decode(*image, image), 0};
+    return StampedImage{image->header.stamp.toSec(), decode(*image, image), image->header.stamp.toNSec()};
   }
   if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) {
     if (!frame->admits(image->header.frame_id)) return std::nullopt;
-    return StampedImage{image->header.stamp.toSec(), decode(*image), 0};
+    return StampedImage{image->header.stamp.toSec(), decode(*image), image->header.stamp.toNSec()};
   }
   throw std::invalid_argument("type " + message.getDataType() + ", expected sensor_msgs/Image or CompressedImage");
 }
@@ -53,8 +53,8 @@ BagDecoding::BagDecoding(const SensorConfig& sensor, const DepthToColour& to_col
       options_(options),
       sink_(std::move(sink)),
       pairer_(pairing(options.input)),
-      clock_steps_(kStreams, options.input.time_jump),
-      clock_(kStreams, options.input.time_jump) {
+      time_(kStreams, options.input.time_jump,
+            {[this](const ClockStep& step) { clockWasSet(step); }, [this](double seconds) { timeRanBack(seconds); }}) {
   focus_.start(sensor.camera);
 }
 
@@ -75,13 +75,12 @@ void BagDecoding::takeColor(const rosbag::MessageInstance& message) {
   const auto taken =
       stampedImage(message, &frames_[message.getTopic()], [this](const auto&... m) { return gray_(m...); });
   if (!taken) return;
-  const auto& [t, image, stamp] = *taken;
-  color_size_ = image.size();
+  color_size_ = taken->image.size();
   const cv::Size calibrated(sensor_.camera.width, sensor_.camera.height);
   if (color_size_ != calibrated && ++counters_["images_of_wrong_size"] == 1)
     warnings_.push_back("topic " + message.getTopic() + ": images are " + sizeText(color_size_) +
                         ", the calibration is for " + sizeText(calibrated) + ": they cannot be used");
-  if (const auto at = inTime(kColor, t, message)) pairer_.addColor(*at, image);
+  take(kColor, taken->t, message, [this, taken](double t) { pairer_.addColor(t, taken->image, taken->stamp); });
 }
 
 void BagDecoding::takeInfo(const rosbag::MessageInstance& message) {
@@ -99,7 +98,6 @@ void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
     return decodeDepth(m, sensor_.depth_scale, sensor_.depth_offset);
   });
   if (!taken) return;
-  const double t = taken->t;
   const cv::Mat depth = to_colour_(taken->image);
   if (!color_size_.empty() && depth.size() != color_size_)
     complain("sizes", "topic " + message.getTopic() + ": depth is " + sizeText(depth.size()) +
@@ -108,7 +106,7 @@ void BagDecoding::takeDepth(const rosbag::MessageInstance& message) {
                           "depth/registered: false with the depth camera's calibration");
   ++depth_images_;
   without_any_ += holdsNoDepth(depth, sensor_.depth_noise);
-  if (const auto at = inTime(kDepth, t, message)) pairer_.addDepth(*at, depth);
+  take(kDepth, taken->t, message, [this, depth](double t) { pairer_.addDepth(t, depth); });
 }
 
 void BagDecoding::takeImu(const rosbag::MessageInstance& message) {
@@ -120,42 +118,41 @@ void BagDecoding::takeImu(const rosbag::MessageInstance& message) {
     return;
   }
   if (!frames_[topic].admits(imu->header.frame_id)) return;
-  const std::optional<double> at =
-      inTime(topic == sensor_.topics.accel ? kAccel : kGyro, imu->header.stamp.toSec(), message);
-  if (!at) return;
-  const double t = *at;
   const Eigen::Vector3d gyro = fromMsg(imu->angular_velocity), accel = fromMsg(imu->linear_acceleration);
-  SensorEvent event = ImuSample{t, gyro, accel};
-  if (topic == sensor_.topics.gyro) event = GyroSample{t, gyro};
-  if (topic == sensor_.topics.accel) event = AccelSample{t, accel};
-  open_ = sink_(std::move(event));
+  const bool gyro_alone = topic == sensor_.topics.gyro, accel_alone = topic == sensor_.topics.accel;
+  take(accel_alone ? kAccel : kGyro, imu->header.stamp.toSec(), message,
+       [this, gyro, accel, gyro_alone, accel_alone](double t) {
+         SensorEvent event = ImuSample{t, gyro, accel};
+         if (gyro_alone) event = GyroSample{t, gyro};
+         if (accel_alone) event = AccelSample{t, accel};
+         open_ = open_ && sink_(std::move(event));
+       });
 }
 
-std::optional<double> BagDecoding::inTime(int stream, double stamp, const rosbag::MessageInstance& message) {
-  const std::size_t steps = clock_steps_.steps().size();
-  const std::optional<double> followed = clock_steps_.follow(std::size_t(stream), stamp, message.getTime().toSec());
-  if (clock_steps_.steps().size() > steps) {
-    ++counters_["clock_steps"];
-    complain("step of " + message.getTopic(), clockStepped(clock_steps_.steps().back(), message.getTopic()));
-  }
-  if (!followed) {
-    ++counters_["stray_messages"];
-    return std::nullopt;
-  }
-  const double t = *followed;
-  const StreamClock::Verdict verdict = clock_.notice(stream, t);
-  if (verdict == StreamClock::Verdict::kStray) ++counters_["stray_messages"];
-  if (verdict == StreamClock::Verdict::kSetBack && ++counters_["clock_steps"] == 1)
-    warnings_.push_back(clockSetBack(clock_.lastJump(), t));
-  if (verdict == StreamClock::Verdict::kJumpedBack) {
-    ++counters_["time_jumps"];
-    clock_steps_.restart();
-    pairer_.end();
-    handOut();
-    pairer_.clear();
-    if (open_) open_ = sink_(TimeJump{clock_.lastJump()});
-  }
-  return open_ && verdict != StreamClock::Verdict::kStray ? followed : std::nullopt;
+void BagDecoding::take(int stream, double stamp, const rosbag::MessageInstance& message,
+                       const StreamTime::Deliver& deliver) {
+  time_.take(std::size_t(stream), stamp, message.getTime().toSec(), deliver);
+}
+
+void BagDecoding::clockWasSet(const ClockStep& step) {
+  ++counters_["clock_steps"];
+  const std::string topic = step.stream ? topicOf(*step.stream) : "";
+  complain("step of " + topic, vip_slam::clockWasSet(step, topic));
+  if (!step.stream && open_) open_ = sink_(ClockSet{step.time, step.seconds});
+}
+
+void BagDecoding::timeRanBack(double seconds) {
+  ++counters_["time_jumps"];
+  pairer_.end();
+  handOut();
+  pairer_.clear();
+  if (open_) open_ = sink_(TimeJump{seconds});
+}
+
+std::string BagDecoding::topicOf(std::size_t stream) const {
+  const SensorTopics& topics = sensor_.topics;
+  const std::string of_stream[] = {topics.color, topics.depth, topics.inertial(), topics.accel};
+  return of_stream[stream];
 }
 
 void BagDecoding::handOut() {
@@ -188,6 +185,7 @@ void BagDecoding::countUnreadable(const std::string& why) {
 }
 
 void BagDecoding::finish() {
+  time_.end();
   pairer_.end();
   handOut();
   if (!focus_.words().empty()) warnings_.push_back(focus_.words());
@@ -210,9 +208,12 @@ void BagDecoding::finish() {
     counters_["messages_of_another_frame"] += frame.leftOut();
     warnings_.push_back("topic " + topic + ": " + frame.words());
   }
-  if (pairs.ahead > 0)
-    warnings_.push_back(std::to_string(pairs.ahead) +
-                        " images are left out: their stamps are later than those of the next image");
+  for (std::size_t stream = 0; stream < kStreams; ++stream) {
+    const auto& [ahead, stray] = time_.leftOut(stream);
+    counters_["messages_ahead"] += ahead;
+    counters_["stray_messages"] += stray;
+    if (ahead > 0) warnings_.push_back("topic " + topicOf(stream) + ": " + stampedAhead(ahead));
+  }
   if (pairs.backward > 0)
     warnings_.push_back(std::to_string(pairs.backward) +
                         " images are left out: their stamps repeat or precede the one before");
@@ -225,7 +226,6 @@ void BagDecoding::finish() {
   counters_["images_without_depth"] = pairs.without_depth;
   counters_["unused_depth_images"] = pairs.unused_depth;
   counters_["images_out_of_order"] = pairs.backward;
-  counters_["images_ahead"] = pairs.ahead;
 }
 
 }  // namespace vip_slam

@@ -1,11 +1,10 @@
-// Converts a bag's messages to sensor events: images are decoded and paired, clock jumps detected, irregularities
+// Converts a bag's messages to sensor events: images are decoded and paired, their time settled, irregularities
 // counted and reported once each.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -14,11 +13,10 @@
 
 #include "vip_slam_bringup/runner/bag_reader.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
-#include "vip_slam_ros/clock_steps.h"
 #include "vip_slam_ros/constant_focus.h"
 #include "vip_slam_ros/image_decoding.h"
 #include "vip_slam_ros/one_frame.h"
-#include "vip_slam_ros/stream_clock.h"
+#include "vip_slam_ros/stream_time/stream_time.h"
 
 namespace vip_slam {
 
@@ -44,9 +42,11 @@ class BagDecoding {
   void takeInfo(const rosbag::MessageInstance& message);
   void takeDepth(const rosbag::MessageInstance& message);
   void takeImu(const rosbag::MessageInstance& message);
-  /// Stamp of a message that may be used, on the clock that its stream began with. Messages before and after a jump of
-  /// the clock are not paired with each other.
-  std::optional<double> inTime(int stream, double t, const rosbag::MessageInstance& message);
+  void take(int stream, double stamp, const rosbag::MessageInstance& message, const StreamTime::Deliver& deliver);
+  void clockWasSet(const ClockStep& step);
+  /// Messages before and after are not paired with each other.
+  void timeRanBack(double seconds);
+  std::string topicOf(std::size_t stream) const;
   void handOut();
   /// Counts an image that `use` cannot decode and warns once per topic.
   void decode(const rosbag::MessageInstance& message, const std::function<void()>& use);
@@ -58,8 +58,7 @@ class BagDecoding {
   const BagReaderOptions options_;
   Sink sink_;
   ImagePairer pairer_;
-  ClockSteps clock_steps_;
-  StreamClock clock_;
+  StreamTime time_;
   std::map<std::string, OneFrame> frames_;  ///< of each topic
   GrayDecoder gray_;
   ConstantFocus focus_;

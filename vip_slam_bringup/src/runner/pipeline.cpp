@@ -35,6 +35,8 @@ void Pipeline::add(const SensorEvent& event) {
     newest_imu_ = std::max(newest_imu_, accel->t);
   } else if (const auto* jump = std::get_if<TimeJump>(&event)) {
     restart(jump->seconds);
+  } else if (const auto* set = std::get_if<ClockSet>(&event)) {
+    machine_clock_.set(set->t, set->seconds);
   } else {
     waiting_.push_back(std::get<ImagePair>(event));
     newest_image_ = std::max(newest_image_, waiting_.back().t);

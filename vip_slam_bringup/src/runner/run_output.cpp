@@ -186,7 +186,8 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
 }
 
 /// The upper triangle of each pose's covariance, row by row.
-void writeCovariances(const std::string& path, const std::vector<OdometryCovariance>& covariances) {
+void writeCovariances(const std::string& path, const std::vector<OdometryCovariance>& covariances,
+                      const MachineClock& clock) {
   AtomicFile file(path);
   file.stream() << "t";
   for (const char* name : {"xx", "xy", "xz", "xa", "xb", "xc", "yy", "yz", "ya", "yb", "yc",
@@ -195,7 +196,8 @@ void writeCovariances(const std::string& path, const std::vector<OdometryCovaria
   }
   file.stream() << '\n';
   for (const OdometryCovariance& sample : covariances) {
-    file.stream() << std::fixed << std::setprecision(9) << sample.t << std::scientific << std::setprecision(8);
+    file.stream() << std::fixed << std::setprecision(9) << clock.stamp(sample.t) << std::scientific
+                  << std::setprecision(8);
     for (int r = 0; r < 6; ++r) {
       for (int c = r; c < 6; ++c) file.stream() << ',' << sample.covariance(r, c);
     }
@@ -227,18 +229,22 @@ void writeRun(const std::string& folder, const RunFacts& facts, const Pipeline& 
               const TimingLog& timing) {
   // Files of an earlier run in the same folder must not be mistaken for this run's.
   for (const char* name : kFiles) std::filesystem::remove(std::filesystem::path(folder) / name);
+  const auto stamped = [&](Trajectory poses) {
+    for (auto& pose : poses) pose.t = pipeline.machineClock().stamp(pose.t);
+    return poses;
+  };
   Trajectory odometry;
   for (const OdometryPose& pose : pipeline.odometry()) odometry.push_back({pose.t, pose.T_odom_I});
-  writeTum(folder + "/odometry.tum", odometry);
-  writeCovariances(folder + "/odometry_covariance.csv", pipeline.covariances());
+  writeTum(folder + "/odometry.tum", stamped(std::move(odometry)));
+  writeCovariances(folder + "/odometry_covariance.csv", pipeline.covariances(), pipeline.machineClock());
   MapSnapshot map;
   std::vector<PlaneEstimate> planes;
   if (const MappingThread* mapping = pipeline.mapping()) {
     map = mapping->backEnd().snapshot();
     planes = mapping->planes();
     const Trajectory trajectory = anchorTrajectory(pipeline.chain(), anchorsOf(map));
-    writeTum(folder + "/trajectory.tum", trajectory);
-    writeTum(folder + "/realtime.tum", pipeline.realtime());
+    writeTum(folder + "/trajectory.tum", stamped(trajectory));
+    writeTum(folder + "/realtime.tum", stamped(pipeline.realtime()));
     writePlanesYaml(folder + "/planes.yaml", planes);
     writePlanesPly(folder + "/planes.ply", planes);
     writeFloorPlan(folder + "/floorplan.svg", planes, trajectory);

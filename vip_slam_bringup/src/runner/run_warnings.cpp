@@ -126,8 +126,7 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
                   " images are not covered by the IMU: images and depth carry the pose there");
   if (c.imu_rejected > 0)
     all.push_back(std::to_string(c.imu_rejected) +
-                  " IMU messages are left out: not finite, all zero, not newer than the one before, or stamped later "
-                  "than the next");
+                  " IMU messages are left out: not finite, all zero, or not newer than the one before");
   if (pipeline.images() == 0) all.push_back("no image could be used");
   for (const std::string& missing : {lateStart(pipeline), missingPoses(pipeline), otherStates(pipeline.states())})
     if (!missing.empty()) all.push_back(missing);

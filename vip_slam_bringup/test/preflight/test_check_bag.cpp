@@ -218,8 +218,15 @@ TEST_F(CheckBag, FramesInTf) {
 }
 
 TEST_F(CheckBag, TimeThatRunsBackwards) {
-  options_.late_jump = -1.0;
+  options_.late_jump = -100;
   expectFound(check(), Severity::kError, "IMU", "time runs backwards");
+}
+
+TEST_F(CheckBag, AClockThatIsSetIsNamedAndFollowed) {
+  options_.late_jump = -0.9;
+  const Findings findings = check();
+  expectFound(findings, Severity::kWarning, "clock", "was set back by 0.900 s");
+  expectNoErrorBut(findings, "");
 }
 
 TEST_F(CheckBag, StampsOfImagesThatJitter) {

@@ -107,6 +107,30 @@ TEST_F(BagReaderTest, WhereTheClockRanBackTheOdometryStartsAnewAndTheMapGoesOn) 
   for (std::size_t i = 0; i < odometry.size(); ++i) EXPECT_EQ(pipeline.covariances()[i].t, odometry[i].t);
 }
 
+TEST_F(BagReaderTest, WhereTheClockIsSetTimeGoesOnAndPosesKeepTheirStamps) {
+  const auto odometry = [&](double late_jump, std::vector<double>* stamps) {
+    options_.late_jump = late_jump;
+    test_support::writeDriverBag(bag_, options_);
+    SensorConfig sensor = options_.sensor;
+    BagReader reader(bag_, sensor);
+    Pipeline pipeline(pipeline_options_, sensor, nullptr);
+    EXPECT_EQ(run(&pipeline, &reader), 0u);
+    EXPECT_EQ(warned(reader, "the clock was set back by 0.900 s"), late_jump != 0);
+    for (const OdometryPose& pose : pipeline.odometry()) stamps->push_back(pipeline.machineClock().stamp(pose.t));
+    return pipeline.odometry();
+  };
+  std::vector<double> stamps, stamps_set;
+  const auto whole = odometry(0, &stamps), set = odometry(-0.9, &stamps_set);
+  ASSERT_EQ(whole.size(), set.size());
+  ASSERT_FALSE(whole.empty());
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    EXPECT_NEAR(set[i].t, whole[i].t, 1e-6);
+    EXPECT_LT((set[i].T_odom_I.t() - whole[i].T_odom_I.t()).norm(), 1e-3);
+  }
+  EXPECT_NEAR(stamps_set.front(), stamps.front(), 1e-6);
+  EXPECT_NEAR(stamps_set.back(), stamps.back() - 0.9, 1e-6);
+}
+
 TEST_F(BagReaderTest, ASecondCameraOnTheSameTopicsIsNamedAndLeftOut) {
   const auto odometry = [&](bool second_camera) {
     options_.second_camera = second_camera;

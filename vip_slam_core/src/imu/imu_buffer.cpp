@@ -24,36 +24,18 @@ ImuSample interpolate(const ImuSample& a, const ImuSample& b, double t) {
 }
 
 ImuBuffer::ImuBuffer(double gap_seconds, double capacity_seconds)
-    : gap_seconds_(gap_seconds),
-      capacity_seconds_(capacity_seconds),
-      united_(gap_seconds),
-      gyro_stream_(gap_seconds),
-      accel_stream_(gap_seconds) {}
+    : gap_seconds_(gap_seconds), capacity_seconds_(capacity_seconds) {}
 
-std::vector<ImuSample> ImuBuffer::Stream::add(const ImuSample& sample) {
-  std::vector<ImuSample> settled;
-  for (const ImuSample& in_time : stamps.add(sample)) {
-    for (const ImuSample& s : spikes.add(in_time)) settled.push_back(s);
-  }
-  return settled;
-}
-
-void ImuBuffer::Stream::clear() {
-  stamps.clear();
-  spikes.clear();
-}
-
-bool ImuBuffer::acceptable(double t, bool finite, const Stream& stream) {
+bool ImuBuffer::acceptable(double t, bool finite, const SpikeFilter& stream) {
   if (!std::isfinite(t) || !finite) {
     ++counters_.not_finite;
     return false;
   }
-  const double newest = stream.stamps.newest();
-  if (t == newest || t == stream.stamps.waiting()) {
+  if (t == stream.newest()) {
     ++counters_.duplicate;
     return false;
   }
-  if (t < newest) {
+  if (t < stream.newest()) {
     ++counters_.out_of_order;
     return false;
   }
@@ -61,11 +43,7 @@ bool ImuBuffer::acceptable(double t, bool finite, const Stream& stream) {
 }
 
 void ImuBuffer::countReplaced() {
-  counters_.spikes = counters_.ahead = 0;
-  for (const Stream* stream : {&united_, &gyro_stream_, &accel_stream_}) {
-    counters_.spikes += stream->spikes.spikes();
-    counters_.ahead += stream->stamps.dropped();
-  }
+  counters_.spikes = united_.spikes() + gyro_stream_.spikes() + accel_stream_.spikes();
 }
 
 bool ImuBuffer::add(const ImuSample& sample) {
@@ -87,7 +65,7 @@ void ImuBuffer::append(const ImuSample& sample) {
 
 bool ImuBuffer::addGyro(double t, const Eigen::Vector3d& gyro) {
   // With an empty buffer an earlier stamp is not out of order.
-  if (samples_.empty() && gyro_.empty() && t < gyro_stream_.stamps.newest()) gyro_stream_.clear();
+  if (samples_.empty() && gyro_.empty() && t < gyro_stream_.newest()) gyro_stream_.clear();
   if (!acceptable(t, gyro.allFinite(), gyro_stream_)) return false;
   for (const ImuSample& settled : gyro_stream_.add({t, gyro, Eigen::Vector3d::Zero()})) {
     gyro_.push_back({settled.t, settled.gyro});

@@ -30,7 +30,7 @@ class Bench {
       front_end_.addAccel(accel->t, accel->accel);
     } else if (const auto* pair = std::get_if<ImagePair>(&event)) {
       waiting_.push_back(*pair);
-    } else {
+    } else if (std::holds_alternative<TimeJump>(event)) {
       waiting_.clear();  // time jumped back; the front end detects that by itself
     }
     while (!waiting_.empty() && front_end_.ready(waiting_.front().t, waiting_.front().depth_lag)) {

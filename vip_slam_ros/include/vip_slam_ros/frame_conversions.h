@@ -30,6 +30,8 @@ NavState fromMsg(const vip_slam_msgs::NavState& msg);
 Feature fromMsg(const vip_slam_msgs::Feature& msg);
 DepthGrid fromMsg(const vip_slam_msgs::DepthGrid& msg);
 TrackedFrame fromMsg(const vip_slam_msgs::TrackedFrame& msg);
+/// Of its image, s, on a clock that goes on.
+double timeOf(const vip_slam_msgs::TrackedFrame& msg);
 Keyframe fromMsg(const vip_slam_msgs::Keyframe& msg);
 
 }  // namespace vip_slam

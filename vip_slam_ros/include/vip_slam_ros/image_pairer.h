@@ -40,7 +40,6 @@ struct PairerCounters {
   std::size_t unused_depth = 0;
   std::size_t dropped = 0;   ///< colour images dropped from a full queue
   std::size_t backward = 0;  ///< images whose stamp was not newer than the one before
-  std::size_t ahead = 0;     ///< images whose stamp was later than that of the next
   double skew = 0;           ///< depth stamp - colour stamp of the newest pair, seconds
 };
 
@@ -51,9 +50,7 @@ class ImagePairer {
  public:
   explicit ImagePairer(const PairerOptions& options = {}) : options_(options) {}
 
-  /// Images of each stream must be in the order of their stamps; others are counted and refused (false). A single stamp
-  /// that leaps ahead waits for the next one of its stream: where that lies before it, the one ahead was wrong, and its
-  /// image is left out.
+  /// Images of each stream must be in the order of their stamps; others are counted and refused (false).
   bool addColor(double t, cv::Mat gray, std::uint64_t stamp = 0);
   bool addDepth(double t, cv::Mat depth);
 
@@ -74,8 +71,6 @@ class ImagePairer {
 
  private:
   void popColor();
-  /// Whether the only waiting colour image leaps ahead, so that the next one has to confirm its stamp.
-  bool leapsAhead() const;
   /// Whether a depth image at `t` is not nearer to another colour image than to the oldest waiting one.
   bool belongsToFront(double t, double lag) const;
   double usualLag() const;  ///< depth stamp - colour stamp of recent pairs, seconds; 0 when it is not steady
@@ -85,7 +80,6 @@ class ImagePairer {
   std::deque<double> color_intervals_, depth_intervals_;  ///< of the last images, seconds
   std::deque<double> lags_;                               ///< of the last pairs, seconds
   std::optional<double> previous_color_;                  ///< stamp of the colour image before the oldest waiting one
-  std::optional<double> previous_depth_;                  ///< stamp of the depth image before the newest
   std::optional<double> newest_color_, newest_depth_;
   std::optional<ImagePair> front_;
   bool ended_ = false;

@@ -20,6 +20,7 @@ CameraIntrinsics camera(double focal) {
 ImagePair look(double t, double focal) {
   ImagePair pair;
   pair.t = t;
+  pair.stamp = std::uint64_t(1e9 * t + 0.5);
   pair.gray = cv::Mat(240, 320, CV_8U);
   pair.depth = cv::Mat(240, 320, CV_32F);
   for (int v = 0; v < 240; ++v) {

@@ -107,39 +107,6 @@ TEST(ImagePairer, RepeatedAndInvalidStampsAreRefused) {
   EXPECT_TRUE(pairer.addColor(0.5, image(3)));
 }
 
-TEST(ImagePairer, OneStampFromTheFutureCostsItsImageOnly) {
-  for (const double ahead : {0.08, 0.5}) {
-    ImagePairer pairer;
-    std::vector<double> stamps;
-    for (int i = 0; i < 40; ++i) {
-      const double t = 0.0333 * i + (i == 20 ? ahead : 0.0);
-      EXPECT_TRUE(pairer.addColor(t, image(i))) << i;
-      EXPECT_TRUE(pairer.addDepth(t, image(i))) << i;
-      for (; const ImagePair* pair = pairer.front(); pairer.pop()) {
-        EXPECT_EQ(valueOf(pair->gray), valueOf(pair->depth));
-        stamps.push_back(pair->t);
-      }
-    }
-    EXPECT_EQ(pairer.counters().ahead, 2u);  // colour and depth
-    EXPECT_EQ(pairer.counters().backward, 0u);
-    ASSERT_EQ(stamps.size(), 39u) << ahead;
-    EXPECT_NEAR(stamps[20], 0.0333 * 21, 1e-9);
-  }
-}
-
-TEST(ImagePairer, ImagesThatAreMissingAreNoLeap) {
-  ImagePairer pairer;
-  int pairs = 0;
-  for (int i = 0; i < 40; ++i) {
-    if (i >= 20 && i < 30) continue;
-    pairer.addColor(0.0333 * i, image(i));
-    pairer.addDepth(0.0333 * i, image(i));
-    for (; pairer.front(); pairer.pop()) ++pairs;
-  }
-  EXPECT_EQ(pairs, 30);
-  EXPECT_EQ(pairer.counters().ahead, 0u);
-}
-
 /// Runs colour images 0, 1, ... and those depth images of the same number that `depth_stamp` has, in the order of their
 /// stamps; at equal stamps depth first if `depth_first`. Which depth image each colour image got, -1: none.
 std::vector<int> pairAll(int images, double interval, bool depth_first,

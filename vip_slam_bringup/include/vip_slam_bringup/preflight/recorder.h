@@ -18,6 +18,7 @@
 #include "vip_slam_frontend/tracking/frozen_depth.h"
 #include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/image_decoding.h"
+#include "vip_slam_ros/stream_time/stream_time.h"
 
 namespace vip_slam {
 
@@ -25,6 +26,8 @@ class Recorder {
  public:
   /// Images are decoded for the first `image_seconds` of the recording only; stamps are kept throughout.
   Recorder(const SensorConfig& sensor, bool live, double image_seconds);
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
 
   /// With the `owner` of the message a grey image is kept without a copy.
   void add(const std::string& topic, double arrival, const sensor_msgs::Image& message, const MessageOwner& owner = {});
@@ -43,6 +46,9 @@ class Recorder {
   template <class ImageMessage, class Gray>
   void addImage(const std::string& topic, double arrival, const ImageMessage& message, const std::string& encoding,
                 const Gray& gray);
+  enum Stream { kColor, kDepth, kInertial, kAccel, kStreams };
+  void take(Stream stream, double arrival, const std_msgs::Header& header, StreamTime::Deliver deliver);
+  StreamRecord& recordOf(Stream stream);
   void addDepth(double t, const cv::Mat& depth);
   void addGray(double t, const cv::Mat& gray);
   bool turns() const;
@@ -54,6 +60,7 @@ class Recorder {
   GrayDecoder gray_;
   const double image_seconds_;
   double first_image_ = -1;
+  StreamTime time_;
   ImageRotation rotation_;
   std::shared_ptr<const CameraModel> camera_;  ///< null: not known yet
   std::unique_ptr<DepthToColour> to_colour_;   ///< of registered depth; null: depth is taken as it comes

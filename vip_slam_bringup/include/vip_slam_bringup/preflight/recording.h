@@ -14,17 +14,19 @@
 #include "vip_slam_core/imu/gyro_range.h"
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_ros/one_frame.h"
+#include "vip_slam_ros/stream_time/stream_time.h"
 
 namespace vip_slam {
 
 struct StreamRecord {
-  std::vector<double> stamps;    ///< header stamps in order of arrival, seconds
+  std::vector<double> stamps;    ///< in order of arrival, seconds; of header stamps what StreamTime makes of them
   std::vector<double> arrivals;  ///< record or receive times, seconds
   std::string type;              ///< ROS type of the messages, "sensor_msgs/Image"
   std::set<std::string> encodings;
   std::set<std::pair<int, int>> sizes;  ///< (width, height)
   std::string frame_id;                 ///< of the first message
   OneFrame one_frame;                   ///< what has another frame_id is in no other member
+  std::size_t ahead = 0;                ///< messages left out, stamped later than the next
   std::size_t unusable = 0;             ///< messages that could not be decoded
   std::string unusable_reason;
   std::size_t decoded = 0;   ///< messages whose pixels were decoded
@@ -104,6 +106,7 @@ struct Recording {
   bool live = false;
   std::map<std::string, std::string> topics;  ///< all existing topics: topic -> type
   StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
+  std::vector<ClockStep> clock_steps;
   CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
   double color_focal_from = 0, color_focal_to = 0;         ///< least and largest fx of all camera_info, px
   std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable

@@ -34,7 +34,11 @@ struct AccelSample {
 struct TimeJump {
   double seconds;
 };
-using SensorEvent = std::variant<ImuSample, GyroSample, AccelSample, ImagePair, TimeJump>;
+/// The clock of all stamps was set. The events' times go on from before; stamps from time `t` on are later by `seconds`.
+struct ClockSet {
+  double t, seconds;
+};
+using SensorEvent = std::variant<ImuSample, GyroSample, AccelSample, ImagePair, TimeJump, ClockSet>;
 
 struct BagReaderOptions {
   double start = 0;      ///< seconds after the first message

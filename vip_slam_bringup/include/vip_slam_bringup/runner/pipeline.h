@@ -22,6 +22,7 @@
 #include "vip_slam_core/types/tracking_state.h"
 #include "vip_slam_core/util/timing.h"
 #include "vip_slam_frontend/front_end.h"
+#include "vip_slam_ros/stream_time/machine_clock.h"
 
 namespace vip_slam {
 
@@ -33,7 +34,7 @@ struct StateChange {
 
 /// An image's pose as published by the front end.
 struct OdometryPose {
-  double t = 0;  ///< image stamp, seconds
+  double t = 0;  ///< of the image, seconds
   std::uint32_t epoch = 0;
   SE3 T_odom_I;
 };
@@ -69,6 +70,8 @@ class Pipeline {
   const std::vector<StateChange>& states() const { return states_; }
   const TrackingStatus& status() const { return status_; }  ///< of the last image
   const Trajectory& realtime() const { return realtime_; }  ///< poses in map, as estimated at the time of each image
+  /// The stamps of these times where the clock was set while recording.
+  const MachineClock& machineClock() const { return machine_clock_; }
   const PipelineOptions& options() const { return options_; }
   const FrontEnd& frontEnd() const { return *front_end_; }
   const MappingThread* mapping() const { return mapping_.get(); }  ///< null: odometry only. Read it after finish()
@@ -101,6 +104,7 @@ class Pipeline {
   double oldest_taken_ = std::numeric_limits<double>::infinity();  ///< stamps of the images since then
   double newest_taken_ = oldest_taken_;
   TimePasses passes_;
+  MachineClock machine_clock_;
   std::vector<OdometryPose> odometry_;
   std::vector<ChainedPose> chain_;
   std::vector<OdometryCovariance> covariances_;

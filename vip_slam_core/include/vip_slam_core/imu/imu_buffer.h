@@ -1,6 +1,5 @@
-// Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams, replaces single
-// wrong samples (spike_filter.h) and drops those with a wrong stamp (stamp_filter.h): a suspicious sample enters the
-// buffer only with the next one.
+// Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams, and replaces
+// single wrong samples (spike_filter.h): a suspicious sample enters the buffer only with the next one.
 // Not thread-safe: one owner; callers lock around it.
 #pragma once
 
@@ -12,14 +11,12 @@
 
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/imu/spike_filter.h"
-#include "vip_slam_core/imu/stamp_filter.h"
 
 namespace vip_slam {
 
 struct ImuBufferCounters {
   std::size_t accepted = 0, out_of_order = 0, duplicate = 0, gaps = 0;
   std::size_t not_finite = 0;  ///< or all zero
-  std::size_t ahead = 0;       ///< samples dropped because their stamp was later than those after them
   std::size_t spikes = 0;      ///< samples replaced by interpolation between their neighbours
 };
 
@@ -59,16 +56,8 @@ class ImuBuffer {
     Eigen::Vector3d value;
   };
   // Split streams are filtered before they are joined: interpolation would spread a spike over its neighbours.
-  struct Stream {
-    explicit Stream(double gap_seconds) : stamps(gap_seconds) {}
-    /// The samples that are decided now.
-    std::vector<ImuSample> add(const ImuSample& sample);
-    void clear();
-    StampFilter stamps;
-    SpikeFilter spikes;
-  };
   /// Whether a sample may be added; counts the reason otherwise.
-  bool acceptable(double t, bool finite, const Stream& stream);
+  bool acceptable(double t, bool finite, const SpikeFilter& stream);
   void countReplaced();
   void append(const ImuSample& sample);
   void joinStreams();
@@ -76,7 +65,8 @@ class ImuBuffer {
   double gap_seconds_, capacity_seconds_;
   std::deque<ImuSample> samples_;
   std::deque<Stamped> gyro_, accel_;
-  Stream united_, gyro_stream_, accel_stream_;
+  // Split streams are filtered before they are joined: interpolation would spread a spike over its neighbours.
+  SpikeFilter united_, gyro_stream_, accel_stream_;
   ImuBufferCounters counters_;
 };
 
