@@ -114,6 +114,7 @@ class BagWriter : public SequenceWriter {
 
   void imu(std::int64_t ns, const ImuSample& s, const NavState& x, const Eigen::Vector3d& omega_I) override {
     const ros::Time stamp = stampOf(ns);
+    const bool inertial = sensor_.topics.hasInertial();
     sensor_msgs::Imu m;
     m.header.seq = imu_seq_;
     m.header.stamp = stamp;
@@ -121,13 +122,13 @@ class BagWriter : public SequenceWriter {
     m.orientation_covariance[0] = -1;  // no orientation
     assign(&m.angular_velocity, s.gyro);
     assign(&m.linear_acceleration, s.accel);
-    put(sensor_.topics.imu, stamp, m);
+    if (inertial) put(sensor_.topics.imu, stamp, m);
 
     nav_msgs::Odometry o;
     o.header.seq = imu_seq_++;
     o.header.stamp = stamp;
     o.header.frame_id = "world";
-    o.child_frame_id = kImuFrame;
+    o.child_frame_id = inertial ? kImuFrame : kColorFrame;
     assign(&o.pose.pose.position, x.T_W_I.t());
     const Eigen::Quaterniond& q = x.T_W_I.rotation();
     o.pose.pose.orientation.x = q.x();

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "vip_slam_sim/motion/imu_drift.h"
 #include "vip_slam_sim/rng.h"
 
 namespace vip_slam {
@@ -21,6 +22,8 @@ ImuLog synthesiseImu(const SplineTrajectory& trajectory, const ImuOptions& o, in
     const Eigen::Vector3d right = deviate(o.misalignment), left = deviate(o.misalignment);
     *M += (Eigen::Matrix3d() << 0, right.z(), left.y(), left.z(), 0, right.x(), right.y(), left.x(), 0).finished();
   }
+  const ThermalDrift drift(o, seed);
+  const GSensitivity felt(o, seed);
   const double root = std::sqrt(o.rate);
   const auto count = static_cast<std::size_t>((trajectory.end() - trajectory.begin()) * o.rate + 1e-6) + 1;
   ImuLog log;
@@ -29,10 +32,11 @@ ImuLog synthesiseImu(const SplineTrajectory& trajectory, const ImuOptions& o, in
     s.t = static_cast<double>(k) / o.rate;
     const MotionState m = trajectory.at(trajectory.begin() + s.t);
     const Eigen::Vector3d force = m.T_W_I.rotation().conjugate() * (m.a_W + gravityVector(gravity));
-    s.gyro = M_gyro * m.omega_I + bias.gyro + deviate(o.gyro_noise_density * root);
-    s.accel = M_accel * force + bias.accel + deviate(o.accel_noise_density * root);
+    const ImuBias now{bias.gyro + drift.gyro(s.t), bias.accel + drift.accel(s.t)};
+    s.gyro = M_gyro * m.omega_I + felt(force) + now.gyro + deviate(o.gyro_noise_density * root);
+    s.accel = M_accel * force + now.accel + deviate(o.accel_noise_density * root);
     log.samples.push_back(s);
-    log.biases.push_back(bias);
+    log.biases.push_back(now);
     bias.gyro += deviate(o.gyro_random_walk / root);
     bias.accel += deviate(o.accel_random_walk / root);
   }

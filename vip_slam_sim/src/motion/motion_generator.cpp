@@ -97,11 +97,13 @@ SplineTrajectory makeFromFile(const MotionOptions& o) {
 }  // namespace
 
 SplineTrajectory makeMotion(const MotionOptions& options, const SE3& T_imu_cam, int seed) {
-  if (options.type == "path") return makePath(options, T_imu_cam, seed);
-  if (options.type == "orbit") return makeOrbit(options, T_imu_cam, seed);
-  if (options.type == "rotate") return makeRotate(options, T_imu_cam);
-  if (options.type == "still") return makeStill(options, T_imu_cam);
-  return makeFromFile(options);
+  SplineTrajectory motion = options.type == "path"     ? makePath(options, T_imu_cam, seed)
+                            : options.type == "orbit"  ? makeOrbit(options, T_imu_cam, seed)
+                            : options.type == "rotate" ? makeRotate(options, T_imu_cam)
+                            : options.type == "still"  ? makeStill(options, T_imu_cam)
+                                                       : makeFromFile(options);
+  if (options.vibration != "none") motion.shake(std::make_shared<Vibration>(options.vibration, seed));
+  return motion;
 }
 
 }  // namespace vip_slam

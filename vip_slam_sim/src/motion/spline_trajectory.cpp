@@ -67,6 +67,22 @@ SplineTrajectory::SplineTrajectory(double begin, double spacing, std::vector<SE3
 }
 
 MotionState SplineTrajectory::at(double t) const {
+  MotionState m = smooth(t);
+  if (!vibration_) return m;
+  // Displacement and turn are small and in the body's frame: exact but for the turn's second order (1e-7 rad).
+  const VibrationState s = vibration_->at(t);
+  const Eigen::Vector3d& o = m.omega_I;
+  const Eigen::Matrix3d R = m.T_W_I.R();
+  const SE3 T_W_I(m.T_W_I.rotation() * expQuaternion(s.turn), m.T_W_I.t() + R * s.p);
+  m.v_W += R * (o.cross(s.p) + s.v);
+  m.a_W += R * (m.alpha_I.cross(s.p) + o.cross(o.cross(s.p)) + 2 * o.cross(s.v) + s.a);
+  m.alpha_I += m.alpha_I.cross(s.turn) + o.cross(s.rate) + s.acceleration;
+  m.omega_I += o.cross(s.turn) + s.rate;
+  m.T_W_I = T_W_I;
+  return m;
+}
+
+MotionState SplineTrajectory::smooth(double t) const {
   const double s = std::clamp((t - begin_) / spacing_, 0.0, static_cast<double>(control_.size() - 5));
   const auto i = std::min<std::size_t>(static_cast<std::size_t>(s), control_.size() - kOrder);
   const double u = s - static_cast<double>(i), r = 1 / spacing_;

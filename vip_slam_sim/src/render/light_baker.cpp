@@ -5,6 +5,8 @@
 #include <cmath>
 #include <thread>
 
+#include "hemisphere.h"
+
 namespace vip_slam {
 namespace {
 
@@ -14,19 +16,9 @@ constexpr float kLampReach = 9.f;      ///< metres; a lamp's light has faded to 
 constexpr float kOffset = 3e-3f;       ///< metres; rays start this far off the surface
 constexpr float kInset = 0.012f;       ///< metres; and this far from its edges, clear of the adjoining wall
 
-/// Cosine-weighted directions about +z on a Fibonacci spiral.
-std::vector<Vec3> hemisphere() {
-  std::vector<Vec3> out;
-  for (int i = 0; i < kAmbientRays; ++i) {
-    const float r = std::sqrt((static_cast<float>(i) + 0.5f) / kAmbientRays), a = 2.39996323f * static_cast<float>(i);
-    out.push_back({r * std::cos(a), r * std::sin(a), std::sqrt(std::max(0.f, 1 - r * r))});
-  }
-  return out;
-}
-
 class Baker {
  public:
-  Baker(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer), sky_(hemisphere()) {
+  Baker(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer), sky_(hemisphere(kAmbientRays)) {
     rays_.resize(kAmbientRays);
   }
 
@@ -158,9 +150,25 @@ void bakeLight(Scene* scene, const RayTracer& tracer, int threads, double spacin
       completeChart(c, valid, light);
     }
   };
+  std::atomic<std::size_t> next_vertex{0};
+  const auto workOnMesh = [&] {
+    constexpr std::size_t kBatch = 256;
+    Baker baker(*scene, tracer);
+    for (std::size_t first = next_vertex.fetch_add(kBatch); first < scene->vertices.size();
+         first = next_vertex.fetch_add(kBatch))
+      for (std::size_t i = first; i < std::min(first + kBatch, scene->vertices.size()); ++i) {
+        MeshVertex& v = scene->vertices[i];
+        v.light = baker.at(v.p, v.n, std::abs(v.n.z) < 0.9f ? Vec3{0, 0, 1} : Vec3{1, 0, 0});
+      }
+  };
   std::vector<std::thread> pool;
-  for (int i = 1; i < threads; ++i) pool.emplace_back(work);
+  for (int i = 1; i < threads; ++i)
+    pool.emplace_back([&] {
+      work();
+      workOnMesh();
+    });
   work();
+  workOnMesh();
   for (std::thread& t : pool) t.join();
 }
 

@@ -54,7 +54,7 @@ struct Packet<16> {
 };
 
 template <int N>
-void trace(RTCScene scene, RayBatch* rays, std::size_t n, float near, bool coherent) {
+void trace(RTCScene scene, int pieces, RayBatch* rays, std::size_t n, float near, bool coherent) {
   Query query = makeQuery(coherent);
   typename Packet<N>::Type packet;
   alignas(64) int valid[N];
@@ -81,8 +81,11 @@ void trace(RTCScene scene, RayBatch* rays, std::size_t n, float near, bool coher
     Packet<N>::call(valid, scene, &query, &packet);
     for (int k = 0; k < count; ++k) {
       rays->t[i + k] = packet.ray.tfar[k];
-      rays->piece[i + k] =
-          packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(packet.hit.primID[k] / 2);
+      // Pieces are two primitives each, triangles of a mesh, which follow them, one.
+      const int hit = static_cast<int>(packet.hit.primID[k]);
+      rays->piece[i + k] = packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID ? -1
+                           : hit < 2 * pieces                              ? hit / 2
+                                                                           : hit - pieces;
     }
   }
 }
@@ -107,7 +110,7 @@ void RayBatch::set(std::size_t i, const Vec3& o, const Vec3& d, float far) {
 struct RayTracer::Impl {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  int width = 4;
+  int width = 4, pieces = 0;
   ~Impl() {
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
@@ -126,11 +129,12 @@ RayTracer::RayTracer(const Scene& scene) : impl_(new Impl) {
   rtcSetSceneBuildQuality(impl_->scene, RTC_BUILD_QUALITY_HIGH);
   rtcSetSceneFlags(impl_->scene, RTC_SCENE_FLAG_ROBUST);
   RTCGeometry mesh = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  const std::size_t n = scene.pieces.size();
-  auto* vertex = static_cast<float*>(
-      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 4 * n));
+  const std::size_t n = scene.pieces.size(), meshed = scene.triangles.size();
+  impl_->pieces = static_cast<int>(n);
+  auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                             3 * sizeof(float), 4 * n + scene.vertices.size()));
   auto* index = static_cast<unsigned*>(
-      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), 2 * n));
+      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), 2 * n + meshed));
   if (!vertex || !index)
     throw std::runtime_error("Embree: no buffers (error " + std::to_string(rtcGetDeviceError(impl_->device)) + ")");
   for (std::size_t i = 0; i < n; ++i) {
@@ -146,6 +150,13 @@ RayTracer::RayTracer(const Scene& scene) : impl_(new Impl) {
     const unsigned base = static_cast<unsigned>(4 * i);
     for (unsigned k : {0u, 1u, 2u, 0u, 2u, 3u}) *index++ = base + k;
   }
+  for (const MeshVertex& v : scene.vertices) {
+    *vertex++ = v.p.x;
+    *vertex++ = v.p.y;
+    *vertex++ = v.p.z;
+  }
+  for (const MeshTriangle& t : scene.triangles)
+    for (int v : t.vertex) *index++ = static_cast<unsigned>(4 * n) + static_cast<unsigned>(v);
   rtcCommitGeometry(mesh);
   rtcAttachGeometry(impl_->scene, mesh);
   rtcReleaseGeometry(mesh);
@@ -160,11 +171,11 @@ RayTracer::~RayTracer() = default;
 
 void RayTracer::intersect(RayBatch* rays, std::size_t n, float near, bool coherent) const {
   if (impl_->width == 16)
-    trace<16>(impl_->scene, rays, n, near, coherent);
+    trace<16>(impl_->scene, impl_->pieces, rays, n, near, coherent);
   else if (impl_->width == 8)
-    trace<8>(impl_->scene, rays, n, near, coherent);
+    trace<8>(impl_->scene, impl_->pieces, rays, n, near, coherent);
   else
-    trace<4>(impl_->scene, rays, n, near, coherent);
+    trace<4>(impl_->scene, impl_->pieces, rays, n, near, coherent);
 }
 
 float RayTracer::clearance(const Vec3& point, float radius) const {

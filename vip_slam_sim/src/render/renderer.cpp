@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_sim/rng.h"
 #include "vip_slam_sim/scene/vec_eigen.h"
 
 namespace vip_slam {
@@ -18,6 +19,10 @@ inline float coverage(float u, float f, float a, float b) {
 constexpr float kSamples[6][2] = {{-0.417f, -0.083f}, {-0.25f, 0.417f}, {-0.083f, -0.25f},
                                   {0.083f, 0.25f},    {0.25f, -0.417f}, {0.417f, 0.083f}};
 constexpr int kSampleCount = 6;
+
+constexpr float kRoughness = 0.01f;    ///< rad; mirrored directions are spread by this
+constexpr float kFaintest = 0.004f;    ///< weaker reflections are left out
+constexpr float kReflectance = 0.04f;  ///< of a polished surface at right angles (glass, varnish)
 
 }  // namespace
 
@@ -39,8 +44,13 @@ struct Renderer::Ray {
 };
 
 Renderer::Renderer(std::shared_ptr<const Scene> scene, std::shared_ptr<const RayTracer> tracer,
-                   std::shared_ptr<const CameraModel> camera)
+                   std::shared_ptr<const CameraModel> camera, double gloss)
     : scene_(std::move(scene)), tracer_(std::move(tracer)), camera_(std::move(camera)) {
+  if (gloss > 0)
+    for (std::size_t i = 0; i < scene_->charts.size(); ++i) {
+      const double shine = Rng(i * 7717 + 3).uniform();
+      gloss_.push_back(static_cast<float>(gloss * shine * shine));  // most surfaces are dull
+    }
   const int w = camera_->width(), h = camera_->height();
   for (int v = 0; v < h; ++v)
     for (int u = 0; u < w; ++u) {
@@ -51,14 +61,35 @@ Renderer::Renderer(std::shared_ptr<const Scene> scene, std::shared_ptr<const Ray
     }
 }
 
+/// Light at a point of a piece, at (u, v) of its chart.
+Vec4 Renderer::lightOn(int piece, const Vec3& p, float u, float v) const {
+  if (const MeshTriangle* t = scene_->triangleOf(piece)) {
+    const MeshVertex &a = scene_->vertices[t->vertex[0]], &b = scene_->vertices[t->vertex[1]];
+    const MeshVertex& c = scene_->vertices[t->vertex[2]];
+    const Vec3 twice = cross(b.p - a.p, c.p - a.p);  // barycentric coordinates by areas
+    const float whole = std::max(dot(twice, twice), 1e-20f);
+    const float fb = std::clamp(dot(cross(p - a.p, c.p - a.p), twice) / whole, 0.f, 1.f);
+    const float fc = std::clamp(dot(cross(b.p - a.p, p - a.p), twice) / whole, 0.f, 1.f);
+    return a.light + (b.light - a.light) * splat(fb) + (c.light - a.light) * splat(fc);
+  }
+  const Chart& c = scene_->charts[scene_->chartOf(piece)];
+  const float gu = std::clamp(u / c.su, 0.f, 1.f) * static_cast<float>(c.light_w - 1);
+  const float gv = std::clamp(v / c.sv, 0.f, 1.f) * static_cast<float>(c.light_h - 1);
+  const int x0 = std::min(static_cast<int>(gu), c.light_w - 2), y0 = std::min(static_cast<int>(gv), c.light_h - 2);
+  const Vec4* l = scene_->light.data() + c.light_offset + static_cast<std::ptrdiff_t>(y0) * c.light_w + x0;
+  const Vec4 fx = splat(gu - static_cast<float>(x0)), fy = splat(gv - static_cast<float>(y0));
+  const Vec4 top = l[0] + (l[1] - l[0]) * fx, bottom = l[c.light_w] + (l[c.light_w + 1] - l[c.light_w]) * fx;
+  return top + (bottom - top) * fy;
+}
+
 Vec4 Renderer::shade(int piece, float t, const Ray& ray) const {
-  const Chart& c = scene_->charts[scene_->pieces[piece].chart];
-  const Vec3 p = ray.o + ray.d * t - c.o;
+  const Chart& c = scene_->charts[scene_->chartOf(piece)];
+  const Vec3 hit = ray.o + ray.d * t, p = hit - c.o, n = scene_->normalOf(piece);
   const float u = dot(p, c.eu), v = dot(p, c.ev);
   // The pixel's footprint: dp = t (dd - d (n.dd)/(n.d)).
-  float nd = dot(c.n, ray.d);
+  float nd = dot(n, ray.d);
   if (std::abs(nd) < 1e-3f) nd = nd < 0 ? -1e-3f : 1e-3f;
-  const float fr = dot(c.n, ray.right) / nd, fd = dot(c.n, ray.down) / nd;
+  const float fr = dot(n, ray.right) / nd, fd = dot(n, ray.down) / nd;
   const float ud = dot(c.eu, ray.d), vd = dot(c.ev, ray.d);
   const float ux = t * (dot(c.eu, ray.right) - ud * fr), vx = t * (dot(c.ev, ray.right) - vd * fr);
   const float uy = t * (dot(c.eu, ray.down) - ud * fd), vy = t * (dot(c.ev, ray.down) - vd * fd);
@@ -91,13 +122,7 @@ Vec4 Renderer::shade(int piece, float t, const Ray& ray) const {
     }
   }
 
-  const float gu = std::clamp(u / c.su, 0.f, 1.f) * static_cast<float>(c.light_w - 1);
-  const float gv = std::clamp(v / c.sv, 0.f, 1.f) * static_cast<float>(c.light_h - 1);
-  const int x0 = std::min(static_cast<int>(gu), c.light_w - 2), y0 = std::min(static_cast<int>(gv), c.light_h - 2);
-  const Vec4* l = scene_->light.data() + c.light_offset + static_cast<std::ptrdiff_t>(y0) * c.light_w + x0;
-  const Vec4 fx = splat(gu - static_cast<float>(x0)), fy = splat(gv - static_cast<float>(y0));
-  const Vec4 top = l[0] + (l[1] - l[0]) * fx, bottom = l[c.light_w] + (l[c.light_w + 1] - l[c.light_w]) * fx;
-  return colour * colour * (top + (bottom - top) * fy) + splat(emission);
+  return colour * colour * lightOn(piece, hit, u, v) + splat(emission);
 }
 
 void Renderer::cast(const std::function<SE3(int)>& row_pose, bool rolling, bool shading, FrameBuffers* out) const {
@@ -139,13 +164,14 @@ void Renderer::cast(const std::function<SE3(int)>& row_pose, bool rolling, bool 
       }
       depth = rays.t[i];
       const Vec3 d{rays.dx[i], rays.dy[i], rays.dz[i]};
-      grazing = std::abs(dot(d, scene_->charts[scene_->pieces[piece].chart].n)) / length(d);
+      grazing = std::abs(dot(d, scene_->normalOf(piece))) / length(d);
       if (!shading) continue;
       const Ray ray{rows[v].o, d, rows[v].x * step_x, rows[v].y * step_y};
       *reinterpret_cast<Vec4*>(out->radiance.ptr<float>(v) + 4 * (at % w)) = shade(piece, rays.t[i], ray);
     }
   }
   if (shading) antialias(rows, out);
+  if (shading && !gloss_.empty()) addReflections(rows, out);
 }
 
 void Renderer::antialias(const std::vector<RowFrame>& rows, FrameBuffers* out) const {
@@ -154,7 +180,7 @@ void Renderer::antialias(const std::vector<RowFrame>& rows, FrameBuffers* out) c
   const float step_y = 1.f / static_cast<float>(camera_->intrinsics().fy);
   const auto chart = [&](int v, int u) {
     const int piece = out->piece.at<int>(v, u);
-    return piece < 0 ? -1 : scene_->pieces[piece].chart;
+    return piece < 0 ? -1 : scene_->chartOf(piece);
   };
   std::vector<int> edge;
   std::vector<int> above(w, -2), here(w);
@@ -195,12 +221,55 @@ void Renderer::antialias(const std::vector<RowFrame>& rows, FrameBuffers* out) c
   }
 }
 
+void Renderer::addReflections(const std::vector<RowFrame>& rows, FrameBuffers* out) const {
+  const int w = camera_->width(), h = camera_->height();
+  const float step = 1.f / static_cast<float>(camera_->intrinsics().fx);
+  RayBatch rays;
+  rays.resize(w);
+  std::vector<int> column(w);
+  std::vector<float> weight(w);
+  for (int v = 0; v < h; ++v) {
+    std::size_t count = 0;
+    for (int u = 0; u < w; ++u) {
+      const int piece = out->piece.at<int>(v, u);
+      if (piece < 0) continue;
+      const float away = 1 - out->grazing.at<float>(v, u);
+      const float fresnel = kReflectance + (1 - kReflectance) * away * away * away * away * away;
+      weight[count] = gloss_[scene_->chartOf(piece)] * fresnel;
+      if (weight[count] < kFaintest) continue;
+      const Vec3 d = rows[v].direction(x_[v * w + u], y_[v * w + u]), n = scene_->normalOf(piece);
+      const Vec3 mirrored = d - n * (2 * dot(n, d));
+      rays.set(count, rows[v].o + d * out->depth.at<float>(v, u), mirrored);
+      column[count++] = u;
+    }
+    tracer_->intersect(&rays, count, 5e-3f, false);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (rays.piece[i] < 0) continue;
+      const int u = column[i];
+      const Vec3 n = scene_->normalOf(out->piece.at<int>(v, u));
+      const float t = rays.t[i];
+      const float spread = (out->depth.at<float>(v, u) + t) / t * step + kRoughness;
+      const auto mirror = [&](const Vec3& a) { return (a - n * (2 * dot(n, a))) * spread; };
+      auto* to = reinterpret_cast<Vec4*>(out->radiance.ptr<float>(v) + 4 * u);
+      *to += splat(weight[i]) * shade(rays.piece[i], t,
+                                      {{rays.ox[i], rays.oy[i], rays.oz[i]},
+                                       {rays.dx[i], rays.dy[i], rays.dz[i]},
+                                       mirror(rows[v].x),
+                                       mirror(rows[v].y)});
+    }
+  }
+}
+
 void Renderer::render(const std::function<SE3(int row)>& row_pose, bool rolling, FrameBuffers* out) const {
   cast(row_pose, rolling, true, out);
 }
 
 void Renderer::render(const SE3& T_W_C, FrameBuffers* out) const {
   cast([&](int) { return T_W_C; }, false, true, out);
+}
+
+void Renderer::renderDepth(const std::function<SE3(int row)>& row_pose, bool rolling, FrameBuffers* out) const {
+  cast(row_pose, rolling, false, out);
 }
 
 void Renderer::renderDepth(const SE3& T_W_C, FrameBuffers* out) const {

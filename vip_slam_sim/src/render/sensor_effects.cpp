@@ -15,7 +15,13 @@ constexpr std::size_t kMargin = 1 << 14;  ///< longest run of deviates read from
 
 SensorEffects::SensorEffects(const EffectOptions& effects, const DepthOptions& depth, const CameraModel& camera,
                              int seed)
-    : effects_(effects), depth_(depth), camera_(camera), seed_(static_cast<std::uint64_t>(seed)) {
+    : effects_(effects),
+      depth_(depth),
+      camera_(camera),
+      steps_(camera.intrinsics().fx * depth.disparity_baseline, depth.disparity_step),
+      coarse_(depth.coarse),
+      jpeg_(effects.jpeg),
+      seed_(static_cast<std::uint64_t>(seed)) {
   Rng rng(seed_ * 31 + 1);
   gauss_.reserve(kTable + kMargin);
   for (std::size_t i = 0; i < kTable + kMargin; ++i) gauss_.push_back(static_cast<float>(rng.gauss()));
@@ -33,8 +39,9 @@ const float* SensorEffects::noise(std::uint64_t key) const {
   return gauss_.data() + rng.next() % kTable;
 }
 
-void SensorEffects::motionBlur(const CameraTwist& twist, FrameBuffers* frame) const {
-  if (!effects_.motion_blur || effects_.exposure_time <= 0) return;
+void SensorEffects::motionBlur(const CameraTwist& twist, double t, FrameBuffers* frame) const {
+  const double exposure_time = exposure(t).time;
+  if (!effects_.motion_blur || exposure_time <= 0) return;
   const int w = camera_.width(), h = camera_.height();
   const auto& k = camera_.intrinsics();
   cv::Mat out(h, w, CV_32FC4);
@@ -48,7 +55,7 @@ void SensorEffects::motionBlur(const CameraTwist& twist, FrameBuffers* frame) co
       const double iz = depth[x] > 0 ? 1.0 / depth[x] : 0.0;
       const double dx = (-v.x() + a * v.z()) * iz - o.y() + b * o.z() + a * (a * -o.y() + b * o.x());
       const double dy = (-v.y() + b * v.z()) * iz + o.x() - a * o.z() + b * (b * o.x() - a * o.y());
-      const double fx = dx * k.fx * effects_.exposure_time, fy = dy * k.fy * effects_.exposure_time;
+      const double fx = dx * k.fx * exposure_time, fy = dy * k.fy * exposure_time;
       const int taps = std::min(24, 1 + static_cast<int>(std::hypot(fx, fy)));
       Vec4 sum = splat(0);
       for (int i = 0; i < taps; ++i) {
@@ -67,19 +74,24 @@ void SensorEffects::motionBlur(const CameraTwist& twist, FrameBuffers* frame) co
   frame->radiance = out;
 }
 
-double SensorEffects::gain(double t) const {
+Exposure SensorEffects::exposure(double t) const {
   const double phase = static_cast<double>(seed_ % 17);
   const double drift = 0.65 * std::sin(2 * M_PI * t / 19.0 + phase) + 0.35 * std::sin(2 * M_PI * t / 7.3 + 2 * phase);
   // The exposure alternates between two levels; the seed selects the first.
   const auto jumps = static_cast<long>(std::floor(t / effects_.exposure_jump_interval)) + static_cast<long>(seed_ % 2);
   const double level = std::pow(effects_.exposure_jump, jumps % 2 == 0 ? 0.5 : -0.5);
-  return effects_.exposure * level * (1 + effects_.exposure_drift * drift);
+  Exposure e{effects_.exposure, 1, effects_.exposure_time};
+  if (control_) e = control_->at(t);
+  e.gain *= level * (1 + effects_.exposure_drift * drift);
+  return e;
 }
 
 cv::Mat SensorEffects::colour(const FrameBuffers& frame, int index, double t) const {
   const int w = camera_.width(), h = camera_.height();
-  const auto gain = static_cast<float>(this->gain(t));
-  const auto read = static_cast<float>(effects_.read_noise), shot = static_cast<float>(effects_.shot_noise);
+  const Exposure exposed = exposure(t);
+  const auto gain = static_cast<float>(exposed.gain), more = static_cast<float>(exposed.noise);
+  const float read = more * static_cast<float>(effects_.read_noise);
+  const float shot = more * static_cast<float>(effects_.shot_noise);
   cv::Mat out(h, w, CV_8UC3);
   std::vector<float> line(4 * static_cast<std::size_t>(w));
   for (int v = 0; v < h; ++v) {
@@ -95,6 +107,7 @@ cv::Mat SensorEffects::colour(const FrameBuffers& frame, int index, double t) co
     for (int u = 0; u < w; ++u)
       for (int c = 0; c < 3; ++c) to[3 * u + c] = static_cast<unsigned char>(line[4 * u + c]);
   }
+  jpeg_.apply(&out);
   return out;
 }
 
@@ -105,18 +118,21 @@ cv::Mat SensorEffects::depth(const FrameBuffers& frame, const cv::Mat& brightnes
   const auto near = static_cast<float>(depth_.min_range), far = static_cast<float>(depth_.max_range);
   const bool hard = depth_.dropout > 0 || depth_.edge_hole > 0 || depth_.grazing_limit > 0 || depth_.dark_limit > 0;
   const std::uint64_t key = (static_cast<std::uint64_t>(index) + 1) * 8192 + 4096;
-  const auto wiggle = static_cast<float>(depth_.bias_amplitude);
+  const auto wiggle = static_cast<float>(depth_.bias_amplitude), white = static_cast<float>(depth_.white);
   for (int v = 0; v < h; ++v) {
     const float* in = frame.depth.ptr<float>(v);
     auto* to = out.ptr<std::uint16_t>(v);
     const float* g = noise(key + v);
     for (int u = 0; u < w; ++u) {
       const float z = in[u];
-      const float m = z + (a + (b + c * z) * z) * g[u] + wiggle * std::sin(4.1f * z);
+      const float m = steps_(z + white * (a + (b + c * z) * z) * g[u] + wiggle * std::sin(4.1f * z));
       to[u] = z >= near && z <= far && m > 0 ? static_cast<std::uint16_t>(std::min(m * 1000.f + 0.5f, 65535.f)) : 0;
     }
   }
-  if (!hard) return out;
+  if (!hard) {
+    coarse_.apply(&out);
+    return out;
+  }
 
   // Missing depth: drop-outs in clumps of about 3 px; increasing loss at edges, grazing angles and on dark surfaces.
   Rng rng(seed_ * 77003 + key);
@@ -153,6 +169,7 @@ cv::Mat SensorEffects::depth(const FrameBuffers& frame, const cv::Mat& brightnes
       }
       if (gone) mm = 0;
     }
+  coarse_.apply(&out);
   return out;
 }
 

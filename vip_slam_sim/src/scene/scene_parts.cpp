@@ -1,5 +1,7 @@
 #include "scene_parts.h"
 
+#include "scanned_room.h"
+
 #include <cmath>
 #include <stdexcept>
 
@@ -131,9 +133,10 @@ Scene buildScene(const std::string& name) {
   if (name == "gallery") return buildGallery();
   if (name == "workshop") return buildWorkshop();
   if (name == "foyer") return buildFoyer();
+  if (isScanFile(name)) return buildScannedRoom(name);
   std::string known;
   for (const std::string& n : sceneNames()) known += (known.empty() ? "" : ", ") + n;
-  throw std::invalid_argument("scene '" + name + "' is not known, expected one of: " + known);
+  throw std::invalid_argument("scene '" + name + "' is not known, expected a scanned room (.json) or one of: " + known);
 }
 
 }  // namespace vip_slam

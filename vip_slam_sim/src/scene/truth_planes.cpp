@@ -23,6 +23,7 @@ struct SurfaceRect {
 std::vector<SurfaceRect> surfaceRects(const Scene& scene, const Surface& surface) {
   const Chart& f = scene.charts[surface.frame_chart];
   std::vector<SurfaceRect> rects;
+  if (surface.pieces.empty()) rects.push_back({0, 0, f.su, f.sv});
   for (int index : surface.pieces) {
     const Piece& piece = scene.pieces[index];
     const Chart& c = scene.charts[piece.chart];
@@ -193,7 +194,7 @@ void VisibilityCounter::add(const FrameBuffers& frame, const CameraModel& camera
       ++samples;
       const int piece = frame.piece.at<int>(v, u);
       if (piece < 0) continue;
-      const int surface = scene_->charts[scene_->pieces[piece].chart].surface;
+      const int surface = scene_->surfaceOf(piece);
       const float z = frame.depth.at<float>(v, u);
       if (surface < 0 || z > max_depth) continue;
       ++counts[surface];

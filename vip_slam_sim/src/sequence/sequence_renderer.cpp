@@ -28,7 +28,7 @@ SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions
       trajectory_(makeMotion(spec.motion, spec.T_imu_cam(), spec.seed)),
       imu_(synthesiseImu(trajectory_, spec.imu, spec.seed, sensor_.gravity)) {
   options_.threads = std::max(1, options_.threads);
-  camera_ = makeCamera(sensor_.camera);
+  camera_ = makeCamera(spec.trueCamera());
   auto scene = std::make_shared<Scene>(buildScene(spec.scene));
   tracer_ = std::make_shared<RayTracer>(*scene);
   scene_ = scene;
@@ -45,15 +45,20 @@ SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions
     }
   }
   bakeLight(scene.get(), *tracer_, options_.threads, options_.light_spacing_scale);
-  renderer_ = std::make_unique<Renderer>(scene_, tracer_, camera_);
-  if (spec.depth.separate())
-    depth_renderer_ =
-        std::make_unique<Renderer>(scene_, tracer_, spec.depth.registered ? camera_ : makeCamera(sensor_.depth_camera));
+  renderer_ = std::make_unique<Renderer>(scene_, tracer_, camera_, spec.effects.gloss);
+  // Depth that is registered lies where the calibration says that the colour camera sees it.
+  if (spec.depthApart())
+    depth_renderer_ = std::make_unique<Renderer>(
+        scene_, tracer_, makeCamera(spec.depth.registered ? sensor_.camera : sensor_.depth_camera));
   passers_ = std::make_unique<PassersBy>(
       spec.passers,
       [this](double t) { return trajectory_.at(std::clamp(t, 0.0, trajectory_.end())).T_W_I * sensor_.T_imu_cam; },
       spec.seed);
   effects_ = std::make_unique<SensorEffects>(spec.effects, spec.depth, *camera_, spec.seed);
+  if (spec.effects.auto_exposure) effects_->setAutoExposure(meterExposure());
+  shared_error_ = std::make_unique<SharedDepthError>(spec.depth, spec.seed);
+  multipath_ = std::make_unique<Multipath>(spec.depth.multipath, scene_, tracer_);
+  fattening_ = std::make_unique<EdgeFattening>(spec.depth.fattening, spec.seed);
   visibility_ = std::make_unique<VisibilityCounter>(scene_);
   const double usable = trajectory_.end() - 2 * kMargin - std::abs(spec.imu.time_offset) - spec.effects.rolling_shutter;
   if (usable <= 0)
@@ -64,6 +69,34 @@ SequenceRenderer::SequenceRenderer(const SequenceSpec& spec, const RenderOptions
 }
 
 SequenceRenderer::~SequenceRenderer() = default;
+
+std::shared_ptr<const AutoExposure> SequenceRenderer::meterExposure() const {
+  CameraIntrinsics small = sensor_.camera;
+  const double shrink = 32.0 / small.width;
+  small.width = 32;
+  small.height = std::max(2, static_cast<int>(std::lround(small.height * shrink)));
+  for (double* k : {&small.fx, &small.fy, &small.cx, &small.cy}) *k *= shrink;
+  const Renderer meter(scene_, tracer_, makeCamera(small));
+  std::vector<double> brightness;
+  FrameBuffers seen;
+  for (double t = 0; t <= trajectory_.end(); t += AutoExposure::kStep) {
+    meter.render(trajectory_.at(t).T_W_I * sensor_.T_imu_cam, &seen);
+    const cv::Scalar mean = cv::mean(cv::min(seen.radiance, 1.0));
+    brightness.push_back((mean[0] + mean[1] + mean[2]) / 3);
+  }
+  return std::make_shared<AutoExposure>(brightness, spec_.effects.exposure, spec_.effects.exposure_time);
+}
+
+cv::Mat SequenceRenderer::measuredDepth(int index, double t, const SE3& T_W_D, const FrameBuffers& seen,
+                                        const cv::Mat& brightness, const Renderer& renderer) const {
+  FrameBuffers measured = seen;
+  if (!shared_error_->none() || spec_.depth.multipath > 0 || spec_.depth.fattening > 0) {
+    measured.depth = shared_error_->apply(seen, *scene_, t);
+    multipath_->apply(renderer, seen, T_W_D, &measured.depth);
+    fattening_->apply(t, &measured.depth);
+  }
+  return effects_->depth(measured, brightness, index);
+}
 
 double SequenceRenderer::leastClearance(double* when) const {
   double least = 1e9;
@@ -127,12 +160,17 @@ SimFrame SequenceRenderer::renderFrame(int index) const {
     twist.omega_C = R_C_I * m.omega_I;
     const Eigen::Vector3d v_I = m.T_W_I.rotation().conjugate() * m.v_W + m.omega_I.cross(sensor_.T_imu_cam.t());
     twist.v_C = R_C_I * v_I;
-    effects_->motionBlur(twist, &f.exact);
+    effects_->motionBlur(twist, t, &f.exact);
   }
   f.rgb = effects_->colour(f.exact, index, t);
   f.depth_stamp_ns = toNanoseconds(t - spec_.imu.time_offset + spec_.depth.lag);
-  if (!spec_.depth.separate()) {
-    f.depth = effects_->depth(f.exact, f.rgb, index);
+  if (!spec_.depthApart()) {
+    f.depth = measuredDepth(index, t, f.T_W_C, f.exact, f.rgb, *renderer_);
+  } else if (!spec_.depth.separate()) {
+    FrameBuffers own;
+    depth_renderer_->renderDepth(row_pose, readout > 0, &own);
+    passers_->draw(*depth_renderer_, t, row_pose, &own);
+    f.depth = measuredDepth(index, t, f.T_W_C, own, f.rgb, *depth_renderer_);
   } else {
     FrameBuffers own;
     const double t_depth = t + spec_.depth.lag;
@@ -140,7 +178,9 @@ SimFrame SequenceRenderer::renderFrame(int index) const {
     depth_renderer_->renderDepth(T_W_D, &own);
     passers_->draw(
         *depth_renderer_, t_depth, [&](int) { return T_W_D; }, &own);
-    f.depth = effects_->depth(own, cv::Mat(), index);
+    // A few milliseconds apart, colour still shows which surfaces are dark.
+    const cv::Mat brightness = spec_.depth.registered ? f.rgb : cv::Mat();
+    f.depth = measuredDepth(index, t_depth, T_W_D, own, brightness, *depth_renderer_);
   }
   return f;
 }

@@ -1,18 +1,22 @@
 #include "vip_slam_sim/sequence/sequence_spec.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
 
 #include <yaml-cpp/yaml.h>
 
 #include "vip_slam_sim/scene/scene.h"
+#include "vip_slam_sim/sequence/camera_model_error.h"
 
 namespace vip_slam {
 
 void MotionOptions::visit(OptionVisitor& v) {
   v.field("type", type, {"path", "orbit", "rotate", "still", "file"}, "kind of motion");
   v.field("waypoints", waypoints, {}, "path: 'x,y[,z]; ...', with 'turn DEGREES' and 'pause SECONDS' in between, m");
+  v.field("vibration", vibration, {"none", "rotors", "hand"},
+          "fast shake of body, camera and IMU, as measured on a drone and a phone");
   v.field("style", style, {"handheld", "drone", "smooth"}, "what shakes the camera");
   v.field("file", file, {}, "file: TUM or EuRoC poses of the body");
   v.field("duration", duration, 0, 3600, "length, s; 0: as long as the path or file");
@@ -52,6 +56,8 @@ void CameraOptions::visit(OptionVisitor& v) {
   v.field("k3", k3, -2, 2, "distortion");
   v.field("k4", k4, -2, 2, "distortion (equidistant)");
   v.field("rate", rate, 0.5, 120, "images per second");
+  v.field("model_error", model_error, 0, 10,
+          "how far the true camera is from the stated one, root mean square over the image, px");
 }
 
 CameraIntrinsics CameraOptions::intrinsics() const {
@@ -80,7 +86,22 @@ void DepthOptions::visit(OptionVisitor& v) {
   v.field("edge_hole", edge_hole, 0, 1, "chance that a pixel beside a depth edge is lost or flies between");
   v.field("grazing_limit", grazing_limit, 0, 1, "readings fade out below this cosine of ray and normal");
   v.field("dark_limit", dark_limit, 0, 1, "readings fade out below this brightness");
+  v.field("bias_floor", bias_floor, 0, 0.1, "stated in the sensor file: least error that a surface's pixels share, m");
   v.field("bias_amplitude", bias_amplitude, 0, 0.1, "cyclic distance error (ToF wiggling), m");
+  v.field("white", white, 0, 10, "the noise that pixels do not share, in sigmas");
+  v.field("scale", scale, 0.5, 2, "readings over true depth");
+  v.field("offset", offset, -1, 1, "added to readings, m");
+  v.field("surface_error", surface_error, 0, 20,
+          "error that a surface has as a whole in an image, in sigmas; it grows with incidence");
+  v.field("warp", warp, 0, 20, "error that changes over the image and with time, in sigmas");
+  v.field("fixed_warp", fixed_warp, 0, 20, "error that changes over the image and stays, in sigmas");
+  v.field("shared_px", shared_px, 2, 10000, "warps: correlation falls to 1/e over so many px");
+  v.field("shared_time", shared_time, 0.01, 1000, "surface_error, warp: correlation falls to 1/e within, s");
+  v.field("disparity_step", disparity_step, 0, 4, "steps of the disparity behind the depth, px; 0: none");
+  v.field("disparity_baseline", disparity_baseline, 0.005, 1, "between the two eyes, or eye and projector, m");
+  v.field("fattening", fattening, 0, 20, "foreground grows over the background by up to so many px");
+  v.field("coarse", coarse, 1, 8, "depth is measured at every so many px and blended in between");
+  v.field("multipath", multipath, 0, 1, "time of flight: reflectance of surfaces by which light makes a detour");
   v.field("registered", registered, "depth pixels belong to the colour camera");
   v.field("baseline", baseline, 0, 0.2, "not registered: depth camera to the left of the colour camera, m");
   v.field("lag", lag, -0.05, 0.05, "depth is taken so much later than colour, by a global shutter, s");
@@ -92,15 +113,25 @@ void ImuOptions::visit(OptionVisitor& v) {
   v.field("gyro_random_walk", gyro_random_walk, 0, 1, "rad/s^2/sqrt(Hz)");
   v.field("accel_noise_density", accel_noise_density, 0, 1, "m/s^2/sqrt(Hz)");
   v.field("accel_random_walk", accel_random_walk, 0, 1, "m/s^3/sqrt(Hz)");
+  v.field("stated_noise", stated_noise, 0.01, 100, "noise densities in the sensor file over the sensor's own");
   v.field("gyro_bias", gyro_bias, 0, 1, "initial bias per axis, one sigma, rad/s");
   v.field("accel_bias", accel_bias, 0, 5, "initial bias per axis, one sigma, m/s^2");
   v.field("scale_error", scale_error, 0, 0.2, "scale error per axis, one sigma");
   v.field("misalignment", misalignment, 0, 0.2, "what one axis measures of another, one sigma, rad");
+  v.field("gyro_drift", gyro_drift, 0, 1, "bias that comes with warming up, per axis, one sigma, rad/s");
+  v.field("accel_drift", accel_drift, 0, 5, "bias that comes with warming up, per axis, one sigma, m/s^2");
+  v.field("warm_up", warm_up, 1, 10000, "time constant of warming up, s");
+  v.field("g_sensitivity", g_sensitivity, 0, 0.1,
+          "what the gyro measures of specific force, one sigma, rad/s per m/s^2");
+  v.field("present", present, "false: no IMU, the body is the camera");
   v.field("time_offset", time_offset, -0.5, 0.5, "t_imu = t_image + time_offset, s");
 }
 
 void EffectOptions::visit(OptionVisitor& v) {
-  v.field("exposure", exposure, 0.05, 20, "gain of the image");
+  v.field("auto_exposure", auto_exposure,
+          "exposure follows the scene, late by a third of a second; exposure_time is the longest, gain and noise do "
+          "the rest");
+  v.field("exposure", exposure, 0.05, 20, "gain of the image at exposure_time");
   v.field("exposure_drift", exposure_drift, 0, 0.5, "slow change of gain, amplitude");
   v.field("exposure_jump", exposure_jump, 1, 10, "gain before over gain after a sudden change, or the other way");
   v.field("exposure_jump_interval", exposure_jump_interval, 0.05, 1000, "between sudden changes of gain, s");
@@ -109,6 +140,8 @@ void EffectOptions::visit(OptionVisitor& v) {
   v.field("shot_noise", shot_noise, 0, 30, "one sigma added in white, grey levels");
   v.field("exposure_time", exposure_time, 0, 0.1, "s; sets motion blur");
   v.field("motion_blur", motion_blur, "blur along the optical flow");
+  v.field("gloss", gloss, 0, 1, "how much of a polished surface's reflections the shiniest surfaces have");
+  v.field("jpeg", jpeg, 0, 100, "quality of the JPEG that the image went through; 0: none");
   v.field("rolling_shutter", rolling_shutter, 0, 0.1, "time from first to last row, s; 0: global shutter");
 }
 
@@ -124,7 +157,11 @@ void PasserOptions::visit(OptionVisitor& v) {
 }
 
 void SequenceSpec::visit(OptionVisitor& v) {
-  v.field("scene", scene, sceneNames(), "scene to fly through");
+  std::string scenes =
+      "scene to fly through, or the file of a scanned room (.json; beside the sequence's file, or $NAME/... by a "
+      "variable of the environment):";
+  for (const std::string& known : sceneNames()) scenes += " " + known;
+  v.field("scene", scene, {}, scenes);
   v.field("seed", seed, 0, 1000000, "of all noise");
   v.field("start_time", start_time, 0, 4e9, "stamp of the trajectory's start, s");
   v.group("motion", motion);
@@ -136,7 +173,12 @@ void SequenceSpec::visit(OptionVisitor& v) {
 }
 
 SE3 SequenceSpec::T_imu_cam() const {
+  if (!imu.present) return SE3();
   return SE3(expQuaternion(Eigen::Vector3d(0.010, -0.018, 0.014)), Eigen::Vector3d(0.021, -0.008, 0.012));
+}
+
+CameraIntrinsics SequenceSpec::trueCamera() const {
+  return CameraModelError(camera.model_error, seed).trueCamera(camera.intrinsics());
 }
 
 SensorConfig SequenceSpec::sensorConfig() const {
@@ -146,7 +188,7 @@ SensorConfig SequenceSpec::sensorConfig() const {
   s.topics.color_info = "/camera/color/camera_info";
   s.topics.depth = depth.registered ? "/camera/aligned_depth_to_color/image_raw" : "/camera/depth/image_rect_raw";
   s.topics.depth_info = depth.registered ? "/camera/aligned_depth_to_color/camera_info" : "/camera/depth/camera_info";
-  s.topics.imu = "/camera/imu";
+  if (imu.present) s.topics.imu = "/camera/imu";
   s.depth_registered = depth.registered;
   s.color_rate = s.depth_rate = camera.rate;
   s.imu_rate = imu.rate;
@@ -161,15 +203,16 @@ SensorConfig SequenceSpec::sensorConfig() const {
     s.T_color_depth = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-depth.baseline, 0, 0));
   }
   s.T_imu_cam = T_imu_cam();
-  s.imu_noise.gyro_noise_density = imu.gyro_noise_density;
+  s.imu_noise.gyro_noise_density = imu.stated_noise * imu.gyro_noise_density;
   s.imu_noise.gyro_random_walk = imu.gyro_random_walk;
-  s.imu_noise.accel_noise_density = imu.accel_noise_density;
+  s.imu_noise.accel_noise_density = imu.stated_noise * imu.accel_noise_density;
   s.imu_noise.accel_random_walk = imu.accel_random_walk;
   s.imu_noise.gyro_correction_sigma = std::max({s.imu_noise.gyro_correction_sigma, imu.scale_error, imu.misalignment});
   s.depth_noise.type = depthSensorTypeFromName(depth.model);
   s.depth_noise.a = std::max(depth.a, 0.0005);  // at least the rounding to millimetres in 16UC1
   s.depth_noise.b = depth.b;
   s.depth_noise.c = depth.c;
+  s.depth_noise.bias_floor = depth.bias_floor;
   s.depth_noise.min_range = depth.min_range;
   s.depth_noise.max_range = depth.max_range;
   s.time_offset = imu.time_offset;
@@ -230,6 +273,26 @@ void applySequence(const YAML::Node& library, const YAML::Node& node, const std:
   }
 }
 
+/// A scene that is a file: relative to the folder of the sequence's file. `$NAME/` is filled in where the environment
+/// has it, and stays otherwise: a library may name rooms that are not on this machine.
+void resolveScene(const std::filesystem::path& file, const std::string& where, SequenceSpec* spec) {
+  std::string& scene = spec->scene;
+  if (std::filesystem::path(scene).extension() != ".json") {
+    std::string known;
+    for (const std::string& n : sceneNames()) {
+      if (n == scene) return;
+      known += ", " + n;
+    }
+    throw std::runtime_error(where + ": scene: '" + scene + "', expected the file of a scanned room (.json)" + known);
+  }
+  if (scene.front() == '$') {
+    const std::size_t end = std::min(scene.find('/'), scene.size());
+    if (const char* folder = std::getenv(scene.substr(1, end - 1).c_str())) scene = folder + scene.substr(end);
+  } else if (std::filesystem::path(scene).is_relative()) {
+    scene = (file.parent_path() / scene).lexically_normal().string();
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> sequenceNames(const std::string& library) {
@@ -244,6 +307,7 @@ SequenceSpec loadSequence(const std::string& name_or_file, const std::string& li
   const std::filesystem::path path(name_or_file);
   if (path.extension() == ".yaml" || path.extension() == ".yml") {
     applySequence(shipped, loadYaml(name_or_file), name_or_file, 0, &spec);
+    resolveScene(path, name_or_file, &spec);
     spec.name = path.stem().string();
     return spec;
   }
@@ -254,6 +318,7 @@ SequenceSpec loadSequence(const std::string& name_or_file, const std::string& li
     throw std::runtime_error("sequence '" + name_or_file + "' is not known, expected a .yaml file or one of: " + known);
   }
   applySequence(shipped, node, library + ": " + name_or_file, 0, &spec);
+  resolveScene(library, name_or_file, &spec);
   spec.name = name_or_file;
   return spec;
 }

@@ -16,6 +16,7 @@
 #include "vip_slam_core/sensor/sensor_config.h"
 #include "vip_slam_core/trajectory/tum_io.h"
 #include "vip_slam_core/types/planes_yaml.h"
+#include "vip_slam_core/util/atomic_file.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/output_folder.h"
@@ -48,6 +49,19 @@ void writeTruth(const SequenceRenderer& sequence, const std::string& path) {
     truth.push_back({static_cast<double>(ns) * 1e-9, sequence.stateAt(s.t).T_W_I});
   }
   writeTum(path, truth);
+}
+
+/// What the sensor file does not know: the camera as it is, and what depth readings are of true depth.
+void writeErrors(const SequenceRenderer& sequence, const std::string& path) {
+  const CameraIntrinsics& c = sequence.camera()->intrinsics();
+  const DepthOptions& depth = sequence.spec().depth;
+  std::string distortion;
+  for (const double k : c.distortion) distortion += formatted("%s%.9g", distortion.empty() ? "" : ", ", k);
+  AtomicFile file(path);
+  file.stream() << formatted(
+      "camera: [%.9g, %.9g, %.9g, %.9g]\ndistortion: [%s]\ndepth_scale: %.9g\ndepth_offset: %.9g\n", c.fx, c.fy, c.cx,
+      c.cy, distortion.c_str(), depth.scale, depth.offset);
+  file.commit();
 }
 
 int run(int argc, char** argv) {
@@ -130,6 +144,7 @@ int run(int argc, char** argv) {
     saveSensorConfig(base + "_sensor.yaml", sequence.sensor());
     writeTruePlanesYaml(base + "_planes.yaml", sequence.planes());
     writeTruth(sequence, base + "_truth.tum");
+    writeErrors(sequence, base + "_errors.yaml");
     writer->commit();
   }
   return 0;

@@ -115,7 +115,9 @@ TEST(Imu, NoiseMatchesTheConfiguredDensities) {
 
 TEST(Motion, NamedSequencesMoveLikePeopleAndDrones) {
   for (const std::string& name : sequenceNames(libraryPath())) {
-    const SequenceSpec spec = loadSequence(name, libraryPath());
+    SequenceSpec spec = loadSequence(name, libraryPath());
+    const bool shakes = spec.motion.vibration != "none";  // from the first image on
+    spec.motion.vibration = "none";
     if (spec.motion.type == "path" && spec.motion.waypoints.empty()) continue;  // only a base of other sequences
     const SplineTrajectory s = makeMotion(spec.motion, spec.T_imu_cam(), spec.seed);
     double v = 0, a = 0, w = 0, still = 0;
@@ -129,7 +131,7 @@ TEST(Motion, NamedSequencesMoveLikePeopleAndDrones) {
     EXPECT_LT(v, 2.3) << name;
     EXPECT_LT(a, 5.0) << name;
     EXPECT_LT(w, 2.4) << name;
-    if (spec.motion.start_at == 0 && spec.motion.type != "still") {
+    if (spec.motion.start_at == 0 && spec.motion.type != "still" && !shakes) {
       EXPECT_GE(still, 1.5) << name;
     }
   }

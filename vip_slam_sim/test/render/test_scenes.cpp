@@ -135,8 +135,10 @@ TEST(Sequences, MotionThroughAWallIsRefused) {
 }
 
 TEST(Sequences, PathsKeepClear) {
-  for (const std::string name : {"01", "02", "03", "04", "05", "long_loop", "stairs", "alias", "attic", "attic_phone",
-                                 "gallery", "gallery_robot", "workshop", "foyer"}) {
+  for (const std::string name : {"01",       "02",      "03",      "04",          "05",      "long_loop",
+                                 "stairs",   "alias",   "attic",   "attic_phone", "gallery", "gallery_robot",
+                                 "workshop", "foyer",   "real_01", "real_02",     "real_03", "real_04",
+                                 "real_05",  "real_06", "real_07"}) {
     SequenceSpec spec = loadSequence(name, libraryPath());
     EXPECT_TRUE(spec.motion.check_collisions);
     EXPECT_NO_THROW(SequenceRenderer(spec,

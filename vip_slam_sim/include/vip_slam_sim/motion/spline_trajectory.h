@@ -2,10 +2,12 @@
 // Source: Sommer et al. 2020, "Efficient derivative computation for cumulative B-splines on Lie groups".
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "vip_slam_core/geometry/se3.h"
 #include "vip_slam_core/trajectory/tum_io.h"
+#include "vip_slam_sim/motion/vibration.h"
 
 namespace vip_slam {
 
@@ -24,6 +26,8 @@ class SplineTrajectory {
 
   double begin() const { return begin_; }
   double end() const { return begin_ + spacing_ * static_cast<double>(control_.size() - 5); }
+  /// From now on the body shakes about the curve.
+  void shake(std::shared_ptr<const Vibration> vibration) { vibration_ = std::move(vibration); }
   /// t is clamped to [begin, end].
   MotionState at(double t) const;
 
@@ -32,9 +36,12 @@ class SplineTrajectory {
   static SplineTrajectory fit(const Trajectory& poses, double spacing, int iterations);
 
  private:
+  MotionState smooth(double t) const;
+
   double begin_, spacing_;
   std::vector<SE3> control_;
   std::vector<Eigen::Vector3d> steps_;  ///< Log(R_i^-1 R_i+1)
+  std::shared_ptr<const Vibration> vibration_;
 };
 
 }  // namespace vip_slam

@@ -23,14 +23,16 @@ struct FrameBuffers {
 
 class Renderer {
  public:
+  /// `gloss`: how much the shiniest surfaces mirror the scene, of what a polished one would; surfaces differ.
   Renderer(std::shared_ptr<const Scene> scene, std::shared_ptr<const RayTracer> tracer,
-           std::shared_ptr<const CameraModel> camera);
+           std::shared_ptr<const CameraModel> camera, double gloss = 0);
 
   /// `row_pose(row)` gives T_W_C when the row is read out (the same for all rows with a global shutter). Several
   /// threads may render with one Renderer.
   void render(const std::function<SE3(int row)>& row_pose, bool rolling, FrameBuffers* out) const;
   void render(const SE3& T_W_C, FrameBuffers* out) const;
   /// Depth, piece and grazing angle only.
+  void renderDepth(const std::function<SE3(int row)>& row_pose, bool rolling, FrameBuffers* out) const;
   void renderDepth(const SE3& T_W_C, FrameBuffers* out) const;
 
   /// Direction of a pixel, z = 1 in the camera.
@@ -41,13 +43,16 @@ class Renderer {
  private:
   struct RowFrame;  // camera axes and centre of one row, in floats
   struct Ray;
+  Vec4 lightOn(int piece, const Vec3& p, float u, float v) const;
   Vec4 shade(int piece, float t, const Ray& ray) const;
   void antialias(const std::vector<RowFrame>& rows, FrameBuffers* out) const;
+  void addReflections(const std::vector<RowFrame>& rows, FrameBuffers* out) const;
   void cast(const std::function<SE3(int)>& row_pose, bool rolling, bool shading, FrameBuffers* out) const;
 
   std::shared_ptr<const Scene> scene_;
   std::shared_ptr<const RayTracer> tracer_;
   std::shared_ptr<const CameraModel> camera_;
+  std::vector<float> gloss_;  ///< of each chart; empty when nothing mirrors
   std::vector<float> x_, y_;  ///< normalised coordinates of every pixel
 };
 

@@ -51,10 +51,23 @@ struct Lamp {
   float power;  ///< radiance, before exposure
 };
 
+/// Corner of a mesh. Its light is baked with the light maps.
+struct MeshVertex {
+  Vec3 p, n;
+  Vec4 light;
+};
+
+/// A triangle of a scanned mesh: it lies anywhere near its chart, which colours it by parallel projection.
+struct MeshTriangle {
+  int chart;
+  int vertex[3];
+  Vec3 n;
+};
+
 /// Coplanar pieces that touch: one physical plane.
 struct Surface {
-  int frame_chart;  ///< its o, eu, ev are the surface's 2D frame
-  std::vector<int> pieces;
+  int frame_chart;          ///< its o, eu, ev are the surface's 2D frame
+  std::vector<int> pieces;  ///< empty: the whole rectangle of that chart, seen as triangles of a mesh
   double area = 0;
 };
 
@@ -63,17 +76,35 @@ struct Scene {
   std::vector<Texture> textures;
   std::vector<Chart> charts;
   std::vector<Piece> pieces;
+  std::vector<MeshVertex> vertices;
+  std::vector<MeshTriangle> triangles;
   std::vector<Decal> decals;
   std::vector<Lamp> lamps;
   std::vector<Surface> surfaces;
   std::vector<Vec4> light;      ///< light map nodes of all charts
   float light_spacing = 0.08f;  ///< metres between nodes
   Vec4 ambient = {0.45f, 0.45f, 0.46f, 0};
+
+  // By what a ray hits: an index into pieces, then into triangles.
+  const MeshTriangle* triangleOf(int piece) const {
+    const int i = piece - static_cast<int>(pieces.size());
+    return i < 0 ? nullptr : &triangles[i];
+  }
+  int chartOf(int piece) const {
+    const MeshTriangle* t = triangleOf(piece);
+    return t ? t->chart : pieces[piece].chart;
+  }
+  const Vec3& normalOf(int piece) const {
+    const MeshTriangle* t = triangleOf(piece);
+    return t ? t->n : charts[pieces[piece].chart].n;
+  }
+  int surfaceOf(int piece) const { return charts[chartOf(piece)].surface; }
 };
 
 /// Names of the scenes that come with the simulator.
 std::vector<std::string> sceneNames();
-/// Builds a scene without lighting it. Throws std::invalid_argument naming the known scenes.
+/// Builds a scene without lighting it: one of these or, when the name ends in .json, a scanned room (scanned_room.h).
+/// Throws std::invalid_argument naming the known scenes, std::runtime_error naming the file.
 Scene buildScene(const std::string& name);
 
 }  // namespace vip_slam

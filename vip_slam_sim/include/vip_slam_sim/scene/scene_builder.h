@@ -32,6 +32,10 @@ class SceneBuilder {
 
   /// Rectangle o + [0,|u|] x [0,|v|]; seen from u x v. Returns the chart.
   int rectangle(const Eigen::Vector3d& o, const Eigen::Vector3d& u, const Eigen::Vector3d& v, const Material& material);
+  /// A frame alone, with nothing solid in it: for triangles of a mesh.
+  int chart(const Eigen::Vector3d& o, const Eigen::Vector3d& u, const Eigen::Vector3d& v, const Material& material) {
+    return addChart(o, u, v, material);
+  }
   /// Upright wall from a to b (floor plan); the room lies to the right of a->b. Openings are cut and furnished.
   int wall(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double z0, double z1, const Material& material,
            const std::vector<Opening>& openings = {}, const Material& threshold = {});

@@ -15,9 +15,12 @@
 #include "vip_slam_core/types/true_plane.h"
 #include "vip_slam_sim/motion/imu_synthesiser.h"
 #include "vip_slam_sim/motion/spline_trajectory.h"
+#include "vip_slam_sim/render/edge_fattening.h"
+#include "vip_slam_sim/render/multipath.h"
 #include "vip_slam_sim/render/passers_by.h"
 #include "vip_slam_sim/render/renderer.h"
 #include "vip_slam_sim/render/sensor_effects.h"
+#include "vip_slam_sim/render/shared_depth_error.h"
 #include "vip_slam_sim/scene/truth_planes.h"
 #include "vip_slam_sim/sequence/sequence_spec.h"
 
@@ -52,7 +55,7 @@ class SequenceRenderer {
   const Scene& scene() const { return *scene_; }
   const ImuLog& imu() const { return imu_; }  ///< times from 0
   int frameCount() const { return frame_count_; }
-  std::shared_ptr<const CameraModel> camera() const { return camera_; }
+  std::shared_ptr<const CameraModel> camera() const { return camera_; }  ///< as it is, not as stated
 
   /// Nanoseconds of trajectory time t on the IMU clock, and back.
   std::int64_t toNanoseconds(double t) const;
@@ -71,6 +74,9 @@ class SequenceRenderer {
 
  private:
   double frameTime(int index) const;  ///< trajectory time of the exposure middle
+  std::shared_ptr<const AutoExposure> meterExposure() const;
+  cv::Mat measuredDepth(int index, double t, const SE3& T_W_D, const FrameBuffers& seen, const cv::Mat& brightness,
+                        const Renderer& renderer) const;
 
   SequenceSpec spec_;
   RenderOptions options_;
@@ -83,6 +89,9 @@ class SequenceRenderer {
   std::unique_ptr<Renderer> renderer_, depth_renderer_;
   std::unique_ptr<PassersBy> passers_;
   std::unique_ptr<SensorEffects> effects_;
+  std::unique_ptr<SharedDepthError> shared_error_;
+  std::unique_ptr<Multipath> multipath_;
+  std::unique_ptr<EdgeFattening> fattening_;
   std::unique_ptr<VisibilityCounter> visibility_;
   int frame_count_ = 0;
 };

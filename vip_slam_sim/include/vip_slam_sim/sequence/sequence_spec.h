@@ -14,6 +14,7 @@ struct MotionOptions {
   std::string type = "path";
   std::string waypoints;  ///< "x,y[,z]; ...; turn DEG; pause SECONDS"
   std::string style = "handheld";
+  std::string vibration = "none";
   std::string file;
   double duration = 0, hold = 2.6, start_at = 0;
   double speed = 0.8, height = 1.5, max_rate = 0.8;
@@ -31,14 +32,21 @@ struct CameraOptions {
   std::string model = "none";
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0;
   double rate = 20;
+  double model_error = 0;
   void visit(OptionVisitor& v);
-  CameraIntrinsics intrinsics() const;
+  CameraIntrinsics intrinsics() const;  ///< as stated in the sensor file
 };
 
 struct DepthOptions {
   std::string model = "proportional";
   double a = 0, b = 0.0017, c = 0, min_range = 0.2, max_range = 10;
   double dropout = 0, edge_hole = 0, grazing_limit = 0, dark_limit = 0, bias_amplitude = 0;
+  double white = 1, scale = 1, offset = 0;
+  double surface_error = 0, warp = 0, fixed_warp = 0, shared_px = 64, shared_time = 0.5;
+  double disparity_step = 0, disparity_baseline = 0.05;
+  double bias_floor = 0.005;
+  int fattening = 0, coarse = 1;
+  double multipath = 0;
   bool registered = true;
   double baseline = 0.015;
   double lag = 0;
@@ -53,17 +61,23 @@ struct ImuOptions {
   double accel_noise_density = 2e-3, accel_random_walk = 3e-3;
   double gyro_bias = 0.01, accel_bias = 0.06;
   double scale_error = 0, misalignment = 0;
+  double stated_noise = 1;
+  double gyro_drift = 0, accel_drift = 0, warm_up = 60, g_sensitivity = 0;
   double time_offset = 0;
+  bool present = true;
   void visit(OptionVisitor& v);
 };
 
 struct EffectOptions {
+  bool auto_exposure = false;
   double exposure = 1.0, exposure_drift = 0.06, vignetting = 0.18;
   double exposure_jump = 1.0, exposure_jump_interval = 2.0;
   double read_noise = 1.0, shot_noise = 0.9;
   double exposure_time = 0.005;
   bool motion_blur = false;
   double rolling_shutter = 0;
+  double gloss = 0;
+  int jpeg = 0;
   void visit(OptionVisitor& v);
 };
 
@@ -90,7 +104,11 @@ struct SequenceSpec {
   PasserOptions passers;
   void visit(OptionVisitor& v);
 
-  SE3 T_imu_cam() const;  ///< fixed extrinsics of the rig, about a degree and 1 to 2 cm off in every axis
+  /// Fixed extrinsics of the rig, about a degree and 1 to 2 cm off in every axis; without IMU the body is the camera.
+  SE3 T_imu_cam() const;
+  CameraIntrinsics trueCamera() const;  ///< what the colour camera is, `camera.model_error` away from what is stated
+  /// Whether depth is rendered apart from colour.
+  bool depthApart() const { return depth.separate() || camera.model_error > 0; }
   SensorConfig sensorConfig() const;
 };
 
