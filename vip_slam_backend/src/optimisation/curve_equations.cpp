@@ -25,13 +25,6 @@ struct PlaneSystem {
         cross(Eigen::MatrixXd::Zero(entries, 3)),
         g_own(Eigen::VectorXd::Zero(entries)) {}
   double misfit() const { return squares / std::max(1.0, points); }
-  /// Gradients of one keyframe's points.
-  struct Share {
-    Eigen::Index keyframe;
-    Eigen::VectorXd g_own;
-    Eigen::Vector3d g;
-  };
-  std::vector<Share> shares;
   Eigen::MatrixXd own, cross;
   Eigen::VectorXd g_own;
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -142,8 +135,7 @@ CurveEquations curveEquations(const std::vector<const MapKeyframe*>& keyframes, 
                               const Eigen::VectorXd& value, const DepthNoise& noise) {
   const Eigen::Index entries = value.size();
   std::map<PlaneId, PlaneSystem> systems;
-  for (std::size_t k = 0; k < keyframes.size(); ++k) {
-    const MapKeyframe* kf = keyframes[k];
+  for (const MapKeyframe* kf : keyframes) {
     const SE3 T_W_C = kf->T_W_C();
     for (const auto& [id, observation] : kf->planes) {
       const auto plane = planes.find(id);
@@ -151,15 +143,10 @@ CurveEquations curveEquations(const std::vector<const MapKeyframe*>& keyframes, 
       PlaneSystem& system = systems.try_emplace(id, entries).first->second;
       const Plane& surface = *plane->second;
       const Eigen::Vector3d u = surface.n.unitOrthogonal(), v = surface.n.cross(u);
-      const Eigen::VectorXd g_own = system.g_own;
-      const Eigen::Vector3d g = system.g;
       for (const PlaneSample& point : observation.points) add(point, T_W_C, surface, u, v, {value, noise}, &system);
-      system.shares.push_back({static_cast<Eigen::Index>(k), system.g_own - g_own, system.g - g});
     }
   }
-  const auto n = static_cast<Eigen::Index>(keyframes.size());
-  CurveEquations equations{Eigen::MatrixXd::Zero(entries, entries), Eigen::VectorXd::Zero(entries), 1,
-                           Eigen::MatrixXd::Zero(entries, n)};
+  CurveEquations equations{Eigen::MatrixXd::Zero(entries, entries), Eigen::VectorXd::Zero(entries), 1};
   const double usual = usualMisfit(systems);
   double squares = 0, points = 0;
   for (auto& [id, system] : systems) {
@@ -170,9 +157,6 @@ CurveEquations curveEquations(const std::vector<const MapKeyframe*>& keyframes, 
     const Eigen::LDLT<Eigen::Matrix3d> ldlt(system.H);
     equations.H += trust * (system.own - system.cross * ldlt.solve(system.cross.transpose()));
     equations.g += trust * (system.g_own - system.cross * ldlt.solve(system.g));
-    for (const auto& [keyframe, g_own, g] : system.shares) {
-      equations.shares.col(keyframe) += trust * (g_own - system.cross * ldlt.solve(g));
-    }
   }
   equations.scatter = std::max(1e-12, squares / std::max(1.0, points));
   return equations;

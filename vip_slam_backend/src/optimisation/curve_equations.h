@@ -32,9 +32,6 @@ struct CurveEquations {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;   ///< gradient at the value they were built at
   double scatter = 1;  ///< squared residual per point: sigmas allow for errors that all points of a keyframe share
-  /// Contribution of each keyframe to g, in columns. All points of a keyframe share its pose's error, so the scatter of
-  /// these columns gives the true uncertainty, independent of the number of points.
-  Eigen::MatrixXd shares;
 };
 
 /// Linearised at `value`, m, the correction of the readings. Points far off their plane have hardly any weight, planes

@@ -101,7 +101,9 @@ TEST(DisparityFit, WhatNoCalibrationExplainsIsNotBelieved) {
   EXPECT_TRUE(errorOf([](double z) { return z / (1 + 0.004 * z) - z; }));
 }
 
-// An error of a pose shifts all points of the keyframe alike: it counts as one error, not as hundreds.
+// An error of a pose shifts all points of the keyframe alike: it counts as one error, not as hundreds. Chance exceeds
+// three of the sigmas that 20 groups of keyframes give in 0.74% of maps (Student's t, 19 degrees of freedom), so in more
+// than one of 40 with a probability of 3.5%.
 TEST(DisparityFit, PosesThatAreOffAreNotMistakenForManyErrors) {
   int found = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
@@ -117,7 +119,7 @@ TEST(DisparityFit, PosesThatAreOffAreNotMistakenForManyErrors) {
     found += fitDisparityError(map, stereo(), false).has_value();
   }
   std::printf("found in %d of 40 maps of exact depth with poses that are off by 2 cm\n", found);
-  EXPECT_LE(found, 2);
+  EXPECT_LE(found, 1);
 }
 
 TEST(DisparityFit, TellsTheUser) {
