@@ -1,23 +1,47 @@
 #include "vip_slam_ros/camera_info.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace vip_slam {
 
 namespace {
 
-// width, height, K and P refer to the whole sensor; images may be cropped (region of interest) and binned.
-CameraIntrinsics ofTheImages(CameraIntrinsics whole, const sensor_msgs::CameraInfo& info) {
+bool cropped(const sensor_msgs::CameraInfo& info) { return info.roi.width > 0 && info.roi.height > 0; }
+int binning(std::uint32_t given) { return std::max(1, int(given)); }
+
+// How far a principal point is from the middle of the sensor, as a share of the sensor's size.
+double besideTheMiddle(const CameraIntrinsics& whole) {
+  return std::max(std::abs((whole.cx + 0.5) / whole.width - 0.5), std::abs((whole.cy + 0.5) / whole.height - 0.5));
+}
+
+// width, height, K and P refer to the whole sensor; images may be cropped (region of interest) and binned. Some drivers
+// fill roi and binning and give a K that is of the images already: on the whole sensor its principal point would then
+// lie where no lens has it, and taken as that of the images it lies in the sensor's middle.
+bool ofTheImagesAlready(const CameraIntrinsics& given, const sensor_msgs::CameraInfo& info) {
+  constexpr double kNoLens = 0.1, kMiddle = 0.05;
+  CameraIntrinsics whole = given;
+  whole.cx = (given.cx + 0.5) * binning(info.binning_x) - 0.5;
+  whole.cy = (given.cy + 0.5) * binning(info.binning_y) - 0.5;
+  if (cropped(info)) whole.cx += info.roi.x_offset, whole.cy += info.roi.y_offset;
+  return besideTheMiddle(given) > kNoLens && besideTheMiddle(whole) < kMiddle;
+}
+
+CameraIntrinsics ofTheImages(const CameraIntrinsics& given, const sensor_msgs::CameraInfo& info) {
   const sensor_msgs::RegionOfInterest& roi = info.roi;
-  if (roi.width > 0 && roi.height > 0) {
-    whole.cx -= roi.x_offset;
-    whole.cy -= roi.y_offset;
-    whole.width = int(roi.width);
-    whole.height = int(roi.height);
+  CameraIntrinsics images = given;
+  if (cropped(info)) {
+    images.cx -= roi.x_offset;
+    images.cy -= roi.y_offset;
+    images.width = int(roi.width);
+    images.height = int(roi.height);
   }
-  const int columns = std::max(1, int(info.binning_x)), rows = std::max(1, int(info.binning_y));
-  return columns * rows > 1 ? whole.scaled(whole.width / columns, whole.height / rows) : whole;
+  const int columns = binning(info.binning_x), rows = binning(info.binning_y);
+  if (columns * rows > 1) images = images.scaled(images.width / columns, images.height / rows);
+  if (!ofTheImagesAlready(given, info)) return images;
+  images.fx = given.fx, images.fy = given.fy, images.cx = given.cx, images.cy = given.cy;
+  return images;
 }
 
 // Drivers pad the coefficients of a model with zeros.
@@ -32,6 +56,13 @@ bool onlyProjection(const sensor_msgs::CameraInfo& info) {
 }  // namespace
 
 std::string cameraInfoNote(const sensor_msgs::CameraInfo& info) {
+  CameraIntrinsics given;
+  given.width = int(info.width), given.height = int(info.height);
+  given.cx = info.K[2], given.cy = info.K[5];
+  if (info.K[0] > 0 && given.width > 0 && given.height > 0 && ofTheImagesAlready(given, info))
+    return "K is taken for that of the images already, without roi and binning: on the whole sensor its principal "
+           "point would lie " +
+           std::to_string(int(std::lround(100 * besideTheMiddle(given)))) + " % beside the middle";
   if (!onlyProjection(info)) return "";
   const bool straight = std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0; });
   return std::string("K is zero, P is used instead") +

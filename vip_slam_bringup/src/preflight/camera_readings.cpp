@@ -1,5 +1,6 @@
 #include "vip_slam_bringup/preflight/camera_readings.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "vip_slam_core/camera/camera_model.h"
@@ -58,6 +59,10 @@ std::vector<CameraReading> otherReadings(const CameraIntrinsics& used, const sen
   if (info.K[0] > 0) {
     other.fx = info.K[0], other.fy = info.K[4], other.cx = info.K[2], other.cy = info.K[5];
     add(used, other, "K is that of the images already, without roi and binning", &out);
+    const double columns = std::max(1, int(info.binning_x)), rows = std::max(1, int(info.binning_y));
+    other.fx /= columns, other.cx = (other.cx - info.roi.x_offset + 0.5) / columns - 0.5;
+    other.fy /= rows, other.cy = (other.cy - info.roi.y_offset + 0.5) / rows - 0.5;
+    add(used, other, "K is that of the whole sensor, roi and binning are to be applied", &out);
   }
   if (info.P[0] > 0) {
     other.fx = info.P[0], other.fy = info.P[5], other.cx = info.P[2], other.cy = info.P[6];

@@ -13,7 +13,8 @@ namespace vip_slam {
 /// missing size or an unknown distortion model throws std::invalid_argument naming the field. `image_topic`: topic of
 /// the images. K and D describe the lens, so for images that image_proc has already rectified (a name with image_rect)
 /// P is used without distortion, and where K is zero and P is not, P is used with D. A region of interest and binning
-/// are applied: the result holds for the images as published.
+/// are applied, unless the principal point shows that K has them applied already: the result holds for the images as
+/// published.
 CameraIntrinsics intrinsicsFromCameraInfo(const sensor_msgs::CameraInfo& info, const std::string& image_topic = "");
 /// What is unusual in how the message was read, in words; else empty.
 std::string cameraInfoNote(const sensor_msgs::CameraInfo& info);

@@ -151,6 +151,36 @@ TEST(CameraInfo, APartOfTheSensorAndBinnedPixels) {
   EXPECT_EQ(part.fx, 1200);
   EXPECT_EQ(part.cx, 319.5);
   EXPECT_EQ(part.cy, 359.5);
+  EXPECT_EQ(cameraInfoNote(info), "");
+}
+
+TEST(CameraInfo, AKThatIsOfTheImagesAlreadyIsTakenSo) {
+  sensor_msgs::CameraInfo binned;
+  binned.width = 1280;
+  binned.height = 960;
+  binned.K = {600, 0, 318.2, 0, 600, 243.5, 0, 0, 1};
+  binned.binning_x = binned.binning_y = 2;
+  sensor_msgs::CameraInfo part = binned;
+  part.K = {1200, 0, 319.5, 0, 1200, 359.5, 0, 0, 1};
+  part.binning_x = part.binning_y = 0;
+  part.roi.x_offset = 320;
+  part.roi.y_offset = 120;
+  part.roi.width = 640;
+  part.roi.height = 720;
+  for (const sensor_msgs::CameraInfo& info : {binned, part}) {
+    const CameraIntrinsics camera = intrinsicsFromCameraInfo(info);
+    EXPECT_EQ(camera.width, 640);
+    EXPECT_EQ(camera.fx, info.K[0]);
+    EXPECT_EQ(camera.cx, info.K[2]);
+    EXPECT_EQ(camera.cy, info.K[5]);
+    EXPECT_NE(cameraInfoNote(info).find("K is taken for that of the images already"), std::string::npos);
+  }
+  // A lens a little beside the middle, and a crop about which the principal point says nothing, are taken as given.
+  part.K = {1200, 0, 680, 0, 1200, 450, 0, 0, 1};
+  EXPECT_EQ(intrinsicsFromCameraInfo(part).cx, 360);
+  part.roi.x_offset = 40;
+  part.roi.y_offset = 20;
+  EXPECT_EQ(intrinsicsFromCameraInfo(part).cx, 640);
 }
 
 TEST(CameraInfo, UnusableIsNamed) {
