@@ -42,28 +42,35 @@ Verdict judge(const Fault& fault, const SensorConfig& sensor) {
 }
 
 // A host that stamps images on arrival: 2 ms are two pixels at this rotation rate.
+// The estimate follows the last few images and scatters by a millisecond: its mean over four runs is judged.
 TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
   const CornerWorld world;
   const SensorConfig sensor = cornerSensor(0, 0);
-  FrontEnd front_end(cornerOptions(), sensor);
-  std::mt19937 random(4);
-  std::normal_distribution<double> jitter(0, 0.002);
-  double imu_t = 0;
-  FrameOutput output;
-  for (int k = 0; k < 200; ++k) {
-    const double t = 0.05 * k, stamp = t + jitter(random);
-    for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
-    FrameInput input;
-    input.t = stamp;
-    world.look(t, 0, &input.gray, &input.depth);
-    output = front_end.process(input);
-    if (t < kStill + 3) continue;
-    EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
+  double sum = 0;
+  int count = 0;
+  for (const unsigned seed : {1, 2, 3, 4}) {
+    FrontEnd front_end(cornerOptions(), sensor);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> jitter(0, 0.002);
+    double imu_t = 0;
+    FrameOutput output;
+    for (int k = 0; k < 200; ++k) {
+      const double t = 0.05 * k, stamp = t + jitter(random);
+      for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
+      FrameInput input;
+      input.t = stamp;
+      world.look(t, 0, &input.gray, &input.depth);
+      output = front_end.process(input);
+      if (t < kStill + 3) continue;
+      EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
+      sum += front_end.counters().stamp_sigma;
+      ++count;
+    }
+    EXPECT_EQ(front_end.counters().imu_contradicted, 0u) << seed;
+    EXPECT_LT(front_end.counters().imu_noise_scale, 2.0) << seed;
+    EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(output.frame->t).t()).norm(), 0.02) << seed;
   }
-  EXPECT_EQ(front_end.counters().imu_contradicted, 0u);
-  EXPECT_LT(front_end.counters().imu_noise_scale, 2.0);
-  EXPECT_NEAR(front_end.counters().stamp_sigma, 0.002, 0.001);
-  EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(output.frame->t).t()).norm(), 0.02);
+  EXPECT_NEAR(sum / count, 0.002, 0.001);
 }
 
 /// 76 images are evaluated.
