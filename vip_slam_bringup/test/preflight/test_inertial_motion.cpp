@@ -138,21 +138,29 @@ TEST_F(MotionCause, ALensUnderAnotherModelsNameIsNamed) {
   for (const Finding& f : checkMotion(r)) EXPECT_NE(f.severity, Severity::kError) << f.text;
 }
 
-TEST_F(MotionCause, BinningThatKHasAlready) {
+// As it is, K is of the images; taken otherwise the motion tells, whatever the principal point is like.
+TEST_F(MotionCause, BinningThatKHasAlreadyOrHasNot) {
   const CameraIntrinsics& camera = sound_->color_camera;
-  sensor_msgs::CameraInfo info = toCameraInfo(camera);
-  info.width *= 2, info.height *= 2;
-  info.binning_x = info.binning_y = 2;
-  Recording r = *sound_;
-  r.color_camera = intrinsicsFromCameraInfo(info, "/camera/color/image_raw");
-  ASSERT_EQ(r.color_camera.width, camera.width);
-  r.camera_readings = otherReadings(r.color_camera, info);
-  ASSERT_EQ(r.camera_readings.size(), 1u);
-  r.rotations.clear();
-  const auto wrong = makeCamera(r.color_camera);
-  for (const PixelStep& step : r.pixel_steps)
-    if (const auto seen = seenBy(*wrong, step)) r.rotations.push_back(*seen);
-  expectOnlyError(r, "colour camera_info", "K is that of the images already");
+  for (const bool already : {true, false}) {
+    CameraIntrinsics of_info = already ? camera : camera.scaled(2 * camera.width, 2 * camera.height);
+    sensor_msgs::CameraInfo info = toCameraInfo(of_info);
+    info.width = 2 * camera.width, info.height = 2 * camera.height;
+    info.binning_x = info.binning_y = 2;
+    EXPECT_NEAR(intrinsicsFromCameraInfo(info).fx, camera.fx, 1e-9);
+
+    Recording r = *sound_;
+    r.color_camera.fx *= already ? 0.5 : 2, r.color_camera.fy *= already ? 0.5 : 2;
+    r.color_camera.cx = (camera.cx + 0.5) * (already ? 0.5 : 2) - 0.5;
+    r.color_camera.cy = (camera.cy + 0.5) * (already ? 0.5 : 2) - 0.5;
+    r.camera_readings = otherReadings(r.color_camera, info);
+    ASSERT_EQ(r.camera_readings.size(), 1u);
+    r.rotations.clear();
+    const auto wrong = makeCamera(r.color_camera);
+    for (const PixelStep& step : r.pixel_steps)
+      if (const auto seen = seenBy(*wrong, step)) r.rotations.push_back(*seen);
+    expectOnlyError(r, "colour camera_info",
+                    already ? "K is that of the images already" : "K is that of the whole sensor");
+  }
 }
 
 TEST(Smoothed, AnImuThatLosesFastTurnsOnlyIsNamed) {
