@@ -4,12 +4,9 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "vip_slam_core/depth/disparity_curve.h"
 #include "vip_slam_core/depth/grid_spacing.h"
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
-#include "vip_slam_core/util/formatted.h"
-#include "vip_slam_core/util/size_text.h"
 
 #include "front_end_impl.h"
 
@@ -17,8 +14,6 @@ namespace vip_slam {
 
 namespace {
 
-// Depth with a smaller lag than this counts as taken with the colour image, seconds: half a millimetre at 1 m/s.
-constexpr double kSameInstant = 5e-4;
 // Longest prediction beyond the newest image, s.
 constexpr double kPredicted = 5.0;
 
@@ -74,38 +69,35 @@ FrontEnd::Impl::Impl(const FrontEndOptions& options, const SensorConfig& sensor,
     : options_(forSize(options, sensor.camera.width, sensor.camera.height)),
       sensor_(checked(sensor)),
       timing_(timing),
-      clock_jump_(clock_jump),
       camera_(makeCamera(sensor_.camera)),
+      checks_({camera_->width(), camera_->height()}, clock_jump, &counters_),
       inertial_(sensor_, options.recovery.max_imu_gap),
-      dense_(camera_, sensor_.depth_noise),
-      depth_unit_(camera_, sensor_.depth_noise),
-      masked_(sensor_.mask.empty() ? cv::Mat() : cv::Mat(sensor_.mask == 0)),
+      depth_input_(sensor_, camera_),
       tracker_(options_.tracking, camera_, sensor_.depth_noise, timing,
                featureMask(sensor_.mask, options_.tracking.border), first.landmark),
       surfaces_(camera_, sensor_.depth_noise, options.filter.window),
-      landmarks_(options_.tracking, camera_),
+      map_(options_.tracking, camera_),
       orb_(options.tracking.keyframe_corners),
       filter_(filterOptions(options, sensor_), sensor_.imu_noise, sensor_.T_imu_cam, sensor_.time_offset,
               camera_->focal(), sensor_.gravity),
+      sources_(options_, sensor_, camera_, &filter_, &inertial_),
       initialiser_(options.initialisation, options.filter, sensor_.imu_noise, sensor_.T_imu_cam, sensor_.gravity),
-      stillness_(options.filter.zupt),
-      selector_(options.keyframes),
-      epoch_(first.epoch),
-      next_keyframe_(first.keyframe) {
+      rest_(options.filter.zupt, sensor_.imu_noise),
+      keyframes_(options.keyframes, first.keyframe),
+      health_(options.recovery, &counters_),
+      epoch_(first.epoch) {
   counters_.sigma_px = filter_.sigmaPx();
 }
 
-bool FrontEnd::Impl::noticeTimeJump(double t, double newest, const char* what) {
-  if (!(t < newest - clock_jump_)) return false;
-  clockRanBack(formatted("%s clock ran back by %.3f s", what, newest - t));
-  return true;
+void FrontEnd::Impl::noticeTimeJump(const std::string& jump) {
+  if (!jump.empty()) clockRanBack(jump);
 }
 
 void FrontEnd::Impl::clockRanBack(const std::string& reason) {
   inertial_.clear();
-  last_image_t_ = last_imu_t_ = -1e300;
+  checks_.reset();
   // Stamps are ordered only within an epoch, so the clock's jump back needs a new one.
-  if (phase_ == Phase::kWaiting) ++epoch_;
+  if (health_.waiting()) ++epoch_;
   reset(reason);
 }
 
@@ -119,14 +111,14 @@ void FrontEnd::Impl::countImu() {
 }
 
 bool FrontEnd::Impl::addImu(const ImuSample& sample) {
-  if (std::isfinite(sample.t)) noticeTimeJump(sample.t, inertial_.newestMeasured(), "IMU");
+  if (std::isfinite(sample.t)) noticeTimeJump(checks_.clockJump(sample.t, inertial_.newestMeasured(), "IMU"));
   const bool accepted = inertial_.addImu(sample);
   countImu();
   return accepted;
 }
 
 bool FrontEnd::Impl::addGyro(double t, const Eigen::Vector3d& gyro) {
-  if (std::isfinite(t)) noticeTimeJump(t, inertial_.newestMeasured(), "gyro");
+  if (std::isfinite(t)) noticeTimeJump(checks_.clockJump(t, inertial_.newestMeasured(), "gyro"));
   const bool accepted = inertial_.addGyro(t, gyro);
   countImu();
   return accepted;
@@ -138,87 +130,28 @@ bool FrontEnd::Impl::addAccel(double t, const Eigen::Vector3d& accel) {
   return accepted;
 }
 
-std::string FrontEnd::Impl::checkInput(const FrameInput& input, DepthReading* depth) {
-  if (!std::isfinite(input.t)) {
-    ++counters_.bad_stamp;
-    return "image stamp is not finite";
-  }
-  noticeTimeJump(input.t, last_image_t_, "image");
-  if (input.t <= last_image_t_) {
-    ++counters_.bad_stamp;
-    return formatted("image stamp %.3f s does not follow %.3f s", input.t, last_image_t_);
-  }
-  if (input.gray.empty() || input.gray.type() != CV_8UC1) {
-    ++counters_.bad_image;
-    return input.gray.empty() ? "image is empty"
-                              : "image is " + cv::typeToString(input.gray.type()) + ", expected 8-bit grey";
-  }
-  if (input.gray.cols != camera_->width() || input.gray.rows != camera_->height()) {
-    ++counters_.bad_image;
-    return "image is " + sizeText(input.gray.size()) + ", the camera is " +
-           sizeText(cv::Size(camera_->width(), camera_->height()));
-  }
-  if (input.depth.empty()) {
-    ++counters_.no_depth;
-  } else if (input.depth.type() != CV_32FC1 || input.depth.size() != input.gray.size()) {
-    ++counters_.bad_depth;
-  } else {
-    depth->image = input.depth;
-    missing_reading_.look(input.depth);
-    if (missing_reading_.value() > 0) {
-      depth->image = input.depth.clone();
-      depth->image.setTo(0, input.depth == missing_reading_.value());
-      counters_.missing_reading = missing_reading_.value();
-    }
-    if (depth_unit_.factor() != 1) depth->image = depth->image * depth_unit_.factor();
-    const bool own = depth->image.data != input.depth.data;
-    depth->lag = std::abs(input.depth_lag) >= kSameInstant ? input.depth_lag : 0.0;
-    const DepthCurve curve = chained(sensor_.depth_curve, depth_curve_);
-    const Eigen::Vector2d shift = sensor_.depth_shift + depth_shift_.px;
-    const bool shifted = !shift.isZero();
-    if (shifted) depth->image = shiftedDepth(depth->image, shift);
-    // The caller's image must stay unchanged.
-    if (!shifted && !own && (!masked_.empty() || !curve.empty())) depth->image = input.depth.clone();
-    if (!masked_.empty()) depth->image.setTo(0, masked_);
-    applyDepthCurve(curve, &depth->image);
-  }
-  return "";
-}
-
-void FrontEnd::Impl::followDepthUnit(double t, double t_imu, DepthReading* depth) {
-  const std::optional<NavState> predicted = inertial_.complete() ? predict(t_imu) : std::nullopt;
-  const SE3 T_odom_C = predicted ? predicted->T_W_I * extrinsics()
-                                 : filter_.nav().T_W_I * extrinsics() * last_motion_.inverse();
-  const double before = depth_unit_.factor();
-  if (!depth_unit_.changes(depth->image, T_odom_C, t)) return;
-  depth->image = depth->image * (depth_unit_.factor() / before);
+void FrontEnd::Impl::followDepthUnit(ImageStep* step) {
+  const std::optional<NavState> predicted = inertial_.complete() ? predict(step->t_imu) : std::nullopt;
+  const SE3 T_odom_C =
+      predicted ? predicted->T_W_I * extrinsics() : filter_.nav().T_W_I * extrinsics() * sources_.last().inverse();
+  if (!depth_input_.followUnit(T_odom_C, step->t, &step->read)) return;
   ++counters_.depth_unit_changes;
-  counters_.depth_unit = depth_unit_.factor();
+  counters_.depth_unit = depth_input_.unit();
 }
 
 void FrontEnd::Impl::followDepthShift() {
-  const Eigen::Vector2d& found = filter_.takeDepthShift();
-  if (found == depth_shift_.bearing) return;
-  depth_shift_ = {found.cwiseProduct(Eigen::Vector2d(sensor_.camera.fx, sensor_.camera.fy)), found};
-  surfaces_.clear();  // their readings have the old shift
+  // The surfaces' readings have the old shift.
+  if (depth_input_.followShift(filter_.takeDepthShift())) surfaces_.clear();
 }
 
 void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {
-  landmarks_.apply(update);
-  if (update.depth_curve != depth_curve_ && validateDepthCurve(update.depth_curve).empty()) {
-    depth_curve_ = update.depth_curve;
-    surfaces_.clear();  // their readings have the old curve: the difference would pass for motion
-    if (voidsDepthOffset(update.disparity_error - disparity_error_)) {
-      disparity_error_ = update.disparity_error;
-      // A disparity error replaces the depth offset: what was estimated as an offset was this error.
-      filter_.restartDepthOffset(disparity_error_ != 0);
-    }
-  }
-  // A loaded map has keyframes of its own: new ids continue after them.
-  next_keyframe_ = std::max(next_keyframe_, update.newest_keyframe + 1);
-  // T_map_odom of another epoch, or of a map without keyframes, is not valid for this odometry.
-  have_map_ = update.epoch == epoch_ && update.newest_keyframe != 0;
-  if (have_map_) T_map_odom_ = update.T_map_odom;
+  map_.apply(update, epoch_);
+  keyframes_.continueAfter(update.newest_keyframe);
+  const frontend::DepthInput::Change depth = depth_input_.followCurve(update);
+  // The surfaces' readings have the old curve: the difference would pass for motion.
+  if (depth.curve) surfaces_.clear();
+  // A disparity error replaces the depth offset: what was estimated as an offset was this error.
+  if (depth.voids_offset) filter_.restartDepthOffset(depth_input_.disparityError() != 0);
 }
 
 std::optional<NavState> FrontEnd::Impl::predict(double t) const {
@@ -235,36 +168,22 @@ std::optional<NavState> FrontEnd::Impl::predict(double t) const {
   return predicted;
 }
 
-Eigen::Vector3d FrontEnd::Impl::gyro(double t) const {
-  if (!(inertial_.oldest() <= inertial_.newest())) return Eigen::Vector3d::Zero();
-  const auto sample = inertial_.at(std::clamp(t, inertial_.oldest(), inertial_.newest()));
-  return sample ? correctedRate(sample->gyro, filter_.window().gyro_correction) : Eigen::Vector3d::Zero();
-}
-
 void FrontEnd::Impl::reset(const std::string& reason) {
-  if (phase_ != Phase::kWaiting) {
+  if (!health_.waiting()) {
     ++counters_.restarts;
     ++epoch_;
   }
-  phase_ = Phase::kWaiting;
-  status_ = {TrackingState::kInitialising, reason};
+  health_.reset(reason);
   tracker_.clear();
-  landmarks_.forgetPatches();
+  map_.reset();
   surfaces_.clear();
-  depth_unit_.forget();
-  moving_ = {};
-  moving_imu_t_ = last_depth_t_ = cut_off_imu_t_ = silent_imu_t_ = fault_t_ = -1e300;  // the clock may have run back
+  depth_input_.reset();
+  bodies_.reset();
   filter_.stop();
+  sources_.reset();
   initialiser_.reset();
-  stillness_.reset();
-  selector_.reset();
-  recent_pixels_.clear();
-  still_anchor_.clear();
-  still_ = false;
-  have_map_ = false;
-  last_keyframe_ = 0;
-  keyframe_imu_broken_ = false;
-  gated_in_a_row_ = 0;
+  rest_.reset();
+  keyframes_.reset();
 }
 
 }  // namespace vip_slam

@@ -1,10 +1,8 @@
 // What one image gives to the filter: rolling-shutter poses, depth at the stamp, features, stillness, surfaces.
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "vip_slam_core/imu/gyro_correction.h"
-#include "vip_slam_core/util/statistics.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
 #include "front_end_impl.h"
@@ -31,9 +29,8 @@ cv::Mat FrontEnd::Impl::depthAtStamp(const DepthReading& depth, const NavState& 
   const Readout readout = Readout::around(sensor_.depth_rolling_shutter, depth.lag);
   if (depth.image.empty() || readout.instant()) return depth.image;
   ScopedTimer timer(timing_, "frontend.depth_rows", nav.t);
-  if (!depth_rows_) depth_rows_ = std::make_unique<DepthRows>(camera_);  // most sensors never need its tables
   const std::shared_ptr<const RowPoses> poses = rows(readout, nav);
-  return poses ? depth_rows_->atStamp(depth.image, *poses) : depth.image;
+  return poses ? depth_input_.atStamp(depth.image, *poses) : depth.image;
 }
 
 std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
@@ -58,51 +55,13 @@ std::vector<Eigen::Vector3d> FrontEnd::Impl::trackedPoints() const {
   return points;
 }
 
-bool FrontEnd::Impl::decideStillness(double previous_t_imu, double t_imu) {
-  if (moving_.any()) moving_imu_t_ = t_imu;
-  const bool image_counts = !movedLately(t_imu);  // features on a body that pauses do not show that the camera stands
-  const ZuptOptions& options = options_.filter.zupt;
-  PixelList now;
-  for (const Track& track : tracker_.tracks()) now.emplace_back(track.feature.id, track.feature.pixel);
-  const auto disparity = [&now](const PixelList& then) {
-    std::map<LandmarkId, Eigen::Vector2f> pixels(then.begin(), then.end());
-    std::vector<float> moved;
-    for (const auto& item : now) {
-      const auto it = pixels.find(item.first);
-      if (it != pixels.end()) moved.push_back((it->second - item.second).norm());
-    }
-    if (moved.size() < 5) return -1.0;
-    return static_cast<double>(upperMedian(std::move(moved)));
-  };
-  StillnessCues cues;
-  // Back to the last image at least: in a longer gap between images the camera may have moved and stopped again.
-  double since = std::min(t_imu - options.window, previous_t_imu);
-  since = std::max(inertial_.oldest(), since);
-  // An image alone does not tell standing from a wall that moves along.
-  if (!inertial_.measured(since, t_imu)) return false;
-  cues.imu = imuSpread(inertial_.between(since, t_imu), &sensor_.imu_noise);
-  cues.tracks = image_counts ? static_cast<int>(now.size()) : 0;
-  cues.speed = filter_.nav().v_W.norm();
-  cues.px_per_metre = leastImageMotion(trackedPoints(), camera_->focal());
-  while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options.window - 1e-6) {
-    recent_pixels_.pop_front();
-  }
-  if (!recent_pixels_.empty()) cues.disparity_px = disparity(recent_pixels_.front().second);
-  if (still_ && image_counts) cues.anchor_disparity_px = disparity(still_anchor_);
-  recent_pixels_.emplace_back(t_imu, now);
-  const bool still = stillness_.update(cues);
-  // Without features in common with the anchor image (the lights went out) the motion since it is unknown: renew it.
-  const bool anchor_gone = still_ && cues.anchor_disparity_px < 0 && cues.tracks > options.min_tracks;
-  if (still && (!still_ || anchor_gone)) still_anchor_ = std::move(now);
-  return still;
-}
-
-SurfaceMatches FrontEnd::Impl::matchSurfaces(const cv::Mat& depth, const SE3& T_odom_C, double turned, double t) {
+SurfaceMatches FrontEnd::Impl::matchSurfaces(const ImageStep& step) {
   const int index = filter_.window().indexOf(surfaces_.reference());
-  if (index < 0 || depth.empty() || !options_.filter.use_surfaces) return {};
-  ScopedTimer timer(timing_, "frontend.surfaces", t);
+  if (index < 0 || step.depth.empty() || !options_.filter.use_surfaces) return {};
+  ScopedTimer timer(timing_, "frontend.surfaces", step.t);
   const SE3 T_odom_ref = cameraPose(filter_.window(), filter_.window().clones[index]);
-  SurfaceMatches matches = surfaces_.match(depth, T_odom_C.inverse() * T_odom_ref, moving_);
+  SurfaceMatches matches = surfaces_.match(step.depth, step.T_odom_C.inverse() * T_odom_ref, bodies_.regions());
+  const double turned = step.propagation.omega_I.norm() * std::abs(step.read.lag);
   // Colour and depth that are not taken together: their stamps, and so the warp to the colour image's, are unsure.
   for (SurfacePair& pair : matches.pairs) pair.shared = std::hypot(pair.shared, kOfLag * turned * pair.q_cur.norm());
   return matches;
@@ -114,7 +73,7 @@ void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, do
   const bool leaving = filter_.window().indexOf(surfaces_.reference()) <= 0;
   if (!leaving && 2 * matched >= surfaces_.size()) return;
   ScopedTimer timer(timing_, "frontend.surfaces", t);
-  surfaces_.setReference(depth, filter_.window().clones.back().id, moving_);
+  surfaces_.setReference(depth, filter_.window().clones.back().id, bodies_.regions());
 }
 
 }  // namespace vip_slam

@@ -59,16 +59,17 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   auto frame = std::make_shared<TrackedFrame>();
   frame->t = t;
   frame->epoch = epoch_;
-  frame->status = status_;
+  frame->status = health_.status();
   frame->T_I_C = extrinsics();
   frame->time_offset = timeOffset();
-  frame->camera_correction = {filter_.depthCorrection(), depth_curve_, filter_.bearingCorrection(), depth_shift_};
-  frame->zero_velocity = still_;
-  frame->keyframe = newest_keyframe_;
+  frame->camera_correction = {filter_.depthCorrection(), depth_input_.curve(), filter_.bearingCorrection(),
+                              depth_input_.shift()};
+  frame->zero_velocity = rest_.still();
+  frame->keyframe = keyframes_.newest();
   if (filter_.started()) {
     frame->state = filter_.nav();
     frame->covariance = filter_.covariance();
-    frame->T_chain_C = chainedCamera(frame->state.T_W_I);
+    frame->T_chain_C = keyframes_.chainedCamera(filter_, frame->state.T_W_I, extrinsics());
   }
   if (with_features) {
     for (const Track& track : tracker_.tracks()) frame->features.push_back(track.feature);
@@ -76,32 +77,22 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   return frame;
 }
 
-SE3 FrontEnd::Impl::chainedCamera(const SE3& T_odom_I) const {
-  const SE3 T_I_C = extrinsics();
-  if (last_keyframe_ == 0) return T_odom_I * T_I_C;
-  SE3 moved = T_odom_keyframe_.inverse() * T_odom_I;
-  if (const auto T_keyframe_I = filter_.poseSinceMark()) {
-    moved = *T_keyframe_I * (filter_.nav().T_W_I.inverse() * T_odom_I);
-  }
-  return T_chain_keyframe_ * (T_I_C.inverse() * moved * T_I_C);
-}
-
 FrameOutput FrontEnd::Impl::statusOnly(double t, TrackingState state, const std::string& reason) const {
   std::shared_ptr<TrackedFrame> frame = makeFrame(t, false);
   frame->status = {state, reason};
   if (filter_.started() && std::isfinite(t)) {
     const double t_imu = t + timeOffset();
-    const std::vector<ImuSample> samples =
-        inertial_.between(filter_.nav().t, std::min({t_imu, inertial_.newest(), filter_.nav().t + longestImuGap()}));
+    const std::vector<ImuSample> samples = inertial_.between(
+        filter_.nav().t, std::min({t_imu, inertial_.newest(), filter_.nav().t + options_.recovery.longestImuGap()}));
     if (samples.size() > 1) {
       const Propagation to = filter_.predict(samples, inertial_.noise(samples.front().t, samples.back().t));
       frame->state = to.predicted;
       frame->covariance = to.Phi * frame->covariance * to.Phi.transpose() + to.Q;
     }
     // The pose is published with the image's stamp, so extrapolate it to that time; after longer it is LOST.
-    const double untold = std::min(t_imu - frame->state.t, longestImuGap());
+    const double untold = std::min(t_imu - frame->state.t, options_.recovery.longestImuGap());
     if (untold > 0) carryOn(gyro(frame->state.t) - frame->state.bias_gyro, untold, &frame->state, &frame->covariance);
-    frame->T_chain_C = chainedCamera(frame->state.T_W_I);
+    frame->T_chain_C = keyframes_.chainedCamera(filter_, frame->state.T_W_I, extrinsics());
   }
   return {frame, nullptr};
 }
@@ -110,20 +101,8 @@ FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
   if (!filter_.started()) return statusOnly(t, TrackingState::kWaiting, why);
   // Without a usable image and without the IMU nothing carries the pose on.
   const double t_imu = t + timeOffset();
-  const bool imu_ended = t_imu - inertial_.newest() > longestImuGap();
-  if (phase_ != Phase::kLost && (imu_ended || t_imu - filter_.nav().t > options_.recovery.coast_seconds)) {
-    phase_ = Phase::kLost;
-    status_ = {TrackingState::kLost, why};  // also reported for the next images, until the state is re-evaluated
-    ++counters_.lost;
-  }
-  return statusOnly(t, phase_ == Phase::kLost ? TrackingState::kLost : TrackingState::kDegraded, why);
-}
-
-void FrontEnd::Impl::dropMoving(std::vector<Feature>* features) const {
-  if (!moving_.any()) return;
-  features->erase(std::remove_if(features->begin(), features->end(),
-                                 [&](const Feature& f) { return moving_.moves(f.pixel.cast<double>(), f.depth); }),
-                  features->end());
+  const bool imu_ended = t_imu - inertial_.newest() > options_.recovery.longestImuGap();
+  return statusOnly(t, health_.unusable(why, imu_ended, t_imu - filter_.nav().t), why);
 }
 
 float FrontEnd::Impl::trueDepth(float reading) const {
@@ -142,10 +121,10 @@ void FrontEnd::Impl::correctDepth(std::vector<Feature>* features) const {
 DepthGrid FrontEnd::Impl::depthGrid(int stride) const {
   const int on_image = strideOn(camera_->width(), camera_->height(), stride);
   DepthGrid grid = makeDepthGrid(tracker_.depth(), on_image, sensor_.depth_noise);
-  for (int v = 0; v < grid.rows && moving_.any(); ++v) {
+  for (int v = 0; v < grid.rows && bodies_.regions().any(); ++v) {
     for (int u = 0; u < grid.cols; ++u) {
       float& z = grid.z[static_cast<std::size_t>(v) * grid.cols + u];
-      if (z > 0 && moving_.moves(grid.pixel(u, v), z)) z = 0;
+      if (z > 0 && bodies_.regions().moves(grid.pixel(u, v), z)) z = 0;
     }
   }
   for (float& z : grid.z) z = trueDepth(z);
@@ -156,9 +135,9 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
   const bool is_keyframe = !keyframe_reason.empty();
   const bool few = static_cast<int>(tracker_.tracks().size()) < 2 * options_.recovery.min_tracks;
-  if (options_.use_map_landmarks && have_map_ && (is_keyframe || few)) {
+  if (options_.use_map_landmarks && (is_keyframe || few)) {
     ScopedTimer timer(timing_, "frontend.reacquire", t);
-    counters_.landmarks_reacquired += landmarks_.reacquire(&tracker_, orb_, T_map_odom_ * T_odom_C, T_odom_C);
+    counters_.landmarks_reacquired += map_.reacquire(&tracker_, orb_, T_odom_C);
   }
   tracker_.replenish(T_odom_C, is_keyframe, t);
 
@@ -173,11 +152,11 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   }
   correctDepth(&frame->features);
   // Features on moving bodies are not passed on; the tracker keeps them, to recognise the bodies in the next images.
-  dropMoving(&frame->features);
+  bodies_.drop(&frame->features);
   if (is_keyframe) {
     ScopedTimer timer(timing_, "frontend.keyframe", t);
     output.keyframe = makeKeyframe(*frame, t_imu);
-    frame->keyframe = newest_keyframe_;
+    frame->keyframe = keyframes_.newest();
   }
   placeAtStamp(&frame->features);
   if (!tracker_.depth().empty()) {
@@ -187,7 +166,7 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   output.frame = frame;
   const double horizon =
       std::max({2.0, options_.initialisation.standing_seconds + 0.5, options_.filter.zupt.window + 0.5});
-  inertial_.dropBefore(last_keyframe_ != 0 ? std::min(last_keyframe_imu_t_, t_imu - horizon) : t_imu - horizon);
+  inertial_.dropBefore(keyframes_.imuSince(t_imu - horizon));
   return output;
 }
 
@@ -205,37 +184,23 @@ void FrontEnd::Impl::placeAtStamp(std::vector<Feature>* features) const {
 
 KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu) {
   auto keyframe = std::make_shared<Keyframe>();
-  keyframe->id = next_keyframe_++;
   keyframe->frame = frame;
-  keyframe->frame.keyframe = keyframe->id;
-  keyframe->previous = last_keyframe_;
   std::vector<cv::Point2f> occupied;
   for (const Feature& f : frame.features) occupied.emplace_back(f.pixel.x(), f.pixel.y());
   std::vector<Feature> corners = orb_.extract(tracker_.gray(), occupied, 6.0, tracker_.mask());
   for (Feature& corner : corners) tracker_.measure(&corner);
   correctDepth(&corners);
   keyframe->frame.features.insert(keyframe->frame.features.end(), corners.begin(), corners.end());
-  dropMoving(&keyframe->frame.features);
+  bodies_.drop(&keyframe->frame.features);
   placeAtStamp(&keyframe->frame.features);
   if (!tracker_.depth().empty()) {
     keyframe->frame.depth_grid = depthGrid(options_.keyframe_grid_stride);
   }
-  if (last_keyframe_ != 0 && !keyframe_imu_broken_ && inertial_.measured(last_keyframe_imu_t_, t_imu))
-    keyframe->imu = inertial_.between(last_keyframe_imu_t_, t_imu);
   keyframe->gyro_correction = filter_.gyroCorrection();
   keyframe->imu_noise_scale = filter_.imuNoiseScale();
   keyframe->depth_noise = surfaces_.learnt().parts();
 
-  if (const RelativeMotion motion = filter_.motionSinceMark(); last_keyframe_ != 0 && motion.isUsable())
-    keyframe->motion = motion;
-  filter_.markNewest();
-  T_odom_keyframe_ = frame.state.T_W_I;
-  T_chain_keyframe_ = frame.T_chain_C;
-
-  selector_.accept(frame.t, frame.state.T_W_I * frame.T_I_C, frame.features);
-  last_keyframe_ = newest_keyframe_ = keyframe->id;
-  last_keyframe_imu_t_ = t_imu;
-  keyframe_imu_broken_ = false;
+  keyframes_.accept(keyframe.get(), frame.features, t_imu, inertial_, &filter_);
   ++counters_.keyframes;
   return keyframe;
 }

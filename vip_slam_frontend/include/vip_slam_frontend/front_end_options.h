@@ -18,6 +18,9 @@ struct RecoveryOptions {
   double max_position_sigma = 2.0;
   double max_speed = 20.0;
 
+  /// Longest IMU gap over which the IMU is believed, s; in a longer one images and depth carry the pose.
+  double longestImuGap() const { return 5.0 * max_imu_gap; }
+
   void visit(OptionVisitor& v) {
     v.field("coast_seconds", coast_seconds, 0.1, 60.0, "IMU-only time before LOST, s");
     v.field("min_tracks", min_tracks, 3, 500, "fewer tracks than this count as none");
