@@ -25,6 +25,7 @@ constexpr double kImplausibleNoise = 10.0;
 constexpr double kStandsPx = 0.5;
 // Repeated images are reported as a fault only after this time, s.
 constexpr double kFrozen = 0.3;
+
 }  // namespace
 
 bool FrontEnd::Impl::imuIsContradicted() const { return filter_.imuNoiseScale() > kImplausibleNoise; }

@@ -135,7 +135,7 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   const SE3 T_odom_C = filter_.nav().T_W_I * extrinsics();
   const bool is_keyframe = !keyframe_reason.empty();
   const bool few = static_cast<int>(tracker_.tracks().size()) < 2 * options_.recovery.min_tracks;
-  if (options_.use_map_landmarks && (is_keyframe || few)) {
+  if (is_keyframe || few) {
     ScopedTimer timer(timing_, "frontend.reacquire", t);
     counters_.landmarks_reacquired += map_.reacquire(&tracker_, orb_, T_odom_C);
   }
@@ -161,12 +161,10 @@ FrameOutput FrontEnd::Impl::makeOutput(double t, double t_imu, const std::string
   placeAtStamp(&frame->features);
   if (!tracker_.depth().empty()) {
     ScopedTimer timer(timing_, "frontend.depth_grid", t);
-    frame->depth_grid = depthGrid(options_.frame_grid_stride);
+    frame->depth_grid = depthGrid(2 * options_.keyframe_grid_stride);
   }
   output.frame = frame;
-  const double horizon =
-      std::max({2.0, options_.initialisation.standing_seconds + 0.5, options_.filter.zupt.window + 0.5});
-  inertial_.dropBefore(keyframes_.imuSince(t_imu - horizon));
+  inertial_.dropBefore(keyframes_.imuSince(t_imu - 2.0 * kStandingSeconds));
   return output;
 }
 

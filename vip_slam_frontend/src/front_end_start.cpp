@@ -48,7 +48,7 @@ FrameOutput FrontEnd::Impl::initialise(const ImageStep& step) {
   const std::optional<ImuSample> here = inertial_.at(t_imu);
   const Eigen::Vector3d omega = here ? Eigen::Vector3d(here->gyro - prior->state.bias_gyro) : Eigen::Vector3d::Zero();
   filter_.start(*prior, next_clone_++, omega);
-  if (prior->at_rest) rest_.begin(inertial_, t_imu, options_.initialisation.standing_seconds);
+  if (prior->at_rest) rest_.begin(inertial_, t_imu, kStandingSeconds);
   counters_.level = initialiser_.level();
   initialiser_.reset();
   health_.start(t, filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff());

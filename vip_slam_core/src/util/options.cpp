@@ -124,7 +124,8 @@ void OptionSetter::finish() const {
     // With an edit distance of the whole length any name would match.
     if (best >= values_[k].first.size()) nearest = nullptr;
     throw std::invalid_argument((source_.empty() ? "" : source_ + ": ") + "unknown option '" + values_[k].first + "'" +
-                                (nearest ? ", did you mean '" + *nearest + "'?" : ""));
+                                (nearest ? ", did you mean '" + *nearest + "'?" : "") +
+                                " (docs/parameters.md lists all; some of earlier versions are fixed values now)");
   }
 }
 

@@ -40,8 +40,6 @@ struct FrontEndOptions {
   InitialisationOptions initialisation;
   KeyframeOptions keyframes;
   RecoveryOptions recovery;
-  bool use_map_landmarks = true;
-  int frame_grid_stride = 16;
   int keyframe_grid_stride = 8;
 
   void visit(OptionVisitor& v) {
@@ -50,11 +48,8 @@ struct FrontEndOptions {
     v.group("initialisation", initialisation);
     v.group("keyframes", keyframes);
     v.group("recovery", recovery);
-    v.field("use_map_landmarks", use_map_landmarks, "re-acquire the back end's landmarks so that they keep their id");
-    v.field("frame_grid_stride", frame_grid_stride, 4, 64,
-            "stride of the depth grid of every image, px of 640; finer in smaller images");
     v.field("keyframe_grid_stride", keyframe_grid_stride, 2, 64,
-            "stride of the depth grid of a keyframe, px of 640; finer in smaller images");
+            "stride of the depth grid of a keyframe, px of 640, finer in smaller images; of other images twice that");
   }
 };
 

@@ -78,7 +78,7 @@ std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool w
 
 double VioFilter::ownNoise(const Triangulation& point) const {
   const int dof = point.pixel_rows - 3;
-  if (!options_.own_noise || dof <= 0 || point.pixel_chi2 < explained_.threshold(dof)) return 1.0;
+  if (!options_.own_noise || dof <= 0 || point.pixel_chi2 < gate_.threshold(dof)) return 1.0;
   return point.pixel_chi2 / dof;
 }
 
@@ -86,7 +86,7 @@ double VioFilter::beyondState(const FeatureRows& feature) const {
   const int n = static_cast<int>(feature.r.size());
   if (n == 0) return 1.0;
   const double distance = testInnovation(filter_.R(), feature.H, feature.r).distance;
-  return distance < explained_.threshold(n) ? 1.0 : distance / n;
+  return distance < gate_.threshold(n) ? 1.0 : distance / n;
 }
 
 double VioFilter::openPixels() const {
@@ -106,7 +106,6 @@ VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& c
   MeasurementNoise noise;
   noise.sigma_xy = noise_.sigma() / focal_;
   noise.depth_inflation = options_.depth_inflation * depthScale();
-  noise.use_depth = options_.use_depth;
   FeatureBatch batch;
   for (const Candidate& candidate : candidates) {
     if (static_cast<int>(batch.accepted.size()) >= options_.max_update_features) break;
@@ -146,7 +145,7 @@ VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& c
     }
     // A patch that slides with the motion (crossing edges at different depths) looks like another motion: spread over
     // two dozen rows that passes any gate, but it biases the few directions of the state that the feature measures.
-    const double weight = huberWeight(innovation.distance / dof, options_.huber) *
+    const double weight = huberWeight(innovation.distance / dof, kHuberSigmas) *
                           huberWeight(innovation.pull / innovation.expected_pull, options_.pull_huber);
     if (weight < 1) {
       feature.H *= std::sqrt(weight);

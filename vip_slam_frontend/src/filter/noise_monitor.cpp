@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 
 namespace {
@@ -23,11 +25,11 @@ constexpr double kMinJitter = 1e-4, kMaxJitter = 5e-3;
 
 }  // namespace
 
-NoiseMonitor::NoiseMonitor(double sigma, double lowest, double highest, bool adapt)
-    : sigma_(std::clamp(sigma, lowest, std::max(lowest, highest))), min_(lowest), max_(highest), adapt_(adapt) {}
+NoiseMonitor::NoiseMonitor(double sigma, double lowest, double highest)
+    : sigma_(std::clamp(sigma, lowest, std::max(lowest, highest))), min_(lowest), max_(highest) {}
 
 void NoiseMonitor::add(double chi2_per_dof, int dof) {
-  if (!adapt_ || dof < 20 || !(chi2_per_dof > 0) || !std::isfinite(chi2_per_dof)) return;
+  if (dof < kEnough || !(chi2_per_dof > 0) || !std::isfinite(chi2_per_dof)) return;
   // Plain average over the first 20 updates, then exponential: a wrong initial value is forgotten quickly.
   const double gain = 1.0 / (updates_ = std::min(updates_ + 1, 20));
   const double most = updates_ <= kGuessed ? kMaxOfGuess : 1.0;

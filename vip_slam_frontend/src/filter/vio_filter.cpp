@@ -10,6 +10,7 @@ namespace {
 // Largest factor on the depth camera's noise model; beyond it readings are wrong rather than noisy.
 constexpr double kMaxDepthNoise = 5.0;
 constexpr double kMinDepthNoise = 0.3;
+constexpr double kMaxPixelNoise = 2.0;  // px; beyond, tracks are lost rather than noisy
 // Number of features in an update from which on it is used to estimate the stamps' jitter.
 constexpr int kMinOfStamps = 5;
 
@@ -35,10 +36,9 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       sigma_depth_offset_(options.calibration.sigma_depth_offset),
       focal_(focal_px),
       G_(gravityVector(gravity)),
-      gate_(options.gate_probability),
-      explained_(0.95),
-      noise_(options.sigma_px, options.sigma_px_min, options.sigma_px_max, options.adapt_sigma_px),
-      depth_noise_(1.0, kMinDepthNoise, kMaxDepthNoise, options.adapt_depth_noise),
+      gate_(kGateProbability),
+      noise_(options.sigma_px, options.sigma_px_min, kMaxPixelNoise),
+      depth_noise_(1.0, kMinDepthNoise, kMaxDepthNoise),
       stamp_monitor_(options.adapt_imu_noise),
       imu_monitor_(options.adapt_imu_noise) {}
 
@@ -186,7 +186,7 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
 }
 
 void VioFilter::updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report) {
-  SurfaceRows surface = surfaceRows(filter_.window(), filter_.R(), surfaces, options_.huber);
+  SurfaceRows surface = surfaceRows(filter_.window(), filter_.R(), surfaces, kHuberSigmas);
   report->surfaces_used = surface.used;
   const int dof = static_cast<int>(surface.rows.r.size());
   if (dof == 0) return;
@@ -225,8 +225,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     if (still_images_ == 0) still_anchor_ = id;
     Eigen::MatrixXd H;
     Eigen::VectorXd h;
-    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, *residual_motion,
-                     options_.zupt, &H, &h);
+    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, *residual_motion, &H,
+                     &h);
     const UpdateResult result = filter_.update(H, h);
     report.zero_velocity = true;
     report.healthy = result.ok;
@@ -244,7 +244,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   after_open_ = propagation.open;
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full, all);
   if (!candidates.empty()) updateWithFeatures(candidates, all, &report);
-  if (surfaces && !still && options_.use_depth) updateWithSurfaces(*surfaces, &report);
+  if (surfaces && !still) updateWithSurfaces(*surfaces, &report);
   if (delay_before_) holdDelay();
   judgeDepthOffset();
   judgeDepthShift();

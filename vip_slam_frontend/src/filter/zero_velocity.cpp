@@ -5,10 +5,18 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 
 namespace {
 
+// Largest mean image motion over the window, px, and estimated speed, m/s, to stand still.
+constexpr double kStillPixels = 0.5, kStillSpeed = 0.1;
+// Still images in a row to enter, moving ones to leave.
+constexpr int kImagesIn = 4, kImagesOut = 2;
+// One sigma of zero velocity, m/s, and of zero rotation, rad, and translation, m, since stopping.
+constexpr double kZeroVelocity = 0.02, kZeroRotation = 0.0017, kZeroPosition = 0.002;
 // The sigmas stop growing after this many repeats; else the IMU's noise would make the standing pose drift.
 constexpr int kMaxRepeats = 8;
 // Without an image, the IMU's means may differ from those at rest by this much (or five sigmas of their noise), ...
@@ -66,10 +74,10 @@ ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise
 
 bool StillnessDetector::update(const StillnessCues& cues) {
   const bool quiet = cues.imu.count >= 5 && cues.imu.quiet(options_.max_gyro_std, options_.max_accel_std);
-  const bool image_known = cues.disparity_px >= 0 && cues.tracks > options_.min_tracks;
+  const bool image_known = cues.disparity_px >= 0 && cues.tracks > kEnough;
   const double shows = cues.px_per_metre > 0 ? cues.px_per_metre / kPxPerMetre : 1.0;
-  const double limit = options_.max_disparity_px * std::clamp(shows, kMinLimit, 1.0);
-  bool wants = options_.enabled && quiet && cues.speed < options_.max_speed;
+  const double limit = kStillPixels * std::clamp(shows, kMinLimit, 1.0);
+  bool wants = options_.enabled && quiet && cues.speed < kStillSpeed;
   if (still_) {
     // While still, an image without features (lights off) does not end the stillness; image motion does.
     wants = wants && (image_known ? cues.disparity_px < 1.5 * limit : restsAs(cues.imu, rest_)) &&
@@ -80,7 +88,7 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   residual_motion_ = {};
   if (image_known) {
     const double moved = kFar * std::max(cues.disparity_px, cues.anchor_disparity_px);
-    residual_motion_.rotation = std::max(kMinResidualMotion, moved / options_.max_disparity_px);
+    residual_motion_.rotation = std::max(kMinResidualMotion, moved / kStillPixels);
     residual_motion_.translation = std::max(kMinResidualMotion, moved / limit);
   }
   if (wants) {
@@ -90,13 +98,13 @@ bool StillnessDetector::update(const StillnessCues& cues) {
   }
   if (wants == still_) {
     in_a_row_ = 0;
-  } else if (++in_a_row_ >= (still_ ? options_.frames_out : options_.frames_in)) {
+  } else if (++in_a_row_ >= (still_ ? kImagesOut : kImagesIn)) {
     still_ = wants;
     in_a_row_ = 0;
   }
   since_still_ = still_ ? 0 : std::min(since_still_ + 1, kForgotten);
   imu_rests_ = quiet && since_still_ < kForgotten && restsAs(cues.imu, rest_);
-  // A single image with motion already suspends the updates; it takes frames_in images to start them.
+  // A single image with motion already suspends the updates; it takes kImagesIn images to start them.
   return still_ && wants;
 }
 
@@ -130,21 +138,21 @@ double leastImageMotion(const std::vector<Eigen::Vector3d>& points, double focal
 }
 
 void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ResidualMotion& residual_motion,
-                      const ZuptOptions& options, Eigen::MatrixXd* H, Eigen::VectorXd* h) {
+                      Eigen::MatrixXd* H, Eigen::VectorXd* h) {
   const int newest = static_cast<int>(window.clones.size()) - 1;
   const bool relative = anchor >= 0 && anchor != newest;
   const double root = std::sqrt(1.0 + std::min(repeats, kMaxRepeats));
   const double step = residual_motion.translation * root, turn = residual_motion.rotation * root;
   *H = Eigen::MatrixXd::Zero(relative ? 9 : 3, window.dimension());
   *h = Eigen::VectorXd::Zero(relative ? 9 : 3);
-  const double wv = 1.0 / (options.sigma_velocity * step);
+  const double wv = 1.0 / (kZeroVelocity * step);
   H->block<3, 3>(0, window.navColumn()) = wv * Eigen::Matrix3d::Identity();
   h->head<3>() = -wv * window.v_W;
   if (!relative) return;
 
   const Clone& a = window.clones[anchor];
   const Clone& b = window.clones[newest];
-  const double wr = 1.0 / (options.sigma_rotation * turn), wp = 1.0 / (options.sigma_position * step);
+  const double wr = 1.0 / (kZeroRotation * turn), wp = 1.0 / (kZeroPosition * step);
   // Log(R_a^T R_b) = 0 with theta right-perturbed on both: d = dtheta_b - R_b^T R_a dtheta_a for a small angle. The
   // translation is compared in the frame of a, which keeps yaw and position unobservable.
   const Eigen::Matrix3d Ra = a.T_W_I_fej.R(), Rb = b.T_W_I_fej.R();

@@ -15,7 +15,6 @@ constexpr double kGate = 8.0;
 // A fault is sudden: for kCalm s before it differences stayed below this share of the gate.
 constexpr double kCalm = 0.5, kDeviates = 0.7;
 constexpr double kMemory = 1.0;  // s, of the share of contradicted time
-constexpr double kMostly = 0.5;
 
 }  // namespace
 
@@ -42,7 +41,7 @@ bool FaultDetection::add(const MotionEvidence& e) {
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;
   const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || suspects(e.t));
-  const bool fault = begins || goes_on || (contradicts && contradicted_ > kMostly);
+  const bool fault = begins || goes_on || (contradicts && contradicted_ > 0.5);
   if (fault && contradicts) last_fault_t_ = e.t;
   return fault;
 }

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::frontend {
 
@@ -12,7 +13,6 @@ namespace {
 // Of a normal against the camera's up. A floor's is off by what the camera looks down, a wall's by 90 degrees less what
 // it looks up, which cameras do less.
 constexpr double kUpright = 60.0;  // degrees
-constexpr int kFewestPatches = 20;
 
 }  // namespace
 
@@ -32,7 +32,7 @@ std::optional<Eigen::Vector3d> upByFloor(const std::vector<SurfacePatch>& on_pla
   static const double least = std::cos(kUpright * kDegree);
   std::map<int, int> patches;
   std::optional<Eigen::Vector3d> up;
-  int largest = kFewestPatches - 1;
+  int largest = kEnough - 1;
   for (const SurfacePatch& patch : on_planes) {
     if (patch.surface < 0 || -patch.n_C.y() < least || ++patches[patch.surface] <= largest) continue;
     largest = patches[patch.surface];

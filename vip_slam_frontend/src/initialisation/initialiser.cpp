@@ -41,12 +41,12 @@ void Initialiser::reset() {
 }
 
 std::optional<FilterPrior> Initialiser::standing(double t, const frontend::InertialInput& inertial) {
-  const double from = t - options_.standing_seconds;
+  const double from = t - kStandingSeconds;
   if (!inertial.complete() || inertial.oldest() > from) return std::nullopt;
   const std::vector<ImuSample> samples = inertial.between(from, t);
   if (samples.size() < kFewestSamples) return std::nullopt;
   const ImuSpread spread = imuSpread(samples, &noise_);
-  if (!spread.quiet(options_.max_gyro_std, options_.max_accel_std) || spread.mean_gyro.norm() > kMaxTurn)
+  if (!spread.quiet(filter_.zupt.max_gyro_std, filter_.zupt.max_accel_std) || spread.mean_gyro.norm() > kMaxTurn)
     return std::nullopt;
   level_ = frontend::Level::kAccelerometer;
   FilterPrior prior;
@@ -57,7 +57,7 @@ std::optional<FilterPrior> Initialiser::standing(double t, const frontend::Inert
   prior.sigma_tilt = 0.3;
   prior.sigma_velocity = 0.02;
   prior.sigma_bias_accel = filter_.sigma_bias_accel;
-  const double inflation = 2.0 * filter_.imu_noise_inflation, root = std::sqrt(options_.standing_seconds);
+  const double inflation = 2.0 * filter_.imu_noise_inflation, root = std::sqrt(kStandingSeconds);
   prior.sigma_bias_gyro = std::min(
       filter_.sigma_bias_gyro, 2e-4 + inflation * (noise_.gyro_noise_density / root + noise_.gyro_random_walk * root));
   prior.sigma_mean_accel = 0.005 + inflation * (noise_.accel_noise_density / root + noise_.accel_random_walk * root);
@@ -107,7 +107,7 @@ std::optional<FilterPrior> Initialiser::add(const InitialisationInput& image, co
   prior.sigma_tilt = prior.sigma_position;  // without an accelerometer part of the gauge
   if (inertial.hasAccel()) {
     const ImuSpread spread = imuSpread(samples, &noise_);
-    if (spread.quiet(options_.max_gyro_std, options_.max_accel_std) &&
+    if (spread.quiet(filter_.zupt.max_gyro_std, filter_.zupt.max_accel_std) &&
         std::abs(spread.mean_accel.norm() - gravity_) > kMaxOffGravity) {
       reason_ = formatted("the accelerometer reads %.2f at rest, expected %.2f m/s^2: is its unit right?",
                           spread.mean_accel.norm(), gravity_);

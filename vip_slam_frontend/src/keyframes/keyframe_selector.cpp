@@ -4,14 +4,9 @@
 
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam {
-
-namespace {
-
-constexpr std::size_t kMinForRatio = 20;
-
-}  // namespace
 
 void KeyframeSelector::reset() { any_ = false; }
 
@@ -37,7 +32,7 @@ std::string KeyframeSelector::decide(double t, const SE3& T_odom_C, const std::v
   }
   // With a handful of features the ratio is not meaningful.
   const auto before = static_cast<double>(features_.size());
-  if (features_.size() >= kMinForRatio && common < options_.min_tracked_ratio * before) return "tracked ratio";
+  if (before >= kEnough && common < options_.min_tracked_ratio * before) return "tracked ratio";
   if (common > 0 && parallax / common > options_.min_parallax_px) return "parallax";
   if (t - t_ > options_.max_seconds) return "time";
   return "";

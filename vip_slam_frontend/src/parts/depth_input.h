@@ -18,8 +18,9 @@
 
 namespace vip_slam::frontend {
 
-/// Longest time without depth that is normal, s: a depth camera slower than the colour camera leaves images without.
-constexpr double kBetweenDepths = 0.5;
+/// For how long what has just been seen still holds, s: without depth, as images of a colour camera that is the faster
+/// one are; without enough points; after a fault of the IMU.
+constexpr double kMoment = 0.5;
 
 /// A depth image at its own stamp; empty when there is none.
 struct DepthReading {

@@ -5,14 +5,10 @@
 
 #include "vip_slam_core/util/formatted.h"
 
-#include "parts/depth_input.h"
-
 namespace vip_slam::frontend {
 
 namespace {
 
-// A fault of the IMU is said for this long after it, s.
-constexpr double kFaultShown = 0.5;
 // Nearly all features gated in this many images in a row: the estimate has diverged from the measurements.
 constexpr int kGatedImages = 30;
 // Factor on coast_seconds: when everything in view contradicts the IMU for longer, the IMU, or the velocity integrated
@@ -71,7 +67,7 @@ bool Health::resume(const Sight& sight) {
   // RANSAC gives a metric pose (pose_ok) only from points with depth; without such points, as with depth on surfaces
   // alone, tracking resumes without it.
   if (sight.with_depth >= options_.min_tracks) last_points_t_ = sight.t;
-  const bool agrees = sight.pose_ok || sight.t - last_points_t_ > kBetweenDepths;
+  const bool agrees = sight.pose_ok || sight.t - last_points_t_ > kMoment;
   if (!lost() || sight.tracked < 2 * options_.min_tracks || !agrees) return true;
   // The IMU was integrated throughout. While the position's uncertainty stays within bounds the odometry goes on.
   if (coastedSigma(sight.variance) > options_.max_position_sigma) return false;
@@ -85,11 +81,11 @@ std::string Health::doubts(const Sight& sight) const {
     return "the images contradict the IMU: are its axes, signs and units, T_imu_cam, the stamps and the scale of depth "
            "right? check_bag tells";
   }
-  if (sight.t_imu - silent_imu_t_ < kFaultShown) return "no IMU samples: held by images and depth";
-  if (sight.t_imu - fault_t_ < kFaultShown) return "the IMU contradicts what is seen: held by images and depth";
-  if (sight.t_imu - cut_off_imu_t_ < kFaultShown)
+  if (sight.t_imu - silent_imu_t_ < kMoment) return "no IMU samples: held by images and depth";
+  if (sight.t_imu - fault_t_ < kMoment) return "the IMU contradicts what is seen: held by images and depth";
+  if (sight.t_imu - cut_off_imu_t_ < kMoment)
     return formatted("the gyroscope is at the end of its range, %.2f rad/s", gyro_range_);
-  if (sight.t - last_metric_t_ > kBetweenDepths && !sight.still) return "no depth: visual-inertial only";
+  if (sight.t - last_metric_t_ > kMoment && !sight.still) return "no depth: visual-inertial only";
   return "";
 }
 

@@ -8,6 +8,8 @@
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_options.h"
 
+#include "parts/depth_input.h"
+
 namespace vip_slam::frontend {
 
 /// What one image says about its pose.
@@ -34,7 +36,7 @@ class Health {
   bool tracking() const { return phase_ == Phase::kTracking; }
   bool lost() const { return phase_ == Phase::kLost; }
   /// Whether the points have been too few for so long that their depth tells nothing of where to look for them.
-  bool coasts(double t) const { return lost() || t - last_good_t_ > 0.5; }
+  bool coasts(double t) const { return lost() || t - last_good_t_ > kMoment; }
 
   /// Waits for a first image; `reason` is said.
   void reset(const std::string& reason);

@@ -5,7 +5,7 @@
 namespace vip_slam::frontend {
 
 bool Keyframes::waitsForDepth(bool has_depth, double t) {
-  const bool waits = !has_depth && t - last_depth_t_ < kBetweenDepths;
+  const bool waits = !has_depth && t - last_depth_t_ < kMoment;
   if (has_depth) last_depth_t_ = t;
   return waits;
 }

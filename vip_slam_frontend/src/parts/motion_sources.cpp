@@ -17,25 +17,23 @@ namespace {
 constexpr double kBeyondRange = 0.3;
 // One sigma of the motion between two images where they cannot be aligned, rad and m; floor of that by points. Points
 // have the same pixels as the filter's tracks, which it takes for independent: factor on their variance.
-constexpr double kUnknownTurn = 0.02, kUnknownStep = 0.02, kPointsLeast = 1e-3, kSharedByTracks = 9.0;
+constexpr double kUnknown = 0.02, kPointsLeast = 1e-3, kSharedByTracks = 9.0;
 // What one alignment errs, the next one does too: in each direction, one sigma in rad and m, and as a share of the
 // motion. Judged on real recordings of a Kinect and an Xtion.
 constexpr double kAlignedLeast = 2e-3, kAlignedShare = 0.05;
 // A turn between images that optical flow need not follow, and how far from it dense alignment sees another one, rad.
 constexpr double kBeyondFlow = 0.1, kTurnsApart = 0.05;
-constexpr double kAlignedGate = 4.0;  // sigmas, between the two
 
 // Time after the start during which the filter's velocity is not yet trusted to judge the points, s.
 constexpr double kSettled = 2.0;
 // Errors of the prediction that no covariance has (rolling shutter, delay, extrinsics), one sigma: a share of the turn
-// and an angle, rad; by the time and a length, m/s and m.
-constexpr double kUnmodelledTurn = 0.05, kUnmodelledAngle = 1e-3;
-constexpr double kUnmodelledSpeed = 0.0125, kUnmodelledLength = 2.5e-4;
+// and an angle, rad; as displacements at this distance, m, and of a body that turns by 1 rad/s.
+constexpr double kUnmodelledTurn = 0.05, kUnmodelledAngle = 1e-3, kLeverArm = 0.25;
 // Images agree among themselves with at least this many points with depth, and one outlier per kAgreeingOutliers.
 constexpr int kAgreeing = 30, kAgreeingOutliers = 10;
-// Time without images after which the camera may look elsewhere, s. After twice that time a rotation further than
-// kFarTurn, rad, from the predicted one is too far from the filter's linearisation point.
-constexpr double kLongUnseen = 0.2, kFarTurn = 0.05;
+// Time without images after which the camera may look elsewhere, s. After twice that time a turn further than
+// kTurnsApart from the predicted one is too far from the filter's linearisation point.
+constexpr double kLongUnseen = 0.2;
 
 /// Of the errors that alignments in a row share, for a turn (rad) or a displacement (m) of this size.
 double commonVariance(double motion) {
@@ -63,8 +61,7 @@ std::optional<AlignedMotion> MotionSources::byPixels(const FeatureTracker& track
 
 AlignedMotion MotionSources::goingOn() const {
   AlignedMotion unknown{last_, Matrix6d::Zero()};
-  unknown.covariance.diagonal() << Eigen::Vector3d::Constant(kUnknownTurn * kUnknownTurn),
-      Eigen::Vector3d::Constant(kUnknownStep * kUnknownStep);
+  unknown.covariance.diagonal().setConstant(kUnknown * kUnknown);
   return unknown;
 }
 
@@ -131,7 +128,7 @@ Propagation MotionSources::byImages(double t_imu, const MotionFit& points, const
     Matrix6d of_points = kSharedByTracks * points.covariance;
     of_points.diagonal().array() += kPointsLeast * kPointsLeast;
     const Matrix6d gain = covariance * (covariance + of_points).inverse();
-    if (motionDifference(points.T_current_previous, T_cur_prev, covariance + of_points) < kAlignedGate) {
+    if (motionDifference(points.T_current_previous, T_cur_prev, covariance + of_points) < kGateSigmas) {
       T_cur_prev = T_cur_prev.boxplus(gain * points.T_current_previous.boxminus(T_cur_prev));
       covariance -= gain * covariance;
     }
@@ -175,7 +172,7 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
     covariance.topLeftCorner<3, 3>() += R_C_I * propagation.turnCovariance(P) * R_C_I.transpose();
     covariance.bottomRightCorner<3, 3>() += R_C_W * propagation.displacementCovariance(P) * R_C_W.transpose();
     const double turn = kUnmodelledTurn * propagation.omega_I.norm() * prediction.interval + kUnmodelledAngle;
-    const double length = kUnmodelledSpeed * prediction.interval + kUnmodelledLength;
+    const double length = kLeverArm * (kUnmodelledTurn * prediction.interval + kUnmodelledAngle);
     covariance.diagonal().head<3>().array() += turn * turn;
     covariance.diagonal().tail<3>().array() += length * length;
     evidence.sigmas = motionDifference(tracking.motion.T_current_previous, prediction.T_current_previous, covariance);
@@ -188,7 +185,7 @@ bool MotionSources::bridgesGap(const TrackingResult& tracking, std::size_t track
   if (unseen < kLongUnseen) return true;
   if (!tracking.pose_ok || 2 * static_cast<std::size_t>(tracking.tracked) < tracks_before) return false;
   const SE3 apart = prediction.T_current_previous.inverse() * tracking.T_current_previous;
-  return unseen < 2 * kLongUnseen || logSO3(apart.R()).norm() < kFarTurn;
+  return unseen < 2 * kLongUnseen || logSO3(apart.R()).norm() < kTurnsApart;
 }
 
 void MotionSources::start(double t_imu) {

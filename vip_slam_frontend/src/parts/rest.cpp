@@ -4,6 +4,7 @@
 #include <map>
 
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::frontend {
 
@@ -13,7 +14,7 @@ std::optional<ResidualMotion> Rest::residualMotion() const {
 }
 
 bool Rest::imuIsQuiet(const InertialInput& inertial, double since, double t_imu) const {
-  since = std::max(inertial.oldest(), std::min(t_imu - options_.window, since));
+  since = std::max(inertial.oldest(), std::min(t_imu - kRestWindow, since));
   return imuSpread(inertial.between(since, t_imu), &noise_).quiet(options_.max_gyro_std, options_.max_accel_std);
 }
 
@@ -38,7 +39,7 @@ void Rest::decide(const InertialInput& inertial, double previous_t_imu, double t
 
 bool Rest::isStill(const InertialInput& inertial, double previous_t_imu, double t_imu, const View& view) {
   // Back to the last image at least: in a longer gap between images the camera may have moved and stopped again.
-  const double since = std::max(inertial.oldest(), std::min(t_imu - options_.window, previous_t_imu));
+  const double since = std::max(inertial.oldest(), std::min(t_imu - kRestWindow, previous_t_imu));
   // An image alone does not tell standing from a wall that moves along.
   if (!inertial.measured(since, t_imu)) return false;
   PixelList now;
@@ -48,7 +49,7 @@ bool Rest::isStill(const InertialInput& inertial, double previous_t_imu, double 
   cues.tracks = view.counts ? static_cast<int>(now.size()) : 0;
   cues.speed = view.speed;
   cues.px_per_metre = view.px_per_metre;
-  while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= options_.window - 1e-6) {
+  while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= kRestWindow - 1e-6) {
     recent_pixels_.pop_front();
   }
   if (!recent_pixels_.empty()) cues.disparity_px = disparity(recent_pixels_.front().second, now);
@@ -56,7 +57,7 @@ bool Rest::isStill(const InertialInput& inertial, double previous_t_imu, double 
   recent_pixels_.emplace_back(t_imu, now);
   const bool still = detector_.update(cues);
   // Without features in common with the anchor image (the lights went out) the motion since it is unknown: renew it.
-  const bool anchor_gone = still_ && cues.anchor_disparity_px < 0 && cues.tracks > options_.min_tracks;
+  const bool anchor_gone = still_ && cues.anchor_disparity_px < 0 && cues.tracks > kEnough;
   if (still && (!still_ || anchor_gone)) anchor_ = std::move(now);
   return still;
 }

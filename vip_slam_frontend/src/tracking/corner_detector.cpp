@@ -50,6 +50,8 @@ bool stronger(const Corner& a, const Corner& b) {
   return a.pixel.y != b.pixel.y ? a.pixel.y < b.pixel.y : a.pixel.x < b.pixel.x;
 }
 
+// Cells of the image, for an even spread of corners.
+constexpr int kColumns = 16, kRows = 12;
 // Structure below this is image noise of a few grey levels, not a corner.
 constexpr float kMinScore = 4.0f;
 
@@ -78,7 +80,7 @@ std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Poi
                                   const TrackingOptions& options, const cv::Mat& mask) {
   std::vector<Corner> result;
   if (wanted <= 0) return result;
-  const int cols = options.grid_columns, rows = options.grid_rows, border = options.border;
+  const int cols = kColumns, rows = kRows, border = options.border;
   std::vector<int> count(static_cast<std::size_t>(cols) * rows, 0);
   Occupancy occupancy(gray.size(), options.min_distance);
   for (const cv::Point2f& p : occupied) {

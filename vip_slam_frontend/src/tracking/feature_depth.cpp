@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include "vip_slam_core/depth/depth_image.h"
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam {
 
@@ -20,7 +21,6 @@ constexpr int kMinNear = 12;
 constexpr double kPixelError = 0.5;
 // A corner farther than this from the nearer surface's edge belongs to the surface behind, px.
 constexpr double kMaxOffRim = 1.5;
-constexpr double kInlierSigmas = 3.5;
 constexpr double kMaxRelativeSigma = 0.05;
 
 struct Reading {
@@ -37,7 +37,7 @@ struct InversePlane {
     const double inverse = c.x() + c.y() * x + c.z() * y;
     return inverse > 1e-3 ? 1.0 / inverse : 1e3;
   }
-  bool explains(const Reading& r) const { return std::abs(z(r.x, r.y) - r.z) < kInlierSigmas * r.sigma; }
+  bool explains(const Reading& r) const { return std::abs(z(r.x, r.y) - r.z) < kReadingSigmas * r.sigma; }
 };
 
 template <typename Use>
@@ -116,7 +116,7 @@ FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
   for (int i = 0; i < n; ++i) {
     const Reading& r = readings[i];
     if (!near(r)) {
-      behind += r.z > plane.z(r.x, r.y) + kInlierSigmas * r.sigma;
+      behind += r.z > plane.z(r.x, r.y) + kReadingSigmas * r.sigma;
     } else if (plane.explains(r)) {
       off2 = std::min(off2, r.x * r.x + r.y * r.y);
     }

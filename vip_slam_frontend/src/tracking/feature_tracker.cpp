@@ -9,6 +9,12 @@
 
 namespace vip_slam {
 
+namespace {
+
+constexpr double kInlierPixels = 2.0;  // of outlier rejection, px
+
+}  // namespace
+
 FeatureTracker::FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera,
                                const DepthNoise& noise, TimingLog* timing, const cv::Mat& mask, LandmarkId first_id)
     : options_(options),
@@ -41,8 +47,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     ScopedTimer timer(timing_, "frontend.track", t);
     pyramid_.swap(last_pyramid_);
     pyramid_.clear();
-    cv::buildOpticalFlowPyramid(gray, pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
-                                options_.klt_levels);
+    cv::buildOpticalFlowPyramid(gray, pyramid_, cv::Size(kFlowWindow, kFlowWindow), kFlowLevels);
     if (!last_pyramid_.empty()) matchExposure(gray, predicted.T_current_previous, has_translation);
     if (!last_pyramid_.empty()) runKlt(gray, predicted.T_current_previous, has_translation, &next, &found);
     gray_ = gray;
@@ -56,8 +61,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   std::vector<std::size_t> index;
   const std::vector<PointPair> pairs = pairsOf(next, found, &index);
   RansacOptions ransac;
-  ransac.threshold = options_.ransac_px / camera_->focal();
-  ransac.iterations = options_.ransac_iterations;
+  ransac.threshold = kInlierPixels / camera_->focal();
   ransac.seed = image_count_;
   const RansacResult model = rejectOutliers(pairs, predicted, ransac, &result.moves_by_itself);
   result.lost_outlier = static_cast<int>(pairs.size()) - model.inliers;
@@ -75,7 +79,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     result.regions.add({next[index[k]].x, next[index[k]].y}, pairs[k].depth_previous, model.inlier[k]);
   }
   keepInliers(index, model.inlier, next, predicted.T_current_previous);
-  if (options_.refine_against_reference) alignWithReferences(T_odom_here);
+  alignWithReferences(T_odom_here);
   for (Track& track : tracks_) measure(&track);
   result.tracked = static_cast<int>(tracks_.size());
   return result;

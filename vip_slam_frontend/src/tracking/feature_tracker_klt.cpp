@@ -16,6 +16,7 @@ namespace {
 constexpr double kExposureGain = 0.1;
 constexpr double kExposureShift = 6.0;
 constexpr int kExposureReach = 12;           // px around a track
+constexpr double kFlowApart = 0.5;           // px, largest forward-backward error
 constexpr std::size_t kMinForExposure = 10;  // tracks
 
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
@@ -61,13 +62,12 @@ void FeatureTracker::matchExposure(const cv::Mat& gray, const SE3& predicted, bo
   cv::Mat adapted;
   gray_.convertTo(adapted, CV_8U, gain, offset);
   last_pyramid_.clear();
-  cv::buildOpticalFlowPyramid(adapted, last_pyramid_, cv::Size(options_.klt_window | 1, options_.klt_window | 1),
-                              options_.klt_levels);
+  cv::buildOpticalFlowPyramid(adapted, last_pyramid_, cv::Size(kFlowWindow, kFlowWindow), kFlowLevels);
 }
 
 void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation,
                             std::vector<cv::Point2f>* next, std::vector<char>* found) {
-  const cv::Size window(options_.klt_window | 1, options_.klt_window | 1);
+  const cv::Size window(kFlowWindow, kFlowWindow);
   std::vector<cv::Point2f> previous;
   previous.reserve(tracks_.size());
   next->clear();
@@ -81,20 +81,20 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
   found->assign(tracks_.size(), 0);
   if (tracks_.empty()) return;
 
-  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.klt_iterations, 0.01);
+  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.01);
   std::vector<std::uint8_t> status, back_status;
-  cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, previous, *next, status, cv::noArray(), window, options_.klt_levels,
+  cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, previous, *next, status, cv::noArray(), window, kFlowLevels,
                            criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   // Backward check from the forward result, started at the previous pixel: one pyramid level is enough.
   std::vector<cv::Point2f> back = previous;
-  cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, *next, back, back_status, cv::noArray(), window,
-                           std::min(1, options_.klt_levels), criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, *next, back, back_status, cv::noArray(), window, 1, criteria,
+                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   for (std::size_t i = 0; i < previous.size(); ++i) {
     const cv::Point2f d = back[i] - previous[i];
     const Eigen::Vector2d uv = asVector((*next)[i]);
-    (*found)[i] = status[i] && back_status[i] && std::hypot(d.x, d.y) < options_.forward_backward_px &&
-                  uv.allFinite() && uv.x() >= options_.border && uv.y() >= options_.border &&
-                  uv.x() < gray.cols - options_.border && uv.y() < gray.rows - options_.border && allowed(uv);
+    (*found)[i] = status[i] && back_status[i] && std::hypot(d.x, d.y) < kFlowApart && uv.allFinite() &&
+                  uv.x() >= options_.border && uv.y() >= options_.border && uv.x() < gray.cols - options_.border &&
+                  uv.y() < gray.rows - options_.border && allowed(uv);
   }
 }
 

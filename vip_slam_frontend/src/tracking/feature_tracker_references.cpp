@@ -11,7 +11,7 @@ namespace vip_slam {
 namespace {
 
 constexpr int kMaxMissed = 5;               // images in a row in which a patch is not found
-constexpr double kMaxFromPrediction = 3.0;  // px
+constexpr double kMaxFromPrediction = 3.0, kMaxFromFlow = 1.0;  // px, of a match
 
 // Variance of a corner that was recognised by its descriptor, px^2.
 constexpr double kCornerVariance = 1.0;
@@ -147,7 +147,7 @@ void FeatureTracker::restartReferences(const SE3& T_odom_C, const std::shared_pt
 void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
   std::shared_ptr<ReferenceImage> here;
   for (Track& track : tracks_) {
-    const Match match = this->match(&track, T_odom_C, options_.reference_max_correction_px);
+    const Match match = this->match(&track, T_odom_C, kMaxFromFlow);
     const bool known = track.surface.known;
     track.missed = match == Match::kFound ? 0 : track.missed + 1;
     if (match == Match::kFound && (known || !surfaceIsKnown(&track))) continue;

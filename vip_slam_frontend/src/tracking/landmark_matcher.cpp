@@ -15,9 +15,11 @@ constexpr int kPatchRadius = 41;  // px, holds a wide patch shown at half its si
 constexpr int kMinRadius = 14;    // px, holds a narrow one likewise
 constexpr std::size_t kMaxPatches = 8000;
 constexpr int kMaxPerImage = 60;
+constexpr int kSearchRadius = 8;  // px, of the search around a projected landmark
+constexpr int kHamming = 50;      // bits, largest descriptor distance
 // Largest distance of a newly detected corner from the pixel of the old track, px.
 constexpr double kCornerOffset = 3.0;
-constexpr double kNearest = 0.2, kFarthest = 15.0;  // m along the optical axis
+constexpr double kFarthest = 15.0;  // m along the optical axis
 
 // Length of the longest ray of the image at unit depth; infinite when a corner of the image has no ray.
 double longestRay(const CameraModel& camera) {
@@ -122,8 +124,8 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     if (entry.observations < 3 || tracked.count(id)) continue;
     const Eigen::Vector3d p_C = T_C_map * entry.p_map;
     Eigen::Vector2d uv;
-    if (p_C.z() < kNearest || p_C.z() > kFarthest || !tracker->camera().project(p_C, &uv)) continue;
-    if (!camera_->inImage(uv, options_.border + options_.landmark_radius_px) || !tracker->allowed(uv)) continue;
+    if (!(p_C.z() > 0) || p_C.z() > kFarthest || !tracker->camera().project(p_C, &uv)) continue;
+    if (!camera_->inImage(uv, options_.border + kSearchRadius) || !tracker->allowed(uv)) continue;
     if (free(uv, options_.min_distance)) visible.push_back({id, &entry, uv, p_C.z()});
   }
   std::stable_sort(visible.begin(), visible.end(),
@@ -144,19 +146,18 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     track->reference_variance = patch->second.reference_variance;
     return true;
   };
-  const int radius = static_cast<int>(options_.landmark_radius_px);
   std::vector<cv::KeyPoint> keypoints;
   for (std::size_t i = 0; i < visible.size(); ++i) {
     Track there;
     there.feature.pixel = visible[i].uv.cast<float>();
-    if (withPatch(i, &there) && tracker->alignTrack(&there, T_odom_C, 0.5 * options_.landmark_radius_px)) {
+    if (withPatch(i, &there) && tracker->alignTrack(&there, T_odom_C, 0.5 * kSearchRadius)) {
       corners.push_back(there.feature);
       owner.push_back(i);
       aligned.push_back(static_cast<int>(direct.size()));
       direct.push_back(std::move(there));
     }
     const int x = static_cast<int>(visible[i].uv.x()), y = static_cast<int>(visible[i].uv.y());
-    const cv::Rect roi(x - radius - 3, y - radius - 3, 2 * radius + 7, 2 * radius + 7);
+    const cv::Rect roi(x - kSearchRadius - 3, y - kSearchRadius - 3, 2 * kSearchRadius + 7, 2 * kSearchRadius + 7);
     cv::FAST(gray(roi & cv::Rect(0, 0, gray.cols, gray.rows)), keypoints, options_.fast_threshold_low, true);
     for (const cv::KeyPoint& k : keypoints) {
       Feature f;
@@ -168,7 +169,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
     }
   }
   orb.describe(gray, &corners);
-  std::vector<int> best(visible.size(), -1), best_distance(visible.size(), options_.landmark_hamming + 1);
+  std::vector<int> best(visible.size(), -1), best_distance(visible.size(), kHamming + 1);
   for (std::size_t k = 0; k < corners.size(); ++k) {
     const int distance = hammingDistance(corners[k].descriptor, visible[owner[k]].entry->descriptor);
     if (distance < best_distance[owner[k]]) {

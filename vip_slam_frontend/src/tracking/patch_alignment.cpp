@@ -133,32 +133,34 @@ bool shifted(const cv::Mat& image, double x, double y, float* out) {
 template <int kRadius>
 PatchAlignment align(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
                      const cv::Mat& current, const Eigen::Vector2d& start) {
-  constexpr int kSide = Patch<kRadius>::kSide, kCount = Patch<kRadius>::kCount;
+  using Square = Patch<kRadius>;
   PatchAlignment result;
-  Patch<kRadius> patch;
+  Square patch;
   if (!patch.sample(reference, reference_pixel, warp)) return result;
   const Eigen::Matrix3d A = patch.gradients();
   result.texture = textureOf(A);
   const float mean = patch.grey.mean();
-  const float deviation = std::sqrt(std::max(1e-6f, (patch.grey.array() - mean).matrix().squaredNorm() / kCount));
+  const float deviation =
+      std::sqrt(std::max(1e-6f, (patch.grey.array() - mean).matrix().squaredNorm() / Square::kCount));
   const Eigen::LDLT<Eigen::Matrix3d> solver(A);
   if (deviation < 1.0f || solver.vectorD().minCoeff() < 1.0) return result;
 
   const Window window = matchBlur(current, start, warp, kRadius);
   const bool bytes = window.grey.depth() == CV_8U;
   Eigen::Vector2d pixel = start;
-  typename Patch<kRadius>::Values seen;
+  typename Square::Values seen;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Eigen::Vector2d first = pixel - window.origin - Eigen::Vector2d::Constant(kRadius);
-    if (!(bytes ? shifted<std::uint8_t, kSide>(window.grey, first.x(), first.y(), seen.data())
-                : shifted<float, kSide>(window.grey, first.x(), first.y(), seen.data())))
+    if (!(bytes ? shifted<std::uint8_t, Square::kSide>(window.grey, first.x(), first.y(), seen.data())
+                : shifted<float, Square::kSide>(window.grey, first.x(), first.y(), seen.data())))
       return result;
     const float seen_mean = seen.mean();
     seen.array() -= seen_mean;
     // A gain for contrast changes by exposure, limited so that noise is not amplified.
-    const float gain = std::clamp(deviation / std::sqrt(std::max(1e-6f, seen.squaredNorm() / kCount)), 0.5f, 2.0f);
+    const float gain =
+        std::clamp(deviation / std::sqrt(std::max(1e-6f, seen.squaredNorm() / Square::kCount)), 0.5f, 2.0f);
     seen = gain * seen - (patch.grey.array() - mean).matrix();
-    result.residual = std::sqrt(seen.squaredNorm() / kCount);
+    result.residual = std::sqrt(seen.squaredNorm() / Square::kCount);
     const Eigen::Vector3d step = solver.solve(Eigen::Vector3d(patch.gx.dot(seen), patch.gy.dot(seen), seen.sum()));
     if (!step.allFinite() || step.head<2>().norm() > kFarthestStep) return result;
     pixel -= step.head<2>();

@@ -5,13 +5,14 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 
 namespace {
 
 constexpr int kMinPatches = 6;
 constexpr int kRefinements = 3;
-constexpr double kSigmas = 3.5;
 // Unevenness of a wall, m, and error of a patch's normal close to an edge, rad; one sigma each.
 constexpr double kUneven = 0.003;
 constexpr double kTurned = 0.03;
@@ -27,8 +28,8 @@ struct PlaneFit {
 
   bool holds(const SurfacePatch& patch) const {
     const double turned = normal().cross(patch.n_C).norm();
-    return std::abs(distance(patch.p_C)) < kSigmas * std::hypot(patch.sigma, kUneven) && normal().dot(patch.n_C) > 0 &&
-           turned < kSigmas * std::hypot(patch.sigma_normal, kTurned);
+    return std::abs(distance(patch.p_C)) < kReadingSigmas * std::hypot(patch.sigma, kUneven) && normal().dot(patch.n_C) > 0 &&
+           turned < kReadingSigmas * std::hypot(patch.sigma_normal, kTurned);
   }
 };
 
@@ -61,7 +62,7 @@ bool leansAcrossAStep(const std::vector<SurfacePatch>& patches, const std::vecto
     turned += w * n.cross(patches[i].n_C);
     weight += w;
   }
-  return turned.norm() / weight > kSigmas * std::hypot(1.0 / std::sqrt(weight), kTurnedTogether);
+  return turned.norm() / weight > kReadingSigmas * std::hypot(1.0 / std::sqrt(weight), kTurnedTogether);
 }
 
 /// The plane round patch `seed` and its members among those that are not `done`; false when there is none.
@@ -74,7 +75,7 @@ bool growPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>
     const Eigen::Vector3d step = patches[i].p_C - from.p_C;
     const double away = extrapolate ? from.sigma_normal * step.norm() : kUneven;
     const double sigma = std::hypot(std::hypot(from.sigma, patches[i].sigma), away);
-    (*member)[i] = !done[i] && std::abs(from.n_C.dot(step)) < kSigmas * sigma && from.n_C.dot(patches[i].n_C) > 0.9;
+    (*member)[i] = !done[i] && std::abs(from.n_C.dot(step)) < kReadingSigmas * sigma && from.n_C.dot(patches[i].n_C) > 0.9;
   }
   for (int k = 0; k < kRefinements; ++k) {
     if (!fitPlane(patches, *member, plane)) return false;

@@ -2,17 +2,16 @@
 
 #include <algorithm>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 
 namespace {
 
 constexpr int kMinInliers = 5;
-constexpr double kSigmas = 4.0;
-// Above these shares of found's inliers both motions explain the points, or the bounded one explains enough of them.
-constexpr double kSameShare = 0.95, kBoundedShare = 0.67;
-// When nearly all points, at least kEnoughOld of them old, agree on one motion, the IMU has missed something.
-constexpr double kNearlyAll = 0.95;
-constexpr int kEnoughOld = 20;
+// Above this share of found's inliers the bounded motion explains enough of them; with nearly all of them both do. When
+// nearly all points, enough of them old, agree on one motion, the IMU has missed something.
+constexpr double kBoundedShare = 0.67, kNearlyAll = 0.95;
 // Allowance for other errors of a translation (blur, rolling shutter, clock), m/s.
 constexpr double kMinSpeed = 0.1;
 // After this time without images, s, the view has changed: optical flow then finds mostly chance matches.
@@ -26,7 +25,7 @@ bool matchedByChance(const PredictedMotion& prediction, const RansacResult& foun
 }  // namespace
 
 double mostApart(const PredictedMotion& prediction) {
-  return kSigmas * prediction.sigma + kMinSpeed * prediction.interval;
+  return kGateSigmas * prediction.sigma + kMinSpeed * prediction.interval;
 }
 
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded) {
@@ -46,7 +45,7 @@ bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found) 
     ++old;
     old_found += found.inlier[i] != 0;
   }
-  return old >= kEnoughOld && old_found >= kNearlyAll * old && found.inliers >= kNearlyAll * pairs.size();
+  return old >= kEnough && old_found >= kNearlyAll * old && found.inliers >= kNearlyAll * pairs.size();
 }
 
 RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const PredictedMotion& prediction,
@@ -67,7 +66,7 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const Predicted
   if (!prediction.wary && !prediction.at_rest && shownByAll(pairs, found)) return found;
   RansacResult bounded = rejectOutliers(pairs, prediction.T_current_previous, options);
   // Few or distant points hardly constrain the translation: then both motions explain them.
-  if (!prediction.wary && bounded.inliers > kSameShare * found.inliers) return found;
+  if (!prediction.wary && bounded.inliers > kNearlyAll * found.inliers) return found;
   if (bounded.inliers > kBoundedShare * found.inliers) return bounded;
   *moves = prediction.at_rest || movesByItself(pairs, found, bounded);
   return *moves ? bounded : found;

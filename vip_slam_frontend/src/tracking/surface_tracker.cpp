@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 
 namespace {
@@ -15,7 +17,6 @@ constexpr int kReach = kHalf * kSampleStep;
 constexpr int kSamples = (2 * kHalf + 1) * (2 * kHalf + 1);
 constexpr int kMinSamples = 42;
 constexpr std::size_t kMinPatches = 40;
-constexpr double kInlierSigmas = 3.5;
 constexpr double kMinCosine = 0.12;
 constexpr double kMaxTurned = 0.985;  // cosine between the normals of a pair
 // What two images less than half a second apart see of a wall errs alike (correlation 0.5 to 0.9, measured on Kinect,
@@ -87,7 +88,7 @@ bool SurfaceTracker::fit(const cv::Mat& depth, int u, int v, SurfacePatch* patch
   for (int i = 0; i < kSamples; ++i) {
     if (!(z[i] > 0)) continue;
     const double inverse = c.x() + c.y() * at[i].x() + c.z() * at[i].y();
-    explained += inverse > 0 && std::abs(1.0 / inverse - z[i]) < kInlierSigmas * noise_.sigma(z[i]);
+    explained += inverse > 0 && std::abs(1.0 / inverse - z[i]) < kReadingSigmas * noise_.sigma(z[i]);
   }
   if (explained < 0.95 * valid) return false;
 

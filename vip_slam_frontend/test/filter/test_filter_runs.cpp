@@ -15,7 +15,7 @@ namespace {
 // soon.
 TEST(NoiseMonitor, AWrongStartIsForgottenWithinThreeImages) {
   for (const double truth : {0.03, 0.5, 1.5}) {
-    NoiseMonitor monitor(0.5, 0.01, 2.0, true);
+    NoiseMonitor monitor(0.5, 0.01, 2.0);
     for (int image = 0; image < 3; ++image) monitor.add(std::pow(truth / monitor.sigma(), 2), 60);
     EXPECT_NEAR(std::log(monitor.sigma() / truth), 0.0, 0.1) << truth;
   }

@@ -235,7 +235,7 @@ StillnessCues quiet() {
 TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
   const ZuptOptions options;
   StillnessDetector detector(options);
-  for (int i = 0; i < options.frames_in - 1; ++i) EXPECT_FALSE(detector.update(quiet()));
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(detector.update(quiet()));
   EXPECT_TRUE(detector.update(quiet()));
   StillnessCues moving = quiet();
   moving.disparity_px = 5;

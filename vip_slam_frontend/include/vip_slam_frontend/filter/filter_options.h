@@ -56,53 +56,29 @@ struct CalibrationOptions {
   }
 };
 
+/// Standing still. The limits of the IMU depend on the body's vibrations.
 struct ZuptOptions {
   bool enabled = true;
-  double window = 0.25;
   double max_gyro_std = 0.02;
   double max_accel_std = 0.25;
-  double max_disparity_px = 0.5;
-  int min_tracks = 20;
-  double max_speed = 0.1;
-  int frames_in = 4;
-  int frames_out = 2;
-  double sigma_velocity = 0.02;
-  double sigma_rotation = 0.0017;
-  double sigma_position = 0.002;
 
   void visit(OptionVisitor& v) {
     v.field("enabled", enabled, "zero-velocity updates while standing still");
-    v.field("window", window, 0.1, 5.0, "IMU time looked at, s");
     v.field("max_gyro_std", max_gyro_std, 0.0, 1.0, "largest gyro deviation while still, rad/s");
     v.field("max_accel_std", max_accel_std, 0.0, 10.0, "largest accelerometer deviation while still, m/s^2");
-    v.field("max_disparity_px", max_disparity_px, 0.0, 10.0,
-            "largest mean image motion over the window, px; less where all is far");
-    v.field("min_tracks", min_tracks, 0, 1000, "tracks needed to trust the image motion");
-    v.field("max_speed", max_speed, 0.0, 10.0, "largest estimated speed to enter, m/s");
-    v.field("frames_in", frames_in, 1, 100, "still images in a row to enter");
-    v.field("frames_out", frames_out, 1, 100, "moving images in a row to leave");
-    v.field("sigma_velocity", sigma_velocity, 1e-4, 1.0, "one-sigma of zero velocity, m/s");
-    v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "one-sigma of zero rotation since stopping, rad");
-    v.field("sigma_position", sigma_position, 1e-5, 1.0, "one-sigma of zero translation since stopping, m");
   }
 };
 
 struct FilterOptions {
   int window = 11;
   double sigma_px = 0.5;
-  bool adapt_sigma_px = true;
   double sigma_px_min = 0.05;
-  double sigma_px_max = 2.0;
   double pixel_inflation = 1.3;
   bool own_noise = true;
-  double gate_probability = 0.95;
-  double huber = 1.5;
   double pull_huber = 1.0;
   int max_update_features = 30;
-  bool use_depth = true;
   bool use_surfaces = true;
   double depth_inflation = 1.4;
-  bool adapt_depth_noise = true;
   double imu_noise_inflation = 1.0;
   bool adapt_imu_noise = true;
   double sigma_bias_gyro = 0.02;
@@ -113,24 +89,18 @@ struct FilterOptions {
   void visit(OptionVisitor& v) {
     v.field("window", window, 4, 30, "clones kept");
     v.field("sigma_px", sigma_px, 0.05, 10.0, "one-sigma of a well textured patch's pixel at the start, px");
-    v.field("adapt_sigma_px", adapt_sigma_px, "adapt sigma_px to the normalised innovations");
     v.field("sigma_px_min", sigma_px_min, 0.01, 10.0,
             "lower bound of the adaptation, px; the error that good tracks share");
-    v.field("sigma_px_max", sigma_px_max, 0.05, 20.0, "upper bound of the adaptation, px");
     v.field("pixel_inflation", pixel_inflation, 1.0, 20.0,
             "factor on the adapted sigma_px; above 1: what a track errs in one image it errs in the next, too");
     v.field("own_noise", own_noise, "a feature whose residuals sigma_px does not explain gets a larger one of its own");
-    v.field("gate_probability", gate_probability, 0.5, 0.9999, "chi-square quantile of the feature gate");
-    v.field("huber", huber, 0.5, 100.0, "Huber threshold on whitened residuals, sigmas");
     v.field("pull_huber", pull_huber, 0.1, 1000.0,
             "Huber threshold on the correction that one feature asks for, in sigmas of what it may");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");
-    v.field("use_depth", use_depth, "use depth measurements");
     v.field("use_surfaces", use_surfaces,
             "tie each depth image to the flat patches of an earlier one; needs no corners");
     v.field("depth_inflation", depth_inflation, 0.1, 20.0,
             "factor on the depth noise; above 1: what a corner's depth errs in one image it errs in the next, too");
-    v.field("adapt_depth_noise", adapt_depth_noise, "widen the depth noise while the sightings of points say so");
     v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
     v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the images contradict the IMU");
     v.field("sigma_bias_gyro", sigma_bias_gyro, 1e-5, 1.0, "initial one-sigma of the gyro bias, rad/s");

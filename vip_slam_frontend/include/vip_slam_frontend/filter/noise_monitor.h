@@ -10,14 +10,13 @@ namespace vip_slam {
 class NoiseMonitor {
  public:
   /// `sigma`: initial value, for pixels in px, for depth a factor on the sensor's noise model.
-  NoiseMonitor(double sigma, double lowest, double highest, bool adapt);
+  NoiseMonitor(double sigma, double lowest, double highest);
   /// `chi2_per_dof`: squared residuals whitened by sigma() over their degrees of freedom; `dof` rows behind it.
   void add(double chi2_per_dof, int dof);
   double sigma() const { return sigma_; }
 
  private:
   double sigma_, min_, max_;
-  bool adapt_;
   int updates_ = 0;
 };
 

@@ -186,7 +186,7 @@ class VioFilter {
   double sigma_depth_offset_;        ///< m, of the prior at a start
   double focal_;
   Eigen::Vector3d G_;
-  Gate gate_, explained_;
+  Gate gate_;
   NoiseMonitor noise_, depth_noise_;
   StampMonitor stamp_monitor_;
   ImuNoiseMonitor imu_monitor_;

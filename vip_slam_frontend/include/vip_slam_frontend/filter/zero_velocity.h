@@ -11,6 +11,8 @@
 
 namespace vip_slam {
 
+/// IMU time that is looked at for stillness, s.
+constexpr double kRestWindow = 0.25;
 struct ImuSpread {
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
   double gyro_std = 0, accel_std = 0;      ///< norm of the per-axis standard deviations
@@ -25,7 +27,7 @@ ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise
 
 /// Evidence of one image and the IMU samples before it about motion.
 struct StillnessCues {
-  ImuSpread imu;                    ///< over ZuptOptions::window
+  ImuSpread imu;                    ///< over kRestWindow
   double disparity_px = -1;         ///< mean image motion over the same time; < 0: unknown
   double anchor_disparity_px = -1;  ///< since standing still began; < 0: unknown
   int tracks = 0;
@@ -74,6 +76,6 @@ double leastImageMotion(const std::vector<Eigen::Vector3d>& points, double focal
 /// measurement, so the sigmas grow with its root, up to threefold. `residual_motion`: larger for a camera held in the
 /// hand than on a tripod.
 void zeroVelocityRows(const WindowState& window, int anchor, int repeats, const ResidualMotion& residual_motion,
-                      const ZuptOptions& options, Eigen::MatrixXd* H, Eigen::VectorXd* h);
+                      Eigen::MatrixXd* H, Eigen::VectorXd* h);
 
 }  // namespace vip_slam

@@ -111,6 +111,8 @@ class FeatureTracker {
   void measure(Track* track) const;
 
  private:
+  static constexpr int kFlowWindow = 15;   ///< of optical flow, px, odd
+  static constexpr int kFlowLevels = 3;    ///< of its pyramid above the image
   static constexpr double kFarAway = 1e4;  ///< m, where a point without depth is put
   /// After a jump of the exposure: gives the last image's pyramid the contrast and brightness of the new image. Medians
   /// over the tracks' surroundings, there and at the predicted pixels, so that new content in view has no influence.
