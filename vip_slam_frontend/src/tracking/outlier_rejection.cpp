@@ -197,13 +197,12 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const SE3& pred
   const bool doubtful = n >= kMinToDoubt && 3 * result.inliers < n && !bounded;
   if (!doubtful && !options.turn_unknown) return result;
   GeneralMotion general = poseFromDepth(pairs, predicted, options);
-  if (doubtful && general.model == GeneralModel::kNone) general = fundamentalOrHomography(pairs, options);
+  if (!general.ok) return result;
   if (doubtful ? 3 * general.inliers > 2 * n : general.inliers > result.inliers) {
-    const bool metric = general.model == GeneralModel::kPose;
     result.ok = true;
     result.free_rotation = true;
-    result.with_depth = metric;
-    result.T_current_previous = metric ? general.T_current_previous : predicted;
+    result.with_depth = true;
+    result.T_current_previous = general.T_current_previous;
     result.inlier = std::move(general.inlier);
     result.inliers = general.inliers;
   }

@@ -1,4 +1,4 @@
-// Outlier rejection without a usable rotation: general scenes, and the two degenerate for a fundamental matrix.
+// Outlier rejection without a usable rotation: a general scene, a plane, a rotation on the spot.
 #include <algorithm>
 #include <random>
 
@@ -48,39 +48,13 @@ Pairs make(Scene scene, bool with_depth, unsigned seed) {
 }
 
 /// An outlier moved by up to 0.12 lands within the threshold of its right place or epipolar line by chance.
-constexpr double kByChanceOnLine = 0.12, kByChanceAtPoint = 0.03;
-
-TEST(GeneralMotion, FundamentalMatrixInAGeneralScene) {
-  for (unsigned seed = 1; seed <= 20; ++seed) {
-    const Pairs set = make(Scene::kGeneral, false, seed);
-    const GeneralMotion motion = fundamentalOrHomography(set.pairs, RansacOptions());
-    EXPECT_EQ(motion.model, GeneralModel::kFundamental) << seed;
-    EXPECT_GE(motion.inliers, 0.7 * set.pairs.size());
-    EXPECT_GE(set.accepted(motion.inlier, true), 0.95 * set.total(true)) << seed;
-    EXPECT_LE(set.accepted(motion.inlier, false), kByChanceOnLine * set.total(false) + 3) << seed;
-  }
-}
-
-TEST(GeneralMotion, APlaneAndARotationOnTheSpotDoNotFoolIt) {
-  for (const Scene scene : {Scene::kPlane, Scene::kRotation}) {
-    int wrong = 0, outliers = 0;
-    for (unsigned seed = 1; seed <= 20; ++seed) {
-      const Pairs set = make(scene, false, seed);
-      const GeneralMotion motion = fundamentalOrHomography(set.pairs, RansacOptions());
-      EXPECT_EQ(motion.model, GeneralModel::kHomography) << seed;
-      EXPECT_GE(set.accepted(motion.inlier, true), 0.97 * set.total(true)) << seed;
-      wrong += set.accepted(motion.inlier, false);
-      outliers += set.total(false);
-    }
-    EXPECT_LE(wrong, kByChanceAtPoint * outliers);
-  }
-}
+constexpr double kByChanceOnLine = 0.12;
 
 TEST(GeneralMotion, PoseFromDepthNeedsNoRotation) {
   for (const Scene scene : {Scene::kGeneral, Scene::kPlane, Scene::kRotation}) {
     const Pairs set = make(scene, true, 3);
     const GeneralMotion motion = poseFromDepth(set.pairs, SE3(), RansacOptions());
-    ASSERT_EQ(motion.model, GeneralModel::kPose);
+    ASSERT_TRUE(motion.ok);
     EXPECT_GE(set.accepted(motion.inlier, true), 0.97 * set.total(true));
     EXPECT_LE(set.accepted(motion.inlier, false), 2);
     EXPECT_LT((motion.T_current_previous.t() - set.truth.t()).norm(), 3e-3);
@@ -89,20 +63,18 @@ TEST(GeneralMotion, PoseFromDepthNeedsNoRotation) {
 }
 
 TEST(GeneralMotion, OutlierRejectionFallsBackOnlyWhenTheGyroIsContradicted) {
-  for (const bool depth : {true, false}) {
-    const Pairs set = make(Scene::kGeneral, depth, 5);
-    const RansacResult right =
-        rejectOutliers(set.pairs, SE3(set.truth.rotation(), Eigen::Vector3d::Zero()), RansacOptions());
-    EXPECT_TRUE(right.ok);
-    EXPECT_FALSE(right.free_rotation);
-    // The gyro missed a rotation of seven degrees.
-    const RansacResult wrong = rejectOutliers(set.pairs, SE3(), RansacOptions());
-    EXPECT_TRUE(wrong.ok);
-    EXPECT_TRUE(wrong.free_rotation);
-    EXPECT_EQ(wrong.with_depth, depth);
-    EXPECT_GE(set.accepted(wrong.inlier, true), 0.95 * set.total(true));
-    EXPECT_LE(set.accepted(wrong.inlier, false), kByChanceOnLine * set.total(false) + 3);
-  }
+  const Pairs set = make(Scene::kGeneral, true, 5);
+  const RansacResult right =
+      rejectOutliers(set.pairs, SE3(set.truth.rotation(), Eigen::Vector3d::Zero()), RansacOptions());
+  EXPECT_TRUE(right.ok);
+  EXPECT_FALSE(right.free_rotation);
+  // The gyro missed a rotation of seven degrees.
+  const RansacResult wrong = rejectOutliers(set.pairs, SE3(), RansacOptions());
+  EXPECT_TRUE(wrong.ok);
+  EXPECT_TRUE(wrong.free_rotation);
+  EXPECT_TRUE(wrong.with_depth);
+  EXPECT_GE(set.accepted(wrong.inlier, true), 0.95 * set.total(true));
+  EXPECT_LE(set.accepted(wrong.inlier, false), kByChanceOnLine * set.total(false) + 3);
 }
 
 TEST(GeneralMotion, ABodyThatMovesByItselfDoesNotWinAgainstTheGyro) {
@@ -128,8 +100,7 @@ TEST(GeneralMotion, ABodyThatMovesByItselfDoesNotWinAgainstTheGyro) {
 TEST(GeneralMotion, TooFewPairsGiveNoModel) {
   Pairs set = make(Scene::kGeneral, true, 9);
   set.pairs.resize(7);
-  EXPECT_EQ(poseFromDepth(set.pairs, SE3(), RansacOptions()).model, GeneralModel::kNone);
-  EXPECT_EQ(fundamentalOrHomography(set.pairs, RansacOptions()).model, GeneralModel::kNone);
+  EXPECT_FALSE(poseFromDepth(set.pairs, SE3(), RansacOptions()).ok);
 }
 
 }  // namespace
