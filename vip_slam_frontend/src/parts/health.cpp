@@ -9,8 +9,6 @@ namespace vip_slam::frontend {
 
 namespace {
 
-// Nearly all features gated in this many images in a row: the estimate has diverged from the measurements.
-constexpr int kGatedImages = 30;
 // Factor on coast_seconds: when everything in view contradicts the IMU for longer, the IMU, or the velocity integrated
 // from it, is taken to be wrong.
 constexpr double kPatience = 2.0;
@@ -21,7 +19,6 @@ void Health::reset(const std::string& reason) {
   phase_ = Phase::kWaiting;
   status_ = {TrackingState::kInitialising, reason};
   cut_off_imu_t_ = silent_imu_t_ = fault_t_ = -1e300;  // the clock may have run back
-  gated_in_a_row_ = 0;
 }
 
 void Health::initialising(const std::string& reason) {
@@ -47,8 +44,6 @@ bool Health::contradictedForLong(const Sight& sight) const {
 }
 
 std::string Health::divergence(const StepReport& report, double speed, const Sight& sight) {
-  const bool all_gated = report.features_gated >= 5 && report.features_used * 5 < report.features_gated;
-  gated_in_a_row_ = all_gated ? gated_in_a_row_ + 1 : (report.features_used > 0 ? 0 : gated_in_a_row_);
   const int needed = options_.min_tracks;
   const bool agrees =
       sight.moves_by_itself ? sight.old_with_depth >= needed : sight.pose_ok && sight.tracked >= 2 * needed;
@@ -57,7 +52,6 @@ std::string Health::divergence(const StepReport& report, double speed, const Sig
   if (!report.healthy) return "the filter became singular";
   const double most = options_.max_speed;
   if (speed > most) return formatted("estimated speed is %.1f m/s, at most %g (recovery/max_speed)", speed, most);
-  if (gated_in_a_row_ >= kGatedImages) return formatted("%d images in a row contradict the estimate", gated_in_a_row_);
   if (contradictedForLong(sight)) return "what is seen contradicts the IMU";
   return "";
 }

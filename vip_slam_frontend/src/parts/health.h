@@ -85,7 +85,6 @@ class Health {
   double silent_imu_t_ = -1e300;   ///< no IMU samples before it
   double fault_t_ = -1e300;        ///< the IMU at fault before it
   double gyro_range_ = 0;          ///< that limit, rad/s
-  int gated_in_a_row_ = 0;
 };
 
 }  // namespace vip_slam::frontend
