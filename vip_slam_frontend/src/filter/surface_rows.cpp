@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/filter/qr.h"
 #include "vip_slam_frontend/filter/triangular_solve.h"
 #include "vip_slam_frontend/filter/triangulation.h"
@@ -15,9 +16,6 @@ namespace vip_slam {
 
 namespace {
 
-constexpr double kGateSigmas = 4.0;
-// With fewer surviving pairs outliers among them cannot be recognised.
-constexpr int kMinPairs = 20;
 // Bearing over which the correlation of depth errors falls to 1 / e: 64 px of a Kinect, an Xtion and a LiDAR phone, on
 // which it was measured.
 constexpr double kCorrelationLength = 0.12;
@@ -113,22 +111,27 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   return A;
 }
 
-/// Multiplies the rows of one surface (numbers in `rows`) by the inverse root of their covariance I + S, where S is what
-/// they share: the nearer two patches were in the reference's image, the more.
+/// Multiplies the rows of one surface (numbers in `rows`) by the inverse root of their covariance I + S. S is what they
+/// share: the nearer two patches were in the reference's image, the more.
 void whitenShared(const std::vector<SurfacePair>& pairs, const std::vector<int>& rows, Eigen::MatrixXd* A) {
   const int n = static_cast<int>(rows.size());
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(n, n), of_surface(n, A->cols());
+  Eigen::ArrayXd x(n), y(n), shared(n);
+  Eigen::MatrixXd of_surface(n, A->cols());
   for (int k = 0; k < n; ++k) {
     const SurfacePair& pair = pairs[rows[k]];
-    const Eigen::Vector2d xy = pair.p_ref.hnormalized();
-    for (int l = 0; l <= k; ++l) {
-      const SurfacePair& other = pairs[rows[l]];
-      const double correlation = std::exp(-(xy - other.p_ref.hnormalized()).norm() / kCorrelationLength);
-      covariance(k, l) += correlation * (pair.shared / pair.sigma) * (other.shared / other.sigma);
-    }
+    x(k) = pair.p_ref.x() / pair.p_ref.z(), y(k) = pair.p_ref.y() / pair.p_ref.z();
+    shared(k) = pair.shared / pair.sigma;
     of_surface.row(k) = A->row(rows[k]);
   }
-  covariance.selfadjointView<Eigen::Lower>().llt().matrixL().solveInPlace(of_surface);
+  Eigen::MatrixXd covariance(n, n);  // lower triangle
+  for (int k = 0; k < n; ++k) {
+    const int below = n - k;
+    const Eigen::ArrayXd apart = ((x.tail(below) - x(k)).square() + (y.tail(below) - y(k)).square()).sqrt();
+    covariance.col(k).tail(below) = shared(k) * shared.tail(below) * (apart / -kCorrelationLength).exp();
+  }
+  covariance.diagonal().array() += 1;
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(covariance);  // in place
+  factor.matrixL().solveInPlace(of_surface);
   for (int k = 0; k < n; ++k) A->row(rows[k]) = of_surface.row(k);
 }
 
@@ -138,7 +141,7 @@ SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, con
                         double huber) {
   SurfaceRows result;
   const int a = window.indexOf(matches.reference), b = static_cast<int>(window.clones.size()) - 1;
-  if (a < 0 || a == b || static_cast<int>(matches.pairs.size()) < kMinPairs) return result;
+  if (a < 0 || a == b || static_cast<int>(matches.pairs.size()) < kEnough) return result;
   const Layout layout(window);
   Eigen::MatrixXd A = stackPairs(window, layout, a, b, matches.pairs);
 
@@ -158,7 +161,7 @@ SurfaceRows surfaceRows(const WindowState& window, const Eigen::MatrixXd& R, con
     surfaces[pair.surface].push_back(i);
     ++result.used;
   }
-  if (result.used < kMinPairs || result.used < result.gated) {
+  if (result.used < kEnough || result.used < result.gated) {
     result.used = 0;
     return result;
   }

@@ -5,10 +5,10 @@
 // The rows depend on the relative pose of two clones and on the camera's calibration only: position and yaw of the
 // window stay unobservable.
 //
-// Their noise has two parts: white, of each pair, and one that the pairs of a surface share the more the nearer they are
-// in the image: the correlation falls to 1 / e over a tenth of bearing. A surface's rows are multiplied by the inverse Cholesky factor of their
-// covariance, so that a small surface is worth no more than its shared part, however many pairs it has, and a large one
-// as much as the independent errors on it allow.
+// Their noise has two parts: white, of each pair, and one that the pairs of a surface share the more the nearer they
+// are in the image: its correlation falls to 1 / e over a tenth of bearing. A surface's rows are multiplied by the
+// inverse Cholesky factor of their covariance, so that a small surface is worth no more than its shared part, however
+// many pairs it has, and a large one as much as the independent errors on it allow.
 #pragma once
 
 #include <vector>
