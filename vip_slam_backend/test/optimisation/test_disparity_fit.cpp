@@ -102,8 +102,8 @@ TEST(DisparityFit, WhatNoCalibrationExplainsIsNotBelieved) {
 }
 
 // An error of a pose shifts all points of the keyframe alike: it counts as one error, not as hundreds. Chance exceeds
-// three of the sigmas that 20 groups of keyframes give in 0.74% of maps (Student's t, 19 degrees of freedom), so in more
-// than one of 40 with a probability of 3.5%.
+// three of the sigmas that 20 groups of keyframes give in 0.74% of maps (Student's t, 19 degrees of freedom), so in
+// more than one of 40 with a probability of 3.5%.
 TEST(DisparityFit, PosesThatAreOffAreNotMistakenForManyErrors) {
   int found = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {

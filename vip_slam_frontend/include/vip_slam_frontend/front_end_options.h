@@ -24,8 +24,9 @@ struct RecoveryOptions {
   void visit(OptionVisitor& v) {
     v.field("coast_seconds", coast_seconds, 0.1, 60.0, "IMU-only time before LOST, s");
     v.field("min_tracks", min_tracks, 3, 500, "fewer tracks than this count as none");
-    v.field("max_imu_gap", max_imu_gap, 0.05, 5.0,
-            "IMU gaps beyond this are bridged with more noise, s; from five times as long on by images and depth alone");
+    v.field(
+        "max_imu_gap", max_imu_gap, 0.05, 5.0,
+        "IMU gaps beyond this are bridged with more noise, s; from five times as long on by images and depth alone");
     v.field("max_image_gap", max_image_gap, 0.2, 25.0,
             "images missing for longer than this restart the tracking, s; until then the IMU carries the pose");
     v.field("max_position_sigma", max_position_sigma, 0.05, 100.0,

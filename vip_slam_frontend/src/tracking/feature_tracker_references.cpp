@@ -10,7 +10,7 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kMaxMissed = 5;               // images in a row in which a patch is not found
+constexpr int kMaxMissed = 5;                                   // images in a row in which a patch is not found
 constexpr double kMaxFromPrediction = 3.0, kMaxFromFlow = 1.0;  // px, of a match
 
 // Variance of a corner that was recognised by its descriptor, px^2.

@@ -28,8 +28,8 @@ struct PlaneFit {
 
   bool holds(const SurfacePatch& patch) const {
     const double turned = normal().cross(patch.n_C).norm();
-    return std::abs(distance(patch.p_C)) < kReadingSigmas * std::hypot(patch.sigma, kUneven) && normal().dot(patch.n_C) > 0 &&
-           turned < kReadingSigmas * std::hypot(patch.sigma_normal, kTurned);
+    return std::abs(distance(patch.p_C)) < kReadingSigmas * std::hypot(patch.sigma, kUneven) &&
+           normal().dot(patch.n_C) > 0 && turned < kReadingSigmas * std::hypot(patch.sigma_normal, kTurned);
   }
 };
 
@@ -75,7 +75,8 @@ bool growPlane(const std::vector<SurfacePatch>& patches, const std::vector<char>
     const Eigen::Vector3d step = patches[i].p_C - from.p_C;
     const double away = extrapolate ? from.sigma_normal * step.norm() : kUneven;
     const double sigma = std::hypot(std::hypot(from.sigma, patches[i].sigma), away);
-    (*member)[i] = !done[i] && std::abs(from.n_C.dot(step)) < kReadingSigmas * sigma && from.n_C.dot(patches[i].n_C) > 0.9;
+    (*member)[i] =
+        !done[i] && std::abs(from.n_C.dot(step)) < kReadingSigmas * sigma && from.n_C.dot(patches[i].n_C) > 0.9;
   }
   for (int k = 0; k < kRefinements; ++k) {
     if (!fitPlane(patches, *member, plane)) return false;

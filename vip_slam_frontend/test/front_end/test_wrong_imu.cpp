@@ -13,6 +13,14 @@ namespace {
 
 using Fault = std::function<ImuSample(ImuSample)>;
 
+/// What the camera sees at t, with this stamp.
+FrameInput seen(const CornerWorld& world, double t, double stamp) {
+  FrameInput input;
+  input.t = stamp;
+  world.look(t, 0, &input.gray, &input.depth);
+  return input;
+}
+
 struct Verdict {
   std::uint64_t contradicted = 0;  ///< images before which the IMU was at fault, or that contradict it for good
   double farthest = 0;             ///< of the poses from the true ones, m
@@ -27,10 +35,7 @@ Verdict judge(const Fault& fault, const SensorConfig& sensor) {
   for (int k = 0; k < 160; ++k) {
     const double t = 0.05 * k;
     for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(fault(CornerWorld::imu(imu_t)));
-    FrameInput input;
-    input.t = t;
-    world.look(t, 0, &input.gray, &input.depth);
-    const TrackedFramePtr frame = front_end.process(input).frame;
+    const TrackedFramePtr frame = front_end.process(seen(world, t, t)).frame;
     const TrackingStatus status = frame->status;
     if (t < kStill + 3) continue;
     verdict.farthest = std::max(verdict.farthest, (frame->state.T_W_I.t() - CornerWorld::pose(t).t()).norm());
@@ -57,10 +62,7 @@ TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
     for (int k = 0; k < 200; ++k) {
       const double t = 0.05 * k, stamp = t + jitter(random);
       for (; imu_t < t + 0.03; imu_t += 0.005) front_end.addImu(CornerWorld::imu(imu_t));
-      FrameInput input;
-      input.t = stamp;
-      world.look(t, 0, &input.gray, &input.depth);
-      output = front_end.process(input);
+      output = front_end.process(seen(world, t, stamp));
       if (t < kStill + 3) continue;
       EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
       sum += front_end.counters().stamp_sigma;
@@ -151,10 +153,7 @@ TEST(WrongImu, SingleWrongSamplesDoNotMoveThePose) {
       wrong += samples % 100 == 50 || samples % 100 == 90;
       front_end.addImu(sample);
     }
-    FrameInput input;
-    input.t = t;
-    world.look(t, 0, &input.gray, &input.depth);
-    output = front_end.process(input);
+    output = front_end.process(seen(world, t, t));
     if (t < kStill + 3) continue;
     EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
     EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(t).t()).norm(), 0.02) << t;

@@ -34,7 +34,8 @@ struct AccelSample {
 struct TimeJump {
   double seconds;
 };
-/// The clock of all stamps was set. The events' times go on from before; stamps from time `t` on are later by `seconds`.
+/// The clock of all stamps was set. The events' times go on from before; stamps from time `t` on are later by
+/// `seconds`.
 struct ClockSet {
   double t, seconds;
 };

@@ -55,7 +55,6 @@ class ImuBuffer {
     double t;
     Eigen::Vector3d value;
   };
-  // Split streams are filtered before they are joined: interpolation would spread a spike over its neighbours.
   /// Whether a sample may be added; counts the reason otherwise.
   bool acceptable(double t, bool finite, const SpikeFilter& stream);
   void countReplaced();

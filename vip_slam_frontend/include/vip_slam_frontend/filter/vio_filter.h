@@ -83,7 +83,7 @@ class VioFilter {
   const WindowState& window() const { return filter_.window(); }
   /// Present estimate of extrinsics and calibration; valid also between two starts.
   CalibrationEstimate calibration() const;
-  SE3 extrinsics() const { return started_ ? filter_.window().T_I_C : learnt_.T_I_C; }  ///< likewise
+  SE3 extrinsics() const { return started_ ? filter_.window().T_I_C : learnt_.T_I_C; }                 ///< likewise
   double timeOffset() const { return started_ ? filter_.window().time_offset : learnt_.time_offset; }  ///< likewise, s
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }

@@ -13,6 +13,7 @@ namespace vip_slam {
 
 /// IMU time that is looked at for stillness, s.
 constexpr double kRestWindow = 0.25;
+
 struct ImuSpread {
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
   double gyro_std = 0, accel_std = 0;      ///< norm of the per-axis standard deviations
