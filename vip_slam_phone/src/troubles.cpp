@@ -17,12 +17,12 @@ std::vector<std::string> troubles(const PhoneStatus& before, const PhoneStatus& 
   if (asleep) {
     words.push_back("the phone does not answer (" + now.video.problem +
                     "): is its screen on, the app streaming, and the address right? Trying again; the map stays");
-    return words;
+  } else {
+    stream("video", now.video, "is the app streaming? Trying again; the map stays");
+    stream("IMU", now.records, "switch on the IMU in the app. Trying again; the map stays");
+    stream("depth", now.depth, "switch on depth in the app; until then it goes on visual-inertially");
+    words.insert(words.end(), now.complaints.begin(), now.complaints.end());
   }
-  stream("video", now.video, "is the app streaming? Trying again; the map stays");
-  stream("IMU", now.records, "switch on the IMU in the app. Trying again; the map stays");
-  stream("depth", now.depth, "switch on depth in the app; until then it goes on visual-inertially");
-  words.insert(words.end(), now.complaints.begin(), now.complaints.end());
   if (now.video.connected && !now.sender_report)
     words.push_back("no RTCP sender report yet: the time of the images is not known, " + std::to_string(now.untimed) +
                     " were left out");

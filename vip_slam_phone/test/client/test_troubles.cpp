@@ -100,6 +100,16 @@ TEST(PhoneTroubles, APhoneThatSleepsIsOneTroubleAndNotThree) {
   EXPECT_NE(words[0].find("the map stays"), std::string::npos);
 }
 
+TEST(PhoneTroubles, WhatWasLostBeforeAPhoneFellAsleepIsSaid) {
+  const auto words = after([](Looks* l) {
+    for (StreamStatus* stream : {&l->now.records, &l->now.video, &l->now.depth})
+      *stream = {false, 1, 100, 0, "192.0.2.7:8554: nothing for 3 s"};
+    l->now.video.lost = l->before.video.lost + 5;
+  });
+  ASSERT_EQ(words.size(), 2u);
+  EXPECT_EQ(words[1].find("5 packets of the video were lost"), 0u) << words[1];
+}
+
 TEST(PhoneTroubles, UprightImages) {
   expectOne(after([](Looks* l) { l->now.assembly.portrait = 40; }), "images are upright");
   expectOne(after([](Looks* l) {

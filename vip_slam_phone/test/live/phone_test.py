@@ -121,7 +121,7 @@ class PhoneTest(unittest.TestCase):
         self.assertTrue((depth[15:-15, 20:-20] == 2000).all())
 
     def test_02_broken_connections_and_lost_packets(self):
-        begin = self.play('--reconnect', '4', '--lose', '50')
+        begin = self.play('--reconnect', '4', '--lose', '30')
         self.check_stamps(self.color, begin)
         stamps = np.array([m.header.stamp.to_sec() for _, m in self.color.all]) - begin - 1000
         self.assertGreater(stamps[-1], SECONDS - 1)
