@@ -27,7 +27,6 @@ struct MeasurementOptions {
   double plane_prior_deg = 0.5;
   double homography_inflation = 1.0;
   bool use_odometry = true;
-  double odometry_inflation = 2.0;
 
   void visit(OptionVisitor& v) {
     v.field("pixel_sigma", pixel_sigma, 0.05, 10.0,
@@ -47,8 +46,6 @@ struct MeasurementOptions {
             "factor on the sigma of homography pairs, for noise that the pairs of one host share");
     v.field("use_odometry", use_odometry,
             "the odometry's motion between successive keyframes, which knows the images and depth in between, counts");
-    v.field("odometry_inflation", odometry_inflation, 1.0, 100.0,
-            "factor on the sigma that the odometry tells: what it errs in one motion it errs in the next, too");
   }
 };
 

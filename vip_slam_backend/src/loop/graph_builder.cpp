@@ -14,7 +14,7 @@ namespace vip_slam {
 namespace {
 
 // The odometry's covariance between two keyframes is that of independent errors; what it errs in one motion it errs in
-// the next, too. The adjustments use the same factor (measurement/odometry_inflation).
+// the next, too: over the many motions of a loop that adds up.
 constexpr double kInflation = 2.0;
 
 // Metres between neighbours. A rotation in place drifts too: a full turn counts as two metres of travel.

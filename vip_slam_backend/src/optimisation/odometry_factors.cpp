@@ -13,7 +13,7 @@ constexpr double kMinRotation = 5e-5, kMinTranslation = 3e-4;
 bool odometryFactor(const MapKeyframe& keyframe, int i, int j, const MeasurementOptions& options,
                     BaRelativePose* factor) {
   if (!options.use_odometry || !keyframe.motion.known()) return false;
-  Matrix6d covariance = options.odometry_inflation * options.odometry_inflation * keyframe.motion.covariance;
+  Matrix6d covariance = keyframe.motion.covariance;
   covariance.diagonal().head<3>().array() += kMinRotation * kMinRotation;
   covariance.diagonal().tail<3>().array() += kMinTranslation * kMinTranslation;
   const Matrix6d information = covariance.llt().solve(Matrix6d::Identity());
