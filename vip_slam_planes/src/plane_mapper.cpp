@@ -37,10 +37,6 @@ bool isFinite(const PlanePolygon& polygon) {
 
 }  // namespace
 
-bool isSound(const KeyframeEstimate& estimate) {
-  return estimate.state.T_W_I.isFinite() && estimate.T_I_C.isFinite() && isSound(estimate.camera_correction);
-}
-
 bool isSound(const Plane& plane) {
   return plane.n.allFinite() && std::isfinite(plane.d) && std::abs(plane.n.norm() - 1) < 1e-3;
 }
@@ -62,37 +58,24 @@ std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, std
   std::vector<PlaneTrack*> tracks;
   // Planes may also grow into view: the range is larger by the growth gap.
   for (auto& [id, track] : tracks_) {
-    if (!epochs_.tied(track.epoch, epoch)) continue;
+    if (!keyframes_.tied(track.epoch, epoch)) continue;
     if (mayBeInView(track, T_map_C, noise.max_range + options.growth.gap)) tracks.push_back(&track);
   }
   return tracks;
 }
 
-const CameraPoses& PlaneMapper::Impl::posesTiedTo(std::uint32_t epoch) {
-  if (epochs_.allTied()) return poses_;
-  tied_poses_.clear();
-  for (const auto& [id, keyframe] : placed_) {
-    if (epochs_.tied(keyframe->frame.epoch, epoch)) tied_poses_[id] = poses_.at(id);
-  }
-  return tied_poses_;
-}
-
 void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
-  const bool usable = frame.status.state == TrackingState::kTracking && !frame.depth_grid.empty() && newest_ != 0 &&
-                      frame.epoch == epoch_ && !localising_ && !tracks_.empty() && isSound(frame.depth_grid) &&
-                      isSound(frame.camera_correction);
+  const bool usable = frame.status.state == TrackingState::kTracking && !frame.depth_grid.empty() &&
+                      keyframes_.newest() != 0 && frame.epoch == keyframes_.newestEpoch() && !localising_ &&
+                      !tracks_.empty() && isSound(frame.depth_grid) && isSound(frame.camera_correction);
   const SE3 T_map_C = T_map_odom * frame.state.T_W_I * frame.T_I_C;
-  const SE3 moved = grown_at_.inverse() * T_map_C;
-  const bool still = has_grown_ && moved.t().norm() < options.growth.min_move &&
-                     logSO3(moved.rotation()).norm() < options.growth.min_turn_deg * kDegree;
-  if (!usable || still || !T_map_C.isFinite()) {
+  if (!usable || !T_map_C.isFinite() || !pace_.due(T_map_C, options.growth)) {
     ++counters.frames_skipped;
     return;
   }
   const ScopedTimer timer(timing, "planes.grow", frame.t);
   ++counters.frames_grown;
-  grown_at_ = T_map_C;
-  has_grown_ = true;
+  pace_.grew(T_map_C);
   const std::vector<PlaneTrack*> tracks = tracksInView(T_map_C, frame.epoch);
   if (tracks.empty()) return;
   const DepthMesh& mesh =
@@ -100,12 +83,12 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
   const std::vector<MapTriangle> triangles = placeMesh(mesh, T_map_C);
   std::vector<int> label = associateTriangles(triangles, {tracks.begin(), tracks.end()}, options.growth);
   releaseOtherLayers(triangles, {tracks.begin(), tracks.end()}, &label);
-  const auto host_pose = poses_.find(frame.keyframe);
-  const KeyframeId host = host_pose == poses_.end() ? newest_ : frame.keyframe;
+  const CameraPoses& poses = keyframes_.poses();
+  const KeyframeId host = poses.count(frame.keyframe) ? frame.keyframe : keyframes_.newest();
   std::vector<double> area(tracks.size(), 0);
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     if (label[i] < 0) continue;
-    tracks[label[i]]->cover(triangles[i], host, poses_.at(host), nullptr);
+    tracks[label[i]]->cover(triangles[i], host, poses.at(host), nullptr);
     area[label[i]] += triangles[i].area;
   }
   // Frames from other places confirm a plane that one keyframe has started, as a second keyframe would.
@@ -119,30 +102,22 @@ void PlaneMapper::Impl::grow(const TrackedFrame& frame, const SE3& T_map_odom) {
 }
 
 void PlaneMapper::Impl::clear() {
-  waiting_.clear();
-  placed_.clear();
-  poses_.clear();
-  epoch_of_.clear();
-  tied_poses_.clear();
-  epochs_.clear();
+  keyframes_ = PlacedKeyframes();
   tracks_.clear();
+  next_plane_ = 1;
   points_.clear();
   evidence_.clear();
   strips_.clear();
   open_gaps_.clear();
+  pace_.clear();
+  changes_ = PlaneChanges();
   published.clear();
-  merges_.clear();
-  removed_.clear();
-  fresh_.clear();
-  withdrawn_.clear();
-  next_plane_ = 1;
-  newest_ = stored_until_ = 0;
-  has_grown_ = came_together_ = localising_ = false;
+  came_together_ = localising_ = false;
 }
 
 void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe) {
   clear();
-  stored_until_ = newest_keyframe;
+  keyframes_ = PlacedKeyframes(newest_keyframe);
   for (const auto& [estimate, host] : planes) {
     next_plane_ = std::max(next_plane_, estimate.id + 1);
     const bool sound = !estimate.polygons.empty() && !estimate.polygons.front().outer.empty() &&
@@ -150,7 +125,7 @@ void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, Keyframe
                        isSound(estimate.plane) && estimate.kind <= PlaneKind::kGeneral && host.T_map_C.isFinite() &&
                        !tracks_.count(estimate.id);
     if (!sound) {
-      if (!tracks_.count(estimate.id)) removed_.push_back(estimate.id);
+      if (!tracks_.count(estimate.id)) changes_.unpublished(estimate.id);
       continue;
     }
     PlaneTrack track(estimate.id, estimate.kind, estimate.plane, estimate.polygons.front().outer.front(),
@@ -166,8 +141,7 @@ void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, Keyframe
     }
     track.stored = true;
     track.epoch = host.epoch;
-    epochs_.add(host.epoch);
-    if (host.keyframe != 0) poses_[host.keyframe] = host.T_map_C, epoch_of_[host.keyframe] = host.epoch;
+    keyframes_.addHost(host);
     track.confirmed = track.determined = true;
     track.keyframes_seen = static_cast<int>(estimate.keyframes);
     tracks_.emplace(estimate.id, std::move(track));
@@ -177,15 +151,10 @@ void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, Keyframe
 
 void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
   // A keyframe that was in transit when the map was loaded has the id of a stored one, which it would replace.
-  if (!keyframe || keyframe->id <= stored_until_ || placed_.count(keyframe->id)) return;
+  if (!keyframe || keyframes_.known(keyframe->id)) return;
   if (!isSound(keyframe->frame.depth_grid) || !isSound(keyframe->frame.camera_correction)) return;
-  waiting_.emplace(keyframe->id, keyframe);
-  // One more than the back end holds: the newest one, which it may still place.
-  while (waiting_.size() > kMaxWaitingKeyframes + 1) {
-    waiting_.erase(waiting_.begin());
-    ++counters.keyframes_forgotten;
-  }
-  counters.keyframes_waiting = waiting_.size();
+  counters.keyframes_forgotten += keyframes_.wait(keyframe);
+  counters.keyframes_waiting = keyframes_.waiting();
 }
 
 PlaneMapper::PlaneMapper(const PlaneMapperOptions& options, std::shared_ptr<const CameraModel> camera,

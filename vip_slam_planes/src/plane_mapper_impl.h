@@ -2,12 +2,14 @@
 #pragma once
 
 #include <map>
-#include <set>
+#include <vector>
 
+#include "growth/growth_pace.h"
+#include "state/placed_keyframes.h"
+#include "state/plane_changes.h"
 #include "vip_slam_planes/association/plane_sampler.h"
 #include "vip_slam_planes/association/point_association.h"
 #include "vip_slam_planes/detection/strip_evidence.h"
-#include "vip_slam_planes/epochs/epoch_groups.h"
 #include "vip_slam_planes/growth/plane_track.h"
 #include "vip_slam_planes/merging/gap_view.h"
 #include "vip_slam_planes/mesh/depth_mesh.h"
@@ -18,8 +20,6 @@ namespace vip_slam {
 
 /// Finite, with a unit normal.
 bool isSound(const Plane& plane);
-/// Pose, extrinsics and camera correction are usable.
-bool isSound(const KeyframeEstimate& estimate);
 
 class PlaneMapper::Impl {
  public:
@@ -47,17 +47,12 @@ class PlaneMapper::Impl {
   void removeUnnamed(const MapUpdate& update);
   void takeCorrections(const MapUpdate& update);
   /// False when the keyframe already has this correction.
-  bool adoptCameraCorrection(const CameraCorrection& correction, KeyframePtr* keyframe);
+  bool adoptCameraCorrection(const CameraCorrection& correction, const KeyframePtr& keyframe);
   void removeKeyframe(KeyframeId id);
-  /// Forgets merged landmarks whose tracks no keyframe contains any more.
-  void forgetAliases();
-  /// One sigma of the gravity direction in the newest placed keyframe, radians, from the front end's covariance.
-  double gravitySigma() const;
   void refit(PlaneTrack* track);
   void withdrawBrokenObservations();
   void judgeAgreement();
   bool forgetWhereItWas(PlaneTrack* track);
-  void withdraw(const PlaneTrack& track, KeyframeId keyframe);
   void decideOnPoints();
 
   // plane_mapper_output.cpp: the update to the back end.
@@ -68,8 +63,8 @@ class PlaneMapper::Impl {
   void processKeyframe(const Keyframe& keyframe, bool first_time);
   /// Planes that may be in view of a camera at T_map_C and belong to epochs tied to this one.
   std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C, std::uint32_t epoch);
-  const CameraPoses& posesTiedTo(std::uint32_t epoch);
   void removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C, std::uint32_t epoch);
+  PlaneTrack& startPlane(PlaneKind kind, const Plane& plane, const Eigen::Vector3d& centroid, std::uint32_t epoch);
   /// Returns the strips found by detection.
   std::vector<DetectedPlane> startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
                                          const std::vector<MapTriangle>& triangles, std::vector<int>* label,
@@ -91,30 +86,15 @@ class PlaneMapper::Impl {
   PointAssociation points_;
   PlaneEvidence evidence_;
   StripEvidence strips_;
-  OpenGaps open_gaps_;
 
-  std::map<KeyframeId, KeyframePtr> waiting_;     ///< not placed yet
-  std::map<KeyframeId, KeyframePtr> placed_;      ///< processed keyframes that the map still has
-  CameraPoses poses_;                             ///< T_map_C of placed keyframes and of the hosts of loaded planes
-  std::map<KeyframeId, std::uint32_t> epoch_of_;  ///< epoch of each of these
-  CameraPoses tied_poses_;                        ///< result of posesTiedTo() while not all epochs are tied
-  EpochGroups epochs_;
+  PlacedKeyframes keyframes_;
   Tracks tracks_;
   PlaneId next_plane_ = 1;
-  std::uint32_t epoch_ = 0;  ///< of the newest placed keyframe
-  KeyframeId newest_ = 0;
-  KeyframeId stored_until_ = 0;  ///< keyframes up to here are those of a loaded map
-  SE3 grown_at_;                 ///< camera pose of the last frame that grew planes
-  bool has_grown_ = false;
-  bool map_moved_ = false;      ///< this update moved the map by a noticeable amount
+  OpenGaps open_gaps_;
+  GrowthPace pace_;
+  PlaneChanges changes_;
   bool came_together_ = false;  ///< epochs were tied, and the planes have not been compared since
   bool localising_ = false;     ///< the back end is in localisation-only mode: its map and planes do not change
-
-  // Collected for the next PlaneUpdate.
-  std::vector<PlaneMerge> merges_;
-  std::vector<PlaneId> removed_;
-  std::set<std::pair<PlaneId, KeyframeId>> fresh_;  ///< observations to report
-  std::vector<PlaneObservation> withdrawn_;         ///< empty observations that replace invalid ones
 };
 
 }  // namespace vip_slam

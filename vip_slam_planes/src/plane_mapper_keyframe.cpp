@@ -28,7 +28,7 @@ bool isSeenFlat(const PlaneTrack& track, const Eigen::Vector3d& centroid, const 
 
 void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_time) {
   const ScopedTimer timer(timing, "planes.keyframe", keyframe.frame.t);
-  const SE3& T_map_C = poses_.at(keyframe.id);
+  const SE3& T_map_C = keyframes_.poses().at(keyframe.id);
   const DepthGrid& grid = keyframe.frame.depth_grid;
   const DepthMesh& mesh =
       mesher_.build(keyframe.frame.features, grid, T_map_C.R().row(2), keyframe.frame.camera_correction.bearing);
@@ -54,7 +54,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   const std::size_t known = tracks.size();
   if (first_time) {
     std::vector<DetectedPlane> strips = startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
-    const CameraPoses& poses = posesTiedTo(keyframe.frame.epoch);
+    const CameraPoses& poses = keyframes_.posesTiedTo(keyframe.frame.epoch);
     for (const auto& [track, e] : evidence_.takeJoining(poses, {tracks.begin(), tracks.end()})) {
       tracks_.at(track->id()).cover(e.triangle, e.keyframe, poses.at(e.keyframe), nullptr);
     }
@@ -65,7 +65,7 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
     };
     strips.erase(std::remove_if(strips.begin(), strips.end(), known_by_now), strips.end());
     strips_.add(keyframe.id, T_map_C, triangles, label, strips);
-    startJointPlanes(keyframe, strips_.detect(posesTiedTo(keyframe.frame.epoch)), &label, &tracks);
+    startJointPlanes(keyframe, strips_.detect(keyframes_.posesTiedTo(keyframe.frame.epoch)), &label, &tracks);
     ++counters.keyframes;
   }
   const SurfaceLabels labels = labelNodes(mesh, label, grid);
@@ -97,6 +97,15 @@ void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& trian
   for (PlaneId id : contradicted) removePlane(id);
 }
 
+PlaneTrack& PlaneMapper::Impl::startPlane(PlaneKind kind, const Plane& plane, const Eigen::Vector3d& centroid,
+                                          std::uint32_t epoch) {
+  const PlaneId id = next_plane_++;
+  PlaneTrack& track = tracks_.try_emplace(id, id, kind, plane, centroid, options.growth.cell).first->second;
+  track.epoch = epoch;
+  ++counters.planes_started;
+  return track;
+}
+
 std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
                                                           const std::vector<MapTriangle>& triangles,
                                                           std::vector<int>* label, std::vector<PlaneTrack*>* tracks) {
@@ -105,19 +114,16 @@ std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyfra
   std::vector<DetectedPlane> strips;
   for (const DetectedPlane& found :
        detectPlanes(triangles, taken, T_map_C.t(), options.detection, options.growth, &strips)) {
-    const PlaneId id = next_plane_++;
-    PlaneTrack& track =
-        tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;
-    track.epoch = keyframe.frame.epoch;
+    PlaneTrack& track = startPlane(found.kind, found.plane, found.centroid, keyframe.frame.epoch);
     for (int i : found.triangles) {
       track.cover(triangles[i], keyframe.id, T_map_C, nullptr);
       (*label)[i] = static_cast<int>(tracks->size());
     }
     if (track.area() < options.support.sure_area) {
-      track.keyframes_seen = evidence_.seenBy(track, posesTiedTo(keyframe.frame.epoch), options.support.min_area);
+      track.keyframes_seen =
+          evidence_.seenBy(track, keyframes_.posesTiedTo(keyframe.frame.epoch), options.support.min_area);
     }
     tracks->push_back(&track);
-    ++counters.planes_started;
   }
   return strips;
 }
@@ -125,13 +131,10 @@ std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyfra
 void PlaneMapper::Impl::startJointPlanes(const Keyframe& keyframe, const std::vector<JointPlane>& joint,
                                          std::vector<int>* label, std::vector<PlaneTrack*>* tracks) {
   for (const JointPlane& found : joint) {
-    const PlaneId id = next_plane_++;
-    PlaneTrack& track =
-        tracks_.try_emplace(id, id, found.kind, found.plane, found.centroid, options.growth.cell).first->second;
-    track.epoch = keyframe.frame.epoch;
+    PlaneTrack& track = startPlane(found.kind, found.plane, found.centroid, keyframe.frame.epoch);
     std::set<KeyframeId> earlier;
     for (const EvidenceTriangle& e : found.triangles) {
-      track.cover(e.triangle, e.keyframe, poses_.at(e.keyframe), nullptr);
+      track.cover(e.triangle, e.keyframe, keyframes_.poses().at(e.keyframe), nullptr);
       if (e.keyframe == keyframe.id) {
         (*label)[e.index] = static_cast<int>(tracks->size());
       } else {
@@ -140,7 +143,6 @@ void PlaneMapper::Impl::startJointPlanes(const Keyframe& keyframe, const std::ve
     }
     track.keyframes_seen = static_cast<int>(earlier.size());
     tracks->push_back(&track);
-    ++counters.planes_started;
   }
 }
 
@@ -165,7 +167,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
         observation->camera_correction = keyframe.frame.camera_correction;
         const Eigen::Vector3d shown_at = T_map_C * PlaneMoments{observation->G}.centroid();
         track.observations().insert_or_assign(keyframe.id, std::move(*observation));
-        fresh_.emplace(track.id(), keyframe.id);
+        changes_.observed(track.id(), keyframe.id);
         refit(&track);
         flat = isSeenFlat(track, shown_at, T_map_C.t());
       }
@@ -180,22 +182,23 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
     track.confirmed = track.confirmed || seen || large;
     trusted.push_back(track.known() && track.determined && track.agrees);
   }
-  points_.process(keyframe, labels, ids, trusted, poses_, [this](PlaneId id) { return findPlane(id); });
+  points_.process(keyframe, labels, ids, trusted, keyframes_.poses(), [this](PlaneId id) { return findPlane(id); });
 }
 
 // A piece of a wall seen from afar may pass for the door in it as well: it goes to the one that it suits best.
 PlaneId PlaneMapper::Impl::samePlane(PlaneId id) {
   const PlaneTrack& mine = tracks_.at(id);
-  const SceneView view{placed_, poses_, *camera, noise, options.support.see_through, open_gaps_};
+  const SceneView view{keyframes_.placed(),         keyframes_.poses(), *camera, noise,
+                       options.support.see_through, open_gaps_};
   std::vector<const PlaneTrack*> known;
   for (const auto& [other_id, other] : tracks_) {
-    if (epochs_.tied(mine.epoch, other.epoch)) known.push_back(&other);
+    if (keyframes_.tied(mine.epoch, other.epoch)) known.push_back(&other);
   }
   PlaneId best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (const PlaneTrack* other : known) {
     if (other->id() == id || !sameSurface(mine, *other, known, view, options.merging)) continue;
-    const double misfit = jointMisfit(mine, *other, poses_);
+    const double misfit = jointMisfit(mine, *other, keyframes_.poses());
     if (best == 0 || misfit < least) best = other->id(), least = misfit;
   }
   return best;
@@ -228,37 +231,21 @@ void PlaneMapper::Impl::mergePlanes(const std::vector<PlaneId>& changed) {
 void PlaneMapper::Impl::mergeInto(PlaneId from_id, PlaneId into_id) {
   PlaneTrack& into = tracks_.at(into_id);
   const PlaneTrack& from = tracks_.at(from_id);
-  const bool known = from.known();
-  for (const auto& [keyframe, observation] : from.observations()) {
-    // The back end renames the observations that it has. Those that it lacks, and joint ones of a keyframe that
-    // observed both planes, are reported.
-    if (!known || into.observations().count(keyframe) || fresh_.count({from_id, keyframe})) {
-      fresh_.emplace(into_id, keyframe);
-    }
-    fresh_.erase({from_id, keyframe});
-  }
-  // The back end renames invalid observations with the rest, so their withdrawal must follow.
-  for (PlaneObservation& none : withdrawn_) {
-    if (none.plane == from_id) none.plane = into_id;
-  }
-  into.absorb(from, poses_);
+  changes_.merged(from, into);
+  into.absorb(from, keyframes_.poses());
   refit(&into);
   points_.renamePlane(from_id, into_id);
   open_gaps_.rename(from_id, into_id);
   into.takes_points = false;  // so that candidates of the other plane are decided on as well
   tracks_.erase(from_id);
   ++counters.planes_merged;
-  if (known) merges_.push_back({from_id, into_id});
 }
 
 void PlaneMapper::Impl::removePlane(PlaneId id) {
   const auto it = tracks_.find(id);
   if (it == tracks_.end()) return;
-  for (const auto& [keyframe, observation] : it->second.observations()) fresh_.erase({id, keyframe});
-  if (it->second.known()) {
-    removed_.push_back(id);
-    ++counters.planes_removed;
-  }
+  changes_.removed(it->second);
+  counters.planes_removed += it->second.known();
   points_.removePlane(id);
   open_gaps_.remove(id);
   tracks_.erase(it);

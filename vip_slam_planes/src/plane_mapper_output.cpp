@@ -15,10 +15,7 @@ void PlaneMapper::Impl::dropUnsupported(PlaneUpdate* result) {
     if (shrunk || never_confirmed) gone.push_back(id);
   }
   for (PlaneId id : gone) removePlane(id);
-  result->merges = std::move(merges_);
-  result->removed = std::move(removed_);
-  merges_.clear();
-  removed_.clear();
+  changes_.takeStructure(result);
 }
 
 void PlaneMapper::Impl::publish(PlaneUpdate* result) {
@@ -36,29 +33,7 @@ void PlaneMapper::Impl::publish(PlaneUpdate* result) {
   }
   result->planes = published;
 
-  for (PlaneObservation& none : withdrawn_) {
-    const auto it = tracks_.find(none.plane);
-    if (it == tracks_.end()) continue;
-    // A new observation of the same keyframe replaces the invalid one, unless it is not published yet.
-    const bool observed = it->second.observations().count(none.keyframe) > 0;
-    if (observed) fresh_.emplace(none.plane, none.keyframe);
-    if (!observed || !it->second.determined) result->observations.push_back(none);
-  }
-  withdrawn_.clear();
-  for (auto it = fresh_.begin(); it != fresh_.end();) {
-    const auto track = tracks_.find(it->first);
-    if (track == tracks_.end()) {
-      it = fresh_.erase(it);
-      continue;
-    }
-    if (!track->second.known() || !track->second.determined) {
-      ++it;
-      continue;
-    }
-    const auto observation = track->second.observations().find(it->second);
-    if (observation != track->second.observations().end()) result->observations.push_back(observation->second);
-    it = fresh_.erase(it);
-  }
+  changes_.takeObservations(tracks_, result);
   result->associated = points_.takeAssociated();
   result->dissociated = points_.takeDissociated();
   counters.points_associated += result->associated.size();
