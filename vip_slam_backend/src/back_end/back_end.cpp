@@ -74,14 +74,14 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
 void BackEnd::Impl::noteWeakness(const MapKeyframe& inserted) {
   const Keyframe& data = *inserted.data;
   const std::string name = "keyframe " + std::to_string(data.id) + ": ";
-  if (data.frame.features.empty()) keep(name + "without features: only its neighbours hold it", &notices);
+  if (data.frame.features.empty()) notices.add(name + "without features: only its neighbours hold it");
   const bool whole_imu = sensor.hasGyro() && sensor.hasAccel();
   if (!whole_imu || data.previous == 0 || inserted.preintegration) return;
   const std::string before = std::to_string(data.previous);
   if (inserted.previous == 0) {
-    keep(name + "its previous keyframe " + before + " is not the last of the map's chain: no IMU factor", &notices);
+    notices.add(name + "its previous keyframe " + before + " is not the last of the map's chain: no IMU factor");
   } else {
-    keep(name + "its IMU samples do not tell the whole motion since keyframe " + before + ": no IMU factor", &notices);
+    notices.add(name + "its IMU samples do not tell the whole motion since keyframe " + before + ": no IMU factor");
   }
 }
 
@@ -105,15 +105,15 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     if (frozen()) {
       localise(keyframe);
       finishUpdate(&update);
-      if (!searching) {  // keyframes that waited for the map to be recognised will not be mapped any more
-        for (const KeyframePtr& waiting : held) update.removed_keyframes.push_back(waiting->id);
-        held.clear();
+      if (!localisation.searching) {  // keyframes that waited for the map to be recognised will not be mapped any more
+        for (const KeyframePtr& waiting : localisation.held) update.removed_keyframes.push_back(waiting->id);
+        localisation.held.clear();
       }
       update.removed_keyframes.push_back(keyframe->id);  // it will never be in the map
       return update;
     }
-    entering = searching;
-    if (searching && !enterLoadedMap(keyframe)) {
+    entering = localisation.searching;
+    if (localisation.searching && !enterLoadedMap(keyframe)) {
       finishUpdate(&update);
       return update;
     }
@@ -125,11 +125,12 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     }
   } catch (const MapError& e) {
     refusal = e.what();
-    refuse(refusal);
+    refusals.add(refusal);
     finishUpdate(&update);
     // Report it as removed, since other modules wait for it; not when the map has a keyframe with this id.
     const auto waits = [&keyframe](const KeyframePtr& other) { return other->id == keyframe->id; };
-    if (keyframe && !map.hasKeyframe(keyframe->id) && std::none_of(held.begin(), held.end(), waits))
+    if (keyframe && !map.hasKeyframe(keyframe->id) &&
+        std::none_of(localisation.held.begin(), localisation.held.end(), waits))
       update.removed_keyframes.push_back(keyframe->id);
     return update;
   }
@@ -137,7 +138,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   cull(&update);
   closeLoop(&update);
   if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
-  if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global_wanted = true;
+  if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global.want();
   // Poses of keyframes that waited or were moved, and corrected depth, are new to all receivers: update everything.
   if (entering || brought || camera_correction != camera_correction_before) fillGlobal(&update);
   finishUpdate(&update);
@@ -166,8 +167,8 @@ MapSnapshot BackEnd::Impl::snapshot() const {
   }
   for (const LandmarkId id : map.landmarkIds()) snapshot.landmarks.push_back(estimateOf(map.landmark(id)));
   for (const auto& entry : map.planes()) snapshot.planes.push_back(entry.second.estimate);
-  snapshot.loops = loops;
-  snapshot.localised = localised;
+  snapshot.loops = loops.kept();
+  snapshot.localised = localisation.localised;
   snapshot.statistics = statistics;
   for (const LandmarkEstimate& landmark : snapshot.landmarks)
     snapshot.statistics.plane_landmarks += landmark.plane != 0;
@@ -178,19 +179,13 @@ void BackEnd::Impl::reset() {
   map.clear();
   maker.clear();
   loop_closer.clear();
-  searching = false;
+  localisation = Localisation();
   relocaliser.clear();
-  held.clear();
-  localised.clear();
-  held_updates.clear();
-  last_found.reset();
   solver = makeSolver(options.solver);
   T_map_odom = SE3();
   epoch = 0;
   first_revision = revision + 1;
-  ++correction;
-  global_wanted = false;
-  last_global = -1e300;
+  global.reset();
   camera_correction = {};
   keyframes_at_correction = 0;
   newest_depth_offset = disparity_error = 0;
@@ -198,11 +193,8 @@ void BackEnd::Impl::reset() {
   newest_depth_shift = {};
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
-  refusals.clear();
-  notices.clear();
-  loops.clear();
-  rejected_kept = 0;
-  new_loops.clear();
+  refusals = notices = MessageLog();
+  loops = LoopJournal();
   statistics = BackEndStatistics();
 }
 
@@ -212,14 +204,14 @@ BackEnd::~BackEnd() = default;
 
 MapUpdate BackEnd::addKeyframe(KeyframePtr keyframe) { return impl_->addKeyframe(keyframe); }
 const std::string& BackEnd::lastRefusal() const { return impl_->refusal; }
-std::vector<std::string> BackEnd::takeRefusals() { return std::exchange(impl_->refusals, {}); }
-std::vector<std::string> BackEnd::takeNotices() { return std::exchange(impl_->notices, {}); }
+std::vector<std::string> BackEnd::takeRefusals() { return impl_->refusals.take(); }
+std::vector<std::string> BackEnd::takeNotices() { return impl_->notices.take(); }
 void BackEnd::applyPlaneUpdate(const PlaneUpdate& update) { impl_->applyPlaneUpdate(update); }
-bool BackEnd::globalBaWanted() const { return impl_->global_wanted && !impl_->frozen(); }
-void BackEnd::requestGlobalBa() { impl_->global_wanted = true; }
+bool BackEnd::globalBaWanted() const { return impl_->global.wanted() && !impl_->frozen(); }
+void BackEnd::requestGlobalBa() { impl_->global.want(); }
 
 GbaJob BackEnd::startGlobalBa() {
-  impl_->global_wanted = false;
+  impl_->global.start();
   impl_->camera_correction.offset = impl_->newest_depth_offset;
   impl_->camera_correction.bearing = impl_->newest_bearing;
   impl_->camera_correction.shift = impl_->newest_depth_shift;

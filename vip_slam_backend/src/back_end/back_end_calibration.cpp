@@ -38,8 +38,8 @@ void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
   camera_correction.bearing = newest.bearing;
   camera_correction.shift = newest.shift;
   map.adoptCameraCorrection(camera_correction);
-  global_wanted = true;
-  ++correction;  // an adjustment under way has the old readings
+  global.want();
+  global.outdate();  // an adjustment under way has the old readings
 }
 
 bool BackEnd::Impl::learnDepthCurve() {
@@ -63,7 +63,7 @@ bool BackEnd::Impl::learnDepthCurve() {
     if (voidsDepthOffset(*disparity)) camera_correction.offset = newest_depth_offset = 0;
   }
   map.adoptCameraCorrection(camera_correction);
-  ++correction;
+  global.outdate();
   return true;
 }
 
@@ -72,8 +72,8 @@ void BackEnd::Impl::followGyroCorrection(const Eigen::Matrix3d& newest) {
   if ((newest - gyro_correction).cwiseAbs().maxCoeff() < kNewGyroCorrection) return;
   gyro_correction = newest;
   map.adoptGyroCorrection(newest, sensor.imu_noise);
-  global_wanted = true;
-  ++correction;  // an adjustment under way has the old IMU factors
+  global.want();
+  global.outdate();  // an adjustment under way has the old IMU factors
 }
 
 }  // namespace vip_slam

@@ -8,6 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "adjustment_requests.h"
+#include "localisation.h"
+#include "loop_journal.h"
+#include "message_log.h"
 #include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/loop/loop_closer.h"
@@ -35,9 +39,6 @@ struct BackEnd::Impl {
   /// Localisation-only mode with a map, which must not change.
   bool frozen() const { return localisation_only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
-  void refuse(const std::string& reason) { keep(reason, &refusals); }
-  /// Adds a message to a bounded list, which nobody may ever take.
-  static void keep(const std::string& message, std::vector<std::string>* messages);
   void removeUnnamedPlanes(const PlaneUpdate& update);
   void applyHeldUpdates();
   MapSnapshot snapshot() const;
@@ -99,7 +100,6 @@ struct BackEnd::Impl {
   void tieToLastFound(const KeyframePtr& keyframe);
 
   // back_end_loops.cpp
-  void remember(const LoopEvent& event);
   /// Adds the newest keyframe to the place database and closes a loop there when there is one.
   void closeLoop(MapUpdate* update);
 
@@ -114,30 +114,15 @@ struct BackEnd::Impl {
   std::unique_ptr<BaSolver> solver;
   LoopCloser loop_closer;
   Relocaliser relocaliser;
-  bool searching = false;  ///< a loaded map is not recognised yet
+  Localisation localisation;
   bool localisation_only = false;
-  std::vector<PlaneUpdate> held_updates;  ///< received while frozen(), applied when mapping goes on
-  std::deque<KeyframePtr> held;           ///< received while searching, inserted once the map is recognised
-  std::vector<Anchor> localised;          ///< keyframes localised in the map without entering it
-
-  /// Localisation-only mode: the last keyframe found in the map, to which the odometry is tied when mapping goes on.
-  struct LastFound {
-    std::uint32_t epoch = 0;
-    KeyframeId match = 0;
-    double t = 0;
-  };
-  std::optional<LastFound> last_found;
   std::uint64_t loads = 0;  ///< number of maps loaded since the start
 
   SE3 T_map_odom;
   std::uint32_t epoch = 0;
   std::uint64_t revision = 0;
   std::uint64_t first_revision = 0;  ///< first one since the last reset; older ones refer to another map
-  /// Counts loop corrections, new calibrations, loaded maps and resets: a global adjustment that started before one
-  /// must not undo it.
-  std::uint64_t correction = 0;
-  bool global_wanted = false;
-  double last_global = -1e300;                                       ///< stamp of the last one requested by a loop
+  AdjustmentRequests global;
   CameraCorrection camera_correction;                                ///< applied to all keyframes of this session
   std::uint64_t keyframes_at_correction = 0;                         ///< received when it last changed by much
   double newest_depth_offset = 0;                                    ///< m, reported with the newest keyframe
@@ -147,11 +132,8 @@ struct BackEnd::Impl {
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();         ///< applied to all keyframes of this session
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< reported with the newest keyframe
   std::string refusal;                                               ///< of the last keyframe
-  std::vector<std::string> refusals;                                 ///< since takeRefusals()
-  std::vector<std::string> notices;                                  ///< since takeNotices()
-  std::vector<LoopEvent> loops;      ///< all accepted so far, and the newest refused ones
-  std::size_t rejected_kept = 0;     ///< number of refused ones in `loops`
-  std::vector<LoopEvent> new_loops;  ///< since the last update
+  MessageLog refusals, notices;
+  LoopJournal loops;
   BackEndStatistics statistics;
 };
 

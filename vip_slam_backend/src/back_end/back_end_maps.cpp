@@ -29,8 +29,8 @@ MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
   reset();
   map = std::move(stored.map);
   loop_closer.rebuild(map, stored.loops);
-  searching = !map.empty();
-  if (searching) epoch = map.keyframe(map.newestKeyframe()).data->frame.epoch;
+  localisation.searching = !map.empty();
+  if (localisation.searching) epoch = map.keyframe(map.newestKeyframe()).data->frame.epoch;
   MapUpdate update = beginUpdate(0);
   fillGlobal(&update);
   finishUpdate(&update);
@@ -73,23 +73,24 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found
     event.inliers = result->inliers;
     event.T_match_query = map.keyframe(result->match).state.T_W_I.inverse() * result->T_W_I;
   }
-  remember(event);
+  loops.add(event);
   return result.has_value();
 }
 
 bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
   Relocalisation found;
   if (!findInMap(keyframe, &found)) {
-    if (held.size() == kMaxWaitingKeyframes) return mapHeld();  // this keyframe is then inserted as any other
-    held.push_back(keyframe);
+    if (localisation.held.size() == kMaxWaitingKeyframes)
+      return mapHeld();  // this keyframe is then inserted as any other
+    localisation.held.push_back(keyframe);
     return false;
   }
-  searching = false;
+  localisation.searching = false;
   epoch = keyframe->frame.epoch;
   T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
   // Keyframes from before the recognition are inserted as well, unless the odometry has restarted since.
   std::deque<KeyframePtr> before;
-  before.swap(held);
+  before.swap(localisation.held);
   before.erase(
       std::remove_if(before.begin(), before.end(),
                      [&](const KeyframePtr& kf) { return kf->frame.epoch != epoch || kf->id >= keyframe->id; }),
@@ -103,10 +104,10 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
 }
 
 bool BackEnd::Impl::mapHeld() {
-  if (!searching || held.empty() || frozen()) return false;
-  searching = false;
+  if (!localisation.searching || localisation.held.empty() || frozen()) return false;
+  localisation.searching = false;
   std::deque<KeyframePtr> unplaced;
-  unplaced.swap(held);
+  unplaced.swap(localisation.held);
   insertHeld(unplaced);
   return true;
 }
@@ -117,40 +118,40 @@ void BackEnd::Impl::insertHeld(const std::deque<KeyframePtr>& keyframes) {
       insert(kf);
     } catch (const MapError& e) {  // the others are inserted nevertheless
       refusal = e.what();
-      refuse(refusal);
+      refusals.add(refusal);
       continue;
     }
     loop_closer.add(map, kf->id);
-    global_wanted = true;  // most of them lie beyond the local window
+    global.want();  // most of them lie beyond the local window
   }
 }
 
 void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
-  const bool known = !searching && keyframe->frame.epoch == epoch;
+  const bool known = !localisation.searching && keyframe->frame.epoch == epoch;
   std::optional<Relocalisation> found;
   const SE3 predicted = T_map_odom * keyframe->frame.state.T_W_I;
   if (known) found = relocaliser.track(map, loop_closer, *keyframe, predicted, inReferencePart());
   Relocalisation place;
   if (!found && findInMap(keyframe, &place)) found = place;
   if (!found) return;
-  searching = false;
+  localisation.searching = false;
   epoch = keyframe->frame.epoch;
   const SE3& T_odom_I = keyframe->frame.state.T_W_I;
   T_map_odom = alignLevelled(found->T_W_I, T_odom_I);
-  localised.push_back(
+  localisation.localised.push_back(
       {keyframe->frame.t, epoch, keyframe->frame.T_chain_C, T_map_odom * T_odom_I, keyframe->frame.T_I_C});
-  last_found = LastFound{epoch, found->match, keyframe->frame.t};
+  localisation.last_found = Localisation::LastFound{epoch, found->match, keyframe->frame.t};
 }
 
 bool BackEnd::Impl::hasRecentLocalisation(const Keyframe& keyframe) {
-  if (!last_found) return false;
-  if (keyframe.frame.epoch != last_found->epoch) {
-    last_found.reset();
+  if (!localisation.last_found) return false;
+  if (keyframe.frame.epoch != localisation.last_found->epoch) {
+    localisation.last_found.reset();
     return false;
   }
   // Later the odometry has drifted: its place is still good enough for a pose, but not to join two parts of the map.
-  const double since = keyframe.frame.t - last_found->t;
-  return since >= 0 && since < kRecent && map.hasKeyframe(last_found->match);
+  const double since = keyframe.frame.t - localisation.last_found->t;
+  return since >= 0 && since < kRecent && map.hasKeyframe(localisation.last_found->match);
 }
 
 bool BackEnd::Impl::moveUnplacedPartToMap(std::uint32_t of_epoch) {
@@ -159,7 +160,7 @@ bool BackEnd::Impl::moveUnplacedPartToMap(std::uint32_t of_epoch) {
     if (kf.data->frame.epoch == of_epoch) newest = id;
   if (newest == 0) return false;
   const std::set<KeyframeId> part = connectedKeyframes(map, newest, loop_closer.loops());
-  if (part.count(last_found->match)) return false;
+  if (part.count(localisation.last_found->match)) return false;
   const MapKeyframe& last = map.keyframe(newest);
   const SE3 move = alignLevelled(T_map_odom * last.data->frame.state.T_W_I, last.state.T_W_I);
   std::map<KeyframeId, SE3> moved;
@@ -171,14 +172,14 @@ bool BackEnd::Impl::moveUnplacedPartToMap(std::uint32_t of_epoch) {
   }
   map.moveKeyframes(moved);
   for (const PlaneId id : planes) map.movePlane(id, move);
-  ++correction;  // an adjustment under way has it at its old place
-  global_wanted = true;
+  global.outdate();  // an adjustment under way has it at its old place
+  global.want();
   return true;
 }
 
 void BackEnd::Impl::tieToLastFound(const KeyframePtr& keyframe) {
-  loop_closer.tie(map, keyframe->id, last_found->match);
-  last_found.reset();
+  loop_closer.tie(map, keyframe->id, localisation.last_found->match);
+  localisation.last_found.reset();
 }
 
 }  // namespace vip_slam

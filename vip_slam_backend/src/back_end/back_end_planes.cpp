@@ -12,7 +12,7 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     // The plane module sends each change only once: keep those that it sent before it learnt of localisation-only mode.
     const bool says = !update.merges.empty() || !update.removed.empty() || !update.observations.empty() ||
                       !update.associated.empty() || !update.dissociated.empty();
-    if (says) held_updates.push_back(update);
+    if (says) localisation.held_updates.push_back(update);
     return;
   }
   const ScopedTimer timer(log, "backend.planes", update.t);
@@ -20,7 +20,7 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     try {
       change();
     } catch (const MapError& e) {
-      refuse(e.what());
+      refusals.add(e.what());
     }
   };
   for (const PlaneMerge& merge : update.merges) attempt([&] { map.mergePlanes(merge.from, merge.into); });
@@ -30,7 +30,7 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
   for (const PlaneObservation& observation : update.observations) {
     if (map.setPlaneObservation(observation)) continue;
     const std::string bad = validateObservation(observation);
-    if (!bad.empty()) refuse(bad);  // else its keyframe or plane is gone
+    if (!bad.empty()) refusals.add(bad);  // else its keyframe or plane is gone
   }
   for (const auto& pair : update.associated) {
     const LandmarkId id = map.resolve(pair.first);
@@ -40,12 +40,6 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     const LandmarkId id = map.resolve(landmark);
     if (map.hasLandmark(id)) map.associate(id, 0);
   }
-}
-
-void BackEnd::Impl::keep(const std::string& message, std::vector<std::string>* messages) {
-  constexpr std::size_t kMostKept = 100;
-  messages->push_back(message);
-  if (messages->size() > kMostKept) messages->erase(messages->begin());
 }
 
 // An update lists all planes. A plane that it does not list was removed or merged in an update that was lost.
@@ -60,7 +54,7 @@ void BackEnd::Impl::removeUnnamedPlanes(const PlaneUpdate& update) {
 
 void BackEnd::Impl::applyHeldUpdates() {
   std::vector<PlaneUpdate> held;
-  held.swap(held_updates);
+  held.swap(localisation.held_updates);
   for (const PlaneUpdate& update : held) applyPlaneUpdate(update);
 }
 

@@ -46,7 +46,7 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   {
     const ScopedTimer solve_timer(log, "backend.lba_solve", t);
     summary = solver->attempt(built.problem, solver_options);
-    if (!summary.usable) return refuse("result of the local adjustment: " + summary.message);
+    if (!summary.usable) return refusals.add("result of the local adjustment: " + summary.message);
   }
   statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
@@ -89,8 +89,8 @@ void BackEnd::Impl::followNewest() {
 }
 
 bool BackEnd::Impl::placed() const {
-  if (map.empty() || searching) return false;
-  if (last_found && last_found->epoch == epoch) return true;
+  if (map.empty() || localisation.searching) return false;
+  if (localisation.last_found && localisation.last_found->epoch == epoch) return true;
   return referencePart(map, loop_closer.loops()).count(map.newestKeyframe()) != 0;
 }
 
@@ -138,15 +138,14 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->removed_keyframes = std::move(changes.removed_keyframes);
   update->removed_landmarks = std::move(changes.removed_landmarks);
   update->merged_landmarks = std::move(changes.merged_landmarks);
-  update->loops = std::move(new_loops);
-  new_loops.clear();
+  update->loops = loops.takeNew();
 }
 
 void BackEnd::Impl::askForScale() { statistics.scale = inertialScale(map, sensor.gravity, sensor.imu_noise); }
 
 GbaJob BackEnd::Impl::makeGlobalJob() const {
   GbaJob job;
-  job.correction = correction;
+  job.correction = global.correction();
   if (map.keyframes().size() < 2) return job;
   auto problem = std::make_shared<GlobalBaProblem>();
   problem->map = std::make_shared<const Map>(map);
@@ -163,30 +162,31 @@ GbaJob BackEnd::Impl::makeGlobalJob() const {
 }
 
 bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
-  if (result.correction != correction) {
+  if (result.correction != global.correction()) {
     // The map has been corrected or replaced since the job was copied: adjust again.
-    global_wanted = global_wanted || (result.solution != nullptr && !map.empty());
+    if (result.solution && !map.empty()) global.want();
   } else if (frozen()) {
-    global_wanted = global_wanted || result.solution != nullptr;  // adjust again when mapping goes on
+    if (result.solution) global.want();  // adjust again when mapping goes on
   } else if (result.solution && result.solution->summary.usable) {
     // Without newer keyframes T_map_odom comes from the last localisation and follows its matched keyframe.
     const TrackedFrame& newest = map.keyframe(map.newestKeyframe()).data->frame;
-    const bool found = last_found && last_found->epoch == epoch && map.hasKeyframe(last_found->match) &&
-                       !(newest.epoch == epoch && newest.t > last_found->t);
-    const SE3 match_before = found ? map.keyframe(last_found->match).state.T_W_I : SE3();
+    const bool found = localisation.last_found && localisation.last_found->epoch == epoch &&
+                       map.hasKeyframe(localisation.last_found->match) &&
+                       !(newest.epoch == epoch && newest.t > localisation.last_found->t);
+    const SE3 match_before = found ? map.keyframe(localisation.last_found->match).state.T_W_I : SE3();
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     statistics.outliers += result.solution->outliers.size();
     statistics.track_noise_factor = result.solution->built.track_noise_factor;
     if (found) {
       // The newest keyframe is older than the localisation, and the odometry has drifted since.
-      T_map_odom = alignLevelled(map.keyframe(last_found->match).state.T_W_I, match_before) * T_map_odom;
+      T_map_odom = alignLevelled(map.keyframe(localisation.last_found->match).state.T_W_I, match_before) * T_map_odom;
     } else {
       followNewest();
     }
     askForScale();
     return true;
   } else if (result.solution) {
-    refuse("result of the global adjustment: " + result.solution->summary.message);
+    refusals.add("result of the global adjustment: " + result.solution->summary.message);
   }
   return false;
 }

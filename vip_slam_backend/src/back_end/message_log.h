@@ -1,0 +1,19 @@
+// Messages for people until somebody takes them: bounded, since nobody ever may.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace vip_slam {
+
+class MessageLog {
+ public:
+  void add(const std::string& message);
+  std::vector<std::string> take() { return std::exchange(messages_, {}); }
+
+ private:
+  std::vector<std::string> messages_;
+};
+
+}  // namespace vip_slam
