@@ -10,10 +10,8 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFarthestLandmark = 6.0, kCosineOfView = 0.5;
-constexpr double kMetresPerCosine = 4.0;  // weight of a change of direction against one of position
-constexpr double kRatio = 0.9;            // of best to second distance; weak, since few corners lie around a projection
-constexpr float kSameCorner2 = 4.0f;      // px^2: two detections of one corner do not compete
+constexpr double kRatio = 0.9;        // of best to second distance; weak, since few corners lie around a projection
+constexpr float kSameCorner2 = 4.0f;  // px^2: two detections of one corner do not compete
 
 // With kWide over all descriptors of a landmark, since it looks different from other sides.
 int distanceOf(const Map& map, const MapPoint& point, const Descriptor& descriptor, GuidedLooks looks) {
@@ -62,24 +60,6 @@ PlaceMatch makePlaceMatch(const Feature& feature, const MapPoint& point) {
   m.depth_sigma = std::hypot(feature.depth_sigma, point.sigma);
   m.scale = std::pow(kOctaveScale, feature.octave);
   return m;
-}
-
-std::vector<KeyframeId> viewsAlong(const Map& map, const SE3& T_W_C, std::size_t most,
-                                   const std::function<bool(KeyframeId)>& allowed) {
-  const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
-  std::vector<std::pair<double, KeyframeId>> near;
-  for (const auto& entry : map.keyframes()) {
-    const SE3 other = entry.second.T_W_C();
-    const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
-    const double distance = (other.t() - T_W_C.t()).norm();
-    if (cosine < kCosineOfView || distance > kFarthestLandmark || (allowed && !allowed(entry.first))) continue;
-    near.emplace_back(distance + kMetresPerCosine * (1.0 - cosine), entry.first);
-  }
-  std::sort(near.begin(), near.end());
-  if (near.size() > most) near.resize(most);
-  std::vector<KeyframeId> views;
-  for (const auto& view : near) views.push_back(view.second);
-  return views;
 }
 
 GuidedMatches matchGuided(const Map& map, const std::vector<Feature>& features, const SE3& T_W_C, double radius,

@@ -5,16 +5,15 @@
 #include <map>
 
 #include "vip_slam_backend/loop/graph_builder.h"
+#include "vip_slam_backend/map/views.h"
 #include "vip_slam_backend/place_recognition/vocabulary_io.h"
 
 namespace vip_slam {
 namespace {
 
-// A place farther than this from the query's pose in the map, m and rad, is not the expected one: it is refused when
-// another candidate or view fits the query as well, with at least this share of its points.
-constexpr double kElsewhere = 0.3, kElsewhereAngle = 0.2, kRivalShare = 0.7;
-// Limits of a view of the same scene, m and rad, and the weight of a rotation against a distance.
-constexpr double kFarthestView = 3.0, kMetresPerRadian = 2.0, kWidestView = 0.7;
+// A place other than the expected one is refused when another candidate or view fits the query as well, with at least
+// this share of its points.
+constexpr double kRivalShare = 0.7;
 
 // A keyframe with the neighbours that show the same place.
 std::set<KeyframeId> placeOf(const Map& map, KeyframeId id) {
@@ -24,21 +23,6 @@ std::set<KeyframeId> placeOf(const Map& map, KeyframeId id) {
     if (neighbour != 0) place.insert(neighbour);
   for (const auto& neighbour : map.covisible(id, 15)) place.insert(neighbour.first);
   return place;
-}
-
-// The nearest old keyframe that looks at the same scene as a camera at T_W_C; 0: none.
-KeyframeId nearestView(const Map& map, const SE3& T_W_C, const std::function<bool(KeyframeId)>& old) {
-  KeyframeId nearest = 0;
-  double least = kFarthestView;
-  for (const auto& [id, kf] : map.keyframes()) {
-    const SE3 view = kf.T_W_C();
-    const double angle = view.rotation().angularDistance(T_W_C.rotation());
-    const double distance = (view.t() - T_W_C.t()).norm() + angle * kMetresPerRadian;
-    if (angle > kWidestView || distance >= least || !old(id)) continue;
-    nearest = id;
-    least = distance;
-  }
-  return nearest;
 }
 
 bool touch(const std::set<KeyframeId>& a, const std::set<KeyframeId>& b) {
@@ -165,16 +149,13 @@ std::string LoopCloser::rival(const Map& map, KeyframeId query, const PlaceVerif
                               const std::vector<KeyframeId>& candidates,
                               const std::function<bool(KeyframeId)>& old) const {
   const MapKeyframe& kf = map.keyframe(query);
-  const auto elsewhere = [&place](const SE3& T_W_I) {
-    return (T_W_I.t() - place.T_W_I.t()).norm() > kElsewhere ||
-           T_W_I.rotation().angularDistance(place.T_W_I.rotation()) > kElsewhereAngle;
-  };
+  const auto elsewhere = [&place](const SE3& T_W_I) { return !samePlace(T_W_I, place.T_W_I); };
   if (!elsewhere(kf.state.T_W_I)) return "";
   const auto rivals = [&](const PlaceVerification& other) {
     return other.accepted && elsewhere(other.T_W_I) && other.inliers > kRivalShare * place.inliers;
   };
-  if (const KeyframeId nearest = nearestView(map, kf.T_W_C(), old); nearest != 0) {
-    const PlaceVerification other = verifier_.track(map, *kf.data, kf.state.T_W_I, nearest, old);
+  if (const auto nearest = viewsAlong(map, kf.T_W_C(), 1, old); !nearest.empty()) {
+    const PlaceVerification other = verifier_.track(map, *kf.data, kf.state.T_W_I, nearest.front(), old);
     if (rivals(other)) return "where the map has it fits as well, " + std::to_string(other.inliers) + " points";
   }
   for (const KeyframeId match : candidates) {

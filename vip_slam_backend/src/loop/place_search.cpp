@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "vip_slam_backend/loop/guided_matching.h"
+#include "vip_slam_backend/map/views.h"
 #include "vip_slam_core/util/formatted.h"
 
 namespace vip_slam {
@@ -17,11 +18,6 @@ constexpr int kFewLandmarks = 5;  // fewer missing landmarks may be occluded or 
 // Whether two keyframes look at the same scene, so that one of them is enough as a candidate.
 bool sameView(const SE3& T_W_C_a, const SE3& T_W_C_b) {
   return (T_W_C_a.t() - T_W_C_b.t()).norm() < 1.0 && T_W_C_a.rotation().angularDistance(T_W_C_b.rotation()) < 0.5;
-}
-
-// Whether two poses are the same place, within the differences of two matches of it.
-bool samePlace(const SE3& a, const SE3& b) {
-  return (a.t() - b.t()).norm() < 0.3 && a.rotation().angularDistance(b.rotation()) < 0.2;
 }
 
 }  // namespace

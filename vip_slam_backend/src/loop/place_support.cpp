@@ -8,6 +8,7 @@
 #include "vip_slam_backend/loop/guided_matching.h"
 #include "vip_slam_backend/loop/place_coverage.h"
 #include "vip_slam_backend/loop/place_surfaces.h"
+#include "vip_slam_backend/map/views.h"
 
 namespace vip_slam {
 namespace {

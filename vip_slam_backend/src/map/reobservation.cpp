@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "vip_slam_backend/map/views.h"
+
 namespace vip_slam {
 namespace {
 
@@ -57,22 +59,9 @@ std::vector<KeyframeId> Reobservation::neighbours(const Map& map, KeyframeId id,
     chosen.push_back(c.first);
     taken.insert(c.first);
   }
-  const SE3 T_W_C = map.keyframe(id).T_W_C();
-  const Eigen::Vector3d forward = T_W_C.rotation() * Eigen::Vector3d::UnitZ();
-  std::vector<std::pair<double, KeyframeId>> near;
-  for (const auto& entry : map.keyframes()) {
-    if (taken.count(entry.first) || (allowed && !allowed(entry.first))) continue;
-    const SE3 other = entry.second.T_W_C();
-    const double cosine = forward.dot(other.rotation() * Eigen::Vector3d::UnitZ());
-    const double distance = (other.t() - T_W_C.t()).norm();
-    if (cosine < 0.5 || distance > 5.0) continue;
-    near.emplace_back(distance + 3.0 * (1.0 - cosine), entry.first);
-  }
-  std::sort(near.begin(), near.end());
-  for (const auto& n : near) {
-    if (chosen.size() >= limit) break;
-    chosen.push_back(n.second);
-  }
+  const auto other = [&](KeyframeId k) { return taken.count(k) == 0 && (!allowed || allowed(k)); };
+  for (const KeyframeId view : viewsAlong(map, map.keyframe(id).T_W_C(), limit - chosen.size(), other))
+    chosen.push_back(view);
   return chosen;
 }
 

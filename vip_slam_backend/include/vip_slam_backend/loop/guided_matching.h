@@ -30,11 +30,6 @@ std::vector<MapPoint> mapPointsOf(const Map& map, const std::vector<KeyframeId>&
 /// A query feature that shows `p_W`.
 PlaceMatch makePlaceMatch(const Feature& feature, const MapPoint& point);
 
-/// Keyframes with a viewing direction similar to a camera at T_W_C, nearest views first, at most `most`; only those
-/// accepted by `allowed` (empty: all).
-std::vector<KeyframeId> viewsAlong(const Map& map, const SE3& T_W_C, std::size_t most,
-                                   const std::function<bool(KeyframeId)>& allowed);
-
 struct GuidedMatches {
   std::vector<PlaceMatch> matches;
   std::vector<std::pair<std::uint32_t, LandmarkId>> source;  ///< of each: query feature, landmark or kNoLandmark
