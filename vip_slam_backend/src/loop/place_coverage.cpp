@@ -1,14 +1,15 @@
 #include "vip_slam_backend/loop/place_coverage.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
+
+#include "vip_slam_backend/loop/scene_agreement.h"
+#include "vip_slam_core/depth/sight.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr std::size_t kCoveringViews = 5;
-constexpr double kDepthSlack = 0.1, kDepthSlackPerMetre = 0.05;
 
 int cellOf(const Feature& feature, const CameraModel& camera) {
   return static_cast<int>(feature.pixel.x() * 8 / camera.width()) * 6 +
@@ -18,14 +19,12 @@ int cellOf(const Feature& feature, const CameraModel& camera) {
 }  // namespace
 
 bool shows(const DepthGrid& grid, const Eigen::Vector3d& p_V, const CameraModel& camera) {
-  Eigen::Vector2d uv;
-  if (p_V.z() < 0.2 || !camera.project(p_V, &uv) || !camera.inImage(uv, 10)) return false;
-  if (grid.empty()) return true;
-  const int c = static_cast<int>(std::lround((uv.x() - grid.offset) / grid.stride));
-  const int r = static_cast<int>(std::lround((uv.y() - grid.offset) / grid.stride));
-  if (c < 0 || r < 0 || c >= grid.cols || r >= grid.rows) return false;
-  const double z = grid.at(c, r);
-  return z <= 0 || z > p_V.z() - kDepthSlack - kDepthSlackPerMetre * p_V.z();
+  if (grid.empty()) {
+    Eigen::Vector2d uv;
+    return p_V.z() > 0 && camera.project(p_V, &uv) && camera.inImage(uv);
+  }
+  const Sight sight = sightLine(grid, camera, p_V).at(p_V.z(), depthSlack(p_V.z()));
+  return sight != Sight::kOutside && sight != Sight::kHidden;
 }
 
 PlaceCoverage placeCoverage(const Map& map, const std::vector<Feature>& features, const std::vector<bool>& inlier,

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "vip_slam_core/depth/sight.h"
 #include "vip_slam_core/geometry/angle.h"
 
 namespace vip_slam {
@@ -16,27 +16,12 @@ void warp(const DepthGrid& from, const DepthGrid& into, const SE3& T_into_from, 
       const double z = from.at(c, r);
       if (z <= 0) continue;
       const Eigen::Vector3d p = T_into_from * camera.unproject(from.pixel(c, r), z);
-      Eigen::Vector2d uv;
-      if (p.z() < 0.2 || !camera.project(p, &uv) || !camera.inImage(uv)) continue;
-      // The four nodes around the pixel: a surface agrees when it passes between them.
-      int c0 = 0, r0 = 0;
-      if (!into.nodesAround(uv, &c0, &r0)) continue;
-      double nearest = std::numeric_limits<double>::max(), farthest = 0;
-      for (int k = 0; k < 4; ++k) {
-        const double node = into.at(c0 + (k & 1), r0 + (k >> 1));
-        if (node <= 0) continue;
-        nearest = std::min(nearest, node);
-        farthest = std::max(farthest, node);
-      }
-      if (farthest <= 0) continue;
-      const double tolerance = 0.05 + 0.025 * p.z();
+      const Sight sight = sightLine(into, camera, p).at(p.z(), depthSlack(p.z()));
+      if (sight == Sight::kOutside || sight == Sight::kNothing) continue;
       ++count->compared;
-      if (p.z() < nearest - tolerance)
-        ++count->see_through;
-      else if (p.z() > farthest + tolerance)
-        ++count->occluded;
-      else
-        ++count->agree;
+      count->see_through += sight == Sight::kThrough;
+      count->occluded += sight == Sight::kHidden;
+      count->agree += sight == Sight::kThere;
     }
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "vip_slam_core/depth/sight.h"
+
 namespace vip_slam {
 namespace {
 
@@ -79,14 +81,12 @@ int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, co
   track->cells().forEachIn(view.first, view.last, [&](CellIndex cell, int) {
     const Eigen::Vector3d p = p0 + cell.x * px + cell.y * py;
     if (p.z() < noise.min_range || p.z() > range || -n_C.dot(p) < kGrazing * p.norm()) return;
-    Eigen::Vector2d uv;
-    if (!camera.project(p, &uv) || !camera.inImage(uv)) return;
-    int c = 0, r = 0;
-    if (!grid.nodesAround(uv, &c, &r)) return;
+    const SightLine line = sightLine(grid, camera, p);
+    if (line.measured < 4) return;
     const double facing = -n_C.dot(p) / p.z();  // |n . ray|
     const double slack = (margin + 3 * noise.sigma(p.z()) * facing) / facing;
     for (int k = 0; k < 4; ++k) {
-      const int col = c + (k & 1), row = r + (k >> 1), label = labels.at(col, row);
+      const int col = line.col + (k & 1), row = line.row + (k >> 1), label = labels.at(col, row);
       const double z = grid.at(col, row);
       const bool behind = z > p.z() + slack, another = z > p.z() - slack && label >= 0 && label != own;
       if (!behind && !another) return;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "vip_slam_core/depth/sight.h"
+
 namespace vip_slam {
 namespace {
 
@@ -54,26 +56,19 @@ std::vector<Eigen::Vector3d> placesBetween(const PlaneTrack& small, const PlaneT
   return places;
 }
 
-enum class Sight { kOutside, kUnsure, kBlocked, kOpen };
+enum class Gap { kOutside, kUnsure, kBlocked, kOpen };
 
-// Judges a point by the four nodes around its projection: it is open when none of them shows a surface on the plane or
-// in front of it. Missing depth counts as open, since not every floor next to a table has depth.
-Sight look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3d& n_C, const SceneView& view) {
-  Eigen::Vector2d uv;
-  int c = 0, r = 0;
-  if (p.z() <= 0 || !view.camera.project(p, &uv) || !view.camera.inImage(uv) || !grid.nodesAround(uv, &c, &r))
-    return Sight::kOutside;
+// A place is open when none of the nodes around it shows a surface on the plane or in front of it. Missing depth counts
+// as open, since not every floor next to a table has depth.
+Gap look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3d& n_C, const SceneView& view) {
+  const SightLine line = sightLine(grid, view.camera, p);
+  if (!line.inside) return Gap::kOutside;
   const double facing = -n_C.dot(p) / p.z();  // |n . ray|
-  if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kFlattest * p.norm()) return Sight::kUnsure;
-  const double slack = (view.see_through + 3 * view.noise.sigma(p.z()) * facing) / facing;
-  int behind = 0;
-  for (int k = 0; k < 4; ++k) {
-    const double z = grid.at(c + (k & 1), r + (k >> 1));
-    if (z > 0 && z <= p.z() + slack) return Sight::kBlocked;
-    behind += z > 0;
-  }
+  if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kFlattest * p.norm()) return Gap::kUnsure;
+  const Sight sight = line.at(p.z(), (view.see_through + 3 * view.noise.sigma(p.z()) * facing) / facing);
+  if (sight != Sight::kThrough && sight != Sight::kNothing) return Gap::kBlocked;
   // At a flat angle missing depth may be that of the surface itself.
-  return behind < 4 && -n_C.dot(p) < kFlat * p.norm() ? Sight::kUnsure : Sight::kOpen;
+  return line.measured < 4 && -n_C.dot(p) < kFlat * p.norm() ? Gap::kUnsure : Gap::kOpen;
 }
 
 }  // namespace
@@ -108,21 +103,21 @@ bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneV
   if (!witnessed[0] || !witnessed[1]) return true;
   const std::vector<Eigen::Vector3d> places = placesBetween(small, large);
   const double few = kOpen * static_cast<double>(places.size());
-  std::vector<Sight> seen(places.size(), Sight::kOutside);
+  std::vector<Gap> seen(places.size(), Gap::kOutside);
   std::size_t open = 0;
   for (const Keyframe* keyframe : witnesses) {
     const SE3 T_C_map = view.poses.at(keyframe->id).inverse();
     const Eigen::Vector3d n_C = T_C_map.rotation() * large.plane().n;
     for (std::size_t k = 0; k < places.size(); ++k) {
-      if (seen[k] == Sight::kOpen) continue;
+      if (seen[k] == Gap::kOpen) continue;
       seen[k] = std::max(seen[k], look(keyframe->frame.depth_grid, T_C_map * places[k], n_C, view));
-      if (seen[k] == Sight::kOpen && ++open > few) {
+      if (seen[k] == Gap::kOpen && ++open > few) {
         view.open_gaps.add(small.id(), large.id());
         return true;
       }
     }
   }
-  const auto unsure = std::count(seen.begin(), seen.end(), Sight::kUnsure);
+  const auto unsure = std::count(seen.begin(), seen.end(), Gap::kUnsure);
   return static_cast<double>(unsure) > kUnsure * static_cast<double>(places.size());
 }
 

@@ -21,6 +21,10 @@ struct DepthAgreement {
   double seeThrough() const { return compared ? static_cast<double>(see_through) / compared : 0; }
 };
 
+/// How far a reading may be from the surface that it shows, m along the optical axis, with the errors of the poses that
+/// are compared.
+inline double depthSlack(double z) { return 0.05 + 0.025 * z; }
+
 /// Warps each grid into the other camera; T_a_b maps points of camera b into camera a.
 DepthAgreement compareDepth(const DepthGrid& a, const DepthGrid& b, const SE3& T_a_b, const CameraModel& camera);
 
