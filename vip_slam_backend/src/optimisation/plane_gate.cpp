@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/util/significance.h"
 #include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kGoodFit = 1.5;  // mean squared residual, sigmas^2, up to which all points are kept unchecked
-constexpr double kSigmas = 3.0;
-constexpr double kFarthest = 0.05;               // metres
+constexpr double kGoodFit = 1.5;    // mean squared residual, sigmas^2, up to which all points are kept unchecked
+constexpr double kFarthest = 0.05;  // metres
 constexpr double kMaxNear = 0.5, kMaxFar = 0.9;  // shares that must be kept, with the median within kFarthest or not
 
 }  // namespace
@@ -23,7 +23,7 @@ PlaneGate::PlaneGate(const PlaneObservation& observation, const Eigen::Vector4d&
   for (const PlaneSample& p : points) distance.push_back(plane_C.dot(p.p_C.cast<double>().homogeneous()));
   const double median = upperMedian(distance);
   for (std::size_t k = 0; k < points.size(); ++k)
-    if (std::abs(distance[k] - median) <= kSigmas * points[k].sigma) kept_.push_back(static_cast<int>(k));
+    if (std::abs(distance[k] - median) <= kNoiseSigmas * points[k].sigma) kept_.push_back(static_cast<int>(k));
   all_ = kept_.size() == points.size();
   const double share = std::abs(median) > kFarthest ? kMaxFar : kMaxNear;
   if (kept_.size() < share * points.size()) kept_.clear();

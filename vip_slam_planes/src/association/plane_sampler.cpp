@@ -4,9 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Eigenvalues>
-
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/significance.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 
@@ -96,11 +95,8 @@ bool PlaneSampler::keepLocalSurface(const Eigen::Vector3d& n_C, std::vector<Eige
   }
   // Mostly outliers: clutter. Rotated by more than noise explains for a surface of this size: another surface.
   if (kept.size() < std::max<std::size_t>(options_.min_points, points->size() / 2)) return false;
-  const Eigen::Vector3d mean = moments.centroid();
-  const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
-  const double spread =
-      std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
-  const double slack = 3.0 * (median + 0.3 * noise_.bias_floor) / spread / std::sqrt(double(kept.size()) / 9.0);
+  const double slack =
+      kNoiseSigmas * (median + 0.3 * noise_.bias_floor) / moments.spread() / std::sqrt(double(kept.size()) / 9.0);
   const double turned = std::acos(std::min(1.0, std::abs(local.n.dot(n_C))));
   *points = std::move(kept);
   return turned < 5.0 * kDegree + slack;
@@ -125,7 +121,7 @@ std::optional<PlaneObservation> PlaneSampler::sample(KeyframeId keyframe, const 
   const Plane plane_C = transformPlane(T_map_C.inverse(), plane);
   std::vector<Eigen::Vector3d> points;
   for (const Eigen::Vector3d& p : shown) {
-    const double gate = std::max(distance_gate_, 3.0 * sigmaAlong(plane_C.n, p));
+    const double gate = std::max(distance_gate_, kNoiseSigmas * sigmaAlong(plane_C.n, p));
     if (std::abs(plane_C.signedDistance(p)) < gate) points.push_back(p);
   }
   if (points.size() < std::size_t(options_.min_points)) return {};

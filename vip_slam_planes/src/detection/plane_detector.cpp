@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/connected_surfaces.h"
@@ -157,10 +155,8 @@ class Detector {
     std::vector<Eigen::Vector3d> points;
     std::vector<double> weights;
     for (int i : members) {
-      // Weighted by area, so that dense features do not dominate, and by noise, so that the far end does not.
       points.push_back(triangles_[i].centre - camera_);
-      const double sigma = triangles_[i].sigma + 0.005;
-      weights.push_back(triangles_[i].area / (sigma * sigma));
+      weights.push_back(fitWeight(triangles_[i]));
     }
     Plane local;
     if (points.size() < 3 || !fitPlaneRobust(points, weights, medianSigma(members) + 0.002, kind,
@@ -201,10 +197,7 @@ class Detector {
       return false;
     }
 
-    const Eigen::Vector3d mean = moments.centroid();
-    const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
-    const double minor = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1);
-    const double spread = std::sqrt(std::max(1e-12, minor));
+    const double spread = moments.spread();
     if (spread * std::sqrt(12.0) < options_.min_width) return false;  // side of a uniform rectangle
 
     // Surfaces that lean are not accepted: the tilt of a free fit minus what noise explains.
@@ -223,7 +216,7 @@ class Detector {
     }
     // A strip may be the rim of a column; views from elsewhere will show that (StripEvidence).
     if (!strip && isCurved(triangles_, surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
-    result.centroid = mean + camera_;
+    result.centroid = moments.centroid() + camera_;
     for (int i : surface) {
       // The triangles were gathered around the whole peak; keep those on this surface's own plane.
       if (!joins(triangles_[i], result.plane, 1.0)) continue;

@@ -7,6 +7,7 @@
 
 #include "evidence_layers.h"
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/significance.h"
 #include "vip_slam_planes/detection/plane_histogram.h"
 #include "vip_slam_planes/detection/surface_shape.h"
 #include "vip_slam_planes/growth/triangle_association.h"
@@ -24,9 +25,9 @@ constexpr double kMinUpright = 2.0, kMinLevel = 0.3;
 constexpr double kMinLevelWidth = 0.6;  // likewise of the width
 // A plane this far below a known one may be what that lies on, m.
 constexpr double kStepDown = 0.02;
-// Left-over triangles join a plane that has grown up to them within this distance, m, or as many of their sigmas:
+// Left-over triangles join a plane that has grown up to them within this distance, m, or within their noise:
 // further off they may be another layer that no keyframe has told apart yet.
-constexpr double kSameLayer = 0.02, kSameLayerSigmas = 3.0;
+constexpr double kSameLayer = 0.02;
 constexpr int kMaxTests = 4;  // peaks tested per keyframe, the largest ones
 // Share of the area of a wall's peak that must be new since its last test. Horizontal peaks are tested every time,
 // since the visible pieces of a dark table top change.
@@ -171,7 +172,7 @@ std::vector<std::pair<const PlaneTrack*, EvidenceTriangle>> PlaneEvidence::takeJ
     for (std::size_t i = 0; i < evidence.size(); ++i) {
       const MapTriangle& t = evidence[i].triangle;
       joins[i] = joins[i] && std::abs(known[label[i]]->plane().signedDistance(t.centre)) <
-                                 std::max(kSameLayer, kSameLayerSigmas * t.sigma);
+                                 std::max(kSameLayer, kNoiseSigmas * t.sigma);
       if (joins[i]) joining.emplace_back(known[label[i]], evidence[i]);
     }
     forget(votes, evidence, joins);

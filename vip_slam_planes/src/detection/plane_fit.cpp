@@ -35,6 +35,12 @@ double PlaneMoments::meanSquare(const Plane& plane) const {
   return weight() > 0 ? std::max(0.0, pi.dot(M * pi) / weight()) : 0.0;
 }
 
+double PlaneMoments::spread() const {
+  const Eigen::Vector3d mean = centroid();
+  const Eigen::Matrix3d scatter = M.topLeftCorner<3, 3>() / weight() - mean * mean.transpose();
+  return std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
+}
+
 PlaneMoments PlaneMoments::transformed(const SE3& T) const {
   const Eigen::Matrix4d A = T.matrix();
   return {A * M * A.transpose()};

@@ -216,8 +216,7 @@ void StripEvidence::take(const Placed& placed, JointPlane* face) const {
 bool StripEvidence::fit(const Placed& mine, JointPlane* face) const {
   PlaneMoments moments;  // relative to the strip: far from the origin of `map` the scatter would lose precision
   for (const EvidenceTriangle& e : face->triangles) {
-    const double sigma = e.triangle.sigma + 0.005;
-    moments.add(e.triangle.centre - mine.centroid, e.triangle.area / (sigma * sigma));
+    moments.add(e.triangle.centre - mine.centroid, fitWeight(e.triangle));
   }
   Plane local;
   face->kind = PlaneKind::kVertical;

@@ -9,6 +9,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_core/util/significance.h"
+
 namespace vip_slam {
 namespace {
 
@@ -83,7 +85,7 @@ bool isCurved(const std::vector<MapTriangle>& triangles, const std::vector<int>&
     const Vector6 j = (Vector6() << 0, 0, 0, 2 * a.x() * a.x(), 2 * a.x() * a.y(), 2 * a.y() * a.y()).finished();
     const double error = std::sqrt(std::max(0.0, j.dot(solver.solve(j))));
     const double bends = std::abs(axes.eigenvalues()(k));
-    if (bends - 3 * error > kBends || bends + error > kColumn) return true;
+    if (bends - kNoiseSigmas * error > kBends || bends + error > kColumn) return true;
   }
   return false;
 }

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/significance.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/growth/triangle_association.h"
@@ -16,13 +15,12 @@ namespace {
 constexpr std::size_t kMinTriangles = 10;  // fewer do not determine a direction
 constexpr double kFacing = 0.7;            // cosine to the plane's normal; sides of objects on it are turned further
 constexpr double kMinShare = 0.5;          // share of the plane's area; a smaller part of a wall may bend
-constexpr double kSigmas = 3.0;
-constexpr double kOnPlane = 0.01;  // m, plus three sigmas: largest distance of a corner that lies on a plane
+constexpr double kOnPlane = 0.01;          // m, plus three sigmas: largest distance of a corner that lies on a plane
 
 /// The nearest plane on whose covered area a corner lies; null: none.
 const PlaneTrack* ownerOf(const Eigen::Vector3d& corner, double sigma, const std::vector<const PlaneTrack*>& tracks) {
   const PlaneTrack* owner = nullptr;
-  double best = kOnPlane + kSigmas * sigma;
+  double best = kOnPlane + kNoiseSigmas * sigma;
   for (const PlaneTrack* track : tracks) {
     const double distance = std::abs(track->plane().signedDistance(corner));
     if (distance < best && track->cells().near(track->cellAt(track->toPlane(corner)), 1)) {
@@ -57,9 +55,8 @@ PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const Plane
     if (std::abs(track.plane().signedDistance(t.centre)) > distanceGate(t, growth.distance)) continue;
     if (track.plane().n.dot(t.n) < kFacing || !track.cells().at(track.cellAt(track.toPlane(t.centre)))) continue;
     if (spansPlanes(t, all)) continue;
-    const double sigma = t.sigma + 0.005;
     points.push_back(t.centre - triangles.front().centre);
-    weights.push_back(t.area / (sigma * sigma));
+    weights.push_back(fitWeight(t));
     sigmas.push_back(t.sigma);
     area += t.area;
   }
@@ -72,14 +69,10 @@ PlaneVerdict planeVerdict(const std::vector<MapTriangle>& triangles, const Plane
   }
   PlaneMoments moments;
   for (const Eigen::Vector3d& p : points) moments.add(p, 1.0);
-  const Eigen::Vector3d mean = moments.centroid();
-  const Eigen::Matrix3d scatter = moments.M.topLeftCorner<3, 3>() / moments.weight() - mean * mean.transpose();
-  const double spread =
-      std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues()(1)));
   // Neighbouring triangles share vertices: count a quarter of them as independent.
-  const double uncertainty = std::max(sigma, rms) / (spread * std::sqrt(double(points.size()) / 4.0));
+  const double uncertainty = std::max(sigma, rms) / (moments.spread() * std::sqrt(double(points.size()) / 4.0));
   const double turned = std::acos(std::min(1.0, shown.n.dot(track.plane().n)));
-  const bool against = turned > detection.max_tilt_deg * kDegree + kSigmas * uncertainty;
+  const bool against = turned > detection.max_tilt_deg * kDegree + kNoiseSigmas * uncertainty;
   return against ? PlaneVerdict::kAgainst : PlaneVerdict::kFor;
 }
 

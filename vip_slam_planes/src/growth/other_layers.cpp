@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_core/util/significance.h"
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_planes/detection/surface_layers.h"
 
@@ -11,7 +12,6 @@ namespace {
 
 constexpr std::size_t kMinInLayers = 30;  // fewer do not show two layers
 constexpr double kMinStep = 0.02;         // m, between the layers
-constexpr double kStepSigmas = 3.0;
 
 }  // namespace
 
@@ -31,7 +31,7 @@ std::vector<PlaneId> releaseOtherLayers(const std::vector<MapTriangle>& triangle
       area.push_back(triangles[i].area);
       sigma.push_back(triangles[i].sigma);
     }
-    const double noise = upperMedian(sigma), step = std::max(kMinStep, kStepSigmas * noise);
+    const double noise = upperMedian(sigma), step = std::max(kMinStep, kNoiseSigmas * noise);
     const auto [low, high] = std::minmax_element(offset.begin(), offset.end());
     if (*high - *low < step) continue;
     const auto layers = splitLayers(offset, area, noise);

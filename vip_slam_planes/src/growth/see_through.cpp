@@ -5,11 +5,10 @@
 #include <vector>
 
 #include "vip_slam_core/depth/sight.h"
+#include "vip_slam_core/util/significance.h"
 
 namespace vip_slam {
 namespace {
-
-constexpr double kGrazing = 0.25;  // cosine of 75 degrees
 
 struct CellBox {
   CellIndex first, last;
@@ -72,7 +71,8 @@ int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, co
   const Eigen::Vector3d n_C = T_C_map.rotation() * track->plane().n;
   // Cells far behind all measured depth cannot be refuted.
   const double deepest = *std::max_element(grid.z.begin(), grid.z.end());
-  const double range = std::min(noise.max_range, deepest + margin / kGrazing + 3 * noise.sigma(noise.max_range));
+  const double range =
+      std::min(noise.max_range, deepest + margin / kGrazing + kNoiseSigmas * noise.sigma(noise.max_range));
   const CellBox view = cellsInView(*track, camera, T_map_C, range);
   std::vector<CellIndex> refuted;
   // Centres are an affine function of the index.
@@ -84,7 +84,7 @@ int clearRefuted(const DepthGrid& grid, const SurfaceLabels& labels, int own, co
     const SightLine line = sightLine(grid, camera, p);
     if (line.measured < 4) return;
     const double facing = -n_C.dot(p) / p.z();  // |n . ray|
-    const double slack = (margin + 3 * noise.sigma(p.z()) * facing) / facing;
+    const double slack = (margin + kNoiseSigmas * noise.sigma(p.z()) * facing) / facing;
     for (int k = 0; k < 4; ++k) {
       const int col = line.col + (k & 1), row = line.row + (k >> 1), label = labels.at(col, row);
       const double z = grid.at(col, row);

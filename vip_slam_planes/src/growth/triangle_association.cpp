@@ -3,15 +3,15 @@
 #include <cmath>
 
 #include "vip_slam_core/geometry/angle.h"
+#include "vip_slam_core/util/significance.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr double kWidestAngle = 25.0 * kDegree;
 constexpr int kNone = -1;
-constexpr double kToldApart = 2.0;    // sigmas of a triangle's distance by which the nearest plane must be nearer
-constexpr double kMinSigma = 1e-3;    // m
-constexpr double kWorstSquare = 9.0;  // cap on a squared distance, sigmas^2, so that outliers do not decide
+constexpr double kToldApart = 2.0;  // sigmas of a triangle's distance by which the nearest plane must be nearer
+constexpr double kMinSigma = 1e-3;  // m
 
 /// A triangle whose noise does not allow a decision between two planes.
 struct Doubt {
@@ -33,7 +33,8 @@ void settleDoubts(const std::vector<MapTriangle>& triangles, const std::vector<D
     patch.assign(1, static_cast<int>(seed));
     visited[seed] = 1;
     for (std::size_t i = 0; i < patch.size(); ++i) {
-      for (int k = 0; k < 2; ++k) sum[k] += std::min(doubts[patch[i]].squares[k], kWorstSquare);
+      // Capped, so that outliers do not decide.
+      for (int k = 0; k < 2; ++k) sum[k] += std::min(doubts[patch[i]].squares[k], kNoiseSigmas * kNoiseSigmas);
       for (int g : triangles[patch[i]].neighbour) {
         if (g < 0 || visited[g] || doubts[g].track[0] != first.track[0] || doubts[g].track[1] != first.track[1]) {
           continue;
@@ -118,7 +119,7 @@ AngleGate::AngleGate(double angle_deg)
       cos_wide_(std::cos(wide_)) {}
 
 double distanceGate(const MapTriangle& triangle, double distance) {
-  return std::clamp(3.0 * triangle.sigma, distance, 2.0 * distance);
+  return std::clamp(kNoiseSigmas * triangle.sigma, distance, 2.0 * distance);
 }
 
 std::vector<int> associateTriangles(const std::vector<MapTriangle>& triangles,

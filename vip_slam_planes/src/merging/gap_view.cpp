@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "vip_slam_core/depth/sight.h"
+#include "vip_slam_core/util/significance.h"
+#include "vip_slam_planes/growth/see_through.h"
 
 namespace vip_slam {
 namespace {
@@ -14,7 +16,6 @@ namespace {
 constexpr std::size_t kWays = 8, kPlaces = 12;  // lines from the smaller piece to the larger, and points on each
 constexpr double kRim = 0.15;                   // m, uncertainty of a piece's border, not tested
 constexpr double kOpen = 0.05;                  // share of points that may be open, since poses and depth have errors
-constexpr double kFlat = 0.25;                  // cosine of 75 degrees
 constexpr double kUnsure = 0.5;                 // share of points that may be undecided
 constexpr double kFlattest = 0.1;               // cosine of 84 degrees, the mesh's limit for horizontal surfaces
 
@@ -65,10 +66,10 @@ Gap look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3d&
   if (!line.inside) return Gap::kOutside;
   const double facing = -n_C.dot(p) / p.z();  // |n . ray|
   if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kFlattest * p.norm()) return Gap::kUnsure;
-  const Sight sight = line.at(p.z(), (view.see_through + 3 * view.noise.sigma(p.z()) * facing) / facing);
+  const Sight sight = line.at(p.z(), (view.see_through + kNoiseSigmas * view.noise.sigma(p.z()) * facing) / facing);
   if (sight != Sight::kThrough && sight != Sight::kNothing) return Gap::kBlocked;
   // At a flat angle missing depth may be that of the surface itself.
-  return line.measured < 4 && -n_C.dot(p) < kFlat * p.norm() ? Gap::kUnsure : Gap::kOpen;
+  return line.measured < 4 && -n_C.dot(p) < kGrazing * p.norm() ? Gap::kUnsure : Gap::kOpen;
 }
 
 }  // namespace

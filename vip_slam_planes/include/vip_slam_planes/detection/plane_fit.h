@@ -26,6 +26,8 @@ struct PlaneMoments {
   Eigen::Vector3d centroid() const { return M.topRightCorner<3, 1>() / weight(); }
   /// Weighted mean square distance to the plane.
   double meanSquare(const Plane& plane) const;
+  /// Standard deviation of the points in the plane that they lie on, along the narrower direction, m; at least 1e-6.
+  double spread() const;
   /// The moments of the points moved by T.
   PlaneMoments transformed(const SE3& T) const;
 };

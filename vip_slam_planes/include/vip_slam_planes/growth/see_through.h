@@ -11,6 +11,9 @@
 
 namespace vip_slam {
 
+/// Cosine of 75 degrees between normal and ray: flatter, missing or farther depth says nothing of a surface.
+constexpr double kGrazing = 0.25;
+
 /// Removes a hit from every cell that the keyframe refutes: each of the four grid nodes around its projection either
 /// measures depth more than `margin` metres (plus noise) behind the plane, or is nearer than that and shows another
 /// plane than `own` (wall and recessed door look like one slanted surface from afar, and are two from near). The plane

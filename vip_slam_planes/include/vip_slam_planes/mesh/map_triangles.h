@@ -20,6 +20,12 @@ struct MapTriangle {
   double sigma_angle;  ///< of the normal, radians
 };
 
+/// Of a triangle in a fit: by area, so that dense features do not dominate, and by noise, so that the far end does not.
+inline double fitWeight(const MapTriangle& triangle) {
+  const double sigma = triangle.sigma + 0.005;
+  return triangle.area / (sigma * sigma);
+}
+
 std::vector<MapTriangle> placeMesh(const DepthMesh& mesh, const SE3& T_map_C);
 /// A triangle in the frame that T maps into.
 MapTriangle moved(const SE3& T, MapTriangle triangle);
