@@ -190,16 +190,13 @@ PlaneId PlaneMapper::Impl::samePlane(PlaneId id) {
   const PlaneTrack& mine = tracks_.at(id);
   const SceneView view{keyframes_.placed(),         keyframes_.poses(), *camera, noise,
                        options.support.see_through, open_gaps_};
-  std::vector<const PlaneTrack*> known;
-  for (const auto& [other_id, other] : tracks_) {
-    if (keyframes_.tied(mine.epoch, other.epoch)) known.push_back(&other);
-  }
   PlaneId best = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (const PlaneTrack* other : known) {
-    if (other->id() == id || !sameSurface(mine, *other, known, view, options.merging)) continue;
-    const double misfit = jointMisfit(mine, *other, keyframes_.poses());
-    if (best == 0 || misfit < least) best = other->id(), least = misfit;
+  for (const auto& [other_id, other] : tracks_) {
+    if (other_id == id || !keyframes_.tied(mine.epoch, other.epoch)) continue;
+    if (!sameSurface(mine, other, view, options.merging)) continue;
+    const double misfit = jointMisfit(mine, other, keyframes_.poses());
+    if (best == 0 || misfit < least) best = other_id, least = misfit;
   }
   return best;
 }

@@ -37,6 +37,15 @@ class Rig {
     return nullptr;
   }
 
+  /// Number of planes that face like `truth`, up to a few degrees, within max_d of it.
+  int count(const Plane& truth, double max_d) const {
+    int n = 0;
+    for (const PlaneEstimate& p : mapper.planes()) {
+      n += p.plane.n.dot(truth.n) > 0.99 && std::abs(p.plane.d - truth.d) < max_d;
+    }
+    return n;
+  }
+
   SceneCamera camera;
   PlaneMapper mapper;
   std::map<KeyframeId, SE3> poses;

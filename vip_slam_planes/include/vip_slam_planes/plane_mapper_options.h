@@ -84,9 +84,8 @@ struct PlaneGrowthOptions {
 struct PlaneMergingOptions {
   double angle_deg = 10.0;
   double distance = 0.10;
-  double distance_apart = 0.02;
   double gap = 0.4;
-  double gap_per_area = 2.0;
+  double chance = 0.028;
   double overlap = 0.3;
   double max_rms = 0.02;
 
@@ -94,13 +93,9 @@ struct PlaneMergingOptions {
     v.field("angle_deg", angle_deg, 0.5, 30.0, "largest angle between planes that are merged, degrees");
     v.field("distance", distance, 0.01, 0.5,
             "largest distance of each one's boundary points to the other, m; twice that where depth noise explains it");
-    v.field(
-        "distance_apart", distance_apart, 0.002, 0.5,
-        "the same, of the smaller one to the larger plane, when they are further apart than the gap, m; twice that for "
-        "walls of 4 m^2 and more, which drift moves apart");
-    v.field("gap", gap, 0.0, 5.0, "largest gap between the covered areas, m");
-    v.field("gap_per_area", gap_per_area, 0.0, 100.0,
-            "gap allowed between walls (1 m^2 and more) and between floors (4 m^2), per m^2 of the smaller one, m");
+    v.field("gap", gap, 0.0, 5.0, "pieces no further apart than this are next to each other, m");
+    v.field("chance", chance, 0.0, 1.0,
+            "beyond: largest product of the gap and of the distance off the larger plane, per area of the smaller one");
     v.field("overlap", overlap, 0.05, 1.0, "share of the smaller area covered by both that makes them one surface");
     v.field("max_rms", max_rms, 0.002, 0.2, "what the joint fit may add to each one's RMS when they do not overlap, m");
   }

@@ -126,16 +126,17 @@ TEST(Mapper, FarPiecesOfOneWallAreOneButNotThoseOfTwo) {
   }
 }
 
-TEST(Mapper, SidesOfARoomMayHaveDriftedFurtherApartThanPiecesOfFurniture) {
+TEST(Mapper, TheLargerThePiecesTheFurtherTheyMayHaveDriftedApart) {
   // 3 cm of drift between two pieces of one wall, 3 m apart.
-  for (const double height : {2.5, 0.8}) {
+  for (const bool large : {true, false}) {
+    const double length = large ? 3 : 1.2, height = large ? 2.5 : 0.8;
     Rig rig(0.3);
     Scene scene;
-    scene.add({-4, 1, 0.5}, {3, 0, 0}, {0, 0, height});
-    scene.add({2, 1.03, 0.5}, {3, 0, 0}, {0, 0, height});
+    scene.add({-1 - length, 1, 0.5}, {length, 0, 0}, {0, 0, height});
+    scene.add({2, 1.03, 0.5}, {length, 0, 0}, {0, 0, height});
     for (int i = 0; i < 4; ++i) rig.look(scene, {-2.8 + 0.3 * i, -1.5, 1.3}, {-2.8 + 0.3 * i, 1, 1.2});
     for (int i = 0; i < 4; ++i) rig.look(scene, {3.2 + 0.3 * i, -1.5, 1.3}, {3.2 + 0.3 * i, 1, 1.2});
-    EXPECT_EQ(height > 1 ? 1u : 2u, rig.mapper.planes().size()) << height;
+    EXPECT_EQ(large ? 1u : 2u, rig.mapper.planes().size()) << large;
   }
 }
 
@@ -152,8 +153,8 @@ TEST(Mapper, TheFurtherApartTheBetterPiecesOfOneWallMustAgree) {
 }
 
 // Two pieces of a wall, 1 m apart and seen from 6 m, that differ by 1 to 4 cm and 1 degree: equal for a camera with 13
-// cm of depth noise there, correlated between neighbouring pixels, but not for an accurate one. A step of 20 cm is
-// different for both.
+// cm of depth noise there, correlated between neighbouring pixels. A step of 20 cm is different for it, one of 10 cm
+// for an accurate one.
 TEST(Mapper, PiecesThatDifferByWhatNoiseExplainsAreOneWall) {
   DepthNoise noisy = testing::quietNoise();
   noisy.a = 0.001, noisy.b = 0, noisy.c = 0.0036, noisy.max_range = 6.5;
@@ -168,7 +169,7 @@ TEST(Mapper, PiecesThatDifferByWhatNoiseExplainsAreOneWall) {
   };
   EXPECT_EQ(1u, planes(noisy, 0.01));
   EXPECT_EQ(2u, planes(noisy, 0.2));
-  EXPECT_EQ(2u, planes(testing::quietNoise(), 0.01));
+  EXPECT_EQ(2u, planes(testing::quietNoise(), 0.1));
 }
 
 // A piece between a wall and a door 12 cm behind it, seen from afar: noise would allow that it belongs to either.
@@ -201,18 +202,15 @@ TEST(Mapper, ASmallPieceOfAWallBelongsToItWhenItIsOnItsPlane) {
   }
 }
 
-TEST(Mapper, APartitionWhoseMiddleIsHiddenIsOneButCupboardsAreTwo) {
-  struct Case {
-    double height, step;
-    std::size_t planes;
-  };
-  for (const Case& c : {Case{2.0, 0.0, 1}, Case{2.0, 0.03, 2}, Case{0.9, 0.0, 2}}) {
+// Whatever stands between them or can be seen there: walls go on behind doors and cupboards.
+TEST(Mapper, TheLeavesOfAPartitionAreOneWhenTheyAreOnOnePlane) {
+  for (const double step : {0.0, 0.05}) {
     Rig rig(0.5);
     Scene scene;
-    scene.add({-0.8, 1, 0}, {0.4, 0, 0}, {0, 0, c.height});  // 0.8 m^2
-    scene.add({0.4, 1 + c.step, 0}, {0.4, 0, 0}, {0, 0, c.height});
+    scene.add({-0.8, 1, 0}, {0.4, 0, 0}, {0, 0, 2.0});  // 0.8 m^2
+    scene.add({0.4, 1 + step, 0}, {0.4, 0, 0}, {0, 0, 2.0});
     for (int i = 0; i < 6; ++i) rig.look(scene, {-0.5 + 0.2 * i, -1.5, 1.3}, {-0.2 + 0.1 * i, 1, 1.0});
-    EXPECT_EQ(c.planes, rig.mapper.planes().size()) << c.height << " m high, " << c.step << " m apart";
+    EXPECT_EQ(step == 0 ? 1u : 2u, rig.mapper.planes().size()) << step;
   }
 }
 
@@ -230,7 +228,7 @@ TEST(SameSurface, WhatHasNoAreaLeftIsNoPieceOfAnything) {
   const CameraPoses poses;
   const SceneView view{keyframes, poses, *rig.camera.camera, rig.camera.noise, 0.1, gaps};
   EXPECT_TRUE(gone.cells().empty());
-  EXPECT_FALSE(sameSurface(strip, gone, {&strip, &gone}, view, PlaneMergingOptions()));
+  EXPECT_FALSE(sameSurface(strip, gone, view, PlaneMergingOptions()));
 }
 
 TEST(OpenGaps, GoWithTheirPlanes) {
