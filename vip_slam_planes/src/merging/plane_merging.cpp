@@ -100,10 +100,12 @@ bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const SceneView& view
   if (shared > 2 * options.overlap) return true;
   if (meeting.near == 0) {
     // A tilt error of a tenth of a degree extrapolates to centimetres some metres away, so compare heights of
-    // horizontal surfaces instead.
+    // horizontal surfaces instead. Steps in a floor and counters of two heights stay; walls and ceilings drift
+    // further apart.
     double off = meeting.worst_border;
     if (a.kind() == PlaneKind::kHorizontal) off = std::min(off, heightDifference(a, b));
-    if (off * between > options.chance * small.area() && !noise()) return false;
+    const double drift = (a.plane().n.z() > 0.5 ? 1 : 2) * options.max_rms;
+    if (off > std::min(drift, options.chance * small.area() / between) && !noise()) return false;
   }
   if (jointMisfit(surfaceMoments(a, poses), surfaceMoments(b, poses), large) > options.max_rms && !noise())
     return false;

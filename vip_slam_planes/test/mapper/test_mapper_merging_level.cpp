@@ -76,7 +76,7 @@ TEST(Mapper, ACounterGoesOnBehindACupboardButNotAcrossAnAisle) {
     int counters;
   };
   for (const Case& c :
-       {Case{true, true, 0, 1}, Case{true, true, 0.04, 2}, Case{false, true, 0, 2}, Case{false, false, 0, 2}}) {
+       {Case{true, true, 0, 1}, Case{true, true, 0.03, 2}, Case{false, true, 0, 2}, Case{false, false, 0, 2}}) {
     Rig rig(0.3);
     Scene scene;
     const double length = c.cupboard ? 2.0 : 1.4;
