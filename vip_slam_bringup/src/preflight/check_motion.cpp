@@ -5,6 +5,7 @@
 #include "vip_slam_bringup/preflight/gyro_integral.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/formatted.h"
+#include "vip_slam_core/util/statistics.h"
 
 namespace vip_slam {
 namespace {
@@ -19,6 +20,43 @@ Finding readoutFinding(const Recording& r, const MotionEstimate& motion) {
     return {Severity::kWarning, "rolling shutter", measured, "the last row comes first: is the image turned round?"};
   return {Severity::kWarning, "rolling shutter", measured,
           formatted("set color/rolling_shutter: %.4f in the sensor file", motion.readout)};
+}
+
+/// A gyroscope in degrees a second, throughout or for some time: in blocks of half a second, against the images.
+std::optional<Finding> degreesFinding(const Recording& r) {
+  constexpr double kBlock = 0.5, kTurns = 0.1, kLeast = 30, kMost = 90;  // s, rad/s of the images, times
+  constexpr int kSure = 3;                                               // blocks in a row
+  const GyroIntegral gyro(r.gyro_samples);
+  std::vector<double> ratios;
+  double from = 0, to = 0;
+  int blocks = 0, run = 0;
+  bool sure = false;
+  for (std::size_t begin = 0, end = 0; begin < r.rotations.size(); begin = end) {
+    const double t = r.rotations[begin].t0;
+    double turned = 0, seen = 0, n = 0;
+    for (; end < r.rotations.size() && r.rotations[end].t0 < t + kBlock; ++end) {
+      const RotationStep& step = r.rotations[end];
+      if (!gyro.covers(step.t0) || !gyro.covers(step.t1)) continue;
+      turned += ((gyro.at(step.t1) - gyro.at(step.t0)) / (step.t1 - step.t0)).squaredNorm();
+      seen += step.rate_C.squaredNorm();
+      n += 1;
+    }
+    end = std::max(end, begin + 1);
+    if (seen < n * kTurns * kTurns) continue;
+    ++blocks;
+    const double ratio = std::sqrt(turned / seen);
+    run = ratio > kLeast && ratio < kMost ? run + 1 : 0;
+    if (run == 0) continue;
+    if (ratios.empty()) from = t;
+    to = t + kBlock;
+    ratios.push_back(ratio);
+    sure = sure || run == kSure;
+  }
+  if (!sure) return std::nullopt;
+  std::string text = formatted("turns %.0f times as fast as the images", upperMedian(ratios));
+  if (int(ratios.size()) < blocks)
+    text += formatted(" from %.1f to %.1f s", from - r.color.stamps.front(), to - r.color.stamps.front());
+  return Finding{Severity::kError, "gyroscope", text, "it reports degrees a second; radians a second are expected"};
 }
 
 /// Share of the corners that stand still in the image while the gyro turns the camera by several pixels.
@@ -63,20 +101,38 @@ std::optional<Finding> smoothedFinding(const MotionEstimate& motion) {
                  "depth that are advised otherwise are not real"};
 }
 
-/// The delay in both halves of the recording, when they differ by more than their sigmas explain: then there is no one
-/// delay to advise.
-std::optional<Finding> unsteadyDelay(const Recording& r) {
+/// How the delay changes: the stamps drift, or, where the halves of the recording are not on one line, step. Empty when
+/// one delay holds for all, or when it is not known. `differs`: the delay from the sensor file's.
+std::optional<Finding> unsteadyDelay(const Recording& r, const MotionEstimate& motion, bool differs) {
+  constexpr double kMatters = 0.004, kSure = 4, kOnLine = 0.002;  // s, sigmas, s
+  if (!(motion.drift_sigma > 0)) return std::nullopt;
+  const double begin = r.rotations.front().t0, end = r.rotations.back().t1;
+  const double span = end - begin, drifted = motion.time_drift * span;
+  const bool drifts = std::abs(drifted) > std::max(kMatters, kSure * motion.drift_sigma * span);
+  if (!drifts && !differs) return std::nullopt;
   const auto middle = r.rotations.begin() + std::ptrdiff_t(r.rotations.size() / 2);
-  const MotionEstimate first = estimateMotion(r, {r.rotations.begin(), middle});
-  const MotionEstimate second = estimateMotion(r, {middle, r.rotations.end()});
-  if (!first.usable || !second.usable) return std::nullopt;
-  const double apart = std::abs(first.time_offset - second.time_offset);
-  if (apart < std::max(0.004, 4 * std::hypot(first.time_sigma, second.time_sigma))) return std::nullopt;
-  return Finding{Severity::kWarning, "camera-IMU delay",
-                 formatted("%+.1f ms in the first half, %+.1f ms in the second", 1000 * first.time_offset,
-                           1000 * second.time_offset),
-                 "the clocks of images and IMU drift or step against each other: stamp both by one clock; no "
-                 "time_offset holds for all"};
+  const std::vector<RotationStep> halves[] = {{r.rotations.begin(), middle}, {middle, r.rotations.end()}};
+  const MotionEstimate first = estimateMotion(r, halves[0]), second = estimateMotion(r, halves[1]);
+  if (first.usable && second.usable) {
+    const double apart = second.time_offset - first.time_offset;
+    const double sigma = std::hypot(first.time_sigma, second.time_sigma);
+    const bool line = drifts && std::abs(apart - 0.5 * drifted) < std::max(kOnLine, kSure * sigma);
+    if (!line && std::abs(apart) > std::max(kMatters, kSure * sigma))
+      return Finding{Severity::kWarning, "camera-IMU delay",
+                     formatted("%+.1f ms in the first half, %+.1f ms in the second", 1000 * first.time_offset,
+                               1000 * second.time_offset),
+                     "the clock of images or IMU steps: stamp both by one clock; no time_offset holds for all"};
+  }
+  if (!drifts) return std::nullopt;
+  return Finding{
+      Severity::kWarning, "camera-IMU delay",
+      formatted("drifts by %+.0f microseconds a second (one sigma %.0f): %+.1f ms at the beginning, %+.1f ms "
+                "at the end",
+                1e6 * motion.time_drift, 1e6 * motion.drift_sigma, 1000 * (motion.time_offset - 0.5 * drifted),
+                1000 * (motion.time_offset + 0.5 * drifted)),
+      formatted("the clock of the images is %s than the IMU's: let the driver stamp both by one clock "
+                "(global or system time); no time_offset holds for all",
+                motion.time_drift > 0 ? "slower" : "faster")};
 }
 
 /// The rotation of given extrinsics against the motion's. Wrong ones are an error where they are what the system uses.
@@ -108,9 +164,7 @@ Findings checkMotion(const Recording& r) {
   Findings out;
   const MotionEstimate motion = estimateMotion(r, r.rotations);
   if (const auto wrong = cameraFinding(r, motion)) return {*wrong};  // what else the motion says follows from it
-  if (motion.scale > 30 && motion.scale < 90)
-    out.push_back({Severity::kError, "gyroscope", formatted("turns %.0f times as fast as the images", motion.scale),
-                   "it reports degrees a second; radians a second are expected"});
+  if (const auto degrees = degreesFinding(r)) return {*degrees};     // the same
   if (motion.contradicts) {
     out.push_back(contradictionFinding(r, motion));
     return out;
@@ -131,8 +185,7 @@ Findings checkMotion(const Recording& r) {
       formatted("%+.1f ms measured (one sigma %.1f ms), the sensor file says %+.1f ms", 1000 * motion.time_offset,
                 1000 * motion.time_sigma, 1000 * r.sensor.time_offset);
   const bool differs = std::abs(difference) > std::max(0.006, 3 * motion.time_sigma);
-  const auto unsteady = differs ? unsteadyDelay(r) : std::nullopt;
-  if (unsteady)
+  if (const auto unsteady = unsteadyDelay(r, motion, differs))
     out.push_back(*unsteady);
   else if (differs)
     out.push_back({std::abs(difference) > 0.05 ? Severity::kError : Severity::kWarning, "camera-IMU delay", measured,

@@ -88,7 +88,8 @@ constexpr double kStep = 0.002;           // of the grid of delays, seconds
 struct Search {
   Fit fit;
   double offset = 0;
-  double sigma = 0;  ///< of the offset, from the curvature of the residual; seconds
+  double sigma = 0;     ///< of the offset, from the curvature of the residual; seconds
+  bool at_end = false;  ///< of the range, so that there is no best one in it
 };
 
 /// The best delay within `range` of `middle`; false when gyro and images never overlap.
@@ -103,7 +104,8 @@ bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, do
   if (best < 0) return false;
   out->fit = fits[best];
   out->offset = middle + (best - half) * kStep;
-  if (best > 0 && best + 1 < static_cast<int>(fits.size())) {
+  out->at_end = best == 0 || best + 1 == static_cast<int>(fits.size());
+  if (!out->at_end) {
     const double a = fits[best - 1].residual, b = out->fit.residual, c = fits[best + 1].residual, curve = a - 2 * b + c;
     if (curve > 0) {
       out->offset += kStep * 0.5 * (a - c) / curve;
@@ -117,7 +119,9 @@ bool search(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, do
 
 /// Gyro rate over image rate: of the mean over half a second, and of what is left. The gyro's noise is the smaller one:
 /// images are regressed on it, so that their noise does not make the gain smaller.
-void gainsOf(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, const Search& fit, MotionEstimate* out) {
+/// `found`: delay and rotation.
+void gainsOf(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, const ReadoutEstimate& found,
+             MotionEstimate* out) {
   constexpr double kBlock = 0.5;
   struct Pair {
     Eigen::Vector3d imu, camera;
@@ -129,9 +133,9 @@ void gainsOf(const std::vector<RotationStep>& steps, const GyroIntegral& gyro, c
     std::vector<Pair> block;
     std::size_t end = begin;
     for (; end < steps.size() && steps[end].t1 - steps[begin].t0 < kBlock; ++end) {
-      const double from = steps[end].t0 + fit.offset, to = steps[end].t1 + fit.offset;
+      const double from = found.imuTime(steps[end].t0), to = found.imuTime(steps[end].t1);
       if (!gyro.covers(from) || !gyro.covers(to)) continue;
-      block.push_back({(gyro.at(to) - gyro.at(from)) / (to - from), fit.fit.R * steps[end].rate_C});
+      block.push_back({(gyro.at(to) - gyro.at(from)) / (to - from), found.R_imu_cam * steps[end].rate_C});
     }
     begin = std::max(end, begin + 1);
     if (block.size() < 4) continue;
@@ -196,13 +200,18 @@ MotionEstimate estimateMotion(const Recording& r, const std::vector<RotationStep
     out.contradicts = fit.variance > kTurns * kTurns;
     return out;
   }
-  gainsOf(steps, gyro, fine, &out);
+  if (fine.at_end || coarse.at_end) {
+    out.why_not = formatted("no delay within %.0f ms fits images and gyroscope best", 1000 * max_offset);
+    return out;
+  }
   out.time_offset = fine.offset;
   out.time_sigma = fine.sigma;
   // The rotation is observable once there is motion about a second axis, 0.05 rad/s.
   out.rotation_known = fit.camera_variances(1) > 0.05 * 0.05;
   out.usable = true;
-  const auto rows = estimateReadout(steps, gyro, {fine.offset, 0.0, out.R_imu_cam});
+  const ReadoutEstimate start{fine.offset, 0.0, out.R_imu_cam};
+  const auto rows = estimateReadout(steps, gyro, start);
+  gainsOf(steps, gyro, rows.value_or(start), &out);
   if (rows && rows->readout_sigma < kUsefulReadout) {
     // With a rolling shutter the delay estimated without rows does not refer to a definite row.
     out.time_offset = rows->time_offset;
@@ -213,6 +222,8 @@ MotionEstimate estimateMotion(const Recording& r, const std::vector<RotationStep
   // Without depth sideways motion passes for rotation, and with it for a delay.
   if (!rows) out.time_sigma = std::hypot(out.time_sigma, 0.01);
   if (rows) {
+    out.time_drift = rows->time_drift;
+    out.drift_sigma = rows->drift_sigma;
     std::vector<double> errors;
     for (const StepFit& fit : rows->fits) errors.push_back(fit.error);
     out.misfit = quantile(errors, 0.75);

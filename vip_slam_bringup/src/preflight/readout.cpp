@@ -12,17 +12,26 @@ namespace vip_slam {
 namespace {
 
 constexpr std::size_t kMinTracks = 12;
-constexpr int kRounds = 12, kUnknowns = 8;  // td, r, rotation (3), bias (3)
+constexpr int kRounds = 12, kUnknowns = 9, kDrift = 8;  // td, r, rotation (3), bias (3), drift of td
+constexpr double kUsualDrift = 1e-3;                    // one sigma: no quartz is off by more
+constexpr double kTogether = 0.5;                       // s in which errors are taken for common ...
+constexpr int kBlocks = 40;                             // ... as far as so many such blocks are left
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 
 struct State {
-  double time_offset, readout;
+  double middle, time_offset, readout;
   Eigen::Matrix3d R_imu_cam;
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();  // rad/s
+  double drift = 0;
 
+  double imuTime(double t) const { return t + time_offset + drift * (t - middle); }
   State plus(const Unknowns& d) const {
-    return {time_offset + d(0), readout + d(1), R_imu_cam * expSO3(Eigen::Vector3d(d.segment<3>(2))),
-            bias + d.segment<3>(5)};
+    return {middle,
+            time_offset + d(0),
+            readout + d(1),
+            R_imu_cam * expSO3(Eigen::Vector3d(d.segment<3>(2))),
+            bias + d.segment<3>(5),
+            drift + d(kDrift)};
   }
 };
 
@@ -48,8 +57,8 @@ Prediction predict(const RotationStep& step, const GyroIntegral& gyro, const Sta
   Prediction p{Eigen::VectorXd(2 * n), Eigen::MatrixX3d(2 * n, 3)};
   for (int i = 0; i < n; ++i) {
     const CornerTrack& track = step.tracks[i];
-    const double from = step.t0 + x.time_offset + x.readout * track.row_from;
-    const double to = step.t1 + x.time_offset + x.readout * track.row_to;
+    const double from = x.imuTime(step.t0) + x.readout * track.row_from;
+    const double to = x.imuTime(step.t1) + x.readout * track.row_to;
     const Eigen::Vector3d turn = x.R_imu_cam.transpose() * (gyro.at(to) - gyro.at(from) - (to - from) * x.bias);
     const Eigen::Matrix3d R_to_from = expSO3(Eigen::Vector3d(-turn));
     const double late = 0.5 * x.readout * (track.row_from + track.row_to);  // after the middle between the images
@@ -99,13 +108,14 @@ Share shareOf(const RotationStep& step, const GyroIntegral& gyro, const State& x
     p = predict(step, gyro, x, *course);
   }
   w = weightsOf(p.residual);
-  constexpr double kDelta[kUnknowns] = {1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
+  constexpr double kDelta[kDrift] = {1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
   Eigen::MatrixXd J(p.residual.size(), kUnknowns);
-  for (int c = 0; c < kUnknowns; ++c) {
+  for (int c = 0; c < kDrift; ++c) {
     const Unknowns d = Unknowns::Unit(c) * kDelta[c];
     J.col(c) = (predict(step, gyro, x.plus(d), *course).residual - predict(step, gyro, x.plus(-d), *course).residual) /
                (2 * kDelta[c]);
   }
+  J.col(kDrift) = (0.5 * (step.t0 + step.t1) - x.middle) * J.col(0);
   const Eigen::Matrix3d A = p.by_speed.transpose() * w.asDiagonal() * p.by_speed + 1e-9 * Eigen::Matrix3d::Identity();
   const Eigen::MatrixXd by_speed_w = p.by_speed.transpose() * w.asDiagonal();
   const Eigen::MatrixXd projected = J - p.by_speed * A.ldlt().solve(by_speed_w * J);
@@ -117,8 +127,8 @@ Share shareOf(const RotationStep& step, const GyroIntegral& gyro, const State& x
 void accelerate(const std::vector<const RotationStep*>& steps, const GyroIntegral& gyro, const State& x,
                 std::vector<Course>* courses) {
   const auto turned = [&](double from, double to) {  // R_from_to of the camera
-    return expSO3(Eigen::Vector3d(x.R_imu_cam.transpose() * (gyro.at(to + x.time_offset) -
-                                                             gyro.at(from + x.time_offset) - (to - from) * x.bias)));
+    return expSO3(Eigen::Vector3d(x.R_imu_cam.transpose() *
+                                  (gyro.at(x.imuTime(to)) - gyro.at(x.imuTime(from)) - (to - from) * x.bias)));
   };
   for (std::size_t k = 1; k + 1 < steps.size(); ++k) {
     const RotationStep &before = *steps[k - 1], &now = *steps[k], &after = *steps[k + 1];
@@ -139,7 +149,9 @@ std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& 
     if (s.tracks.size() >= kMinTracks && covered(s, gyro, kMargin + std::abs(start.time_offset))) used.push_back(&s);
   if (used.size() < 40) return std::nullopt;
 
-  State x{start.time_offset, start.readout, start.R_imu_cam.toRotationMatrix()};
+  const double middle = 0.5 * (used.front()->t0 + used.back()->t1);
+  const double together_for = std::min(kTogether, 2 * (middle - used.front()->t0) / kBlocks);
+  State x{middle, start.time_offset, start.readout, start.R_imu_cam.toRotationMatrix()};
   Eigen::Matrix<double, kUnknowns, kUnknowns> covariance;
   std::vector<Course> courses(used.size());
   bool settled = false;
@@ -147,30 +159,51 @@ std::optional<ReadoutEstimate> estimateReadout(const std::vector<RotationStep>& 
     Eigen::Matrix<double, kUnknowns, kUnknowns> H = 1e-12 * Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity();
     Eigen::Matrix<double, kUnknowns, kUnknowns> scatter = 0 * H;
     Unknowns g = Unknowns::Zero();
+    Unknowns together = Unknowns::Zero();
+    double block = used.front()->t0;
+    int blocks = 0;
+    H(kDrift, kDrift) = scatter(kDrift, kDrift) = 1 / (kUsualDrift * kUsualDrift);
+    g(kDrift) = x.drift / (kUsualDrift * kUsualDrift);
     for (std::size_t k = 0; k < used.size(); ++k) {
       const Share share = shareOf(*used[k], gyro, x, &courses[k]);
       H += share.H;
       g += share.g;
-      scatter += share.g * share.g.transpose();
+      together += share.g;
+      if (k + 1 < used.size() && used[k + 1]->t0 < block + together_for) continue;
+      scatter += together * together.transpose();
+      together.setZero();
+      ++blocks;
+      if (k + 1 < used.size()) block = used[k + 1]->t0;
     }
     const Unknowns d = -H.ldlt().solve(g);
     x = x.plus(d);
     if (!d.allFinite() || std::abs(x.time_offset - start.time_offset) > kMargin / 2 || std::abs(x.readout) > kMargin)
       return std::nullopt;
-    settled = std::abs(d(0)) < 1e-5 && std::abs(d(1)) < 1e-5;
     accelerate(used, gyro, x, &courses);
-    // Errors common to a pair of images (blur, gyro noise) are in all their corners: take the covariance by pairs.
+    // Errors common to a pair of images (blur, gyro noise) are in all their corners, and those of a view last while it
+    // is seen: take the covariance by blocks.
     const Eigen::Matrix<double, kUnknowns, kUnknowns> inverse =
         H.ldlt().solve(Eigen::Matrix<double, kUnknowns, kUnknowns>::Identity());
-    covariance = inverse * scatter * inverse;
+    covariance = inverse * scatter * inverse * (double(blocks) / std::max(1, blocks - kUnknowns));
+    const auto below = [&](double seconds, double drift, double sigmas) {
+      const auto is = [&](int i, double least) {
+        return std::abs(d(i)) < std::max(least, sigmas * std::sqrt(covariance(i, i)));
+      };
+      return is(0, seconds) && is(1, seconds) && is(kDrift, drift);
+    };
+    // What still creeps after all rounds by far less than it is known by has settled as well.
+    settled = below(1e-5, 1e-6, round + 1 < kRounds ? 0 : 0.1);
   }
   if (!settled) return std::nullopt;
   ReadoutEstimate out{x.time_offset, x.readout, Eigen::Quaterniond(x.R_imu_cam)};
   out.time_sigma = std::sqrt(covariance(0, 0));
   out.readout_sigma = std::sqrt(covariance(1, 1));
   out.gyro_bias = x.bias;
+  out.middle = middle;
+  out.time_drift = x.drift;
+  out.drift_sigma = std::sqrt(covariance(kDrift, kDrift));
   for (std::size_t k = 0; k < used.size(); ++k)
-    out.fits.push_back({used[k]->t0 + x.time_offset, used[k]->t1 + x.time_offset, courses[k].speed,
+    out.fits.push_back({x.imuTime(used[k]->t0), x.imuTime(used[k]->t1), courses[k].speed,
                         upperMedian(errorsOf(predict(*used[k], gyro, x, courses[k]).residual))});
   return out;
 }

@@ -102,6 +102,24 @@ TEST_F(MotionCause, AxesOfTheAccelerometerThatAreNotTheGyroscopes) {
   expectOnlyError(r, "accelerometer", "opposite sign");
 }
 
+TEST_F(MotionCause, AGyroscopeInDegreesForAWhileIsNamedWithItsTime) {
+  Recording r = *sound_;
+  const double start = r.color.stamps.front();
+  for (StampedVector& s : r.gyro_samples)
+    if (s.t > start + 6) s.value *= 180 / M_PI;
+  expectOnlyError(r, "gyroscope", "times as fast as the images from 6.");
+}
+
+TEST_F(MotionCause, AClockThatDriftsIsNamedWithItsRate) {
+  Recording r = *sound_;
+  const double start = r.color.stamps.front();
+  for (RotationStep& s : r.rotations) s.t0 -= 1e-3 * (s.t0 - start), s.t1 -= 1e-3 * (s.t1 - start);
+  std::string found;
+  for (const Finding& f : checkMotion(r))
+    if (f.about == "camera-IMU delay") found += f.text;
+  EXPECT_NE(found.find("drifts by +"), std::string::npos) << found;
+}
+
 TEST_F(MotionCause, MirroredPicturesAreNamed) {
   const float width = float(sound_->color_camera.width), height = float(sound_->color_camera.height);
   expectOnlyError(withPixels([&](const Eigen::Vector2f& p) { return Eigen::Vector2f(width - 1 - p.x(), p.y()); }),

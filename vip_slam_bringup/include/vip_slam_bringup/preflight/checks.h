@@ -52,8 +52,10 @@ std::string toText(const Findings& findings, bool color);
 struct MotionEstimate {
   bool usable = false;
   std::string why_not;     ///< reason when not usable
-  double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset
+  double time_offset = 0;  ///< seconds; t_imu = t_image + time_offset, in the middle of the recording
   double time_sigma = 0;   ///< one sigma of it, seconds
+  double time_drift = 0;   ///< seconds a second by which it grows
+  double drift_sigma = 0;  ///< one sigma of that; 0: not known
   Eigen::Quaterniond R_imu_cam = Eigen::Quaterniond::Identity();
   bool rotation_known = false;  ///< rotated about two axes at least
   double correlation = 0;       ///< share of the gyro's variance that the images explain, 0..1
