@@ -174,6 +174,26 @@ void checkDepth(const Recording& r, Findings* out) {
                     formatted("%.0f %% of the pixels have depth, median %.2f m", 100 * share, z), ""});
 }
 
+void checkMissingReading(const Recording& r, Findings* out) {
+  if (r.missing_reading > 0)
+    out->push_back(
+        {Severity::kNote, "depth image",
+         formatted("exactly %.3f m stands apart from the surfaces around it: taken for \"no reading\", which "
+                   "should be 0 (or NaN)",
+                   r.missing_reading),
+         ""});
+}
+
+void checkDepthUnit(const Recording& r, Findings* out) {
+  if (r.depth_unit_changes.empty()) return;
+  const DepthUnitChange& first = r.depth_unit_changes.front();
+  std::string what = formatted("its unit is set anew at %.1f s: readings are %.3g times as long from there",
+                               first.t - r.depth.stamps.front(), first.factor);
+  if (const std::size_t more = r.depth_unit_changes.size() - 1) what += formatted(", and %zu times more", more);
+  out->push_back({Severity::kWarning, "depth image", what,
+                  "it is followed, in the unit of the first images; set depth units or preset before recording only"});
+}
+
 }  // namespace
 
 Findings checkImages(const Recording& r) {
@@ -206,6 +226,8 @@ Findings checkImages(const Recording& r) {
                      "the depth image is not registered to colour"});
   }
   if (!r.depths.empty()) checkDepth(r, &out);
+  checkMissingReading(r, &out);
+  checkDepthUnit(r, &out);
   return out;
 }
 

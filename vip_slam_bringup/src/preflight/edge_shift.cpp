@@ -12,7 +12,6 @@ namespace {
 
 constexpr int kColumns = 160;            // of the small images, cells
 constexpr int kPatch = 31;               // cells around, the mean of which is taken out
-constexpr double kEvery = 0.09;          // s
 constexpr double kSecond = 1.0;          // s
 constexpr float kEdgeJump = 0.08f;       // of the nearer depth, from one pixel to the next
 constexpr float kStrong = 60;            // grey levels of gradient: stronger edges count no more
@@ -98,8 +97,7 @@ EdgeShift EdgeShifts::Sum::shift(double cell) const {
 }
 
 void EdgeShifts::add(double t, const cv::Mat& grey, const cv::Mat& depth) {
-  if (grey.size() != depth.size() || t - last_ < kEvery) return;
-  last_ = t;
+  if (grey.size() != depth.size()) return;
   const cv::Mat jumps = nearerAtJumps(depth);
   std::vector<float> nearer;
   for (int v = 0; v < jumps.rows; ++v)

@@ -44,8 +44,8 @@ std::optional<Eigen::Matrix3d> alignBearings(const std::vector<Eigen::Vector3d>&
 /// RANSAC, then refinement with the tracks that agree within 2.5 times the median error of all. A fixed threshold would
 /// keep tracks with errors of a pixel or two, and a few of those bias a least-squares fit by more than all the good
 /// ones improve it. `pixel`: size of a pixel in these coordinates.
-std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& points,
-                                             const std::vector<cv::Point2f>& images, double pixel) {
+std::optional<SE3> motionByPnp(const std::vector<cv::Point3f>& points, const std::vector<cv::Point2f>& images,
+                               double pixel) {
   const cv::Matx33d K = cv::Matx33d::eye();
   cv::Mat r, t, inliers;
   if (!cv::solvePnPRansac(points, images, K, cv::noArray(), r, t, false, 60, static_cast<float>(2.0 * pixel), 0.99,
@@ -74,12 +74,13 @@ std::optional<Eigen::Matrix3d> rotationByPnp(const std::vector<cv::Point3f>& poi
     }
   }
   cv::solvePnPRefineLM(good_points, good_images, K, cv::noArray(), r, t);
-  return expSO3(Eigen::Vector3d(r.at<double>(0), r.at<double>(1), r.at<double>(2)));
+  return SE3(expSO3(Eigen::Vector3d(r.at<double>(0), r.at<double>(1), r.at<double>(2))),
+             {t.at<double>(0), t.at<double>(1), t.at<double>(2)});
 }
 
 }  // namespace
 
-std::optional<PixelStep> ImageRotation::add(double t, const cv::Mat& image, const cv::Mat& depth) {
+std::optional<PixelStep> ImageRotation::add(double t, const cv::Mat& image) {
   // A large image is followed in a smaller one: its corners are as exact as those of a small camera.
   const int shrink = (image.cols + kMaxColumns - 1) / kMaxColumns;
   cv::Mat gray = image;
@@ -108,8 +109,8 @@ std::optional<PixelStep> ImageRotation::add(double t, const cv::Mat& image, cons
     }
   }
   t_ = t;
-  gray_ = gray.clone();
-  depth_ = depth.empty() ? cv::Mat() : depth.clone();
+  gray_ = gray;
+  depth_ = cv::Mat();
   if (step.tracks.size() < kMinCorners) return std::nullopt;
   return step;
 }
@@ -118,7 +119,7 @@ std::optional<RotationStep> seenBy(const CameraModel& camera, const PixelStep& s
   std::vector<Eigen::Vector3d> from, to;
   std::vector<cv::Point3f> points;
   std::vector<cv::Point2f> images;
-  RotationStep out{step.t0, step.t1, Eigen::Vector3d::Zero(), {}};
+  RotationStep out{step.t0, step.t1, Eigen::Vector3d::Zero(), {}, {}};
   for (const PixelTrack& track : step.tracks) {
     Eigen::Vector2d a, b;
     if (!camera.undistort(track.from.cast<double>(), &a) || !camera.undistort(track.to.cast<double>(), &b)) continue;
@@ -132,7 +133,8 @@ std::optional<RotationStep> seenBy(const CameraModel& camera, const PixelStep& s
         {{points.back().x, points.back().y, track.z}, b.cast<float>(), rowOf(track.from.y()), rowOf(track.to.y())});
   }
   std::optional<Eigen::Matrix3d> R_now_before;
-  if (points.size() >= kMinCorners) R_now_before = rotationByPnp(points, images, 1.0 / camera.focal());
+  if (points.size() >= kMinCorners) out.T_now_before = motionByPnp(points, images, 1.0 / camera.focal());
+  if (out.T_now_before) R_now_before = out.T_now_before->R();
   if (!R_now_before) R_now_before = alignBearings(from, to);
   if (!R_now_before) return std::nullopt;
   // For a camera rotating by w dt the scene rotates by -w dt.

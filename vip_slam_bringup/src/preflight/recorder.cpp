@@ -52,6 +52,7 @@ Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds)
 
 void Recorder::startRotation(const CameraIntrinsics& camera) {
   camera_ = makeCamera(camera);
+  depth_unit_ = std::make_unique<frontend::DepthUnit>(camera_, recording_.sensor.depth_noise);
   if (!recording_.sensor.depth_registered) return;
   SensorConfig resolved = recording_.sensor;
   resolved.camera = camera;
@@ -195,9 +196,14 @@ void Recorder::add(const tf2_msgs::TFMessage& message) {
   }
 }
 
-void Recorder::addDepth(double t, const cv::Mat& depth) {
+void Recorder::addDepth(double t, cv::Mat depth) {
   ++recording_.depth.decoded;
   recording_.depth.repeated += frozen_depth_.repeats(depth) && turns();
+  missing_reading_.look(depth);
+  if (const float none = missing_reading_.value(); none > 0) {
+    recording_.missing_reading = none;
+    depth.setTo(0, depth == none);
+  }
   if (recording_.depth.stamps.size() % 5 == 1) {
     std::vector<double> values;
     std::size_t all = 0, usable = 0;
@@ -257,16 +263,35 @@ void Recorder::flushGray(bool all) {
       if (std::abs(d.t - gray.t) < 0.02 && d.image.size() == gray.image.size()) depth = &d.image;
     if (!depth && !all && waiting_gray_.size() < 4) return;
     if (camera_ && gray.image.size() == cv::Size(camera_->width(), camera_->height())) {
-      if (depth && depth_edges_) depth_edges_->add(gray.image, *depth);
+      constexpr double kEvery = 0.09;  // s
+      const bool look = depth && std::abs(gray.t - edges_at_) > kEvery;
+      if (look) edges_at_ = gray.t;
+      if (look && depth_edges_) depth_edges_->add(gray.image, *depth);
       const cv::Mat aligned = !depth ? cv::Mat() : to_colour_ ? (*to_colour_)(*depth) : *depth;
-      if (depth && to_colour_) edge_shifts_.add(gray.t, gray.image, aligned);
-      if (const auto step = rotation_.add(gray.t, gray.image, aligned)) {
-        recording_.pixel_steps.push_back(*step);
-        if (const auto seen = seenBy(*camera_, *step)) recording_.rotations.push_back(*seen);
-      }
+      if (look && to_colour_) edge_shifts_.add(gray.t, gray.image, aligned);
+      addMotion(gray.t, gray.image, aligned);
     }
     waiting_gray_.erase(waiting_gray_.begin());
   }
+}
+
+void Recorder::addMotion(double t, const cv::Mat& gray, cv::Mat depth) {
+  const auto step = rotation_.add(t, gray);
+  if (step) recording_.pixel_steps.push_back(*step);
+  const auto seen = step ? seenBy(*camera_, *step) : std::nullopt;
+  if (seen) recording_.rotations.push_back(*seen);
+  if (seen && seen->T_now_before)
+    T_odom_C_ = T_odom_C_ * seen->T_now_before->inverse();
+  else
+    depth_unit_->forget();
+  const double before = depth_unit_->factor();
+  if (before != 1) depth = depth * before;
+  if (depth_unit_->changes(depth, T_odom_C_, t)) {
+    depth = depth * (depth_unit_->factor() / before);
+    recording_.depth_unit_changes.push_back({t, before / depth_unit_->factor()});
+  }
+  depth_unit_->remember(depth, T_odom_C_, t);
+  rotation_.setDepth(depth);
 }
 
 }  // namespace vip_slam

@@ -200,7 +200,7 @@ TEST(Smoothed, AnImuThatLosesFastTurnsOnlyIsNamed) {
     for (double t = 0.5; t < 19; t += 0.05) {
       Eigen::Vector3d mean = Eigen::Vector3d::Zero();
       for (int i = 0; i < 10; ++i) mean += 0.1 * rate(t + 0.005 * i + 0.0025);
-      r.rotations.push_back({t, t + 0.05, mean, {}});
+      r.rotations.push_back({t, t + 0.05, mean, {}, {}});
     }
     bool named = false;
     for (const Finding& f : checkMotion(r)) named |= f.about == "IMU" && f.text.find("smoothed") != std::string::npos;

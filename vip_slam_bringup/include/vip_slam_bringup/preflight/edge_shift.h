@@ -12,8 +12,7 @@ namespace vip_slam {
 
 class EdgeShifts {
  public:
-  /// `grey`: 8UC1; `depth`: 32FC1 metres, aligned to it, at the same time `t`. Images of another size are left out, and
-  /// those less than 0.1 s after the last.
+  /// `grey`: 8UC1; `depth`: 32FC1 metres, aligned to it, at the same time `t`. Images of another size are left out.
   void add(double t, const cv::Mat& grey, const cv::Mat& depth);
   EdgeShiftRecord record() const;
 
@@ -25,7 +24,7 @@ class EdgeShifts {
     void add(const cv::Mat& one);
     EdgeShift shift(double cell) const;
   };
-  double last_ = -1e9, cell_ = 1;
+  double cell_ = 1;
   std::vector<Sum> seconds_;
   Sum near_, far_;
   double near_inverse_ = 0, far_inverse_ = 0;  ///< sums of the images' mean 1/z of those edges

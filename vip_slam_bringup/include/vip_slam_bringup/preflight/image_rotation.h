@@ -16,9 +16,10 @@ class ImageRotation {
  public:
   /// Corners are used where `mask` is not zero; empty: anywhere.
   explicit ImageRotation(const cv::Mat& mask = cv::Mat()) : mask_(mask) {}
-  /// `image` 8UC1, `depth` 32FC1 metres of the same size or empty. Returns a step when the last two images are less
-  /// than 0.2 s apart and there are enough corners.
-  std::optional<PixelStep> add(double t, const cv::Mat& image, const cv::Mat& depth);
+  /// `image` 8UC1. Returns a step when the last two images are less than 0.2 s apart and there are enough corners.
+  std::optional<PixelStep> add(double t, const cv::Mat& image);
+  /// Of the image that was added last: 32FC1 metres of the same size or empty. Not written to afterwards.
+  void setDepth(const cv::Mat& depth) { depth_ = depth; }
 
  private:
   double t_ = 0;

@@ -14,7 +14,9 @@
 #include "vip_slam_bringup/preflight/edge_shift.h"
 #include "vip_slam_bringup/preflight/image_rotation.h"
 #include "vip_slam_bringup/preflight/recording.h"
+#include "vip_slam_core/depth/missing_reading.h"
 #include "vip_slam_core/sensor/depth_to_colour.h"
+#include "vip_slam_frontend/tracking/depth_unit.h"
 #include "vip_slam_frontend/tracking/frozen_depth.h"
 #include "vip_slam_ros/bag_files.h"
 #include "vip_slam_ros/image_decoding.h"
@@ -49,9 +51,11 @@ class Recorder {
   enum Stream { kColor, kDepth, kInertial, kAccel, kStreams };
   void take(Stream stream, double arrival, const std_msgs::Header& header, StreamTime::Deliver deliver);
   StreamRecord& recordOf(Stream stream);
-  void addDepth(double t, const cv::Mat& depth);
+  void addDepth(double t, cv::Mat depth);
   void addGray(double t, const cv::Mat& gray);
   bool turns() const;
+  /// The motion to the image at t, its depth in the unit of the first ones.
+  void addMotion(double t, const cv::Mat& gray, cv::Mat depth);
   void flushGray(bool all);
   /// From when the colour camera is known.
   void startRotation(const CameraIntrinsics& camera);
@@ -63,14 +67,18 @@ class Recorder {
   StreamTime time_;
   ImageRotation rotation_;
   std::shared_ptr<const CameraModel> camera_;  ///< null: not known yet
-  std::unique_ptr<DepthToColour> to_colour_;   ///< of registered depth; null: depth is taken as it comes
-  std::unique_ptr<DepthEdges> depth_edges_;    ///< null: depth is not registered
+  std::unique_ptr<frontend::DepthUnit> depth_unit_;
+  SE3 T_odom_C_;                              ///< by the steps since one was missing
+  std::unique_ptr<DepthToColour> to_colour_;  ///< of registered depth; null: depth is taken as it comes
+  std::unique_ptr<DepthEdges> depth_edges_;   ///< null: depth is not registered
   EdgeShifts edge_shifts_;
+  double edges_at_ = -1e9;  ///< stamp of the image whose edges were looked at last
   struct Stamped {
     double t;
     cv::Mat image;
   };
   FrozenDepth frozen_depth_;
+  MissingReading missing_reading_;
   cv::Mat newest_gray_;                               ///< newest image that was not a repetition
   std::vector<Stamped> waiting_gray_, recent_depth_;  ///< colour images wait a moment for their depth
 };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -60,6 +61,13 @@ struct RotationStep {
   double t0 = 0, t1 = 0;
   Eigen::Vector3d rate_C = Eigen::Vector3d::Zero();  ///< mean rotation rate, rad/s, in the colour optical frame
   std::vector<CornerTrack> tracks;                   ///< corners with depth
+  std::optional<SE3> T_now_before;                   ///< by these corners; empty: too few agree
+};
+
+/// The unit of depth is set anew.
+struct DepthUnitChange {
+  double t = 0;       ///< of the first image in the new unit, seconds
+  double factor = 1;  ///< its readings over those in the unit before
 };
 
 /// What the colour camera might be instead of what is taken for it.
@@ -117,6 +125,8 @@ struct Recording {
   std::vector<RotationStep> rotations;         ///< of pixel_steps, with the camera as configured
   std::vector<CameraReading> camera_readings;  ///< others of the same camera_info or sensor file
   std::vector<DepthSample> depths;
+  double missing_reading = 0;                       ///< metres, written instead of "no reading"; 0: none
+  std::vector<DepthUnitChange> depth_unit_changes;  ///< depth is in the first unit throughout, but for `depths`
   DepthEdgeRecord depth_edges;                      ///< of registered depth
   EdgeShiftRecord edge_shifts;                      ///< the same
   std::string gray_note;                            ///< of 16-bit grey that does not fill 16 bits
