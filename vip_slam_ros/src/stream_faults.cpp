@@ -7,7 +7,8 @@
 namespace vip_slam {
 
 std::string timeRanBack(double seconds) {
-  return formatted("time ran backwards by %.1f s (a bag that loops?)", seconds);
+  return formatted("time ran back by %.3f s (a clock that was set or wraps round, or a bag that loops or was joined?)",
+                   seconds);
 }
 
 std::string clockWasSet(const ClockStep& step, const std::string& topic) {

@@ -194,8 +194,13 @@ void checkOrder(const Recording& r, Findings* out) {
   }
 }
 
-/// Clocks that were set, whose stamps are followed.
+/// Clocks that were set, whose stamps are followed, and time that began anew.
 void checkClocks(const Recording& r, Findings* out) {
+  if (!r.restarts.empty()) {
+    const std::string more = r.restarts.size() > 1 ? formatted(", and %zu times more", r.restarts.size() - 1) : "";
+    out->push_back({Severity::kError, "clock", timeRanBack(r.restarts.front()) + more,
+                    "the odometry starts anew there; let all streams be stamped by a clock that goes on"});
+  }
   for (const ClockStep& step : r.clock_steps) {
     const std::string topics[] = {r.sensor.topics.color, r.sensor.topics.depth, r.sensor.topics.inertial(),
                                   r.sensor.topics.accel};
@@ -248,7 +253,7 @@ Findings checkRates(const Recording& r) {
           {Severity::kWarning, w.role, "stamps begin at zero", "recorded without a clock? all streams must share one"});
     if (backward > 0)
       out.push_back({Severity::kError, w.role, formatted("time runs backwards %zu times", backward),
-                     "bag joined or played in a loop? messages out of order are dropped"});
+                     "messages come out of order, and are dropped"});
     if (repeated > 0)
       out.push_back({Severity::kWarning, w.role, formatted("%zu stamps repeat the one before", repeated),
                      "repeated messages are dropped"});

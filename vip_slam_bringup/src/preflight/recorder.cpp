@@ -41,7 +41,11 @@ bool smootherSwapped(const cv::Mat& depth, double unit) {
 Recorder::Recorder(const SensorConfig& sensor, bool live, double image_seconds)
     : image_seconds_(image_seconds),
       time_(kStreams, InputOptions().time_jump,
-            {[this](const ClockStep& step) { recording_.clock_steps.push_back(step); }, [](double) {}}),
+            {[this](const ClockStep& step) { recording_.clock_steps.push_back(step); },
+             [this](double seconds) {
+               recording_.restarts.push_back(seconds);
+               restarted_by_ += seconds;
+             }}),
       rotation_(sensor.mask) {
   recording_.sensor = sensor;
   recording_.live = live;
@@ -63,10 +67,10 @@ void Recorder::startRotation(const CameraIntrinsics& camera) {
 void Recorder::take(Stream stream, double arrival, const std_msgs::Header& header, StreamTime::Deliver deliver) {
   StreamRecord& record = recordOf(stream);
   record.frame_id = header.frame_id;
-  time_.take(stream, header.stamp.toSec(), arrival, [&record, arrival, deliver = std::move(deliver)](double t) {
-    record.stamps.push_back(t);
+  time_.take(stream, header.stamp.toSec(), arrival, [this, &record, arrival, deliver = std::move(deliver)](double t) {
+    record.stamps.push_back(t + restarted_by_);
     record.arrivals.push_back(arrival);
-    deliver(t);
+    deliver(t + restarted_by_);
   });
   record.ahead = time_.leftOut(stream).ahead;
 }

@@ -143,6 +143,7 @@ void BagDecoding::clockWasSet(const ClockStep& step) {
 
 void BagDecoding::timeRanBack(double seconds) {
   ++counters_["time_jumps"];
+  complain("time jump", vip_slam::timeRanBack(seconds) + ": the odometry starts anew there, the map goes on");
   pairer_.end();
   handOut();
   pairer_.clear();
@@ -217,11 +218,6 @@ void BagDecoding::finish() {
   if (pairs.backward > 0)
     warnings_.push_back(std::to_string(pairs.backward) +
                         " images are left out: their stamps repeat or precede the one before");
-  if (const auto jumps = counters_.find("time_jumps"); jumps != counters_.end())
-    warnings_.push_back(
-        "time ran backwards " + std::to_string(jumps->second) +
-        " times (a bag that was joined, or recorded while another was played in a loop?): the odometry " +
-        "starts anew there, the map goes on");
   counters_["image_pairs"] = pairs.pairs;
   counters_["images_without_depth"] = pairs.without_depth;
   counters_["unused_depth_images"] = pairs.unused_depth;

@@ -217,9 +217,13 @@ TEST_F(CheckBag, FramesInTf) {
   expectFound(check(), Severity::kWarning, "tf", "differs from the sensor file's T_imu_cam by 0.0 degrees and 5.0 cm");
 }
 
-TEST_F(CheckBag, TimeThatRunsBackwards) {
-  options_.late_jump = -100;
-  expectFound(check(), Severity::kError, "IMU", "time runs backwards");
+// All else is told as without it.
+TEST_F(CheckBag, TimeThatBeginsAnewIsTheOneCause) {
+  options_.late_jump = -4294.967296;  // a counter of microseconds that wraps
+  const Findings findings = check();
+  expectFound(findings, Severity::kError, "clock", "time ran back by 4294.967 s (a clock that was set or wraps round");
+  for (const Finding& f : findings)
+    EXPECT_TRUE(f.severity < Severity::kWarning || f.about == "clock") << f.about << ": " << f.text;
 }
 
 TEST_F(CheckBag, AClockThatIsSetIsNamedAndFollowed) {

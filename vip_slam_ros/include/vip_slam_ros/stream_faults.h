@@ -9,7 +9,7 @@
 
 namespace vip_slam {
 
-/// Why an odometry starts anew: a clock that ran back by `seconds`.
+/// Why an odometry starts anew: time ran back by `seconds`.
 std::string timeRanBack(double seconds);
 /// `topic`: of the stream, where it is one alone.
 std::string clockWasSet(const ClockStep& step, const std::string& topic);

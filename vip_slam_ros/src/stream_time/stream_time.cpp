@@ -246,7 +246,7 @@ bool StreamTime::straggles(Stream* own, double t) {
 
 void StreamTime::restart(Stream* own) {
   restarted_by_ = own->newest - time(*own, own->held.front());
-  listener_.restarted(restarted_by_);
+  listener_.restarted(-stepOf(*own));
   const auto held = takeHeld();
   for (Stream& s : streams_) {
     const LeftOut left_out = s.left_out;

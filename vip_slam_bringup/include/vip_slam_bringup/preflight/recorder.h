@@ -65,6 +65,7 @@ class Recorder {
   const double image_seconds_;
   double first_image_ = -1;
   StreamTime time_;
+  double restarted_by_ = 0;  ///< s by which stamps are earlier than at the beginning
   ImageRotation rotation_;
   std::shared_ptr<const CameraModel> camera_;  ///< null: not known yet
   std::unique_ptr<frontend::DepthUnit> depth_unit_;

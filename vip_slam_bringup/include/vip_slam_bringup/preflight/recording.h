@@ -115,6 +115,7 @@ struct Recording {
   std::map<std::string, std::string> topics;  ///< all existing topics: topic -> type
   StreamRecord color, depth, color_info, depth_info, imu, gyro, accel;
   std::vector<ClockStep> clock_steps;
+  std::vector<double> restarts;  ///< s by which time ran back, where it began anew; stamps go on from before
   CameraIntrinsics color_camera, depth_camera;             ///< from camera_info; width 0: none seen
   double color_focal_from = 0, color_focal_to = 0;         ///< least and largest fx of all camera_info, px
   std::string color_camera_error, depth_camera_error;      ///< why camera_info is unusable

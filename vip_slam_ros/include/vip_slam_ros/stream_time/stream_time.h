@@ -34,7 +34,8 @@ class StreamTime {
  public:
   struct Listener {
     std::function<void(const ClockStep&)> stepped;
-    /// Time began anew, by so many seconds before the newest: what comes now is not related to what came before.
+    /// Time began anew, with stamps so many seconds earlier than if it had gone on: what comes now is not related to
+    /// what came before.
     std::function<void(double seconds)> restarted;
   };
   struct LeftOut {
