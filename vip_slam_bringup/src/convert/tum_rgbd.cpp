@@ -10,7 +10,10 @@
 #include "vip_slam_bringup/convert/converters.h"
 #include "vip_slam_bringup/convert/image_messages.h"
 #include "vip_slam_bringup/convert/text_table.h"
+#include "vip_slam_bringup/preflight/checks.h"
+#include "vip_slam_bringup/preflight/recorder.h"
 #include "vip_slam_core/depth/depth_factor.h"
+#include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/size_text.h"
 
@@ -152,6 +155,25 @@ Trajectory readGroundTruth(const std::string& path, const SE3& T_cam_imu) {
   return truth;
 }
 
+/// By which of their own stamps the poses fit the images, from the rotation of both; empty when it is not known.
+std::string delayOfPoses(const Recorder& images, const Trajectory& truth) {
+  std::vector<StampedVector> rates;
+  for (std::size_t i = 1; i < truth.size(); ++i) {
+    const double dt = truth[i].t - truth[i - 1].t;
+    const Eigen::Matrix3d turned = truth[i - 1].T_W_B.R().transpose() * truth[i].T_W_B.R();
+    rates.push_back({0.5 * (truth[i - 1].t + truth[i].t), logSO3(turned) / dt});
+  }
+  Recording recording = images.recording();
+  recording.gyro_samples = std::move(rates);
+  recording.accel_samples.clear();
+  const MotionEstimate motion = estimateMotion(recording, recording.rotations);
+  if (!motion.usable) return "";
+  return formatted(
+      "groundtruth.txt: its poses fit the images %+.1f ms after the images' stamps (one sigma %.1f, by their "
+      "rotation): evaluate --time-offset %.4f",
+      1e3 * motion.time_offset, 1e3 * motion.time_sigma, motion.time_offset);
+}
+
 double rateOf(const std::vector<ListedFile>& files) {
   const double seconds = files.back().t - files.front().t;
   return seconds > 0 ? (files.size() - 1) / seconds : 30.0;
@@ -194,36 +216,6 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   ConversionReport report;
   const double depth_factor = depthFactor(options, depth, &report);
   BagOutput bag(options.bag, options.overwrite);
-  const auto addImages = [&](const std::vector<ListedFile>& files, const std::string& topic, const std::string& info,
-                             bool is_color) {
-    for (const ListedFile& file : files) {
-      const ros::Time stamp(file.t);
-      bag.add(stamp, [=](rosbag::Bag& out) {
-        const cv::Mat image =
-            cv::imread(file.path, is_color ? cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION : cv::IMREAD_UNCHANGED);
-        if (image.empty()) throw std::runtime_error(file.path + ": is not a readable image");
-        if (image.type() != (is_color ? CV_8UC3 : CV_16UC1))
-          throw std::runtime_error(file.path + ": image is " + cv::typeToString(image.type()) + ", expected " +
-                                   (is_color ? "8-bit colour" : "16-bit depth"));
-        if (image.cols != camera.width || image.rows != camera.height)
-          throw std::runtime_error(file.path + ": image is " + sizeText(image.size()) + ", the first colour image is " +
-                                   sizeText({camera.width, camera.height}));
-        std_msgs::Header header;
-        header.stamp = stamp;
-        header.frame_id = kFrame;
-        out.write(topic, stamp, imageMessage(image, is_color ? "bgr8" : "16UC1", header));
-        out.write(info, stamp, cameraInfo(camera, header));
-      });
-    }
-    report.messages[topic] = report.messages[info] = files.size();
-  };
-  addImages(color, kColor, kColorInfo, true);
-  addImages(depth, kDepth, kDepthInfo, false);
-  for (const auto& sample : imu)
-    bag.add(sample.header.stamp,
-            [sample, gyro](rosbag::Bag& out) { out.write(gyro ? kImu : kAccel, sample.header.stamp, sample); });
-  if (!imu.empty()) report.messages[gyro ? kImu : kAccel] = imu.size();
-
   SensorConfig sensor;
   sensor.name = "tum_rgbd";
   sensor.topics.color = kColor;
@@ -248,7 +240,46 @@ ConversionReport convertTumRgbd(const TumRgbdOptions& options) {
   sensor.camera = camera;
   sensor.T_imu_cam = T_imu_cam;
   sensor.depth_noise = DepthNoise::preset(DepthSensorType::kStructuredLight);
+  constexpr double kLookedAt = 60;  // s of images
+  Recorder seen(sensor, false, truth.empty() ? -1 : kLookedAt);
+
+  const auto addImages = [&](const std::vector<ListedFile>& files, const std::string& topic, const std::string& info,
+                             bool is_color) {
+    for (const ListedFile& file : files) {
+      const ros::Time stamp(file.t);
+      bag.add(stamp, [=, &seen](rosbag::Bag& out) {
+        const cv::Mat image =
+            cv::imread(file.path, is_color ? cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION : cv::IMREAD_UNCHANGED);
+        if (image.empty()) throw std::runtime_error(file.path + ": is not a readable image");
+        if (image.type() != (is_color ? CV_8UC3 : CV_16UC1))
+          throw std::runtime_error(file.path + ": image is " + cv::typeToString(image.type()) + ", expected " +
+                                   (is_color ? "8-bit colour" : "16-bit depth"));
+        if (image.cols != camera.width || image.rows != camera.height)
+          throw std::runtime_error(file.path + ": image is " + sizeText(image.size()) + ", the first colour image is " +
+                                   sizeText({camera.width, camera.height}));
+        std_msgs::Header header;
+        header.stamp = stamp;
+        header.frame_id = kFrame;
+        const auto message = imageMessage(image, is_color ? "bgr8" : "16UC1", header);
+        out.write(topic, stamp, message);
+        seen.add(topic, file.t, message);
+        const auto of_camera = cameraInfo(camera, header);
+        out.write(info, stamp, of_camera);
+        seen.add(info, file.t, of_camera);
+      });
+    }
+    report.messages[topic] = report.messages[info] = files.size();
+  };
+  addImages(color, kColor, kColorInfo, true);
+  addImages(depth, kDepth, kDepthInfo, false);
+  for (const auto& sample : imu)
+    bag.add(sample.header.stamp,
+            [sample, gyro](rosbag::Bag& out) { out.write(gyro ? kImu : kAccel, sample.header.stamp, sample); });
+  if (!imu.empty()) report.messages[gyro ? kImu : kAccel] = imu.size();
+
   finishConversion(options, sensor, truth, &bag, &report);
+  seen.finish();
+  if (const std::string delay = delayOfPoses(seen, truth); !delay.empty()) report.notes.push_back(delay);
   return report;
 }
 

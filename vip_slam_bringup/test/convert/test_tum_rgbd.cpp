@@ -13,6 +13,7 @@
 
 #include "converted_folder.h"
 #include "vip_slam_bringup/convert/converters.h"
+#include "vip_slam_core/geometry/so3.h"
 #include "vip_slam_core/util/formatted.h"
 
 namespace fs = std::filesystem;
@@ -147,6 +148,56 @@ TEST_F(TumConverter, TheUnitOfDepthIsGuessedAndNamed) {
   options_.depth_factor = 2000;
   EXPECT_NEAR(scaleOf(1, 5, 1000), 2000, 1e-6);
   EXPECT_EQ(words_ + warning_, "") << "as given";
+}
+
+// Before a textured sphere, around whose middle the camera turns: colour and depth are exact.
+TEST_F(TumConverter, TheDelayBetweenPosesAndImagesIsEstimated) {
+  constexpr int kColumns = 320, kRows = 240;
+  constexpr double kFocal = 250, kRadius = 3, kDelay = 0.037;
+  cv::Mat texture(3 * kRows, 3 * kColumns, CV_8UC3);
+  cv::RNG random(3);
+  random.fill(texture, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(texture, texture, {0, 0}, 2.5);
+  cv::normalize(texture, texture, 0, 255, cv::NORM_MINMAX);
+  const auto turn = [](double t) {
+    return expSO3(Eigen::Vector3d(0.2 * std::sin(3 * t), 0.25 * std::sin(2.2 * t + 1), 0.1 * std::sin(4 * t)));
+  };
+  Eigen::Matrix3d K, of_texture;
+  K << kFocal, 0, 0.5 * (kColumns - 1), 0, kFocal, 0.5 * (kRows - 1), 0, 0, 1;
+  of_texture << kFocal, 0, 1.5 * kColumns, 0, kFocal, 1.5 * kRows, 0, 0, 1;
+  cv::Mat depth(kRows, kColumns, CV_16UC1);
+  for (int v = 0; v < kRows; ++v)
+    for (int u = 0; u < kColumns; ++u)
+      depth.at<std::uint16_t>(v, u) = std::uint16_t(5000 * kRadius / (K.inverse() * Eigen::Vector3d(u, v, 1)).norm());
+  std::string rgb, depths, truth;
+  for (int i = 0; i < 90; ++i) {
+    const double t = i / 30.0;
+    const Eigen::Matrix3d H = of_texture * turn(t) * K.inverse();
+    cv::Mat to_texture(3, 3, CV_64F), image;
+    for (int k = 0; k < 9; ++k) to_texture.at<double>(k / 3, k % 3) = H(k / 3, k % 3);
+    cv::warpPerspective(texture, image, to_texture, {kColumns, kRows}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
+    writeImage("set/rgb/" + std::to_string(i) + ".png", image);
+    writeImage("set/depth/" + std::to_string(i) + ".png", depth);
+    rgb += formatted("%.6f rgb/%d.png\n", 100 + t, i);
+    depths += formatted("%.6f depth/%d.png\n", 100 + t, i);
+  }
+  for (double t = -0.5; t < 3.5; t += 0.01) {
+    const Eigen::Quaterniond q(turn(t - kDelay));
+    truth += formatted("%.4f 0 0 0 %.9f %.9f %.9f %.9f\n", 100 + t, q.x(), q.y(), q.z(), q.w());
+  }
+  write("set/rgb.txt", rgb);
+  write("set/depth.txt", depths);
+  write("set/groundtruth.txt", truth);
+  write("set/calibration.txt", formatted("%g %g %g %g\n", K(0, 0), K(1, 1), K(0, 2), K(1, 2)));
+  options_.folder = (root_ / "set").string();
+  options_.bag = bag_;
+  options_.depth_factor = 5000;
+  const ConversionReport report = convertTumRgbd(options_);
+  ASSERT_EQ(report.notes.size(), 1u);
+  const std::string& note = report.notes[0];
+  const auto at = note.find("--time-offset ");
+  ASSERT_NE(at, std::string::npos) << note;
+  EXPECT_NEAR(std::stod(note.substr(at + 14)), kDelay, 0.001) << note;
 }
 
 TEST_F(TumConverter, StampsInNanosecondsAreReadAndOthersNameTheirLine) {
