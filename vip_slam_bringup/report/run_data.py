@@ -17,8 +17,9 @@ class Unreadable(Exception):
 
 
 def read_tum(path):
-    """Array of rows t, x, y, z, qx, qy, qz, qw; strictly increasing in t: of a time that comes twice, the first."""
-    rows = []
+    """Array of rows t, x, y, z, qx, qy, qz, qw; strictly increasing in t: of a time that comes twice, as where a clock
+    was set back, the first."""
+    rows, back, first_back = [], 0, 0
     try:
         with open(path, encoding='utf-8') as file:
             for number, line in enumerate(file, 1):
@@ -34,10 +35,13 @@ def read_tum(path):
                 if rows and values[0] == rows[-1][0]:
                     continue
                 if rows and values[0] < rows[-1][0]:
-                    raise Unreadable('%s:%d: the stamp does not follow the one before' % (path, number))
+                    back, first_back = back + 1, first_back or number
+                    continue
                 rows.append(values)
     except UnicodeDecodeError:
         raise Unreadable('%s: is not a text file' % path)
+    if back and back >= len(rows):
+        raise Unreadable('%s:%d: the stamp does not follow the one before, and so most of them' % (path, first_back))
     return np.array(rows).reshape(-1, 8)
 
 

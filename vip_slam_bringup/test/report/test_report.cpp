@@ -225,6 +225,12 @@ TEST_F(Report, LivesWithATrajectoryAlone) {
   EXPECT_EQ(dataOf(slurp(dir_ / "report.html"))["missing"].size(), 4u);
 }
 
+TEST_F(Report, LivesWithAClockThatWasSetBack) {
+  std::ofstream(dir_ / "trajectory.tum") << "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n1.5 2 0 0 0 0 0 1\n2.5 3 0 0 0 0 0 1\n";
+  const Outcome outcome = run("--out-dir " + dir_.string());
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+}
+
 TEST_F(Report, NamesWhatItCannotRead) {
   const auto expect = [&](const std::string& arguments, const std::string& words) {
     fs::remove(dir_ / "report.html");
@@ -241,7 +247,7 @@ TEST_F(Report, NamesWhatItCannotRead) {
   expect(folder, "timing.csv:3: expected stage,t,ms[,cpu_ms]");
   std::ofstream(dir_ / "planes.yaml") << "planes: [{id: 1}]\n";
   expect(folder, "planes.yaml: plane 1");
-  std::ofstream(dir_ / "trajectory.tum") << "1 0 0 0 0 0 0 1\n0.9 0 0 0 0 0 0 1\n";
+  std::ofstream(dir_ / "trajectory.tum") << "1 0 0 0 0 0 0 1\n0.9 0 0 0 0 0 0 1\n0.8 0 0 0 0 0 0 1\n";
   expect(folder, "trajectory.tum:2: the stamp does not follow");
   fs::remove(dir_ / "trajectory.tum");
   fs::remove(dir_ / "odometry.tum");

@@ -36,11 +36,12 @@ StampedPose parseLine(const std::string& line, const std::string& where) {
 
 }  // namespace
 
-Trajectory readTum(const std::string& path) {
+Trajectory readTum(const std::string& path, std::string* ran_back) {
   std::ifstream file(path);
   if (!file) throw std::runtime_error(path + ": cannot be opened, expected a TUM trajectory");
   Trajectory trajectory;
-  std::string line;
+  std::string line, first_back;
+  std::size_t left_out = 0;
   for (std::size_t number = 1; std::getline(file, line); ++number) {
     const std::size_t first = line.find_first_not_of(" \t\r");
     if (first == std::string::npos || line[first] == '#') continue;
@@ -48,8 +49,12 @@ Trajectory readTum(const std::string& path) {
     const StampedPose pose = parseLine(line, where);
     if (!trajectory.empty() && pose.t == trajectory.back().t) continue;  // public recordings repeat a few poses
     if (!trajectory.empty() && !(pose.t > trajectory.back().t)) {
-      throw std::runtime_error(where + "timestamp " + formatDouble(pose.t) + " does not follow " +
-                               formatDouble(trajectory.back().t) + ", expected ascending times");
+      if (first_back.empty())
+        first_back = where + "timestamp " + formatDouble(pose.t) + " does not follow " +
+                     formatDouble(trajectory.back().t) + ", ";
+      if (!ran_back) throw std::runtime_error(first_back + "expected ascending times");
+      ++left_out;
+      continue;
     }
     trajectory.push_back(pose);
   }
@@ -58,6 +63,11 @@ Trajectory readTum(const std::string& path) {
     if (unit != 1.0)
       for (StampedPose& pose : trajectory) pose.t *= unit;
   }
+  if (left_out > 0 && left_out >= trajectory.size())
+    throw std::runtime_error(first_back + "and so most of them; expected ascending times");
+  if (left_out > 0)
+    *ran_back = first_back + "a clock that was set back? " + std::to_string(left_out) +
+                " poses are left out, until time goes on; later stamps may be of another clock than those before";
   if (file.bad()) throw std::runtime_error(path + ": reading failed, expected a text file");
   return trajectory;
 }

@@ -99,6 +99,18 @@ TEST_F(FileFormats, TumErrorsNameTheLine) {
   refused("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "ascending");
 }
 
+TEST_F(FileFormats, TumOfAClockThatWasSetBackIsReadWithoutTheTimeThatRepeats) {
+  write("back.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n1.5 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n2.5 4 0 0 0 0 0 1\n");
+  std::string ran_back;
+  const Trajectory read = readTum(path("back.tum"), &ran_back);
+  ASSERT_EQ(read.size(), 3u);
+  EXPECT_EQ(read[2].T_W_B.t().x(), 4);
+  EXPECT_NE(ran_back.find(":3: timestamp 1.5 does not follow 2"), std::string::npos) << ran_back;
+  EXPECT_NE(ran_back.find(" 1 poses are left out"), std::string::npos) << ran_back;
+  write("mixed.tum", "5 0 0 0 0 0 0 1\n4 1 0 0 0 0 0 1\n3 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n");
+  expectRefused([&] { readTum(path("mixed.tum"), &ran_back); }, "mixed.tum", "most of them");
+}
+
 TEST_F(FileFormats, PoseAtInterpolatesButNotAcrossGaps) {
   const SE3 a(Eigen::Quaterniond::Identity(), {0, 0, 0}), b(expQuaternion({0, 0, 1}), {1, 0, 0});
   const Trajectory trajectory = {{1.0, a}, {1.1, b}, {3.0, a}};

@@ -65,7 +65,9 @@ int main(int argc, char** argv) {
     input.alignment = alignmentFromName(alignment);
     if (input.title.empty()) input.title = estimate;
     input.truth = readTrajectory(truth, truth_topic, nullptr, truth_times);
-    input.estimate = readTrajectory(estimate, estimate_topic, &input.covariances);
+    std::string ran_back;
+    input.estimate = readTrajectory(estimate, estimate_topic, &input.covariances, "", &ran_back);
+    if (!ran_back.empty()) std::cerr << "evaluate: warning: " << ran_back << "\n";
     mendQuaternions(truth, &input);
     if (!covariance.empty()) input.covariances = readCovariances(covariance, input.estimate);
     if (!true_planes.empty()) input.true_planes = readTruePlanesYaml(true_planes);

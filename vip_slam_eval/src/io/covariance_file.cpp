@@ -43,6 +43,7 @@ std::vector<PoseWithCovariance> readCovariances(const std::string& path, const T
         !sample.covariance.allFinite()) {
       throw std::runtime_error(where + "expected a stamp and 21 finite numbers, found '" + line + "'");
     }
+    if (!samples.empty() && sample.t < samples.back().t + kSameStamp) continue;
     while (pose != trajectory.end() && pose->t < sample.t - kSameStamp) ++pose;
     if (pose == trajectory.end() || std::abs(pose->t - sample.t) > kSameStamp) {
       throw std::runtime_error(where + "no pose of the estimate has this stamp, " + formatted("%.9f", sample.t) +

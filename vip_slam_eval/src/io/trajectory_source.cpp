@@ -92,11 +92,12 @@ Trajectory readBag(const std::string& path, const std::string& wanted, std::vect
 }  // namespace
 
 Trajectory readTrajectory(const std::string& path, const std::string& topic,
-                          std::vector<PoseWithCovariance>* covariances, const std::string& times) {
+                          std::vector<PoseWithCovariance>* covariances, const std::string& times,
+                          std::string* ran_back) {
   const bool is_bag = path.size() > 4 && path.compare(path.size() - 4, 4, ".bag") == 0;
   Trajectory trajectory;
   if (!is_bag) {
-    trajectory = readTextTrajectory(path, times);
+    trajectory = readTextTrajectory(path, times, ran_back);
   } else {
     try {
       trajectory = readBag(path, topic, covariances);

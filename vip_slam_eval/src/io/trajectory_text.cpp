@@ -98,7 +98,7 @@ std::optional<bool> scalarFirst(const std::string& path) {
   return commas;
 }
 
-Trajectory readTextTrajectory(const std::string& path, const std::string& times) {
+Trajectory readTextTrajectory(const std::string& path, const std::string& times, std::string* ran_back) {
   const bool commas = hasCommas(path);
   const TextTable table(path, commas ? "," : " \t", 1);
   const TextRow& first = table.rows().front();
@@ -107,7 +107,7 @@ Trajectory readTextTrajectory(const std::string& path, const std::string& times)
   if (!times.empty())
     throw std::runtime_error(times + ": stamps are for KITTI poses (12 numbers in a row), not for " + path);
   if (commas && columns >= kEuroc) return readEuroc(path);
-  if (!commas && columns == kTum) return readTum(path);
+  if (!commas && columns == kTum) return readTum(path, ran_back);
   table.fail(first, formatted("%zu numbers between %s, expected 8 between blanks (TUM: t tx ty tz qx qy qz qw), 8 or "
                               "more between commas (EuRoC: t,px,py,pz,qw,qx,qy,qz,...) or 12 between blanks (KITTI)",
                               columns, commas ? "commas" : "blanks"));

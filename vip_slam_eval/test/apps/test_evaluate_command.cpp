@@ -99,6 +99,17 @@ TEST_F(EvaluateCommand, CovarianceFileAddsTheNees) {
   expectRefused(input + path("covariance.csv"), "covariance.csv:2: expected a stamp and 21 finite numbers");
 }
 
+TEST_F(EvaluateCommand, AClockThatWasSetBackIsNamedAndTimeThatRepeatsLeftOut) {
+  Trajectory set = estimate_;
+  for (std::size_t k = 0; k < set.size(); ++k)
+    if (set[k].t > 112) set[k].t -= 0.4;
+  writeTum(path("set.tum"), set);
+  ASSERT_EQ(run("--truth " + path("truth.tum") + " --estimate " + path("set.tum")), 0) << error_;
+  EXPECT_NE(error_.find("does not follow"), std::string::npos) << error_;
+  EXPECT_NE(error_.find("poses are left out"), std::string::npos) << error_;
+  EXPECT_NE(output_.find("position rmse"), std::string::npos);
+}
+
 TEST_F(EvaluateCommand, LeavesTableCsvAndPicture) {
   ASSERT_EQ(run("--truth " + path("truth.tum") + " --estimate " + path("estimate.tum") + " --out " + path("out")), 0)
       << error_;

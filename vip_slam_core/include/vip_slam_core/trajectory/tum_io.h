@@ -16,9 +16,10 @@ using Trajectory = std::vector<StampedPose>;
 
 /// Stamps may also be in milliseconds, microseconds or nanoseconds (stamp_unit.h). A pose that repeats the stamp of the
 /// one before is left out. Throws std::runtime_error "file:line: what, expected
-/// what" on a missing file, malformed line, non-finite number, a quaternion whose length is 5 % or more off 1, or
-/// stamps that run backwards.
-Trajectory readTum(const std::string& path);
+/// what" on a missing file, malformed line, non-finite number, or a quaternion whose length is 5 % or more off 1.
+/// Where stamps run backwards, as after a clock was set back, poses are left out until time goes on; `ran_back` tells,
+/// and without it such a file is refused.
+Trajectory readTum(const std::string& path, std::string* ran_back = nullptr);
 /// Stamps with 9 decimals, values with 9; whole or not at all.
 void writeTum(const std::string& path, const Trajectory& trajectory);
 

@@ -15,8 +15,8 @@ namespace vip_slam {
 ///   which is for this format only.
 /// The unit of stamps is told by secondsPerUnit. Throws std::runtime_error "file:line: what, expected what" when it is
 /// none of these, a number or a pose cannot be read, or stamps do not ascend; a TUM pose that repeats a stamp is left
-/// out.
-Trajectory readTextTrajectory(const std::string& path, const std::string& times = "");
+/// out. `ran_back`: as for readTum.
+Trajectory readTextTrajectory(const std::string& path, const std::string& times = "", std::string* ran_back = nullptr);
 
 /// Whether the quaternions of this file's format begin with their scalar; none: it has no quaternions, or is a bag.
 std::optional<bool> scalarFirst(const std::string& path);
