@@ -11,7 +11,12 @@ elseif(CATKIN_ENABLE_TESTING)
   add_custom_command(OUTPUT ${test_data}/smoke.bag
     COMMAND ${CATKIN_ENV} rosrun vip_slam_sim render_sequence smoke --out ${test_data}
     COMMENT "Rendering the test sequence" VERBATIM)
-  add_custom_target(vip_slam_bringup_test_data DEPENDS ${test_data}/smoke.bag)
+  add_custom_command(OUTPUT ${test_data}/other_room.bag
+    COMMAND ${CATKIN_ENV} rosrun vip_slam_sim render_sequence ${CMAKE_CURRENT_SOURCE_DIR}/test/system/other_room.yaml
+      --out ${test_data}
+    DEPENDS test/system/other_room.yaml
+    COMMENT "Rendering another room" VERBATIM)
+  add_custom_target(vip_slam_bringup_test_data DEPENDS ${test_data}/smoke.bag ${test_data}/other_room.bag)
   add_executable(render_euroc_folder EXCLUDE_FROM_ALL test/render_euroc_folder.cpp)
   target_include_directories(render_euroc_folder PRIVATE ${vip_slam_sim_INCLUDE_DIRS})
   target_link_libraries(render_euroc_folder vip_slam_bringup ${vip_slam_sim_LIBRARIES})

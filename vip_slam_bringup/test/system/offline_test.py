@@ -23,13 +23,22 @@ class OfflineTest(unittest.TestCase):
         cls.data = rospy.get_param('~data')
         cls.folder = tempfile.mkdtemp()
 
-    def command(self, out, *more):
-        return ['rosrun', 'vip_slam_bringup', 'run_bag', os.path.join(self.data, 'smoke.bag'), '--sensor',
-                os.path.join(self.data, 'smoke_sensor.yaml'), '--out', os.path.join(self.folder, out), *more]
+    def command(self, out, *more, bag='smoke'):
+        return ['rosrun', 'vip_slam_bringup', 'run_bag', os.path.join(self.data, bag + '.bag'), '--sensor',
+                os.path.join(self.data, bag + '_sensor.yaml'), '--out', os.path.join(self.folder, out), *more]
 
     def summary(self, out):
         with open(os.path.join(self.folder, out, 'summary.yaml')) as file:
             return yaml.safe_load(file)
+
+    def localise(self, out, stored):
+        subprocess.run(self.command(out, '--map', stored, '--localise', '--no-report'), check=True, timeout=120)
+        mapped, found = (np.loadtxt(os.path.join(self.folder, name, 'trajectory.tum')) for name in ('a', out))
+        _, i, j = np.intersect1d(mapped[:, 0], found[:, 0], return_indices=True)
+        self.assertGreater(len(i), 0.9 * len(mapped))
+        error = np.linalg.norm(mapped[i, 1:4] - found[j, 1:4], axis=1)
+        self.assertLess(np.median(error), 0.01)
+        self.assertLess(error.max(), 0.05)
 
     def test_01_two_runs_give_the_same_bits(self):
         for out in ('a', 'b'):
@@ -63,13 +72,7 @@ class OfflineTest(unittest.TestCase):
 
     def test_04_localisation_only_gives_the_trajectory_in_the_stored_map(self):
         stored = os.path.join(self.folder, 'a', 'map.vsm')
-        subprocess.run(self.command('e', '--map', stored, '--localise', '--no-report'), check=True, timeout=120)
-        mapped, found = (np.loadtxt(os.path.join(self.folder, out, 'trajectory.tum')) for out in ('a', 'e'))
-        _, i, j = np.intersect1d(mapped[:, 0], found[:, 0], return_indices=True)
-        self.assertGreater(len(i), 0.9 * len(mapped))
-        error = np.linalg.norm(mapped[i, 1:4] - found[j, 1:4], axis=1)
-        self.assertLess(np.median(error), 0.01)
-        self.assertLess(error.max(), 0.05)
+        self.localise('e', stored)
         self.assertTrue(filecmp.cmp(stored, os.path.join(self.folder, 'e', 'map.vsm'), shallow=False))
 
     def test_05_the_launch_file_does_the_same(self):
@@ -88,6 +91,19 @@ class OfflineTest(unittest.TestCase):
                        timeout=120)
         self.assertEqual(sorted(os.listdir(os.path.join(self.folder, 'd'))),
                          ['odometry.tum', 'odometry_covariance.csv', 'summary.yaml', 'timing.csv'])
+
+    def test_07_another_room_is_kept_as_a_part_of_the_stored_map(self):
+        stored = os.path.join(self.folder, 'a', 'map.vsm')
+        subprocess.run(self.command('g', '--no-report', bag='other_room'), check=True, timeout=120)
+        subprocess.run(self.command('h', '--map', stored, '--no-report', bag='other_room'), check=True, timeout=120)
+        alone, both = self.summary('g'), self.summary('h')
+        self.assertGreater(alone['keyframes'], 2)
+        self.assertEqual(both['keyframes'], self.summary('a')['keyframes'] + alone['keyframes'])
+        self.assertTrue(any('never tied to the rest of the map' in words for words in both['warnings']))
+        paths = [np.loadtxt(os.path.join(self.folder, out, 'trajectory.tum')) for out in ('g', 'h')]
+        self.assertEqual(len(paths[0]), len(paths[1]))
+        # The room that was stored is found in it as before.
+        self.localise('i', os.path.join(self.folder, 'h', 'map.vsm'))
 
 
 if __name__ == '__main__':
