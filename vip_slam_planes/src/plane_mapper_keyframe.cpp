@@ -14,15 +14,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kFlat = 0.34;   // cosine of 70 degrees
 constexpr int kEstablished = 3;  // a plane seen by this many keyframes is removed only after two contradictions
-
-/// Whether a plane is seen at such a flat angle that it may span a recessed door and the wall next to it, which looks
-/// like a wall and may be as large as one.
-bool isSeenFlat(const PlaneTrack& track, const Eigen::Vector3d& centroid, const Eigen::Vector3d& camera_centre) {
-  return track.kind() != PlaneKind::kHorizontal &&
-         track.plane().signedDistance(camera_centre) < kFlat * (centroid - camera_centre).norm();
-}
 
 }  // namespace
 
@@ -160,16 +152,13 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     PlaneTrack& track = *tracks[k];
     ids.push_back(track.id());
-    bool flat = track.kind() != PlaneKind::kHorizontal;  // until there is an observation
     if (area[k] > 0) {
       auto observation = sampler_.sample(keyframe.id, shown[k], T_map_C, track.id(), track.plane());
       if (observation) {
         observation->camera_correction = keyframe.frame.camera_correction;
-        const Eigen::Vector3d shown_at = T_map_C * PlaneMoments{observation->G}.centroid();
         track.observations().insert_or_assign(keyframe.id, std::move(*observation));
         changes_.observed(track.id(), keyframe.id);
         refit(&track);
-        flat = isSeenFlat(track, shown_at, T_map_C.t());
       }
     }
     if (first_time && area[k] >= options.support.min_area) {
@@ -178,7 +167,7 @@ void PlaneMapper::Impl::observe(const Keyframe& keyframe, const SE3& T_map_C, co
     }
     const double covered = track.area();
     const bool seen = track.keyframes_seen >= options.support.min_keyframes && covered >= options.support.min_area;
-    const bool large = track.keyframes_seen > 0 && covered >= options.support.sure_area && !flat;
+    const bool large = track.keyframes_seen > 0 && covered >= options.support.sure_area;
     track.confirmed = track.confirmed || seen || large;
     trusted.push_back(track.known() && track.determined && track.agrees);
   }
