@@ -1,6 +1,8 @@
 // Whole-filter runs on the landmark simulation: outliers, noise adaptation, standing still.
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>
@@ -21,28 +23,45 @@ TEST(NoiseMonitor, AWrongStartIsForgottenWithinThreeImages) {
   }
 }
 
-TEST(StampMonitor, FindsTheJitterOfStampsAndNoneWhereThereIsNone) {
-  std::mt19937 random(2);
+/// What the monitor finds of stamps with a jitter of `truth` (s) over 400 images. Draws come one after the other: where
+/// they are arguments of one call, the compiler chooses their order, and not the same on every processor.
+double jitterFound(double truth, unsigned seed) {
+  std::mt19937 random(seed);
   std::normal_distribution<double> normal;
+  const auto noise = [&](double sigma) {
+    Eigen::Vector3d out;
+    for (double& value : out) value = sigma * normal(random);
+    return out;
+  };
+  StampMonitor monitor(true);
+  for (int image = 0; image < 400; ++image) {
+    const Eigen::Vector3d omega(0.5 * std::sin(0.3 * image), 0.6 * std::cos(0.21 * image), 0.1);
+    // One update: the predicted orientation, with errors of gyro and stamps, against a more accurate measurement.
+    const double gyro = 4e-5, image_sigma = 2e-4;
+    Eigen::Vector3d measured = noise(gyro);
+    measured += std::sqrt(2.0) * truth * normal(random) * omega;
+    measured += noise(image_sigma);
+    const Eigen::Matrix3d P =
+        gyro * gyro * Eigen::Matrix3d::Identity() + 2 * monitor.sigma() * monitor.sigma() * omega * omega.transpose();
+    const Eigen::Matrix3d K = P * (P + image_sigma * image_sigma * Eigen::Matrix3d::Identity()).inverse();
+    monitor.add(omega, K * measured, K * P);
+  }
+  return monitor.sigma();
+}
+
+// Single runs scatter: without jitter a quarter of them find 0.1 ms and a little more.
+TEST(StampMonitor, FindsTheJitterOfStampsAndNoneWhereThereIsNone) {
   for (const double truth : {0.0, 0.001, 0.003}) {
-    StampMonitor monitor(true);
-    for (int image = 0; image < 400; ++image) {
-      const Eigen::Vector3d omega(0.5 * std::sin(0.3 * image), 0.6 * std::cos(0.21 * image), 0.1);
-      // One update: the predicted orientation, with errors of gyro and stamps, against a more accurate measurement.
-      const double gyro = 4e-5, image_sigma = 2e-4;
-      const Eigen::Vector3d error = gyro * Eigen::Vector3d(normal(random), normal(random), normal(random)) +
-                                    std::sqrt(2.0) * truth * normal(random) * omega;
-      const Eigen::Vector3d measured =
-          error + image_sigma * Eigen::Vector3d(normal(random), normal(random), normal(random));
-      const Eigen::Matrix3d P =
-          gyro * gyro * Eigen::Matrix3d::Identity() + 2 * monitor.sigma() * monitor.sigma() * omega * omega.transpose();
-      const Eigen::Matrix3d K = P * (P + image_sigma * image_sigma * Eigen::Matrix3d::Identity()).inverse();
-      monitor.add(omega, K * measured, K * P);
-    }
+    std::vector<double> found;
+    for (unsigned seed = 1; seed <= 21; ++seed) found.push_back(jitterFound(truth, seed));
+    std::sort(found.begin(), found.end());
     if (truth > 0) {
-      EXPECT_NEAR(std::log(monitor.sigma() / truth), 0.0, 0.7) << truth;
+      EXPECT_NEAR(std::log(found[10] / truth), 0.0, 0.15) << truth;
+      EXPECT_NEAR(std::log(found[2] / truth), 0.0, 0.7) << truth;
+      EXPECT_NEAR(std::log(found[18] / truth), 0.0, 0.7) << truth;
     } else {
-      EXPECT_LT(monitor.sigma(), 1e-4);
+      EXPECT_LT(found[10], 1e-4);
+      EXPECT_LT(found.back(), 2e-4);
     }
   }
 }
