@@ -72,7 +72,7 @@ struct ZuptOptions {
 struct FilterOptions {
   int window = 11;
   double sigma_px = 0.5;
-  double sigma_px_min = 0.05;
+  double sigma_px_min = 0.11;
   double pixel_inflation = 1.3;
   bool own_noise = true;
   double pull_huber = 1.0;
