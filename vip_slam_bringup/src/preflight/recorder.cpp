@@ -289,7 +289,7 @@ void Recorder::addMotion(double t, const cv::Mat& gray, cv::Mat depth) {
   else
     depth_unit_->forget();
   const double before = depth_unit_->factor();
-  if (before != 1) depth = depth * before;
+  if (before != 1 && !depth.empty()) depth = depth * before;
   if (depth_unit_->changes(depth, T_odom_C_, t)) {
     depth = depth * (depth_unit_->factor() / before);
     recording_.depth_unit_changes.push_back({t, before / depth_unit_->factor()});

@@ -56,12 +56,13 @@ class DepthReadings : public testing::Test {
         }
       }
       recorder.add("/color", 1 + t, grey);
-      recorder.add("/depth", 1 + t, depth);
+      if (i < no_depth_from_ || i >= no_depth_from_ + 3) recorder.add("/depth", 1 + t, depth);
     }
     recorder.finish();
     return recorder.recording();
   }
   SensorConfig sensor_;
+  int no_depth_from_ = 60;  ///< three images without depth from this one on
 };
 
 TEST_F(DepthReadings, AUnitThatChangesIsNamedWithItsTime) {
@@ -80,6 +81,13 @@ TEST_F(DepthReadings, AUnitThatChangesIsNamedWithItsTime) {
     for (const Finding& f : checkImages(r)) named |= f.text.find("its unit is set anew at 1.0 s") != std::string::npos;
     EXPECT_TRUE(named);
   }
+}
+
+TEST_F(DepthReadings, ImagesWithoutDepthAfterTheUnitHasChanged) {
+  no_depth_from_ = 45;
+  const Recording r = record([&](double z, double t, int, int) { return t > 0.99 ? 2 * z : z; });
+  EXPECT_EQ(r.depth_unit_changes.size(), 1u);
+  EXPECT_GT(r.rotations.size(), 50u);
 }
 
 TEST_F(DepthReadings, ADistanceThatStandsForNoReadingIsNamedAndLeftOut) {
