@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # VIP-SLAM on Debian 12, from its own packages alone. From the top of the repository:
 #   docker build -f docker/debian12.Dockerfile -t vip_slam:debian12 .
 #   docker run --rm -it --network host vip_slam:debian12 roslaunch vip_slam_bringup vip_slam.launch sensor:=d435i

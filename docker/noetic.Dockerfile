@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # VIP-SLAM on Ubuntu 20.04 with ROS Noetic. From the top of the repository:
 #   docker build -f docker/noetic.Dockerfile -t vip_slam:noetic .
 #   docker run --rm -it --network host vip_slam:noetic roslaunch vip_slam_bringup vip_slam.launch sensor:=d435i

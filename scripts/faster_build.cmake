@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Makes the build of the whole workspace faster: what takes the compiler's time is not our code but Eigen, which every
 # file reads and of which many instantiate the same, so libraries and tests are compiled six files at a time (planes:
 # 62 s instead of 113). The workspace's catkin profile includes this file at each project(), and so does

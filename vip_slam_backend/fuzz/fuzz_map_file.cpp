@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // libFuzzer target: whatever the bytes, reading a map gives a consistent map or a std::runtime_error.
 // The checksum is made right first, else the fuzzer would only ever see the checksum's error.
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // libFuzzer target: whatever the bytes, reading a vocabulary (binary, or text when the first byte is a digit) gives a
 // vocabulary that can be used or a std::runtime_error.
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "back_end_nodelet.h"
 
 #include <fstream>

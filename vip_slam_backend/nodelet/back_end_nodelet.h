@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The back end as a nodelet: keyframes and plane updates in; map updates, map->odom, paths, markers and services out.
 // One thread owns the map; a global bundle adjustment runs in a thread of its own and its result is merged by the
 // owner.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the back-end nodelet publishes: map updates, display, statistics and diagnostics.
 #include <vip_slam_msgs/LoopEvent.h>
 #include <vip_slam_msgs/MapUpdate.h>

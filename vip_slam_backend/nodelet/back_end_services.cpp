@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The services of the system, offered by the back end.
 #include <cstdlib>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The map for rviz: keyframes, trajectory, loop edges, landmarks. It is built from the map updates, so that nothing has
 // to be copied from the estimator.
 #pragma once

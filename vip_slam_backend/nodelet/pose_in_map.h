@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Pose of the body in `map` at each image: T_map_odom of the back end times the odometry. Thread-safe: frames arrive at
 // image rate while the estimator is busy.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Keeps data from before a reset out of the new map. Sensor stamps are compared with sensor stamps only, since their
 // clock may differ from ROS time.
 #pragma once

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # The offline runner.
 
 add_library(vip_slam_runner

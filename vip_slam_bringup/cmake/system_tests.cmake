@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 #catkin_lint: ignore duplicate_find uninstalled_target
 # Tests of the whole system, on a sequence that is rendered when the tests are built.
 if(CATKIN_ENABLE_TESTING)

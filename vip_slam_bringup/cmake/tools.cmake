@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Stereo depth, converters, preflight check, run report.
 
 add_library(vip_slam_bringup

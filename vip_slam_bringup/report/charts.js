@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 'use strict';
 // Small charts over time in SVG; all share one time cursor, which the two maps show as a point on the path.
 const css = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();

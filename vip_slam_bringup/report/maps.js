@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 'use strict';
 // The run from above and in 3D, on canvases. World: z up, metres.
 function setUpCanvas(canvas, draw) {

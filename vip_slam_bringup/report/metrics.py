@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Errors against the truth, computed here so that the page stands on its own: absolute trajectory error after one rigid
 alignment, and plane angle and distance. The judge of record is `vip_slam_eval evaluate`, which also asks how much of a
 plane's area lies on a true one; here its middle has to."""

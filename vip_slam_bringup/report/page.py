@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Puts data, style and scripts into one file."""
 import html
 import json

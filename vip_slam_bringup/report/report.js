@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 'use strict';
 // Fills the page from the embedded data; sections without data stay away.
 function table(parent, columns, rows) {

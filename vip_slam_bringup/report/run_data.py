@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Reads what run_bag left and reduces it to what the page shows."""
 import csv
 import math

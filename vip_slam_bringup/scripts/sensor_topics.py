@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Topics of the sensor that a running front end was given."""
 import os
 

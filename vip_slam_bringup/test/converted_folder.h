@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A folder to convert, what is written into it, and the bag that comes of it.
 #pragma once
 

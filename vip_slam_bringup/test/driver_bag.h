@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Short bags that look like a driver's output: its topics, encodings, sizes, rates, frames. A camera in a textured box,
 // first still, then turning and swaying; the IMU follows the same motion. Faults can be built in one by one.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the cameras' drivers publish and which arguments their launch files have: the tables in test/drivers, one file a
 // driver, written from the drivers' sources and not from our sensor files.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A folder in EuRoC's layout, rendered: the shipped EuRoC stereo pair and an IMU fly through the simulator's room.
 //   render_euroc_folder OUT [SECONDS]
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // With a ROS master: check_bag's listening to live topics, and the stereo nodelet from messages to messages.
 #include <unistd.h>
 

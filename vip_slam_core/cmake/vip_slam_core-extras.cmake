@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # For packages that find vip_slam_core.
 
 # dynamic_reconfigure looks for PythonInterp, which catkin of Debian 13 does not cache: in one CMake project, as of

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Collects the calibration that the estimators need to start: intrinsics from camera_info or the sensor configuration,
 // extrinsics from tf or the sensor configuration.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "depth_alignment.h"
 
 #include <exception>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Registers depth to the colour camera, as the estimator needs it. Mismatches are reported instead of thrown, so that a
 // wrongly configured camera costs the depth and not the odometry.
 #pragma once

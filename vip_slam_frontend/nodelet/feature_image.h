@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The image with its tracked features and the tracking state, for display.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The front-end nodelet's /diagnostics.
 #include <algorithm>
 #include <cmath>

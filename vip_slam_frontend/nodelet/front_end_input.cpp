@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sensor input: images are decoded in the callback threads, then all is passed to the thread that owns the estimator.
 #include "front_end_nodelet.h"
 

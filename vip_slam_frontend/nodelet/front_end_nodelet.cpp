@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "front_end_nodelet.h"
 
 #include <image_transport/image_transport.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The front end as a nodelet: subscribers decode and queue messages, one thread owns the estimator and publishes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the front-end nodelet publishes.
 #include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>

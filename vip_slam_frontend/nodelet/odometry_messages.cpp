@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "odometry_messages.h"
 
 #include "vip_slam_ros/geometry_conversions.h"

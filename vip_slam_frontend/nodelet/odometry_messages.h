@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The front end's state as nav_msgs/Odometry: the pose of base_link in odom, its twist in base_link, both with
 // covariance (REP-105).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_frontend/front_end.h"
 
 #include "front_end_impl.h"

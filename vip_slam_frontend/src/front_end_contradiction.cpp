@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Contradictions between images and IMU: repeated images, faults of the IMU, bodies that move independently of
 // the camera, an IMU that is wrong or missing.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The front end's implementation: what it owns and the steps of one image.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Input side of the front end: IMU, checks of images, clock jumps, feedback from the back end.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What one image gives to the filter: rolling-shutter poses, depth at the stamp, features, stillness, surfaces.
 #include <algorithm>
 #include <cmath>

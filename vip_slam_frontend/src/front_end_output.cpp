@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Output side of the front end: tracked frames and keyframes.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The first state: images until the initialiser has one, then the start of filter, tracks and stillness.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The steps of one image: check, predict, track, estimate, output.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A body on a smooth path in a box-shaped room whose walls carry points; IMU samples and noisy sightings of the points
 // (pixels and depth) without rendering. Everything random comes from the seed.
 #pragma once

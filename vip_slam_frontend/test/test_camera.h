@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The pinhole camera of the front end's tests: 640 x 480, no distortion, 400 pixels of focal length in most of them.
 #pragma once
 

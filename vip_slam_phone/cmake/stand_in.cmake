@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # A program that plays a bag as the phone would. What it sends with is what the tests of the library send with too.
 add_library(${PROJECT_NAME}_sending STATIC src/stand_in/rtp_writer.cpp src/stand_in/rtsp_server.cpp
   src/stand_in/server.cpp src/stand_in/video_encoder.cpp)

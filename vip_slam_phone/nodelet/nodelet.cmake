@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # The phone as a nodelet. Included last: ROS stays out of the library above.
 #catkin_lint: ignore order_violation duplicate_find shadowed_find
 find_package(catkin REQUIRED COMPONENTS

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A phone's streams as topics.
 //   publishes   color/image_raw (bgr8), depth/image_raw (16UC1 mm), each with /compressed beside it and camera_info;
 //               imu; odometry (the phone's own pose, for comparison); /diagnostics

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A server on the loopback interface that says what it is told, whatever it is asked.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Messages as the phone writes them, for tests, and their damage.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "planes_nodelet.h"
 
 #include <vip_slam_msgs/PlaneMap.h>

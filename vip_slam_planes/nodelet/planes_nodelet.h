@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The plane module as a nodelet: keyframes, tracked frames and map updates in; plane updates, the plane map, rviz
 // markers and a cloud out. One thread owns the estimator.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The plane mapper's state; its steps are spread over plane_mapper_*.cpp.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Updates the plane map with a placed keyframe: grow, start, observe, associate.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Output to the back end after an update.
 #include <utility>
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Corrections from the back end.
 #include <algorithm>
 #include <cmath>

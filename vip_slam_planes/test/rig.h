@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Test support: the whole plane module, with poses given as by a back end.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Test support: exact depth images of scenes made of flat rectangles, and keyframes taken in them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_ros/calibration.h"
 
 #include "vip_slam_ros/camera_info.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Images whose pixels lie in a message.
 #pragma once
 

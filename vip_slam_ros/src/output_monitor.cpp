@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_ros/output_monitor.h"
 
 // Only here: before diagnostic_updater 1.11 this header defines a function that is not inline.

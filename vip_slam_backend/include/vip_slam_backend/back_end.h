@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The back end: map, local and global bundle adjustment, loop closing. ROS-free; the nodelet, the offline runner and
 // the tests use exactly this class. One owner thread calls it; run() may be called from any thread.
 #pragma once

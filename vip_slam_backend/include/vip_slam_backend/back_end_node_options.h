@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Parameters of the back-end nodelet in addition to those of the estimator.
 #pragma once
 

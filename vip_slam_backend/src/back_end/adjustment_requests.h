@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whether a global adjustment is due, and which ones under way still hold.
 #pragma once
 

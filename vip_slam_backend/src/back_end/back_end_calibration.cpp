@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Applies corrections of camera and gyro estimated by the front end and from the map to all keyframes of the session.
 #include <algorithm>
 #include <cmath>

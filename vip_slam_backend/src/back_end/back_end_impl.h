@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // State of the back end, shared by the files that implement its parts.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stored maps within the back end: saving, loading, relocalisation in a loaded map, localisation without mapping.
 #include <algorithm>
 #include <map>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The back end takes over what the plane module reports.
 #include <set>
 #include <vector>

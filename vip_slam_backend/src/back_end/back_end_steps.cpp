@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The steps of the back end between a keyframe and a map update.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the back end knows of its place in a stored map, and what waits until it may map.
 #pragma once
 

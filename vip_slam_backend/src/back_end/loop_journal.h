@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The loops of a session: all accepted ones, the newest refused ones, and those since the last update.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "message_log.h"
 
 namespace vip_slam {

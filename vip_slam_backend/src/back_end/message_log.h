@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Messages for people until somebody takes them: bounded, since nobody ever may.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_backend/factors/point_to_plane.h"
 
 #include <cmath>

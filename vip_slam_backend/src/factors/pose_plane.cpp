@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_backend/factors/pose_plane.h"
 
 namespace vip_slam {

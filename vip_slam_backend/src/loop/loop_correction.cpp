@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Correction of the map by an accepted place: plane check, pose-plane graph, evidence for the loop, landmark fusion.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_backend/loop/loop_fusion.h"
 
 namespace vip_slam {

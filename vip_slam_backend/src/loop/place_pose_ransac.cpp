@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // RANSAC with two points. With gravity known the pose has four degrees of freedom: yaw and position. Two rays levelled
 // by R_G_B are given lengths (by depth, or for rays of one camera by the height difference and distance of the two map
 // points), the horizontal direction between the two ends gives yaw, the rest position.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Gauss-Newton on pixels and depths over the inliers, and on the distances of surfaces to their planes.
 #include <algorithm>
 #include <cmath>

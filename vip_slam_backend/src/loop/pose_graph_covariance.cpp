@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How well the pose-plane graph knows one keyframe from another: the best way along its edges.
 #include <algorithm>
 #include <limits>

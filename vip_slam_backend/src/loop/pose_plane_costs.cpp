@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "pose_plane_costs.h"
 
 #include "../solver/ceres_factors.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Ceres cost functions of the pose-plane graph. Parameter blocks: keyframe 4 (yaw relative to the rotation R that it
 // started with, position), plane 4 (n, d).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Keyframes of the map: insertion with checks, the IMU chain, removal, covisibility.
 #include <algorithm>
 #include <cmath>

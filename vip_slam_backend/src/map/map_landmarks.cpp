@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Landmarks of the map: observations, merging, descriptors.
 #include <algorithm>
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes of the map: estimates, observations by keyframes, association of landmarks.
 #include <cmath>
 

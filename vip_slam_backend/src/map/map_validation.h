@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What numbers the map accepts; shared by its operations and its checker.
 #pragma once
 

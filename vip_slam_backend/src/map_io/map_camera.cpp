@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Checks that a stored map fits the present camera.
 #include <algorithm>
 #include <cmath>

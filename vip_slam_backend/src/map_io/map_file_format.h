@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Constants shared by writer and reader of map files.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Normal equations for a depth error that depends on the reading alone, from depth points on planes: a wall seen from
 // near and from far has one place. Poses are fixed, planes are free.
 #pragma once

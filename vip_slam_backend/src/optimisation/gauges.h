@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Priors for what the measurements of a problem leave free.
 #pragma once
 

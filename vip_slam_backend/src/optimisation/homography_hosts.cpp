@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "homography_hosts.h"
 
 #include <algorithm>

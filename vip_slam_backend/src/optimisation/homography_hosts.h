@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Chooses the host keyframe of each landmark on a plane, for the host-observer pairs of the homographies.
 #pragma once
 

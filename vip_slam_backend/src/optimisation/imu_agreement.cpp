@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "imu_agreement.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Checks the IMU factor between two keyframes against the odometry, which uses images as well.
 #pragma once
 

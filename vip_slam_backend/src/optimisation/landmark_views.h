@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The landmarks of a problem and their views in flat arrays: looked up in the map once, read by all builders of
 // factors. Features are scattered over the keyframes' memory, beyond the second-level cache: the fields needed are
 // copied.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "odometry_factors.h"
 
 #include <Eigen/Cholesky>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Factors from the odometry's motion between successive keyframes. The odometry used every image and depth image in
 // between, the back end only keyframes: where few landmarks survive from one keyframe to the next this is most of the
 // information. It also keeps landmarks that move together from distorting the map. Not in the paper.

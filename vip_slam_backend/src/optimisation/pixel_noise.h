@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sigma of a feature's pixel. The front end reports it for each track (its tracking/pixel_noise.h): a tenth of a pixel
 // where the depth gives the patch's surface, several times that elsewhere. This is the scatter of a track's views about
 // the point that its reference patch shows; the patch of another track of the same landmark shows a point next to it.

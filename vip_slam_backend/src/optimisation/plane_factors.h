@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes of a problem: homographies from landmarks on planes, point-to-plane blocks from depth, priors.
 #pragma once
 

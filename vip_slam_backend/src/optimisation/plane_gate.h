@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Selects the depth points of an observation that belong to its plane. Points of a cupboard or a notice board in front
 // of a wall can be among the samples of the wall; once compressed into G they cannot be separated and would bias the
 // keyframe, so they are removed before.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Positions of landmarks on planes that were no variables: intersections of their rays with the plane.
 #pragma once
 

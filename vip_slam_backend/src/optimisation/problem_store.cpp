@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From a solved problem back to the map.
 #include <algorithm>
 #include <cmath>

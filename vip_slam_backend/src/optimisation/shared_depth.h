@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth readings of single points share errors as those of planes do: with their neighbours on the same surface in one
 // keyframe, and with the next keyframes.
 #pragma once

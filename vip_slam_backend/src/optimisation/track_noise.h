@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Estimates the actual pixel error of tracks relative to the reported sigmas, from their residuals against the map's
 // landmarks. The reported sigmas cover only the noise of image and matching. A camera whose lens or readout differs
 // slightly from its configuration, or whose depth is from another time, has errors of a few tenths of a pixel that a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 /* vocabulary/vip_slam.voc as read-only data of the library; the include path is set in CMakeLists.txt. */
     .section .rodata
     .balign 16

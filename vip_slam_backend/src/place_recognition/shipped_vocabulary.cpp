@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The shipped vocabulary is linked into the library (shipped_vocabulary.S), so that it does not depend on search paths.
 #include <memory>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The compact binary vocabulary format.
 #include <cstring>
 #include <fstream>

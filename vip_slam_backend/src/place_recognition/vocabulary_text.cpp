@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The text vocabulary format of ORB-SLAM: a header "k L scoring weighting" and one line per node,
 // "parent is_leaf d0 ... d31 weight", nodes numbered from 1 in file order, node 0 being the root.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_backend/solver/ba_problem.h"
 
 #include "vip_slam_backend/factors/plane_prior.h"

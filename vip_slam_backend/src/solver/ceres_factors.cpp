@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "ceres_factors.h"
 
 #include "vip_slam_backend/factors/plane_prior.h"

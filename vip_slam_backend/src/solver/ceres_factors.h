@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Ceres cost functions over the shared factors. Parameter blocks: pose 7 (quaternion x y z w, position), motion 9
 // (v, b_g, b_a), plane 4 (n, d), point 3. Pose Jacobians are given in the tangent: the pose manifold lifts by [I; 0],
 // so that the first six columns of an ambient Jacobian are the tangent's and nothing is computed twice. Plane Jacobians

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // ceres::Manifold is there since Ceres 2.1. Before it (Ubuntu 20.04 has 1.14, 22.04 has 2.0) the same comes as a
 // LocalParameterization, which needs no Minus.
 #pragma once

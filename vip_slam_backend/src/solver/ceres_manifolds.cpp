@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "ceres_factors.h"
 
 namespace vip_slam {

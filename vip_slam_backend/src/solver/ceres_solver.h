@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The reference solver: the same factors in Ceres' Levenberg-Marquardt with SPARSE_SCHUR. Used in tests, in the
 // benchmark, and when the user selects it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "dense_kernels.h"
 
 #include "instruction_set.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dense kernels of the multifrontal Cholesky on plain arrays, column-major.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Elimination order of a sparse Cholesky factorisation, and its elimination tree.
 #pragma once
 

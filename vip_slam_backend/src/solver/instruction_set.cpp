@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "instruction_set.h"
 
 namespace vip_slam {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Vector instruction sets of the kernels. Each kernel is built once per set (kernel_builds.inc) and chosen at run time,
 // so that nothing depends on -march; only plain pointers are passed to them, so that no Eigen object is used with
 // different alignments.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Kernels of plane and IMU factors work on batches of factors side by side.
 #pragma once
 

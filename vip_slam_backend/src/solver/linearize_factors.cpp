@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All factors except those of points: IMU, planes, priors. Each adds J^T J and J^T r to the blocks of the reduced
 // system.
 #include "structured_solver.h"

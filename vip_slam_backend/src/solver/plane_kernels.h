@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Compressed plane factors of the structured solver on plain arrays, eight factors at a time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "point_kernels.h"
 
 #include "instruction_set.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The inner loops of the structured solver on plain arrays: all observations of a point are linearised at once, so that
 // its Jacobians stay in the first-level cache; the parts needed for its elimination are stored.
 #pragma once

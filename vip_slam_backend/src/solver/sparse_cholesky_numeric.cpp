@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Numeric part of the block-sparse Cholesky: assembly, partial factorisation of the fronts, substitution.
 #include <algorithm>
 #include <cstring>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Symbolic part of the block-sparse Cholesky: fronts, their memory offsets and their parts.
 #include <algorithm>
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From a problem to the plain arrays that the kernels of the structured solver read.
 #include <algorithm>
 

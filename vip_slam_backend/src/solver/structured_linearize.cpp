@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The normal equations of the structured solver: factors between poses, motions and planes, and points with their
 // elimination.
 #include <algorithm>

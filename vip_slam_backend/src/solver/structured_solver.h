@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Levenberg-Marquardt that exploits the structure of a bundle adjustment: fixed-size blocks, points eliminated while
 // they are linearised, plane factors reduced to small dense blocks, one symbolic factorisation for all iterations.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The unknowns of a problem, the pairs of them that share a factor, and the offsets of their blocks: everything about
 // the reduced system that is constant over iterations, and over calls with the same structure.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One helper thread that takes pieces of its owner's work and sleeps between jobs.
 //
 // The owner never waits for the helper to start: pieces that it has not begun when the owner is done with the others

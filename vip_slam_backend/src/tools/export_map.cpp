@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_backend export_map MAP.vsm --out DIR: keyframe trajectory (TUM), planes (YAML), points (PLY, PCD).
 #include <algorithm>
 #include <cstdio>

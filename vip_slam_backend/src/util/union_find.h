@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Disjoint sets of numbers; the least number of a set stands for it.
 #pragma once
 

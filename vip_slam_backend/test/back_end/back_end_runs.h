@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Feeds simulated keyframes to a back end, checks its map after every operation and returns the final error.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A back end whose map is checked after every operation.
 #pragma once
 

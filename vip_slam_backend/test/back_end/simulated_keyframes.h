@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A landmark-level front end for back-end tests: keyframes with tracked features, IMU and drifting odometry in a room
 // with walls, floor and free points; and the plane module's answers.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The back end on simulated keyframes: accuracy, invariants after every operation, all variants.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the back end does with bad input: refused by name or bridged, and the map stays valid.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Corrections of extrinsics, depth, gyro and intrinsics that the front end learns late apply to all keyframes.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The back end when its map is reset, loaded, or used for localisation only.
 #include <gtest/gtest.h>
 

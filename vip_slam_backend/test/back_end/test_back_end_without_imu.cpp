@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The back end on keyframes of an RGB-D camera alone: they are tied by the odometry's motions, points and planes.
 #include <gtest/gtest.h>
 

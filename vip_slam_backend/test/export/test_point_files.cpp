@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The files that export_map writes of a map's points, read by PCL.
 #include <unistd.h>
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A Ceres cost function's Jacobians against central differences, in the tangents of its parameter blocks.
 // ceres::GradientChecker is of no use for poses: it needs ambient Jacobians, theirs are in the tangent.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth ratio of a pair of views of a plane, where a homography of them may be a factor.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every factor: analytic against numeric Jacobians; compressed against uncompressed cost and gradient.
 #include <gtest/gtest.h>
 

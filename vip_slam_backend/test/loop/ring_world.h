@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A camera on a circle that looks at a round wall full of points; the estimate drifts. For loop and relocalisation
 // tests.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How stiff the pose-plane graph takes the odometry between the ends of a loop.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What speaks for a loop: how much of the image it explains, and where the map expected it.
 #include <cmath>
 

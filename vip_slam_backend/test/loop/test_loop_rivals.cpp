@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An aisle of equal bays that is walked twice, with a long way in between: similar appearance alone makes no loop.
 #include <cmath>
 #include <memory>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The pose-plane graph's cost functions: yaw and position alone, and the ambient plane.
 #include <array>
 #include <memory>

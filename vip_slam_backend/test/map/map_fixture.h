@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A map that grows by simulated keyframes at true poses, checked after each.
 #pragma once
 

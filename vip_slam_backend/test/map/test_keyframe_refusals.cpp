@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Keyframes that the map refuses, each with its reason; a refusal changes nothing.
 #include <gtest/gtest.h>
 

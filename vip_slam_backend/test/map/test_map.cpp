@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The map's operations keep its invariants; operations that would break them are refused and change nothing.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The checker names every kind of damage.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Random sequences of operations: the map is consistent after each, and what it holds can be saved and loaded again.
 #include <gtest/gtest.h>
 

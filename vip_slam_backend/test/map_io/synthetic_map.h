@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A map for the file tests: a walk along a corridor with landmarks, planes, IMU and depth, everything filled.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Inputs found by fuzzing, read in every test run: each gives a consistent map or a clear error.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A map before its first adjustment: simulated keyframes at the poses of their odometry, a landmark per track, planes.
 #pragma once
 

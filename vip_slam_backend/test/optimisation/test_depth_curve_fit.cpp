@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth curve estimated from a map: an existing error is found, and other errors are not mistaken for it.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A constant error of all disparities: found when it is there, together with the depth offset and scale it implies.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the measurements of an inertial problem leave free, and that the priors hold this and nothing else.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which frames of a problem are held, where parts of a map are tied by planes alone.
 #include <gtest/gtest.h>
 

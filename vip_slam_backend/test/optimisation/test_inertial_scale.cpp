@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Scale of the map from the accelerometer: estimated with a consistent sigma when the motion makes it observable,
 // otherwise unknown.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The odometry's motion as a factor: weighted by its reported covariance, left out when it reports none.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Homographies built from a map: what happens to wrongly associated views, whichever keyframe is the host.
 #include <gtest/gtest.h>
 

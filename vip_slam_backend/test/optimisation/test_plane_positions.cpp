@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes that only one keyframe sees, and planes through the world's origin, where the closest point tells no normal:
 // through the local and the global adjustment with both solvers.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a solved problem changes in the map.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the local adjustment may move, what holds it, and the limits on iterations and time of both adjustments.
 #include <gtest/gtest.h>
 

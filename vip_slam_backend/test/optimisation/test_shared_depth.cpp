@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth of single points that share their errors.
 #include <gtest/gtest.h>
 

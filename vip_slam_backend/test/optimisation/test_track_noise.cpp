@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whether the map detects pixel errors larger than their reported sigma.
 #include <gtest/gtest.h>
 

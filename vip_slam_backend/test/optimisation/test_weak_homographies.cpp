@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Homographies of weak geometry, from map to problem: which are refused, and that the others are finite and harmless.
 #include <gtest/gtest.h>
 

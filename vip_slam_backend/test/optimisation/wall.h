@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A wall before a camera that moves along it, for tests of the homographies built from a map.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Descriptors for the place recognition tests: random places, and the same place seen again with flipped bits.
 #pragma once
 

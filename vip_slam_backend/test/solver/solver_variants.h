@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the solver tests run over: the variants of the system, and solvers that do not stop early.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A small room for solver tests: a camera with an IMU on a closed curve, free points, points on four walls and the
 // floor.
 #pragma once

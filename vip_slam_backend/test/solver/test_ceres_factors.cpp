@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The manifolds and cost functions of the Ceres solver: what Ceres requires of them, against central differences.
 #include <gtest/gtest.h>
 

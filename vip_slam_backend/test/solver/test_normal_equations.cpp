@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The structured solver's normal equations and damped steps against those of Ceres' Jacobians, with the kernels of
 // every instruction set this machine runs.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every reason for which a problem is refused, by both solvers, before anything is changed.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The structured solver against Ceres: the same cost, the same iterates, the same minimum; and against itself.
 #include <gtest/gtest.h>
 

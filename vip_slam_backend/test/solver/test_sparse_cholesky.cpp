@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The block-sparse Cholesky against Eigen's dense one on random structures, for every instruction set this machine
 // runs.
 #include <random>

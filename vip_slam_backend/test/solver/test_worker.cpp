@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The solver's helper thread: every piece of work is done exactly once, by either thread and however late the helper
 // is.
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The parameter reference of the documentation, generated from the option structs.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_bringup check_bag BAG... --sensor NAME_OR_YAML  a recording, in one bag or several
 // rosrun vip_slam_bringup check_bag --live --sensor NAME_OR_YAML  what is published now
 // Exit status: 0 ready (warnings may stand), 1 not ready, 2 nothing could be checked.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_bringup convert_to_bag euroc|tum_rgbd|stray FOLDER --out NAME.bag
 #include <unistd.h>
 

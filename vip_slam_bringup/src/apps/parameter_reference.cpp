@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_bringup parameter_reference > docs/parameters.md
 #include <cstdio>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // run_bag BAG... --sensor NAME_OR_YAML --out DIR: the whole system over a recording, in lock-step.
 #include <sys/wait.h>
 #include <unistd.h>

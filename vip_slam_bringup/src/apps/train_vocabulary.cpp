@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // train_vocabulary INPUT... --out FILE: a place-recognition vocabulary from bags and pictures, with the same corners
 // and descriptors as in the front end.
 #include <algorithm>

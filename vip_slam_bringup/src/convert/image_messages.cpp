@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_bringup/convert/image_messages.h"
 
 #include <cv_bridge/cv_bridge.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stray Scanner layout: rgb.mp4 (1920x1440, one frame per row of odometry.csv), depth/NNNNNN.png (16-bit millimetres,
 // 256x192, registered to the colour camera), confidence/NNNNNN.png (0, 1, 2), odometry.csv (stamp, frame, position,
 // quaternion xyzw [, fx, fy, cx, cy]), camera_matrix.csv, imu.csv (stamp, accelerometer, gyro). One clock for all.

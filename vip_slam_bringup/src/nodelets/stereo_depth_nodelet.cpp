@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stereo pair in, rectified left image and depth out, for sensors without a depth camera (EuRoC).
 //   subscribes  left/image_raw, right/image_raw  (mono8 or colour)
 //   publishes   rectified/image, depth/image (32FC1 metres), rectified/camera_info, depth/camera_info

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The colour camera's calibration against the motion: readings of it, and whether it stays the same.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Registered depth that lies in the image of the colour camera without its lens: by its camera_info, and by its edges.
 #include <cmath>
 #include <optional>

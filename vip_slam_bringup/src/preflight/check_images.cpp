@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Encodings, sizes, calibration, depth values, colour against depth.
 #include <algorithm>
 #include <cmath>

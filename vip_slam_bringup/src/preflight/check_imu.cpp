@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // IMU gaps, units, gravity.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Axes of accelerometer and gyroscope, mirrored pictures and the unit of depth, from the motion (inertial_motion.h).
 #include <cmath>
 

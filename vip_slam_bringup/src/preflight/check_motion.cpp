@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the motion says of delay, rolling shutter, extrinsics and the IMU (motion_estimate.cpp), as findings.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the IMU measures while the images stand still: an engine or fans shake it by more than its noise figures say.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Topics and rates.
 #include <algorithm>
 #include <cmath>

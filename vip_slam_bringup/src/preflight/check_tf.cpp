@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Frames in tf, and their extrinsics against the sensor file.
 #include <tf2/buffer_core.h>
 

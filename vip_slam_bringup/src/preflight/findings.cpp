@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All checks together, and their findings as text.
 #include <algorithm>
 

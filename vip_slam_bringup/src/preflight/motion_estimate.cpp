@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Camera-IMU delay and rotation from the motion: the gyro and the images see the same rotation.
 //   gyro(t + td) = R_I_C rate_C(t) + b
 // For each delay in a grid, R and b by orthogonal Procrustes; the delay with the smallest residual is taken. Two

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Recordings from a bag and from live topics.
 #include <ros/callback_queue.h>
 #include <ros/ros.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Converts a bag's messages to sensor events: images are decoded and paired, their time settled, irregularities
 // counted and reported once each.
 #pragma once

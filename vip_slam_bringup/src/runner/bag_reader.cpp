@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_bringup/runner/bag_reader.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Warnings for the user after a successful run.
 #include <algorithm>
 #include <iterator>

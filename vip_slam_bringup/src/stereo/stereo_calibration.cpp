@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_bringup/stereo/stereo_calibration.h"
 
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stray Scanner's recordings on tiny ones: the bag's content, and the errors for unreadable folders.
 #include <cmath>
 #include <cstdio>

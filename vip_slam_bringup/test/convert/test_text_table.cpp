@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Checks of a table's rows.
 #include <gtest/gtest.h>
 

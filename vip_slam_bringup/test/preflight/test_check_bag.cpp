@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // check_bag against bags with one fault each: the fault is found, named, and nothing else is called an error.
 #include <unistd.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth with and without the lens of the colour camera is told apart by its edges, on a rendered scene: panels before a
 // wall, all textured.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the recorder finds in depth itself: a unit that changes, a distance that stands for "no reading".
 #include <functional>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where the image's edges lie beside those of depth: boxes before a wall, as seen by a camera that moves on.
 #include <cmath>
 #include <random>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Axes of accelerometer and gyroscope, mirrored pictures, the unit of depth and the reading of a calibration, each
 // found from the motion of a rendered bag whose recording is changed accordingly.
 #include <unistd.h>

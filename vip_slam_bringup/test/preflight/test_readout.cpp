@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The readout time of a rolling shutter, estimated from corners and gyro of a synthetic motion.
 #include <cmath>
 #include <random>

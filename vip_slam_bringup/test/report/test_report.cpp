@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // make_report on a small synthetic run: the page is self-contained, has the right numbers, and bad input is named.
 #include <sys/wait.h>
 #include <unistd.h>

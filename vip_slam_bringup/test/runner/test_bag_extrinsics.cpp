@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where run_bag takes the extrinsics from: tf in the bag, or the sensor file.
 #include <unistd.h>
 

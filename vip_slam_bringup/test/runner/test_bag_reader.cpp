@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bags whose clock jumps, and bags that cannot be read to their end.
 #include <unistd.h>
 

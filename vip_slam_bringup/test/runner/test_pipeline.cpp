@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Data flow in the runner: images wait for IMU data on the IMU's clock, whose offset from the camera's may be large;
 // the plane module's answers reach the back end.
 #include <unistd.h>

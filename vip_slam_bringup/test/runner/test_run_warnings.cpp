@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a run says of the states that its images were in.
 #include <string>
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Documents generated from the code are up to date, and their links have targets.
 #include <algorithm>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every shipped configuration with a bag as its driver writes it: check_bag reports no problem, and the offline
 // pipeline tracks it. Bags of cameras are made from the tables of what the drivers do (driver_facts.h), so that a wrong
 // topic, encoding, axis or geometry in a sensor file shows; where no driver is, from the sensor file itself.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sensor and launch files against what the drivers do (driver_facts.h), value by value.
 #include <algorithm>
 #include <fstream>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every shipped sensor file loads, has all keys, survives saving, and has plausible values.
 #include <unistd.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stereo depth against rendered pairs whose depth is known.
 #include <cmath>
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """What users get wrong is named: by the launch, by the tracking status, by run_bag."""
 import csv
 import os

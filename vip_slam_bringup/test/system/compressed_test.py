@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The live system on compressed images, with or without the plugins of image_transport: Debian has none."""
 import os
 import re

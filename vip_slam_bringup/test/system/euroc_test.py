@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """EuRoC from end to end: a rendered folder of the stereo pair to a bag with depth, run offline and judged; then the raw
 pair through the nodelets."""
 import os

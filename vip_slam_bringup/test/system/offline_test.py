@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """run_bag: every file it promises, the same bits twice, and results when it is interrupted."""
 import filecmp
 import os

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """phone.launch against the stand-in that plays the rendered sequence: poses, error, nothing lost, and the map stays."""
 import os
 import re

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Nodelets die in the middle of a run: with respawn everything comes back, and the map's planes stay."""
 import os
 import sys

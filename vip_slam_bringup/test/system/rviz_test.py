@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The real rviz with our display, on a screen in memory: planes and the feature image are seen."""
 import os
 import subprocess

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The running system on a bag that plays in a loop: poses, frames, covariances, names, services."""
 import concurrent.futures
 import os

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "camera/equidistant_camera.h"
 
 #include <algorithm>

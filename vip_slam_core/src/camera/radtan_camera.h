@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Pinhole with radial-tangential (Brown-Conrady) distortion, polynomial or rational; without distortion the plain
 // pinhole.
 #pragma once

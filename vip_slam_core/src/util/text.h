@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Small text helpers of the file formats: locale-free numbers and their shortest exact spelling.
 #pragma once
 

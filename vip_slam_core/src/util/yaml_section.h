@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Strict reading of YAML maps: every key must be known, every value have its type and lie within its range. Errors are
 // std::runtime_error that begin with the key's full name ("imu/rate: ...").
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Camera models: projection and its inverse over the whole image, Jacobians, scaling, bad intrinsics.
 #include <gtest/gtest.h>
 

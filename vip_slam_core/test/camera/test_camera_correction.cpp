@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth that turns out to have been read too long.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Images of a lens that breathes, made to look like one camera's.
 #include <cmath>
 

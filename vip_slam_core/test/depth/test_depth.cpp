@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth noise, edge-safe look-up, grids, conversion and registration.
 #include <gtest/gtest.h>
 

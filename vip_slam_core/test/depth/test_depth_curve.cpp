@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What is added to depth readings at each distance.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The unit of depth images, told from their values.
 #include <cmath>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth image shifted against the colour image: the depth at a pixel belongs to a neighbouring one.
 #include <gtest/gtest.h>
 

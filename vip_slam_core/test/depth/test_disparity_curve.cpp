@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth from disparities with a constant error.
 #include <gtest/gtest.h>
 

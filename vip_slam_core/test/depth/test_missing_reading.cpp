@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Values that stand for "no reading", and readings that must not pass for one.
 #include <cmath>
 

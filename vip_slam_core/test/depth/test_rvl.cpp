@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // RVL: words written out by hand, images there and back, and damaged data.
 #include <cstdint>
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rotations, rigid transforms and planes: group properties, and every Jacobian against central differences.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Weights of depth points on planes, from their agreement with the planes.
 #include <gtest/gtest.h>
 

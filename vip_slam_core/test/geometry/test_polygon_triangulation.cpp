@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The triangles cover the polygon: their areas add up to it and their normals are the plane's.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Matrices that are no rigid transforms are refused with what is wrong; rounded ones are made exact.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The IMU buffer: interpolated ends, gaps, out-of-order samples, split streams, bounded memory.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Preintegration against exact motion, its Jacobians against central differences, its covariance against Monte Carlo.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The real IMU of EuRoC V1_01 with its ground truth, when the data are there: VIP_SLAM_REAL_DATA names the folder that
 // holds euroc_v101/{imu,truth}.csv.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Single wrong samples of the IMU: replaced, counted; vibration, shocks, gaps and ordinary motion are left alone.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth in the geometry of the colour camera without its lens, beside a colour image with its lens: the truth is a
 // rendered scene, a panel before a slanted wall, seen by both.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every image's pose follows the final keyframes.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Ids of merged landmarks.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // TUM trajectories, plane maps and sensor files: round trips, and errors that name file, line or key.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Options, text, timing, atomic files, and the bounded queue.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Programs of the workspace, as the scripts of real and rendered recordings call them."""
 import os
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Judges a run through an L-shaped corridor by the building: its two legs are at a right angle.
 
 The heading of the walls in each image comes from its depth alone; the trajectory turns it into its own world, where it

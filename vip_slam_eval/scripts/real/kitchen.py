@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Judges a run on 7-Scenes' red kitchen by its own images, without truth.
 
 Depth: points of one image, moved by the run, against the surface that another image sees there. Tracks: corners that

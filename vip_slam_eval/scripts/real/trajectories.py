@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Trajectories in TUM files, and how far one lies from another.
 
 Poses are rows (t, x, y, z, qx, qy, qz, qw) of T_world_body; rotations are arrays of matrices.

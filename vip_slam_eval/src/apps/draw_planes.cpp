@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_eval draw_planes BAG --sensor S --trajectory T.tum --planes P.yaml --time SECONDS... --out DIR
 // [--heights]: draws the planes of a run over images of its bag; --heights measures how stable horizontal planes are.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_eval evaluate --truth T.tum --estimate E.tum [--planes-truth TP.yaml --planes P.yaml] [--out DIR]
 #include <iostream>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // gba_benchmark --out DIR: the paper's Table III and its time-over-keyframes figure on a simulated map.
 #include <algorithm>
 #include <cstdio>

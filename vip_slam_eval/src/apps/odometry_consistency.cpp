@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_eval odometry_consistency SEQUENCE [--seeds N] [--seconds S] [--out FILE]
 // Consistency of the odometry's covariance. One rendered sequence runs through the whole front end many times, each
 // time with different noise in images, depth and IMU: errors common to all runs come from the scene, their scatter from

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_eval place_metrics --map M.vsm --truth T.tum [--query Q.vsm --query-truth QT.tum]
 // Evaluates the loops of a stored map (correct or wrong, revisits closed) and relocalisation of another session in it.
 #include <algorithm>

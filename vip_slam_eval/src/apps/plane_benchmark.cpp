@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // rosrun vip_slam_eval plane_benchmark BAG --sensor S --truth T.tum [--planes-truth P.yaml] [--out DIR]
 // Evaluates the plane module alone, with true poses; of a real recording how steady its planes are.
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rectangles that carry points and occlude what is behind them, boxes of free clutter, and a path through them.
 #pragma once
 

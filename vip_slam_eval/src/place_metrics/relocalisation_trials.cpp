@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "place_metrics/relocalisation_trials.h"
 
 #include <algorithm>

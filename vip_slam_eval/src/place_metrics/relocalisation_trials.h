@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Relocalisation of one session in the stored map of another, as the back end does it: a trial starts at each keyframe
 // of the query session with no prior pose, receives the keyframes of the next second one by one, and ends with the
 // first pose found.

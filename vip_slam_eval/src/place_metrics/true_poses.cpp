@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "place_metrics/true_poses.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // True poses of the keyframes of a stored map.
 #pragma once
 

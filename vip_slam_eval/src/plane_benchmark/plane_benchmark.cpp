@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_eval/plane_benchmark/plane_benchmark.h"
 #include "vip_slam_core/util/progress_bar.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Replaces the back end when the plane module is evaluated alone: keyframes have their true poses, landmarks the
 // weighted mean of their measured positions.
 #pragma once

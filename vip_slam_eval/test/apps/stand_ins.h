@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Small scripts in place of a workspace's programs, for the tests of commands that call them.
 #pragma once
 

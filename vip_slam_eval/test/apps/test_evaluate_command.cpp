@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The command itself: its output, its files, and how it rejects bad input.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The real_recordings command with small scripts in place of converter and run_bag: its figures, what it does without
 // a recording and with a run that has no pose.
 #include <filesystem>

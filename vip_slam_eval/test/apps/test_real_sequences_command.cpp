@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The real_sequences command with small scripts in place of its programs: figures, what a second call does, failures.
 #include "stand_ins.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The tables command with small scripts in place of the programs it calls: handling of failures, and which runs are repeated.
 #include <gtest/gtest.h>
 

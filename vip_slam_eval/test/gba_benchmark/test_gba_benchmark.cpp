@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The benchmark's simulation and runs: counts as requested, all variants build from one map, the adjustment helps.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The paper's Table III: what each variant's problem contains at the table's size, that planes make the trajectory no
 // worse, and that problems grow with a corridor's length and no faster.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Plane maps with known faults.
 #include <gtest/gtest.h>
 

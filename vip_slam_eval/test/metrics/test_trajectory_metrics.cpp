@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Trajectories with known errors.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The commands plane_benchmark and draw_planes on a rendered sequence.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes drawn over an image: where they are, and nowhere else.
 #include <gtest/gtest.h>
 

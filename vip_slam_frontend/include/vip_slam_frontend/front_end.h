@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The front end: RGB-D-inertial odometry at image rate (paper section "Front End"). ROS-free; one owner thread.
 //
 // Images go in with process() in order of their stamps, IMU samples with addImu() (or addGyro()/addAccel() when the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Parameters of the front-end nodelet beside those of the estimator.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All options of the front end, in groups.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The filter's update with features: selection of tracks, their rows, and their weights.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Vector arithmetic of the filter's kernels: packs of four doubles, and functions compiled for AVX2, too, chosen at run
 // time. For inclusion by these kernels' sources only.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The filter's calibration states (extrinsics, depth, intrinsics, gyro): which values are reported, plausible, kept.
 #include <algorithm>
 #include <cmath>

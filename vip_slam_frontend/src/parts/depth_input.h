@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth images as they come, turned into readings as they are meant: missing readings, unit, shift, curve, mask.
 #pragma once
 

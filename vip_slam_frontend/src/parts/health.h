@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the newest pose is worth: the tracking state, its reason, and all clocks that decide on them.
 #pragma once
 

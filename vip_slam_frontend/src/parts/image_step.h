@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What passes through the front end in one image: input, prediction, tracked, consistency, update. Assembled once, in
 // this order; each step reads what those before it have filled in.
 #pragma once

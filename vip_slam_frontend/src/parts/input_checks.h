@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a colour image and its stamp must be, and what of them is counted.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "parts/keyframes.h"
 
 #include "parts/depth_input.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The keyframes so far: when the next one is due, its number, and what ties it to the one before.
 #pragma once
 

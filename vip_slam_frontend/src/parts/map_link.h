@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The front end's link to the map: the back end's landmarks, and where the map lies in odom.
 #pragma once
 

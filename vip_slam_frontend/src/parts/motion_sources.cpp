@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "parts/motion_sources.h"
 
 #include <algorithm>

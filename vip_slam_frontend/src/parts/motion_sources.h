@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What tells the motion between two images: the IMU, all pixels, the points with depth; which of them is believed.
 #pragma once
 

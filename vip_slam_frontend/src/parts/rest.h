@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whether the body stands still: the IMU's spread and the motion of the tracks' pixels over a short time.
 #pragma once
 

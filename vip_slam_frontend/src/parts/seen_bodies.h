@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bodies that move independently of the camera: where they are in the newest image, and when one was last seen.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The feature tracker's optical flow: predicted starts, exposure, forward-backward check.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The feature tracker's references: each track's patch in the image where it began, its match in the newest image, and
 // what is measured there.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_frontend/tracking/moving_regions.h"
 
 #include <cmath>

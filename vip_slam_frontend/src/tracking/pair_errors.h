@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Errors of a point pair under a camera motion, pixels over the focal length. Internal to outlier rejection.
 #pragma once
 

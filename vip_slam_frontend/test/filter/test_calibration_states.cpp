@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Extrinsics, depth and gyro errors learnt by the filter: accuracy, consistency, and that they are passed on, kept and
 // reported.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Consistency and drift of whole-filter runs on the landmark simulation.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Jacobians of the measurement rows and of the propagation against central differences.
 #include <gtest/gtest.h>
 

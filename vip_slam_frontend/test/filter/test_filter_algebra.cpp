@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The square-root filter against plain covariance algebra, on random problems with fixed seeds.
 #include <random>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whole-filter runs on the landmark simulation: outliers, noise adaptation, standing still.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Separates the body's rotation from the gyro's noise.
 #include <cmath>
 #include <random>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rows from flat surfaces: Jacobians, unobservable directions, and the association of the pairs.
 #include <cmath>
 #include <random>

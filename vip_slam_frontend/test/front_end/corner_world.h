@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A textured corner of a room, seen by a camera with an IMU that turns and sways: images and depth for tests of the
 // whole front end.
 #pragma once

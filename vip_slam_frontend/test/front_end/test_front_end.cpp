@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The facade on rendered images of a textured wall: a whole run, bitwise repeatability, rest, feedback from a map.
 #include <cmath>
 #include <map>

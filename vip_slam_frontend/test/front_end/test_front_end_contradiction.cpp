@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The facade when images and IMU contradict each other: repeated images, shocks that the IMU measures wrongly.
 #include <cmath>
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The facade with bad input: rejected images, no depth, darkness, changing light, gaps, clock jumps.
 #include <cmath>
 #include <limits>

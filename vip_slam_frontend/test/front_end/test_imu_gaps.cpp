@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // IMU gaps during rotation, with images and without.
 #include <algorithm>
 #include <cmath>

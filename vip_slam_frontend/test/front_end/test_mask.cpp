@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Nothing is detected in the masked area (the robot's own bumper): no features, no depth, no corners.
 #include <gtest/gtest.h>
 

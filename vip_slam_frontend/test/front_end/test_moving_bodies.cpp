@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Moving objects are not mistaken for camera motion: pairs of points, regions of an image, and a screen that is carried
 // past the camera and fills its view.
 #include <algorithm>

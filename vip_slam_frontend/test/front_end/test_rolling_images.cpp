@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rolling-shutter images and depth, and depth taken at another time than colour, while the body turns and sways in
 // front of a textured corner.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An IMU whose axes or signs differ from the configuration: the poses are wrong, and the status must not be TRACKING.
 #include <functional>
 #include <random>

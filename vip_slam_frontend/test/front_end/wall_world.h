@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A camera that sways in front of a textured wall, and its front end, for tests of the facade.
 #pragma once
 

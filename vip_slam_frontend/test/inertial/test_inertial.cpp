@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Inertial channels with stand-ins, fault detection, and the propagation by another source's motion.
 #include <cmath>
 #include <random>

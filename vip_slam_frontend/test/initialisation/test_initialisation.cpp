@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Starts at rest and in motion on the landmark simulation; stillness; keyframe selection.
 #include <cmath>
 #include <optional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sources of the calibration, and how long the nodelet waits for them.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth of an unexpected size is reported and left out.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The odometry message: base_link's pose and twist, and covariances checked by perturbing the state.
 #include <gtest/gtest.h>
 

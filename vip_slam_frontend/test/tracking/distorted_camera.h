@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A rolling-shutter camera with some radial distortion, its centre in the middle of the image.
 #pragma once
 

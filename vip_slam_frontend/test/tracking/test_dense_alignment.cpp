@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dense alignment of two rendered RGB-D images: large turns without a prediction, exposure, holes and noise of the
 // depth, depth of another moment, and what its covariance says.
 #include <cmath>

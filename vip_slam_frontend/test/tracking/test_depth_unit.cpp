@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The unit of depth that changes while recording, and what must not pass for it.
 #include <gtest/gtest.h>
 

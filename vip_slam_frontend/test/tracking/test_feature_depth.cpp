@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth of corners on rims and slanted walls, on exact scenes with known noise.
 #include <cmath>
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Outlier rejection without a usable rotation: a general scene, a plane, a rotation on the spot.
 #include <algorithm>
 #include <random>

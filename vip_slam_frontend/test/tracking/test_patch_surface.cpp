@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A patch's surface from depth, and its warp into another view against the exact homography of the plane.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What flat walls teach of the two parts of depth noise.
 #include <cmath>
 #include <random>

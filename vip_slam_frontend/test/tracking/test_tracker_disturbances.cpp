@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Temporarily poor images, and objects that enter the view: tracks stay on their points.
 #include <map>
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Tracking pieces on small synthetic images with known motion.
 #include <cmath>
 #include <map>

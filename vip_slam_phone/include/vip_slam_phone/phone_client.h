@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A phone's three streams, received in threads of their own, reconnected when they break, assembled on one clock.
 #pragma once
 

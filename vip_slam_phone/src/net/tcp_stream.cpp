@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_phone/net/tcp_stream.h"
 
 #include <netdb.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Plays a rendered bag as a phone with the app would, on the loopback interface only: for tests and for trying the
 // system without a phone. The clock is a day ahead and drifts, the focus breathes, the exposure changes, RTP and
 // sequence numbers wrap. Images of the bag are stamped at mid-exposure.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "rtp_writer.h"
 
 #include <algorithm>

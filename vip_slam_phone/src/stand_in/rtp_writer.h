@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Pictures to RTP packets, as a phone sends them: single units and fragments.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "rtsp_server.h"
 
 #include <sys/socket.h>

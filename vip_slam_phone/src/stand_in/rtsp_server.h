@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The video port of the stand-in: RTSP 1.0 with interleaved RTP.
 #pragma once
 

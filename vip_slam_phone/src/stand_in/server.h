@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The phone's three ports on the loopback interface, one client each.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // H.264 by libx264 and HEVC by libx265, as a phone's encoder makes it: no B pictures, a key picture a second.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What libavcodec's coders and decoders are made of, given back together.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_phone/video/rtp.h"
 
 namespace vip_slam::phone {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_phone/video/rtsp_session.h"
 
 namespace vip_slam::phone {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One clock, one camera, the middle row's mid-exposure.
 #include <cmath>
 #include <random>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A phone is found by what it announces, or it is said why not.
 #include <unistd.h>
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A slow taker costs its own data, counted, and never the giver's time.
 #include <chrono>
 #include <condition_variable>

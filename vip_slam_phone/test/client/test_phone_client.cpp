@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The client against servers that say wrong things: it names them, and goes on when they say right ones.
 #include <chrono>
 

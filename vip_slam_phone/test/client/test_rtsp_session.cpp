@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What an RTSP server may say, rightly and wrongly.
 #include <gtest/gtest.h>
 

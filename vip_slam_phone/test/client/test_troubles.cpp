@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What goes wrong with a phone is said in words, and nothing else is.
 #include <algorithm>
 #include <functional>

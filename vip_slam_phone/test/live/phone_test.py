@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The nodelet against the stand-in, which plays a small bag made here: a textured wall, a phone that lies still."""
 import os
 import shutil

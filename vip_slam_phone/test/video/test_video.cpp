@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // RTP, the pictures in it, and the text of RTSP.
 #include <algorithm>
 #include <cctype>

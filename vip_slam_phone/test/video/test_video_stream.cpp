@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Pictures coded, sent as RTP and received: what comes out is what went in, with its time.
 #include <cmath>
 

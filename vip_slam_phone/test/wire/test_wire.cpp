@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Records, handshakes and depth images: their meaning, and that damage is an error and no crash.
 #include <cmath>
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The plane module (paper section "Plane Detection and Association"). ROS-free; one owner thread.
 //
 // Keyframes are added with addKeyframe() and wait until a MapUpdate places them in `map`; tracked frames only grow

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Options of the plane module: name, default, range and meaning in one place.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which left-over triangles of several keyframes belong to planes that are known by now.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which tracked frames grow planes: those that show something new.
 #pragma once
 

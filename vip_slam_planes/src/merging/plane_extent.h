@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Relative position of two planes' areas: contact, distance, heights.
 #pragma once
 

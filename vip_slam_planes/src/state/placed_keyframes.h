@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The keyframes of the plane mapper: those that wait for their place in `map`, those that have it, and the hosts of a
 // loaded map's planes.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the next PlaneUpdate tells the back end: planes merged and removed, observations new and withdrawn.
 #pragma once
 

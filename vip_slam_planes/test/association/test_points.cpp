@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Association of map points with planes.
 #include <random>
 #include <set>

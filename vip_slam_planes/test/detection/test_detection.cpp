@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Mesh and detection on exact scenes: one keyframe, no map.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes from several keyframes together.
 #include <numeric>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Narrow faces, whose orientation becomes certain only when they are seen from two sides.
 #include <cmath>
 

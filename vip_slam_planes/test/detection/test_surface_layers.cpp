@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Parallel surfaces in one peak.
 #include <algorithm>
 #include <random>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // When an image shows another surface in place of a plane.
 #include <random>
 

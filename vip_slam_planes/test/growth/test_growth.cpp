@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which triangles join a plane: the gates of 10 degrees and 5 cm, the side, and the reach of the covered area.
 #include <random>
 

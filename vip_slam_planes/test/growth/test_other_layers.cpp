@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One image shows two surfaces, both near enough to a plane to join it.
 #include <random>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A keyframe's evidence against the cells of a plane.
 #include <gtest/gtest.h>
 

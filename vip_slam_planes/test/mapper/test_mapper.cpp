@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The whole plane module on exact scenes, with poses given as by a back end.
 #include <cmath>
 #include <limits>

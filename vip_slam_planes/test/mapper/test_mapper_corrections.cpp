@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Corrections by the back end, on exact scenes: poses, extrinsics, intrinsics and depth offset.
 #include <cmath>
 #include <set>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Effect of keyframes of a restarted odometry on planes, before and after their pose in the map is known.
 #include <algorithm>
 #include <set>

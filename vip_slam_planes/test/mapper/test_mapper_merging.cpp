@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which pieces the plane module merges into one surface, on exact scenes.
 #include <cmath>
 #include <set>

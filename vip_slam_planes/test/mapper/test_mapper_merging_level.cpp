@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which pieces of floors, tables and ceilings the plane module merges into one surface, on exact scenes.
 #include <cmath>
 

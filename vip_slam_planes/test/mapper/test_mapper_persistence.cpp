@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes that stay in the map although single views or a very accurate map contradict them.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What rviz is told about planes: colours, translucency, deletions, depth points.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Opening recordings, with the same error messages in every tool.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The calibration that the front end resolved, passed to the other nodelets.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // sensor_msgs/CameraInfo <-> the core's intrinsics.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Images of a camera whose camera_info changes from image to image (autofocus, zoom) are brought to the camera that the
 // estimator was started with: nothing behind has to know. ROS-free, single owner; used by the nodelet and the offline
 // runner.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whether messages have been dropped recently, not ever: diagnostics that keep warning after one hiccup at the start
 // would be ignored.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The front end's output: core types <-> messages, without loss.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Geometry: core types <-> geometry_msgs. Exact both ways up to the normalisation of quaternions.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Converts images from drivers, recordings and phones to the front end's input: 8-bit gray, and depth in metres.
 #pragma once
 

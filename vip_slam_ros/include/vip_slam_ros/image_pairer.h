@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Pairs colour and depth images by their stamps. ROS-free, single owner; used by the nodelet and the offline runner, so
 // that both get the same pairs.
 #pragma once

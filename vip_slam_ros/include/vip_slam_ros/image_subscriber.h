@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A stream of images by image_transport. Compressed ones are read without its plugins too, which Debian does not have.
 #pragma once
 

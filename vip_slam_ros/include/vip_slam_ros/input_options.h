@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How streams of images and IMU samples are brought together: the same live and offline.
 #pragma once
 

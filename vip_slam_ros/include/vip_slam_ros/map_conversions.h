@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Map updates and loop events: core types <-> messages, without loss.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Keeps a topic to the sensor that it began with. When two drivers run under one name, or two bags were joined, images
 // of two cameras come on one topic, and only their frame_id tells them apart.
 #pragma once

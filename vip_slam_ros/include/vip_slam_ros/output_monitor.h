@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The rate and the delay of a topic that we publish, in /diagnostics ("... odom topic status").
 #pragma once
 

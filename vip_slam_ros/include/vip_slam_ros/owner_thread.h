@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The thread that owns an estimator: all tasks that use the estimator run here, in the order of their posting.
 // Tasks are queued in lanes of bounded length; a full lane drops its oldest task and counts it.
 #pragma once

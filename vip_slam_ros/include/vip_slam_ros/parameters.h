@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Option structs from ROS parameters: "group/name" is read below the given namespace.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes: core types <-> messages, without loss.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Coloured point clouds: pcl::PointCloud to a message. PCL's headers are needed by those alone who make a cloud.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Faults of streams in words, the same in the live system and offline.
 #pragma once
 

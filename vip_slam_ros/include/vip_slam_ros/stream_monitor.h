@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Monitors the stamps of one input topic: measured rate, gaps, repetitions, backward steps, silence.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sensor extrinsics from tf, when the robot or the camera driver publishes them.
 #pragma once
 

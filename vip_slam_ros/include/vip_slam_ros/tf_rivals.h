@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Finds out who else publishes the transform that a nodelet publishes: an odometry of the robot's, a recorded /tf that
 // is played, a second launch. tf takes what comes last, so that the frame jumps to and fro between the two.
 #pragma once

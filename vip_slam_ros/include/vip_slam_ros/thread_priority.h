@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Thread priorities: mapping yields to tracking.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the ROS master knows of a topic: why it has no messages, who publishes it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Intrinsics to camera_info and back; fields that drivers leave out are handled, unusable ones are named.
 #include <stdexcept>
 #include <string>

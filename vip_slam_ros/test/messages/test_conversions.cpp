@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Core types are unchanged after conversion to messages, serialisation and back.
 #include <array>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Every encoding that a driver may send gives the same gray or depth image; unreadable ones are named in the error.
 #include <cstdint>
 #include <cstring>

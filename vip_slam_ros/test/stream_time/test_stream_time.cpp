@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Each fault of stamps and clocks, and mixtures: what time messages get, and what is left out. Images of colour and
 // depth at 20 Hz and an IMU at 200 Hz over 20 s, with delays as of USB.
 #include <algorithm>

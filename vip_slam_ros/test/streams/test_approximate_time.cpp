@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Why colour and depth are not paired by message_filters' ApproximateTime: the same streams through both. What the
 // figures mean for the odometry is in docs/dependencies.md.
 #include <algorithm>

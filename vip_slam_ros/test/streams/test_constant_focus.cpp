@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Images whose K changes with the focus reach the estimator as those of one camera.
 #include <gtest/gtest.h>
 

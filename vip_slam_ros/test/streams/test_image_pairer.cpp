@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Colour and depth are paired by stamp, in whatever order they arrive.
 #include <algorithm>
 #include <cmath>

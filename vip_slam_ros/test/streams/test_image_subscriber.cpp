@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which topic a camera's images are read from, and by what.
 #include <stdexcept>
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Random numbers that are the same on every machine, which the standard distributions do not guarantee.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Point-to-plane registration of the depth images of a folder.
 #pragma once
 

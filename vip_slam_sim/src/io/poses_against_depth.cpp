@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Relative motion from depth image registration, to evaluate and refine given poses.
 #include <algorithm>
 #include <cmath>

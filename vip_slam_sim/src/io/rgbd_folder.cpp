@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_sim/io/rgbd_folder.h"
 
 #include <algorithm>

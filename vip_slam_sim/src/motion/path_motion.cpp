@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Walking and flying motions along waypoints.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Motion planning: position and viewing direction of the camera over time, converted to the spline of the IMU.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_sim/render/light_baker.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_sim/render/sensor_effects.h"
 
 #include <algorithm>

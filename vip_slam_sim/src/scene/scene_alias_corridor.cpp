@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A corridor of identical bays: the same door, the same poster, the same lamp, eight times. A loop closer that trusts
 // appearance alone fails here. Only the ends differ.
 #include <cmath>

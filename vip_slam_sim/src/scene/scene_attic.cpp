@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An attic, 9 x 5.6 m: the roof comes down to a metre on both sides, a chimney, a dormer, low furniture and a half-open
 // door. Little stands upright, and much is slanted.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A foyer, 17 x 9.6 m, in which little is at right angles: walls that bend by 8 to 60 degrees, a ramp for wheelchairs
 // (4 degrees) to a landing, a step of 10 cm, boards that lean, counters and columns at odd angles, a sloping soffit.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A gallery, 18 x 9 m: pillars, free-standing panels, pedestals, a podium one step high, benches.
 #include <cmath>
 

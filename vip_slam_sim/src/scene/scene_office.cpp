@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An office floor, 44 x 22 m: a ring of corridors round a closed core, rooms to the north and south, and an open hall
 // to the east. Long plain walls, faint carpet and ceiling tiles; pictures and fittings are far between, as in real
 // ones.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "scene_parts.h"
 
 #include "scanned_room.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Furniture and fittings shared by the scenes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A motion-capture room, 9 x 7 x 4 m: mats on the floor, posters, furniture along the walls, the middle free to fly.
 #include "scene_parts.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A stairwell, 12 x 8 m under a pitched roof: a flight of steps and a ramp lead to a gallery. Slanted planes abound.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A workshop, 7 x 6 m: open racks with boards at many heights, boxes, a bench with clutter, an open door into a store.
 #include <cmath>
 

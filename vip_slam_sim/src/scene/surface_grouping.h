@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Coplanar pieces that touch each other become one physical plane.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // imu_from_rgbd_folder FOLDER --out DIR: real RGB-D images with poses become a bag with a synthetic IMU, or without
 // any.
 #include <csignal>

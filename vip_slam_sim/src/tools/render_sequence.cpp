@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // render_sequence NAME_OR_YAML --out DIR: a sequence with ground truth into a bag (or a folder).
 #include <malloc.h>
 

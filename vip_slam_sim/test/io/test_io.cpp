@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bags and folders: data survive the round trip, no partial output stays; folders of real images.
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Poses of a folder: their accuracy, the noise of an IMU made from them, and their refinement by depth images.
 #include <gtest/gtest.h>
 #include <unistd.h>

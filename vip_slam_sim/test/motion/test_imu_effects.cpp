@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What real IMUs measure beyond motion, constant bias and white noise.
 #include <gtest/gtest.h>
 

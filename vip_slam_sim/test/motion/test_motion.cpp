@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Trajectories: exact derivatives, IMU integration, sensible motions.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What real colour cameras do beyond a calibrated lens and white noise.
 #include <gtest/gtest.h>
 

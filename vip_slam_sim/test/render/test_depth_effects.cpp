@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What real depth cameras get wrong, each effect measured in what comes out.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Images against geometry: warping, optical flow, noise, determinism.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rooms from a headset's scan: mesh, labelled planes, errors.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Scenes and their true planes; sequence definitions.
 #include <gtest/gtest.h>
 

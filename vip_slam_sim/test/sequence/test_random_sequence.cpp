@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The script that draws random definitions: all are accepted, and equal seeds give equal definitions.
 #include <cstdlib>
 #include <filesystem>

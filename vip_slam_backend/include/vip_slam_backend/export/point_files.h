@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The map's points for other programs; coordinates in `map`, metres; `label` is the plane a point lies on, 0 for none.
 // In a library of its own (vip_slam_backend_export): PCL's writers load VTK.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A keyframe's pose unpacked for the visual factors: computed once per keyframe and iteration, used by all its factors.
 // Perturbation everywhere: R_W_I <- R_W_I Exp(dtheta), t_W_I <- t_W_I + dt; tangent order (theta, t).
 #pragma once

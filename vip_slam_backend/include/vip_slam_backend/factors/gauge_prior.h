@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Fixes the gauge (not in the paper), which no measurement of an inertial problem observes: position and yaw of one
 // keyframe. Four rows; at the minimum they are zero, so their weight changes nothing but the conditioning.
 //   r = w (p - p_0, e_z . Log(R R_0^T)),  d Log / d theta = J_r^-1(phi) R_0.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Homography of a plane between two keyframes (paper section "Compressed Homography Measurement", equations 3 to 7,
 // corrected):
 //   H = R_j^T (I - a n^T / D) R_i,  a = t_i - t_j,  D = d + n^T t_i   (camera poses),  H p_i = (z_j / z_i) p_j.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A weak prior (not in the paper) on velocity and biases of one keyframe without an IMU factor from the keyframe before
 // (first keyframe, IMU gap).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Horizontal and vertical planes (the paper's text on E_GBA, equation 11, names the prior, its sum lacks it):
 // horizontal r = (n_x, n_y)/sigma, vertical r = n_z/sigma, sigma in radians. A general plane has no prior.
 #pragma once

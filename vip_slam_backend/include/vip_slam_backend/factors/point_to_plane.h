@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth points of one keyframe on a plane (paper section "Compressed Point-to-Plane Measurement", equations 8 and 9,
 // corrected: points in the camera frame, camera pose): u = T_W_C^T pi = (R_C_W n, n.t_W_C + d), residual of a point w
 // (u . [p_C; 1]); N points compress into G_p = sum w^2 p~ p~^T: cost C^cpp = 1/2 u^T G_p u.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A plane observed from a pose (third sum of E_PPG, equation 10 of the paper, corrected: pi_C = T_W_C^T pi_W and the
 // difference on S^2 x R): r = ( B^T R^T n ,  n . t + d - d_m ) with B the tangent basis of the measured normal. The
 // first two rows are the sine of the angle between predicted and measured normal, smooth everywhere; both normals must

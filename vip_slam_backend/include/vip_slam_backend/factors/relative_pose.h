@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Relative pose of two frames (first two sums of E_PPG, equation 10 of the paper, corrected: inverse instead of
 // transpose, rotation as a logarithm): with T_i_j measured,
 //   r_theta = Log(R_ij^T R_i^T R_j),  r_t = R_i^T (t_j - t_i) - t_ij.

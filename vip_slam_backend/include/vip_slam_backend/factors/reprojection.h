@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Reprojection and depth of a point seen by a keyframe (paper section "IMU and Point Feature Measurement", equation 2,
 // r^C and r^C_lambda): p_C = R_C_I (R_W_I^T (p_W - t_W_I) - t_I_C), r = (x/z - u, y/z - v), r_depth = z - lambda.
 //   d p_C / d p_W = R_C_W,  d p_C / d t = -R_C_W,  d p_C / d theta = R_C_I [R_W_I^T (p_W - t_W_I)]x.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From the map to the pose-plane graph: odometry edges between neighbours in time, edges from earlier loops and shared
 // landmarks, and plane edges; the caller adds the new loop.
 #pragma once

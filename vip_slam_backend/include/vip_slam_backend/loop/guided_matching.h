@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Matches points of the map that a camera at a known pose should see with features around their projections.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Loop closing (paper section "Loop Detection and Pose Plane Graph Optimization"): recognises places, verifies them,
 // corrects the map by the pose-plane graph and fuses landmarks. A loop is accepted only when appearance, neighbouring
 // keyframes, geometry, gravity, depth, planes and odometry agree.

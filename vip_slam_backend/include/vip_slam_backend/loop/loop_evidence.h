@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How much more probable it is that two keyframes show one place than that they show two places that look alike, from
 // how much of the image the match explains and from where the map expected it. Natural logarithms of likelihood ratios.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Merges duplicate landmarks after a loop.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Options of place recognition, loop verification and the pose-plane graph.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How much of what the map shows of a place an image explains. A door frame that looks like another one explains one
 // corner of the image; the true place explains most of it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Descriptor matches between two keyframes that may show the same place, guided by the direct index: only features
 // below the same vocabulary node are compared.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The pose of a camera, or of a rig of cameras, from matched points of the map: a RANSAC on pairs of points that uses
 // depth and the known direction of gravity, then Gauss-Newton on pixels and depths. World is any frame with z up in
 // which the points are given. Several keyframes of one odometry form a rig: over a second or two its drift is far below

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Searches the place of a map that the last keyframes of an odometry show, by appearance alone. Since there is no prior
 // pose that could rule out a wrong place (another odometry, a loaded map), the keyframes of a second or two are judged
 // together, they must explain what the map predicts to be visible, and a second place that fits about as well leads to

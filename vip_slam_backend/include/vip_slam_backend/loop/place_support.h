@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Evidence of several keyframes of one odometry for a place of the map, and their pose there. A door frame that looks
 // like another one explains one corner of the image; the true place explains most of what the map's views of it cover.
 #pragma once

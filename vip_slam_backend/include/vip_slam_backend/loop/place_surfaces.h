@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Associates the points of a depth image with planes of the map.
 #pragma once
 

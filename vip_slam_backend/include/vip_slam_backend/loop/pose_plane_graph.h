@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The pose-plane graph (paper section "Loop Detection and Pose Plane Graph Optimization", corrected residuals: see
 // factors/relative_pose.h and factors/pose_plane.h). Poses have yaw and position as variables; roll and pitch are
 // fixed, since the IMU observes them. Planes are variables on S^2 x R. ROS-free and independent of the map.

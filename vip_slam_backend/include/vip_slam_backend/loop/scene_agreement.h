@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Checks of a place match that are independent of its feature points: whether the depth images and the planes of the
 // two keyframes describe one scene.
 #pragma once

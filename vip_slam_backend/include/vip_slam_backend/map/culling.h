@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Keeps the map small: removes landmarks with too few views, and redundant keyframes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Landmarks from a new keyframe: known tracks gain an observation, new tracks become landmarks by depth, tracks without
 // depth wait until two keyframes see them under enough parallax.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The map of the back end. One owner thread; others get snapshots. Every operation keeps the invariants that
 // checkMap() (map_checker.h) states, or throws MapError and changes nothing.
 #pragma once

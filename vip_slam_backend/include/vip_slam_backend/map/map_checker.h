@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The map's invariants. Tests run it after every operation; tools may run it on a loaded map.
 #pragma once
 

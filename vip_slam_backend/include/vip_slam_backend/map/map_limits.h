@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Limits on the data of a map, from a front end or a file: what is accepted can be saved and loaded again.
 #pragma once
 

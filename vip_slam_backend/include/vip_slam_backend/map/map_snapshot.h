@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A copy of the map for readers in other threads: runner, publishers, report.
 #pragma once
 

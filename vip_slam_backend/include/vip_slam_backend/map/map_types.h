@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the map holds: keyframes with their states, landmarks (points) and planes. World is `map`, z up.
 #pragma once
 

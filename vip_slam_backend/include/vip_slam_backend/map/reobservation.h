@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Finds landmarks of nearby keyframes again in a new keyframe: projection, pixel gate, Hamming distance. Untracked
 // corners become observations; a tracked feature that has another landmark is the same point under a new track, and the
 // two landmarks merge.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which poses are one place, and which keyframes look at the same scene.
 #pragma once
 

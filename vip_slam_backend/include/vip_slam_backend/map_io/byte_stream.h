@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Little-endian bytes in and out, for files. The reader never reads beyond its end and never trusts a count.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Map files (.vsm): everything that a later session needs to relocalise and to continue mapping.
 //
 // Layout, little-endian: "VIPMAP" 0 0 | u32 version = 6 | u32 reserved = 0 | u64 payload bytes | payload | u32 CRC-32

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Estimates the depth camera's distance-dependent error from the map. A wall seen from near and from far has one place
 // in the map: where its depth points lie in front of it at some distances and behind it at others, the camera reads too
 // short and too long there. A time-of-flight camera's periodic error of some millimetres is found to a few tenths of

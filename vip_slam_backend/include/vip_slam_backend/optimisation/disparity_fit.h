@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Estimates a common disparity error of a stereo or structured-light camera (a tenth of a pixel, say) from the map.
 // Most of its effect on depth is an offset and a scale, which a map cannot observe. But its curvature is observable
 // where planes are seen from near and from far, and since the error has one parameter, offset and scale follow from it.

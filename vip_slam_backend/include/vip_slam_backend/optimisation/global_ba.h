@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Global bundle adjustment in parallel to the running back end (paper section "Global Plane and Point Bundle
 // Adjustment"): it solves a copy of the problem, and the solution is merged with the map, which has changed meanwhile.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Estimates the map's scale from the accelerometer alone, as a check. A map's distances come from tens of thousands of
 // depth readings, and the accelerometer has hardly any weight against them. Here the keyframes' poses are fixed except
 // for one common factor on their distances, and velocities, biases, the direction of gravity and its magnitude are

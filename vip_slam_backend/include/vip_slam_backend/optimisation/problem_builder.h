@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From the map to a bundle adjustment and back (paper sections "Local Plane and Point Bundle Adjustment" and "Global
 // Plane and Point Bundle Adjustment"): which keyframes are free, which are fixed, and how the four variants turn
 // landmarks and planes into factors.

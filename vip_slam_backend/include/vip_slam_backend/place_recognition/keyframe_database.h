@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Inverse index from words to keyframes, to find keyframes of similar appearance.
 #pragma once
 

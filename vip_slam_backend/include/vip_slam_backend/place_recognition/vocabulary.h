@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A hierarchical binary vocabulary in the DBoW2 scheme (Galvez-Lopez & Tardos 2012): a tree of k-medians over ORB
 // descriptors whose leaves are visual words weighted by their inverse document frequency.
 // An image becomes a sparse tf-idf vector of L1 norm 1 (BowVector) and a direct index from tree nodes to its features.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Vocabulary files: our compact binary format, and the text format of ORB-SLAM (DBoW2's saveToTextFile).
 //
 // Binary, little-endian: "VIPVOC" 0 0 | u32 version = 1 | u32 branching | u32 levels | u32 nodes | u32 words |

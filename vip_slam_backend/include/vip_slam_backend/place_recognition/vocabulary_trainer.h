@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Trains a vocabulary: hierarchical k-medians over binary descriptors (the median of a cluster is the majority of each
 // bit), idf from the number of images that contain a word.
 #pragma once

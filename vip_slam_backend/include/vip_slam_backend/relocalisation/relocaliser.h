@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Relocalisation: finds a keyframe in the map without a prior pose (after LOST, in a loaded map, in localisation-only
 // mode). See loop/place_search.h for the reasons of a refusal.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A bundle adjustment as plain arrays: what both solvers read and change. Indices are positions in these arrays.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The interface of the two bundle adjusters. Both run Levenberg-Marquardt with the same damping (Ceres' rule) on the
 // same factors, so that their iterates agree.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Arrays of doubles for the solver's kernels: aligned to cache lines, and large ones on huge pages, since a solver that
 // is made for a single adjustment would spend a tenth of its time on the first touch of small pages.
 #pragma once

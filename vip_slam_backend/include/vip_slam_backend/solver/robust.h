@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Losses of a squared, whitened residual.
 #pragma once
 

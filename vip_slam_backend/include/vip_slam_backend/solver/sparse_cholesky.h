@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Block-sparse Cholesky of a symmetric positive definite matrix whose unknowns come in nodes (6 pose, 9 motion, 3
 // plane): approximate minimum degree, then a multifrontal factorisation on dense fronts. The symbolic part is done once
 // per structure; values are copied directly from the caller's blocks into the fronts. The right-hand side is the last

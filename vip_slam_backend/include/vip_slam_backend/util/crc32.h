@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // CRC-32 (IEEE 802.3 polynomial, reflected), the checksum of our files.
 #pragma once
 

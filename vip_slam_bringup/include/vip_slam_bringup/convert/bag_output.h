@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A bag that appears completely or not at all, filled from streams that are each in time order.
 #pragma once
 

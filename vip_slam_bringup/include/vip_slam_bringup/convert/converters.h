@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Converts data-set folders to bags. Each converter reads all tables before it writes, reports file and line of what it
 // cannot read (std::runtime_error, one line), and leaves either all of its files or none.
 #pragma once

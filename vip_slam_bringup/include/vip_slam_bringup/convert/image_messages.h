@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Images and intrinsics to messages, as converters and the stereo nodelet need them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Tables in text files (CSV or blank-separated); every error names file and line.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Other readings of a calibration that drivers are known to mean by it: the same numbers under another model, for
 // images that are rectified already, with roi and binning applied already.
 #pragma once

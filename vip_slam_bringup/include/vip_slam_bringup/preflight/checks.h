@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The preflight checks: each tests one aspect of a recording and reports its findings in plain words.
 #pragma once
 

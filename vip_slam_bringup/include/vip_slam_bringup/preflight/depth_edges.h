@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Registered depth whose pixels are not those of the colour image: some drivers align it to the colour camera without
 // its lens. Where depth jumps, the image usually has an edge too; the two places where that can be differ by the
 // lens's distortion.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where the image's edges lie beside those of registered depth: cross-correlation of the two over all shifts, round the
 // image's border as well, since a torn image is wrapped round. Small images, summed over a second each and in all.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The integrated rotation angle of the gyro as a function of time: for motions so short that rotations are additive.
 #pragma once
 

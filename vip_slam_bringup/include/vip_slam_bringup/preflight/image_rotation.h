@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rotation between successive images, for the check of delay and extrinsics: from corners tracked by KLT, with depth by
 // PnP (accounts for parallax), else by aligning the bearing vectors.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The camera's velocity from images and depth against the accelerometer: whether accelerometer and gyroscope have the
 // same axes, and how long a metre of depth is.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Estimates the readout time of a rolling shutter, from the first row of an image to the last, and the camera-IMU
 // delay.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Fills a Recording from messages, whether they come from a bag or from live topics.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Data of a sensor from a bag or live topics, reduced to what the checks need. It depends on neither bag nor master, so
 // that the checks can be tested on synthetic recordings.
 #pragma once

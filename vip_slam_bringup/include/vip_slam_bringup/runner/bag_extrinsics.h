@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Camera-IMU extrinsics from the bag's tf, by the rules of the front-end nodelet: frame names are those of the
 // messages, /tf_static is used always, and /tf when it is early enough.
 #pragma once

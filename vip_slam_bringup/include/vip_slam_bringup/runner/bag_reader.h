@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The bags of a recording as a sequence of decoded sensor data: IMU samples and paired images, in the order they were
 // recorded. Reading, decoding and pairing run ahead in their own thread; the output does not depend on its speed.
 #pragma once

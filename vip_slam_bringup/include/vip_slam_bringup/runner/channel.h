@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A lossless bounded queue between two threads: the writer waits while it is full. (The nodelets' queues drop instead,
 // since a camera does not wait.)
 #pragma once

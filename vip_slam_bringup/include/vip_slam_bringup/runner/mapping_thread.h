@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Planes and back end in their own thread: tasks are done in the order of their posting, so that the results do not
 // depend on the speed of either thread.
 #pragma once

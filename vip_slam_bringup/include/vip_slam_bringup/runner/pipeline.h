@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The estimators in lock-step: sensor events are input, poses are output, with bit-identical results each time.
 //
 // The front end runs in the calling thread, planes and back end in their own thread. The back end's update for a

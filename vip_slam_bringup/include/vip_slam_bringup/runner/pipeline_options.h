@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All options of the estimators, with the names used by run_bag and the parameter reference.
 #pragma once
 

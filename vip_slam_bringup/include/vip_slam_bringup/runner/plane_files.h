@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Export of planes: a mesh, and a floor plan.
 #pragma once
 

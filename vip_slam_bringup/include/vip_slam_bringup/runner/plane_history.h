@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where each plane lay after each map update, to judge how steady planes are (plane_history.csv).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The output files of a run (docs/outputs.md).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sub-pixel refinement of a disparity image by the images' own intensities: one Lucas-Kanade step along the rows.
 //
 // Semi-global matching selects whole pixels and interpolates costs, and its smoothness penalty turns slanted surfaces

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A calibrated stereo pair as one YAML file:
 //   left:  {width, height, fx, fy, cx, cy, model, distortion: [...], T_imu_cam: 4x4 as four rows}
 //   right: likewise

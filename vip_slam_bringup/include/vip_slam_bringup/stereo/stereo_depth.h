@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth from a calibrated stereo pair: rectification, OpenCV's semi-global block matching, sub-pixel refinement,
 // depth = f B / disparity.
 // The depth belongs to the rectified left camera, whose optical frame is the left one rotated by the rectification.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Correction of a camera's intrinsics in normalised coordinates: the true bearing of a pixel is (x + sx x + cx, y + sy
 // y + cy, 1), where (x, y, 1) is the one computed with the given intrinsics. s is positive when the given focal length
 // is too long, c when the given principal point is too far right or down. The map is linear in (x, y, 1), so that it

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Camera models: pixels <-> normalised coordinates (x, y, 1) in the optical frame (x right, y down, z forward).
 // Pixel (0,0) is the centre of the top-left pixel, as in OpenCV and ROS.
 #pragma once

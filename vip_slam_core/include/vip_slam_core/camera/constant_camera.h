@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Images of a camera whose focal length changes from image to image (autofocus), as a camera with one constant K sees
 // them: nothing behind has to know. The same step makes them smaller. Pinhole to pinhole, without distortion: a scale
 // and a shift.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Correction of a depth camera's distance-dependent error that is neither an offset nor a scale, such as the periodic
 // error of a time-of-flight camera: a table over the reading, linear in between; positive where it reads too short.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // In which unit a folder's 16-bit depth images are written, told from their values.
 #pragma once
 

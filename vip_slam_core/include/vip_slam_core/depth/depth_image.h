@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Edge-safe depth: a look-up that refuses values next to depth edges, and a coarse grid of such depths.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth noise of RGB-D cameras: one-sigma error of the measured z as a function of z.
 #pragma once
 

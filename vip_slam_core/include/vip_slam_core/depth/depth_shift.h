@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth that is registered to the colour image with an error of some pixels. On a wall seen at a slant a neighbouring
 // pixel has another depth, so that depth and colour show inconsistent motions.
 #pragma once

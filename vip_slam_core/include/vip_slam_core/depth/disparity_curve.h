@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth error of a stereo or structured-light camera with a common error of all disparities: with d = f B / z of focal
 // length and baseline, 1/z = 1/reading - error, error = (excess of d) / (f B). The depth error grows with the square of
 // the distance.

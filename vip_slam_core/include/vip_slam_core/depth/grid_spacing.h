@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Spacing of depth look-ups on the image.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth cameras that write "no reading" as a distance, as the end of their range, instead of 0.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // RVL, the lossless compression of 16-bit depth images of A. D. Wilson, "Fast lossless depth image compression" (ISS
 // 2017). The pixels, row after row, are runs of zeros and of values in turn; a run is its length and, of values, the
 // differences to the value before in zigzag order (0, -1, 1, -2, ...). Numbers are written in digits of three bits, the

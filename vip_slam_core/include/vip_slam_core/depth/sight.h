@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a depth image says of a place: that something is there, hides it, or lies behind it. One test for all who ask.
 #pragma once
 

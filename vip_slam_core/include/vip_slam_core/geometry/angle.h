@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Degrees, for people; everything computes in radians.
 #pragma once
 

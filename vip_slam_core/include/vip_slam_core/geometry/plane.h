@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Infinite planes n^T x + d = 0 with |n| = 1, metres, and their manifold S^2 x R.
 // Source: paper section "Notation"; closest-point (CP) vector as in Geneva et al. 2018. Here eta = n d with
 // n^T x + d = 0, so eta is minus the plane's closest point to the origin. n is undefined at eta = 0, which is why

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What one keyframe's depth points on a plane are worth, and how they agree with their plane.
 //
 // The points' errors along the plane's normal have two parts: white ones, and one that the whole surface shares in that

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Triangles of a plane's polygon with holes, for drawing and for meshes.
 #pragma once
 

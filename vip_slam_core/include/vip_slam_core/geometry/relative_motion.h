@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A measured motion of the body with its covariance, as between two poses of an odometry.
 #pragma once
 

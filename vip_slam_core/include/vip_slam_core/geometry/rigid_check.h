@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Matrices that users write or files hold, taken as transforms.
 #pragma once
 

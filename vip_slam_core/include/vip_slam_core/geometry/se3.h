@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rigid transforms. T_A_B maps points of B into A: p_A = T_A_B * p_B.
 // The estimators perturb T with R <- R Exp(dtheta), t <- t + dt (dt in the target frame); see boxplus().
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rotations: exponential map, logarithm and Jacobians of SO(3).
 // Hamilton quaternions, right perturbation R <- R Exp(dtheta), radians throughout.
 // Source: Forster et al. 2015. The IMU factor uses J_r and J_r^-1.

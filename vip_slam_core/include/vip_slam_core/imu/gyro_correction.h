@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A gyro's scale errors and axis misalignment, which are not white noise: a correction C with
 // omega = (I + C) * measured, applied before the bias is removed. Scale errors are on its diagonal (-0.003: measures
 // 0.3 % too much), cross-axis sensitivities (radians) off the diagonal.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Detects saturation: a gyro at the limit of its range repeats the same number while the body turns faster.
 #pragma once
 

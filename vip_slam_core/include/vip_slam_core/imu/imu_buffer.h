@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Time-ordered IMU samples with boundary interpolation. Joins separate gyro and accelerometer streams, and replaces
 // single wrong samples (spike_filter.h): a suspicious sample enters the buffer only with the next one.
 // Not thread-safe: one owner; callers lock around it.

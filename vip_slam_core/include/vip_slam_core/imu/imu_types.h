@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // IMU samples, noise figures and the navigation state shared by front end and back end.
 #pragma once
 

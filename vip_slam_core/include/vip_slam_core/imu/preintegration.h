@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // IMU preintegration between two keyframes (paper section "IMU and Point Feature Measurement"; Forster 2015, residual
 // as in VINS-Mono).
 // Gyro and accelerometer are linear over each step, with the terms of coning and sculling that follow from it; J and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Replaces single wrong samples (a bus error, a flipped bit) of an IMU's stream before integration: 30 m/s^2 during one
 // sample of 5 ms is 15 cm/s, far beyond the noise model.
 //

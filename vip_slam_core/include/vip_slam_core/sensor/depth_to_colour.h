@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth images as a driver publishes them, brought to the pixels of the colour image, as the sensor file says: the one
 // place for the live system, run_bag and check_bag.
 #pragma once

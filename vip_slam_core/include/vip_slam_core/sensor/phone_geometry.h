@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where the camera of an iPhone or iPad sits: one place for its recordings and its live streams.
 #pragma once
 

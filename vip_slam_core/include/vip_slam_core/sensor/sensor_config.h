@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One sensor = one YAML file: topics, encodings, intrinsics, extrinsics, IMU and depth noise, delay.
 // Keys are documented in vip_slam_bringup/config/sensors/README.md; every shipped and every simulated file has them
 // all.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A smooth 6-DoF motion with exact derivatives and its ideal IMU, for tests of estimators.
 // Position is a sum of sines; orientation is ZYX Euler angles of sines, whose body rate is exact.
 #pragma once

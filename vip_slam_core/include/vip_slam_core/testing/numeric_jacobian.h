@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Central differences for the tests of analytic Jacobians.
 #pragma once
 

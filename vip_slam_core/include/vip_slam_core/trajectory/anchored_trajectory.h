@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The poses of all images, from odometry and keyframes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Selects the stamps of a trajectory when the clock runs back: a looping bag, joined recordings, a device whose clock
 // restarts. A trajectory has each time only once, so for repeated times the first pass is used.
 #pragma once

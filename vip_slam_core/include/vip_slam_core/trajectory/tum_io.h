@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Trajectories in TUM format: "timestamp tx ty tz qx qy qz qw", one pose per line, '#' comments.
 #pragma once
 

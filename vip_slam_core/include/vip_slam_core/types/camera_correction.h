@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Applies corrections of depth and intrinsics that are estimated only after readings and bearings were passed on: all
 // data derived from them is converted to the newest correction. A corrected reading moves its point along the ray; a
 // corrected bearing rotates the ray. With a shift of the depth image, points on planes move sideways with their

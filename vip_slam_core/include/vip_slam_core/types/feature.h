@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Identifiers and image features that the front end passes to planes and back end.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Output of the front end: a tracked frame per image, and keyframes. Immutable once published.
 #pragma once
 

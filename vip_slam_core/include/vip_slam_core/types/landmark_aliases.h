@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Landmarks that were merged: the id under which a track is known now. Tracks keep the id that the front end gave them.
 #pragma once
 

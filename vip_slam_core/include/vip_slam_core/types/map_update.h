@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The back end's output to front end and planes after each optimisation. World is `map`.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The plane module's output to the back end: the plane map and its changes. World here is `map`.
 #pragma once
 

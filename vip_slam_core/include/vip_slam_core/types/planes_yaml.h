@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Plane maps as YAML: true and found planes share one layout, to which the truth adds seen_seconds and seen_area.
 //   planes: [{id, kind: horizontal|vertical|general, normal: [x,y,z], distance, area, polygons: [{outer: [[x,y,z],...],
 //   holes: [...]}]}]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where a front end's numbers begin. One that is started again beside a back end that goes on must not use numbers that
 // the map has already: its odometry is a new epoch, and what it sees are new keyframes and landmarks.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Convention of front end and back end on the sigma that a feature reports.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A plane that is known to be there, with how long and how much of it was in view: what found planes are judged by.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Files that appear completely or not at all: written next to the target and renamed on commit().
 #pragma once
 

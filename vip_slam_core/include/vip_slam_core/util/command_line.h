@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The command line of a tool: a thin wrapper of Boost.Program_options, so that all tools behave alike: defaults in
 // --help, one line for a mistake that names the option and what was expected, exit status 2.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // printf into a string.
 #pragma once
 

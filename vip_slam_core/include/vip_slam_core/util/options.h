@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Option structs. One declaration per option gives name, default, range, unit and meaning; loading from YAML or ROS
 // parameters, range checks, printing and the parameter reference are all derived from it:
 //

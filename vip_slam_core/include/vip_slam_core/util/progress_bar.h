@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Progress with the remaining time: a bar that is redrawn on a terminal, elsewhere a line per tenth.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whether two images are equal. By noise no two images of a camera are, so the comparison mostly ends with the first
 // row.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Limits that restate a statistical fact, once for each meaning.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // In which unit a file's stamps are written.
 #pragma once
 

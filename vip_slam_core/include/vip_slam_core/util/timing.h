@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stage timing: scoped timers feed a TimingLog, which writes CSV and summarises. Milliseconds, by the clock and of the
 // processor: the first is what a user waits for, the second does not depend on what else the machine runs.
 #pragma once

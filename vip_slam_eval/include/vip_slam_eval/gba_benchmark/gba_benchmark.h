@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The paper's Table III and time-over-keyframes figure: four variants and two solvers on one map, with the time of
 // each part.
 #pragma once

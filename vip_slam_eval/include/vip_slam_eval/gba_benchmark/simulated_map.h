@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A map as the system would have it at the end of a sequence, from a landmark-level simulation: geometry, visibility
 // with occlusion, a tracker that loses and finds points, pixel, depth and IMU noise, and drifted initial poses.
 #pragma once

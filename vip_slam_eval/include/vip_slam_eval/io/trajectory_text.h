@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Trajectories from text files as data sets publish them, and the order of their quaternions.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Precision and recall of the point-to-plane associations of a map.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Quality of a plane map: which true planes were found, how often, how accurately, and which estimates are false.
 #pragma once
 

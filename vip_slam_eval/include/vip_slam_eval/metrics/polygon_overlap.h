@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Areas of polygons with holes and of their intersection, in the coordinates of a plane.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Completeness of a trajectory, and consistency of its covariances with its errors (NEES).
 #pragma once
 

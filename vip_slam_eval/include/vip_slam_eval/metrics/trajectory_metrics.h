@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Errors of a trajectory against the truth: absolute error after alignment (ATE), relative errors over time and over
 // distance (RPE). Poses are of the body (IMU); the truth's world and the estimate's world may differ.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Benchmark of the plane module alone: the front end tracks and selects keyframes, whose poses are the true ones.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How stable the horizontal planes of a map are: their height as measured by each depth image at its estimated pose.
 #pragma once
 

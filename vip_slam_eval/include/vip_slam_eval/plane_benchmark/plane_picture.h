@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Estimated planes drawn over a camera image, with their outlines, ids and kinds.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The complete evaluation of one run: everything that the command `evaluate` prints, writes and draws.
 #pragma once
 

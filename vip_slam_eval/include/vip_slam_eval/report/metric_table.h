@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A list of named values and its two output formats: terminal table and CSV.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Plane and association metrics as rows of a table and as CSV.
 #pragma once
 

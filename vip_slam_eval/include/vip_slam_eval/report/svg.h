@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Pictures as SVG: a page of primitives, and axes with ticks, grid and labels that map data to the page.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Camera-IMU extrinsics, time offset, and the corrections of depth, intrinsics and gyro, as estimated online by the
 // filter.
 #pragma once

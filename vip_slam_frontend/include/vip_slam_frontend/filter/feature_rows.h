@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Measurement rows of one feature (MSCKF): per view two pixel rows and, when there is a depth, one depth row
 // lambda - z_C; whitened; the feature itself is projected out by a QR of its Jacobian, which leaves
 // 2 m + n_depth - 3 rows. The QR goes view by view, so that a row has zeros for all clones before its view: later steps

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Options of the sliding-window filter, its calibration states and zero-velocity updates.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Chi-square gate on measurement rows before they enter the filter.
 #pragma once
 

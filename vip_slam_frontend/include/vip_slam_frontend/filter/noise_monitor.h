@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Adapts the noise of pixels, and that of depth, to the residuals of triangulation: log-domain moving average, clamped,
 // used from the next image on. Each uses its own rows, so that a wrong noise model of the one does not affect the
 // other.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A feature's observations as the filter uses them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // IMU propagation between two images: predicted state, transition Phi and noise Q, state order (theta, p, v, b_g, b_a).
 // Phi is evaluated between the first estimates of both ends (FEJ), which keeps the four unobservable directions
 // (position and yaw) unobservable: Phi N_k = N_{k+1} exactly.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // In-place Householder triangularisations for the square-root filter. Columns are contiguous (Eigen's default), the
 // inner loops run along rows, so they vectorise; four reflectors are applied at once.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Recent angular rates of the body, for the Jacobians of calibration states. A Jacobian with the noise of the same
 // samples that propagate the pose is correlated with the error it has to explain: in slow motion, which is mostly
 // noise, gyro scale and camera-IMU delay would be estimated from that noise.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Square-root inverse filter algebra (Wu et al. 2015; algorithms as in the paper's front end): the cost |R x - r|^2 of
 // the error state with R upper triangular, so P = R^-1 R^-T. After every update the correction is applied to the window
 // and r is zero again.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rows from depth alone: points of the newest depth image lie on the flat patches that an earlier one saw. They need no
 // corners, so they constrain five degrees of freedom in a corridor with textureless walls. Per pair, in the patch's
 // camera:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Solves with the filter's triangular factor, vectorised over the rows; rows with leading zeros cost less.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A feature's position from its observations in the window: start from the median of the depth readings (robust against
 // readings across an edge) or, without depth, from the least squares of all rays; then Gauss-Newton over pixels and
 // depths in the inverse-depth form (x/z, y/z, 1/z) of the first camera.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The visual-inertial filter: window, feature tracks and the order of steps per image (propagate, augment, select
 // features, update, marginalise). Source: paper section "Motion Estimation"; Wu et al. 2015.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
 // present pose), E = (v, b_g, b_a), calibration = the estimated ones of (theta_IC, t_IC, td, depth offset, bearing
 // correction, depth shift, gyro correction).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Zero-velocity updates: detection of standing still, and its measurement rows.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Fault detection and isolation of the IMU. Each interval between two images has two witnesses of the camera's motion:
 // the IMU, and the points with depth in the images. Their difference, in sigmas of both, is tested. The images are only
 // heard when they agree among themselves: most points follow one motion, and nothing in view has moved by itself

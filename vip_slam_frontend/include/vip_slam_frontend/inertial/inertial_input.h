@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The inertial side of the front end: what gyroscope and accelerometer measured, and what stands in for a channel that
 // there is not, or that is not to be trusted over an interval. A stand-in is a sample like any other, a constant rate
 // or specific force, with a noise so wide that it says little: so everything behind (propagation, rolling shutters,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What is level without an accelerometer: the floor, or a table, that the first depth image shows.
 #pragma once
 

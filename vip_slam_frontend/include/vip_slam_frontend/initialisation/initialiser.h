@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The start: the filter's first state from the first usable images, moving or still, with sigmas wide enough for what a
 // fraction of a second cannot tell; the filter itself sharpens them. Level: by the mean specific force, else by a
 // floor, else as the camera's axes are. Velocity and rate: by the motion between the images (dense_alignment.h). No

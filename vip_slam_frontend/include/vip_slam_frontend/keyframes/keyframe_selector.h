@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which images become keyframes: by rotation-compensated parallax, tracked ratio, rotation, translation over scene
 // depth, and time; none while standing still.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // FAST corners spread over the image by a grid: strong ones first, weaker ones where nothing strong is.
 #pragma once
 

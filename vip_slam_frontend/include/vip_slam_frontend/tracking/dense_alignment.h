@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The camera's motion between two RGB-D images from all of their pixels: grey values and depth of the earlier image,
 // moved to the later one, have to agree there. Coarse to fine on small images, so that large turns are found without
 // any prediction. It gives the turn where no gyroscope does, for the start of optical flow, before features are

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Removes rolling shutter and stamp lag from a depth image: the result is what the camera at the stamp would have seen.
 // Not needed for depth sensors with a global shutter and the stamps of the colour image.
 #pragma once

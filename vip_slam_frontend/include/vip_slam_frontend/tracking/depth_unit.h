@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Detects that the unit of depth changes between two images, as when a driver's depth units are set anew at run time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth of the surface a tracked corner belongs to. Corners gather where surfaces end (door frames, rims of boxes),
 // where a window of readings holds two surfaces, and on walls seen at a flat angle, where it holds a wide range of
 // depths. The edge-safe look-up refuses both; here planes decide. A plane is affine in inverse depth:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Follows features from image to image: KLT from a start predicted by gyro, depth and the filter, forward-backward
 // check, alignment with the patch of first appearance, gyro-aided outlier rejection, and new corners where features are
 // missing. Track ids live as long as the track and are never reused.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Detects a frozen depth camera, which repeats its last image under new stamps.
 #pragma once
 

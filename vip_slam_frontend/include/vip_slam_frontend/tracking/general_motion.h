@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Outlier rejection when the rotation between two images is not known (IMU gap, wrong calibration): camera pose from
 // points with depth. Without depth nothing replaces the rotation.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Spatial index of the map's landmarks: a building has hundreds of thousands, an image shows some hundred.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Re-acquires landmarks of the map that are in view but not tracked: projected with the corrected pose, matched by
 // Hamming distance to the corners around and aligned with the patch of their old track, so that a track starts again
 // with the landmark's id.

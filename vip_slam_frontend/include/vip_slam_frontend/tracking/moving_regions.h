@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Regions of an image that move independently of the camera, from its tracks: around a point that does not follow the
 // camera's motion and at about its depth, when no static point is nearer.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // ORB descriptors at given pixels, and further ORB corners for keyframes. Rotation by the intensity centroid.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Gyro-aided outlier rejection. The rotation between two images comes from the gyro, so a sample only has to determine
 // the translation: two points with depth (metric), or two rays (direction only). Unlike the eight-point fundamental
 // matrix this does not degenerate when all points lie on one plane.

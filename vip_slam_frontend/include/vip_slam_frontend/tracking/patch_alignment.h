@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sub-pixel alignment of a patch with its first appearance (inverse compositional Lucas-Kanade over shift and
 // brightness). It removes the drift of frame-to-frame tracking, a few hundredths of a pixel per image.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Patches that lie on one plane share its normal. A single patch is some centimetres wide and gives its normal to about
 // a degree; measurement rows with such normals would falsely constrain the motion along a bare wall.
 #pragma once

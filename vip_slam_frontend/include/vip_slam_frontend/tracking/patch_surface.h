@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The piece of surface that a patch shows. With its depth and slope the patch can be warped into another view to second
 // order. On a wall seen at a flat angle a patch that is assumed to face the camera would drift.
 #pragma once

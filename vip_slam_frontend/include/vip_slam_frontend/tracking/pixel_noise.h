@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Pixel covariance of a patch match. It depends on direction and contrast: along a straight edge the patch can slide
 // almost freely, and the same image noise shifts a faint corner further than a strong one. The covariance of a
 // least-squares match is sigma_grey^2 G^-1 with G the sum of the gradients' products.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The camera's motion between two images as predicted by the IMU, for outlier rejection. When a person close to the
 // camera fills the view, most points follow the person's motion; for some seconds the IMU is the better judge.
 #pragma once

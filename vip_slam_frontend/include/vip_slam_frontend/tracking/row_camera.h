@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The colour camera during one image. A rolling shutter reads the rows one after the other while the camera moves, so
 // every row has a pose of its own. This class converts pixels to points seen from the pose at the stamp and back, so
 // that the rest of the code can assume a global shutter.

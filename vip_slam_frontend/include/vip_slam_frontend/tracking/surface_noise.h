@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The two parts of a depth camera's noise, learnt from flat surfaces. White noise differs from patch to patch and
 // averages out over a surface: it is what patches of two images differ by, offset and tilt of the surface apart. What
 // neighbouring patches have in common (warped depth, disparity steps, multipath) does not average out: the part that

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Flat patches of one depth image, and where later depth images see the same surfaces: projective association of points
 // to planes, the measurements behind surface_rows.h.
 #pragma once

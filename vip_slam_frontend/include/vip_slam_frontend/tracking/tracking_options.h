@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Options of feature detection, tracking and outlier rejection.
 #pragma once
 

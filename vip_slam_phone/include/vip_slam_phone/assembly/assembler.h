@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Puts images, their cameras, depth and IMU of the phone together: all on our clock, stamped at the middle row's
 // mid-exposure, as one camera with one constant K.
 #pragma once

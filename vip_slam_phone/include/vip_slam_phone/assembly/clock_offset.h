@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The phone's clock against ours. What the network adds to an arrival is never negative: the smallest of
 // (arrival - stamp) is the offset and the shortest way.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Hands on what was received in a thread of its own, so that whoever takes it slowly does not stall the reading.
 #pragma once
 

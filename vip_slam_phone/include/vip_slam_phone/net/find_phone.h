@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Finds a phone in the local network by what it announces (Bonjour), with avahi's own command.
 #pragma once
 

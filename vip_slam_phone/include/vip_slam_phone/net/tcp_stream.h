@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A TCP connection that gives up in time and can be told to stop from another thread.
 #pragma once
 

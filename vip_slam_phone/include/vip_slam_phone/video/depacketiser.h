@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // RTP packets to the pictures of a video: H.264 (RFC 6184, single units, STAP-A, FU-A) and HEVC (RFC 7798, single
 // units, aggregation, fragments).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // RTP packets and RTCP sender reports (RFC 3550).
 #pragma once
 

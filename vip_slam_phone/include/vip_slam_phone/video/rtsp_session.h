@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An RTSP 1.0 session (RFC 2326) with its video interleaved in the same TCP connection. Sound is left out.
 #pragma once
 

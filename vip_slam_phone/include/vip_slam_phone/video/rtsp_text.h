@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The text of RTSP (RFC 2326): answers and authentication.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The description of an RTSP session (SDP): where its video is and how it is coded.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // H.264 and HEVC by libavcodec.
 #pragma once
 

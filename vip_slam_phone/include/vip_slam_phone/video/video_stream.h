@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The packets of an RTSP session's video to images with the phone's time.
 #pragma once
 

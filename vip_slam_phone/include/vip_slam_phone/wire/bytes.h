@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bytes from the network. Every length is checked before it is believed.
 #pragma once
 

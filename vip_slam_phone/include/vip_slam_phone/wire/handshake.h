@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the phone says of itself at the start of the record and depth streams.
 #pragma once
 

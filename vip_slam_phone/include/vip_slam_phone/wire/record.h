@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The records of 64 bytes that the phone sends for ever: IMU, intrinsics of each image, its own pose, camera format.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The paper's geometric-consistency test of a map point against a plane (section "Point and Plane Association"):
 // whether its reprojection error stays as small when it is forced onto the plane. Depth is used as well, since with
 // little parallax any point can be moved onto a plane behind it without a larger reprojection error.

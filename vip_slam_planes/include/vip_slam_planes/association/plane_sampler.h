@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The compressed point-to-plane measurement of one keyframe on one plane (paper section "Compressed Point-to-Plane
 // Measurement"): samples spread evenly in 3D, G = s * sum p~ p~^T / sigma^2, with s for the error that they share.
 // A wrong sample cannot be removed once it is summed, so the selection is strict: nodes one stride inside the surface's

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Association of landmarks with planes (paper section "Point and Plane Association"): candidate set and decisions. The
 // data of landmarks follow the merges and positions in the back end's MapUpdates.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Plane labels of the nodes of a keyframe's depth grid.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The surfaces that triangles of one plane consist of: a wall on either side of a door is two.
 #pragma once
 

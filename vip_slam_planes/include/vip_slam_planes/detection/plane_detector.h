@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // New planes from the triangles of one keyframe that no known plane explains (paper section "Plane Detection").
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Evidence of planes that no single image shows well enough: a distant wall behind an opening, whose normals are noisy,
 // or a dark worktop, which has depth in pieces only. Horizontal planes may start smaller than in one image; tracked
 // frames grow them.

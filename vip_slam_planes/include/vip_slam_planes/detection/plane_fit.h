@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Fitting planes to weighted points by total least squares.
 //
 // The paper solves [n_x/d, n_y/d] p = -1, which is singular for planes through the origin and biased near it. Here the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sparse, unbounded voting spaces for planes: height for horizontal triangles, angle x distance for vertical ones.
 // Votes are areas. Opposite normals have separate bins: floor and ceiling, or the two faces of a thin wall. With
 // normals towards the camera the angle covers the full circle and wraps at +-180 degrees, without the sign flip of d

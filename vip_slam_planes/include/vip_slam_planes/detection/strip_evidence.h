@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Evidence of faces seen at such a flat angle that they fill only a column or two of the depth grid: sides of pillars,
 // ends of walls.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Separates parallel surfaces close to each other in one peak of the histogram: a worktop and the trays on it, two
 // steps of a stair. A joint fit would lie on neither. The distances along the normal of one surface have one mode,
 // however noisy; a valley between two modes shows two surfaces, independent of the histogram's bins.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Shape tests of whether a set of mesh triangles is one flat surface. `surface`: ascending indices into the triangles,
 // not empty.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Groups of odometry epochs whose relative pose is known, as reported by the back end. The place of a new epoch in the
 // map is a guess until a loop closure or relocalisation ties it to another one; only within a group of tied epochs are
 // views evidence for or against planes.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A plane's covered area as square cells of its own 2D frame, each with the number of sightings (saturating).
 // Memory depends on the covered area, not on the number of frames; area, containment, overlap and polygons are computed
 // from it.

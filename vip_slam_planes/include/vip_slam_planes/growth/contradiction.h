@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Tests whether an image shows another surface at the place of a plane.
 #pragma once
 

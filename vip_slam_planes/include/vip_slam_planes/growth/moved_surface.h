@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Detects that a surface was moved: a cupboard shifted by a hand's breadth, a door left ajar.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Surfaces that one image shows at two depths are separate, even if both are near enough to one plane to join it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Polygons with holes from covered cells: the borders between covered and uncovered cells, traced along the cells'
 // sides and simplified.
 #pragma once

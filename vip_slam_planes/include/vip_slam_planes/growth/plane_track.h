@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One plane of the mapper: parameters, covered cells, and the contributions of each keyframe.
 //
 // Cells are stored as points in the camera frame of the keyframe that first covered them, so that a correction of the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Evidence against a plane: a keyframe's depth lies behind its covered cells, or belongs to another plane there.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Association of the triangles of a placed mesh with known planes (paper: 10 degrees, 5 cm).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Tests what keyframes saw between two pieces of one plane. Between two tables the floor below is visible; a counter
 // that continues behind an object in front of it, or outside the images, was never seen to end.
 #pragma once

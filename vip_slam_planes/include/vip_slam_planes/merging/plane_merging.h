@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Decides whether two planes of the map are one surface (paper section "Plane Detection and Merging").
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Delaunay triangulation of image points (Bowyer-Watson, incremental).
 // Coordinates are rounded to a fixed sub-pixel lattice so that orientation and in-circle tests are exact in 64-bit
 // integers: regular grids, with four points on a circle everywhere, are handled without tolerances.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The image's Delaunay mesh lifted to 3D by depth (paper section "Plane Detection"), in the camera's optical frame.
 //
 // The paper triangulates the features alone. White walls, which are most useful against drift, have none; so nodes of

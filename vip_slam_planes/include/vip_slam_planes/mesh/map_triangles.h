@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A depth mesh placed in `map`.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The least delay of a stream's messages: what their arrival tells about the clock of their stamps. ROS-free.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The clock of the machine against time that goes on while it is set: which stamp belongs to a time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All of time of streams that are delivered in parallel: the stamp that each message gets, on one clock that goes on,
 // and what is left out. ROS-free, single owner; the nodelet and the offline runner call take() and nothing else.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Accuracy of the poses of an RGB-D folder, and the noise of an IMU that is synthesised from them.
 //
 // An IMU synthesised from measured poses carries their errors: jitter from pose to pose becomes noise of rate and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Folders of real RGB-D images with poses: 7-Scenes layout (frame-N.color.*, frame-N.depth.png, frame-N.pose.txt,
 // camera-intrinsics.txt) or TUM layout (rgb.txt, depth.txt, groundtruth.txt).
 // In the 7-Scenes layout intrinsics and poses are those of the depth camera, and the folder does not calibrate the

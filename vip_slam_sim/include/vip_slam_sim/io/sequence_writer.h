@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Output of a rendered sequence: a bag (vip_slam_sim_bag) or a folder.
 #pragma once
 

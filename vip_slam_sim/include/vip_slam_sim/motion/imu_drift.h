@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What an IMU measures beyond a constant bias: a bias that comes with warming up, and a gyro that feels acceleration.
 #pragma once
 

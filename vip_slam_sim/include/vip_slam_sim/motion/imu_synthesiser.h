@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Synthesises the measurements of an IMU that moves along a trajectory.
 #pragma once
 

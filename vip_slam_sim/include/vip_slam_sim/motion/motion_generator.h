@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Turns MotionOptions into a spline of the body (IMU).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A smooth body trajectory: a uniform cumulative B-spline of degree 5 (C^4) over R^3 x SO(3) with exact derivatives.
 // Source: Sommer et al. 2020, "Efficient derivative computation for cumulative B-splines on Lie groups".
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Fast shake of a body, as sums of sines in bands: of a drone's rotors, of a hand. It moves body, camera and IMU alike;
 // the IMU samples it without a filter.
 #pragma once

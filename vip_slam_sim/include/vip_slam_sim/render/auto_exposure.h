@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The exposure control of a camera: exposure time and gain follow the brightness of what is seen, with delay. Darker
 // scenes have longer exposures (more blur) up to the longest, then more gain (more noise).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth that is measured at every n-th pixel and enlarged to the colour image, as phones give it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Depth from a disparity that is known in steps of a fraction of a pixel (structured light, stereo).
 #pragma once
 

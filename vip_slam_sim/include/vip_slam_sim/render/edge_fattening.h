@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Foreground grown over the background at depth edges, as by the matching window of stereo and structured light.
 #pragma once
 

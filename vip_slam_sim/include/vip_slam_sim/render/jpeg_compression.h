@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An image that was compressed as JPEG on its way.
 #pragma once
 

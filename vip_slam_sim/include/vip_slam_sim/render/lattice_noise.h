@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Smooth random fields over image and time that are read at any place in any order: a lattice of normal deviates, each
 // a hash of its coordinates, blended linearly and scaled to unit variance.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bakes direct light of the lamps (with soft shadows) and ambient light (with contact shading) into light maps.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a time-of-flight camera measures in concave corners: light that came by way of another surface makes distances
 // long. One bounce, diffuse surfaces, a lamp beside the lens that lights what the camera sees: of all directions from a
 // point, those that end on a lit surface add light whose way is longer; the camera measures the mean way, weighted by

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // People who walk in front of the camera: upright elliptic cylinders with a texture. They occlude the scene in colour
 // and depth, belong to no true plane, and cast no shadows.
 #pragma once

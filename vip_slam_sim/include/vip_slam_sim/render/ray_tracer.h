@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A small interface to Embree: takes rays, returns distances and the pieces hit.
 #pragma once
 

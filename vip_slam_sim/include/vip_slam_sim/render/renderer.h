@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Renders what a camera sees: radiance, exact depth and which piece of the scene each pixel shows.
 #pragma once
 

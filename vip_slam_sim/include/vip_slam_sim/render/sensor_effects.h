@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Turns radiance and exact depth into sensor images with blur, exposure, noise and missing depth.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The part of a depth camera's error that neighbouring pixels and images share, which averages out slowly or not at
 // all: a wrong scale and offset, an error that a whole surface has in an image, a warp over the image, and one that
 // stays.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Procedural pictures: walls, carpets, ceiling tiles, wood, posters, shelves of books. CV_32FC3 RGB, square root of
 // reflectance, deterministic in the seed.
 #pragma once

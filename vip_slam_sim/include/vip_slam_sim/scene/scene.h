@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A scene: planar charts (a frame, a texture, a light map, decals) cut into rectangular pieces. World z is up, metres.
 // Curved objects are strips of narrow charts that are not `planar`: they are rendered but are no true planes.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Builds scenes from rooms, walls with openings, boxes, cylinders and spheres.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A mip-mapped texture with anisotropic look-up, which avoids aliasing at long range and grazing angles.
 // Colours are stored as the square root of the reflectance (gamma 2): filtering happens in that space.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The true planes of a scene and how long and how much of each the camera saw.
 #pragma once
 

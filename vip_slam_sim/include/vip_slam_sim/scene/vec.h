@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Small float vectors for the renderer's inner loops, used in place of Eigen.
 #pragma once
 

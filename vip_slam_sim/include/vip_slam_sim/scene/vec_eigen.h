@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Conversions between the renderer's vectors and Eigen's.
 #pragma once
 

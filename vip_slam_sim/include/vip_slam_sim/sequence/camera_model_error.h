@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How a camera differs from its calibration: focal lengths, centre and distortion, drawn by a seed and scaled so that
 // pixels are off by a given number.
 #pragma once

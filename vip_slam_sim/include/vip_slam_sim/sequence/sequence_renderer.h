@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Renders a sequence in memory: frames in order to a callback, IMU, truth. No ROS.
 //
 //   SequenceRenderer sequence(loadSequence("smoke", library));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Everything that defines a sequence. One declaration per key gives default, range and meaning; the YAML of named
 // sequences and a user's own file use the same keys.
 #pragma once
