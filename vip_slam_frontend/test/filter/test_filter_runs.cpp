@@ -31,7 +31,7 @@ double jitterFound(double truth, unsigned seed) {
   std::normal_distribution<double> normal;
   const auto noise = [&](double sigma) {
     Eigen::Vector3d out;
-    for (double& value : out) value = sigma * normal(random);
+    for (int axis = 0; axis < 3; ++axis) out(axis) = sigma * normal(random);
     return out;
   };
   StampMonitor monitor(true);
