@@ -34,6 +34,7 @@ FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& 
   filter.calibration.intrinsics = filter.calibration.intrinsics && sensor.depth_registered && sensor.hasGyro() &&
                                   sensor.camera.model != DistortionModel::kEquidistant;
   // A camera's rotation, delay and scale of rates against an IMU need one.
+  filter.calibration.depth_scale = filter.calibration.depth_scale && sensor.hasGyro() && sensor.hasAccel();
   filter.calibration.rotation = filter.calibration.rotation && sensor.hasGyro();
   filter.calibration.time_offset = filter.calibration.time_offset && sensor.hasGyro();
   filter.calibration.gyro_scale = filter.calibration.gyro_scale && sensor.hasGyro();

@@ -41,6 +41,7 @@ CalibrationEstimate FrontEnd::Impl::calibration() const {
   CalibrationEstimate calibration = filter_.calibration();
   // The filter sees readings and rates to which the configured corrections are already applied: add those back.
   calibration.depth_offset += sensor_.depth_offset;
+  if (sensor_.depth_encoding != "32FC1") calibration.depth_unit = sensor_.depth_scale * calibration.depth_scale;
   const CameraIntrinsics& camera = sensor_.camera;
   calibration.depth_shift_px =
       sensor_.depth_shift + calibration.depth_shift.cwiseProduct(Eigen::Vector2d(camera.fx, camera.fy));
@@ -64,7 +65,7 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   frame->T_I_C = extrinsics();
   frame->time_offset = timeOffset();
   frame->camera_correction = {filter_.depthCorrection(), depth_input_.curve(), filter_.bearingCorrection(),
-                              depth_input_.shift()};
+                              depth_input_.shift(), filter_.depthScale()};
   frame->zero_velocity = rest_.still();
   frame->keyframe = keyframes_.newest();
   if (filter_.started()) {
@@ -108,7 +109,7 @@ FrameOutput FrontEnd::Impl::unusable(double t, const std::string& why) {
 
 float FrontEnd::Impl::trueDepth(float reading) const {
   if (!(reading > 0)) return reading;
-  return std::max(1e-3f, reading + static_cast<float>(filter_.depthCorrection()));
+  return std::max(1e-3f, static_cast<float>(filter_.depthScale() * reading + filter_.depthCorrection()));
 }
 
 void FrontEnd::Impl::correctDepth(std::vector<Feature>* features) const {

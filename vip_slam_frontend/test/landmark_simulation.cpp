@@ -147,7 +147,7 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
         const Eigen::Vector2d beside = options_.depth_shift - read_with_;
         const double read = p.z() * n.dot(ray) / (n.dot(ray) - n.head<2>().dot(beside));
         m.depth_slope = -p.z() / n.dot(ray) * n.head<2>();
-        m.depth = read + options_.depth_offset + noise.z() * m.depth_sigma;
+        m.depth = options_.depth_scale * read + options_.depth_offset + noise.z() * m.depth_sigma;
         m.depth_sigma *= options_.depth_told;
       }
       seen.push_back(m);
@@ -251,7 +251,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
   result.nis_per_dof = rows > 0 ? nis / rows : 0;
   result.window = filter.window();
   result.calibration = filter.calibration();
-  result.depth_scale = filter.depthScale();
+  result.depth_noise_scale = filter.depthNoiseScale();
   return result;
 }
 

@@ -19,6 +19,7 @@ struct SimulationOptions {
   double depth_a = 0.002, depth_c = 0.002;  ///< sigma = a + c z^2
   double depth_told = 1.0;                  ///< share of that sigma reported to the filter
   double depth_offset = 0;                  ///< m, added to all readings
+  double depth_scale = 1;                   ///< factor of all readings
   /// Shift of the depth image against the colour image, right and down, in bearings.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();
   BearingCorrection bearing;  ///< error of the intrinsics: the sightings need this correction
@@ -77,7 +78,7 @@ struct RunResult {
   double final_velocity = 0;  ///< m/s
   double length = 0;          ///< m travelled
   double nis_per_dof = 0;
-  double depth_scale = 1;  ///< factor on the depth noise estimated by the filter, at the end
+  double depth_noise_scale = 1;  ///< factor on the depth noise estimated by the filter, at the end
   /// Motions over 8 and 20 images in turn, as between keyframes: mean NEES (expectation 6), sum of the error lengths
   /// (m), and that sum for the difference of the two poses at the time when each was the newest.
   double motion_nees = 0, motion_error = 0, newest_error = 0;

@@ -126,6 +126,7 @@ vip_slam_msgs::TrackedFrame toMsg(const TrackedFrame& frame, const std::string& 
   msg.time_offset = frame.time_offset;
   msg.depth_correction = frame.camera_correction.offset;
   msg.depth_curve = frame.camera_correction.curve.added;
+  msg.depth_scale = frame.camera_correction.scale;
   msg.bearing_correction = toArray(frame.camera_correction.bearing);
   msg.depth_shift = toArray(frame.camera_correction.shift);
   msg.features.reserve(frame.features.size());
@@ -151,7 +152,8 @@ TrackedFrame fromMsg(const vip_slam_msgs::TrackedFrame& msg) {
   frame.camera_correction = {msg.depth_correction,
                              {msg.depth_curve},
                              bearingFromArray(msg.bearing_correction),
-                             shiftFromArray(msg.depth_shift)};
+                             shiftFromArray(msg.depth_shift),
+                             msg.depth_scale};
   frame.features.reserve(msg.features.size());
   for (const auto& feature : msg.features) frame.features.push_back(fromMsg(feature));
   frame.depth_grid = fromMsg(msg.depth_grid);

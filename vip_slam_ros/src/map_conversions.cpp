@@ -94,6 +94,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
     k.imu_camera = toPoseMsg(keyframe.T_I_C);
     k.depth_correction = keyframe.camera_correction.offset;
     k.depth_curve = keyframe.camera_correction.curve.added;
+    k.depth_scale = keyframe.camera_correction.scale;
     k.bearing_correction = toArray(keyframe.camera_correction.bearing);
     k.depth_shift = toArray(keyframe.camera_correction.shift);
     msg.keyframes.push_back(k);
@@ -139,7 +140,8 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
                                 {keyframe.depth_correction,
                                  {keyframe.depth_curve},
                                  bearingFromArray(keyframe.bearing_correction),
-                                 shiftFromArray(keyframe.depth_shift)}});
+                                 shiftFromArray(keyframe.depth_shift),
+                                 keyframe.depth_scale}});
   }
   update.landmarks.reserve(msg.landmarks.size());
   for (const auto& landmark : msg.landmarks) update.landmarks.push_back(fromLandmarkMsg(landmark));

@@ -89,6 +89,7 @@ vip_slam_msgs::PlaneObservation toMsg(const PlaneObservation& observation) {
   msg.weight_scale = observation.weight_scale;
   msg.depth_correction = observation.camera_correction.offset;
   msg.depth_curve = observation.camera_correction.curve.added;
+  msg.depth_scale = observation.camera_correction.scale;
   msg.bearing_correction = toArray(observation.camera_correction.bearing);
   msg.depth_shift = toArray(observation.camera_correction.shift);
   msg.points.reserve(4 * observation.points.size());
@@ -112,7 +113,8 @@ PlaneObservation fromMsg(const vip_slam_msgs::PlaneObservation& msg) {
   observation.camera_correction = {msg.depth_correction,
                                    {msg.depth_curve},
                                    bearingFromArray(msg.bearing_correction),
-                                   shiftFromArray(msg.depth_shift)};
+                                   shiftFromArray(msg.depth_shift),
+                                   msg.depth_scale};
   observation.points.reserve(msg.points.size() / 4);
   for (std::size_t i = 0; i < msg.points.size(); i += 4) {
     observation.points.push_back({{msg.points[i], msg.points[i + 1], msg.points[i + 2]}, msg.points[i + 3]});

@@ -189,9 +189,8 @@ void BackEnd::Impl::reset() {
   global.reset();
   camera_correction = {};
   keyframes_at_correction = 0;
-  newest_depth_offset = disparity_error = 0;
-  newest_bearing = {};
-  newest_depth_shift = {};
+  newest_correction = {};
+  disparity_error = 0;
   gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
   refusal.clear();
   refusals = notices = MessageLog();
@@ -213,9 +212,7 @@ void BackEnd::requestGlobalBa() { impl_->global.want(); }
 
 GbaJob BackEnd::startGlobalBa() {
   impl_->global.start();
-  impl_->camera_correction.offset = impl_->newest_depth_offset;
-  impl_->camera_correction.bearing = impl_->newest_bearing;
-  impl_->camera_correction.shift = impl_->newest_depth_shift;
+  impl_->camera_correction = impl_->newest_correction;
   impl_->map.adoptCameraCorrection(impl_->camera_correction);
   impl_->gyro_correction = impl_->newest_gyro_correction;
   impl_->map.adoptGyroCorrection(impl_->gyro_correction, impl_->sensor.imu_noise);

@@ -23,21 +23,17 @@ constexpr double kNewGyroCorrection = 5e-4;  // per entry of the matrix
 
 void BackEnd::Impl::followCameraCorrection(const CameraCorrection& newest) {
   if (newest.curve != camera_correction.curve) return;  // it refers to readings with another curve
-  newest_depth_offset = newest.offset;
-  newest_bearing = newest.bearing;
-  newest_depth_shift = newest.shift;
+  newest_correction = newest;
   // The front end's values move with every second of data, the first ones most. An adjustment to new ones is due with
   // half as many keyframes again.
   const std::uint64_t wait = std::max(kLeastWait, keyframes_at_correction / 2);
   if (keyframes_at_correction > 0 && statistics.keyframes_received < keyframes_at_correction + wait) return;
-  if (std::abs(newest.offset - camera_correction.offset) < kNewDepthOffset &&
+  if (newest.scale == camera_correction.scale && std::abs(newest.offset - camera_correction.offset) < kNewDepthOffset &&
       (newest.bearing.value - camera_correction.bearing.value).cwiseAbs().maxCoeff() < kNewBearing &&
       (newest.shift.px - camera_correction.shift.px).cwiseAbs().maxCoeff() < kNewDepthShift)
     return;
   keyframes_at_correction = statistics.keyframes_received;
-  camera_correction.offset = newest.offset;
-  camera_correction.bearing = newest.bearing;
-  camera_correction.shift = newest.shift;
+  camera_correction = newest;
   map.adoptCameraCorrection(camera_correction);
   global.want();
   global.outdate();  // an adjustment under way has the old readings
@@ -61,8 +57,9 @@ bool BackEnd::Impl::learnDepthCurve() {
   camera_correction.curve = std::move(curve);
   if (disparity) {
     disparity_error += *disparity;
-    if (voidsDepthOffset(*disparity)) camera_correction.offset = newest_depth_offset = 0;
+    if (voidsDepthOffset(*disparity)) camera_correction.offset = newest_correction.offset = 0;
   }
+  newest_correction.curve = camera_correction.curve;
   map.adoptCameraCorrection(camera_correction);
   global.outdate();
   return true;

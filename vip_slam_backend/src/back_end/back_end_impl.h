@@ -126,9 +126,7 @@ struct BackEnd::Impl {
   AdjustmentRequests global;
   CameraCorrection camera_correction;                                ///< applied to all keyframes of this session
   std::uint64_t keyframes_at_correction = 0;                         ///< received when it last changed by much
-  double newest_depth_offset = 0;                                    ///< m, reported with the newest keyframe
-  BearingCorrection newest_bearing;                                  ///< likewise
-  DepthShift newest_depth_shift;                                     ///< likewise
+  CameraCorrection newest_correction;                                ///< reported with the newest keyframe; same curve
   double disparity_error = 0;                                        ///< 1/m, corrected by the curve
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();         ///< applied to all keyframes of this session
   Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< reported with the newest keyframe

@@ -133,6 +133,7 @@ void Map::adoptCameraCorrection(const CameraCorrection& correction) {
   if (!bad.empty()) throw MapError("new correction of the camera: " + bad);
   for (auto& [id, kf] : keyframes_) {
     if (kf.stored || kf.data->frame.camera_correction == correction) continue;
+    kf.motion = withDepthScale(kf.motion, correction.scale / kf.data->frame.camera_correction.scale);
     const KeyframePtr corrected = withCameraCorrection(kf.data, correction);
     // IMU samples inside the keyframe's data must not keep the old data alive.
     if (kf.imu && kf.imu.get() == &kf.data->imu) kf.imu = {corrected, &corrected->imu};

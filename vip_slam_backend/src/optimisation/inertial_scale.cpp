@@ -22,7 +22,7 @@ constexpr double kGravitySigma = 0.002;  // relative, variation over the earth
 constexpr double kBiasSigma = 0.5;       // prior at the beginning of each chain, m/s^2
 // With a larger sigma of the scale the motion is not informative enough: it is reported as unknown.
 constexpr double kLargestSigma = 0.01;
-constexpr double kSure = 5.0, kMinDifference = 0.005;
+constexpr double kSure = 5.0;
 // Beyond this share the estimate is linearised too far away to be entered anywhere.
 constexpr double kLargeDifference = 0.05;
 
@@ -224,25 +224,12 @@ bool isLarge(const InertialScale& scale) {
 }
 
 std::string scaleDifference(const InertialScale& scale, const SensorConfig& sensor) {
+  if (!isLarge(scale)) return "";
   const double difference = scale.factor - 1;
-  if (!(scale.sigma > 0) || std::abs(difference) < std::max(kMinDifference, kSure * scale.sigma)) return "";
-  if (isLarge(scale)) {
-    return formatted(
-        "distances are %s than the accelerometer says, by some %.0f %%: is the unit of depth (depth/scale: %.6g) "
-        "right, "
-        "and the accelerometer's? what else was learnt of the calibration is not to be trusted",
-        difference < 0 ? "longer" : "shorter", 100 * std::abs(difference), sensor.depth_scale);
-  }
-  std::string remedy;
-  if (sensor.depth_encoding != "32FC1") {
-    remedy =
-        formatted(", and depth/scale in the sensor's configuration should be %.6g", sensor.depth_scale * scale.factor);
-  }
   return formatted(
-      "distances are %.1f %% %s than the accelerometer says (one sigma %.2f %%): depth reads too %s%s, "
-      "unless the accelerometer is off by as much",
-      100 * std::abs(difference), difference < 0 ? "longer" : "shorter", 100 * scale.sigma,
-      difference < 0 ? "long" : "short", remedy.c_str());
+      "distances are %s than the accelerometer says, by some %.0f %%: is the unit of depth (depth/scale: %.6g) right, "
+      "and the accelerometer's? what else was learnt of the calibration is not to be trusted",
+      difference < 0 ? "longer" : "shorter", 100 * std::abs(difference), sensor.depth_scale);
 }
 
 }  // namespace vip_slam

@@ -90,6 +90,47 @@ TEST(BackEnd, AGlobalAdjustmentDoesNotBringBackOldExtrinsics) {
   EXPECT_LT(after.boxminus(between).norm(), 0.01);
 }
 
+// Depth reads 3 % too long and the odometry goes by it, until the front end learns the scale at the 16th keyframe: then
+// the map has it from its beginning on.
+TEST(BackEnd, AScaleOfDepthLearntOnTheWayHoldsForTheWholeMap) {
+  SimulatedKeyframes world(4);
+  CheckedBackEnd back_end(options("vip"), world.sensor());
+  CameraCorrection known;
+  const auto length = [&] {  // of the map, against the true one
+    double found = 0, truth = 0;
+    const SnapshotKeyframe* before = nullptr;
+    const MapSnapshot snapshot = back_end.snapshot();
+    for (const SnapshotKeyframe& kf : snapshot.keyframes) {
+      if (before) {
+        found += (kf.state.T_W_I.t() - before->state.T_W_I.t()).norm();
+        truth += (world.truth(kf.t).T_W_I.t() - world.truth(before->t).T_W_I.t()).norm();
+      }
+      before = &kf;
+    }
+    return found / truth;
+  };
+  for (int k = 0; k < 30; ++k) {
+    auto exact = std::make_shared<Keyframe>(*world.next());
+    exact->frame.camera_correction.scale = 1 / 1.03;
+    if (k == 15) {
+      EXPECT_GT(length(), 1.02);
+      known.scale = 1 / 1.03;
+    }
+    const MapUpdate update = back_end.addKeyframe(withCameraCorrection(exact, known));
+    ASSERT_EQ(back_end.lastRefusal(), "");
+    EXPECT_EQ(back_end.map().keyframe(1).data->frame.camera_correction, known);
+    if (k == 15) EXPECT_TRUE(back_end.globalBaWanted());
+    PlaneUpdate planes = world.planes();
+    for (PlaneObservation& o : planes.observations) {
+      o.camera_correction.scale = 1 / 1.03;
+      setCameraCorrection(known, &o);
+    }
+    back_end.applyPlaneUpdate(planes);
+  }
+  back_end.finish();
+  EXPECT_NEAR(length(), 1.0, 0.005);
+}
+
 // Depth reads 2 cm too long; the front end learns it at the 16th keyframe and refines it with each further one.
 TEST(BackEnd, ADepthCorrectionHoldsForAllKeyframes) {
   SimulatedKeyframes world(4);

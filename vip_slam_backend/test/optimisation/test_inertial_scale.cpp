@@ -115,13 +115,6 @@ TEST(InertialScale, FindsAMapThatIsTooLargeOrTooSmall) {
     ASSERT_GT(scale.sigma, 0);
     EXPECT_LT(scale.sigma, 0.0025);
     EXPECT_NEAR(scale.factor, 1 / map_scale, 4 * scale.sigma) << map_scale;
-    // 1.012: depth of a camera that reads 0.001 m per unit too long.
-    const std::string words = scaleDifference({1 / map_scale, 0.001}, SensorConfig());
-    EXPECT_NE(words.find(map_scale > 1 ? "too long" : "too short"), std::string::npos) << words;
-    EXPECT_NE(words.find(map_scale > 1 ? "0.000988142" : "0.00101215"), std::string::npos) << words;
-    SensorConfig metres;
-    metres.depth_encoding = "32FC1";  // depth in metres: no key of the sensor file scales it
-    EXPECT_EQ(scaleDifference({1 / map_scale, 0.001}, metres).find("depth/scale"), std::string::npos);
   }
 }
 
@@ -168,13 +161,12 @@ TEST(InertialScale, NothingIsKnownWithoutMotionOrTime) {
 }
 
 TEST(InertialScale, SaysNothingUnlessSureAndLargeEnough) {
-  EXPECT_EQ(scaleDifference({0.99, 0.0025}, SensorConfig()), "");   // four sigmas
-  EXPECT_EQ(scaleDifference({0.996, 0.0002}, SensorConfig()), "");  // twenty, but within any camera's accuracy
-  EXPECT_EQ(scaleDifference({0.98, 0}, SensorConfig()), "");        // sigma zero: not known
+  EXPECT_EQ(scaleDifference({0.9, 0.025}, SensorConfig()), "");    // four sigmas
+  EXPECT_EQ(scaleDifference({0.96, 0.0002}, SensorConfig()), "");  // many, but what a camera's calibration is off by
+  EXPECT_EQ(scaleDifference({0.8, 0}, SensorConfig()), "");        // sigma zero: not known
   // A wrong unit is named, without a number to enter.
   const std::string unit = scaleDifference({1.3, 0.02}, SensorConfig());
   EXPECT_NE(unit.find("shorter"), std::string::npos) << unit;
   EXPECT_NE(unit.find("unit of depth"), std::string::npos) << unit;
   EXPECT_EQ(unit.find("should be"), std::string::npos) << unit;
-  EXPECT_NE(scaleDifference({0.99, 0.0015}, SensorConfig()), "");
 }

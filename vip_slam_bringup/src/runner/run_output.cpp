@@ -109,8 +109,7 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
 }
 
 /// With the keys and units of a sensor file, so that it can be copied there.
-void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration, const DepthCurve& depth_curve,
-                     const InertialScale& scale, double depth_scale) {
+void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration, const DepthCurve& depth_curve) {
   const auto list = [&yaml](const char* key, const Eigen::VectorXd& values) {
     yaml << YAML::Key << key << YAML::Value << YAML::Flow
          << std::vector<double>(values.data(), values.data() + values.size());
@@ -133,6 +132,11 @@ void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration
   list("sigma_bearing", calibration.sigma_bearing);
   yaml << YAML::Key << "depth_offset" << YAML::Value << calibration.depth_offset;
   yaml << YAML::Key << "sigma_depth_offset" << YAML::Value << calibration.sigma_depth_offset;
+  if (calibration.sigma_depth_scale > 0) {
+    const double unit = calibration.depth_unit > 0 ? calibration.depth_unit / calibration.depth_scale : 1.0;
+    yaml << YAML::Key << "depth_scale" << YAML::Value << unit * calibration.depth_scale;
+    yaml << YAML::Key << "sigma_depth_scale" << YAML::Value << unit * calibration.sigma_depth_scale;
+  }
   list("depth_shift", calibration.depth_shift_px);
   list("sigma_depth_shift", calibration.sigma_depth_shift);
   Eigen::VectorXd added(static_cast<Eigen::Index>(depth_curve.added.size()));
@@ -142,10 +146,6 @@ void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration
   list("depth_curve", added);
   rows("gyro_correction", calibration.gyro_correction);
   rows("sigma_gyro_correction", calibration.sigma_gyro_correction);
-  if (scale.sigma > 0) {
-    yaml << YAML::Key << "depth_scale_by_imu" << YAML::Value << depth_scale * scale.factor;
-    yaml << YAML::Key << "sigma_depth_scale_by_imu" << YAML::Value << depth_scale * scale.sigma;
-  }
   yaml << YAML::EndMap;
 }
 
@@ -178,8 +178,7 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   emitCounters(yaml, pipeline.frontEnd().counters(), reader.counters());
   const BackEnd* back_end = pipeline.mapping() ? &pipeline.mapping()->backEnd() : nullptr;
   emitCalibration(yaml, pipeline.frontEnd().calibration(),
-                  chained(reader.sensor().depth_curve, back_end ? back_end->depthCurve() : DepthCurve()),
-                  back_end ? back_end->scale() : InertialScale(), reader.sensor().depth_scale);
+                  chained(reader.sensor().depth_curve, back_end ? back_end->depthCurve() : DepthCurve()));
   emitStates(yaml, pipeline.states());
   put("warnings", runWarnings(pipeline, reader));
   yaml << YAML::EndMap;

@@ -56,15 +56,15 @@ DepthChange::DepthChange(const CameraCorrection& from, const CameraCorrection& t
 
 float DepthChange::operator()(float z) const {
   if (!(z > 0)) return z;
-  double changed = z + (to_.offset - from_.offset);
+  double bent = (z - from_.offset) / from_.scale;
   if (!same_curve_) {
-    const double bent = z - from_.offset;
     double reading = bent;
     for (int i = 0; i < kInverseIterations && !from_.curve.empty(); ++i) {
       reading = bent - from_.curve.at(static_cast<float>(reading));
     }
-    changed = reading + to_.curve.at(static_cast<float>(reading)) + to_.offset;
+    bent = reading + to_.curve.at(static_cast<float>(reading));
   }
+  const double changed = to_.scale * bent + to_.offset;
   return static_cast<float>(std::max(kNearest, changed));
 }
 

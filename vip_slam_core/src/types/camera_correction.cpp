@@ -9,6 +9,7 @@ namespace vip_slam {
 namespace {
 
 constexpr double kLargestOffset = 10;    // m
+constexpr double kLargestScale = 0.5;    // of depth, from 1
 constexpr double kLargestBearing = 0.2;  // share of the focal length
 constexpr double kLargestShift = 100;    // px
 
@@ -39,6 +40,7 @@ std::string validateCameraCorrection(const CameraCorrection& correction) {
   using Number = Eigen::Matrix<double, 1, 1>;
   for (const std::string& problem :
        {beyond("depth offset of", Number(correction.offset), kLargestOffset, " m"),
+        beyond("depth scaled by 1 and", Number(correction.scale - 1), kLargestScale, ""),
         beyond("bearings changed by", correction.bearing.value, kLargestBearing, ""),
         beyond("depth image shifted by", correction.shift.px, kLargestShift, " px"),
         beyond("depth image shifted by", correction.shift.bearing, kLargestBearing, " of the focal length")})
@@ -47,11 +49,18 @@ std::string validateCameraCorrection(const CameraCorrection& correction) {
   return curve.empty() ? "" : "depth curve: " + curve;
 }
 
+RelativeMotion withDepthScale(const RelativeMotion& motion, double factor) {
+  RelativeMotion scaled = motion;
+  scaled.T_a_b = SE3(motion.T_a_b.R(), factor * motion.T_a_b.t());
+  return scaled;
+}
+
 KeyframePtr withCameraCorrection(const KeyframePtr& keyframe, const CameraCorrection& correction) {
   if (keyframe->frame.camera_correction == correction) return keyframe;
   const DepthChange change(keyframe->frame.camera_correction, correction);
   auto corrected = std::make_shared<Keyframe>(*keyframe);
   corrected->frame.camera_correction = correction;
+  corrected->motion = withDepthScale(keyframe->motion, correction.scale / keyframe->frame.camera_correction.scale);
   const Eigen::Matrix3f turn = bearingChange(keyframe->frame.camera_correction.bearing, correction.bearing);
   const Eigen::Vector2d shift = correction.shift.px - keyframe->frame.camera_correction.shift.px;
   DepthGrid& grid = corrected->frame.depth_grid;

@@ -102,15 +102,18 @@ TEST(BearingCorrection, TheIntrinsicsItNamesNeedNone) {
 
 TEST(CameraCorrection, AnotherCurveTakesTheOldOnesPlace) {
   CameraCorrection before{0.004, {}}, after{-0.003, {}};
+  before.scale = 1.01;
+  after.scale = 0.97;
   for (int k = 0; k < 40; ++k) {
     before.curve.added.push_back(0.004f * std::sin(0.5f * float(k)));
     after.curve.added.push_back(0.006f * std::cos(0.3f * float(k)));
   }
   const auto corrected = [](float reading, const CameraCorrection& c) {
-    return reading + c.curve.at(reading) + float(c.offset);
+    return float(c.scale) * (reading + c.curve.at(reading)) + float(c.offset);
   };
   auto keyframe = std::make_shared<Keyframe>();
   keyframe->frame.camera_correction = before;
+  keyframe->motion.T_a_b = SE3(Eigen::Matrix3d(Eigen::Matrix3d::Identity()), Eigen::Vector3d(0.1, 0.2, -0.3));
   PlaneObservation observation;
   observation.camera_correction = before;
   std::vector<float> readings;
@@ -130,6 +133,7 @@ TEST(CameraCorrection, AnotherCurveTakesTheOldOnesPlace) {
               4e-6f);
   }
   EXPECT_EQ(other->frame.depth_grid.z.back(), 0.0f);
+  EXPECT_LT((other->motion.T_a_b.t() - 0.97 / 1.01 * Eigen::Vector3d(0.1, 0.2, -0.3)).norm(), 1e-12);
   EXPECT_EQ(withCameraCorrection(other, after), other);
 }
 

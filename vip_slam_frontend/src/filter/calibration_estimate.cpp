@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSure = 5.0;  // sigmas
 constexpr double kMinTurn = 0.2 * kDegree, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005, kMinBearing = 0.001,
-                 kMinGyroError = 0.002, kMinDepthShift = 0.001;
+                 kMinGyroError = 0.002, kMinDepthShift = 0.001, kMinDepthScale = 0.005;
 
 /// Whether some component's difference is significant, above kSure sigmas.
 bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
@@ -67,6 +67,16 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
                   "configuration should be %.4f",
                   1e3 * std::abs(depth), depth < 0 ? "long" : "short",
                   1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
+  }
+  const double scale = found.depth_scale - given.depth_scale;
+  if (found.sigma_depth_scale > 0 && std::abs(scale) > kMinDepthScale) {
+    const std::string remedy =
+        found.depth_unit > 0 ? formatted("; depth/scale in the sensor's configuration should be %.6g", found.depth_unit)
+                             : "";
+    all.push_back(
+        formatted("depth reads %.1f %% too %s by the accelerometer (one sigma %.1f %%), which is corrected for",
+                  100 * std::abs(scale), scale < 0 ? "long" : "short", 100 * found.sigma_depth_scale) +
+        remedy);
   }
   const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();

@@ -97,7 +97,7 @@ double VioFilter::openPixels() const {
   return std::sqrt(std::max(0.0, variance)) * seconds * focal_;
 }
 
-double VioFilter::depthScale() const {
+double VioFilter::depthNoiseScale() const {
   // Depth errors are correlated between images: a smaller scatter than the model's does not mean a smaller error.
   return depth_noise_.sigma() > kWorseThanModel ? depth_noise_.sigma() : 1.0;
 }
@@ -106,7 +106,7 @@ VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& c
                                                  const Eigen::VectorXd& moved, OwnNoise own_noise) const {
   MeasurementNoise noise;
   noise.sigma_xy = noise_.sigma() / focal_;
-  noise.depth_inflation = options_.depth_inflation * depthScale();
+  noise.depth_inflation = options_.depth_inflation * depthNoiseScale();
   FeatureBatch batch;
   for (const Candidate& candidate : candidates) {
     if (static_cast<int>(batch.accepted.size()) >= options_.max_update_features) break;
@@ -134,7 +134,7 @@ VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& c
       batch.chi2_rows += point.pixel_rows - 3;
     }
     if (point.depth_rows >= 5) {
-      const double scale = depthScale() / depth_noise_.sigma();  // from the whitening used to the monitor's sigma
+      const double scale = depthNoiseScale() / depth_noise_.sigma();  // from the whitening used to the monitor's sigma
       batch.depth_chi2.push_back(scale * scale * point.depth_chi2 / (point.depth_rows - 1));
       batch.depth_rows += point.depth_rows - 1;
     }
@@ -180,6 +180,8 @@ UpdateResult VioFilter::updateRelinearised(const std::vector<Candidate>& candida
     filter_.relinearise();
     at = filter_.window();
   }
+  // Rows of before have other first estimates: together they say more of the scale than there is.
+  scale_unseen_ = nav().t;
   return result;
 }
 

@@ -71,6 +71,7 @@ Eigen::Matrix3d Propagation::turnCovariance(const Matrix15d& P) const {
 Propagation propagateByMotion(const WindowState& window, const SE3& T_I0_I1, const Matrix6d& covariance, double dt,
                               const ImuNoise& noise) {
   Propagation result;
+  result.inertial = false;
   const NavState from = window.nav();
   result.predicted = from;
   result.predicted.t = from.t + dt;

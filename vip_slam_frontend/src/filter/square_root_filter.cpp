@@ -116,6 +116,12 @@ void SquareRootFilter::renew(int column, double sigma) {
   R_ = A.triangularView<Eigen::Upper>();
 }
 
+double SquareRootFilter::sigma(int column) const {
+  Eigen::VectorXd row = Eigen::VectorXd::Unit(window_.dimension(), column);
+  R_.transpose().triangularView<Eigen::Lower>().solveInPlace(row);
+  return row.norm();
+}
+
 void SquareRootFilter::consider(int column, double change, double sigma) {
   // With this column last, the upper rows hold the conditional of the others given it, and the last row its marginal.
   const int n = window_.dimension();

@@ -53,7 +53,8 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const int rotation = 6, translation = 6 + (window.calibration.rotation ? 3 : 0);
   const int reference = layout.reference(), offset = translation + (window.calibration.translation ? 3 : 0);
   const int depth = offset + (window.calibration.time_offset ? 1 : 0);
-  const int intrinsics = depth + (window.calibration.depth_offset ? 1 : 0);
+  const int scale = depth + (window.calibration.depth_offset ? 1 : 0);
+  const int intrinsics = scale + (window.calibration.depth_scale ? 1 : 0);
   const int shift = intrinsics + (window.calibration.intrinsics ? 4 : 0);
   // For points from depth alone a shift of the depth image is equivalent to one of the principal point.
   Eigen::Matrix3d bearing = window.bearing.matrix();
@@ -92,6 +93,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
                      A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
     }
     if (window.calibration.depth_offset) A(i, depth) = w * n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
+    if (window.calibration.depth_scale) A(i, scale) = -w * n_ref.dot(R_I_C.transpose() * (R_ab * t_I_C + t_ab - t_I_C));
     if (window.calibration.intrinsics || window.calibration.depth_shift) {
       // d(x, y) of a point (x, y, z) by (sx, sy, cx, cy): (x, 0), (0, y), (z, 0), (0, z). The normal rotates the other
       // way, which acts on the distance of the two points along the plane.

@@ -35,6 +35,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       given_{T_I_C, time_offset},
       learnt_(given_),
       sigma_depth_offset_(options.calibration.sigma_depth_offset),
+      depth_scale_({1.0, options.calibration.sigma_depth_scale}),
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(kGateProbability),
@@ -72,14 +73,20 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.T_I_C = learnt_.T_I_C;
   window.time_offset = learnt_.time_offset;
   window.depth_offset = learnt_.depth_offset;
+  window.depth_scale = depth_scale_.adopted();
   window.bearing = learnt_.bearing;
   window.depth_shift = learnt_.depth_shift;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = {calibration.rotation,    calibration.translation,
-                        calibration.time_offset, calibration.depth_offset && !depth_contradicts_,
-                        calibration.intrinsics,  calibration.depth_shift && !shift_contradicts_,
-                        calibration.gyro_scale,  calibration.gyro_misalignment};
+  window.calibration = {calibration.rotation,
+                        calibration.translation,
+                        calibration.time_offset,
+                        calibration.depth_offset && !depth_contradicts_,
+                        calibration.depth_scale,
+                        calibration.intrinsics,
+                        calibration.depth_shift && !shift_contradicts_,
+                        calibration.gyro_scale,
+                        calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
@@ -94,6 +101,8 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
       sigma = calibration.sigma_translation;
     } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
       sigma = sigma_depth_offset_;
+    } else if (window.calibration.depth_scale && c == window.depthScaleColumn()) {
+      sigma = depth_scale_.held().sigma;
     } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.depthShiftColumn()) {
       sigma = calibration.sigma_centre;
     } else if (c >= window.depthShiftColumn() && c < window.gyroColumn()) {
@@ -247,6 +256,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (!candidates.empty()) updateWithFeatures(candidates, all, &report);
   if (surfaces && !still) updateWithSurfaces(*surfaces, &report);
   if (delay_before_) holdDelay();
+  learnDepthScale(propagation.inertial);
   judgeDepthOffset();
   judgeDepthShift();
   judgeIntrinsics();

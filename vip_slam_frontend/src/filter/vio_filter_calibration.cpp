@@ -46,6 +46,8 @@ CalibrationEstimate VioFilter::calibration() const {
   calibration.T_I_C = window.T_I_C;
   calibration.time_offset = window.time_offset;
   calibration.depth_offset = window.depth_offset;
+  calibration.depth_scale = depth_scale_.adopted();
+  calibration.sigma_depth_scale = window.calibration.depth_scale ? depth_scale_.estimate().sigma : 0.0;
   calibration.bearing = window.bearing;
   calibration.depth_shift = depth_shift_ + window.depth_shift;
   calibration.gyro_correction = window.gyro_correction;
@@ -107,6 +109,21 @@ bool VioFilter::isSteady(double depth_offset) {
   return offset_is_steady_;
 }
 
+void VioFilter::learnDepthScale(bool inertial) {
+  const WindowState& window = filter_.window();
+  if (!window.calibration.depth_scale) return;
+  // Only the accelerometer knows the scale: a motion that is itself measured by depth agrees with any.
+  if (!inertial) scale_unseen_ = window.clones.back().t;
+  const frontend::Estimate before = depth_scale_.held();
+  const frontend::Estimate after{window.depth_scale, filter_.sigma(window.depthScaleColumn())};
+  if (!scale_unseen_ || window.clones.front().t > *scale_unseen_) {
+    scale_unseen_.reset();
+    depth_scale_.add(nav().t, frontend::learntBetween(before, after));
+    depth_scale_.adopt();
+  }
+  filter_.consider(window.depthScaleColumn(), depth_scale_.adopted() - after.value, before.sigma);
+}
+
 void VioFilter::judgeDepthOffset() {
   const WindowState& window = filter_.window();
   const double change = window.depth_offset - given_.depth_offset;
@@ -124,6 +141,7 @@ void VioFilter::judgeDepthOffset() {
   Eigen::VectorXd r = Eigen::VectorXd::Constant(1, -change / kHeldOffset);
   filter_.update(H, r);
   depth_contradicts_ = true;
+  scale_unseen_ = nav().t;
   depth_is_off_ = false;
 }
 
@@ -168,6 +186,7 @@ const Eigen::Vector2d& VioFilter::takeDepthShift() {
 void VioFilter::restartDepthOffset(bool none) {
   sigma_depth_offset_ = none ? kHeldOffset : options_.calibration.sigma_depth_offset;
   learnt_.depth_offset = given_.depth_offset;
+  depth_scale_.reset();
   depth_is_off_ = depth_contradicts_ = false;
   for (auto& [id, track] : tracks_) {
     for (Observation& observation : track.observations) observation.depth = 0;

@@ -36,6 +36,7 @@ void WindowState::boxplus(const Eigen::VectorXd& delta) {
   if (calibration.rotation || calibration.translation) T_I_C = T_I_C.boxplus(extrinsic);
   if (calibration.time_offset) time_offset += delta(timeOffsetColumn());
   if (calibration.depth_offset) depth_offset += delta(depthOffsetColumn());
+  if (calibration.depth_scale) depth_scale += delta(depthScaleColumn());
   if (calibration.intrinsics) bearing.value += delta.segment<4>(intrinsicsColumn());
   if (calibration.depth_shift) depth_shift += delta.segment<2>(depthShiftColumn());
   for (int k = 0; k < calibration.gyro(); ++k) {
@@ -52,8 +53,8 @@ bool WindowState::isFinite() const {
     if (!clone.T_W_I.isFinite()) return false;
   }
   return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
-         std::isfinite(time_offset) && std::isfinite(depth_offset) && bearing.value.allFinite() &&
-         depth_shift.allFinite() && gyro_correction.allFinite();
+         std::isfinite(time_offset) && std::isfinite(depth_offset) && std::isfinite(depth_scale) &&
+         bearing.value.allFinite() && depth_shift.allFinite() && gyro_correction.allFinite();
 }
 
 }  // namespace vip_slam

@@ -128,6 +128,7 @@ TEST(Calibration, FindsWhatDepthIsTooLongBy) {
     simulation.depth_offset = 0.01;
     FilterOptions options = singlePixels();
     options.calibration.time_offset = false;  // which so noisy a gyro misleads
+    options.calibration.depth_scale = false;  // which takes a part of the offset
     const RunResult run = runFilter(simulation, options, 20.0, false);
     EXPECT_NEAR(run.calibration.depth_offset, -0.01, 0.002);
     EXPECT_NEAR(run.most_depth_correction, -0.01, 0.003);
@@ -141,6 +142,44 @@ TEST(Calibration, FindsWhatDepthIsTooLongBy) {
   EXPECT_LT(nees, 9.0);
   EXPECT_LT(offset_nees, 2.5);
   EXPECT_GT(believed, 1.5 * nees);
+}
+
+/// With the IMU of a phone, whose accelerometer knows how far it went.
+SimulationOptions exactMotion(int seed) {
+  SimulationOptions simulation = exactReadings(seed);
+  simulation.noise.gyro_noise_density = 2e-4;
+  simulation.noise.accel_noise_density = 2e-3;
+  return simulation;
+}
+
+// Held by the accelerometer alone: the pixels fit a world of any size.
+TEST(Calibration, FindsTheScaleOfDepth) {
+  double nees = 0, believed = 0, own_nees = 0;
+  constexpr int kRuns = 6;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation = exactMotion(seed);
+    simulation.depth_scale = 1.03;
+    FilterOptions options = singlePixels();
+    const RunResult run = runFilter(simulation, options, 30.0, false);
+    EXPECT_NEAR(run.calibration.depth_scale, 1 / 1.03, 0.01);
+    own_nees += std::pow((run.calibration.depth_scale - 1 / 1.03) / run.calibration.sigma_depth_scale, 2) / kRuns;
+    nees += run.nees / kRuns;
+    options.calibration.depth_scale = false;
+    believed += runFilter(simulation, options, 30.0, false).nees / kRuns;
+  }
+  std::printf("NEES with depth 3 %% too long: %.2f, of the scale %.2f; depth believed: %.2f\n", nees, own_nees,
+              believed);
+  EXPECT_LT(own_nees, 4.0);
+  EXPECT_LT(nees, believed);
+}
+
+TEST(Calibration, DepthOfTheRightScaleKeepsIt) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const RunResult run = runFilter(exactMotion(seed), singlePixels(), 30.0, false);
+    EXPECT_EQ(run.calibration.depth_scale, 1.0);
+    EXPECT_GT(run.calibration.sigma_depth_scale, 0.0);
+    EXPECT_LT(run.calibration.sigma_depth_scale, 0.01) << "known, but not to differ";
+  }
 }
 
 // The estimate varies about zero and must not be passed on.
@@ -425,6 +464,15 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   const std::string more = calibrationDifferences(given, found).back();
   EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
   EXPECT_NE(more.find("-0.0120"), std::string::npos) << more;
+  found.depth_scale = 0.971;
+  found.sigma_depth_scale = 0.005;
+  const std::string scale = calibrationDifferences(given, found).back();
+  EXPECT_NE(scale.find("depth reads 2.9 % too long"), std::string::npos) << scale;
+  EXPECT_EQ(scale.find("depth/scale"), std::string::npos) << scale;
+  found.depth_unit = 0.000971;
+  const std::string unit = calibrationDifferences(given, found).back();
+  EXPECT_NE(unit.find("depth/scale in the sensor's configuration should be 0.000971"), std::string::npos) << unit;
+  found.depth_scale = 1;
   found.bearing.value << 0, 0.003, 0, 0;
   found.sigma_bearing.setConstant(0.0003);
   found.intrinsics << 480.04, 481.46, 320.2, 240.1;

@@ -28,7 +28,7 @@ Scene makeScene() {
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
   scene.window.T_I_C = simulation.T_I_C();
-  scene.window.calibration = {true, true, true, true, true, true};
+  scene.window.calibration = {true, true, true, true, true, true, true};
   scene.window.depth_shift << 0.004, -0.003;
   scene.window.bearing.value << 0.003, -0.002, 0.001, -0.0015;
   scene.window.time_offset = 0.003;
@@ -69,10 +69,11 @@ TEST(FeatureRows, JacobiansMatchCentralDifferences) {
     stackFeature(b, scene.observations, fb, noise, &unused_x, &unused_f, &minus);
     return Eigen::VectorXd(-(plus - minus) / (2 * h));
   };
-  // The columns of the focal lengths are evaluated at the predicted bearing, not at the measured one.
-  const int focal = scene.window.intrinsicsColumn();
+  // The columns of the focal lengths are evaluated at the predicted bearing, not at the measured one, and that of the
+  // depth's scale at the predicted depth.
+  const int focal = scene.window.intrinsicsColumn(), scale = scene.window.depthScaleColumn();
   for (int c = 0; c < scene.window.dimension(); ++c) {
-    if (c == focal || c == focal + 1) continue;
+    if (c == focal || c == focal + 1 || c == scale) continue;
     Eigen::VectorXd delta = Eigen::VectorXd::Zero(scene.window.dimension());
     delta(c) = h;
     WindowState a = scene.window, b = scene.window;
@@ -86,6 +87,34 @@ TEST(FeatureRows, JacobiansMatchCentralDifferences) {
     EXPECT_LT((difference(scene.window, scene.f_W + step, scene.window, scene.f_W - step) - H_f.col(c)).norm(),
               1e-6 * H_f.col(c).norm());
   }
+}
+
+// A reading's own noise would shrink the scale: with it the column is that of a reading without noise.
+TEST(FeatureRows, TheScaleOfDepthIsAskedWhereDepthIsExpected) {
+  const Scene scene = makeScene();
+  const MeasurementNoise noise;
+  const auto column = [&](double error) {
+    std::vector<Observation> seen = scene.observations;
+    for (Observation& o : seen) o.depth += error - 0.01 - o.depth_slope.dot(scene.window.depth_shift);
+    Eigen::MatrixXd H_x, H_f;
+    Eigen::VectorXd r;
+    stackFeature(scene.window, seen, scene.f_W, noise, &H_x, &H_f, &r);
+    return Eigen::VectorXd(H_x.col(scene.window.depthScaleColumn()));
+  };
+  std::vector<Observation> exact = scene.observations;
+  for (Observation& o : exact) o.depth -= 0.01 + o.depth_slope.dot(scene.window.depth_shift);
+  const auto residual = [&](double scale) {
+    WindowState window = scene.window;
+    window.depth_scale = scale;
+    Eigen::MatrixXd H_x, H_f;
+    Eigen::VectorXd r;
+    stackFeature(window, exact, scene.f_W, noise, &H_x, &H_f, &r);
+    return r;
+  };
+  const Eigen::VectorXd numeric = -(residual(1 + 1e-6) - residual(1 - 1e-6)) / 2e-6;
+  EXPECT_GT(numeric.norm(), 100.0);
+  EXPECT_LT((column(0) - numeric).norm(), 1e-2 * numeric.norm());  // the shift's part of a reading is not scaled
+  EXPECT_EQ(column(0.2), column(0));
 }
 
 TEST(FeatureRows, FocalLengthsAreAskedWhereTheBearingIsExpected) {

@@ -179,11 +179,11 @@ TEST(FilterRuns, PixelNoiseIsLearnt) {
 TEST(FilterRuns, DepthNoisierThanToldIsFoundOut) {
   SimulationOptions simulation;
   simulation.seed = 6;
-  EXPECT_LT(runFilter(simulation, singlePixels(), 10.0, false).depth_scale, 1.1);
+  EXPECT_LT(runFilter(simulation, singlePixels(), 10.0, false).depth_noise_scale, 1.1);
   simulation.depth_told = 1.0 / 3.0;
   const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
-  std::printf("depth noise three times what was told: found %.2f\n", run.depth_scale);
-  EXPECT_NEAR(run.depth_scale, 3.0, 0.6);
+  std::printf("depth noise three times what was told: found %.2f\n", run.depth_noise_scale);
+  EXPECT_NEAR(run.depth_noise_scale, 3.0, 0.6);
 }
 
 /// An IMU with data sheet noise that vibrates: the images are more accurate, which the filter must detect.

@@ -67,7 +67,8 @@ class Conversions : public ::testing::Test {
     f.camera_correction = {number(),
                            {{0.001f, -0.002f}},
                            {{number(), number(), number(), number()}},
-                           {{number(), number()}, {number(), number()}}};
+                           {{number(), number()}, {number(), number()}},
+                           1.0 + 0.1 * number()};
     f.time_offset = number();
     for (int i = 0; i < 5; ++i) f.features.push_back(feature());
     f.depth_grid.stride = 16;
@@ -197,7 +198,8 @@ TEST_F(Conversions, PlaneUpdateIsUnchanged) {
   observation.plane = 2;
   observation.G.setRandom();
   observation.weight_scale = 0.25;
-  observation.camera_correction = {-0.01, {{0.003f}}, {{0.001, -0.002, 0.003, 0.004}}, {{1.5, -0.5}, {0.003, -0.001}}};
+  observation.camera_correction = {
+      -0.01, {{0.003f}}, {{0.001, -0.002, 0.003, 0.004}}, {{1.5, -0.5}, {0.003, -0.001}}, 0.97};
   observation.points = {{{1, 2, 3}, 0.01f}, {{4, 5, 6}, 0.02f}};
   update.observations = {observation};
   update.associated = {{11, 2}, {12, 1}};

@@ -22,8 +22,8 @@ InertialScale inertialScale(const Map& map, double gravity, const ImuNoise& nois
 /// sigmas) and by more than five per cent.
 bool isLarge(const InertialScale& scale);
 
-/// Message to the user when depth and accelerometer contradict each other significantly (five sigmas) and by enough to
-/// matter (half a percent); empty otherwise. `sensor` has the depth scale in use; depth in 32FC1 has none.
+/// Message to the user when depth and accelerometer contradict each other by that much; empty otherwise. Less is learnt
+/// and corrected for by the front end. `sensor` has the unit of depth in use.
 std::string scaleDifference(const InertialScale& scale, const SensorConfig& sensor);
 
 }  // namespace vip_slam

@@ -46,13 +46,15 @@ void applyDepthCurve(const DepthCurve& curve, cv::Mat* depth);
 
 /// All corrections of a camera's depth readings and bearings.
 struct CameraCorrection {
-  double offset = 0;  ///< m, after the curve
+  double offset = 0;  ///< m, after curve and scale
   DepthCurve curve;
   BearingCorrection bearing;
   DepthShift shift;  ///< applied when depth was read
+  double scale = 1;  ///< factor, after the curve
 
   bool operator==(const CameraCorrection& other) const {
-    return offset == other.offset && curve == other.curve && bearing == other.bearing && shift == other.shift;
+    return offset == other.offset && curve == other.curve && bearing == other.bearing && shift == other.shift &&
+           scale == other.scale;
   }
   bool operator!=(const CameraCorrection& other) const { return !(*this == other); }
 };

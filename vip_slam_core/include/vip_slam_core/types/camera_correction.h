@@ -15,6 +15,9 @@ namespace vip_slam {
 /// Message on what is wrong, empty when nothing is: not finite, or more than a camera can be off by.
 std::string validateCameraCorrection(const CameraCorrection& correction);
 
+/// The odometry's motion had its depth been longer by this factor: its displacement is as long as depth says.
+RelativeMotion withDepthScale(const RelativeMotion& motion, double factor);
+
 /// The keyframe with `correction` instead of its present correction of readings and bearings; the same object when they
 /// are equal. Sigmas, pixels and the grid's layout, which is in pixels, stay.
 KeyframePtr withCameraCorrection(const KeyframePtr& keyframe, const CameraCorrection& correction);

@@ -20,6 +20,9 @@ struct CalibrationEstimate {
   double sigma_time_offset = 0;                                 ///< s
   double depth_offset = 0;        ///< m, to be added to every reading of the depth camera, as in a sensor file
   double sigma_depth_offset = 0;  ///< m
+  double depth_scale = 1;         ///< factor of every reading, before the offset, that is adopted
+  double sigma_depth_scale = 0;   ///< of the present estimate
+  double depth_unit = 0;  ///< m, the unit of readings with this factor, as in a sensor file; 0: they are in metres
   /// Shift of the depth image to the right and down against the colour image, in bearings, and one sigma.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero(), sigma_depth_shift = Eigen::Vector2d::Zero();
   Eigen::Vector2d depth_shift_px = Eigen::Vector2d::Zero();  ///< the same in px, as in a sensor file

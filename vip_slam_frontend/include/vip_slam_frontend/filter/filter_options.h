@@ -14,6 +14,7 @@ struct CalibrationOptions {
   bool translation = false;
   bool time_offset = true;
   bool depth_offset = true;
+  bool depth_scale = true;
   bool intrinsics = true;
   bool depth_shift = true;
   bool gyro_scale = true;
@@ -23,6 +24,7 @@ struct CalibrationOptions {
   double sigma_time_offset = 0.005;
   double time_offset_walk = 0;
   double sigma_depth_offset = 0.005;
+  double sigma_depth_scale = 0.02;
   double sigma_focal = 0.002;
   double sigma_aspect = 0.0005;
   double sigma_centre = 0.002;
@@ -33,6 +35,7 @@ struct CalibrationOptions {
     v.field("translation", translation, "estimate the camera-IMU translation online");
     v.field("time_offset", time_offset, "estimate the camera-IMU delay online");
     v.field("depth_offset", depth_offset, "estimate online what all depth readings are too long or too short by");
+    v.field("depth_scale", depth_scale, "estimate online the factor that depth readings need");
     v.field(
         "intrinsics", intrinsics,
         "estimate online what focal lengths and principal point are off by; not of a fisheye, nor where depth is not "
@@ -47,6 +50,7 @@ struct CalibrationOptions {
     v.field("time_offset_walk", time_offset_walk, 0.0, 1e-2,
             "how much the delay changes on the way, s / sqrt(s); 2e-5 where it goes with the exposure time");
     v.field("sigma_depth_offset", sigma_depth_offset, 1e-6, 1.0, "initial one-sigma of the depth's offset, m");
+    v.field("sigma_depth_scale", sigma_depth_scale, 1e-6, 1.0, "initial one-sigma of the depth's scale");
     v.field("sigma_focal", sigma_focal, 1e-6, 1.0, "initial one-sigma of the focal lengths, as a share of them");
     v.field("sigma_aspect", sigma_aspect, 1e-6, 1.0, "initial one-sigma of fx / fy");
     v.field("sigma_centre", sigma_centre, 1e-6, 1.0,

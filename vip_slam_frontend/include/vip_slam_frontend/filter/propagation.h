@@ -25,6 +25,7 @@ struct Propagation {
   Eigen::Matrix3d displacementCovariance(const Matrix15d& P) const;  ///< of the displacement, world axes, m^2
   Eigen::Matrix3d turnCovariance(const Matrix15d& P) const;          ///< of the rotation, axes at the end, rad^2
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();                 ///< bias-corrected rate at the end
+  bool inertial = true;  ///< by the IMU, not by what images and depth saw of the motion
   bool open =
       false;  ///< a stand-in took the IMU's place over this interval alone: the motion before and after is measured
   RateHistory rates;  ///< the window's, extended to the end

@@ -10,6 +10,7 @@
 
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_frontend/filter/calibration_estimate.h"
+#include "vip_slam_frontend/filter/calibration_evidence.h"
 #include "vip_slam_frontend/filter/feature_rows.h"
 #include "vip_slam_frontend/filter/filter_options.h"
 #include "vip_slam_frontend/filter/gating.h"
@@ -101,6 +102,8 @@ class VioFilter {
   /// Offset to be added to depth readings outside the filter, m: the estimate once it is significant and large enough
   /// to matter, else 0. Before it converges the estimate varies by a millimetre, which would stay in a map of exact
   /// depth.
+  /// Adopted factor of the readings of depth.
+  double depthScale() const { return depth_scale_.adopted(); }
   double depthCorrection() const { return depth_is_off_ ? filter_.window().depth_offset : 0.0; }
   /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
   /// matter, else zero.
@@ -111,7 +114,7 @@ class VioFilter {
   /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is significant
   /// and known to a tenth of a pixel. The part taken is removed from the state, and the filter estimates the rest.
   const Eigen::Vector2d& takeDepthShift();
-  double depthScale() const;  ///< adapted factor on the depth noise, 1 or more
+  double depthNoiseScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
  private:
@@ -154,6 +157,9 @@ class VioFilter {
   UpdateResult updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
+  /// Takes what this step said of the depth's scale out of the filter and adds it to depth_scale_; `inertial`: the
+  /// IMU predicted the motion.
+  void learnDepthScale(bool inertial);
   /// Decides whether the depth offset is significant. An implausibly large one has some other cause: it is reset to the
   /// given value and no longer estimated.
   void judgeDepthOffset();
@@ -185,6 +191,8 @@ class VioFilter {
   const CalibrationEstimate given_;  ///< by the sensor's configuration
   CalibrationEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
   double sigma_depth_offset_;        ///< m, of the prior at a start
+  frontend::CalibrationEvidence depth_scale_;
+  std::optional<double> scale_unseen_;  ///< time of the newest clone that the IMU did not predict; empty: none is left
   double focal_;
   Eigen::Vector3d G_;
   Gate gate_;

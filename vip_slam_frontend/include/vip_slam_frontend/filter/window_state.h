@@ -30,12 +30,13 @@ struct Clone {
 
 struct CalibrationFlags {
   bool rotation = false, translation = false, time_offset = false, depth_offset = false;
+  bool depth_scale = false;
   bool intrinsics = false, depth_shift = false;
   bool gyro_scale = false, gyro_misalignment = false;
   /// Number of the camera's calibration states, on which the measurements depend.
   int camera() const {
     return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0) + (depth_offset ? 1 : 0) +
-           (intrinsics ? 4 : 0) + (depth_shift ? 2 : 0);
+           (depth_scale ? 1 : 0) + (intrinsics ? 4 : 0) + (depth_shift ? 2 : 0);
   }
   int gyro() const { return (gyro_scale ? 3 : 0) + (gyro_misalignment ? 6 : 0); }
   int size() const { return camera() + gyro(); }
@@ -53,6 +54,7 @@ struct WindowState {
   SE3 T_I_C;
   double time_offset = 0;
   double depth_offset = 0;    ///< m, to be added to every reading of the depth camera
+  double depth_scale = 1;     ///< times every reading, before the offset
   BearingCorrection bearing;  ///< correction of the camera's intrinsics
   /// Shift of the depth image to the right and down against the colour image, in bearings: depth read at bearing b
   /// belongs to b - shift.
@@ -70,13 +72,14 @@ struct WindowState {
   int translationColumn() const { return calibrationColumn() + (calibration.rotation ? 3 : 0); }
   int timeOffsetColumn() const { return translationColumn() + (calibration.translation ? 3 : 0); }
   int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
-  int intrinsicsColumn() const { return depthOffsetColumn() + (calibration.depth_offset ? 1 : 0); }
+  int depthScaleColumn() const { return depthOffsetColumn() + (calibration.depth_offset ? 1 : 0); }
+  int intrinsicsColumn() const { return depthScaleColumn() + (calibration.depth_scale ? 1 : 0); }
   int depthShiftColumn() const { return intrinsicsColumn() + (calibration.intrinsics ? 4 : 0); }
   /// The correction's diagonal (scale), then its off-diagonal entries (misalignment), if estimated: see gyroEntry().
   int gyroColumn() const { return calibrationColumn() + calibration.camera(); }
 
-  /// Depth z for a reading of the depth camera, m: the offset added.
-  double trueDepth(double reading) const { return reading + depth_offset; }
+  /// Depth z for a reading of the depth camera, m.
+  double trueDepth(double reading) const { return depth_scale * reading + depth_offset; }
   /// Index of the clone, -1 when it is not in the window.
   int indexOf(CloneId id) const;
   NavState nav() const;
