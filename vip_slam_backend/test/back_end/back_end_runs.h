@@ -21,6 +21,14 @@ inline BackEndOptions options(const std::string& variant) {
   return o;
 }
 
+/// The part of the map that an odometry belongs to, as the update has it.
+inline std::uint32_t partOf(const MapUpdate& update, std::uint32_t epoch) {
+  for (const EpochPart& told : update.parts)
+    if (told.epoch == epoch) return told.part;
+  ADD_FAILURE() << "nothing told of epoch " << epoch;
+  return 0;
+}
+
 /// Keyframes and the plane module's answer to each.
 inline void feed(SimulatedKeyframes* world, BackEnd* back_end, int keyframes) {
   for (int k = 0; k < keyframes; ++k) {

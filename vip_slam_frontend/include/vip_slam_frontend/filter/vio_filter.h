@@ -102,9 +102,8 @@ class VioFilter {
   /// Offset to be added to depth readings outside the filter, m: the estimate once it is significant and large enough
   /// to matter, else 0. Before it converges the estimate varies by a millimetre, which would stay in a map of exact
   /// depth.
-  /// Adopted factor of the readings of depth.
-  double depthScale() const { return depth_scale_.adopted(); }
   double depthCorrection() const { return depth_is_off_ ? filter_.window().depth_offset : 0.0; }
+  double depthScale() const { return depth_scale_.adopted(); }  ///< adopted factor of the readings of depth
   /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
   /// matter, else zero.
   Eigen::Matrix3d gyroCorrection() const;
