@@ -119,7 +119,7 @@ void VioFilter::learnDepthScale(bool inertial) {
   if (!scale_unseen_ || window.clones.front().t > *scale_unseen_) {
     scale_unseen_.reset();
     depth_scale_.add(nav().t, frontend::learntBetween(before, after));
-    depth_scale_.adopt();
+    if (depth_scale_.adopt()) startDepthOffsetAnew();
   }
   filter_.consider(window.depthScaleColumn(), depth_scale_.adopted() - after.value, before.sigma);
 }
@@ -187,10 +187,14 @@ void VioFilter::restartDepthOffset(bool none) {
   sigma_depth_offset_ = none ? kHeldOffset : options_.calibration.sigma_depth_offset;
   learnt_.depth_offset = given_.depth_offset;
   depth_scale_.reset();
-  depth_is_off_ = depth_contradicts_ = false;
   for (auto& [id, track] : tracks_) {
     for (Observation& observation : track.observations) observation.depth = 0;
   }
+  startDepthOffsetAnew();
+}
+
+void VioFilter::startDepthOffsetAnew() {
+  depth_is_off_ = depth_contradicts_ = false;
   if (!started_ || !filter_.window().calibration.depth_offset) return;
   filter_.renew(filter_.window().depthOffsetColumn(), sigma_depth_offset_);
   filter_.window().depth_offset = given_.depth_offset;

@@ -162,6 +162,8 @@ TEST(Calibration, FindsTheScaleOfDepth) {
     FilterOptions options = singlePixels();
     const RunResult run = runFilter(simulation, options, 30.0, false);
     EXPECT_NEAR(run.calibration.depth_scale, 1 / 1.03, 0.01);
+    EXPECT_FALSE(run.calibration.depth_contradicts) << "though it did until the scale was known";
+    EXPECT_LT(std::abs(run.calibration.depth_offset), 4 * run.calibration.sigma_depth_offset);
     own_nees += std::pow((run.calibration.depth_scale - 1 / 1.03) / run.calibration.sigma_depth_scale, 2) / kRuns;
     nees += run.nees / kRuns;
     options.calibration.depth_scale = false;

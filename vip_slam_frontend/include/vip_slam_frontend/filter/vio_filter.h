@@ -162,6 +162,8 @@ class VioFilter {
   /// Decides whether the depth offset is significant. An implausibly large one has some other cause: it is reset to the
   /// given value and no longer estimated.
   void judgeDepthOffset();
+  /// From its prior: readings have another scale or curve, a part of which it had been taken for.
+  void startDepthOffsetAnew();
   bool isSteady(double depth_offset);
   /// Estimate of the camera-IMU delay while it is held.
   struct Delay {
