@@ -23,7 +23,9 @@ LandmarkSimulation::LandmarkSimulation(const SimulationOptions& options) : optio
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   const Eigen::Vector3d half(4.5, 3.5, 1.6);
   for (int i = 0; i < options.points; ++i) {
-    Eigen::Vector3d p(half.x() * unit(random_), half.y() * unit(random_), half.z() * unit(random_));
+    // As arguments of one call they would be drawn in the compiler's order, not the same on every processor.
+    const double z = unit(random_), y = unit(random_), x = unit(random_);
+    Eigen::Vector3d p(half.x() * x, half.y() * y, half.z() * z);
     const int axis = i % 3;
     p(axis) = unit(random_) > 0 ? half(axis) : -half(axis);
     // Clutter in front of the walls.
