@@ -27,6 +27,8 @@ Likelihood learntBetween(const Estimate& before, const Estimate& after) {
 Estimate CalibrationEvidence::held() const { return {adopted_, kHeld * prior_.sigma}; }
 
 void CalibrationEvidence::add(double t, const Likelihood& step) {
+  // A filter that has failed says nothing; it is started again.
+  if (!std::isfinite(step.information) || !std::isfinite(step.weighted)) return;
   if (stretches_.empty() || !(std::abs(t - begin_) < kStretch)) {
     stretches_.emplace_back();
     begin_ = t;

@@ -75,6 +75,16 @@ TEST(CalibrationEvidence, ScatterOfTheStretchesWidensItsSigma) {
   EXPECT_GT(nees, 0.4);
 }
 
+TEST(CalibrationEvidence, AFilterThatFailedDoesNotSpoilIt) {
+  std::mt19937 random(7);
+  CalibrationEvidence evidence({1.0, 0.02});
+  addReadings(0.97, 0.05, 0, 40, &random, &evidence);
+  const Estimate before = evidence.estimate();
+  evidence.add(40, learntBetween(evidence.held(), {std::nan(""), std::nan("")}));
+  EXPECT_EQ(evidence.estimate().value, before.value);
+  EXPECT_EQ(evidence.estimate().sigma, before.sigma);
+}
+
 TEST(CalibrationEvidence, RightValuesStay) {
   int adopted = 0;
   for (int seed = 0; seed < 200; ++seed) {

@@ -193,7 +193,9 @@ class VioFilter {
   CalibrationEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
   double sigma_depth_offset_;        ///< m, of the prior at a start
   frontend::CalibrationEvidence depth_scale_;
-  std::optional<double> scale_unseen_;  ///< time of the newest clone that the IMU did not predict; empty: none is left
+  /// Time of the newest clone that the IMU did not predict, or whose first estimate no longer agrees with those of the
+  /// others; empty: none is left, what steps say of the scale counts.
+  std::optional<double> scale_unseen_;
   double focal_;
   Eigen::Vector3d G_;
   Gate gate_;
