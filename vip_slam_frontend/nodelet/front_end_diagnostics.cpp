@@ -146,6 +146,8 @@ void FrontEndNodelet::reportTracking(diagnostic_updater::DiagnosticStatusWrapper
   status.add("vertical by", frontend::levelName(c.level));
   status.add("pixel sigma in use", c.sigma_px);
   status.add("IMU noise in use, times the configured", c.imu_noise_scale);
+  status.add("drift of the gyroscope's bias in use, times the configured random walk", c.gyro_walk);
+  status.add("drift of the accelerometer's bias in use, times the configured random walk", c.accel_walk);
   status.add("jitter of image stamps in use (ms)", 1e3 * c.stamp_sigma);
   status.add("depth noise that a surface shares, times the configured", c.depth_shared);
   status.add("images that contradict the IMU", c.imu_contradicted);

@@ -197,7 +197,7 @@ KeyframePtr FrontEnd::Impl::makeKeyframe(const TrackedFrame& frame, double t_imu
     keyframe->frame.depth_grid = depthGrid(options_.keyframe_grid_stride);
   }
   keyframe->gyro_correction = filter_.gyroCorrection();
-  keyframe->imu_noise_scale = filter_.imuNoiseScale();
+  keyframe->imu_noise_scale = filter_.imuNoise();
   keyframe->depth_noise = surfaces_.learnt().parts();
 
   keyframes_.accept(keyframe.get(), frame.features, t_imu, inertial_, &filter_);

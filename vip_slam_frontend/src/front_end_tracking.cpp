@@ -167,7 +167,10 @@ void FrontEnd::Impl::updateFilter(ImageStep* step) {
   counters_.surfaces_used += report.surfaces_used;
   counters_.zero_velocity += report.zero_velocity;
   counters_.sigma_px = filter_.sigmaPx();
-  counters_.imu_noise_scale = filter_.imuNoiseScale();
+  const ImuNoiseScale imu_noise = filter_.imuNoise();
+  counters_.imu_noise_scale = imu_noise.density;
+  counters_.gyro_walk = imu_noise.gyro_walk;
+  counters_.accel_walk = imu_noise.accel_walk;
   counters_.stamp_sigma = filter_.stampSigma();
   counters_.depth_white = surfaces_.learnt().white();
   counters_.depth_shared = surfaces_.learnt().shared();

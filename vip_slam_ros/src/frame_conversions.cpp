@@ -170,7 +170,9 @@ vip_slam_msgs::Keyframe toMsg(const Keyframe& keyframe, const std::string& odom_
   msg.imu.reserve(keyframe.imu.size());
   for (const ImuSample& sample : keyframe.imu) msg.imu.push_back(toMsg(sample));
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(msg.gyro_correction.data()) = keyframe.gyro_correction;
-  msg.imu_noise_scale = keyframe.imu_noise_scale;
+  msg.imu_noise_scale = keyframe.imu_noise_scale.density;
+  msg.gyro_walk_scale = keyframe.imu_noise_scale.gyro_walk;
+  msg.accel_walk_scale = keyframe.imu_noise_scale.accel_walk;
   msg.depth_noise_white = keyframe.depth_noise.white;
   msg.depth_noise_shared = keyframe.depth_noise.shared;
   msg.motion = toPoseMsg(keyframe.motion.T_a_b);
@@ -186,7 +188,7 @@ Keyframe fromMsg(const vip_slam_msgs::Keyframe& msg) {
   keyframe.imu.reserve(msg.imu.size());
   for (const auto& sample : msg.imu) keyframe.imu.push_back(fromMsg(sample));
   keyframe.gyro_correction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(msg.gyro_correction.data());
-  keyframe.imu_noise_scale = msg.imu_noise_scale;
+  keyframe.imu_noise_scale = {msg.imu_noise_scale, msg.gyro_walk_scale, msg.accel_walk_scale};
   keyframe.depth_noise = {msg.depth_noise_white, msg.depth_noise_shared};
   keyframe.motion.T_a_b = fromMsg(msg.motion);
   keyframe.motion.covariance =

@@ -17,16 +17,12 @@ using ImuSamples = std::shared_ptr<const std::vector<ImuSample>>;
 /// IMU factor into keyframe `id`. Throws MapError when numbers in range cannot be integrated together.
 std::shared_ptr<const Preintegration> integrate(KeyframeId id, const ImuSamples& imu,
                                                 const Eigen::Matrix3d& gyro_correction, const NavState& from,
-                                                const ImuNoise& noise, double noise_scale) {
+                                                const ImuNoise& noise, const ImuNoiseScale& noise_scale) {
   if (!imu) return nullptr;
-  ImuNoise scaled = noise;
-  for (double* density :
-       {&scaled.gyro_noise_density, &scaled.gyro_random_walk, &scaled.accel_noise_density, &scaled.accel_random_walk})
-    *density *= noise_scale;
   const std::string name = "keyframe " + std::to_string(id) + ": IMU samples: ";
   try {
     const auto factor = std::make_shared<Preintegration>(withGyroCorrection(*imu, gyro_correction), from.bias_gyro,
-                                                         from.bias_accel, scaled);
+                                                         from.bias_accel, scaled(noise, noise_scale));
     if (!isFinite(*factor)) throw MapError(name + "their integral is not finite");
     return factor;
   } catch (const std::invalid_argument& e) {
@@ -201,7 +197,7 @@ void Map::joinOver(const MapKeyframe& kf, const ImuNoise& noise, double max_imu_
   MapKeyframe& next = keyframe(kf.next);
   ImuSamples joined;
   std::shared_ptr<const Preintegration> preintegration;
-  double scale = next.imu_noise_scale;
+  ImuNoiseScale scale = next.imu_noise_scale;
   bool chain = joinable(kf) && joinedSeconds(kf) <= max_imu_seconds;
   if (chain && kf.imu) {
     auto samples = std::make_shared<std::vector<ImuSample>>(*kf.imu);
@@ -209,7 +205,9 @@ void Map::joinOver(const MapKeyframe& kf, const ImuNoise& noise, double max_imu_
     chain = agreeInDuration(*samples, keyframe(kf.previous).data->frame, next.data->frame);
     if (chain) {
       joined = samples;
-      scale = std::max(kf.imu_noise_scale, scale);
+      const ImuNoiseScale& first = kf.imu_noise_scale;
+      scale = {std::max(first.density, scale.density), std::max(first.gyro_walk, scale.gyro_walk),
+               std::max(first.accel_walk, scale.accel_walk)};
       preintegration = integrate(next.id(), joined, next.gyro_correction, keyframe(kf.previous).state, noise, scale);
     }
   }
@@ -259,7 +257,8 @@ void Map::setState(KeyframeId id, const NavState& state, const ImuNoise& noise) 
 
 void Map::widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise) {
   MapKeyframe& kf = keyframe(id);
-  const double scale = std::min(factor * kf.imu_noise_scale, map_limits::kMaxNoiseScale);
+  ImuNoiseScale scale = kf.imu_noise_scale;
+  scale.density = std::min(factor * scale.density, map_limits::kMaxNoiseScale);
   if (!isImuNoiseScale(scale))
     throw MapError("keyframe " + std::to_string(id) + ": factor on the IMU's noise is " + std::to_string(factor));
   if (kf.preintegration)

@@ -25,7 +25,10 @@ bool isGyroCorrection(const Eigen::Matrix3d& correction) {
   return correction.allFinite() && correction.cwiseAbs().maxCoeff() <= map_limits::kMaxGyroCorrection;
 }
 
-bool isImuNoiseScale(double scale) { return scale > 0 && scale <= map_limits::kMaxNoiseScale; }
+bool isImuNoiseScale(const ImuNoiseScale& scale) {
+  const auto usable = [](double factor) { return factor > 0 && factor <= map_limits::kMaxNoiseScale; };
+  return usable(scale.density) && usable(scale.gyro_walk) && usable(scale.accel_walk);
+}
 
 std::string validateImu(const std::vector<ImuSample>& imu) {
   for (std::size_t k = 0; k < imu.size(); ++k) {
@@ -94,8 +97,11 @@ std::string validateKeyframe(const Keyframe& keyframe) {
     return name +
            formatted("the gyro's correction is not finite, or has entries above %g", map_limits::kMaxGyroCorrection);
   if (!isImuNoiseScale(keyframe.imu_noise_scale))
-    return name + formatted("the scale of the IMU's noise is %g, expected more than 0, at most %g",
-                            keyframe.imu_noise_scale, map_limits::kMaxNoiseScale);
+    return name + formatted(
+                      "the scale of the IMU's noise is %g, of its random walks %g (gyroscope) and %g "
+                      "(accelerometer), expected more than 0, at most %g",
+                      keyframe.imu_noise_scale.density, keyframe.imu_noise_scale.gyro_walk,
+                      keyframe.imu_noise_scale.accel_walk, map_limits::kMaxNoiseScale);
   if (!keyframe.depth_noise.isUsable())
     return name + formatted("the parts of the depth noise are %g (white) and %g (shared), expected variances",
                             keyframe.depth_noise.white, keyframe.depth_noise.shared);

@@ -17,7 +17,7 @@ bool isFinite(const Preintegration& factor);
 bool isAreaFinite(const PlaneEstimate& plane);
 /// Finite, and within what a gyro can be off by.
 bool isGyroCorrection(const Eigen::Matrix3d& correction);
-bool isImuNoiseScale(double scale);
+bool isImuNoiseScale(const ImuNoiseScale& scale);
 /// Empty when the samples are finite, in order and within the limits of map_limits.h, else the reason.
 std::string validateImu(const std::vector<ImuSample>& imu);
 /// Whether samples (not empty) last as long as the images' stamps, with their delays, say.

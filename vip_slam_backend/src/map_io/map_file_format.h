@@ -9,9 +9,10 @@ namespace vip_slam {
 namespace map_file {
 
 constexpr char kMagic[8] = {'V', 'I', 'P', 'M', 'A', 'P', 0, 0};
-constexpr std::uint32_t kVersion = 6;
+constexpr std::uint32_t kVersion = 7;
 /// Oldest readable version. Version 1 lacks the features' pixel_sigma, up to 2 a landmark has a single track, up to 3
-/// there is no odometry motion, up to 4 no camera, up to 5 no scale of the IMU's noise.
+/// there is no odometry motion, up to 4 no camera, up to 5 no scale of the IMU's noise, up to 6 none
+/// of its random walks.
 constexpr std::uint32_t kOldestVersion = 1;
 constexpr float kPixelSigmaOfVersion1 = 0.3f;  ///< average sigma of tracks, px
 constexpr std::size_t kHeader = 8 + 4 + 4 + 8;

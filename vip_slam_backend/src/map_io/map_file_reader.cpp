@@ -191,7 +191,12 @@ void readKeyframe(ByteReader& in, std::uint32_t version, std::size_t landmark_li
   }
   frame.depth_grid = readGrid(in);
   if (version >= 4 && flag(in, "motion flag")) data->motion = readMotion(in);
-  if (version >= 6) data->imu_noise_scale = finite(in, "scale of the IMU's noise");
+  ImuNoiseScale& scale = data->imu_noise_scale;
+  if (version >= 6) scale.density = finite(in, "scale of the IMU's noise");
+  if (version >= 7) {
+    scale.gyro_walk = finite(in, "scale of the gyroscope's random walk");
+    scale.accel_walk = finite(in, "scale of the accelerometer's random walk");
+  }
   std::vector<ImuSample> imu(in.count(map_file::kImuBytes, "IMU samples"));
   for (std::size_t k = 0; k < imu.size(); ++k) {
     imu[k].t = finite(in, "IMU sample");

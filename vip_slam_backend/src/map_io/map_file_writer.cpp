@@ -145,7 +145,9 @@ void write(ByteWriter& out, const MapKeyframe& kf, std::uint32_t epoch, Landmark
     for (int r = 0; r < 6; ++r)
       for (int c = r; c < 6; ++c) out.put(kf.motion.covariance(r, c));
   }
-  out.put(kf.imu_noise_scale);
+  out.put(kf.imu_noise_scale.density);
+  out.put(kf.imu_noise_scale.gyro_walk);
+  out.put(kf.imu_noise_scale.accel_walk);
   const std::size_t samples = kf.previous != 0 && kf.imu ? kf.imu->size() : 0;
   out.put(static_cast<std::uint32_t>(samples));
   const std::vector<ImuSample> scaled =

@@ -233,7 +233,7 @@ TEST(BackEnd, AnImuThatTheOdometryContradictsDoesNotBendTheMap) {
         for (int s = 20; s < 24; ++s) kf->imu[s].accel.x() -= 25.0;  // 0.5 m/s
       back_end.addKeyframe(kf);
       back_end.applyPlaneUpdate(world.planes());
-      const double scale = back_end.map().keyframe(kf->id).imu_noise_scale;
+      const double scale = back_end.map().keyframe(kf->id).imu_noise_scale.density;
       if (k % 10 == 7) EXPECT_GT(scale, 3.0) << k;
       if (k % 10 != 7) EXPECT_LT(scale, 2.5) << k;
     }
@@ -253,14 +253,14 @@ TEST(BackEnd, AKeyframeTellsHowNoisyItsImuIs) {
   CheckedBackEnd back_end(options("vip"), world.sensor());
   for (int k = 0; k < 3; ++k) {
     auto kf = std::make_shared<Keyframe>(*world.next());
-    if (k == 2) kf->imu_noise_scale = 4;
+    if (k == 2) kf->imu_noise_scale.density = 4;
     back_end.addKeyframe(kf);
   }
   const Matrix15d &as_told = back_end.map().keyframe(2).preintegration->covariance(),
                   &wider = back_end.map().keyframe(3).preintegration->covariance();
   EXPECT_NEAR(wider.trace() / as_told.trace(), 16.0, 2.0);
   auto bad = std::make_shared<Keyframe>(*world.next());
-  bad->imu_noise_scale = 0;
+  bad->imu_noise_scale.density = 0;
   back_end.addKeyframe(bad);
   EXPECT_NE(back_end.lastRefusal().find("scale of the IMU's noise"), std::string::npos) << back_end.lastRefusal();
 }

@@ -90,7 +90,7 @@ class RandomMap {
     if (chance(10)) kf->frame.t += 0.12;
     if (chance(10)) kf->motion = RelativeMotion();
     if (chance(10)) kf->frame.features.clear();
-    if (chance(5)) kf->imu_noise_scale = 3;
+    if (chance(5)) kf->imu_noise_scale.density = 3;
     if (kf->frame.t <= last_stamp_) kf->frame.t = last_stamp_ + 0.01;
     last_stamp_ = kf->frame.t;
     return kf;

@@ -57,8 +57,9 @@ TEST(MapCamera, AVersion4FileIsReadWithout) {
   std::string bytes = serialiseMap(map, {}, 1);
   bytes.erase(24 + 8, 1);  // the flag for "no camera stored"
   const std::string scale(reinterpret_cast<const char*>(&kScale), sizeof kScale);
-  int scales = 0;  // stored per keyframe since version 6
-  for (std::size_t at; (at = bytes.find(scale)) != std::string::npos; ++scales) bytes.erase(at, sizeof kScale);
+  int scales = 0;  // stored per keyframe since version 6, and behind it those of two random walks since version 7
+  for (std::size_t at; (at = bytes.find(scale)) != std::string::npos; ++scales)
+    bytes.erase(at, 3 * sizeof kScale);
   ASSERT_EQ(scales, 3);
   bytes[8] = 4;
   const std::uint64_t length = bytes.size() - 24 - 4;

@@ -209,8 +209,8 @@ TEST(MapFile, ForeignAndNewerFilesAreNamed) {
   EXPECT_NE(message("\x89PNG and what follows, surely not one of ours").find("not a map file"), std::string::npos);
   EXPECT_NE(message("").find("too short"), std::string::npos);
   std::string newer = serialiseMap(syntheticMap(3, 12, 100), {}, 5);
-  newer[8] = 7;
-  EXPECT_NE(message(sealed(newer)).find("version 7, expected 1 to 6"), std::string::npos);
+  newer[8] = 8;
+  EXPECT_NE(message(sealed(newer)).find("version 8, expected 1 to 7"), std::string::npos);
   try {
     loadMapFile("/nonexistent/map.vsm", ImuNoise());
     FAIL();

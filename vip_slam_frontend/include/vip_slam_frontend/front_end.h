@@ -64,13 +64,14 @@ struct FrontEndCounters {
   std::uint64_t surfaces_used = 0;  ///< pairs of a depth reading and a flat patch of an earlier image
   std::uint64_t landmarks_reacquired = 0;
   frontend::Level level = frontend::Level::kAccelerometer;  ///< what the vertical of the last start was taken from
-  double depth_unit = 1;       ///< factor that brings readings to the unit of the first ones
-  double missing_reading = 0;  ///< value of depth that stands for "no reading" beside 0, m; 0: none seen
-  double sigma_px = 0;         ///< adapted pixel noise
-  double gyro_range = 0;       ///< limit of the gyro's range, rad/s; 0: never reached
-  double imu_noise_scale = 1;  ///< factor on the IMU's noise, see ImuNoiseMonitor
-  double stamp_sigma = 0;      ///< learnt jitter of the image stamps, one sigma, s
-  double nis_per_dof = 0;      ///< of the last update; about 1 when consistent
+  double depth_unit = 1;                 ///< factor that brings readings to the unit of the first ones
+  double missing_reading = 0;            ///< value of depth that stands for "no reading" beside 0, m; 0: none seen
+  double sigma_px = 0;                   ///< adapted pixel noise
+  double gyro_range = 0;                 ///< limit of the gyro's range, rad/s; 0: never reached
+  double imu_noise_scale = 1;            ///< factor on the IMU's noise, see ImuNoiseMonitor
+  double gyro_walk = 1, accel_walk = 1;  ///< factors on the random walks of its biases, see DriftMonitor
+  double stamp_sigma = 0;                ///< learnt jitter of the image stamps, one sigma, s
+  double nis_per_dof = 0;                ///< of the last update; about 1 when consistent
   /// Learnt noise of depth on surfaces, as factors on the configured noise: of single patches, and common to a surface.
   double depth_white = 1, depth_shared = 1;
 };

@@ -49,7 +49,12 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   }
   const double delay = found.time_offset - given.time_offset;
   const double least_delay = std::max(kMinDelay, kSure * found.sigma_time_offset);
-  if (found.sigma_time_offset > 0 && std::abs(delay) > least_delay) {
+  if (found.sigma_time_offset > 0 && std::abs(delay) > least_delay && found.delay_drifts) {
+    all.push_back(formatted(
+        "the delay of the images drifts and is followed: from the %.1f ms of time_offset to %.1f ms by now; are "
+        "images and IMU stamped by two clocks? Let the driver stamp both by one; no time_offset holds for long",
+        1e3 * given.time_offset, 1e3 * found.time_offset));
+  } else if (found.sigma_time_offset > 0 && std::abs(delay) > least_delay) {
     all.push_back(
         formatted("images lag by %.1f ms, not by the %.1f ms of time_offset in the sensor's configuration, which is "
                   "corrected for; time_offset should be %.4f",

@@ -42,7 +42,8 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       noise_(options.sigma_px, options.sigma_px_min, kMaxPixelNoise),
       depth_noise_(1.0, kMinDepthNoise, kMaxDepthNoise),
       stamp_monitor_(options.adapt_imu_noise),
-      imu_monitor_(options.adapt_imu_noise) {}
+      imu_monitor_(options.adapt_imu_noise),
+      drift_(imu_noise, options) {}
 
 void VioFilter::stop() {
   if (started_) learnCalibration();
@@ -50,6 +51,7 @@ void VioFilter::stop() {
   tracks_.clear();
   stamp_monitor_.reset();
   imu_monitor_.reset();
+  drift_.reset();
   still_images_ = 0;
   after_open_ = false;
   delay_before_.reset();
@@ -133,18 +135,20 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   started_ = true;
 }
 
+ImuNoiseScale VioFilter::imuNoise() const {
+  using Drift = frontend::DriftMonitor;
+  return {imu_monitor_.scale(), drift_.of(Drift::kGyroBias).factor(), drift_.of(Drift::kAccelBias).factor()};
+}
+
 Propagation VioFilter::predict(const SE3& T_I0_I1, const Matrix6d& covariance, double dt) const {
   return propagateByMotion(filter_.window(), T_I0_I1, covariance, dt, imu_noise_);
 }
 
 Propagation VioFilter::predict(const std::vector<ImuSample>& samples, const frontend::ChannelNoise& noise) const {
-  const double scale = options_.imu_noise_inflation * imu_monitor_.scale();
-  ImuNoise scaled = imu_noise_;
-  scaled.gyro_noise_density *= scale * noise.gyro;
-  scaled.accel_noise_density *= scale * noise.accel;
-  scaled.gyro_random_walk *= scale;
-  scaled.accel_random_walk *= scale;
-  return propagate(filter_.window(), samples, scaled, G_, stamp_monitor_.sigma());
+  ImuNoise found = scaled(imu_noise_, imuNoise());
+  found.gyro_noise_density *= options_.imu_noise_inflation * noise.gyro;
+  found.accel_noise_density *= options_.imu_noise_inflation * noise.accel;
+  return propagate(filter_.window(), samples, found, G_, stamp_monitor_.sigma());
 }
 
 void VioFilter::forgetClone(CloneId id) {
@@ -213,11 +217,12 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   if (!filter_.window().calibration.time_offset || propagation.rates.changes()) {
     delay_before_.reset();
   } else if (!delay_before_) {
-    delay_before_ = Delay{filter_.window().time_offset, calibration().sigma_time_offset};
+    delay_before_ = delay();
   }
   // While the delay is held it neither drifts nor is estimated.
   const double since = propagation.predicted.t - filter_.window().clones.back().t;
-  const double delay_change = delay_before_ ? 0.0 : options_.calibration.time_offset_walk * std::sqrt(since);
+  const double delay_change =
+      delay_before_ ? 0.0 : drift_.of(frontend::DriftMonitor::kDelay).density() * std::sqrt(since);
   filter_.augment(propagation, id, delay_change);
 
   // From the second still image on, the newest clone replaces the one before: the window keeps what it knew of the
@@ -247,6 +252,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
 
   const NavState predicted = nav();
   const Matrix15d P_predicted = covariance();
+  const frontend::Estimate delay_predicted = filter_.window().calibration.time_offset ? delay() : frontend::Estimate{};
   const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
   // After an interval that left the motion open only images can measure the velocity: the first image after it updates
   // with all tracks.
@@ -255,7 +261,14 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const std::vector<Candidate> candidates = chooseCandidates(id, window_full, all);
   if (!candidates.empty()) updateWithFeatures(candidates, all, &report);
   if (surfaces && !still) updateWithSurfaces(*surfaces, &report);
-  if (delay_before_) holdDelay();
+  if (delay_before_) {
+    holdDelay();
+  } else if (filter_.window().calibration.time_offset && !still) {
+    const auto one = [](double value) { return Eigen::VectorXd::Constant(1, value); };
+    const frontend::Estimate found = delay();
+    drift_.add(frontend::DriftMonitor::kDelay, one(found.value - delay_predicted.value),
+               one(std::pow(delay_predicted.sigma, 2)), one(std::pow(found.sigma, 2)));
+  }
   learnDepthScale(propagation.inertial);
   judgeDepthOffset();
   judgeDepthShift();
@@ -275,6 +288,13 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
         correction = std::min(correction, std::max(0.0, 6.0 * correction - along * along / w.dot(lost * w)) / 5.0);
       }
     }
+    if (propagation.inertial) {
+      using Drift = frontend::DriftMonitor;
+      const Eigen::Matrix<double, 15, 1> before = P_predicted.diagonal(), after = covariance().diagonal();
+      drift_.add(Drift::kGyroBias, nav().bias_gyro - predicted.bias_gyro, before.segment<3>(9), after.segment<3>(9));
+      drift_.add(Drift::kAccelBias, nav().bias_accel - predicted.bias_accel, before.tail<3>(), after.tail<3>());
+    }
+    drift_.endImage(nav().t);
     imu_monitor_.add(correction, report.features_used, report.features_gated);
   }
 

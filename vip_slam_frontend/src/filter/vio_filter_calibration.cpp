@@ -60,6 +60,7 @@ CalibrationEstimate VioFilter::calibration() const {
     calibration.sigma_translation = sigmas.segment<3>(window.translationColumn() - first);
   }
   if (window.calibration.time_offset) calibration.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
+  calibration.delay_drifts = drift_.of(frontend::DriftMonitor::kDelay).drifts();
   if (window.calibration.depth_offset) calibration.sigma_depth_offset = sigmas(window.depthOffsetColumn() - first);
   if (window.calibration.intrinsics) calibration.sigma_bearing = sigmas.segment<4>(window.intrinsicsColumn() - first);
   if (window.calibration.depth_shift) {

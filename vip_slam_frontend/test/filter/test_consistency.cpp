@@ -39,12 +39,15 @@ double meanNees(SimulationOptions simulation, const FilterOptions& options, int 
 /// The motions span the window (8 images) or more than it (20), where they are composed of several.
 TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
   constexpr int kSeeds = 20;
-  double nees = 0, nis = 0, drift = 0, motion_nees = 0, motion_error = 0, newest_error = 0;
+  double nees = 0, adapting_nees = 0, nis = 0, drift = 0, motion_nees = 0, motion_error = 0, newest_error = 0;
   for (int seed = 1; seed <= kSeeds; ++seed) {
     SimulationOptions simulation;
     simulation.seed = static_cast<std::uint32_t>(seed);
-    const RunResult run = runFilter(simulation, independentNoise(), 30.0, false);
-    nees += run.nees / kSeeds;
+    FilterOptions options = independentNoise();
+    const RunResult run = runFilter(simulation, options, 30.0, false);
+    adapting_nees += run.nees / kSeeds;
+    options.adapt_imu_noise = false;
+    nees += runFilter(simulation, options, 30.0, false).nees / kSeeds;
     nis += run.nis_per_dof / kSeeds;
     drift += run.final_position / run.length / kSeeds;
     motion_nees += run.motion_nees / kSeeds;
@@ -57,6 +60,9 @@ TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
   std::printf("NEES %.2f, band %.2f to %.2f; NIS per row %.3f; drift %.3f %%\n", nees, low, high, nis, 100 * drift);
   EXPECT_GT(nees, low);
   EXPECT_LT(nees, high);
+  // What adapts to noise and drift hardly widens the covariance where there is nothing to adapt to.
+  std::printf("NEES while adapting %.2f\n", adapting_nees);
+  EXPECT_NEAR(adapting_nees, nees, 0.05 * nees);
   EXPECT_NEAR(nis, 1.0, 0.1);
   EXPECT_LT(drift, 0.004);
   std::printf("NEES of the motion %.2f; error %.3f of that of the newest poses\n", motion_nees,

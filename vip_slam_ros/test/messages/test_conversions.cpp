@@ -164,14 +164,16 @@ TEST_F(Conversions, KeyframeIsUnchanged) {
   keyframe.previous = 17;
   for (int i = 0; i < 4; ++i) keyframe.imu.push_back({1e9 + 0.1 * i, vector(), vector()});
   keyframe.gyro_correction << 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09;
-  keyframe.imu_noise_scale = 2.5;
+  keyframe.imu_noise_scale = {2.5, 30, 4};
   keyframe.depth_noise = {0.1, 0.3};
   keyframe.motion.T_a_b = keyframe.frame.T_I_C;
   for (int i = 0; i < 36; ++i) keyframe.motion.covariance(i / 6, i % 6) = vector().x();
   const Keyframe back = fromMsg(throughBytes(toMsg(keyframe, "odom")));
   EXPECT_LT(back.motion.T_a_b.boxminus(keyframe.motion.T_a_b).norm(), 1e-14);
   EXPECT_EQ(back.motion.covariance, keyframe.motion.covariance);
-  EXPECT_EQ(back.imu_noise_scale, 2.5);
+  EXPECT_EQ(back.imu_noise_scale.density, 2.5);
+  EXPECT_EQ(back.imu_noise_scale.gyro_walk, 30);
+  EXPECT_EQ(back.imu_noise_scale.accel_walk, 4);
   EXPECT_EQ(back.depth_noise.white, 0.1);
   EXPECT_EQ(back.depth_noise.shared, 0.3);
   EXPECT_EQ(back.id, keyframe.id);

@@ -41,7 +41,7 @@ struct MapKeyframe {
   std::shared_ptr<const std::vector<ImuSample>> imu;
   std::shared_ptr<const Preintegration> preintegration;
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< applied in the factor, see Keyframe
-  double imu_noise_scale = 1;                                 ///< likewise
+  ImuNoiseScale imu_noise_scale;                              ///< likewise
   /// The odometry's motion from `previous`; unknown when there is none.
   RelativeMotion motion;
   /// Depth points of this keyframe on planes.

@@ -27,6 +27,17 @@ struct ImuNoise {
   double gyro_correction_sigma = 1e-3;  ///< one sigma of each entry, see gyro_correction.h
 };
 
+/// Factors on the configured noise, as found on the way.
+struct ImuNoiseScale {
+  double density = 1;                    ///< on both noise densities
+  double gyro_walk = 1, accel_walk = 1;  ///< on the random walks of the biases: they drift
+};
+
+inline ImuNoise scaled(const ImuNoise& noise, const ImuNoiseScale& by) {
+  return {noise.gyro_noise_density * by.density, noise.gyro_random_walk * by.gyro_walk,
+          noise.accel_noise_density * by.density, noise.accel_random_walk * by.accel_walk, noise.gyro_correction_sigma};
+}
+
 /// State of the IMU (body) at time t. Tangent order wherever a 15x15 covariance appears:
 /// (theta, p, v, b_g, b_a), theta by right perturbation, p and v in the world (odom or map) frame.
 struct NavState {

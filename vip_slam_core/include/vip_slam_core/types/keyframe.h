@@ -55,8 +55,8 @@ struct Keyframe {
   std::vector<ImuSample> imu;
   /// Present estimate of the gyro's correction, which is not applied to the rates in `imu`: see gyro_correction.h.
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();
-  double imu_noise_scale = 1;  ///< factor on the configured IMU noise, estimated by the front end
-  DepthNoiseParts depth_noise;  ///< of the recording, learnt by the front end up to here
+  ImuNoiseScale imu_noise_scale;  ///< estimated by the front end
+  DepthNoiseParts depth_noise;    ///< of the recording, learnt by the front end up to here
   /// The odometry's motion since the previous keyframe; unknown when previous == 0 or when tracking was interrupted.
   /// Not the difference of the two published states, which were corrected in between.
   RelativeMotion motion;

@@ -18,6 +18,7 @@ struct CalibrationEstimate {
   Eigen::Vector3d sigma_rotation = Eigen::Vector3d::Zero();     ///< rad, right perturbation
   Eigen::Vector3d sigma_translation = Eigen::Vector3d::Zero();  ///< m, in the IMU frame
   double sigma_time_offset = 0;                                 ///< s
+  bool delay_drifts = false;                                    ///< faster than its random walk says; it is followed
   double depth_offset = 0;        ///< m, to be added to every reading of the depth camera, as in a sensor file
   double sigma_depth_offset = 0;  ///< m
   double depth_scale = 1;         ///< factor of every reading, before the offset, that is adopted

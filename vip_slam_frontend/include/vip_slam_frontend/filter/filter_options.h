@@ -22,7 +22,6 @@ struct CalibrationOptions {
   double sigma_rotation = 0.01;
   double sigma_translation = 0.01;
   double sigma_time_offset = 0.005;
-  double time_offset_walk = 0;
   double sigma_depth_offset = 0.005;
   double sigma_depth_scale = 0.02;
   double sigma_focal = 0.002;
@@ -47,8 +46,6 @@ struct CalibrationOptions {
     v.field("sigma_rotation", sigma_rotation, 1e-5, 1.0, "initial one-sigma of the rotation, rad");
     v.field("sigma_translation", sigma_translation, 1e-5, 1.0, "initial one-sigma of the translation, m");
     v.field("sigma_time_offset", sigma_time_offset, 1e-6, 1.0, "initial one-sigma of the delay, s");
-    v.field("time_offset_walk", time_offset_walk, 0.0, 1e-2,
-            "how much the delay changes on the way, s / sqrt(s); 2e-5 where it goes with the exposure time");
     v.field("sigma_depth_offset", sigma_depth_offset, 1e-6, 1.0, "initial one-sigma of the depth's offset, m");
     v.field("sigma_depth_scale", sigma_depth_scale, 1e-6, 1.0, "initial one-sigma of the depth's scale");
     v.field("sigma_focal", sigma_focal, 1e-6, 1.0, "initial one-sigma of the focal lengths, as a share of them");

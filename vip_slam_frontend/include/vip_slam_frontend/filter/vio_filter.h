@@ -11,6 +11,7 @@
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_frontend/filter/calibration_estimate.h"
 #include "vip_slam_frontend/filter/calibration_evidence.h"
+#include "vip_slam_frontend/filter/drift_monitor.h"
 #include "vip_slam_frontend/filter/feature_rows.h"
 #include "vip_slam_frontend/filter/filter_options.h"
 #include "vip_slam_frontend/filter/gating.h"
@@ -97,7 +98,8 @@ class VioFilter {
   /// The pose of motionSinceMark() without the cost of its covariance; empty when nothing was marked.
   std::optional<SE3> poseSinceMark() const;
   double sigmaPx() const { return noise_.sigma(); }
-  double imuNoiseScale() const { return imu_monitor_.scale(); }
+  double imuNoiseScale() const { return imu_monitor_.scale(); }  ///< on the densities
+  ImuNoiseScale imuNoise() const;
   double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s
   /// Offset to be added to depth readings outside the filter, m: the estimate once it is significant and large enough
   /// to matter, else 0. Before it converges the estimate varies by a millimetre, which would stay in a map of exact
@@ -165,13 +167,13 @@ class VioFilter {
   /// From its prior: readings have another scale or curve, a part of which it had been taken for.
   void startDepthOffsetAnew();
   bool isSteady(double depth_offset);
-  /// Estimate of the camera-IMU delay while it is held.
-  struct Delay {
-    double value, sigma;  ///< s
-  };
   /// Resets the camera-IMU delay and its sigma to delay_before_: while the rate hardly changes, noise alone would drive
   /// its estimate.
   void holdDelay();
+  /// Camera-IMU delay, s; to be called while it is estimated.
+  frontend::Estimate delay() const {
+    return {filter_.window().time_offset, filter_.sigma(filter_.window().timeOffsetColumn())};
+  }
   /// Resets an implausibly large shift of the depth image and stops applying it.
   void judgeDepthShift();
   /// Adjusts the depth in the tracks to readings that are shifted by this much more, in bearings.
@@ -202,6 +204,7 @@ class VioFilter {
   NoiseMonitor noise_, depth_noise_;
   StampMonitor stamp_monitor_;
   ImuNoiseMonitor imu_monitor_;
+  frontend::DriftMonitor drift_;
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;
@@ -215,10 +218,10 @@ class VioFilter {
   bool depth_is_off_ = false;                                                            ///< significantly
   Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
-  bool depth_contradicts_ = false;     ///< its offset became implausibly large
-  int still_images_ = 0;               ///< images since standing still began; 0 when moving
-  bool after_open_ = false;            ///< the propagation before left the motion open
-  std::optional<Delay> delay_before_;  ///< the value held; empty while the delay is estimated
+  bool depth_contradicts_ = false;                  ///< its offset became implausibly large
+  int still_images_ = 0;                            ///< images since standing still began; 0 when moving
+  bool after_open_ = false;                         ///< the propagation before left the motion open
+  std::optional<frontend::Estimate> delay_before_;  ///< the value held; empty while the delay is estimated
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;                       ///< 0: none
   std::optional<RelativeMotion> to_mark_;  ///< from the clone marked originally to mark_, when that is another one
