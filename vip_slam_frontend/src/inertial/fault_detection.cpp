@@ -31,7 +31,7 @@ void FaultDetection::reset(double t) {
 }
 
 bool FaultDetection::add(const MotionEvidence& e) {
-  const bool contradicts = e.images_agree && e.sigmas > kGate;
+  const bool contradicts = e.images_agree && (e.implausible || e.sigmas > kGate);
   const double gain = std::min(1.0, e.interval / kMemory);
   if (e.images_agree) contradicted_ += gain * (contradicts - contradicted_);
   const bool deviates = e.images_agree && e.sigmas > kDeviates * kGate;

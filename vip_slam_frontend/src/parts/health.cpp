@@ -96,8 +96,8 @@ void Health::judge(const Sight& sight) {
   }
   if (sight.surfaces_hold && !lost()) last_held_t_ = sight.t;
   counters_->coasting += !sight.surfaces_hold;
-  // Without an IMU neither images nor samples tell the motion.
-  const double patience = sight.blind ? options_.longestImuGap() : options_.coast_seconds;
+  // Without an IMU, or with one that is wrong, neither images nor samples tell the motion.
+  const double patience = sight.blind || sight.contradicts_imu ? options_.longestImuGap() : options_.coast_seconds;
   if (!lost() && (sight.t - last_held_t_ > patience || coastedSigma(sight.variance) > options_.max_position_sigma)) {
     phase_ = Phase::kLost;
     ++counters_->lost;

@@ -158,8 +158,9 @@ bool MotionSources::admitCutOff(double from, double t_imu, Propagation* propagat
 }
 
 bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction,
-                                 const Propagation& propagation) {
+                                 const Propagation& propagation, bool implausible) {
   MotionEvidence evidence;
+  evidence.implausible = implausible;
   evidence.t = propagation.predicted.t;
   evidence.interval = prediction.interval;
   evidence.images_agree = !prediction.turn_unknown && leave_out_moving_ && !prediction.wary &&

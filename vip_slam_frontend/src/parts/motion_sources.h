@@ -56,7 +56,9 @@ class MotionSources {
   /// Whether the IMU was at fault a moment before t (IMU clock).
   bool suspectImu(double t) const { return inertial_->complete() && faults_.suspects(t); }
   /// Whether the IMU is at fault in the interval before this image (fault_detection.h).
-  bool imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction, const Propagation& propagation);
+  /// `implausible`: its noise has been widened beyond what an IMU has.
+  bool imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction, const Propagation& propagation,
+                    bool implausible);
   /// Whether the image after an IMU gap shows the motion during the gap. Images taken inside the gap follow each other
   /// closely; when they are missing as well, enough tracks must survive and the rotation must be near the predicted
   /// one. `unseen`: time since the last image, s.

@@ -133,6 +133,21 @@ TEST(FaultDetection, AWrongImuIsFoundWithinTwoSecondsOfMotion) {
 }
 
 // What fills the view moves: while it comes into view images do not agree among themselves, then they contradict.
+/// Where the filter widens the IMU's noise until nothing contradicts it, the noise itself is the contradiction.
+TEST(FaultDetection, AnImplausibleNoiseHidesNothing) {
+  for (const bool implausible : {false, true}) {
+    FaultDetection detection;
+    detection.reset(0);
+    int found = 0;
+    for (int k = 1; k <= 300; ++k) {
+      const double t = k / 30.0;
+      found += detection.add({t, 1 / 30.0, true, 2.0, implausible && t > 5});
+    }
+    EXPECT_GE(found, implausible ? 120 : 0);
+    EXPECT_LE(found, implausible ? 150 : 0);
+  }
+}
+
 TEST(FaultDetection, ABodyThatFillsTheViewForAMomentIsNoFaultOfTheImu) {
   const auto body = [](double t) { return t > 5 && t < 5.6 ? 30.0 : 2.0; };
   EXPECT_TRUE(faults(10, body, [](double t) { return t < 4.9 || t > 5.1; }).empty());

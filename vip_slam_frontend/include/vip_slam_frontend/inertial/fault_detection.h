@@ -5,7 +5,8 @@
 // lately. Then the IMU is at fault in an interval
 // - that contradicts them all of a sudden, after a time of agreement (a shock, saturation, shaking), and in those after
 //   it for as long as they contradict, or
-// - when most of the last second does (axes, signs or units).
+// - when most of the last second does (axes, signs or units), or
+// - when the filter has had to widen the IMU's noise beyond what any IMU has: then no difference is large in sigmas.
 // A body that fills the view contradicts the IMU gradually, while parts of the view still agree with it: neither rule
 // takes it for a fault of the IMU.
 #pragma once
@@ -21,6 +22,7 @@ struct MotionEvidence {
   double interval = 0;        ///< s
   bool images_agree = false;  ///< among themselves
   double sigmas = 0;          ///< difference between the two motions
+  bool implausible = false;   ///< the noise that the filter had to assume of the IMU
 };
 
 class FaultDetection {
