@@ -26,8 +26,9 @@ bool isGyroCorrection(const Eigen::Matrix3d& correction) {
 }
 
 bool isImuNoiseScale(const ImuNoiseScale& scale) {
-  const auto usable = [](double factor) { return factor > 0 && factor <= map_limits::kMaxNoiseScale; };
-  return usable(scale.density) && usable(scale.gyro_walk) && usable(scale.accel_walk);
+  const auto usable = [](double factor, double most) { return factor > 0 && factor <= most; };
+  return usable(scale.density, map_limits::kMaxNoiseScale) && usable(scale.gyro_walk, map_limits::kMaxWalkScale) &&
+         usable(scale.accel_walk, map_limits::kMaxWalkScale);
 }
 
 std::string validateImu(const std::vector<ImuSample>& imu) {
@@ -99,9 +100,9 @@ std::string validateKeyframe(const Keyframe& keyframe) {
   if (!isImuNoiseScale(keyframe.imu_noise_scale))
     return name + formatted(
                       "the scale of the IMU's noise is %g, of its random walks %g (gyroscope) and %g "
-                      "(accelerometer), expected more than 0, at most %g",
+                      "(accelerometer), expected more than 0, at most %g and %g",
                       keyframe.imu_noise_scale.density, keyframe.imu_noise_scale.gyro_walk,
-                      keyframe.imu_noise_scale.accel_walk, map_limits::kMaxNoiseScale);
+                      keyframe.imu_noise_scale.accel_walk, map_limits::kMaxNoiseScale, map_limits::kMaxWalkScale);
   if (!keyframe.depth_noise.isUsable())
     return name + formatted("the parts of the depth noise are %g (white) and %g (shared), expected variances",
                             keyframe.depth_noise.white, keyframe.depth_noise.shared);

@@ -67,6 +67,8 @@ const std::vector<BadKeyframe>& badKeyframes() {
       {"the scale of the IMU's noise is",
        [](Keyframe* kf) { kf->imu_noise_scale.density = 1.1 * map_limits::kMaxNoiseScale; }},
       {"of its random walks 0 (gyroscope)", [](Keyframe* kf) { kf->imu_noise_scale.gyro_walk = 0; }},
+      {"of its random walks 1.1e+10",
+       [](Keyframe* kf) { kf->imu_noise_scale.gyro_walk = 1.1 * map_limits::kMaxWalkScale; }},
       {"and nan (accelerometer)", [](Keyframe* kf) { kf->imu_noise_scale.accel_walk = kNan; }},
       {"the parts of the depth noise are nan", [](Keyframe* kf) { kf->depth_noise.white = kNan; }},
       {"(white) and -1 (shared)", [](Keyframe* kf) { kf->depth_noise.shared = -1; }},

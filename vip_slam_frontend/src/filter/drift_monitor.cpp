@@ -27,7 +27,7 @@ void RandomWalk::add(const Eigen::VectorXd& correction, const Eigen::VectorXd& b
   lost_ += (before - after).array();
 }
 
-double RandomWalk::closeStretch(double seconds) {
+double RandomWalk::closeStretch() {
   // An update that is linearised anew may leave less known than before: then nothing is said.
   const Eigen::ArrayXd now = (lost_ > 0).select(sum_ / lost_.abs().sqrt(), 0.0);
   const double dof = static_cast<double>(now.size());
@@ -38,7 +38,7 @@ double RandomWalk::closeStretch(double seconds) {
     // The product of two stretches is free of their noise, and what the updates add up to is as small a share of the
     // drift as they have removed of the variance.
     const double share = std::clamp(lost_.sum() / variance_, 1e-9, 1.0);
-    needed_ = std::sqrt(std::max(0.0, product) * lost_.max(0.0).mean() / seconds) / share;
+    needed_ = std::sqrt(std::max(0.0, product) * lost_.max(0.0).mean() / kStretch) / share;
     level_ += std::max(kLevelGain, 1.0 / ++stretches_) * (now.square().sum() / dof - level_);
   }
   whitened_ = now;
@@ -78,7 +78,7 @@ void DriftMonitor::endImage(double t) {
   double sigmas = kGateSigmas;
   RandomWalk* drifting = nullptr;
   for (RandomWalk& walk : walks_) {
-    const double its = walk.closeStretch(kStretch);
+    const double its = walk.closeStretch();
     if (!(its > sigmas) || walk.isBeyondDrift()) continue;
     sigmas = its;
     drifting = &walk;

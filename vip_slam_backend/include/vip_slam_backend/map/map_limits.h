@@ -10,6 +10,7 @@ namespace vip_slam::map_limits {
 constexpr double kMaxRate = 1e3;            ///< rad/s
 constexpr double kMaxAcceleration = 1e4;    ///< m/s^2
 constexpr double kMaxNoiseScale = 1e4;      ///< of the IMU
+constexpr double kMaxWalkScale = 1e10;      ///< of its biases: configured walks begin at 1e-9
 constexpr double kLongestImu = 1e4;         ///< s, of one keyframe
 constexpr double kLongestImuStep = 0.2;     ///< s, between samples; over a longer one the motion is unknown
 constexpr double kMaxGyroCorrection = 0.5;  ///< each entry

@@ -22,9 +22,9 @@ class RandomWalk {
       : configured_(configured), least_(least), largest_(largest), density_(configured) {}
   /// One update: what it added to the state, and the state's variances before and after it. Always of one dimension.
   void add(const Eigen::VectorXd& correction, const Eigen::VectorXd& before, const Eigen::VectorXd& after);
-  /// Ends a stretch of `seconds`. How surely the state drifts, in sigmas: the correlation of its corrections with those
+  /// Ends a stretch. How surely the state drifts, in sigmas: the correlation of its corrections with those
   /// of the stretch before.
-  double closeStretch(double seconds);
+  double closeStretch();
   /// Whether the last stretch asks for more than is drift.
   bool isBeyondDrift() const { return needed_ > largest_; }
   /// To what the drift that the last stretch saw asks for.
@@ -59,7 +59,7 @@ class DriftMonitor {
   /// configured, and the delay does not change.
   DriftMonitor(const ImuNoise& noise, const FilterOptions& options);
   enum State { kGyroBias, kAccelBias, kDelay, kStates };
-  /// One update at time t, s, of one of them.
+  /// One update of one of them, see RandomWalk::add().
   void add(State state, const Eigen::VectorXd& correction, const Eigen::VectorXd& before, const Eigen::VectorXd& after);
   /// After all updates of an image at time t, s.
   void endImage(double t);
