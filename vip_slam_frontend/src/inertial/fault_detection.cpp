@@ -15,7 +15,10 @@ namespace {
 constexpr double kGate = 8.0;
 // A fault is sudden: for kCalm s before it differences stayed below this share of the gate.
 constexpr double kCalm = 0.5, kDeviates = 0.7;
-constexpr double kMemory = 1.0;  // s, of the share of contradicted time
+constexpr double kMemory = 1.0;     // s, of the share of contradicted time
+constexpr double kForgotten = 4.0;  // s without a fault
+// The share from which on it is at fault: while a body may fill the view, that came in within kMemory, and else.
+constexpr double kMostly = 0.5, kSustained = 0.2;
 
 }  // namespace
 
@@ -35,6 +38,7 @@ bool FaultDetection::add(const MotionEvidence& e) {
   const double gain = std::min(1.0, e.interval / kMemory);
   if (e.images_agree) contradicted_ += gain * (contradicts - contradicted_);
   const bool deviates = e.images_agree && e.sigmas > kDeviates * kGate;
+  if (!e.images_agree) disagreed_t_ = e.t;
   if (!e.images_agree || deviates) {
     if (e.t - doubt_t_ > kCalm) began_t_ = e.t;
     doubt_t_ = e.t;
@@ -42,9 +46,15 @@ bool FaultDetection::add(const MotionEvidence& e) {
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;
   const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || suspects(e.t));
-  const bool fault = begins || goes_on || (contradicts && contradicted_ > 0.5);
-  if (fault && contradicts) last_fault_t_ = e.t;
-  return fault;
+  const double share = e.t - disagreed_t_ > kMemory ? kSustained : kMostly;
+  const bool fault = begins || goes_on || (contradicts && contradicted_ > share);
+  // An IMU whose faults come back is believed again later each time.
+  if (fault) {
+    const double since = e.t - last_fault_t_;
+    if (since > isolation()) isolated_ = since < kForgotten + isolated_ ? 2 * isolation() : 0.0;
+    last_fault_t_ = e.t;
+  }
+  return fault || (e.images_agree && e.t - last_fault_t_ < isolated_);
 }
 
 }  // namespace vip_slam::frontend

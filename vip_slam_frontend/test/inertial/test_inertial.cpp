@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Inertial channels with stand-ins, fault detection, and the propagation by another source's motion.
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -132,7 +133,6 @@ TEST(FaultDetection, AWrongImuIsFoundWithinTwoSecondsOfMotion) {
   EXPECT_GT(found.size(), 230u);
 }
 
-// What fills the view moves: while it comes into view images do not agree among themselves, then they contradict.
 /// Where the filter widens the IMU's noise until nothing contradicts it, the noise itself is the contradiction.
 TEST(FaultDetection, AnImplausibleNoiseHidesNothing) {
   for (const bool implausible : {false, true}) {
@@ -148,6 +148,19 @@ TEST(FaultDetection, AnImplausibleNoiseHidesNothing) {
   }
 }
 
+// An accelerometer in wrong axes contradicts in every second half second, when the camera is held aslant.
+TEST(FaultDetection, AnImuWhoseFaultsComeBackIsIsolatedForLonger) {
+  const auto wrong = [](double t) { return t > 5 && t < 12 && std::fmod(t, 1.0) < 0.5 ? 30.0 : 2.0; };
+  const std::vector<double> found = faults(40, wrong, kAlways);
+  const auto in = [&](double from, double to) {
+    return std::count_if(found.begin(), found.end(), [&](double t) { return t > from && t < to; });
+  };
+  EXPECT_LT(in(5.55, 6), 2) << "believed again at once";
+  EXPECT_GT(in(8, 12), 115) << "of 120 images";
+  EXPECT_EQ(in(20, 40), 0);
+}
+
+// What fills the view moves: while it comes into view images do not agree among themselves, then they contradict.
 TEST(FaultDetection, ABodyThatFillsTheViewForAMomentIsNoFaultOfTheImu) {
   const auto body = [](double t) { return t > 5 && t < 5.6 ? 30.0 : 2.0; };
   EXPECT_TRUE(faults(10, body, [](double t) { return t < 4.9 || t > 5.1; }).empty());

@@ -5,11 +5,15 @@
 // lately. Then the IMU is at fault in an interval
 // - that contradicts them all of a sudden, after a time of agreement (a shock, saturation, shaking), and in those after
 //   it for as long as they contradict, or
-// - when most of the last second does (axes, signs or units), or
+// - when a fifth of the last second does (axes, signs or units); most of it, where images disagreed among themselves in
+//   that second, or
 // - when the filter has had to widen the IMU's noise beyond what any IMU has: then no difference is large in sigmas.
+// After a fault it stays isolated for a moment, and for twice as long after each that comes back within seconds.
 // A body that fills the view contradicts the IMU gradually, while parts of the view still agree with it: neither rule
 // takes it for a fault of the IMU.
 #pragma once
+
+#include <algorithm>
 
 #include <Eigen/Core>
 
@@ -30,17 +34,21 @@ class FaultDetection {
   /// Adds one interval; whether the IMU is at fault in it.
   bool add(const MotionEvidence& evidence);
   /// Whether the IMU was at fault a moment before `t`: the images' prediction is the better one then.
-  bool suspects(double t) const { return t - last_fault_t_ < kSuspicion; }
+  bool suspects(double t) const { return t - last_fault_t_ < isolation(); }
   /// A start: no agreement has been seen yet.
   void reset(double t);
 
  private:
   static constexpr double kSuspicion = 0.3;  ///< s
 
+  double isolation() const { return std::max(kSuspicion, isolated_); }
+
   double last_fault_t_ = -1e300;
-  double doubt_t_ = -1e300;  ///< last interval that deviated, or that gave no test
-  double began_t_ = -1e300;  ///< first such interval after agreement: a fault may begin there
-  double contradicted_ = 0;  ///< share of the last second
+  double doubt_t_ = -1e300;      ///< last interval that deviated, or that gave no test
+  double began_t_ = -1e300;      ///< first such interval after agreement: a fault may begin there
+  double disagreed_t_ = -1e300;  ///< last time when images did not agree
+  double contradicted_ = 0;      ///< share of the last second
+  double isolated_ = 0;          ///< s for which the IMU stays isolated after a fault
 };
 
 /// Squared difference of two motions, T_current_previous, over their covariances (theta, t), as a number of sigmas.
