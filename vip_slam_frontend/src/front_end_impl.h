@@ -57,8 +57,8 @@ class FrontEnd::Impl {
   using ImageStep = frontend::ImageStep;
 
   SE3 extrinsics() const { return filter_.extrinsics(); }
-  /// Applies the filter's estimate of the depth image's shift to the depth images to come.
-  void followDepthShift();
+  /// Applies the filter's estimate of the depth image's shift and delay to the depth images to come.
+  void followDepth();
   /// Brings the readings to the unit of the first ones when it changes with this image.
   void followDepthUnit(ImageStep* step);
   /// Starts anew when there is one.
@@ -91,7 +91,7 @@ class FrontEnd::Impl {
   }
   /// The depth image as seen at the stamp of the colour image, when it has another stamp or a rolling shutter.
   cv::Mat depthAtStamp(const DepthReading& depth, const NavState& nav);
-  std::vector<FilterMeasurement> measurements() const;
+  std::vector<FilterMeasurement> measurements(const Propagation& propagation) const;
   SurfaceMatches matchSurfaces(const ImageStep& step);
   /// The newest image becomes the reference when the old one is about to leave the window or to go out of view.
   void renewSurfaces(const cv::Mat& depth, std::size_t matched, double t);

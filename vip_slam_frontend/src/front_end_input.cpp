@@ -35,6 +35,7 @@ FilterOptions filterOptions(const FrontEndOptions& options, const SensorConfig& 
                                   sensor.camera.model != DistortionModel::kEquidistant;
   // A camera's rotation, delay and scale of rates against an IMU need one.
   filter.calibration.depth_scale = filter.calibration.depth_scale && sensor.hasGyro() && sensor.hasAccel();
+  filter.calibration.depth_delay = filter.calibration.depth_delay && sensor.hasGyro() && sensor.hasAccel();
   filter.calibration.rotation = filter.calibration.rotation && sensor.hasGyro();
   filter.calibration.time_offset = filter.calibration.time_offset && sensor.hasGyro();
   filter.calibration.gyro_scale = filter.calibration.gyro_scale && sensor.hasGyro();
@@ -143,9 +144,10 @@ void FrontEnd::Impl::followDepthUnit(ImageStep* step) {
   counters_.depth_unit = depth_input_.unit();
 }
 
-void FrontEnd::Impl::followDepthShift() {
-  // The surfaces' readings have the old shift.
-  if (depth_input_.followShift(filter_.takeDepthShift())) surfaces_.clear();
+void FrontEnd::Impl::followDepth() {
+  const bool shift = depth_input_.followShift(filter_.takeDepthShift());
+  const bool delay = depth_input_.followDelay(filter_.depthDelay());
+  if (shift || delay) surfaces_.clear();  // their readings have the old ones
 }
 
 void FrontEnd::Impl::applyMapUpdate(const MapUpdate& update) {

@@ -34,14 +34,21 @@ cv::Mat FrontEnd::Impl::depthAtStamp(const DepthReading& depth, const NavState& 
   return poses ? depth_input_.atStamp(depth.image, *poses) : depth.image;
 }
 
-std::vector<FilterMeasurement> FrontEnd::Impl::measurements() const {
+std::vector<FilterMeasurement> FrontEnd::Impl::measurements(const Propagation& propagation) const {
+  const SE3 T_I_C = extrinsics();
+  const Eigen::Matrix3d R_C_I = T_I_C.R().transpose();
+  const Eigen::Vector3d& omega = propagation.omega_I;
+  const Eigen::Vector3d v_I = propagation.predicted.T_W_I.R().transpose() * propagation.predicted.v_W;
+  const Eigen::Vector3d omega_C = R_C_I * omega, v_C = R_C_I * (v_I + omega.cross(T_I_C.t()));
   std::vector<FilterMeasurement> list;
   list.reserve(tracker_.tracks().size());
   for (const Track& track : tracker_.tracks()) {
     const Feature& f = track.feature;
     const Eigen::Vector2d xy = f.xy.cast<double>();
     const Eigen::Vector2d depth_slope = camera_->focal() * track.depth_slope;
-    list.push_back({f.id, xy, f.depth, f.depth_sigma, depth_slope, track.whitening, bearingJacobian(*camera_, xy)});
+    const double rate = depth_slope.isZero() ? 0.0 : depthRate(xy, f.depth, depth_slope, omega_C, v_C);
+    list.push_back(
+        {f.id, xy, f.depth, f.depth_sigma, depth_slope, rate, track.whitening, bearingJacobian(*camera_, xy)});
   }
   return list;
 }

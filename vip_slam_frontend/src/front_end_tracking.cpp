@@ -22,7 +22,7 @@ std::string uncovered(const frontend::InertialInput& imu, double t_imu) {
 FrameOutput FrontEnd::Impl::process(const FrameInput& input, const FrontEnd::PoseReady& on_pose) {
   ScopedTimer timer(timing_, "frontend.total", input.t);
   ++counters_.images;
-  followDepthShift();
+  followDepth();
   if (std::isfinite(input.t)) noticeTimeJump(checks_.clockJump(input));
   const std::string problem = checks_.problem(input);
   if (!problem.empty()) return unusable(input.t, problem);
@@ -158,7 +158,8 @@ void FrontEnd::Impl::updateFilter(ImageStep* step) {
     rest_.decide(inertial_, step->from, t_imu,
                  {&tracker_.tracks(), !bodies_.movedLately(t_imu), filter_.nav().v_W.norm(),
                   leastImageMotion(trackedPoints(), camera_->focal())});
-    step->report = filter_.step(step->propagation, next_clone_++, measurements(), rest_.residualMotion(), &surfaces);
+    step->report = filter_.step(step->propagation, next_clone_++, measurements(step->propagation),
+                                rest_.residualMotion(), &surfaces);
   }
   renewSurfaces(step->depth, surfaces.pairs.size(), step->t);
   step->sight = sight(*step);

@@ -149,7 +149,16 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
         const Eigen::Vector2d beside = options_.depth_shift - read_with_;
         const double read = p.z() * n.dot(ray) / (n.dot(ray) - n.head<2>().dot(beside));
         m.depth_slope = -p.z() / n.dot(ray) * n.head<2>();
-        m.depth = options_.depth_scale * read + options_.depth_offset + noise.z() * m.depth_sigma;
+        // The same ray of the camera of another moment meets the wall elsewhere.
+        const auto at = [&](double moment) {
+          const SE3 T_W_then = poseAt(moment) * T_I_C_;
+          const Eigen::Vector3d n_W = Eigen::Vector3d::Unit(static_cast<int>(i % 3));
+          return n_W.dot(points_[i] - T_W_then.t()) / n_W.dot(T_W_then.R() * ray);
+        };
+        m.depth_rate = (at(t + 1e-4) - at(t - 1e-4)) / 2e-4;
+        const double late = options_.depth_delay - read_late_;
+        const double older = late == 0 ? 0.0 : at(t - late) - p.z();
+        m.depth = options_.depth_scale * (read + older) + options_.depth_offset + noise.z() * m.depth_sigma;
         m.depth_sigma *= options_.depth_told;
       }
       seen.push_back(m);
@@ -210,7 +219,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
     result.depth_shift = filter.takeDepthShift();
-    simulation.readDepthWith(result.depth_shift);
+    simulation.readDepthWith(result.depth_shift, filter.depthDelay());
     result.most_bearing_correction =
         std::max(result.most_bearing_correction, filter.bearingCorrection().value.cwiseAbs().maxCoeff());
     result.gyro_correction = filter.gyroCorrection();

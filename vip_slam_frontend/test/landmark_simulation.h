@@ -20,6 +20,7 @@ struct SimulationOptions {
   double depth_told = 1.0;                  ///< share of that sigma reported to the filter
   double depth_offset = 0;                  ///< m, added to all readings
   double depth_scale = 1;                   ///< factor of all readings
+  double depth_delay = 0;                   ///< s by which depth shows an earlier moment than the pixels
   /// Shift of the depth image against the colour image, right and down, in bearings.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();
   BearingCorrection bearing;  ///< error of the intrinsics: the sightings need this correction
@@ -52,8 +53,8 @@ class LandmarkSimulation {
   std::vector<ImuSample> imuBetween(double t0, double t1) const;
   /// Noisy sightings at IMU time t of at most `most` points; a point keeps its track id while it stays in view.
   std::vector<FilterMeasurement> sight(double t, std::size_t most);
-  /// Corrects depth readings for this shift from now on.
-  void readDepthWith(const Eigen::Vector2d& shift) { read_with_ = shift; }
+  /// Corrects depth readings for this shift and this delay (s) from now on.
+  void readDepthWith(const Eigen::Vector2d& shift, double delay) { read_with_ = shift, read_late_ = delay; }
   const SE3& T_I_C() const { return T_I_C_; }
   void generateImu(double until);
 
@@ -64,6 +65,7 @@ class LandmarkSimulation {
   SE3 T_I_C_;
   std::vector<Eigen::Vector3d> points_;
   Eigen::Vector2d read_with_ = Eigen::Vector2d::Zero();
+  double read_late_ = 0;
   std::vector<LandmarkId> track_;
   std::vector<Eigen::Vector2d> creep_, crept_;  ///< px per image, px; per point
   LandmarkId next_ = 1;

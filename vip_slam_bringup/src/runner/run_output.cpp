@@ -137,6 +137,10 @@ void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration
     yaml << YAML::Key << "depth_scale" << YAML::Value << unit * calibration.depth_scale;
     yaml << YAML::Key << "sigma_depth_scale" << YAML::Value << unit * calibration.sigma_depth_scale;
   }
+  if (calibration.sigma_depth_delay > 0) {
+    yaml << YAML::Key << "depth_delay" << YAML::Value << calibration.depth_delay;
+    yaml << YAML::Key << "sigma_depth_delay" << YAML::Value << calibration.sigma_depth_delay;
+  }
   list("depth_shift", calibration.depth_shift_px);
   list("sigma_depth_shift", calibration.sigma_depth_shift);
   Eigen::VectorXd added(static_cast<Eigen::Index>(depth_curve.added.size()));

@@ -134,6 +134,7 @@ void readDepth(Section depth, SensorConfig* config) {
   depth.choice("encoding", config->depth_encoding, {"16UC1", "32FC1", "compressed"});
   depth.number("scale", config->depth_scale, 1e-6, 1.0);
   depth.number("offset", config->depth_offset, -0.5, 0.5, false);
+  depth.number("delay", config->depth_delay, -0.2, 0.2, false);
   std::vector<double> shift;
   depth.get("shift", shift, false);
   if (!shift.empty() && shift.size() != 2)
@@ -285,9 +286,9 @@ void saveSensorConfig(const std::string& path, const SensorConfig& config) {
       << "\"\ncolor:\n  encoding: " << config.color_encoding << "\n  rate: " << formatDouble(config.color_rate)
       << "\n  rolling_shutter: " << formatDouble(config.rolling_shutter)
       << "\ndepth:\n  encoding: " << config.depth_encoding << "\n  scale: " << formatDouble(config.depth_scale)
-      << "\n  offset: " << formatDouble(config.depth_offset) << "\n  shift: [" << formatDouble(config.depth_shift.x())
-      << ", " << formatDouble(config.depth_shift.y()) << "]\n  curve: " << list(config.depth_curve.added)
-      << "\n  rate: " << formatDouble(config.depth_rate)
+      << "\n  offset: " << formatDouble(config.depth_offset) << "\n  delay: " << formatDouble(config.depth_delay)
+      << "\n  shift: [" << formatDouble(config.depth_shift.x()) << ", " << formatDouble(config.depth_shift.y())
+      << "]\n  curve: " << list(config.depth_curve.added) << "\n  rate: " << formatDouble(config.depth_rate)
       << "\n  registered: " << (config.depth_registered ? "true" : "false")
       << "\n  undistorted: " << (config.depth_undistorted ? "true" : "false")
       << "\n  rolling_shutter: " << formatDouble(config.depth_rolling_shutter)

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSure = 5.0;  // sigmas
 constexpr double kMinTurn = 0.2 * kDegree, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005, kMinBearing = 0.001,
-                 kMinGyroError = 0.002, kMinDepthShift = 0.001, kMinDepthScale = 0.005;
+                 kMinGyroError = 0.002, kMinDepthShift = 0.001, kMinDepthScale = 0.005, kMinDepthDelay = 0.002;
 
 /// Whether some component's difference is significant, above kSure sigmas.
 bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
@@ -82,6 +82,14 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
         formatted("depth reads %.1f %% too %s by the accelerometer (one sigma %.1f %%), which is corrected for",
                   100 * std::abs(scale), scale < 0 ? "long" : "short", 100 * found.sigma_depth_scale) +
         remedy);
+  }
+  const double late = found.depth_delay - given.depth_delay;
+  if (found.sigma_depth_delay > 0 && std::abs(late) > kMinDepthDelay) {
+    all.push_back(formatted(
+        "depth shows %s moment than its stamps say, by %.0f ms (one sigma %.0f ms), which is corrected for: is "
+        "a temporal filter on in the driver, are the two cameras not taken together? depth/delay in the "
+        "sensor's configuration should be %.3f",
+        late > 0 ? "an earlier" : "a later", 1e3 * std::abs(late), 1e3 * found.sigma_depth_delay, found.depth_delay));
   }
   const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();

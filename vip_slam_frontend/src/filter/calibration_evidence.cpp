@@ -11,7 +11,8 @@ namespace {
 // outliers in (a phone, real: odometry 1.94 instead of 1.62 cm). What a step says of the number is the same.
 constexpr double kHeld = 0.25;
 constexpr double kStretch = 2.0;    // s, longer than a track lives: stretches share no measurements
-constexpr std::size_t kEnough = 5;  // stretches, fewer do not show their scatter
+constexpr double kOfScatter = 4;    // stretches that kUsualScatter is worth
+constexpr std::size_t kEnough = 2;  // stretches, one may be the start's error
 constexpr double kSure = 4.0;       // sigmas between the adopted value and the estimate
 // Beyond so many sigmas of the prior something else is wrong, a unit or another sensor, and nothing is adopted.
 constexpr double kBelievable = 4.0;
@@ -24,7 +25,10 @@ Likelihood learntBetween(const Estimate& before, const Estimate& after) {
   return {now - old, now * after.value - old * before.value};
 }
 
-Estimate CalibrationEvidence::held() const { return {adopted_, kHeld * prior_.sigma}; }
+Estimate CalibrationEvidence::held() const {
+  const Estimate found = estimate();
+  return {adopted_, std::min(kHeld * prior_.sigma, std::hypot(found.sigma, found.value - adopted_))};
+}
 
 void CalibrationEvidence::add(double t, const Likelihood& step) {
   // A filter that has failed says nothing; it is started again.
@@ -42,13 +46,13 @@ Estimate CalibrationEvidence::estimate() const {
   for (const Likelihood& stretch : stretches_) sum.add(stretch);
   if (!(sum.information > 0)) return prior_;
   const double mean = sum.weighted / sum.information;
-  double squares = 0, inflation = 1;
+  double squares = kUsualScatter * kOfScatter;
   for (const Likelihood& stretch : stretches_) {
     if (stretch.information > 0)
       squares += stretch.information * std::pow(stretch.weighted / stretch.information - mean, 2);
   }
-  if (stretches_.size() > 1) inflation = std::max(1.0, squares / static_cast<double>(stretches_.size() - 1));
-  const double information = sum.information / inflation;
+  const double degrees = kOfScatter + static_cast<double>(stretches_.size() - 1);
+  const double information = sum.information / std::max(1.0, squares / degrees);
   return {(information * mean + prior * prior_.value) / (information + prior), 1 / std::sqrt(information + prior)};
 }
 

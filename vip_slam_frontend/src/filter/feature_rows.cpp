@@ -103,6 +103,8 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     // Sign: the offset is added to the measured depth, whereas the other columns are Jacobians of the predicted one.
     if (window.calibration.depth_offset && with_depth) (*H_x)(row + 2, window.depthOffsetColumn()) = -1.0 / sigma_z;
     if (window.calibration.depth_scale && with_depth) (*H_x)(row + 2, window.depthScaleColumn()) = -q_C.z() / sigma_z;
+    if (window.calibration.depth_delay && with_depth)
+      (*H_x)(row + 2, window.depthDelayColumn()) = -o.depth_rate / sigma_z;
     if (window.calibration.intrinsics) {
       // Evaluated at the predicted bearing: the measured one has the residual's noise, and its square would bias the
       // focal length (by 0.25 % with 0.2 px).

@@ -54,7 +54,8 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const int reference = layout.reference(), offset = translation + (window.calibration.translation ? 3 : 0);
   const int depth = offset + (window.calibration.time_offset ? 1 : 0);
   const int scale = depth + (window.calibration.depth_offset ? 1 : 0);
-  const int intrinsics = scale + (window.calibration.depth_scale ? 1 : 0);
+  const int delay = scale + (window.calibration.depth_scale ? 1 : 0);
+  const int intrinsics = delay + (window.calibration.depth_delay ? 1 : 0);
   const int shift = intrinsics + (window.calibration.intrinsics ? 4 : 0);
   // For points from depth alone a shift of the depth image is equivalent to one of the principal point.
   Eigen::Matrix3d bearing = window.bearing.matrix();
@@ -88,10 +89,10 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
     if (window.calibration.translation) {
       A.block<1, 3>(i, translation) = n_I * (R_ab - Eigen::Matrix3d::Identity());
     }
-    if (window.calibration.time_offset) {
-      A(i, offset) = A.block<1, 3>(i, 0).dot(to.omega_I) + A.block<1, 3>(i, 3).dot(to.v_W) +
-                     A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
-    }
+    const double later = A.block<1, 3>(i, 0).dot(to.omega_I) + A.block<1, 3>(i, 3).dot(to.v_W) +
+                         A.block<1, 3>(i, reference).dot(from.omega_I) + A.block<1, 3>(i, reference + 3).dot(from.v_W);
+    if (window.calibration.time_offset) A(i, offset) = later;
+    if (window.calibration.depth_delay) A(i, delay) = -later;
     if (window.calibration.depth_offset) A(i, depth) = w * n_ref.dot(R_I_C.transpose() * R_ab * R_I_C * q_ray - p_ray);
     if (window.calibration.depth_scale) A(i, scale) = -w * n_ref.dot(R_I_C.transpose() * (R_ab * t_I_C + t_ab - t_I_C));
     if (window.calibration.intrinsics || window.calibration.depth_shift) {
@@ -109,7 +110,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
         if (window.calibration.depth_shift) A(i, shift + k) = -w * by_centre;
       }
     }
-    A(i, layout.size()) = -w * n_ref.dot(T_ref_cur * q_cur - p_ref);
+    A(i, layout.size()) = -w * n_ref.dot(T_ref_cur * q_cur - p_ref) + later * window.depth_delay;
   }
   return A;
 }

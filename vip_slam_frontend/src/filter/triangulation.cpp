@@ -61,6 +61,12 @@ BearingJacobian bearingJacobian(const CameraModel& camera, const Eigen::Vector2d
   return bend.inverse() * focal.asDiagonal() * bearingJacobian(distorted);
 }
 
+double depthRate(const Eigen::Vector2d& xy, double z, const Eigen::Vector2d& slope, const Eigen::Vector3d& omega_C,
+                 const Eigen::Vector3d& v_C) {
+  const Eigen::Vector3d moved = -omega_C.cross(z * xy.homogeneous()) - v_C;
+  return moved.z() - slope.dot(moved.head<2>() - xy * moved.z()) / z;
+}
+
 SE3 cameraPose(const WindowState& window, const Clone& clone) {
   const double shift = window.time_offset - clone.time_offset;
   if (shift == 0.0) return clone.T_W_I * window.T_I_C;

@@ -36,6 +36,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       learnt_(given_),
       sigma_depth_offset_(options.calibration.sigma_depth_offset),
       depth_scale_({1.0, options.calibration.sigma_depth_scale}),
+      depth_delay_({0.0, options.calibration.sigma_depth_delay}),
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(kGateProbability),
@@ -80,15 +81,11 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.depth_shift = learnt_.depth_shift;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = {calibration.rotation,
-                        calibration.translation,
-                        calibration.time_offset,
-                        calibration.depth_offset && !depth_contradicts_,
-                        calibration.depth_scale,
-                        calibration.intrinsics,
-                        calibration.depth_shift && !shift_contradicts_,
-                        calibration.gyro_scale,
-                        calibration.gyro_misalignment};
+  window.calibration = {calibration.rotation,    calibration.translation,
+                        calibration.time_offset, calibration.depth_offset && !depth_contradicts_,
+                        calibration.depth_scale, calibration.depth_delay,
+                        calibration.intrinsics,  calibration.depth_shift && !shift_contradicts_,
+                        calibration.gyro_scale,  calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
@@ -105,6 +102,8 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
       sigma = sigma_depth_offset_;
     } else if (window.calibration.depth_scale && c == window.depthScaleColumn()) {
       sigma = depth_scale_.held().sigma;
+    } else if (window.calibration.depth_delay && c == window.depthDelayColumn()) {
+      sigma = depth_delay_.held().sigma;
     } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.depthShiftColumn()) {
       sigma = calibration.sigma_centre;
     } else if (c >= window.depthShiftColumn() && c < window.gyroColumn()) {
@@ -195,7 +194,8 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
   for (const FilterMeasurement& m : measurements) {
     FilterTrack& track = tracks_[m.id];
     track.id = m.id;
-    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma, m.depth_slope, m.by_intrinsics, m.whitening});
+    track.observations.push_back(
+        {id, m.xy, m.depth, m.depth_sigma, m.depth_slope, m.depth_rate, m.by_intrinsics, m.whitening});
   }
 }
 
@@ -269,7 +269,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     drift_.add(frontend::DriftMonitor::kDelay, one(found.value - delay_predicted.value),
                one(std::pow(delay_predicted.sigma, 2)), one(std::pow(found.sigma, 2)));
   }
-  learnDepthScale(propagation.inertial);
+  learnDepth(propagation.inertial);
   judgeDepthOffset();
   judgeDepthShift();
   judgeIntrinsics();

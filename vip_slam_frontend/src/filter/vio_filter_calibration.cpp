@@ -48,6 +48,8 @@ CalibrationEstimate VioFilter::calibration() const {
   calibration.depth_offset = window.depth_offset;
   calibration.depth_scale = depth_scale_.adopted();
   calibration.sigma_depth_scale = window.calibration.depth_scale ? depth_scale_.estimate().sigma : 0.0;
+  calibration.depth_delay = depth_delay_.adopted();
+  calibration.sigma_depth_delay = window.calibration.depth_delay ? depth_delay_.estimate().sigma : 0.0;
   calibration.bearing = window.bearing;
   calibration.depth_shift = depth_shift_ + window.depth_shift;
   calibration.gyro_correction = window.gyro_correction;
@@ -110,19 +112,39 @@ bool VioFilter::isSteady(double depth_offset) {
   return offset_is_steady_;
 }
 
-void VioFilter::learnDepthScale(bool inertial) {
+void VioFilter::learnDepth(bool inertial) {
   const WindowState& window = filter_.window();
-  if (!window.calibration.depth_scale) return;
-  // Only the accelerometer knows the scale: a motion that is itself measured by depth agrees with any.
-  if (!inertial) scale_unseen_ = window.clones.back().t;
-  const frontend::Estimate before = depth_scale_.held();
-  const frontend::Estimate after{window.depth_scale, filter_.sigma(window.depthScaleColumn())};
-  if (!scale_unseen_ || window.clones.front().t > *scale_unseen_) {
-    scale_unseen_.reset();
-    depth_scale_.add(nav().t, frontend::learntBetween(before, after));
-    if (depth_scale_.adopt()) startDepthOffsetAnew();
+  // Only the IMU knows scale and delay: a motion that is itself measured by depth agrees with any.
+  if (!inertial) depth_unseen_ = window.clones.back().t;
+  const bool counts = !depth_unseen_ || window.clones.front().t > *depth_unseen_;
+  if (counts) depth_unseen_.reset();
+  const frontend::Estimate scale = depth_scale_.held(), delay = depth_delay_.held();
+  const double rest = window.depth_delay;
+  if (counts && window.calibration.depth_scale) {
+    const double sigma = filter_.sigma(window.depthScaleColumn());
+    depth_scale_.add(nav().t, frontend::learntBetween(scale, {window.depth_scale, sigma}));
   }
-  filter_.consider(window.depthScaleColumn(), depth_scale_.adopted() - after.value, before.sigma);
+  if (counts && window.calibration.depth_delay) {
+    const double sigma = filter_.sigma(window.depthDelayColumn());
+    depth_delay_.add(nav().t, frontend::learntBetween(delay, {delay.value + rest, sigma}));
+  }
+  if (depth_scale_.adopt()) startDepthOffsetAnew();
+  if (depth_delay_.adopt()) {
+    moveDepth(Eigen::Vector2d::Zero(), depth_delay_.adopted() - delay.value);
+    startDepthOffsetAnew();
+  }
+  holdDepth();
+}
+
+void VioFilter::holdDepth() {
+  const WindowState& window = filter_.window();
+  if (window.calibration.depth_scale) {
+    const frontend::Estimate scale = depth_scale_.held();
+    filter_.consider(window.depthScaleColumn(), scale.value - window.depth_scale, scale.sigma);
+  }
+  if (window.calibration.depth_delay) {
+    filter_.consider(window.depthDelayColumn(), -window.depth_delay, depth_delay_.held().sigma);
+  }
 }
 
 void VioFilter::judgeDepthOffset() {
@@ -142,14 +164,14 @@ void VioFilter::judgeDepthOffset() {
   Eigen::VectorXd r = Eigen::VectorXd::Constant(1, -change / kHeldOffset);
   filter_.update(H, r);
   depth_contradicts_ = true;
-  scale_unseen_ = nav().t;
+  depth_unseen_ = nav().t;
   depth_is_off_ = false;
 }
 
-void VioFilter::moveDepth(const Eigen::Vector2d& shift) {
+void VioFilter::moveDepth(const Eigen::Vector2d& shift, double delay) {
   for (auto& [id, track] : tracks_) {
     for (Observation& o : track.observations) {
-      if (o.depth > 0) o.depth = std::max(1e-3, o.depth + o.depth_slope.dot(shift));
+      if (o.depth > 0) o.depth = std::max(1e-3, o.depth + o.depth_slope.dot(shift) + o.depth_rate * delay);
     }
   }
 }
@@ -163,7 +185,7 @@ void VioFilter::judgeDepthShift() {
   H.middleCols<2>(window.depthShiftColumn()).diagonal().setConstant(1.0 / kHeldShift);
   Eigen::VectorXd r = -change / kHeldShift;
   filter_.update(H, r);
-  moveDepth(-depth_shift_);
+  moveDepth(-depth_shift_, 0);
   depth_shift_.setZero();
   filter_.window().depth_shift.setZero();
   shift_contradicts_ = true;
@@ -178,7 +200,7 @@ const Eigen::Vector2d& VioFilter::takeDepthShift() {
   if (sigma.maxCoeff() > kKnownShift || !(off > kMinShift && off > kSureShift * sigma.array()).any()) {
     return depth_shift_;
   }
-  moveDepth(rest);
+  moveDepth(rest, 0);
   depth_shift_ += rest;
   filter_.window().depth_shift.setZero();
   return depth_shift_;
@@ -188,6 +210,7 @@ void VioFilter::restartDepthOffset(bool none) {
   sigma_depth_offset_ = none ? kHeldOffset : options_.calibration.sigma_depth_offset;
   learnt_.depth_offset = given_.depth_offset;
   depth_scale_.reset();
+  if (started_) holdDepth();
   for (auto& [id, track] : tracks_) {
     for (Observation& observation : track.observations) observation.depth = 0;
   }

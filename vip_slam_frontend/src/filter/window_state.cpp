@@ -37,6 +37,7 @@ void WindowState::boxplus(const Eigen::VectorXd& delta) {
   if (calibration.time_offset) time_offset += delta(timeOffsetColumn());
   if (calibration.depth_offset) depth_offset += delta(depthOffsetColumn());
   if (calibration.depth_scale) depth_scale += delta(depthScaleColumn());
+  if (calibration.depth_delay) depth_delay += delta(depthDelayColumn());
   if (calibration.intrinsics) bearing.value += delta.segment<4>(intrinsicsColumn());
   if (calibration.depth_shift) depth_shift += delta.segment<2>(depthShiftColumn());
   for (int k = 0; k < calibration.gyro(); ++k) {
@@ -54,7 +55,8 @@ bool WindowState::isFinite() const {
   }
   return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
          std::isfinite(time_offset) && std::isfinite(depth_offset) && std::isfinite(depth_scale) &&
-         bearing.value.allFinite() && depth_shift.allFinite() && gyro_correction.allFinite();
+         std::isfinite(depth_delay) && bearing.value.allFinite() && depth_shift.allFinite() &&
+         gyro_correction.allFinite();
 }
 
 }  // namespace vip_slam

@@ -2,6 +2,7 @@
 #include "parts/depth_input.h"
 
 #include <cmath>
+#include <utility>
 
 #include "vip_slam_core/depth/disparity_curve.h"
 
@@ -17,13 +18,15 @@ constexpr double kSameInstant = 5e-4;
 DepthInput::DepthInput(const SensorConfig& sensor, std::shared_ptr<const CameraModel> camera)
     : camera_(std::move(camera)),
       given_curve_(sensor.depth_curve),
+      given_delay_(sensor.depth_delay),
       given_shift_(sensor.depth_shift),
       focal_(sensor.camera.fx, sensor.camera.fy),
       masked_(sensor.mask.empty() ? cv::Mat() : cv::Mat(sensor.mask == 0)),
       unit_(camera_, sensor.depth_noise) {}
 
 DepthReading DepthInput::read(const cv::Mat& depth, double lag) {
-  DepthReading reading{depth, std::abs(lag) >= kSameInstant ? lag : 0.0};
+  const double apart = lag - given_delay_ - delay_;
+  DepthReading reading{depth, std::abs(apart) >= kSameInstant ? apart : 0.0};
   missing_.look(depth);
   if (missing_.value() > 0) {
     reading.image = depth.clone();
@@ -53,6 +56,8 @@ bool DepthInput::followUnit(const SE3& T_odom_C, double t, DepthReading* depth) 
   depth->image = depth->image * (unit_.factor() / before);
   return true;
 }
+
+bool DepthInput::followDelay(double seconds) { return std::exchange(delay_, seconds) != seconds; }
 
 bool DepthInput::followShift(const Eigen::Vector2d& bearing) {
   if (bearing == shift_.bearing) return false;

@@ -23,17 +23,18 @@ namespace vip_slam::frontend {
 /// one are; without enough points; after a fault of the IMU.
 constexpr double kMoment = 0.5;
 
-/// A depth image at its own stamp; empty when there is none.
+/// A depth image at its own moment; empty when there is none.
 struct DepthReading {
   cv::Mat image;   ///< 32FC1, m, 0 or NaN: no reading
-  double lag = 0;  ///< its stamp minus that of the colour image, seconds
+  double lag = 0;  ///< the moment that it shows minus that of the colour image, seconds
 };
 
 class DepthInput {
  public:
   DepthInput(const SensorConfig& sensor, std::shared_ptr<const CameraModel> camera);
 
-  /// The corrected and masked readings of an image, which stays unchanged.
+  /// The corrected and masked readings of an image, which stays unchanged; `lag`: its stamp minus the colour image's,
+  /// s.
   DepthReading read(const cv::Mat& depth, double lag);
 
   /// Whether the image, before read(), repeats the one before. `T_odom_last`: camera pose at the image before; empty:
@@ -48,6 +49,9 @@ class DepthInput {
   /// The image at its final pose, to compare the next one's unit with.
   void remember(const cv::Mat& depth, const SE3& T_odom_C, double t) { unit_.remember(depth, T_odom_C, t); }
 
+  /// Seconds by which depth shows an earlier moment than its stamp says, as estimated by the filter, for the images to
+  /// come; true when it changes.
+  bool followDelay(double seconds);
   /// Shift of the depth image as estimated by the filter, in bearings, for the images to come; true when it changes.
   bool followShift(const Eigen::Vector2d& bearing);
   /// What an update makes different for the images to come.
@@ -72,7 +76,8 @@ class DepthInput {
 
  private:
   std::shared_ptr<const CameraModel> camera_;
-  DepthCurve given_curve_;  ///< by the sensor's configuration
+  DepthCurve given_curve_;          ///< by the sensor's configuration
+  double given_delay_, delay_ = 0;  ///< s, by the sensor's configuration and estimated
   Eigen::Vector2d given_shift_, focal_;
   cv::Mat masked_;  ///< not zero where depth is to be left out; empty: nowhere
   MissingReading missing_;

@@ -49,6 +49,12 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   const std::string unit = calibrationDifferences(given, found).back();
   EXPECT_NE(unit.find("depth/scale in the sensor's configuration should be 0.000971"), std::string::npos) << unit;
   found.depth_scale = 1;
+  found.depth_delay = 0.0412;
+  found.sigma_depth_delay = 0.002;
+  const std::string late = calibrationDifferences(given, found).back();
+  EXPECT_NE(late.find("an earlier moment than its stamps say, by 41 ms"), std::string::npos) << late;
+  EXPECT_NE(late.find("depth/delay in the sensor's configuration should be 0.041"), std::string::npos) << late;
+  found.depth_delay = 0;
   found.bearing.value << 0, 0.003, 0, 0;
   found.sigma_bearing.setConstant(0.0003);
   found.intrinsics << 480.04, 481.46, 320.2, 240.1;

@@ -182,6 +182,35 @@ TEST(Calibration, DepthOfTheRightScaleKeepsIt) {
   }
 }
 
+// Depth of another moment than the pixels, as a temporal filter in the driver makes it.
+TEST(Calibration, FindsTheDelayOfDepth) {
+  double nees = 0, believed = 0, own_nees = 0;
+  constexpr int kRuns = 6;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation = exactMotion(seed);
+    simulation.depth_delay = 0.02;
+    FilterOptions options = singlePixels();
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    EXPECT_NEAR(run.calibration.depth_delay, 0.02, 0.002);
+    own_nees += std::pow((run.calibration.depth_delay - 0.02) / run.calibration.sigma_depth_delay, 2) / kRuns;
+    nees += run.nees / kRuns;
+    options.calibration.depth_delay = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with depth 20 ms old: %.2f, of the delay %.2f; depth believed: %.2f\n", nees, own_nees, believed);
+  EXPECT_LT(own_nees, 4.0);
+  EXPECT_LT(nees, believed);
+}
+
+TEST(Calibration, DepthOfTheSameMomentStaysSo) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const RunResult run = runFilter(exactMotion(seed), singlePixels(), 20.0, false);
+    EXPECT_EQ(run.calibration.depth_delay, 0.0);
+    EXPECT_GT(run.calibration.sigma_depth_delay, 0.0);
+    EXPECT_LT(run.calibration.sigma_depth_delay, 0.002) << "known, but not to differ";
+  }
+}
+
 // The estimate varies about zero and must not be passed on.
 TEST(Calibration, ExactDepthIsHandedOnAsItIs) {
   for (int seed = 1; seed <= 3; ++seed) {

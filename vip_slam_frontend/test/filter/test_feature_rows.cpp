@@ -28,7 +28,8 @@ Scene makeScene() {
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
   scene.window.T_I_C = simulation.T_I_C();
-  scene.window.calibration = {true, true, true, true, true, true, true};
+  scene.window.calibration = {true, true, true, true, true, true, true, true};
+  scene.window.depth_delay = 0.01;
   scene.window.depth_shift << 0.004, -0.003;
   scene.window.bearing.value << 0.003, -0.002, 0.001, -0.0015;
   scene.window.time_offset = 0.003;
@@ -48,7 +49,7 @@ Scene makeScene() {
     Eigen::Matrix2d whitening;
     whitening << 0.9, 0.0, -0.2 * i, 0.4;
     scene.observations.push_back(
-        {clone.id, xy, p_C.z() + 0.01, 0.01, {1.5 - i, 0.4 * i}, bearingJacobian(xy), whitening});
+        {clone.id, xy, p_C.z() + 0.01, 0.01, {1.5 - i, 0.4 * i}, 0.7 - 0.3 * i, bearingJacobian(xy), whitening});
   }
   scene.window.v_W = scene.window.v_W_fej = scene.window.clones.back().v_W;
   return scene;
@@ -93,16 +94,19 @@ TEST(FeatureRows, JacobiansMatchCentralDifferences) {
 TEST(FeatureRows, TheScaleOfDepthIsAskedWhereDepthIsExpected) {
   const Scene scene = makeScene();
   const MeasurementNoise noise;
+  const auto beside = [&](const Observation& o) {
+    return o.depth_slope.dot(scene.window.depth_shift) + o.depth_rate * scene.window.depth_delay;
+  };
   const auto column = [&](double error) {
     std::vector<Observation> seen = scene.observations;
-    for (Observation& o : seen) o.depth += error - 0.01 - o.depth_slope.dot(scene.window.depth_shift);
+    for (Observation& o : seen) o.depth += error - 0.01 - beside(o);
     Eigen::MatrixXd H_x, H_f;
     Eigen::VectorXd r;
     stackFeature(scene.window, seen, scene.f_W, noise, &H_x, &H_f, &r);
     return Eigen::VectorXd(H_x.col(scene.window.depthScaleColumn()));
   };
   std::vector<Observation> exact = scene.observations;
-  for (Observation& o : exact) o.depth -= 0.01 + o.depth_slope.dot(scene.window.depth_shift);
+  for (Observation& o : exact) o.depth -= 0.01 + beside(o);
   const auto residual = [&](double scale) {
     WindowState window = scene.window;
     window.depth_scale = scale;
@@ -113,8 +117,29 @@ TEST(FeatureRows, TheScaleOfDepthIsAskedWhereDepthIsExpected) {
   };
   const Eigen::VectorXd numeric = -(residual(1 + 1e-6) - residual(1 - 1e-6)) / 2e-6;
   EXPECT_GT(numeric.norm(), 100.0);
-  EXPECT_LT((column(0) - numeric).norm(), 1e-2 * numeric.norm());  // the shift's part of a reading is not scaled
+  EXPECT_LT((column(0) - numeric).norm(),
+            1e-2 * numeric.norm());  // the shift's and the delay's part of a reading are not scaled
   EXPECT_EQ(column(0.2), column(0));
+}
+
+// What one pixel reads of a slanted wall a moment before and after, from a camera that moves and turns.
+TEST(FeatureRows, RateOfDepthMatchesCentralDifferences) {
+  const Eigen::Vector3d n = Eigen::Vector3d(0.5, -0.3, 0.8).normalized(), omega(0.7, -0.4, 0.9), v(0.5, -0.8, 0.3);
+  const Eigen::Vector2d xy(0.3, -0.2);
+  constexpr double kDistance = 2.0, h = 1e-6;
+  const auto reading = [&](double t, const Eigen::Vector2d& pixel) {
+    const SE3 T_W_C(expSO3(Eigen::Vector3d(omega * t)), v * t);  // v: along the axes at t = 0
+    const Eigen::Vector3d ray = T_W_C.R() * pixel.homogeneous();
+    return (kDistance - n.dot(T_W_C.t())) / n.dot(ray);
+  };
+  Eigen::Vector2d slope;
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Vector2d step = h * Eigen::Vector2d::Unit(k);
+    slope(k) = (reading(0, xy + step) - reading(0, xy - step)) / (2 * h);
+  }
+  const double numeric = (reading(h, xy) - reading(-h, xy)) / (2 * h);
+  EXPECT_GT(std::abs(numeric), 0.1);
+  EXPECT_NEAR(depthRate(xy, reading(0, xy), slope, omega, v), numeric, 1e-6);
 }
 
 TEST(FeatureRows, FocalLengthsAreAskedWhereTheBearingIsExpected) {
@@ -192,7 +217,7 @@ TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
     const Eigen::Vector3d given = scene.window.bearing.matrix().inverse() * p_C;
     o.xy = given.head<2>() / given.z();
     o.by_intrinsics = bearingJacobian(o.xy);
-    o.depth = p_C.z() - o.depth_slope.dot(scene.window.depth_shift);
+    o.depth = p_C.z() - o.depth_slope.dot(scene.window.depth_shift) - o.depth_rate * scene.window.depth_delay;
   }
   MeasurementNoise noise;
   Triangulation point = triangulate(scene.window, scene.observations, noise);

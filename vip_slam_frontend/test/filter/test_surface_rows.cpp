@@ -71,8 +71,10 @@ SurfaceMatches makeMatches(const WindowState& window, unsigned seed, const std::
 }
 
 double cost(const WindowState& window, const SurfaceMatches& matches) {
-  const SE3 T_ref_cur = cameraPose(window, window.clones[window.indexOf(matches.reference)]).inverse() *
-                        cameraPose(window, window.clones.back());
+  WindowState of_depth = window;  // whose images are older
+  of_depth.time_offset -= window.depth_delay;
+  const SE3 T_ref_cur = cameraPose(of_depth, window.clones[window.indexOf(matches.reference)]).inverse() *
+                        cameraPose(of_depth, window.clones.back());
   double sum = 0;
   for (const SurfacePair& pair : matches.pairs) {
     Eigen::Matrix3d bearing = window.bearing.matrix();
@@ -94,8 +96,8 @@ const std::vector<Eigen::Vector3d> kCorridor{Eigen::Vector3d::UnitY(), -Eigen::V
                                              -Eigen::Vector3d::UnitZ()};
 
 TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
-  const CalibrationFlags all{true, true, true, true, true, true, true},
-      shift{false, false, false, false, false, false, true};
+  const CalibrationFlags all{true, true, true, true, true, true, true, true},
+      shift{false, false, false, false, false, false, false, true};
   for (const CalibrationFlags& calibration : {CalibrationFlags(), all, shift}) {
     WindowState window = makeWindow(3, calibration);
     const bool calibrated = calibration.rotation;

@@ -13,11 +13,14 @@ namespace {
 
 constexpr double kReadout = 0.03;
 
-/// RMS position error over five seconds of motion, metres. `see`: fills the images at time t.
+/// RMS position error over five seconds of motion, metres. `see`: fills the images at time t. `depth_delay`: as found.
 template <class See>
-double errorOf(const SensorConfig& sensor, double depth_lag, const See& see) {
+double errorOf(const SensorConfig& sensor, double depth_lag, const See& see, bool find_delay = true,
+               double* depth_delay = nullptr) {
   const CornerWorld world;
-  FrontEnd front_end(cornerOptions(), sensor);
+  FrontEndOptions options = cornerOptions();
+  options.filter.calibration.depth_delay = find_delay;
+  FrontEnd front_end(options, sensor);
   double imu_t = 0, square = 0;
   int n = 0;
   for (int k = 0; k < 125; ++k) {
@@ -31,6 +34,7 @@ double errorOf(const SensorConfig& sensor, double depth_lag, const See& see) {
     square += (output.frame->state.T_W_I.t() - CornerWorld::pose(input.t).t()).squaredNorm();
     ++n;
   }
+  if (depth_delay) *depth_delay = front_end.calibration().depth_delay;
   return std::sqrt(square / n);
 }
 
@@ -43,13 +47,15 @@ double errorOfRows(double colour_told, double depth_told, bool depth_rolls) {
   });
 }
 
-/// Global-shutter colour, depth taken `lag` later. `told`: the lag reported to the front end.
-double errorWithLag(double lag, double told, double depth_readout) {
-  return errorOf(cornerSensor(0, depth_readout), told, [&](const CornerWorld& world, FrameInput* input) {
+/// Global-shutter colour, depth taken `lag` later. `told`: the lag by the stamps.
+double errorWithLag(double lag, double told, const SensorConfig& sensor, bool find_delay = true,
+                    double* depth_delay = nullptr) {
+  const auto see = [&](const CornerWorld& world, FrameInput* input) {
     cv::Mat not_used;
     world.look(input->t, 0, &input->gray, &not_used);
-    world.look(input->t + lag, depth_readout, &not_used, &input->depth);
-  });
+    world.look(input->t + lag, sensor.depth_rolling_shutter, &not_used, &input->depth);
+  };
+  return errorOf(sensor, told, see, find_delay, depth_delay);
 }
 
 TEST(RollingImages, RowsAreTakenForWhatTheyAre) {
@@ -66,13 +72,26 @@ TEST(RollingImages, DepthOfOneInstantBelongsToTheStamp) {
 
 TEST(LaggingDepth, IsCarriedOverToTheStampOfColour) {
   for (const double lag : {-0.015, 0.015}) {
-    const double told = errorWithLag(lag, lag, 0), not_told = errorWithLag(lag, 0, 0);
+    const double told = errorWithLag(lag, lag, cornerSensor(0, 0));
     EXPECT_LT(told, 0.003) << lag;
-    EXPECT_GT(not_told, 3 * told) << lag;
+    EXPECT_GT(errorWithLag(lag, 0, cornerSensor(0, 0), false), 3 * told) << lag;
+    SensorConfig sensor = cornerSensor(0, 0);
+    sensor.depth_delay = -lag;
+    EXPECT_LT(errorWithLag(lag, 0, sensor, false), 0.003) << lag;
   }
 }
 
-TEST(LaggingDepth, RowsOfALaterDepthImage) { EXPECT_LT(errorWithLag(0.012, 0.012, kReadout), 0.003); }
+TEST(LaggingDepth, IsFoundWhereStampsDoNotTellIt) {
+  for (const double lag : {-0.025, 0.0}) {
+    double found = 1;
+    const double learnt = errorWithLag(lag, 0, cornerSensor(0, 0), true, &found);
+    EXPECT_NEAR(found, -lag, 0.003);
+    EXPECT_EQ(found == 0, lag == 0);
+    if (lag != 0) EXPECT_LT(learnt, 0.5 * errorWithLag(lag, 0, cornerSensor(0, 0), false));
+  }
+}
+
+TEST(LaggingDepth, RowsOfALaterDepthImage) { EXPECT_LT(errorWithLag(0.012, 0.012, cornerSensor(0, kReadout)), 0.003); }
 
 }  // namespace
 }  // namespace vip_slam

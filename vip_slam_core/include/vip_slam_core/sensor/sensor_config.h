@@ -36,6 +36,8 @@ struct SensorConfig {
   std::string depth_encoding = "16UC1";  ///< 16UC1, 32FC1 or "compressed" (16-bit PNG, also compressedDepth)
   double depth_scale = 0.001;            ///< metres per unit of 16UC1
   double depth_offset = 0;               ///< metres to be added to every reading
+  /// Seconds by which a depth image shows an earlier moment than its stamp says, beside a rolling shutter.
+  double depth_delay = 0;
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();  ///< px, see depth_shift.h
   DepthCurve depth_curve;                                 ///< distance-dependent correction, applied after that
   bool depth_registered = true;                           ///< depth pixels belong to the colour camera

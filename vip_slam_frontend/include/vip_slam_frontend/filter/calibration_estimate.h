@@ -23,6 +23,8 @@ struct CalibrationEstimate {
   double sigma_depth_offset = 0;  ///< m
   double depth_scale = 1;         ///< factor of every reading, before the offset, that is adopted
   double sigma_depth_scale = 0;   ///< of the present estimate
+  double depth_delay = 0;         ///< s by which depth shows an earlier moment than its stamp says, that is adopted
+  double sigma_depth_delay = 0;   ///< of the present estimate
   double depth_unit = 0;  ///< m, the unit of readings with this factor, as in a sensor file; 0: they are in metres
   /// Shift of the depth image to the right and down against the colour image, in bearings, and one sigma.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero(), sigma_depth_shift = Eigen::Vector2d::Zero();

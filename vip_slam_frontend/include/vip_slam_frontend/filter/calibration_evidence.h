@@ -30,11 +30,16 @@ Likelihood learntBetween(const Estimate& before, const Estimate& after);
 
 class CalibrationEvidence {
  public:
+  /// Scatter of stretches over what the filter's sigmas say, as a variance, before there are many of them: 2 to 4 on a
+  /// phone (real), less than 1 where noise is white.
+  static constexpr double kUsualScatter = 4;
+
   /// `prior`: of the sensor's configuration.
   explicit CalibrationEvidence(const Estimate& prior) : prior_(prior), adopted_(prior.value) {}
 
   double adopted() const { return adopted_; }
-  /// What the filter is to have of the number at the beginning of each step.
+  /// What the filter is to have of the number at the beginning of each step: the adopted value, with a share of the
+  /// prior's sigma until data know it better.
   Estimate held() const;
   /// What one step said, at t seconds.
   void add(double t, const Likelihood& step);

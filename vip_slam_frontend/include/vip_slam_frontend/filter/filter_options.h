@@ -15,6 +15,7 @@ struct CalibrationOptions {
   bool time_offset = true;
   bool depth_offset = true;
   bool depth_scale = true;
+  bool depth_delay = true;
   bool intrinsics = true;
   bool depth_shift = true;
   bool gyro_scale = true;
@@ -24,6 +25,7 @@ struct CalibrationOptions {
   double sigma_time_offset = 0.005;
   double sigma_depth_offset = 0.005;
   double sigma_depth_scale = 0.02;
+  double sigma_depth_delay = 0.015;
   double sigma_focal = 0.002;
   double sigma_aspect = 0.0005;
   double sigma_centre = 0.002;
@@ -35,6 +37,7 @@ struct CalibrationOptions {
     v.field("time_offset", time_offset, "estimate the camera-IMU delay online");
     v.field("depth_offset", depth_offset, "estimate online what all depth readings are too long or too short by");
     v.field("depth_scale", depth_scale, "estimate online the factor that depth readings need");
+    v.field("depth_delay", depth_delay, "estimate online how much later depth is stamped than it was seen");
     v.field(
         "intrinsics", intrinsics,
         "estimate online what focal lengths and principal point are off by; not of a fisheye, nor where depth is not "
@@ -48,6 +51,7 @@ struct CalibrationOptions {
     v.field("sigma_time_offset", sigma_time_offset, 1e-6, 1.0, "initial one-sigma of the delay, s");
     v.field("sigma_depth_offset", sigma_depth_offset, 1e-6, 1.0, "initial one-sigma of the depth's offset, m");
     v.field("sigma_depth_scale", sigma_depth_scale, 1e-6, 1.0, "initial one-sigma of the depth's scale");
+    v.field("sigma_depth_delay", sigma_depth_delay, 1e-6, 1.0, "initial one-sigma of the depth's delay, s");
     v.field("sigma_focal", sigma_focal, 1e-6, 1.0, "initial one-sigma of the focal lengths, as a share of them");
     v.field("sigma_aspect", sigma_aspect, 1e-6, 1.0, "initial one-sigma of fx / fy");
     v.field("sigma_centre", sigma_centre, 1e-6, 1.0,

@@ -20,6 +20,11 @@ BearingJacobian bearingJacobian(const CameraModel& camera, const Eigen::Vector2d
 /// The same for a lens without distortion.
 BearingJacobian bearingJacobian(const Eigen::Vector2d& xy);
 
+/// Observation::depth_rate where the camera has these rates of its own, rad/s and m/s, both in its frame, and the scene
+/// is at rest. `z`: m; `slope`: see Observation.
+double depthRate(const Eigen::Vector2d& xy, double z, const Eigen::Vector2d& slope, const Eigen::Vector3d& omega_C,
+                 const Eigen::Vector3d& v_C);
+
 struct Observation {
   CloneId clone = 0;
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< undistorted normalised coordinates
@@ -28,15 +33,17 @@ struct Observation {
   /// d z / d xy of the surface there, metres; zero where it is not known. When the depth image is shifted
   /// (WindowState::depth_shift) the depth is read next to the pixel, and this slope gives the difference.
   Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();
+  /// d z / d t in this pixel as the camera moves, m/s; zero where the slope is not known.
+  double depth_rate = 0;
   /// Jacobian by WindowState::bearing: d xy / d (sx, sy, cx, cy). Zero when the intrinsics are not estimated.
   BearingJacobian by_intrinsics = BearingJacobian::Zero();
   /// L with L^T L the inverse of the pixel's covariance in units of MeasurementNoise::sigma_xy^2.
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
 };
 
-/// Depth z of an observation, m: its reading corrected by the estimated offset and shift.
+/// Depth z of an observation, m: its reading corrected by the estimated scale, offset, shift and delay.
 inline double trueDepth(const WindowState& window, const Observation& o) {
-  return window.trueDepth(o.depth) + o.depth_slope.dot(window.depth_shift);
+  return window.trueDepth(o.depth) + o.depth_slope.dot(window.depth_shift) + o.depth_rate * window.depth_delay;
 }
 
 struct FilterTrack {

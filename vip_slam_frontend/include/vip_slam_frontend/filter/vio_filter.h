@@ -31,6 +31,7 @@ struct FilterMeasurement {
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();             ///< undistorted normalised coordinates
   double depth = 0, depth_sigma = 0;                        ///< z in the camera and its sigma, metres; 0: none
   Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();    ///< see Observation
+  double depth_rate = 0;                                    ///< likewise
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< likewise
   BearingJacobian by_intrinsics = BearingJacobian::Zero();  ///< likewise
 };
@@ -115,6 +116,8 @@ class VioFilter {
   /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is significant
   /// and known to a tenth of a pixel. The part taken is removed from the state, and the filter estimates the rest.
   const Eigen::Vector2d& takeDepthShift();
+  /// Seconds by which depth images show an earlier moment than their stamps say, to apply to the images to come.
+  double depthDelay() const { return depth_delay_.adopted(); }
   double depthNoiseScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
@@ -158,9 +161,11 @@ class VioFilter {
   UpdateResult updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
-  /// Takes what this step said of the depth's scale out of the filter and adds it to depth_scale_; `inertial`: the
-  /// IMU predicted the motion.
-  void learnDepthScale(bool inertial);
+  /// Takes what this step said of the depth's scale and delay out of the filter and adds it to their evidence;
+  /// `inertial`: the IMU predicted the motion.
+  void learnDepth(bool inertial);
+  /// Takes scale and delay of depth back to what is adopted.
+  void holdDepth();
   /// Decides whether the depth offset is significant. An implausibly large one has some other cause: it is reset to the
   /// given value and no longer estimated.
   void judgeDepthOffset();
@@ -176,8 +181,9 @@ class VioFilter {
   }
   /// Resets an implausibly large shift of the depth image and stops applying it.
   void judgeDepthShift();
-  /// Adjusts the depth in the tracks to readings that are shifted by this much more, in bearings.
-  void moveDepth(const Eigen::Vector2d& shift);
+  /// Adjusts the depth in the tracks to readings that are shifted by this much more, in bearings, and taken for this
+  /// much older, s.
+  void moveDepth(const Eigen::Vector2d& shift, double delay);
   void judgeIntrinsics();
   void judgeGyroCorrection();
   /// Keeps the estimated extrinsics and calibration for the next start, unless they are implausibly far from the given
@@ -194,10 +200,10 @@ class VioFilter {
   const CalibrationEstimate given_;  ///< by the sensor's configuration
   CalibrationEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
   double sigma_depth_offset_;        ///< m, of the prior at a start
-  frontend::CalibrationEvidence depth_scale_;
+  frontend::CalibrationEvidence depth_scale_, depth_delay_;
   /// Time of the newest clone that the IMU did not predict, or whose first estimate no longer agrees with those of the
-  /// others; empty: none is left, what steps say of the scale counts.
-  std::optional<double> scale_unseen_;
+  /// others; empty: none is left, what steps say of scale and delay counts.
+  std::optional<double> depth_unseen_;
   double focal_;
   Eigen::Vector3d G_;
   Gate gate_;
