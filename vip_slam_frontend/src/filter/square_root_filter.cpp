@@ -123,6 +123,25 @@ double SquareRootFilter::sigma(int column) const {
 }
 
 void SquareRootFilter::consider(int column, double change, double sigma) {
+  Eigen::VectorXd delta = Eigen::VectorXd::Zero(window_.dimension());
+  delta(column) = change;
+  window_.boxplus(delta);
+  // As after a process noise: the covariance with the others stays.
+  const double now = this->sigma(column), lost = sigma * sigma - now * now;
+  if (!(lost > 0)) return;
+  const int n = window_.dimension();
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n + 1, n + 1);  // the last column: the state without the noise
+  A.topLeftCorner(n, n) = R_;
+  A.col(n) = A.col(column);
+  A.col(column).setZero();
+  A(n, column) = 1 / std::sqrt(lost);
+  A(n, n) = -A(n, column);
+  std::vector<int> order = {n};
+  for (int c = 0; c < n; ++c) order.push_back(c);
+  R_ = marginaliseColumns(A, order, 1);
+}
+
+void SquareRootFilter::replaceMarginal(int column, double change, double sigma) {
   // With this column last, the upper rows hold the conditional of the others given it, and the last row its marginal.
   const int n = window_.dimension();
   const auto rotate = [this, n](int pivot, int from) {  // makes (pivot + 1, from) zero

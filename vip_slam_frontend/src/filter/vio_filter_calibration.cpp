@@ -140,10 +140,10 @@ void VioFilter::holdDepth() {
   const WindowState& window = filter_.window();
   if (window.calibration.depth_scale) {
     const frontend::Estimate scale = depth_scale_.held();
-    filter_.consider(window.depthScaleColumn(), scale.value - window.depth_scale, scale.sigma);
+    filter_.replaceMarginal(window.depthScaleColumn(), scale.value - window.depth_scale, scale.sigma);
   }
   if (window.calibration.depth_delay) {
-    filter_.consider(window.depthDelayColumn(), -window.depth_delay, depth_delay_.held().sigma);
+    filter_.replaceMarginal(window.depthDelayColumn(), -window.depth_delay, depth_delay_.held().sigma);
   }
 }
 

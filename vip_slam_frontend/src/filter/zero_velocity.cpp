@@ -73,12 +73,36 @@ ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise
   return spread;
 }
 
+std::vector<ImuSample> movingMeans(const std::vector<ImuSample>& samples, double seconds) {
+  std::vector<ImuSample> means;
+  ImuSample sum;
+  std::size_t first = 0, count = 0;  // of those in the sum
+  std::size_t next = 0;
+  for (const ImuSample& middle : samples) {
+    if (middle.t - samples.front().t < 0.5 * seconds) continue;
+    if (samples.back().t - middle.t < 0.5 * seconds) break;
+    for (; next < samples.size() && samples[next].t <= middle.t + 0.5 * seconds; ++next, ++count) {
+      sum.gyro += samples[next].gyro;
+      sum.accel += samples[next].accel;
+    }
+    for (; samples[first].t < middle.t - 0.5 * seconds; ++first, --count) {
+      sum.gyro -= samples[first].gyro;
+      sum.accel -= samples[first].accel;
+    }
+    means.push_back({middle.t, sum.gyro / static_cast<double>(count), sum.accel / static_cast<double>(count)});
+  }
+  return means;
+}
+
 bool StillnessDetector::update(const StillnessCues& cues) {
-  const bool quiet = cues.imu.count >= 5 && cues.imu.quiet(options_.max_gyro_std, options_.max_accel_std);
+  const auto quiet = [this](const ImuSpread& spread) {
+    return spread.count >= 5 && spread.quiet(options_.max_gyro_std, options_.max_accel_std);
+  };
+  const bool rests = quiet(cues.imu);
   const bool image_known = cues.disparity_px >= 0 && cues.tracks > kEnough;
   const double shows = cues.px_per_metre > 0 ? cues.px_per_metre / kPxPerMetre : 1.0;
   const double limit = kStillPixels * std::clamp(shows, kMinLimit, 1.0);
-  bool wants = options_.enabled && quiet && cues.speed < kStillSpeed;
+  bool wants = options_.enabled && (rests || (image_known && quiet(cues.unshaken))) && cues.speed < kStillSpeed;
   if (still_) {
     // While still, an image without features (lights off) does not end the stillness; image motion does.
     wants = wants && (image_known ? cues.disparity_px < 1.5 * limit : restsAs(cues.imu, rest_)) &&
@@ -104,7 +128,7 @@ bool StillnessDetector::update(const StillnessCues& cues) {
     in_a_row_ = 0;
   }
   since_still_ = still_ ? 0 : std::min(since_still_ + 1, kForgotten);
-  imu_rests_ = quiet && since_still_ < kForgotten && restsAs(cues.imu, rest_);
+  imu_rests_ = rests && since_still_ < kForgotten && restsAs(cues.imu, rest_);
   // A single image with motion already suspends the updates; it takes kImagesIn images to start them.
   return still_ && wants;
 }

@@ -116,7 +116,35 @@ TEST(Marginalisation, ARenewedStateIsKnownByItsNewSigmaAlone) {
   EXPECT_TRUE(filter.healthy());
 }
 
-TEST(Marginalisation, AConsideredStateIsKnownAsBeforeAndTheOthersGivenItAsNow) {
+// Against the textbook: an update whose gain for the considered state is zero, in Joseph's form.
+TEST(Marginalisation, AnUpdateTakenBackInOneStateIsTheSchmidtKalmanFilter) {
+  std::mt19937 random(8);
+  WindowState window;
+  window.clones.resize(3);
+  window.calibration.depth_offset = window.calibration.time_offset = true;
+  const int n = window.dimension(), column = window.timeOffsetColumn(), rows = 12;
+  SquareRootFilter filter;
+  filter.initialise(window, randomMatrix(n + 20, n, random));
+  const Eigen::MatrixXd P = filter.covariance(), H = randomMatrix(rows, n, random);
+  const Eigen::VectorXd h = randomMatrix(rows, 1, random);
+  const Eigen::MatrixXd S = H * P * H.transpose() + Eigen::MatrixXd::Identity(rows, rows);
+  Eigen::MatrixXd K = P * H.transpose() * S.inverse();
+  K.row(column).setZero();
+  const Eigen::MatrixXd I_KH = Eigen::MatrixXd::Identity(n, n) - K * H;
+  const Eigen::MatrixXd expected = I_KH * P * I_KH.transpose() + K * K.transpose();
+  Eigen::MatrixXd H_given = H;
+  Eigen::VectorXd h_given = h;
+  ASSERT_TRUE(filter.update(H_given, h_given).ok);
+  filter.consider(column, -filter.window().time_offset, std::sqrt(P(column, column)));
+  EXPECT_LT(relative(filter.covariance(), expected), 1e-10);
+  EXPECT_TRUE(filter.R().isUpperTriangular(1e-12));
+  EXPECT_TRUE(filter.healthy());
+  EXPECT_EQ(filter.window().time_offset, 0.0);
+  EXPECT_NEAR(filter.window().depth_offset, (K * h)(window.depthOffsetColumn()), 1e-12);
+  EXPECT_NEAR(filter.window().v_W.y(), (K * h)(window.navColumn() + 1), 1e-12);
+}
+
+TEST(Marginalisation, AReplacedMarginalLeavesTheOthersGivenItAsTheyAre) {
   std::mt19937 random(7);
   WindowState window;
   window.clones.resize(3);
@@ -126,7 +154,7 @@ TEST(Marginalisation, AConsideredStateIsKnownAsBeforeAndTheOthersGivenItAsNow) {
   filter.initialise(window, randomMatrix(n + 20, n, random));
   const Eigen::MatrixXd before = filter.covariance();
   const double sigma = 3.0 * std::sqrt(before(column, column)), change = 1e-3;
-  filter.consider(column, change, sigma);
+  filter.replaceMarginal(column, change, sigma);
   // P(others given it) stays: P - p p^T / s, with p its column; then p follows from its own variance.
   const Eigen::VectorXd gain = before.col(column) / before(column, column);
   const Eigen::MatrixXd expected = before + (sigma * sigma - before(column, column)) * gain * gain.transpose();

@@ -260,6 +260,46 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
 }
 
 // Between the first image of a motion and its detection, zero velocity must not be claimed with millimetre accuracy.
+// An engine shakes the IMU of a body that stands, or that moves.
+TEST(Stillness, AShakenImuIsQuietByItsMovingMeansWhereTheImageStands) {
+  const auto spreads = [](double sway) {  // of the body, rad/s and m/s^2, once a second
+    std::vector<ImuSample> samples;
+    for (int k = 0; k <= 100; ++k) {
+      const double t = 0.005 * k, shake = std::sin(2 * M_PI * 31 * t), slow = sway * std::sin(2 * M_PI * t);
+      samples.push_back({t, {0.2 * shake + slow, 0, 0}, {0, 4 * shake + 3 * slow, 9.81}});
+    }
+    StillnessCues cues = quiet();
+    cues.imu = imuSpread({samples.end() - 50, samples.end()});
+    cues.unshaken = imuSpread(movingMeans(samples, kShake));
+    return cues;
+  };
+  StillnessDetector detector((ZuptOptions()));
+  const StillnessCues stands = spreads(0);
+  EXPECT_GT(stands.imu.accel_std, 2);
+  for (int i = 0; i < 5; ++i) detector.update(stands);
+  EXPECT_TRUE(detector.still());
+  StillnessCues dark = stands;
+  dark.tracks = 0;
+  dark.disparity_px = -1;
+  EXPECT_FALSE(detector.update(dark)) << "the image has to be seen to stand";
+  detector.reset();
+  for (int i = 0; i < 5; ++i) EXPECT_FALSE(detector.update(spreads(0.3)));
+}
+
+TEST(Stillness, MovingMeansAreThoseOfTheSamplesAround) {
+  std::vector<ImuSample> samples;
+  for (int k = 0; k <= 20; ++k) samples.push_back({0.01 * k, {0.01 * k, 1, 0}, {0, 0, 0.01 * k}});
+  const std::vector<ImuSample> means = movingMeans(samples, 0.1);
+  ASSERT_GE(means.size(), 9u);
+  ASSERT_LE(means.size(), 11u);
+  for (const ImuSample& mean : means) {
+    EXPECT_NEAR(mean.gyro.x(), mean.t, 0.0051);  // a sample at the border may count or not
+    EXPECT_NEAR(mean.gyro.y(), 1, 1e-12);
+    EXPECT_NEAR(mean.accel.z(), mean.t, 0.0051);
+  }
+  EXPECT_TRUE(movingMeans({}, 0.1).empty());
+}
+
 TEST(Stillness, IsAsExactAsTheImagesAreQuiet) {
   const ZuptOptions options;
   StillnessDetector detector(options);

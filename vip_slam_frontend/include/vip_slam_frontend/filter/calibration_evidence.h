@@ -2,8 +2,8 @@
 // What the data say of one calibration number, gathered beside the filter, which keeps the number at an adopted value
 // until they are sure of another. A filter that follows such a number from its wide prior on carries each error of its
 // first seconds in its trajectory; one that leaves it out calls itself too sure. Here the filter has it as a state with
-// its prior's sigma, which every step takes back to the adopted value (a consider update): what the step said of it is
-// the difference of the marginals' information, and goes here.
+// its prior's sigma, which every step takes back to the adopted value: what the step said of it is the difference of
+// the marginals' information, and goes here.
 #pragma once
 
 #include <vector>

@@ -39,7 +39,10 @@ class SquareRootFilter {
   /// Replaces all information on one column's state by `sigma`; the information on the others is kept.
   void renew(int column, double sigma);
   /// Resets the marginal of the state in this column to the given sigma, at `change` from its present value; the
-  /// conditional of the others given this state is kept (a consider update, as in the Schmidt-Kalman filter).
+  /// conditional of the others given this state is kept: what the marginal had learnt has gone elsewhere.
+  void replaceMarginal(int column, double change, double sigma);
+  /// Takes back what an update did to the state in this column: `change` back to its value, and its sigma to the given
+  /// one, while all others keep what they learnt (a consider state of the Schmidt-Kalman filter).
   void consider(int column, double change, double sigma);
 
   /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.

@@ -14,6 +14,8 @@ namespace vip_slam {
 
 /// IMU time that is looked at for stillness, s.
 constexpr double kRestWindow = 0.25;
+/// The same where an engine or fans shake the IMU, and the time over which their shaking is averaged, s.
+constexpr double kShakenWindow = 0.5, kShake = 0.1;
 
 struct ImuSpread {
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
@@ -27,9 +29,13 @@ struct ImuSpread {
 /// `noise` may be null: then the floors stay 0.
 ImuSpread imuSpread(const std::vector<ImuSample>& samples, const ImuNoise* noise = nullptr);
 
+/// Means over `seconds` around each sample that has as much before and behind it: without what shakes faster.
+std::vector<ImuSample> movingMeans(const std::vector<ImuSample>& samples, double seconds);
+
 /// Evidence of one image and the IMU samples before it about motion.
 struct StillnessCues {
   ImuSpread imu;                    ///< over kRestWindow
+  ImuSpread unshaken;               ///< of moving means over kShake, over kShakenWindow
   double disparity_px = -1;         ///< mean image motion over the same time; < 0: unknown
   double anchor_disparity_px = -1;  ///< since standing still began; < 0: unknown
   int tracks = 0;
@@ -44,6 +50,7 @@ struct ResidualMotion {
 };
 
 /// Still only when the IMU is quiet, the image does not move and the estimated speed is low; with hysteresis both ways.
+/// An IMU that is shaken counts as quiet by its moving means, as long as the image is seen to stand still.
 /// The image alone is never enough: a wall that moves along with the camera would deceive it. A body that stands and
 /// sees nothing (darkness, a bare wall) stays still while the IMU's means stay unchanged: no motion begins without an
 /// acceleration or a rotation.
