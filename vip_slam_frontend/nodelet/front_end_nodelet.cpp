@@ -261,7 +261,9 @@ void FrontEndNodelet::process(ImagePair pair) {
   std::lock_guard<std::mutex> lock(shown_mutex_);
   if (calibration) {
     shown_.calibration = *calibration;
-    shown_.calibration_differences = calibrationDifferences(front_end_->givenCalibration(), *calibration);
+    shown_.calibration_differences = front_end_->counters().imuIsWrong()
+                                         ? std::vector<std::string>()
+                                         : calibrationDifferences(front_end_->givenCalibration(), *calibration);
   }
   shown_.size_problem = size_problem;
   shown_.status = output.frame->status;

@@ -74,6 +74,8 @@ struct FrontEndCounters {
   double nis_per_dof = 0;                ///< of the last update; about 1 when consistent
   /// Learnt noise of depth on surfaces, as factors on the configured noise: of single patches, and common to a surface.
   double depth_white = 1, depth_shared = 1;
+  /// Whether so many images contradict the IMU that what was learnt against it, such as its delay, is worth nothing.
+  bool imuIsWrong() const { return 10 * (imu_faults + imu_contradicted) > images; }
 };
 
 class FrontEnd {

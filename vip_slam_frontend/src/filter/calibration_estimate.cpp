@@ -94,10 +94,11 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();
   if ((beside_sigma > 0 && beside > (kSure * beside_sigma).cwiseMax(kMinDepthShift)).any()) {
-    all.push_back(
-        formatted("the depth image lies beside the colour image, which is corrected for; depth/shift in the sensor's "
-                  "configuration should be [%.2f, %.2f] pixels",
-                  found.depth_shift_px.x(), found.depth_shift_px.y()));
+    all.push_back(formatted(
+        "the depth image lies beside the colour image, which is corrected for: is it registered to colour, are its "
+        "holes filled from one side (switch that off)? Else depth/shift in the sensor's configuration should be "
+        "[%.2f, %.2f] pixels",
+        found.depth_shift_px.x(), found.depth_shift_px.y()));
   }
   const Eigen::Array4d bearing = (found.bearing.value - given.bearing.value).cwiseAbs();
   const Eigen::Array4d& bearing_sigma = found.sigma_bearing.array();
@@ -114,8 +115,9 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   if (off.maxCoeff() > 0) {
     const Eigen::Matrix3d& C = found.gyro_correction;
     all.push_back(formatted(
-        "scale or alignment of the gyro's axes is off by up to %.1f %%, which is corrected for; imu/gyro_correction "
-        "in the sensor's configuration should have the rows [%.4f, %.4f, %.4f], [%.4f, %.4f, %.4f], "
+        "scale or alignment of the gyro's axes is off by up to %.1f %%, which is corrected for: is the IMU smoothed "
+        "(check_bag tells)? Else imu/gyro_correction in the sensor's configuration should have the rows [%.4f, %.4f, "
+        "%.4f], [%.4f, %.4f, %.4f], "
         "[%.4f, %.4f, %.4f]",
         100 * off.maxCoeff(), C(0, 0), C(0, 1), C(0, 2), C(1, 0), C(1, 1), C(1, 2), C(2, 0), C(2, 1), C(2, 2)));
   }

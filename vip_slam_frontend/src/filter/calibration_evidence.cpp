@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace vip_slam::frontend {
 namespace {
@@ -56,10 +57,19 @@ Estimate CalibrationEvidence::estimate() const {
   return {(information * mean + prior * prior_.value) / (information + prior), 1 / std::sqrt(information + prior)};
 }
 
+bool CalibrationEvidence::contradicts() const {
+  if (stretches_.size() < kEnough) return false;
+  const Estimate found = estimate();
+  return std::abs(found.value - prior_.value) > std::max(kBelievable * prior_.sigma, kSure * found.sigma);
+}
+
 bool CalibrationEvidence::adopt() {
   if (stretches_.size() < kEnough) return false;
   const Estimate found = estimate();
-  if (!(std::abs(found.value - prior_.value) < kBelievable * prior_.sigma)) return false;
+  if (!(std::abs(found.value - prior_.value) < kBelievable * prior_.sigma)) {
+    adopted_information_ = 0;
+    return std::exchange(adopted_, prior_.value) != prior_.value;
+  }
   const double information = 1 / (found.sigma * found.sigma), apart = std::abs(found.value - adopted_);
   const bool surer = adopted_information_ > 0 && information > kMuchSurer * adopted_information_;
   if (!(apart > kSure * found.sigma) && !(surer && apart > found.sigma)) return false;

@@ -101,21 +101,6 @@ void SquareRootFilter::marginalise(const std::vector<int>& clone_indices) {
   }
 }
 
-void SquareRootFilter::renew(int column, double sigma) {
-  const int n = window_.dimension();
-  std::vector<int> order = {column};
-  for (int c = 0; c < n; ++c) {
-    if (c != column) order.push_back(c);
-  }
-  const Eigen::MatrixXd others = marginaliseColumns(R_, order, 1);
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-  A.topLeftCorner(n - 1, column) = others.leftCols(column);
-  A.topRightCorner(n - 1, n - 1 - column) = others.rightCols(n - 1 - column);
-  A(n - 1, column) = 1.0 / sigma;
-  triangularise(A, n);
-  R_ = A.triangularView<Eigen::Upper>();
-}
-
 double SquareRootFilter::sigma(int column) const {
   Eigen::VectorXd row = Eigen::VectorXd::Unit(window_.dimension(), column);
   R_.transpose().triangularView<Eigen::Lower>().solveInPlace(row);
@@ -141,30 +126,35 @@ void SquareRootFilter::consider(int column, double change, double sigma) {
   R_ = marginaliseColumns(A, order, 1);
 }
 
-void SquareRootFilter::replaceMarginal(int column, double change, double sigma) {
-  // With this column last, the upper rows hold the conditional of the others given it, and the last row its marginal.
-  const int n = window_.dimension();
+void SquareRootFilter::replaceMarginal(int column, const Eigen::VectorXd& change, const Eigen::VectorXd& sigmas) {
+  // With these columns last, the upper rows hold the conditional of the others given them, the last rows their
+  // marginal.
+  const int n = window_.dimension(), k = static_cast<int>(change.size()), others = n - k;
   const auto rotate = [this, n](int pivot, int from) {  // makes (pivot + 1, from) zero
     Eigen::JacobiRotation<double> rotation;
     rotation.makeGivens(R_(pivot, from), R_(pivot + 1, from));
     R_.rightCols(n - std::min(from, pivot)).applyOnTheLeft(pivot, pivot + 1, rotation.adjoint());
     R_(pivot + 1, from) = 0;
   };
-  const Eigen::VectorXd moved = R_.col(column);
-  for (int c = column; c + 1 < n; ++c) R_.col(c) = R_.col(c + 1).eval();
-  R_.col(n - 1) = moved;
-  for (int c = column; c + 1 < n; ++c) rotate(c, c);
-  R_(n - 1, n - 1) = 1.0 / sigma;
+  for (int i = 0; i < k; ++i) {
+    const Eigen::VectorXd moved = R_.col(column);
+    for (int c = column; c + 1 < n; ++c) R_.col(c) = R_.col(c + 1).eval();
+    R_.col(n - 1) = moved;
+    for (int c = column; c + 1 < n; ++c) rotate(c, c);
+  }
+  R_.bottomRightCorner(k, k) = sigmas.cwiseInverse().asDiagonal();
 
-  Eigen::VectorXd others = -change * R_.col(n - 1).head(n - 1);
-  R_.topLeftCorner(n - 1, n - 1).triangularView<Eigen::Upper>().solveInPlace(others);
+  Eigen::VectorXd follow = -R_.topRightCorner(others, k) * change;
+  R_.topLeftCorner(others, others).triangularView<Eigen::Upper>().solveInPlace(follow);
   Eigen::VectorXd delta(n);
-  delta << others.head(column), change, others.tail(n - 1 - column);
+  delta << follow.head(column), change, follow.tail(others - column);
 
-  const Eigen::VectorXd last = R_.col(n - 1);
-  for (int c = n - 1; c > column; --c) R_.col(c) = R_.col(c - 1).eval();
-  R_.col(column) = last;
-  for (int r = n - 2; r >= column; --r) rotate(r, column);
+  for (int i = 0; i < k; ++i) {
+    const Eigen::VectorXd last = R_.col(n - 1);
+    for (int c = n - 1; c > column; --c) R_.col(c) = R_.col(c - 1).eval();
+    R_.col(column) = last;
+    for (int r = n - 2; r >= column; --r) rotate(r, column);
+  }
   for (int r = column; r < n; ++r) {
     if (R_(r, r) < 0) R_.row(r) = -R_.row(r);
   }

@@ -34,7 +34,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       imu_noise_(imu_noise),
       given_{T_I_C, time_offset},
       learnt_(given_),
-      sigma_depth_offset_(options.calibration.sigma_depth_offset),
+      depth_offset_({0.0, options.calibration.sigma_depth_offset}),
       depth_scale_({1.0, options.calibration.sigma_depth_scale}),
       depth_delay_({0.0, options.calibration.sigma_depth_delay}),
       focal_(focal_px),
@@ -75,14 +75,14 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.bias_accel = prior.state.bias_accel;
   window.T_I_C = learnt_.T_I_C;
   window.time_offset = learnt_.time_offset;
-  window.depth_offset = learnt_.depth_offset;
+  window.depth_offset = depth_offset_.adopted();
   window.depth_scale = depth_scale_.adopted();
   window.bearing = learnt_.bearing;
   window.depth_shift = learnt_.depth_shift;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
   window.calibration = {calibration.rotation,    calibration.translation,
-                        calibration.time_offset, calibration.depth_offset && !depth_contradicts_,
+                        calibration.time_offset, calibration.depth_offset,
                         calibration.depth_scale, calibration.depth_delay,
                         calibration.intrinsics,  calibration.depth_shift && !shift_contradicts_,
                         calibration.gyro_scale,  calibration.gyro_misalignment};
@@ -99,7 +99,7 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
     } else if (calibration.translation && c < window.translationColumn() + 3) {
       sigma = calibration.sigma_translation;
     } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
-      sigma = sigma_depth_offset_;
+      sigma = depth_offset_.held().sigma;
     } else if (window.calibration.depth_scale && c == window.depthScaleColumn()) {
       sigma = depth_scale_.held().sigma;
     } else if (window.calibration.depth_delay && c == window.depthDelayColumn()) {
@@ -270,7 +270,6 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
                one(std::pow(delay_predicted.sigma, 2)), one(std::pow(found.sigma, 2)));
   }
   learnDepth(propagation.inertial);
-  judgeDepthOffset();
   judgeDepthShift();
   judgeIntrinsics();
   judgeGyroCorrection();

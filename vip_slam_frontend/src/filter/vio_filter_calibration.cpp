@@ -12,12 +12,7 @@ namespace {
 // An estimate is plausible, and kept over a restart, within this many sigmas of the prior; an entry of the gyro's
 // correction within a fixed limit, since its prior sigma is only a data-sheet value.
 constexpr double kBelievableChange = 4.0, kMaxGyroError = 0.05;
-// A depth offset becomes significant above this many sigmas and metres, and stays so until below half as many metres.
-constexpr double kSureOffset = 4.0, kMinOffset = 0.002;
-// It must also not change by more than this share of itself within this time, s: an offset that is still growing may
-// become implausible, and must not be passed on before.
-constexpr double kSteadySeconds = 1.0, kSteadyShare = 0.25;
-// One sigma of a depth offset that is reset to its given value, m: holds it there.
+// One sigma of a depth offset that is not to be learnt, m.
 constexpr double kHeldOffset = 1e-6;
 // Shift of the depth image, in bearings (px over the focal length): significant above kSureShift sigmas, worth
 // correcting above kMinShift, known well enough below a sigma of kKnownShift. In an office one pixel of shift raised
@@ -38,14 +33,18 @@ CalibrationEstimate VioFilter::calibration() const {
   if (!started_) {
     CalibrationEstimate calibration = learnt_;
     calibration.depth_shift += depth_shift_;
-    calibration.depth_contradicts = depth_contradicts_ || shift_contradicts_;
+    calibration.depth_offset = depth_offset_.adopted();
+    calibration.depth_scale = depth_scale_.adopted();
+    calibration.depth_delay = depth_delay_.adopted();
+    calibration.depth_contradicts = depth_offset_.contradicts() || shift_contradicts_;
     return calibration;
   }
   const WindowState& window = filter_.window();
   CalibrationEstimate calibration;
   calibration.T_I_C = window.T_I_C;
   calibration.time_offset = window.time_offset;
-  calibration.depth_offset = window.depth_offset;
+  calibration.depth_offset = depth_offset_.adopted();
+  calibration.sigma_depth_offset = window.calibration.depth_offset ? depth_offset_.estimate().sigma : 0.0;
   calibration.depth_scale = depth_scale_.adopted();
   calibration.sigma_depth_scale = window.calibration.depth_scale ? depth_scale_.estimate().sigma : 0.0;
   calibration.depth_delay = depth_delay_.adopted();
@@ -53,7 +52,7 @@ CalibrationEstimate VioFilter::calibration() const {
   calibration.bearing = window.bearing;
   calibration.depth_shift = depth_shift_ + window.depth_shift;
   calibration.gyro_correction = window.gyro_correction;
-  calibration.depth_contradicts = depth_contradicts_ || shift_contradicts_;
+  calibration.depth_contradicts = depth_offset_.contradicts() || shift_contradicts_;
   if (window.calibration.size() == 0) return calibration;
   const Eigen::VectorXd sigmas = filter_.calibrationSigmas();
   const int first = window.calibrationColumn();
@@ -63,7 +62,6 @@ CalibrationEstimate VioFilter::calibration() const {
   }
   if (window.calibration.time_offset) calibration.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
   calibration.delay_drifts = drift_.of(frontend::DriftMonitor::kDelay).drifts();
-  if (window.calibration.depth_offset) calibration.sigma_depth_offset = sigmas(window.depthOffsetColumn() - first);
   if (window.calibration.intrinsics) calibration.sigma_bearing = sigmas.segment<4>(window.intrinsicsColumn() - first);
   if (window.calibration.depth_shift) {
     calibration.sigma_depth_shift = sigmas.segment<2>(window.depthShiftColumn() - first);
@@ -86,7 +84,6 @@ void VioFilter::learnCalibration() {
   if (change.head<3>().norm() > kBelievableChange * options.sigma_rotation ||
       change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
       std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset ||
-      std::abs(window.depth_offset - given_.depth_offset) > kBelievableChange * options.sigma_depth_offset ||
       (window.bearing.value.head<2>().array().abs() > kBelievableChange * options.sigma_focal).any() ||
       (window.bearing.value.tail<2>().array().abs() > kBelievableChange * options.sigma_centre).any() ||
       ((depth_shift + window.depth_shift).array().abs() > kBelievableChange * options.sigma_depth_shift).any() ||
@@ -95,77 +92,52 @@ void VioFilter::learnCalibration() {
   }
   learnt_.T_I_C = window.T_I_C;
   learnt_.time_offset = window.time_offset;
-  learnt_.depth_offset = window.depth_offset;
   learnt_.bearing = window.bearing;
   learnt_.depth_shift = window.depth_shift;
   depth_shift_ = depth_shift;
   learnt_.gyro_correction = window.gyro_correction;
 }
 
-bool VioFilter::isSteady(double depth_offset) {
-  const double t = nav().t, since = t - offset_before_.t;
-  if (!(since >= 0) || since >= kSteadySeconds) {
-    const double moved = std::abs(depth_offset - offset_before_.value);
-    offset_is_steady_ = since < 2 * kSteadySeconds && moved < kSteadyShare * std::abs(depth_offset);
-    offset_before_ = {t, depth_offset};
-  }
-  return offset_is_steady_;
-}
-
 void VioFilter::learnDepth(bool inertial) {
+  using frontend::learntBetween;
   const WindowState& window = filter_.window();
   // Only the IMU knows scale and delay: a motion that is itself measured by depth agrees with any.
   if (!inertial) depth_unseen_ = window.clones.back().t;
   const bool counts = !depth_unseen_ || window.clones.front().t > *depth_unseen_;
   if (counts) depth_unseen_.reset();
-  const frontend::Estimate scale = depth_scale_.held(), delay = depth_delay_.held();
-  const double rest = window.depth_delay;
+  if (window.calibration.depth_offset) {
+    const double sigma = filter_.sigma(window.depthOffsetColumn());
+    depth_offset_.add(nav().t, learntBetween(depth_offset_.held(), {window.depth_offset, sigma}));
+  }
   if (counts && window.calibration.depth_scale) {
     const double sigma = filter_.sigma(window.depthScaleColumn());
-    depth_scale_.add(nav().t, frontend::learntBetween(scale, {window.depth_scale, sigma}));
+    depth_scale_.add(nav().t, learntBetween(depth_scale_.held(), {window.depth_scale, sigma}));
   }
+  const frontend::Estimate delay = depth_delay_.held();
   if (counts && window.calibration.depth_delay) {
     const double sigma = filter_.sigma(window.depthDelayColumn());
-    depth_delay_.add(nav().t, frontend::learntBetween(delay, {delay.value + rest, sigma}));
+    depth_delay_.add(nav().t, learntBetween(delay, {delay.value + window.depth_delay, sigma}));
   }
-  if (depth_scale_.adopt()) startDepthOffsetAnew();
-  if (depth_delay_.adopt()) {
-    moveDepth(Eigen::Vector2d::Zero(), depth_delay_.adopted() - delay.value);
-    startDepthOffsetAnew();
-  }
+  const bool scaled = depth_scale_.adopt(), delayed = depth_delay_.adopt();
+  if (delayed) moveDepth(Eigen::Vector2d::Zero(), depth_delay_.adopted() - delay.value);
+  // Of another scale or moment a part had been taken for the offset.
+  if (scaled || delayed) depth_offset_.reset();
+  depth_offset_.adopt();
   holdDepth();
 }
 
 void VioFilter::holdDepth() {
   const WindowState& window = filter_.window();
-  if (window.calibration.depth_scale) {
-    const frontend::Estimate scale = depth_scale_.held();
-    filter_.replaceMarginal(window.depthScaleColumn(), scale.value - window.depth_scale, scale.sigma);
-  }
-  if (window.calibration.depth_delay) {
-    filter_.replaceMarginal(window.depthDelayColumn(), -window.depth_delay, depth_delay_.held().sigma);
-  }
-}
-
-void VioFilter::judgeDepthOffset() {
-  const WindowState& window = filter_.window();
-  const double change = window.depth_offset - given_.depth_offset;
-  if (!window.calibration.depth_offset || depth_contradicts_) return;
-  const bool steady = isSteady(change);
-  if (!depth_is_off_ && std::abs(change) > kMinOffset) {
-    depth_is_off_ = steady && std::abs(change) > kSureOffset * calibration().sigma_depth_offset;
-  } else if (std::abs(change) < kMinOffset / 2) {
-    depth_is_off_ = false;
-  }
-  if (std::abs(change) <= kBelievableChange * options_.calibration.sigma_depth_offset) return;
-  // A measurement that the offset has its given value corrects all other states as if it had never been uncertain.
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, window.dimension());
-  H(0, window.depthOffsetColumn()) = 1.0 / kHeldOffset;
-  Eigen::VectorXd r = Eigen::VectorXd::Constant(1, -change / kHeldOffset);
-  filter_.update(H, r);
-  depth_contradicts_ = true;
-  depth_unseen_ = nav().t;
-  depth_is_off_ = false;
+  Eigen::VectorXd change(3), sigmas(3);
+  int states = 0;
+  const auto hold = [&](double by, const frontend::Estimate& held) {
+    change(states) = by;
+    sigmas(states++) = held.sigma;
+  };
+  if (window.calibration.depth_offset) hold(depth_offset_.adopted() - window.depth_offset, depth_offset_.held());
+  if (window.calibration.depth_scale) hold(depth_scale_.adopted() - window.depth_scale, depth_scale_.held());
+  if (window.calibration.depth_delay) hold(-window.depth_delay, depth_delay_.held());
+  if (states > 0) filter_.replaceMarginal(window.depthOffsetColumn(), change.head(states), sigmas.head(states));
 }
 
 void VioFilter::moveDepth(const Eigen::Vector2d& shift, double delay) {
@@ -207,21 +179,12 @@ const Eigen::Vector2d& VioFilter::takeDepthShift() {
 }
 
 void VioFilter::restartDepthOffset(bool none) {
-  sigma_depth_offset_ = none ? kHeldOffset : options_.calibration.sigma_depth_offset;
-  learnt_.depth_offset = given_.depth_offset;
+  depth_offset_ = frontend::CalibrationEvidence({0.0, none ? kHeldOffset : options_.calibration.sigma_depth_offset});
   depth_scale_.reset();
-  if (started_) holdDepth();
   for (auto& [id, track] : tracks_) {
     for (Observation& observation : track.observations) observation.depth = 0;
   }
-  startDepthOffsetAnew();
-}
-
-void VioFilter::startDepthOffsetAnew() {
-  depth_is_off_ = depth_contradicts_ = false;
-  if (!started_ || !filter_.window().calibration.depth_offset) return;
-  filter_.renew(filter_.window().depthOffsetColumn(), sigma_depth_offset_);
-  filter_.window().depth_offset = given_.depth_offset;
+  if (started_) holdDepth();
 }
 
 void VioFilter::holdDelay() {

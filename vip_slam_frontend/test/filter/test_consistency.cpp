@@ -46,7 +46,10 @@ TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
     FilterOptions options = independentNoise();
     const RunResult run = runFilter(simulation, options, 30.0, false);
     adapting_nees += run.nees / kSeeds;
+    // Numbers of depth that are kept at adopted values count as less known than they are: they would hide a filter that
+    // is too sure.
     options.adapt_imu_noise = false;
+    options.calibration.depth_offset = options.calibration.depth_scale = options.calibration.depth_delay = false;
     nees += runFilter(simulation, options, 30.0, false).nees / kSeeds;
     nis += run.nis_per_dof / kSeeds;
     drift += run.final_position / run.length / kSeeds;
@@ -60,9 +63,10 @@ TEST(Consistency, PosesAndMotionsOverTwentySeeds) {
   std::printf("NEES %.2f, band %.2f to %.2f; NIS per row %.3f; drift %.3f %%\n", nees, low, high, nis, 100 * drift);
   EXPECT_GT(nees, low);
   EXPECT_LT(nees, high);
-  // What adapts to noise and drift hardly widens the covariance where there is nothing to adapt to.
+  // What adapts to noise and drift and learns depth widens the covariance by a tenth where there is nothing to learn.
   std::printf("NEES while adapting %.2f\n", adapting_nees);
-  EXPECT_NEAR(adapting_nees, nees, 0.05 * nees);
+  EXPECT_LT(adapting_nees, 1.05 * nees);
+  EXPECT_GT(adapting_nees, 0.85 * nees);
   EXPECT_NEAR(nis, 1.0, 0.1);
   EXPECT_LT(drift, 0.004);
   std::printf("NEES of the motion %.2f; error %.3f of that of the newest poses\n", motion_nees,

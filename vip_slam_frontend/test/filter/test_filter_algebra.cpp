@@ -98,24 +98,6 @@ TEST(Marginalisation, QrEqualsSchur) {
   EXPECT_LT(relative(R.transpose() * R, schur), 1e-12);
 }
 
-TEST(Marginalisation, ARenewedStateIsKnownByItsNewSigmaAlone) {
-  std::mt19937 random(6);
-  WindowState window;
-  window.clones.resize(3);
-  window.calibration.depth_offset = window.calibration.time_offset = true;
-  const int n = window.dimension(), column = window.depthOffsetColumn();
-  SquareRootFilter filter;
-  filter.initialise(window, randomMatrix(n + 20, n, random));
-  const Eigen::MatrixXd before = filter.covariance();
-  filter.renew(column, 0.005);
-  Eigen::MatrixXd expected = before;
-  expected.row(column).setZero();
-  expected.col(column).setZero();
-  expected(column, column) = 0.005 * 0.005;
-  EXPECT_LT(relative(filter.covariance(), expected), 1e-10);
-  EXPECT_TRUE(filter.healthy());
-}
-
 // Against the textbook: an update whose gain for the considered state is zero, in Joseph's form.
 TEST(Marginalisation, AnUpdateTakenBackInOneStateIsTheSchmidtKalmanFilter) {
   std::mt19937 random(8);
@@ -145,25 +127,29 @@ TEST(Marginalisation, AnUpdateTakenBackInOneStateIsTheSchmidtKalmanFilter) {
 }
 
 TEST(Marginalisation, AReplacedMarginalLeavesTheOthersGivenItAsTheyAre) {
-  std::mt19937 random(7);
-  WindowState window;
-  window.clones.resize(3);
-  window.calibration.depth_offset = window.calibration.time_offset = window.calibration.gyro_scale = true;
-  const int n = window.dimension(), column = window.timeOffsetColumn();
-  SquareRootFilter filter;
-  filter.initialise(window, randomMatrix(n + 20, n, random));
-  const Eigen::MatrixXd before = filter.covariance();
-  const double sigma = 3.0 * std::sqrt(before(column, column)), change = 1e-3;
-  filter.replaceMarginal(column, change, sigma);
-  // P(others given it) stays: P - p p^T / s, with p its column; then p follows from its own variance.
-  const Eigen::VectorXd gain = before.col(column) / before(column, column);
-  const Eigen::MatrixXd expected = before + (sigma * sigma - before(column, column)) * gain * gain.transpose();
-  EXPECT_LT(relative(filter.covariance(), expected), 1e-10);
-  EXPECT_TRUE(filter.R().isUpperTriangular(1e-12));
-  EXPECT_TRUE(filter.healthy());
-  EXPECT_NEAR(filter.window().time_offset, change, 1e-12);
-  EXPECT_NEAR(filter.window().depth_offset, change * gain(window.depthOffsetColumn()), 1e-12);
-  EXPECT_NEAR(filter.window().v_W.y(), change * gain(window.navColumn() + 1), 1e-12);
+  for (const int k : {1, 2}) {
+    std::mt19937 random(7);
+    WindowState window;
+    window.clones.resize(3);
+    window.calibration.depth_offset = window.calibration.time_offset = window.calibration.gyro_scale = true;
+    const int n = window.dimension(), column = window.timeOffsetColumn();
+    SquareRootFilter filter;
+    filter.initialise(window, randomMatrix(n + 20, n, random));
+    const Eigen::MatrixXd before = filter.covariance(), marginal = before.block(column, column, k, k);
+    const Eigen::VectorXd sigmas = 3.0 * marginal.diagonal().cwiseSqrt(), change = Eigen::VectorXd::Constant(k, 1e-3);
+    filter.replaceMarginal(column, change, sigmas);
+    // P(others given them) stays: P - p M^-1 p^T, with p their columns and M their marginal; then p follows from the
+    // new marginal.
+    const Eigen::MatrixXd gain = before.middleCols(column, k) * marginal.inverse();
+    const Eigen::MatrixXd replaced = Eigen::MatrixXd(sigmas.cwiseAbs2().asDiagonal()) - marginal;
+    EXPECT_LT(relative(filter.covariance(), before + gain * replaced * gain.transpose()), 1e-10);
+    EXPECT_TRUE(filter.R().isUpperTriangular(1e-12));
+    EXPECT_TRUE(filter.healthy());
+    const Eigen::VectorXd moved = gain * change;
+    EXPECT_NEAR(filter.window().time_offset, change(0), 1e-12);
+    EXPECT_NEAR(filter.window().depth_offset, moved(window.depthOffsetColumn()), 1e-12);
+    EXPECT_NEAR(filter.window().v_W.y(), moved(window.navColumn() + 1), 1e-12);
+  }
 }
 
 /// Covariance-form twin: the same state, propagated, cloned, marginalised and updated by the textbook EKF.

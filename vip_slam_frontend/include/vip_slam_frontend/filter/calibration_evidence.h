@@ -47,8 +47,10 @@ class CalibrationEvidence {
   /// sigma is too small where noise is not white.
   Estimate estimate() const;
   /// Adopts the estimate when it is sure to differ from the adopted value, and later again when it has become much
-  /// surer. True when the adopted value has changed.
+  /// surer; back to the prior's value when it goes beyond belief. True when the adopted value has changed.
   bool adopt();
+  /// Whether the estimate is beyond what is believed of the prior, and sure: something else is wrong.
+  bool contradicts() const;
   /// Nothing is known, the prior's value is adopted.
   void reset() { *this = CalibrationEvidence(prior_); }
 

@@ -36,11 +36,10 @@ class SquareRootFilter {
   /// Marginalises clones (indices ascending). Removing the oldest ones only deletes rows; others cost a QR.
   void marginalise(const std::vector<int>& clone_indices);
 
-  /// Replaces all information on one column's state by `sigma`; the information on the others is kept.
-  void renew(int column, double sigma);
-  /// Resets the marginal of the state in this column to the given sigma, at `change` from its present value; the
-  /// conditional of the others given this state is kept: what the marginal had learnt has gone elsewhere.
-  void replaceMarginal(int column, double change, double sigma);
+  /// Resets the marginal of the states from this column on to the given sigmas, independent of each other, at `change`
+  /// from their present values; the conditional of the others given them is kept: what the marginal had learnt has gone
+  /// elsewhere.
+  void replaceMarginal(int column, const Eigen::VectorXd& change, const Eigen::VectorXd& sigmas);
   /// Takes back what an update did to the state in this column: `change` back to its value, and its sigma to the given
   /// one, while all others keep what they learnt (a consider state of the Schmidt-Kalman filter).
   void consider(int column, double change, double sigma);

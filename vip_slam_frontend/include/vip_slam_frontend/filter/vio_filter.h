@@ -101,12 +101,9 @@ class VioFilter {
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }  ///< on the densities
   ImuNoiseScale imuNoise() const;
-  double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s
-  /// Offset to be added to depth readings outside the filter, m: the estimate once it is significant and large enough
-  /// to matter, else 0. Before it converges the estimate varies by a millimetre, which would stay in a map of exact
-  /// depth.
-  double depthCorrection() const { return depth_is_off_ ? filter_.window().depth_offset : 0.0; }
-  double depthScale() const { return depth_scale_.adopted(); }  ///< adopted factor of the readings of depth
+  double stampSigma() const { return stamp_monitor_.sigma(); }        ///< s
+  double depthCorrection() const { return depth_offset_.adopted(); }  ///< adopted offset of the readings of depth, m
+  double depthScale() const { return depth_scale_.adopted(); }        ///< adopted factor of the readings of depth
   /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
   /// matter, else zero.
   Eigen::Matrix3d gyroCorrection() const;
@@ -161,17 +158,11 @@ class VioFilter {
   UpdateResult updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
-  /// Takes what this step said of the depth's scale and delay out of the filter and adds it to their evidence;
+  /// Takes what this step said of the depth's offset, scale and delay out of the filter and adds it to their evidence;
   /// `inertial`: the IMU predicted the motion.
   void learnDepth(bool inertial);
-  /// Takes scale and delay of depth back to what is adopted.
+  /// Takes offset, scale and delay of depth back to what is adopted.
   void holdDepth();
-  /// Decides whether the depth offset is significant. An implausibly large one has some other cause: it is reset to the
-  /// given value and no longer estimated.
-  void judgeDepthOffset();
-  /// From its prior: readings have another scale or curve, a part of which it had been taken for.
-  void startDepthOffsetAnew();
-  bool isSteady(double depth_offset);
   /// Resets the camera-IMU delay and its sigma to delay_before_: while the rate hardly changes, noise alone would drive
   /// its estimate.
   void holdDelay();
@@ -199,8 +190,7 @@ class VioFilter {
   ImuNoise imu_noise_;
   const CalibrationEstimate given_;  ///< by the sensor's configuration
   CalibrationEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
-  double sigma_depth_offset_;        ///< m, of the prior at a start
-  frontend::CalibrationEvidence depth_scale_, depth_delay_;
+  frontend::CalibrationEvidence depth_offset_, depth_scale_, depth_delay_;
   /// Time of the newest clone that the IMU did not predict, or whose first estimate no longer agrees with those of the
   /// others; empty: none is left, what steps say of scale and delay counts.
   std::optional<double> depth_unseen_;
@@ -216,15 +206,8 @@ class VioFilter {
   bool started_ = false;
   Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();  ///< already applied to the readings, in bearings
   bool shift_contradicts_ = false;                         ///< it became implausibly large
-  struct Offset {
-    double t = -1e300, value = 0;  ///< s, m
-  };
-  Offset offset_before_;  ///< at the last check of its steadiness
-  bool offset_is_steady_ = false;
-  bool depth_is_off_ = false;                                                            ///< significantly
   Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
   Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
-  bool depth_contradicts_ = false;                  ///< its offset became implausibly large
   int still_images_ = 0;                            ///< images since standing still began; 0 when moving
   bool after_open_ = false;                         ///< the propagation before left the motion open
   std::optional<frontend::Estimate> delay_before_;  ///< the value held; empty while the delay is estimated
