@@ -206,6 +206,7 @@ SensorConfig sensor() {
   c.depth_encoding = "32FC1";
   c.depth_scale = 0.0002;
   c.depth_offset = -0.012;
+  c.depth_delay = 0.021;
   c.depth_shift << 1.75, -0.5;
   c.depth_curve.added = {0.0f, 0.0031f, -0.002f};
   c.depth_registered = false;
@@ -242,6 +243,7 @@ TEST_F(FileFormats, SensorRoundTrip) {
   EXPECT_EQ(b.depth_encoding, a.depth_encoding);
   EXPECT_EQ(b.depth_scale, a.depth_scale);
   EXPECT_EQ(b.depth_offset, a.depth_offset);
+  EXPECT_EQ(b.depth_delay, a.depth_delay);
   EXPECT_EQ(b.depth_shift, a.depth_shift);
   EXPECT_EQ(b.depth_curve, a.depth_curve);
   EXPECT_FALSE(b.depth_registered);

