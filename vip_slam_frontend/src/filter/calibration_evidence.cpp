@@ -12,7 +12,7 @@ namespace {
 // outliers in (a phone, real: odometry 1.94 instead of 1.62 cm). What a step says of the number is the same.
 constexpr double kHeld = 0.25;
 constexpr double kStretch = 2.0;    // s, longer than a track lives: stretches share no measurements
-constexpr double kOfScatter = 4;    // stretches that kUsualScatter is worth
+constexpr double kOfScatter = 1;    // stretches that kUsualScatter is worth
 constexpr std::size_t kEnough = 2;  // stretches, one may be the start's error
 constexpr double kSure = 4.0;       // sigmas between the adopted value and the estimate
 // Beyond so many sigmas of the prior something else is wrong, a unit or another sensor, and nothing is adopted.
