@@ -16,7 +16,8 @@ constexpr double kGate = 8.0;
 // A fault is sudden: for kCalm s before it differences stayed below this share of the gate.
 constexpr double kCalm = 0.5, kDeviates = 0.7;
 constexpr double kMemory = 1.0;     // s, of the share of contradicted time
-constexpr double kForgotten = 4.0;  // s without a fault
+constexpr double kForgotten = 1.0;  // s without a fault after it is believed again
+constexpr double kLongest = 5.0;    // s of isolation: bumps that come back are no IMU that is wrong for good
 // The share from which on it is at fault: while a body may fill the view, that came in within kMemory, and else.
 constexpr double kMostly = 0.5, kSustained = 0.2;
 
@@ -51,7 +52,7 @@ bool FaultDetection::add(const MotionEvidence& e) {
   // An IMU whose faults come back is believed again later each time.
   if (fault) {
     const double since = e.t - last_fault_t_;
-    if (since > isolation()) isolated_ = since < kForgotten + isolated_ ? 2 * isolation() : 0.0;
+    if (since > isolation()) isolated_ = since < kForgotten + isolation() ? std::min(2 * isolation(), kLongest) : 0.0;
     last_fault_t_ = e.t;
   }
   return fault || (e.images_agree && e.t - last_fault_t_ < isolated_);

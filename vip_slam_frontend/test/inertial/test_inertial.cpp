@@ -160,6 +160,12 @@ TEST(FaultDetection, AnImuWhoseFaultsComeBackIsIsolatedForLonger) {
   EXPECT_EQ(in(20, 40), 0);
 }
 
+// A robot that bumps into something every three seconds has a sound IMU in between.
+TEST(FaultDetection, BumpsThatComeBackDoNotIsolateTheImuForGood) {
+  const auto bumps = [](double t) { return t > 5 && std::fmod(t, 3.0) < 0.2 ? 30.0 : 2.0; };
+  EXPECT_LT(faults(300, bumps, kAlways).size(), 0.75 * 300 * 30);
+}
+
 // What fills the view moves: while it comes into view images do not agree among themselves, then they contradict.
 TEST(FaultDetection, ABodyThatFillsTheViewForAMomentIsNoFaultOfTheImu) {
   const auto body = [](double t) { return t > 5 && t < 5.6 ? 30.0 : 2.0; };

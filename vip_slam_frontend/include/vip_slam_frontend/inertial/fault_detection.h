@@ -8,7 +8,8 @@
 // - when a fifth of the last second does (axes, signs or units); most of it, where images disagreed among themselves in
 //   that second, or
 // - when the filter has had to widen the IMU's noise beyond what any IMU has: then no difference is large in sigmas.
-// After a fault it stays isolated for a moment, and for twice as long after each that comes back within seconds.
+// After a fault it stays isolated for a moment, and for twice as long after each that comes back within a second,
+// up to some seconds.
 // A body that fills the view contradicts the IMU gradually, while parts of the view still agree with it: neither rule
 // takes it for a fault of the IMU.
 #pragma once
