@@ -3,79 +3,186 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 namespace vip_slam::frontend {
 namespace {
 
-// The filter holds the number with this share of its prior's sigma: with all of it, the innovation gates let more
+// The filter holds a number with this share of its prior's sigma: with all of it, the innovation gates let more
 // outliers in (a phone, real: odometry 1.94 instead of 1.62 cm). What a step says of the number is the same.
 constexpr double kHeld = 0.25;
-constexpr double kStretch = 2.0;    // s, longer than a track lives: stretches share no measurements
-constexpr double kOfScatter = 1;    // stretches that kUsualScatter is worth
-constexpr std::size_t kEnough = 2;  // stretches, one may be the start's error
-constexpr double kSure = 4.0;       // sigmas between the adopted value and the estimate
+constexpr double kStretch = 1.0;           // s, longer than the filter's window: stretches share no measurements
+constexpr std::size_t kMaxStretches = 64;  // then they become twice as long
+constexpr double kSure = 3.0;              // sigmas between the adopted value and the estimate
 // Beyond so many sigmas of the prior something else is wrong, a unit or another sensor, and nothing is adopted.
 constexpr double kBelievable = 4.0;
 constexpr double kMuchSurer = 2.0;  // in information
+constexpr double kNothing = 1e-6;   // share of the prior's information, below which data say nothing
 
 }  // namespace
 
-Likelihood learntBetween(const Estimate& before, const Estimate& after) {
-  const double old = 1 / (before.sigma * before.sigma), now = 1 / (after.sigma * after.sigma);
-  return {now - old, now * after.value - old * before.value};
+Likelihood Likelihood::of(const Eigen::VectorXd& value, const Eigen::MatrixXd& covariance) {
+  const Eigen::MatrixXd information =
+      covariance.llt().solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
+  return {information, information * value};
 }
 
-Estimate CalibrationEvidence::held() const {
-  const Estimate found = estimate();
-  return {adopted_, std::min(kHeld * prior_.sigma, std::hypot(found.sigma, found.value - adopted_))};
+void Likelihood::add(const Likelihood& other) {
+  information += other.information;
+  weighted += other.weighted;
+}
+
+void Likelihood::marginalise(int k, const Estimate& prior) {
+  const double of_prior = 1 / (prior.sigma * prior.sigma), own = information(k, k) + of_prior;
+  const Eigen::VectorXd shared = information.col(k);
+  weighted -= shared * ((weighted(k) + of_prior * prior.value) / own);
+  information -= shared * shared.transpose() / own;
+  information.row(k).setZero();
+  information.col(k).setZero();
+  weighted(k) = 0;
+}
+
+CalibrationEvidence::CalibrationEvidence(const std::vector<Estimate>& prior)
+    : prior_(prior),
+      prior_likelihood_(Likelihood::none(static_cast<int>(prior.size()))),
+      adopted_(prior.size()),
+      adopted_information_(Eigen::VectorXd::Zero(prior.size())),
+      length_(kStretch) {
+  for (std::size_t k = 0; k < prior.size(); ++k) {
+    adopted_(k) = prior[k].value;
+    prior_likelihood_.information(k, k) = 1 / (prior[k].sigma * prior[k].sigma);
+    prior_likelihood_.weighted(k) = prior[k].value * prior_likelihood_.information(k, k);
+  }
+  estimate();
+}
+
+void CalibrationEvidence::couple(int j, int k, double sigma) {
+  Eigen::VectorXd row = Eigen::VectorXd::Zero(adopted_.size());
+  row(j) = 1 / sigma;
+  row(k) = -1 / sigma;
+  prior_likelihood_.information += row * row.transpose();
+  prior_likelihood_.weighted += row * ((prior_[j].value - prior_[k].value) / sigma);
+  estimate();
+}
+
+double CalibrationEvidence::sigmaOfAdopted(int k) const { return std::hypot(sigma_(k), found_(k) - adopted_(k)); }
+
+Estimate CalibrationEvidence::held(int k) const {
+  return {adopted_(k), std::min(kHeld * prior_[k].sigma, sigmaOfAdopted(k))};
 }
 
 void CalibrationEvidence::add(double t, const Likelihood& step) {
   // A filter that has failed says nothing; it is started again.
-  if (!std::isfinite(step.information) || !std::isfinite(step.weighted)) return;
-  if (stretches_.empty() || !(std::abs(t - begin_) < kStretch)) {
-    stretches_.emplace_back();
+  if (!step.information.allFinite() || !step.weighted.allFinite()) return;
+  if (stretches_.empty() || !(std::abs(t - begin_) < length_)) {
+    if (stretches_.size() == kMaxStretches) {
+      for (std::size_t k = 0; k < kMaxStretches / 2; ++k) {
+        stretches_[k] = stretches_[2 * k];
+        stretches_[k].add(stretches_[2 * k + 1]);
+      }
+      stretches_.resize(kMaxStretches / 2);
+      length_ *= 2;
+    }
+    stretches_.push_back(Likelihood::none(static_cast<int>(prior_.size())));
     begin_ = t;
   }
   stretches_.back().add(step);
+  estimate();
 }
 
-Estimate CalibrationEvidence::estimate() const {
-  const double prior = 1 / (prior_.sigma * prior_.sigma);
-  Likelihood sum;
-  for (const Likelihood& stretch : stretches_) sum.add(stretch);
-  if (!(sum.information > 0)) return prior_;
-  const double mean = sum.weighted / sum.information;
-  double squares = kUsualScatter * kOfScatter;
-  for (const Likelihood& stretch : stretches_) {
-    if (stretch.information > 0)
-      squares += stretch.information * std::pow(stretch.weighted / stretch.information - mean, 2);
+void CalibrationEvidence::estimate() {
+  // In units of the priors' sigmas.
+  const int n = static_cast<int>(prior_.size());
+  Eigen::VectorXd unit(n), centre(n);
+  for (int k = 0; k < n; ++k) {
+    unit(k) = prior_[k].sigma;
+    centre(k) = prior_[k].value;
   }
-  const double degrees = kOfScatter + static_cast<double>(stretches_.size() - 1);
-  const double information = sum.information / std::max(1.0, squares / degrees);
-  return {(information * mean + prior * prior_.value) / (information + prior), 1 / std::sqrt(information + prior)};
+  const auto scaled = [&unit](const Eigen::MatrixXd& information) {
+    return Eigen::MatrixXd(unit.asDiagonal() * information * unit.asDiagonal());
+  };
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
+  for (const Likelihood& s : stretches_) {
+    information += scaled(s.information);
+    weighted += unit.cwiseProduct(s.weighted - s.information * centre);
+  }
+  // The root of the sum, information = root root^T, and its inverse where data say something.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(information);
+  const Eigen::MatrixXd root = axes.eigenvectors() * axes.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd whiten =
+      axes.eigenvectors() * axes.eigenvalues().cwiseMax(kNothing).cwiseSqrt().cwiseInverse().asDiagonal();  // root^-T
+  const Eigen::VectorXd alone = whiten * (whiten.transpose() * weighted);
+  // Scatter of the stretches' scores in units of what it should be, and the usual scatter of one stretch. Each score is
+  // taken at the estimate by all others.
+  const Eigen::MatrixXd prior = scaled(prior_likelihood_.information);
+  const Eigen::MatrixXd all = Eigen::MatrixXd::Identity(n, n) + whiten.transpose() * prior * whiten;
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(n, n);
+  for (const Likelihood& s : stretches_) {
+    const Eigen::VectorXd score =
+        whiten.transpose() * unit.cwiseProduct(s.weighted - s.information * (centre + unit.cwiseProduct(alone)));
+    const Eigen::MatrixXd share = whiten.transpose() * scaled(s.information) * whiten;
+    const Eigen::VectorXd apart = all * (all - share).llt().solve(score);
+    scatter += apart * apart.transpose() + kUsualScatter * share * share;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> wider(scatter);
+  const Eigen::MatrixXd directions = root * wider.eigenvectors();
+  const Eigen::MatrixXd robust =
+      directions * wider.eigenvalues().cwiseMax(1.0).cwiseInverse().asDiagonal() * directions.transpose();
+  const Eigen::VectorXd prior_weighted =
+      unit.cwiseProduct(prior_likelihood_.weighted - prior_likelihood_.information * centre);
+  const Eigen::LLT<Eigen::MatrixXd> sum(robust + prior);
+  found_ = centre + unit.cwiseProduct(sum.solve(robust * alone + prior_weighted));
+  const Eigen::MatrixXd covariance = sum.solve(Eigen::MatrixXd::Identity(n, n));
+  sigma_ = unit.cwiseProduct(covariance.diagonal().cwiseSqrt());
+  Eigen::ArrayXd variance = Eigen::ArrayXd::Zero(n), squares = Eigen::ArrayXd::Zero(n);
+  for (const Likelihood& s : stretches_) {
+    const Eigen::ArrayXd of_stretch = (covariance * scaled(s.information) * covariance).diagonal();
+    variance += of_stretch;
+    squares += of_stretch.square();
+  }
+  degrees_ = (squares > 0).select(variance.square() / squares, 1.0);
 }
 
-bool CalibrationEvidence::contradicts() const {
-  if (stretches_.size() < kEnough) return false;
-  const Estimate found = estimate();
-  return std::abs(found.value - prior_.value) > std::max(kBelievable * prior_.sigma, kSure * found.sigma);
+double CalibrationEvidence::sureSigmas(int k) const {
+  // About as improbable by Student's distribution as kSure by the normal one.
+  return std::sqrt(degrees_(k) * std::expm1(kSure * kSure / degrees_(k)));
+}
+
+bool CalibrationEvidence::contradicts(int k) const {
+  return std::abs(found_(k) - prior_[k].value) > std::max(kBelievable * prior_[k].sigma, sureSigmas(k) * sigma_(k));
 }
 
 bool CalibrationEvidence::adopt() {
-  if (stretches_.size() < kEnough) return false;
-  const Estimate found = estimate();
-  if (!(std::abs(found.value - prior_.value) < kBelievable * prior_.sigma)) {
-    adopted_information_ = 0;
-    return std::exchange(adopted_, prior_.value) != prior_.value;
+  const Eigen::VectorXd before = adopted_;
+  for (int k = 0; k < adopted_.size(); ++k) {
+    if (!(std::abs(found_(k) - prior_[k].value) < kBelievable * prior_[k].sigma)) {
+      adopted_information_(k) = 0;
+      adopted_(k) = prior_[k].value;
+      continue;
+    }
+    const double information = 1 / (sigma_(k) * sigma_(k)), apart = std::abs(found_(k) - adopted_(k));
+    const bool surer = adopted_information_(k) > 0 && information > kMuchSurer * adopted_information_(k);
+    // The filter's sigma of a number that is held allows for a small difference.
+    if (adopted_information_(k) == 0 && apart < kHeld * prior_[k].sigma) continue;
+    if (!(apart > sureSigmas(k) * sigma_(k)) && !(surer && apart > sigma_(k))) continue;
+    adopted_(k) = found_(k);
+    adopted_information_(k) = information;
   }
-  const double information = 1 / (found.sigma * found.sigma), apart = std::abs(found.value - adopted_);
-  const bool surer = adopted_information_ > 0 && information > kMuchSurer * adopted_information_;
-  if (!(apart > kSure * found.sigma) && !(surer && apart > found.sigma)) return false;
-  adopted_ = found.value;
-  adopted_information_ = information;
-  return true;
+  return adopted_ != before;
+}
+
+void CalibrationEvidence::restart(int k, double sigma) {
+  for (Likelihood& stretch : stretches_) stretch.marginalise(k, prior_[k]);
+  const double more = 1 / (sigma * sigma) - 1 / (prior_[k].sigma * prior_[k].sigma);
+  prior_likelihood_.information(k, k) += more;
+  prior_likelihood_.weighted(k) += more * prior_[k].value;
+  prior_[k].sigma = sigma;
+  adopted_(k) = prior_[k].value;
+  adopted_information_(k) = 0;
+  estimate();
 }
 
 }  // namespace vip_slam::frontend

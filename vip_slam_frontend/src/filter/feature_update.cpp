@@ -181,7 +181,7 @@ UpdateResult VioFilter::updateRelinearised(const std::vector<Candidate>& candida
     at = filter_.window();
   }
   // Rows of before have other first estimates: together they say more of the scale than there is.
-  depth_unseen_ = nav().t;
+  motion_unmeasured_ = nav().t;
   return result;
 }
 

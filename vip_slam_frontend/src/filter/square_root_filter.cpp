@@ -182,6 +182,13 @@ void SquareRootFilter::relinearise() {
   window_.v_W_fej = window_.v_W;
 }
 
+Eigen::MatrixXd SquareRootFilter::covariance(int column, int size) const {
+  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(size, window_.dimension());
+  Y.middleCols(column, size).setIdentity();
+  solveRight(R_, Y);
+  return Y * Y.transpose();
+}
+
 Eigen::VectorXd SquareRootFilter::calibrationSigmas() const {
   const int size = window_.calibration.size();
   Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(size, window_.dimension());

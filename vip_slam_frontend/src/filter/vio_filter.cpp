@@ -34,9 +34,13 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       imu_noise_(imu_noise),
       given_{T_I_C, time_offset},
       learnt_(given_),
-      depth_offset_({0.0, options.calibration.sigma_depth_offset}),
-      depth_scale_({1.0, options.calibration.sigma_depth_scale}),
-      depth_delay_({0.0, options.calibration.sigma_depth_delay}),
+      evidence_({{0.0, options.calibration.sigma_depth_offset},
+                 {1.0, options.calibration.sigma_depth_scale},
+                 {0.0, options.calibration.sigma_depth_delay},
+                 {0.0, options.calibration.sigma_focal},
+                 {0.0, options.calibration.sigma_focal},
+                 {0.0, options.calibration.sigma_centre},
+                 {0.0, options.calibration.sigma_centre}}),
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(kGateProbability),
@@ -44,7 +48,9 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       depth_noise_(1.0, kMinDepthNoise, kMaxDepthNoise),
       stamp_monitor_(options.adapt_imu_noise),
       imu_monitor_(options.adapt_imu_noise),
-      drift_(imu_noise, options) {}
+      drift_(imu_noise, options) {
+  evidence_.couple(kBearing, kBearing + 1, options.calibration.sigma_aspect);  // pixels are nearly square
+}
 
 void VioFilter::stop() {
   if (started_) learnCalibration();
@@ -75,9 +81,9 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.bias_accel = prior.state.bias_accel;
   window.T_I_C = learnt_.T_I_C;
   window.time_offset = learnt_.time_offset;
-  window.depth_offset = depth_offset_.adopted();
-  window.depth_scale = depth_scale_.adopted();
-  window.bearing = learnt_.bearing;
+  window.depth_offset = depthCorrection();
+  window.depth_scale = depthScale();
+  window.bearing = bearingCorrection();
   window.depth_shift = learnt_.depth_shift;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
@@ -99,26 +105,19 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
     } else if (calibration.translation && c < window.translationColumn() + 3) {
       sigma = calibration.sigma_translation;
     } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
-      sigma = depth_offset_.held().sigma;
+      sigma = evidence_.held(kDepthOffset).sigma;
     } else if (window.calibration.depth_scale && c == window.depthScaleColumn()) {
-      sigma = depth_scale_.held().sigma;
+      sigma = evidence_.held(kDepthScale).sigma;
     } else if (window.calibration.depth_delay && c == window.depthDelayColumn()) {
-      sigma = depth_delay_.held().sigma;
+      sigma = evidence_.held(kDepthDelay).sigma;
     } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.depthShiftColumn()) {
-      sigma = calibration.sigma_centre;
+      sigma = evidence_.held(kBearing + c - window.intrinsicsColumn()).sigma;
     } else if (c >= window.depthShiftColumn() && c < window.gyroColumn()) {
       sigma = calibration.sigma_depth_shift;
     } else if (c >= window.gyroColumn()) {
       sigma = imu_noise_.gyro_correction_sigma;
     }
     rows(c, c) = 1.0 / sigma;
-  }
-  if (window.calibration.intrinsics) {
-    // Prior on the mean of the two focal lengths, and a tight one on their ratio: pixels are square to a few parts in
-    // ten thousand.
-    const int c = window.intrinsicsColumn();
-    rows.block<1, 2>(c, c).setConstant(0.5 / calibration.sigma_focal);
-    rows.block<1, 2>(c + 1, c) << 1.0 / calibration.sigma_aspect, -1.0 / calibration.sigma_aspect;
   }
   rows.block<3, 3>(nav, nav).diagonal().setConstant(1.0 / prior.sigma_velocity);
   rows.block<3, 3>(nav + 3, nav + 3).diagonal().setConstant(1.0 / prior.sigma_bias_gyro);
@@ -269,9 +268,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     drift_.add(frontend::DriftMonitor::kDelay, one(found.value - delay_predicted.value),
                one(std::pow(delay_predicted.sigma, 2)), one(std::pow(found.sigma, 2)));
   }
-  learnDepth(propagation.inertial);
+  learnHeldNumbers(propagation.inertial);
   judgeDepthShift();
-  judgeIntrinsics();
   judgeGyroCorrection();
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
   if (!still) {

@@ -22,37 +22,29 @@ constexpr double kSureShift = 4.0, kMinShift = 1e-4, kKnownShift = 2e-4;
 constexpr double kHeldShift = 1e-7;
 // An entry of the gyro's correction is significant above these: 5e-4 of a rotation by 60 degrees is 0.03 degrees.
 constexpr double kSureGyroError = 4.0, kMinGyroError = 5e-4;
-// An entry of the bearings' correction (focal lengths, principal point) likewise. Exact focal lengths are estimated
-// within 0.03 %, and within 0.1 % when depth has a periodic error.
-constexpr double kSureBearing = 4.0;
-const Eigen::Array4d kMinBearing(1e-3, 1e-3, 5e-4, 5e-4);
 
 }  // namespace
 
 CalibrationEstimate VioFilter::calibration() const {
-  if (!started_) {
-    CalibrationEstimate calibration = learnt_;
-    calibration.depth_shift += depth_shift_;
-    calibration.depth_offset = depth_offset_.adopted();
-    calibration.depth_scale = depth_scale_.adopted();
-    calibration.depth_delay = depth_delay_.adopted();
-    calibration.depth_contradicts = depth_offset_.contradicts() || shift_contradicts_;
-    return calibration;
-  }
+  CalibrationEstimate calibration = learnt_;
+  calibration.depth_offset = depthCorrection();
+  calibration.depth_scale = depthScale();
+  calibration.depth_delay = depthDelay();
+  calibration.bearing = bearingCorrection();
+  calibration.depth_contradicts = evidence_.contradicts(kDepthOffset) || shift_contradicts_;
+  calibration.depth_shift += depth_shift_;
+  if (!started_) return calibration;
   const WindowState& window = filter_.window();
-  CalibrationEstimate calibration;
+  calibration.depth_shift = depth_shift_ + window.depth_shift;
   calibration.T_I_C = window.T_I_C;
   calibration.time_offset = window.time_offset;
-  calibration.depth_offset = depth_offset_.adopted();
-  calibration.sigma_depth_offset = window.calibration.depth_offset ? depth_offset_.estimate().sigma : 0.0;
-  calibration.depth_scale = depth_scale_.adopted();
-  calibration.sigma_depth_scale = window.calibration.depth_scale ? depth_scale_.estimate().sigma : 0.0;
-  calibration.depth_delay = depth_delay_.adopted();
-  calibration.sigma_depth_delay = window.calibration.depth_delay ? depth_delay_.estimate().sigma : 0.0;
-  calibration.bearing = window.bearing;
-  calibration.depth_shift = depth_shift_ + window.depth_shift;
+  calibration.sigma_depth_offset = window.calibration.depth_offset ? evidence_.sigmaOfAdopted(kDepthOffset) : 0.0;
+  calibration.sigma_depth_scale = window.calibration.depth_scale ? evidence_.sigmaOfAdopted(kDepthScale) : 0.0;
+  calibration.sigma_depth_delay = window.calibration.depth_delay ? evidence_.sigmaOfAdopted(kDepthDelay) : 0.0;
+  for (int k = 0; window.calibration.intrinsics && k < 4; ++k) {
+    calibration.sigma_bearing(k) = evidence_.sigmaOfAdopted(kBearing + k);
+  }
   calibration.gyro_correction = window.gyro_correction;
-  calibration.depth_contradicts = depth_offset_.contradicts() || shift_contradicts_;
   if (window.calibration.size() == 0) return calibration;
   const Eigen::VectorXd sigmas = filter_.calibrationSigmas();
   const int first = window.calibrationColumn();
@@ -62,7 +54,6 @@ CalibrationEstimate VioFilter::calibration() const {
   }
   if (window.calibration.time_offset) calibration.sigma_time_offset = sigmas(window.timeOffsetColumn() - first);
   calibration.delay_drifts = drift_.of(frontend::DriftMonitor::kDelay).drifts();
-  if (window.calibration.intrinsics) calibration.sigma_bearing = sigmas.segment<4>(window.intrinsicsColumn() - first);
   if (window.calibration.depth_shift) {
     calibration.sigma_depth_shift = sigmas.segment<2>(window.depthShiftColumn() - first);
   }
@@ -84,60 +75,75 @@ void VioFilter::learnCalibration() {
   if (change.head<3>().norm() > kBelievableChange * options.sigma_rotation ||
       change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
       std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset ||
-      (window.bearing.value.head<2>().array().abs() > kBelievableChange * options.sigma_focal).any() ||
-      (window.bearing.value.tail<2>().array().abs() > kBelievableChange * options.sigma_centre).any() ||
       ((depth_shift + window.depth_shift).array().abs() > kBelievableChange * options.sigma_depth_shift).any() ||
       window.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroError) {
     return;
   }
   learnt_.T_I_C = window.T_I_C;
   learnt_.time_offset = window.time_offset;
-  learnt_.bearing = window.bearing;
   learnt_.depth_shift = window.depth_shift;
   depth_shift_ = depth_shift;
   learnt_.gyro_correction = window.gyro_correction;
 }
 
-void VioFilter::learnDepth(bool inertial) {
-  using frontend::learntBetween;
-  const WindowState& window = filter_.window();
-  // Only the IMU knows scale and delay: a motion that is itself measured by depth agrees with any.
-  if (!inertial) depth_unseen_ = window.clones.back().t;
-  const bool counts = !depth_unseen_ || window.clones.front().t > *depth_unseen_;
-  if (counts) depth_unseen_.reset();
-  if (window.calibration.depth_offset) {
-    const double sigma = filter_.sigma(window.depthOffsetColumn());
-    depth_offset_.add(nav().t, learntBetween(depth_offset_.held(), {window.depth_offset, sigma}));
-  }
-  if (counts && window.calibration.depth_scale) {
-    const double sigma = filter_.sigma(window.depthScaleColumn());
-    depth_scale_.add(nav().t, learntBetween(depth_scale_.held(), {window.depth_scale, sigma}));
-  }
-  const frontend::Estimate delay = depth_delay_.held();
-  if (counts && window.calibration.depth_delay) {
-    const double sigma = filter_.sigma(window.depthDelayColumn());
-    depth_delay_.add(nav().t, learntBetween(delay, {delay.value + window.depth_delay, sigma}));
-  }
-  const bool scaled = depth_scale_.adopt(), delayed = depth_delay_.adopt();
-  if (delayed) moveDepth(Eigen::Vector2d::Zero(), depth_delay_.adopted() - delay.value);
-  // Of another scale or moment a part had been taken for the offset.
-  if (scaled || delayed) depth_offset_.reset();
-  depth_offset_.adopt();
-  holdDepth();
+std::vector<VioFilter::HeldNumber> VioFilter::heldNumbers() {
+  WindowState& window = filter_.window();
+  const CalibrationFlags& flags = window.calibration;
+  std::vector<HeldNumber> all;
+  if (flags.depth_offset) all.push_back({kDepthOffset, &window.depth_offset, false});
+  if (flags.depth_scale) all.push_back({kDepthScale, &window.depth_scale, false});
+  if (flags.depth_delay) all.push_back({kDepthDelay, &window.depth_delay, true});
+  for (int k = 0; flags.intrinsics && k < 4; ++k) all.push_back({kBearing + k, &window.bearing.value(k), false});
+  return all;
 }
 
-void VioFilter::holdDepth() {
-  const WindowState& window = filter_.window();
-  Eigen::VectorXd change(3), sigmas(3);
-  int states = 0;
-  const auto hold = [&](double by, const frontend::Estimate& held) {
-    change(states) = by;
-    sigmas(states++) = held.sigma;
-  };
-  if (window.calibration.depth_offset) hold(depth_offset_.adopted() - window.depth_offset, depth_offset_.held());
-  if (window.calibration.depth_scale) hold(depth_scale_.adopted() - window.depth_scale, depth_scale_.held());
-  if (window.calibration.depth_delay) hold(-window.depth_delay, depth_delay_.held());
-  if (states > 0) filter_.replaceMarginal(window.depthOffsetColumn(), change.head(states), sigmas.head(states));
+void VioFilter::learnHeldNumbers(bool inertial) {
+  using frontend::Likelihood;
+  const std::vector<HeldNumber> numbers = heldNumbers();
+  if (numbers.empty()) return;
+  const int n = static_cast<int>(numbers.size());
+  Eigen::VectorXd value(n), before(n);
+  Eigen::MatrixXd sigmas = Eigen::MatrixXd::Zero(n, n);
+  for (int k = 0; k < n; ++k) {
+    const frontend::Estimate held = evidence_.held(numbers[k].index);
+    before(k) = held.value;
+    value(k) = *numbers[k].state + (numbers[k].applied ? held.value : 0.0);
+    sigmas(k, k) = held.sigma;
+  }
+  const Likelihood of_before = Likelihood::of(before, sigmas * sigmas);
+  const Likelihood after = Likelihood::of(value, filter_.covariance(filter_.window().depthOffsetColumn(), n));
+  Likelihood step = Likelihood::none(kHeldNumbers);  // numbers that are not estimated have zeros
+  for (int j = 0; j < n; ++j) {
+    step.weighted(numbers[j].index) = after.weighted(j) - of_before.weighted(j);
+    for (int k = 0; k < n; ++k) {
+      step.information(numbers[j].index, numbers[k].index) = after.information(j, k) - of_before.information(j, k);
+    }
+  }
+  // Only the IMU knows more than the offset: a motion that is itself measured by images and depth agrees with any.
+  if (!inertial) motion_unmeasured_ = filter_.window().clones.back().t;
+  if (motion_unmeasured_ && filter_.window().clones.front().t <= *motion_unmeasured_) {
+    for (const HeldNumber& number : numbers) {
+      if (number.index != kDepthOffset) step.marginalise(number.index, evidence_.held(number.index));
+    }
+  } else {
+    motion_unmeasured_.reset();
+  }
+  evidence_.add(nav().t, step);
+  const double delay = depthDelay();
+  if (evidence_.adopt()) moveDepth(Eigen::Vector2d::Zero(), depthDelay() - delay);
+  hold();
+}
+
+void VioFilter::hold() {
+  const std::vector<HeldNumber> numbers = heldNumbers();
+  if (numbers.empty()) return;
+  Eigen::VectorXd change(numbers.size()), sigmas(numbers.size());
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const frontend::Estimate held = evidence_.held(numbers[k].index);
+    change(k) = (numbers[k].applied ? 0.0 : held.value) - *numbers[k].state;
+    sigmas(k) = held.sigma;
+  }
+  filter_.replaceMarginal(filter_.window().depthOffsetColumn(), change, sigmas);
 }
 
 void VioFilter::moveDepth(const Eigen::Vector2d& shift, double delay) {
@@ -179,12 +185,12 @@ const Eigen::Vector2d& VioFilter::takeDepthShift() {
 }
 
 void VioFilter::restartDepthOffset(bool none) {
-  depth_offset_ = frontend::CalibrationEvidence({0.0, none ? kHeldOffset : options_.calibration.sigma_depth_offset});
-  depth_scale_.reset();
+  evidence_.restart(kDepthOffset, none ? kHeldOffset : options_.calibration.sigma_depth_offset);
+  evidence_.restart(kDepthScale, options_.calibration.sigma_depth_scale);
   for (auto& [id, track] : tracks_) {
     for (Observation& observation : track.observations) observation.depth = 0;
   }
-  if (started_) holdDepth();
+  if (started_) hold();
 }
 
 void VioFilter::holdDelay() {
@@ -192,18 +198,10 @@ void VioFilter::holdDelay() {
   filter_.consider(window.timeOffsetColumn(), delay_before_->value - window.time_offset, delay_before_->sigma);
 }
 
-void VioFilter::judgeIntrinsics() {
-  if (!filter_.window().calibration.intrinsics) return;
-  const Eigen::Array4d change = filter_.window().bearing.value.array().abs();
-  bearing_is_off_ = bearing_is_off_ && change > kMinBearing / 2;
-  if ((change > kMinBearing && !bearing_is_off_).any()) {
-    bearing_is_off_ =
-        bearing_is_off_ || (change > kMinBearing && change > kSureBearing * calibration().sigma_bearing.array());
-  }
-}
-
 BearingCorrection VioFilter::bearingCorrection() const {
-  return {bearing_is_off_.select(filter_.window().bearing.value, Eigen::Vector4d::Zero())};
+  BearingCorrection correction;
+  for (int k = 0; k < 4; ++k) correction.value(k) = evidence_.adopted(kBearing + k);
+  return correction;
 }
 
 void VioFilter::judgeGyroCorrection() {

@@ -321,7 +321,9 @@ TEST(Calibration, ExactIntrinsicsAreHandedOnAsTheyAre) {
     SimulationOptions simulation;
     simulation.seed = seed;
     const RunResult run = runFilter(simulation, singlePixels(), 10.0, false);
-    EXPECT_NE(run.calibration.bearing.value, Eigen::Vector4d::Zero());
+    EXPECT_EQ(run.calibration.bearing.value, Eigen::Vector4d::Zero());
+    EXPECT_GT(run.calibration.sigma_bearing.minCoeff(), 0.0);
+    EXPECT_LT(run.calibration.sigma_bearing.maxCoeff(), 0.002) << "known, but not to differ";
     EXPECT_EQ(run.most_bearing_correction, 0.0);
   }
 }

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the data say of one calibration number, gathered beside the filter, which keeps the number at an adopted value
-// until they are sure of another. A filter that follows such a number from its wide prior on carries each error of its
-// first seconds in its trajectory; one that leaves it out calls itself too sure. Here the filter has it as a state with
-// its prior's sigma, which every step takes back to the adopted value: what the step said of it is the difference of
-// the marginals' information, and goes here.
+// What the data say of a block of calibration numbers, gathered beside the filter, which keeps each at an adopted value
+// until they are sure of another. A filter that follows such numbers from their wide priors carries each error of its
+// first seconds in its trajectory; one that leaves them out calls itself too sure. Here the filter has them as states
+// with sigmas which every step takes back to the adopted values: what the step said of them is the difference of the
+// block's marginal information, and goes here, with what it says of each given the others. Sources: the information
+// form of recursive least squares; for errors that readings share the sandwich covariance over clusters (Liang and
+// Zeger 1986, "Longitudinal data analysis using generalized linear models").
 #pragma once
 
 #include <vector>
+
+#include <Eigen/Core>
 
 namespace vip_slam::frontend {
 
@@ -15,18 +19,17 @@ struct Estimate {
   double value = 0, sigma = 0;
 };
 
-/// The sum of two Gaussians' exponents: information, and information times value.
+/// A Gaussian's exponent: information (n x n), and information times value.
 struct Likelihood {
-  double information = 0, weighted = 0;
+  Eigen::MatrixXd information;
+  Eigen::VectorXd weighted;
 
-  void add(const Likelihood& other) {
-    information += other.information;
-    weighted += other.weighted;
-  }
+  static Likelihood none(int n) { return {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)}; }
+  static Likelihood of(const Eigen::VectorXd& value, const Eigen::MatrixXd& covariance);
+  void add(const Likelihood& other);
+  /// Without number k, which had this prior: what is said of the others. Its row and column become zero.
+  void marginalise(int k, const Estimate& prior);
 };
-
-/// What an update made of a state that had the marginal `before`.
-Likelihood learntBetween(const Estimate& before, const Estimate& after);
 
 class CalibrationEvidence {
  public:
@@ -35,30 +38,41 @@ class CalibrationEvidence {
   static constexpr double kUsualScatter = 4;
 
   /// `prior`: of the sensor's configuration.
-  explicit CalibrationEvidence(const Estimate& prior) : prior_(prior), adopted_(prior.value) {}
+  explicit CalibrationEvidence(const std::vector<Estimate>& prior);
+  /// Numbers j and k have, apart from their own priors, the same value within `sigma`.
+  void couple(int j, int k, double sigma);
 
-  double adopted() const { return adopted_; }
-  /// What the filter is to have of the number at the beginning of each step: the adopted value, with a share of the
+  double adopted(int k) const { return adopted_(k); }
+  double sigmaOfAdopted(int k) const;
+  /// What the filter is to have of a number at the beginning of each step: the adopted value, with a share of the
   /// prior's sigma until data know it better.
-  Estimate held() const;
+  Estimate held(int k) const;
   /// What one step said, at t seconds.
   void add(double t, const Likelihood& step);
-  /// With the prior. The sigma grows with the scatter of stretches of some seconds, by whose errors the filter's own
-  /// sigma is too small where noise is not white.
-  Estimate estimate() const;
-  /// Adopts the estimate when it is sure to differ from the adopted value, and later again when it has become much
-  /// surer; back to the prior's value when it goes beyond belief. True when the adopted value has changed.
+  /// With the priors, and with all other numbers unknown within theirs. The sigma grows with the scatter of stretches
+  /// of some seconds, by whose errors the filter's own sigma is too small where noise is not white.
+  Estimate estimate(int k) const { return {found_(k), sigma_(k)}; }
+  /// Adopts each estimate that is sure to differ from the adopted value, and later again when it has become much surer;
+  /// back to the prior's value where it goes beyond belief. True when an adopted value has changed.
   bool adopt();
   /// Whether the estimate is beyond what is believed of the prior, and sure: something else is wrong.
-  bool contradicts() const;
-  /// Nothing is known, the prior's value is adopted.
-  void reset() { *this = CalibrationEvidence(prior_); }
+  bool contradicts(int k) const;
+  /// Nothing is known of number k; the prior's value, with this sigma, is adopted.
+  void restart(int k, double sigma);
 
  private:
-  Estimate prior_;
-  double adopted_;
-  double adopted_information_ = 0;  ///< of the estimate when it was adopted; 0: the prior's value is
-  double begin_ = 0;                ///< of the newest stretch, s
+  void estimate();
+  /// Between the adopted value of number k and an estimate that is sure to differ.
+  double sureSigmas(int k) const;
+
+  std::vector<Estimate> prior_;
+  Likelihood prior_likelihood_;
+  Eigen::VectorXd adopted_;
+  Eigen::VectorXd adopted_information_;  ///< of the estimate when it was adopted; 0: the prior's value is
+  Eigen::VectorXd found_, sigma_;
+  Eigen::ArrayXd degrees_;  ///< of freedom of each sigma: how many stretches it comes from (Satterthwaite 1946)
+  double begin_ = 0;        ///< of the newest stretch, s
+  double length_;           ///< of a stretch, s
   std::vector<Likelihood> stretches_;
 };
 

@@ -26,7 +26,7 @@ struct CalibrationOptions {
   double sigma_depth_offset = 0.005;
   double sigma_depth_scale = 0.02;
   double sigma_depth_delay = 0.015;
-  double sigma_focal = 0.002;
+  double sigma_focal = 0.005;
   double sigma_aspect = 0.0005;
   double sigma_centre = 0.002;
   double sigma_depth_shift = 0.003;

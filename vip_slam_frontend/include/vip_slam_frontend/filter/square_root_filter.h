@@ -50,7 +50,8 @@ class SquareRootFilter {
   /// Makes the present estimates the first estimates, where later Jacobians are evaluated.
   void relinearise();
 
-  double sigma(int column) const;  ///< of one state
+  double sigma(int column) const;                          ///< of one state
+  Eigen::MatrixXd covariance(int column, int size) const;  ///< of successive states
   /// One sigma of each calibration state.
   Eigen::VectorXd calibrationSigmas() const;
   /// Covariance of (theta, p, v, b_g, b_a) of the newest pose.

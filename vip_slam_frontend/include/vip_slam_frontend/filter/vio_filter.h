@@ -101,20 +101,20 @@ class VioFilter {
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }  ///< on the densities
   ImuNoiseScale imuNoise() const;
-  double stampSigma() const { return stamp_monitor_.sigma(); }        ///< s
-  double depthCorrection() const { return depth_offset_.adopted(); }  ///< adopted offset of the readings of depth, m
-  double depthScale() const { return depth_scale_.adopted(); }        ///< adopted factor of the readings of depth
+  double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s
+  double depthCorrection() const {
+    return evidence_.adopted(kDepthOffset);
+  }                                                                     ///< adopted offset of the readings of depth, m
+  double depthScale() const { return evidence_.adopted(kDepthScale); }  ///< adopted factor of the readings of depth
   /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
   /// matter, else zero.
   Eigen::Matrix3d gyroCorrection() const;
-  /// Correction of bearings for use outside the filter: each entry's estimate once it is significant and large enough
-  /// to matter, else zero.
-  BearingCorrection bearingCorrection() const;
+  BearingCorrection bearingCorrection() const;  ///< adopted correction of bearings
   /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is significant
   /// and known to a tenth of a pixel. The part taken is removed from the state, and the filter estimates the rest.
   const Eigen::Vector2d& takeDepthShift();
   /// Seconds by which depth images show an earlier moment than their stamps say, to apply to the images to come.
-  double depthDelay() const { return depth_delay_.adopted(); }
+  double depthDelay() const { return evidence_.adopted(kDepthDelay); }
   double depthNoiseScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
@@ -158,11 +158,21 @@ class VioFilter {
   UpdateResult updateRelinearised(const std::vector<Candidate>& candidates, FeatureBatch* batch);
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
-  /// Takes what this step said of the depth's offset, scale and delay out of the filter and adds it to their evidence;
-  /// `inertial`: the IMU predicted the motion.
-  void learnDepth(bool inertial);
-  /// Takes offset, scale and delay of depth back to what is adopted.
-  void holdDepth();
+  /// Numbers of the calibration that the filter keeps at adopted values while their evidence is gathered, in the order
+  /// of their columns. The bearings' four come last.
+  enum HeldIndex { kDepthOffset, kDepthScale, kDepthDelay, kBearing, kHeldNumbers = kBearing + 4 };
+  struct HeldNumber {
+    int index;
+    double* state;
+    bool applied;  ///< to the readings outside: the state is what remains
+  };
+  /// All that are estimated, in the order of their columns.
+  std::vector<HeldNumber> heldNumbers();
+  /// Takes what this step said of the held numbers out of the filter and adds it to their evidence; `inertial`: the IMU
+  /// predicted the motion.
+  void learnHeldNumbers(bool inertial);
+  /// Takes them back to what is adopted.
+  void hold();
   /// Resets the camera-IMU delay and its sigma to delay_before_: while the rate hardly changes, noise alone would drive
   /// its estimate.
   void holdDelay();
@@ -175,7 +185,6 @@ class VioFilter {
   /// Adjusts the depth in the tracks to readings that are shifted by this much more, in bearings, and taken for this
   /// much older, s.
   void moveDepth(const Eigen::Vector2d& shift, double delay);
-  void judgeIntrinsics();
   void judgeGyroCorrection();
   /// Keeps the estimated extrinsics and calibration for the next start, unless they are implausibly far from the given
   /// ones: then they are as wrong as the estimate that failed.
@@ -188,12 +197,12 @@ class VioFilter {
 
   FilterOptions options_;
   ImuNoise imu_noise_;
-  const CalibrationEstimate given_;  ///< by the sensor's configuration
-  CalibrationEstimate learnt_;       ///< initial values at a start: given_, or the estimate of an earlier run
-  frontend::CalibrationEvidence depth_offset_, depth_scale_, depth_delay_;
+  const CalibrationEstimate given_;         ///< by the sensor's configuration
+  CalibrationEstimate learnt_;              ///< initial values at a start: given_, or the estimate of an earlier run
+  frontend::CalibrationEvidence evidence_;  ///< of the numbers that are held
   /// Time of the newest clone that the IMU did not predict, or whose first estimate no longer agrees with those of the
   /// others; empty: none is left, what steps say of scale and delay counts.
-  std::optional<double> depth_unseen_;
+  std::optional<double> motion_unmeasured_;
   double focal_;
   Eigen::Vector3d G_;
   Gate gate_;
@@ -206,8 +215,7 @@ class VioFilter {
   bool started_ = false;
   Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();  ///< already applied to the readings, in bearings
   bool shift_contradicts_ = false;                         ///< it became implausibly large
-  Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);     ///< likewise, by entries
-  Eigen::Array<bool, 4, 1> bearing_is_off_ = Eigen::Array<bool, 4, 1>::Constant(false);  ///< likewise
+  Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);  ///< likewise, by entries
   int still_images_ = 0;                            ///< images since standing still began; 0 when moving
   bool after_open_ = false;                         ///< the propagation before left the motion open
   std::optional<frontend::Estimate> delay_before_;  ///< the value held; empty while the delay is estimated
