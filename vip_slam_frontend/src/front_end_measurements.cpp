@@ -77,8 +77,8 @@ SurfaceMatches FrontEnd::Impl::matchSurfaces(const ImageStep& step) {
 
 void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, double t) {
   if (depth.empty() || !options_.filter.use_surfaces) return;
-  // At index 0 the reference leaves the window with the next image; changed now, this image is tied to both references.
-  const bool leaving = filter_.window().indexOf(surfaces_.reference()) <= 0;
+  // The oldest clone leaves the window with the next image; changed now, this image is tied to both references.
+  const bool leaving = filter_.window().indexOf(surfaces_.reference()) <= filter_.window().indexOf(filter_.oldest().id);
   if (!leaving && 2 * matched >= surfaces_.size()) return;
   ScopedTimer timer(timing_, "frontend.surfaces", t);
   surfaces_.setReference(depth, filter_.window().clones.back().id, bodies_.regions());

@@ -63,11 +63,11 @@ double huberWeight(double squared, double threshold) {
 
 std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool window_full, bool all) {
   std::vector<Candidate> candidates;
-  const CloneId oldest = filter_.window().clones.front().id;
+  const CloneId leaves = oldest().id;
   for (auto& entry : tracks_) {
     const auto& observations = entry.second.observations;
     const bool lost = observations.back().clone != id;
-    const bool leaving = window_full && observations.front().clone == oldest;
+    const bool leaving = window_full && observations.front().clone == leaves;
     if ((lost || leaving || all) && observations.size() >= 2) candidates.push_back({&entry.second, lost});
   }
   // Long tracks are the most informative. Ties keep the order of ids, so that two runs agree.
@@ -93,7 +93,7 @@ double VioFilter::beyondState(const FeatureRows& feature) const {
 double VioFilter::openPixels() const {
   const WindowState& window = filter_.window();
   const double variance = covariance().block<3, 3>(6, 6).diagonal().maxCoeff();
-  const double seconds = window.clones.back().t - window.clones.front().t;
+  const double seconds = window.clones.back().t - oldest().t;
   return std::sqrt(std::max(0.0, variance)) * seconds * focal_;
 }
 

@@ -63,6 +63,7 @@ void VioFilter::stop() {
   after_open_ = false;
   delay_before_.reset();
   mark_ = 0;
+  mark_kept_ = false;
 }
 
 void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3d& omega_I) {
@@ -160,33 +161,26 @@ void VioFilter::forgetClone(CloneId id) {
 }
 
 void VioFilter::markNewest() {
+  if (mark_kept_) filter_.marginalise({filter_.window().indexOf(mark_)});
+  mark_kept_ = false;
   mark_ = filter_.window().clones.back().id;
-  to_mark_.reset();
 }
 
-RelativeMotion VioFilter::motionFromMark(int clone) const {
-  const int mark = filter_.window().indexOf(mark_);
-  if (mark < 0 || clone < 0 || (mark == clone && !to_mark_)) return {};
-  if (mark == clone) return *to_mark_;
-  const RelativeMotion motion = filter_.relativeMotion(mark, clone);
-  return to_mark_ ? compose(*to_mark_, motion) : motion;
+const Clone& VioFilter::oldest() const {
+  const std::vector<Clone>& clones = filter_.window().clones;
+  return clones[mark_kept_ && clones.front().id == mark_ ? 1 : 0];
 }
 
 RelativeMotion VioFilter::motionSinceMark() const {
-  return motionFromMark(static_cast<int>(filter_.window().clones.size()) - 1);
+  const int mark = filter_.window().indexOf(mark_), newest = static_cast<int>(filter_.window().clones.size()) - 1;
+  return mark < 0 || mark == newest ? RelativeMotion{} : filter_.relativeMotion(mark, newest);
 }
 
 std::optional<SE3> VioFilter::poseSinceMark() const {
   const int mark = filter_.window().indexOf(mark_);
   if (mark < 0) return std::nullopt;
   const auto& clones = filter_.window().clones;
-  const SE3 T_mark_I = clones[mark].T_W_I.inverse() * clones.back().T_W_I;
-  return to_mark_ ? to_mark_->T_a_b * T_mark_I : T_mark_I;
-}
-
-void VioFilter::moveMark(CloneId to) {
-  to_mark_ = motionFromMark(filter_.window().indexOf(to));
-  mark_ = to;
+  return clones[mark].T_W_I.inverse() * clones.back().T_W_I;
 }
 
 void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>& measurements) {
@@ -228,9 +222,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   // motion and does not fill with copies of one pose.
   const bool replace = still && still_images_ > 0;
   if (replace && previous != still_anchor_) {
-    // The mark moves to the anchor, which stays: image by image the motion would be composed of many IMU predictions.
-    if (previous == mark_) moveMark(still_anchor_);
-    filter_.marginalise({static_cast<int>(filter_.window().clones.size()) - 2});
+    mark_kept_ = mark_kept_ || previous == mark_;
+    if (previous != mark_) filter_.marginalise({static_cast<int>(filter_.window().clones.size()) - 2});
     forgetClone(previous);
   }
   addMeasurements(id, measurements);
@@ -252,7 +245,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const NavState predicted = nav();
   const Matrix15d P_predicted = covariance();
   const frontend::Estimate delay_predicted = filter_.window().calibration.time_offset ? delay() : frontend::Estimate{};
-  const bool window_full = static_cast<int>(filter_.window().clones.size()) > options_.window;
+  const bool window_full = static_cast<int>(filter_.window().clones.size()) - (mark_kept_ ? 1 : 0) > options_.window;
   // After an interval that left the motion open only images can measure the velocity: the first image after it updates
   // with all tracks.
   const bool all = after_open_ && !propagation.open;
@@ -306,10 +299,10 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     it = it->second.observations.back().clone != id ? tracks_.erase(it) : std::next(it);
   }
   if (window_full) {
-    const CloneId oldest = filter_.window().clones.front().id;
-    if (oldest == mark_) moveMark(still && oldest != still_anchor_ ? still_anchor_ : id);
-    filter_.marginalise({0});
-    forgetClone(oldest);
+    const CloneId leaving = oldest().id;
+    mark_kept_ = mark_kept_ || leaving == mark_;
+    if (leaving != mark_) filter_.marginalise({filter_.window().indexOf(leaving)});
+    forgetClone(leaving);
   }
   report.healthy = report.healthy && filter_.healthy();
   return report;

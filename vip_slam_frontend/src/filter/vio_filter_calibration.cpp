@@ -121,7 +121,7 @@ void VioFilter::learnHeldNumbers(bool inertial) {
   }
   // Only the IMU knows more than the offset: a motion that is itself measured by images and depth agrees with any.
   if (!inertial) motion_unmeasured_ = filter_.window().clones.back().t;
-  if (motion_unmeasured_ && filter_.window().clones.front().t <= *motion_unmeasured_) {
+  if (motion_unmeasured_ && oldest().t <= *motion_unmeasured_) {
     for (const HeldNumber& number : numbers) {
       if (number.index != kDepthOffset) step.marginalise(number.index, evidence_.held(number.index));
     }

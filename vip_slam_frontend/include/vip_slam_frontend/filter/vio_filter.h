@@ -91,10 +91,11 @@ class VioFilter {
   double timeOffset() const { return started_ ? filter_.window().time_offset : learnt_.time_offset; }  ///< likewise, s
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
+  /// The oldest clone whose image still has measurements to come: the marked one stays in the state beyond its time.
+  const Clone& oldest() const;
   /// Marks the newest clone (its image became a keyframe) as the start of motionSinceMark().
   void markNewest();
-  /// The motion from the marked clone to the newest. When the marked clone has left the window it is composed of pieces
-  /// as long as the window, whose errors are taken as independent. Unknown when nothing was marked.
+  /// The motion from the marked clone to the newest. Unknown when nothing was marked.
   RelativeMotion motionSinceMark() const;
   /// The pose of motionSinceMark() without the cost of its covariance; empty when nothing was marked.
   std::optional<SE3> poseSinceMark() const;
@@ -190,10 +191,6 @@ class VioFilter {
   /// ones: then they are as wrong as the estimate that failed.
   void learnCalibration();
   void forgetClone(CloneId id);
-  /// From the marked clone to another one; unknown when nothing is marked.
-  RelativeMotion motionFromMark(int clone) const;
-  /// Clone `to` replaces the marked one, which is about to be marginalised.
-  void moveMark(CloneId to);
 
   FilterOptions options_;
   ImuNoise imu_noise_;
@@ -220,8 +217,8 @@ class VioFilter {
   bool after_open_ = false;                         ///< the propagation before left the motion open
   std::optional<frontend::Estimate> delay_before_;  ///< the value held; empty while the delay is estimated
   CloneId still_anchor_ = 0;
-  CloneId mark_ = 0;                       ///< 0: none
-  std::optional<RelativeMotion> to_mark_;  ///< from the clone marked originally to mark_, when that is another one
+  CloneId mark_ = 0;        ///< 0: none
+  bool mark_kept_ = false;  ///< its clone is beyond its time in the window, and stays in the state alone
 };
 
 }  // namespace vip_slam
