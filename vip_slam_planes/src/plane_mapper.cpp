@@ -59,7 +59,7 @@ std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, std
   std::vector<PlaneTrack*> tracks;
   // Planes may also grow into view: the range is larger by the growth gap.
   for (auto& [id, track] : tracks_) {
-    if (!keyframes_.tied(track.epoch, epoch)) continue;
+    if (!keyframes_.tied(track.epoch, epoch) || !track.seenSince(keyframes_.sureSince())) continue;
     if (mayBeInView(track, T_map_C, noise.max_range + options.growth.gap)) tracks.push_back(&track);
   }
   return tracks;

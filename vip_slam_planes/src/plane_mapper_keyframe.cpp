@@ -184,6 +184,7 @@ PlaneId PlaneMapper::Impl::samePlane(PlaneId id) {
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [other_id, other] : tracks_) {
     if (other_id == id || !keyframes_.tied(mine.epoch, other.epoch)) continue;
+    if (other.seenSince(keyframes_.sureSince()) != mine.seenSince(keyframes_.sureSince())) continue;
     if (!sameSurface(mine, other, view, options.merging)) continue;
     const double misfit = jointMisfit(mine, other, keyframes_.poses());
     if (best == 0 || misfit < least) best = other_id, least = misfit;

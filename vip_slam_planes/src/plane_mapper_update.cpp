@@ -26,7 +26,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   PlaneUpdate result;
   result.revision = update.revision;
   result.t = update.t;
-  came_together_ = keyframes_.tie(update.parts) || came_together_;
+  came_together_ = keyframes_.tie(update) || came_together_;
   followMode(update);
   if (localising_) {
     // Planes must not change now; changes from before are reported once mapping goes on.
@@ -39,7 +39,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   takeCorrections(update);
 
   for (const KeyframeEstimate& estimate : update.keyframes) {
-    const KeyframePtr keyframe = keyframes_.place(estimate);
+    const KeyframePtr keyframe = keyframes_.place(estimate, options.growth.distance);
     if (!keyframe) continue;
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);

@@ -22,17 +22,30 @@ std::size_t PlacedKeyframes::wait(const KeyframePtr& keyframe) {
   return forgotten;
 }
 
-KeyframePtr PlacedKeyframes::place(const KeyframeEstimate& estimate) {
+KeyframePtr PlacedKeyframes::place(const KeyframeEstimate& estimate, double same_place) {
   const auto it = waiting_.find(estimate.id);
   if (it == waiting_.end() || !isSound(estimate)) return nullptr;
   const KeyframePtr keyframe = withCameraCorrection(it->second, estimate.camera_correction);
   waiting_.erase(it);
   placed_[keyframe->id] = keyframe;
+  const RelativeMotion& motion = keyframe->motion;
+  if (motion.known() && motion.covariance.diagonal().tail<3>().maxCoeff() > same_place * same_place) {
+    sure_since_ = std::max(sure_since_, keyframe->id);
+  }
   poses_[keyframe->id] = estimate.state.T_W_I * estimate.T_I_C;
   if (keyframe->id > newest_) newest_ = keyframe->id, epoch_ = keyframe->frame.epoch;
   epoch_of_[keyframe->id] = keyframe->frame.epoch;
   epochs_.add(keyframe->frame.epoch);
   return keyframe;
+}
+
+bool PlacedKeyframes::tie(const MapUpdate& update) {
+  const bool across = std::any_of(update.loops.begin(), update.loops.end(), [this](const LoopEvent& loop) {
+    const auto [first, last] = std::minmax(loop.query, loop.match);
+    return loop.accepted && first < sure_since_ && last >= sure_since_;
+  });
+  if (across) sure_since_ = 0;
+  return epochs_.tie(update.parts) || across;
 }
 
 void PlacedKeyframes::addHost(const PlaneHost& host) {

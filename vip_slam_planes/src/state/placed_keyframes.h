@@ -30,8 +30,12 @@ class PlacedKeyframes {
   bool known(KeyframeId id) const { return id <= stored_until_ || placed_.count(id) > 0; }
   bool waits(KeyframeId id) const { return waiting_.count(id) > 0; }
   std::size_t waiting() const { return waiting_.size(); }
-  /// Null when no keyframe with this id waits, or when the estimate is not sound.
-  KeyframePtr place(const KeyframeEstimate& estimate);
+  /// Null when no keyframe with this id waits, or when the estimate is not sound. `same_place`: one sigma of a motion's
+  /// translation, m, beyond which surfaces before and after it cannot be told to be the same by their place.
+  KeyframePtr place(const KeyframeEstimate& estimate, double same_place);
+  /// The first keyframe after the last motion that was less sure than that, 0 without one: what was seen before may lie
+  /// elsewhere.
+  KeyframeId sureSince() const { return sure_since_; }
   /// Adds the keyframe that a loaded plane belongs to.
   void addHost(const PlaneHost& host);
 
@@ -45,8 +49,8 @@ class PlacedKeyframes {
   void replace(const KeyframePtr& corrected) { placed_.at(corrected->id) = corrected; }
 
   bool tied(std::uint32_t a, std::uint32_t b) const { return epochs_.tied(a, b); }
-  /// True when epochs came together.
-  bool tie(const std::vector<EpochPart>& parts) { return epochs_.tie(parts); }
+  /// True when epochs came together, or what was seen before and after an unsure motion did, by a loop across it.
+  bool tie(const MapUpdate& update);
 
   KeyframeId newest() const { return newest_; }
   std::uint32_t newestEpoch() const { return epoch_; }
@@ -76,6 +80,7 @@ class PlacedKeyframes {
   KeyframeId newest_ = 0;    ///< of the placed ones
   std::uint32_t epoch_ = 0;  ///< its epoch
   KeyframeId stored_until_ = 0;
+  KeyframeId sure_since_ = 0;
 };
 
 }  // namespace vip_slam

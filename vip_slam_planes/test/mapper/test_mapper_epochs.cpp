@@ -123,6 +123,47 @@ TEST(MapperEpochs, ALoopBetweenEpochsMakesOnePlaneOfTwo) {
                           [&](const PlaneObservation& o) { return o.keyframe == query->id + 1; }));
 }
 
+// After seconds in the dark the odometry goes on in one epoch, metres off: a wall that comes to lie on another one's
+// place is not that one.
+TEST(MapperEpochs, WhatLiesBehindAnUnsureMotionIsNotToldByItsPlace) {
+  for (const double sigma : {0.003, 0.7}) {
+    Rig rig;
+    std::map<KeyframeId, SE3> truth;
+    const auto look = [&](int i, bool first) {
+      const auto keyframe = taken(&rig, view(i), 0);
+      keyframe->motion.covariance.diagonal().setConstant(1e-6);
+      if (first) keyframe->motion.covariance.diagonal().tail<3>().setConstant(sigma * sigma);
+      truth[keyframe->id] = view(i);
+      return keyframe;
+    };
+    for (int i = 0; i < 6; ++i) rig.place(look(i, false), view(i));
+    const std::vector<PlaneEstimate> before = rig.mapper.planes();
+    const std::set<PlaneId> old = idsOf(rig);
+    std::size_t known_again = 0;
+    for (int i = 0; i < 6; ++i) {
+      const PlaneUpdate result = rig.place(look(i, i == 0), guess(view(i)));
+      for (const PlaneObservation& o : result.observations) known_again += old.count(o.plane);
+    }
+    if (sigma < 0.01) {
+      EXPECT_GT(known_again, 0u) << "floor and ceiling lie where they did";
+      continue;
+    }
+    EXPECT_EQ(known_again, 0u);
+    expectSame(before, rig.mapper.planes());
+    EXPECT_EQ(2 * before.size(), rig.mapper.planes().size());
+
+    const auto query = look(3, false);
+    rig.mapper.addKeyframe(query);
+    MapUpdate update = closing(*query, 0, truth);
+    update.loops.emplace_back();
+    update.loops.back().query = query->id;
+    update.loops.back().match = 2;
+    update.loops.back().accepted = true;
+    rig.mapper.applyMapUpdate(update);
+    EXPECT_EQ(old, idsOf(rig)) << "the loop tells that they are the same";
+  }
+}
+
 TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   constexpr KeyframeId kFirst = 100;  // the loaded map has the ids before
   constexpr std::uint32_t kLoaded = 0x80000000u;

@@ -84,6 +84,11 @@ class PlaneTrack {
   const std::map<KeyframeId, PlaneObservation>& observations() const { return observations_; }
   /// Whether some of its area or an observation belongs to a keyframe.
   bool restsOn(KeyframeId keyframe) const { return observations_.count(keyframe) > 0 || patches_.count(keyframe) > 0; }
+  /// Whether some keyframe from this one on has seen it.
+  bool seenSince(KeyframeId keyframe) const {
+    const auto newest = [](const auto& by_keyframe) { return by_keyframe.empty() ? 0 : by_keyframe.rbegin()->first; };
+    return std::max(newest(observations_), newest(patches_)) >= keyframe;
+  }
   /// Whether it has neither observations nor a loaded map's data, and all its hosts exist: it moves with its main host.
   bool followsHosts() const { return observations_.empty() && !stored && !patches_.count(0); }
   /// Moments of all observations in `map`.
