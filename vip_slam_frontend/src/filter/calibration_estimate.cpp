@@ -74,17 +74,18 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
                   1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
   }
   const double scale = found.depth_scale - given.depth_scale;
-  if (found.sigma_depth_scale > 0 && std::abs(scale) > kMinDepthScale) {
+  if (found.sigma_depth_scale > 0 && std::abs(scale) > std::max(kMinDepthScale, kSure * found.sigma_depth_scale)) {
     const std::string remedy =
-        found.depth_unit > 0 ? formatted("; depth/scale in the sensor's configuration should be %.6g", found.depth_unit)
-                             : "";
-    all.push_back(
-        formatted("depth reads %.1f %% too %s by the accelerometer (one sigma %.1f %%), which is corrected for",
-                  100 * std::abs(scale), scale < 0 ? "long" : "short", 100 * found.sigma_depth_scale) +
-        remedy);
+        found.depth_unit > 0
+            ? formatted(" Else depth/scale in the sensor's configuration should be %.6g", found.depth_unit)
+            : "";
+    all.push_back(formatted("depth reads %.1f %% too %s by the accelerometer (one sigma %.1f %%), which is corrected "
+                            "for: is the IMU smoothed (check_bag tells)?",
+                            100 * std::abs(scale), scale < 0 ? "long" : "short", 100 * found.sigma_depth_scale) +
+                  remedy);
   }
   const double late = found.depth_delay - given.depth_delay;
-  if (found.sigma_depth_delay > 0 && std::abs(late) > kMinDepthDelay) {
+  if (found.sigma_depth_delay > 0 && std::abs(late) > std::max(kMinDepthDelay, kSure * found.sigma_depth_delay)) {
     all.push_back(formatted(
         "depth shows %s moment than its stamps say, by %.0f ms (one sigma %.0f ms), which is corrected for: is "
         "a temporal filter on in the driver, are the two cameras not taken together? depth/delay in the "

@@ -40,7 +40,10 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   const std::string more = calibrationDifferences(given, found).back();
   EXPECT_NE(more.find("7.0 mm too long"), std::string::npos) << more;
   EXPECT_NE(more.find("-0.0120"), std::string::npos) << more;
+  const std::size_t without = calibrationDifferences(given, found).size();
   found.depth_scale = 0.971;
+  found.sigma_depth_scale = 0.007;
+  EXPECT_EQ(calibrationDifferences(given, found).size(), without) << "in use at four sigmas, not yet to be entered";
   found.sigma_depth_scale = 0.005;
   const std::string scale = calibrationDifferences(given, found).back();
   EXPECT_NE(scale.find("depth reads 2.9 % too long"), std::string::npos) << scale;
