@@ -143,7 +143,7 @@ void CalibrationEvidence::estimate() {
     variance += of_stretch;
     squares += of_stretch.square();
   }
-  degrees_ = (squares > 0).select(variance.square() / squares, 1.0);
+  degrees_ = (squares > 0).select(variance.square() / squares, 1.0).max(1.0);
 }
 
 double CalibrationEvidence::sureSigmas(int k) const {

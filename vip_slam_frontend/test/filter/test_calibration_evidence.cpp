@@ -124,6 +124,24 @@ TEST(CalibrationEvidence, AFilterThatFailedDoesNotSpoilIt) {
   EXPECT_EQ(evidence.estimate(0).sigma, before.sigma);
 }
 
+// A consider state in the filter makes its update suboptimal: a step may take information away.
+TEST(CalibrationEvidence, StepsThatSayLessThanNothingDoNoHarm) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  CalibrationEvidence evidence({{1.0, 0.02}, {0.0, 0.005}});
+  for (int k = 0; k < 600; ++k) {
+    const Eigen::RowVector2d by(normal(random), normal(random));
+    Likelihood step = readingOf(by, by.x() * 1.0, 0.05);
+    if (k / 20 % 2 == 1) step = {-1.01 * step.information, -0.9 * step.weighted};  // every other second
+    evidence.add(0.05 * k, step);
+    evidence.adopt();
+    for (int n = 0; n < 2; ++n) {
+      ASSERT_TRUE(std::isfinite(evidence.held(n).value) && evidence.held(n).sigma > 0) << k;
+      ASSERT_TRUE(std::isfinite(evidence.estimate(n).value) && evidence.estimate(n).sigma > 0) << k;
+    }
+  }
+}
+
 TEST(CalibrationEvidence, RightValuesStay) {
   int adopted = 0;
   for (int seed = 0; seed < 200; ++seed) {
