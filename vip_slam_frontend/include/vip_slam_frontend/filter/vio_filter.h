@@ -103,10 +103,9 @@ class VioFilter {
   double imuNoiseScale() const { return imu_monitor_.scale(); }  ///< on the densities
   ImuNoiseScale imuNoise() const;
   double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s
-  double depthCorrection() const {
-    return evidence_.adopted(kDepthOffset);
-  }                                                                     ///< adopted offset of the readings of depth, m
-  double depthScale() const { return evidence_.adopted(kDepthScale); }  ///< adopted factor of the readings of depth
+  /// Adopted offset of the readings of depth, m, and the factor on them.
+  double depthCorrection() const { return evidence_.adopted(kDepthOffset); }
+  double depthScale() const { return evidence_.adopted(kDepthScale); }
   /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
   /// matter, else zero.
   Eigen::Matrix3d gyroCorrection() const;
