@@ -114,16 +114,19 @@ void SquareRootFilter::consider(int column, double change, double sigma) {
   // As after a process noise: the covariance with the others stays.
   const double now = this->sigma(column), lost = sigma * sigma - now * now;
   if (!(lost > 0)) return;
-  const int n = window_.dimension();
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n + 1, n + 1);  // the last column: the state without the noise
+  inflate(std::sqrt(lost) * Eigen::VectorXd::Unit(window_.dimension(), column));
+}
+
+void SquareRootFilter::inflate(const Eigen::MatrixXd& N) {
+  const int n = static_cast<int>(N.rows()), k = static_cast<int>(N.cols());
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n + k, n + k);  // the last columns: the unit variables
   A.topLeftCorner(n, n) = R_;
-  A.col(n) = A.col(column);
-  A.col(column).setZero();
-  A(n, column) = 1 / std::sqrt(lost);
-  A(n, n) = -A(n, column);
-  std::vector<int> order = {n};
+  A.topRightCorner(n, k) = -R_ * N;
+  A.bottomRightCorner(k, k).setIdentity();
+  std::vector<int> order;
+  for (int c = n; c < n + k; ++c) order.push_back(c);
   for (int c = 0; c < n; ++c) order.push_back(c);
-  R_ = marginaliseColumns(A, order, 1);
+  R_ = marginaliseColumns(A, order, k);
 }
 
 void SquareRootFilter::replaceMarginal(int column, const Eigen::VectorXd& change, const Eigen::VectorXd& sigmas) {

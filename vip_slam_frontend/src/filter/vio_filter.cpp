@@ -59,6 +59,7 @@ void VioFilter::stop() {
   stamp_monitor_.reset();
   imu_monitor_.reset();
   drift_.reset();
+  disputed_.reset();
   still_images_ = 0;
   after_open_ = false;
   delay_before_.reset();
@@ -160,6 +161,33 @@ void VioFilter::forgetClone(CloneId id) {
   }
 }
 
+void VioFilter::admitDispute() {
+  const Eigen::VectorXd sigmas = disputed_.take().cwiseSqrt();
+  const WindowState& window = filter_.window();
+  const Eigen::Vector3d newest = window.clones.back().T_W_I_fej.t();
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(window.dimension(), 6);
+  for (int i = 0; i < static_cast<int>(window.clones.size()); ++i) {
+    if (mark_kept_ && window.clones[i].id == mark_) continue;
+    const SE3& T_W_I = window.clones[i].T_W_I_fej;
+    auto of_clone = N.middleRows<6>(window.cloneColumn(i));
+    of_clone.topLeftCorner<3, 3>() = T_W_I.R().transpose();
+    of_clone.bottomLeftCorner<3, 3>() = -hat(T_W_I.t() - newest);
+    of_clone.bottomRightCorner<3, 3>().setIdentity();
+  }
+  N.block<3, 3>(window.navColumn(), 0) = -hat(window.v_W_fej);
+  filter_.inflate(N * sigmas.asDiagonal());
+}
+
+void VioFilter::noteCorrection(const NavState& predicted, const Matrix15d& P_predicted) {
+  const Eigen::Matrix3d R_W_I = predicted.T_W_I.R();
+  const Vector6d corrected = nav().T_W_I.boxminus(predicted.T_W_I);
+  const Matrix15d removed = P_predicted - covariance();
+  Vector6d correction, variance;
+  correction << R_W_I * corrected.head<3>(), corrected.tail<3>();
+  variance << (R_W_I * removed.topLeftCorner<3, 3>() * R_W_I.transpose()).diagonal(), removed.diagonal().segment<3>(3);
+  disputed_.add(predicted.t, correction, variance);
+}
+
 void VioFilter::markNewest() {
   if (mark_kept_) filter_.marginalise({filter_.window().indexOf(mark_)});
   mark_kept_ = false;
@@ -216,6 +244,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   const double since = propagation.predicted.t - filter_.window().clones.back().t;
   const double delay_change =
       delay_before_ ? 0.0 : drift_.of(frontend::DriftMonitor::kDelay).density() * std::sqrt(since);
+  if (propagation.open && !after_open_) admitDispute();
   filter_.augment(propagation, id, delay_change);
 
   // From the second still image on, the newest clone replaces the one before: the window keeps what it knew of the
@@ -264,6 +293,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   learnHeldNumbers(propagation.inertial);
   judgeDepthShift();
   judgeGyroCorrection();
+  noteCorrection(predicted, P_predicted);
   report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
   if (!still) {
     // While more stamp jitter may explain the correction about the rotation axis, that part is not blamed on the IMU.

@@ -126,6 +126,22 @@ TEST(Marginalisation, AnUpdateTakenBackInOneStateIsTheSchmidtKalmanFilter) {
   EXPECT_NEAR(filter.window().v_W.y(), (K * h)(window.navColumn() + 1), 1e-12);
 }
 
+TEST(Marginalisation, InflationAddsToTheCovarianceWhatItIsGiven) {
+  std::mt19937 random(9);
+  WindowState window;
+  window.clones.resize(3);
+  const int n = window.dimension();
+  SquareRootFilter filter;
+  filter.initialise(window, randomMatrix(n + 20, n, random));
+  const Eigen::MatrixXd P = filter.covariance();
+  Eigen::MatrixXd N = randomMatrix(n, 6, random);
+  N.col(4).setZero();
+  filter.inflate(N);
+  EXPECT_LT(relative(filter.covariance(), P + N * N.transpose()), 1e-10);
+  EXPECT_TRUE(filter.R().isUpperTriangular(1e-12));
+  EXPECT_TRUE(filter.healthy());
+}
+
 TEST(Marginalisation, AReplacedMarginalLeavesTheOthersGivenItAsTheyAre) {
   for (const int k : {1, 2}) {
     std::mt19937 random(7);

@@ -44,6 +44,9 @@ class SquareRootFilter {
   /// one, while all others keep what they learnt (a consider state of the Schmidt-Kalman filter).
   void consider(int column, double change, double sigma);
 
+  /// Covariance inflation by N N^T: the state is what it was taken for, plus N times independent unit variables.
+  void inflate(const Eigen::MatrixXd& N);
+
   /// Whitened rows H x = h. Applies the correction to the window and clears r. `H` and `h` are used as work space.
   UpdateResult update(Eigen::MatrixXd& H, Eigen::VectorXd& h);
 

@@ -11,6 +11,7 @@
 #include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_frontend/filter/calibration_estimate.h"
 #include "vip_slam_frontend/filter/calibration_evidence.h"
+#include "vip_slam_frontend/filter/disputed_motion.h"
 #include "vip_slam_frontend/filter/drift_monitor.h"
 #include "vip_slam_frontend/filter/feature_rows.h"
 #include "vip_slam_frontend/filter/filter_options.h"
@@ -190,6 +191,11 @@ class VioFilter {
   /// ones: then they are as wrong as the estimate that failed.
   void learnCalibration();
   void forgetClone(CloneId id);
+  /// When the IMU is found at fault: what it and the images disputed until then is added to the covariance, as one
+  /// motion of the whole window against the world and the marked clone.
+  void admitDispute();
+  /// After the updates of an image whose pose was `predicted`, with this covariance.
+  void noteCorrection(const NavState& predicted, const Matrix15d& P_predicted);
 
   FilterOptions options_;
   ImuNoise imu_noise_;
@@ -206,6 +212,7 @@ class VioFilter {
   StampMonitor stamp_monitor_;
   ImuNoiseMonitor imu_monitor_;
   frontend::DriftMonitor drift_;
+  frontend::DisputedMotion disputed_;
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;
   bool started_ = false;

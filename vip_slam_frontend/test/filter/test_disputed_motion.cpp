@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "vip_slam_frontend/filter/disputed_motion.h"
+
+namespace vip_slam::frontend {
+namespace {
+
+constexpr double kInterval = 0.05, kSigma = 1e-3;
+
+/// Corrections of `seconds`, white with kSigma, plus `bias` each.
+DisputedMotion corrected(double seconds, const Vector6d& bias, int seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, kSigma);
+  DisputedMotion disputed;
+  for (double t = 0; t < seconds; t += kInterval) {
+    Vector6d correction = bias;
+    for (int i = 0; i < 6; ++i) correction(i) += normal(random);
+    disputed.add(t, correction, Vector6d::Constant(kSigma * kSigma));
+  }
+  return disputed;
+}
+
+TEST(DisputedMotion, WhiteCorrectionsDisputeNoMoreThanChance) {
+  double sum = 0, removed = 0;
+  for (int seed = 1; seed <= 200; ++seed) {
+    sum += corrected(3.0, Vector6d::Zero(), seed).take().sum() / 6;
+    removed += kSigma * kSigma / (1 - std::exp(-2 * kInterval));  // of a consistent filter, in the steady state
+  }
+  EXPECT_LT(sum, 0.6 * removed);  // E[max(0, x^2 - 1)] of a standard normal x is 0.48
+}
+
+TEST(DisputedMotion, CorrectionsInOneDirectionAreTheirSumAndAreTakenOnce) {
+  Vector6d bias = Vector6d::Zero();
+  bias(1) = 0.004, bias(3) = -0.002;
+  DisputedMotion disputed = corrected(3.0, bias, 1);
+  const Vector6d sigma = disputed.take().cwiseSqrt();
+  const double intervals = 1 / (1 - std::exp(-kInterval));  // in a fading memory of a second
+  EXPECT_NEAR(sigma(1), 0.004 * intervals, 0.012);
+  EXPECT_NEAR(sigma(3), 0.002 * intervals, 0.012);
+  EXPECT_LT(sigma(0), 0.012);
+  EXPECT_EQ(disputed.take().norm(), 0.0);
+}
+
+}  // namespace
+}  // namespace vip_slam::frontend
