@@ -9,17 +9,17 @@
 namespace vip_slam::frontend {
 namespace {
 
-constexpr double kInterval = 0.05, kSigma = 1e-3;
+constexpr double kCorrectionStep = 0.05, kCorrection = 1e-3;
 
-/// Corrections of `seconds`, white with kSigma, plus `bias` each.
-DisputedMotion corrected(double seconds, const Vector6d& bias, int seed) {
+/// Corrections of `seconds`, white with kCorrection, plus `bias` each.
+DisputedMotion afterCorrections(double seconds, const Vector6d& bias, int seed) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, kSigma);
+  std::normal_distribution<double> normal(0.0, kCorrection);
   DisputedMotion disputed;
-  for (double t = 0; t < seconds; t += kInterval) {
+  for (double t = 0; t < seconds; t += kCorrectionStep) {
     Vector6d correction = bias;
     for (int i = 0; i < 6; ++i) correction(i) += normal(random);
-    disputed.add(t, correction, Vector6d::Constant(kSigma * kSigma));
+    disputed.add(t, correction, Vector6d::Constant(kCorrection * kCorrection));
   }
   return disputed;
 }
@@ -27,8 +27,9 @@ DisputedMotion corrected(double seconds, const Vector6d& bias, int seed) {
 TEST(DisputedMotion, WhiteCorrectionsDisputeNoMoreThanChance) {
   double sum = 0, removed = 0;
   for (int seed = 1; seed <= 200; ++seed) {
-    sum += corrected(3.0, Vector6d::Zero(), seed).take().sum() / 6;
-    removed += kSigma * kSigma / (1 - std::exp(-2 * kInterval));  // of a consistent filter, in the steady state
+    sum += afterCorrections(3.0, Vector6d::Zero(), seed).take().sum() / 6;
+    removed += kCorrection * kCorrection /
+               (1 - std::exp(-2 * kCorrectionStep));  // of a consistent filter, in the steady state
   }
   EXPECT_LT(sum, 0.6 * removed);  // E[max(0, x^2 - 1)] of a standard normal x is 0.48
 }
@@ -36,9 +37,9 @@ TEST(DisputedMotion, WhiteCorrectionsDisputeNoMoreThanChance) {
 TEST(DisputedMotion, CorrectionsInOneDirectionAreTheirSumAndAreTakenOnce) {
   Vector6d bias = Vector6d::Zero();
   bias(1) = 0.004, bias(3) = -0.002;
-  DisputedMotion disputed = corrected(3.0, bias, 1);
+  DisputedMotion disputed = afterCorrections(3.0, bias, 1);
   const Vector6d sigma = disputed.take().cwiseSqrt();
-  const double intervals = 1 / (1 - std::exp(-kInterval));  // in a fading memory of a second
+  const double intervals = 1 / (1 - std::exp(-kCorrectionStep));  // in a fading memory of a second
   EXPECT_NEAR(sigma(1), 0.004 * intervals, 0.012);
   EXPECT_NEAR(sigma(3), 0.002 * intervals, 0.012);
   EXPECT_LT(sigma(0), 0.012);
