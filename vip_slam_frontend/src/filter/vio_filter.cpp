@@ -178,10 +178,9 @@ void VioFilter::admitDispute() {
   filter_.inflate(N * sigmas.asDiagonal());
 }
 
-void VioFilter::noteCorrection(const NavState& predicted, const Matrix15d& P_predicted) {
+void VioFilter::noteCorrection(const NavState& predicted, const Matrix15d& removed) {
   const Eigen::Matrix3d R_W_I = predicted.T_W_I.R();
   const Vector6d corrected = nav().T_W_I.boxminus(predicted.T_W_I);
-  const Matrix15d removed = P_predicted - covariance();
   Vector6d correction, variance;
   correction << R_W_I * corrected.head<3>(), corrected.tail<3>();
   variance << (R_W_I * removed.topLeftCorner<3, 3>() * R_W_I.transpose()).diagonal(), removed.diagonal().segment<3>(3);
@@ -293,15 +292,16 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   learnHeldNumbers(propagation.inertial);
   judgeDepthShift();
   judgeGyroCorrection();
-  noteCorrection(predicted, P_predicted);
-  report.correction = correctionPerDof(predicted, P_predicted, nav(), covariance());
+  const Matrix15d P_updated = covariance();
+  noteCorrection(predicted, P_predicted - P_updated);
+  report.correction = correctionPerDof(predicted, P_predicted, nav(), P_updated);
   if (!still) {
     // While more stamp jitter may explain the correction about the rotation axis, that part is not blamed on the IMU.
     double correction = report.correction;
     if (report.features_used >= kMinOfStamps) {
       const Eigen::Vector3d& w = propagation.omega_I;
       const Eigen::Vector3d turned = logSO3(Eigen::Matrix3d(predicted.T_W_I.R().transpose() * nav().T_W_I.R()));
-      const Eigen::Matrix3d lost = (P_predicted - covariance()).topLeftCorner<3, 3>();
+      const Eigen::Matrix3d lost = (P_predicted - P_updated).topLeftCorner<3, 3>();
       stamp_monitor_.add(w, turned, lost);
       const double along = turned.dot(w);
       if (stamp_monitor_.isGrowing()) {
@@ -310,7 +310,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     }
     if (propagation.inertial) {
       using Drift = frontend::DriftMonitor;
-      const Eigen::Matrix<double, 15, 1> before = P_predicted.diagonal(), after = covariance().diagonal();
+      const Eigen::Matrix<double, 15, 1> before = P_predicted.diagonal(), after = P_updated.diagonal();
       drift_.add(Drift::kGyroBias, nav().bias_gyro - predicted.bias_gyro, before.segment<3>(9), after.segment<3>(9));
       drift_.add(Drift::kAccelBias, nav().bias_accel - predicted.bias_accel, before.tail<3>(), after.tail<3>());
     }

@@ -194,8 +194,8 @@ class VioFilter {
   /// When the IMU is found at fault: what it and the images disputed until then is added to the covariance, as one
   /// motion of the whole window against the world and the marked clone.
   void admitDispute();
-  /// After the updates of an image whose pose was `predicted`, with this covariance.
-  void noteCorrection(const NavState& predicted, const Matrix15d& P_predicted);
+  /// After the updates of an image whose pose was `predicted`; `removed`: from the covariance, by them.
+  void noteCorrection(const NavState& predicted, const Matrix15d& removed);
 
   FilterOptions options_;
   ImuNoise imu_noise_;
