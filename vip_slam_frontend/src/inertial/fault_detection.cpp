@@ -29,6 +29,8 @@ double motionDifference(const SE3& a, const SE3& b, const Matrix6d& covariance) 
   return std::isfinite(squared) ? std::sqrt(std::max(0.0, squared)) : 0.0;
 }
 
+bool FaultDetection::isOnProbation(double t) const { return t - last_fault_t_ < isolation() + kForgotten; }
+
 void FaultDetection::reset(double t) {
   *this = FaultDetection();
   doubt_t_ = t;
@@ -46,13 +48,13 @@ bool FaultDetection::add(const MotionEvidence& e) {
   }
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;
-  const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || suspects(e.t));
+  const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || isOnProbation(e.t));
   const double share = e.t - disagreed_t_ > kMemory ? kSustained : kMostly;
   const bool fault = begins || goes_on || (contradicts && contradicted_ > share);
   // An IMU whose faults come back is believed again later each time.
   if (fault) {
     const double since = e.t - last_fault_t_;
-    if (since > isolation()) isolated_ = since < kForgotten + isolation() ? std::min(2 * isolation(), kLongest) : 0.0;
+    if (since > isolation()) isolated_ = isOnProbation(e.t) ? std::min(2 * isolation(), kLongest) : 0.0;
     last_fault_t_ = e.t;
   }
   return fault || (e.images_agree && e.t - last_fault_t_ < isolated_);

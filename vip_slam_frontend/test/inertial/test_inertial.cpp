@@ -160,6 +160,17 @@ TEST(FaultDetection, AnImuWhoseFaultsComeBackIsIsolatedForLonger) {
   EXPECT_EQ(in(20, 40), 0);
 }
 
+// A wrong IMU contradicts gradually once the images have carried the motion for a while.
+TEST(FaultDetection, AnImuJustBelievedAgainIsAtFaultWithTheFirstContradiction) {
+  const auto grows = [](double t) {
+    return t > 5.18 && t < 5.22 ? 30.0 : t > 5.3 && t < 6.3 ? 2 + 12 * (t - 5.3) : 2.0;
+  };
+  const std::vector<double> found = faults(10, grows, kAlways);
+  const auto again = std::find_if(found.begin(), found.end(), [](double t) { return t > 5.55; });
+  ASSERT_NE(again, found.end());
+  EXPECT_NEAR(*again, 5.8 + 1 / 60.0, 1 / 60.0 + 1e-9) << "the gate of eight sigmas is passed at 5.8 s";
+}
+
 // A robot that bumps into something every three seconds has a sound IMU in between.
 TEST(FaultDetection, BumpsThatComeBackDoNotIsolateTheImuForGood) {
   const auto bumps = [](double t) { return t > 5 && std::fmod(t, 3.0) < 0.2 ? 30.0 : 2.0; };

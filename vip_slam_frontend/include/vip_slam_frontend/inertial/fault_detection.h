@@ -5,6 +5,7 @@
 // lately. Then the IMU is at fault in an interval
 // - that contradicts them all of a sudden, after a time of agreement (a shock, saturation, shaking), and in those after
 //   it for as long as they contradict, or
+// - that contradicts them within a second after the IMU is believed again, or
 // - when a fifth of the last second does (axes, signs or units); most of it, where images disagreed among themselves in
 //   that second, or
 // - when the filter has had to widen the IMU's noise beyond what any IMU has: then no difference is large in sigmas.
@@ -42,6 +43,8 @@ class FaultDetection {
  private:
   static constexpr double kSuspicion = 0.3;  ///< s
 
+  /// For a while after it is believed again the IMU is at fault as soon as it contradicts.
+  bool isOnProbation(double t) const;
   double isolation() const { return std::max(kSuspicion, isolated_); }
 
   double last_fault_t_ = -1e300;
