@@ -35,7 +35,7 @@ class FrontEnd::Impl {
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
   bool ready(double t_image, double depth_lag) const {
-    const double last = std::max(0.5 * sensor_.rolling_shutter, depth_lag + 0.5 * sensor_.depth_rolling_shutter);
+    const double last = std::max(0.5 * readout(), depth_lag + 0.5 * sensor_.depth_rolling_shutter);
     return inertial_.covers(t_image + timeOffset() + last);
   }
   FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);
@@ -57,6 +57,8 @@ class FrontEnd::Impl {
   using ImageStep = frontend::ImageStep;
 
   SE3 extrinsics() const { return filter_.extrinsics(); }
+  /// Seconds from the first to the last row of a colour image.
+  double readout() const { return sensor_.rolling_shutter + filter_.readout(); }
   /// Applies the filter's estimate of the depth image's shift and delay to the depth images to come.
   void followDepth();
   /// Brings the readings to the unit of the first ones when it changes with this image.
@@ -87,7 +89,7 @@ class FrontEnd::Impl {
   /// Poses of the colour camera during a rolling-shutter readout, given the state at the stamp; null: global shutter.
   std::shared_ptr<const RowPoses> rows(const Readout& readout, const NavState& nav) const;
   std::shared_ptr<const RowPoses> colourRows(const NavState& nav) const {
-    return rows(Readout::around(sensor_.rolling_shutter), nav);
+    return rows(Readout::around(readout()), nav);
   }
   /// The depth image as seen at the stamp of the colour image, when it has another stamp or a rolling shutter.
   cv::Mat depthAtStamp(const DepthReading& depth, const NavState& nav);

@@ -19,8 +19,8 @@ constexpr double kOfLag = 0.5;  // one sigma of the lag between depth and colour
 std::shared_ptr<const RowPoses> FrontEnd::Impl::rows(const Readout& readout, const NavState& nav) const {
   if (readout.instant()) return nullptr;
   const std::vector<ImuSample> around =
-      inertial_.between(std::max(inertial_.oldest(), nav.t + std::min(readout.first, 0.0)),
-                        std::min(inertial_.newest(), nav.t + std::max(readout.last, 0.0)));
+      inertial_.between(std::max(inertial_.oldest(), nav.t + std::min({readout.first, readout.last, 0.0})),
+                        std::min(inertial_.newest(), nav.t + std::max({readout.first, readout.last, 0.0})));
   if (around.empty()) return nullptr;
   return std::make_shared<RowPoses>(readout, nav, withGyroCorrection(around, filter_.window().gyro_correction),
                                     extrinsics(), sensor_.gravity);
@@ -47,8 +47,10 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements(const Propagation& p
     const Eigen::Vector2d xy = f.xy.cast<double>();
     const Eigen::Vector2d depth_slope = camera_->focal() * track.depth_slope;
     const double rate = depth_slope.isZero() ? 0.0 : depthRate(xy, f.depth, depth_slope, omega_C, v_C);
-    list.push_back(
-        {f.id, xy, f.depth, f.depth_sigma, depth_slope, rate, track.whitening, bearingJacobian(*camera_, xy)});
+    const double z = f.depth > 0 ? f.depth : sensor_.depth_noise.max_range;
+    const double from_middle = (f.pixel.y() + 0.5) / camera_->height() - 0.5;
+    list.push_back({f.id, xy, f.depth, f.depth_sigma, depth_slope, rate, track.whitening, bearingJacobian(*camera_, xy),
+                    -from_middle * bearingRate(xy, z, omega_C, v_C)});
   }
   return list;
 }

@@ -43,6 +43,7 @@ CalibrationEstimate FrontEnd::Impl::calibration() const {
   calibration.depth_offset += sensor_.depth_offset;
   if (sensor_.depth_encoding != "32FC1") calibration.depth_unit = sensor_.depth_scale * calibration.depth_scale;
   calibration.depth_delay += sensor_.depth_delay;
+  calibration.readout += sensor_.rolling_shutter;
   const CameraIntrinsics& camera = sensor_.camera;
   calibration.depth_shift_px =
       sensor_.depth_shift + calibration.depth_shift.cwiseProduct(Eigen::Vector2d(camera.fx, camera.fy));
@@ -55,6 +56,7 @@ CalibrationEstimate FrontEnd::Impl::givenCalibration() const {
   CalibrationEstimate given{sensor_.T_imu_cam, sensor_.time_offset};
   given.depth_offset = sensor_.depth_offset;
   given.depth_delay = sensor_.depth_delay;
+  given.readout = sensor_.rolling_shutter;
   given.gyro_correction = sensor_.gyro_correction;
   return given;
 }

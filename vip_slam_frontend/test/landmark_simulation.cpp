@@ -138,7 +138,17 @@ std::vector<FilterMeasurement> LandmarkSimulation::sight(double t, std::size_t m
       FilterMeasurement m;
       m.id = track_[i];
       const Eigen::Vector3d noise = gaussian(random_, 1.0);
-      m.xy = (given * p).head<2>() / p.z() + (noise.head<2>() * options_.sigma_px + crept_[i]) / options_.focal;
+      // The row is read a moment before or after the stamp; what the tracker knows of it is taken back.
+      constexpr double kHeight = 0.92;  // of the image, as a bearing
+      const double row = p.y() / p.z() / kHeight;
+      const auto bearingAt = [&](double moment) {
+        const Eigen::Vector3d then = (poseAt(moment) * T_I_C_).inverse() * points_[i];
+        return Eigen::Vector2d((given * then).head<2>() / then.z());
+      };
+      const double late = row * (options_.readout - read_within_);
+      m.by_readout = -row * (bearingAt(t + 1e-4) - bearingAt(t - 1e-4)) / 2e-4;
+      m.xy = (late == 0 ? Eigen::Vector2d((given * p).head<2>() / p.z()) : bearingAt(t + late)) +
+             (noise.head<2>() * options_.sigma_px + crept_[i]) / options_.focal;
       if (unit(random_) < options_.outlier_ratio) m.xy += Eigen::Vector2d(0.05, -0.04);
       m.by_intrinsics = bearingJacobian(m.xy);
       if (options_.depth) {
@@ -220,6 +230,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
       result.most_depth_correction = filter.depthCorrection();
     result.depth_shift = filter.takeDepthShift();
     simulation.readDepthWith(result.depth_shift, filter.depthDelay());
+    simulation.readRowsWithin(filter.readout());
     result.most_bearing_correction =
         std::max(result.most_bearing_correction, filter.bearingCorrection().value.cwiseAbs().maxCoeff());
     result.gyro_correction = filter.gyroCorrection();

@@ -21,6 +21,7 @@ struct SimulationOptions {
   double depth_offset = 0;                  ///< m, added to all readings
   double depth_scale = 1;                   ///< factor of all readings
   double depth_delay = 0;                   ///< s by which depth shows an earlier moment than the pixels
+  double readout = 0;                       ///< s in which the rows of an image are read, the middle one at the stamp
   /// Shift of the depth image against the colour image, right and down, in bearings.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();
   BearingCorrection bearing;  ///< error of the intrinsics: the sightings need this correction
@@ -55,6 +56,8 @@ class LandmarkSimulation {
   std::vector<FilterMeasurement> sight(double t, std::size_t most);
   /// Corrects depth readings for this shift and this delay (s) from now on.
   void readDepthWith(const Eigen::Vector2d& shift, double delay) { read_with_ = shift, read_late_ = delay; }
+  /// Takes sightings to the stamp with this readout, s, from now on.
+  void readRowsWithin(double seconds) { read_within_ = seconds; }
   const SE3& T_I_C() const { return T_I_C_; }
   void generateImu(double until);
 
@@ -66,6 +69,7 @@ class LandmarkSimulation {
   std::vector<Eigen::Vector3d> points_;
   Eigen::Vector2d read_with_ = Eigen::Vector2d::Zero();
   double read_late_ = 0;
+  double read_within_ = 0;
   std::vector<LandmarkId> track_;
   std::vector<Eigen::Vector2d> creep_, crept_;  ///< px per image, px; per point
   LandmarkId next_ = 1;

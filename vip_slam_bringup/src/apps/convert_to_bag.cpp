@@ -56,7 +56,7 @@ int convertTumRgbd(int argc, char** argv) {
   line.option("camera", camera, "fx fy cx cy [k1 k2 p1 p2 [k3]]", vip_slam::count<double>(4, 9));
   line.flag("no-imu", tum.no_imu, "leave out imu.txt and accelerometer.txt");
   line.option("rolling-shutter", tum.rolling_shutter,
-              "seconds from the colour image's first row to its last; a Kinect v1's: 0.02 to 0.03",
+              "seconds from the colour image's first row to its last; a Kinect v1's: 0.02 to 0.03; rendered images: 0",
               vip_slam::between(0.0, 0.1));
   line.option("depth-factor", depth_factor, "depth units per metre; 0: 1000 or 5000, as the images tell",
               vip_slam::between(0.0, 1e6));

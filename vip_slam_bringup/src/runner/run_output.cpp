@@ -141,6 +141,10 @@ void emitCalibration(YAML::Emitter& yaml, const CalibrationEstimate& calibration
     yaml << YAML::Key << "depth_delay" << YAML::Value << calibration.depth_delay;
     yaml << YAML::Key << "sigma_depth_delay" << YAML::Value << calibration.sigma_depth_delay;
   }
+  if (calibration.sigma_readout > 0) {
+    yaml << YAML::Key << "rolling_shutter" << YAML::Value << calibration.readout;
+    yaml << YAML::Key << "sigma_rolling_shutter" << YAML::Value << calibration.sigma_readout;
+  }
   list("depth_shift", calibration.depth_shift_px);
   list("sigma_depth_shift", calibration.sigma_depth_shift);
   Eigen::VectorXd added(static_cast<Eigen::Index>(depth_curve.added.size()));

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kSure = 5.0;  // sigmas
 constexpr double kMinTurn = 0.2 * kDegree, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005, kMinBearing = 0.001,
-                 kMinGyroError = 0.002, kMinDepthShift = 0.001, kMinDepthScale = 0.005, kMinDepthDelay = 0.002;
+                 kMinGyroError = 0.002, kMinDepthShift = 0.001, kMinDepthScale = 0.005, kMinDepthDelay = 0.002,
+                 kMinReadout = 0.003;
 
 /// Whether some component's difference is significant, above kSure sigmas.
 bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
@@ -91,6 +92,16 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
         "a temporal filter on in the driver, are the two cameras not taken together? depth/delay in the "
         "sensor's configuration should be %.3f",
         late > 0 ? "an earlier" : "a later", 1e3 * std::abs(late), 1e3 * found.sigma_depth_delay, found.depth_delay));
+  }
+  const double read = found.readout - given.readout;
+  if (found.sigma_readout > 0 && std::abs(read) > std::max(kMinReadout, kSure * found.sigma_readout)) {
+    const double seconds = 1e-4 * std::round(1e4 * found.readout) + 0.0;  // no minus before a zero
+    all.push_back(
+        formatted("the rows of a colour image are read within %.1f ms (one sigma %.1f ms), not %.1f ms, which is "
+                  "corrected for; ",
+                  1e3 * seconds, 1e3 * found.sigma_readout, 1e3 * given.readout) +
+        (seconds < 0 ? std::string("the last row comes first: is the image turned round?")
+                     : formatted("color/rolling_shutter in the sensor's configuration should be %.4f", seconds)));
   }
   const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();

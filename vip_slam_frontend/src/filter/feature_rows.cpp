@@ -81,7 +81,7 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     weight(2, 2) = 1.0 / sigma_z;
     J_measure = weight * J_measure;
 
-    const Eigen::Vector2d xy = o.xy + o.by_intrinsics * window.bearing.value;
+    const Eigen::Vector2d xy = trueBearing(window, o);
     Eigen::Vector3d residual(xy.x() - p_C.x() / p_C.z(), xy.y() - p_C.y() / p_C.z(), trueDepth(window, o) - p_C.z());
     residual = weight * residual;
 
@@ -105,6 +105,8 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     if (window.calibration.depth_scale && with_depth) (*H_x)(row + 2, window.depthScaleColumn()) = -q_C.z() / sigma_z;
     if (window.calibration.depth_delay && with_depth)
       (*H_x)(row + 2, window.depthDelayColumn()) = -o.depth_rate / sigma_z;
+    if (window.calibration.readout)
+      H_x->block<2, 1>(row, window.readoutColumn()) = -weight.topLeftCorner<2, 2>() * o.by_readout;
     if (window.calibration.intrinsics) {
       // Evaluated at the predicted bearing: the measured one has the residual's noise, and its square would bias the
       // focal length (by 0.25 % with 0.2 px).

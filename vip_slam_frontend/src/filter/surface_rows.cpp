@@ -55,7 +55,7 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const int depth = offset + (window.calibration.time_offset ? 1 : 0);
   const int scale = depth + (window.calibration.depth_offset ? 1 : 0);
   const int delay = scale + (window.calibration.depth_scale ? 1 : 0);
-  const int intrinsics = delay + (window.calibration.depth_delay ? 1 : 0);
+  const int intrinsics = delay + (window.calibration.depth_delay ? 1 : 0) + (window.calibration.readout ? 1 : 0);
   const int shift = intrinsics + (window.calibration.intrinsics ? 4 : 0);
   // For points from depth alone a shift of the depth image is equivalent to one of the principal point.
   Eigen::Matrix3d bearing = window.bearing.matrix();

@@ -61,10 +61,16 @@ BearingJacobian bearingJacobian(const CameraModel& camera, const Eigen::Vector2d
   return bend.inverse() * focal.asDiagonal() * bearingJacobian(distorted);
 }
 
+Eigen::Vector2d bearingRate(const Eigen::Vector2d& xy, double z, const Eigen::Vector3d& omega_C,
+                            const Eigen::Vector3d& v_C) {
+  const Eigen::Vector3d moved = -omega_C.cross(z * xy.homogeneous()) - v_C;
+  return (moved.head<2>() - xy * moved.z()) / z;
+}
+
 double depthRate(const Eigen::Vector2d& xy, double z, const Eigen::Vector2d& slope, const Eigen::Vector3d& omega_C,
                  const Eigen::Vector3d& v_C) {
   const Eigen::Vector3d moved = -omega_C.cross(z * xy.homogeneous()) - v_C;
-  return moved.z() - slope.dot(moved.head<2>() - xy * moved.z()) / z;
+  return moved.z() - slope.dot(bearingRate(xy, z, omega_C, v_C));
 }
 
 SE3 cameraPose(const WindowState& window, const Clone& clone) {
@@ -87,7 +93,7 @@ Triangulation triangulate(const WindowState& window, const std::vector<Observati
     const SE3 T_W_C = cameraPose(window, window.clones[index]);
     if (views.empty()) T_W_A = T_W_C;
     const SE3 T_C_A = T_W_C.inverse() * T_W_A;
-    views.push_back({T_C_A.R(), T_C_A.t(), &o, o.xy + o.by_intrinsics * window.bearing.value});
+    views.push_back({T_C_A.R(), T_C_A.t(), &o, trueBearing(window, o)});
   }
   if (views.size() < 2) return result;
 

@@ -37,6 +37,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       evidence_({{0.0, options.calibration.sigma_depth_offset},
                  {1.0, options.calibration.sigma_depth_scale},
                  {0.0, options.calibration.sigma_depth_delay},
+                 {0.0, options.calibration.sigma_readout},
                  {0.0, options.calibration.sigma_focal},
                  {0.0, options.calibration.sigma_focal},
                  {0.0, options.calibration.sigma_centre},
@@ -89,11 +90,11 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.depth_shift = learnt_.depth_shift;
   window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = {calibration.rotation,    calibration.translation,
-                        calibration.time_offset, calibration.depth_offset,
-                        calibration.depth_scale, calibration.depth_delay,
-                        calibration.intrinsics,  calibration.depth_shift && !shift_contradicts_,
-                        calibration.gyro_scale,  calibration.gyro_misalignment};
+  window.calibration = {
+      calibration.rotation,     calibration.translation,      calibration.time_offset,
+      calibration.depth_offset, calibration.depth_scale,      calibration.depth_delay,
+      calibration.readout,      calibration.intrinsics,       calibration.depth_shift && !shift_contradicts_,
+      calibration.gyro_scale,   calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
@@ -112,6 +113,8 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
       sigma = evidence_.held(kDepthScale).sigma;
     } else if (window.calibration.depth_delay && c == window.depthDelayColumn()) {
       sigma = evidence_.held(kDepthDelay).sigma;
+    } else if (window.calibration.readout && c == window.readoutColumn()) {
+      sigma = evidence_.held(kReadout).sigma;
     } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.depthShiftColumn()) {
       sigma = evidence_.held(kBearing + c - window.intrinsicsColumn()).sigma;
     } else if (c >= window.depthShiftColumn() && c < window.gyroColumn()) {
@@ -215,7 +218,7 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
     FilterTrack& track = tracks_[m.id];
     track.id = m.id;
     track.observations.push_back(
-        {id, m.xy, m.depth, m.depth_sigma, m.depth_slope, m.depth_rate, m.by_intrinsics, m.whitening});
+        {id, m.xy, m.depth, m.depth_sigma, m.depth_slope, m.depth_rate, m.by_intrinsics, m.by_readout, m.whitening});
   }
 }
 

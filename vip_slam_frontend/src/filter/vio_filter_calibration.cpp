@@ -30,6 +30,7 @@ CalibrationEstimate VioFilter::calibration() const {
   calibration.depth_offset = depthCorrection();
   calibration.depth_scale = depthScale();
   calibration.depth_delay = depthDelay();
+  calibration.readout = readout();
   calibration.bearing = bearingCorrection();
   calibration.depth_contradicts = evidence_.contradicts(kDepthOffset) || shift_contradicts_;
   calibration.depth_shift += depth_shift_;
@@ -41,6 +42,7 @@ CalibrationEstimate VioFilter::calibration() const {
   calibration.sigma_depth_offset = window.calibration.depth_offset ? evidence_.sigmaOfAdopted(kDepthOffset) : 0.0;
   calibration.sigma_depth_scale = window.calibration.depth_scale ? evidence_.sigmaOfAdopted(kDepthScale) : 0.0;
   calibration.sigma_depth_delay = window.calibration.depth_delay ? evidence_.sigmaOfAdopted(kDepthDelay) : 0.0;
+  calibration.sigma_readout = window.calibration.readout ? evidence_.sigmaOfAdopted(kReadout) : 0.0;
   for (int k = 0; window.calibration.intrinsics && k < 4; ++k) {
     calibration.sigma_bearing(k) = evidence_.sigmaOfAdopted(kBearing + k);
   }
@@ -93,6 +95,7 @@ std::vector<VioFilter::HeldNumber> VioFilter::heldNumbers() {
   if (flags.depth_offset) all.push_back({kDepthOffset, &window.depth_offset, false});
   if (flags.depth_scale) all.push_back({kDepthScale, &window.depth_scale, false});
   if (flags.depth_delay) all.push_back({kDepthDelay, &window.depth_delay, true});
+  if (flags.readout) all.push_back({kReadout, &window.readout, true});
   for (int k = 0; flags.intrinsics && k < 4; ++k) all.push_back({kBearing + k, &window.bearing.value(k), false});
   return all;
 }
@@ -123,14 +126,20 @@ void VioFilter::learnHeldNumbers(bool inertial) {
   if (!inertial) motion_unmeasured_ = filter_.window().clones.back().t;
   if (motion_unmeasured_ && oldest().t <= *motion_unmeasured_) {
     for (const HeldNumber& number : numbers) {
-      if (number.index != kDepthOffset) step.marginalise(number.index, evidence_.held(number.index));
+      if (number.index != kDepthOffset && number.index != kReadout)
+        step.marginalise(number.index, evidence_.held(number.index));
     }
   } else {
     motion_unmeasured_.reset();
   }
   evidence_.add(nav().t, step);
-  const double delay = depthDelay();
-  if (evidence_.adopt()) moveDepth(Eigen::Vector2d::Zero(), depthDelay() - delay);
+  const double delay = depthDelay(), read = readout();
+  if (evidence_.adopt()) {
+    moveDepth(Eigen::Vector2d::Zero(), depthDelay() - delay);
+    for (auto& [id, track] : tracks_) {
+      for (Observation& o : track.observations) o.xy += o.by_readout * (readout() - read);
+    }
+  }
   hold();
 }
 

@@ -38,6 +38,7 @@ void WindowState::boxplus(const Eigen::VectorXd& delta) {
   if (calibration.depth_offset) depth_offset += delta(depthOffsetColumn());
   if (calibration.depth_scale) depth_scale += delta(depthScaleColumn());
   if (calibration.depth_delay) depth_delay += delta(depthDelayColumn());
+  if (calibration.readout) readout += delta(readoutColumn());
   if (calibration.intrinsics) bearing.value += delta.segment<4>(intrinsicsColumn());
   if (calibration.depth_shift) depth_shift += delta.segment<2>(depthShiftColumn());
   for (int k = 0; k < calibration.gyro(); ++k) {
@@ -55,7 +56,7 @@ bool WindowState::isFinite() const {
   }
   return v_W.allFinite() && bias_gyro.allFinite() && bias_accel.allFinite() && T_I_C.isFinite() &&
          std::isfinite(time_offset) && std::isfinite(depth_offset) && std::isfinite(depth_scale) &&
-         std::isfinite(depth_delay) && bearing.value.allFinite() && depth_shift.allFinite() &&
+         std::isfinite(depth_delay) && std::isfinite(readout) && bearing.value.allFinite() && depth_shift.allFinite() &&
          gyro_correction.allFinite();
 }
 

@@ -26,14 +26,14 @@ ImuSample sampleAt(const std::vector<ImuSample>& imu, double t) {
 RowPoses::RowPoses(const Readout& readout, const NavState& nav, const std::vector<ImuSample>& imu, const SE3& T_I_C,
                    double gravity) {
   const double length = readout.last - readout.first;
-  const int intervals = 2 * std::max(1, static_cast<int>(std::ceil(0.5 * length / kKnotSeconds)));
+  const int intervals = 2 * std::max(1, static_cast<int>(std::ceil(0.5 * std::abs(length) / kKnotSeconds)));
   knots_.resize(static_cast<std::size_t>(intervals + 1));
   const auto timeOf = [&](int k) { return readout.first + length * k / intervals; };
   const Eigen::Matrix3d R_I_C = T_I_C.R();
   const Eigen::Vector3d g_stamp = nav.T_W_I.R().transpose() * gravityVector(gravity);
   const Eigen::Vector3d v_stamp = nav.T_W_I.R().transpose() * nav.v_W;
   int later = 0;  // the first knot that is not before the stamp
-  while (later <= intervals && timeOf(later) < 0) ++later;
+  while (later <= intervals && timeOf(later) * length < 0) ++later;
   // Integrates from the stamp in both directions: body pose at a knot relative to the stamp, converted to the camera.
   const auto march = [&](int begin, int end, int way) {
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();

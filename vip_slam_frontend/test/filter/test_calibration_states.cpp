@@ -204,6 +204,35 @@ TEST(Calibration, FindsTheDelayOfDepth) {
   EXPECT_LT(nees, believed);
 }
 
+TEST(Calibration, FindsWithinWhatTimeRowsAreRead) {
+  double nees = 0, believed = 0, own_nees = 0;
+  constexpr int kRuns = 6;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    SimulationOptions simulation = exactMotion(seed);
+    simulation.readout = 0.02;
+    FilterOptions options = singlePixels();
+    const RunResult run = runFilter(simulation, options, 20.0, false);
+    EXPECT_NEAR(run.calibration.readout, 0.02, 0.002);
+    own_nees += std::pow((run.calibration.readout - 0.02) / run.calibration.sigma_readout, 2) / kRuns;
+    nees += run.nees / kRuns;
+    options.calibration.readout = false;
+    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+  }
+  std::printf("NEES with rows read within 20 ms: %.2f, of the readout %.2f; taken for an instant: %.2f\n", nees,
+              own_nees, believed);
+  EXPECT_LT(own_nees, 4.0);
+  EXPECT_LT(nees, believed);
+}
+
+TEST(Calibration, AGlobalShutterStaysOne) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const RunResult run = runFilter(exactMotion(seed), singlePixels(), 20.0, false);
+    EXPECT_EQ(run.calibration.readout, 0.0);
+    EXPECT_GT(run.calibration.sigma_readout, 0.0);
+    EXPECT_LT(run.calibration.sigma_readout, 0.001) << "known, but not to differ";
+  }
+}
+
 TEST(Calibration, DepthOfTheSameMomentStaysSo) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     const RunResult run = runFilter(exactMotion(seed), singlePixels(), 20.0, false);

@@ -28,8 +28,9 @@ Scene makeScene() {
   testing::LandmarkSimulation simulation(options);
   simulation.generateImu(3.0);
   scene.window.T_I_C = simulation.T_I_C();
-  scene.window.calibration = {true, true, true, true, true, true, true, true};
+  scene.window.calibration = {true, true, true, true, true, true, true, true, true};
   scene.window.depth_delay = 0.01;
+  scene.window.readout = 0.001;
   scene.window.depth_shift << 0.004, -0.003;
   scene.window.bearing.value << 0.003, -0.002, 0.001, -0.0015;
   scene.window.time_offset = 0.003;
@@ -48,8 +49,15 @@ Scene makeScene() {
     const Eigen::Vector2d xy = p_C.head<2>() / p_C.z() + Eigen::Vector2d(1e-3, -2e-3);
     Eigen::Matrix2d whitening;
     whitening << 0.9, 0.0, -0.2 * i, 0.4;
-    scene.observations.push_back(
-        {clone.id, xy, p_C.z() + 0.01, 0.01, {1.5 - i, 0.4 * i}, 0.7 - 0.3 * i, bearingJacobian(xy), whitening});
+    scene.observations.push_back({clone.id,
+                                  xy,
+                                  p_C.z() + 0.01,
+                                  0.01,
+                                  {1.5 - i, 0.4 * i},
+                                  0.7 - 0.3 * i,
+                                  bearingJacobian(xy),
+                                  {0.4 - 0.3 * i, 0.1 * i},
+                                  whitening});
   }
   scene.window.v_W = scene.window.v_W_fej = scene.window.clones.back().v_W;
   return scene;
@@ -142,6 +150,18 @@ TEST(FeatureRows, RateOfDepthMatchesCentralDifferences) {
   EXPECT_NEAR(depthRate(xy, reading(0, xy), slope, omega, v), numeric, 1e-6);
 }
 
+TEST(FeatureRows, RateOfABearingMatchesCentralDifferences) {
+  const Eigen::Vector3d omega(0.7, -0.4, 0.9), v(0.5, -0.8, 0.3), p(0.6, -0.4, 2.0);
+  constexpr double h = 1e-6;
+  const auto bearing = [&](double t) {
+    const Eigen::Vector3d seen = expSO3(Eigen::Vector3d(omega * t)).transpose() * (p - v * t);
+    return Eigen::Vector2d(seen.head<2>() / seen.z());
+  };
+  const Eigen::Vector2d numeric = (bearing(h) - bearing(-h)) / (2 * h);
+  EXPECT_GT(numeric.norm(), 0.1);
+  EXPECT_LT((bearingRate(bearing(0), p.z(), omega, v) - numeric).norm(), 1e-6);
+}
+
 TEST(FeatureRows, FocalLengthsAreAskedWhereTheBearingIsExpected) {
   Scene scene = makeScene();
   const MeasurementNoise noise;
@@ -154,6 +174,7 @@ TEST(FeatureRows, FocalLengthsAreAskedWhereTheBearingIsExpected) {
     const Eigen::Vector3d given = scene.window.bearing.matrix().inverse() * p_C;
     o.xy = given.head<2>() / given.z();
     o.by_intrinsics = bearingJacobian(o.xy);
+    o.xy -= o.by_readout * scene.window.readout;
   }
   stackFeature(scene.window, scene.observations, scene.f_W, noise, &H_x, &H_f, &r);
   const double h = 1e-6;
@@ -217,6 +238,7 @@ TEST(Triangulation, FindsThePointWithAndWithoutDepth) {
     const Eigen::Vector3d given = scene.window.bearing.matrix().inverse() * p_C;
     o.xy = given.head<2>() / given.z();
     o.by_intrinsics = bearingJacobian(o.xy);
+    o.xy -= o.by_readout * scene.window.readout;
     o.depth = p_C.z() - o.depth_slope.dot(scene.window.depth_shift) - o.depth_rate * scene.window.depth_delay;
   }
   MeasurementNoise noise;

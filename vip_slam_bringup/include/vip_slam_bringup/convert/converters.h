@@ -44,9 +44,11 @@ ConversionReport convertEuroc(const EurocOptions& options);
 struct TumRgbdOptions : ConversionOptions {
   std::optional<CameraIntrinsics> camera;  ///< else calibration.txt, else from "freiburg1..3" in the folder's name
   std::optional<double> depth_factor;      ///< depth units per metre; else guessed from the images
-  double rolling_shutter = 0;              ///< of the colour camera, s, as in a sensor file
-  bool no_imu = false;                     ///< leave out imu.txt and accelerometer.txt
-  SE3 T_imu_cam;                           ///< identity unless the folder's imu.txt has other axes
+  /// Of the colour camera, s, as in a sensor file. Nearly all such folders were recorded by structured-light cameras;
+  /// this is a Kinect v1's, and what another one differs by the odometry finds.
+  double rolling_shutter = 0.025;
+  bool no_imu = false;  ///< leave out imu.txt and accelerometer.txt
+  SE3 T_imu_cam;        ///< identity unless the folder's imu.txt has other axes
 };
 /// TUM RGB-D folder: rgb.txt, depth.txt, optional groundtruth.txt, and inertial data from imu.txt (stamp, gyro, accel),
 /// else from accelerometer.txt (stamp, accel, in the axes of a Kinect's: -x -y z of its camera; written in the

@@ -25,6 +25,8 @@ struct CalibrationEstimate {
   double sigma_depth_scale = 0;   ///< of the present estimate
   double depth_delay = 0;         ///< s by which depth shows an earlier moment than its stamp says, that is adopted
   double sigma_depth_delay = 0;   ///< of the present estimate
+  double readout = 0;             ///< s from the first to the last row of a colour image, that is adopted
+  double sigma_readout = 0;       ///< of the present estimate
   double depth_unit = 0;  ///< m, the unit of readings with this factor, as in a sensor file; 0: they are in metres
   /// Shift of the depth image to the right and down against the colour image, in bearings, and one sigma.
   Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero(), sigma_depth_shift = Eigen::Vector2d::Zero();

@@ -16,6 +16,7 @@ struct CalibrationOptions {
   bool depth_offset = true;
   bool depth_scale = true;
   bool depth_delay = true;
+  bool readout = true;
   bool intrinsics = true;
   bool depth_shift = true;
   bool gyro_scale = true;
@@ -26,6 +27,7 @@ struct CalibrationOptions {
   double sigma_depth_offset = 0.005;
   double sigma_depth_scale = 0.02;
   double sigma_depth_delay = 0.015;
+  double sigma_readout = 0.015;
   double sigma_focal = 0.005;
   double sigma_aspect = 0.0005;
   double sigma_centre = 0.002;
@@ -38,6 +40,7 @@ struct CalibrationOptions {
     v.field("depth_offset", depth_offset, "estimate online what all depth readings are too long or too short by");
     v.field("depth_scale", depth_scale, "estimate online the factor that depth readings need");
     v.field("depth_delay", depth_delay, "estimate online how much later depth is stamped than it was seen");
+    v.field("readout", readout, "estimate online within what time the rows of a colour image are read");
     v.field(
         "intrinsics", intrinsics,
         "estimate online what focal lengths and principal point are off by; not of a fisheye, nor where depth is not "
@@ -52,6 +55,7 @@ struct CalibrationOptions {
     v.field("sigma_depth_offset", sigma_depth_offset, 1e-6, 1.0, "initial one-sigma of the depth's offset, m");
     v.field("sigma_depth_scale", sigma_depth_scale, 1e-6, 1.0, "initial one-sigma of the depth's scale");
     v.field("sigma_depth_delay", sigma_depth_delay, 1e-6, 1.0, "initial one-sigma of the depth's delay, s");
+    v.field("sigma_readout", sigma_readout, 1e-6, 1.0, "initial one-sigma of the time in which rows are read, s");
     v.field("sigma_focal", sigma_focal, 1e-6, 1.0, "initial one-sigma of the focal lengths, as a share of them");
     v.field("sigma_aspect", sigma_aspect, 1e-6, 1.0, "initial one-sigma of fx / fy");
     v.field("sigma_centre", sigma_centre, 1e-6, 1.0,

@@ -20,6 +20,11 @@ BearingJacobian bearingJacobian(const CameraModel& camera, const Eigen::Vector2d
 /// The same for a lens without distortion.
 BearingJacobian bearingJacobian(const Eigen::Vector2d& xy);
 
+/// d xy / d t, 1/s, of a point of a scene at rest, z metres before a camera with these rates of its own, rad/s and m/s,
+/// both in its frame.
+Eigen::Vector2d bearingRate(const Eigen::Vector2d& xy, double z, const Eigen::Vector3d& omega_C,
+                            const Eigen::Vector3d& v_C);
+
 /// Observation::depth_rate where the camera has these rates of its own, rad/s and m/s, both in its frame, and the scene
 /// is at rest. `z`: m; `slope`: see Observation.
 double depthRate(const Eigen::Vector2d& xy, double z, const Eigen::Vector2d& slope, const Eigen::Vector3d& omega_C,
@@ -37,9 +42,16 @@ struct Observation {
   double depth_rate = 0;
   /// Jacobian by WindowState::bearing: d xy / d (sx, sy, cx, cy). Zero when the intrinsics are not estimated.
   BearingJacobian by_intrinsics = BearingJacobian::Zero();
+  /// d xy / d WindowState::readout, 1/s: how xy, which is as seen at the stamp, depends on when the row was read.
+  Eigen::Vector2d by_readout = Eigen::Vector2d::Zero();
   /// L with L^T L the inverse of the pixel's covariance in units of MeasurementNoise::sigma_xy^2.
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
 };
+
+/// Bearing of an observation at the stamp: as measured, corrected by the estimated intrinsics and readout.
+inline Eigen::Vector2d trueBearing(const WindowState& window, const Observation& o) {
+  return o.xy + o.by_intrinsics * window.bearing.value + o.by_readout * window.readout;
+}
 
 /// Depth z of an observation, m: its reading corrected by the estimated scale, offset, shift and delay.
 inline double trueDepth(const WindowState& window, const Observation& o) {

@@ -35,6 +35,7 @@ struct FilterMeasurement {
   double depth_rate = 0;                                    ///< likewise
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< likewise
   BearingJacobian by_intrinsics = BearingJacobian::Zero();  ///< likewise
+  Eigen::Vector2d by_readout = Eigen::Vector2d::Zero();     ///< likewise
 };
 
 /// Initial state and its one-sigma uncertainties.
@@ -116,6 +117,8 @@ class VioFilter {
   const Eigen::Vector2d& takeDepthShift();
   /// Seconds by which depth images show an earlier moment than their stamps say, to apply to the images to come.
   double depthDelay() const { return evidence_.adopted(kDepthDelay); }
+  /// Seconds that reading the rows of an image takes beyond what the sensor's configuration says.
+  double readout() const { return evidence_.adopted(kReadout); }
   double depthNoiseScale() const;  ///< adapted factor on the depth noise, 1 or more
   const SquareRootFilter& algebra() const { return filter_; }
 
@@ -161,7 +164,7 @@ class VioFilter {
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
   /// Numbers of the calibration that the filter keeps at adopted values while their evidence is gathered, in the order
   /// of their columns. The bearings' four come last.
-  enum HeldIndex { kDepthOffset, kDepthScale, kDepthDelay, kBearing, kHeldNumbers = kBearing + 4 };
+  enum HeldIndex { kDepthOffset, kDepthScale, kDepthDelay, kReadout, kBearing, kHeldNumbers = kBearing + 4 };
   struct HeldNumber {
     int index;
     double* state;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
 // present pose), E = (v, b_g, b_a), calibration = the estimated ones of (theta_IC, t_IC, td, depth offset, depth
-// scale, depth delay, bearing correction, depth shift, gyro correction).
+// scale, depth delay, readout, bearing correction, depth shift, gyro correction).
 // Rotations are perturbed on the right, positions in the world.
 #pragma once
 
@@ -30,13 +30,14 @@ struct Clone {
 
 struct CalibrationFlags {
   bool rotation = false, translation = false, time_offset = false, depth_offset = false;
-  bool depth_scale = false, depth_delay = false;
+  bool depth_scale = false, depth_delay = false, readout = false;
   bool intrinsics = false, depth_shift = false;
   bool gyro_scale = false, gyro_misalignment = false;
   /// Number of the camera's calibration states, on which the measurements depend.
   int camera() const {
     return (rotation ? 3 : 0) + (translation ? 3 : 0) + (time_offset ? 1 : 0) + (depth_offset ? 1 : 0) +
-           (depth_scale ? 1 : 0) + (depth_delay ? 1 : 0) + (intrinsics ? 4 : 0) + (depth_shift ? 2 : 0);
+           (depth_scale ? 1 : 0) + (depth_delay ? 1 : 0) + (readout ? 1 : 0) + (intrinsics ? 4 : 0) +
+           (depth_shift ? 2 : 0);
   }
   int gyro() const { return (gyro_scale ? 3 : 0) + (gyro_misalignment ? 6 : 0); }
   int size() const { return camera() + gyro(); }
@@ -56,6 +57,7 @@ struct WindowState {
   double depth_offset = 0;    ///< m, to be added to every reading of the depth camera
   double depth_scale = 1;     ///< times every reading, before the offset
   double depth_delay = 0;     ///< s by which depth shows an earlier moment than the reader has taken it for
+  double readout = 0;         ///< s that reading the rows takes beyond what the tracker has taken it for
   BearingCorrection bearing;  ///< correction of the camera's intrinsics
   /// Shift of the depth image to the right and down against the colour image, in bearings: depth read at bearing b
   /// belongs to b - shift.
@@ -75,7 +77,8 @@ struct WindowState {
   int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
   int depthScaleColumn() const { return depthOffsetColumn() + (calibration.depth_offset ? 1 : 0); }
   int depthDelayColumn() const { return depthScaleColumn() + (calibration.depth_scale ? 1 : 0); }
-  int intrinsicsColumn() const { return depthDelayColumn() + (calibration.depth_delay ? 1 : 0); }
+  int readoutColumn() const { return depthDelayColumn() + (calibration.depth_delay ? 1 : 0); }
+  int intrinsicsColumn() const { return readoutColumn() + (calibration.readout ? 1 : 0); }
   int depthShiftColumn() const { return intrinsicsColumn() + (calibration.intrinsics ? 4 : 0); }
   /// The correction's diagonal (scale), then its off-diagonal entries (misalignment), if estimated: see gyroEntry().
   int gyroColumn() const { return calibrationColumn() + calibration.camera(); }
