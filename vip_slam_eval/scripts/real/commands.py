@@ -20,6 +20,11 @@ def logged(command, log):
         return subprocess.run(command, stdout=file, stderr=subprocess.STDOUT, check=False).returncode
 
 
+def printed(command):
+    """What the command prints."""
+    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False).stdout.decode()
+
+
 def last_words(log):
     with open(log, encoding='utf-8', errors='replace') as file:
         lines = [line.strip() for line in file.read().replace('\r', '\n').splitlines() if line.strip()]

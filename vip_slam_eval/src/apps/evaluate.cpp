@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
   EvaluationInput input;
   std::string truth, truth_topic, truth_times, estimate, estimate_topic, covariance, true_planes, planes, points, out;
   std::string alignment = "yaw";
+  bool no_gravity = false;
   line.option("truth", truth, "true trajectory: TUM, EuRoC's csv, KITTI's poses (with --truth-times) or bag");
   line.required("truth");
   line.option("truth-topic", truth_topic, "topic of the truth in a bag with several");
@@ -46,6 +47,8 @@ int main(int argc, char** argv) {
   line.required("estimate");
   line.option("estimate-topic", estimate_topic, "topic of the estimate in a bag with several");
   line.option("covariance", covariance, "the estimate's covariances, CSV as run_bag writes it: adds the NEES");
+  line.flag("no-gravity", no_gravity,
+            "the estimate had no IMU with gyroscope: its tilt is part of the start and is aligned for the NEES");
   line.option("planes-truth", true_planes, "true planes, YAML");
   line.option("planes", planes, "estimated planes, YAML");
   line.needs("planes-truth", "planes");
@@ -63,6 +66,7 @@ int main(int argc, char** argv) {
   line.option("out", out, "folder for metrics.csv, errors.csv, evaluation.svg and the planes' tables");
   if (const auto status = line.parse(argc, argv)) return *status;
   try {
+    input.level = !no_gravity;
     input.alignment = alignmentFromName(alignment);
     if (input.title.empty()) input.title = estimate;
     input.truth = readTrajectory(truth, truth_topic, nullptr, truth_times);

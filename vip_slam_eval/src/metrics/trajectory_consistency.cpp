@@ -32,7 +32,7 @@ Coverage coverage(const Trajectory& truth, const Trajectory& estimate, double ga
 }
 
 std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate,
-                                      double max_gap, double time_offset) {
+                                      double max_gap, double time_offset, bool level) {
   std::vector<JoinedError> result;
   bool joined = false;
   SE3 T_M_W;
@@ -41,7 +41,7 @@ std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector
     if (!poseAt(truth, sample.t + time_offset, &T_W_B, max_gap)) continue;
     if (!joined) {
       joined = true;
-      T_M_W = alignLevelled(sample.T_M_B, T_W_B);
+      T_M_W = level ? alignLevelled(sample.T_M_B, T_W_B) : sample.T_M_B * T_W_B.inverse();
     }
     const SE3 T_M_B = T_M_W * T_W_B;
     JoinedError e;
@@ -55,12 +55,12 @@ std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector
   return result;
 }
 
-Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap,
-          double time_offset) {
+Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap, double time_offset,
+          bool level) {
   Nees result;
   std::vector<double> pose, position, rotation;
   std::size_t within = 0;
-  for (const JoinedError& e : joinedErrors(truth, estimate, max_gap, time_offset)) {
+  for (const JoinedError& e : joinedErrors(truth, estimate, max_gap, time_offset, level)) {
     const Eigen::LLT<Eigen::Matrix3d> llt_p(e.covariance.topLeftCorner<3, 3>());
     const Eigen::LLT<Eigen::Matrix3d> llt_r(e.covariance.bottomRightCorner<3, 3>());
     if (e.nees < 0 || llt_p.info() != Eigen::Success || llt_r.info() != Eigen::Success) {

@@ -66,7 +66,7 @@ Evaluation evaluate(const EvaluationInput& input) {
   for (const double m : input.rpe_metres) result.over_distance.push_back(relativeErrorOverDistance(result.pairs, m));
   result.coverage = coverage(input.truth, input.estimate, input.gap_seconds, input.time_offset);
   if (!input.covariances.empty()) {
-    result.nees = nees(input.truth, input.covariances, input.max_gap, input.time_offset);
+    result.nees = nees(input.truth, input.covariances, input.max_gap, input.time_offset, input.level);
   }
   if (input.true_planes && input.planes) {
     result.planes = planeMetrics(*input.true_planes, transformPlanes(result.shown.T_W_M, *input.planes));

@@ -208,6 +208,20 @@ TEST_F(NeesTest, TheBodyMayStandOnItsEnd) {
   EXPECT_NEAR(nees(truth_, draw(1.0)).pose.mean, 6.0, 0.3);
 }
 
+/// Without an IMU the world has the first camera's axes, whichever way it looks.
+TEST_F(NeesTest, AWorldWithoutAVerticalIsAlignedAsAWhole) {
+  auto samples = draw(1.0);
+  const SE3 tilted(expQuaternion({0.4, -0.3, 0.2}), Eigen::Vector3d(1, 2, 3));
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = tilted.R();
+  for (PoseWithCovariance& sample : samples) {
+    sample.T_M_B = tilted * sample.T_M_B;
+    sample.covariance = turn * sample.covariance * turn.transpose();
+  }
+  EXPECT_NEAR(nees(truth_, samples, 0.1, 0, false).pose.mean, 6.0, 0.3);
+  EXPECT_GT(nees(truth_, samples).pose.mean, 100.0);
+}
+
 TEST_F(NeesTest, OptimisticCovariancesShow) {
   const Nees optimistic = nees(truth_, draw(2.0));
   EXPECT_NEAR(optimistic.pose.mean, 24.0, 1.2);

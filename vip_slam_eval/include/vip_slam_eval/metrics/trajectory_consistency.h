@@ -31,7 +31,8 @@ struct PoseWithCovariance {
 };
 
 /// Error of a pose after aligning the truth to the first estimated pose in position and yaw, because the filter's
-/// covariance is relative to its start.
+/// covariance is relative to its start. `level` false: in position and rotation, where the tilt is part of the start
+/// (no IMU with a gyroscope).
 struct JoinedError {
   double t = 0;
   Vector6d error = Vector6d::Zero();  ///< x y z, rotation, both in M; metres and radians
@@ -39,7 +40,7 @@ struct JoinedError {
   double nees = 0;  ///< negative when the covariance is not positive definite
 };
 std::vector<JoinedError> joinedErrors(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate,
-                                      double max_gap = 0.1, double time_offset = 0.0);
+                                      double max_gap = 0.1, double time_offset = 0.0, bool level = true);
 
 /// Normalised estimation error squared: e^T P^-1 e. Its mean is the number of degrees of freedom for a consistent
 /// filter.
@@ -51,6 +52,6 @@ struct Nees {
   std::size_t unusable = 0;  ///< covariances that are not positive definite
 };
 Nees nees(const Trajectory& truth, const std::vector<PoseWithCovariance>& estimate, double max_gap = 0.1,
-          double time_offset = 0.0);
+          double time_offset = 0.0, bool level = true);
 
 }  // namespace vip_slam

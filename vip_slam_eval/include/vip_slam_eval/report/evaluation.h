@@ -26,6 +26,7 @@ struct EvaluationInput {
   double max_gap = 0.1;                   ///< seconds; true poses further apart are not interpolated
   double gap_seconds = 0.5;               ///< a longer interval without an estimate is a gap
   double time_offset = 0;                 ///< t_truth = t_estimate + time_offset
+  bool level = true;                      ///< see joinedErrors()
   std::vector<double> rpe_seconds = {1.0, 10.0};
   std::vector<double> rpe_metres = {1.0, 5.0, 10.0};
 };
