@@ -2,6 +2,7 @@
 // The front end's implementation: what it owns and the steps of one image.
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "vip_slam_core/types/session_numbers.h"
@@ -35,7 +36,7 @@ class FrontEnd::Impl {
   bool addGyro(double t, const Eigen::Vector3d& gyro);
   bool addAccel(double t, const Eigen::Vector3d& accel);
   bool ready(double t_image, double depth_lag) const {
-    const double last = std::max(0.5 * readout(), depth_lag + 0.5 * sensor_.depth_rolling_shutter);
+    const double last = std::max(0.5 * std::abs(readout()), depth_lag + 0.5 * sensor_.depth_rolling_shutter);
     return inertial_.covers(t_image + timeOffset() + last);
   }
   FrameOutput process(const FrameInput& input, const FrontEnd::PoseReady& on_pose);

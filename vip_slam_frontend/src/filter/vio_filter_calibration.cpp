@@ -122,7 +122,8 @@ void VioFilter::learnHeldNumbers(bool inertial) {
       step.information(numbers[j].index, numbers[k].index) = after.information(j, k) - of_before.information(j, k);
     }
   }
-  // Only the IMU knows more than the offset: a motion that is itself measured by images and depth agrees with any.
+  // Only the IMU knows more than the offset and the readout: a motion that is itself measured by images and depth
+  // agrees with any.
   if (!inertial) motion_unmeasured_ = filter_.window().clones.back().t;
   if (motion_unmeasured_ && oldest().t <= *motion_unmeasured_) {
     for (const HeldNumber& number : numbers) {
