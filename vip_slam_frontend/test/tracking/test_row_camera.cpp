@@ -49,10 +49,10 @@ struct Swing {
     return list;
   }
   /// The pixel whose row, at its time, sees the point.
-  Eigen::Vector2d seenByItsRow(double t, const Eigen::Vector3d& p_W) const {
+  Eigen::Vector2d seenByItsRow(double t, const Eigen::Vector3d& p_W, double readout = kReadout) const {
     Eigen::Vector2d uv(0, 239.5);
     for (int k = 0; k < 30; ++k) {
-      const double at = t + kReadout * ((uv.y() + 0.5) / 480 - 0.5);
+      const double at = t + readout * ((uv.y() + 0.5) / 480 - 0.5);
       EXPECT_TRUE(largeCamera()->project((T_W_I(at) * T_I_C).inverse() * p_W, &uv));
     }
     return uv;
@@ -82,6 +82,22 @@ TEST(RowCamera, EveryRowAgreesWithTheMotionThere) {
     }
   }
   EXPECT_GT(most_apart, 8.0);
+}
+
+/// An image that is turned round.
+TEST(RowCamera, TheLastRowMayComeFirst) {
+  const Swing swing;
+  const RowCamera view(largeCamera(), std::make_shared<RowPoses>(Readout::around(-kReadout), swing.nav(0.5),
+                                                                 swing.imu(0.49, 0.51), swing.T_I_C));
+  const SE3 T_W_C = swing.T_W_I(0.5) * swing.T_I_C;
+  for (double y : {-0.4, 0.3}) {  // far from the middle row, where both are one moment
+    const Eigen::Vector3d p(0.5, 2 * y, 2.0);
+    const Eigen::Vector2d truth = swing.seenByItsRow(0.5, T_W_C * p, -kReadout);
+    EXPECT_GT((truth - swing.seenByItsRow(0.5, T_W_C * p)).norm(), 1.0);
+    Eigen::Vector2d uv;
+    ASSERT_TRUE(view.project(p, &uv));
+    EXPECT_LT((uv - truth).norm(), 0.01) << y;
+  }
 }
 
 TEST(RowCamera, BeyondTheImuItsLastSampleCounts) {
