@@ -85,6 +85,7 @@ vip_slam_msgs::MapUpdate toMsg(const MapUpdate& update, const std::string& map_f
   msg.newest_keyframe = update.newest_keyframe;
   msg.depth_curve = update.depth_curve.added;
   msg.disparity_error = update.disparity_error;
+  msg.odometry_variance = update.odometry_variance;
   msg.global_update = update.global;
   msg.keyframes.reserve(update.keyframes.size());
   for (const auto& keyframe : update.keyframes) {
@@ -131,6 +132,7 @@ MapUpdate fromMsg(const vip_slam_msgs::MapUpdate& msg) {
   update.newest_keyframe = msg.newest_keyframe;
   update.depth_curve.added = msg.depth_curve;
   update.disparity_error = msg.disparity_error;
+  update.odometry_variance = msg.odometry_variance;
   update.global = msg.global_update;
   update.keyframes.reserve(msg.keyframes.size());
   for (const auto& keyframe : msg.keyframes) {

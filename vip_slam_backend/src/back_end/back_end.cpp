@@ -52,6 +52,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   }
   const MapKeyframe& inserted = map.keyframe(keyframe->id);
   noteWeakness(inserted);
+  map.widenMotion(keyframe->id, odometry_noise.varianceFactor());
   if (inserted.previous != 0) {
     const double factor = imuNoiseFactor(map.keyframe(inserted.previous), inserted, settings.gravity);
     if (factor > 1) map.widenImuNoise(keyframe->id, factor, sensor.imu_noise);
@@ -179,6 +180,7 @@ MapSnapshot BackEnd::Impl::snapshot() const {
 void BackEnd::Impl::reset() {
   map.clear();
   maker.clear();
+  odometry_noise.reset();
   loop_closer.clear();
   localisation = Localisation();
   relocaliser.clear();

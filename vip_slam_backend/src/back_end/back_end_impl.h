@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "../optimisation/odometry_noise.h"
 #include "adjustment_requests.h"
 #include "localisation.h"
 #include "loop_journal.h"
@@ -113,6 +114,7 @@ struct BackEnd::Impl {
   LandmarkMaker maker;
   Reobservation reobservation;
   std::unique_ptr<BaSolver> solver;
+  backend::OdometryNoise odometry_noise;
   LoopCloser loop_closer;
   Relocaliser relocaliser;
   Localisation localisation;

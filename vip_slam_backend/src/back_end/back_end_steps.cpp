@@ -55,6 +55,8 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   if (summary.iterations > 0)
     statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
   followNewest();
+  odometry_noise.compare(map, map.newestKeyframe());
+  statistics.odometry_variance = odometry_noise.varianceFactor();
 
   std::set<LandmarkId> landmarks;
   for (std::size_t f = 0; f < built.frames.size(); ++f) {
@@ -133,6 +135,7 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->parts = epochParts(map, loop_closer.loops());
   update->depth_curve = camera_correction.curve;
   update->disparity_error = disparity_error;
+  update->odometry_variance = odometry_noise.varianceFactor();
   update->newest_keyframe = map.newestKeyframe();
   if (update->newest_keyframe != 0) update->t = map.keyframe(update->newest_keyframe).data->frame.t;
   MapChanges changes = map.takeChanges();

@@ -14,10 +14,6 @@
 namespace vip_slam {
 namespace {
 
-// The odometry's covariance between two keyframes is that of independent errors; what it errs in one motion it errs in
-// the next, too: over the many motions of a loop that adds up.
-constexpr double kInflation = 2.0;
-
 // Metres between neighbours. A rotation in place drifts too: a full turn counts as two metres of travel.
 double wayBetween(const MapKeyframe& a, const MapKeyframe& b) {
   const double turned = a.state.T_W_I.rotation().angularDistance(b.state.T_W_I.rotation());
@@ -39,7 +35,7 @@ Matrix6d odometryInformation(const MapKeyframe& a, const MapKeyframe& b, double 
   const bool weak =
       a.data->frame.status.state != TrackingState::kTracking || b.data->frame.status.state != TrackingState::kTracking;
   if (b.previous == a.id() && b.motion.known())
-    covariance += kInflation * kInflation * b.motion.covariance;
+    covariance += b.motion.covariance;
   else if (weak)
     covariance *= 100;
   return (drift * covariance).inverse().llt().matrixU();

@@ -266,6 +266,14 @@ void Map::widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise) {
   kf.imu_noise_scale = scale;
 }
 
+void Map::widenMotion(KeyframeId id, double factor) {
+  MapKeyframe& kf = keyframe(id);
+  if (!(factor > 0) || !std::isfinite(factor))
+    throw MapError("keyframe " + std::to_string(id) + ": factor on the odometry's covariance is " +
+                   std::to_string(factor));
+  kf.motion.covariance *= factor;
+}
+
 void Map::moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I) {
   std::map<KeyframeId, SE3> motion;  // new world from old world, per keyframe
   for (const auto& entry : T_W_I) {

@@ -2,6 +2,8 @@
 // The front end's link to the map: the back end's landmarks, and where the map lies in odom.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -21,6 +23,7 @@ class MapLink {
     // T_map_odom of another epoch, or of a map without keyframes, is not valid for this odometry.
     T_map_odom_.reset();
     if (update.epoch == epoch && update.newest_keyframe != 0) T_map_odom_ = update.T_map_odom;
+    if (std::isfinite(update.odometry_variance)) odometry_variance_ = std::max(1.0, update.odometry_variance);
   }
   /// A track that has ended: its patch may be recognised later.
   void retire(const Track& track) { landmarks_.retire(track); }
@@ -28,8 +31,13 @@ class MapLink {
   int reacquire(FeatureTracker* tracker, const OrbExtractor& orb, const SE3& T_odom_C) const {
     return T_map_odom_ ? landmarks_.reacquire(tracker, orb, *T_map_odom_ * T_odom_C, T_odom_C) : 0;
   }
+  /// Factor on the covariance of the filter, by which the map finds its motions wrong.
+  double odometryVariance() const { return odometry_variance_; }
   /// The back end has discarded its map.
-  void forgetMap() { landmarks_.clear(); }
+  void forgetMap() {
+    landmarks_.clear();
+    odometry_variance_ = 1;
+  }
   /// A new epoch.
   void reset() {
     landmarks_.forgetPatches();
@@ -38,6 +46,7 @@ class MapLink {
 
  private:
   LandmarkMatcher landmarks_;
+  double odometry_variance_ = 1;
   std::optional<SE3> T_map_odom_;  ///< empty: not known in this epoch
 };
 

@@ -167,6 +167,25 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
   EXPECT_LT(front_end_.calibration().depth_offset, -0.001);
 }
 
+// What the map finds of the odometry's error is in the covariance, and in nothing else.
+TEST_F(FrontEndTest, TheMapsFactorIsOnThePublishedCovarianceAlone) {
+  FrontEnd without(options(), sensor());
+  for (double t = 0; t < 2.1; t += 0.005) without.addImu(World::imu(t));
+  MapUpdate update;
+  update.odometry_variance = 9;
+  Matrix15d alone, with;
+  for (int k = 0; k < 40; ++k) {
+    const double t = 0.05 * k;
+    feedImu(t + 0.05);
+    if (k == 30) front_end_.applyMapUpdate(update);
+    alone = without.process({t, world_.image(t), World::depth(t)}).frame->covariance;
+    const TrackedFramePtr frame = front_end_.process({t, world_.image(t), World::depth(t)}).frame;
+    with = frame->covariance;
+  }
+  EXPECT_GT(alone.norm(), 0);
+  EXPECT_LT((with - 9 * alone).norm(), 1e-12 * with.norm());
+}
+
 // However far the map is moved against the odometry, the odometry goes on to the last bit.
 TEST_F(FrontEndTest, ACorrectionOfTheMapDoesNotMoveTheOdometry) {
   FrontEnd untouched(options(), sensor());

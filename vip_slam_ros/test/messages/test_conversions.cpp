@@ -305,6 +305,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   update.newest_keyframe = 30;
   update.depth_curve.added = {0.f, -0.001f, 0.004f};
   update.disparity_error = -0.0021;
+  update.odometry_variance = 2.25;
   update.global = true;
   update.keyframes = {{29, state(), pose(), {}}, {30, state(), pose(), {-0.004, {{0.f, 0.002f}}, {}, {}}}};
   LandmarkEstimate landmark;
@@ -344,6 +345,7 @@ TEST_F(Conversions, MapUpdateIsUnchanged) {
   EXPECT_EQ(back.keyframes[1].camera_correction, update.keyframes[1].camera_correction);
   EXPECT_EQ(back.depth_curve, update.depth_curve);
   EXPECT_EQ(back.disparity_error, update.disparity_error);
+  EXPECT_EQ(back.odometry_variance, update.odometry_variance);
   ASSERT_EQ(back.landmarks.size(), 1u);
   EXPECT_EQ(back.landmarks[0].id, 77);
   EXPECT_EQ(back.landmarks[0].p_W, landmark.p_W);

@@ -106,6 +106,8 @@ class Map {
   void moveKeyframes(const std::map<KeyframeId, SE3>& T_W_I);
   /// Multiplies the noise of the IMU factor into a keyframe by `factor`.
   void widenImuNoise(KeyframeId id, double factor, const ImuNoise& noise);
+  /// Multiplies the covariance of the odometry's motion into a keyframe by `factor`.
+  void widenMotion(KeyframeId id, double factor);
   MapChanges takeChanges();
   void clear();
   bool empty() const { return keyframes_.empty(); }

@@ -54,6 +54,7 @@ struct MapUpdate {
   KeyframeId newest_keyframe = 0;
   DepthCurve depth_curve;                         ///< depth correction estimated from the map
   double disparity_error = 0;                     ///< 1/m, the part of depth_curve due to it; see disparity_curve.h
+  double odometry_variance = 1;                   ///< factor on the odometry's covariance, by the map
   bool global = false;                            ///< everything moved (GBA, loop); else a local window
   std::vector<KeyframeEstimate> keyframes;        ///< changed ones (all when global)
   std::vector<LandmarkEstimate> landmarks;        ///< changed ones (all when global)
