@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "packs.h"
+#include "vip_slam_frontend/filter/shared_depth.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
 namespace vip_slam {
@@ -55,6 +56,7 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
   *r = Eigen::VectorXd::Zero(most);
   const Eigen::Matrix3d R_C_I = window.T_I_C.R().transpose();
   std::vector<ViewRows> views;
+  std::vector<frontend::DepthRow> depths;
   int row = 0;
   for (const Observation& o : observations) {
     const int index = window.indexOf(o.clone);
@@ -117,8 +119,10 @@ std::vector<ViewRows> stackFeature(const WindowState& window, const std::vector<
     if (window.calibration.depth_shift && with_depth)
       H_x->block<1, 2>(row + 2, window.depthShiftColumn()) = -o.depth_slope.transpose() / sigma_z;
     r->segment(row, rows) = residual.head(rows);
+    if (with_depth) depths.push_back({row + 2, o.depth_shared / sigma_z, o.xy});
     row += rows;
   }
+  frontend::decorrelateDepth(depths, H_x, H_f, r);
   H_x->conservativeResize(row, Eigen::NoChange);
   H_f->conservativeResize(row, Eigen::NoChange);
   r->conservativeResize(row);

@@ -10,16 +10,13 @@
 
 #include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/filter/qr.h"
+#include "vip_slam_frontend/filter/shared_depth.h"
 #include "vip_slam_frontend/filter/triangular_solve.h"
 #include "vip_slam_frontend/filter/triangulation.h"
 
 namespace vip_slam {
 
 namespace {
-
-// Bearing over which the correlation of depth errors falls to 1 / e: 64 px of a Kinect, an Xtion and a LiDAR phone, on
-// which it was measured.
-constexpr double kCorrelationLength = 0.12;
 
 /// Columns of the rows before compression: newest clone (theta, p), calibration of the camera, reference's clone
 /// (theta, p).
@@ -131,7 +128,7 @@ void whitenShared(const std::vector<SurfacePair>& pairs, const std::vector<int>&
   for (int k = 0; k < n; ++k) {
     const int below = n - k;
     const Eigen::ArrayXd apart = ((x.tail(below) - x(k)).square() + (y.tail(below) - y(k)).square()).sqrt();
-    covariance.col(k).tail(below) = shared(k) * shared.tail(below) * (apart / -kCorrelationLength).exp();
+    covariance.col(k).tail(below) = shared(k) * shared.tail(below) * (apart / -frontend::kDepthCorrelationLength).exp();
   }
   covariance.diagonal().array() += 1;
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(covariance);  // in place

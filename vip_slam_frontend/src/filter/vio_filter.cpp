@@ -217,8 +217,8 @@ void VioFilter::addMeasurements(CloneId id, const std::vector<FilterMeasurement>
   for (const FilterMeasurement& m : measurements) {
     FilterTrack& track = tracks_[m.id];
     track.id = m.id;
-    track.observations.push_back(
-        {id, m.xy, m.depth, m.depth_sigma, m.depth_slope, m.depth_rate, m.by_intrinsics, m.by_readout, m.whitening});
+    track.observations.push_back({id, m.xy, m.depth, m.depth_sigma, m.depth_slope, m.depth_rate, m.by_intrinsics,
+                                  m.by_readout, m.whitening, m.depth_shared});
   }
 }
 

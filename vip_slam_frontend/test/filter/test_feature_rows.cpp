@@ -57,7 +57,8 @@ Scene makeScene() {
                                   0.7 - 0.3 * i,
                                   bearingJacobian(xy),
                                   {0.4 - 0.3 * i, 0.1 * i},
-                                  whitening});
+                                  whitening,
+                                  0.008 + 0.002 * i});
   }
   scene.window.v_W = scene.window.v_W_fej = scene.window.clones.back().v_W;
   return scene;

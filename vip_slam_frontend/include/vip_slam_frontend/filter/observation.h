@@ -34,7 +34,7 @@ struct Observation {
   CloneId clone = 0;
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();  ///< undistorted normalised coordinates
   double depth = 0;                              ///< z, metres; 0: none
-  double depth_sigma = 0;                        ///< metres
+  double depth_sigma = 0;                        ///< of the reading's own error, metres
   /// d z / d xy of the surface there, metres; zero where it is not known. When the depth image is shifted
   /// (WindowState::depth_shift) the depth is read next to the pixel, and this slope gives the difference.
   Eigen::Vector2d depth_slope = Eigen::Vector2d::Zero();
@@ -46,6 +46,9 @@ struct Observation {
   Eigen::Vector2d by_readout = Eigen::Vector2d::Zero();
   /// L with L^T L the inverse of the pixel's covariance in units of MeasurementNoise::sigma_xy^2.
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
+  /// One sigma of the error of depth that is shared with readings nearby, in this image and in others, metres. It
+  /// counts as often as tracks share it, so that together they are worth one.
+  double depth_shared = 0;
 };
 
 /// Bearing of an observation at the stamp: as measured, corrected by the estimated intrinsics and readout.

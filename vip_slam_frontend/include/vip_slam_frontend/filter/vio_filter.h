@@ -36,6 +36,7 @@ struct FilterMeasurement {
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();  ///< likewise
   BearingJacobian by_intrinsics = BearingJacobian::Zero();  ///< likewise
   Eigen::Vector2d by_readout = Eigen::Vector2d::Zero();     ///< likewise
+  double depth_shared = 0;                                  ///< likewise
 };
 
 /// Initial state and its one-sigma uncertainties.
