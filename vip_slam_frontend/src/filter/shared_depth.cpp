@@ -28,28 +28,25 @@ std::vector<double> depthSharing(const std::vector<Eigen::Vector2d>& places) {
 
 void decorrelateDepth(const std::vector<DepthRow>& depths, Eigen::MatrixXd* H_x, Eigen::MatrixXd* H_f,
                       Eigen::VectorXd* r) {
-  // In the reverse order U is the lower Cholesky factor: place k there is depth n - 1 - k.
-  const int n = static_cast<int>(depths.size());
-  Eigen::MatrixXd reversed = Eigen::MatrixXd::Identity(n, n);
+  // In the reverse order U is the lower Cholesky factor.
+  const int n = static_cast<int>(depths.size()), width = static_cast<int>(H_x->cols());
+  if (n == 0) return;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(n, n);
+  Eigen::MatrixXd rows(n, width + 4);
   for (int k = 0; k < n; ++k) {
     const DepthRow& a = depths[n - 1 - k];
     for (int m = 0; m <= k; ++m) {
       const DepthRow& b = depths[n - 1 - m];
-      reversed(k, m) += a.shared * b.shared * correlation(a.xy, b.xy);
+      covariance(k, m) += a.shared * b.shared * correlation(a.xy, b.xy);
     }
+    rows.row(k) << H_x->row(a.row), H_f->row(a.row), (*r)(a.row);
   }
-  const Eigen::MatrixXd L = reversed.llt().matrixL();
+  covariance.llt().matrixL().solveInPlace(rows);
   for (int k = 0; k < n; ++k) {
     const int row = depths[n - 1 - k].row;
-    for (int m = 0; m < k; ++m) {
-      const int later = depths[n - 1 - m].row;
-      H_x->row(row) -= L(k, m) * H_x->row(later);
-      H_f->row(row) -= L(k, m) * H_f->row(later);
-      (*r)(row) -= L(k, m) * (*r)(later);
-    }
-    H_x->row(row) /= L(k, k);
-    H_f->row(row) /= L(k, k);
-    (*r)(row) /= L(k, k);
+    H_x->row(row) = rows.row(k).head(width);
+    H_f->row(row) = rows.row(k).segment<3>(width);
+    (*r)(row) = rows(k, width + 3);
   }
 }
 
