@@ -44,7 +44,7 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   const std::uint32_t epoch_before = epoch;
   const NavState state = predict(*keyframe);
   try {
-    map.addKeyframe(withCameraCorrection(keyframe, camera_correction), state, sensor.imu_noise);
+    map.addKeyframe(withCameraCorrection(keyframe, calibration.camera()), state, sensor.imu_noise);
   } catch (...) {
     T_map_odom = T_map_odom_before;
     epoch = epoch_before;
@@ -60,8 +60,11 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // New extrinsics change the body poses outside the local window as well. These are published with the next global
   // update; until then the published camera poses are still right.
   map.adoptExtrinsics(keyframe->frame.T_I_C);
-  followCameraCorrection(keyframe->frame.camera_correction);
-  followGyroCorrection(keyframe->gyro_correction);
+  const bool new_camera = calibration.follow(keyframe->frame.camera_correction, statistics.keyframes_received, &map);
+  if (calibration.followGyro(keyframe->gyro_correction, sensor.imu_noise, &map) || new_camera) {
+    global.want();
+    global.outdate();  // an adjustment under way has the old readings
+  }
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   // The place of a new odometry in the map is a guess until a loop ties it: its landmarks must not be matched with
   // older ones by chance.
@@ -93,7 +96,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   const double t = keyframe ? keyframe->frame.t : 0.0;
   const ScopedTimer timer(log, "backend.keyframe", t);
   MapUpdate update = beginUpdate(t);
-  const CameraCorrection camera_correction_before = camera_correction;
+  const CameraCorrection camera_before = calibration.camera();
   bool entering = false, brought = false;
   try {
     if (!keyframe) throw MapError("no keyframe given");
@@ -142,7 +145,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
   if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global.want();
   // Poses of keyframes that waited or were moved, and corrected depth, are new to all receivers: update everything.
-  if (entering || brought || camera_correction != camera_correction_before) fillGlobal(&update);
+  if (entering || brought || calibration.camera() != camera_before) fillGlobal(&update);
   finishUpdate(&update);
   return update;
 }
@@ -189,11 +192,7 @@ void BackEnd::Impl::reset() {
   epoch = 0;
   first_revision = revision + 1;
   global.reset();
-  camera_correction = {};
-  keyframes_at_correction = 0;
-  newest_correction = {};
-  disparity_error = 0;
-  gyro_correction = newest_gyro_correction = Eigen::Matrix3d::Zero();
+  calibration.reset();
   refusal.clear();
   refusals = notices = MessageLog();
   loops = LoopJournal();
@@ -214,10 +213,7 @@ void BackEnd::requestGlobalBa() { impl_->global.want(); }
 
 GbaJob BackEnd::startGlobalBa() {
   impl_->global.start();
-  impl_->camera_correction = impl_->newest_correction;
-  impl_->map.adoptCameraCorrection(impl_->camera_correction);
-  impl_->gyro_correction = impl_->newest_gyro_correction;
-  impl_->map.adoptGyroCorrection(impl_->gyro_correction, impl_->sensor.imu_noise);
+  impl_->calibration.adoptNewest(impl_->sensor.imu_noise, &impl_->map);
   return impl_->makeGlobalJob();
 }
 
@@ -247,10 +243,10 @@ MapUpdate BackEnd::finish() {
 }
 
 InertialScale BackEnd::scale() const { return impl_->statistics.scale; }
-const DepthCurve& BackEnd::depthCurve() const { return impl_->camera_correction.curve; }
-double BackEnd::disparityError() const { return impl_->disparity_error; }
+const DepthCurve& BackEnd::depthCurve() const { return impl_->calibration.camera().curve; }
+double BackEnd::disparityError() const { return impl_->calibration.disparityError(); }
 std::string BackEnd::depthDifference() const {
-  if (impl_->disparity_error != 0) return disparityDifference(impl_->disparity_error);
+  if (disparityError() != 0) return disparityDifference(disparityError());
   return depthCurveDifference(depthCurve());
 }
 std::string BackEnd::trackNoiseDifference() const {

@@ -11,6 +11,7 @@
 
 #include "../optimisation/odometry_noise.h"
 #include "adjustment_requests.h"
+#include "adopted_calibration.h"
 #include "localisation.h"
 #include "loop_journal.h"
 #include "message_log.h"
@@ -46,14 +47,8 @@ struct BackEnd::Impl {
   MapSnapshot snapshot() const;
   void reset();
 
-  // back_end_calibration.cpp
-  /// Applies the newest keyframe's correction of the camera to all keyframes of this session once it differs enough to
-  /// justify a new global adjustment.
-  void followCameraCorrection(const CameraCorrection& newest);
-  /// Estimates the depth camera's distance-dependent error from the map and applies a significant change to all
-  /// keyframes of this session. False when nothing changed.
+  /// Learns the depth camera's error over the distance, and tells an adjustment under way. False: nothing changed.
   bool learnDepthCurve();
-  void followGyroCorrection(const Eigen::Matrix3d& newest);
 
   // back_end_steps.cpp
   /// Pose of the keyframe in the map as T_map_odom predicts it; starts a new epoch where the odometry did.
@@ -126,13 +121,8 @@ struct BackEnd::Impl {
   std::uint64_t revision = 0;
   std::uint64_t first_revision = 0;  ///< first one since the last reset; older ones refer to another map
   AdjustmentRequests global;
-  CameraCorrection camera_correction;                                ///< applied to all keyframes of this session
-  std::uint64_t keyframes_at_correction = 0;                         ///< received when it last changed by much
-  CameraCorrection newest_correction;                                ///< reported with the newest keyframe; same curve
-  double disparity_error = 0;                                        ///< 1/m, corrected by the curve
-  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();         ///< applied to all keyframes of this session
-  Eigen::Matrix3d newest_gyro_correction = Eigen::Matrix3d::Zero();  ///< reported with the newest keyframe
-  std::string refusal;                                               ///< of the last keyframe
+  backend::AdoptedCalibration calibration;
+  std::string refusal;  ///< of the last keyframe
   MessageLog refusals, notices;
   LoopJournal loops;
   BackEndStatistics statistics;

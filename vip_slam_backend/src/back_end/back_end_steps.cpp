@@ -133,8 +133,8 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->T_map_odom = T_map_odom;
   update->placed = placed();
   update->parts = epochParts(map, loop_closer.loops());
-  update->depth_curve = camera_correction.curve;
-  update->disparity_error = disparity_error;
+  update->depth_curve = calibration.camera().curve;
+  update->disparity_error = calibration.disparityError();
   update->odometry_variance = odometry_noise.varianceFactor();
   update->newest_keyframe = map.newestKeyframe();
   if (update->newest_keyframe != 0) update->t = map.keyframe(update->newest_keyframe).data->frame.t;
@@ -143,6 +143,14 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->removed_landmarks = std::move(changes.removed_landmarks);
   update->merged_landmarks = std::move(changes.merged_landmarks);
   update->loops = loops.takeNew();
+}
+
+bool BackEnd::Impl::learnDepthCurve() {
+  if (!options.depth_curve || frozen()) return false;
+  const ScopedTimer timer(log, "backend.depth_curve", map.empty() ? 0 : map.keyframes().rbegin()->second.data->frame.t);
+  if (!calibration.learnDepthCurve(sensor.depth_noise, options.disparity, &map)) return false;
+  global.outdate();
+  return true;
 }
 
 void BackEnd::Impl::askForScale() { statistics.scale = inertialScale(map, sensor.gravity, sensor.imu_noise); }

@@ -11,13 +11,17 @@ constexpr double kMinRotation = 5e-5, kMinTranslation = 3e-4;
 
 }  // namespace
 
+Matrix6d leastCovariance(const Matrix6d& covariance) {
+  Matrix6d least = covariance;
+  least.diagonal().head<3>().array() += kMinRotation * kMinRotation;
+  least.diagonal().tail<3>().array() += kMinTranslation * kMinTranslation;
+  return least;
+}
+
 bool odometryFactor(const MapKeyframe& keyframe, int i, int j, const MeasurementOptions& options,
                     BaRelativePose* factor) {
   if (!options.use_odometry || !keyframe.motion.known()) return false;
-  Matrix6d covariance = keyframe.motion.covariance;
-  covariance.diagonal().head<3>().array() += kMinRotation * kMinRotation;
-  covariance.diagonal().tail<3>().array() += kMinTranslation * kMinTranslation;
-  const Matrix6d information = covariance.llt().solve(Matrix6d::Identity());
+  const Matrix6d information = leastCovariance(keyframe.motion.covariance).llt().solve(Matrix6d::Identity());
   const Eigen::LLT<Matrix6d> root(information);
   if (root.info() != Eigen::Success || !information.allFinite()) return false;
   factor->i = i;

@@ -10,6 +10,9 @@
 
 namespace vip_slam {
 
+/// The covariance of a motion of the odometry with what neither odometry nor map know better, even of the shortest one.
+Matrix6d leastCovariance(const Matrix6d& covariance);
+
 /// The factor of `keyframe`'s motion since its previous one; i and j are their frames. False: the motion is not known.
 bool odometryFactor(const MapKeyframe& keyframe, int i, int j, const MeasurementOptions& options,
                     BaRelativePose* factor);

@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "odometry_factors.h"
 #include "vip_slam_backend/factors/relative_pose.h"
 #include "vip_slam_core/geometry/relative_motion.h"
 
@@ -19,8 +20,6 @@ constexpr double kShortest = 0.5, kLongest = 2.0;
 constexpr double kSettled = 1.0;
 // Number of motions that the mean remembers, and where a single one is cut off, in sigmas of the present mean.
 constexpr double kMemory = 50, kCutOff = 3.0;
-// Errors of the map that no covariance has, as of odometry factors: rad, m.
-constexpr double kMinRotation = 5e-5, kMinTranslation = 3e-4;
 
 /// q of the motion that ends at `last` and takes kShortest to kLongest; negative when none is known.
 double normalisedError(const Map& map, const MapKeyframe& last) {
@@ -34,11 +33,8 @@ double normalisedError(const Map& map, const MapKeyframe& last) {
     first = &map.keyframe(first->previous);
   }
   if (last.data->frame.t - first->data->frame.t > kLongest) return -1;
-  Matrix6d covariance = motion.covariance;
-  covariance.diagonal().head<3>().array() += kMinRotation * kMinRotation;
-  covariance.diagonal().tail<3>().array() += kMinTranslation * kMinTranslation;
   const Vector6d r = relativePoseResidual(first->state.T_W_I, last.state.T_W_I, motion.T_a_b);
-  const double q = r.dot(covariance.llt().solve(r)) / 6;
+  const double q = r.dot(leastCovariance(motion.covariance).llt().solve(r)) / 6;
   return std::isfinite(q) ? q : -1;
 }
 
