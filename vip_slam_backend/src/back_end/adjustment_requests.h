@@ -18,6 +18,10 @@ class AdjustmentRequests {
   /// must not undo it.
   std::uint64_t correction() const { return correction_; }
   void outdate() { ++correction_; }
+  void startOver() {
+    want();
+    outdate();
+  }
 
   /// A loop was closed at time t; it `moved` the map by a noticeable amount, or hardly: in a room that is seen again
   /// and again each loop would cost an adjustment, so those that move nothing ask for one after a rest only.

@@ -60,11 +60,9 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // New extrinsics change the body poses outside the local window as well. These are published with the next global
   // update; until then the published camera poses are still right.
   map.adoptExtrinsics(keyframe->frame.T_I_C);
-  const bool new_camera = calibration.follow(keyframe->frame.camera_correction, statistics.keyframes_received, &map);
-  if (calibration.followGyro(keyframe->gyro_correction, sensor.imu_noise, &map) || new_camera) {
-    global.want();
-    global.outdate();  // an adjustment under way has the old readings
-  }
+  // An adjustment under way has the old readings.
+  if (calibration.follow(keyframe->frame.camera_correction, statistics.keyframes_received, &map)) global.startOver();
+  if (calibration.followGyro(keyframe->gyro_correction, sensor.imu_noise, &map)) global.startOver();
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   // The place of a new odometry in the map is a guess until a loop ties it: its landmarks must not be matched with
   // older ones by chance.
@@ -175,6 +173,7 @@ MapSnapshot BackEnd::Impl::snapshot() const {
   snapshot.loops = loops.kept();
   snapshot.localised = localisation.localised;
   snapshot.statistics = statistics;
+  snapshot.statistics.odometry_variance = odometry_noise.varianceFactor();
   for (const LandmarkEstimate& landmark : snapshot.landmarks)
     snapshot.statistics.plane_landmarks += landmark.plane != 0;
   return snapshot;

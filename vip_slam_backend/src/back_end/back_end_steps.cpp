@@ -56,7 +56,6 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
     statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
   followNewest();
   odometry_noise.compare(map, map.newestKeyframe());
-  statistics.odometry_variance = odometry_noise.varianceFactor();
 
   std::set<LandmarkId> landmarks;
   for (std::size_t f = 0; f < built.frames.size(); ++f) {

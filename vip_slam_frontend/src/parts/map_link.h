@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The front end's link to the map: the back end's landmarks, and where the map lies in odom.
+// The front end's link to the map: its landmarks, where it lies in odom, and how far it finds the odometry off.
 #pragma once
 
 #include <algorithm>
