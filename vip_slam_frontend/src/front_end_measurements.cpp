@@ -41,11 +41,6 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements(const Propagation& p
   const Eigen::Vector3d& omega = propagation.omega_I;
   const Eigen::Vector3d v_I = propagation.predicted.T_W_I.R().transpose() * propagation.predicted.v_W;
   const Eigen::Vector3d omega_C = R_C_I * omega, v_C = R_C_I * (v_I + omega.cross(T_I_C.t()));
-  std::vector<Eigen::Vector2d> with_depth;
-  for (const Track& track : tracker_.tracks())
-    if (track.feature.depth > 0) with_depth.push_back(track.feature.xy.cast<double>());
-  const std::vector<double> shares = frontend::depthSharing(with_depth);
-  auto sharing = shares.begin();
   std::vector<FilterMeasurement> list;
   list.reserve(tracker_.tracks().size());
   for (const Track& track : tracker_.tracks()) {
@@ -55,7 +50,7 @@ std::vector<FilterMeasurement> FrontEnd::Impl::measurements(const Propagation& p
     const double rate = depth_slope.isZero() ? 0.0 : depthRate(xy, f.depth, depth_slope, omega_C, v_C);
     const double z = f.depth > 0 ? f.depth : sensor_.depth_noise.max_range;
     const double from_middle = (f.pixel.y() + 0.5) / camera_->height() - 0.5;
-    const double shared = f.depth > 0 ? surfaces_.learnt().shared() * f.depth_sigma * std::sqrt(*sharing++) : 0.0;
+    const double shared = f.depth > 0 ? surfaces_.learnt().shared() * f.depth_sigma : 0.0;
     list.push_back({f.id, xy, f.depth, f.depth_sigma, depth_slope, rate, track.whitening, bearingJacobian(*camera_, xy),
                     -from_middle * bearingRate(xy, z, omega_C, v_C), shared});
   }

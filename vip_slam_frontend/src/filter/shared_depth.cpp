@@ -14,18 +14,6 @@ double correlation(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 }  // namespace
 
-std::vector<double> depthSharing(const std::vector<Eigen::Vector2d>& places) {
-  std::vector<double> sharing(places.size(), 1.0);
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      const double common = correlation(places[i], places[j]);
-      sharing[i] += common;
-      sharing[j] += common;
-    }
-  }
-  return sharing;
-}
-
 void decorrelateDepth(const std::vector<DepthRow>& depths, Eigen::MatrixXd* H_x, Eigen::MatrixXd* H_f,
                       Eigen::VectorXd* r) {
   // In the reverse order U is the lower Cholesky factor.

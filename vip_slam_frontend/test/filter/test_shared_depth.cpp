@@ -71,15 +71,3 @@ TEST(SharedDepth, WithoutASharedPartNothingChanges) {
   EXPECT_EQ(H_x, H_x_before);
   EXPECT_EQ(r, r_before);
 }
-
-// The variance of the mean of N readings that share all of their error, each taken for independent.
-TEST(SharedDepth, ReadingsOfOnePlaceAreWorthOneAndThoseFarApartEachTheirOwn) {
-  const std::vector<double> together = depthSharing(std::vector<Eigen::Vector2d>(20, Eigen::Vector2d(0.1, -0.2)));
-  double information = 0;
-  for (double shares : together) information += 1 / shares;
-  EXPECT_NEAR(information, 1, 1e-12);
-  std::vector<Eigen::Vector2d> apart;
-  for (int k = 0; k < 5; ++k) apart.emplace_back(2.0 * k, 0);
-  for (double shares : depthSharing(apart)) EXPECT_NEAR(shares, 1, 1e-6);
-  EXPECT_TRUE(depthSharing({}).empty());
-}

@@ -46,8 +46,7 @@ struct Observation {
   Eigen::Vector2d by_readout = Eigen::Vector2d::Zero();
   /// L with L^T L the inverse of the pixel's covariance in units of MeasurementNoise::sigma_xy^2.
   Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
-  /// One sigma of the error of depth that is shared with readings nearby, in this image and in others, metres. It
-  /// counts as often as tracks share it, so that together they are worth one.
+  /// One sigma of the error of depth that is shared with readings nearby, in this image and in others, metres.
   double depth_shared = 0;
 };
 

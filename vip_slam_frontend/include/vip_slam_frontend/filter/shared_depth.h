@@ -14,10 +14,6 @@ namespace vip_slam::frontend {
 /// a Kinect, an Xtion and a LiDAR phone.
 constexpr double kDepthCorrelationLength = 0.12;
 
-/// How many readings the shared error of each of these places counts for, 1 or more: with its variance taken as often,
-/// and as independent, N readings of one place are worth one. `places`: normalised image coordinates.
-std::vector<double> depthSharing(const std::vector<Eigen::Vector2d>& places);
-
 /// A row of a system for a depth, in sigmas of the reading's own error.
 struct DepthRow {
   int row = 0;
