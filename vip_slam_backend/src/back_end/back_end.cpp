@@ -22,10 +22,13 @@ constexpr int kAdjustmentsAtEnd = 3;  // at most, while the estimated depth curv
 }  // namespace
 
 BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l)
+    : Impl(o, s, makeCamera(s.camera), l) {}
+
+BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, const std::shared_ptr<const CameraModel>& camera,
+                    TimingLog* l)
     : options(o),
       sensor(s),
       log(l),
-      camera(makeCamera(s.camera)),
       maker(camera->focal()),
       reobservation(o.reobservation, camera),
       solver(makeSolver(o.solver)),
@@ -40,14 +43,12 @@ BackEnd::Impl::Impl(const BackEndOptions& o, const SensorConfig& s, TimingLog* l
 
 void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   const double t = keyframe->frame.t;
-  const SE3 T_map_odom_before = T_map_odom;
-  const std::uint32_t epoch_before = epoch;
-  const NavState state = predict(*keyframe);
+  const backend::OdometryInMap before = odometry;
+  const NavState state = odometry.predict(*keyframe, map);
   try {
     map.addKeyframe(withCameraCorrection(keyframe, calibration.camera()), state, sensor.imu_noise);
   } catch (...) {
-    T_map_odom = T_map_odom_before;
-    epoch = epoch_before;
+    odometry = before;
     throw;
   }
   const MapKeyframe& inserted = map.keyframe(keyframe->id);
@@ -61,7 +62,8 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   // update; until then the published camera poses are still right.
   map.adoptExtrinsics(keyframe->frame.T_I_C);
   // An adjustment under way has the old readings.
-  if (calibration.follow(keyframe->frame.camera_correction, statistics.keyframes_received, &map)) global.startOver();
+  if (calibration.follow(keyframe->frame.camera_correction, report.statistics.keyframes_received, &map))
+    global.startOver();
   if (calibration.followGyro(keyframe->gyro_correction, sensor.imu_noise, &map)) global.startOver();
   const ScopedTimer reobserve_timer(log, "backend.reobserve", t);
   // The place of a new odometry in the map is a guess until a loop ties it: its landmarks must not be matched with
@@ -70,27 +72,28 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
   const auto in_part = [&part](KeyframeId id) { return part.count(id) != 0; };
   maker.process(keyframe->id, &map, in_part);
   const ReobservationResult found = reobservation.process(keyframe->id, &map, in_part);
-  statistics.reobserved += found.found;
-  statistics.merged += found.merged;
+  report.statistics.reobserved += found.found;
+  report.statistics.merged += found.merged;
 }
 
 void BackEnd::Impl::noteWeakness(const MapKeyframe& inserted) {
   const Keyframe& data = *inserted.data;
   const std::string name = "keyframe " + std::to_string(data.id) + ": ";
-  if (data.frame.features.empty()) notices.add(name + "without features: only its neighbours hold it");
+  if (data.frame.features.empty()) report.notices.add(name + "without features: only its neighbours hold it");
   const bool whole_imu = sensor.hasGyro() && sensor.hasAccel();
   if (!whole_imu || data.previous == 0 || inserted.preintegration) return;
   const std::string before = std::to_string(data.previous);
   if (inserted.previous == 0) {
-    notices.add(name + "its previous keyframe " + before + " is not the last of the map's chain: no IMU factor");
+    report.notices.add(name + "its previous keyframe " + before + " is not the last of the map's chain: no IMU factor");
   } else {
-    notices.add(name + "its IMU samples do not tell the whole motion since keyframe " + before + ": no IMU factor");
+    report.notices.add(name + "its IMU samples do not tell the whole motion since keyframe " + before +
+                       ": no IMU factor");
   }
 }
 
 MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
-  refusal.clear();
-  ++statistics.keyframes_received;
+  report.refusal.clear();
+  ++report.statistics.keyframes_received;
   const double t = keyframe ? keyframe->frame.t : 0.0;
   const ScopedTimer timer(log, "backend.keyframe", t);
   MapUpdate update = beginUpdate(t);
@@ -101,7 +104,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
     const std::string bad = validateKeyframe(*keyframe);
     if (!bad.empty()) throw MapError(bad);
     // Mapping it would create a map of this single keyframe, to localise in from then on.
-    if (localisation_only && map.empty()) throw MapError("localisation without a map: load one, or go on mapping");
+    if (localisation.only && map.empty()) throw MapError("localisation without a map: load one, or go on mapping");
     if (keyframe->id <= map.newestKeyframe())
       throw MapError("keyframe " + std::to_string(keyframe->id) + " is not newer than keyframe " +
                      std::to_string(map.newestKeyframe()) + " of the map");
@@ -127,8 +130,7 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
       if (found) tieToLastFound(keyframe);
     }
   } catch (const MapError& e) {
-    refusal = e.what();
-    refusals.add(refusal);
+    report.refused(e.what());
     finishUpdate(&update);
     // Report it as removed, since other modules wait for it; not when the map has a keyframe with this id.
     const auto waits = [&keyframe](const KeyframePtr& other) { return other->id == keyframe->id; };
@@ -140,8 +142,8 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
   localBundleAdjustment(t, &update);
   cull(&update);
   closeLoop(&update);
-  if (statistics.keyframes_received % kScaleInterval == 0) askForScale();
-  if (statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global.want();
+  if (report.statistics.keyframes_received % kScaleInterval == 0) askForScale();
+  if (report.statistics.keyframes_received % kCurveInterval == 0 && learnDepthCurve()) global.want();
   // Poses of keyframes that waited or were moved, and corrected depth, are new to all receivers: update everything.
   if (entering || brought || calibration.camera() != camera_before) fillGlobal(&update);
   finishUpdate(&update);
@@ -150,9 +152,9 @@ MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {
 
 MapSnapshot BackEnd::Impl::snapshot() const {
   MapSnapshot snapshot;
-  snapshot.revision = revision;
-  snapshot.epoch = epoch;
-  snapshot.T_map_odom = T_map_odom;
+  snapshot.revision = numbers.revision();
+  snapshot.epoch = odometry.epoch();
+  snapshot.T_map_odom = odometry.T_map_odom();
   const auto placed = inReferencePart();
   for (const auto& entry : map.keyframes()) {
     const MapKeyframe& kf = entry.second;
@@ -170,9 +172,9 @@ MapSnapshot BackEnd::Impl::snapshot() const {
   }
   for (const LandmarkId id : map.landmarkIds()) snapshot.landmarks.push_back(estimateOf(map.landmark(id)));
   for (const auto& entry : map.planes()) snapshot.planes.push_back(entry.second.estimate);
-  snapshot.loops = loops.kept();
+  snapshot.loops = report.loops.kept();
   snapshot.localised = localisation.localised;
-  snapshot.statistics = statistics;
+  snapshot.statistics = report.statistics;
   snapshot.statistics.odometry_variance = odometry_noise.varianceFactor();
   for (const LandmarkEstimate& landmark : snapshot.landmarks)
     snapshot.statistics.plane_landmarks += landmark.plane != 0;
@@ -184,18 +186,14 @@ void BackEnd::Impl::reset() {
   maker.clear();
   odometry_noise.reset();
   loop_closer.clear();
-  localisation = Localisation();
+  localisation.reset();
   relocaliser.clear();
   solver = makeSolver(options.solver);
-  T_map_odom = SE3();
-  epoch = 0;
-  first_revision = revision + 1;
+  odometry = backend::OdometryInMap();
+  numbers.startMap();
   global.reset();
   calibration.reset();
-  refusal.clear();
-  refusals = notices = MessageLog();
-  loops = LoopJournal();
-  statistics = BackEndStatistics();
+  report = backend::Report();
 }
 
 BackEnd::BackEnd(const BackEndOptions& options, const SensorConfig& sensor, TimingLog* log)
@@ -203,9 +201,9 @@ BackEnd::BackEnd(const BackEndOptions& options, const SensorConfig& sensor, Timi
 BackEnd::~BackEnd() = default;
 
 MapUpdate BackEnd::addKeyframe(KeyframePtr keyframe) { return impl_->addKeyframe(keyframe); }
-const std::string& BackEnd::lastRefusal() const { return impl_->refusal; }
-std::vector<std::string> BackEnd::takeRefusals() { return impl_->refusals.take(); }
-std::vector<std::string> BackEnd::takeNotices() { return impl_->notices.take(); }
+const std::string& BackEnd::lastRefusal() const { return impl_->report.refusal; }
+std::vector<std::string> BackEnd::takeRefusals() { return impl_->report.refusals.take(); }
+std::vector<std::string> BackEnd::takeNotices() { return impl_->report.notices.take(); }
 void BackEnd::applyPlaneUpdate(const PlaneUpdate& update) { impl_->applyPlaneUpdate(update); }
 bool BackEnd::globalBaWanted() const { return impl_->global.wanted() && !impl_->frozen(); }
 void BackEnd::requestGlobalBa() { impl_->global.want(); }
@@ -241,7 +239,7 @@ MapUpdate BackEnd::finish() {
   return impl_->globalUpdate(moved);
 }
 
-InertialScale BackEnd::scale() const { return impl_->statistics.scale; }
+InertialScale BackEnd::scale() const { return impl_->report.statistics.scale; }
 const DepthCurve& BackEnd::depthCurve() const { return impl_->calibration.camera().curve; }
 double BackEnd::disparityError() const { return impl_->calibration.disparityError(); }
 std::string BackEnd::depthDifference() const {
@@ -249,7 +247,7 @@ std::string BackEnd::depthDifference() const {
   return depthCurveDifference(depthCurve());
 }
 std::string BackEnd::trackNoiseDifference() const {
-  return vip_slam::trackNoiseDifference(impl_->statistics.track_noise_factor);
+  return vip_slam::trackNoiseDifference(impl_->report.statistics.track_noise_factor);
 }
 MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }
@@ -258,7 +256,7 @@ void BackEnd::saveMap(const std::string& path) const { impl_->saveMap(path); }
 std::vector<StoredPlane> BackEnd::storedPlanes() const { return impl_->storedPlanes(); }
 MapUpdate BackEnd::loadMap(const std::string& path) { return impl_->loadMap(path); }
 void BackEnd::setLocalisationMode(bool on) {
-  impl_->localisation_only = on;
+  impl_->localisation.only = on;
   if (!on) impl_->applyHeldUpdates();
 }
 

@@ -13,8 +13,9 @@
 #include "adjustment_requests.h"
 #include "adopted_calibration.h"
 #include "localisation.h"
-#include "loop_journal.h"
-#include "message_log.h"
+#include "map_numbers.h"
+#include "odometry_in_map.h"
+#include "report.h"
 #include "vip_slam_backend/back_end.h"
 #include "vip_slam_backend/loop/graph_builder.h"
 #include "vip_slam_backend/loop/loop_closer.h"
@@ -32,6 +33,8 @@ namespace vip_slam {
 
 struct BackEnd::Impl {
   Impl(const BackEndOptions& options, const SensorConfig& sensor, TimingLog* log);
+  Impl(const BackEndOptions& options, const SensorConfig& sensor, const std::shared_ptr<const CameraModel>& camera,
+       TimingLog* log);
 
   // back_end.cpp
   /// Inserts at the predicted pose and re-observes known landmarks; throws MapError when refused.
@@ -40,7 +43,7 @@ struct BackEnd::Impl {
   /// Notices what holds a keyframe less than usual.
   void noteWeakness(const MapKeyframe& inserted);
   /// Localisation-only mode with a map, which must not change.
-  bool frozen() const { return localisation_only && !map.empty(); }
+  bool frozen() const { return localisation.only && !map.empty(); }
   void applyPlaneUpdate(const PlaneUpdate& update);
   void removeUnnamedPlanes(const PlaneUpdate& update);
   void applyHeldUpdates();
@@ -51,13 +54,9 @@ struct BackEnd::Impl {
   bool learnDepthCurve();
 
   // back_end_steps.cpp
-  /// Pose of the keyframe in the map as T_map_odom predicts it; starts a new epoch where the odometry did.
-  NavState predict(const Keyframe& keyframe);
   /// Optimises the window; adds the keyframes, landmarks and planes that changed to `update`.
   void localBundleAdjustment(double t, MapUpdate* update);
   void cull(MapUpdate* update);
-  /// Sets T_map_odom from the newest keyframe.
-  void followNewest();
   /// Whether the place of the present odometry epoch in the map is known; else T_map_odom is a guess.
   bool placed() const;
   MapUpdate beginUpdate(double t) const;
@@ -103,7 +102,6 @@ struct BackEnd::Impl {
   BackEndOptions options;
   SensorConfig sensor;
   TimingLog* log = nullptr;
-  std::shared_ptr<const CameraModel> camera;
   BuilderSettings settings;
   Map map;
   LandmarkMaker maker;
@@ -113,19 +111,11 @@ struct BackEnd::Impl {
   LoopCloser loop_closer;
   Relocaliser relocaliser;
   Localisation localisation;
-  bool localisation_only = false;
-  std::uint64_t loads = 0;  ///< number of maps loaded since the start
-
-  SE3 T_map_odom;
-  std::uint32_t epoch = 0;
-  std::uint64_t revision = 0;
-  std::uint64_t first_revision = 0;  ///< first one since the last reset; older ones refer to another map
+  backend::MapNumbers numbers;
+  backend::OdometryInMap odometry;
   AdjustmentRequests global;
   backend::AdoptedCalibration calibration;
-  std::string refusal;  ///< of the last keyframe
-  MessageLog refusals, notices;
-  LoopJournal loops;
-  BackEndStatistics statistics;
+  backend::Report report;
 };
 
 }  // namespace vip_slam

@@ -13,9 +13,9 @@ void BackEnd::Impl::closeLoop(MapUpdate* update) {
   std::map<KeyframeId, SE3> before;  // of all, since the loop closer decides which part moves when two are joined
   for (const auto& entry : map.keyframes()) before.emplace(entry.first, entry.second.state.T_W_I);
   for (const LoopEvent& event : loop_closer.close(map, id)) {
-    loops.add(event);
+    report.loops.add(event);
     if (!event.accepted) continue;
-    followNewest();
+    odometry.follow(map);
     fillGlobal(update);
     const auto moved_far = [&](KeyframeId end) {
       const SE3 &then = before.at(end), &now = map.keyframe(end).state.T_W_I;

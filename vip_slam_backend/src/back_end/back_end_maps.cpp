@@ -11,8 +11,7 @@
 namespace vip_slam {
 namespace {
 
-constexpr std::uint64_t kMaxLoads = 4096;  // number of loads until ranges of landmark ids are reused
-constexpr double kRecent = 5.0;            // s after the last localisation while the odometry's drift is negligible
+constexpr double kRecent = 5.0;  // s after the last localisation while the odometry's drift is negligible
 
 PlaneHost hostAt(const MapKeyframe& kf) { return {kf.id(), kf.data->frame.epoch, kf.state.T_W_I * kf.T_I_C}; }
 
@@ -24,14 +23,14 @@ void BackEnd::Impl::saveMap(const std::string& path) const {
 
 MapUpdate BackEnd::Impl::loadMap(const std::string& path) {
   // Both throw before the back end is changed.
-  StoredMap stored = loadMapFile(path, sensor.imu_noise, kLoadedLandmarks + (loads % kMaxLoads) * kLoadedApart);
+  StoredMap stored = loadMapFile(path, sensor.imu_noise, numbers.loadedLandmarks());
   requireCamera(stored, sensor.camera, path);
-  ++loads;
+  numbers.loaded();
   reset();
   map = std::move(stored.map);
   loop_closer.rebuild(map, stored.loops);
   localisation.searching = !map.empty();
-  if (localisation.searching) epoch = map.keyframe(map.newestKeyframe()).data->frame.epoch;
+  if (localisation.searching) odometry.startIn(map);
   MapUpdate update = beginUpdate(0);
   fillGlobal(&update);
   finishUpdate(&update);
@@ -74,7 +73,7 @@ bool BackEnd::Impl::findInMap(const KeyframePtr& keyframe, Relocalisation* found
     event.inliers = result->inliers;
     event.T_match_query = map.keyframe(result->match).state.T_W_I.inverse() * result->T_W_I;
   }
-  loops.add(event);
+  report.loops.add(event);
   return result.has_value();
 }
 
@@ -87,17 +86,17 @@ bool BackEnd::Impl::enterLoadedMap(const KeyframePtr& keyframe) {
     return false;
   }
   localisation.searching = false;
-  epoch = keyframe->frame.epoch;
-  T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
+  odometry.place(keyframe->frame, found.T_W_I);
   // Keyframes from before the recognition are inserted as well, unless the odometry has restarted since.
   std::deque<KeyframePtr> before;
   before.swap(localisation.held);
-  before.erase(
-      std::remove_if(before.begin(), before.end(),
-                     [&](const KeyframePtr& kf) { return kf->frame.epoch != epoch || kf->id >= keyframe->id; }),
-      before.end());
+  before.erase(std::remove_if(before.begin(), before.end(),
+                              [&](const KeyframePtr& kf) {
+                                return kf->frame.epoch != odometry.epoch() || kf->id >= keyframe->id;
+                              }),
+               before.end());
   insertHeld(before);
-  T_map_odom = alignLevelled(found.T_W_I, keyframe->frame.state.T_W_I);
+  odometry.place(keyframe->frame, found.T_W_I);
   insert(keyframe);
   loop_closer.tie(map, keyframe->id, found.match);
   fuseLandmarks(map, keyframe->id, found.landmarks);
@@ -118,8 +117,7 @@ void BackEnd::Impl::insertHeld(const std::deque<KeyframePtr>& keyframes) {
     try {
       insert(kf);
     } catch (const MapError& e) {  // the others are inserted nevertheless
-      refusal = e.what();
-      refusals.add(refusal);
+      report.refused(e.what());
       continue;
     }
     loop_closer.add(map, kf->id);
@@ -128,20 +126,18 @@ void BackEnd::Impl::insertHeld(const std::deque<KeyframePtr>& keyframes) {
 }
 
 void BackEnd::Impl::localise(const KeyframePtr& keyframe) {
-  const bool known = !localisation.searching && keyframe->frame.epoch == epoch;
+  const bool known = !localisation.searching && keyframe->frame.epoch == odometry.epoch();
   std::optional<Relocalisation> found;
-  const SE3 predicted = T_map_odom * keyframe->frame.state.T_W_I;
+  const SE3 predicted = odometry.T_map_odom() * keyframe->frame.state.T_W_I;
   if (known) found = relocaliser.track(map, loop_closer, *keyframe, predicted, inReferencePart());
   Relocalisation place;
   if (!found && findInMap(keyframe, &place)) found = place;
   if (!found) return;
   localisation.searching = false;
-  epoch = keyframe->frame.epoch;
-  const SE3& T_odom_I = keyframe->frame.state.T_W_I;
-  T_map_odom = alignLevelled(found->T_W_I, T_odom_I);
-  localisation.localised.push_back(
-      {keyframe->frame.t, epoch, keyframe->frame.T_chain_C, T_map_odom * T_odom_I, keyframe->frame.T_I_C});
-  localisation.last_found = Localisation::LastFound{epoch, found->match, keyframe->frame.t};
+  odometry.place(keyframe->frame, found->T_W_I);
+  localisation.localised.push_back({keyframe->frame.t, odometry.epoch(), keyframe->frame.T_chain_C,
+                                    odometry.T_map_odom() * keyframe->frame.state.T_W_I, keyframe->frame.T_I_C});
+  localisation.last_found = Localisation::LastFound{odometry.epoch(), found->match, keyframe->frame.t};
 }
 
 bool BackEnd::Impl::hasRecentLocalisation(const Keyframe& keyframe) {
@@ -163,7 +159,7 @@ bool BackEnd::Impl::moveUnplacedPartToMap(std::uint32_t of_epoch) {
   const std::set<KeyframeId> part = connectedKeyframes(map, newest, loop_closer.loops());
   if (part.count(localisation.last_found->match)) return false;
   const MapKeyframe& last = map.keyframe(newest);
-  const SE3 move = alignLevelled(T_map_odom * last.data->frame.state.T_W_I, last.state.T_W_I);
+  const SE3 move = alignLevelled(odometry.T_map_odom() * last.data->frame.state.T_W_I, last.state.T_W_I);
   std::map<KeyframeId, SE3> moved;
   std::set<PlaneId> planes;
   for (const KeyframeId id : part) {

@@ -8,7 +8,7 @@
 namespace vip_slam {
 
 void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
-  if (update.revision < first_revision) return;  // it refers to a map that was reset or replaced meanwhile
+  if (!numbers.ofThisMap(update.revision)) return;  // it refers to a map that was reset or replaced meanwhile
   if (frozen()) {
     // The plane module sends each change only once: keep those that it sent before it learnt of localisation-only mode.
     const bool says = !update.merges.empty() || !update.removed.empty() || !update.observations.empty() ||
@@ -21,7 +21,7 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
     try {
       change();
     } catch (const MapError& e) {
-      refusals.add(e.what());
+      report.refusals.add(e.what());
     }
   };
   for (const PlaneMerge& merge : update.merges) attempt([&] { map.mergePlanes(merge.from, merge.into); });
@@ -31,7 +31,7 @@ void BackEnd::Impl::applyPlaneUpdate(const PlaneUpdate& update) {
   for (const PlaneObservation& observation : update.observations) {
     if (map.setPlaneObservation(observation)) continue;
     const std::string bad = validateObservation(observation);
-    if (!bad.empty()) refusals.add(bad);  // else its keyframe or plane is gone
+    if (!bad.empty()) report.refusals.add(bad);  // else its keyframe or plane is gone
   }
   for (const auto& pair : update.associated) {
     const LandmarkId id = map.resolve(pair.first);

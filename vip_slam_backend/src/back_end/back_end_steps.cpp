@@ -9,26 +9,6 @@
 
 namespace vip_slam {
 
-NavState BackEnd::Impl::predict(const Keyframe& keyframe) {
-  const NavState& odom = keyframe.frame.state;
-  if (!map.empty() && keyframe.frame.epoch != epoch) {
-    // The odometry restarted: continue at the end of the map until a loop or relocalisation gives its true place.
-    T_map_odom = alignLevelled(map.keyframe(map.newestKeyframe()).state.T_W_I, odom.T_W_I);
-  }
-  epoch = keyframe.frame.epoch;
-  NavState state = odom;
-  state.T_W_I = T_map_odom * odom.T_W_I;
-  state.v_W = T_map_odom.rotation() * odom.v_W;
-  // A stored map may have another keyframe with that id, with another IMU's biases.
-  if (keyframe.previous != 0 && map.hasKeyframe(keyframe.previous) &&
-      map.keyframe(keyframe.previous).data->frame.epoch == epoch) {
-    const NavState& previous = map.keyframe(keyframe.previous).state;
-    state.bias_gyro = previous.bias_gyro;
-    state.bias_accel = previous.bias_accel;
-  }
-  return state;
-}
-
 void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   const ScopedTimer timer(log, "backend.lba", t);
   BuiltProblem built;
@@ -47,14 +27,14 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
   {
     const ScopedTimer solve_timer(log, "backend.lba_solve", t);
     summary = solver->attempt(built.problem, solver_options);
-    if (!summary.usable) return refusals.add("result of the local adjustment: " + summary.message);
+    if (!summary.usable) return report.refusals.add("result of the local adjustment: " + summary.message);
   }
-  statistics.track_noise_factor = built.track_noise_factor;
+  report.statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
   // Without any step, for want of time, good views may look wrong.
   if (summary.iterations > 0)
-    statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
-  followNewest();
+    report.statistics.outliers += removeOutliers(built, options.measurement.outlier_chi2, &map).size();
+  odometry.follow(map);
   odometry_noise.compare(map, map.newestKeyframe());
 
   std::set<LandmarkId> landmarks;
@@ -85,14 +65,9 @@ void BackEnd::Impl::cull(MapUpdate* update) {
                           update->landmarks.end());
 }
 
-void BackEnd::Impl::followNewest() {
-  const MapKeyframe& newest = map.keyframe(map.newestKeyframe());
-  if (newest.data->frame.epoch == epoch) T_map_odom = newest.state.T_W_I * newest.data->frame.state.T_W_I.inverse();
-}
-
 bool BackEnd::Impl::placed() const {
   if (map.empty() || localisation.searching) return false;
-  if (localisation.last_found && localisation.last_found->epoch == epoch) return true;
+  if (localisation.last_found && localisation.last_found->epoch == odometry.epoch()) return true;
   return referencePart(map, loop_closer.loops()).count(map.newestKeyframe()) != 0;
 }
 
@@ -127,9 +102,9 @@ void BackEnd::Impl::fillGlobal(MapUpdate* update) const {
 }
 
 void BackEnd::Impl::finishUpdate(MapUpdate* update) {
-  update->revision = ++revision;
-  update->epoch = epoch;
-  update->T_map_odom = T_map_odom;
+  update->revision = numbers.nextRevision();
+  update->epoch = odometry.epoch();
+  update->T_map_odom = odometry.T_map_odom();
   update->placed = placed();
   update->parts = epochParts(map, loop_closer.loops());
   update->depth_curve = calibration.camera().curve;
@@ -141,7 +116,7 @@ void BackEnd::Impl::finishUpdate(MapUpdate* update) {
   update->removed_keyframes = std::move(changes.removed_keyframes);
   update->removed_landmarks = std::move(changes.removed_landmarks);
   update->merged_landmarks = std::move(changes.merged_landmarks);
-  update->loops = loops.takeNew();
+  update->loops = report.loops.takeNew();
 }
 
 bool BackEnd::Impl::learnDepthCurve() {
@@ -152,7 +127,7 @@ bool BackEnd::Impl::learnDepthCurve() {
   return true;
 }
 
-void BackEnd::Impl::askForScale() { statistics.scale = inertialScale(map, sensor.gravity, sensor.imu_noise); }
+void BackEnd::Impl::askForScale() { report.statistics.scale = inertialScale(map, sensor.gravity, sensor.imu_noise); }
 
 GbaJob BackEnd::Impl::makeGlobalJob() const {
   GbaJob job;
@@ -181,23 +156,23 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
   } else if (result.solution && result.solution->summary.usable) {
     // Without newer keyframes T_map_odom comes from the last localisation and follows its matched keyframe.
     const TrackedFrame& newest = map.keyframe(map.newestKeyframe()).data->frame;
-    const bool found = localisation.last_found && localisation.last_found->epoch == epoch &&
+    const bool found = localisation.last_found && localisation.last_found->epoch == odometry.epoch() &&
                        map.hasKeyframe(localisation.last_found->match) &&
-                       !(newest.epoch == epoch && newest.t > localisation.last_found->t);
+                       !(newest.epoch == odometry.epoch() && newest.t > localisation.last_found->t);
     const SE3 match_before = found ? map.keyframe(localisation.last_found->match).state.T_W_I : SE3();
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
-    statistics.outliers += result.solution->outliers.size();
-    statistics.track_noise_factor = result.solution->built.track_noise_factor;
+    report.statistics.outliers += result.solution->outliers.size();
+    report.statistics.track_noise_factor = result.solution->built.track_noise_factor;
     if (found) {
       // The newest keyframe is older than the localisation, and the odometry has drifted since.
-      T_map_odom = alignLevelled(map.keyframe(localisation.last_found->match).state.T_W_I, match_before) * T_map_odom;
+      odometry.move(alignLevelled(map.keyframe(localisation.last_found->match).state.T_W_I, match_before));
     } else {
-      followNewest();
+      odometry.follow(map);
     }
     askForScale();
     return true;
   } else if (result.solution) {
-    refusals.add("result of the global adjustment: " + result.solution->summary.message);
+    report.refusals.add("result of the global adjustment: " + result.solution->summary.message);
   }
   return false;
 }

@@ -14,6 +14,7 @@
 namespace vip_slam {
 
 struct Localisation {
+  bool only = false;                      ///< localisation-only mode: the map does not change; outlives a reset
   bool searching = false;                 ///< a loaded map is not recognised yet
   std::deque<KeyframePtr> held;           ///< received while searching, inserted once the map is recognised
   std::vector<PlaneUpdate> held_updates;  ///< received in localisation-only mode, applied when mapping goes on
@@ -26,6 +27,8 @@ struct Localisation {
     double t = 0;
   };
   std::optional<LastFound> last_found;
+
+  void reset() { *this = Localisation{only}; }
 };
 
 }  // namespace vip_slam
