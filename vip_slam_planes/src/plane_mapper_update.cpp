@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Corrections from the back end.
+// What the back end changes: corrections of the map, another map.
 #include <algorithm>
-#include <cmath>
 #include <set>
+#include <vector>
 
 #include "plane_mapper_impl.h"
+#include "state/fit_to_observations.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"
 #include "vip_slam_core/types/camera_correction.h"
@@ -16,65 +17,77 @@ namespace {
 // Largest number of keyframes per update that are processed again after the map has moved their observations off
 // planes.
 constexpr std::size_t kMaxRenewed = 10;
-constexpr double kSureDirection = 2.0 * kDegree;                  // largest sigma of a determined direction, rad
 constexpr double kMovedTurn = 0.5 * kDegree, kMovedShift = 0.02;  // of a keyframe by one update, rad and m
 
 }  // namespace
 
 PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
-  const ScopedTimer timer(timing, "planes.update", update.t);
+  const ScopedTimer timer(timing_, "planes.update", update.t);
   PlaneUpdate result;
   result.revision = update.revision;
   result.t = update.t;
-  came_together_ = keyframes_.tie(update) || came_together_;
-  followMode(update);
-  if (localising_) {
+  if (keyframes_.tie(update)) planes_.compareAll();
+  mode_.follow(update, keyframes_);
+  if (mode_.localising()) {
     // Planes must not change now; changes from before are reported once mapping goes on.
     for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
     points_.applyMapUpdate(update);
-    counters.keyframes_waiting = keyframes_.waiting();
-    result.planes = published;
+    counters_.keyframes_waiting = keyframes_.waiting();
+    result.planes = planes_.published();
     return result;
   }
   takeCorrections(update);
 
   for (const KeyframeEstimate& estimate : update.keyframes) {
-    const KeyframePtr keyframe = keyframes_.place(estimate, options.growth.distance);
+    const KeyframePtr keyframe = keyframes_.place(estimate, options_.growth.distance);
     if (!keyframe) continue;
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);
   }
-  counters.keyframes_waiting = keyframes_.waiting();
+  counters_.keyframes_waiting = keyframes_.waiting();
 
-  std::vector<PlaneId> changed;
-  for (auto& [id, track] : tracks_) {
-    if (track.changed(true) || came_together_) changed.push_back(id);
-  }
-  came_together_ = false;
-  mergePlanes(changed);
-  dropUnsupported(&result);
+  for (const auto& [from, into] : planes_.mergeSame(keyframes_, *camera_, noise_)) points_.renamePlane(from, into);
+  for (PlaneId id : planes_.dropUnsupported()) points_.removePlane(id);
   decideOnPoints();
-  publish(&result);
+  tell(&result);
   return result;
 }
 
-// Detects the back end's mode: in localisation-only mode it removes each waiting keyframe at once; a keyframe that it
-// places, or a global update, shows that it maps.
-void PlaneMapper::Impl::followMode(const MapUpdate& update) {
-  const bool maps = update.global || std::any_of(update.keyframes.begin(), update.keyframes.end(),
-                                                 [this](const KeyframeEstimate& k) { return keyframes_.waits(k.id); });
-  const bool gives_back = std::any_of(update.removed_keyframes.begin(), update.removed_keyframes.end(),
-                                      [this](KeyframeId id) { return keyframes_.waits(id); });
-  localising_ = !maps && (localising_ || gives_back);
+void PlaneMapper::Impl::clear() {
+  keyframes_ = PlacedKeyframes();
+  planes_.clear();
+  points_.clear();
+  unexplained_.clear();
+  pace_.clear();
+  mode_ = planes::BackEndMode();
+}
+
+void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe) {
+  clear();
+  keyframes_ = PlacedKeyframes(newest_keyframe);
+  for (const StoredPlane& plane : planes) {
+    if (planes_.restore(plane)) keyframes_.addHost(plane.host);
+  }
 }
 
 // Candidate points wait until their plane takes points; most of them are out of view by then, so all are decided on.
 void PlaneMapper::Impl::decideOnPoints() {
-  for (auto& [id, track] : tracks_) {
+  for (auto& [id, track] : planes_) {
     const bool before = track.takes_points;
     track.takes_points = track.known() && track.determined && track.agrees;
     if (track.takes_points && !before) points_.decide(id, track.plane(), keyframes_.poses());
   }
+}
+
+void PlaneMapper::Impl::tell(PlaneUpdate* result) {
+  planes_.tell(result);
+  result->associated = points_.takeAssociated();
+  result->dissociated = points_.takeDissociated();
+  const auto& [started, merged, removed] = planes_.counts();
+  counters_.planes_started = started, counters_.planes_merged = merged, counters_.planes_removed = removed;
+  counters_.points_associated += result->associated.size();
+  counters_.points_dissociated += result->dissociated.size();
+  counters_.point_candidates = points_.candidates();
 }
 
 // A global update lists all keyframes of the map. A keyframe that it does not list was removed in an update that was
@@ -106,27 +119,27 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     keyframes_.move(estimate.id, corrected);
   }
   if (map_moved) {
-    for (auto& [id, track] : tracks_) track.turnWithKeyframes(keyframes_.poses());
+    for (auto& [id, track] : planes_) track.turnWithKeyframes(keyframes_.poses());
   }
   for (const auto& [id, plane] : update.planes) {
-    const auto it = tracks_.find(id);
-    if (it == tracks_.end() || !it->second.known() || !isSound(plane) || it->second.followsHosts()) continue;
+    PlaneTrack* track = planes_.find(id);
+    if (!track || !track->known() || !planes::isSound(plane) || track->followsHosts()) continue;
     // Without observations of a plane the back end only returns the parameters that it received from here.
-    if (!it->second.determined) continue;
-    it->second.setPlane(plane);
-    it->second.setOptimised(true);
+    if (!track->determined) continue;
+    track->setPlane(plane);
+    track->setOptimised(true);
   }
   points_.applyMapUpdate(update);
   const bool removed = !update.removed_keyframes.empty();
-  for (auto& [id, track] : tracks_) {
+  for (auto& [id, track] : planes_) {
     const bool concerned = removed || std::any_of(moved.begin(), moved.end(), [&track = track](KeyframeId keyframe) {
                              return track.restsOn(keyframe);
                            });
-    if (!track.optimised() && (concerned || track.refit_due)) refit(&track);
+    if (!track.optimised() && (concerned || track.refit_due)) planes::fitToObservations(&track, keyframes_);
     if (concerned) track.followKeyframes(keyframes_.poses());
   }
   if (map_moved) {
-    evidence_.forgetTests();
+    unexplained_.forgetTests();
     withdrawBrokenObservations();
   }
   judgeAgreement();
@@ -139,7 +152,7 @@ bool PlaneMapper::Impl::adoptCameraCorrection(const CameraCorrection& correction
   if (corrected == keyframe) return false;
   keyframes_.replace(corrected);
   points_.renewSightings(*corrected);
-  for (auto& [id, track] : tracks_) {
+  for (auto& [id, track] : planes_) {
     const auto observation = track.observations().find(corrected->id);
     if (observation != track.observations().end()) setCameraCorrection(correction, &observation->second);
   }
@@ -152,7 +165,7 @@ bool PlaneMapper::Impl::adoptCameraCorrection(const CameraCorrection& correction
 void PlaneMapper::Impl::judgeAgreement() {
   std::vector<PlaneMisfit> misfits;
   std::size_t index = 0;
-  for (const auto& [id, track] : tracks_) {
+  for (const auto& [id, track] : planes_) {
     for (const auto& [keyframe, observation] : track.observations()) {
       const auto pose = keyframes_.poses().find(keyframe);
       if (pose == keyframes_.poses().end()) continue;
@@ -165,19 +178,12 @@ void PlaneMapper::Impl::judgeAgreement() {
   }
   const std::vector<char> agree = planesAgree(misfits, index);
   index = 0;
-  for (auto& [id, track] : tracks_) {
+  for (auto& [id, track] : planes_) {
     const bool known = track.known(), hidden = track.confirmed && !known;
     track.agrees = agree[index++] != 0 || forgetWhereItWas(&track);
     if (!track.agrees) points_.releaseFrom(id);
-    if (known && !track.known()) {
-      changes_.unpublished(id);
-      ++counters.planes_removed;
-      track.setOptimised(false);
-      track.refit_due = true;
-    }
-    for (auto it = track.observations().begin(); hidden && track.known() && it != track.observations().end(); ++it) {
-      changes_.observed(id, it->first);
-    }
+    if (known && !track.known()) planes_.unpublish(&track);
+    if (hidden && track.known()) planes_.republish(track);
   }
 }
 
@@ -185,13 +191,12 @@ void PlaneMapper::Impl::judgeAgreement() {
 bool PlaneMapper::Impl::forgetWhereItWas(PlaneTrack* track) {
   const KeyframeId since = surfaceMovedAt(*track, keyframes_.poses());
   if (since == 0) return false;
-  auto& observations = track->observations();
+  const auto& observations = track->observations();
   while (!observations.empty() && observations.begin()->first < since) {
-    changes_.withdraw(*track, observations.begin()->first);
-    observations.erase(observations.begin());
+    planes_.withdraw(track, observations.begin()->first);
   }
   track->setOptimised(false);
-  refit(track);
+  planes::fitToObservations(track, keyframes_);
   return true;
 }
 
@@ -199,53 +204,30 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   keyframes_.stopWaiting(id);
   if (!keyframes_.hasPose(id)) return;
   const KeyframeId heir = keyframes_.heirOf(id);  // of its cells
-  for (auto& [plane, track] : tracks_) {
-    track.rehost(id, heir, keyframes_.poses());
-    changes_.forget(plane, id);
-  }
+  planes_.forgetKeyframe(id, heir, keyframes_.poses());
   const KeyframePtr placed = keyframes_.remove(id);
   if (!placed) return;
   points_.removeKeyframe(*placed);
-  evidence_.remove(id);
-  strips_.remove(id);
+  unexplained_.remove(id);
   if (points_.aliases().crowded()) points_.aliases().forgetUnused(keyframes_.tracks());
-}
-
-void PlaneMapper::Impl::refit(PlaneTrack* track) {
-  track->refit_due = false;
-  if (track->optimised() && track->determined) return;
-  const PlaneMoments moments = track->moments(keyframes_.poses());
-  if (!(moments.weight() > 0)) return;
-  track->determined = normalSigma(moments, track->kind()) < kSureDirection;
-  if (track->optimised()) return;
-  // Until the samples determine the direction, keep that of detection, which used the surface up to its border.
-  Plane plane = Plane::fromPointNormal(moments.centroid(), track->plane().n);
-  if (track->determined &&
-      !fitLeaningPlane(moments, track->kind(), keyframes_.gravitySigma(), track->plane().n, &plane))
-    return;
-  track->setPlane(plane);
 }
 
 void PlaneMapper::Impl::withdrawBrokenObservations() {
   // Samples that are off their plane at the corrected poses belong to another surface, or to another piece of it.
   std::set<KeyframeId> renewed;
   const CameraPoses& poses = keyframes_.poses();
-  for (auto& [id, track] : tracks_) {
-    for (auto it = track.observations().begin(); it != track.observations().end();) {
-      const auto pose = poses.find(it->first);
-      const PlaneMoments moments{it->second.G};
+  for (auto& [id, track] : planes_) {
+    std::vector<KeyframeId> broken;
+    for (const auto& [keyframe, observation] : track.observations()) {
+      const auto pose = poses.find(keyframe);
+      const PlaneMoments moments{observation.G};
       const bool holds =
           pose == poses.end() || moments.meanSquare(transformPlane(pose->second.inverse(), track.plane())) <
-                                     options.growth.distance * options.growth.distance;
-      if (holds) {
-        ++it;
-        continue;
-      }
-      changes_.withdraw(track, it->first);
-      renewed.insert(it->first);
-      it = track.observations().erase(it);
-      track.refit_due = true;
+                                     options_.growth.distance * options_.growth.distance;
+      if (!holds) broken.push_back(keyframe);
     }
+    for (KeyframeId keyframe : broken) planes_.withdraw(&track, keyframe);
+    renewed.insert(broken.begin(), broken.end());
   }
   while (renewed.size() > kMaxRenewed) renewed.erase(renewed.begin());  // keep the newest
   for (KeyframeId id : renewed) processKeyframe(*keyframes_.placed().at(id), false);
