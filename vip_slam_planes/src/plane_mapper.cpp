@@ -30,6 +30,15 @@ PlaneMapper::Impl::Impl(const PlaneMapperOptions& options, std::shared_ptr<const
       planes_(options),
       points_(options.association, checked(camera_, noise).focal(), noise.bias_floor) {}
 
+PlaneMapperCounters PlaneMapper::Impl::counters() const {
+  PlaneMapperCounters all = counters_;
+  const auto& [started, merged, removed] = planes_.counts();
+  all.planes_started = started, all.planes_merged = merged, all.planes_removed = removed;
+  all.keyframes_waiting = keyframes_.waiting();
+  all.point_candidates = points_.candidates();
+  return all;
+}
+
 PlaneMapper::PlaneMapper(const PlaneMapperOptions& options, std::shared_ptr<const CameraModel> camera,
                          const DepthNoise& noise, TimingLog* timing)
     : impl_(new Impl(options, std::move(camera), noise, timing)) {}
@@ -43,6 +52,6 @@ void PlaneMapper::restore(const std::vector<StoredPlane>& planes, KeyframeId new
   impl_->restore(planes, newest_keyframe);
 }
 void PlaneMapper::clear() { impl_->clear(); }
-const PlaneMapperCounters& PlaneMapper::counters() const { return impl_->counters(); }
+PlaneMapperCounters PlaneMapper::counters() const { return impl_->counters(); }
 
 }  // namespace vip_slam

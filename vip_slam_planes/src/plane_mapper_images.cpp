@@ -32,7 +32,6 @@ void PlaneMapper::Impl::addKeyframe(const KeyframePtr& keyframe) {
   if (!keyframe || keyframes_.known(keyframe->id)) return;
   if (!isSound(keyframe->frame.depth_grid) || !isSound(keyframe->frame.camera_correction)) return;
   counters_.keyframes_forgotten += keyframes_.wait(keyframe);
-  counters_.keyframes_waiting = keyframes_.waiting();
 }
 
 std::vector<PlaneTrack*> PlaneMapper::Impl::tracksInView(const SE3& T_map_C, std::uint32_t epoch) {

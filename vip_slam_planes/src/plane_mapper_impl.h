@@ -31,7 +31,7 @@ class PlaneMapper::Impl {
   void clear();
 
   const std::vector<PlaneEstimate>& published() const { return planes_.published(); }
-  const PlaneMapperCounters& counters() const { return counters_; }
+  PlaneMapperCounters counters() const;
 
  private:
   // plane_mapper_update.cpp: corrections from the back end.
@@ -75,7 +75,7 @@ class PlaneMapper::Impl {
   PointAssociation points_;
   GrowthPace pace_;
   planes::BackEndMode mode_;
-  PlaneMapperCounters counters_;
+  PlaneMapperCounters counters_;  ///< without those that the parts count
 };
 
 }  // namespace vip_slam

@@ -32,7 +32,6 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
     // Planes must not change now; changes from before are reported once mapping goes on.
     for (KeyframeId id : update.removed_keyframes) removeKeyframe(id);
     points_.applyMapUpdate(update);
-    counters_.keyframes_waiting = keyframes_.waiting();
     result.planes = planes_.published();
     return result;
   }
@@ -44,7 +43,6 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);
   }
-  counters_.keyframes_waiting = keyframes_.waiting();
 
   for (const auto& [from, into] : planes_.mergeSame(keyframes_, *camera_, noise_)) points_.renamePlane(from, into);
   for (PlaneId id : planes_.dropUnsupported()) points_.removePlane(id);
@@ -83,11 +81,8 @@ void PlaneMapper::Impl::tell(PlaneUpdate* result) {
   planes_.tell(result);
   result->associated = points_.takeAssociated();
   result->dissociated = points_.takeDissociated();
-  const auto& [started, merged, removed] = planes_.counts();
-  counters_.planes_started = started, counters_.planes_merged = merged, counters_.planes_removed = removed;
   counters_.points_associated += result->associated.size();
   counters_.points_dissociated += result->dissociated.size();
-  counters_.point_candidates = points_.candidates();
 }
 
 // A global update lists all keyframes of the map. A keyframe that it does not list was removed in an update that was

@@ -60,7 +60,7 @@ class PlaneMapper {
   void restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe);
   void clear();
 
-  const PlaneMapperCounters& counters() const;
+  PlaneMapperCounters counters() const;
 
  private:
   class Impl;

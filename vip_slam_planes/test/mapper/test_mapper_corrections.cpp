@@ -293,6 +293,8 @@ TEST(MapperCorrections, KeyframesThatTheBackEndNeverTookAreNotKept) {
   EXPECT_EQ(3u, rig.mapper.counters().keyframes_waiting);
   rig.mapper.applyMapUpdate(everything(rig.poses));
   EXPECT_EQ(1u, rig.mapper.counters().keyframes_waiting);  // the newest one may still be placed
+  rig.mapper.clear();
+  EXPECT_EQ(0u, rig.mapper.counters().keyframes_waiting);
 }
 
 TEST(MapperCorrections, AKeyframeOnItsWayIsNoneOfAMapThatIsLoadedMeanwhile) {
