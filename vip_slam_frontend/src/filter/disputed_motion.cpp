@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam::frontend {
 
 namespace {
@@ -16,13 +18,18 @@ void DisputedMotion::add(double t, const Vector6d& correction, const Vector6d& r
   const double kept = std::exp(-(t - t_) / kMemory);
   sum_ = kept * sum_ + correction;
   expected_ = kept * kept * expected_ + removed.cwiseMax(0.0);
+  taken_ *= kept * kept;
   t_ = t;
 }
 
+bool DisputedMotion::isSignificant() const {
+  return (sum_.cwiseAbs2().array() > kGateSigmas * kGateSigmas * expected_.array()).any();
+}
+
 Vector6d DisputedMotion::take() {
-  const Vector6d excess = (sum_.cwiseAbs2() - expected_).cwiseMax(0.0);
-  reset();
-  return excess;
+  const Vector6d more = (sum_.cwiseAbs2() - expected_ - taken_).cwiseMax(0.0);
+  taken_ += more;
+  return more;
 }
 
 }  // namespace vip_slam::frontend

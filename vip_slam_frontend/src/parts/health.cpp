@@ -19,7 +19,7 @@ constexpr double kPatience = 2.0;
 void Health::reset(const std::string& reason) {
   phase_ = Phase::kWaiting;
   status_ = {TrackingState::kInitialising, reason};
-  cut_off_imu_t_ = silent_imu_t_ = fault_t_ = -1e300;  // the clock may have run back
+  cut_off_imu_t_ = silent_imu_t_ = fault_t_ = last_disputed_t_ = -1e300;  // the clock may have run back
 }
 
 void Health::initialising(const std::string& reason) {
@@ -80,12 +80,17 @@ std::string Health::doubts(const Sight& sight) const {
   if (sight.t_imu - fault_t_ < kMoment) return "the IMU contradicts what is seen: held by images and depth";
   if (sight.t_imu - cut_off_imu_t_ < kMoment)
     return formatted("the gyroscope is at the end of its range, %.2f rad/s", gyro_range_);
+  if (sight.t - last_disputed_t_ < kMoment) {
+    return "predictions and images contradict each other, cause not known (blur, torn images, something that moves, "
+           "stamps?): sigma widened";
+  }
   if (sight.t - last_metric_t_ > kMoment && !sight.still) return "no depth: visual-inertial only";
   return "";
 }
 
 void Health::judge(const Sight& sight) {
   if (sight.surfaces_hold || sight.with_depth >= options_.min_tracks) last_metric_t_ = sight.t;
+  if (sight.disputed) last_disputed_t_ = sight.t;
   if (sight.tracked >= options_.min_tracks || sight.still) {
     if (lost()) return;
     last_good_t_ = last_held_t_ = sight.t;

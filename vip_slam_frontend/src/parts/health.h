@@ -24,6 +24,7 @@ struct Sight {
   bool still = false;               ///< the body stands still
   bool contradicts_imu = false;     ///< the IMU's adapted noise is implausible
   bool blind = false;               ///< no IMU tells the motion
+  bool disputed = false;            ///< predictions and updates of the last second contradict each other
   double variance = 0;              ///< largest of the position, m^2
 };
 
@@ -76,16 +77,17 @@ class Health {
   Phase phase_ = Phase::kWaiting;
   TrackingStatus status_{TrackingState::kWaiting, "waiting for the first image"};
   // Times of the last image with ...
-  double last_good_t_ = 0;         ///< enough features
-  double last_held_t_ = 0;         ///< enough features or matched depth surfaces
-  double last_metric_t_ = 0;       ///< a part of depth in the update
-  double last_points_t_ = 0;       ///< enough points that have depth
-  double last_agreed_t_ = 0;       ///< points that agree with the IMU
-  double last_good_variance_ = 0;  ///< of the position at last_good_t_, m^2
-  double cut_off_imu_t_ = -1e300;  ///< the gyro at the limit of its range before it
-  double silent_imu_t_ = -1e300;   ///< no IMU samples before it
-  double fault_t_ = -1e300;        ///< the IMU at fault before it
-  double gyro_range_ = 0;          ///< that limit, rad/s
+  double last_good_t_ = 0;           ///< enough features
+  double last_held_t_ = 0;           ///< enough features or matched depth surfaces
+  double last_metric_t_ = 0;         ///< a part of depth in the update
+  double last_disputed_t_ = -1e300;  ///< the motion was in dispute
+  double last_points_t_ = 0;         ///< enough points that have depth
+  double last_agreed_t_ = 0;         ///< points that agree with the IMU
+  double last_good_variance_ = 0;    ///< of the position at last_good_t_, m^2
+  double cut_off_imu_t_ = -1e300;    ///< the gyro at the limit of its range before it
+  double silent_imu_t_ = -1e300;     ///< no IMU samples before it
+  double fault_t_ = -1e300;          ///< the IMU at fault before it
+  double gyro_range_ = 0;            ///< that limit, rad/s
 };
 
 }  // namespace vip_slam::frontend

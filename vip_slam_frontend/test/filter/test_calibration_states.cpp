@@ -364,7 +364,7 @@ SimulationOptions goodGyro(std::uint32_t seed) {
 
 TEST(Calibration, FindsTheScaleOfTheGyro) {
   constexpr int kRuns = 6;
-  double nees = 0, believed = 0, scale_nees = 0;
+  double nees = 0, believed = 0, scale_nees = 0, error = 0, error_believed = 0;
   for (int seed = 1; seed <= kRuns; ++seed) {
     SimulationOptions simulation = goodGyro(seed);
     simulation.gyro_error.diagonal() << 0.006, -0.004, 0.008;
@@ -387,13 +387,19 @@ TEST(Calibration, FindsTheScaleOfTheGyro) {
     nees += run.nees / kRuns;
     options.calibration.gyro_scale = false;
     options.adapt_imu_noise = false;
-    believed += runFilter(simulation, options, 20.0, false).nees / kRuns;
+    const RunResult unknown = runFilter(simulation, options, 20.0, false);
+    believed += unknown.nees / kRuns;
+    error += run.final_position / kRuns;
+    error_believed += unknown.final_position / kRuns;
   }
-  std::printf("NEES with a gyro off by up to 0.8 %%: %.2f, of the scale (3) %.2f; gyro believed: %.2f\n", nees,
-              scale_nees, believed);
+  std::printf(
+      "NEES with a gyro off by up to 0.8 %%: %.2f, of the scale (3) %.2f; gyro believed: %.2f; mm: %.1f, %.1f\n", nees,
+      scale_nees, believed, 1e3 * error, 1e3 * error_believed);
   EXPECT_LT(nees, 9.0);
   EXPECT_LT(scale_nees, 7.0);
-  EXPECT_GT(believed, 3 * nees);
+  // What a wrong gyro and the images dispute widens sigma: the pose is honest even so.
+  EXPECT_LT(believed, 12.0);
+  EXPECT_LT(error, 0.8 * error_believed);
 }
 
 TEST(Calibration, FindsHowTheGyroIsMisaligned) {

@@ -46,5 +46,37 @@ TEST(DisputedMotion, CorrectionsInOneDirectionAreTheirSumAndAreTakenOnce) {
   EXPECT_EQ(disputed.take().norm(), 0.0);
 }
 
+/// Share of the updates with a significant dispute, and what is taken of axis 0 at those.
+struct Taken {
+  double share = 0, variance = 0;
+};
+Taken followed(double seconds, double bias) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal(0.0, kCorrection);
+  DisputedMotion disputed;
+  Taken taken;
+  for (double t = 0; t < seconds; t += kCorrectionStep) {
+    Vector6d correction;
+    for (int i = 0; i < 6; ++i) correction(i) = normal(random) + (i == 0 ? bias : 0.0);
+    disputed.add(t, correction, Vector6d::Constant(kCorrection * kCorrection));
+    if (!disputed.isSignificant()) continue;
+    taken.share += kCorrectionStep / seconds;
+    taken.variance += disputed.take()(0);
+  }
+  return taken;
+}
+
+TEST(DisputedMotion, WhiteCorrectionsAreHardlyEverSignificant) {
+  EXPECT_LT(followed(2000.0, 0.0).share, 1e-3);  // beyond four sigmas: 6 axes at 6.3e-5
+}
+
+TEST(DisputedMotion, ADriftIsWithinTwoSigmasOfWhatIsTaken) {
+  for (const double seconds : {1.0, 2.0, 4.0}) {
+    const double drift = 2e-3 * seconds / kCorrectionStep, sigma = std::sqrt(followed(seconds, 2e-3).variance);
+    EXPECT_GT(sigma, drift / 2) << seconds;
+    EXPECT_LT(sigma, 1.5 * drift) << seconds;
+  }
+}
+
 }  // namespace
 }  // namespace vip_slam::frontend

@@ -62,6 +62,7 @@ struct StepReport {
   int rows = 0;
   double nis = 0;
   double correction = 0;  ///< normalised squared correction of the predicted motion, see ImuNoiseMonitor
+  bool disputed = false;  ///< the corrections of the last second are more than the covariance allows
 };
 
 class VioFilter {
@@ -195,8 +196,8 @@ class VioFilter {
   /// ones: then they are as wrong as the estimate that failed.
   void learnCalibration();
   void forgetClone(CloneId id);
-  /// When the IMU is found at fault: what it and the images disputed until then is added to the covariance, as one
-  /// motion of the whole window against the world and the marked clone.
+  /// Adds what predictions and updates dispute to the covariance, as one motion of the whole window against the world
+  /// and the marked clone.
   void admitDispute();
   /// After the updates of an image whose pose was `predicted`; `removed`: from the covariance, by them.
   void noteCorrection(const NavState& predicted, const Matrix15d& removed);
