@@ -26,7 +26,7 @@ PlaneMapper::Impl::Impl(const PlaneMapperOptions& options, std::shared_ptr<const
       timing_(timing),
       mesher_(options.mesh, camera_, noise),
       observer_(options, camera_, noise),
-      unexplained_(options),
+      evidence_(options.detection, options.growth),
       planes_(options),
       points_(options.association, checked(camera_, noise).focal(), noise.bias_floor) {}
 

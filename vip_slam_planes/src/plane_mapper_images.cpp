@@ -102,16 +102,13 @@ void PlaneMapper::Impl::processKeyframe(const Keyframe& keyframe, bool first_tim
   }
   const std::size_t known = tracks.size();
   if (first_time) {
-    std::vector<DetectedPlane> strips = startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
+    startPlanes(keyframe, T_map_C, triangles, &label, &tracks);
     const CameraPoses& poses = keyframes_.posesTiedTo(keyframe.frame.epoch);
-    for (const auto& [track, e] : unexplained_.takeJoining(poses, {tracks.begin(), tracks.end()})) {
+    for (const auto& [track, e] : evidence_.takeJoining(poses, {tracks.begin(), tracks.end()})) {
       planes_.at(track->id()).cover(e.triangle, e.keyframe, poses.at(e.keyframe), nullptr);
     }
-    const auto joint =
-        unexplained_.addTriangles(keyframe.id, triangles, label, beside, poses, {tracks.begin(), tracks.end()});
-    startJointPlanes(keyframe, joint, &label, &tracks);
-    const auto faces = unexplained_.addStrips(keyframe.id, triangles, label, std::move(strips), poses);
-    startJointPlanes(keyframe, faces, &label, &tracks);
+    evidence_.add(keyframe.id, T_map_C, triangles, label, beside);
+    startJointPlanes(keyframe, evidence_.detect(poses, {tracks.begin(), tracks.end()}), &label, &tracks);
     ++counters_.keyframes;
   }
   const SurfaceLabels labels = labelNodes(mesh, label, grid);
@@ -146,14 +143,12 @@ void PlaneMapper::Impl::removeContradicted(const std::vector<MapTriangle>& trian
   }
 }
 
-std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
-                                                          const std::vector<MapTriangle>& triangles,
-                                                          std::vector<int>* label, std::vector<PlaneTrack*>* tracks) {
+void PlaneMapper::Impl::startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
+                                    const std::vector<MapTriangle>& triangles, std::vector<int>* label,
+                                    std::vector<PlaneTrack*>* tracks) {
   std::vector<char> taken(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) taken[i] = (*label)[i] >= 0;
-  std::vector<DetectedPlane> strips;
-  for (const DetectedPlane& found :
-       detectPlanes(triangles, taken, T_map_C.t(), options_.detection, options_.growth, &strips)) {
+  for (const DetectedPlane& found : detectPlanes(triangles, taken, T_map_C.t(), options_.detection, options_.growth)) {
     PlaneTrack& track = planes_.start(found.kind, found.plane, found.centroid, keyframe.frame.epoch);
     for (int i : found.triangles) {
       track.cover(triangles[i], keyframe.id, T_map_C, nullptr);
@@ -161,11 +156,10 @@ std::vector<DetectedPlane> PlaneMapper::Impl::startPlanes(const Keyframe& keyfra
     }
     if (track.area() < options_.support.sure_area) {
       track.keyframes_seen =
-          unexplained_.seenBy(track, keyframes_.posesTiedTo(keyframe.frame.epoch), options_.support.min_area);
+          evidence_.seenBy(track, keyframes_.posesTiedTo(keyframe.frame.epoch), options_.support.min_area);
     }
     tracks->push_back(&track);
   }
-  return strips;
 }
 
 void PlaneMapper::Impl::startJointPlanes(const Keyframe& keyframe, const std::vector<JointPlane>& joint,

@@ -10,8 +10,8 @@
 #include "state/back_end_mode.h"
 #include "state/placed_keyframes.h"
 #include "state/plane_set.h"
-#include "state/unexplained_surfaces.h"
 #include "vip_slam_planes/association/point_association.h"
+#include "vip_slam_planes/detection/plane_evidence.h"
 #include "vip_slam_planes/growth/plane_track.h"
 #include "vip_slam_planes/mesh/depth_mesh.h"
 #include "vip_slam_planes/mesh/map_triangles.h"
@@ -51,10 +51,8 @@ class PlaneMapper::Impl {
   void processKeyframe(const Keyframe& keyframe, bool first_time);
   std::vector<PlaneTrack*> tracksInView(const SE3& T_map_C, std::uint32_t epoch);
   void removeContradicted(const std::vector<MapTriangle>& triangles, const SE3& T_map_C, std::uint32_t epoch);
-  /// Returns the strips found by detection.
-  std::vector<DetectedPlane> startPlanes(const Keyframe& keyframe, const SE3& T_map_C,
-                                         const std::vector<MapTriangle>& triangles, std::vector<int>* label,
-                                         std::vector<PlaneTrack*>* tracks);
+  void startPlanes(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<MapTriangle>& triangles,
+                   std::vector<int>* label, std::vector<PlaneTrack*>* tracks);
   void startJointPlanes(const Keyframe& keyframe, const std::vector<JointPlane>& joint, std::vector<int>* label,
                         std::vector<PlaneTrack*>* tracks);
   void observe(const Keyframe& keyframe, const SE3& T_map_C, const std::vector<PlaneTrack*>& tracks,
@@ -69,7 +67,7 @@ class PlaneMapper::Impl {
 
   DepthMeshBuilder mesher_;
   planes::PlaneObserver observer_;
-  planes::UnexplainedSurfaces unexplained_;
+  PlaneEvidence evidence_;
   PlacedKeyframes keyframes_;
   planes::PlaneSet planes_;
   PointAssociation points_;

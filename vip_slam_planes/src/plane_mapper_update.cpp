@@ -55,7 +55,7 @@ void PlaneMapper::Impl::clear() {
   keyframes_ = PlacedKeyframes();
   planes_.clear();
   points_.clear();
-  unexplained_.clear();
+  evidence_.clear();
   pace_.clear();
   mode_ = planes::BackEndMode();
 }
@@ -134,7 +134,7 @@ void PlaneMapper::Impl::takeCorrections(const MapUpdate& update) {
     if (concerned) track.followKeyframes(keyframes_.poses());
   }
   if (map_moved) {
-    unexplained_.forgetTests();
+    evidence_.forgetTests();
     withdrawBrokenObservations();
   }
   judgeAgreement();
@@ -203,7 +203,7 @@ void PlaneMapper::Impl::removeKeyframe(KeyframeId id) {
   const KeyframePtr placed = keyframes_.remove(id);
   if (!placed) return;
   points_.removeKeyframe(*placed);
-  unexplained_.remove(id);
+  evidence_.remove(id);
   if (points_.aliases().crowded()) points_.aliases().forgetUnused(keyframes_.tracks());
 }
 

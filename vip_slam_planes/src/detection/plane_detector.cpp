@@ -19,16 +19,14 @@ namespace {
 class Detector {
  public:
   Detector(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
-           const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth,
-           std::vector<DetectedPlane>* strips = nullptr)
+           const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options, const PlaneGrowthOptions& growth)
       : triangles_(triangles),
         taken_(taken),
         camera_(camera_centre),
         options_(options),
         growth_(growth),
         level_(options.gravity_deg),
-        joins_(growth.angle_deg),
-        strips_(strips) {}
+        joins_(growth.angle_deg) {}
 
   std::vector<DetectedPlane> run() {
     histogramPeaks();
@@ -185,8 +183,7 @@ class Detector {
     // Horizontal surfaces may be strips: they are seen at a flat angle, a few nodes high, and a mesh across a step is
     // horizontal by accident only.
     if (result.area < options_.min_area) return false;
-    const bool strip = kind != PlaneKind::kHorizontal && !isSolid(triangles_, surface);
-    if (strip && (!strips_ || kind != PlaneKind::kVertical)) return false;
+    if (kind != PlaneKind::kHorizontal && !isSolid(triangles_, surface)) return false;
     double rms = 0;
     if (!fit(surface, kind, &result.plane, &rms)) return false;
     const double sigma = medianSigma(surface);
@@ -215,18 +212,13 @@ class Detector {
       const double tilt = kind == PlaneKind::kHorizontal ? std::acos(z) : std::asin(z);
       if (tilt > limit + 2 * uncertainty) return false;
     }
-    // A strip may be the rim of a column; views from elsewhere will show that (StripEvidence).
-    if (!strip && isCurved(triangles_, surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
+    if (isCurved(triangles_, surface, result.plane, std::max(rms, 0.5 * sigma))) return false;
     result.centroid = moments.centroid() + camera_;
     for (int i : surface) {
       // The triangles were gathered around the whole peak; keep those on this surface's own plane.
       if (!joins(triangles_[i], result.plane, 1.0)) continue;
       result.triangles.push_back(i);
-      if (!strip) taken_[i] = 1;
-    }
-    if (strip) {
-      strips_->push_back(std::move(result));
-      return false;
+      taken_[i] = 1;
     }
     found_.push_back(std::move(result));
     return true;
@@ -238,7 +230,6 @@ class Detector {
   const PlaneDetectionOptions& options_;
   const PlaneGrowthOptions& growth_;
   const AngleGate level_, joins_;
-  std::vector<DetectedPlane>* strips_;
   std::vector<DetectedPlane> found_;
 };
 
@@ -246,8 +237,8 @@ class Detector {
 
 std::vector<DetectedPlane> detectPlanes(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
                                         const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options,
-                                        const PlaneGrowthOptions& growth, std::vector<DetectedPlane>* strips) {
-  return Detector(triangles, taken, camera_centre, options, growth, strips).run();
+                                        const PlaneGrowthOptions& growth) {
+  return Detector(triangles, taken, camera_centre, options, growth).run();
 }
 
 std::vector<DetectedPlane> detectPlanesAt(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,

@@ -19,11 +19,10 @@ struct DetectedPlane {
 };
 
 /// Histogram peaks, refined on their triangles, split into connected surfaces (gaps above growth.gap separate), tested
-/// for fit, width and tilt. `taken[i]` != 0 excludes triangle i. `strips` (may be null) gets walls that pass all tests
-/// but have hardly a vertex inside their border; see StripEvidence.
+/// for fit, width and tilt. `taken[i]` != 0 excludes triangle i.
 std::vector<DetectedPlane> detectPlanes(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
                                         const Eigen::Vector3d& camera_centre, const PlaneDetectionOptions& options,
-                                        const PlaneGrowthOptions& growth, std::vector<DetectedPlane>* strips = nullptr);
+                                        const PlaneGrowthOptions& growth);
 
 /// The same tests for free triangles that all lie near one plane already (a peak of votes).
 std::vector<DetectedPlane> detectPlanesAt(const std::vector<MapTriangle>& triangles, const std::vector<char>& taken,
