@@ -207,8 +207,7 @@ void BackEndNodelet::addKeyframe(const vip_slam_msgs::Keyframe& msg) {
     const bool known = update.placed && update.epoch == keyframe->frame.epoch;
     if (problem_.empty() && !known && update.newest_keyframe != 0)
       problem_ = "the odometry began anew, and its place in the map is not found yet";
-    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_), back_end_->depthDifference(),
-                                back_end_->trackNoiseDifference()};
+    calibration_differences_ = {scaleDifference(back_end_->scale(), sensor_), back_end_->depthDifference()};
   }
   report(back_end_->takeRefusals());
   for (const std::string& what : back_end_->takeNotices()) NODELET_WARN_THROTTLE(1, "%s", what.c_str());

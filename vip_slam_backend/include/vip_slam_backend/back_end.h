@@ -80,8 +80,6 @@ class BackEnd {
   const DepthCurve& depthCurve() const;
   /// Message to the user about the depth correction when it is large enough to matter; empty otherwise.
   std::string depthDifference() const;
-  /// Message to the user when the last adjustment found pixel errors well above the reported sigmas; empty otherwise.
-  std::string trackNoiseDifference() const;
   /// 1/m: common disparity error that is part of the curve, see disparity_curve.h; 0: none.
   double disparityError() const;
   const Map& map() const;

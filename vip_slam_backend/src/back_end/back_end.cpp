@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "../optimisation/imu_agreement.h"
-#include "../optimisation/track_noise.h"
 #include "back_end_impl.h"
 #include "vip_slam_backend/optimisation/depth_curve_fit.h"
 #include "vip_slam_backend/optimisation/disparity_fit.h"
@@ -245,9 +244,6 @@ double BackEnd::disparityError() const { return impl_->calibration.disparityErro
 std::string BackEnd::depthDifference() const {
   if (disparityError() != 0) return disparityDifference(disparityError());
   return depthCurveDifference(depthCurve());
-}
-std::string BackEnd::trackNoiseDifference() const {
-  return vip_slam::trackNoiseDifference(impl_->report.statistics.track_noise_factor);
 }
 MapSnapshot BackEnd::snapshot() const { return impl_->snapshot(); }
 const Map& BackEnd::map() const { return impl_->map; }

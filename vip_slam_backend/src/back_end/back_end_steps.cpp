@@ -29,7 +29,6 @@ void BackEnd::Impl::localBundleAdjustment(double t, MapUpdate* update) {
     summary = solver->attempt(built.problem, solver_options);
     if (!summary.usable) return report.refusals.add("result of the local adjustment: " + summary.message);
   }
-  report.statistics.track_noise_factor = built.track_noise_factor;
   storeProblem(built, sensor.imu_noise, &map);
   // Without any step, for want of time, good views may look wrong.
   if (summary.iterations > 0)
@@ -162,7 +161,6 @@ bool BackEnd::Impl::takeGlobal(const GbaResult& result) {
     const SE3 match_before = found ? map.keyframe(localisation.last_found->match).state.T_W_I : SE3();
     mergeGlobalBa(*result.solution, sensor.imu_noise, &map);
     report.statistics.outliers += result.solution->outliers.size();
-    report.statistics.track_noise_factor = result.solution->built.track_noise_factor;
     if (found) {
       // The newest keyframe is older than the localisation, and the odometry has drifted since.
       odometry.move(alignLevelled(map.keyframe(localisation.last_found->match).state.T_W_I, match_before));

@@ -33,11 +33,6 @@ class LandmarkViews {
   LandmarkViews(const Map& map, const ProblemScope& scope, const std::vector<KeyframeId>& keyframes,
                 const PixelNoise& noise);
 
-  /// Multiplies all sigmas by a factor.
-  void inflate(double factor) {
-    for (LandmarkView& v : views_) v.sigma *= factor;
-  }
-
   int size() const { return static_cast<int>(points_.size()); }
   const MapLandmark& landmark(int l) const { return *points_[l]; }
   /// The first point of a landmark, that of its longest track, represents the landmark.

@@ -11,7 +11,6 @@
 #include "pixel_noise.h"
 #include "plane_factors.h"
 #include "shared_depth.h"
-#include "track_noise.h"
 
 namespace vip_slam {
 namespace {
@@ -68,9 +67,7 @@ BuiltProblem buildProblem(const Map& map, const ProblemScope& scope, const Build
 
   const PixelNoise noise(settings.measurement, settings.focal);
   built.gate_weight = 1.0 / noise.gateSigma();
-  LandmarkViews views(map, scope, built.frames, noise);
-  built.track_noise_factor = trackNoiseFactor(views, frameGeometry(problem));
-  if (built.track_noise_factor > 1) views.inflate(built.track_noise_factor);
+  const LandmarkViews views(map, scope, built.frames, noise);
   built.depth_noise = noiseOfThisSession(map);
   PlaneFactorBuilder planes(map, scope, settings, &built);
   const std::vector<char> on_plane = planes.addHomographies(views);

@@ -82,7 +82,6 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   put("landmarks_found_again", map.statistics.reobserved);
   put("landmarks_merged", map.statistics.merged);
   put("outliers_removed", map.statistics.outliers);
-  put("track_noise_factor", map.statistics.track_noise_factor);
   put("odometry_variance_factor", map.statistics.odometry_variance);
   yaml << YAML::Key << "loops" << YAML::Value << YAML::BeginSeq;
   for (const LoopEvent& loop : map.loops) {

@@ -155,8 +155,6 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     if (!difference.empty()) all.push_back(difference);
     const std::string bent = pipeline.mapping()->backEnd().depthDifference();
     if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
-    const std::string missed = pipeline.mapping()->backEnd().trackNoiseDifference();
-    if (!missed.empty()) all.push_back(missed);
     const MapSnapshot map = pipeline.mapping()->backEnd().snapshot();
     for (const auto& [from, to] : guessedTimes(map))
       all.push_back(

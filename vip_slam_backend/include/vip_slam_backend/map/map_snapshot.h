@@ -35,7 +35,6 @@ struct BackEndStatistics {
   std::uint64_t reobserved = 0;   ///< landmarks found again by projection
   std::uint64_t merged = 0;       ///< duplicate tracks joined
   std::uint64_t outliers = 0;     ///< observations removed by residual
-  double track_noise_factor = 1;  ///< see optimisation/problem_builder.h; of the last adjustment, local or global
   double odometry_variance = 1;   ///< factor on the odometry's covariance that is in use
   InertialScale scale;            ///< of the last global adjustment, or from some keyframes ago
 };

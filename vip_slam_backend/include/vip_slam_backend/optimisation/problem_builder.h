@@ -41,9 +41,8 @@ struct BuiltProblem {
   std::vector<RefusedView> refused;      ///< gated views of those
   /// Landmark and keyframe of every observation, for outlier removal.
   std::vector<MapObservation> observations;
-  double track_noise_factor = 1;  ///< on the sigmas of all pixels, estimated in src/optimisation/track_noise.h
-  DepthNoiseParts depth_noise;    ///< of the recording, learnt by the front end
-  double gate_weight = 0;         ///< largest weight, focal / sigma, with which outliers are judged
+  DepthNoiseParts depth_noise;  ///< of the recording, learnt by the front end
+  double gate_weight = 0;       ///< largest weight, focal / sigma, with which outliers are judged
 };
 
 struct BuilderSettings {
