@@ -296,9 +296,11 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   judgeDepthShift();
   judgeGyroCorrection();
   const Matrix15d P_updated = covariance();
-  if (!still) noteCorrection(predicted, P_predicted - P_updated);
-  report.disputed = disputed_.isSignificant();
-  if (report.disputed) admitDispute();
+  if (!still) {
+    noteCorrection(predicted, P_predicted - P_updated);
+    report.disputed = disputed_.isSignificant();
+    if (report.disputed) admitDispute();
+  }
   report.correction = correctionPerDof(predicted, P_predicted, nav(), P_updated);
   if (!still) {
     // While more stamp jitter may explain the correction about the rotation axis, that part is not blamed on the IMU.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "landmark_simulation.h"
 #include "vip_slam_frontend/filter/disputed_motion.h"
 
 namespace vip_slam::frontend {
@@ -76,6 +77,36 @@ TEST(DisputedMotion, ADriftIsWithinTwoSigmasOfWhatIsTaken) {
     EXPECT_GT(sigma, drift / 2) << seconds;
     EXPECT_LT(sigma, 1.5 * drift) << seconds;
   }
+}
+
+// A gyro that shows a turn for a second, before a camera that stands: nothing says which of them is wrong.
+TEST(DisputedMotion, WidensThePositionAndIsNoneWhileTheBodyStands) {
+  testing::SimulationOptions options;
+  options.speed = 0;
+  testing::LandmarkSimulation simulation(options);
+  simulation.generateImu(6.0);
+  FilterOptions filter_options = testing::singlePixels();
+  filter_options.adapt_imu_noise = false;
+  VioFilter filter(filter_options, options.noise, simulation.T_I_C(), 0.0, options.focal, 9.81);
+  FilterPrior prior;
+  prior.state = simulation.stateAt(0.2);
+  CloneId id = 1;
+  filter.start(prior, id++, Eigen::Vector3d::Zero());
+  const auto step = [&](double t, double turn, std::optional<ResidualMotion> still) {
+    std::vector<ImuSample> samples = simulation.imuBetween(filter.nav().t, t);
+    for (ImuSample& sample : samples) sample.gyro.z() += turn;
+    return filter.step(filter.predict(samples), id++, simulation.sight(t, options.most_points), still).disputed;
+  };
+  const auto sigma = [&] { return std::sqrt(filter.covariance().diagonal().segment<3>(0).maxCoeff()); };
+  int disputed = 0;
+  double t = 0.2;
+  for (int k = 0; k < 40; ++k) disputed += step(t += 0.05, 0.0, std::nullopt);
+  EXPECT_EQ(disputed, 0);
+  const double before = sigma();
+  for (int k = 0; k < 20; ++k) disputed += step(t += 0.05, 0.03, std::nullopt);
+  EXPECT_GT(disputed, 5);
+  EXPECT_GT(sigma(), 1.5 * before);
+  for (int k = 0; k < 20; ++k) EXPECT_FALSE(step(t += 0.05, 0.0, ResidualMotion())) << t;
 }
 
 }  // namespace
