@@ -17,7 +17,7 @@ import rosgraph
 import rospy
 import rostest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image
@@ -101,6 +101,10 @@ class BadInputTest(unittest.TestCase):
             self.assertEqual(status.last().state, TrackingStatus.WAITING)
             wait_for(lambda: any('/nowhere/image_raw' in s.message for m in diagnostics.all() for s in m.status), 30,
                      'diagnostics that name the topic')
+            for topic in ('odom', 'pose'):
+                wait_for(lambda name=topic: any(
+                    s.name.endswith(name + ' topic status') and s.level == DiagnosticStatus.ERROR
+                    for m in diagnostics.all() for s in m.status), 30, 'the rate of %s, which is none' % topic)
         finally:
             launch.terminate()
             launch.wait(30)

@@ -77,7 +77,6 @@ class SystemTest(unittest.TestCase):
     def test_02b_rates_of_the_outputs_are_reported(self):
         for topic in ('odom', 'pose'):
             told = [s for m in self.diagnostics.all() for s in m.status if s.name.endswith(topic + ' topic status')]
-            self.assertIn(DiagnosticStatus.ERROR, [s.level for s in told], 'before the first ' + topic)
             good = [s for s in told if s.level == DiagnosticStatus.OK]
             self.assertGreater(len(good), 2, {s.message for s in told})
             rate = {v.key: v.value for v in good[-1].values}['Actual frequency (Hz)']

@@ -81,7 +81,7 @@ class PhoneTest(unittest.TestCase):
             keep.clear()
         play = subprocess.Popen(['rosrun', 'vip_slam_phone', 'phone_stand_in', self.bag, '--sensor', self.sensor,
                                  '--rtsp-port', str(port), '--record-port', str(port + 1), '--depth-port', str(port + 2),
-                                 '--wait', '3', *more], stdout=subprocess.PIPE, text=True)
+                                 '--wait', '5', *more], stdout=subprocess.PIPE, text=True)
         try:
             begin = float(play.stdout.readline().split()[1])
             beside()
