@@ -11,6 +11,7 @@ add_library(vip_slam_runner
   src/runner/plane_history.cpp
   src/runner/run_output.cpp
   src/runner/run_warnings.cpp
+  src/runner/trial_run.cpp
 )
 target_link_libraries(vip_slam_runner ${catkin_LIBRARIES} ${OpenCV_LIBRARIES} yaml-cpp)
 

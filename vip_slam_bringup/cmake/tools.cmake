@@ -45,7 +45,7 @@ target_link_libraries(convert_to_bag vip_slam_bringup)
 install(TARGETS vip_slam_bringup vip_slam_bringup_nodelets
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
 add_executable(check_bag src/apps/check_bag.cpp)
-target_link_libraries(check_bag vip_slam_bringup)
+target_link_libraries(check_bag vip_slam_bringup vip_slam_runner)
 
 add_executable(parameter_reference src/apps/parameter_reference.cpp)
 target_link_libraries(parameter_reference vip_slam_bringup)

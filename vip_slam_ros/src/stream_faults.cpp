@@ -26,7 +26,7 @@ std::string clockWasSet(const ClockStep& step, const std::string& topic) {
 }
 
 std::string stampedAhead(std::size_t messages) {
-  return formatted("%zu messages are left out: their stamps are later than those of the next message", messages);
+  return formatted("%zu messages are left out: their stamps are ahead of those around them", messages);
 }
 
 std::string holdNoDepth(const DepthNoise& noise) {

@@ -77,17 +77,10 @@ void BackEnd::Impl::insert(const KeyframePtr& keyframe) {
 
 void BackEnd::Impl::noteWeakness(const MapKeyframe& inserted) {
   const Keyframe& data = *inserted.data;
-  const std::string name = "keyframe " + std::to_string(data.id) + ": ";
-  if (data.frame.features.empty()) report.notices.add(name + "without features: only its neighbours hold it");
+  if (data.frame.features.empty())
+    report.notices.add("keyframe " + std::to_string(data.id) + ": without features: only its neighbours hold it");
   const bool whole_imu = sensor.hasGyro() && sensor.hasAccel();
-  if (!whole_imu || data.previous == 0 || inserted.preintegration) return;
-  const std::string before = std::to_string(data.previous);
-  if (inserted.previous == 0) {
-    report.notices.add(name + "its previous keyframe " + before + " is not the last of the map's chain: no IMU factor");
-  } else {
-    report.notices.add(name + "its IMU samples do not tell the whole motion since keyframe " + before +
-                       ": no IMU factor");
-  }
+  if (whole_imu && data.previous != 0 && !inserted.preintegration) ++report.statistics.without_imu;
 }
 
 MapUpdate BackEnd::Impl::addKeyframe(const KeyframePtr& keyframe) {

@@ -7,11 +7,13 @@
 #include <cstdio>
 #include <iostream>
 #include <optional>
+#include <utility>
 
 #include <ros/ros.h>
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_bringup/preflight/recorder.h"
+#include "vip_slam_bringup/runner/trial_run.h"
 #include "vip_slam_core/util/command_line.h"
 #include "vip_slam_ros/sensor_files.h"
 
@@ -44,7 +46,11 @@ int main(int argc, char** argv) {
     for (const std::string& note : notes) std::printf("%s\n", note.c_str());
     const auto recording = live ? vip_slam::recordLive(config, seconds > 0 ? seconds : 10)
                                 : vip_slam::recordBag(*set, config, seconds > 0 ? seconds : 60);
-    const vip_slam::Findings findings = vip_slam::checkAll(recording);
+    vip_slam::Findings findings = vip_slam::checkAll(recording);
+    if (set && vip_slam::worst(findings) < vip_slam::Severity::kError) {
+      const vip_slam::Findings found = vip_slam::trialRun(std::move(*set), config, seconds > 0 ? seconds : 60);
+      findings.insert(findings.end(), found.begin(), found.end());
+    }
     std::fputs(vip_slam::toText(findings, ::isatty(STDOUT_FILENO)).c_str(), stdout);
     return vip_slam::worst(findings) == vip_slam::Severity::kError ? 1 : 0;
   } catch (const std::exception& e) {

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_core/util/formatted.h"
@@ -49,8 +53,10 @@ std::string candidates(const Recording& r, const Wanted& w) {
     list += (list.empty() ? "" : ", ") + topic;
   }
   const std::string where = r.live ? "published" : "in the bag";
-  return list.empty() ? "no topic of type " + w.types.front() + " is " + where
-                      : "of type " + w.types.front() + " " + where + ": " + list;
+  if (!list.empty()) return "of type " + w.types.front() + " " + where + ": " + list;
+  const bool inertial = w.types.front() == "sensor_msgs/Imu";
+  return "no topic of type " + w.types.front() + " is " + where +
+         (inertial ? "; RGB-D alone works as well: set topics/imu, gyro and accel to \"\" in the sensor file" : "");
 }
 
 /// Advice on a topic of the wrong type.
@@ -202,10 +208,14 @@ void checkClocks(const Recording& r, Findings* out) {
     out->push_back({Severity::kError, "clock", timeRanBack(r.restarts.front()) + more,
                     "the odometry starts anew there; let all streams be stamped by a clock that goes on"});
   }
-  for (const ClockStep& step : r.clock_steps) {
+  // One finding for each clock: a driver that stamps the same time again and again sets it at every turn.
+  std::map<std::optional<std::size_t>, std::vector<ClockStep>> of_clock;
+  for (const ClockStep& step : r.clock_steps) of_clock[step.stream].push_back(step);
+  for (const auto& [stream, steps] : of_clock) {
     const std::string topics[] = {r.sensor.topics.color, r.sensor.topics.depth, r.sensor.topics.inertial(),
                                   r.sensor.topics.accel};
-    out->push_back({Severity::kWarning, "clock", clockWasSet(step, step.stream ? topics[*step.stream] : ""),
+    const std::string more = steps.size() > 1 ? formatted(", and was set %zu times more", steps.size() - 1) : "";
+    out->push_back({Severity::kWarning, "clock", clockWasSet(steps.front(), stream ? topics[*stream] : "") + more,
                     "it is followed; let the time service slew the clock instead of setting it"});
   }
 }

@@ -58,8 +58,13 @@ struct BagReader::Source {
       check(topic, {"sensor_msgs/Image", "sensor_msgs/CompressedImage"});
     for (const std::string& topic : {topics.imu, topics.gyro, topics.accel}) check(topic, {"sensor_msgs/Imu"});
     if (!missing.empty()) {
-      throw std::runtime_error(bags.name() + ": no topic " + join(missing) + ", which sensor '" + sensor.name +
-                               "' names; in the bag are: " + join(names));
+      const bool imu_there_or_unwanted =
+          !topics.hasInertial() ||
+          std::any_of(there.begin(), there.end(), [](const auto& topic) { return topic.second == "sensor_msgs/Imu"; });
+      throw std::runtime_error(
+          bags.name() + ": no topic " + join(missing) + ", which sensor '" + sensor.name +
+          "' names; in the bag are: " + join(names) +
+          (imu_there_or_unwanted ? "" : " (without an IMU: topics/imu, gyro and accel \"\" in the sensor file)"));
     }
   }
 

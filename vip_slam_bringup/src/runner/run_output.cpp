@@ -82,6 +82,7 @@ void emitMap(YAML::Emitter& yaml, const MapSnapshot& map, std::size_t planes,
   put("landmarks_found_again", map.statistics.reobserved);
   put("landmarks_merged", map.statistics.merged);
   put("outliers_removed", map.statistics.outliers);
+  put("keyframes_without_imu", map.statistics.without_imu);
   put("odometry_variance_factor", map.statistics.odometry_variance);
   yaml << YAML::Key << "loops" << YAML::Value << YAML::BeginSeq;
   for (const LoopEvent& loop : map.loops) {

@@ -31,7 +31,8 @@ std::string lateStart(const Pipeline& pipeline) {
          "; standing still for a second, in view of some texture, starts at once";
 }
 
-/// Warning about poses missing after the first one, for longer than a moment.
+}  // namespace
+
 std::string missingPoses(const Pipeline& pipeline) {
   constexpr double kMoment = 1.0;  // s
   const std::vector<StateChange>& states = pipeline.states();
@@ -52,8 +53,6 @@ std::string missingPoses(const Pipeline& pipeline) {
       "%.1f of %.1f s have no pose, the longest stretch begins %.1f s after the first image and lasts %.1f s: %s",
       missing, pipeline.duration(), worst->t - begin, longest, worst->status.reason.c_str());
 }
-
-}  // namespace
 
 std::string otherStates(const std::vector<StateChange>& states) {
   constexpr double kFew = 0.02;
@@ -156,6 +155,12 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     const std::string bent = pipeline.mapping()->backEnd().depthDifference();
     if (!bent.empty()) all.push_back(bent + " (summary.yaml: calibration)");
     const MapSnapshot map = pipeline.mapping()->backEnd().snapshot();
+    if (map.statistics.without_imu > 0)
+      all.push_back(formatted(
+          "%zu of %zu keyframes have no IMU factor: holes in the samples since the one before, or samples that images "
+          "contradict",
+          static_cast<std::size_t>(map.statistics.without_imu),
+          static_cast<std::size_t>(map.statistics.keyframes_received)));
     for (const auto& [from, to] : guessedTimes(map))
       all.push_back(
           formatted("keyframes from %.1f to %.1f s after the first image were never tied to the rest of the map: their "

@@ -70,6 +70,7 @@ void VioFilter::stop() {
 
 void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3d& omega_I) {
   stop();
+  start_ = prior.state.T_W_I.t();
   WindowState window;
   Clone clone;
   clone.id = id;

@@ -208,6 +208,16 @@ void VioFilter::holdDelay() {
   filter_.consider(window.timeOffsetColumn(), delay_before_->value - window.time_offset, delay_before_->sigma);
 }
 
+Matrix15d VioFilter::covarianceOfScale() const {
+  Eigen::Matrix<double, 15, 1> by_scale = Eigen::Matrix<double, 15, 1>::Zero();
+  if (started_) {
+    const NavState state = nav();
+    by_scale.segment<3>(3) = evidence_.notAdopted(kDepthScale) * (state.T_W_I.t() - start_);
+    by_scale.segment<3>(6) = evidence_.notAdopted(kDepthScale) * state.v_W;
+  }
+  return by_scale * by_scale.transpose();
+}
+
 BearingCorrection VioFilter::bearingCorrection() const {
   BearingCorrection correction;
   for (int k = 0; k < 4; ++k) correction.value(k) = evidence_.adopted(kBearing + k);

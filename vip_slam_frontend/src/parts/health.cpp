@@ -80,6 +80,10 @@ std::string Health::doubts(const Sight& sight) const {
   if (sight.t_imu - fault_t_ < kMoment) return "the IMU contradicts what is seen: held by images and depth";
   if (sight.t_imu - cut_off_imu_t_ < kMoment)
     return formatted("the gyroscope is at the end of its range, %.2f rad/s", gyro_range_);
+  if (sight.scale_contradicts) {
+    return "depth and the accelerometer disagree about distances by more than any calibration: is depth/scale right, "
+           "and the IMU? check_bag tells; sigma widened";
+  }
   if (sight.t - last_disputed_t_ < kMoment) {
     return "predictions and images contradict each other, cause not known (blur, torn images, something that moves, "
            "stamps?): sigma widened";

@@ -287,6 +287,25 @@ TEST(Calibration, AnExactDepthImageStaysWhereItIs) {
   }
 }
 
+// A unit of depth that is another one: its scale is not used, but the pose knows how far off it may be.
+TEST(Calibration, AScaleThatIsNotAdoptedIsInTheCovariance) {
+  for (const double scale : {1.0, 1.5}) {
+    SimulationOptions simulation = exactMotion(1);
+    simulation.depth_scale = scale;
+    const RunResult run = runFilter(simulation, singlePixels(), 20.0, false);
+    const Eigen::Vector3d way =
+        run.window.clones.back().T_W_I.t() - LandmarkSimulation(simulation).stateAt(0.2).T_W_I.t();
+    const double sigma = std::sqrt(run.covariance_of_scale.block<3, 3>(3, 3).trace()) / way.norm();
+    EXPECT_EQ(run.calibration.depth_scale, 1.0);
+    EXPECT_LE(sigma, run.calibration.sigma_depth_scale);
+    if (scale == 1.0) {
+      EXPECT_LT(sigma, 0.005);
+    } else {
+      EXPECT_GT(sigma, 0.02) << "the prior's";
+    }
+  }
+}
+
 // An implausible shift has another cause, such as depth of another camera.
 TEST(Calibration, AShiftBeyondBeliefIsTakenBack) {
   SimulationOptions simulation;

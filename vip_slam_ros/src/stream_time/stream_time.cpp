@@ -93,8 +93,14 @@ bool StreamTime::waits(Stream* own, const Message& message) const {
 
 bool StreamTime::goesOnAsBefore(const Stream& own, const Message& message) const {
   const double t = time(own, message);
-  if (own.forward) return t < time(own, own.held.front());
-  if (own.by_arrival) return own.delay.excess(t, message.arrival).value_or(0) > -kLeastStep;
+  const auto excess = [&own](double stamp, double arrival) { return own.delay.excess(stamp, arrival).value_or(0); };
+  if (own.forward) {
+    // A stamp that is ahead by less than an interval is seen by arrival alone.
+    const Message& first = own.held.front();
+    const double ahead = time(own, first);
+    return t < ahead || (own.by_arrival && excess(t, message.arrival) < 0.5 * excess(ahead, first.arrival));
+  }
+  if (own.by_arrival) return excess(t, message.arrival) > -kLeastStep;
   if (own.intervals.size() < kEnough) return t >= own.newest - jump_;
   const double interval = usual(own.intervals);
   return t >= own.last + double(own.held.size() + 1) * interval - std::max(kLeastStep, kLeastOfInterval * interval);

@@ -178,6 +178,19 @@ TEST(StreamTime, ASingleStampAheadIsLeftOut) {
   }
 }
 
+TEST(StreamTime, AStampAheadByLessThanAnIntervalIsSeenByItsArrival) {
+  int k = 0;
+  std::size_t wrong = 0;
+  const Result r = run([&](Message* m) {
+    if (m->stream != kColor || m->sent < 106 || ++k % 40 != 20) return;
+    m->stamp += 0.045;
+    ++wrong;
+  });
+  expectTrueTimes(r);
+  EXPECT_EQ(r.ahead, wrong);
+  EXPECT_TRUE(r.steps.empty());
+}
+
 TEST(StreamTime, AFirstStampAheadIsLeftOut) {
   const Result r = run([](Message* m) {
     if (m->sent < 100.001) m->stamp += 500 + 100 * double(m->stream);

@@ -35,6 +35,7 @@ struct BackEndStatistics {
   std::uint64_t reobserved = 0;   ///< landmarks found again by projection
   std::uint64_t merged = 0;       ///< duplicate tracks joined
   std::uint64_t outliers = 0;     ///< observations removed by residual
+  std::uint64_t without_imu = 0;  ///< keyframes whose IMU samples do not hold the motion since the one before
   double odometry_variance = 1;   ///< factor on the odometry's covariance that is in use
   InertialScale scale;            ///< of the last global adjustment, or from some keyframes ago
 };

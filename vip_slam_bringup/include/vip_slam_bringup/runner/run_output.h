@@ -18,10 +18,12 @@ struct RunFacts {
   double processing_time = 0;  ///< seconds, wall clock
 };
 
-/// Warnings for the user after a run, one sentence each.
+/// A warning about poses missing after the first one, for longer than a moment; else empty.
+std::string missingPoses(const Pipeline& pipeline);
 /// The share of the images after the first pose in any state but TRACKING, by states, and the longest stretch of these
 /// with its reason; empty up to 2 %.
 std::string otherStates(const std::vector<StateChange>& states);
+/// Warnings for the user after a run, one sentence each.
 std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& reader);
 
 /// Throws std::runtime_error naming the file that cannot be written.

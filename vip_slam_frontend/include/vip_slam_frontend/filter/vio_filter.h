@@ -95,6 +95,11 @@ class VioFilter {
   double timeOffset() const { return started_ ? filter_.window().time_offset : learnt_.time_offset; }  ///< likewise, s
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
+  /// What the scale of depth adds to it that the accelerometer has found and that is not adopted: by as much the way
+  /// from the start, and the speed, may be wrong.
+  Matrix15d covarianceOfScale() const;
+  /// The accelerometer is sure of a scale of depth beyond belief.
+  bool scaleContradicts() const { return evidence_.contradicts(kDepthScale); }
   /// The oldest clone whose image still has measurements to come: the marked one stays in the state beyond its time.
   const Clone& oldest() const;
   /// Marks the newest clone (its image became a keyframe) as the start of motionSinceMark().
@@ -217,6 +222,7 @@ class VioFilter {
   StampMonitor stamp_monitor_;
   ImuNoiseMonitor imu_monitor_;
   frontend::DriftMonitor drift_;
+  Eigen::Vector3d start_ = Eigen::Vector3d::Zero();  ///< position in W at start()
   frontend::DisputedMotion disputed_;
   SquareRootFilter filter_;
   std::map<LandmarkId, FilterTrack> tracks_;

@@ -3,7 +3,7 @@
 // and what is left out. ROS-free, single owner; the nodelet and the offline runner call take() and nothing else.
 //
 // A message whose stamp does not follow the one before waits for the next ones, which tell what it is:
-// - a single stamp ahead: the next of its stream lies before it; it is left out.
+// - a single stamp ahead: the next of its stream lies before it, or arrives as on the clock of before; it is left out.
 // - a gap: the next of its stream goes on from there.
 // - a clock of one device that was set: its messages go on from there while the other streams go on as before, and
 //   their arrival shows that no delay did it. The stream is followed on the clock that it began with.
