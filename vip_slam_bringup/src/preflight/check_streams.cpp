@@ -84,23 +84,35 @@ double stampJitter(const std::vector<double>& stamps, double period) {
   return pairs < kEnough ? 0.0 : std::sqrt(std::max(0.0, sum / static_cast<double>(pairs)));
 }
 
+/// First and last stamp.
+using Span = std::pair<double, double>;
+
+/// Of a stream whose stamps tell time; empty when there are none or all are the same, which is named by itself.
+std::optional<Span> spanOf(const StreamRecord& stream) {
+  if (stream.stamps.empty()) return std::nullopt;
+  const auto [first, last] = std::minmax_element(stream.stamps.begin(), stream.stamps.end());
+  return *first < *last ? std::optional<Span>({*first, *last}) : std::nullopt;
+}
+
+bool overlap(const Span& a, const Span& b) { return a.first <= b.second && b.first <= a.second; }
+
 constexpr double kLate = 1.0;  // seconds that a stream may begin later, or end earlier, than the others
 
 /// Reports streams that begin later or end earlier than the others, or have another clock: each of them alone looks
 /// fine.
 void checkCoverage(const Recording& r, Findings* out) {
   double begin = 1e300, end = -1e300;
-  std::vector<std::pair<std::string, std::pair<double, double>>> streams;
+  std::vector<std::pair<std::string, Span>> streams;
   for (const Wanted& w : wanted(r)) {
-    if (!w.required || w.role.find("camera_info") != std::string::npos || w.stream->stamps.empty()) continue;
-    const auto [first, last] = std::minmax_element(w.stream->stamps.begin(), w.stream->stamps.end());
-    streams.push_back({w.role, {*first, *last}});
-    begin = std::min(begin, *first);
-    end = std::max(end, *last);
+    const auto span = spanOf(*w.stream);
+    if (!w.required || w.role.find("camera_info") != std::string::npos || !span) continue;
+    streams.push_back({w.role, *span});
+    begin = std::min(begin, span->first);
+    end = std::max(end, span->second);
   }
   for (const auto& [role, span] : streams) {
     for (const auto& [other, other_span] : streams) {
-      if (role >= other || (span.first <= other_span.second && other_span.first <= span.second)) continue;
+      if (role >= other || overlap(span, other_span)) continue;
       const double apart = std::max(span.first - other_span.second, other_span.first - span.second);
       out->push_back({Severity::kError, role,
                       formatted("has no time in common with the %s, %.1f s lie between them", other.c_str(), apart),
@@ -184,10 +196,14 @@ double medianDelay(const StreamRecord& stream) {
 /// too late for them.
 void checkOrder(const Recording& r, Findings* out) {
   constexpr double kDepthWaits = 0.3, kImuWaits = 0.5, kImuKept = 25;  // s
-  if (r.live || r.color.stamps.empty()) return;
+  const auto images = spanOf(r.color);
+  if (r.live || !images) return;
   const double color = medianDelay(r.color);
   for (const Wanted& w : wanted(r)) {
-    if (w.stream == &r.color || w.stream->stamps.empty() || w.role.find("camera_info") != std::string::npos) continue;
+    const auto span = spanOf(*w.stream);
+    // A stream of another clock has been named.
+    if (w.stream == &r.color || !span || !overlap(*span, *images)) continue;
+    if (w.role.find("camera_info") != std::string::npos) continue;
     const double late = medianDelay(*w.stream) - color;
     const bool depth = w.stream == &r.depth;
     if (depth ? std::abs(late) < kDepthWaits : late < kImuWaits && late > -kImuKept) continue;

@@ -27,8 +27,10 @@ std::string lateStart(const Pipeline& pipeline) {
   if (seconds < kSoon) return "";
   const std::string late = never ? formatted("there is no pose at all in %.1f s", seconds)
                                  : formatted("the first pose comes late, %.1f s after the first image", seconds);
-  return late + ": " + std::prev(first)->status.reason +
-         "; standing still for a second, in view of some texture, starts at once";
+  const TrackingStatus& before = std::prev(first)->status;
+  const bool waits = before.state == TrackingState::kWaiting;  // for data, whatever the sensor does
+  return late + ": " + before.reason +
+         (waits ? "" : "; standing still for a second, in view of some texture, starts at once");
 }
 
 }  // namespace
@@ -123,7 +125,8 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
                   static_cast<std::size_t>(c.gyro_cut_off), c.gyro_range));
   if (c.imu_missing > 0 && reader.sensor().topics.hasInertial())
     all.push_back(std::to_string(c.imu_missing) + " of " + std::to_string(c.images) +
-                  " images are not covered by the IMU: images and depth carry the pose there");
+                  " images are not covered by the IMU" +
+                  (pipeline.odometry().empty() ? "" : ": images and depth carry the pose there"));
   if (c.imu_rejected > 0)
     all.push_back(std::to_string(c.imu_rejected) +
                   " IMU messages are left out: not finite, all zero, or not newer than the one before");

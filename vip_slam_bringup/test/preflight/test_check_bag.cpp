@@ -2,6 +2,7 @@
 // check_bag against bags with one fault each: the fault is found, named, and nothing else is called an error.
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -259,6 +260,15 @@ TEST_F(CheckBag, StreamsThatDoNotCoverEachOther) {
   Recording other_clock = whole;
   for (double& t : other_clock.imu.stamps) t += 1000;
   expectFound(checkRates(other_clock), Severity::kError, "IMU", "no time in common with the colour image");
+  Recording unstamped = whole;
+  for (double& t : unstamped.imu.stamps) t = 0;
+  expectFound(checkRates(unstamped), Severity::kError, "IMU", "all stamps are the same");
+  for (const Recording& recording : {other_clock, unstamped}) {
+    const Findings all = checkRates(recording);
+    EXPECT_EQ(std::count_if(all.begin(), all.end(), [](const Finding& f) { return f.severity == Severity::kError; }), 1)
+        << "one cause, one advice\n"
+        << toText(all, false);
+  }
   Recording short_one = whole;
   short_one.color.stamps.resize(1);
   expectFound(checkRates(short_one), Severity::kError, "colour image", "1 messages in all");
