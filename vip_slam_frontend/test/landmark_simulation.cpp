@@ -244,7 +244,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     last = truth.T_W_I.t();
     const Vector6d error = truth.T_W_I.boxminus(estimate.T_W_I);
     result.covariance_of_scale = filter.covarianceOfScale();
-    result.covariance = filter.covariance() + result.covariance_of_scale;
+    result.covariance = filter.covariance();
     if (k * step > 1.0) {
       const Matrix6d P = result.covariance.topLeftCorner<6, 6>();
       result.nees += error.dot(P.ldlt().solve(error));
