@@ -75,6 +75,7 @@ std::shared_ptr<TrackedFrame> FrontEnd::Impl::makeFrame(double t, bool with_feat
   if (filter_.started()) {
     frame->state = filter_.nav();
     frame->covariance = map_.odometryVariance() * filter_.covariance() + filter_.covarianceOfScale();
+    if (sources_.verticalUnknown()) frame->covariance += filter_.covarianceOfVertical();
     frame->T_chain_C = keyframes_.chainedCamera(filter_, frame->state.T_W_I, extrinsics());
   }
   if (with_features) {

@@ -196,6 +196,7 @@ frontend::Sight FrontEnd::Impl::sight(const ImageStep& step) const {
   sight.still = rest_.still();
   sight.contradicts_imu = imuIsContradicted();
   sight.blind = step.no_imu;
+  sight.vertical_unknown = sources_.verticalUnknown();
   sight.scale_contradicts = filter_.scaleContradicts();
   sight.disputed = step.report.disputed;
   sight.variance = filter_.covariance().block<3, 3>(3, 3).diagonal().maxCoeff();

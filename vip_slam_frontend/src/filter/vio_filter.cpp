@@ -182,6 +182,15 @@ void VioFilter::admitDispute() {
   filter_.inflate(N * sigmas.asDiagonal());
 }
 
+Matrix15d VioFilter::covarianceOfVertical() const {
+  const NavState state = nav();
+  Eigen::Matrix<double, 15, 3> by_turn = Eigen::Matrix<double, 15, 3>::Zero();
+  by_turn.topRows<3>() = state.T_W_I.R().transpose();
+  by_turn.middleRows<3>(3) = -hat(state.T_W_I.t() - start_);
+  by_turn.middleRows<3>(6) = -hat(state.v_W);
+  return by_turn.leftCols<2>() * by_turn.leftCols<2>().transpose();
+}
+
 void VioFilter::noteCorrection(const NavState& predicted, const Matrix15d& removed) {
   const Eigen::Matrix3d R_W_I = predicted.T_W_I.R();
   const Vector6d corrected = nav().T_W_I.boxminus(predicted.T_W_I);

@@ -20,6 +20,8 @@ constexpr double kForgotten = 1.0;  // s without a fault after it is believed ag
 constexpr double kLongest = 5.0;    // s of isolation: bumps that come back are no IMU that is wrong for good
 // The share from which on it is at fault: while a body may fill the view, that came in within kMemory, and else.
 constexpr double kMostly = 0.5, kSustained = 0.2;
+// A turn by so much shows whether the vertical is right, rad: wrong axes make 3 m/s^2 of it.
+constexpr double kShowsVertical = 0.3;
 
 }  // namespace
 
@@ -27,6 +29,10 @@ double motionDifference(const SE3& a, const SE3& b, const Matrix6d& covariance) 
   const Vector6d d = a.boxminus(b);
   const double squared = d.dot(covariance.ldlt().solve(d));
   return std::isfinite(squared) ? std::sqrt(std::max(0.0, squared)) : 0.0;
+}
+
+bool FaultDetection::neverAgreed() const {
+  return contradicted_turn_ >= kShowsVertical && contradicted_turn_ > agreed_turn_;
 }
 
 bool FaultDetection::isOnProbation(double t) const { return t - last_fault_t_ < isolation() + kForgotten; }
@@ -57,7 +63,14 @@ bool FaultDetection::add(const MotionEvidence& e) {
     if (since > isolation()) isolated_ = isOnProbation(e.t) ? std::min(2 * isolation(), kLongest) : 0.0;
     last_fault_t_ = e.t;
   }
-  return fault || (e.images_agree && e.t - last_fault_t_ < isolated_);
+  const bool isolated = fault || (e.images_agree && e.t - last_fault_t_ < isolated_);
+  if (std::max(agreed_turn_, contradicted_turn_) < kShowsVertical) {
+    if (isolated)
+      contradicted_turn_ += e.turn;
+    else if (e.images_agree && !deviates)
+      agreed_turn_ += e.turn;
+  }
+  return isolated;
 }
 
 }  // namespace vip_slam::frontend

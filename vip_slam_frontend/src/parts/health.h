@@ -24,6 +24,7 @@ struct Sight {
   bool still = false;               ///< the body stands still
   bool contradicts_imu = false;     ///< the IMU's adapted noise is implausible
   bool blind = false;               ///< no IMU tells the motion
+  bool vertical_unknown = false;    ///< the IMU contradicts from its first motion on
   bool scale_contradicts = false;   ///< the accelerometer is sure of another scale of depth, beyond belief
   bool disputed = false;            ///< predictions and updates of the last second contradict each other
   double variance = 0;              ///< largest of the position, m^2

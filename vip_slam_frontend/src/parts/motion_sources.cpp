@@ -177,6 +177,7 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
     const double length = kLeverArm * (kUnmodelledTurn * prediction.interval + kUnmodelledAngle);
     covariance.diagonal().head<3>().array() += turn * turn;
     covariance.diagonal().tail<3>().array() += length * length;
+    evidence.turn = logSO3(tracking.motion.T_current_previous.R()).norm();
     evidence.sigmas = motionDifference(tracking.motion.T_current_previous, prediction.T_current_previous, covariance);
   }
   return faults_.add(evidence);

@@ -183,6 +183,25 @@ TEST(FaultDetection, ABodyThatFillsTheViewForAMomentIsNoFaultOfTheImu) {
   EXPECT_TRUE(faults(10, body, [](double t) { return t < 4.9 || t > 5.1; }).empty());
 }
 
+// Two seconds of rest, then turning by 0.3 rad/s.
+TEST(FaultDetection, AnImuThatIsWrongFromItsFirstMotionOnHasNotToldTheVertical) {
+  const auto never_agreed = [](double from, double to) {
+    FaultDetection detection;
+    detection.reset(0);
+    for (int k = 1; k <= 300; ++k) {
+      const double t = k / 30.0;
+      MotionEvidence evidence{t, 1 / 30.0, true, t > from && t < to ? 30.0 : 2.0};
+      evidence.turn = t > 2 ? 0.01 : 0.0;
+      detection.add(evidence);
+    }
+    return detection.neverAgreed();
+  };
+  EXPECT_TRUE(never_agreed(2, 10)) << "wrong axes";
+  EXPECT_FALSE(never_agreed(5, 10)) << "a gyro whose unit is set anew";
+  EXPECT_FALSE(never_agreed(2, 2.2)) << "a bump at the start";
+  EXPECT_FALSE(never_agreed(20, 20));
+}
+
 TEST(MotionDifference, CountsSigmas) {
   const Matrix6d covariance = 1e-4 * Matrix6d::Identity();
   Vector6d d = Vector6d::Zero();

@@ -98,6 +98,8 @@ class VioFilter {
   /// What the scale of depth adds to it that the accelerometer has found and that is not adopted: by as much the way
   /// from the start, and the speed, may be wrong.
   Matrix15d covarianceOfScale() const;
+  /// What a vertical that is not known adds: a radian about the start, to each side.
+  Matrix15d covarianceOfVertical() const;
   /// The accelerometer is sure of a scale of depth beyond belief.
   bool scaleContradicts() const { return evidence_.contradicts(kDepthScale); }
   /// The oldest clone whose image still has measurements to come: the marked one stays in the state beyond its time.

@@ -29,6 +29,7 @@ struct MotionEvidence {
   bool images_agree = false;  ///< among themselves
   double sigmas = 0;          ///< difference between the two motions
   bool implausible = false;   ///< the noise that the filter had to assume of the IMU
+  double turn = 0;            ///< of the body by the images, rad
 };
 
 class FaultDetection {
@@ -37,6 +38,9 @@ class FaultDetection {
   bool add(const MotionEvidence& evidence);
   /// Whether the IMU was at fault a moment before `t`: the images' prediction is the better one then.
   bool suspects(double t) const { return t - last_fault_t_ < isolation(); }
+  /// Whether the IMU contradicts for good from its first motion on (axes, signs, units): what it said of the vertical
+  /// at rest, no turn has confirmed.
+  bool neverAgreed() const;
   /// A start: no agreement has been seen yet.
   void reset(double t);
 
@@ -53,6 +57,8 @@ class FaultDetection {
   double disagreed_t_ = -1e300;  ///< last time when images did not agree
   double contradicted_ = 0;      ///< share of the last second
   double isolated_ = 0;          ///< s for which the IMU stays isolated after a fault
+  /// By which the body has turned in agreement and while the IMU was isolated, until one shows the vertical, rad.
+  double agreed_turn_ = 0, contradicted_turn_ = 0;
 };
 
 /// Squared difference of two motions, T_current_previous, over their covariances (theta, t), as a number of sigmas.
