@@ -118,7 +118,7 @@ TEST_F(CheckBag, DepthOfAnotherSizeUnitOrTime) {
   expectFound(check(), Severity::kError, "depth image", "the sensor file uses 0.2");
   options_.depth_unit_factor = 1;
   options_.depth_skew = 5.0;
-  expectFound(check(), Severity::kError, "colour and depth", "");
+  expectFound(check(), Severity::kError, "colour image", "no time in common with the depth image");
 }
 
 TEST_F(CheckBag, EncodingAndRate) {
