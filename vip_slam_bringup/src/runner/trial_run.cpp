@@ -41,12 +41,12 @@ Findings trialRun(BagSet bags, SensorConfig sensor, double seconds) {
 
   Findings all;
   const FrontEndCounters& counters = pipeline.frontEnd().counters();
-  const auto doubtful =
+  const auto contradicting =
       static_cast<std::size_t>(std::min(counters.images, counters.imu_faults + counters.imu_contradicted));
   if (counters.imuIsWrong())
     all.push_back({Severity::kError, "odometry",
                    formatted("the IMU and what is seen contradict each other in %zu of %zu images, why is not known",
-                             doubtful, static_cast<std::size_t>(counters.images)),
+                             contradicting, static_cast<std::size_t>(counters.images)),
                    "are depth and colour of one moment, does something fill the view that moves, are axes, signs and "
                    "units right?"});
   for (const std::string& missing : {missingPoses(pipeline), otherStates(pipeline.states())})

@@ -293,9 +293,9 @@ TEST(Calibration, AScaleThatIsNotAdoptedIsInTheCovariance) {
     SimulationOptions simulation = exactMotion(1);
     simulation.depth_scale = scale;
     const RunResult run = runFilter(simulation, singlePixels(), 20.0, false);
-    const Eigen::Vector3d way =
+    const Eigen::Vector3d displacement =
         run.window.clones.back().T_W_I.t() - LandmarkSimulation(simulation).stateAt(0.2).T_W_I.t();
-    const double sigma = std::sqrt(run.covariance_of_scale.block<3, 3>(3, 3).trace()) / way.norm();
+    const double sigma = std::sqrt(run.covariance_of_scale.block<3, 3>(3, 3).trace()) / displacement.norm();
     EXPECT_EQ(run.calibration.depth_scale, 1.0);
     EXPECT_LE(sigma, run.calibration.sigma_depth_scale);
     if (scale == 1.0) {

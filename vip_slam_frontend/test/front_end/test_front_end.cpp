@@ -171,19 +171,19 @@ TEST_F(FrontEndTest, AnOffsetThatStoodForDisparitiesIsNoneAnyMore) {
 TEST_F(FrontEndTest, TheMapsFactorIsOnThePublishedCovarianceAlone) {
   FrontEndOptions fixed = options();
   fixed.filter.calibration.depth_scale = false;  // what is found of it is in the covariance as well
-  FrontEnd without(fixed, sensor()), told(fixed, sensor());
+  FrontEnd without(fixed, sensor()), updated(fixed, sensor());
   for (double t = 0; t < 2.1; t += 0.005) {
     without.addImu(World::imu(t));
-    told.addImu(World::imu(t));
+    updated.addImu(World::imu(t));
   }
   MapUpdate update;
   update.odometry_variance = 9;
   Matrix15d alone, with;
   for (int k = 0; k < 40; ++k) {
     const double t = 0.05 * k;
-    if (k == 30) told.applyMapUpdate(update);
+    if (k == 30) updated.applyMapUpdate(update);
     alone = without.process({t, world_.image(t), World::depth(t)}).frame->covariance;
-    with = told.process({t, world_.image(t), World::depth(t)}).frame->covariance;
+    with = updated.process({t, world_.image(t), World::depth(t)}).frame->covariance;
   }
   EXPECT_GT(alone.norm(), 0);
   EXPECT_LT((with - 9 * alone).norm(), 1e-12 * with.norm());

@@ -10,7 +10,7 @@
 namespace vip_slam {
 
 /// Runs the odometry over the first `seconds` of the images, as run_bag does with its defaults: images without a pose
-/// or with a doubtful one, an IMU that images contradict, depth of another moment. Throws std::runtime_error as
+/// or with a degraded one, an IMU that images contradict, depth of another moment. Throws std::runtime_error as
 /// BagReader does.
 Findings trialRun(BagSet bags, SensorConfig sensor, double seconds);
 

@@ -95,8 +95,8 @@ class VioFilter {
   double timeOffset() const { return started_ ? filter_.window().time_offset : learnt_.time_offset; }  ///< likewise, s
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
-  /// What the scale of depth adds to it that the accelerometer has found and that is not adopted: by as much the way
-  /// from the start, and the speed, may be wrong.
+  /// What the scale of depth adds to it that the accelerometer has found and that is not adopted: by as much the
+  /// displacement from the start, and the velocity, may be wrong.
   Matrix15d covarianceOfScale() const;
   /// What a vertical that is not known adds: a radian about the start, to each side.
   Matrix15d covarianceOfVertical() const;
