@@ -96,7 +96,7 @@ struct RunResult {
   double most_bearing_correction = 0;                         ///< passed on, largest entry of all images
   Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< passed on, at the end
   double most_gyro_correction = 0;                            ///< its largest entry of all images
-  Matrix15d covariance = Matrix15d::Zero();  ///< the filter's
+  Matrix15d covariance = Matrix15d::Zero();                   ///< the filter's
   Matrix15d covariance_of_scale = Matrix15d::Zero();
 };
 

@@ -370,6 +370,7 @@ TEST(Calibration, ExactIntrinsicsAreHandedOnAsTheyAre) {
   }
 }
 
+// As when colour and depth are taken at different times: no offset is better than a wrong one.
 TEST(Calibration, AnOffsetOfDepthBeyondBeliefIsTakenBack) {
   SimulationOptions simulation;
   simulation.depth_offset = 0.06;

@@ -82,6 +82,5 @@ TEST(Calibration, AnExactGyroIsHandedOnAsItIs) {
   }
 }
 
-// As when colour and depth are taken at different times: no offset is better than a wrong one.
 }  // namespace
 }  // namespace vip_slam::testing
