@@ -228,7 +228,8 @@ std::string scaleDifference(const InertialScale& scale, const SensorConfig& sens
   const double difference = scale.factor - 1;
   return formatted(
       "distances are %s than the accelerometer says, by some %.0f %%: is the unit of depth (depth/scale: %.6g) right, "
-      "and the accelerometer's? what else was learnt of the calibration is not to be trusted",
+      "and the accelerometer's, is the IMU smoothed (check_bag tells)? what else was learnt of the calibration is not "
+      "to be trusted",
       difference < 0 ? "longer" : "shorter", 100 * std::abs(difference), sensor.depth_scale);
 }
 

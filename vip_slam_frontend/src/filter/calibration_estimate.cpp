@@ -121,6 +121,13 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
                   "configuration or camera_info should be %.1f, %.1f, %.1f, %.1f",
                   k(0), k(1), k(2), k(3)));
   }
+  if (found.gyro_contradicts) {
+    all.push_back(
+        "the gyro's rates differ from the turns of the images by more than imu/gyro_correction_sigma allows the scale "
+        "of "
+        "its axes, which is not corrected for: is the IMU smoothed or shaken, its range too small, the focal length "
+        "wrong (check_bag tells)? A sensor whose gyro is less exact should say so there");
+  }
   const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
   const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();
   const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kMinGyroError)).select(gyro, 0.0);

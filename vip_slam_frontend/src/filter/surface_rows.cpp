@@ -47,13 +47,13 @@ Eigen::MatrixXd stackPairs(const WindowState& window, const Layout& layout, int 
   const Eigen::Vector3d t_ab = R_a.transpose() * (to.T_W_I_fej.t() - from.T_W_I_fej.t());
   const Eigen::Matrix3d R_I_C = window.T_I_C.R();
   const Eigen::Vector3d t_I_C = window.T_I_C.t();
-  const int rotation = 6, translation = 6 + (window.calibration.rotation ? 3 : 0);
-  const int reference = layout.reference(), offset = translation + (window.calibration.translation ? 3 : 0);
-  const int depth = offset + (window.calibration.time_offset ? 1 : 0);
-  const int scale = depth + (window.calibration.depth_offset ? 1 : 0);
-  const int delay = scale + (window.calibration.depth_scale ? 1 : 0);
-  const int intrinsics = delay + (window.calibration.depth_delay ? 1 : 0) + (window.calibration.readout ? 1 : 0);
-  const int shift = intrinsics + (window.calibration.intrinsics ? 4 : 0);
+  const int reference = layout.reference();
+  // Columns of the window's calibration, behind the newest clone's six.
+  const int first = 6 - window.calibrationColumn();
+  const int rotation = first + window.rotationColumn(), translation = first + window.translationColumn();
+  const int offset = first + window.timeOffsetColumn(), shift = first + window.depthShiftColumn();
+  const int depth = first + window.depthOffsetColumn(), scale = first + window.depthScaleColumn();
+  const int delay = first + window.depthDelayColumn(), intrinsics = first + window.intrinsicsColumn();
   // For points from depth alone a shift of the depth image is equivalent to one of the principal point.
   Eigen::Matrix3d bearing = window.bearing.matrix();
   bearing.col(2).head<2>() -= window.depth_shift;

@@ -34,14 +34,7 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       imu_noise_(imu_noise),
       given_{T_I_C, time_offset},
       learnt_(given_),
-      evidence_({{0.0, options.calibration.sigma_depth_offset},
-                 {1.0, options.calibration.sigma_depth_scale},
-                 {0.0, options.calibration.sigma_depth_delay},
-                 {0.0, options.calibration.sigma_readout},
-                 {0.0, options.calibration.sigma_focal},
-                 {0.0, options.calibration.sigma_focal},
-                 {0.0, options.calibration.sigma_centre},
-                 {0.0, options.calibration.sigma_centre}}),
+      evidence_(priors(options.calibration, imu_noise)),
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(kGateProbability),
@@ -89,45 +82,27 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.depth_scale = depthScale();
   window.bearing = bearingCorrection();
   window.depth_shift = learnt_.depth_shift;
-  window.gyro_correction = learnt_.gyro_correction;
+  window.gyro_correction = gyroCorrection();
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = {
-      calibration.rotation,     calibration.translation,      calibration.time_offset,
-      calibration.depth_offset, calibration.depth_scale,      calibration.depth_delay,
-      calibration.readout,      calibration.intrinsics,       calibration.depth_shift && !shift_contradicts_,
-      calibration.gyro_scale,   calibration.gyro_misalignment};
+  window.calibration = calibrationFlags();
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
+  const auto known = [&rows](int column, int size, double sigma) {
+    rows.diagonal().segment(column, size).setConstant(1.0 / sigma);
+  };
   const Eigen::Vector3d sigma_rotation(prior.sigma_tilt, prior.sigma_tilt, prior.sigma_yaw);
   rows.block<3, 3>(0, 0) = sigma_rotation.cwiseInverse().asDiagonal() * prior.state.T_W_I.R();
-  rows.block<3, 3>(3, 3).diagonal().setConstant(1.0 / prior.sigma_position);
-  for (int c = 6; c < nav; ++c) {
-    double sigma = calibration.sigma_time_offset;
-    if (calibration.rotation && c < window.rotationColumn() + 3) {
-      sigma = calibration.sigma_rotation;
-    } else if (calibration.translation && c < window.translationColumn() + 3) {
-      sigma = calibration.sigma_translation;
-    } else if (window.calibration.depth_offset && c == window.depthOffsetColumn()) {
-      sigma = evidence_.held(kDepthOffset).sigma;
-    } else if (window.calibration.depth_scale && c == window.depthScaleColumn()) {
-      sigma = evidence_.held(kDepthScale).sigma;
-    } else if (window.calibration.depth_delay && c == window.depthDelayColumn()) {
-      sigma = evidence_.held(kDepthDelay).sigma;
-    } else if (window.calibration.readout && c == window.readoutColumn()) {
-      sigma = evidence_.held(kReadout).sigma;
-    } else if (window.calibration.intrinsics && c >= window.intrinsicsColumn() && c < window.depthShiftColumn()) {
-      sigma = evidence_.held(kBearing + c - window.intrinsicsColumn()).sigma;
-    } else if (c >= window.depthShiftColumn() && c < window.gyroColumn()) {
-      sigma = calibration.sigma_depth_shift;
-    } else if (c >= window.gyroColumn()) {
-      sigma = imu_noise_.gyro_correction_sigma;
-    }
-    rows(c, c) = 1.0 / sigma;
-  }
-  rows.block<3, 3>(nav, nav).diagonal().setConstant(1.0 / prior.sigma_velocity);
-  rows.block<3, 3>(nav + 3, nav + 3).diagonal().setConstant(1.0 / prior.sigma_bias_gyro);
-  rows.block<3, 3>(nav + 6, nav + 6).diagonal().setConstant(1.0 / prior.sigma_bias_accel);
+  known(3, 3, prior.sigma_position);
+  if (window.calibration.rotation) known(window.rotationColumn(), 3, calibration.sigma_rotation);
+  if (window.calibration.translation) known(window.translationColumn(), 3, calibration.sigma_translation);
+  if (window.calibration.time_offset) known(window.timeOffsetColumn(), 1, calibration.sigma_time_offset);
+  if (window.calibration.depth_shift) known(window.depthShiftColumn(), 2, calibration.sigma_depth_shift);
+  int column = window.depthOffsetColumn();
+  for (const HeldNumber& number : heldNumbers(&window)) known(column++, 1, evidence_.held(number.index).sigma);
+  known(nav, 3, prior.sigma_velocity);
+  known(nav + 3, 3, prior.sigma_bias_gyro);
+  known(nav + 6, 3, prior.sigma_bias_accel);
   if (prior.standing) {
     // mean = b_a + R^T G. The state was levelled with this mean, so the residual is zero.
     const Eigen::Vector3d up_I = prior.state.T_W_I.R().transpose() * G_;
@@ -302,9 +277,8 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     drift_.add(frontend::DriftMonitor::kDelay, one(found.value - delay_predicted.value),
                one(std::pow(delay_predicted.sigma, 2)), one(std::pow(found.sigma, 2)));
   }
-  learnHeldNumbers(propagation.inertial);
+  learnHeldNumbers(propagation.inertial && !still);
   judgeDepthShift();
-  judgeGyroCorrection();
   const Matrix15d P_updated = covariance();
   if (!still) {
     noteCorrection(predicted, P_predicted - P_updated);

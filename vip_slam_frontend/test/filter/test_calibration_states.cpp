@@ -67,18 +67,13 @@ TEST(Calibration, LearnsNeitherDelayNorGyroScaleFromNoise) {
   simulation.speed = 0.1;
   simulation.noise_told = 5;
   simulation.noise.gyro_correction_sigma = 0.03;
-  double scale_nees = 0;
-  constexpr int kRuns = 3;
-  for (int seed = 1; seed <= kRuns; ++seed) {
+  for (int seed = 1; seed <= 3; ++seed) {
     simulation.seed = seed;
-    const CalibrationEstimate calibration = runFilter(simulation, singlePixels(), 60.0, false).calibration;
-    EXPECT_NEAR(calibration.time_offset, 0.0, 1e-4);
-    EXPECT_GT(calibration.sigma_time_offset, 0.004);
-    const Eigen::Array3d scale = calibration.gyro_correction.diagonal().array();
-    scale_nees += (scale / calibration.sigma_gyro_correction.diagonal().array()).square().sum() / kRuns;
+    const RunResult run = runFilter(simulation, singlePixels(), 60.0, false);
+    EXPECT_NEAR(run.calibration.time_offset, 0.0, 1e-4);
+    EXPECT_GT(run.calibration.sigma_time_offset, 0.004);
+    EXPECT_EQ(run.most_gyro_correction, 0.0);
   }
-  std::printf("NEES of the gyro's scale (3) in slow motion: %.2f\n", scale_nees);
-  EXPECT_LT(scale_nees, 6.0);
 }
 
 // The held delay stays consistent: it is 8 ms, 1.6 sigmas, and the pose covariance accounts for it.
@@ -423,18 +418,24 @@ TEST(Calibration, OutlivesARestart) {
   EXPECT_NEAR(filter.calibration().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
 }
 
+// With a prior sigma of 0.001.
 TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
-  for (const double off : {-0.02, -0.08}) {
+  for (const double off : {-0.003, -0.02}) {
     VioFilter filter(singlePixels(), ImuNoise(), SE3(), 0.0, 500, 9.81);
     filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, filter.window().dimension());
     H(0, filter.window().gyroColumn() + 1) = 1e6;
     Eigen::VectorXd r = Eigen::VectorXd::Constant(1, 1e6 * off);
     const_cast<SquareRootFilter&>(filter.algebra()).update(H, r);
+    const Eigen::Vector3d up(0, 0, 9.81);
+    const std::vector<ImuSample> samples{{0.0, Eigen::Vector3d::Zero(), up}, {0.1, Eigen::Vector3d::Zero(), up}};
+    filter.step(filter.predict(samples), 2, {}, std::nullopt);
+    const bool believed = off > -0.004;
+    EXPECT_EQ(filter.calibration().gyro_contradicts, !believed);
     filter.stop();
     filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
     Eigen::Matrix3d expected = Eigen::Matrix3d::Zero();
-    if (off > -0.05) expected(1, 1) = off;
+    if (believed) expected(1, 1) = off;
     EXPECT_LT((filter.window().gyro_correction - expected).norm(), 1e-5);
   }
 }

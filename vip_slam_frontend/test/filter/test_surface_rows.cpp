@@ -96,8 +96,8 @@ const std::vector<Eigen::Vector3d> kCorridor{Eigen::Vector3d::UnitY(), -Eigen::V
                                              -Eigen::Vector3d::UnitZ()};
 
 TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
-  const CalibrationFlags all{true, true, true, true, true, true, true, true},
-      shift{false, false, false, false, false, false, false, true};
+  const CalibrationFlags all{true, true, true, true, true, true, true, true, true, true, true},
+      shift{false, false, false, false, false, false, false, false, true};
   for (const CalibrationFlags& calibration : {CalibrationFlags(), all, shift}) {
     WindowState window = makeWindow(3, calibration);
     const bool calibrated = calibration.rotation;
@@ -110,7 +110,7 @@ TEST(SurfaceRows, GradientEqualsDifferencesInEveryColumn) {
     const Eigen::MatrixXd R = 1e-3 * Eigen::MatrixXd::Identity(n, n);
     const SurfaceRows rows = surfaceRows(window, R, matches, 100.0);
     ASSERT_EQ(rows.used, 120);
-    ASSERT_EQ(rows.rows.H.rows(), 6 + window.calibration.size());
+    ASSERT_EQ(rows.rows.H.rows(), 6 + window.calibration.camera());
     const Eigen::VectorXd gradient = -rows.rows.H.transpose() * rows.rows.r;
     EXPECT_GT(gradient.norm(), 1.0);
     double by_offset = 0;

@@ -208,7 +208,7 @@ SensorConfig SequenceSpec::sensorConfig() const {
   s.imu_noise.gyro_random_walk = imu.gyro_random_walk;
   s.imu_noise.accel_noise_density = imu.stated_noise * imu.accel_noise_density;
   s.imu_noise.accel_random_walk = imu.accel_random_walk;
-  s.imu_noise.gyro_correction_sigma = std::max({s.imu_noise.gyro_correction_sigma, imu.scale_error, imu.misalignment});
+  s.imu_noise.gyro_correction_sigma = std::max({1e-3, imu.scale_error, imu.misalignment});
   s.depth_noise.type = depthSensorTypeFromName(depth.model);
   s.depth_noise.a = std::max(depth.a, 0.0005);  // at least the rounding to millimetres in 16UC1
   s.depth_noise.b = depth.b;

@@ -24,7 +24,7 @@ struct ImuNoise {
   double gyro_random_walk = 1e-5;       ///< rad/s^2/sqrt(Hz)
   double accel_noise_density = 1e-2;    ///< m/s^2/sqrt(Hz)
   double accel_random_walk = 1e-4;      ///< m/s^3/sqrt(Hz)
-  double gyro_correction_sigma = 1e-3;  ///< one sigma of each entry, see gyro_correction.h
+  double gyro_correction_sigma = 5e-3;  ///< one sigma of each entry, see gyro_correction.h
 };
 
 /// Factors on the configured noise, as found on the way.

@@ -117,9 +117,7 @@ class VioFilter {
   /// Adopted offset of the readings of depth, m, and the factor on them.
   double depthCorrection() const { return evidence_.adopted(kDepthOffset); }
   double depthScale() const { return evidence_.adopted(kDepthScale); }
-  /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
-  /// matter, else zero.
-  Eigen::Matrix3d gyroCorrection() const;
+  Eigen::Matrix3d gyroCorrection() const;       ///< adopted
   BearingCorrection bearingCorrection() const;  ///< adopted correction of bearings
   /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is significant
   /// and known to a tenth of a pixel. The part taken is removed from the state, and the filter estimates the rest.
@@ -172,15 +170,19 @@ class VioFilter {
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
   /// Numbers of the calibration that the filter keeps at adopted values while their evidence is gathered, in the order
-  /// of their columns. The bearings' four come last.
-  enum HeldIndex { kDepthOffset, kDepthScale, kDepthDelay, kReadout, kBearing, kHeldNumbers = kBearing + 4 };
+  /// of their columns: four of the bearings, and the entries of the gyro's correction, see gyroEntry().
+  enum HeldIndex { kDepthOffset, kDepthScale, kDepthDelay, kReadout, kBearing, kGyro = kBearing + 4 };
+  /// Of the held numbers, by the sensor's configuration.
+  static std::vector<frontend::Estimate> priors(const CalibrationOptions& calibration, const ImuNoise& imu_noise);
+  /// Which calibration a start makes part of the state.
+  CalibrationFlags calibrationFlags() const;
   struct HeldNumber {
     int index;
     double* state;
     bool applied;  ///< to the readings outside: the state is what remains
   };
   /// All that are estimated, in the order of their columns.
-  std::vector<HeldNumber> heldNumbers();
+  static std::vector<HeldNumber> heldNumbers(WindowState* state);
   /// Takes what this step said of the held numbers out of the filter and adds it to their evidence; `inertial`: the IMU
   /// predicted the motion.
   void learnHeldNumbers(bool inertial);
@@ -198,7 +200,6 @@ class VioFilter {
   /// Adjusts the depth in the tracks to readings that are shifted by this much more, in bearings, and taken for this
   /// much older, s.
   void moveDepth(const Eigen::Vector2d& shift, double delay);
-  void judgeGyroCorrection();
   /// Keeps the estimated extrinsics and calibration for the next start, unless they are implausibly far from the given
   /// ones: then they are as wrong as the estimate that failed.
   void learnCalibration();
@@ -231,10 +232,9 @@ class VioFilter {
   bool started_ = false;
   Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();  ///< already applied to the readings, in bearings
   bool shift_contradicts_ = false;                         ///< it became implausibly large
-  Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);  ///< likewise, by entries
-  int still_images_ = 0;                            ///< images since standing still began; 0 when moving
-  bool after_open_ = false;                         ///< the propagation before left the motion open
-  std::optional<frontend::Estimate> delay_before_;  ///< the value held; empty while the delay is estimated
+  int still_images_ = 0;                                   ///< images since standing still began; 0 when moving
+  bool after_open_ = false;                                ///< the propagation before left the motion open
+  std::optional<frontend::Estimate> delay_before_;         ///< the value held; empty while the delay is estimated
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;        ///< 0: none
   bool mark_kept_ = false;  ///< its clone is beyond its time in the window, and stays in the state alone

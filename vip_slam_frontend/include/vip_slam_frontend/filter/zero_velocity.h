@@ -14,8 +14,9 @@ namespace vip_slam {
 
 /// IMU time that is looked at for stillness, s.
 constexpr double kRestWindow = 0.25;
-/// The same where an engine or fans shake the IMU, and the time over which their shaking is averaged, s.
-constexpr double kShakenWindow = 0.5, kShake = 0.1;
+/// The same where an engine or fans shake the IMU, and the time over which their shaking is averaged, s: of 25 Hz, an
+/// engine's 1500 turns a minute, a twentieth is left.
+constexpr double kShakenWindow = 1.0, kShake = 0.25;
 
 struct ImuSpread {
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
