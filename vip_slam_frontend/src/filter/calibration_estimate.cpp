@@ -121,23 +121,20 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
                   "configuration or camera_info should be %.1f, %.1f, %.1f, %.1f",
                   k(0), k(1), k(2), k(3)));
   }
-  if (found.gyro_contradicts) {
-    all.push_back(
-        "the gyro's rates differ from the turns of the images by more than imu/gyro_correction_sigma allows the scale "
-        "of "
-        "its axes, which is not corrected for: is the IMU smoothed or shaken, its range too small, the focal length "
-        "wrong (check_bag tells)? A sensor whose gyro is less exact should say so there");
-  }
   const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
   const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();
   const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kMinGyroError)).select(gyro, 0.0);
-  if (off.maxCoeff() > 0) {
+  if (found.gyro_contradicts) {
+    all.push_back(
+        "the gyro's rates differ from the turns of the images by more than imu/gyro_correction_sigma allows the scale "
+        "of an axis, which is not corrected for: is the IMU smoothed or shaken, its range too small, the focal length "
+        "wrong (check_bag tells)? A sensor whose gyro is less exact should say so there");
+  } else if (off.maxCoeff() > 0) {
     const Eigen::Matrix3d& C = found.gyro_correction;
     all.push_back(formatted(
-        "scale or alignment of the gyro's axes is off by up to %.1f %%, which is corrected for: is the IMU smoothed "
-        "(check_bag tells)? Else imu/gyro_correction in the sensor's configuration should have the rows [%.4f, %.4f, "
-        "%.4f], [%.4f, %.4f, %.4f], "
-        "[%.4f, %.4f, %.4f]",
+        "scale or alignment of the gyro's axes is off by up to %.1f %%, which is corrected for: is the IMU smoothed or "
+        "shaken (check_bag tells)? Else imu/gyro_correction in the sensor's configuration should have the rows [%.4f, "
+        "%.4f, %.4f], [%.4f, %.4f, %.4f], [%.4f, %.4f, %.4f]",
         100 * off.maxCoeff(), C(0, 0), C(0, 1), C(0, 2), C(1, 0), C(1, 1), C(1, 2), C(2, 0), C(2, 1), C(2, 2)));
   }
   return all;

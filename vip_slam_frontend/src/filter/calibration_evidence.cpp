@@ -73,6 +73,11 @@ Estimate CalibrationEvidence::held(int k) const {
   return {adopted_(k), std::min(kHeld * prior_[k].sigma, sigmaOfAdopted(k))};
 }
 
+double CalibrationEvidence::varianceBeyondHeld(int k) const {
+  const double all = sigmaOfAdopted(k), kept = held(k).sigma;
+  return std::max(0.0, all * all - kept * kept);
+}
+
 void CalibrationEvidence::add(double t, const Likelihood& step) {
   // A filter that has failed says nothing; it is started again.
   if (!step.information.allFinite() || !step.weighted.allFinite()) return;

@@ -56,6 +56,7 @@ void VioFilter::stop() {
   disputed_.reset();
   still_images_ = 0;
   after_open_ = false;
+  motion_unmeasured_.reset();
   delay_before_.reset();
   mark_ = 0;
   mark_kept_ = false;

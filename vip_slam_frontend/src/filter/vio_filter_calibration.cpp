@@ -201,6 +201,7 @@ void VioFilter::judgeDepthShift() {
   depth_shift_.setZero();
   filter_.window().depth_shift.setZero();
   shift_contradicts_ = true;
+  hold();
 }
 
 const Eigen::Vector2d& VioFilter::takeDepthShift() {
@@ -234,12 +235,12 @@ void VioFilter::holdDelay() {
 
 Matrix15d VioFilter::covarianceOfScale() const {
   Eigen::Matrix<double, 15, 1> by_scale = Eigen::Matrix<double, 15, 1>::Zero();
-  if (started_) {
+  if (started_ && filter_.window().calibration.depth_scale) {
     const NavState state = nav();
-    by_scale.segment<3>(3) = evidence_.notAdopted(kDepthScale) * (state.T_W_I.t() - start_);
-    by_scale.segment<3>(6) = evidence_.notAdopted(kDepthScale) * state.v_W;
+    by_scale.segment<3>(3) = state.T_W_I.t() - start_;
+    by_scale.segment<3>(6) = state.v_W;
   }
-  return by_scale * by_scale.transpose();
+  return evidence_.varianceBeyondHeld(kDepthScale) * by_scale * by_scale.transpose();
 }
 
 BearingCorrection VioFilter::bearingCorrection() const {

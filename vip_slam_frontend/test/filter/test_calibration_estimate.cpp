@@ -82,6 +82,12 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   const std::string gyro = calibrationDifferences(given, found).back();
   EXPECT_NE(gyro.find("up to 1.2 %"), std::string::npos) << gyro;
   EXPECT_NE(gyro.find("[0.0000, -0.0123, 0.0000]"), std::string::npos) << gyro;
+  const std::size_t said = calibrationDifferences(given, found).size();
+  found.gyro_contradicts = true;
+  const std::vector<std::string> contradicting = calibrationDifferences(given, found);
+  EXPECT_EQ(contradicting.size(), said);
+  EXPECT_NE(contradicting.back().find("which is not corrected for"), std::string::npos) << contradicting.back();
+  found.gyro_contradicts = false;
   found.sigma_gyro_correction(1, 1) = 0.003;
   found.sigma_rotation.setConstant(0.01);  // not significant
   found.sigma_translation.setConstant(0.01);

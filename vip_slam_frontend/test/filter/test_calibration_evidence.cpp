@@ -164,7 +164,7 @@ TEST(CalibrationEvidence, WhatIsBeyondThePriorIsAnotherFault) {
   }
   EXPECT_EQ(evidence.adopted(0), 1.0);
   EXPECT_TRUE(evidence.contradicts(0));
-  EXPECT_NEAR(evidence.notAdopted(0), -0.2, 0.02);
+  EXPECT_NEAR(std::sqrt(evidence.varianceBeyondHeld(0)), 0.2, 0.02);
 }
 
 // An hour's evidence is kept in stretches that grow.

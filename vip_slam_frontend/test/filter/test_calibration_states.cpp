@@ -2,6 +2,7 @@
 // Extrinsics, depth and gyro errors learnt by the filter: accuracy, consistency, and that they are passed on and kept.
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -73,6 +74,8 @@ TEST(Calibration, LearnsNeitherDelayNorGyroScaleFromNoise) {
     EXPECT_NEAR(run.calibration.time_offset, 0.0, 1e-4);
     EXPECT_GT(run.calibration.sigma_time_offset, 0.004);
     EXPECT_EQ(run.most_gyro_correction, 0.0);
+    // With the estimate's difference from zero.
+    EXPECT_LT(run.calibration.sigma_gyro_correction.maxCoeff(), 1.2 * simulation.noise.gyro_correction_sigma);
   }
 }
 
@@ -418,10 +421,34 @@ TEST(Calibration, OutlivesARestart) {
   EXPECT_NEAR(filter.calibration().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
 }
 
-// With a prior sigma of 0.001.
+// A body at rest whose IMU is shaken: rates and accelerations are noise alone.
+TEST(Calibration, NothingIsLearntOfScalesAtRest) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  const auto noise = [&](double sigma) {
+    return Eigen::Vector3d(sigma * Eigen::Vector3d::NullaryExpr([&] { return normal(random); }));
+  };
+  VioFilter filter(singlePixels(), ImuNoise(), SE3(), 0.0, 500, 9.81);
+  filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
+  const CalibrationEstimate before = filter.calibration();
+  CloneId id = 2;
+  for (int k = 0; k < 300; ++k) {
+    std::vector<ImuSample> samples;
+    for (int i = 0; i <= 10; ++i)
+      samples.push_back({0.05 * k + 0.005 * i, noise(0.15), Eigen::Vector3d(0, 0, 9.81) + noise(3)});
+    filter.step(filter.predict(samples), id++, {}, ResidualMotion());
+  }
+  const CalibrationEstimate after = filter.calibration();
+  EXPECT_EQ(after.gyro_correction, before.gyro_correction);
+  EXPECT_LT((after.sigma_gyro_correction - before.sigma_gyro_correction).norm(), 1e-9);
+  EXPECT_NEAR(after.sigma_depth_scale, before.sigma_depth_scale, 1e-9);
+}
+
 TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
+  ImuNoise noise;
+  noise.gyro_correction_sigma = 0.001;
   for (const double off : {-0.003, -0.02}) {
-    VioFilter filter(singlePixels(), ImuNoise(), SE3(), 0.0, 500, 9.81);
+    VioFilter filter(singlePixels(), noise, SE3(), 0.0, 500, 9.81);
     filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, filter.window().dimension());
     H(0, filter.window().gyroColumn() + 1) = 1e6;

@@ -264,7 +264,7 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
 TEST(Stillness, AShakenImuIsQuietByItsMovingMeansWhereTheImageStands) {
   const auto spreads = [](double sway) {  // of the body, rad/s and m/s^2, once a second
     std::vector<ImuSample> samples;
-    for (int k = 0; k <= 100; ++k) {
+    for (int k = 0; 0.005 * k <= kShakenWindow; ++k) {
       const double t = 0.005 * k, shake = std::sin(2 * M_PI * 31 * t), slow = sway * std::sin(2 * M_PI * t);
       samples.push_back({t, {0.2 * shake + slow, 0, 0}, {0, 4 * shake + 3 * slow, 9.81}});
     }

@@ -58,8 +58,8 @@ class CalibrationEvidence {
   bool adopt();
   /// Whether the estimate is beyond what is believed of the prior, and sure: something else is wrong.
   bool contradicts(int k) const;
-  /// By how much the estimate differs from the adopted value: not sure yet, or beyond belief.
-  double notAdopted(int k) const { return found_(k) - adopted_(k); }
+  /// Variance of the adopted value, an estimate that is not sure yet or beyond belief included, above that of held().
+  double varianceBeyondHeld(int k) const;
   /// Nothing is known of number k; the prior's value, with this sigma, is adopted.
   void restart(int k, double sigma);
 

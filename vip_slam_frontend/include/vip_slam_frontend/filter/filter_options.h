@@ -8,7 +8,8 @@ namespace vip_slam {
 
 /// Which calibration of camera and gyro is estimated online. There is no threshold of motion below which it is frozen,
 /// since leaving the calibration out of an update treats it as exact there, which a filter cannot undo later. Only the
-/// delay is held (not left out) while the gyro does not change: a steady turn tells it from nothing else.
+/// delay is held (not left out) while the gyro does not change: a steady turn tells it from nothing else. Numbers whose
+/// evidence is gathered beside the filter (CalibrationEvidence) are held at adopted values all the time.
 struct CalibrationOptions {
   bool rotation = true;
   bool translation = false;

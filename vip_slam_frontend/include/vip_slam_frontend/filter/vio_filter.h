@@ -95,8 +95,8 @@ class VioFilter {
   double timeOffset() const { return started_ ? filter_.window().time_offset : learnt_.time_offset; }  ///< likewise, s
   NavState nav() const { return filter_.window().nav(); }
   Matrix15d covariance() const { return filter_.navCovariance(); }
-  /// What the scale of depth adds to it that the accelerometer has found and that is not adopted: by as much the
-  /// displacement from the start, and the velocity, may be wrong.
+  /// What the scale of depth adds to it beyond what the filter holds: by as much as the adopted scale may be wrong, by
+  /// the prior and the accelerometer, the displacement from the start and the velocity may be.
   Matrix15d covarianceOfScale() const;
   /// What a vertical that is not known adds: a radian about the start, to each side.
   Matrix15d covarianceOfVertical() const;
@@ -184,7 +184,7 @@ class VioFilter {
   /// All that are estimated, in the order of their columns.
   static std::vector<HeldNumber> heldNumbers(WindowState* state);
   /// Takes what this step said of the held numbers out of the filter and adds it to their evidence; `inertial`: the IMU
-  /// predicted the motion.
+  /// predicted the motion of a body that moves.
   void learnHeldNumbers(bool inertial);
   /// Takes them back to what is adopted.
   void hold();
@@ -215,7 +215,7 @@ class VioFilter {
   const CalibrationEstimate given_;         ///< by the sensor's configuration
   CalibrationEstimate learnt_;              ///< initial values at a start: given_, or the estimate of an earlier run
   frontend::CalibrationEvidence evidence_;  ///< of the numbers that are held
-  /// Time of the newest clone that the IMU did not predict, or whose first estimate no longer agrees with those of the
+  /// Time of the newest clone at rest, or that the IMU did not predict, or whose first estimate no longer agrees with those of the
   /// others; empty: none is left, what steps say of scale and delay counts.
   std::optional<double> motion_unmeasured_;
   double focal_;
