@@ -233,7 +233,8 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     simulation.readRowsWithin(filter.readout());
     result.most_bearing_correction =
         std::max(result.most_bearing_correction, filter.bearingCorrection().value.cwiseAbs().maxCoeff());
-    result.most_gyro_correction = std::max(result.most_gyro_correction, filter.gyroCorrection().cwiseAbs().maxCoeff());
+    result.gyro_correction = filter.gyroCorrection();
+    result.most_gyro_correction = std::max(result.most_gyro_correction, result.gyro_correction.cwiseAbs().maxCoeff());
     nis += report.nis;
     rows += report.rows;
     result.gated += report.features_gated;

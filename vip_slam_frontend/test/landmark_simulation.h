@@ -91,11 +91,12 @@ struct RunResult {
   int gated = 0, used = 0;
   WindowState window;  ///< at the end
   CalibrationEstimate calibration;
-  double most_depth_correction = 0;                       ///< m, of all images, with its sign
-  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();  ///< applied, at the end
-  double most_bearing_correction = 0;                     ///< passed on, largest entry of all images
-  double most_gyro_correction = 0;                        ///< largest entry of the adopted one, of all images
-  Matrix15d covariance = Matrix15d::Zero();               ///< the filter's
+  double most_depth_correction = 0;                           ///< m, of all images, with its sign
+  Eigen::Vector2d depth_shift = Eigen::Vector2d::Zero();      ///< applied, at the end
+  double most_bearing_correction = 0;                         ///< passed on, largest entry of all images
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< passed on, at the end
+  double most_gyro_correction = 0;                            ///< its largest entry of all images
+  Matrix15d covariance = Matrix15d::Zero();                   ///< the filter's
   Matrix15d covariance_of_scale = Matrix15d::Zero();
 };
 

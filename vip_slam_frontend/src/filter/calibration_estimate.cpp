@@ -77,7 +77,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   const double scale = found.depth_scale - given.depth_scale;
   if (found.sigma_depth_scale > 0 && std::abs(scale) > std::max(kMinDepthScale, kSure * found.sigma_depth_scale)) {
     const std::string remedy =
-        found.depth_unit > 0
+        found.depth_unit > 0 && !found.gyro_contradicts  // of an IMU whose rates are wrong neither is the scale right
             ? formatted(" Else depth/scale in the sensor's configuration should be %.6g", found.depth_unit)
             : "";
     all.push_back(formatted("depth reads %.1f %% too %s by the accelerometer (one sigma %.1f %%), which is corrected "
@@ -124,11 +124,12 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
   const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();
   const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kMinGyroError)).select(gyro, 0.0);
-  if (found.gyro_contradicts) {
-    all.push_back(
-        "the gyro's rates differ from the turns of the images by more than imu/gyro_correction_sigma allows the scale "
-        "of an axis, which is not corrected for: is the IMU smoothed or shaken, its range too small, the focal length "
-        "wrong (check_bag tells)? A sensor whose gyro is less exact should say so there");
+  if (off.maxCoeff() > 0 && found.gyro_contradicts) {
+    all.push_back(formatted(
+        "the gyro's rates differ from the turns of the images by up to %.1f %%, which is corrected for, more than "
+        "imu/gyro_correction_sigma allows the scale of an axis: is the IMU smoothed or shaken, its range too small, "
+        "the focal length wrong (check_bag tells)? A sensor whose gyro is less exact should say so there",
+        100 * off.maxCoeff()));
   } else if (off.maxCoeff() > 0) {
     const Eigen::Matrix3d& C = found.gyro_correction;
     all.push_back(formatted(

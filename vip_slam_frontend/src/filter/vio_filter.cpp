@@ -34,7 +34,14 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       imu_noise_(imu_noise),
       given_{T_I_C, time_offset},
       learnt_(given_),
-      evidence_(priors(options.calibration, imu_noise)),
+      evidence_({{0.0, options.calibration.sigma_depth_offset},
+                 {1.0, options.calibration.sigma_depth_scale},
+                 {0.0, options.calibration.sigma_depth_delay},
+                 {0.0, options.calibration.sigma_readout},
+                 {0.0, options.calibration.sigma_focal},
+                 {0.0, options.calibration.sigma_focal},
+                 {0.0, options.calibration.sigma_centre},
+                 {0.0, options.calibration.sigma_centre}}),
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(kGateProbability),
@@ -83,9 +90,13 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   window.depth_scale = depthScale();
   window.bearing = bearingCorrection();
   window.depth_shift = learnt_.depth_shift;
-  window.gyro_correction = gyroCorrection();
+  window.gyro_correction = learnt_.gyro_correction;
   const CalibrationOptions& calibration = options_.calibration;
-  window.calibration = calibrationFlags();
+  window.calibration = {
+      calibration.rotation,     calibration.translation,      calibration.time_offset,
+      calibration.depth_offset, calibration.depth_scale,      calibration.depth_delay,
+      calibration.readout,      calibration.intrinsics,       calibration.depth_shift && !shift_contradicts_,
+      calibration.gyro_scale,   calibration.gyro_misalignment};
 
   const int n = window.dimension(), nav = window.navColumn();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + 3, n);
@@ -99,6 +110,7 @@ void VioFilter::start(const FilterPrior& prior, CloneId id, const Eigen::Vector3
   if (window.calibration.translation) known(window.translationColumn(), 3, calibration.sigma_translation);
   if (window.calibration.time_offset) known(window.timeOffsetColumn(), 1, calibration.sigma_time_offset);
   if (window.calibration.depth_shift) known(window.depthShiftColumn(), 2, calibration.sigma_depth_shift);
+  known(window.gyroColumn(), window.calibration.gyro(), imu_noise_.gyro_correction_sigma);
   int column = window.depthOffsetColumn();
   for (const HeldNumber& number : heldNumbers(&window)) known(column++, 1, evidence_.held(number.index).sigma);
   known(nav, 3, prior.sigma_velocity);
@@ -280,6 +292,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   }
   learnHeldNumbers(propagation.inertial && !still);
   judgeDepthShift();
+  judgeGyroCorrection();
   const Matrix15d P_updated = covariance();
   if (!still) {
     noteCorrection(predicted, P_predicted - P_updated);

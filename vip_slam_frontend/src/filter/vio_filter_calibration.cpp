@@ -9,8 +9,9 @@ namespace vip_slam {
 
 namespace {
 
-// An estimate is plausible, and kept over a restart, within this many sigmas of the prior.
-constexpr double kBelievableChange = 4.0;
+// An estimate is plausible, and kept over a restart, within this many sigmas of the prior; an entry of the gyro's
+// correction within a fixed limit, since its prior sigma is only a data-sheet value.
+constexpr double kBelievableChange = 4.0, kMaxGyroError = 0.05;
 // One sigma of a depth offset that is not to be learnt, m.
 constexpr double kHeldOffset = 1e-6;
 // Shift of the depth image, in bearings (px over the focal length): significant above kSureShift sigmas, worth
@@ -19,31 +20,10 @@ constexpr double kHeldOffset = 1e-6;
 constexpr double kSureShift = 4.0, kMinShift = 1e-4, kKnownShift = 2e-4;
 // One sigma of a shift that is reset to zero, in bearings: holds it there.
 constexpr double kHeldShift = 1e-7;
-
-CalibrationFlags flagsOf(const CalibrationOptions& options) {
-  return {options.rotation,    options.translation, options.time_offset,      options.depth_offset,
-          options.depth_scale, options.depth_delay, options.readout,          options.intrinsics,
-          options.depth_shift, options.gyro_scale,  options.gyro_misalignment};
-}
+// An entry of the gyro's correction is significant above these: 5e-4 of a rotation by 60 degrees is 0.03 degrees.
+constexpr double kSureGyroError = 4.0, kMinGyroError = 5e-4;
 
 }  // namespace
-
-CalibrationFlags VioFilter::calibrationFlags() const {
-  CalibrationFlags flags = flagsOf(options_.calibration);
-  flags.depth_shift = flags.depth_shift && !shift_contradicts_;
-  return flags;
-}
-
-std::vector<frontend::Estimate> VioFilter::priors(const CalibrationOptions& calibration, const ImuNoise& imu_noise) {
-  std::vector<frontend::Estimate> all(kGyro + flagsOf(calibration).gyro(), {0.0, imu_noise.gyro_correction_sigma});
-  all[kDepthOffset] = {0.0, calibration.sigma_depth_offset};
-  all[kDepthScale] = {1.0, calibration.sigma_depth_scale};
-  all[kDepthDelay] = {0.0, calibration.sigma_depth_delay};
-  all[kReadout] = {0.0, calibration.sigma_readout};
-  all[kBearing] = all[kBearing + 1] = {0.0, calibration.sigma_focal};
-  all[kBearing + 2] = all[kBearing + 3] = {0.0, calibration.sigma_centre};
-  return all;
-}
 
 CalibrationEstimate VioFilter::calibration() const {
   CalibrationEstimate calibration = learnt_;
@@ -52,13 +32,6 @@ CalibrationEstimate VioFilter::calibration() const {
   calibration.depth_delay = depthDelay();
   calibration.readout = readout();
   calibration.bearing = bearingCorrection();
-  calibration.gyro_correction = gyroCorrection();
-  const int of_gyro = flagsOf(options_.calibration).gyro();
-  for (int k = 0; k < of_gyro; ++k) {
-    const auto [row, column] = gyroEntry(flagsOf(options_.calibration), k);
-    calibration.sigma_gyro_correction(row, column) = evidence_.sigmaOfAdopted(kGyro + k);
-    calibration.gyro_contradicts = calibration.gyro_contradicts || evidence_.contradicts(kGyro + k);
-  }
   calibration.depth_contradicts = evidence_.contradicts(kDepthOffset) || shift_contradicts_;
   calibration.depth_shift += depth_shift_;
   if (!started_) return calibration;
@@ -73,6 +46,7 @@ CalibrationEstimate VioFilter::calibration() const {
   for (int k = 0; window.calibration.intrinsics && k < 4; ++k) {
     calibration.sigma_bearing(k) = evidence_.sigmaOfAdopted(kBearing + k);
   }
+  calibration.gyro_correction = window.gyro_correction;
   if (window.calibration.size() == 0) return calibration;
   const Eigen::VectorXd sigmas = filter_.calibrationSigmas();
   const int first = window.calibrationColumn();
@@ -84,6 +58,13 @@ CalibrationEstimate VioFilter::calibration() const {
   calibration.delay_drifts = drift_.of(frontend::DriftMonitor::kDelay).drifts();
   if (window.calibration.depth_shift) {
     calibration.sigma_depth_shift = sigmas.segment<2>(window.depthShiftColumn() - first);
+  }
+  for (int k = 0; k < window.calibration.gyro(); ++k) {
+    const auto [row, column] = gyroEntry(window.calibration, k);
+    calibration.sigma_gyro_correction(row, column) = sigmas(window.gyroColumn() - first + k);
+    calibration.gyro_contradicts =
+        calibration.gyro_contradicts ||
+        std::abs(gyroCorrection()(row, column)) > kBelievableChange * imu_noise_.gyro_correction_sigma;
   }
   return calibration;
 }
@@ -99,13 +80,15 @@ void VioFilter::learnCalibration() {
   if (change.head<3>().norm() > kBelievableChange * options.sigma_rotation ||
       change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
       std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset ||
-      ((depth_shift + window.depth_shift).array().abs() > kBelievableChange * options.sigma_depth_shift).any()) {
+      ((depth_shift + window.depth_shift).array().abs() > kBelievableChange * options.sigma_depth_shift).any() ||
+      window.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroError) {
     return;
   }
   learnt_.T_I_C = window.T_I_C;
   learnt_.time_offset = window.time_offset;
   learnt_.depth_shift = window.depth_shift;
   depth_shift_ = depth_shift;
+  learnt_.gyro_correction = window.gyro_correction;
 }
 
 std::vector<VioFilter::HeldNumber> VioFilter::heldNumbers(WindowState* state) {
@@ -117,10 +100,6 @@ std::vector<VioFilter::HeldNumber> VioFilter::heldNumbers(WindowState* state) {
   if (flags.depth_delay) all.push_back({kDepthDelay, &window.depth_delay, true});
   if (flags.readout) all.push_back({kReadout, &window.readout, true});
   for (int k = 0; flags.intrinsics && k < 4; ++k) all.push_back({kBearing + k, &window.bearing.value(k), false});
-  for (int k = 0; k < flags.gyro(); ++k) {
-    const auto [row, column] = gyroEntry(flags, k);
-    all.push_back({kGyro + k, &window.gyro_correction(row, column), false});
-  }
   return all;
 }
 
@@ -139,7 +118,7 @@ void VioFilter::learnHeldNumbers(bool inertial) {
   }
   const Likelihood of_before = Likelihood::of(before, sigmas * sigmas);
   const Likelihood after = Likelihood::of(value, filter_.covariance(filter_.window().depthOffsetColumn(), n));
-  Likelihood step = Likelihood::none(evidence_.size());  // numbers that are not estimated have zeros
+  Likelihood step = Likelihood::none(kHeldNumbers);  // numbers that are not estimated have zeros
   for (int j = 0; j < n; ++j) {
     step.weighted(numbers[j].index) = after.weighted(j) - of_before.weighted(j);
     for (int k = 0; k < n; ++k) {
@@ -249,14 +228,19 @@ BearingCorrection VioFilter::bearingCorrection() const {
   return correction;
 }
 
-Eigen::Matrix3d VioFilter::gyroCorrection() const {
-  Eigen::Matrix3d correction = Eigen::Matrix3d::Zero();
-  const CalibrationFlags flags = flagsOf(options_.calibration);
-  for (int k = 0; k < flags.gyro(); ++k) {
-    const auto [row, column] = gyroEntry(flags, k);
-    correction(row, column) = evidence_.adopted(kGyro + k);
+void VioFilter::judgeGyroCorrection() {
+  const WindowState& window = filter_.window();
+  if (window.calibration.gyro() == 0) return;
+  const Eigen::Array33d change = window.gyro_correction.cwiseAbs();
+  gyro_is_off_ = gyro_is_off_ && change > kMinGyroError / 2;
+  if ((change > kMinGyroError && !gyro_is_off_).any()) {
+    gyro_is_off_ = gyro_is_off_ ||
+                   (change > kMinGyroError && change > kSureGyroError * calibration().sigma_gyro_correction.array());
   }
-  return correction;
+}
+
+Eigen::Matrix3d VioFilter::gyroCorrection() const {
+  return gyro_is_off_.select(filter_.window().gyro_correction, Eigen::Matrix3d::Zero());
 }
 
 }  // namespace vip_slam

@@ -51,6 +51,11 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   found.depth_unit = 0.000971;
   const std::string unit = calibrationDifferences(given, found).back();
   EXPECT_NE(unit.find("depth/scale in the sensor's configuration should be 0.000971"), std::string::npos) << unit;
+  found.gyro_contradicts = true;
+  const std::string doubtful = calibrationDifferences(given, found).back();
+  EXPECT_NE(doubtful.find("depth reads 2.9 % too long"), std::string::npos) << doubtful;
+  EXPECT_EQ(doubtful.find("should be"), std::string::npos) << "of an IMU that is itself in question: " << doubtful;
+  found.gyro_contradicts = false;
   found.depth_scale = 1;
   found.depth_delay = 0.0412;
   found.sigma_depth_delay = 0.002;
@@ -86,7 +91,8 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   found.gyro_contradicts = true;
   const std::vector<std::string> contradicting = calibrationDifferences(given, found);
   EXPECT_EQ(contradicting.size(), said);
-  EXPECT_NE(contradicting.back().find("which is not corrected for"), std::string::npos) << contradicting.back();
+  EXPECT_NE(contradicting.back().find("more than imu/gyro_correction_sigma allows"), std::string::npos);
+  EXPECT_EQ(contradicting.back().find("should have the rows"), std::string::npos) << contradicting.back();
   found.gyro_contradicts = false;
   found.sigma_gyro_correction(1, 1) = 0.003;
   found.sigma_rotation.setConstant(0.01);  // not significant

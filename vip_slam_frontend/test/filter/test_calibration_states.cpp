@@ -2,7 +2,6 @@
 // Extrinsics, depth and gyro errors learnt by the filter: accuracy, consistency, and that they are passed on and kept.
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include <gtest/gtest.h>
 
@@ -68,15 +67,18 @@ TEST(Calibration, LearnsNeitherDelayNorGyroScaleFromNoise) {
   simulation.speed = 0.1;
   simulation.noise_told = 5;
   simulation.noise.gyro_correction_sigma = 0.03;
-  for (int seed = 1; seed <= 3; ++seed) {
+  double scale_nees = 0;
+  constexpr int kRuns = 3;
+  for (int seed = 1; seed <= kRuns; ++seed) {
     simulation.seed = seed;
-    const RunResult run = runFilter(simulation, singlePixels(), 60.0, false);
-    EXPECT_NEAR(run.calibration.time_offset, 0.0, 1e-4);
-    EXPECT_GT(run.calibration.sigma_time_offset, 0.004);
-    EXPECT_EQ(run.most_gyro_correction, 0.0);
-    // With the estimate's difference from zero.
-    EXPECT_LT(run.calibration.sigma_gyro_correction.maxCoeff(), 1.2 * simulation.noise.gyro_correction_sigma);
+    const CalibrationEstimate calibration = runFilter(simulation, singlePixels(), 60.0, false).calibration;
+    EXPECT_NEAR(calibration.time_offset, 0.0, 1e-4);
+    EXPECT_GT(calibration.sigma_time_offset, 0.004);
+    const Eigen::Array3d scale = calibration.gyro_correction.diagonal().array();
+    scale_nees += (scale / calibration.sigma_gyro_correction.diagonal().array()).square().sum() / kRuns;
   }
+  std::printf("NEES of the gyro's scale (3) in slow motion: %.2f\n", scale_nees);
+  EXPECT_LT(scale_nees, 6.0);
 }
 
 // The held delay stays consistent: it is 8 ms, 1.6 sigmas, and the pose covariance accounts for it.
@@ -285,8 +287,8 @@ TEST(Calibration, AnExactDepthImageStaysWhereItIs) {
   }
 }
 
-// A unit of depth that is another one: its scale is not used, but the pose knows how far off it may be.
-TEST(Calibration, AScaleThatIsNotAdoptedIsInTheCovariance) {
+// A unit of depth that is another one: no scale that would be right is used, but the pose knows how far off it may be.
+TEST(Calibration, AScaleBeyondBeliefIsInTheCovariance) {
   for (const double scale : {1.0, 1.5}) {
     SimulationOptions simulation = exactMotion(1);
     simulation.depth_scale = scale;
@@ -294,9 +296,9 @@ TEST(Calibration, AScaleThatIsNotAdoptedIsInTheCovariance) {
     const Eigen::Vector3d displacement =
         run.window.clones.back().T_W_I.t() - LandmarkSimulation(simulation).stateAt(0.2).T_W_I.t();
     const double sigma = std::sqrt(run.covariance_of_scale.block<3, 3>(3, 3).trace()) / displacement.norm();
-    EXPECT_EQ(run.calibration.depth_scale, 1.0);
     EXPECT_LE(sigma, run.calibration.sigma_depth_scale);
     if (scale == 1.0) {
+      EXPECT_EQ(run.calibration.depth_scale, 1.0);
       EXPECT_LT(sigma, 0.005);
     } else {
       EXPECT_GT(sigma, 0.02) << "the prior's";
@@ -393,6 +395,32 @@ TEST(Calibration, StandingTeachesNothing) {
   EXPECT_LT(std::abs(run.window.depth_offset), 0.2 * options.calibration.sigma_depth_offset);
 }
 
+/// Sigma of the scale of depth after one image, 0.1 s from `t` on, that says it is 1 % off. Rates and accelerations are
+/// those of a body at rest; `still`: it is known to be.
+double sigmaOfTaughtScale(VioFilter* filter, CloneId id, double t, bool still) {
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, filter->window().dimension());
+  H(0, filter->window().depthScaleColumn()) = 1e4;
+  Eigen::VectorXd r = Eigen::VectorXd::Constant(1, 1e4 * 0.01);
+  const_cast<SquareRootFilter&>(filter->algebra()).update(H, r);
+  const Eigen::Vector3d up(0, 0, 9.81);
+  const std::vector<ImuSample> samples{{t, Eigen::Vector3d::Zero(), up}, {t + 0.1, Eigen::Vector3d::Zero(), up}};
+  filter->step(filter->predict(samples), id, {}, still ? std::optional(ResidualMotion()) : std::nullopt);
+  return filter->calibration().sigma_depth_scale;
+}
+
+TEST(Calibration, NothingIsLearntOfScaleAtRestAndLearntAgainAfterAClockThatRanBack) {
+  VioFilter filter(singlePixels(), ImuNoise(), SE3(), 0.0, 500, 9.81);
+  FilterPrior prior;
+  prior.state.t = 100;
+  filter.start(prior, 1, Eigen::Vector3d::Zero());
+  const double before = filter.calibration().sigma_depth_scale;
+  EXPECT_NEAR(sigmaOfTaughtScale(&filter, 2, 100, true), before, 1e-9);
+  filter.stop();
+  prior.state.t = 0;
+  filter.start(prior, 3, Eigen::Vector3d::Zero());
+  EXPECT_LT(sigmaOfTaughtScale(&filter, 4, 0, false), 0.9 * before);
+}
+
 /// A filter at rest at the origin, whose extrinsic rotation was corrected by `turn` by one measurement.
 VioFilter taught(const FilterOptions& options, const SE3& given, const Eigen::Vector3d& turn) {
   VioFilter filter(options, ImuNoise(), given, 0.0, 500, 9.81);
@@ -421,33 +449,28 @@ TEST(Calibration, OutlivesARestart) {
   EXPECT_NEAR(filter.calibration().sigma_rotation.x(), options.calibration.sigma_rotation, 1e-6);
 }
 
-// A body at rest whose IMU is shaken: rates and accelerations are noise alone.
-TEST(Calibration, NothingIsLearntOfScalesAtRest) {
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) {
-    return Eigen::Vector3d(sigma * Eigen::Vector3d::NullaryExpr([&] { return normal(random); }));
-  };
-  VioFilter filter(singlePixels(), ImuNoise(), SE3(), 0.0, 500, 9.81);
-  filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
-  const CalibrationEstimate before = filter.calibration();
-  CloneId id = 2;
-  for (int k = 0; k < 300; ++k) {
-    std::vector<ImuSample> samples;
-    for (int i = 0; i <= 10; ++i)
-      samples.push_back({0.05 * k + 0.005 * i, noise(0.15), Eigen::Vector3d(0, 0, 9.81) + noise(3)});
-    filter.step(filter.predict(samples), id++, {}, ResidualMotion());
+TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
+  for (const double off : {-0.02, -0.08}) {
+    VioFilter filter(singlePixels(), ImuNoise(), SE3(), 0.0, 500, 9.81);
+    filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, filter.window().dimension());
+    H(0, filter.window().gyroColumn() + 1) = 1e6;
+    Eigen::VectorXd r = Eigen::VectorXd::Constant(1, 1e6 * off);
+    const_cast<SquareRootFilter&>(filter.algebra()).update(H, r);
+    EXPECT_NEAR(filter.calibration().gyro_correction(1, 1), off, 1e-5);
+    filter.stop();
+    filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
+    Eigen::Matrix3d expected = Eigen::Matrix3d::Zero();
+    if (off > -0.05) expected(1, 1) = off;
+    EXPECT_LT((filter.window().gyro_correction - expected).norm(), 1e-5);
   }
-  const CalibrationEstimate after = filter.calibration();
-  EXPECT_EQ(after.gyro_correction, before.gyro_correction);
-  EXPECT_LT((after.sigma_gyro_correction - before.sigma_gyro_correction).norm(), 1e-9);
-  EXPECT_NEAR(after.sigma_depth_scale, before.sigma_depth_scale, 1e-9);
 }
 
-TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
+// It is corrected for nevertheless, but not what a sensor file should have.
+TEST(Calibration, AGyroThatIsWorseThanItsPriorContradicts) {
   ImuNoise noise;
-  noise.gyro_correction_sigma = 0.001;
-  for (const double off : {-0.003, -0.02}) {
+  noise.gyro_correction_sigma = 0.005;
+  for (const double off : {-0.015, -0.025}) {
     VioFilter filter(singlePixels(), noise, SE3(), 0.0, 500, 9.81);
     filter.start(FilterPrior(), 1, Eigen::Vector3d::Zero());
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(1, filter.window().dimension());
@@ -457,13 +480,8 @@ TEST(Calibration, OfTheGyroOutlivesARestartUnlessItIsBeyondBelief) {
     const Eigen::Vector3d up(0, 0, 9.81);
     const std::vector<ImuSample> samples{{0.0, Eigen::Vector3d::Zero(), up}, {0.1, Eigen::Vector3d::Zero(), up}};
     filter.step(filter.predict(samples), 2, {}, std::nullopt);
-    const bool believed = off > -0.004;
-    EXPECT_EQ(filter.calibration().gyro_contradicts, !believed);
-    filter.stop();
-    filter.start(FilterPrior(), 9, Eigen::Vector3d::Zero());
-    Eigen::Matrix3d expected = Eigen::Matrix3d::Zero();
-    if (believed) expected(1, 1) = off;
-    EXPECT_LT((filter.window().gyro_correction - expected).norm(), 1e-5);
+    EXPECT_NEAR(filter.gyroCorrection()(1, 1), off, 1e-4);
+    EXPECT_EQ(filter.calibration().gyro_contradicts, off < -0.02);
   }
 }
 

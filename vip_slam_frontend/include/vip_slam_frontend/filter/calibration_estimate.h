@@ -33,10 +33,10 @@ struct CalibrationEstimate {
   Eigen::Vector2d depth_shift_px = Eigen::Vector2d::Zero();  ///< the same in px, as in a sensor file
   BearingCorrection bearing = {};                            ///< correction of the intrinsics in use
   Eigen::Vector4d sigma_bearing = Eigen::Vector4d::Zero();
-  Eigen::Vector4d intrinsics = Eigen::Vector4d::Zero();             ///< fx, fy, cx, cy in px that make `bearing` zero
-  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();        ///< that is adopted, see gyro_correction.h
-  Eigen::Matrix3d sigma_gyro_correction = Eigen::Matrix3d::Zero();  ///< of the present estimate
-  bool gyro_contradicts = false;   ///< gyro and images disagree by more than scale and alignment of its axes may
+  Eigen::Vector4d intrinsics = Eigen::Vector4d::Zero();       ///< fx, fy, cx, cy in px that make `bearing` zero
+  Eigen::Matrix3d gyro_correction = Eigen::Matrix3d::Zero();  ///< see gyro_correction.h
+  Eigen::Matrix3d sigma_gyro_correction = Eigen::Matrix3d::Zero();
+  bool gyro_contradicts = false;  ///< a significant entry is beyond what is believed of ImuNoise::gyro_correction_sigma
   bool depth_contradicts = false;  ///< depth and images disagree by more than any offset; none is used
 };
 

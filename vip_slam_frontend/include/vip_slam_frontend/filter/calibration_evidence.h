@@ -42,7 +42,6 @@ class CalibrationEvidence {
   /// Numbers j and k have, apart from their own priors, the same value within `sigma`.
   void couple(int j, int k, double sigma);
 
-  int size() const { return static_cast<int>(prior_.size()); }
   double adopted(int k) const { return adopted_(k); }
   double sigmaOfAdopted(int k) const;
   /// What the filter is to have of a number at the beginning of each step: the adopted value, with a share of the

@@ -117,7 +117,9 @@ class VioFilter {
   /// Adopted offset of the readings of depth, m, and the factor on them.
   double depthCorrection() const { return evidence_.adopted(kDepthOffset); }
   double depthScale() const { return evidence_.adopted(kDepthScale); }
-  Eigen::Matrix3d gyroCorrection() const;       ///< adopted
+  /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
+  /// matter, else zero.
+  Eigen::Matrix3d gyroCorrection() const;
   BearingCorrection bearingCorrection() const;  ///< adopted correction of bearings
   /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is significant
   /// and known to a tenth of a pixel. The part taken is removed from the state, and the filter estimates the rest.
@@ -170,12 +172,8 @@ class VioFilter {
   void updateWithFeatures(const std::vector<Candidate>& candidates, bool after_step, StepReport* report);
   void updateWithSurfaces(const SurfaceMatches& surfaces, StepReport* report);
   /// Numbers of the calibration that the filter keeps at adopted values while their evidence is gathered, in the order
-  /// of their columns: four of the bearings, and the entries of the gyro's correction, see gyroEntry().
-  enum HeldIndex { kDepthOffset, kDepthScale, kDepthDelay, kReadout, kBearing, kGyro = kBearing + 4 };
-  /// Of the held numbers, by the sensor's configuration.
-  static std::vector<frontend::Estimate> priors(const CalibrationOptions& calibration, const ImuNoise& imu_noise);
-  /// Which calibration a start makes part of the state.
-  CalibrationFlags calibrationFlags() const;
+  /// of their columns. The bearings' four come last.
+  enum HeldIndex { kDepthOffset, kDepthScale, kDepthDelay, kReadout, kBearing, kHeldNumbers = kBearing + 4 };
   struct HeldNumber {
     int index;
     double* state;
@@ -200,6 +198,7 @@ class VioFilter {
   /// Adjusts the depth in the tracks to readings that are shifted by this much more, in bearings, and taken for this
   /// much older, s.
   void moveDepth(const Eigen::Vector2d& shift, double delay);
+  void judgeGyroCorrection();
   /// Keeps the estimated extrinsics and calibration for the next start, unless they are implausibly far from the given
   /// ones: then they are as wrong as the estimate that failed.
   void learnCalibration();
@@ -215,8 +214,8 @@ class VioFilter {
   const CalibrationEstimate given_;         ///< by the sensor's configuration
   CalibrationEstimate learnt_;              ///< initial values at a start: given_, or the estimate of an earlier run
   frontend::CalibrationEvidence evidence_;  ///< of the numbers that are held
-  /// Time of the newest clone at rest, or that the IMU did not predict, or whose first estimate no longer agrees with those of the
-  /// others; empty: none is left, what steps say of scale and delay counts.
+  /// Time of the newest clone that the IMU did not predict, that is at rest, or whose first estimate no longer agrees
+  /// with those of the others; empty: none is left, what steps say of scale and delay counts.
   std::optional<double> motion_unmeasured_;
   double focal_;
   Eigen::Vector3d G_;
@@ -232,9 +231,10 @@ class VioFilter {
   bool started_ = false;
   Eigen::Vector2d depth_shift_ = Eigen::Vector2d::Zero();  ///< already applied to the readings, in bearings
   bool shift_contradicts_ = false;                         ///< it became implausibly large
-  int still_images_ = 0;                                   ///< images since standing still began; 0 when moving
-  bool after_open_ = false;                                ///< the propagation before left the motion open
-  std::optional<frontend::Estimate> delay_before_;         ///< the value held; empty while the delay is estimated
+  Eigen::Array<bool, 3, 3> gyro_is_off_ = Eigen::Array<bool, 3, 3>::Constant(false);  ///< likewise, by entries
+  int still_images_ = 0;                            ///< images since standing still began; 0 when moving
+  bool after_open_ = false;                         ///< the propagation before left the motion open
+  std::optional<frontend::Estimate> delay_before_;  ///< the value held; empty while the delay is estimated
   CloneId still_anchor_ = 0;
   CloneId mark_ = 0;        ///< 0: none
   bool mark_kept_ = false;  ///< its clone is beyond its time in the window, and stays in the state alone

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The filter's state: [C_1 ... C_M | calibration | E]. C = (theta, p) of the IMU at image times (oldest first, newest =
-// present pose), E = (v, b_g, b_a), calibration = the estimated ones of (theta_IC, t_IC, td, depth shift, depth
-// offset, depth scale, depth delay, readout, bearing correction, gyro correction).
+// present pose), E = (v, b_g, b_a), calibration = the estimated ones of (theta_IC, t_IC, td, depth offset, depth
+// scale, depth delay, readout, bearing correction, depth shift, gyro correction).
 // Rotations are perturbed on the right, positions in the world.
 #pragma once
 
@@ -74,12 +74,12 @@ struct WindowState {
   int rotationColumn() const { return calibrationColumn(); }
   int translationColumn() const { return calibrationColumn() + (calibration.rotation ? 3 : 0); }
   int timeOffsetColumn() const { return translationColumn() + (calibration.translation ? 3 : 0); }
-  int depthShiftColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
-  int depthOffsetColumn() const { return depthShiftColumn() + (calibration.depth_shift ? 2 : 0); }
+  int depthOffsetColumn() const { return timeOffsetColumn() + (calibration.time_offset ? 1 : 0); }
   int depthScaleColumn() const { return depthOffsetColumn() + (calibration.depth_offset ? 1 : 0); }
   int depthDelayColumn() const { return depthScaleColumn() + (calibration.depth_scale ? 1 : 0); }
   int readoutColumn() const { return depthDelayColumn() + (calibration.depth_delay ? 1 : 0); }
   int intrinsicsColumn() const { return readoutColumn() + (calibration.readout ? 1 : 0); }
+  int depthShiftColumn() const { return intrinsicsColumn() + (calibration.intrinsics ? 4 : 0); }
   /// The correction's diagonal (scale), then its off-diagonal entries (misalignment), if estimated: see gyroEntry().
   int gyroColumn() const { return calibrationColumn() + calibration.camera(); }
 
