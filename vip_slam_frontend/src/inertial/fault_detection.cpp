@@ -31,10 +31,6 @@ double motionDifference(const SE3& a, const SE3& b, const Matrix6d& covariance) 
   return std::isfinite(squared) ? std::sqrt(std::max(0.0, squared)) : 0.0;
 }
 
-bool FaultDetection::neverAgreed() const {
-  return contradicted_turn_ >= kShowsVertical && contradicted_turn_ > agreed_turn_;
-}
-
 bool FaultDetection::isOnProbation(double t) const { return t - last_fault_t_ < isolation() + kForgotten; }
 
 void FaultDetection::reset(double t) {
@@ -64,11 +60,12 @@ bool FaultDetection::add(const MotionEvidence& e) {
     last_fault_t_ = e.t;
   }
   const bool isolated = fault || (e.images_agree && e.t - last_fault_t_ < isolated_);
-  if (std::max(agreed_turn_, contradicted_turn_) < kShowsVertical) {
-    if (isolated)
-      contradicted_turn_ += e.turn;
-    else if (e.images_agree && !deviates)
-      agreed_turn_ += e.turn;
+  if (e.images_agree && !vertical_confirmed_) {
+    if (fault || e.disputed)
+      agreement_ = std::max(agreement_ - e.turn, -kShowsVertical);
+    else if (!deviates && !isOnProbation(e.t))
+      agreement_ += e.turn;
+    vertical_confirmed_ = agreement_ >= kShowsVertical;
   }
   return isolated;
 }

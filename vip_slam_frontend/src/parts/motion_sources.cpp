@@ -161,6 +161,7 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
                                  const Propagation& propagation, bool implausible) {
   MotionEvidence evidence;
   evidence.implausible = implausible;
+  evidence.disputed = filter_->isDisputed();
   evidence.t = propagation.predicted.t;
   evidence.interval = prediction.interval;
   evidence.images_agree = !prediction.turn_unknown && leave_out_moving_ && !prediction.wary &&

@@ -60,7 +60,7 @@ class MotionSources {
   bool imuIsAtFault(const TrackingResult& tracking, const PredictedMotion& prediction, const Propagation& propagation,
                     bool implausible);
   /// Whether the IMU has contradicted the images from its first motion on, so that the vertical is not known.
-  bool verticalUnknown() const { return faults_.neverAgreed(); }
+  bool verticalUnknown() const { return faults_.verticalUnknown(); }
   /// Whether the image after an IMU gap shows the motion during the gap. Images taken inside the gap follow each other
   /// closely; when they are missing as well, enough tracks must survive and the rotation must be near the predicted
   /// one. `unseen`: time since the last image, s.

@@ -2,6 +2,7 @@
 // Inertial channels with stand-ins, fault detection, and the propagation by another source's motion.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -184,22 +185,38 @@ TEST(FaultDetection, ABodyThatFillsTheViewForAMomentIsNoFaultOfTheImu) {
 }
 
 // Two seconds of rest, then turning by 0.3 rad/s.
-TEST(FaultDetection, AnImuThatIsWrongFromItsFirstMotionOnHasNotToldTheVertical) {
-  const auto never_agreed = [](double from, double to) {
+TEST(FaultDetection, TheVerticalIsNotKnownWhereTheFirstTurnsContradict) {
+  struct Unknown {
+    bool at_3s, at_end;
+  };
+  const auto unknown = [](const std::function<double(double)>& sigmas, const std::function<bool(double)>& disputed) {
     FaultDetection detection;
     detection.reset(0);
+    Unknown result{};
     for (int k = 1; k <= 300; ++k) {
       const double t = k / 30.0;
-      MotionEvidence evidence{t, 1 / 30.0, true, t > from && t < to ? 30.0 : 2.0};
+      MotionEvidence evidence{t, 1 / 30.0, true, sigmas(t)};
+      evidence.disputed = disputed(t);
       evidence.turn = t > 2 ? 0.01 : 0.0;
       detection.add(evidence);
+      (t < 3 ? result.at_3s : result.at_end) = detection.verticalUnknown();
     }
-    return detection.neverAgreed();
+    return result;
   };
-  EXPECT_TRUE(never_agreed(2, 10)) << "wrong axes";
-  EXPECT_FALSE(never_agreed(5, 10)) << "a gyro whose unit is set anew";
-  EXPECT_FALSE(never_agreed(2, 2.2)) << "a bump at the start";
-  EXPECT_FALSE(never_agreed(20, 20));
+  const auto never = [](double) { return false; };
+  const auto between = [](double from, double to) { return [=](double t) { return t > from && t < to ? 30.0 : 2.0; }; };
+  const Unknown axes = unknown(between(2, 10), never);
+  EXPECT_TRUE(axes.at_3s && axes.at_end) << "wrong axes";
+  const Unknown some = unknown([](double t) { return t > 2 && std::fmod(t, 0.2) < 0.05 ? 12.0 : 3.0; }, never);
+  EXPECT_TRUE(some.at_3s && some.at_end) << "between its faults an IMU that is not believed confirms nothing";
+  const Unknown disputed = unknown(between(20, 20), [](double t) { return t > 2.1; });
+  EXPECT_TRUE(disputed.at_3s && disputed.at_end) << "gradually";
+  const Unknown bump = unknown(between(2, 2.2), never);
+  EXPECT_TRUE(bump.at_3s && !bump.at_end) << "a bump at the start";
+  const Unknown later = unknown(between(5, 10), never);
+  EXPECT_FALSE(later.at_3s || later.at_end) << "a gyro whose unit is set anew";
+  const Unknown sound = unknown(between(20, 20), never);
+  EXPECT_FALSE(sound.at_3s || sound.at_end);
 }
 
 TEST(MotionDifference, CountsSigmas) {

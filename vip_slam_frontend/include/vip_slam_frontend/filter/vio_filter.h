@@ -98,6 +98,8 @@ class VioFilter {
   /// What the scale of depth adds to it beyond what the filter holds: by as much as the adopted scale may be wrong, by
   /// the prior and the accelerometer, the displacement from the start and the velocity may be.
   Matrix15d covarianceOfScale() const;
+  /// Whether the corrections of the last second are more than the covariance allows.
+  bool isDisputed() const { return disputed_.isSignificant(); }
   /// What a vertical that is not known adds: a radian about the start, to each side.
   Matrix15d covarianceOfVertical() const;
   /// The accelerometer is sure of a scale of depth beyond belief.

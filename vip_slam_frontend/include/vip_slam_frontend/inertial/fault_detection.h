@@ -29,6 +29,7 @@ struct MotionEvidence {
   bool images_agree = false;  ///< among themselves
   double sigmas = 0;          ///< difference between the two motions
   bool implausible = false;   ///< the noise that the filter had to assume of the IMU
+  bool disputed = false;      ///< the filter's predictions of the last second contradict its updates
   double turn = 0;            ///< of the body by the images, rad
 };
 
@@ -38,9 +39,9 @@ class FaultDetection {
   bool add(const MotionEvidence& evidence);
   /// Whether the IMU was at fault a moment before `t`: the images' prediction is the better one then.
   bool suspects(double t) const { return t - last_fault_t_ < isolation(); }
-  /// Whether the IMU contradicts for good from its first motion on (axes, signs, units): what it said of the vertical
-  /// at rest, no turn has confirmed.
-  bool neverAgreed() const;
+  /// Whether no turn has confirmed what the accelerometer said of the vertical, and turns have contradicted it (axes,
+  /// signs, units). For good it is confirmed by a turn in agreement.
+  bool verticalUnknown() const { return !vertical_confirmed_ && agreement_ < 0; }
   /// A start: no agreement has been seen yet.
   void reset(double t);
 
@@ -57,8 +58,10 @@ class FaultDetection {
   double disagreed_t_ = -1e300;  ///< last time when images did not agree
   double contradicted_ = 0;      ///< share of the last second
   double isolated_ = 0;          ///< s for which the IMU stays isolated after a fault
-  /// By which the body has turned in agreement and while the IMU was isolated, until one shows the vertical, rad.
-  double agreed_turn_ = 0, contradicted_turn_ = 0;
+  /// Until the vertical is confirmed: by how much further the body has turned in agreement than in contradiction,
+  /// within the turn that shows the vertical, rad.
+  double agreement_ = 0;
+  bool vertical_confirmed_ = false;
 };
 
 /// Squared difference of two motions, T_current_previous, over their covariances (theta, t), as a number of sigmas.
