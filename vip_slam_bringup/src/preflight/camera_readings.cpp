@@ -2,6 +2,8 @@
 #include "vip_slam_bringup/preflight/camera_readings.h"
 
 #include <algorithm>
+#include <limits>
+#include <memory>
 #include <stdexcept>
 
 #include "vip_slam_core/camera/camera_model.h"
@@ -12,31 +14,43 @@ namespace {
 
 /// Whether the two are of one image size and see a direction at places that differ by two pixels or more.
 bool differ(const CameraIntrinsics& a, const CameraIntrinsics& b) {
-  if (a.width != b.width || a.height != b.height) return false;
-  const auto from = makeCamera(a), to = makeCamera(b);
-  for (int i = 0; i <= 8; ++i) {
-    for (int j = 0; j <= 8; ++j) {
-      const Eigen::Vector2d uv(a.width * i / 8.0 - 0.5, a.height * j / 8.0 - 0.5);
-      Eigen::Vector2d xy, seen;
-      if (!from->undistort(uv, &xy)) continue;
-      if (!to->project(xy.homogeneous(), &seen) || (seen - uv).norm() > 2) return true;
-    }
-  }
-  return false;
+  return a.width == b.width && a.height == b.height && pixelsApart(a, b) > 2;
 }
 
 void add(const CameraIntrinsics& used, const CameraIntrinsics& other, const std::string& what,
          std::vector<CameraReading>* out) {
   try {
-    if (!other.validate().empty() || !differ(used, other)) return;
-    for (const CameraReading& reading : *out)
-      if (!differ(reading.camera, other)) return;
-    out->push_back({other, what});
+    makeCamera(other);
   } catch (const std::invalid_argument&) {  // folds the image over: no camera is like that
+    return;
   }
+  if (!differ(used, other)) return;
+  for (const CameraReading& reading : *out)
+    if (!differ(reading.camera, other)) return;
+  out->push_back({other, what});
 }
 
 }  // namespace
+
+double pixelsApart(const CameraIntrinsics& a, const CameraIntrinsics& b) {
+  double most = 0;
+  std::shared_ptr<const CameraModel> from, to;
+  try {
+    from = makeCamera(a), to = makeCamera(b);
+  } catch (const std::invalid_argument&) {  // folds the image over
+    return std::numeric_limits<double>::infinity();
+  }
+  for (int i = 0; i <= 8; ++i) {
+    for (int j = 0; j <= 8; ++j) {
+      const Eigen::Vector2d uv(a.width * i / 8.0 - 0.5, a.height * j / 8.0 - 0.5);
+      Eigen::Vector2d xy, seen;
+      if (!from->undistort(uv, &xy)) continue;
+      if (!to->project(xy.homogeneous(), &seen)) return std::numeric_limits<double>::infinity();
+      most = std::max(most, (seen - uv).norm());
+    }
+  }
+  return most;
+}
 
 std::vector<CameraReading> otherReadings(const CameraIntrinsics& used) {
   std::vector<CameraReading> out;
@@ -51,6 +65,13 @@ std::vector<CameraReading> otherReadings(const CameraIntrinsics& used) {
   other.distortion.resize(4);
   if (equidistant || used.distortion.size() <= 5)
     add(used, other, "its coefficients are those of the model " + distortionModelName(other.model), &out);
+  return out;
+}
+
+std::vector<CameraReading> otherReadings(const CameraIntrinsics& used, const CameraIntrinsics& of_info) {
+  std::vector<CameraReading> out;
+  add(used, of_info, "camera_info holds, not the camera of the sensor file", &out);
+  for (const CameraReading& reading : otherReadings(used)) add(used, reading.camera, reading.what, &out);
   return out;
 }
 

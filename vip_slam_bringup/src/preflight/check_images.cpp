@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_bringup/preflight/camera_readings.h"
 #include "vip_slam_bringup/preflight/checks.h"
 #include "vip_slam_core/util/formatted.h"
 #include "vip_slam_core/util/size_text.h"
@@ -84,13 +85,17 @@ void checkSensorFileCamera(const Recording& r, Findings* out) {
                         sizeText(*r.color.sizes.begin()),
                     "calibrate for the resolution that is recorded"});
   const CameraIntrinsics& info = r.color_camera;
-  if (info.width == camera.width && info.height == camera.height &&
-      (std::abs(info.fx / camera.fx - 1) > 0.02 || std::abs(info.fy / camera.fy - 1) > 0.02 ||
-       std::abs(info.cx - camera.cx) > 0.02 * camera.width || std::abs(info.cy - camera.cy) > 0.02 * camera.width))
+  if (info.width != camera.width || info.height != camera.height) return;
+  constexpr double kMatters = 0.01;  // of the image's width: 2 % of the focal length
+  const double apart = pixelsApart(camera, info);
+  if (apart > kMatters * camera.width)
     out->push_back({Severity::kWarning, "camera",
-                    formatted("the sensor file says fx %.1f, fy %.1f, cx %.1f, cy %.1f, camera_info fx %.1f, fy %.1f, "
-                              "cx %.1f, cy %.1f",
-                              camera.fx, camera.fy, camera.cx, camera.cy, info.fx, info.fy, info.cx, info.cy),
+                    formatted("the sensor file says fx %.1f, fy %.1f, cx %.1f, cy %.1f, distortion %s, camera_info fx "
+                              "%.1f, fy %.1f, cx %.1f, cy %.1f, distortion %s: ",
+                              camera.fx, camera.fy, camera.cx, camera.cy, distortionModelName(camera.model).c_str(),
+                              info.fx, info.fy, info.cx, info.cy, distortionModelName(info.model).c_str()) +
+                        (std::isfinite(apart) ? formatted("up to %.0f pixels apart", apart)
+                                              : std::string("the one sees what the other does not")),
                     "the sensor file's are used; set intrinsics_from_camera_info when the driver is calibrated"});
 }
 

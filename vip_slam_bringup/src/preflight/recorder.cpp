@@ -155,6 +155,7 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
   };
   const SensorTopics& topics = recording_.sensor.topics;
   if (topic == topics.color_info) {
+    const bool first_usable = recording_.color_camera.width == 0;
     take(&recording_.color_info, topics.color, &recording_.color_camera, &recording_.color_camera_error);
     if (recording_.color_camera_note.empty()) recording_.color_camera_note = cameraInfoNote(message);
     const double focal = message.K[0];
@@ -163,9 +164,12 @@ void Recorder::add(const std::string& topic, double arrival, const sensor_msgs::
       recording_.color_focal_from = first ? focal : std::min(recording_.color_focal_from, focal);
       recording_.color_focal_to = std::max(recording_.color_focal_to, focal);
     }
-    if (!camera_ && recording_.color_camera.width > 0) {
-      startRotation(recording_.color_camera);
-      recording_.camera_readings = otherReadings(recording_.color_camera, message);
+    const CameraIntrinsics& found = recording_.color_camera;
+    if (first_usable && found.width > 0) {
+      const bool used = recording_.sensor.intrinsics_from_camera_info;
+      if (used) startRotation(found);
+      recording_.camera_readings =
+          used ? otherReadings(found, message) : otherReadings(recording_.sensor.camera, found);
     }
   }
   if (topic == topics.depth_info)

@@ -349,6 +349,10 @@ TEST_F(CheckBag, CalibrationOfTheSensorFile) {
   options_.width = options_.height = 0;
   expected_.camera.fx *= 1.1;
   expectFound(check(), Severity::kWarning, "camera", "camera_info fx");
+  expected_.camera.fx /= 1.1;
+  expected_.camera.model = DistortionModel::kRadTan;
+  expected_.camera.distortion = {-0.2, 0.03, 0, 0};
+  expectFound(check(), Severity::kWarning, "camera", "distortion none: up to ");
 }
 
 TEST_F(CheckBag, ValuesThatAreNoNumbersAreNotTakenForADelay) {

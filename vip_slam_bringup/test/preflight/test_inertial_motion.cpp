@@ -157,6 +157,26 @@ TEST_F(MotionCause, ALensUnderAnotherModelsNameIsNamed) {
   for (const Finding& f : checkMotion(r)) EXPECT_NE(f.severity, Severity::kError) << f.text;
 }
 
+TEST_F(MotionCause, ASensorFileWithoutTheLensThatCameraInfoKnowsIsNamed) {
+  CameraIntrinsics lens = sound_->color_camera;
+  lens.model = DistortionModel::kRadTan;
+  lens.distortion = {-0.25, 0.06, 0, 0};
+  const auto pinhole = makeCamera(sound_->color_camera), distorting = makeCamera(lens);
+  Recording r = withPixels([&](const Eigen::Vector2f& p) {
+    Eigen::Vector2d xy;
+    pinhole->undistort(p.cast<double>(), &xy);
+    return Eigen::Vector2f(distorting->distort(xy).cast<float>());
+  });
+  r.sensor.intrinsics_from_camera_info = false;
+  r.sensor.camera = sound_->color_camera;
+  r.color_camera = lens;
+  r.rotations.clear();
+  for (const PixelStep& step : r.pixel_steps)
+    if (const auto seen = seenBy(*pinhole, step)) r.rotations.push_back(*seen);
+  r.camera_readings = otherReadings(r.sensor.camera, r.color_camera);
+  expectOnlyError(r, "camera", "camera_info holds, not the camera of the sensor file");
+}
+
 // As it is, K is of the images; taken otherwise the motion tells, whatever the principal point is like.
 TEST_F(MotionCause, BinningThatKHasAlreadyOrHasNot) {
   const CameraIntrinsics& camera = sound_->color_camera;
