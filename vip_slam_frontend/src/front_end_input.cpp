@@ -139,7 +139,7 @@ void FrontEnd::Impl::followDepthUnit(ImageStep* step) {
   const std::optional<NavState> predicted = inertial_.complete() ? predict(step->t_imu) : std::nullopt;
   const SE3 T_odom_C =
       predicted ? predicted->T_W_I * extrinsics() : filter_.nav().T_W_I * extrinsics() * sources_.last().inverse();
-  if (!depth_input_.followUnit(T_odom_C, step->t, &step->read)) return;
+  if (!depth_input_.followUnit(step->gray, T_odom_C, step->t, &step->read)) return;
   ++counters_.depth_unit_changes;
   counters_.depth_unit = depth_input_.unit();
 }

@@ -222,7 +222,7 @@ FrameOutput FrontEnd::Impl::trackImage(ImageStep step, const FrontEnd::PoseReady
   const std::string failure = health_.divergence(step.report, filter_.nav().v_W.norm(), step.sight);
   if (!failure.empty()) return startAnew(step, failure);
   if (!health_.resume(step.sight)) return startAnew(step, "features are back after LOST");
-  depth_input_.remember(step.depth, filter_.nav().T_W_I * extrinsics(), step.t);
+  depth_input_.remember(step.depth, step.gray, filter_.nav().T_W_I * extrinsics(), step.t);
   if (on_pose) on_pose(*makeFrame(step.t, false));
   return makeOutput(step.t, step.t_imu, keyframeReason(step));
 }

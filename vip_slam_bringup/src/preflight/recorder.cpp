@@ -295,11 +295,11 @@ void Recorder::addMotion(double t, const cv::Mat& gray, cv::Mat depth) {
     depth_unit_->forget();
   const double before = depth_unit_->factor();
   if (before != 1 && !depth.empty()) depth = depth * before;
-  if (depth_unit_->changes(depth, T_odom_C_, t)) {
+  if (depth_unit_->changes(depth, gray, T_odom_C_, t)) {
     depth = depth * (depth_unit_->factor() / before);
     recording_.depth_unit_changes.push_back({t, before / depth_unit_->factor()});
   }
-  depth_unit_->remember(depth, T_odom_C_, t);
+  depth_unit_->remember(depth, gray, T_odom_C_, t);
   rotation_.setDepth(depth);
 }
 

@@ -50,9 +50,9 @@ bool DepthInput::repeats(const cv::Mat& depth, const std::optional<SE3>& T_odom_
   return same_ && T_odom_new_.has_value();
 }
 
-bool DepthInput::followUnit(const SE3& T_odom_C, double t, DepthReading* depth) {
+bool DepthInput::followUnit(const cv::Mat& gray, const SE3& T_odom_C, double t, DepthReading* depth) {
   const double before = unit_.factor();
-  if (!unit_.changes(depth->image, T_odom_C, t)) return false;
+  if (!unit_.changes(depth->image, gray, T_odom_C, t)) return false;
   depth->image = depth->image * (unit_.factor() / before);
   return true;
 }

@@ -43,11 +43,13 @@ class DepthInput {
   /// Camera pose when the depth image that is repeated was new.
   const SE3& repeatedPose() const { return *T_odom_new_; }
 
-  /// Brings the readings of an image, taken at t (s) from about T_odom_C, to the unit of the first ones; true when the
-  /// unit changes with it.
-  bool followUnit(const SE3& T_odom_C, double t, DepthReading* depth);
+  /// Brings the readings of an image, taken at t (s) from about T_odom_C together with `gray`, to the unit of the first
+  /// ones; true when the unit changes with it.
+  bool followUnit(const cv::Mat& gray, const SE3& T_odom_C, double t, DepthReading* depth);
   /// The image at its final pose, to compare the next one's unit with.
-  void remember(const cv::Mat& depth, const SE3& T_odom_C, double t) { unit_.remember(depth, T_odom_C, t); }
+  void remember(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_odom_C, double t) {
+    unit_.remember(depth, gray, T_odom_C, t);
+  }
 
   /// Seconds by which depth shows an earlier moment than its stamp says, as estimated by the filter, for the images to
   /// come; true when it changes.

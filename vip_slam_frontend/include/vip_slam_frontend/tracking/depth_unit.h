@@ -15,7 +15,8 @@
 namespace vip_slam::frontend {
 
 /// From one image to the next nothing in view comes nearer by a share of its distance that is the same near and far: a
-/// motion changes distances by metres, a body only its own. Where all readings do, their unit has changed.
+/// motion changes distances by metres, a body only its own. Where all readings do, their unit has changed. Of a view at
+/// one distance a body might be the cause: there the colour image, which knows no unit, has to be the same.
 class DepthUnit {
  public:
   DepthUnit(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
@@ -24,24 +25,32 @@ class DepthUnit {
   double factor() const { return factor_; }
 
   /// Whether the unit changes with this image (32FC1, m, 0 = invalid, times factor()), taken at t (s) from about
-  /// T_odom_C; factor() is another one then. A view that does not show it, as a single wall at one distance, is passed
-  /// over, and the next one is compared.
-  bool changes(const cv::Mat& depth, const SE3& T_odom_C, double t);
+  /// T_odom_C; factor() is another one then. `gray`: the colour image (8UC1, of the same size), or empty. A view that
+  /// does not show it, as a bare wall at one distance, is passed over, and the next one is compared.
+  bool changes(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_odom_C, double t);
 
   /// The next image is compared with this one, in the unit of the first ones and with its estimated pose.
-  void remember(const cv::Mat& depth, const SE3& T_odom_C, double t);
+  void remember(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_odom_C, double t);
 
   /// A new epoch: poses have another frame. The unit stays.
   void forget() { points_.clear(); }
 
  private:
+  struct Seen {
+    Eigen::Vector3d point;  ///< odom, m
+    double brightness;      ///< about it; 0: there is no image
+  };
+  /// The mean brightness about each pixel that is looked at; empty where there is no image.
+  cv::Mat coarse(const cv::Mat& gray) const;
+
   std::shared_ptr<const CameraModel> camera_;
   DepthNoise noise_;
   std::vector<std::pair<cv::Point, Eigen::Vector3d>> rays_;  ///< pixels that are looked at, with z = 1
   double factor_ = 1;
-  std::vector<Eigen::Vector3d> points_;  ///< of the last image, in odom, m
-  double t_ = 0;                         ///< its time, s
-  bool open_ = false;                    ///< readings may have changed since: that image stays the one to compare with
+  int step_;                  ///< px from one of them to the next
+  std::vector<Seen> points_;  ///< of the last image
+  double t_ = 0;              ///< its time, s
+  bool open_ = false;         ///< readings may have changed since: that image stays the one to compare with
 };
 
 }  // namespace vip_slam::frontend
