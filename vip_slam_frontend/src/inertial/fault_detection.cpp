@@ -6,6 +6,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam::frontend {
 
 namespace {
@@ -39,7 +41,7 @@ void FaultDetection::reset(double t) {
 }
 
 bool FaultDetection::add(const MotionEvidence& e) {
-  const bool contradicts = e.images_agree && (e.implausible || e.sigmas > kGate);
+  const bool contradicts = e.images_agree && (e.implausible || e.sigmas > (suspects(e.t) ? kGateSigmas : kGate));
   const double gain = std::min(1.0, e.interval / kMemory);
   if (e.images_agree) contradicted_ += gain * (contradicts - contradicted_);
   const bool deviates = e.images_agree && e.sigmas > kDeviates * kGate;

@@ -161,10 +161,18 @@ TEST(FaultDetection, AnImuWhoseFaultsComeBackIsIsolatedForLonger) {
   EXPECT_EQ(in(20, 40), 0);
 }
 
+// A shaken IMU may be right within the noise of its samples in the interval after one that was wrong beyond any.
+TEST(FaultDetection, RightAfterAFaultAnImuHasToAgreeToBeBelieved) {
+  for (const double after : {3.0, 5.5}) {
+    const auto shaken = [after](double t) { return t > 4.99 && t < 5.01 ? 30.0 : t > 5.01 && t < 5.19 ? after : 2.0; };
+    EXPECT_EQ(faults(10, shaken, kAlways).size(), after > 4 ? 6u : 1u) << after;
+  }
+}
+
 // A wrong IMU contradicts gradually once the images have carried the motion for a while.
 TEST(FaultDetection, AnImuJustBelievedAgainIsAtFaultWithTheFirstContradiction) {
   const auto grows = [](double t) {
-    return t > 5.18 && t < 5.22 ? 30.0 : t > 5.3 && t < 6.3 ? 2 + 12 * (t - 5.3) : 2.0;
+    return t > 5.18 && t < 5.22 ? 30.0 : t > 5.5 && t < 6.3 ? 2 + 20 * (t - 5.5) : 2.0;
   };
   const std::vector<double> found = faults(10, grows, kAlways);
   const auto again = std::find_if(found.begin(), found.end(), [](double t) { return t > 5.55; });
