@@ -107,9 +107,9 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();
   if ((beside_sigma > 0 && beside > (kSure * beside_sigma).cwiseMax(kMinDepthShift)).any()) {
     all.push_back(formatted(
-        "the depth image lies beside the colour image, which is corrected for: is it registered to colour, are its "
-        "holes filled from one side (switch that off)? Else depth/shift in the sensor's configuration should be "
-        "[%.2f, %.2f] pixels",
+        "the depth image lies beside the colour image by [%.2f, %.2f] pixels, not by depth/shift of the sensor's "
+        "configuration, which is corrected for: is it registered to colour, are its holes filled from one side (switch "
+        "that off)? check_bag tells",
         found.depth_shift_px.x(), found.depth_shift_px.y()));
   }
   const Eigen::Array4d bearing = (found.bearing.value - given.bearing.value).cwiseAbs();

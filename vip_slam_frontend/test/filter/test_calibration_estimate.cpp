@@ -77,6 +77,14 @@ TEST(Calibration, SaysWhatTheConfigurationShouldHave) {
   EXPECT_NE(turned.find("is the image turned round?"), std::string::npos) << turned;
   EXPECT_EQ(turned.find("should be"), std::string::npos) << "no sensor file may have it";
   given.readout = found.readout = 0;
+  // Filled holes pass for a shift: what is found is not called right.
+  found.depth_shift << 0.002, 0;
+  found.depth_shift_px << 1.04, 0;
+  found.sigma_depth_shift.setConstant(1e-4);
+  const std::string beside = calibrationDifferences(given, found).back();
+  EXPECT_NE(beside.find("by [1.04, 0.00] pixels"), std::string::npos) << beside;
+  EXPECT_EQ(beside.find("should be"), std::string::npos) << beside;
+  found.depth_shift.setZero();
   found.bearing.value << 0, 0.003, 0, 0;
   found.sigma_bearing.setConstant(0.0003);
   found.intrinsics << 480.04, 481.46, 320.2, 240.1;
