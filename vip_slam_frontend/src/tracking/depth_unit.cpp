@@ -31,9 +31,11 @@ struct Sample {
   double before, now;      ///< brightness
 };
 
-/// Of a coarse image; 0 without one, and at what its last row or column has left over.
+/// Of a coarse image; 0 without one. Its last row and column stand for what is left over beyond them.
 double brightness(const cv::Mat& small, long u, long v) {
-  return u < small.cols && v < small.rows ? small.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) : 0.0;
+  if (small.empty()) return 0.0;
+  return small.at<std::uint8_t>(std::min(static_cast<int>(v), small.rows - 1),
+                                std::min(static_cast<int>(u), small.cols - 1));
 }
 
 bool sameView(const std::vector<Sample>& samples) {
@@ -62,7 +64,8 @@ DepthUnit::DepthUnit(std::shared_ptr<const CameraModel> camera, const DepthNoise
 
 cv::Mat DepthUnit::coarse(const cv::Mat& gray) const {
   cv::Mat small;
-  if (!gray.empty()) cv::resize(gray, small, gray.size() / step_, 0, 0, cv::INTER_AREA);
+  const cv::Size size(std::max(1, gray.cols / step_), std::max(1, gray.rows / step_));
+  if (!gray.empty()) cv::resize(gray, small, size, 0, 0, cv::INTER_AREA);
   return small;
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "test_camera.h"
+#include "vip_slam_core/camera/camera_model.h"
 #include "vip_slam_frontend/tracking/depth_unit.h"
 
 namespace vip_slam::frontend {
@@ -101,6 +102,19 @@ TEST_F(DepthUnitTest, OfASingleWallTheImageTellsWhetherItIsTheSame) {
     EXPECT_FALSE(unit.changes(1.2 * later, picture(now_, 0), now_, 1.033)) << "a motion";
     ASSERT_TRUE(unit.changes(factor * later, picture(now_, 0), now_, 1.033)) << factor;
     EXPECT_NEAR(unit.factor(), 1 / factor, 0.005 / factor);
+  }
+}
+
+// What the grid of the brightness leaves over at the edges, as of 848 x 480, must not pass for a contrast.
+TEST_F(DepthUnitTest, OfABareWallTheImageTellsNothingAtAnySize) {
+  for (const cv::Size& size : {cv::Size(640, 480), cv::Size(848, 480), cv::Size(640, 360), cv::Size(640, 10)}) {
+    CameraIntrinsics intrinsics = testCamera()->intrinsics();
+    intrinsics.width = size.width, intrinsics.height = size.height;
+    intrinsics.cx = 0.5 * (size.width - 1), intrinsics.cy = 0.5 * (size.height - 1);
+    const cv::Mat wall(size, CV_32F, cv::Scalar(kFar)), bare(size, CV_8U, cv::Scalar(128));
+    DepthUnit unit(makeCamera(intrinsics), DepthNoise());
+    unit.remember(wall, bare, then_, 1.0);
+    EXPECT_FALSE(unit.changes(0.5 * wall, bare, then_, 1.033)) << size;
   }
 }
 
