@@ -27,6 +27,7 @@ PlaneMapper::Impl::Impl(const PlaneMapperOptions& options, std::shared_ptr<const
       mesher_(options.mesh, camera_, noise),
       observer_(options, camera_, noise),
       evidence_(options.detection, options.growth),
+      keyframes_(noise),
       planes_(options),
       points_(options.association, checked(camera_, noise).focal(), noise.bias_floor) {}
 

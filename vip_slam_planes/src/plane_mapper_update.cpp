@@ -38,13 +38,13 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
   takeCorrections(update);
 
   for (const KeyframeEstimate& estimate : update.keyframes) {
-    const KeyframePtr keyframe = keyframes_.place(estimate, options_.growth.distance);
+    const KeyframePtr keyframe = keyframes_.place(estimate, options_.merging.distance);
     if (!keyframe) continue;
     points_.addSightings(*keyframe);
     processKeyframe(*keyframe, true);
   }
 
-  for (const auto& [from, into] : planes_.mergeSame(keyframes_, *camera_, noise_)) points_.renamePlane(from, into);
+  for (const auto& [from, into] : planes_.mergeSame(keyframes_, *camera_)) points_.renamePlane(from, into);
   for (PlaneId id : planes_.dropUnsupported()) points_.removePlane(id);
   decideOnPoints();
   tell(&result);
@@ -52,7 +52,7 @@ PlaneUpdate PlaneMapper::Impl::applyMapUpdate(const MapUpdate& update) {
 }
 
 void PlaneMapper::Impl::clear() {
-  keyframes_ = PlacedKeyframes();
+  keyframes_ = PlacedKeyframes(noise_);
   planes_.clear();
   points_.clear();
   evidence_.clear();
@@ -62,7 +62,7 @@ void PlaneMapper::Impl::clear() {
 
 void PlaneMapper::Impl::restore(const std::vector<StoredPlane>& planes, KeyframeId newest_keyframe) {
   clear();
-  keyframes_ = PlacedKeyframes(newest_keyframe);
+  keyframes_ = PlacedKeyframes(noise_, newest_keyframe);
   for (const StoredPlane& plane : planes) {
     if (planes_.restore(plane)) keyframes_.addHost(plane.host);
   }
@@ -165,7 +165,7 @@ void PlaneMapper::Impl::judgeAgreement() {
       const auto pose = keyframes_.poses().find(keyframe);
       if (pose == keyframes_.poses().end()) continue;
       const Plane plane_C = transformPlane(pose->second.inverse(), track.plane());
-      const Eigen::Matrix4d G = viewMoments(observation).M;
+      const Eigen::Matrix4d G = samplesOf(observation).M;
       const double misfit = planeMisfit(G, plane_C.coefficients()), weight = G(3, 3);
       misfits.push_back({static_cast<int>(index), misfit, weight > 0 ? misfit / weight : 0.0});
     }
@@ -215,7 +215,7 @@ void PlaneMapper::Impl::withdrawBrokenObservations() {
     std::vector<KeyframeId> broken;
     for (const auto& [keyframe, observation] : track.observations()) {
       const auto pose = poses.find(keyframe);
-      const PlaneMoments moments{observation.G};
+      const PlaneMoments moments = samplesOf(observation);
       const bool holds =
           pose == poses.end() || moments.meanSquare(transformPlane(pose->second.inverse(), track.plane())) <
                                      options_.growth.distance * options_.growth.distance;

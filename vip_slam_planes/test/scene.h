@@ -129,6 +129,7 @@ class SceneCamera {
     k->previous = last_id_ - 1;
     k->frame = frame(scene, T_W_C, 0.5 * double(last_id_), 8);
     k->frame.keyframe = k->id;
+    k->depth_noise = parts;
     std::normal_distribution<double> gauss;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3d p = T_W_C.inverse() * points[i];
@@ -151,6 +152,7 @@ class SceneCamera {
 
   std::shared_ptr<const CameraModel> camera;
   DepthNoise noise;
+  DepthNoiseParts parts{0.15, 0.0};  ///< as the front end learns them of white noise
 
  private:
   double noise_scale_;

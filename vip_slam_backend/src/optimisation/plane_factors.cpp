@@ -226,8 +226,16 @@ std::vector<PlaneFactorBuilder::DepthBlock> PlaneFactorBuilder::collectDepthBloc
       const Eigen::Vector4d plane_C = T_W_C.transpose() * parameters.coefficients();
       PlaneGate gate(observation.second, plane_C);
       if (!gate.all() && gate.kept().empty()) continue;
-      DepthBlock block{constant ? -1 : frame->second, plane->second, &entry.second, &observation.second,
-                       std::move(gate), plane_C, 1, 1, Eigen::Matrix4d::Identity(), 0};
+      DepthBlock block{constant ? -1 : frame->second,
+                       plane->second,
+                       &entry.second,
+                       &observation.second,
+                       std::move(gate),
+                       plane_C,
+                       1,
+                       1,
+                       Eigen::Matrix4d::Identity(),
+                       0};
       blocks.push_back(std::move(block));
     }
   }
@@ -252,31 +260,20 @@ void PlaneFactorBuilder::findTogether(std::vector<DepthBlock>* blocks) {
   }
 }
 
-// Of a single reading at the surface's centre, along its normal; 0: not known.
-double PlaneFactorBuilder::readingVariance(const DepthBlock& block) const {
-  const Eigen::Matrix4d& G = block.observation->G;
-  const Eigen::Vector3d centre = G.topRightCorner<3, 1>() / G(3, 3);
-  if (block.observation->points.empty() || !(centre.z() > 0)) return 0;
-  const double sigma = settings_.depth_noise.sigma(centre.z()) * block.plane_C.head<3>().dot(centre) / centre.z();
-  return sigma * sigma;
-}
-
 void PlaneFactorBuilder::addDepthBlocks() {
   if (planes_.empty()) return;
   BaProblem& problem = built_->problem;
   std::vector<DepthBlock> blocks = collectDepthBlocks();
   findTogether(&blocks);
-  const DepthNoiseParts& noise = built_->depth_noise;
   std::vector<PlaneMisfit> misfits;
   misfits.reserve(blocks.size());
   for (DepthBlock& block : blocks) {
-    const double reading = readingVariance(block);
-    // The samples' own variance, on average, is their number over the sum of their weights.
-    if (reading > 0)
-      block.white = noise.white * reading * block.observation->G(3, 3) /
-                    (block.observation->weight_scale * static_cast<double>(block.observation->points.size()));
-    const Eigen::Matrix4d G = block.gate.G() / (block.observation->weight_scale * block.white);
-    block.T = sharedErrorShrinkage(G, noise.shared * block.together * reading);
+    const PlaneObservation& o = *block.observation;
+    const SurfaceNoise parts = surfaceNoise(o.G / o.weight_scale, o.points.size(), block.plane_C.head<3>(),
+                                            settings_.depth_noise, built_->depth_noise);
+    block.white = parts.white;
+    const Eigen::Matrix4d G = block.gate.G() / (o.weight_scale * block.white);
+    block.T = sharedErrorShrinkage(G, parts.shared * block.together);
     block.misfit = planeMisfit(block.T * G * block.T.transpose(), block.plane_C);
     misfits.push_back({block.plane, block.misfit});
   }

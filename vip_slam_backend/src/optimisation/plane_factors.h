@@ -41,7 +41,6 @@ class PlaneFactorBuilder {
     double misfit;
   };
   std::vector<DepthBlock> collectDepthBlocks() const;
-  double readingVariance(const DepthBlock& block) const;
   /// Finds out how many keyframes share each block's error.
   static void findTogether(std::vector<DepthBlock>* blocks);
   void storeGroup(int host, int plane, std::vector<Observer>* observers, std::vector<int>* slot);

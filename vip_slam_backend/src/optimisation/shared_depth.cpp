@@ -7,7 +7,6 @@
 namespace vip_slam {
 namespace {
 
-constexpr double kSharedSeconds = 1.0;
 // Readings of one surface: within this angle of each other, and by so much of their depth.
 constexpr double kNearAngle = 0.1, kSameDepth = 0.05;
 
@@ -36,8 +35,6 @@ std::vector<double> neighbours(const BaProblem& problem) {
 }
 
 }  // namespace
-
-double sharedDepth(double seconds) { return std::max(0.0, 1 - std::abs(seconds) / kSharedSeconds); }
 
 void shareDepthErrors(const DepthNoise& model, const DepthNoiseParts& noise, const std::vector<double>& times,
                       BaProblem* problem) {

@@ -10,9 +10,6 @@
 
 namespace vip_slam {
 
-/// Correlation of the depth errors of one place in two keyframes that are so many seconds apart.
-double sharedDepth(double seconds);
-
 /// Sets the weights of all depth observations, whose depth_weight is that of the reading's white part. A reading that
 /// shares its error with n - 1 others of its point's surface and keyframe has the variance white^2 + n shared^2: any
 /// number of them is worth one with shared^2. `times`: of the frames, s.

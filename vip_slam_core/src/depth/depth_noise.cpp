@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_core/depth/depth_noise.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "util/text.h"
 
 namespace vip_slam {
+namespace {
+
+constexpr double kSharedSeconds = 1.0;
+
+}  // namespace
+
+double sharedDepth(double seconds) { return std::max(0.0, 1 - std::abs(seconds) / kSharedSeconds); }
 
 DepthSensorType depthSensorTypeFromName(const std::string& name) {
   if (name == "proportional") return DepthSensorType::kProportional;

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kMinObservations = 30;
 constexpr double kMedian = 2.366;  // of a chi square with three degrees of freedom
-// The typical misfit is at least a twenty-fifth of the noise model's: planes and poses are fitted to the same points, so
-// that the residuals of a map with few planes are too small.
+// The typical misfit is at least a twenty-fifth of the noise model's: planes and poses are fitted to the same points,
+// so that the residuals of a map with few planes are too small.
 constexpr double kMaxReduction = 25.0;
 // Prior degrees of freedom of a plane's variance: as if four observations had confirmed that it is one surface.
 constexpr double kPlaneFreedom = 12.0;
@@ -39,6 +39,18 @@ double typicalMisfit(const std::vector<PlaneMisfit>& misfits) {
 }
 
 }  // namespace
+
+SurfaceNoise surfaceNoise(const Eigen::Matrix4d& G, std::size_t count, const Eigen::Vector3d& n_C,
+                          const DepthNoise& model, const DepthNoiseParts& parts) {
+  const double weight = G(3, 3);
+  if (!(weight > 0) || count == 0) return {};
+  const Eigen::Vector3d centre = G.topRightCorner<3, 1>() / weight;
+  if (!(centre.z() > 0)) return {};
+  const double sigma = model.sigma(centre.z()) * n_C.dot(centre) / centre.z(), reading = sigma * sigma;
+  if (!(reading > 0)) return {};
+  // The samples' own variance, on average, is their number over the sum of their weights.
+  return {parts.white * reading * weight / static_cast<double>(count), parts.shared * reading};
+}
 
 Eigen::Matrix4d sharedErrorShrinkage(const Eigen::Matrix4d& G, double shared) {
   const double weight = G(3, 3);

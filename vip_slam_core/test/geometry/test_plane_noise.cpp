@@ -90,6 +90,25 @@ TEST(PlaneNoise, ManyCorrelatedReadingsAreNotWorthMany) {
 }
 
 // Misfits of points whose errors are as the model says, shared ones included, are a chi square's.
+// The two parts are stated in squares of a reading's sigma, along the viewing ray; a wall that is seen at an angle
+// moves by less along its normal.
+TEST(PlaneNoise, TheTwoPartsGoByTheReadingsSigmaAlongTheNormal) {
+  std::mt19937 random(1);
+  const Eigen::Matrix4d G = observation(0, 0, 0, &random);
+  const DepthNoise model;
+  const DepthNoiseParts parts{0.2, 0.7};
+  for (const double turned : {0.0, 0.6}) {
+    const Eigen::Vector3d n(std::sin(turned), 0, -std::cos(turned));
+    const double reading = std::pow(model.sigma(2.0) * std::cos(turned), 2);
+    const SurfaceNoise noise = surfaceNoise(G, kPoints, n, model, parts);
+    EXPECT_NEAR(noise.shared, 0.7 * reading, 1e-12);
+    EXPECT_NEAR(1 / (G / noise.white)(3, 3), 0.2 * reading / kPoints, 1e-12) << "variance of the mean of all";
+  }
+  const SurfaceNoise nothing = surfaceNoise(Eigen::Matrix4d::Zero(), 0, kAhead.head<3>(), model, parts);
+  EXPECT_EQ(nothing.white, 1);
+  EXPECT_EQ(nothing.shared, 0);
+}
+
 TEST(PlaneNoise, MisfitsKnowWhatIsShared) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;

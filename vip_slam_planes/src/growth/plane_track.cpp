@@ -3,15 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+
+#include "vip_slam_core/geometry/plane_noise.h"
 
 namespace vip_slam {
 namespace {
 
 constexpr double kMinTurn = 1e-3, kMinShift = 1e-3;  // radians, metres; smaller changes are ignored
 constexpr double kLargeTurn = 0.3;  // radians; an adjustment turns hosts by less, a loop that joins parts by any angle
-// Points of one view that count when planes are fitted and compared. What all of a view's points share says nothing of
-// whether two surfaces are one, and views of a new plane are too few to learn it from.
-constexpr double kIndependent = 50.0;
 
 }  // namespace
 
@@ -227,16 +227,50 @@ void PlaneTrack::absorb(const PlaneTrack& other, const CameraPoses& poses) {
   determined = determined || other.determined;
 }
 
-PlaneMoments viewMoments(const PlaneObservation& observation) {
-  const double counted = std::min(1.0, kIndependent / double(std::max<std::size_t>(1, observation.points.size())));
-  return {counted / observation.weight_scale * observation.G};
+PlaneMoments samplesOf(const PlaneObservation& observation) { return {observation.G / observation.weight_scale}; }
+
+PlaneMoments informationOf(const PlaneObservation& observation, const Eigen::Vector3d& n_C, const PlaneViews& views,
+                           double together) {
+  const Eigen::Matrix4d samples = samplesOf(observation).M;
+  const SurfaceNoise noise = surfaceNoise(samples, observation.points.size(), n_C, views.noise, views.parts);
+  const Eigen::Matrix4d G = samples / noise.white, T = sharedErrorShrinkage(G, together * noise.shared);
+  return {T * G * T.transpose()};
 }
 
-PlaneMoments PlaneTrack::moments(const CameraPoses& poses) const {
+double PlaneTrack::together(Observations::const_iterator view, const PlaneViews& views) const {
+  const auto keyframe = views.keyframes.find(view->first);
+  if (keyframe == views.keyframes.end()) return 1;
+  const TrackedFrame& mine = keyframe->second->frame;
+  // False where the error is another one, as for all views beyond.
+  const auto add = [&](Observations::const_iterator other, double* count) {
+    const auto found = views.keyframes.find(other->first);
+    if (found == views.keyframes.end() || found->second->frame.epoch != mine.epoch) return false;
+    const double correlation = sharedDepth(found->second->frame.t - mine.t);
+    *count += correlation;
+    return correlation > 0;
+  };
+  double count = 1;
+  for (auto other = std::next(view); other != observations_.end() && add(other, &count); ++other) continue;
+  for (auto other = view; other != observations_.begin() && add(std::prev(other), &count); --other) continue;
+  return count;
+}
+
+PlaneMoments PlaneTrack::samples(const CameraPoses& poses) const {
   PlaneMoments sum;
   for (const auto& [keyframe, observation] : observations_) {
     const auto it = poses.find(keyframe);
-    if (it != poses.end()) sum.M += viewMoments(observation).transformed(it->second).M;
+    if (it != poses.end()) sum.M += samplesOf(observation).transformed(it->second).M;
+  }
+  return sum;
+}
+
+PlaneMoments PlaneTrack::information(const PlaneViews& views) const {
+  PlaneMoments sum;
+  for (auto it = observations_.begin(); it != observations_.end(); ++it) {
+    const auto pose = views.poses.find(it->first);
+    if (pose == views.poses.end()) continue;
+    const Eigen::Vector3d n_C = pose->second.R().transpose() * plane_.n;
+    sum.M += informationOf(it->second, n_C, views, together(it, views)).transformed(pose->second).M;
   }
   return sum;
 }

@@ -66,8 +66,9 @@ Gap look(const DepthGrid& grid, const Eigen::Vector3d& p, const Eigen::Vector3d&
   const SightLine line = sightLine(grid, view.camera, p);
   if (!line.inside) return Gap::kOutside;
   const double facing = -n_C.dot(p) / p.z();  // |n . ray|
-  if (!view.noise.inRange(p.z()) || -n_C.dot(p) < kFlattest * p.norm()) return Gap::kUnsure;
-  const Sight sight = line.at(p.z(), (view.see_through + kNoiseSigmas * view.noise.sigma(p.z()) * facing) / facing);
+  if (!view.views.noise.inRange(p.z()) || -n_C.dot(p) < kFlattest * p.norm()) return Gap::kUnsure;
+  const Sight sight =
+      line.at(p.z(), (view.see_through + kNoiseSigmas * view.views.noise.sigma(p.z()) * facing) / facing);
   if (sight != Sight::kThrough && sight != Sight::kNothing) return Gap::kBlocked;
   // At a flat angle missing depth may be that of the surface itself.
   return line.measured < 4 && -n_C.dot(p) < kGrazing * p.norm() ? Gap::kUnsure : Gap::kOpen;
@@ -96,9 +97,9 @@ bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneV
   if (view.open_gaps.has(small.id(), large.id())) return true;
   std::vector<const Keyframe*> witnesses;
   bool witnessed[2] = {false, false};
-  for (const auto& [id, keyframe] : view.keyframes) {
+  for (const auto& [id, keyframe] : view.views.keyframes) {
     const bool shows[2] = {small.restsOn(id), large.restsOn(id)};
-    if (!(shows[0] || shows[1]) || !view.poses.count(id) || keyframe->frame.depth_grid.empty()) continue;
+    if (!(shows[0] || shows[1]) || !view.views.poses.count(id) || keyframe->frame.depth_grid.empty()) continue;
     witnesses.push_back(keyframe.get());
     for (int k = 0; k < 2; ++k) witnessed[k] = witnessed[k] || shows[k];
   }
@@ -108,7 +109,7 @@ bool gapMayBeOpen(const PlaneTrack& small, const PlaneTrack& large, const SceneV
   std::vector<Gap> seen(places.size(), Gap::kOutside);
   std::size_t open = 0;
   for (const Keyframe* keyframe : witnesses) {
-    const SE3 T_C_map = view.poses.at(keyframe->id).inverse();
+    const SE3 T_C_map = view.views.poses.at(keyframe->id).inverse();
     const Eigen::Vector3d n_C = T_C_map.rotation() * large.plane().n;
     for (std::size_t k = 0; k < places.size(); ++k) {
       if (seen[k] == Gap::kOpen) continue;

@@ -13,7 +13,7 @@ constexpr double kSureDirection = 2.0 * kDegree;  // largest sigma of a determin
 void fitToObservations(PlaneTrack* track, const PlacedKeyframes& keyframes) {
   track->refit_due = false;
   if (track->optimised() && track->determined) return;
-  const PlaneMoments moments = track->moments(keyframes.poses());
+  const PlaneMoments moments = track->samples(keyframes.poses());
   if (!(moments.weight() > 0)) return;
   track->determined = normalSigma(moments, track->kind()) < kSureDirection;
   if (track->optimised()) return;

@@ -29,8 +29,11 @@ KeyframePtr PlacedKeyframes::place(const KeyframeEstimate& estimate, double same
   waiting_.erase(it);
   placed_[keyframe->id] = keyframe;
   const RelativeMotion& motion = keyframe->motion;
-  if (motion.known() && motion.covariance.diagonal().tail<3>().maxCoeff() > same_place * same_place) {
-    sure_since_ = std::max(sure_since_, keyframe->id);
+  if (motion.known() && motion.covariance.bottomRightCorner<3, 3>().trace() > same_place * same_place) {
+    const Eigen::Matrix3d R = (estimate.state.T_W_I.rotation() * motion.T_a_b.rotation().inverse()).matrix();
+    const Eigen::Matrix3d covariance = R * motion.covariance.bottomRightCorner<3, 3>() * R.transpose();
+    unsure_.push_back({keyframe->id, covariance / (same_place * same_place)});
+    std::sort(unsure_.begin(), unsure_.end(), [](const auto& a, const auto& b) { return a.to < b.to; });
   }
   poses_[keyframe->id] = estimate.state.T_W_I * estimate.T_I_C;
   if (keyframe->id > newest_) newest_ = keyframe->id, epoch_ = keyframe->frame.epoch;
@@ -39,12 +42,27 @@ KeyframePtr PlacedKeyframes::place(const KeyframeEstimate& estimate, double same
   return keyframe;
 }
 
+KeyframeId PlacedKeyframes::sureSince(const Eigen::Vector3d& normal) const {
+  const auto last = std::find_if(unsure_.rbegin(), unsure_.rend(),
+                                 [&normal](const auto& motion) { return normal.dot(motion.covariance * normal) > 1; });
+  return last == unsure_.rend() ? 0 : last->to;
+}
+
+PlaneViews PlacedKeyframes::views() const {
+  const auto newest = placed_.find(newest_);
+  return {placed_, poses_, noise_, newest == placed_.end() ? DepthNoiseParts() : newest->second->depth_noise};
+}
+
 bool PlacedKeyframes::tie(const MapUpdate& update) {
-  const bool across = std::any_of(update.loops.begin(), update.loops.end(), [this](const LoopEvent& loop) {
-    const auto [first, last] = std::minmax(loop.query, loop.match);
-    return loop.accepted && first < sure_since_ && last >= sure_since_;
-  });
-  if (across) sure_since_ = 0;
+  const auto closed = [&update](const UnsureMotion& motion) {
+    return std::any_of(update.loops.begin(), update.loops.end(), [&motion](const LoopEvent& loop) {
+      const auto [first, last] = std::minmax(loop.query, loop.match);
+      return loop.accepted && first < motion.to && last >= motion.to;
+    });
+  };
+  const auto kept = std::remove_if(unsure_.begin(), unsure_.end(), closed);
+  const bool across = kept != unsure_.end();
+  unsure_.erase(kept, unsure_.end());
   return epochs_.tie(update.parts) || across;
 }
 

@@ -20,9 +20,9 @@ bool isSound(const KeyframeEstimate& estimate);
 
 class PlacedKeyframes {
  public:
-  PlacedKeyframes() = default;
   /// `stored_until`: keyframes up to here are those of a loaded map.
-  explicit PlacedKeyframes(KeyframeId stored_until) : stored_until_(stored_until) {}
+  explicit PlacedKeyframes(const DepthNoise& noise, KeyframeId stored_until = 0)
+      : noise_(noise), stored_until_(stored_until) {}
 
   /// Keeps a keyframe that is not known until it is placed. Returns how many older ones had to be given up.
   std::size_t wait(const KeyframePtr& keyframe);
@@ -33,15 +33,17 @@ class PlacedKeyframes {
   /// Null when no keyframe with this id waits, or when the estimate is not sound. `same_place`: one sigma of a motion's
   /// translation, m, beyond which surfaces before and after it cannot be told to be the same by their place.
   KeyframePtr place(const KeyframeEstimate& estimate, double same_place);
-  /// The first keyframe after the last motion that was less sure than that, 0 without one: what was seen before may lie
-  /// elsewhere.
-  KeyframeId sureSince() const { return sure_since_; }
+  /// The first keyframe after the last motion that was less sure than that along a plane's normal in `map`, 0 without
+  /// one: what was seen before may lie elsewhere.
+  KeyframeId sureSince(const Eigen::Vector3d& normal) const;
   /// Adds the keyframe that a loaded plane belongs to.
   void addHost(const PlaneHost& host);
 
   const std::map<KeyframeId, KeyframePtr>& placed() const { return placed_; }
   /// T_map_C of placed keyframes and of the hosts of loaded planes.
   const CameraPoses& poses() const { return poses_; }
+  /// The same as views of planes.
+  PlaneViews views() const;
   /// Those of epochs that are tied to this one; valid until the next call.
   const CameraPoses& posesTiedTo(std::uint32_t epoch);
   void move(KeyframeId id, const SE3& T_map_C) { poses_.at(id) = T_map_C; }
@@ -72,6 +74,7 @@ class PlacedKeyframes {
   std::unordered_set<LandmarkId> tracks() const;
 
  private:
+  DepthNoise noise_;
   std::map<KeyframeId, KeyframePtr> waiting_, placed_;
   CameraPoses poses_;
   std::map<KeyframeId, std::uint32_t> epoch_of_;  ///< of all that have a pose
@@ -80,7 +83,11 @@ class PlacedKeyframes {
   KeyframeId newest_ = 0;    ///< of the placed ones
   std::uint32_t epoch_ = 0;  ///< its epoch
   KeyframeId stored_until_ = 0;
-  KeyframeId sure_since_ = 0;
+  struct UnsureMotion {
+    KeyframeId to;
+    Eigen::Matrix3d covariance;  ///< of the displacement in `map`, in squares of what is sure enough
+  };
+  std::vector<UnsureMotion> unsure_;  ///< ascending
 };
 
 }  // namespace vip_slam

@@ -40,7 +40,7 @@ std::vector<PlaneTrack*> PlaneSet::inView(const SE3& T_map_C, std::uint32_t epoc
   std::vector<PlaneTrack*> tracks;
   // Planes may also grow into view: the range is larger by the growth gap.
   for (auto& [id, track] : tracks_) {
-    if (!keyframes.tied(track.epoch, epoch) || !track.seenSince(keyframes.sureSince())) continue;
+    if (!keyframes.tied(track.epoch, epoch) || !track.seenSince(keyframes.sureSince(track.plane().n))) continue;
     if (mayBeInView(track, T_map_C, range + growth_.gap)) tracks.push_back(&track);
   }
   return tracks;

@@ -57,8 +57,7 @@ class PlaneSet {
   void compareAll() { compare_all_ = true; }
   /// Merges planes that show the same surface, if one of them has changed since the last call. Returns the merges in
   /// their order.
-  std::vector<PlaneMerge> mergeSame(const PlacedKeyframes& keyframes, const CameraModel& camera,
-                                    const DepthNoise& noise);
+  std::vector<PlaneMerge> mergeSame(const PlacedKeyframes& keyframes, const CameraModel& camera);
 
   /// Adds an observation, or replaces that of the same keyframe.
   void observe(PlaneTrack* track, PlaneObservation observation);

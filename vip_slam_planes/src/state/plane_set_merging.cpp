@@ -16,9 +16,10 @@ PlaneId PlaneSet::samePlane(PlaneId id, const PlacedKeyframes& keyframes, const 
   const PlaneTrack& mine = tracks_.at(id);
   PlaneId best = 0;
   double least = std::numeric_limits<double>::infinity();
+  const KeyframeId since = keyframes.sureSince(mine.plane().n);
   for (const auto& [other_id, other] : tracks_) {
     if (other_id == id || !keyframes.tied(mine.epoch, other.epoch)) continue;
-    if (other.seenSince(keyframes.sureSince()) != mine.seenSince(keyframes.sureSince())) continue;
+    if (other.seenSince(since) != mine.seenSince(since)) continue;
     if (!sameSurface(mine, other, view, merging_)) continue;
     const double misfit = jointMisfit(mine, other, keyframes.poses());
     if (best == 0 || misfit < least) best = other_id, least = misfit;
@@ -26,14 +27,14 @@ PlaneId PlaneSet::samePlane(PlaneId id, const PlacedKeyframes& keyframes, const 
   return best;
 }
 
-std::vector<PlaneMerge> PlaneSet::mergeSame(const PlacedKeyframes& keyframes, const CameraModel& camera,
-                                            const DepthNoise& noise) {
+std::vector<PlaneMerge> PlaneSet::mergeSame(const PlacedKeyframes& keyframes, const CameraModel& camera) {
   std::set<PlaneId> open;
   for (auto& [id, track] : tracks_) {
     if (track.changed(true) || compare_all_) open.insert(id);
   }
   compare_all_ = false;
-  const SceneView view{keyframes.placed(), keyframes.poses(), camera, noise, support_.see_through, open_gaps_};
+  const PlaneViews views = keyframes.views();
+  const SceneView view{views, camera, support_.see_through, open_gaps_};
   std::vector<PlaneMerge> merges;
   // Each merge may make further merges possible; each removes a plane, so this terminates.
   while (!open.empty()) {

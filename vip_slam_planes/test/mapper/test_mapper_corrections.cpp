@@ -99,7 +99,7 @@ TEST(Mapper, IntrinsicsThatWereWrongAreCorrectedInAllKeyframes) {
     all.keyframes.push_back(updateFor(*keyframe, T_W_C).keyframes[0]);
     all.keyframes.back().camera_correction.bearing = bearing;
   }
-  EXPECT_FALSE(rig.find(truth, 0.005));
+  EXPECT_FALSE(rig.find(truth, 0.004));
   rig.mapper.applyMapUpdate(all);
   EXPECT_TRUE(rig.find(truth, 0.003));
   // A keyframe that carries the correction is used with it at once.

@@ -164,6 +164,32 @@ TEST(MapperEpochs, WhatLiesBehindAnUnsureMotionIsNotToldByItsPlace) {
   }
 }
 
+// A motion that is unsure along one axis leaves unsure only where the walls across that axis are.
+TEST(MapperEpochs, AMotionIsUnsureOnlyForPlanesAcrossIt) {
+  Rig rig;
+  const auto look = [&](int i, bool first) {
+    const SE3 T_W_C = view(i);
+    const auto keyframe = taken(&rig, T_W_C, 0);
+    keyframe->motion.T_a_b = SE3(expSO3({0, 0.3, 0}), {0.1, 0, 0});
+    Eigen::Vector3d variance(1e-6, 1e-6, first ? 0.25 : 1e-6);  // of the displacement in the map: up and down
+    const Eigen::Matrix3d R_a_W = keyframe->motion.T_a_b.R() * T_W_C.R().transpose();
+    keyframe->motion.covariance.setIdentity();
+    keyframe->motion.covariance *= 1e-6;
+    keyframe->motion.covariance.bottomRightCorner<3, 3>() = R_a_W * variance.asDiagonal() * R_a_W.transpose();
+    return rig.place(keyframe, T_W_C);
+  };
+  for (int i = 0; i < 6; ++i) look(i, false);
+  const std::set<PlaneId> old = idsOf(rig);
+  for (int i = 0; i < 6; ++i) look(i, i == 0);
+  int walls = 0, level = 0;
+  for (const PlaneEstimate& plane : rig.mapper.planes()) {
+    if (old.count(plane.id)) continue;
+    ++(plane.kind == PlaneKind::kHorizontal ? level : walls);
+  }
+  EXPECT_EQ(0, walls) << "they lie where they did";
+  EXPECT_GT(level, 0) << "floor or ceiling may be another one";
+}
+
 TEST(MapperEpochs, AnEpochBelongsToALoadedMapOnceItIsRecognised) {
   constexpr KeyframeId kFirst = 100;  // the loaded map has the ids before
   constexpr std::uint32_t kLoaded = 0x80000000u;

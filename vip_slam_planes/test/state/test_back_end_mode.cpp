@@ -27,7 +27,7 @@ class Mode : public ::testing::Test {
     return update;
   }
 
-  PlacedKeyframes keyframes;
+  PlacedKeyframes keyframes{DepthNoise()};
   BackEndMode mode;
 };
 

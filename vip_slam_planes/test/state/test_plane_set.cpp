@@ -27,7 +27,7 @@ class Planes : public ::testing::Test {
     return track;
   }
   PlaneTrack& table(bool confirmed, std::uint32_t epoch = 0) { return start(PlaneKind::kHorizontal, confirmed, epoch); }
-  std::vector<PlaneMerge> merge() { return set.mergeSame(keyframes, *camera, noise); }
+  std::vector<PlaneMerge> merge() { return set.mergeSame(keyframes, *camera); }
   PlaneUpdate tell() {
     PlaneUpdate update;
     set.tell(&update);
@@ -51,8 +51,7 @@ class Planes : public ::testing::Test {
   }
 
   std::shared_ptr<const CameraModel> camera = testing::testCamera();
-  DepthNoise noise = testing::quietNoise();
-  PlacedKeyframes keyframes;
+  PlacedKeyframes keyframes{testing::quietNoise()};
   PlaneSet set{PlaneMapperOptions()};
 };
 

@@ -47,4 +47,7 @@ struct DepthNoiseParts {
   bool isUsable() const { return white > 0 && std::isfinite(white) && shared >= 0 && std::isfinite(shared); }
 };
 
+/// Correlation of the shared errors of one place in two images that are so many seconds apart.
+double sharedDepth(double seconds);
+
 }  // namespace vip_slam

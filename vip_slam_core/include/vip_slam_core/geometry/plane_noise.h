@@ -13,11 +13,25 @@
 // readings are not worth N.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "vip_slam_core/depth/depth_noise.h"
+
 namespace vip_slam {
+
+/// The two parts of one observation's noise, along its plane's normal.
+struct SurfaceNoise {
+  double white = 1;   ///< factor on the variance of its samples
+  double shared = 0;  ///< variance that all of them have in common in one image, m^2
+};
+
+/// `G`: sum of p~ p~^T / sigma^2 over `count` samples, in the camera; `n_C`: the plane's normal there. Of samples that
+/// say nothing the white factor is 1, and nothing is shared.
+SurfaceNoise surfaceNoise(const Eigen::Matrix4d& G, std::size_t count, const Eigen::Vector3d& n_C,
+                          const DepthNoise& model, const DepthNoiseParts& parts);
 
 /// The map of homogeneous points p~ for which G' = T G T^T: the centroid's weight and the extent shrink, and the points
 /// move onto their own plane, since their scatter about it tells nothing of where it is. `shared`: variance, m^2.

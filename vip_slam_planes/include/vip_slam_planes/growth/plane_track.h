@@ -13,8 +13,10 @@
 
 #include <Eigen/Geometry>
 
+#include "vip_slam_core/depth/depth_noise.h"
 #include "vip_slam_core/geometry/plane.h"
 #include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_core/types/keyframe.h"
 #include "vip_slam_core/types/plane_map.h"
 #include "vip_slam_planes/detection/plane_fit.h"
 #include "vip_slam_planes/growth/cell_grid.h"
@@ -26,8 +28,20 @@ namespace vip_slam {
 /// Camera poses T_map_C of placed keyframes.
 using CameraPoses = std::unordered_map<KeyframeId, SE3>;
 
-/// Moments of a view's points, in its camera, with the weights for fits: at most so many points count.
-PlaneMoments viewMoments(const PlaneObservation& observation);
+/// The keyframes that see planes, and how far their depth is to be trusted.
+struct PlaneViews {
+  const std::map<KeyframeId, KeyframePtr>& keyframes;  ///< hosts of a loaded map's planes are missing
+  const CameraPoses& poses;                            ///< keyframes without a pose are not used
+  const DepthNoise& noise;
+  DepthNoiseParts parts;  ///< of the recording, as far as they are known now
+};
+
+/// Moments of a view's samples, in its camera.
+PlaneMoments samplesOf(const PlaneObservation& observation);
+/// What they say of a plane with the normal `n_C` there, with the error that they share (plane_noise.h). `together`:
+/// the number of views that share it.
+PlaneMoments informationOf(const PlaneObservation& observation, const Eigen::Vector3d& n_C, const PlaneViews& views,
+                           double together = 1);
 
 class PlaneTrack {
  public:
@@ -91,8 +105,11 @@ class PlaneTrack {
   }
   /// Whether it has neither observations nor a loaded map's data, and all its hosts exist: it moves with its main host.
   bool followsHosts() const { return observations_.empty() && !stored && !patches_.count(0); }
-  /// Moments of all observations in `map`.
-  PlaneMoments moments(const CameraPoses& poses) const;
+  /// Moments in `map` of all samples of its observations: what a plane is fitted to.
+  PlaneMoments samples(const CameraPoses& poses) const;
+  /// Moments in `map` that say how well the plane is known: with what a view's samples share, and views within a
+  /// second.
+  PlaneMoments information(const PlaneViews& views) const;
 
   /// Outlines are traced again only when the area changed; the points always lie on the present plane.
   std::vector<PlanePolygon> polygons(int min_hits);
@@ -121,6 +138,10 @@ class PlaneTrack {
   int keyframes_waited = 0;  ///< number of keyframes with it in view before it was confirmed
 
  private:
+  using Observations = std::map<KeyframeId, PlaneObservation>;
+  /// How many views share the error of this one, itself included.
+  double together(Observations::const_iterator view, const PlaneViews& views) const;
+
   struct Patch {
     SE3 T_map_C;                           ///< of the host, when last rasterised
     std::vector<Eigen::Vector3f> cells_C;  ///< cell centres in the host's camera frame
@@ -146,7 +167,7 @@ class PlaneTrack {
   std::vector<Outline> outlines_;
   Plane last_checked_;
   std::map<KeyframeId, Patch> patches_;  ///< by host; host 0: cells whose keyframe was removed, in `map`
-  std::map<KeyframeId, PlaneObservation> observations_;
+  Observations observations_;
 };
 
 }  // namespace vip_slam

@@ -31,10 +31,8 @@ class OpenGaps {
 
 /// Data needed to check a map's planes against its keyframes.
 struct SceneView {
-  const std::map<KeyframeId, KeyframePtr>& keyframes;
-  const CameraPoses& poses;  ///< keyframes without a pose are not used
+  const PlaneViews& views;
   const CameraModel& camera;
-  const DepthNoise& noise;
   double see_through;  ///< metres behind a plane, beyond noise, from which depth counts as behind it
   OpenGaps& open_gaps;
 };

@@ -16,8 +16,8 @@ namespace vip_slam {
 /// the gap. The plane offsets d are not compared, since their difference grows with the distance from the origin.
 bool sameSurface(const PlaneTrack& a, const PlaneTrack& b, const SceneView& view, const PlaneMergingOptions& options);
 
-/// What one plane for both adds to the distances of their points, RMS of the worse of both, m; infinity when they do not
-/// determine a plane.
+/// What one plane for both adds to the distances of their points, RMS of the worse of both, m; infinity when they do
+/// not determine a plane.
 double jointMisfit(const PlaneTrack& a, const PlaneTrack& b, const CameraPoses& poses);
 
 }  // namespace vip_slam
