@@ -21,11 +21,6 @@ namespace {
 // Factor on the IMU's noise that no sound IMU reaches: with wrong axes, signs or units the adapted factor goes to its
 // limit of 30, while extrinsics that are wrong by a degree or a delay of 10 ms leave it at 1.
 constexpr double kImplausibleNoise = 10.0;
-// An image may repeat the one before while the IMU is at rest and predicts less image motion than this, px: a standing
-// camera that is simulated without noise renders equal images.
-constexpr double kStandsPx = 0.5;
-// Repeated images are reported as a fault only after this time, s.
-constexpr double kFrozen = 0.3;
 
 }  // namespace
 
@@ -42,7 +37,8 @@ bool FrontEnd::Impl::movesByImu(double t_imu, const SE3& T_odom_C_then) const {
     if (now.z() > 0) moved.push_back((now.hnormalized() - then.hnormalized()).norm() * camera_->focal());
   }
   if (moved.empty()) return true;
-  return upperMedian(std::move(moved)) > kStandsPx;
+  // A standing camera that is simulated without noise renders equal images.
+  return upperMedian(std::move(moved)) > kStillPixels;
 }
 
 bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
@@ -52,8 +48,8 @@ bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
 
 FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {
   ++counters_.repeated_image;
-  // A camera slower than its topic repeats images in between, which is no fault.
-  if (health_.tracking() && t_imu - filter_.nav().t < kFrozen)
+  // A camera slower than its topic repeats images in between, which is no fault for a moment.
+  if (health_.tracking() && t_imu - filter_.nav().t < frontend::kMoment)
     return statusOnly(t, health_.status().state, health_.status().reason);
   return unusable(t, "the image repeats the one before: has the camera frozen?");
 }

@@ -7,6 +7,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam::frontend {
 namespace {
 
@@ -16,10 +18,8 @@ constexpr double kHeld = 0.25;
 constexpr double kStretch = 1.0;           // s, longer than the filter's window: stretches share no measurements
 constexpr std::size_t kMaxStretches = 64;  // then they become twice as long
 constexpr double kSure = 3.0;              // sigmas between the adopted value and the estimate
-// Beyond so many sigmas of the prior something else is wrong, a unit or another sensor, and nothing is adopted.
-constexpr double kBelievable = 4.0;
-constexpr double kMuchSurer = 2.0;  // in information
-constexpr double kNothing = 1e-6;   // share of the prior's information, below which data say nothing
+constexpr double kMuchSurer = 2.0;         // in information
+constexpr double kNothing = 1e-6;          // share of the prior's information, below which data say nothing
 
 }  // namespace
 
@@ -157,13 +157,14 @@ double CalibrationEvidence::sureSigmas(int k) const {
 }
 
 bool CalibrationEvidence::contradicts(int k) const {
-  return std::abs(found_(k) - prior_[k].value) > std::max(kBelievable * prior_[k].sigma, sureSigmas(k) * sigma_(k));
+  return std::abs(found_(k) - prior_[k].value) > std::max(kGateSigmas * prior_[k].sigma, sureSigmas(k) * sigma_(k));
 }
 
 bool CalibrationEvidence::adopt() {
   const Eigen::VectorXd before = adopted_;
   for (int k = 0; k < adopted_.size(); ++k) {
-    if (!(std::abs(found_(k) - prior_[k].value) < kBelievable * prior_[k].sigma)) {
+    // Further from the prior something else is wrong, a unit or another sensor, and nothing is adopted.
+    if (!(std::abs(found_(k) - prior_[k].value) < kGateSigmas * prior_[k].sigma)) {
       adopted_information_(k) = 0;
       adopted_(k) = prior_[k].value;
       continue;

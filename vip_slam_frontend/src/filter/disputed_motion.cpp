@@ -4,18 +4,12 @@
 #include <cmath>
 
 #include "vip_slam_frontend/filter/gating.h"
+#include "vip_slam_frontend/inertial/fault_detection.h"
 
 namespace vip_slam::frontend {
 
-namespace {
-
-// The memory of fault detection, in which the share of contradicted time is judged, s.
-constexpr double kMemory = 1.0;
-
-}  // namespace
-
 void DisputedMotion::add(double t, const Vector6d& correction, const Vector6d& removed) {
-  const double kept = std::exp(-(t - t_) / kMemory);
+  const double kept = std::exp(-(t - t_) / kFaultMemory);
   sum_ = kept * sum_ + correction;
   expected_ = kept * kept * expected_ + removed.cwiseMax(0.0);
   taken_ *= kept * kept;

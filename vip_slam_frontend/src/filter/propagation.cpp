@@ -23,8 +23,8 @@ Eigen::Matrix<double, 15, 1> noiseFloor() {
 }
 
 // Motion of a hand-held camera, one sigma, rad/s and m/s^2, at one to two hertz. Linear interpolation across a gap is
-// wrong by curvature * gap^2 (1/s^3 and m/s^4), up to the full amplitude.
-constexpr double kRate = 2.0, kRateCurvature = 8.0, kAcceleration = 6.0, kAccelerationCurvature = 24.0;
+// wrong by its curvature, kCurvature (1/s^2) of the amplitude, times gap^2, up to the full amplitude.
+constexpr double kRate = 2.0, kAcceleration = 6.0, kCurvature = 4.0;
 
 Matrix15d whitening(const Matrix15d& Q) {
   const Eigen::LLT<Matrix15d> llt(Q);
@@ -34,8 +34,8 @@ Matrix15d whitening(const Matrix15d& Q) {
 }  // namespace
 
 void Propagation::admitGap(double gap, double dt) {
-  const double rate = std::min(kRate, kRateCurvature * gap * gap);
-  const double acceleration = std::min(kAcceleration, kAccelerationCurvature * gap * gap);
+  const double share = std::min(1.0, kCurvature * gap * gap), rate = share * kRate;
+  const double acceleration = share * kAcceleration;
   // The error is constant over the whole interval.
   const double theta = rate * dt, v = acceleration * dt, p = 0.5 * v * dt;
   for (int axis = 0; axis < 3; ++axis) {

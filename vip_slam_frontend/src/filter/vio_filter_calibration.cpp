@@ -3,25 +3,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/filter/vio_filter.h"
 
 namespace vip_slam {
 
 namespace {
 
-// An estimate is plausible, and kept over a restart, within this many sigmas of the prior; an entry of the gyro's
-// correction within a fixed limit, since its prior sigma is only a data-sheet value.
-constexpr double kBelievableChange = 4.0, kMaxGyroError = 0.05;
+// An entry of the gyro's correction is plausible, and kept over a restart, within a fixed limit: its prior sigma is
+// only a data-sheet value.
+constexpr double kMaxGyroError = 0.05;
 // One sigma of a depth offset that is not to be learnt, m.
 constexpr double kHeldOffset = 1e-6;
-// Shift of the depth image, in bearings (px over the focal length): significant above kSureShift sigmas, worth
-// correcting above kMinShift, known well enough below a sigma of kKnownShift. In an office one pixel of shift raised
-// the error from 0.8 to 13 mm.
-constexpr double kSureShift = 4.0, kMinShift = 1e-4, kKnownShift = 2e-4;
+// Shift of the depth image, in bearings (px over the focal length): worth correcting above kMinShift, known well enough
+// below a sigma of kKnownShift. In an office one pixel of shift raised the error from 0.8 to 13 mm.
+constexpr double kMinShift = 1e-4, kKnownShift = 2e-4;
 // One sigma of a shift that is reset to zero, in bearings: holds it there.
 constexpr double kHeldShift = 1e-7;
-// An entry of the gyro's correction is significant above these: 5e-4 of a rotation by 60 degrees is 0.03 degrees.
-constexpr double kSureGyroError = 4.0, kMinGyroError = 5e-4;
+// An entry of the gyro's correction is worth correcting above this: 5e-4 of a rotation by 60 degrees is 0.03 degrees.
+constexpr double kMinGyroError = 5e-4;
 
 }  // namespace
 
@@ -62,9 +62,8 @@ CalibrationEstimate VioFilter::calibration() const {
   for (int k = 0; k < window.calibration.gyro(); ++k) {
     const auto [row, column] = gyroEntry(window.calibration, k);
     calibration.sigma_gyro_correction(row, column) = sigmas(window.gyroColumn() - first + k);
-    calibration.gyro_contradicts =
-        calibration.gyro_contradicts ||
-        std::abs(gyroCorrection()(row, column)) > kBelievableChange * imu_noise_.gyro_correction_sigma;
+    calibration.gyro_contradicts = calibration.gyro_contradicts || std::abs(gyroCorrection()(row, column)) >
+                                                                       kGateSigmas * imu_noise_.gyro_correction_sigma;
   }
   return calibration;
 }
@@ -77,10 +76,10 @@ void VioFilter::learnCalibration() {
   if (!window.isFinite()) return;
   const CalibrationOptions& options = options_.calibration;
   const Vector6d change = window.T_I_C.boxminus(given_.T_I_C);
-  if (change.head<3>().norm() > kBelievableChange * options.sigma_rotation ||
-      change.tail<3>().norm() > kBelievableChange * options.sigma_translation ||
-      std::abs(window.time_offset - given_.time_offset) > kBelievableChange * options.sigma_time_offset ||
-      ((depth_shift + window.depth_shift).array().abs() > kBelievableChange * options.sigma_depth_shift).any() ||
+  if (change.head<3>().norm() > kGateSigmas * options.sigma_rotation ||
+      change.tail<3>().norm() > kGateSigmas * options.sigma_translation ||
+      std::abs(window.time_offset - given_.time_offset) > kGateSigmas * options.sigma_time_offset ||
+      ((depth_shift + window.depth_shift).array().abs() > kGateSigmas * options.sigma_depth_shift).any() ||
       window.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroError) {
     return;
   }
@@ -171,7 +170,7 @@ void VioFilter::judgeDepthShift() {
   const WindowState& window = filter_.window();
   if (!window.calibration.depth_shift || shift_contradicts_) return;
   const Eigen::Vector2d change = depth_shift_ + window.depth_shift;
-  if (change.cwiseAbs().maxCoeff() <= kBelievableChange * options_.calibration.sigma_depth_shift) return;
+  if (change.cwiseAbs().maxCoeff() <= kGateSigmas * options_.calibration.sigma_depth_shift) return;
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, window.dimension());
   H.middleCols<2>(window.depthShiftColumn()).diagonal().setConstant(1.0 / kHeldShift);
   Eigen::VectorXd r = -change / kHeldShift;
@@ -189,7 +188,7 @@ const Eigen::Vector2d& VioFilter::takeDepthShift() {
   if (rest.cwiseAbs().maxCoeff() < kMinShift) return depth_shift_;
   const Eigen::Vector2d sigma = calibration().sigma_depth_shift;
   const auto off = rest.array().abs();
-  if (sigma.maxCoeff() > kKnownShift || !(off > kMinShift && off > kSureShift * sigma.array()).any()) {
+  if (sigma.maxCoeff() > kKnownShift || !(off > kMinShift && off > kGateSigmas * sigma.array()).any()) {
     return depth_shift_;
   }
   moveDepth(rest, 0);
@@ -234,8 +233,8 @@ void VioFilter::judgeGyroCorrection() {
   const Eigen::Array33d change = window.gyro_correction.cwiseAbs();
   gyro_is_off_ = gyro_is_off_ && change > kMinGyroError / 2;
   if ((change > kMinGyroError && !gyro_is_off_).any()) {
-    gyro_is_off_ = gyro_is_off_ ||
-                   (change > kMinGyroError && change > kSureGyroError * calibration().sigma_gyro_correction.array());
+    gyro_is_off_ =
+        gyro_is_off_ || (change > kMinGyroError && change > kGateSigmas * calibration().sigma_gyro_correction.array());
   }
 }
 

@@ -12,8 +12,7 @@ namespace vip_slam {
 
 namespace {
 
-// Largest mean image motion over the window, px, and estimated speed, m/s, to stand still.
-constexpr double kStillPixels = 0.5, kStillSpeed = 0.1;
+constexpr double kStillSpeed = 0.1;  // m/s, largest estimated one to stand still
 // Still images in a row to enter, moving ones to leave.
 constexpr int kImagesIn = 4, kImagesOut = 2;
 // One sigma of zero velocity, m/s, and of zero rotation, rad, and translation, m, since stopping.

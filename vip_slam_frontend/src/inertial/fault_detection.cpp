@@ -17,10 +17,8 @@ namespace {
 constexpr double kGate = 8.0;
 // A fault is sudden: for kCalm s before it differences stayed below this share of the gate.
 constexpr double kCalm = 0.5, kDeviates = 0.7;
-constexpr double kMemory = 1.0;     // s, of the share of contradicted time
-constexpr double kForgotten = 1.0;  // s without a fault after it is believed again
-constexpr double kLongest = 5.0;    // s of isolation: bumps that come back are no IMU that is wrong for good
-// The share from which on it is at fault: while a body may fill the view, that came in within kMemory, and else.
+constexpr double kLongest = 5.0;  // s of isolation: bumps that come back are no IMU that is wrong for good
+// The share from which on it is at fault: while a body may fill the view, that came in within kFaultMemory, and else.
 constexpr double kMostly = 0.5, kSustained = 0.2;
 // A turn by so much shows whether the vertical is right, rad: wrong axes make 3 m/s^2 of it.
 constexpr double kShowsVertical = 0.3;
@@ -33,7 +31,7 @@ double motionDifference(const SE3& a, const SE3& b, const Matrix6d& covariance) 
   return std::isfinite(squared) ? std::sqrt(std::max(0.0, squared)) : 0.0;
 }
 
-bool FaultDetection::isOnProbation(double t) const { return t - last_fault_t_ < isolation() + kForgotten; }
+bool FaultDetection::isOnProbation(double t) const { return t - last_fault_t_ < isolation() + kFaultMemory; }
 
 void FaultDetection::reset(double t) {
   *this = FaultDetection();
@@ -42,7 +40,7 @@ void FaultDetection::reset(double t) {
 
 bool FaultDetection::add(const MotionEvidence& e) {
   const bool contradicts = e.images_agree && (e.implausible || e.sigmas > (suspects(e.t) ? kGateSigmas : kGate));
-  const double gain = std::min(1.0, e.interval / kMemory);
+  const double gain = std::min(1.0, e.interval / kFaultMemory);
   if (e.images_agree) contradicted_ += gain * (contradicts - contradicted_);
   const bool deviates = e.images_agree && e.sigmas > kDeviates * kGate;
   if (!e.images_agree) disagreed_t_ = e.t;
@@ -53,7 +51,7 @@ bool FaultDetection::add(const MotionEvidence& e) {
   // A shock may begin at the end of one interval and show fully in the next one.
   const bool begins = deviates && began_t_ == e.t;
   const bool goes_on = contradicts && (e.t - began_t_ <= 2.5 * e.interval || isOnProbation(e.t));
-  const double share = e.t - disagreed_t_ > kMemory ? kSustained : kMostly;
+  const double share = e.t - disagreed_t_ > kFaultMemory ? kSustained : kMostly;
   const bool fault = begins || goes_on || (contradicts && contradicted_ > share);
   // An IMU whose faults come back is believed again later each time.
   if (fault) {

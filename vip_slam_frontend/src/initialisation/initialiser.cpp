@@ -11,9 +11,8 @@ namespace vip_slam {
 
 namespace {
 
-constexpr double kMaxTurn = 0.3;            // rad/s, mean rate at rest that may be gyro bias
-constexpr double kMaxOffGravity = 1.5;      // m/s^2, deviation from gravity at rest that may be accelerometer bias
-constexpr std::size_t kFewestSamples = 10;  // of the IMU in the standing time
+constexpr double kMaxTurn = 0.3;        // rad/s, mean rate at rest that may be gyro bias
+constexpr double kMaxOffGravity = 1.5;  // m/s^2, deviation from gravity at rest that may be accelerometer bias
 constexpr std::size_t kFewestImages = 3;
 // How far back samples are averaged for the level, s.
 constexpr double kLevelSeconds = 0.5;
@@ -45,7 +44,7 @@ std::optional<FilterPrior> Initialiser::standing(double t, const frontend::Inert
   const double from = t - kStandingSeconds;
   if (!inertial.complete() || inertial.oldest() > from) return std::nullopt;
   const std::vector<ImuSample> samples = inertial.between(from, t);
-  if (samples.size() < kFewestSamples) return std::nullopt;
+  if (samples.size() < kEnough) return std::nullopt;
   const ImuSpread spread = imuSpread(samples, &noise_);
   if (!spread.quiet(filter_.zupt.max_gyro_std, filter_.zupt.max_accel_std) || spread.mean_gyro.norm() > kMaxTurn)
     return std::nullopt;

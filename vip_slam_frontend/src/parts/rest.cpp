@@ -47,9 +47,9 @@ bool Rest::isStill(const InertialInput& inertial, double previous_t_imu, double 
   for (const Track& track : *view.tracks) now.emplace_back(track.feature.id, track.feature.pixel);
   StillnessCues cues;
   cues.imu = imuSpread(inertial.between(since, t_imu), &noise_);
-  const double shaken_since = std::min(t_imu - kShakenWindow, since);
+  const double shaken_since = std::min(t_imu - kStandingSeconds, since);
   if (shaken_since >= inertial.oldest()) {
-    cues.unshaken = imuSpread(movingMeans(inertial.between(shaken_since, t_imu), kShake));
+    cues.unshaken = imuSpread(movingMeans(inertial.between(shaken_since, t_imu), kRestWindow));
   }
   cues.tracks = view.counts ? static_cast<int>(now.size()) : 0;
   cues.speed = view.speed;

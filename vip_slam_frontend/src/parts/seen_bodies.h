@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "vip_slam_core/types/feature.h"
+#include "vip_slam_frontend/inertial/fault_detection.h"
 #include "vip_slam_frontend/tracking/moving_regions.h"
 
 namespace vip_slam::frontend {
@@ -19,7 +20,7 @@ class SeenBodies {
   }
   const MovingRegions& regions() const { return regions_; }
   /// Whether one moved a moment ago: a body that pauses looks static, and the images stay in doubt.
-  bool movedLately(double t_imu) const { return t_imu - last_imu_t_ < kPauses; }
+  bool movedLately(double t_imu) const { return t_imu - last_imu_t_ < kFaultMemory; }
   /// Removes the features on them.
   void drop(std::vector<Feature>* features) const {
     if (!regions_.any()) return;
@@ -29,8 +30,6 @@ class SeenBodies {
   void reset() { *this = SeenBodies(); }
 
  private:
-  static constexpr double kPauses = 1.0;  ///< s
-
   MovingRegions regions_;
   double last_imu_t_ = -1e300;
 };

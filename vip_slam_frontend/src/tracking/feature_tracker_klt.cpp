@@ -7,6 +7,7 @@
 
 #include "vip_slam_core/util/statistics.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
+#include "vip_slam_frontend/tracking/pixel_noise.h"
 
 namespace vip_slam {
 
@@ -17,7 +18,6 @@ namespace {
 constexpr double kExposureGain = 0.1;
 constexpr double kExposureShift = 6.0;
 constexpr int kExposureReach = 12;           // px around a track
-constexpr double kFlowApart = 0.5;           // px, largest forward-backward error
 constexpr std::size_t kMinForExposure = 10;  // tracks
 
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
@@ -86,14 +86,15 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
   std::vector<std::uint8_t> status, back_status;
   cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, previous, *next, status, cv::noArray(), window, kFlowLevels,
                            criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
-  // Backward check from the forward result, started at the previous pixel: one pyramid level is enough.
+  // Backward check from the forward result, started at the previous pixel: one pyramid level is enough. It may be off
+  // by the flow's sigma.
   std::vector<cv::Point2f> back = previous;
   cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, *next, back, back_status, cv::noArray(), window, 1, criteria,
                            cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   for (std::size_t i = 0; i < previous.size(); ++i) {
     const cv::Point2f d = back[i] - previous[i];
     const Eigen::Vector2d uv = asVector((*next)[i]);
-    (*found)[i] = status[i] && back_status[i] && std::hypot(d.x, d.y) < kFlowApart && uv.allFinite() &&
+    (*found)[i] = status[i] && back_status[i] && std::hypot(d.x, d.y) < kFlowSigma && uv.allFinite() &&
                   uv.x() >= options_.border && uv.y() >= options_.border && uv.x() < gray.cols - options_.border &&
                   uv.y() < gray.rows - options_.border && allowed(uv);
   }

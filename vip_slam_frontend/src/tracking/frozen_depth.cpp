@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_frontend/tracking/frozen_depth.h"
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 namespace {
 
-constexpr int kStep = 12;      // pixels
-constexpr int kMinDepth = 50;  // samples with depth; with noise that many are never all equal
+constexpr int kStep = 12;  // pixels
 
 }  // namespace
 
@@ -19,7 +20,8 @@ bool FrozenDepth::repeats(const cv::Mat& depth) {
       with_depth += row[x] > 0;
     }
   }
-  const bool same = with_depth >= kMinDepth && now == last_;
+  // With noise so many are never all equal.
+  const bool same = with_depth >= kEnough && now == last_;
   last_ = std::move(now);
   return same;
 }

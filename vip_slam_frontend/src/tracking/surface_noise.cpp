@@ -7,13 +7,12 @@
 #include <Eigen/Cholesky>
 
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::frontend {
 
 namespace {
 
-// On smaller surfaces the plane's fit takes up most of what neighbours share.
-constexpr int kFewest = 20;
 // Memory, in items: some ten images that are full of surfaces.
 constexpr double kMemory = 3000;
 constexpr double kMedianOfChi2 = 0.455;  // with one degree of freedom
@@ -41,7 +40,8 @@ void SurfaceNoise::addImage(const std::vector<SurfacePatch>& patches) {
   double products = 0;
   int pairs = 0;
   for (const SurfacePatch& patch : patches) {
-    if (sizes[patch.surface] < kFewest) continue;
+    // On smaller surfaces the plane's fit takes up most of what neighbours share.
+    if (sizes[patch.surface] < kEnough) continue;
     for (const auto& [x, y] : {std::pair(1, 0), std::pair(0, 1)}) {
       const auto it = raster.find({patch.cell.x() + x, patch.cell.y() + y});
       if (it == raster.end() || it->second->surface != patch.surface) continue;
@@ -49,7 +49,7 @@ void SurfaceNoise::addImage(const std::vector<SurfacePatch>& patches) {
       ++pairs;
     }
   }
-  if (pairs >= kFewest) shared_.add(products / pairs, pairs);
+  if (pairs >= kEnough) shared_.add(products / pairs, pairs);
 }
 
 void SurfaceNoise::addDifferences(const std::vector<SurfaceDifference>& differences) {
@@ -57,7 +57,7 @@ void SurfaceNoise::addDifferences(const std::vector<SurfaceDifference>& differen
   for (const SurfaceDifference& d : differences) surfaces[d.surface].push_back(&d);
   for (const auto& [surface, members] : surfaces) {
     const int n = static_cast<int>(members.size());
-    if (n < kFewest) continue;
+    if (n < kEnough) continue;
     // Offset and tilt of a plane that does not pass through the origin: one linear function of the place.
     Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();

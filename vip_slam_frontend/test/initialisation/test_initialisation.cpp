@@ -264,13 +264,13 @@ TEST(Stillness, NeedsImuImageAndSpeedAndHasHysteresis) {
 TEST(Stillness, AShakenImuIsQuietByItsMovingMeansWhereTheImageStands) {
   const auto spreads = [](double sway) {  // of the body, rad/s and m/s^2, once a second
     std::vector<ImuSample> samples;
-    for (int k = 0; 0.005 * k <= kShakenWindow; ++k) {
+    for (int k = 0; 0.005 * k <= kStandingSeconds; ++k) {
       const double t = 0.005 * k, shake = std::sin(2 * M_PI * 31 * t), slow = sway * std::sin(2 * M_PI * t);
       samples.push_back({t, {0.2 * shake + slow, 0, 0}, {0, 4 * shake + 3 * slow, 9.81}});
     }
     StillnessCues cues = quiet();
     cues.imu = imuSpread({samples.end() - 50, samples.end()});
-    cues.unshaken = imuSpread(movingMeans(samples, kShake));
+    cues.unshaken = imuSpread(movingMeans(samples, kRestWindow));
     return cues;
   };
   StillnessDetector detector((ZuptOptions()));

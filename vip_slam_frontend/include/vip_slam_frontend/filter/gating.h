@@ -9,7 +9,8 @@ namespace vip_slam {
 // What counts as an outlier, one value per meaning.
 /// Probability of a consistent measurement to pass a chi-square gate.
 constexpr double kGateProbability = 0.95;
-/// Innovation gate of a motion or of a surface patch, sigmas: loose, since their errors are not Gaussian.
+/// Innovation gate of a motion or of a surface patch, sigmas: loose, since their errors are not Gaussian. So far from
+/// zero a number of the calibration surely is another one, and from its prior not to be believed.
 constexpr double kGateSigmas = 4.0;
 /// Readings that belong to one surface lie within this many sigmas of it.
 constexpr double kReadingSigmas = 3.5;

@@ -12,11 +12,13 @@
 
 namespace vip_slam {
 
+/// Largest image motion of a camera that stands, px.
+constexpr double kStillPixels = 0.5;
 /// IMU time that is looked at for stillness, s.
 constexpr double kRestWindow = 0.25;
-/// The same where an engine or fans shake the IMU, and the time over which their shaking is averaged, s: of 25 Hz, an
-/// engine's 1500 turns a minute, a twentieth is left.
-constexpr double kShakenWindow = 1.0, kShake = 0.25;
+/// The same without usable images, and where an engine or fans shake the IMU, s: averaged over kRestWindow, a twentieth
+/// of an engine's 1500 turns a minute (25 Hz) is left.
+constexpr double kStandingSeconds = 1.0;
 
 struct ImuSpread {
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_accel = Eigen::Vector3d::Zero();
@@ -36,7 +38,7 @@ std::vector<ImuSample> movingMeans(const std::vector<ImuSample>& samples, double
 /// Evidence of one image and the IMU samples before it about motion.
 struct StillnessCues {
   ImuSpread imu;                    ///< over kRestWindow
-  ImuSpread unshaken;               ///< of moving means over kShake, over kShakenWindow
+  ImuSpread unshaken;               ///< of moving means over kRestWindow, over kStandingSeconds
   double disparity_px = -1;         ///< mean image motion over the same time; < 0: unknown
   double anchor_disparity_px = -1;  ///< since standing still began; < 0: unknown
   int tracks = 0;

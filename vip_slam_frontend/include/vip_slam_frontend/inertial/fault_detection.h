@@ -23,6 +23,9 @@
 
 namespace vip_slam::frontend {
 
+/// For how long counts what images and IMU have said of each other, s.
+constexpr double kFaultMemory = 1.0;
+
 struct MotionEvidence {
   double t = 0;               ///< end of the interval, IMU clock, s
   double interval = 0;        ///< s

@@ -17,9 +17,6 @@
 
 namespace vip_slam {
 
-/// Rest by the IMU that a start without usable images needs, s.
-constexpr double kStandingSeconds = 1.0;
-
 struct InitialisationInput {
   double t_imu = 0;
   int points = 0;                         ///< tracked points with depth
