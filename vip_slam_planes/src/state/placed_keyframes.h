@@ -31,7 +31,8 @@ class PlacedKeyframes {
   bool waits(KeyframeId id) const { return waiting_.count(id) > 0; }
   std::size_t waiting() const { return waiting_.size(); }
   /// Null when no keyframe with this id waits, or when the estimate is not sound. `same_place`: one sigma of a motion's
-  /// translation, m, beyond which surfaces before and after it cannot be told to be the same by their place.
+  /// displacement along a normal, m, beyond which surfaces across it before and after cannot be known again by their
+  /// place.
   KeyframePtr place(const KeyframeEstimate& estimate, double same_place);
   /// The first keyframe after the last motion that was less sure than that along a plane's normal in `map`, 0 without
   /// one: what was seen before may lie elsewhere.
