@@ -319,7 +319,7 @@ def gyroscope_in_degrees(r):
     return Made(of_imu(r, lambda a, w, t: (a, np.degrees(w) if t > r.middle - r.begin else w)))
 
 
-@fault('gravity', False)
+@fault('gravity', False, 6.0, 4.0)
 def gravity_taken_out(r):
     """the driver takes gravity out"""
     def alter(force, rate, seconds):
