@@ -7,7 +7,6 @@
 #include <unordered_map>
 
 #include "homography_hosts.h"
-#include "shared_depth.h"
 #include "vip_slam_backend/solver/robust.h"
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/geometry/plane_noise.h"

@@ -89,7 +89,6 @@ TEST(PlaneNoise, ManyCorrelatedReadingsAreNotWorthMany) {
   EXPECT_TRUE(sharedErrorShrinkage(Eigen::Matrix4d::Zero(), 1).isIdentity(0));
 }
 
-// Misfits of points whose errors are as the model says, shared ones included, are a chi square's.
 // The two parts are stated in squares of a reading's sigma, along the viewing ray; a wall that is seen at an angle
 // moves by less along its normal.
 TEST(PlaneNoise, TheTwoPartsGoByTheReadingsSigmaAlongTheNormal) {
@@ -109,6 +108,7 @@ TEST(PlaneNoise, TheTwoPartsGoByTheReadingsSigmaAlongTheNormal) {
   EXPECT_EQ(nothing.shared, 0);
 }
 
+// Misfits of points whose errors are as the model says, shared ones included, are a chi square's.
 TEST(PlaneNoise, MisfitsKnowWhatIsShared) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;

@@ -43,7 +43,7 @@ class PlacedKeyframes {
   const std::map<KeyframeId, KeyframePtr>& placed() const { return placed_; }
   /// T_map_C of placed keyframes and of the hosts of loaded planes.
   const CameraPoses& poses() const { return poses_; }
-  /// The same as views of planes.
+  /// Keyframes, poses and depth noise as the comparison of planes needs them; refers to this object.
   PlaneViews views() const;
   /// Those of epochs that are tied to this one; valid until the next call.
   const CameraPoses& posesTiedTo(std::uint32_t epoch);
