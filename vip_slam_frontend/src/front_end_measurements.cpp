@@ -69,7 +69,7 @@ std::vector<Eigen::Vector3d> FrontEnd::Impl::trackedPoints() const {
 
 SurfaceMatches FrontEnd::Impl::matchSurfaces(const ImageStep& step) {
   const int index = filter_.window().indexOf(surfaces_.reference());
-  if (index < 0 || step.depth.empty() || !options_.filter.use_surfaces) return {};
+  if (index < 0 || step.depth.empty()) return {};
   ScopedTimer timer(timing_, "frontend.surfaces", step.t);
   const SE3 T_odom_ref = cameraPose(filter_.window(), filter_.window().clones[index]);
   SurfaceMatches matches = surfaces_.match(step.depth, step.T_odom_C.inverse() * T_odom_ref, bodies_.regions());
@@ -80,7 +80,7 @@ SurfaceMatches FrontEnd::Impl::matchSurfaces(const ImageStep& step) {
 }
 
 void FrontEnd::Impl::renewSurfaces(const cv::Mat& depth, std::size_t matched, double t) {
-  if (depth.empty() || !options_.filter.use_surfaces) return;
+  if (depth.empty()) return;
   // The oldest clone leaves the window with the next image; changed now, this image is tied to both references.
   const bool leaving = filter_.window().indexOf(surfaces_.reference()) <= filter_.window().indexOf(filter_.oldest().id);
   if (!leaving && 2 * matched >= surfaces_.size()) return;

@@ -36,7 +36,7 @@ FrameOutput FrontEnd::Impl::initialise(const ImageStep& step) {
   const auto& tracks = tracker_.tracks();
   const auto points =
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.feature.depth > 0; });
-  const bool surfaces = !depth.empty() && options_.filter.use_surfaces && surfaces_.sees(depth);
+  const bool surfaces = !depth.empty() && surfaces_.sees(depth);
   std::optional<Eigen::Vector3d> up;
   if (!depth.empty() && !inertial_.hasAccel()) up = frontend::upByFloor(shareNormals(surfaces_.patches(depth)));
   std::optional<FilterPrior> prior =

@@ -181,7 +181,6 @@ FilterOptions singlePixels() {
   FilterOptions options;
   options.depth_inflation = 1.0;
   options.pixel_inflation = 1.0;
-  options.own_noise = false;
   options.pull_huber = 1000.0;
   return options;
 }

@@ -79,7 +79,7 @@ std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool w
 
 double VioFilter::ownNoise(const Triangulation& point) const {
   const int dof = point.pixel_rows - 3;
-  if (!options_.own_noise || dof <= 0 || point.pixel_chi2 < gate_.threshold(dof)) return 1.0;
+  if (dof <= 0 || point.pixel_chi2 < gate_.threshold(dof)) return 1.0;
   return point.pixel_chi2 / dof;
 }
 

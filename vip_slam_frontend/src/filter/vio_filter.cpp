@@ -138,8 +138,8 @@ Propagation VioFilter::predict(const SE3& T_I0_I1, const Matrix6d& covariance, d
 
 Propagation VioFilter::predict(const std::vector<ImuSample>& samples, const frontend::ChannelNoise& noise) const {
   ImuNoise found = scaled(imu_noise_, imuNoise());
-  found.gyro_noise_density *= options_.imu_noise_inflation * noise.gyro;
-  found.accel_noise_density *= options_.imu_noise_inflation * noise.accel;
+  found.gyro_noise_density *= noise.gyro;
+  found.accel_noise_density *= noise.accel;
   return propagate(filter_.window(), samples, found, G_, stamp_monitor_.sigma());
 }
 

@@ -57,7 +57,7 @@ std::optional<FilterPrior> Initialiser::standing(double t, const frontend::Inert
   prior.sigma_tilt = 0.3;
   prior.sigma_velocity = 0.02;
   prior.sigma_bias_accel = filter_.sigma_bias_accel;
-  const double inflation = 2.0 * filter_.imu_noise_inflation, root = std::sqrt(kStandingSeconds);
+  const double inflation = 2.0, root = std::sqrt(kStandingSeconds);
   prior.sigma_bias_gyro = std::min(
       filter_.sigma_bias_gyro, 2e-4 + inflation * (noise_.gyro_noise_density / root + noise_.gyro_random_walk * root));
   prior.sigma_mean_accel = 0.005 + inflation * (noise_.accel_noise_density / root + noise_.accel_random_walk * root);

@@ -44,11 +44,9 @@ double commonVariance(double motion) {
 
 }  // namespace
 
-MotionSources::MotionSources(const FrontEndOptions& options, const SensorConfig& sensor,
-                             std::shared_ptr<const CameraModel> camera, const VioFilter* filter,
-                             InertialInput* inertial)
-    : leave_out_moving_(options.tracking.leave_out_moving),
-      imu_noise_(sensor.imu_noise),
+MotionSources::MotionSources(const SensorConfig& sensor, std::shared_ptr<const CameraModel> camera,
+                             const VioFilter* filter, InertialInput* inertial)
+    : imu_noise_(sensor.imu_noise),
       gravity_(sensor.gravity),
       filter_(filter),
       inertial_(inertial),
@@ -90,7 +88,7 @@ PredictedMotion MotionSources::byImu(const Propagation& propagation, const SE3& 
   motion.turn_unknown = doubtful;
   motion.wary = wary;
   motion.at_rest = at_rest;
-  const bool settled = leave_out_moving_ && propagation.predicted.t - started_imu_t_ > kSettled;
+  const bool settled = propagation.predicted.t - started_imu_t_ > kSettled;
   motion.judges = settled && !doubtful;
   return motion;
 }
@@ -164,8 +162,8 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
   evidence.disputed = filter_->isDisputed();
   evidence.t = propagation.predicted.t;
   evidence.interval = prediction.interval;
-  evidence.images_agree = !prediction.turn_unknown && leave_out_moving_ && !prediction.wary &&
-                          !tracking.moves_by_itself && tracking.motion.ok && tracking.motion.pairs >= kAgreeing &&
+  evidence.images_agree = !prediction.turn_unknown && !prediction.wary && !tracking.moves_by_itself &&
+                          tracking.motion.ok && tracking.motion.pairs >= kAgreeing &&
                           kAgreeingOutliers * tracking.lost_outlier <= tracking.tracked;
   if (evidence.images_agree) {
     const Matrix15d P = filter_->covariance();

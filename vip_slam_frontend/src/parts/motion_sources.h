@@ -20,8 +20,8 @@ namespace vip_slam::frontend {
 class MotionSources {
  public:
   /// Reads `filter` and gives stand-ins to `inertial`; both outlive this.
-  MotionSources(const FrontEndOptions& options, const SensorConfig& sensor, std::shared_ptr<const CameraModel> camera,
-                const VioFilter* filter, InertialInput* inertial);
+  MotionSources(const SensorConfig& sensor, std::shared_ptr<const CameraModel> camera, const VioFilter* filter,
+                InertialInput* inertial);
 
   /// Camera motion between the last two images, T_current_previous.
   const SE3& last() const { return last_; }
@@ -72,7 +72,6 @@ class MotionSources {
   void reset();
 
  private:
-  bool leave_out_moving_;
   ImuNoise imu_noise_;
   double gravity_;  ///< m/s^2
   const VioFilter* filter_;

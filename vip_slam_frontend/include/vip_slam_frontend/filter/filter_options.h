@@ -85,12 +85,9 @@ struct FilterOptions {
   double sigma_px = 0.5;
   double sigma_px_min = 0.11;
   double pixel_inflation = 1.3;
-  bool own_noise = true;
   double pull_huber = 1.0;
   int max_update_features = 30;
-  bool use_surfaces = true;
   double depth_inflation = 1.4;
-  double imu_noise_inflation = 1.0;
   bool adapt_imu_noise = true;
   double sigma_bias_gyro = 0.02;
   double sigma_bias_accel = 0.1;
@@ -104,15 +101,11 @@ struct FilterOptions {
             "lower bound of the adaptation, px; the error that good tracks share");
     v.field("pixel_inflation", pixel_inflation, 1.0, 20.0,
             "factor on the adapted sigma_px; above 1: what a track errs in one image it errs in the next, too");
-    v.field("own_noise", own_noise, "a feature whose residuals sigma_px does not explain gets a larger one of its own");
     v.field("pull_huber", pull_huber, 0.1, 1000.0,
             "Huber threshold on the correction that one feature asks for, in sigmas of what it may");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");
-    v.field("use_surfaces", use_surfaces,
-            "tie each depth image to the flat patches of an earlier one; needs no corners");
     v.field("depth_inflation", depth_inflation, 0.1, 20.0,
             "factor on the depth noise; above 1: what a corner's depth errs in one image it errs in the next, too");
-    v.field("imu_noise_inflation", imu_noise_inflation, 0.1, 100.0, "factor on the IMU noise densities");
     v.field("adapt_imu_noise", adapt_imu_noise, "widen the IMU noise while the images contradict the IMU");
     v.field("sigma_bias_gyro", sigma_bias_gyro, 1e-5, 1.0, "initial one-sigma of the gyro bias, rad/s");
     v.field("sigma_bias_accel", sigma_bias_accel, 1e-4, 5.0, "initial one-sigma of the accelerometer bias, m/s^2");

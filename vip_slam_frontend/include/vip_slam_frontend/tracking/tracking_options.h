@@ -11,7 +11,6 @@ struct TrackingOptions {
   double min_distance = 16.0;
   int fast_threshold = 16;
   int fast_threshold_low = 5;
-  bool leave_out_moving = true;
   int border = 12;
   int keyframe_corners = 400;
 
@@ -21,8 +20,6 @@ struct TrackingOptions {
             "smallest distance between tracked features, px of an image of 640 x 480");
     v.field("fast_threshold", fast_threshold, 2, 100, "FAST threshold tried first, grey levels");
     v.field("fast_threshold_low", fast_threshold_low, 1, 100, "FAST threshold in cells where the first found nothing");
-    v.field("leave_out_moving", leave_out_moving,
-            "new points that contradict the IMU move by themselves: no part in pose, surfaces or keyframes");
     v.field("border", border, 4, 100, "no features nearer to the image border, px of an image of 640 x 480");
     v.field("keyframe_corners", keyframe_corners, 0, 5000, "untracked ORB corners added to a keyframe");
   }
