@@ -51,11 +51,6 @@ bool stronger(const Corner& a, const Corner& b) {
   return a.pixel.y != b.pixel.y ? a.pixel.y < b.pixel.y : a.pixel.x < b.pixel.x;
 }
 
-// Cells of the image, for an even spread of corners.
-constexpr int kColumns = 16, kRows = 12;
-// Structure below this is image noise of a few grey levels, not a corner.
-constexpr float kMinScore = 4.0f;
-
 }  // namespace
 
 float cornerScore(const cv::Mat& gray, int x, int y, int radius) {
@@ -81,7 +76,11 @@ std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Poi
                                   const TrackingOptions& options, const cv::Mat& mask) {
   std::vector<Corner> result;
   if (wanted <= 0) return result;
-  const int cols = kColumns, rows = kRows, border = options.border;
+  // For an even spread of corners the image has as many square cells as features are wanted in it.
+  const double aspect = static_cast<double>(gray.cols) / gray.rows;
+  const int cols = std::max(1, cvRound(std::sqrt(options.max_features * aspect)));
+  const int rows = std::max(1, cvRound(std::sqrt(options.max_features / aspect)));
+  const int border = options.border;
   std::vector<int> count(static_cast<std::size_t>(cols) * rows, 0);
   Occupancy occupancy(gray.size(), options.min_distance);
   for (const cv::Point2f& p : occupied) {
@@ -115,7 +114,7 @@ std::vector<Corner> detectCorners(const cv::Mat& gray, const std::vector<cv::Poi
         const cv::Point2f p(k.pt.x + roi.x, k.pt.y + roi.y);
         if (!occupancy.free(p)) continue;
         const float score = cornerScore(gray, cvRound(p.x), cvRound(p.y), 4);
-        if (score > kMinScore) cell.push_back({p, score});
+        if (score > 0) cell.push_back({p, score});
       }
       if (cell.empty()) continue;
       std::sort(cell.begin(), cell.end(), stronger);

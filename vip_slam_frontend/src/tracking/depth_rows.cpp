@@ -12,10 +12,6 @@ namespace {
 
 // Neighbours whose depths differ by more than this share belong to two surfaces.
 constexpr float kOneSurface = 0.05f;
-// When the depth found differs from the expected one by more than this share, the look-up is repeated with it.
-constexpr float kElsewhere = 0.02f;
-// Expected depth before any was found, m.
-constexpr float kUnknownDepth = 2.f;
 
 /// Interpolates 1/z, which is affine over a plane, in an image of inverse depths; 0 where there is no reading.
 inline float inverseAt(const cv::Mat& inverse, float u, float v) {
@@ -52,7 +48,7 @@ struct RowRays {
 
 /// A row of the result: expected depth, source pixels, and the map from z at the source to z at the stamp.
 struct RowBuffers {
-  explicit RowBuffers(int n) : z(n, kUnknownDepth), offset(n, 0.f), u(n), v(n), gain(n), shift(n) {}
+  RowBuffers(int n, float expected) : z(n, expected), offset(n, 0.f), u(n), v(n), gain(n), shift(n) {}
   std::vector<float> z, offset;          ///< expected depth, m, and offset to the source row, px
   std::vector<float> u, v, gain, shift;  ///< pixel; z_stamp = gain z_read + shift
 };
@@ -125,7 +121,10 @@ cv::Mat DepthRows::atStamp(const cv::Mat& depth, const RowPoses& rows) const {
   for (int v = 0; v < depth.rows; ++v) invert(depth.ptr<float>(v), inverse.ptr<float>(v), n);
   const std::vector<RowMotion> motions = motionOfRows(rows, depth.rows);
   // Neighbours move alike: each pixel starts with depth and offset of the one above.
-  RowBuffers b(n);
+  // Until a depth was found the image's mean is expected.
+  const auto usual = static_cast<float>(cv::mean(depth, inverse > 0)[0]);
+  if (!(usual > 0)) return cv::Mat::zeros(depth.size(), CV_32FC1);
+  RowBuffers b(n, usual);
   const float cols = static_cast<float>(depth.cols), height = static_cast<float>(depth.rows);
   for (int v = 0; v < depth.rows; ++v) {
     const std::size_t at = static_cast<std::size_t>(v) * n;
@@ -141,7 +140,7 @@ cv::Mat DepthRows::atStamp(const cv::Mat& depth, const RowPoses& rows) const {
       };
       float z = read();
       bool misled = !(z > 0) && !(b.u[u] >= 0 && b.v[u] >= 0 && b.u[u] < cols && b.v[u] < height);
-      if (z > 0 && std::abs(z - b.z[u]) > kElsewhere * z) {
+      if (z > 0 && std::abs(z - b.z[u]) > kOneSurface * z) {  // another surface than expected
         b.z[u] = z;
         findSources(rays, motion, v, u, u + 1, &b);
         z = read();
@@ -150,7 +149,7 @@ cv::Mat DepthRows::atStamp(const cv::Mat& depth, const RowPoses& rows) const {
       if (z > 0) b.z[u] = z;
       if (misled) {
         // Misled by a speck close to the camera, whose source lies far away: the pixels below start afresh.
-        b.z[u] = kUnknownDepth;
+        b.z[u] = usual;
         b.offset[u] = 0;
       }
       out[u] = std::max(z, 0.f);

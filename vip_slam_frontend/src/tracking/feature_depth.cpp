@@ -3,26 +3,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/LU>
 
 #include "vip_slam_core/depth/depth_image.h"
 #include "vip_slam_frontend/filter/gating.h"
+#include "vip_slam_frontend/tracking/patch_surface.h"
 
 namespace vip_slam {
 
 namespace {
 
 constexpr int kRadius = 3;
-constexpr int kWindow = (2 * kRadius + 1) * (2 * kRadius + 1);
-constexpr int kMinReadings = 30;  // of the 49 in the window
-constexpr int kMinNear = 12;
 // Accuracy of a corner's position relative to the depth image, px.
 constexpr double kPixelError = 0.5;
-// A corner farther than this from the nearer surface's edge belongs to the surface behind, px.
-constexpr double kMaxOffRim = 1.5;
-constexpr double kMaxRelativeSigma = 0.05;
 
 struct Reading {
   double x, y, z;  // offset from the corner in px; metres
@@ -42,12 +38,11 @@ struct InversePlane {
 };
 
 template <typename Use>
-bool fit(const Reading* readings, int n, const Use& use, InversePlane* plane) {
+bool fit(const std::vector<Reading>& readings, const Use& use, InversePlane* plane) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   int count = 0;
-  for (int i = 0; i < n; ++i) {
-    const Reading& r = readings[i];
+  for (const Reading& r : readings) {
     if (!use(r)) continue;
     // sigma of 1/z is sigma_z / z^2.
     const double w = r.z * r.z / r.sigma;
@@ -56,7 +51,7 @@ bool fit(const Reading* readings, int n, const Use& use, InversePlane* plane) {
     b += J * (w / r.z);
     ++count;
   }
-  if (count < kMinNear) return false;
+  if (count < kEnough) return false;
   bool invertible = false;
   double determinant;
   // Scaled so that the determinant says whether the pixels span a plane rather than a line.
@@ -69,9 +64,9 @@ bool fit(const Reading* readings, int n, const Use& use, InversePlane* plane) {
 }
 
 template <typename Use>
-int countExplained(const Reading* readings, int n, const InversePlane& plane, const Use& use) {
+int countExplained(const std::vector<Reading>& readings, const InversePlane& plane, const Use& use) {
   int count = 0;
-  for (int i = 0; i < n; ++i) count += use(readings[i]) && plane.explains(readings[i]);
+  for (const Reading& r : readings) count += use(r) && plane.explains(r);
   return count;
 }
 
@@ -82,7 +77,7 @@ FeatureDepth evaluate(const InversePlane& plane, FeatureDepth::Source source, co
   const double slope = z * z * plane.c.tail<2>().norm();  // metres per px
   const double fitted = z * z * std::sqrt(std::max(0.0, plane.covariance(0, 0)));
   const double sigma = std::hypot(noise.sigma(z), std::hypot(kPixelError * slope, fitted));
-  if (!noise.inRange(z) || sigma > kMaxRelativeSigma * z) return result;
+  if (!noise.inRange(z)) return result;
   result.z = static_cast<float>(z);
   result.sigma = static_cast<float>(sigma);
   result.source = source;
@@ -90,15 +85,16 @@ FeatureDepth evaluate(const InversePlane& plane, FeatureDepth::Source source, co
 }
 
 /// The nearer of two surfaces, split at the widest gap between sorted readings.
-FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
+FeatureDepth nearSide(const std::vector<Reading>& readings, const DepthNoise& noise) {
   FeatureDepth unclear;
   unclear.source = FeatureDepth::Source::kUnclear;
-  double sorted[kWindow];
-  for (int i = 0; i < n; ++i) sorted[i] = readings[i].z;
-  std::sort(sorted, sorted + n);
+  const int n = static_cast<int>(readings.size());
+  std::vector<double> sorted;
+  for (const Reading& r : readings) sorted.push_back(r.z);
+  std::sort(sorted.begin(), sorted.end());
   int split = -1;
   double widest = 0;
-  for (int i = kMinNear; i < n; ++i) {
+  for (int i = kEnough; i < n; ++i) {
     const double gap = sorted[i] - sorted[i - 1];
     if (gap > widest) {
       widest = gap;
@@ -109,20 +105,12 @@ FeatureDepth nearSide(const Reading* readings, int n, const DepthNoise& noise) {
   const double limit = 0.5 * (sorted[split] + sorted[split - 1]);
   const auto near = [limit](const Reading& r) { return r.z < limit; };
   InversePlane plane;
-  if (!fit(readings, n, near, &plane)) return unclear;
-  if (countExplained(readings, n, plane, near) < 0.85 * split) return unclear;
+  if (!fit(readings, near, &plane)) return unclear;
+  if (countExplained(readings, plane, near) < 0.85 * split) return unclear;
   // Readings beyond the gap must also lie behind the plane: else the gap was between columns of a slanted surface.
   int behind = 0;
-  double off2 = 1e300;
-  for (int i = 0; i < n; ++i) {
-    const Reading& r = readings[i];
-    if (!near(r)) {
-      behind += r.z > plane.z(r.x, r.y) + kReadingSigmas * r.sigma;
-    } else if (plane.explains(r)) {
-      off2 = std::min(off2, r.x * r.x + r.y * r.y);
-    }
-  }
-  if (behind < 0.85 * (n - split) || off2 > kMaxOffRim * kMaxOffRim) return unclear;
+  for (const Reading& r : readings) behind += !near(r) && r.z > plane.z(r.x, r.y) + kReadingSigmas * r.sigma;
+  if (behind < 0.85 * (n - split)) return unclear;
   return evaluate(plane, FeatureDepth::Source::kRim, noise);
 }
 
@@ -139,23 +127,24 @@ FeatureDepth featureDepth(const cv::Mat& depth, double u, double v, const DepthN
   }
   if (!(u > -0.5 && v > -0.5 && u < depth.cols - 0.5 && v < depth.rows - 0.5)) return result;
   const int cu = static_cast<int>(std::floor(u + 0.5)), cv = static_cast<int>(std::floor(v + 0.5));
-  Reading readings[kWindow];
-  int n = 0;
+  std::vector<Reading> readings;
   for (int y = std::max(0, cv - kRadius); y <= std::min(depth.rows - 1, cv + kRadius); ++y) {
     const float* row = depth.ptr<float>(y);
     for (int x = std::max(0, cu - kRadius); x <= std::min(depth.cols - 1, cu + kRadius); ++x) {
       if (!noise.inRange(row[x])) continue;  // also refuses 0 and NaN
-      readings[n++] = {x - u, y - v, row[x], noise.sigma(row[x])};
+      readings.push_back({x - u, y - v, row[x], noise.sigma(row[x])});
     }
   }
+  const auto n = static_cast<int>(readings.size());
   if (n > 0) result.source = FeatureDepth::Source::kUnclear;
-  if (n < kMinReadings) return result;
+  const int side = 2 * kRadius + 1;
+  if (n < kMinValid * side * side) return result;
   const auto all = [](const Reading&) { return true; };
   InversePlane plane;
-  if (fit(readings, n, all, &plane) && countExplained(readings, n, plane, all) >= 0.95 * n) {
+  if (fit(readings, all, &plane) && countExplained(readings, plane, all) >= kGateProbability * n) {
     return evaluate(plane, FeatureDepth::Source::kSlanted, noise);
   }
-  return nearSide(readings, n, noise);
+  return nearSide(readings, noise);
 }
 
 }  // namespace vip_slam

@@ -5,16 +5,12 @@
 
 #include <opencv2/video/tracking.hpp>
 
+#include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/tracking/corner_detector.h"
 #include "vip_slam_frontend/tracking/outlier_rejection.h"
+#include "vip_slam_frontend/tracking/pixel_noise.h"
 
 namespace vip_slam {
-
-namespace {
-
-constexpr double kInlierPixels = 2.0;  // of outlier rejection, px
-
-}  // namespace
 
 FeatureTracker::FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera,
                                const DepthNoise& noise, TimingLog* timing, const cv::Mat& mask, LandmarkId first_id)
@@ -48,7 +44,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
     ScopedTimer timer(timing_, "frontend.track", t);
     pyramid_.swap(last_pyramid_);
     pyramid_.clear();
-    cv::buildOpticalFlowPyramid(gray, pyramid_, cv::Size(kFlowWindow, kFlowWindow), kFlowLevels);
+    cv::buildOpticalFlowPyramid(gray, pyramid_, flowWindow(), kFlowLevels);
     if (!last_pyramid_.empty()) matchExposure(gray, predicted.T_current_previous, has_translation);
     if (!last_pyramid_.empty()) runKlt(gray, predicted.T_current_previous, has_translation, &next, &found);
     gray_ = gray;
@@ -62,7 +58,7 @@ TrackingResult FeatureTracker::track(const cv::Mat& gray, const cv::Mat& depth, 
   std::vector<std::size_t> index;
   const std::vector<PointPair> pairs = pairsOf(next, found, &index);
   RansacOptions ransac;
-  ransac.threshold = kInlierPixels / camera_->focal();
+  ransac.threshold = kGateSigmas * kFlowSigma / camera_->focal();
   ransac.seed = image_count_;
   const RansacResult model = rejectOutliers(pairs, predicted, ransac, &result.moves_by_itself);
   result.lost_outlier = static_cast<int>(pairs.size()) - model.inliers;

@@ -6,19 +6,13 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/pixel_noise.h"
 
 namespace vip_slam {
 
 namespace {
-
-// Changes of contrast (ratio) and mean grey level between two images beyond which KLT's brightness constancy is
-// violated.
-constexpr double kExposureGain = 0.1;
-constexpr double kExposureShift = 6.0;
-constexpr int kExposureReach = 12;           // px around a track
-constexpr std::size_t kMinForExposure = 10;  // tracks
 
 Eigen::Vector2d asVector(const cv::Point2f& p) { return {p.x, p.y}; }
 
@@ -33,42 +27,43 @@ bool FeatureTracker::predictMotion(const Track& track, const SE3& predicted, boo
 }
 
 void FeatureTracker::matchExposure(const cv::Mat& gray, const SE3& predicted, bool has_translation) {
-  std::vector<double> gains, last, now;
+  std::vector<double> gains, contrasts, last, now;
   for (const Track& track : tracks_) {
     const Eigen::Vector2d here = track.feature.pixel.cast<double>();
     Eigen::Vector2d there;
     if (!predictMotion(track, predicted, has_translation, &there)) continue;
-    if (!camera_->inImage(here, kExposureReach + 1) || !camera_->inImage(there, kExposureReach + 1)) continue;
+    if (!camera_->inImage(here, kWidePatch + 1) || !camera_->inImage(there, kWidePatch + 1)) continue;
     const auto around = [](const Eigen::Vector2d& uv) {
-      return cv::Rect(cvRound(uv.x()) - kExposureReach, cvRound(uv.y()) - kExposureReach, 2 * kExposureReach + 1,
-                      2 * kExposureReach + 1);
+      return cv::Rect(cvRound(uv.x()) - kWidePatch, cvRound(uv.y()) - kWidePatch, 2 * kWidePatch + 1,
+                      2 * kWidePatch + 1);
     };
     cv::Scalar mean_last, deviation_last, mean, deviation;
     cv::meanStdDev(gray_(around(here)), mean_last, deviation_last);
     cv::meanStdDev(gray(around(there)), mean, deviation);
     if (deviation_last[0] < 2.0 || deviation[0] < 1.0) continue;
     gains.push_back(deviation[0] / deviation_last[0]);
+    contrasts.push_back(deviation_last[0]);
     last.push_back(mean_last[0]);
     now.push_back(mean[0]);
   }
-  if (gains.size() < kMinForExposure) return;
+  if (gains.size() < kEnough) return;
   const double gain = upperMedian(gains);
   std::vector<double> offsets, changes;
   for (std::size_t i = 0; i < gains.size(); ++i) {
     offsets.push_back(now[i] - gain * last[i]);
     changes.push_back(now[i] - last[i]);
   }
-  if (std::abs(gain - 1.0) < kExposureGain && std::abs(upperMedian(changes)) < kExposureShift) return;
+  // Brightness constancy holds while contrast and brightness change by less than the noise of a grey level.
+  if (std::abs(gain - 1.0) * upperMedian(contrasts) < kGreySigma && std::abs(upperMedian(changes)) < kGreySigma) return;
   const double offset = upperMedian(offsets);
   cv::Mat adapted;
   gray_.convertTo(adapted, CV_8U, gain, offset);
   last_pyramid_.clear();
-  cv::buildOpticalFlowPyramid(adapted, last_pyramid_, cv::Size(kFlowWindow, kFlowWindow), kFlowLevels);
+  cv::buildOpticalFlowPyramid(adapted, last_pyramid_, flowWindow(), kFlowLevels);
 }
 
 void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_translation,
                             std::vector<cv::Point2f>* next, std::vector<char>* found) {
-  const cv::Size window(kFlowWindow, kFlowWindow);
   std::vector<cv::Point2f> previous;
   previous.reserve(tracks_.size());
   next->clear();
@@ -84,12 +79,12 @@ void FeatureTracker::runKlt(const cv::Mat& gray, const SE3& predicted, bool has_
 
   const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.01);
   std::vector<std::uint8_t> status, back_status;
-  cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, previous, *next, status, cv::noArray(), window, kFlowLevels,
+  cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, previous, *next, status, cv::noArray(), flowWindow(), kFlowLevels,
                            criteria, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   // Backward check from the forward result, started at the previous pixel: one pyramid level is enough. It may be off
   // by the flow's sigma.
   std::vector<cv::Point2f> back = previous;
-  cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, *next, back, back_status, cv::noArray(), window, 1, criteria,
+  cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, *next, back, back_status, cv::noArray(), flowWindow(), 1, criteria,
                            cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   for (std::size_t i = 0; i < previous.size(); ++i) {
     const cv::Point2f d = back[i] - previous[i];

@@ -3,6 +3,7 @@
 // what is measured there.
 #include <cmath>
 
+#include "vip_slam_frontend/filter/gating.h"
 #include "vip_slam_frontend/tracking/feature_tracker.h"
 #include "vip_slam_frontend/tracking/patch_alignment.h"
 #include "vip_slam_frontend/tracking/pixel_noise.h"
@@ -11,11 +12,7 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kMaxMissed = 5;                                   // images in a row in which a patch is not found
-constexpr double kMaxFromPrediction = 3.0, kMaxFromFlow = 1.0;  // px, of a match
-
-// Variance of a corner that was recognised by its descriptor, px^2.
-constexpr double kCornerVariance = 1.0;
+constexpr int kMaxMissed = 5;  // images in a row in which a patch is not found
 
 /// Variance of the newest pixel against the point that the track began with, px^2. The reference's own error is
 /// enlarged with the patch.
@@ -122,7 +119,8 @@ void FeatureTracker::setReference(Track* track, const std::shared_ptr<const Refe
 void FeatureTracker::addTrack(Track track, const SE3& T_odom_C) {
   if (!track.reference) {
     setReference(&track, referenceHere(T_odom_C));
-    track.reference_variance = kCornerVariance;
+    // Recognised by its descriptor: a corner within this many pixels of the landmark.
+    track.reference_variance = std::pow(kMaxFromPrediction / kReadingSigmas, 2);
   }
   measure(&track);
   tracks_.push_back(std::move(track));
@@ -148,7 +146,7 @@ void FeatureTracker::restartReferences(const SE3& T_odom_C, const std::shared_pt
 void FeatureTracker::alignWithReferences(const SE3& T_odom_C) {
   std::shared_ptr<ReferenceImage> here;
   for (Track& track : tracks_) {
-    const Match match = this->match(&track, T_odom_C, kMaxFromFlow);
+    const Match match = this->match(&track, T_odom_C, kGateSigmas * kFlowSigma);
     const bool known = track.surface.known;
     track.missed = match == Match::kFound ? 0 : track.missed + 1;
     if (match == Match::kFound && (known || !surfaceIsKnown(&track))) continue;

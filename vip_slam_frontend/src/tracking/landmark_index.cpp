@@ -3,18 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace vip_slam {
 namespace {
 
-constexpr double kCell = 5.0;      // m
-constexpr double kFarthest = 1e6;  // cells; coordinates beyond are clamped
-
-int cellAlong(double x) { return static_cast<int>(std::floor(std::clamp(x / kCell, -kFarthest, kFarthest))); }
-
 std::int64_t keyOf(int x, int y) { return std::int64_t(x) * (std::int64_t(1) << 32) + y; }
 
 }  // namespace
+
+int LandmarkIndex::cellAlong(double x) const {
+  using Range = std::numeric_limits<std::int16_t>;  // the last cells hold all that lies beyond
+  return static_cast<int>(std::floor(std::clamp<double>(x / cell_, Range::min(), Range::max())));
+}
 
 void LandmarkIndex::put(LandmarkId id, const Eigen::Vector3d& p_map) {
   if (!p_map.allFinite()) {

@@ -12,14 +12,9 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kPatchRadius = 41;  // px, holds a wide patch shown at half its size, at any roll angle
-constexpr int kMinRadius = 14;    // px, holds a narrow one likewise
 constexpr std::size_t kMaxPatches = 8000;
-constexpr int kMaxPerImage = 60;
-constexpr int kSearchRadius = 8;  // px, of the search around a projected landmark
-constexpr int kHamming = 50;      // bits, largest descriptor distance
-// Largest distance of a newly detected corner from the pixel of the old track, px.
-constexpr double kCornerOffset = 3.0;
+constexpr int kSearchRadius = 8;    // px, of the search around a projected landmark
+constexpr int kHamming = 50;        // bits, largest descriptor distance
 constexpr double kFarthest = 15.0;  // m along the optical axis
 
 // Length of the longest ray of the image at unit depth; infinite when a corner of the image has no ray.
@@ -37,7 +32,10 @@ double longestRay(const CameraModel& camera) {
 }  // namespace
 
 LandmarkMatcher::LandmarkMatcher(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera)
-    : options_(options), camera_(std::move(camera)), reach_(std::min(1e4, kFarthest * longestRay(*camera_))) {}
+    : options_(options),
+      camera_(std::move(camera)),
+      reach_(std::min(kFarAway, kFarthest * longestRay(*camera_))),
+      index_(reach_) {}
 
 void LandmarkMatcher::clear() {
   landmarks_.clear();
@@ -72,8 +70,10 @@ void LandmarkMatcher::retire(const Track& track) {
   const cv::Mat& image = track.reference->gray;
   const int x = static_cast<int>(std::lround(track.reference_pixel.x()));
   const int y = static_cast<int>(std::lround(track.reference_pixel.y()));
-  if (x < kMinRadius || y < kMinRadius || x + kMinRadius >= image.cols || y + kMinRadius >= image.rows) return;
-  const cv::Rect whole(x - kPatchRadius, y - kPatchRadius, 2 * kPatchRadius + 1, 2 * kPatchRadius + 1);
+  // A narrow patch and its gradients shown at half their size, and a wide one likewise at any roll angle.
+  const int narrow = 2 * (kNarrowPatch + 1), wide = 3 * (kWidePatch + 1);
+  if (x < narrow || y < narrow || x + narrow >= image.cols || y + narrow >= image.rows) return;
+  const cv::Rect whole(x - wide, y - wide, 2 * wide + 1, 2 * wide + 1);
   const cv::Rect window = whole & cv::Rect(0, 0, image.cols, image.rows);
   auto reference = std::make_shared<ReferenceImage>(*track.reference);
   reference->gray = image(window).clone();
@@ -131,7 +131,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   }
   std::stable_sort(visible.begin(), visible.end(),
                    [](const Visible& a, const Visible& b) { return a.entry->observations > b.entry->observations; });
-  if (static_cast<int>(visible.size()) > 2 * kMaxPerImage) visible.resize(2 * kMaxPerImage);
+  visible.resize(std::min(visible.size(), static_cast<std::size_t>(options_.max_features)));
 
   // Candidates of each landmark: its patch aligned from the projection, and the corners around; described in one call.
   std::vector<Feature> corners;
@@ -151,7 +151,7 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   for (std::size_t i = 0; i < visible.size(); ++i) {
     Track there;
     there.feature.pixel = visible[i].uv.cast<float>();
-    if (withPatch(i, &there) && tracker->alignTrack(&there, T_odom_C, 0.5 * kSearchRadius)) {
+    if (withPatch(i, &there) && tracker->alignTrack(&there, T_odom_C, FeatureTracker::kMaxFromPrediction)) {
       corners.push_back(there.feature);
       owner.push_back(i);
       aligned.push_back(static_cast<int>(direct.size()));
@@ -180,13 +180,14 @@ int LandmarkMatcher::reacquire(FeatureTracker* tracker, const OrbExtractor& orb,
   }
 
   int count = 0;
-  for (std::size_t i = 0; i < visible.size() && count < kMaxPerImage; ++i) {
+  for (std::size_t i = 0; i < visible.size(); ++i) {
     if (best[i] < 0) continue;
     const int known = aligned[best[i]];
     Track track = known < 0 ? Track() : direct[known];
     track.feature = corners[best[i]];
     track.feature.id = visible[i].id;
-    if (known < 0 && withPatch(i, &track) && !tracker->alignTrack(&track, T_odom_C, kCornerOffset)) continue;
+    if (known < 0 && withPatch(i, &track) && !tracker->alignTrack(&track, T_odom_C, FeatureTracker::kMaxFromPrediction))
+      continue;
     if (!free(track.feature.pixel.cast<double>(), options_.min_distance)) continue;
     tracker->measure(&track.feature);
     // A different depth means that another surface hides the landmark.

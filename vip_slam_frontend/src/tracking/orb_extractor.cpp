@@ -12,8 +12,6 @@ namespace vip_slam {
 namespace {
 
 constexpr int kPatch = 31;
-// Descriptors may reach over the image border: OpenCV mirrors the image there.
-constexpr int kEdge = 4;
 
 /// Direction from the centre to the grey-value centroid of the disc around it.
 float orientation(const cv::Mat& gray, float x, float y) {
@@ -39,9 +37,10 @@ void store(const cv::Mat& row, Feature* feature) { std::memcpy(feature->descript
 }  // namespace
 
 OrbExtractor::OrbExtractor(int corners) : corners_(corners) {
-  describer_ = cv::ORB::create(10000, 1.2f, 1, kEdge, 0, 2, cv::ORB::FAST_SCORE, kPatch, 20);
+  // Descriptors may reach over the image border: OpenCV mirrors the image there.
+  describer_ = cv::ORB::create(10000, 1.2f, 1, 0, 0, 2, cv::ORB::FAST_SCORE, kPatch, 20);
   // Twice as many as wanted: the spreading below keeps the better ones.
-  detector_ = cv::ORB::create(std::max(1, 2 * corners), static_cast<float>(kOctaveScale), 3, kEdge + 12, 0, 2,
+  detector_ = cv::ORB::create(std::max(1, 2 * corners), static_cast<float>(kOctaveScale), 3, kPatch / 2 + 1, 0, 2,
                               cv::ORB::FAST_SCORE, kPatch, 8);
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -12,21 +13,16 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kIterations = 12;
-constexpr double kFarthestStep = 3.0, kConverged = 0.01;  // px
+constexpr double kConverged = 0.01;  // px
 // The camera's own blur, one sigma in px. A patch that is enlarged by the warp has an enlarged blur too; the newest
-// image is blurred to match when that takes at least kMinBlur, px.
-constexpr double kBlurOfCamera = 0.55, kMinBlur = 0.3;
-constexpr int kBlurReach = 5;  // px, margin of the blurred window that the patch may move within
+// image is blurred to match.
+constexpr double kBlurOfCamera = 0.55;
 
-template <int kRadius>
+template <int side>
 struct Patch {
-  static constexpr int kSide = 2 * kRadius + 1;
-  static constexpr int kRow = kSide + 2;  // one more on each side for the gradients
-  static constexpr int kCount = kSide * kSide;
-  using Values = Eigen::Matrix<float, kCount, 1>;
+  using Values = Eigen::Matrix<float, side * side, 1>;
 
-  float framed[kRow * kRow];
+  float framed[(side + 2) * (side + 2)];  ///< one more on each side for the gradients
   Values grey, gx, gy;
 
   /// Samples the patch with its margin; false outside the image.
@@ -43,37 +39,39 @@ inline float bilinear(const cv::Mat& image, float x, float y) {
   return (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) + fy * ((1 - fx) * q[0] + fx * q[1]);
 }
 
-template <int kRadius>
-bool Patch<kRadius>::sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp) {
-  for (int y = 0; y < kRow; ++y) {
-    const double dy = y - kRadius - 1;
+template <int side>
+bool Patch<side>::sample(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp) {
+  float* out = framed;
+  for (int y = 0; y < side + 2; ++y) {
+    const double dy = y - side / 2 - 1;
     const Eigen::Vector2d begin = pixel + warp(0, dy), slope = warp.A.col(0) + warp.xy * dy, bend = 0.5 * warp.xx;
-    for (int x = 0; x < kRow; ++x) {
-      const double dx = x - kRadius - 1;
+    for (int x = 0; x < side + 2; ++x) {
+      const double dx = x - side / 2 - 1;
       const Eigen::Vector2d p = begin + (slope + bend * dx) * dx;
       const auto u = static_cast<float>(p.x()), v = static_cast<float>(p.y());
       // A double just inside may round to the last column or row, which has no neighbour to interpolate with.
       if (!(u >= 0) || !(v >= 0) || u >= static_cast<float>(image.cols - 1) || v >= static_cast<float>(image.rows - 1))
         return false;
-      framed[y * kRow + x] = bilinear(image, u, v);
+      *out++ = bilinear(image, u, v);
     }
   }
   return true;
 }
 
-template <int kRadius>
-Eigen::Matrix3d Patch<kRadius>::gradients() {
-  for (int y = 0; y < kSide; ++y) {
-    const float* p = framed + (y + 1) * kRow + 1;
-    for (int x = 0; x < kSide; ++x) {
-      const int i = y * kSide + x;
+template <int side>
+Eigen::Matrix3d Patch<side>::gradients() {
+  const int row = side + 2;
+  for (int y = 0; y < side; ++y) {
+    const float* p = framed + (y + 1) * row + 1;
+    for (int x = 0; x < side; ++x) {
+      const int i = y * side + x;
       grey[i] = p[x];
       gx[i] = 0.5f * (p[x + 1] - p[x - 1]);
-      gy[i] = 0.5f * (p[x + kRow] - p[x - kRow]);
+      gy[i] = 0.5f * (p[x + row] - p[x - row]);
     }
   }
   Eigen::Matrix3d A;
-  A << gx.squaredNorm(), gx.dot(gy), gx.sum(), 0, gy.squaredNorm(), gy.sum(), 0, 0, kCount;
+  A << gx.squaredNorm(), gx.dot(gy), gx.sum(), 0, gy.squaredNorm(), gy.sum(), 0, 0, side * side;
   return A.selfadjointView<Eigen::Upper>();
 }
 
@@ -82,9 +80,9 @@ Eigen::Matrix2d textureOf(const Eigen::Matrix3d& A) {
   return A.topLeftCorner<2, 2>() - A.topRightCorner<2, 1>() * A.topRightCorner<2, 1>().transpose() / A(2, 2);
 }
 
-template <int kRadius>
+template <int radius>
 Eigen::Matrix2d texture(const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  Patch<kRadius> patch;
+  Patch<2 * radius + 1> patch;
   return patch.sample(image, pixel, PatchWarp()) ? textureOf(patch.gradients()) : Eigen::Matrix2d::Zero();
 }
 
@@ -94,26 +92,32 @@ struct Window {
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();
 };
 
-/// The image around the patch, blurred like the enlarged reference patch, or the unchanged image when that is little.
+/// The image around the patch, blurred like the enlarged reference patch, or the unchanged image when that blur stays
+/// within a pixel. A margin as wide as a narrow patch is for the patch's motion.
 Window matchBlur(const cv::Mat& image, const Eigen::Vector2d& pixel, const PatchWarp& warp, int radius) {
   const Eigen::Matrix2d A = warp.A.inverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(A * A.transpose());
   const Eigen::Vector2d added = (solver.eigenvalues().array() - 1.0).max(0.0);
   const Eigen::Matrix2d covariance = solver.eigenvectors() * added.asDiagonal() * solver.eigenvectors().transpose();
   const double sx = kBlurOfCamera * std::sqrt(covariance(0, 0)), sy = kBlurOfCamera * std::sqrt(covariance(1, 1));
-  if (!(std::max(sx, sy) > kMinBlur)) return {image, Eigen::Vector2d::Zero()};
-  const int reach = radius + kBlurReach, side = 2 * reach + 1;
+  const auto size = [](double sigma) { return 2 * static_cast<int>(std::lround(2.5 * sigma)) + 1; };
+  if (size(std::max(sx, sy)) == 1) return {image, Eigen::Vector2d::Zero()};
+  const int reach = radius + kNarrowPatch, side = 2 * reach + 1;
   const cv::Rect rect = cv::Rect(static_cast<int>(pixel.x()) - reach, static_cast<int>(pixel.y()) - reach, side, side) &
                         cv::Rect(0, 0, image.cols, image.rows);
   if (rect.empty()) return {image, Eigen::Vector2d::Zero()};
   Window window{cv::Mat(), Eigen::Vector2d(rect.x, rect.y)};
   cv::Mat cut;
   image(rect).convertTo(cut, CV_32F);
-  const auto size = [](double sigma) { return 2 * static_cast<int>(std::ceil(2.5 * sigma)) + 1; };
   cv::sepFilter2D(cut, window.grey, CV_32F, cv::getGaussianKernel(size(sx), std::max(sx, 0.01), CV_32F),
                   cv::getGaussianKernel(size(sy), std::max(sy, 0.01), CV_32F), cv::Point(-1, -1), 0,
                   cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
   return window;
+}
+
+template <int n>
+float rootMeanSquare(const Eigen::Matrix<float, n, 1>& values) {
+  return std::sqrt(std::max(1e-6f, values.squaredNorm() / n));
 }
 
 /// The square of `side` pixels whose first lies at (x, y); false outside.
@@ -131,41 +135,43 @@ bool shifted(const cv::Mat& image, double x, double y, float* out) {
   return true;
 }
 
-template <int kRadius>
+template <int radius>
 PatchAlignment align(const cv::Mat& reference, const Eigen::Vector2d& reference_pixel, const PatchWarp& warp,
                      const cv::Mat& current, const Eigen::Vector2d& start) {
-  using Square = Patch<kRadius>;
+  constexpr int side = 2 * radius + 1;
+  using Values = typename Patch<side>::Values;
   PatchAlignment result;
-  Square patch;
+  Patch<side> patch;
   if (!patch.sample(reference, reference_pixel, warp)) return result;
   const Eigen::Matrix3d A = patch.gradients();
   result.texture = textureOf(A);
   const float mean = patch.grey.mean();
-  const float deviation =
-      std::sqrt(std::max(1e-6f, (patch.grey.array() - mean).matrix().squaredNorm() / Square::kCount));
+  const Values centred = patch.grey.array() - mean;
+  const float deviation = rootMeanSquare(centred);
   const Eigen::LDLT<Eigen::Matrix3d> solver(A);
   if (deviation < 1.0f || solver.vectorD().minCoeff() < 1.0) return result;
 
-  const Window window = matchBlur(current, start, warp, kRadius);
+  const Window window = matchBlur(current, start, warp, radius);
   const bool bytes = window.grey.depth() == CV_8U;
   Eigen::Vector2d pixel = start;
-  typename Square::Values seen;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const Eigen::Vector2d first = pixel - window.origin - Eigen::Vector2d::Constant(kRadius);
-    if (!(bytes ? shifted<std::uint8_t, Square::kSide>(window.grey, first.x(), first.y(), seen.data())
-                : shifted<float, Square::kSide>(window.grey, first.x(), first.y(), seen.data())))
+  Values seen;
+  double last = std::numeric_limits<double>::infinity();
+  while (true) {
+    const Eigen::Vector2d first = pixel - window.origin - Eigen::Vector2d::Constant(radius);
+    if (!(bytes ? shifted<std::uint8_t, side>(window.grey, first.x(), first.y(), seen.data())
+                : shifted<float, side>(window.grey, first.x(), first.y(), seen.data())))
       return result;
     const float seen_mean = seen.mean();
     seen.array() -= seen_mean;
     // A gain for contrast changes by exposure, limited so that noise is not amplified.
-    const float gain =
-        std::clamp(deviation / std::sqrt(std::max(1e-6f, seen.squaredNorm() / Square::kCount)), 0.5f, 2.0f);
-    seen = gain * seen - (patch.grey.array() - mean).matrix();
-    result.residual = std::sqrt(seen.squaredNorm() / Square::kCount);
+    seen = std::clamp(deviation / rootMeanSquare(seen), 0.5f, 2.0f) * seen - centred;
+    result.residual = rootMeanSquare(seen);
     const Eigen::Vector3d step = solver.solve(Eigen::Vector3d(patch.gx.dot(seen), patch.gy.dot(seen), seen.sum()));
-    if (!step.allFinite() || step.head<2>().norm() > kFarthestStep) return result;
+    const double length = step.head<2>().norm();
+    if (!(length < last)) return result;  // diverges; also NaN
+    last = length;
     pixel -= step.head<2>();
-    if (step.head<2>().squaredNorm() < kConverged * kConverged) {
+    if (length < kConverged) {
       // The residual must be small compared with the patch's own contrast, else another patch was found.
       result.ok = result.residual < 0.6 * deviation + 2.0;
       break;

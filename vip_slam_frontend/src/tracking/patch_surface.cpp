@@ -1,29 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_frontend/tracking/patch_surface.h"
 
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
+
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam {
 
 namespace {
 
 constexpr int kStride = 2;
-constexpr double kFewest = 0.4;       // of the readings
-constexpr double kMaxForeign = 0.05;  // share of readings far in front or behind: another surface in the patch
-// One sigma of the prior and upper limit of the slope, 1/px. At the flattest angles that can be tracked slopes are a
-// few per cent a pixel; the prior matters where readings are few.
+// One sigma of the slope's prior, 1/px. At the flattest angles that can be tracked slopes are a few per cent a pixel;
+// the prior matters where readings are few.
 constexpr double kPriorSlope = 0.03;
-constexpr double kSteepest = 0.06;
 
-// Limit on the chi-square per degree of freedom of the deviations of the window's row and column means from the plane,
-// with room for correlated noise; kLineFloor is a systematic error as a share of the depth.
-constexpr double kMaxOfLines = 3.5, kLineFloor = 0.0003;
+// Of the means of the window's rows and columns: a systematic error as a share of the depth, and the fewest readings.
+constexpr double kLineFloor = 0.0003;
 constexpr int kFewestOfLine = 3;
-// Largest relative sigma of a reading for a wide patch: up to it the line means show steps of 0.3 % of the depth, which
-// would move half of the patch by a pixel after an image motion of three hundred.
-constexpr double kQuiet = 0.005;
 
 /// Readings in one row or column of the window.
 struct Line {
@@ -40,15 +36,14 @@ struct Line {
   }
 };
 
-/// The plane over the (2 kRadius + 1)^2 window about the pixel.
-template <int kRadius>
+/// The plane over the (2 radius + 1)^2 window about the pixel.
+template <int radius>
 PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixel, double depth,
                          const DepthNoise& noise) {
-  constexpr int kSide = 2 * kRadius / kStride + 1;
   PatchSurface surface;
   surface.depth = depth;
   const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
-  if (u < kRadius || v < kRadius || u + kRadius >= depth_image.cols || v + kRadius >= depth_image.rows) return surface;
+  if (u < radius || v < radius || u + radius >= depth_image.cols || v + radius >= depth_image.rows) return surface;
 
   // Least squares on depth / z = offset + slope . d, in units of the noise of one reading.
   const double sigma = std::max(noise.sigma(depth) / depth, 1e-4);
@@ -57,10 +52,10 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double square = 0;
   int count = 0, foreign = 0;
-  Line rows[kSide], columns[kSide];
-  for (int y = -kRadius; y <= kRadius; y += kStride) {
+  std::array<Line, 2 * radius / kStride + 1> rows, columns;
+  for (int y = -radius; y <= radius; y += kStride) {
     const float* row = depth_image.ptr<float>(v + y) + u;
-    for (int x = -kRadius; x <= kRadius; x += kStride) {
+    for (int x = -radius; x <= radius; x += kStride) {
       const double z = row[x];
       if (!(z > 0)) continue;  // also NaN
       if (z < 0.5 * depth || z > 2.0 * depth) {
@@ -73,19 +68,21 @@ PatchSurface surfaceOver(const cv::Mat& depth_image, const Eigen::Vector2d& pixe
       b += row_of_A * value;
       square += value * value;
       ++count;
-      rows[(y + kRadius) / kStride].add(row_of_A, value);
-      columns[(x + kRadius) / kStride].add(row_of_A, value);
+      rows[(y + radius) / kStride].add(row_of_A, value);
+      columns[(x + radius) / kStride].add(row_of_A, value);
     }
   }
-  if (count < kFewest * kSide * kSide || foreign > kMaxForeign * count) return surface;
+  if (count < kMinValid * rows.size() * columns.size() || foreign > (1 - kGateProbability) * count) return surface;
   const Eigen::Vector3d fit = A.ldlt().solve(b);
   const double residual = std::sqrt(std::max(0.0, square - b.dot(fit)) / count);
   // With a step or an edge inside the window the fit is no plane, and its slope would be worse than none.
-  if (residual > 2.0 * sigma + 0.002 || !(fit.tail<2>().norm() < kSteepest)) return surface;
-  // A step or a bend that single readings hide in their noise shows in the means of rows and columns.
+  if (residual > 2.0 * sigma + 0.002 || !fit.allFinite()) return surface;
+  // A step or a bend that single readings hide in their noise shows in the means of rows and columns. On a plane they
+  // deviate by less than what a residual may without losing weight.
   double chi2 = 0;
-  for (int i = 0; i < kSide; ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
-  if (chi2 > kMaxOfLines * (2 * kSide - 4)) return surface;
+  for (std::size_t i = 0; i < rows.size(); ++i) chi2 += rows[i].chi2(fit, sigma) + columns[i].chi2(fit, sigma);
+  const int dof = 2 * static_cast<int>(rows.size()) - 4;
+  if (chi2 > kHuberSigmas * kHuberSigmas * dof) return surface;
   surface.slope = fit.tail<2>();
   surface.known = true;
   return surface;
@@ -98,10 +95,8 @@ PatchSurface patchSurface(const cv::Mat& depth_image, const Eigen::Vector2d& pix
   PatchSurface surface;
   surface.depth = depth;
   if (!(depth > 0) || depth_image.empty()) return surface;
-  if (noise.sigma(depth) < kQuiet * depth) {
-    surface = surfaceOver<kWidePatch>(depth_image, pixel, depth, noise);
-    surface.wide = surface.known;
-  }
+  surface = surfaceOver<kWidePatch>(depth_image, pixel, depth, noise);
+  surface.wide = surface.known;
   return surface.wide ? surface : surfaceOver<kNarrowPatch>(depth_image, pixel, depth, noise);
 }
 
@@ -114,7 +109,7 @@ PatchSurface narrowPatchSurface(const cv::Mat& depth_image, const Eigen::Vector2
 bool patchWarp(const RowCamera& reference, const RowCamera& current, const Eigen::Vector2d& reference_pixel,
                const PatchSurface& surface, const SE3& T_cur_ref, PatchWarp* warp_ref_cur) {
   PatchSurface plane = surface;
-  if (!(plane.depth > 0)) plane.depth = 1e4;
+  if (!(plane.depth > 0)) plane.depth = kFarAway;
   const double h = 3.0;
   // The warp from reference to current and its derivatives by differences over nine points ...
   Eigen::Vector2d seen[3][3];

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
+#include "vip_slam_frontend/filter/gating.h"
 
 #include "vip_slam_core/types/sliding_tracks.h"
 
@@ -12,30 +13,25 @@ namespace vip_slam {
 
 namespace {
 
-// Sigma of a grey level: besides image noise it covers each patch's own errors by interpolation, blur, shading, slope.
-// With this value, grey levels, the normalised errors of faint and strong patches against true poses are equal.
-constexpr double kGrey = 5.0;
-// Factor on a match's residual, which replaces kGrey when it is larger.
-constexpr double kResidual = 2.0;
-// Remaining sigma of a patch with infinite contrast, px: the unit of the covariance.
-constexpr double kFloor = 0.05;
-constexpr double kAtEdge = 2.5;
-// One sigma of a match, px, for a patch on a known plane (wide, narrow), with depth but no plane, without depth.
-constexpr double kWideSurface = 0.06, kKnownSurface = 0.08, kUnclearSurface = 0.25, kNoSurface = 0.6;
+// One sigma of a match, px, for a patch on a known plane (wide, narrow) and with depth but no plane. Without depth it
+// slides as optical flow does. What is left of the sigma at infinite contrast, the unit of the covariance, is that of
+// the best patches.
+constexpr double kWideSurface = 0.06, kKnownSurface = 0.08, kUnclearSurface = 0.25;
 // The back end recognises sliding tracks by their sigma, so it must separate the kinds of patches.
-static_assert(kUnclearSurface < kSlidingPixelSigma && kNoSurface > kSlidingPixelSigma,
+static_assert(kUnclearSurface < kSlidingPixelSigma && kFlowSigma > kSlidingPixelSigma,
               "the kinds of tracks cannot be told");
-// Added to the texture, (grey levels / px)^2, so that a patch on a straight edge keeps a finite covariance.
-constexpr double kMinTexture = 20.0;
 
 }  // namespace
 
 Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, double wander) {
-  const double grey = std::max(kGrey, kResidual * residual) / kFloor;
-  const Eigen::Matrix2d G = texture + kMinTexture * Eigen::Matrix2d::Identity();
+  // What a match leaves unexplained is alike in neighbouring pixels, so it adds to the noise in full.
+  const double grey = kGreySigma + residual;
+  // Along a straight edge a patch slides no farther than the limit against optical flow.
+  const Eigen::Matrix2d G =
+      texture + std::pow(kGreySigma / (kGateSigmas * kFlowSigma), 2) * Eigen::Matrix2d::Identity();
   Eigen::Matrix2d covariance;
   covariance << G(1, 1), -G(0, 1), -G(1, 0), G(0, 0);
-  covariance *= grey * grey / (G(0, 0) * G(1, 1) - G(0, 1) * G(1, 0));
+  covariance *= std::pow(grey / kWideSurface, 2) / (G(0, 0) * G(1, 1) - G(0, 1) * G(1, 0));
   covariance += Eigen::Matrix2d::Identity();
   covariance *= wander * wander;
   const Eigen::Matrix2d root = covariance.llt().matrixL();
@@ -47,12 +43,14 @@ Eigen::Matrix2d pixelWhitening(const Eigen::Matrix2d& texture, double residual, 
 double matchSigma(const PatchSurface& surface, double magnification) {
   const double m = std::max(1.0, magnification), growth = m * std::sqrt(m);
   if (surface.known) return growth * (surface.wide ? kWideSurface : kKnownSurface);
-  return growth * (surface.depth > 0 ? kUnclearSurface : kNoSurface);
+  return growth * (surface.depth > 0 ? kUnclearSurface : kFlowSigma);
 }
 
 double patchWander(const PatchSurface& surface, bool at_edge, bool missed) {
-  const double sigma = std::max(surface.known ? kKnownSurface : matchSigma(surface, 1.0), missed ? kFlowSigma : 0.0);
-  return std::max(at_edge ? kAtEdge : 1.0, sigma / kKnownSurface);
+  double sigma = surface.known ? kKnownSurface : matchSigma(surface, 1.0);
+  if (at_edge) sigma = std::max(sigma, kUnclearSurface);
+  if (missed) sigma = std::max(sigma, kFlowSigma);
+  return sigma / kKnownSurface;
 }
 
 }  // namespace vip_slam

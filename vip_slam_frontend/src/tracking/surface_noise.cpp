@@ -13,20 +13,15 @@ namespace vip_slam::frontend {
 
 namespace {
 
-// Memory, in items: some ten images that are full of surfaces.
-constexpr double kMemory = 3000;
-constexpr double kMedianOfChi2 = 0.455;  // with one degree of freedom
-// In sigmas of a reading: limits what skirting boards and door frames contribute.
-constexpr double kLargest = 4.0;
-
+/// In sigmas of a reading, limited so that skirting boards and door frames contribute little.
 double standardised(const SurfacePatch& patch) {
-  return std::clamp(patch.deviation / patch.reading, -kLargest, kLargest);
+  return std::clamp(patch.deviation / patch.reading, -kReadingSigmas, kReadingSigmas);
 }
 
 }  // namespace
 
 void SurfaceNoise::Variance::add(double mean, int count) {
-  weight = std::min(weight, kMemory) + count;
+  weight += count;
   value += count / weight * (mean - value);
 }
 
@@ -73,7 +68,7 @@ void SurfaceNoise::addDifferences(const std::vector<SurfaceDifference>& differen
     for (const SurfaceDifference* d : members) {
       squares.push_back(std::pow((d->distance - moved.dot(d->p)) / d->reading, 2));
     }
-    white_.add(upperMedian(std::move(squares)) / kMedianOfChi2 * n / (n - 3), n);
+    white_.add(upperMedian(std::move(squares)) / chiSquareQuantile(0.5, 1) * n / (n - 3), n);
   }
 }
 

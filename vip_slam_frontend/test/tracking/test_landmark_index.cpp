@@ -13,7 +13,7 @@ namespace {
 TEST(LandmarkIndex, FindsAllThatLiesAroundAfterChangesToo) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> u(-60, 60);
-  LandmarkIndex index;
+  LandmarkIndex index(5.0);
   std::map<LandmarkId, Eigen::Vector3d> points;
   for (int k = 0; k < 4000; ++k) {
     const LandmarkId id = 1 + static_cast<LandmarkId>(k % 1500);  // most of them move

@@ -64,6 +64,8 @@ struct TrackingResult {
 
 class FeatureTracker {
  public:
+  static constexpr double kMaxFromPrediction = 3.0;  ///< px, of a match from where its point is expected
+
   /// No features where `mask` is zero; empty: anywhere. `first_id`: of the first track.
   FeatureTracker(const TrackingOptions& options, std::shared_ptr<const CameraModel> camera, const DepthNoise& noise,
                  TimingLog* timing, const cv::Mat& mask = cv::Mat(), LandmarkId first_id = 1);
@@ -112,9 +114,8 @@ class FeatureTracker {
   void measure(Track* track) const;
 
  private:
-  static constexpr int kFlowWindow = 15;   ///< of optical flow, px, odd
-  static constexpr int kFlowLevels = 3;    ///< of its pyramid above the image
-  static constexpr double kFarAway = 1e4;  ///< m, where a point without depth is put
+  static constexpr int kFlowLevels = 3;  ///< of the pyramid of optical flow above the image
+  static cv::Size flowWindow() { return {2 * kNarrowPatch + 1, 2 * kNarrowPatch + 1}; }
   /// After a jump of the exposure: gives the last image's pyramid the contrast and brightness of the new image. Medians
   /// over the tracks' surroundings, there and at the predicted pixels, so that new content in view has no influence.
   void matchExposure(const cv::Mat& gray, const SE3& predicted, bool has_translation);

@@ -14,6 +14,9 @@ namespace vip_slam {
 
 class LandmarkIndex {
  public:
+  /// `cell`: width of its cells, m; about as wide as the radius of most searches.
+  explicit LandmarkIndex(double cell) : cell_(cell) {}
+
   /// Adds or moves a landmark; metres, in `map`. A position that is not finite removes it.
   void put(LandmarkId id, const Eigen::Vector3d& p_map);
   void remove(LandmarkId id);
@@ -22,6 +25,9 @@ class LandmarkIndex {
   std::vector<LandmarkId> around(const Eigen::Vector3d& centre, double radius) const;
 
  private:
+  int cellAlong(double x) const;
+
+  double cell_;
   std::unordered_map<std::int64_t, std::vector<LandmarkId>> cells_;  ///< vertical columns of space
   std::unordered_map<LandmarkId, std::int64_t> cell_of_;
 };

@@ -12,8 +12,14 @@
 
 namespace vip_slam {
 
+/// Share of a window's samples that need a reading.
+constexpr double kMinValid = 0.6;
+
 /// Half the side of a patch, px. The wide patch halves the variance of the match, but needs one plane over all of it.
 constexpr int kNarrowPatch = 6, kWidePatch = 12;
+
+/// Where a point without depth is put, m.
+constexpr double kFarAway = 1e4;
 
 /// A plane is affine in inverse depth over the image: 1/z(p + d) = (1 + slope . d) / depth.
 struct PatchSurface {

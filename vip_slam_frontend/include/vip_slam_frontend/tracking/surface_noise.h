@@ -42,7 +42,7 @@ class SurfaceNoise {
   DepthNoiseParts parts() const { return {white_.value, shared() * shared()}; }
 
  private:
-  /// Mean over the last few thousand items.
+  /// Mean over all items.
   struct Variance {
     double value;        ///< in squares of a reading's sigma
     double weight = 10;  ///< number of items behind it; at the start a poor camera is assumed

@@ -23,8 +23,8 @@ class SurfaceTracker {
   /// `window`: number of images for which a reference lasts at most.
   SurfaceTracker(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise, int window);
 
-  /// Patches of an image, at most one per cell of the raster; none where the surface is not flat, is seen too obliquely
-  /// or belongs to a moving region.
+  /// Patches of an image, at most one per cell of the raster; none where the surface is not flat or belongs to a
+  /// moving region.
   std::vector<SurfacePatch> patches(const cv::Mat& depth, const MovingRegions& moving = {}) const;
   /// Whether a depth image shows enough flat patches for matches to hold a motion.
   bool sees(const cv::Mat& depth) const;
@@ -48,8 +48,7 @@ class SurfaceTracker {
   std::vector<SurfacePatch> patches_;
   frontend::SurfaceNoise learnt_;
   CloneId reference_ = 0;
-  int uses_ = 0;       ///< images matched with this reference
-  double usual_uses_;  ///< with earlier ones, moving average
+  double window_;  ///< images matched with one reference
 };
 
 }  // namespace vip_slam
