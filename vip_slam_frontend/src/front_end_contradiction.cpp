@@ -49,7 +49,7 @@ bool FrontEnd::Impl::repeatsLastImage(const cv::Mat& gray, double t_imu) const {
 FrameOutput FrontEnd::Impl::repeatedImage(double t, double t_imu) {
   ++counters_.repeated_image;
   // A camera slower than its topic repeats images in between, which is no fault for a moment.
-  if (health_.tracking() && t_imu - filter_.nav().t < frontend::kMoment)
+  if (health_.tracking() && t_imu - filter_.nav().t < kMoment)
     return statusOnly(t, health_.status().state, health_.status().reason);
   return unusable(t, "the image repeats the one before: has the camera frozen?");
 }

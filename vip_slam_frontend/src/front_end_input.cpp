@@ -15,9 +15,6 @@ namespace vip_slam {
 
 namespace {
 
-// Longest prediction beyond the newest image, s.
-constexpr double kPredicted = 5.0;
-
 SensorConfig checked(const SensorConfig& sensor) {
   const std::string problem = sensor.camera.validate();
   if (!problem.empty()) throw std::invalid_argument("front end: camera: " + problem);
@@ -56,12 +53,10 @@ cv::Mat featureMask(const cv::Mat& mask, int border) {
 
 /// Scales pixel distances, which the options give for images of 640 x 480, to smaller images with the same view.
 FrontEndOptions forSize(FrontEndOptions options, int width, int height) {
-  constexpr double kMinScale = 0.5;  // of the scale: smaller images than 320 x 240 were not measured
-  constexpr int kMinBorder = 8;      // px, for patches and their gradients
-  const double scale = std::clamp(std::max(width, height) / kReferenceSide, kMinScale, 1.0);
-  options.tracking.min_distance *= scale;
-  const int border = options.tracking.border;
-  options.tracking.border = std::max(std::min(border, kMinBorder), static_cast<int>(std::ceil(scale * border)));
+  options.tracking.min_distance = spacingOn(width, height, options.tracking.min_distance);
+  const int border = options.tracking.border, window = FeatureTracker::flowWindow().width / 2 + 1;  // with gradients
+  const int scaled = static_cast<int>(std::ceil(spacingOn(width, height, border)));
+  options.tracking.border = std::max(std::min(border, window), scaled);
   return options;
 }
 
@@ -164,7 +159,7 @@ std::optional<NavState> FrontEnd::Impl::predict(double t) const {
   if (!filter_.started()) return std::nullopt;
   NavState state = filter_.nav();
   if (!std::isfinite(t)) return state;
-  const double until = std::min({t, inertial_.newest(), state.t + kPredicted});
+  const double until = std::min({t, inertial_.newest(), state.t + options_.recovery.coast_seconds});
   const std::vector<ImuSample> samples = inertial_.between(state.t, until);
   if (samples.size() < 2) return state;
   const Preintegration pre(withGyroCorrection(samples, filter_.window().gyro_correction), state.bias_gyro,

@@ -11,12 +11,8 @@ namespace vip_slam {
 
 namespace {
 
-// Acceleration of a hand-held camera while no IMU measures it, one sigma: m/s^2 and rad/s^2.
-constexpr double kUntoldAcceleration = 3.0;
-constexpr double kUntoldTurn = 5.0;
-
 /// Extrapolates with constant velocity for `dt` seconds after the last IMU sample; `omega`: rad/s in the body, bias
-/// removed. The covariance grows by the unmeasured accelerations.
+/// removed. The covariance grows as in a gap between two of them.
 void carryOn(const Eigen::Vector3d& omega, double dt, NavState* state, Matrix15d* covariance) {
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), turn = expSO3(Eigen::Vector3d(omega * dt));
   Matrix15d F = Matrix15d::Identity();
@@ -24,13 +20,7 @@ void carryOn(const Eigen::Vector3d& omega, double dt, NavState* state, Matrix15d
   F.block<3, 3>(0, 9) = -dt * I;
   F.block<3, 3>(3, 6) = dt * I;
   *covariance = (F * *covariance * F.transpose()).eval();
-  const double way = 0.5 * dt * dt * kUntoldAcceleration, speed = dt * kUntoldAcceleration;
-  const double angle = 0.5 * dt * dt * kUntoldTurn;
-  covariance->block<3, 3>(0, 0) += angle * angle * I;
-  covariance->block<3, 3>(3, 3) += way * way * I;
-  covariance->block<3, 3>(6, 6) += speed * speed * I;
-  covariance->block<3, 3>(3, 6) += way * speed * I;
-  covariance->block<3, 3>(6, 3) += way * speed * I;
+  *covariance += gapCovariance(dt, dt);
   state->T_W_I = SE3(Eigen::Matrix3d(state->T_W_I.R() * turn), state->T_W_I.t() + dt * state->v_W);
   state->t += dt;
 }
@@ -58,6 +48,18 @@ CalibrationEstimate FrontEnd::Impl::givenCalibration() const {
   given.depth_delay = sensor_.depth_delay;
   given.readout = sensor_.rolling_shutter;
   given.gyro_correction = sensor_.gyro_correction;
+  const CalibrationOptions& believed = options_.filter.calibration;
+  given.sigma_rotation.setConstant(believed.sigma_rotation);
+  given.sigma_translation.setConstant(believed.sigma_translation);
+  given.sigma_time_offset = believed.sigma_time_offset;
+  given.sigma_depth_offset = believed.sigma_depth_offset;
+  given.sigma_depth_scale = believed.sigma_depth_scale;
+  given.sigma_depth_delay = believed.sigma_depth_delay;
+  given.sigma_readout = believed.sigma_readout;
+  given.sigma_depth_shift.setConstant(believed.sigma_depth_shift);
+  given.sigma_bearing << Eigen::Vector2d::Constant(believed.sigma_focal),
+      Eigen::Vector2d::Constant(believed.sigma_centre);
+  given.sigma_gyro_correction.setConstant(sensor_.imu_noise.gyro_correction_sigma);
   return given;
 }
 

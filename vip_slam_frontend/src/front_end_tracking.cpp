@@ -130,7 +130,8 @@ std::optional<FrameOutput> FrontEnd::Impl::trackPoints(ImageStep* step) {
                                  colourRows(step->propagation.predicted), step->t);
   const TrackingResult& tracked = step->tracked;
   const double unseen = step->t_imu - step->from;
-  if (step->gap && !sources_.bridgesGap(tracked, tracks_before, prediction, unseen))
+  const bool images_missing = unseen > options_.recovery.max_imu_gap;
+  if (step->gap && images_missing && !sources_.bridgesGap(tracked, tracks_before, prediction))
     return startAnew(*step, formatted("IMU and images are missing for %.2f s", unseen));
   sources_.setLast(tracked.motion.ok ? tracked.motion.T_current_previous : prediction.T_current_previous);
   bodies_.see(tracked.regions, step->propagation.predicted.t);
@@ -157,7 +158,8 @@ void FrontEnd::Impl::updateFilter(ImageStep* step) {
     const double t_imu = step->propagation.predicted.t;
     rest_.decide(inertial_, step->from, t_imu,
                  {&tracker_.tracks(), !bodies_.movedLately(t_imu), filter_.nav().v_W.norm(),
-                  leastImageMotion(trackedPoints(), camera_->focal())});
+                  std::sqrt(filter_.covariance().block<3, 3>(6, 6).diagonal().maxCoeff()), filter_.sigmaPx(),
+                  camera_->focal(), leastImageMotion(trackedPoints(), camera_->focal())});
     step->report = filter_.step(step->propagation, next_clone_++, measurements(step->propagation),
                                 rest_.residualMotion(), &surfaces);
   }
@@ -173,7 +175,6 @@ void FrontEnd::Impl::updateFilter(ImageStep* step) {
   counters_.imu_noise_scale = imu_noise.density;
   counters_.gyro_walk = imu_noise.gyro_walk;
   counters_.accel_walk = imu_noise.accel_walk;
-  counters_.stamp_sigma = filter_.stampSigma();
   counters_.depth_white = surfaces_.learnt().white();
   counters_.depth_shared = surfaces_.learnt().shared();
   counters_.imu_contradicted += step->sight.contradicts_imu;

@@ -181,6 +181,7 @@ FilterOptions singlePixels() {
   FilterOptions options;
   options.depth_inflation = 1.0;
   options.pixel_inflation = 1.0;
+  options.own_noise = false;
   options.pull_huber = 1000.0;
   return options;
 }
@@ -224,7 +225,7 @@ RunResult runFilter(const SimulationOptions& options, const FilterOptions& filte
     const double t_imu = t_imu_true - delay + filter.window().time_offset;
     const Propagation propagation = filter.predict(simulation.imuBetween(filter.nav().t, t_imu));
     const StepReport report = filter.step(propagation, id++, simulation.sight(t_imu_true, options.most_points),
-                                          standing ? std::optional<ResidualMotion>(ResidualMotion()) : std::nullopt);
+                                          standing ? std::optional<ResidualMotion>({0.002, 0.005}) : std::nullopt);
     if (std::abs(filter.depthCorrection()) > std::abs(result.most_depth_correction))
       result.most_depth_correction = filter.depthCorrection();
     result.depth_shift = filter.takeDepthShift();

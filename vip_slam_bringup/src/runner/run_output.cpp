@@ -179,7 +179,6 @@ std::string summary(const RunFacts& facts, const Pipeline& pipeline, const BagRe
   put("tracked_images", pipeline.odometry().size());
   put("distance", lengthOf(pipeline.odometry()));
   put("epochs", pipeline.frontEnd().counters().restarts + 1);
-  put("stamp_jitter", pipeline.frontEnd().counters().stamp_sigma);
   put("gyro_walk_factor", pipeline.frontEnd().counters().gyro_walk);
   put("accel_walk_factor", pipeline.frontEnd().counters().accel_walk);
   put("depth_noise_white", pipeline.frontEnd().counters().depth_white);

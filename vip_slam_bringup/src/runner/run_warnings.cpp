@@ -141,9 +141,6 @@ std::vector<std::string> runWarnings(const Pipeline& pipeline, const BagReader& 
     all.push_back(
         formatted("without an accelerometer the vertical is that of %s%s", frontend::levelName(c.level),
                   c.level == frontend::Level::kCamera ? ": hold it upright, or begin with a floor in view" : ""));
-  if (c.stamp_sigma > kLargeStampJitter && !c.imuIsWrong())
-    all.push_back(formatted("stamps of images jitter by %.1f ms: stamped on arrival, not by the device's own clock?",
-                            1e3 * c.stamp_sigma));
   const InertialScale scale = pipeline.mapping() ? pipeline.mapping()->backEnd().scale() : InertialScale();
   // A calibration estimated with a wrong IMU, or with depth in a wrong unit, is meaningless.
   if (!c.imuIsWrong() && !isLarge(scale)) {

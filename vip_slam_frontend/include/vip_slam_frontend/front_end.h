@@ -70,7 +70,6 @@ struct FrontEndCounters {
   double gyro_range = 0;                 ///< limit of the gyro's range, rad/s; 0: never reached
   double imu_noise_scale = 1;            ///< factor on the IMU's noise, see ImuNoiseMonitor
   double gyro_walk = 1, accel_walk = 1;  ///< factors on the random walks of its biases, see DriftMonitor
-  double stamp_sigma = 0;                ///< learnt jitter of the image stamps, one sigma, s
   double nis_per_dof = 0;                ///< of the last update; about 1 when consistent
   /// Learnt noise of depth on surfaces, as factors on the configured noise: of single patches, and common to a surface.
   double depth_white = 1, depth_shared = 1;

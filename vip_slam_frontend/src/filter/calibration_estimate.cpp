@@ -6,18 +6,24 @@
 
 #include "vip_slam_core/geometry/angle.h"
 #include "vip_slam_core/util/formatted.h"
+#include "vip_slam_frontend/filter/calibration_evidence.h"
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam {
 namespace {
 
-constexpr double kSure = 5.0;  // sigmas
-constexpr double kMinTurn = 0.2 * kDegree, kMinShift = 0.005, kMinDelay = 0.002, kMinDepth = 0.005, kMinBearing = 0.001,
-                 kMinGyroError = 0.002, kMinDepthShift = 0.001, kMinDepthScale = 0.005, kMinDepthDelay = 0.002,
-                 kMinReadout = 0.003;
+/// What a difference has to exceed to be told: significant, and large enough against what was believed to matter.
+double limit(double given, double found) {
+  return std::max(kGateSigmas * found, frontend::CalibrationEvidence::kHeld * given);
+}
 
-/// Whether some component's difference is significant, above kSure sigmas.
-bool sure(const Eigen::Vector3d& difference, const Eigen::Vector3d& sigma) {
-  return sigma.minCoeff() > 0 && (difference.cwiseAbs().array() > kSure * sigma.array()).any();
+template <typename Array>
+Array limit(const Array& given, const Array& found) {
+  return given.binaryExpr(found, [](double g, double f) { return limit(g, f); });
+}
+
+bool exceeds(const Eigen::Vector3d& difference, const Eigen::Vector3d& given, const Eigen::Vector3d& found) {
+  return found.minCoeff() > 0 && (difference.array().abs() > limit<Eigen::Array3d>(given, found)).any();
 }
 
 /// As in a sensor file, precise enough to pass there for a rotation.
@@ -34,14 +40,14 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   std::vector<std::string> all;
   const Vector6d change = found.T_I_C.boxminus(given.T_I_C);
   const Eigen::Vector3d turn = change.head<3>(), shift = change.tail<3>();
-  if (turn.norm() > kMinTurn && sure(turn, found.sigma_rotation)) {
+  if (exceeds(turn, given.sigma_rotation, found.sigma_rotation)) {
     all.push_back(
         formatted("the camera is turned by %.2f degrees against T_imu_cam of the sensor's configuration, which is "
                   "corrected for; T_imu_cam should have the rows ",
                   turn.norm() / kDegree) +
         rowsOf(found.T_I_C));
   }
-  if (shift.norm() > kMinShift && sure(shift, found.sigma_translation)) {
+  if (exceeds(shift, given.sigma_translation, found.sigma_translation)) {
     all.push_back(
         formatted("the camera sits %.1f mm beside where T_imu_cam of the sensor's configuration has it, which is "
                   "corrected for; T_imu_cam should have the rows ",
@@ -49,7 +55,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
         rowsOf(found.T_I_C));
   }
   const double delay = found.time_offset - given.time_offset;
-  const double least_delay = std::max(kMinDelay, kSure * found.sigma_time_offset);
+  const double least_delay = limit(given.sigma_time_offset, found.sigma_time_offset);
   if (found.sigma_time_offset > 0 && std::abs(delay) > least_delay && found.delay_drifts) {
     all.push_back(formatted(
         "the delay of the images drifts and is followed: from the %.1f ms of time_offset to %.1f ms by now; are "
@@ -67,7 +73,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
         "moment, depth registered to the colour camera, its focal length right?");
   }
   const double depth = found.depth_offset - given.depth_offset;
-  if (found.sigma_depth_offset > 0 && std::abs(depth) > std::max(kMinDepth, kSure * found.sigma_depth_offset)) {
+  if (found.sigma_depth_offset > 0 && std::abs(depth) > limit(given.sigma_depth_offset, found.sigma_depth_offset)) {
     all.push_back(
         formatted("depth reads %.1f mm too %s at all distances, which is corrected for; depth/offset in the sensor's "
                   "configuration should be %.4f",
@@ -75,7 +81,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
                   1e-4 * std::round(1e4 * found.depth_offset) + 0.0));  // no minus before a zero
   }
   const double scale = found.depth_scale - given.depth_scale;
-  if (found.sigma_depth_scale > 0 && std::abs(scale) > std::max(kMinDepthScale, kSure * found.sigma_depth_scale)) {
+  if (found.sigma_depth_scale > 0 && std::abs(scale) > limit(given.sigma_depth_scale, found.sigma_depth_scale)) {
     const std::string remedy =
         found.depth_unit > 0 && !found.gyro_contradicts  // of an IMU whose rates are wrong neither is the scale right
             ? formatted(" Else depth/scale in the sensor's configuration should be %.6g", found.depth_unit)
@@ -86,7 +92,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
                   remedy);
   }
   const double late = found.depth_delay - given.depth_delay;
-  if (found.sigma_depth_delay > 0 && std::abs(late) > std::max(kMinDepthDelay, kSure * found.sigma_depth_delay)) {
+  if (found.sigma_depth_delay > 0 && std::abs(late) > limit(given.sigma_depth_delay, found.sigma_depth_delay)) {
     all.push_back(formatted(
         "depth shows %s moment than its stamps say, by %.0f ms (one sigma %.0f ms), which is corrected for: is "
         "a temporal filter on in the driver, are the two cameras not taken together? depth/delay in the "
@@ -94,7 +100,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
         late > 0 ? "an earlier" : "a later", 1e3 * std::abs(late), 1e3 * found.sigma_depth_delay, found.depth_delay));
   }
   const double read = found.readout - given.readout;
-  if (found.sigma_readout > 0 && std::abs(read) > std::max(kMinReadout, kSure * found.sigma_readout)) {
+  if (found.sigma_readout > 0 && std::abs(read) > limit(given.sigma_readout, found.sigma_readout)) {
     const double seconds = 1e-4 * std::round(1e4 * found.readout) + 0.0;  // no minus before a zero
     all.push_back(
         formatted("the rows of a colour image are read within %.1f ms (one sigma %.1f ms), not %.1f ms, which is "
@@ -105,7 +111,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   }
   const Eigen::Array2d beside = (found.depth_shift - given.depth_shift).cwiseAbs();
   const Eigen::Array2d& beside_sigma = found.sigma_depth_shift.array();
-  if ((beside_sigma > 0 && beside > (kSure * beside_sigma).cwiseMax(kMinDepthShift)).any()) {
+  if ((beside_sigma > 0 && beside > limit<Eigen::Array2d>(given.sigma_depth_shift, beside_sigma)).any()) {
     all.push_back(formatted(
         "the depth image lies beside the colour image by [%.2f, %.2f] pixels, not by depth/shift of the sensor's "
         "configuration, which is corrected for: is it registered to colour, are its holes filled from one side (switch "
@@ -114,7 +120,7 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   }
   const Eigen::Array4d bearing = (found.bearing.value - given.bearing.value).cwiseAbs();
   const Eigen::Array4d& bearing_sigma = found.sigma_bearing.array();
-  if ((bearing_sigma > 0 && bearing > (kSure * bearing_sigma).cwiseMax(kMinBearing)).any()) {
+  if ((bearing_sigma > 0 && bearing > limit<Eigen::Array4d>(given.sigma_bearing, bearing_sigma)).any()) {
     const Eigen::Vector4d& k = found.intrinsics;
     all.push_back(
         formatted("focal length or principal point are off, which is corrected for; fx, fy, cx, cy in the sensor's "
@@ -123,7 +129,8 @@ std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given
   }
   const Eigen::Array33d gyro = (found.gyro_correction - given.gyro_correction).cwiseAbs();
   const Eigen::Array33d& sigma = found.sigma_gyro_correction.array();
-  const Eigen::Array33d off = (sigma > 0 && gyro > (kSure * sigma).cwiseMax(kMinGyroError)).select(gyro, 0.0);
+  const Eigen::Array33d off =
+      (sigma > 0 && gyro > limit<Eigen::Array33d>(given.sigma_gyro_correction, sigma)).select(gyro, 0.0);
   if (off.maxCoeff() > 0 && found.gyro_contradicts) {
     all.push_back(formatted(
         "the gyro's rates differ from the turns of the images by up to %.1f %%, which is corrected for, more than "

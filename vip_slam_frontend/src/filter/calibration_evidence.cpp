@@ -7,19 +7,14 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "vip_slam_frontend/filter/drift_monitor.h"
 #include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::frontend {
 namespace {
 
-// The filter holds a number with this share of its prior's sigma: with all of it, the innovation gates let more
-// outliers in (a phone, real: odometry 1.94 instead of 1.62 cm). What a step says of the number is the same.
-constexpr double kHeld = 0.25;
-constexpr double kStretch = 1.0;           // s, longer than the filter's window: stretches share no measurements
-constexpr std::size_t kMaxStretches = 64;  // then they become twice as long
-constexpr double kSure = 3.0;              // sigmas between the adopted value and the estimate
-constexpr double kMuchSurer = 2.0;         // in information
-constexpr double kNothing = 1e-6;          // share of the prior's information, below which data say nothing
+constexpr double kSure = 3.0;      // sigmas between the adopted value and the estimate
+constexpr double kNothing = 1e-6;  // share of the prior's information, below which data say nothing
 
 }  // namespace
 
@@ -48,7 +43,6 @@ CalibrationEvidence::CalibrationEvidence(const std::vector<Estimate>& prior)
     : prior_(prior),
       prior_likelihood_(Likelihood::none(static_cast<int>(prior.size()))),
       adopted_(prior.size()),
-      adopted_information_(Eigen::VectorXd::Zero(prior.size())),
       length_(kStretch) {
   for (std::size_t k = 0; k < prior.size(); ++k) {
     adopted_(k) = prior[k].value;
@@ -82,12 +76,13 @@ void CalibrationEvidence::add(double t, const Likelihood& step) {
   // A filter that has failed says nothing; it is started again.
   if (!step.information.allFinite() || !step.weighted.allFinite()) return;
   if (stretches_.empty() || !(std::abs(t - begin_) < length_)) {
-    if (stretches_.size() == kMaxStretches) {
-      for (std::size_t k = 0; k < kMaxStretches / 2; ++k) {
+    // Enough remain when every two become one.
+    if (stretches_.size() == 2 * kEnough) {
+      for (std::size_t k = 0; k < kEnough; ++k) {
         stretches_[k] = stretches_[2 * k];
         stretches_[k].add(stretches_[2 * k + 1]);
       }
-      stretches_.resize(kMaxStretches / 2);
+      stretches_.resize(kEnough);
       length_ *= 2;
     }
     stretches_.push_back(Likelihood::none(static_cast<int>(prior_.size())));
@@ -165,17 +160,14 @@ bool CalibrationEvidence::adopt() {
   for (int k = 0; k < adopted_.size(); ++k) {
     // Further from the prior something else is wrong, a unit or another sensor, and nothing is adopted.
     if (!(std::abs(found_(k) - prior_[k].value) < kGateSigmas * prior_[k].sigma)) {
-      adopted_information_(k) = 0;
       adopted_(k) = prior_[k].value;
       continue;
     }
-    const double information = 1 / (sigma_(k) * sigma_(k)), apart = std::abs(found_(k) - adopted_(k));
-    const bool surer = adopted_information_(k) > 0 && information > kMuchSurer * adopted_information_(k);
+    const double apart = std::abs(found_(k) - adopted_(k));
+    const bool adopted = adopted_(k) != prior_[k].value;
     // The filter's sigma of a number that is held allows for a small difference.
-    if (adopted_information_(k) == 0 && apart < kHeld * prior_[k].sigma) continue;
-    if (!(apart > sureSigmas(k) * sigma_(k)) && !(surer && apart > sigma_(k))) continue;
-    adopted_(k) = found_(k);
-    adopted_information_(k) = information;
+    if (!adopted && apart < kHeld * prior_[k].sigma) continue;
+    if (apart > (adopted ? 1.0 : sureSigmas(k)) * sigma_(k)) adopted_(k) = found_(k);
   }
   return adopted_ != before;
 }
@@ -187,7 +179,6 @@ void CalibrationEvidence::restart(int k, double sigma) {
   prior_likelihood_.weighted(k) += more * prior_[k].value;
   prior_[k].sigma = sigma;
   adopted_(k) = prior_[k].value;
-  adopted_information_(k) = 0;
   estimate();
 }
 

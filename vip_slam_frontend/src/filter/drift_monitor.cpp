@@ -7,16 +7,6 @@
 #include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::frontend {
-namespace {
-
-// Corrections are summed up over so long, s: a little more than the filter's window, whose images share errors.
-constexpr double kStretch = 0.5;
-constexpr double kLeastDelayWalk = 1e-5;  // s / sqrt(s), once the delay is seen to drift
-constexpr double kSlowestFall = 0.5;      // least factor on the variance of a random walk from one stretch to the next
-constexpr double kLevelGain = 0.05;       // of the mean square of the sums, per stretch
-
-}  // namespace
-
 void RandomWalk::add(const Eigen::VectorXd& correction, const Eigen::VectorXd& before, const Eigen::VectorXd& after) {
   if (!correction.allFinite() || !before.allFinite() || !after.allFinite()) return;
   if (sum_.size() == 0) {
@@ -39,7 +29,7 @@ double RandomWalk::closeStretch() {
     // drift as they have removed of the variance.
     const double share = std::clamp(lost_.sum() / variance_, 1e-9, 1.0);
     needed_ = std::sqrt(std::max(0.0, product) * lost_.max(0.0).mean() / kStretch) / share;
-    level_ += std::max(kLevelGain, 1.0 / ++stretches_) * (now.square().sum() / dof - level_);
+    level_ += 1.0 / (stretches_ = std::min(stretches_ + 1, kEnough)) * (now.square().sum() / dof - level_);
   }
   whitened_ = now;
   sum_.resize(0);
@@ -48,22 +38,25 @@ double RandomWalk::closeStretch() {
 }
 
 void RandomWalk::raise() {
-  density_ = std::max({density_, least_, needed_});
+  density_ = std::max(density_, needed_);
   ++raised_;
 }
 
 void RandomWalk::lower() {
   if (!isRaised() || whitened_.size() == 0) return;
   const double ratio = whitened_.square().sum() / static_cast<double>(whitened_.size());
-  density_ *= std::sqrt(std::clamp(ratio, kSlowestFall, 1.0));
-  if (density_ < std::max(least_, configured_)) density_ = configured_;
+  // Halfway: one stretch alone may be small by chance.
+  density_ *= std::sqrt(0.5 * (1.0 + std::min(ratio, 1.0)));
+  // What hardly adds to the state's variance in a stretch is none.
+  const bool negligible = density_ * density_ * kStretch * static_cast<double>(whitened_.size()) < variance_ / kEnough;
+  if (negligible || density_ < configured_) density_ = configured_;
 }
 
 DriftMonitor::DriftMonitor(const ImuNoise& noise, const FilterOptions& options)
     : adapt_(options.adapt_imu_noise),
-      given_{RandomWalk(noise.gyro_random_walk, 0, options.sigma_bias_gyro),
-             RandomWalk(noise.accel_random_walk, 0, options.sigma_bias_accel),
-             RandomWalk(0, kLeastDelayWalk, options.calibration.sigma_time_offset)},
+      given_{RandomWalk(noise.gyro_random_walk, options.sigma_bias_gyro),
+             RandomWalk(noise.accel_random_walk, options.sigma_bias_accel),
+             RandomWalk(0, options.calibration.sigma_time_offset)},
       walks_(given_) {}
 
 void DriftMonitor::add(State state, const Eigen::VectorXd& correction, const Eigen::VectorXd& before,

@@ -15,13 +15,9 @@ namespace {
 
 // Adapted factor on the depth noise up to which the sensor's noise model is used unchanged.
 constexpr double kWorseThanModel = 1.1;
-// Image motion by the velocity's uncertainty over the window, px, beyond which residuals at the present poses are
-// mainly due to the velocity, as when points come back after a stretch on the IMU alone.
-constexpr double kOpen = 2.0;
 // Number of iterated updates, each linearised at the result of the one before: after the first, poses are right to a
 // pixel.
 constexpr int kPasses = 3;
-constexpr double kUsualDistance = 3.0;  // m, assumed for a point without depth
 
 /// Gives a monitor the median of the features' chi-squares per degree of freedom, and the number of rows.
 void tell(NoiseMonitor* monitor, std::vector<double> chi2, int rows) {
@@ -79,7 +75,7 @@ std::vector<VioFilter::Candidate> VioFilter::chooseCandidates(CloneId id, bool w
 
 double VioFilter::ownNoise(const Triangulation& point) const {
   const int dof = point.pixel_rows - 3;
-  if (dof <= 0 || point.pixel_chi2 < gate_.threshold(dof)) return 1.0;
+  if (!options_.own_noise || dof <= 0 || point.pixel_chi2 < gate_.threshold(dof)) return 1.0;
   return point.pixel_chi2 / dof;
 }
 
@@ -116,8 +112,7 @@ VioFilter::FeatureBatch VioFilter::judgeFeatures(const std::vector<Candidate>& c
     if (!point.ok) continue;
     double own = own_noise == OwnNoise::kNone ? 1.0 : ownNoise(point);
     if (own > 1) {
-      const double z = observations.back().depth > 0 ? observations.back().depth : kUsualDistance;
-      batch.nearest_noisy = std::min(batch.nearest_noisy, z);
+      batch.nearest_noisy = std::min(batch.nearest_noisy, 1.0 / point.inverse_depth);
       if (own_noise == OwnNoise::kBeyondState) {
         MeasurementNoise common = noise;
         common.sigma_xy *= options_.pixel_inflation;
@@ -191,7 +186,10 @@ void VioFilter::updateWithFeatures(const std::vector<Candidate>& candidates, boo
   FeatureBatch batch =
       judgeFeatures(candidates, filter_.window(), here, after_step ? OwnNoise::kNone : OwnNoise::kResiduals);
   // The covariance is asked for only when some feature has noise of its own, which is rare.
-  const bool open = std::isfinite(batch.nearest_noisy) && openPixels() > kOpen * batch.nearest_noisy;
+  // Beyond the noise, residuals at the present poses are mainly due to the velocity, as when points come back after a
+  // stretch on the IMU alone.
+  const bool open =
+      std::isfinite(batch.nearest_noisy) && openPixels() > kGateSigmas * options_.sigma_px * batch.nearest_noisy;
   const UpdateResult result = open ? updateRelinearised(candidates, &batch) : apply(batch);
   tell(&noise_, std::move(batch.chi2), batch.chi2_rows);
   tell(&depth_noise_, std::move(batch.depth_chi2), batch.depth_rows);

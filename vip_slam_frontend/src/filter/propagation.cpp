@@ -9,6 +9,7 @@
 
 #include "vip_slam_core/imu/gyro_correction.h"
 #include "vip_slam_core/imu/preintegration.h"
+#include "vip_slam_frontend/inertial/inertial_input.h"
 
 namespace vip_slam {
 
@@ -22,10 +23,6 @@ Eigen::Matrix<double, 15, 1> noiseFloor() {
   return floor;
 }
 
-// Motion of a hand-held camera, one sigma, rad/s and m/s^2, at one to two hertz. Linear interpolation across a gap is
-// wrong by its curvature, kCurvature (1/s^2) of the amplitude, times gap^2, up to the full amplitude.
-constexpr double kRate = 2.0, kAcceleration = 6.0, kCurvature = 4.0;
-
 Matrix15d whitening(const Matrix15d& Q) {
   const Eigen::LLT<Matrix15d> llt(Q);
   return llt.matrixL().solve(Matrix15d::Identity());
@@ -33,9 +30,11 @@ Matrix15d whitening(const Matrix15d& Q) {
 
 }  // namespace
 
-void Propagation::admitGap(double gap, double dt) {
-  const double share = std::min(1.0, kCurvature * gap * gap), rate = share * kRate;
-  const double acceleration = share * kAcceleration;
+Matrix15d gapCovariance(double gap, double dt) {
+  Matrix15d Q = Matrix15d::Zero();
+  // Linear interpolation is wrong by the motion's curvature, up to the full amplitude.
+  const double share = std::min(1.0, std::pow(frontend::kBodyFrequency * gap, 2) / 8.0);
+  const double rate = share * frontend::kBodyRate, acceleration = share * frontend::kBodyAcceleration;
   // The error is constant over the whole interval.
   const double theta = rate * dt, v = acceleration * dt, p = 0.5 * v * dt;
   for (int axis = 0; axis < 3; ++axis) {
@@ -45,6 +44,11 @@ void Propagation::admitGap(double gap, double dt) {
     Q(3 + axis, 6 + axis) += p * v;
     Q(6 + axis, 3 + axis) += p * v;
   }
+  return Q;
+}
+
+void Propagation::admitGap(double gap, double dt) {
+  Q += gapCovariance(gap, dt);
   W = whitening(Q);
 }
 
@@ -99,7 +103,8 @@ Propagation propagateByMotion(const WindowState& window, const SE3& T_I0_I1, con
   Q.block<6, 3>(0, 6) = pose.rightCols<3>() / dt;
   Q.block<3, 6>(6, 0) = Q.block<6, 3>(0, 6).transpose();
   // The velocity at the end differs from the mean one by half of what the acceleration adds.
-  Q.block<3, 3>(6, 6) = pose.bottomRightCorner<3, 3>() / (dt * dt) + std::pow(0.5 * kAcceleration * dt, 2) * I;
+  Q.block<3, 3>(6, 6) =
+      pose.bottomRightCorner<3, 3>() / (dt * dt) + std::pow(0.5 * frontend::kBodyAcceleration * dt, 2) * I;
   Q.block<3, 3>(9, 9) = noise.gyro_random_walk * noise.gyro_random_walk * dt * I;
   Q.block<3, 3>(12, 12) = noise.accel_random_walk * noise.accel_random_walk * dt * I;
   Q.diagonal() += noiseFloor().cwiseAbs2();
@@ -108,7 +113,7 @@ Propagation propagateByMotion(const WindowState& window, const SE3& T_I0_I1, con
 }
 
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
-                      const Eigen::Vector3d& G, double stamp_sigma) {
+                      const Eigen::Vector3d& G) {
   Propagation result;
   const Preintegration pre(withGyroCorrection(samples, window.gyro_correction), window.bias_gyro, window.bias_accel,
                            noise);
@@ -147,13 +152,6 @@ Propagation propagate(const WindowState& window, const std::vector<ImuSample>& s
   T.block<3, 3>(3, 3) = R_now;
   T.block<3, 3>(6, 6) = R_now;
   result.Q = T * pre.covariance() * T.transpose();
-  if (stamp_sigma > 0) {
-    // Jitter of both images' stamps, with the motion at the end of the interval.
-    Eigen::Matrix<double, 9, 1> rate;
-    rate << result.omega_I, result.predicted.v_W,
-        result.predicted.T_W_I.R() * (samples.back().accel - window.bias_accel) - G;
-    result.Q.topLeftCorner<9, 9>() += 2.0 * stamp_sigma * stamp_sigma * rate * rate.transpose();
-  }
   result.Q.diagonal() += noiseFloor().cwiseAbs2();
   result.W = whitening(result.Q);
   return result;

@@ -4,17 +4,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 
 namespace {
 
-// Time constants of the smoothed rate and of its squared changes, and the time that last() averages over, s.
-constexpr double kLately = 0.05, kChanges = 0.5, kMoment = 0.01;
+// Time that last() averages over, s.
+constexpr double kMoment = 0.01;
 // The rate changes clearly when its variance is this many times that of the noise. A delay estimated from noise alone
 // was wrong by 10 ms at a sigma of 1 ms; at this limit it is off by two sigmas, well above by less than one
 // (docs/notebook/depth_and_calibration.md).
 constexpr double kClearly = 40.0;
-constexpr double kUneven = 0.3;  // largest relative difference of two sample steps for a second difference
 
 Eigen::Vector3d mean(const std::vector<ImuSample>& samples) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -36,35 +37,32 @@ Eigen::Vector3d RateHistory::last(const std::vector<ImuSample>& samples) {
 }
 
 void RateHistory::add(const std::vector<ImuSample>& samples) {
-  const double dt = samples.back().t - samples.front().t;
   const Eigen::Vector3d now = mean(samples);
   std::copy_backward(means_.begin(), means_.end() - 1, means_.end());
   means_[0] = now;
-  if (intervals_++ == 0) smoothed_ = now;
-  const double share = std::min(1.0, dt / kChanges);
+  const double share = 1.0 / kEnough;
   double variance = 0;
   if (noiseOf(samples, &variance)) noise_ += share * (variance / static_cast<double>(lastOnes(samples)) - noise_);
-  const Eigen::Vector3d change = now - smoothed_;
-  squared_changes_ += share * (change.squaredNorm() / 3.0 - squared_changes_);
-  smoothed_ += (1.0 - std::exp(-dt / kLately)) * change;
+  if (++intervals_ < 3) return;
+  squared_changes_ += share * ((now - means_[2]).squaredNorm() / 3.0 - squared_changes_);
 }
 
-// Second differences of white noise have six times its variance, those of motion hardly any. An interval may have only
-// one or two samples between its interpolated ends, so the second differences continue across intervals.
+// A sample's difference from the line through its neighbours is mostly noise. An interval may have only
+// one or two samples between its interpolated ends, so these differences continue across intervals.
 bool RateHistory::noiseOf(const std::vector<ImuSample>& samples, double* variance) {
   double squares = 0;
   int n = 0;
   for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
     const ImuSample &a = measured_[0], &b = measured_[1], &c = samples[i];
-    const double before = b.t - a.t, after = c.t - b.t;
-    if (measured_count_ >= 2 && before > 0 && std::abs(after - before) < kUneven * before) {
-      squares += (a.gyro - 2.0 * b.gyro + c.gyro).squaredNorm();
+    if (measured_count_ >= 2 && a.t < b.t && b.t < c.t) {
+      const double of_c = (b.t - a.t) / (c.t - a.t), of_a = 1.0 - of_c;
+      squares += (b.gyro - of_a * a.gyro - of_c * c.gyro).squaredNorm() / (1.0 + of_a * of_a + of_c * of_c);
       n += 3;
     }
     measured_ = {b, c};
     ++measured_count_;
   }
-  if (n > 0) *variance = squares / (6.0 * n);
+  if (n > 0) *variance = squares / n;
   return n > 0;
 }
 

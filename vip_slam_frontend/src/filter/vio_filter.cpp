@@ -8,13 +8,6 @@ namespace vip_slam {
 
 namespace {
 
-// Largest factor on the depth camera's noise model; beyond it readings are wrong rather than noisy.
-constexpr double kMaxDepthNoise = 5.0;
-constexpr double kMinDepthNoise = 0.3;
-constexpr double kMaxPixelNoise = 2.0;  // px; beyond, tracks are lost rather than noisy
-// Number of features in an update from which on it is used to estimate the stamps' jitter.
-constexpr int kMinOfStamps = 5;
-
 /// Squared correction of orientation and velocity per degree of freedom, whitened by the decrease of the covariance.
 double correctionPerDof(const NavState& before, const Matrix15d& P_before, const NavState& after,
                         const Matrix15d& P_after) {
@@ -45,9 +38,8 @@ VioFilter::VioFilter(const FilterOptions& options, const ImuNoise& imu_noise, co
       focal_(focal_px),
       G_(gravityVector(gravity)),
       gate_(kGateProbability),
-      noise_(options.sigma_px, options.sigma_px_min, kMaxPixelNoise),
-      depth_noise_(1.0, kMinDepthNoise, kMaxDepthNoise),
-      stamp_monitor_(options.adapt_imu_noise),
+      noise_(options.sigma_px, options.sigma_px_min),
+      depth_noise_(1.0, 1.0),
       imu_monitor_(options.adapt_imu_noise),
       drift_(imu_noise, options) {
   evidence_.couple(kBearing, kBearing + 1, options.calibration.sigma_aspect);  // pixels are nearly square
@@ -57,7 +49,6 @@ void VioFilter::stop() {
   if (started_) learnCalibration();
   started_ = false;
   tracks_.clear();
-  stamp_monitor_.reset();
   imu_monitor_.reset();
   drift_.reset();
   disputed_.reset();
@@ -140,7 +131,7 @@ Propagation VioFilter::predict(const std::vector<ImuSample>& samples, const fron
   ImuNoise found = scaled(imu_noise_, imuNoise());
   found.gyro_noise_density *= noise.gyro;
   found.accel_noise_density *= noise.accel;
-  return propagate(filter_.window(), samples, found, G_, stamp_monitor_.sigma());
+  return propagate(filter_.window(), samples, found, G_);
 }
 
 void VioFilter::forgetClone(CloneId id) {
@@ -261,8 +252,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
     if (still_images_ == 0) still_anchor_ = id;
     Eigen::MatrixXd H;
     Eigen::VectorXd h;
-    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), still_images_, *residual_motion, &H,
-                     &h);
+    zeroVelocityRows(filter_.window(), filter_.window().indexOf(still_anchor_), since, *residual_motion, &H, &h);
     const UpdateResult result = filter_.update(H, h);
     report.zero_velocity = true;
     report.healthy = result.ok;
@@ -301,18 +291,6 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
   }
   report.correction = correctionPerDof(predicted, P_predicted, nav(), P_updated);
   if (!still) {
-    // While more stamp jitter may explain the correction about the rotation axis, that part is not blamed on the IMU.
-    double correction = report.correction;
-    if (report.features_used >= kMinOfStamps) {
-      const Eigen::Vector3d& w = propagation.omega_I;
-      const Eigen::Vector3d turned = logSO3(Eigen::Matrix3d(predicted.T_W_I.R().transpose() * nav().T_W_I.R()));
-      const Eigen::Matrix3d lost = (P_predicted - P_updated).topLeftCorner<3, 3>();
-      stamp_monitor_.add(w, turned, lost);
-      const double along = turned.dot(w);
-      if (stamp_monitor_.isGrowing()) {
-        correction = std::min(correction, std::max(0.0, 6.0 * correction - along * along / w.dot(lost * w)) / 5.0);
-      }
-    }
     if (propagation.inertial) {
       using Drift = frontend::DriftMonitor;
       const Eigen::Matrix<double, 15, 1> before = P_predicted.diagonal(), after = P_updated.diagonal();
@@ -320,7 +298,7 @@ StepReport VioFilter::step(const Propagation& propagation, CloneId id,
       drift_.add(Drift::kAccelBias, nav().bias_accel - predicted.bias_accel, before.tail<3>(), after.tail<3>());
     }
     drift_.endImage(nav().t);
-    imu_monitor_.add(correction, report.features_used, report.features_gated);
+    imu_monitor_.add(report.correction, report.features_used + report.features_gated);
   }
 
   // Observations must not be used twice: lost and used tracks are deleted, and restart with the next image.

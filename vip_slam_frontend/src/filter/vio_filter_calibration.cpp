@@ -10,18 +10,8 @@ namespace vip_slam {
 
 namespace {
 
-// An entry of the gyro's correction is plausible, and kept over a restart, within a fixed limit: its prior sigma is
-// only a data-sheet value.
-constexpr double kMaxGyroError = 0.05;
-// One sigma of a depth offset that is not to be learnt, m.
-constexpr double kHeldOffset = 1e-6;
-// Shift of the depth image, in bearings (px over the focal length): worth correcting above kMinShift, known well enough
-// below a sigma of kKnownShift. In an office one pixel of shift raised the error from 0.8 to 13 mm.
-constexpr double kMinShift = 1e-4, kKnownShift = 2e-4;
-// One sigma of a shift that is reset to zero, in bearings: holds it there.
-constexpr double kHeldShift = 1e-7;
-// An entry of the gyro's correction is worth correcting above this: 5e-4 of a rotation by 60 degrees is 0.03 degrees.
-constexpr double kMinGyroError = 5e-4;
+// One sigma of a number that is not to be learnt: of an offset, m, or of a shift in bearings.
+constexpr double kHeldSigma = 1e-6;
 
 }  // namespace
 
@@ -80,7 +70,7 @@ void VioFilter::learnCalibration() {
       change.tail<3>().norm() > kGateSigmas * options.sigma_translation ||
       std::abs(window.time_offset - given_.time_offset) > kGateSigmas * options.sigma_time_offset ||
       ((depth_shift + window.depth_shift).array().abs() > kGateSigmas * options.sigma_depth_shift).any() ||
-      window.gyro_correction.cwiseAbs().maxCoeff() > kMaxGyroError) {
+      window.gyro_correction.cwiseAbs().maxCoeff() > kGateSigmas * imu_noise_.gyro_correction_sigma) {
     return;
   }
   learnt_.T_I_C = window.T_I_C;
@@ -172,8 +162,8 @@ void VioFilter::judgeDepthShift() {
   const Eigen::Vector2d change = depth_shift_ + window.depth_shift;
   if (change.cwiseAbs().maxCoeff() <= kGateSigmas * options_.calibration.sigma_depth_shift) return;
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, window.dimension());
-  H.middleCols<2>(window.depthShiftColumn()).diagonal().setConstant(1.0 / kHeldShift);
-  Eigen::VectorXd r = -change / kHeldShift;
+  H.middleCols<2>(window.depthShiftColumn()).diagonal().setConstant(1.0 / kHeldSigma);
+  Eigen::VectorXd r = -change / kHeldSigma;
   filter_.update(H, r);
   moveDepth(-depth_shift_, 0);
   depth_shift_.setZero();
@@ -185,12 +175,9 @@ void VioFilter::judgeDepthShift() {
 const Eigen::Vector2d& VioFilter::takeDepthShift() {
   if (!started_ || !filter_.window().calibration.depth_shift || shift_contradicts_) return depth_shift_;
   const Eigen::Vector2d rest = filter_.window().depth_shift;
-  if (rest.cwiseAbs().maxCoeff() < kMinShift) return depth_shift_;
-  const Eigen::Vector2d sigma = calibration().sigma_depth_shift;
-  const auto off = rest.array().abs();
-  if (sigma.maxCoeff() > kKnownShift || !(off > kMinShift && off > kGateSigmas * sigma.array()).any()) {
-    return depth_shift_;
-  }
+  // The readings of an image share errors, which the filter's sigma does not know.
+  const double gate = kGateSigmas * std::sqrt(frontend::CalibrationEvidence::kUsualScatter);
+  if (!(rest.array().abs() > gate * calibration().sigma_depth_shift.array()).any()) return depth_shift_;
   moveDepth(rest, 0);
   depth_shift_ += rest;
   filter_.window().depth_shift.setZero();
@@ -198,7 +185,7 @@ const Eigen::Vector2d& VioFilter::takeDepthShift() {
 }
 
 void VioFilter::restartDepthOffset(bool none) {
-  evidence_.restart(kDepthOffset, none ? kHeldOffset : options_.calibration.sigma_depth_offset);
+  evidence_.restart(kDepthOffset, none ? kHeldSigma : options_.calibration.sigma_depth_offset);
   evidence_.restart(kDepthScale, options_.calibration.sigma_depth_scale);
   for (auto& [id, track] : tracks_) {
     for (Observation& observation : track.observations) observation.depth = 0;
@@ -231,11 +218,8 @@ void VioFilter::judgeGyroCorrection() {
   const WindowState& window = filter_.window();
   if (window.calibration.gyro() == 0) return;
   const Eigen::Array33d change = window.gyro_correction.cwiseAbs();
-  gyro_is_off_ = gyro_is_off_ && change > kMinGyroError / 2;
-  if ((change > kMinGyroError && !gyro_is_off_).any()) {
-    gyro_is_off_ =
-        gyro_is_off_ || (change > kMinGyroError && change > kGateSigmas * calibration().sigma_gyro_correction.array());
-  }
+  const Eigen::Array33d sigma = calibration().sigma_gyro_correction;
+  gyro_is_off_ = gyro_is_off_ || (sigma > 0 && change > kGateSigmas * sigma);
 }
 
 Eigen::Matrix3d VioFilter::gyroCorrection() const {

@@ -12,10 +12,7 @@ namespace vip_slam::frontend {
 namespace {
 
 constexpr double kCapacity = 30.0;  // s
-// What a constant rate and a constant velocity leave unknown of a hand-held or flying camera's motion, as densities:
-// rad/s and m/s^2 per sqrt(Hz). Over 33 ms: 10 degrees and 0.9 m/s.
-constexpr double kTurnDensity = 1.0, kForceDensity = 5.0;
-constexpr double kGrid = 0.005;  // s, between samples where there is no complete IMU
+constexpr double kGrid = 0.005;     // s, between samples where there is no complete IMU
 
 }  // namespace
 
@@ -137,8 +134,10 @@ void InertialInput::substitute(const Substitute& substitute) {
 
 ChannelNoise InertialInput::noise(double t0, double t1) const {
   ChannelNoise noise;
-  const double turn = std::max(1.0, kTurnDensity / gyro_density_),
-               force = std::max(1.0, kForceDensity / accel_density_);
+  // White noise with the low frequencies of the motion that a stand-in leaves unknown.
+  const double root = std::sqrt(2.0 / kBodyFrequency);
+  const double turn = std::max(1.0, root * kBodyRate / gyro_density_),
+               force = std::max(1.0, root * kBodyAcceleration / accel_density_);
   if (!has_gyro_) noise.gyro = turn;
   if (!has_accel_) noise.accel = force;
   for (const Substitute& s : substitutes_) {

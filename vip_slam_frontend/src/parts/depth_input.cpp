@@ -8,13 +8,6 @@
 
 namespace vip_slam::frontend {
 
-namespace {
-
-// Depth with a smaller lag than this counts as taken with the colour image, seconds: half a millimetre at 1 m/s.
-constexpr double kSameInstant = 5e-4;
-
-}  // namespace
-
 DepthInput::DepthInput(const SensorConfig& sensor, std::shared_ptr<const CameraModel> camera)
     : camera_(std::move(camera)),
       given_curve_(sensor.depth_curve),
@@ -26,7 +19,7 @@ DepthInput::DepthInput(const SensorConfig& sensor, std::shared_ptr<const CameraM
 
 DepthReading DepthInput::read(const cv::Mat& depth, double lag) {
   const double apart = lag - given_delay_ - delay_;
-  DepthReading reading{depth, std::abs(apart) >= kSameInstant ? apart : 0.0};
+  DepthReading reading{depth, 2 * std::abs(apart) >= kKnotSeconds ? apart : 0.0};
   missing_.look(depth);
   if (missing_.value() > 0) {
     reading.image = depth.clone();

@@ -19,10 +19,6 @@
 
 namespace vip_slam::frontend {
 
-/// For how long what has just been seen still holds, s: without depth, as images of a colour camera that is the faster
-/// one are; without enough points; after a fault of the IMU.
-constexpr double kMoment = 0.5;
-
 /// A depth image at its own moment; empty when there is none.
 struct DepthReading {
   cv::Mat image;   ///< 32FC1, m, 0 or NaN: no reading

@@ -8,14 +8,6 @@
 
 namespace vip_slam::frontend {
 
-namespace {
-
-// Factor on coast_seconds: when everything in view contradicts the IMU for longer, the IMU, or the velocity integrated
-// from it, is taken to be wrong.
-constexpr double kPatience = 2.0;
-
-}  // namespace
-
 void Health::reset(const std::string& reason) {
   phase_ = Phase::kWaiting;
   status_ = {TrackingState::kInitialising, reason};
@@ -39,7 +31,8 @@ double Health::coastedSigma(double variance) const { return std::sqrt(std::max(0
 
 bool Health::contradictedForLong(const Sight& sight) const {
   if (!sight.moves_by_itself) return false;
-  const double patience = kPatience * options_.coast_seconds;
+  // Then the IMU, or the velocity integrated from it, is taken to be wrong.
+  const double patience = options_.max_image_gap;
   if (sight.t - last_agreed_t_ > patience) return true;
   return lost() && (sight.t - last_held_t_ > patience || coastedSigma(sight.variance) > options_.max_position_sigma);
 }

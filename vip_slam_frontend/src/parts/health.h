@@ -8,8 +8,7 @@
 #include "vip_slam_frontend/filter/vio_filter.h"
 #include "vip_slam_frontend/front_end.h"
 #include "vip_slam_frontend/front_end_options.h"
-
-#include "parts/depth_input.h"
+#include "vip_slam_frontend/tracking/predicted_motion.h"
 
 namespace vip_slam::frontend {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "parts/keyframes.h"
 
-#include "parts/depth_input.h"
+#include "vip_slam_frontend/tracking/predicted_motion.h"
 
 namespace vip_slam::frontend {
 

@@ -14,32 +14,17 @@ namespace vip_slam::frontend {
 
 namespace {
 
-// Rate that a saturated gyro does not measure, one sigma, as a share of the limit of its range.
-constexpr double kBeyondRange = 0.3;
-// One sigma of the motion between two images where they cannot be aligned, rad and m; floor of that by points. Points
-// have the same pixels as the filter's tracks, which it takes for independent: factor on their variance.
-constexpr double kUnknown = 0.02, kPointsLeast = 1e-3, kSharedByTracks = 9.0;
-// What one alignment errs, the next one does too: in each direction, one sigma in rad and m, and as a share of the
-// motion. Judged on real recordings of a Kinect and an Xtion.
-constexpr double kAlignedLeast = 2e-3, kAlignedShare = 0.05;
-// A turn between images that optical flow need not follow, and how far from it dense alignment sees another one, rad.
-constexpr double kBeyondFlow = 0.1, kTurnsApart = 0.05;
+// Points have the same pixels as the filter's tracks, which it takes for independent: factor on their variance.
+constexpr double kSharedByTracks = 9.0;
+// What one alignment errs, the next one does too: in each direction, one sigma in rad and m. Judged on real recordings
+// of a Kinect and an Xtion.
+constexpr double kAlignedLeast = 2e-3;
 
-// Time after the start during which the filter's velocity is not yet trusted to judge the points, s.
-constexpr double kSettled = 2.0;
-// Errors of the prediction that no covariance has (rolling shutter, delay, extrinsics), one sigma: a share of the turn
-// and an angle, rad; as displacements at this distance, m, and of a body that turns by 1 rad/s.
-constexpr double kUnmodelledTurn = 0.05, kUnmodelledAngle = 1e-3, kLeverArm = 0.25;
-// Images agree among themselves with at least this many points with depth, and one outlier per kAgreeingOutliers.
-constexpr int kAgreeing = 30, kAgreeingOutliers = 10;
-// Time without images after which the camera may look elsewhere, s. After twice that time a turn further than
-// kTurnsApart from the predicted one is too far from the filter's linearisation point.
-constexpr double kLongUnseen = 0.2;
-
-/// Of the errors that alignments in a row share, for a turn (rad) or a displacement (m) of this size.
-double commonVariance(double motion) {
-  const double share = kAlignedShare * motion;
-  return kAlignedLeast * kAlignedLeast + share * share;
+/// Adds the errors that no covariance of this motion has: `least` (rad and m) and a share of it.
+void admitMotionError(const SE3& motion, double least, Matrix6d* covariance) {
+  const auto variance = [least](double size) { return std::pow(least, 2) + std::pow(kMotionErrorShare * size, 2); };
+  covariance->diagonal().head<3>().array() += variance(logSO3(motion.R()).norm());
+  covariance->diagonal().tail<3>().array() += variance(motion.t().norm());
 }
 
 }  // namespace
@@ -60,7 +45,7 @@ std::optional<AlignedMotion> MotionSources::byPixels(const FeatureTracker& track
 
 AlignedMotion MotionSources::goingOn() const {
   AlignedMotion unknown{last_, Matrix6d::Zero()};
-  unknown.covariance.diagonal().setConstant(kUnknown * kUnknown);
+  unknown.covariance.diagonal().setConstant(kUsualMotion * kUsualMotion);
   return unknown;
 }
 
@@ -88,15 +73,14 @@ PredictedMotion MotionSources::byImu(const Propagation& propagation, const SE3& 
   motion.turn_unknown = doubtful;
   motion.wary = wary;
   motion.at_rest = at_rest;
-  const bool settled = propagation.predicted.t - started_imu_t_ > kSettled;
-  motion.judges = settled && !doubtful;
+  motion.judges = !doubtful;
   return motion;
 }
 
-bool MotionSources::isBeyondFlow(const SE3& motion) { return logSO3(motion.R()).norm() > kBeyondFlow; }
+bool MotionSources::isBeyondFlow(const SE3& motion) { return logSO3(motion.R()).norm() > kUsualMotion; }
 
 bool MotionSources::isAnotherTurn(const AlignedMotion& seen, const SE3& predicted) const {
-  return logSO3((seen.T_current_previous.inverse() * predicted).R()).norm() > kTurnsApart;
+  return logSO3((seen.T_current_previous.inverse() * predicted).R()).norm() > kUsualMotion;
 }
 
 void MotionSources::substitute(double t0, double t1, const SE3& T_current_previous, const NavState& state,
@@ -120,12 +104,11 @@ Propagation MotionSources::byImages(double t_imu, const MotionFit& points, const
   const bool fault = inertial_->complete();
   SE3 T_cur_prev = pixels.T_current_previous;
   Matrix6d covariance = pixels.covariance;
-  covariance.diagonal().head<3>().array() += commonVariance(logSO3(T_cur_prev.R()).norm());
-  covariance.diagonal().tail<3>().array() += commonVariance(T_cur_prev.t().norm());
+  admitMotionError(T_cur_prev, kAlignedLeast, &covariance);
   if (points.ok) {
     // Few points that agree by chance promise more than they hold: all pixels together gate them.
     Matrix6d of_points = kSharedByTracks * points.covariance;
-    of_points.diagonal().array() += kPointsLeast * kPointsLeast;
+    of_points.diagonal().array() += kMotionError * kMotionError;
     const Matrix6d gain = covariance * (covariance + of_points).inverse();
     if (motionDifference(points.T_current_previous, T_cur_prev, covariance + of_points) < kGateSigmas) {
       T_cur_prev = T_cur_prev.boxplus(gain * points.T_current_previous.boxminus(T_cur_prev));
@@ -151,7 +134,7 @@ Propagation MotionSources::byImages(double t_imu, const MotionFit& points, const
 bool MotionSources::admitCutOff(double from, double t_imu, Propagation* propagation) const {
   const double cut_off = inertial_->range().cutOff(from, t_imu);
   if (!(cut_off > 0)) return false;
-  propagation->admitRate(kBeyondRange * cut_off, t_imu - from);
+  propagation->admitRate(cut_off, t_imu - from);
   return true;
 }
 
@@ -163,8 +146,8 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
   evidence.t = propagation.predicted.t;
   evidence.interval = prediction.interval;
   evidence.images_agree = !prediction.turn_unknown && !prediction.wary && !tracking.moves_by_itself &&
-                          tracking.motion.ok && tracking.motion.pairs >= kAgreeing &&
-                          kAgreeingOutliers * tracking.lost_outlier <= tracking.tracked;
+                          tracking.motion.ok && tracking.motion.pairs >= kEnough &&
+                          areMismatches(tracking.lost_outlier, tracking.tracked + tracking.lost_outlier);
   if (evidence.images_agree) {
     const Matrix15d P = filter_->covariance();
     const Eigen::Matrix3d R_C_I = filter_->extrinsics().R().transpose();
@@ -172,10 +155,7 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
     Matrix6d covariance = tracking.motion.covariance;
     covariance.topLeftCorner<3, 3>() += R_C_I * propagation.turnCovariance(P) * R_C_I.transpose();
     covariance.bottomRightCorner<3, 3>() += R_C_W * propagation.displacementCovariance(P) * R_C_W.transpose();
-    const double turn = kUnmodelledTurn * propagation.omega_I.norm() * prediction.interval + kUnmodelledAngle;
-    const double length = kLeverArm * (kUnmodelledTurn * prediction.interval + kUnmodelledAngle);
-    covariance.diagonal().head<3>().array() += turn * turn;
-    covariance.diagonal().tail<3>().array() += length * length;
+    admitMotionError(prediction.T_current_previous, kMotionError, &covariance);
     evidence.turn = logSO3(tracking.motion.T_current_previous.R()).norm();
     evidence.sigmas = motionDifference(tracking.motion.T_current_previous, prediction.T_current_previous, covariance);
   }
@@ -183,17 +163,13 @@ bool MotionSources::imuIsAtFault(const TrackingResult& tracking, const Predicted
 }
 
 bool MotionSources::bridgesGap(const TrackingResult& tracking, std::size_t tracks_before,
-                               const PredictedMotion& prediction, double unseen) {
-  if (unseen < kLongUnseen) return true;
+                               const PredictedMotion& prediction) {
   if (!tracking.pose_ok || 2 * static_cast<std::size_t>(tracking.tracked) < tracks_before) return false;
   const SE3 apart = prediction.T_current_previous.inverse() * tracking.T_current_previous;
-  return unseen < 2 * kLongUnseen || logSO3(apart.R()).norm() < kTurnsApart;
+  return logSO3(apart.R()).norm() < kUsualMotion;
 }
 
-void MotionSources::start(double t_imu) {
-  faults_.reset(t_imu);
-  started_imu_t_ = t_imu;
-}
+void MotionSources::start(double t_imu) { faults_.reset(t_imu); }
 
 void MotionSources::reset() { last_ = SE3(); }
 

@@ -61,11 +61,9 @@ class MotionSources {
                     bool implausible);
   /// Whether the IMU has contradicted the images from its first motion on, so that the vertical is not known.
   bool verticalUnknown() const { return faults_.verticalUnknown(); }
-  /// Whether the image after an IMU gap shows the motion during the gap. Images taken inside the gap follow each other
-  /// closely; when they are missing as well, enough tracks must survive and the rotation must be near the predicted
-  /// one. `unseen`: time since the last image, s.
-  static bool bridgesGap(const TrackingResult& tracking, std::size_t tracks_before, const PredictedMotion& prediction,
-                         double unseen);
+  /// Whether the image after a gap of IMU and images shows the motion in between: enough tracks have survived, and the
+  /// rotation is near the predicted one.
+  static bool bridgesGap(const TrackingResult& tracking, std::size_t tracks_before, const PredictedMotion& prediction);
 
   /// The first state, at t_imu: until its velocity is confirmed, its error cannot be told from a shock.
   void start(double t_imu);
@@ -79,7 +77,6 @@ class MotionSources {
   DenseAlignment dense_;
   FaultDetection faults_;
   SE3 last_;
-  double started_imu_t_ = 0;  ///< IMU time of this epoch's first state
 };
 
 }  // namespace vip_slam::frontend

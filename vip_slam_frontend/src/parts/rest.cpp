@@ -47,17 +47,17 @@ bool Rest::isStill(const InertialInput& inertial, double previous_t_imu, double 
   for (const Track& track : *view.tracks) now.emplace_back(track.feature.id, track.feature.pixel);
   StillnessCues cues;
   cues.imu = imuSpread(inertial.between(since, t_imu), &noise_);
-  const double shaken_since = std::min(t_imu - kStandingSeconds, since);
-  if (shaken_since >= inertial.oldest()) {
-    cues.unshaken = imuSpread(movingMeans(inertial.between(shaken_since, t_imu), kRestWindow));
-  }
   cues.tracks = view.counts ? static_cast<int>(now.size()) : 0;
   cues.speed = view.speed;
+  cues.sigma_velocity = view.sigma_velocity;
+  cues.sigma_px = view.sigma_px;
+  cues.px_per_radian = view.px_per_radian;
   cues.px_per_metre = view.px_per_metre;
   while (recent_pixels_.size() > 1 && t_imu - recent_pixels_[1].first >= kRestWindow - 1e-6) {
     recent_pixels_.pop_front();
   }
-  if (!recent_pixels_.empty()) cues.disparity_px = disparity(recent_pixels_.front().second, now);
+  const bool old = !recent_pixels_.empty() && t_imu - recent_pixels_.front().first >= kRestWindow - 1e-6;
+  if (old) cues.disparity_px = disparity(recent_pixels_.front().second, now);
   if (still_ && view.counts) cues.anchor_disparity_px = disparity(anchor_, now);
   recent_pixels_.emplace_back(t_imu, now);
   const bool still = detector_.update(cues);

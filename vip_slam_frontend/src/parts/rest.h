@@ -29,9 +29,8 @@ class Rest {
   /// One image, t_imu, after the last one at `previous_t_imu`, IMU clock, s.
   struct View {
     const std::vector<Track>* tracks;
-    bool counts;          ///< its motion is the camera's, not that of a body that may pause
-    double speed;         ///< estimated, m/s
-    double px_per_metre;  ///< see StillnessCues
+    bool counts;  ///< its motion is the camera's, not that of a body that may pause
+    double speed, sigma_velocity, sigma_px, px_per_radian, px_per_metre;  ///< see StillnessCues
   };
   void decide(const InertialInput& inertial, double previous_t_imu, double t_imu, const View& view);
   void reset();

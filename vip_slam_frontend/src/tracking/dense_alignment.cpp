@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam::frontend {
 
@@ -17,19 +18,15 @@ namespace {
 
 constexpr std::array<int, 3> kWidths{40, 80, 160};  // px, of the levels
 constexpr std::array<int, 3> kIterations{12, 8, 5};
-constexpr std::array<int, 3> kReach{1, 2, 4};   // of the window of a depth gradient, px
-constexpr std::array<int, 3> kStride{1, 1, 2};  // of the pixels taken along rows and columns
-// One sigma of the motion between two images, rad and m: keeps directions that the images leave open near the start.
-constexpr double kTurn = 0.2, kStep = 0.1;
-// Where less than this share of the pixels has depth, the others show the rotation as far ones do, m. Otherwise they
+constexpr double kLeastGrey = 2.0;  // one sigma of grey values: quantisation
+// One sigma of the turn between two images, rad: keeps directions that the images leave open near the start, as
+// kUsualMotion does for the displacement.
+constexpr double kTurn = 0.2;
+// Where less than this share of the pixels has depth, all show the rotation as those at infinity do. Otherwise they
 // take no part: those of a near surface would turn a displacement into a turn.
-constexpr double kFewWithDepth = 0.1, kFar = 20.0;
-constexpr double kNearest = 0.05;  // m, of points that are compared
-// Fewest pixels of the coarsest level that must agree, and the smallest (quantisation) and largest difference
-// of grey values that counts.
-constexpr int kFewest = 100;
-constexpr double kConverged = 1e-4;  // rad and m, of a step
-constexpr double kLeastGrey = 2.0, kLargestGrey = 60.0;
+constexpr double kFewWithDepth = 0.1;
+constexpr double kConverged = 1e-4;    // rad and m, of a step
+constexpr double kLargestGrey = 60.0;  // difference of grey values that counts
 // Depth that differs by more belongs to another surface, sigmas; so does what a window of depth spans, as a share of
 // it.
 constexpr double kOtherSurface = 10.0, kSteepest = 0.15;
@@ -125,7 +122,7 @@ std::vector<DenseAlignment::Level> DenseAlignment::pyramid(const cv::Mat& gray, 
     small.convertTo(level.gray, CV_32F);
     // Readings are taken, not averaged: a mean over an edge is no surface.
     if (!depth.empty()) cv::resize(depth, level.depth, size, 0, 0, cv::INTER_NEAREST);
-    if (!depth.empty()) level.slopes = depthSlopes(level.depth, noise_, kReach[levels.size()]);
+    if (!depth.empty()) level.slopes = depthSlopes(level.depth, noise_, size.width / kWidths[0]);
     levels.push_back(level);
   }
   return levels;
@@ -136,7 +133,7 @@ void DenseAlignment::compareDepth(const Level& to, const Eigen::Vector3d& turned
   const Eigen::Vector3d p = turned + t;
   Eigen::Vector2d uv;
   Eigen::Matrix<double, 2, 3> J_project;
-  if (p.z() < kNearest || !camera_->project(p, &uv, &J_project)) return;
+  if (!camera_->project(p, &uv, &J_project)) return;
   const double scale = static_cast<double>(camera_->width()) / to.depth.cols;
   uv = ((uv.array() + 0.5) / scale - 0.5).matrix();
   const int u = static_cast<int>(std::lround(uv.x())), v = static_cast<int>(std::lround(uv.y()));
@@ -156,7 +153,8 @@ DenseAlignment::Fit DenseAlignment::align(const Level& from, const Level& to, in
                                           double depth_share, int iterations) const {
   const std::vector<Eigen::Vector2d>& rays = rays_[static_cast<std::size_t>(level)];
   const double scale = static_cast<double>(camera_->width()) / from.gray.cols;
-  const int stride = kStride[static_cast<std::size_t>(level)];
+  // The finest level only sharpens: no more pixels than the one before has.
+  const int stride = std::max(1, from.gray.cols / kWidths[1]);
   const bool far = from.depth.empty() || cv::countNonZero(from.depth) < kFewWithDepth * from.gray.total();
   Fit fit;
   fit.T_current_previous = start;
@@ -180,12 +178,12 @@ DenseAlignment::Fit DenseAlignment::align(const Level& from, const Level& to, in
         const float reading = from.depth.empty() ? 0.0f : from.depth.at<float>(v, u);
         const bool near = noise_.inRange(reading);
         if (!near && !far) continue;
-        const double z = near ? reading : kFar;
+        const double z = near ? reading : 1.0;
         const Eigen::Vector3d point(z * ray.x(), z * ray.y(), z), turned = R * point;
         const Eigen::Vector3d p = near ? Eigen::Vector3d(turned + t) : turned;
         Eigen::Vector2d uv;
         Eigen::Matrix<double, 2, 3> J_project;
-        if (p.z() < kNearest || !camera_->project(p, &uv, &J_project)) continue;
+        if (!camera_->project(p, &uv, &J_project)) continue;
         uv = ((uv.array() + 0.5) / scale - 0.5).matrix();
         double seen;
         Eigen::RowVector2d gradient;
@@ -201,7 +199,7 @@ DenseAlignment::Fit DenseAlignment::align(const Level& from, const Level& to, in
       }
     }
     fit.used = static_cast<int>(differences.size());
-    if (fit.used < kFewest) return fit;
+    if (fit.used < kEnough) return fit;
     shift = upperMedian(differences);
     for (float& difference : differences) difference = std::abs(difference - static_cast<float>(shift));
     grey = std::max(kLeastGrey, 1.4826 * upperMedian(differences));
@@ -209,7 +207,7 @@ DenseAlignment::Fit DenseAlignment::align(const Level& from, const Level& to, in
     fit.cost = cost / fit.used;
     fit.information = normal.A.selfadjointView<Eigen::Upper>();
     fit.information.diagonal().head<3>().array() += 1.0 / (kTurn * kTurn);
-    fit.information.diagonal().tail<3>().array() += 1.0 / (kStep * kStep);
+    fit.information.diagonal().tail<3>().array() += 1.0 / (kUsualMotion * kUsualMotion);
     if (iteration == iterations) break;
     const Vector6d step = fit.information.ldlt().solve(-normal.b);
     if (!step.allFinite()) break;
@@ -229,14 +227,14 @@ std::optional<AlignedMotion> DenseAlignment::motion(const cv::Mat& gray_previous
   best.cost = std::numeric_limits<double>::infinity();
   for (const SE3& start : {guess, SE3()}) {
     const Fit fit = align(then[0], now[0], 0, start, depth_share, kIterations[0]);
-    if (fit.used >= kFewest && fit.cost < best.cost) best = fit;
+    if (fit.used >= kEnough && fit.cost < best.cost) best = fit;
   }
   if (!std::isfinite(best.cost)) return std::nullopt;
   for (std::size_t level = 1; level < now.size(); ++level) {
     best = align(then[level], now[level], static_cast<int>(level), best.T_current_previous, depth_share,
                  kIterations[level]);
   }
-  if (best.used < kFewest || !best.T_current_previous.isFinite()) return std::nullopt;
+  if (best.used < kEnough || !best.T_current_previous.isFinite()) return std::nullopt;
   // From the turn on the left to boxplus' on the right.
   Matrix6d J = Matrix6d::Identity();
   J.topLeftCorner<3, 3>() = best.T_current_previous.R().transpose();

@@ -3,31 +3,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
 
+#include "vip_slam_core/depth/grid_spacing.h"
+#include "vip_slam_core/imu/imu_types.h"
 #include "vip_slam_core/util/statistics.h"
+#include "vip_slam_frontend/filter/filter_options.h"
+#include "vip_slam_frontend/filter/gating.h"
+#include "vip_slam_frontend/tracking/frozen_depth.h"
 
 namespace vip_slam::frontend {
 
 namespace {
 
-constexpr int kAcross = 40;        // samples along a row of the image
-constexpr std::size_t kFew = 100;  // samples that decide nothing
-constexpr double kLongest = 1.0;   // s: after that a motion is not predicted well enough
-// Logarithms of a ratio of distances: least change of a unit, how far a reading may be off it, and how much larger the
-// spread of the distances must be, so that a motion does not pass for a unit.
-constexpr double kLeast = 0.05, kAgrees = 0.03, kSpread = 5 * kAgrees;
-constexpr double kAcceleration = 20;  // m/s^2, that no prediction knows: away from a corner it scales its two walls
-constexpr double kShare = 0.7;        // of the view that must agree, near and far
-// Of a view at one distance the least change of a unit, as a logarithm; correlation of two images that are of the same
-// view, and their least contrast, one sigma in grey levels.
-constexpr double kLeastPlain = 0.4, kSameView = 0.8, kContrast = 3.0;
-
 struct Sample {
-  double distance, ratio;  ///< logarithms: as predicted; of the reading over it
+  double distance, ratio;  ///< as predicted, m; logarithm of the reading over it
   double before, now;      ///< brightness
 };
 
@@ -38,22 +32,24 @@ double brightness(const cv::Mat& small, long u, long v) {
                                 std::min(static_cast<int>(u), small.cols - 1));
 }
 
+/// Whether the one image explains most of the variance of the other.
 bool sameView(const std::vector<Sample>& samples) {
   double before = 0, now = 0, bb = 0, nn = 0, bn = 0;
   const double n = static_cast<double>(samples.size());
   for (const Sample& s : samples) before += s.before / n, now += s.now / n;
   for (const Sample& s : samples) {
-    bb += (s.before - before) * (s.before - before) / n;
-    nn += (s.now - now) * (s.now - now) / n;
-    bn += (s.before - before) * (s.now - now) / n;
+    bb += (s.before - before) * (s.before - before);
+    nn += (s.now - now) * (s.now - now);
+    bn += (s.before - before) * (s.now - now);
   }
-  return std::min(bb, nn) > kContrast * kContrast && bn > kSameView * std::sqrt(bb * nn);
+  const double rounding = n / 12;  // grey levels are whole numbers
+  return std::min(bb, nn) > rounding && bn > 0 && bn * bn > bb * nn - bn * bn;
 }
 
 }  // namespace
 
 DepthUnit::DepthUnit(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise)
-    : camera_(std::move(camera)), noise_(noise), step_(std::max(1, camera_->width() / kAcross)) {
+    : camera_(std::move(camera)), noise_(noise), step_(strideOn(camera_->width(), camera_->height(), kReadingStep)) {
   for (int v = step_ / 2; v < camera_->height(); v += step_) {
     for (int u = step_ / 2; u < camera_->width(); u += step_) {
       Eigen::Vector2d xy;
@@ -72,7 +68,6 @@ cv::Mat DepthUnit::coarse(const cv::Mat& gray) const {
 bool DepthUnit::changes(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_odom_C, double t) {
   open_ = false;
   if (depth.empty()) return false;
-  if (std::abs(t - t_) > kLongest) points_.clear();
   const SE3 T_C_odom = T_odom_C.inverse();
   const cv::Mat small = coarse(gray);
   std::vector<Sample> samples;
@@ -84,28 +79,24 @@ bool DepthUnit::changes(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_
     if (u < 0 || v < 0 || u >= depth.cols || v >= depth.rows) continue;
     const float z = depth.at<float>(static_cast<int>(v), static_cast<int>(u));
     if (!std::isfinite(z) || z <= 0) continue;
-    samples.push_back({std::log(p.z()), std::log(z / p.z()), seen.brightness, brightness(small, u / step_, v / step_)});
+    samples.push_back({p.z(), std::log(z / p.z()), seen.brightness, brightness(small, u / step_, v / step_)});
   }
-  if (samples.size() < kFew) return false;
+  if (samples.size() < kEnough) return false;
   std::sort(samples.begin(), samples.end(), [](auto& a, auto& b) { return a.distance < b.distance; });
-  const std::size_t third = samples.size() / 3;
-  const auto common = [](auto begin, auto end) {
-    std::vector<double> ratios;
-    for (auto it = begin; it != end; ++it) ratios.push_back(it->ratio);
-    return upperMedian(std::move(ratios));
+  const auto common = [](auto begin, auto end, auto value) {
+    std::vector<double> values;
+    for (auto it = begin; it != end; ++it) values.push_back(value(*it));
+    return upperMedian(std::move(values));
   };
-  const double all = common(samples.begin(), samples.end());
-  const double metres = std::abs(std::expm1(all)) * std::exp(samples[samples.size() / 2].distance);
-  if (std::abs(all) < kLeast || metres < 0.5 * kAcceleration * (t - t_) * (t - t_)) return false;
+  const double all = common(samples.begin(), samples.end(), [](auto& s) { return s.ratio; });
+  const double metres = std::abs(std::expm1(all)) * samples[samples.size() / 2].distance;
+  const double prior = CalibrationOptions().sigma_depth_scale, moved = gravityVector().norm() * (t - t_) * (t - t_);
+  if (std::abs(all) < kGateSigmas * prior || metres < moved) return false;
   open_ = true;
-  // The nearest and the farthest third each.
-  const auto agrees = [all, third](auto begin) {
-    const auto n = std::count_if(begin, begin + third, [all](auto& s) { return std::abs(s.ratio - all) < kAgrees; });
-    return static_cast<double>(n) > kShare * static_cast<double>(third);
-  };
-  const double spread = samples[samples.size() - 1 - third / 2].distance - samples[third / 2].distance;
-  const bool shown = spread > kSpread || (std::abs(all) > kLeastPlain && sameView(samples));
-  if (!shown || !agrees(samples.begin()) || !agrees(samples.end() - third)) return false;
+  const auto sigmas = [this, all](auto& s) { return std::abs(s.ratio - all) * s.distance / noise_.sigma(s.distance); };
+  const auto third = static_cast<std::ptrdiff_t>(samples.size() / 3);
+  if (common(samples.begin(), samples.begin() + third, sigmas) > kGateSigmas) return false;
+  if (common(samples.end() - third, samples.end(), sigmas) > kGateSigmas || !sameView(samples)) return false;
   factor_ /= std::exp(all);
   open_ = false;
   return true;

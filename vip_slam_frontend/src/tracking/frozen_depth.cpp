@@ -4,18 +4,13 @@
 #include "vip_slam_frontend/filter/gating.h"
 
 namespace vip_slam {
-namespace {
-
-constexpr int kStep = 12;  // pixels
-
-}  // namespace
 
 bool FrozenDepth::repeats(const cv::Mat& depth) {
   std::vector<float> now;
   int with_depth = 0;
-  for (int y = kStep / 2; y < depth.rows; y += kStep) {
+  for (int y = kReadingStep / 2; y < depth.rows; y += kReadingStep) {
     const float* row = depth.ptr<float>(y);
-    for (int x = kStep / 2; x < depth.cols; x += kStep) {
+    for (int x = kReadingStep / 2; x < depth.cols; x += kReadingStep) {
       now.push_back(row[x] > 0 ? row[x] : 0.f);
       with_depth += row[x] > 0;
     }

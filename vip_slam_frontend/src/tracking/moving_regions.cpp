@@ -3,28 +3,33 @@
 
 #include <cmath>
 
+#include "vip_slam_frontend/filter/gating.h"
+
 namespace vip_slam {
 
 namespace {
 
-// Fewer moving points than this, or a smaller share of all points, are taken for mismatches.
-constexpr std::size_t kMinFeatures = 5;
-constexpr double kMinShare = 0.08;
-// A pixel belongs to a moving body only within this distance of a moving point, px, unless nearly all points move.
-constexpr float kReach = 120.0f;
-constexpr std::size_t kNearlyAll = 4;  // moving points for each that stands still
 // Largest difference in depth from the moving point, as a share of its depth.
 constexpr double kDeep = 0.2;
 
 }  // namespace
+
+bool areMismatches(int outliers, int points) {
+  const double expected = (1 - kGateProbability) * points;
+  double fewer = 0, probability = std::exp(-expected);
+  for (int k = 0; k < outliers; ++k) {
+    fewer += probability;
+    probability *= expected / (k + 1);
+  }
+  return fewer < kGateProbability;
+}
 
 void MovingRegions::add(const Eigen::Vector2f& pixel, double z, bool still) {
   (still ? still_ : moving_).push_back({pixel, static_cast<float>(z)});
 }
 
 bool MovingRegions::any() const {
-  return moving_.size() >= kMinFeatures &&
-         static_cast<double>(moving_.size()) > kMinShare * static_cast<double>(moving_.size() + still_.size());
+  return !areMismatches(static_cast<int>(moving_.size()), static_cast<int>(moving_.size() + still_.size()));
 }
 
 float MovingRegions::nearest(const std::vector<Mark>& marks, const Eigen::Vector2f& pixel, const Mark** mark) {
@@ -42,9 +47,7 @@ bool MovingRegions::moves(const Eigen::Vector2d& pixel, double z) const {
   if (!any()) return false;
   const Eigen::Vector2f p = pixel.cast<float>();
   const Mark *moving = nullptr, *still = nullptr;
-  const float distance = nearest(moving_, p, &moving);
-  if (distance >= nearest(still_, p, &still)) return false;
-  if (distance > kReach * kReach && moving_.size() <= kNearlyAll * still_.size()) return false;
+  if (nearest(moving_, p, &moving) >= nearest(still_, p, &still)) return false;
   return !(z > 0) || !(moving->z > 0) || std::abs(z - moving->z) < kDeep * moving->z;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vip_slam_frontend/tracking/predicted_motion.h"
 
-#include <algorithm>
+#include <cmath>
 
 #include "vip_slam_frontend/filter/gating.h"
 
@@ -9,25 +9,15 @@ namespace vip_slam {
 
 namespace {
 
-constexpr int kMinInliers = 5;
-// Above this share of found's inliers the bounded motion explains enough of them; with nearly all of them both do. When
-// nearly all points, enough of them old, agree on one motion, the IMU has missed something.
-constexpr double kBoundedShare = 0.67, kNearlyAll = 0.95;
-// Allowance for other errors of a translation (blur, rolling shutter, clock), m/s.
-constexpr double kMinSpeed = 0.1;
-// After this time without images, s, the view has changed: optical flow then finds mostly chance matches.
-constexpr double kLongUnseen = 0.5;
-
-/// After a long time without images, a few chance matches that agree on some motion would make a velocity of it.
+/// After a while without images the view has changed: optical flow then finds mostly chance matches, and a few that
+/// agree on some motion would make a velocity of it.
 bool matchedByChance(const PredictedMotion& prediction, const RansacResult& found, std::size_t pairs) {
-  return prediction.interval > kLongUnseen && (!found.ok || 2 * static_cast<std::size_t>(found.inliers) < pairs);
+  return prediction.interval > kMoment && (!found.ok || 2 * static_cast<std::size_t>(found.inliers) < pairs);
 }
 
 }  // namespace
 
-double mostApart(const PredictedMotion& prediction) {
-  return kGateSigmas * prediction.sigma + kMinSpeed * prediction.interval;
-}
+double mostApart(const PredictedMotion& prediction) { return kGateSigmas * std::hypot(prediction.sigma, kMotionError); }
 
 bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& found, const RansacResult& bounded) {
   int old_found = 0, old_bounded = 0;
@@ -36,7 +26,7 @@ bool movesByItself(const std::vector<PointPair>& pairs, const RansacResult& foun
     old_found += found.inlier[i] != 0;
     old_bounded += bounded.inlier[i] != 0;
   }
-  return 4 * old_found < std::max(kMinInliers, found.inliers) || 4 * old_bounded > old_found;
+  return 4 * old_found < found.inliers || 4 * old_bounded > old_found;
 }
 
 bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found) {
@@ -46,7 +36,7 @@ bool shownByAll(const std::vector<PointPair>& pairs, const RansacResult& found) 
     ++old;
     old_found += found.inlier[i] != 0;
   }
-  return old >= kEnough && old_found >= kNearlyAll * old && found.inliers >= kNearlyAll * pairs.size();
+  return old >= kEnough && old_found >= kGateProbability * old && found.inliers >= kGateProbability * pairs.size();
 }
 
 RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const PredictedMotion& prediction,
@@ -67,8 +57,8 @@ RansacResult rejectOutliers(const std::vector<PointPair>& pairs, const Predicted
   if (!prediction.wary && !prediction.at_rest && shownByAll(pairs, found)) return found;
   RansacResult bounded = rejectOutliers(pairs, prediction.T_current_previous, options);
   // Few or distant points hardly constrain the translation: then both motions explain them.
-  if (!prediction.wary && bounded.inliers > kNearlyAll * found.inliers) return found;
-  if (bounded.inliers > kBoundedShare * found.inliers) return bounded;
+  if (!prediction.wary && bounded.inliers > kGateProbability * found.inliers) return found;
+  if (2 * bounded.inliers > found.inliers) return bounded;
   *moves = prediction.at_rest || movesByItself(pairs, found, bounded);
   return *moves ? bounded : found;
 }

@@ -11,9 +11,6 @@ namespace vip_slam {
 
 namespace {
 
-// Between knots poses are interpolated linearly: at 5 rad/s a millisecond leaves 3e-6 rad.
-constexpr double kKnotSeconds = 1e-3;
-
 ImuSample sampleAt(const std::vector<ImuSample>& imu, double t) {
   const auto later =
       std::lower_bound(imu.begin(), imu.end(), t, [](const ImuSample& s, double at) { return s.t < at; });

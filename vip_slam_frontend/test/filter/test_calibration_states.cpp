@@ -404,7 +404,7 @@ double sigmaOfTaughtScale(VioFilter* filter, CloneId id, double t, bool still) {
   const_cast<SquareRootFilter&>(filter->algebra()).update(H, r);
   const Eigen::Vector3d up(0, 0, 9.81);
   const std::vector<ImuSample> samples{{t, Eigen::Vector3d::Zero(), up}, {t + 0.1, Eigen::Vector3d::Zero(), up}};
-  filter->step(filter->predict(samples), id, {}, still ? std::optional(ResidualMotion()) : std::nullopt);
+  filter->step(filter->predict(samples), id, {}, still ? std::optional(ResidualMotion{0.002, 0.005}) : std::nullopt);
   return filter->calibration().sigma_depth_scale;
 }
 

@@ -106,7 +106,7 @@ TEST(DisputedMotion, WidensThePositionAndIsNoneWhileTheBodyStands) {
   for (int k = 0; k < 20; ++k) disputed += step(t += 0.05, 0.03, std::nullopt);
   EXPECT_GT(disputed, 5);
   EXPECT_GT(sigma(), 1.5 * before);
-  for (int k = 0; k < 20; ++k) EXPECT_FALSE(step(t += 0.05, 0.0, ResidualMotion())) << t;
+  for (int k = 0; k < 20; ++k) EXPECT_FALSE(step(t += 0.05, 0.0, ResidualMotion{0.002, 0.005})) << t;
 }
 
 }  // namespace

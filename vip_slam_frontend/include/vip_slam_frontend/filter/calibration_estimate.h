@@ -40,9 +40,8 @@ struct CalibrationEstimate {
   bool depth_contradicts = false;  ///< depth and images disagree by more than any offset; none is used
 };
 
-/// Corrections of the sensor's configuration as sentences: differences that are both significant (five sigmas) and
-/// large enough to matter (0.2 degrees, 5 mm, 2 ms; 5 mm of depth, half a pixel of depth shift; 0.1 % of the focal
-/// length; 0.2 % of the gyro). Empty when it is right.
+/// Corrections of the sensor's configuration as sentences: differences that are both significant and large enough to
+/// matter against the sigmas of `given`, by which it was believed. Empty when it is right.
 std::vector<std::string> calibrationDifferences(const CalibrationEstimate& given, const CalibrationEstimate& found);
 
 }  // namespace vip_slam

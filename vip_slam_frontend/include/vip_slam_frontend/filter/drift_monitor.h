@@ -13,13 +13,16 @@
 
 namespace vip_slam::frontend {
 
+/// What is summed up over so long, s, shares hardly any measurements with the next such stretch: more than the time of
+/// the filter's window.
+constexpr double kStretch = 1.0;
+
 /// Random walk of a state that may drift: a bias of the IMU as it warms up, the delay of images whose clock is another.
 class RandomWalk {
  public:
-  /// Densities, unit of the state / sqrt(s): as configured, the least to raise it to, and the largest that is drift:
-  /// what goes faster is another fault, and is not followed.
-  RandomWalk(double configured, double least, double largest)
-      : configured_(configured), least_(least), largest_(largest), density_(configured) {}
+  /// Densities, unit of the state / sqrt(s): as configured, and the largest that is drift: what goes faster is another
+  /// fault, and is not followed.
+  RandomWalk(double configured, double largest) : configured_(configured), largest_(largest), density_(configured) {}
   /// One update: what it added to the state, and the state's variances before and after it. Always of one dimension.
   void add(const Eigen::VectorXd& correction, const Eigen::VectorXd& before, const Eigen::VectorXd& after);
   /// Ends a stretch. How surely the state drifts, in sigmas: the correlation of its corrections with those
@@ -39,7 +42,7 @@ class RandomWalk {
  private:
   bool isRaised() const { return density_ > configured_; }
 
-  double configured_, least_, largest_, density_;
+  double configured_, largest_, density_;
   int raised_ = 0;           ///< times
   Eigen::ArrayXd sum_;       ///< of the corrections of this stretch; empty: none yet
   Eigen::ArrayXd lost_;      ///< what they have removed of the variances

@@ -85,6 +85,7 @@ struct FilterOptions {
   double sigma_px = 0.5;
   double sigma_px_min = 0.11;
   double pixel_inflation = 1.3;
+  bool own_noise = true;
   double pull_huber = 1.0;
   int max_update_features = 30;
   double depth_inflation = 1.4;
@@ -101,6 +102,7 @@ struct FilterOptions {
             "lower bound of the adaptation, px; the error that good tracks share");
     v.field("pixel_inflation", pixel_inflation, 1.0, 20.0,
             "factor on the adapted sigma_px; above 1: what a track errs in one image it errs in the next, too");
+    v.field("own_noise", own_noise, "a feature whose residuals sigma_px does not explain gets a larger one of its own");
     v.field("pull_huber", pull_huber, 0.1, 1000.0,
             "Huber threshold on the correction that one feature asks for, in sigmas of what it may");
     v.field("max_update_features", max_update_features, 5, 500, "features used by one update");

@@ -29,17 +29,20 @@ struct Propagation {
   bool open =
       false;  ///< a stand-in took the IMU's place over this interval alone: the motion before and after is measured
   RateHistory rates;  ///< the window's, extended to the end
-  /// Adds to Q the error of linear interpolation between two samples that are `gap` seconds apart, for the `dt` seconds
-  /// of this interval, all of which may lie in the gap.
+  /// Adds gapCovariance() to Q.
   void admitGap(double gap, double dt);
   /// Adds to Q a rotation at an unmeasured rate of one sigma `rate`, rad/s, for `dt` seconds.
   void admitRate(double rate, double dt);
 };
 
+/// Covariance of what linear interpolation between two samples that are `gap` seconds apart errs within `dt` seconds,
+/// all of which may lie in the gap.
+Matrix15d gapCovariance(double gap, double dt);
+
 /// Integrates `samples` (first at the newest clone's time, last at the new image's) from the newest clone.
-/// `stamp_sigma`: jitter of both images' stamps, one sigma, s. The window is not changed.
+/// The window is not changed.
 Propagation propagate(const WindowState& window, const std::vector<ImuSample>& samples, const ImuNoise& noise,
-                      const Eigen::Vector3d& G, double stamp_sigma = 0.0);
+                      const Eigen::Vector3d& G);
 
 /// The body's motion since the newest clone as another source than the IMU saw it, for `dt` seconds: T_I0_I1, and its
 /// covariance (theta in the axes at the end, p in those at the beginning). The velocity becomes the mean one over the

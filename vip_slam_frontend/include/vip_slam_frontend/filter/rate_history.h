@@ -27,12 +27,11 @@ class RateHistory {
   bool changes() const;
 
  private:
-  /// Noise variance of one sample per axis, (rad/s)^2, from second differences; false without any.
+  /// Noise variance of one sample per axis, (rad/s)^2; false without any.
   bool noiseOf(const std::vector<ImuSample>& samples, double* variance);
 
   std::array<Eigen::Vector3d, 3> means_;  ///< mean rates of the last intervals, the newest first, rad/s
   int intervals_ = 0;
-  Eigen::Vector3d smoothed_ = Eigen::Vector3d::Zero();
   double squared_changes_ = 0;         ///< per axis, (rad/s)^2
   double noise_ = 0;                   ///< variance of last(), per axis, (rad/s)^2
   std::array<ImuSample, 2> measured_;  ///< the two newest samples, older first, without those interpolated at images

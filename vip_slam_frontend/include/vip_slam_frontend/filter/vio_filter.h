@@ -115,16 +115,14 @@ class VioFilter {
   double sigmaPx() const { return noise_.sigma(); }
   double imuNoiseScale() const { return imu_monitor_.scale(); }  ///< on the densities
   ImuNoiseScale imuNoise() const;
-  double stampSigma() const { return stamp_monitor_.sigma(); }  ///< s
   /// Adopted offset of the readings of depth, m, and the factor on them.
   double depthCorrection() const { return evidence_.adopted(kDepthOffset); }
   double depthScale() const { return evidence_.adopted(kDepthScale); }
-  /// The gyro's correction for use outside the filter: each entry's estimate once it is significant and large enough to
-  /// matter, else zero.
+  /// The gyro's correction for use outside the filter: each entry's estimate once it is significant, else zero.
   Eigen::Matrix3d gyroCorrection() const;
   BearingCorrection bearingCorrection() const;  ///< adopted correction of bearings
-  /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is significant
-  /// and known to a tenth of a pixel. The part taken is removed from the state, and the filter estimates the rest.
+  /// Shift of the depth image (WindowState::depth_shift) to apply to the readings to come: zero until it is
+  /// significant. The part taken is removed from the state, and the filter estimates the rest.
   const Eigen::Vector2d& takeDepthShift();
   /// Seconds by which depth images show an earlier moment than their stamps say, to apply to the images to come.
   double depthDelay() const { return evidence_.adopted(kDepthDelay); }
@@ -223,7 +221,6 @@ class VioFilter {
   Eigen::Vector3d G_;
   Gate gate_;
   NoiseMonitor noise_, depth_noise_;
-  StampMonitor stamp_monitor_;
   ImuNoiseMonitor imu_monitor_;
   frontend::DriftMonitor drift_;
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();  ///< position in W at start()

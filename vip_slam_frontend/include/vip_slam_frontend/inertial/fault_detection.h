@@ -6,11 +6,9 @@
 // - that contradicts them all of a sudden, after a time of agreement (a shock, saturation, shaking), and in those after
 //   it for as long as they contradict, or
 // - that contradicts them within a second after the IMU is believed again, or
-// - when a fifth of the last second does (axes, signs or units); most of it, where images disagreed among themselves in
-//   that second, or
+// - when most of the last second does (axes, signs or units), or
 // - when the filter has had to widen the IMU's noise beyond what any IMU has: then no difference is large in sigmas.
-// After a fault it stays isolated for a moment, and for twice as long after each that comes back within a second,
-// up to some seconds.
+// After a fault it stays isolated for a moment, and for twice as long after each that comes back within a second.
 // A body that fills the view contradicts the IMU gradually, while parts of the view still agree with it: neither rule
 // takes it for a fault of the IMU.
 #pragma once
@@ -20,6 +18,7 @@
 #include <Eigen/Core>
 
 #include "vip_slam_core/geometry/se3.h"
+#include "vip_slam_frontend/tracking/predicted_motion.h"
 
 namespace vip_slam::frontend {
 
@@ -49,18 +48,15 @@ class FaultDetection {
   void reset(double t);
 
  private:
-  static constexpr double kSuspicion = 0.3;  ///< s
-
   /// For a while after it is believed again the IMU is at fault as soon as it contradicts.
   bool isOnProbation(double t) const;
-  double isolation() const { return std::max(kSuspicion, isolated_); }
+  double isolation() const { return std::max(kMoment, isolated_); }
 
   double last_fault_t_ = -1e300;
-  double doubt_t_ = -1e300;      ///< last interval that deviated, or that gave no test
-  double began_t_ = -1e300;      ///< first such interval after agreement: a fault may begin there
-  double disagreed_t_ = -1e300;  ///< last time when images did not agree
-  double contradicted_ = 0;      ///< share of the last second
-  double isolated_ = 0;          ///< s for which the IMU stays isolated after a fault
+  double doubt_t_ = -1e300;  ///< last interval that deviated, or that gave no test
+  double began_t_ = -1e300;  ///< first such interval after agreement: a fault may begin there
+  double contradicted_ = 0;  ///< share of the last second
+  double isolated_ = 0;      ///< s for which the IMU stays isolated after a fault
   /// Until the vertical is confirmed: by how much further the body has turned in agreement than in contradiction,
   /// within the turn that shows the vertical, rad.
   double agreement_ = 0;

@@ -16,6 +16,10 @@
 
 namespace vip_slam::frontend {
 
+/// Motion of a hand-held or flying camera as a random process, one sigma, rad/s and m/s^2, and its angular frequency,
+/// rad/s.
+constexpr double kBodyRate = 2.0, kBodyAcceleration = 6.0, kBodyFrequency = 5.7;
+
 /// Factors on the noise densities of the two channels over an interval.
 struct ChannelNoise {
   double gyro = 1, accel = 1;

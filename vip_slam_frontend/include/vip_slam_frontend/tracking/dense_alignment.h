@@ -18,6 +18,9 @@
 
 namespace vip_slam::frontend {
 
+/// One sigma of the motion between two images before they are looked at, rad and m. Optical flow need not follow more.
+constexpr double kUsualMotion = 0.1;
+
 struct AlignedMotion {
   SE3 T_current_previous;  ///< metres
   Matrix6d covariance;     ///< of boxplus: theta by R exp(theta) (rad), then t (m)

@@ -14,9 +14,9 @@
 
 namespace vip_slam::frontend {
 
-/// From one image to the next nothing in view comes nearer by a share of its distance that is the same near and far: a
-/// motion changes distances by metres, a body only its own. Where all readings do, their unit has changed. Of a view at
-/// one distance a body might be the cause: there the colour image, which knows no unit, has to be the same.
+/// The unit has changed where readings are another multiple of the predicted distances, near and far, while the colour
+/// image, which knows no unit, is the same. A smaller change than the prior of the depth's scale has is left to the
+/// filter. No motion is as large: an IMU whose vertical is upside down predicts one that is wrong by twice gravity.
 class DepthUnit {
  public:
   DepthUnit(std::shared_ptr<const CameraModel> camera, const DepthNoise& noise);
@@ -26,7 +26,7 @@ class DepthUnit {
 
   /// Whether the unit changes with this image (32FC1, m, 0 = invalid, times factor()), taken at t (s) from about
   /// T_odom_C; factor() is another one then. `gray`: the colour image (8UC1, of the same size), or empty. A view that
-  /// does not show it, as a bare wall at one distance, is passed over, and the next one is compared.
+  /// does not show it, as a bare wall, is passed over, and the next one is compared.
   bool changes(const cv::Mat& depth, const cv::Mat& gray, const SE3& T_odom_C, double t);
 
   /// The next image is compared with this one, in the unit of the first ones and with its estimated pose.

@@ -113,9 +113,11 @@ class FeatureTracker {
   /// Same for a track, with the whitening of its pixel.
   void measure(Track* track) const;
 
+  /// Of optical flow, px.
+  static cv::Size flowWindow() { return {2 * kNarrowPatch + 1, 2 * kNarrowPatch + 1}; }
+
  private:
   static constexpr int kFlowLevels = 3;  ///< of the pyramid of optical flow above the image
-  static cv::Size flowWindow() { return {2 * kNarrowPatch + 1, 2 * kNarrowPatch + 1}; }
   /// After a jump of the exposure: gives the last image's pyramid the contrast and brightness of the new image. Medians
   /// over the tracks' surroundings, there and at the predicted pixels, so that new content in view has no influence.
   void matchExposure(const cv::Mat& gray, const SE3& predicted, bool has_translation);

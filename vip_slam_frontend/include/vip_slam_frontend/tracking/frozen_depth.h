@@ -8,6 +8,9 @@
 
 namespace vip_slam {
 
+/// Between the readings that stand for a depth image as a whole, px.
+constexpr int kReadingStep = 12;
+
 class FrozenDepth {
  public:
   /// Whether this image equals the one before, by a sample of its pixels. False for an image with hardly any depth,

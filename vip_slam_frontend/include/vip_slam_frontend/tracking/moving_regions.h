@@ -9,6 +9,9 @@
 
 namespace vip_slam {
 
+/// Whether the gate's share of mismatches explains so many outliers of a number of points (Poisson).
+bool areMismatches(int outliers, int points);
+
 class MovingRegions {
  public:
   /// A tracked point of the image, its depth in metres (0: none), and whether the camera's motion explains it.

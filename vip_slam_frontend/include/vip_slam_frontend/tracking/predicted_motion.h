@@ -14,6 +14,14 @@ namespace vip_slam {
 /// Number of images that a point must have been followed for to count as proven static.
 constexpr std::uint32_t kOldPoint = 8;
 
+/// For how long what has just been seen still holds, s: without depth, as images of a colour camera that is the faster
+/// one are; without enough points; without images; after a fault of the IMU.
+constexpr double kMoment = 0.5;
+
+/// Errors of the motion between two images that no covariance has (blur, rolling shutter, delay, extrinsics) and that
+/// two motions in a row share, one sigma: in each direction in rad and m, and as a share of the motion.
+constexpr double kMotionError = 1e-3, kMotionErrorShare = 0.05;
+
 struct PredictedMotion {
   SE3 T_current_previous;
   double sigma = 0;           ///< one sigma of the translation along its least certain axis, m

@@ -15,6 +15,10 @@
 
 namespace vip_slam {
 
+/// Between knots poses are interpolated linearly: at 5 rad/s a millisecond leaves 3e-6 rad. What is nearer to the stamp
+/// than to the next knot is at the stamp.
+constexpr double kKnotSeconds = 1e-3;
+
 /// Readout times of an image's first and last row, seconds after the stamp that poses belong to.
 struct Readout {
   double first = 0, last = 0;
